@@ -1,0 +1,148 @@
+"""The light field: a grid of views of one scene, and what is known about it.
+
+Conventions, shared by every module:
+
+- views are ``(T, S, H, W, C)``: ``t`` is the row of the view grid (top to bottom), ``s`` its column (left to right);
+- the centre view is ``(T // 2, S // 2)``;
+- disparity ``d`` is in pixels per view step, positive when nearer than the focus plane; the centre-view pixel
+  ``(y, x)`` is seen in view ``(t, s)`` at ``(y - d * (t - t0), x - d * (s - s0))``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from sepi.errors import SepiError
+
+FloatMap = npt.NDArray[np.float32]
+BoolMap = npt.NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class DisparityRange:
+    """Disparities between which the candidates lie.
+
+    Attributes
+    ----------
+    minimum, maximum : float
+        Pixels per view step; ``minimum < maximum``, both finite.
+    source : str
+        Where the range came from: ``"parameters"`` (the scene's own file), ``"given"`` (flag or config) or
+        ``"estimated"`` (from the views).
+    """
+
+    minimum: float
+    maximum: float
+    source: str
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.minimum) and np.isfinite(self.maximum) and self.minimum < self.maximum):
+            raise SepiError(
+                f"disparity range ({self.source}): expected two finite numbers MIN < MAX in pixels per view step, "
+                f"got {self.minimum:g} and {self.maximum:g}"
+            )
+
+    def candidates(self, count: int) -> FloatMap:
+        """``count`` candidates, uniform in disparity, both ends included; shape ``(count,)`` float32."""
+        return np.linspace(self.minimum, self.maximum, count).astype(np.float32)
+
+
+@dataclass(frozen=True)
+class LightField:
+    """A light field with what is known about its scene.
+
+    Attributes
+    ----------
+    views : ndarray, shape (T, S, H, W, C), uint8, uint16 or float32
+        C is 1 or 3 (RGB). Integers span their whole range, floats 0..1.
+    name : str
+        Name of the scene.
+    source : str
+        Where the light field came from: a path or ``"built-in"``.
+    present : ndarray, shape (T, S), bool
+        Which views exist; the centre view must. All, unless given.
+    disparity_range : DisparityRange or None
+        None where nothing is known (it can be estimated from the views).
+    truth : ndarray, shape (H, W), float32, or None
+        Ground-truth disparity of the centre view, for evaluation only.
+    masks : mapping of str to ndarray, shape (H, W), bool
+        Named regions for evaluation (``"occluded"``, ``"textureless"``, ...).
+
+    Raises
+    ------
+    SepiError
+        If a shape or dtype is not as above, or the centre view is missing.
+    """
+
+    views: npt.NDArray[np.generic]
+    name: str
+    source: str = ""
+    present: BoolMap = field(default=None)  # type: ignore[assignment]
+    disparity_range: DisparityRange | None = None
+    truth: FloatMap | None = None
+    masks: Mapping[str, BoolMap] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        v = self.views
+        if v.ndim != 5 or v.shape[4] not in (1, 3) or 0 in v.shape:
+            raise SepiError(f"{self.name}: views must have shape (T, S, H, W, C) with C = 1 or 3, got {v.shape}")
+        if v.shape[0] * v.shape[1] < 2:
+            raise SepiError(f"{self.name}: depth needs at least two views, got a grid of {v.shape[0]}x{v.shape[1]}")
+        if v.dtype not in (np.uint8, np.uint16, np.float32):
+            raise SepiError(f"{self.name}: views must be uint8, uint16 or float32, got {v.dtype}")
+        if self.present is None:
+            object.__setattr__(self, "present", np.ones(v.shape[:2], bool))
+        if self.present.shape != v.shape[:2] or self.present.dtype != bool:
+            raise SepiError(f"{self.name}: present must be bool of shape {v.shape[:2]}, got {self.present.shape}")
+        if not self.present[self.reference]:
+            raise SepiError(f"{self.name}: the centre view (t, s) = {self.reference} is missing; depth is made for it")
+        for what, array in {"truth": self.truth, **self.masks}.items():
+            if array is not None and array.shape != self.shape:
+                raise SepiError(f"{self.name}: {what} must have the views' shape (H, W) = {self.shape}, got {array.shape}")
+
+    @property
+    def reference(self) -> tuple[int, int]:
+        """Grid position ``(t0, s0)`` of the centre view."""
+        return self.views.shape[0] // 2, self.views.shape[1] // 2
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Height and width of a view in pixels."""
+        return self.views.shape[2], self.views.shape[3]
+
+    @property
+    def grid(self) -> tuple[int, int]:
+        """Number of view rows and columns ``(T, S)``."""
+        return self.views.shape[0], self.views.shape[1]
+
+    @property
+    def centre(self) -> FloatMap:
+        """The centre view as ``(H, W, C)`` float32 in 0..1."""
+        return as_unit_float(self.views[self.reference])
+
+    def known_range(self) -> DisparityRange:
+        """The disparity range.
+
+        Raises
+        ------
+        SepiError
+            If it is not known.
+        """
+        if self.disparity_range is None:
+            raise SepiError(f"{self.name}: disparity range unknown; give one (MIN MAX, pixels per view step)")
+        return self.disparity_range
+
+    def with_range(self, disparity_range: DisparityRange) -> LightField:
+        """The same light field with another disparity range."""
+        return replace(self, disparity_range=disparity_range)
+
+
+def as_unit_float(values: npt.NDArray[np.generic]) -> FloatMap:
+    """Pixel values as float32 in 0..1; integers are divided by the largest value of their type."""
+    if np.issubdtype(values.dtype, np.integer):
+        return values.astype(np.float32) / np.float32(np.iinfo(values.dtype).max)  # type: ignore[type-var]
+    return values.astype(np.float32)

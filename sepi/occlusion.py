@@ -1,0 +1,19 @@
+"""Stage occlusion (preliminary)."""
+
+from __future__ import annotations
+
+from sepi.command import stage_command
+from sepi.lightfield import LightField
+from sepi.stage import Choice, NoParameters, Parameters, Progress, StageMaps
+
+
+def none(light_field: LightField, previous: StageMaps | None, parameters: Parameters, progress: Progress) -> StageMaps:
+    """Preliminary."""
+    assert previous is not None
+    return previous
+
+
+CHOICES = {"half_sepi": Choice(NoParameters, none), "wang": Choice(NoParameters, none), "none": Choice(NoParameters, none)}
+
+if __name__ == "__main__":
+    stage_command("occlusion", CHOICES)()

@@ -1,0 +1,87 @@
+"""What every stage has in common: the maps that travel from stage to stage, and the command that a rule calls.
+
+A stage module defines ``CHOICES``: for each word that a variant may use, a parameter model and a pure function
+``(light_field, previous, parameters, progress) -> StageMaps``. The Python API, the command line and the workflow's
+rules all call that function.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from pydantic import BaseModel, ConfigDict
+
+from sepi.lightfield import BoolMap, FloatMap, LightField
+
+Progress = Callable[[float], None]
+"""Called with the fraction done, 0..1."""
+
+
+def no_progress(_: float) -> None:
+    """For callers who do not watch."""
+
+
+class Parameters(BaseModel):
+    """Parameters of one choice of a stage: frozen, unknown keys refused, each with a default and a description."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+
+class NoParameters(Parameters):
+    """A choice that has nothing to set."""
+
+
+@dataclass(frozen=True)
+class StageMaps:
+    """What a stage hands on.
+
+    Attributes
+    ----------
+    disparity : ndarray, shape (H, W), float32
+        Pixels per view step.
+    confidence : ndarray, shape (H, W), float32
+        0..1.
+    extra : mapping of str to ndarray, shape (H, W)
+        Maps of this stage and of those before it (``occluded``, ``occlusion_side``, ``superpixels``, ...).
+    """
+
+    disparity: FloatMap
+    confidence: FloatMap
+    extra: Mapping[str, npt.NDArray[Any]] = field(default_factory=dict)
+
+    def all(self) -> dict[str, npt.NDArray[Any]]:
+        """Every map by name."""
+        return {"disparity": self.disparity, "confidence": self.confidence, **self.extra}
+
+    def mask(self, name: str) -> BoolMap:
+        """A boolean map of an earlier stage; empty where that stage was switched off."""
+        if name in self.extra:
+            return self.extra[name].astype(bool)
+        return np.zeros(self.disparity.shape, bool)
+
+    def updated(self, disparity: FloatMap, confidence: FloatMap, **extra: npt.NDArray[Any]) -> StageMaps:
+        """These maps with a new disparity and confidence and further maps."""
+        return replace(self, disparity=disparity, confidence=confidence, extra={**self.extra, **extra})
+
+
+StageFunction = Callable[[LightField, StageMaps | None, Any, Progress], StageMaps]
+
+
+@dataclass(frozen=True)
+class Choice:
+    """One choice of a stage.
+
+    Attributes
+    ----------
+    parameters : type
+        Model of its parameters.
+    run : callable
+        The stage function.
+    """
+
+    parameters: type[Parameters]
+    run: StageFunction
