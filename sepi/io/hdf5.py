@@ -19,10 +19,12 @@ from sepi.io.files import atomic_path
 from sepi.lightfield import DisparityRange, LightField
 from sepi.stage import StageMaps
 
+Attribute = str | float | int | tuple[float, float]
+
 UNITS = {"disparity": "pixels per view step", "confidence": "0..1"}
 
 
-def write_stage(path: Path, maps: StageMaps, attributes: Mapping[str, str | float | int]) -> None:
+def write_stage(path: Path, maps: StageMaps, attributes: Mapping[str, Attribute]) -> None:
     """Write a stage's maps and the attributes that say what made them."""
     with atomic_path(path) as temporary, h5py.File(temporary, "w") as file:
         for name, values in maps.all().items():
@@ -87,7 +89,9 @@ def read_light_field(path: Path) -> LightField:
     """
     with _opened(path) as file:
         if "views" not in file or "name" not in file.attrs:
-            raise SepiError(f"{path}: not a light field of this package: dataset 'views' or attribute 'name' is missing")
+            raise SepiError(
+                f"{path}: not a light field of this package: dataset 'views' or attribute 'name' is missing"
+            )
         known = None
         if "disparity_range" in file.attrs:
             minimum, maximum = (float(value) for value in file.attrs["disparity_range"])

@@ -1,0 +1,200 @@
+"""What every command has in common: one clear line for a user's error, a progress bar, and the command of a stage.
+
+A stage module ends with ``stage_command("initial", CHOICES)()``: ``python -m sepi.initial`` is the command that the
+workflow's rule calls.
+"""
+
+from __future__ import annotations
+
+import json
+import resource
+import signal
+import sys
+import threading
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from types import FrameType
+from typing import IO, Any
+
+import click
+import cv2
+import numba
+from tqdm import tqdm
+
+from sepi.errors import SepiError
+from sepi.io.files import atomic_path
+from sepi.io.hdf5 import Attribute, read_attributes, read_light_field, read_stage, write_stage
+from sepi.lightfield import LightField
+from sepi.stage import Choice, Progress
+from sepi.validation import validated
+
+
+class _Shown(click.ClickException):
+    """A user's error as click shows it: ``sepi: MESSAGE`` on stderr, exit code 1."""
+
+    def show(self, file: IO[Any] | None = None) -> None:
+        click.echo(f"sepi: {self.format_message()}", file=file, err=file is None)
+
+
+class SepiCommand(click.Command):
+    """A click command that shows a :class:`SepiError` as one line and cleans up when it is terminated."""
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run the command."""
+        with shown_errors():
+            return super().invoke(ctx)
+
+
+class SepiGroup(click.Group):
+    """A click group whose subcommands are :class:`SepiCommand`."""
+
+    command_class = SepiCommand
+
+
+@contextmanager
+def shown_errors() -> Iterator[None]:
+    """Turn :class:`SepiError` into a line without traceback, and SIGTERM into an exit that removes unfinished files."""
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGTERM, _exit_on_signal)
+    try:
+        yield
+    except SepiError as error:
+        raise _Shown(" ".join(str(error).split())) from error
+
+
+def _exit_on_signal(number: int, _: FrameType | None) -> None:
+    # an exception, so that context managers remove their temporary files
+    sys.exit(128 + number)
+
+
+@contextmanager
+def progress_bar(label: str) -> Iterator[Progress]:
+    """A bar from 0 to 100 % on a terminal, silence elsewhere; yields the function to call with the fraction done."""
+    # disable=None: tqdm looks whether stderr is a terminal
+    with tqdm(total=100, desc=label, disable=None, leave=False, bar_format="{desc} {percentage:3.0f}% |{bar}|") as bar:
+
+        def progress(fraction: float) -> None:
+            bar.update(round(100 * min(max(fraction, 0.0), 1.0)) - bar.n)
+
+        yield progress
+
+
+def use_threads(count: int) -> None:
+    """Let numba and OpenCV use at most ``count`` threads (fewer where the machine has fewer cores)."""
+    # numba refuses more threads than it started with
+    numba.set_num_threads(min(count, numba.get_num_threads()))
+    cv2.setNumThreads(count)
+
+
+def package_version() -> str:
+    """Version of the installed package; ``"unknown"`` in a bare source tree."""
+    # not sepi.__version__: the root of the package imports every stage
+    try:
+        return version("sepi")
+    except PackageNotFoundError:
+        return "unknown"
+
+
+def write_timing(path: Path, started: float) -> None:
+    """Write the seconds since ``started`` (of ``time.perf_counter``) and the peak memory of this process as JSON."""
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    megabytes = peak / (2**20 if sys.platform == "darwin" else 2**10)
+    timing = {"seconds": round(time.perf_counter() - started, 3), "peak_memory_mb": round(megabytes, 1)}
+    with atomic_path(path) as temporary:
+        temporary.write_text(json.dumps(timing) + "\n", encoding="utf-8")
+
+
+def stage_command(stage: str, choices: Mapping[str, Choice]) -> click.Command:
+    """The command ``python -m sepi.STAGE`` of a stage with these choices.
+
+    It reads a light field and the maps of the stage before, runs one choice, and writes one stage file, whole or not at
+    all.
+    """
+    existing = click.Path(path_type=Path)
+
+    @click.command(name=f"python -m sepi.{stage}", cls=SepiCommand, help=f"Run the stage '{stage}' on one light field.")
+    @click.option("--light-field", "light_field_path", type=existing, required=True, help="HDF5 file from ingest.")
+    @click.option("--previous", type=existing, help="File of the stage before; the first stage has none.")
+    @click.option("--choice", type=click.Choice(list(choices)), required=True, help="Algorithm of this stage.")
+    @click.option("--parameters", default="{}", show_default=True, help="JSON object; the rest has its default.")
+    @click.option("--threads", type=click.IntRange(min=1), default=1, show_default=True, help="Threads to use.")
+    @click.option("--output", type=existing, required=True, help="Stage file to write.")
+    @click.option("--timing", type=existing, help="JSON file to write: seconds and peak memory.")
+    def command(
+        light_field_path: Path,
+        previous: Path | None,
+        choice: str,
+        parameters: str,
+        threads: int,
+        output: Path,
+        timing: Path | None,
+    ) -> None:
+        started = time.perf_counter()
+        use_threads(threads)
+        chosen = choices[choice]
+        settings = validated(chosen.parameters, _json_object(parameters), f"{stage}.{choice}")
+        light_field = read_light_field(light_field_path)
+        maps = None if previous is None else read_stage(previous)
+        if maps is not None and maps.disparity.shape != light_field.shape:
+            raise SepiError(
+                f"{previous}: maps of {maps.disparity.shape} do not belong to {light_field_path} of {light_field.shape}"
+            )
+        with progress_bar(f"{light_field.name} {stage}") as progress:
+            result = chosen.run(light_field, maps, settings, progress)
+        step = {"stage": stage, "choice": choice, "parameters": settings.model_dump(mode="json")}
+        write_stage(output, result, attributes_of(light_field, step, history_of(previous)))
+        if timing is not None:
+            write_timing(timing, started)
+
+    return command
+
+
+def attributes_of(light_field: LightField, step: Mapping[str, Any], before: list[Any]) -> dict[str, Attribute]:
+    """Attributes of a stage file: what made it, and from what.
+
+    Parameters
+    ----------
+    light_field : LightField
+        With a known disparity range.
+    step : mapping
+        ``stage``, ``choice`` and ``parameters`` of the stage that made the maps.
+    before : list
+        The same of the stages before it, in order; they become ``made_from``, a JSON list.
+    """
+    known = light_field.known_range()
+    return {
+        "scene": light_field.name,
+        "source": light_field.source,
+        "stage": step["stage"],
+        "choice": step["choice"],
+        "parameters": json.dumps(step["parameters"], sort_keys=True),
+        "made_from": json.dumps(before, sort_keys=True),
+        "disparity_range": (known.minimum, known.maximum),
+        "disparity_range_source": known.source,
+        "version": package_version(),
+    }
+
+
+def history_of(path: Path | None) -> list[Any]:
+    """The stages that made a stage file, in order: dictionaries of ``stage``, ``choice`` and ``parameters``."""
+    if path is None:
+        return []
+    attributes = read_attributes(path)
+    try:
+        last = {"stage": str(attributes["stage"]), "choice": str(attributes["choice"])}
+        return [*json.loads(attributes["made_from"]), {**last, "parameters": json.loads(attributes["parameters"])}]
+    except (KeyError, ValueError) as error:
+        raise SepiError(f"{path}: not a stage file: its attributes do not say what made it ({error})") from error
+
+
+def _json_object(text: str) -> dict[str, Any]:
+    try:
+        value = json.loads(text)
+    except ValueError as error:
+        raise SepiError(f"--parameters: not JSON ({error})") from error
+    if not isinstance(value, dict):
+        raise SepiError(f"--parameters: expected a JSON object such as '{{}}', got {text!r}")
+    return value

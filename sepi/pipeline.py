@@ -1,0 +1,145 @@
+"""The stages in order, the built-in variants, and the whole way from a light field to a depth map."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from sepi import initial, occlusion, optimize, textureless
+from sepi.lightfield import LightField
+from sepi.stage import Choice, Parameters, Progress, StageMaps, no_progress
+from sepi.validation import require_known, unknown, validated
+
+STAGES: dict[str, dict[str, Choice]] = {
+    "initial": initial.CHOICES,
+    "occlusion": occlusion.CHOICES,
+    "textureless": textureless.CHOICES,
+    "optimize": optimize.CHOICES,
+}
+"""Stage to its choices, in the order in which the stages run."""
+
+# rough part of the running time, for the progress bar only
+_SHARE = {"initial": 0.5, "occlusion": 0.25, "textureless": 0.1, "optimize": 0.15}
+
+
+@dataclass(frozen=True)
+class Variant:
+    """One choice for each stage.
+
+    Raises
+    ------
+    SepiError
+        If a word is not one of the stage's choices.
+    """
+
+    initial: str
+    occlusion: str
+    textureless: str
+    optimize: str
+
+    def __post_init__(self) -> None:
+        for stage, choice in self.choices.items():
+            require_known(f"variant, stage {stage}", [choice], STAGES[stage])
+
+    @property
+    def choices(self) -> dict[str, str]:
+        """Stage to choice, in the order of the stages."""
+        return {stage: getattr(self, stage) for stage in STAGES}
+
+    def path(self, stage: str) -> str:
+        """The choices up to ``stage`` as a relative path; variants that begin alike share it."""
+        words = list(self.choices.values())
+        return "/".join(words[: list(STAGES).index(stage) + 1])
+
+
+VARIANTS: dict[str, Variant] = {
+    "paper": Variant("sepi", "half_sepi", "lti", "wls"),
+    "no_sepi": Variant("structure_tensor", "half_sepi", "lti", "wls"),
+    "no_occlusion": Variant("sepi", "none", "lti", "wls"),
+    "no_textureless": Variant("sepi", "half_sepi", "none", "wls"),
+    "no_occlusion_no_textureless": Variant("sepi", "none", "none", "wls"),
+    "wang": Variant("sepi", "wang", "lti", "wls"),
+}
+"""The paper's method, the other four columns of its table 4 in their order, and the text's other occlusion stage."""
+
+
+def variant_named(name: str) -> Variant:
+    """A built-in variant.
+
+    Raises
+    ------
+    SepiError
+        If there is none of this name.
+    """
+    if name not in VARIANTS:
+        raise unknown("variant", name, VARIANTS)
+    return VARIANTS[name]
+
+
+def stage_parameters(
+    variant: Variant, parameters: Mapping[str, Mapping[str, Any]] | None = None
+) -> dict[str, Parameters]:
+    """Parameters of each stage of ``variant``: the defaults, but for what ``parameters`` sets.
+
+    Raises
+    ------
+    SepiError
+        If a stage or a field is unknown or a value is not allowed; the message names it.
+    """
+    given = parameters or {}
+    require_known("parameters", given, STAGES)
+    return {
+        stage: validated(STAGES[stage][choice].parameters, given.get(stage, {}), f"{stage}.{choice}")
+        for stage, choice in variant.choices.items()
+    }
+
+
+def estimate_depth(
+    light_field: LightField,
+    variant: str | Variant = "paper",
+    parameters: Mapping[str, Mapping[str, Any]] | None = None,
+    progress: Progress = no_progress,
+) -> StageMaps:
+    """Disparity, confidence and masks of the centre view of a light field.
+
+    Parameters
+    ----------
+    light_field : LightField
+        Where its disparity range is unknown, it is estimated from the views.
+    variant : str or Variant
+        Name of a built-in variant, or a choice for each stage.
+    parameters : mapping, optional
+        Stage to field to value, where the defaults do not suit: ``{"initial": {"candidates": 91}}``.
+    progress : callable
+        Called with the fraction done, 0..1.
+
+    Returns
+    -------
+    StageMaps
+        ``disparity`` (H, W) float32 in pixels per view step, ``confidence`` (H, W) float32 in 0..1, ``extra`` maps of
+        the stages.
+
+    Raises
+    ------
+    SepiError
+        If the variant, a stage or a field is unknown, or a value is not allowed.
+    """
+    chosen = variant_named(variant) if isinstance(variant, str) else variant
+    settings = stage_parameters(chosen, parameters)
+    if light_field.disparity_range is None:
+        from sepi.disparity_range import estimate_range
+
+        light_field = light_field.with_range(estimate_range(light_field))
+    maps: StageMaps | None = None
+    done = 0.0
+    for stage, choice in chosen.choices.items():
+        maps = STAGES[stage][choice].run(light_field, maps, settings[stage], _part(progress, done, _SHARE[stage]))
+        done += _SHARE[stage]
+        progress(done)
+    assert maps is not None  # there are stages
+    return maps
+
+
+def _part(progress: Progress, start: float, share: float) -> Progress:
+    return lambda fraction: progress(start + share * fraction)

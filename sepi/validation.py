@@ -1,0 +1,70 @@
+"""Turn what a user wrote (config keys, flags, JSON) into checked models; each error is one line that names the key."""
+
+from __future__ import annotations
+
+import difflib
+import json
+from collections.abc import Iterable, Mapping
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ValidationError
+
+from sepi.errors import SepiError
+
+Model = TypeVar("Model", bound=BaseModel)
+
+
+def unknown(where: str, word: str, known: Iterable[str]) -> SepiError:
+    """The error for a word that is not one of ``known``: names it, the nearest known word, and all of them."""
+    words = list(known)
+    near = difflib.get_close_matches(word, words, n=1, cutoff=0.5)
+    hint = f"did you mean '{near[0]}'? " if near else ""
+    return SepiError(f"{where}: unknown '{word}'; {hint}known: {', '.join(words) or 'nothing can be set here'}")
+
+
+def require_known(where: str, words: Iterable[str], known: Iterable[str]) -> None:
+    """Raise :func:`unknown` for the first of ``words`` that is not among ``known``."""
+    allowed = list(known)
+    for word in words:
+        if word not in allowed:
+            raise unknown(where, str(word), allowed)
+
+
+def validated(model: type[Model], values: Mapping[str, Any], where: str) -> Model:
+    """Check ``values`` against ``model``.
+
+    Parameters
+    ----------
+    model : type
+        A pydantic model; its unknown keys are errors.
+    values : mapping
+        Keys and values as JSON has them (lists for tuples, no NaN).
+    where : str
+        The place the user wrote them, for the message: ``"stages.initial.sepi"``.
+
+    Raises
+    ------
+    SepiError
+        One line for the first key that is wrong: which, why, and what would be right.
+    """
+    require_known(where, values, model.model_fields)
+    try:
+        # by way of JSON, because strict models take a JSON list for a tuple but not a Python list
+        return model.model_validate_json(json.dumps(dict(values), allow_nan=False))
+    except (TypeError, ValueError) as error:
+        raise SepiError(_first_line(error, where)) from error
+
+
+def _first_line(error: Exception, where: str) -> str:
+    if not isinstance(error, ValidationError):
+        return f"{where}: {error}"
+    first = error.errors(include_url=False)[0]
+    key = ".".join([where, *(str(part) for part in first["loc"])])
+    got = "" if first["type"] == "missing" else f", got {first['input']!r}"
+    text = isinstance(first["input"], str) and first["type"].startswith(("float", "int")) and "e" in first["input"]
+    hint = " (YAML reads 1e-4 as text: write 1.0e-4)" if text else ""
+    return f"{key}: {_lower_first(first['msg'])}{got}{hint}"
+
+
+def _lower_first(text: str) -> str:
+    return text[:1].lower() + text[1:]
