@@ -1,0 +1,154 @@
+"""The figures that the paper [1]_ prints, typed in once as CSV files in the folder ``published`` beside this module.
+
+References
+----------
+.. [1] P. Zhou, L. Shi, X. Liu, J. Jin, Y. Zhang, J. Hou, "Light Field Depth Estimation via Stitched Epipolar Plane
+   Images", tables 1 to 4, sections V-B and V-C.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+
+AVERAGE = "Average"
+"""Name of the average rows in the paper's tables 1 and 2."""
+
+DATASETS: dict[str, str] = {"hci": "HCI 4D light field benchmark", "hci_old": "HCI Blender (2013)"}
+"""Data sets of the paper, under the names that this project gives them."""
+
+
+@dataclass(frozen=True)
+class Method:
+    """A method in the paper's tables.
+
+    Attributes
+    ----------
+    key : str
+        Name in the data files.
+    column : str
+        Letter of its column in tables 1 and 2; empty where it is in table 3 only.
+    authors, name : str
+        As the paper calls it; ``name`` is empty where the paper gives none.
+    learning : str
+        ``"none"``, ``"supervised"`` or ``"unsupervised"``.
+    """
+
+    key: str
+    column: str
+    authors: str
+    name: str
+    learning: str
+
+    @property
+    def label(self) -> str:
+        """Authors and name, for a table's header."""
+        return f"{self.authors} ({self.name})" if self.name else self.authors
+
+
+@dataclass(frozen=True)
+class SceneTable:
+    """Table 1 or 2: a figure per data set, scene and method.
+
+    Attributes
+    ----------
+    cells : mapping
+        ``(dataset, scene)`` to ``{method key: figure}``, in the paper's order; a method that was trained on the scene
+        has no figure.
+    averages : mapping
+        Data set to ``{method key: figure}``: the average rows as printed.
+    """
+
+    cells: Mapping[tuple[str, str], Mapping[str, float]]
+    averages: Mapping[str, Mapping[str, float]]
+
+    def scenes(self, dataset: str) -> list[str]:
+        """Scenes of a data set, in the paper's order."""
+        return [scene for name, scene in self.cells if name == dataset]
+
+
+@dataclass(frozen=True)
+class Regions:
+    """100 x MSE over the whole map, the occluded and the texture-less region; None where the paper prints nothing."""
+
+    overall: float | None
+    occluded: float | None
+    textureless: float | None
+
+
+def paper_scene(dataset: str, scene: str) -> str | None:
+    """The paper's name of a scene, or None where the paper does not have it.
+
+    Only data sets named as in :data:`DATASETS` are looked up, so that a built-in scene called ``dots`` is not taken
+    for the benchmark's; within them, capitals do not matter.
+    """
+    return {name.lower(): name for name in table1().scenes(dataset)}.get(scene.lower())
+
+
+@cache
+def methods() -> dict[str, Method]:
+    """Every method of tables 1 to 3, by key: the columns (a) to (k), then those of table 3 only."""
+    return {row["key"]: Method(**row) for row in _rows("methods.csv")}
+
+
+@cache
+def table1() -> SceneTable:
+    """Table 1: 100 x MSE over the whole map."""
+    return _scene_table("table1_mse.csv")
+
+
+@cache
+def table2() -> SceneTable:
+    """Table 2: Q25 x 100 over the whole map."""
+    return _scene_table("table2_q25.csv")
+
+
+@cache
+def table3() -> dict[str, dict[str, Regions]]:
+    """Table 3: data set to method key to average 100 x MSE in the two regions."""
+    rows = _rows("table3_regions.csv")
+    return {
+        dataset: {
+            row["method"]: Regions(None, float(row[f"{dataset}_occluded"]), float(row[f"{dataset}_textureless"]))
+            for row in rows
+        }
+        for dataset in DATASETS
+    }
+
+
+@cache
+def table4() -> dict[str, dict[str, Regions]]:
+    """Table 4 and the text's figures for Wang's occlusion stage: data set to variant to average 100 x MSE."""
+    table: dict[str, dict[str, Regions]] = {dataset: {} for dataset in DATASETS}
+    for row in _rows("table4_ablation.csv"):
+        table[row["dataset"]][row["variant"]] = Regions(
+            *(float(row[region]) if row[region] else None for region in ("overall", "occluded", "textureless"))
+        )
+    return table
+
+
+@cache
+def runtime() -> dict[str, float]:
+    """Seconds per stage, and ``"total"``: 512 x 512 pixels, 9 x 9 views, Intel Core i7-8700, nothing in parallel."""
+    return {row["stage"]: float(row["seconds"]) for row in _rows("runtime.csv")}
+
+
+def _scene_table(name: str) -> SceneTable:
+    cells: dict[tuple[str, str], dict[str, float]] = {}
+    averages: dict[str, dict[str, float]] = {}
+    for row in _rows(name):
+        dataset, scene = row.pop("dataset"), row.pop("scene")
+        figures = {method: float(text) for method, text in row.items() if text}
+        if scene == AVERAGE:
+            averages[dataset] = figures
+        else:
+            cells[dataset, scene] = figures
+    return SceneTable(cells, averages)
+
+
+def _rows(name: str) -> list[dict[str, str]]:
+    text = files("sepi.report").joinpath("published", name).read_text(encoding="utf-8")
+    return list(csv.DictReader(line for line in text.splitlines() if not line.startswith("#")))
