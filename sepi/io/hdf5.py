@@ -45,7 +45,7 @@ def read_stage(path: Path) -> StageMaps:
     SepiError
         If the file is missing, not HDF5, or holds no disparity and confidence.
     """
-    with _opened(path) as file:
+    with opened(path) as file:
         maps = {name: file[name][...] for name in file}
     try:
         return StageMaps(maps.pop("disparity"), maps.pop("confidence"), maps)
@@ -55,7 +55,7 @@ def read_stage(path: Path) -> StageMaps:
 
 def read_attributes(path: Path) -> dict[str, Any]:
     """Attributes of an HDF5 file."""
-    with _opened(path) as file:
+    with opened(path) as file:
         return dict(file.attrs)
 
 
@@ -87,7 +87,7 @@ def read_light_field(path: Path) -> LightField:
     SepiError
         If the file is missing, not HDF5, or not a light field.
     """
-    with _opened(path) as file:
+    with opened(path) as file:
         if "views" not in file or "name" not in file.attrs:
             raise SepiError(
                 f"{path}: not a light field of this package: dataset 'views' or attribute 'name' is missing"
@@ -108,7 +108,14 @@ def read_light_field(path: Path) -> LightField:
 
 
 @contextmanager
-def _opened(path: Path) -> Iterator[h5py.File]:
+def opened(path: Path) -> Iterator[h5py.File]:
+    """Open an HDF5 file for reading.
+
+    Raises
+    ------
+    SepiError
+        If it is missing, not HDF5, or damaged.
+    """
     if not path.is_file():
         raise SepiError(f"{path}: no such file")
     try:

@@ -1,0 +1,137 @@
+"""Regions for evaluation: where the ground truth says a view is blocked, and where the centre view has no texture.
+
+The paper names another work for its occluded region and defines no texture-less one. These definitions are the same for
+every scene and method, so that rows of a table compare. Estimators never see them.
+"""
+
+from __future__ import annotations
+
+import cv2
+import numba
+import numpy as np
+import numpy.typing as npt
+from scipy import ndimage
+
+from sepi.lightfield import BoolMap, FloatMap
+
+WINDOW = 7
+"""Side in pixels of the window that gradient energy is averaged over."""
+
+ENERGY_THRESHOLD = 0.005
+"""Root-mean-square gradient under which a pixel has no texture: part of the full range per pixel (1.3 of 255 steps)."""
+
+SMALLEST_AREA = 225
+"""Pixels: smaller patches are dropped and smaller holes filled (one superpixel of the paper, 15 x 15)."""
+
+# half a pixel, and a little more so that rounding of float32 disparities decides no tie
+_HALF_PIXEL = 0.501
+# neighbours that land up to this many pixels apart in a view are still one surface
+_STRETCH = 2.0
+
+
+def occluded(truth: FloatMap, grid: tuple[int, int]) -> BoolMap:
+    """Pixels of the centre view that at least one other view does not see.
+
+    A pixel is hidden in a view if a nearer pixel lands within half a pixel of it there: what a z-buffer of that view
+    would say. Instead of a buffer on the view's pixel grid, whose rounding marks slanted planes as hidden by
+    themselves, the sight line is followed through the disparity map. The nearer pixel ``q`` that hides ``p`` in the
+    view at offset ``v`` lies at ``q = p + (d(q) - d(p)) v``, so one walk along ``v`` in steps of one pixel finds it at
+    its exact place. A surface whose slope, times the largest offset, is under one half (0.125 of disparity per pixel
+    for 9 x 9 views) never hides itself.
+
+    Parameters
+    ----------
+    truth : ndarray, shape (H, W), float32
+        Disparity in pixels per view step; pixels that are not finite neither hide nor are hidden.
+    grid : tuple of int
+        Number of view rows and columns ``(T, S)``.
+
+    Returns
+    -------
+    ndarray, shape (H, W), bool
+        A pixel that falls outside a view counts as seen by it.
+    """
+    rows, columns = grid
+    offsets = [(t - rows // 2, s - columns // 2) for t in range(rows) for s in range(columns)]
+    # far views hide most: looking at them first ends the search early
+    offsets.sort(key=lambda offset: -max(abs(offset[0]), abs(offset[1])))
+    finite = np.isfinite(truth)
+    if not finite.any() or len(offsets) < 2:
+        return np.zeros(truth.shape, bool)
+    filled = np.where(finite, truth, -np.inf).astype(np.float64)
+    hidden: BoolMap = _hidden(filled, np.array(offsets[:-1], np.int64), float(truth[finite].max()))
+    return hidden
+
+
+def textureless(centre: FloatMap) -> BoolMap:
+    """Pixels of the centre view round which the image hardly changes.
+
+    The energy is the squared gradient, averaged over the channels and over a window of ``WINDOW`` pixels; its root is
+    compared with ``ENERGY_THRESHOLD``. Patches and holes under ``SMALLEST_AREA`` are removed.
+
+    Parameters
+    ----------
+    centre : ndarray, shape (H, W, C), float32
+        Centre view in 0..1.
+
+    Returns
+    -------
+    ndarray, shape (H, W), bool
+    """
+    energy = np.zeros(centre.shape[:2], np.float32)
+    for channel in range(centre.shape[2]):
+        plane = np.ascontiguousarray(centre[:, :, channel], np.float32)
+        # Scharr's weights sum to 32 per pixel of distance
+        for dx, dy in ((1, 0), (0, 1)):
+            energy += np.square(cv2.Scharr(plane, cv2.CV_32F, dx, dy) / 32)
+    energy = cv2.blur(energy / centre.shape[2], (WINDOW, WINDOW))
+    flat = _without_small(energy < ENERGY_THRESHOLD**2)
+    return ~_without_small(~flat)
+
+
+def _without_small(mask: BoolMap) -> BoolMap:
+    labels, _ = ndimage.label(mask)
+    large = np.bincount(labels.ravel()) >= SMALLEST_AREA
+    large[0] = False
+    kept: BoolMap = large[labels]
+    return kept
+
+
+@numba.njit(cache=True)  # type: ignore[untyped-decorator]
+def _hidden(truth: npt.NDArray[np.float64], offsets: npt.NDArray[np.int64], nearest: float) -> BoolMap:
+    """``occluded`` with -inf for unknown disparities, the view offsets ``(N, 2)`` and the largest disparity."""
+    height, width = truth.shape
+    result = np.zeros((height, width), np.bool_)
+    for y in range(height):
+        for x in range(width):
+            for n in range(len(offsets)):
+                if _hidden_in(truth, y, x, offsets[n, 0], offsets[n, 1], nearest):
+                    result[y, x] = True
+                    break
+    return result
+
+
+@numba.njit(cache=True)  # type: ignore[untyped-decorator]
+def _hidden_in(truth: npt.NDArray[np.float64], y: int, x: int, dt: int, ds: int, nearest: float) -> bool:
+    """Whether the view at offset ``(dt, ds)`` does not see the pixel ``(y, x)``."""
+    height, width = truth.shape
+    own = truth[y, x]
+    landing_y, landing_x = y - own * dt, x - own * ds
+    # also false for unknown disparities
+    if not (0 <= landing_y <= height - 1 and 0 <= landing_x <= width - 1):
+        return False
+    steps_per_disparity = max(abs(dt), abs(ds))
+    before = 0.0
+    # the sight line rises by one pixel of the larger offset per step; no surface is above `nearest`
+    for step in range(1, int((nearest - own) * steps_per_disparity + _HALF_PIXEL) + 1):
+        row = int(np.floor(y + step * dt / steps_per_disparity + 0.5))
+        column = int(np.floor(x + step * ds / steps_per_disparity + 0.5))
+        if not (0 <= row < height and 0 <= column < width):
+            return False
+        # pixels by which the surface here lands beyond the pixel looked at
+        beyond = (truth[row, column] - own) * steps_per_disparity - step
+        crossed = step > 1 and before * beyond < 0 and abs(before - beyond) <= _STRETCH
+        if abs(beyond) <= _HALF_PIXEL or crossed:
+            return True
+        before = beyond
+    return False

@@ -1,0 +1,201 @@
+"""Scores: by hand, against a plain twin, with unknown pixels, and as the command that the workflow calls."""
+
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from sepi import regions
+from sepi.errors import SepiError
+from sepi.evaluate import command, evaluate, evaluation_of, score
+from sepi.io.hdf5 import write_light_field, write_stage
+from sepi.io.scores import read_evaluation, read_scores
+from sepi.lightfield import DisparityRange, LightField
+from sepi.stage import StageMaps
+
+STAGE_ATTRIBUTES = {"stage": "initial", "choice": "sepi", "parameters": "{}", "made_from": "[]", "version": "0"}
+
+
+def scene(truth: np.ndarray | None, masks: dict[str, np.ndarray] | None = None, size: int = 40) -> LightField:
+    """A light field of noise; only its shape, truth and masks matter here."""
+    views = np.random.default_rng(1).integers(0, 256, (3, 3, size, size, 3), np.uint8)
+    known = DisparityRange(-1, 1, "given")
+    return LightField(views, "noise", "built-in", disparity_range=known, truth=truth, masks=masks or {})
+
+
+def twin(estimate: np.ndarray, truth: np.ndarray, border: int) -> dict[str, float]:
+    """The rules of the two protocols, written without masks and in one place."""
+    height, width = truth.shape
+    errors = [
+        abs(float(estimate[y, x]) - float(truth[y, x]))
+        for y in range(border, height - border)
+        for x in range(border, width - border)
+        if np.isfinite(truth[y, x])
+    ]
+    good = [e for e in errors if np.isfinite(e)]
+    ranked = sorted(100 * e if np.isfinite(e) else float("inf") for e in errors)
+    return {
+        "mse100": 100 * sum(e * e for e in good) / len(good),
+        "q25": ranked[int(0.25 * len(errors))],
+        "badpix007": 100 * sum(not e <= 0.07 for e in errors) / len(errors),
+        "badpix003": 100 * sum(not e <= 0.03 for e in errors) / len(errors),
+        "badpix001": 100 * sum(not e <= 0.01 for e in errors) / len(errors),
+        "non_finite": len(errors) - len(good),
+        "pixels": len(errors),
+    }
+
+
+def test_scores_by_hand() -> None:
+    truth = np.zeros((2, 4), np.float32)
+    estimate = np.array([[0, 0.005, 0.02, -0.05], [0.1, -1, 2, 0]], np.float32)
+    scores = score(estimate, truth)
+    squares = 0.005**2 + 0.02**2 + 0.05**2 + 0.1**2 + 1 + 4
+    assert scores["mse100"] == pytest.approx(100 * squares / 8)
+    # sorted: 0, 0, 0.5, ...; the third of eight, not interpolated
+    assert scores["q25"] == pytest.approx(0.5)
+    assert [scores[key] for key in ("badpix007", "badpix003", "badpix001")] == [37.5, 50.0, 62.5]
+    assert (scores["non_finite"], scores["pixels"]) == (0, 8)
+
+
+@pytest.mark.parametrize("border", [0, 15])
+def test_scores_equal_a_plain_twin(border: int) -> None:
+    """Both protocols, with holes in truth and estimate: an error here would make every table wrong."""
+    random = np.random.default_rng(3)
+    truth = random.normal(size=(41, 37)).astype(np.float32)
+    estimate = (truth + random.normal(scale=0.05, size=truth.shape)).astype(np.float32)
+    truth[random.random(truth.shape) < 0.1] = np.nan
+    truth[20, 20] = np.inf
+    estimate[random.random(truth.shape) < 0.1] = np.nan
+    estimate[18, 18] = -np.inf
+    assert score(estimate, truth, border) == pytest.approx(twin(estimate, truth, border))
+
+
+def test_unknown_estimates_are_bad_and_reported() -> None:
+    """The benchmark's toolkit counts NaN as good; a method must not gain by giving none."""
+    truth = np.zeros((2, 2), np.float32)
+    scores = score(np.array([[np.nan, np.inf], [0, 1]], np.float32), truth)
+    assert scores["badpix007"] == 75
+    assert scores["non_finite"] == 2
+    assert scores["mse100"] == 50
+    nothing = score(np.full((2, 2), np.nan, np.float32), truth)
+    assert np.isnan(nothing["mse100"])
+    assert nothing["badpix007"] == 100
+
+
+def test_no_pixels_give_nan_not_a_crash() -> None:
+    """A benchmark border wider than a small scene, or a scene without occlusions."""
+    flat = np.zeros((20, 20), np.float32)
+    for scores in (score(flat, flat, border=15), score(flat, flat, region=np.zeros(flat.shape, bool))):
+        assert scores["pixels"] == 0
+        assert all(np.isnan(scores[key]) for key in ("mse100", "q25", "badpix007", "badpix003", "badpix001"))
+
+
+def test_region_limits_the_pixels() -> None:
+    truth = np.zeros((4, 4), np.float32)
+    estimate = np.tile(np.array([0, 0, 1, 1], np.float32), (4, 1))
+    region = np.zeros((4, 4), bool)
+    region[:, 3] = True
+    assert score(estimate, truth, region=region)["mse100"] == 100
+    assert score(estimate, truth, region=~region)["mse100"] == pytest.approx(100 / 3)
+
+
+def test_evaluate_names_protocols_and_regions() -> None:
+    truth = np.zeros((40, 40), np.float32)
+    mask = np.zeros((40, 40), bool)
+    mask[:10] = True
+    result = evaluate(scene(truth, {"occluded": mask}), truth + np.float32(0.05))
+    assert list(result) == ["paper", "benchmark"]
+    assert list(result["paper"]) == ["all", "occluded", "textureless"]
+    assert result["paper"]["all"]["pixels"] == 1600
+    assert result["benchmark"]["all"]["pixels"] == 100
+    assert result["paper"]["occluded"]["pixels"] == 400
+    assert result["paper"]["all"]["badpix003"] == 100
+
+
+def test_masks_come_from_the_scene_or_are_computed() -> None:
+    truth = np.zeros((40, 40), np.float32)
+    truth[10:30, 10:30] = 1
+    mask = np.ones((40, 40), bool)
+    found = evaluation_of(scene(truth, {"textureless": mask}), truth)
+    assert found.region_sources == {"occluded": "computed", "textureless": "scene"}
+    np.testing.assert_array_equal(found.regions["occluded"], regions.occluded(truth, (3, 3)))
+    np.testing.assert_array_equal(found.regions["textureless"], mask)
+
+
+def test_error_map_is_signed_and_nan_where_unknown() -> None:
+    truth = np.zeros((40, 40), np.float32)
+    truth[0, 0] = np.nan
+    estimate = np.full((40, 40), -0.5, np.float32)
+    estimate[1, 1] = np.inf
+    error = evaluation_of(scene(truth), estimate).error
+    assert error is not None
+    assert error[5, 5] == np.float32(-0.5)
+    assert np.isnan(error[0, 0])
+    assert np.isnan(error[1, 1])
+
+
+def test_no_ground_truth_no_scores() -> None:
+    assert evaluate(scene(None), np.zeros((40, 40), np.float32)) == {}
+
+
+def test_wrong_shape_is_a_clear_error() -> None:
+    with pytest.raises(SepiError, match=r"noise: .*shape \(40, 40\), got \(40, 39\)"):
+        evaluate(scene(None), np.zeros((40, 39), np.float32))
+    with pytest.raises(SepiError, match=r"truth .*\(2, 2\), got \(2, 3\)"):
+        score(np.zeros((2, 2), np.float32), np.zeros((2, 3), np.float32))
+
+
+def run_command(folder: Path, light_field: LightField, disparity: np.ndarray, output: str = "scores.h5") -> Path:
+    write_light_field(folder / "lightfield.h5", light_field)
+    write_stage(folder / "initial.h5", StageMaps(disparity, np.ones_like(disparity)), STAGE_ATTRIBUTES)
+    files = {"--light-field": folder / "lightfield.h5", "--stage": folder / "initial.h5", "--output": folder / output}
+    arguments = [str(part) for pair in files.items() for part in pair]
+    result = CliRunner().invoke(command, arguments, catch_exceptions=False)
+    assert result.exit_code == 0, result.output
+    return folder / output
+
+
+def test_command_writes_what_evaluate_finds(tmp_path: Path) -> None:
+    random = np.random.default_rng(5)
+    truth = random.normal(size=(40, 40)).astype(np.float32)
+    estimate = truth + random.normal(scale=0.05, size=truth.shape).astype(np.float32)
+    light_field = scene(truth)
+    path = run_command(tmp_path, light_field, estimate)
+    written = read_scores(path)
+    expected = evaluate(light_field, estimate)
+    assert set(written) == {"paper", "benchmark"}
+    for protocol, cells in expected.items():
+        for region, scores in cells.items():
+            assert written[protocol][region] == pytest.approx(scores, nan_ok=True)
+    back = read_evaluation(path)
+    assert back.error is not None
+    np.testing.assert_array_equal(back.error, estimate - truth)
+    assert set(back.regions) == {"occluded", "textureless"}
+    assert path.read_bytes() == run_command(tmp_path, light_field, estimate, "again.h5").read_bytes()
+
+
+def test_command_says_that_there_is_no_truth(tmp_path: Path) -> None:
+    """A real picture goes through the workflow: a file is written, without scores."""
+    path = run_command(tmp_path, scene(None), np.zeros((40, 40), np.float32))
+    assert read_scores(path) == {}
+    assert read_evaluation(path).error is None
+    with h5py.File(path) as file:
+        assert not file.attrs["ground_truth"]
+        assert file.attrs["stage"] == "initial"
+
+
+def test_command_on_a_foreign_file_is_one_line(tmp_path: Path) -> None:
+    write_light_field(tmp_path / "lightfield.h5", scene(None))
+    arguments = ["--light-field", str(tmp_path / "lightfield.h5"), "--output", str(tmp_path / "out.h5")]
+    result = CliRunner().invoke(command, [*arguments, "--stage", str(tmp_path / "absent.h5")])
+    assert result.exit_code == 1
+    assert result.output.strip() == f"sepi: {tmp_path / 'absent.h5'}: no such file"
+    assert not (tmp_path / "out.h5").exists()
+
+
+def test_reading_scores_from_another_file_is_a_clear_error(tmp_path: Path) -> None:
+    write_light_field(tmp_path / "lightfield.h5", scene(None))
+    with pytest.raises(SepiError, match="not a score file"):
+        read_scores(tmp_path / "lightfield.h5")
