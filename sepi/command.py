@@ -14,7 +14,6 @@ import threading
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from types import FrameType
 from typing import IO, Any
@@ -26,8 +25,8 @@ from tqdm import tqdm
 
 from sepi.errors import SepiError
 from sepi.io.files import atomic_path
-from sepi.io.hdf5 import Attribute, read_attributes, read_light_field, read_stage, write_stage
-from sepi.lightfield import LightField
+from sepi.io.hdf5 import read_light_field, read_stage, write_stage
+from sepi.provenance import history_of, stage_attributes, step
 from sepi.stage import Choice, Progress
 from sepi.validation import validated
 
@@ -89,20 +88,15 @@ def use_threads(count: int) -> None:
     cv2.setNumThreads(count)
 
 
-def package_version() -> str:
-    """Version of the installed package; ``"unknown"`` in a bare source tree."""
-    # not sepi.__version__: the root of the package imports every stage
-    try:
-        return version("sepi")
-    except PackageNotFoundError:
-        return "unknown"
-
-
-def write_timing(path: Path, started: float) -> None:
-    """Write the seconds since ``started`` (of ``time.perf_counter``) and the peak memory of this process as JSON."""
+def write_timing(path: Path, started: float, threads: int) -> None:
+    """Write as JSON the seconds since ``started`` (of ``time.perf_counter``), the peak memory and the threads."""
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     megabytes = peak / (2**20 if sys.platform == "darwin" else 2**10)
-    timing = {"seconds": round(time.perf_counter() - started, 3), "peak_memory_mb": round(megabytes, 1)}
+    timing = {
+        "seconds": round(time.perf_counter() - started, 3),
+        "peak_memory_mb": round(megabytes, 1),
+        "threads": threads,
+    }
     with atomic_path(path) as temporary:
         temporary.write_text(json.dumps(timing) + "\n", encoding="utf-8")
 
@@ -144,50 +138,12 @@ def stage_command(stage: str, choices: Mapping[str, Choice]) -> click.Command:
             )
         with progress_bar(f"{light_field.name} {stage}") as progress:
             result = chosen.run(light_field, maps, settings, progress)
-        step = {"stage": stage, "choice": choice, "parameters": settings.model_dump(mode="json")}
-        write_stage(output, result, attributes_of(light_field, step, history_of(previous)))
+        steps = [*history_of(previous), step(stage, choice, settings)]
+        write_stage(output, result, stage_attributes(light_field, steps))
         if timing is not None:
-            write_timing(timing, started)
+            write_timing(timing, started, threads)
 
     return command
-
-
-def attributes_of(light_field: LightField, step: Mapping[str, Any], before: list[Any]) -> dict[str, Attribute]:
-    """Attributes of a stage file: what made it, and from what.
-
-    Parameters
-    ----------
-    light_field : LightField
-        With a known disparity range.
-    step : mapping
-        ``stage``, ``choice`` and ``parameters`` of the stage that made the maps.
-    before : list
-        The same of the stages before it, in order; they become ``made_from``, a JSON list.
-    """
-    known = light_field.known_range()
-    return {
-        "scene": light_field.name,
-        "source": light_field.source,
-        "stage": step["stage"],
-        "choice": step["choice"],
-        "parameters": json.dumps(step["parameters"], sort_keys=True),
-        "made_from": json.dumps(before, sort_keys=True),
-        "disparity_range": (known.minimum, known.maximum),
-        "disparity_range_source": known.source,
-        "version": package_version(),
-    }
-
-
-def history_of(path: Path | None) -> list[Any]:
-    """The stages that made a stage file, in order: dictionaries of ``stage``, ``choice`` and ``parameters``."""
-    if path is None:
-        return []
-    attributes = read_attributes(path)
-    try:
-        last = {"stage": str(attributes["stage"]), "choice": str(attributes["choice"])}
-        return [*json.loads(attributes["made_from"]), {**last, "parameters": json.loads(attributes["parameters"])}]
-    except (KeyError, ValueError) as error:
-        raise SepiError(f"{path}: not a stage file: its attributes do not say what made it ({error})") from error
 
 
 def _json_object(text: str) -> dict[str, Any]:

@@ -47,12 +47,21 @@ def validated(model: type[Model], values: Mapping[str, Any], where: str) -> Mode
     SepiError
         One line for the first key that is wrong: which, why, and what would be right.
     """
-    require_known(where, values, model.model_fields)
+    _require_fields(model, values, where)
     try:
         # by way of JSON, because strict models take a JSON list for a tuple but not a Python list
         return model.model_validate_json(json.dumps(dict(values), allow_nan=False))
     except (TypeError, ValueError) as error:
         raise SepiError(_first_line(error, where)) from error
+
+
+def _require_fields(model: type[BaseModel], values: Mapping[str, Any], where: str) -> None:
+    """Refuse unknown keys here rather than by pydantic, to suggest the nearest known one."""
+    require_known(where, values, model.model_fields)
+    for name, value in values.items():
+        inner = model.model_fields[name].annotation
+        if isinstance(inner, type) and issubclass(inner, BaseModel) and isinstance(value, Mapping):
+            _require_fields(inner, value, f"{where}.{name}")
 
 
 def _first_line(error: Exception, where: str) -> str:

@@ -1,0 +1,94 @@
+# What all rules share: the checked configuration, and the names, threads and memory that follow from it.
+
+import os
+import sys
+import time
+from pathlib import Path
+
+from sepi.config import load_settings
+from sepi.digest import code_digest
+from sepi.errors import SepiError
+from sepi.pipeline import STAGES, VARIANTS
+from sepi.validation import require_known
+
+STARTED = time.time()
+
+# jobs call `python`: the one that runs Snakemake, whether or not its environment is activated
+os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
+
+try:
+    SETTINGS = load_settings(config)
+except SepiError as error:
+    sys.exit(f"sepi: {error}")
+
+RESULT_NAMES = ["disparity.pfm", "result.h5", "disparity.png", "confidence.png"]
+
+
+wildcard_constraints:
+    dataset="[^/]+",
+    scene="[^/]+",
+    variant="[^/]+",
+    initial="|".join(STAGES["initial"]),
+    occlusion="|".join(STAGES["occlusion"]),
+    textureless="|".join(STAGES["textureless"]),
+    optimize="|".join(STAGES["optimize"]),
+
+
+def light_field_file(dataset, scene):
+    """The light field of a scene, as ingest writes it."""
+    return f"results/{dataset}/{scene}/lightfield.h5"
+
+
+def stage_file(dataset, scene, variant, stage, ending="h5"):
+    """The file of a stage of a variant; ``ending`` names a file beside it ("scores.h5", "time.json")."""
+    require_known("variant", [variant], SETTINGS.variants)
+    return f"results/{dataset}/{scene}/stages/{SETTINGS.variants[variant].path(stage)}/{stage}.{ending}"
+
+
+def result_files(variants):
+    """The final maps of every configured scene for these variants."""
+    return [
+        f"results/{dataset}/{scene}/{variant}/{name}"
+        for dataset, scene in SETTINGS.scenes
+        for variant in variants
+        for name in RESULT_NAMES
+    ]
+
+
+def parameters_of(stage):
+    """Function of wildcards: the parameters of a stage's choice as JSON, so that a change of them is seen."""
+    return lambda wildcards: SETTINGS.parameters_json(stage, wildcards[stage])
+
+
+def scene_of(wildcards):
+    """The scene that a rule's wildcards name."""
+    return SETTINGS.scene(wildcards.dataset, wildcards.scene)
+
+
+def threads_for(wildcards):
+    """Threads of a job: one for each 8 million samples, since small scenes gain more from jobs side by side."""
+    return min(1 + scene_of(wildcards).samples // 8_000_000, 8)
+
+
+def memory_for(bytes_per_sample, bytes_per_pixel=0):
+    """Function of wildcards: memory of a job in MB, from the samples (pixels of all views) and pixels of its scene."""
+
+    def memory(wildcards):
+        scene = scene_of(wildcards)
+        pixels = scene.height * scene.width
+        # what Python and its libraries take before any data
+        return 300 + round((bytes_per_sample * scene.samples + bytes_per_pixel * pixels) / 2**20)
+
+    return memory
+
+
+def print_written(tables, maps):
+    """Name the tables and the folders of maps that this run wrote."""
+    new = [file for file in [*tables, *maps] if Path(file).exists() and Path(file).stat().st_mtime >= STARTED]
+    groups = {
+        "Tables and figures": [file for file in new if file in tables],
+        "Maps": list(dict.fromkeys(f"{Path(file).parent}/" for file in new if file in maps)),
+    }
+    for title, files in groups.items():
+        if files:
+            print(f"{title} written:", *dict.fromkeys(files), sep="\n  ", flush=True)

@@ -1,0 +1,38 @@
+# Light fields: any format in, one HDF5 file out, with a disparity range and where that came from.
+
+
+def ingest_source(wildcards):
+    """Where a scene comes from, as flags of the ingest command."""
+    scene = scene_of(wildcards)
+    if scene.folder is None:
+        return ["--builtin", scene.name, "--size", str(scene.height)]
+    return ["--folder", str(scene.folder)]
+
+
+def ingest_range(wildcards):
+    """The disparity range that the user set, as flags; none where the scene's own or an estimate serves."""
+    given = scene_of(wildcards).disparity_range
+    return [] if given is None else ["--disparity-range", *map(str, given)]
+
+
+# A scene's views, range, ground truth and masks. Its pictures are the inputs: a changed or new one is read again.
+rule ingest:
+    input:
+        files=lambda wildcards: scene_of(wildcards).files,
+    output:
+        light_field="results/{dataset}/{scene}/lightfield.h5",
+    log:
+        "logs/{dataset}/{scene}/ingest.log",
+    benchmark:
+        "benchmarks/{dataset}/{scene}/ingest.tsv"
+    threads: 1
+    resources:
+        mem_mb=memory_for(bytes_per_sample=12),
+    params:
+        source=ingest_source,
+        disparity_range=ingest_range,
+        code=code_digest("sepi.ingest"),
+    message:
+        "{wildcards.dataset}/{wildcards.scene}: reading the light field"
+    shell:
+        "python -m sepi.ingest {params.source:q} {params.disparity_range:q} --output {output.light_field:q} 2> {log:q}"

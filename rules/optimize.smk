@@ -1,0 +1,24 @@
+# Global optimisation (paper, section IV-D, Eq. 8-12): weighted least squares over the whole map, or none.
+rule optimize:
+    input:
+        light_field="results/{dataset}/{scene}/lightfield.h5",
+        previous="results/{dataset}/{scene}/stages/{initial}/{occlusion}/{textureless}/textureless.h5",
+    output:
+        maps="results/{dataset}/{scene}/stages/{initial}/{occlusion}/{textureless}/{optimize}/optimize.h5",
+        timing="results/{dataset}/{scene}/stages/{initial}/{occlusion}/{textureless}/{optimize}/optimize.time.json",
+    log:
+        "logs/{dataset}/{scene}/{initial}/{occlusion}/{textureless}/{optimize}/optimize.log",
+    benchmark:
+        "benchmarks/{dataset}/{scene}/{initial}/{occlusion}/{textureless}/{optimize}/optimize.tsv"
+    threads: threads_for
+    resources:
+        mem_mb=memory_for(bytes_per_sample=4, bytes_per_pixel=1500),
+    params:
+        parameters=parameters_of("optimize"),
+        code=code_digest("sepi.optimize"),
+    message:
+        "{wildcards.dataset}/{wildcards.scene}: global optimisation ({wildcards.initial}, {wildcards.occlusion}, {wildcards.textureless}, {wildcards.optimize})"
+    shell:
+        "python -m sepi.optimize --light-field {input.light_field:q} --previous {input.previous:q} "
+        "--choice {wildcards.optimize} --parameters {params.parameters:q} --threads {threads} "
+        "--output {output.maps:q} --timing {output.timing:q} 2> {log:q}"

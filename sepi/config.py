@@ -1,0 +1,179 @@
+"""The workflow's configuration: the model of ``config.yaml``, its check, and what the rules are told."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from sepi.datasets import Scene, scenes_in
+from sepi.errors import SepiError
+from sepi.lightfield import DisparityRange
+from sepi.pipeline import STAGES, VARIANTS, Variant
+from sepi.scenes import SCENES
+from sepi.stage import Parameters
+from sepi.validation import require_known, validated
+
+# the built-in scenes have 9x9 views
+_BUILTIN_VIEWS = 81
+
+
+class _Keys(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+
+class Builtin(_Keys):
+    """Keys of ``builtin``."""
+
+    scenes: list[str] = Field(
+        list(SCENES), description="which of the built-in scenes to use, in the order of the tables; [] for none"
+    )
+    size: int = Field(192, ge=64, le=1024, description="height and width of a view in pixels")
+
+
+def _default_stages() -> dict[str, dict[str, dict[str, Any] | None]]:
+    return {
+        stage: {word: choice.parameters().model_dump() for word, choice in choices.items()}
+        for stage, choices in STAGES.items()
+    }
+
+
+class Config(_Keys):
+    """Keys of ``config.yaml``."""
+
+    builtin: Builtin = Field(
+        Builtin(),
+        description="Dataset 'builtin': light fields that the package renders itself, with exact ground truth.",
+    )
+    hci_root: str | None = Field(
+        None,
+        description="Dataset 'hci': a folder of HCI 4D benchmark scenes; every folder in it with input_Cam*.png is a "
+        "scene, also below category folders such as training/. null for none.",
+    )
+    disparity_range: dict[str, tuple[float, float]] = Field(
+        {},
+        description="Disparity range of single scenes in pixels per view step, such as {hci/cotton: [-1.6, 1.5]}. "
+        "Other scenes have the range of their own parameters.cfg, or one estimated from the views.",
+    )
+    variants: dict[str, dict[str, str]] = Field(
+        {name: variant.choices for name, variant in VARIANTS.items()},
+        description="A choice for each stage. 'paper' is the method; 'paper' to 'no_occlusion_no_textureless' are the "
+        "columns of its table 4. These have fixed meanings; add variants of your own beside them.",
+    )
+    stages: dict[str, dict[str, dict[str, Any] | None]] = Field(
+        default_factory=_default_stages, description="Parameters of each stage, by choice."
+    )
+
+
+@dataclass(frozen=True)
+class Settings:
+    """A checked configuration.
+
+    Attributes
+    ----------
+    scenes : mapping of (dataset, scene) to Scene
+        Every scene to run on, in the tables' order.
+    variants : mapping of str to Variant
+        The built-in variants, then the user's own.
+    parameters : mapping of stage to choice to Parameters
+        What each stage runs with.
+    """
+
+    scenes: Mapping[tuple[str, str], Scene]
+    variants: Mapping[str, Variant]
+    parameters: Mapping[str, Mapping[str, Parameters]]
+
+    @property
+    def datasets(self) -> list[str]:
+        """Names of the datasets that have scenes."""
+        return list(dict.fromkeys(dataset for dataset, _ in self.scenes))
+
+    @property
+    def own_variants(self) -> list[str]:
+        """Names of the variants that the user added."""
+        return [name for name in self.variants if name not in VARIANTS]
+
+    def scenes_of(self, dataset: str) -> list[str]:
+        """Names of a dataset's scenes."""
+        return [name for other, name in self.scenes if other == dataset]
+
+    def scene(self, dataset: str, name: str) -> Scene:
+        """A scene by name.
+
+        Raises
+        ------
+        SepiError
+            If there is none; the message suggests the nearest.
+        """
+        require_known("dataset", [dataset], self.datasets)
+        require_known(f"scene of dataset '{dataset}'", [name], self.scenes_of(dataset))
+        return self.scenes[dataset, name]
+
+    def parameters_json(self, stage: str, choice: str) -> str:
+        """Parameters of a stage's choice as JSON with sorted keys."""
+        return json.dumps(self.parameters[stage][choice].model_dump(mode="json"), sort_keys=True)
+
+
+def load_settings(values: Mapping[str, Any]) -> Settings:
+    """Check a configuration (as read from YAML) and find its scenes.
+
+    Raises
+    ------
+    SepiError
+        One line that names the first key, scene, variant, stage or choice that is wrong, and what would be right.
+    """
+    config = validated(Config, values, "config")
+    scenes = _scenes(config)
+    ranges = {}
+    for name, (minimum, maximum) in config.disparity_range.items():
+        require_known("config.disparity_range", [name], [f"{dataset}/{scene}" for dataset, scene in scenes])
+        DisparityRange(minimum, maximum, f"config.disparity_range of {name}")
+        ranges[name] = (minimum, maximum)
+    return Settings(
+        {key: replace(scene, disparity_range=ranges.get("/".join(key))) for key, scene in scenes.items()},
+        dict(VARIANTS) | {name: _variant(name, choices) for name, choices in config.variants.items()},
+        _parameters(config.stages),
+    )
+
+
+def _scenes(config: Config) -> dict[tuple[str, str], Scene]:
+    require_known("config.builtin.scenes", config.builtin.scenes, SCENES)
+    size = config.builtin.size
+    scenes = [Scene("builtin", name, None, (), _BUILTIN_VIEWS, size, size) for name in config.builtin.scenes]
+    if config.hci_root:
+        scenes += scenes_in(Path(config.hci_root).expanduser(), "hci", "config.hci_root")
+    if not scenes:
+        raise SepiError("config: no scene to run on; name some in builtin.scenes or set hci_root")
+    return {(scene.dataset, scene.name): scene for scene in scenes}
+
+
+def _variant(name: str, choices: Mapping[str, str]) -> Variant:
+    where = f"config.variants.{name}"
+    require_known(where, choices, STAGES)
+    missing = [stage for stage in STAGES if stage not in choices]
+    if missing:
+        raise SepiError(f"{where}: no choice for stage '{missing[0]}' (one of {', '.join(STAGES[missing[0]])})")
+    for stage, choice in choices.items():
+        require_known(f"{where}.{stage}", [choice], STAGES[stage])
+    if name in VARIANTS and dict(choices) != VARIANTS[name].choices:
+        raise SepiError(f"{where}: a built-in variant has a fixed meaning; give yours another name")
+    if not name.isidentifier() or name == "stages":
+        raise SepiError(f"{where}: a variant's name must be letters, digits and _, and not 'stages'")
+    return Variant(**choices)
+
+
+def _parameters(stages: Mapping[str, Mapping[str, Mapping[str, Any] | None]]) -> dict[str, dict[str, Parameters]]:
+    require_known("config.stages", stages, STAGES)
+    for stage, choices in stages.items():
+        require_known(f"config.stages.{stage}", choices, STAGES[stage])
+    return {
+        stage: {
+            word: validated(choice.parameters, stages.get(stage, {}).get(word) or {}, f"config.stages.{stage}.{word}")
+            for word, choice in choices.items()
+        }
+        for stage, choices in STAGES.items()
+    }

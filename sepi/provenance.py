@@ -1,0 +1,91 @@
+"""What made a file: the attributes of stage files and results.
+
+A *step* is a dictionary of ``stage``, ``choice`` and ``parameters``; the steps that led to a map, in order, are its
+history.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+from sepi.errors import SepiError
+from sepi.io.hdf5 import Attribute, read_attributes
+from sepi.lightfield import LightField
+from sepi.stage import Parameters
+
+Step = dict[str, Any]
+
+
+def package_version() -> str:
+    """Version of the installed package; ``"unknown"`` in a bare source tree."""
+    try:
+        return version("sepi")
+    except PackageNotFoundError:
+        return "unknown"
+
+
+def step(stage: str, choice: str, parameters: Parameters) -> Step:
+    """The step of a stage that ran with these parameters."""
+    return {"stage": stage, "choice": choice, "parameters": parameters.model_dump(mode="json")}
+
+
+def stage_attributes(light_field: LightField, steps: Sequence[Step]) -> dict[str, Attribute]:
+    """Attributes of a stage file.
+
+    Parameters
+    ----------
+    light_field : LightField
+        With a known disparity range.
+    steps : sequence of Step
+        How the maps were made; the last step is the file's own, the others become ``made_from``.
+    """
+    *before, last = steps
+    return {
+        **_scene_attributes(light_field),
+        "stage": last["stage"],
+        "choice": last["choice"],
+        "parameters": json.dumps(last["parameters"], sort_keys=True),
+        "made_from": json.dumps(before, sort_keys=True),
+    }
+
+
+def result_attributes(light_field: LightField, variant: str, steps: Sequence[Step]) -> dict[str, Attribute]:
+    """Attributes of a variant's result: ``made_from`` holds every step."""
+    return {
+        **_scene_attributes(light_field),
+        "variant": variant,
+        "made_from": json.dumps(list(steps), sort_keys=True),
+    }
+
+
+def history_of(path: Path | None) -> list[Step]:
+    """The steps that made a stage file, its own last; none without a file.
+
+    Raises
+    ------
+    SepiError
+        If the file is no stage file.
+    """
+    if path is None:
+        return []
+    attributes = read_attributes(path)
+    try:
+        last = {"stage": str(attributes["stage"]), "choice": str(attributes["choice"])}
+        return [*json.loads(attributes["made_from"]), {**last, "parameters": json.loads(attributes["parameters"])}]
+    except (KeyError, ValueError) as error:
+        raise SepiError(f"{path}: not a stage file: its attributes do not say what made it ({error})") from error
+
+
+def _scene_attributes(light_field: LightField) -> dict[str, Attribute]:
+    known = light_field.known_range()
+    return {
+        "scene": light_field.name,
+        "source": light_field.source,
+        "disparity_range": (known.minimum, known.maximum),
+        "disparity_range_source": known.source,
+        "version": package_version(),
+    }
