@@ -7,7 +7,7 @@
 # docs/workflow.md explains targets, configuration and what makes a job run again.
 
 
-configfile: workflow.source_path("config.yaml")
+configfile: f"{workflow.basedir}/config.yaml"
 
 
 include: "rules/common.smk"

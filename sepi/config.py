@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -20,6 +21,7 @@ from sepi.validation import require_known, validated
 
 # the built-in scenes have 9x9 views
 _BUILTIN_VIEWS = 81
+_WORDS = {"true": True, "false": False, "null": None}
 
 
 class _Keys(BaseModel):
@@ -126,7 +128,7 @@ def load_settings(values: Mapping[str, Any]) -> Settings:
     SepiError
         One line that names the first key, scene, variant, stage or choice that is wrong, and what would be right.
     """
-    config = validated(Config, values, "config")
+    config = validated(Config, {key: _with_numbers(value) for key, value in values.items()}, "config")
     scenes = _scenes(config)
     ranges = {}
     for name, (minimum, maximum) in config.disparity_range.items():
@@ -138,6 +140,28 @@ def load_settings(values: Mapping[str, Any]) -> Settings:
         dict(VARIANTS) | {name: _variant(name, choices) for name, choices in config.variants.items()},
         _parameters(config.stages),
     )
+
+
+def _with_numbers(value: Any, top: bool = True) -> Any:
+    """Numbers, true, false and null that were left as text below a key.
+
+    Snakemake reads ``--config 'builtin={size: 96}'`` with text for every value, and YAML takes 1e-4 for text.
+    """
+    if isinstance(value, Mapping):
+        return {key: _with_numbers(inner, False) for key, inner in value.items()}
+    if isinstance(value, list):
+        return [_with_numbers(inner, False) for inner in value]
+    if top or not isinstance(value, str):
+        return value
+    if value in _WORDS:
+        return _WORDS[value]
+    for kind in (int, float):
+        try:
+            number = kind(value)
+        except ValueError:
+            continue
+        return number if math.isfinite(number) else value
+    return value
 
 
 def _scenes(config: Config) -> dict[tuple[str, str], Scene]:

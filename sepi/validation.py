@@ -70,9 +70,7 @@ def _first_line(error: Exception, where: str) -> str:
     first = error.errors(include_url=False)[0]
     key = ".".join([where, *(str(part) for part in first["loc"])])
     got = "" if first["type"] == "missing" else f", got {first['input']!r}"
-    text = isinstance(first["input"], str) and first["type"].startswith(("float", "int")) and "e" in first["input"]
-    hint = " (YAML reads 1e-4 as text: write 1.0e-4)" if text else ""
-    return f"{key}: {_lower_first(first['msg'])}{got}{hint}"
+    return f"{key}: {_lower_first(first['msg'])}{got}"
 
 
 def _lower_first(text: str) -> str:
