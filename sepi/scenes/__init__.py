@@ -1,0 +1,15 @@
+"""Built-in synthetic light fields with exact ground truth.
+
+Examples
+--------
+>>> from sepi.scenes import SCENES, render
+>>> light_field = render("fronto_parallel", size=64, views=3)
+>>> float(light_field.truth[10, 20])
+1.0
+"""
+
+from sepi.scenes.definitions import SCENES
+from sepi.scenes.folder import write_hci
+from sepi.scenes.light_field import render
+
+__all__ = ["SCENES", "render", "write_hci"]

@@ -1,0 +1,96 @@
+"""A built-in scene as a folder in the layout of the HCI 4D light field benchmark."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from sepi.errors import SepiError
+from sepi.io.files import atomic_folder
+from sepi.io.pfm import write_pfm
+from sepi.lightfield import LightField
+
+# A made-up camera with the benchmark's numbers. A disparity of d pixels is then a depth of 36.57 / (d + 8.605) metres,
+# finite for every disparity of the scenes; the baseline shrinks with the picture to keep that so.
+FOCAL_LENGTH_MM = 100.0
+SENSOR_SIZE_MM = 35.0
+FOCUS_DISTANCE_M = 4.25
+BASELINE_MM_AT_512 = 25.0
+
+
+def write_hci(light_field: LightField, folder: Path) -> None:
+    """Write a built-in scene as an HCI 4D benchmark folder, whole or not at all.
+
+    The folder holds ``input_CamNNN.png`` (number ``S * t + s``), ``parameters.cfg``, and where they are known
+    ``gt_disp_lowres.pfm`` and one ``mask_NAME.png`` per mask (white inside).
+
+    Parameters
+    ----------
+    light_field : LightField
+        All views present, uint8 RGB, with a disparity range.
+    folder : Path
+        Must not exist yet, or be empty.
+
+    Raises
+    ------
+    SepiError
+        If the format cannot hold the light field, or the folder cannot be written.
+    """
+    if light_field.views.dtype != np.uint8 or light_field.views.shape[-1] != 3:
+        raise SepiError(f"{light_field.name}: a benchmark folder holds uint8 RGB views, got {light_field.views.dtype}")
+    if not light_field.present.all():
+        raise SepiError(f"{light_field.name}: a benchmark folder holds all views of the grid, but some are missing")
+    views = light_field.views.astype(np.uint8, copy=False)
+    settings = _settings(light_field)
+    with atomic_folder(folder) as temporary:
+        for number, view in enumerate(views.reshape(-1, *light_field.shape, 3)):
+            _write_png(temporary / f"input_Cam{number:03d}.png", view[..., ::-1])
+        (temporary / "parameters.cfg").write_text(settings, encoding="utf-8")
+        if light_field.truth is not None:
+            write_pfm(temporary / "gt_disp_lowres.pfm", light_field.truth)
+        for name, mask in light_field.masks.items():
+            _write_png(temporary / f"mask_{name}.png", np.where(mask, np.uint8(255), np.uint8(0)))
+
+
+def _settings(light_field: LightField) -> str:
+    """Content of ``parameters.cfg``."""
+    height, width = light_field.shape
+    rows, columns = light_field.grid
+    known = light_field.known_range()
+    sections: dict[str, Mapping[str, object]] = {
+        "intrinsics": {
+            "focal_length_mm": FOCAL_LENGTH_MM,
+            "image_resolution_x_px": width,
+            "image_resolution_y_px": height,
+            "sensor_size_mm": SENSOR_SIZE_MM,
+            "fstop": 100.0,
+        },
+        "extrinsics": {
+            "num_cams_x": columns,
+            "num_cams_y": rows,
+            "baseline_mm": BASELINE_MM_AT_512 * 512 / max(width, height),
+            "focus_distance_m": FOCUS_DISTANCE_M,
+            **{f"center_cam_{key}": 0.0 for key in ("x_m", "y_m", "z_m", "rx_rad", "ry_rad", "rz_rad")},
+        },
+        "meta": {
+            "scene": light_field.name,
+            "category": "built-in",
+            "disp_min": known.minimum,
+            "disp_max": known.maximum,
+            "depth_map_scale": 1.0,
+        },
+    }
+    blocks = ["\n".join([f"[{head}]", *(f"{k} = {v}" for k, v in keys.items())]) for head, keys in sections.items()]
+    return "\n\n".join(blocks) + "\n"
+
+
+def _write_png(path: Path, values: npt.NDArray[np.uint8]) -> None:
+    """Write grey ``(H, W)`` or blue-green-red ``(H, W, 3)`` values."""
+    done, data = cv2.imencode(".png", values)
+    if not done:
+        raise SepiError(f"{path}: cannot be encoded as PNG")
+    path.write_bytes(data.tobytes())

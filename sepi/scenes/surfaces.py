@@ -1,0 +1,129 @@
+"""Surfaces of the built-in scenes: planar patches with an outline and a texture.
+
+Everything is described as seen in the centre view, in fractions of the picture: (0, 0) is the outer corner of the top
+left pixel, (1, 1) that of the bottom right pixel. Shapes therefore grow with the picture while disparities stay.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from sepi.lightfield import FloatMap
+
+Outline = npt.NDArray[np.float64]
+"""Corners ``(N, 2)`` of a closed polygon as (x, y)."""
+
+# Corners of a circle: at 1024 pixels the polygon is nowhere 0.1 pixels from the circle.
+CIRCLE_CORNERS = 180
+
+
+@dataclass(frozen=True)
+class Plane:
+    """Disparity ``at_centre + across * (x - 1/2) + down * (y - 1/2)`` in pixels per view step."""
+
+    at_centre: float
+    across: float = 0.0
+    down: float = 0.0
+
+    def at(self, x: float, y: float) -> float:
+        """Disparity at a point of the picture."""
+        return self.at_centre + self.across * (x - 0.5) + self.down * (y - 0.5)
+
+
+@dataclass(frozen=True)
+class Surface:
+    """A planar patch.
+
+    Attributes
+    ----------
+    outlines : sequence of ndarray, shape (N, 2)
+        Closed polygons; a point inside an odd number of them belongs to the surface (a second outline cuts a hole).
+    plane : Plane
+        Disparity.
+    texture : ndarray, shape (M, M, 3), float32, 0..1
+        Periodic, one texel per pixel.
+    textureless : bool
+        The texture carries no depth.
+    """
+
+    outlines: Sequence[Outline]
+    plane: Plane
+    texture: FloatMap
+    textureless: bool = False
+
+
+def everywhere() -> Outline:
+    """A rectangle that reaches far beyond what any view sees."""
+    return rectangle(-3, -3, 4, 4)
+
+
+def rectangle(left: float, top: float, right: float, bottom: float) -> Outline:
+    """An upright rectangle."""
+    return np.array([[left, top], [right, top], [right, bottom], [left, bottom]], float)
+
+
+def polygon(*corners: tuple[float, float]) -> Outline:
+    """A polygon through the given corners."""
+    return np.array(corners, float)
+
+
+def circle(x: float, y: float, radius: float) -> Outline:
+    """A circle."""
+    return blob(x, y, radius)
+
+
+def blob(x: float, y: float, radius: float, waves: Sequence[tuple[int, float, float]] = ()) -> Outline:
+    """A circle whose radius varies along its way round.
+
+    Parameters
+    ----------
+    x, y, radius : float
+        Centre and mean radius.
+    waves : sequence of (int, float, float)
+        Periods round the circle, amplitude relative to the radius, and phase in radians of each wave.
+    """
+    angle = 2 * np.pi * np.arange(CIRCLE_CORNERS) / CIRCLE_CORNERS
+    r = radius * (1 + sum((a * np.cos(n * angle + phase) for n, a, phase in waves), np.zeros_like(angle)))
+    return np.stack([x + r * np.cos(angle), y + r * np.sin(angle)], axis=1)
+
+
+def thread(start: tuple[float, float], end: tuple[float, float], width: float) -> Outline:
+    """A straight bar of the given width."""
+    a, b = np.array(start), np.array(end)
+    along = (b - a) / np.hypot(*(b - a))
+    side = 0.5 * width * np.array([-along[1], along[0]])
+    return np.stack([a + side, b + side, b - side, a - side])
+
+
+def pyramid(base: Outline, apex: tuple[float, float], height: float, ground: Plane, texture: FloatMap) -> list[Surface]:
+    """The faces of a pyramid.
+
+    Parameters
+    ----------
+    base : ndarray, shape (N, 2)
+        Corners of its base, which lies on ``ground``.
+    apex : tuple of float
+        Where the top is seen in the centre view.
+    height : float
+        Disparity by which the top is nearer than the ground; negative for a pyramid sunk into it.
+    ground : Plane
+        What it stands on.
+    texture : ndarray
+        Of all faces.
+    """
+    top = (*apex, ground.at(*apex) + height)
+    faces = []
+    for a, b in zip(base, np.roll(base, -1, axis=0), strict=True):
+        plane = _through((*a, ground.at(*a)), (*b, ground.at(*b)), top)
+        faces.append(Surface([np.stack([a, b, np.array(apex)])], plane, texture))
+    return faces
+
+
+def _through(*points: tuple[float, float, float]) -> Plane:
+    """The plane through three points (x, y, disparity)."""
+    p = np.array(points)
+    return Plane(*np.linalg.solve(np.column_stack([np.ones(3), p[:, :2] - 0.5]), p[:, 2]).tolist())

@@ -1,0 +1,280 @@
+"""Built-in scenes: pictures, ground truth and masks must agree, or every score made from them is wrong."""
+
+import configparser
+from functools import cache
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from scipy import ndimage
+
+from sepi.errors import SepiError
+from sepi.io.pfm import read_pfm
+from sepi.lightfield import LightField
+from sepi.scenes import SCENES, render, rendering, write_hci
+from sepi.scenes.definitions import DEFINITIONS
+from sepi.scenes.surfaces import Plane, Surface, circle, everywhere, rectangle
+from sepi.scenes.textures import PERIOD, noise, photograph, shading
+
+SIZE, VIEWS = 96, 5
+
+
+@cache
+def scene(name: str) -> LightField:
+    return render(name, size=SIZE, views=VIEWS)
+
+
+def steps(light_field: LightField) -> list[tuple[int, int, int, int]]:
+    """Grid position of every view but the centre, and its steps down and right from there."""
+    (T, S), (t0, s0) = light_field.grid, light_field.reference
+    return [(t, s, t - t0, s - s0) for t in range(T) for s in range(S) if (t, s) != (t0, s0)]
+
+
+def warp_error(light_field: LightField, offset: float) -> float:
+    """Mean difference in grey levels between the centre view and the views where truth + offset says a point is."""
+    d = light_field.truth.astype(float) + offset
+    y, x = np.mgrid[: d.shape[0], : d.shape[1]]
+    # pixels that mix two surfaces have no one disparity
+    step = ndimage.maximum_filter(light_field.truth, 5) - ndimage.minimum_filter(light_field.truth, 5)
+    usable = ~ndimage.binary_dilation(light_field.masks["occluded"], iterations=2)
+    usable &= ~light_field.masks["textureless"] & (step < 0.6)
+    centre = light_field.views[light_field.reference].astype(float)
+    errors = []
+    for t, s, dt, ds in steps(light_field):
+        at_y, at_x = y - d * dt, x - d * ds
+        inside = usable & (np.minimum(at_y, at_x) > 2) & (np.maximum(at_y, at_x) < d.shape[0] - 3)
+        for channel in range(3):
+            values = light_field.views[t, s, ..., channel].astype(float)
+            seen = ndimage.map_coordinates(values, [at_y, at_x], order=3, mode="nearest")
+            errors.append(np.abs(seen - centre[..., channel])[inside])
+    return float(np.concatenate(errors).mean())
+
+
+@pytest.mark.parametrize("name", [name for name in SCENES if name != "dots"])
+def test_every_view_shows_the_centre_view_where_the_truth_says(name: str) -> None:
+    """A wrong sign, axis or half pixel in truth or views would make a perfect method look bad."""
+    at_truth = warp_error(scene(name), 0.0)
+    assert at_truth < 2.0
+    assert warp_error(scene(name), 0.02) > at_truth
+    assert warp_error(scene(name), -0.02) > at_truth
+
+
+def test_a_plane_of_disparity_one_moves_by_whole_pixels() -> None:
+    light_field = scene("fronto_parallel")
+    assert (light_field.truth == 1).all()
+    centre = light_field.views[light_field.reference]
+    inner = slice(3, SIZE - 3)
+    for t, s, dt, ds in steps(light_field):
+        shifted = np.roll(light_field.views[t, s], (dt, ds), axis=(0, 1))
+        np.testing.assert_array_equal(shifted[inner, inner], centre[inner, inner])
+
+
+def test_slanted_plane_is_linear_at_pixel_centres() -> None:
+    y, x = (np.mgrid[:SIZE, :SIZE] + 0.5) / SIZE - 0.5
+    np.testing.assert_allclose(scene("slanted_plane").truth, 1.6 * x - 0.8 * y, atol=1e-6)
+
+
+@pytest.mark.parametrize("name", list(SCENES))
+def test_the_same_scene_is_the_same_bytes_each_time(name: str) -> None:
+    first, second = scene(name), render(name, size=SIZE, views=VIEWS)
+    assert first.views.tobytes() == second.views.tobytes()
+    assert first.truth.tobytes() == second.truth.tobytes()
+    assert all(first.masks[key].tobytes() == second.masks[key].tobytes() for key in first.masks)
+
+
+FINE = 5
+
+
+def z_buffered(name: str) -> np.ndarray:
+    """Occluded pixels by brute force: the truth at five times the resolution, splatted into every view."""
+    drawn = rendering.drawing(DEFINITIONS[name].surfaces(), FINE * SIZE)
+    drawn = drawn._replace(planes=drawn.planes * FINE)
+    d, _ = rendering.visible(drawn, FINE * SIZE)
+    y, x = np.mgrid[: d.shape[0], : d.shape[1]]
+    centres = slice(FINE // 2, None, FINE)
+    hidden = np.zeros((SIZE, SIZE), bool)
+    for _, _, dt, ds in steps(scene(name)):
+        at_y, at_x = np.rint(y - d * dt).astype(int), np.rint(x - d * ds).astype(int)
+        inside = (np.minimum(at_y, at_x) >= 0) & (np.maximum(at_y, at_x) < d.shape[0])
+        at_y[~inside] = at_x[~inside] = -1
+        nearest = np.full((d.shape[0] + 1, d.shape[1] + 1), -np.inf)
+        np.maximum.at(nearest, (at_y[inside], at_x[inside]), d[inside])
+        # the tolerance is what a slanted surface changes within a fine pixel
+        hidden |= (nearest[at_y, at_x] > d + 0.15 * FINE)[centres, centres]
+    return hidden
+
+
+@pytest.mark.parametrize("name", list(SCENES))
+def test_occlusion_mask_agrees_with_a_z_buffer_of_the_truth(name: str) -> None:
+    """A z-buffer rounds positions, so it may differ next to a boundary of the mask, and nowhere else."""
+    mask, hidden = scene(name).masks["occluded"], z_buffered(name)
+    around = np.ones((3, 3))
+    # both, for a band so thin that one of them has lost it
+    boundary = [ndimage.binary_dilation(m, around) & ~ndimage.binary_erosion(m, around) for m in (mask, hidden)]
+    frame = np.ones(mask.shape, bool)
+    frame[4:-4, 4:-4] = False  # what enters a view from outside the centre view is unknown to a z-buffer
+    assert not ((hidden != mask) & ~boundary[0] & ~boundary[1] & ~frame).any()
+    assert (hidden == mask).mean() > 0.96
+
+
+def test_square_before_a_plane_hides_exactly_the_ring_around_it() -> None:
+    square = rectangle(0.25, 0.25, 0.5, 0.5)
+    grey = shading((0.5, 0.5, 0.5), 0.0)
+    drawn = rendering.drawing([Surface([everywhere()], Plane(0.0), grey), Surface([square], Plane(1.0), grey)], 64)
+    disparity, owner = rendering.visible(drawn, 64)
+    inside = np.zeros((64, 64), bool)
+    inside[16:32, 16:32] = True
+    np.testing.assert_array_equal(owner == 1, inside)
+    expected = ndimage.binary_dilation(inside, np.ones((3, 3))) & ~inside
+    np.testing.assert_array_equal(rendering.occluded(drawn, disparity, (3, 3)), expected)
+
+
+def test_what_leaves_the_picture_is_not_occluded() -> None:
+    """Nobody can see there, so no method can be asked to know it."""
+    grey = shading((0.5, 0.5, 0.5), 0.0)
+    strip = rectangle(-1, -1, 1.5 / 64, 2)  # ends at x = 1 in the centre view and at x = 7 in the view to its left
+    drawn = rendering.drawing([Surface([everywhere()], Plane(-3.0), grey), Surface([strip], Plane(6.0), grey)], 64)
+    disparity, _ = rendering.visible(drawn, 64)
+    hidden = rendering.occluded(drawn, disparity, (3, 3))
+    # the plane's column x is at x - 3 in that view: up to column 9 hidden, but columns 1 and 2 outside
+    np.testing.assert_array_equal(hidden[8:-8].all(axis=0), (np.arange(64) >= 3) & (np.arange(64) <= 9))
+    assert not hidden[:, 1:3].any()
+
+
+def test_edge_pixels_are_a_mixture() -> None:
+    """Without anti-aliasing an edge would jump by whole pixels between views."""
+    white, black = np.ones((8, 8, 3), np.float32), np.zeros((8, 8, 3), np.float32)
+    half = Surface([rectangle(32.25 / 64, -1, 2, 2)], Plane(0.5), white)
+    drawn = rendering.drawing([Surface([everywhere()], Plane(0.0), black), half], 64)
+    centre, right = rendering.render_view(drawn, 64, 0, 0), rendering.render_view(drawn, 64, 0, 1)
+    np.testing.assert_allclose(centre[5, 30:35, 0], [0, 0, 0.75, 1, 1], atol=1e-6)
+    np.testing.assert_allclose(right[5, 30:35, 0], [0, 0.25, 1, 1, 1], atol=1e-6)
+
+
+def test_textureless_mask_is_the_bare_wall() -> None:
+    light_field = scene("wall")
+    bare = light_field.masks["textureless"]
+    assert 0.2 < bare.mean() < 0.6
+    values = light_field.centre[ndimage.binary_erosion(bare, iterations=2)]
+    assert values.std(axis=0).max() < 0.015
+    assert not any(scene(name).masks["textureless"].any() for name in SCENES if name != "wall")
+
+
+def test_stripes_fall_in_contrast() -> None:
+    light_field = scene("stripes")
+    stripes, count = ndimage.label(light_field.truth > 0)
+    contrast = ndimage.standard_deviation(light_field.centre.mean(axis=2), stripes, range(1, count + 1))
+    assert count == 8
+    assert (np.diff(contrast) < 0).all()
+
+
+def test_dots_are_noisy_to_the_right_and_differently_in_each_view() -> None:
+    light_field = scene("dots")
+    again = np.abs(light_field.views[2, 2].astype(float) - ndimage.median_filter(light_field.views[2, 2], (3, 3, 1)))
+    assert again[:, -SIZE // 4 :].mean() > 1.5 * again[:, : SIZE // 4].mean()
+    assert len({view.tobytes() for row in light_field.views for view in row}) == VIEWS**2
+
+
+@pytest.mark.parametrize("name", list(SCENES))
+def test_range_encloses_the_truth_with_a_margin_in_tenths(name: str) -> None:
+    light_field = scene(name)
+    known = light_field.known_range()
+    assert known.source == "parameters"
+    assert known.minimum <= light_field.truth.min() - 0.199
+    assert known.maximum >= light_field.truth.max() + 0.199
+    assert known.maximum - known.minimum < max(2.3, np.ptp(light_field.truth) + 0.6)
+    assert (known.minimum, known.maximum) == (round(known.minimum, 1), round(known.maximum, 1))
+
+
+@pytest.mark.parametrize("views", [2, 4])
+def test_even_grids_have_their_centre_at_the_lower_right_of_the_middle(views: int) -> None:
+    even, odd = render("pyramids", size=64, views=views), render("pyramids", size=64, views=3)
+    assert even.grid == (views, views)
+    np.testing.assert_array_equal(even.views[even.reference], odd.views[odd.reference])
+
+
+def test_shapes_grow_with_the_picture_and_disparities_stay() -> None:
+    small, large = render("curved_occluders", size=64, views=2), render("curved_occluders", size=129, views=2)
+    assert large.shape == (129, 129)
+    at = np.rint((np.arange(64) + 0.5) / 64 * 129 - 0.5).astype(int)
+    assert (np.abs(large.truth[np.ix_(at, at)] - small.truth) < 0.05).mean() > 0.95
+
+
+def test_default_is_nine_by_nine_views_of_192_pixels() -> None:
+    light_field = render("fronto_parallel")
+    assert light_field.views.shape == (9, 9, 192, 192, 3)
+    assert light_field.views.dtype == np.uint8
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"name": "piramids"}, "did you mean 'pyramids'.*fronto_parallel"),
+        ({"name": "wall", "size": 63}, "scene wall: size .* 64 to 1024, got 63"),
+        ({"name": "wall", "size": 96.0}, r"size .* got 96\.0"),
+        ({"name": "wall", "views": 1}, "scene wall: views .* from 2"),
+        ({"name": "wall", "views": True}, "views .* got True"),
+    ],
+)
+def test_bad_arguments_are_named(arguments: dict, message: str) -> None:
+    with pytest.raises(SepiError, match=message):
+        render(**arguments)
+
+
+def test_textures_repeat_without_a_seam_and_keep_their_mean() -> None:
+    """A seam would be an edge that no surface has."""
+    for texture in (noise(5, (0.3, 0.5, 0.6), 0.12), photograph("brick", (1.0, 0.9, 0.8), seed=2)):
+        assert texture.shape == (PERIOD, PERIOD, 3)
+        inside = np.abs(np.diff(texture, axis=0)).mean()
+        assert np.abs(texture[0] - texture[-1]).mean() < 1.5 * inside
+    np.testing.assert_allclose(noise(5, (0.3, 0.5, 0.6), 0.12).mean(axis=(0, 1)), (0.3, 0.5, 0.6), atol=0.01)
+
+
+def test_hole_shows_what_is_behind() -> None:
+    grey = shading((0.5, 0.5, 0.5), 0.0)
+    ring = Surface([circle(0.5, 0.5, 0.4), circle(0.5, 0.5, 0.2)], Plane(1.0), grey)
+    _, owner = rendering.visible(rendering.drawing([Surface([everywhere()], Plane(0.0), grey), ring], 64), 64)
+    assert owner[32, 32] == 0
+    assert owner[32, 51] == 1
+    assert owner.mean() == pytest.approx(np.pi * (0.4**2 - 0.2**2), rel=0.02)
+
+
+def test_folder_has_the_layout_of_the_benchmark(tmp_path: Path) -> None:
+    light_field = render("wall", size=64, views=3)
+    folder = tmp_path / "made" / "wall"
+    write_hci(light_field, folder)
+    assert sorted(path.name for path in folder.iterdir()) == [
+        "gt_disp_lowres.pfm",
+        *(f"input_Cam{number:03d}.png" for number in range(9)),
+        "mask_occluded.png",
+        "mask_textureless.png",
+        "parameters.cfg",
+    ]
+    assert [path.name for path in folder.parent.iterdir()] == ["wall"]
+    settings = configparser.ConfigParser()
+    settings.read(folder / "parameters.cfg")
+    assert dict(settings["meta"]) | {"scene": "wall", "category": "built-in"} == dict(settings["meta"])
+    assert settings.getint("extrinsics", "num_cams_x") == settings.getint("extrinsics", "num_cams_y") == 3
+    known = light_field.known_range()
+    assert settings.getfloat("meta", "disp_min") == known.minimum
+    assert settings.getfloat("meta", "disp_max") == known.maximum
+    np.testing.assert_array_equal(read_pfm(folder / "gt_disp_lowres.pfm"), light_field.truth)
+    view = cv2.imread(str(folder / "input_Cam005.png"))[..., ::-1]
+    np.testing.assert_array_equal(view, light_field.views[1, 2])
+    mask = cv2.imread(str(folder / "mask_occluded.png"), cv2.IMREAD_UNCHANGED)
+    np.testing.assert_array_equal(mask == 255, light_field.masks["occluded"])
+
+
+def test_failed_folder_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cv2, "imencode", lambda *_: (False, None))
+    with pytest.raises(SepiError, match=r"input_Cam000\.png"):
+        write_hci(render("fronto_parallel", size=64, views=2), tmp_path / "scene")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_existing_folder_is_not_overwritten(tmp_path: Path) -> None:
+    (tmp_path / "notes.txt").write_text("mine")
+    with pytest.raises(SepiError, match="exists already"):
+        write_hci(render("fronto_parallel", size=64, views=2), tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == ["notes.txt"]
