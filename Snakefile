@@ -27,6 +27,8 @@ rule all:
     input:
         report_files(),
         result_files(["paper", *SETTINGS.own_variants]),
+    message:
+        "all tables, figures and maps are made"
 
 
 # Table 4 and the maps of all its variants, the text's comparison with Wang et al. included
@@ -34,6 +36,8 @@ rule ablation:
     input:
         ablation_files(),
         result_files(VARIANTS),
+    message:
+        "all ablations are made"
 
 
 onsuccess:
