@@ -56,12 +56,15 @@ class SepiGroup(click.Group):
 @contextmanager
 def shown_errors() -> Iterator[None]:
     """Turn :class:`SepiError` into a line without traceback, and SIGTERM into an exit that removes unfinished files."""
-    if threading.current_thread() is threading.main_thread():
-        signal.signal(signal.SIGTERM, _exit_on_signal)
+    main = threading.current_thread() is threading.main_thread()
+    before = signal.signal(signal.SIGTERM, _exit_on_signal) if main else None
     try:
         yield
     except SepiError as error:
         raise _Shown(" ".join(str(error).split())) from error
+    finally:
+        if main:
+            signal.signal(signal.SIGTERM, before)
 
 
 def _exit_on_signal(number: int, _: FrameType | None) -> None:
@@ -84,7 +87,7 @@ def progress_bar(label: str) -> Iterator[Progress]:
 def use_threads(count: int) -> None:
     """Let numba and OpenCV use at most ``count`` threads (fewer where the machine has fewer cores)."""
     # numba refuses more threads than it started with
-    numba.set_num_threads(min(count, numba.get_num_threads()))
+    numba.set_num_threads(min(count, numba.config.NUMBA_NUM_THREADS))  # type: ignore[attr-defined]
     cv2.setNumThreads(count)
 
 
