@@ -45,7 +45,7 @@ def _slanted_plane() -> list[Surface]:
 def _fine_structures() -> list[Surface]:
     ground = Surface([everywhere()], Plane(-0.8, across=0.6), photograph("gravel", (1.05, 1.0, 0.9), seed=3))
     front = Plane(0.9, down=-0.4)
-    paint = noise(4, (0.62, 0.4, 0.3), 0.13, coarsest=24)
+    paint, cord = noise(4, (0.62, 0.4, 0.3), 0.13, coarsest=24), noise(5, (0.85, 0.83, 0.75), 0.08)
     # equal bars, each gap wider than the one before
     bars, left, gap = [], 0.06, 0.008
     while left < 0.94:
@@ -58,7 +58,7 @@ def _fine_structures() -> list[Surface]:
         ground,
         *(Surface([bar], front, paint) for bar in bars),
         *(Surface([tooth], front, paint) for tooth in teeth),
-        *(Surface([line], Plane(0.3), noise(5, (0.85, 0.83, 0.75), 0.08)) for line in threads),
+        *(Surface([line], Plane(0.3), cord) for line in threads),
     ]
 
 
