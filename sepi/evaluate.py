@@ -12,11 +12,12 @@ import click
 import numpy as np
 
 from sepi import regions
-from sepi.command import SepiCommand, history_of, package_version
+from sepi.command import SepiCommand
 from sepi.errors import SepiError
-from sepi.io.hdf5 import read_attributes, read_light_field, read_stage
+from sepi.io.hdf5 import read_light_field, read_stage
 from sepi.io.scores import Evaluation, Scores, write_scores
 from sepi.lightfield import BoolMap, FloatMap, LightField
+from sepi.provenance import history_of, stage_attributes
 
 PROTOCOLS: dict[str, int] = {"paper": 0, "benchmark": 15}
 """Protocol to the pixels left out on each side."""
@@ -151,23 +152,11 @@ def _quarter(error: FloatMap) -> float:
 def command(light_field_path: Path, stage_path: Path, output: Path) -> None:
     """Score a stage's disparity map against the light field's ground truth, if it has one."""
     light_field = read_light_field(light_field_path)
-    made_from = history_of(stage_path)
+    steps = history_of(stage_path)
     evaluation = evaluation_of(light_field, read_stage(stage_path).disparity)
     if evaluation.error is None:
         click.echo(f"{light_field.name}: no ground truth, no scores", err=True)
-    attributes = read_attributes(stage_path)
-    write_scores(
-        output,
-        evaluation,
-        {
-            "scene": light_field.name,
-            "stage": made_from[-1]["stage"],
-            "choice": made_from[-1]["choice"],
-            "made_from": attributes["made_from"],
-            "parameters": attributes["parameters"],
-            "version": package_version(),
-        },
-    )
+    write_scores(output, evaluation, stage_attributes(light_field, steps))
 
 
 if __name__ == "__main__":

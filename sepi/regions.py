@@ -97,7 +97,7 @@ def _without_small(mask: BoolMap) -> BoolMap:
     return kept
 
 
-@numba.njit(cache=True)  # type: ignore[untyped-decorator]
+@numba.njit(cache=True)
 def _hidden(truth: npt.NDArray[np.float64], offsets: npt.NDArray[np.int64], nearest: float) -> BoolMap:
     """``occluded`` with -inf for unknown disparities, the view offsets ``(N, 2)`` and the largest disparity."""
     height, width = truth.shape
@@ -111,7 +111,7 @@ def _hidden(truth: npt.NDArray[np.float64], offsets: npt.NDArray[np.int64], near
     return result
 
 
-@numba.njit(cache=True)  # type: ignore[untyped-decorator]
+@numba.njit(cache=True)
 def _hidden_in(truth: npt.NDArray[np.float64], y: int, x: int, dt: int, ds: int, nearest: float) -> bool:
     """Whether the view at offset ``(dt, ds)`` does not see the pixel ``(y, x)``."""
     height, width = truth.shape

@@ -12,7 +12,10 @@ import csv
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
-from importlib.resources import files
+from pathlib import Path
+
+FOLDER = Path(__file__).parent / "published"
+"""Where the data files are."""
 
 AVERAGE = "Average"
 """Name of the average rows in the paper's tables 1 and 2."""
@@ -150,5 +153,5 @@ def _scene_table(name: str) -> SceneTable:
 
 
 def _rows(name: str) -> list[dict[str, str]]:
-    text = files("sepi.report").joinpath("published", name).read_text(encoding="utf-8")
+    text = (FOLDER / name).read_text(encoding="utf-8")
     return list(csv.DictReader(line for line in text.splitlines() if not line.startswith("#")))

@@ -1,0 +1,84 @@
+"""From maps to pictures: arrays in, RGB arrays out, and their PNG files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+from matplotlib import colormaps
+
+from sepi.io.files import atomic_path
+from sepi.lightfield import BoolMap, FloatMap, LightField
+
+Picture = npt.NDArray[np.uint8]
+"""RGB, (H, W, 3)."""
+
+ERROR_LIMIT = 0.2
+"""Error in pixels per view step at the ends of the colour scale of error maps, the same in all of them."""
+
+_UNKNOWN = (1.0, 0.0, 1.0)  # magenta is in none of the colour scales
+_MASK = np.array([255, 64, 32], np.float32)
+_OUTLINE = np.array([255, 220, 0], np.uint8)
+
+
+def disparity_limits(light_field: LightField) -> tuple[float, float]:
+    """Ends of the colour scale of a scene: those of its ground truth, else of its disparity range."""
+    if light_field.truth is not None and np.isfinite(light_field.truth).any():
+        known = light_field.truth[np.isfinite(light_field.truth)]
+        return float(known.min()), float(known.max())
+    known_range = light_field.known_range()
+    return known_range.minimum, known_range.maximum
+
+
+def centre_picture(light_field: LightField) -> Picture:
+    """The centre view."""
+    centre = np.rint(255 * np.clip(light_field.centre, 0, 1)).astype(np.uint8)
+    return np.repeat(centre, 3, axis=2) if centre.shape[2] == 1 else centre
+
+
+def map_picture(values: FloatMap, limits: tuple[float, float], scale: str = "viridis") -> Picture:
+    """A map (H, W) in matplotlib's colour scale ``scale``, which spans ``limits``; unknown values are magenta."""
+    low, high = limits
+    unit = (values.astype(np.float64) - low) / max(high - low, 1e-9)
+    unit[~np.isfinite(unit)] = np.nan
+    colours: npt.NDArray[Any] = colormaps[scale].with_extremes(bad=_UNKNOWN)(np.clip(unit, 0, 1), bytes=True)
+    return colours[:, :, :3].astype(np.uint8)
+
+
+def error_picture(error: FloatMap) -> Picture:
+    """A signed error map (H, W): red where the estimate is too near, blue where too far, magenta where unknown."""
+    return map_picture(error, (-ERROR_LIMIT, ERROR_LIMIT), "seismic")
+
+
+def mask_picture(centre: Picture, mask: BoolMap) -> Picture:
+    """A mask (H, W) in orange over the darkened centre view."""
+    dark = centre.astype(np.float32) / 2
+    dark[mask] = (dark[mask] + _MASK) / 2 + 32
+    return np.clip(dark, 0, 255).astype(np.uint8)
+
+
+def outline_picture(centre: Picture, labels: npt.NDArray[np.integer[Any]]) -> Picture:
+    """Borders between regions of equal label (H, W) in yellow over the centre view."""
+    border = np.zeros(labels.shape, bool)
+    border[:, 1:] |= labels[:, 1:] != labels[:, :-1]
+    border[1:] |= labels[1:] != labels[:-1]
+    picture = centre.copy()
+    picture[border] = _OUTLINE
+    return picture
+
+
+def write_png(path: Path, picture: Picture) -> None:
+    """Write a picture as PNG, whole or not at all; equal pictures give equal bytes.
+
+    Raises
+    ------
+    SepiError
+        If the file cannot be written.
+    """
+    # OpenCV's order of channels is blue, green, red
+    _, encoded = cv2.imencode(".png", picture[:, :, ::-1], [cv2.IMWRITE_PNG_COMPRESSION, 6])
+    with atomic_path(path) as temporary:
+        temporary.write_bytes(encoded.tobytes())
