@@ -10,6 +10,7 @@ import pytest
 from scipy import ndimage
 
 from sepi.errors import SepiError
+from sepi.io import read_light_field
 from sepi.io.pfm import read_pfm
 from sepi.lightfield import LightField
 from sepi.scenes import SCENES, render, rendering, write_hci
@@ -264,6 +265,20 @@ def test_folder_has_the_layout_of_the_benchmark(tmp_path: Path) -> None:
     np.testing.assert_array_equal(view, light_field.views[1, 2])
     mask = cv2.imread(str(folder / "mask_occluded.png"), cv2.IMREAD_UNCHANGED)
     np.testing.assert_array_equal(mask == 255, light_field.masks["occluded"])
+
+
+@pytest.mark.parametrize("name", ["wall", "curved_occluders"])
+def test_folder_is_read_back_exactly(name: str, tmp_path: Path) -> None:
+    """Scores of a written scene must be those of the built-in one."""
+    light_field = render(name, size=64, views=4)
+    write_hci(light_field, tmp_path / name)
+    back = read_light_field(tmp_path / name)
+    np.testing.assert_array_equal(back.views, light_field.views)
+    np.testing.assert_array_equal(back.truth, light_field.truth)
+    assert (back.name, back.disparity_range) == (light_field.name, light_field.disparity_range)
+    assert set(back.masks) == set(light_field.masks)
+    for key, mask in light_field.masks.items():
+        np.testing.assert_array_equal(back.masks[key], mask)
 
 
 def test_failed_folder_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
