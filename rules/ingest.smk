@@ -2,11 +2,11 @@
 
 
 def ingest_source(wildcards):
-    """Where a scene comes from, as flags of the ingest command."""
+    """Where a scene comes from, as words for the ingest command."""
     scene = scene_of(wildcards)
     if scene.folder is None:
         return ["--builtin", scene.name, "--size", str(scene.height)]
-    return ["--folder", str(scene.folder)]
+    return [str(scene.folder)]
 
 
 def ingest_range(wildcards):
@@ -25,7 +25,7 @@ rule ingest:
         "logs/{dataset}/{scene}/ingest.log",
     benchmark:
         "benchmarks/{dataset}/{scene}/ingest.tsv"
-    threads: 1
+    threads: threads_for
     resources:
         mem_mb=memory_for(bytes_per_sample=12),
     params:
@@ -35,4 +35,5 @@ rule ingest:
     message:
         "{wildcards.dataset}/{wildcards.scene}: reading the light field"
     shell:
-        "python -m sepi.ingest {params.source:q} {params.disparity_range:q} --output {output.light_field:q} 2> {log:q}"
+        "python -m sepi.ingest {params.source:q} {params.disparity_range:q} --threads {threads} "
+        "--output {output.light_field:q} 2> {log:q}"

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import re
-import struct
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 from sepi.errors import SepiError
+from sepi.io.images import png_size
 
 VIEW_PATTERN = "input_Cam*.png"
 # what a scene's folder may hold besides views, and ingest reads
@@ -100,15 +100,13 @@ def _scene_folders(folder: Path, depth: int) -> Iterator[Path]:
 def _scene_of(folder: Path, dataset: str) -> Scene:
     views = sorted(folder.glob(VIEW_PATTERN))
     others = sorted({path for pattern in _OTHER_PATTERNS for path in folder.glob(pattern)})
-    height, width = _png_size(views[0])
+    height, width = _size_of(views[0])
     return Scene(dataset, folder.name, folder, (*views, *others), len(views), height, width)
 
 
-def _png_size(path: Path) -> tuple[int, int]:
-    """Height and width from a PNG's header; the benchmark's 512x512 where it is damaged, which ingest will say."""
-    with path.open("rb") as file:
-        header = file.read(24)
-    if len(header) < 24 or header[12:16] != b"IHDR":
+def _size_of(view: Path) -> tuple[int, int]:
+    """Height and width of a view; the benchmark's 512x512 where it is damaged, which ingest will say."""
+    try:
+        return png_size(view)
+    except SepiError:
         return 512, 512
-    width, height = struct.unpack(">II", header[16:24])
-    return height, width
