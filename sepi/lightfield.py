@@ -75,13 +75,13 @@ class LightField:
     Raises
     ------
     SepiError
-        If a shape or dtype is not as above, or the centre view is missing.
+        If a shape or dtype is not as above, floats are not finite or far outside 0..1, or the centre view is missing.
     """
 
     views: npt.NDArray[np.generic]
     name: str
     source: str = ""
-    present: BoolMap = field(default=None)  # type: ignore[assignment]
+    present: BoolMap = field(default=None)  # type: ignore[arg-type]
     disparity_range: DisparityRange | None = None
     truth: FloatMap | None = None
     masks: Mapping[str, BoolMap] = field(default_factory=dict)
@@ -100,9 +100,13 @@ class LightField:
             raise SepiError(f"{self.name}: present must be bool of shape {v.shape[:2]}, got {self.present.shape}")
         if not self.present[self.reference]:
             raise SepiError(f"{self.name}: the centre view (t, s) = {self.reference} is missing; depth is made for it")
+        if v.dtype == np.float32:
+            _require_unit(self.name, v[self.present])
         for what, array in {"truth": self.truth, **self.masks}.items():
             if array is not None and array.shape != self.shape:
-                raise SepiError(f"{self.name}: {what} must have the views' shape (H, W) = {self.shape}, got {array.shape}")
+                raise SepiError(
+                    f"{self.name}: {what} must have the views' shape (H, W) = {self.shape}, got {array.shape}"
+                )
 
     @property
     def reference(self) -> tuple[int, int]:
@@ -141,8 +145,16 @@ class LightField:
         return replace(self, disparity_range=disparity_range)
 
 
+def _require_unit(name: str, values: npt.NDArray[np.generic]) -> None:
+    """Raise unless floats are finite and 0..1, but for what resampling overshoots."""
+    low, high = float(values.min()), float(values.max())
+    if not (low >= -0.5 and high <= 1.5):
+        raise SepiError(f"{name}: float views must be finite and within 0..1, got {low:g} to {high:g}")
+
+
 def as_unit_float(values: npt.NDArray[np.generic]) -> FloatMap:
     """Pixel values as float32 in 0..1; integers are divided by the largest value of their type."""
     if np.issubdtype(values.dtype, np.integer):
-        return values.astype(np.float32) / np.float32(np.iinfo(values.dtype).max)  # type: ignore[type-var]
+        largest = np.iinfo(values.dtype).max  # type: ignore[type-var]
+        return np.asarray(values.astype(np.float32) / np.float32(largest), np.float32)
     return values.astype(np.float32)

@@ -16,7 +16,7 @@ import numpy as np
 
 from sepi.errors import SepiError
 from sepi.io.files import atomic_path
-from sepi.lightfield import DisparityRange, LightField
+from sepi.lightfield import DisparityRange, FloatMap, LightField
 from sepi.stage import StageMaps
 
 Attribute = str | float | int | tuple[float, float]
@@ -53,6 +53,21 @@ def read_stage(path: Path) -> StageMaps:
         raise SepiError(f"{path}: not a stage file: dataset {error} is missing") from error
 
 
+def read_map(path: Path, name: str) -> FloatMap:
+    """Read one map, (H, W) float32, of an HDF5 file.
+
+    Raises
+    ------
+    SepiError
+        If the file is missing, not HDF5, or holds no such map.
+    """
+    with opened(path) as file:
+        values = np.asarray(file[name][...])
+    if values.ndim != 2 or values.dtype.kind not in "fiu":
+        raise SepiError(f"{path}: expected '{name}' as numbers of shape (H, W), got {values.dtype} {values.shape}")
+    return values.astype(np.float32)
+
+
 def read_attributes(path: Path) -> dict[str, Any]:
     """Attributes of an HDF5 file."""
     with opened(path) as file:
@@ -77,6 +92,17 @@ def write_light_field(path: Path, light_field: LightField) -> None:
             file["truth"].attrs["units"] = UNITS["disparity"]
         for name, mask in sorted(light_field.masks.items()):
             file.create_dataset(f"masks/{name}", data=mask, compression="gzip", compression_opts=1)
+
+
+def matches(path: Path) -> bool:
+    """Whether ``path`` is an HDF5 file that may be a light field of this package: it holds views, or is damaged."""
+    if not path.is_file() or not h5py.is_hdf5(path):
+        return False
+    try:
+        with h5py.File(path, "r") as file:
+            return "views" in file
+    except OSError:
+        return True
 
 
 def read_light_field(path: Path) -> LightField:
@@ -125,5 +151,5 @@ def opened(path: Path) -> Iterator[h5py.File]:
     with file:
         try:
             yield file
-        except (OSError, KeyError) as error:
+        except (OSError, KeyError, TypeError, ValueError, RuntimeError) as error:
             raise SepiError(f"{path}: damaged HDF5 file ({error})") from error

@@ -1,0 +1,54 @@
+"""Light field depth by stitched epipolar plane images.
+
+Examples
+--------
+>>> import sepi
+>>> light_field = sepi.read_light_field("cotton")  # doctest: +SKIP
+>>> maps = sepi.estimate_depth(light_field)  # doctest: +SKIP
+>>> maps.disparity  # (H, W) float32, pixels per view step  # doctest: +SKIP
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from sepi.errors import SepiError
+    from sepi.io import read_light_field
+    from sepi.lightfield import DisparityRange, LightField
+    from sepi.pipeline import estimate_depth
+
+    __version__: str
+
+__all__ = [
+    "DisparityRange",
+    "LightField",
+    "SepiError",
+    "__version__",
+    "estimate_depth",
+    "read_light_field",
+]
+
+_HOME = {
+    "DisparityRange": "sepi.lightfield",
+    "LightField": "sepi.lightfield",
+    "SepiError": "sepi.errors",
+    "estimate_depth": "sepi.pipeline",
+    "read_light_field": "sepi.io",
+}
+
+
+def __getattr__(name: str) -> Any:
+    # on first use: the pipeline imports every stage, which `sepi --help` and the commands of single stages do without
+    if name == "__version__":
+        from sepi.provenance import package_version
+
+        return package_version()
+    if name in _HOME:
+        return getattr(importlib.import_module(_HOME[name]), name)
+    raise AttributeError(f"module 'sepi' has no attribute '{name}'")
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -1,0 +1,176 @@
+"""Kernel of the range estimate: a coarse plane sweep that keeps each pixel's best candidate and how clear it is.
+
+It differs from the sweep of the initial depth in what it must withstand: candidates far outside the scene's range,
+light loss towards the outer views, noise. Truncated absolute differences of high-pass filtered views, averaged over a
+window, do; sub-pixel accuracy does not matter.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numba
+import numpy as np
+import numpy.typing as npt
+
+from sepi.lightfield import FloatMap
+
+# rows that one thread holds for all candidates: the volume of a block stays within a few MB
+_BLOCK = 16
+
+
+@numba.njit(parallel=True, cache=True)  # type: ignore[untyped-decorator, unused-ignore]
+def coarse_sweep(
+    reference: FloatMap,
+    views: FloatMap,
+    offsets: npt.NDArray[np.int64],
+    candidates: FloatMap,
+    truncation: np.float32,
+    radius: int,
+) -> tuple[FloatMap, FloatMap, FloatMap, FloatMap]:
+    """Match the reference view against other views at each candidate disparity.
+
+    Parameters
+    ----------
+    reference : ndarray, shape (H, W), float32
+        The centre view.
+    views : ndarray, shape (V, H, W), float32
+        Other views.
+    offsets : ndarray, shape (V, 2), int64
+        Grid position ``(t - t0, s - s0)`` of each.
+    candidates : ndarray, shape (N,), float32
+        Disparities in pixels per view step, uniform, rising.
+    truncation : float32
+        Largest difference that one view can count for.
+    radius : int
+        Half width of the square window in pixels.
+
+    Returns
+    -------
+    lowest, second, mean, disparity : ndarrays, shape (H, W), float32
+        Lowest cost; lowest cost outside the valley round it (infinite if there is no other valley); mean cost; the
+        candidate of the lowest cost, refined by a parabola. A candidate at which fewer than half of the views see a
+        pixel of the window is left out; ``lowest`` is infinite where that leaves none, or where the lowest cost is at
+        an end of the candidates and so may go on falling beyond.
+    """
+    H, W = reference.shape
+    N = candidates.size
+    lowest = np.empty((H, W), np.float32)
+    second = np.empty((H, W), np.float32)
+    mean = np.empty((H, W), np.float32)
+    disparity = np.empty((H, W), np.float32)
+    step = candidates[1] - candidates[0]
+    for block in numba.prange((H + _BLOCK - 1) // _BLOCK):
+        top = block * _BLOCK
+        bottom = min(H, top + _BLOCK)
+        first = max(0, top - radius)
+        last = min(H, bottom + radius)
+        volume = np.empty((N, bottom - top, W), np.float32)
+        costs = np.empty((last - first, W), np.float32)
+        for n in range(N):
+            for y in range(first, last):
+                _row_costs(reference, views, offsets, candidates[n], truncation, y, costs[y - first])
+            _box_mean(costs, first, top, H, radius, volume[n])
+        column = np.empty(N, np.float32)
+        for y in range(top, bottom):
+            for x in range(W):
+                column[:] = volume[:, y - top, x]
+                low, other, average, place = _valley(column)
+                lowest[y, x] = low
+                second[y, x] = other
+                mean[y, x] = average
+                disparity[y, x] = candidates[0] + place * step
+    return lowest, second, mean, disparity
+
+
+@numba.njit(cache=True)  # type: ignore[untyped-decorator, unused-ignore]
+def _row_costs(reference, views, offsets, candidate, truncation, y, cost):  # type: ignore[no-untyped-def]
+    """Mean difference of a row over the views that see it; infinite where fewer than half do."""
+    H, W = reference.shape
+    seen = np.zeros(W, np.float32)
+    cost[:] = 0
+    for v in range(len(views)):
+        down = y - candidate * np.float32(offsets[v, 0])
+        across = -candidate * np.float32(offsets[v, 1])
+        row = math.floor(down)
+        shift = math.floor(across)
+        # one column fewer than fit, for the right neighbour of the sample
+        begin = max(0, -shift)
+        end = min(W, W - 1 - shift)
+        if row < 0 or row >= H - 1 or end <= begin:
+            continue
+        fy = np.float32(down - row)
+        fx = np.float32(across - shift)
+        # slices, because indices with an offset keep the loop from being vectorised
+        part = cost[begin:end]
+        here = reference[y, begin:end]
+        a = views[v, row, begin + shift : end + shift]
+        b = views[v, row, begin + shift + 1 : end + shift + 1]
+        if fy == 0:
+            for i in range(end - begin):
+                part[i] += min(abs(here[i] - (a[i] + fx * (b[i] - a[i]))), truncation)
+        else:
+            c = views[v, row + 1, begin + shift : end + shift]
+            d = views[v, row + 1, begin + shift + 1 : end + shift + 1]
+            for i in range(end - begin):
+                upper = a[i] + fx * (b[i] - a[i])
+                lower = c[i] + fx * (d[i] - c[i])
+                part[i] += min(abs(here[i] - (upper + fy * (lower - upper))), truncation)
+        seen[begin:end] += np.float32(1)
+    for x in range(W):
+        cost[x] = cost[x] / seen[x] if 2 * seen[x] >= len(views) else np.float32(np.inf)
+
+
+@numba.njit(cache=True)  # type: ignore[untyped-decorator, unused-ignore]
+def _box_mean(costs, first, top, H, radius, out):  # type: ignore[no-untyped-def]
+    """Mean of ``costs``, whose first row is row ``first`` of the picture, over the window; from row ``top`` on."""
+    rows, W = out.shape
+    sums = np.empty_like(costs)
+    for r in range(costs.shape[0]):
+        total = sums[r]
+        total[:] = costs[r]
+        for j in range(1, min(radius, W - 1) + 1):
+            total[j:] += costs[r, : W - j]
+            total[: W - j] += costs[r, j:]
+    for r in range(rows):
+        above = max(top + r - radius, 0)
+        below = min(top + r + radius, H - 1)
+        out[r] = sums[above - first]
+        for y in range(above + 1, below + 1):
+            out[r] += sums[y - first]
+        for x in range(W):
+            width = min(x + radius, W - 1) - max(x - radius, 0) + 1
+            out[r, x] /= np.float32((below - above + 1) * width)
+
+
+@numba.njit(cache=True)  # type: ignore[untyped-decorator, unused-ignore]
+def _valley(costs):  # type: ignore[no-untyped-def]
+    """Lowest cost, lowest cost outside its valley, mean cost, and the place of the lowest in candidate steps."""
+    infinite = np.float32(np.inf)
+    best, total, count = 0, np.float32(0), 0
+    for n in range(costs.size):
+        if costs[n] < infinite:
+            total += costs[n]
+            count += 1
+        if costs[n] < costs[best]:
+            best = n
+    low = costs[best]
+    if best == 0 or best == costs.size - 1 or not costs[best - 1] < infinite or not costs[best + 1] < infinite:
+        return infinite, infinite, total / np.float32(max(count, 1)), np.float32(best)
+    left = best
+    while left > 0 and costs[left - 1] >= costs[left]:
+        left -= 1
+    right = best
+    while right < costs.size - 1 and costs[right + 1] >= costs[right]:
+        right += 1
+    other = infinite
+    for n in range(left):
+        other = min(other, costs[n])
+    for n in range(right + 1, costs.size):
+        other = min(other, costs[n])
+    before, after = costs[best - 1], costs[best + 1]
+    curvature = before - 2 * low + after
+    place = np.float32(best)
+    if curvature > 0:
+        place += np.float32(0.5) * (before - after) / curvature
+    return low, other, total / np.float32(count), place

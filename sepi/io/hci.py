@@ -1,0 +1,191 @@
+"""Folders in the layout of the HCI 4D light field benchmark.
+
+``input_CamNNN.png`` is view ``NNN = S * t + s``. ``parameters.cfg``, ``gt_disp_lowres.pfm`` (disparity of the centre
+view) and ``mask_NAME.png`` (white regions) are read where present.
+
+References
+----------
+.. [1] K. Honauer, O. Johannsen, D. Kondermann, B. Goldluecke, "A dataset and evaluation methodology for depth
+       estimation on 4D light fields", ACCV 2016.
+"""
+
+from __future__ import annotations
+
+import configparser
+import math
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeVar
+
+import numpy as np
+
+from sepi.errors import SepiError
+from sepi.io.images import png_size, read_png, read_views
+from sepi.io.pfm import read_pfm
+from sepi.lightfield import BoolMap, DisparityRange, FloatMap, LightField
+
+PARAMETERS = "parameters.cfg"
+TRUTH = "gt_disp_lowres.pfm"
+
+Number = TypeVar("Number", int, float)
+
+_VIEW = re.compile(r"input_Cam(\d{1,6})\.png")
+# the masks that evaluation uses: any fault in them is an error; other masks are left out if they do not fit
+_EVALUATED = ("occluded", "textureless")
+
+
+@dataclass(frozen=True)
+class _Parameters:
+    """What this package uses of ``parameters.cfg``; None where the file does not say."""
+
+    grid: tuple[int, int] | None = None
+    shape: tuple[int, int] | None = None
+    disparity_range: DisparityRange | None = None
+    scene: str | None = None
+
+
+def matches(path: Path) -> bool:
+    """Whether ``path`` is a folder with views or parameters of the benchmark's names."""
+    return path.is_dir() and ((path / PARAMETERS).is_file() or any(path.glob("input_Cam*.png")))
+
+
+def read(path: Path) -> LightField:
+    """Read a folder.
+
+    Returns
+    -------
+    LightField
+        With the scene's own disparity range, ground truth and masks where the folder has them.
+
+    Raises
+    ------
+    SepiError
+        If a view is missing, given twice, damaged or unlike the others, the parameters are nonsense, or ground truth
+        or masks do not fit the views.
+    """
+    parameters = _read_parameters(path / PARAMETERS) if (path / PARAMETERS).is_file() else _Parameters()
+    paths, grid = _numbered_views(path, parameters.grid)
+    views = read_views(paths)
+    shape = views.shape[1], views.shape[2]
+    if parameters.shape not in (None, shape):
+        raise SepiError(
+            f"{path / PARAMETERS}: image_resolution (y, x) = {parameters.shape}, but the views are {shape}; "
+            "disparities change with the size, so set image_resolution, disp_min and disp_max for these views"
+        )
+    return LightField(
+        views=views.reshape(*grid, *views.shape[1:]),
+        name=parameters.scene or path.resolve().name,
+        source=str(path),
+        disparity_range=parameters.disparity_range,
+        truth=_read_truth(path / TRUTH, shape),
+        masks=_read_masks(path, shape),
+    )
+
+
+def _numbered_views(folder: Path, grid: tuple[int, int] | None) -> tuple[list[Path], tuple[int, int]]:
+    """Files of the views in order of their numbers, and the grid ``(T, S)``."""
+    views: dict[int, Path] = {}
+    for path in sorted(folder.glob("input_Cam*.png")):
+        match = _VIEW.fullmatch(path.name)
+        if match is None:
+            raise SepiError(f"{path}: expected a name like input_Cam007.png")
+        number = int(match[1])
+        if number in views:
+            raise SepiError(f"{path}: view {number} is given twice, also as {views[number].name}")
+        views[number] = path
+    if not views:
+        raise SepiError(f"{folder}: no views (expected input_Cam000.png, input_Cam001.png, ...)")
+    highest = max(views)
+    side = math.isqrt(highest + 1)
+    if grid is None and side**2 == highest + 1:
+        grid = side, side
+    if grid is None:
+        raise SepiError(
+            f"{folder}: views up to {views[highest].name} make {highest + 1}, which is no square grid; "
+            f"give num_cams_x and num_cams_y in {PARAMETERS}, or all views of a grid such as {side + 1}x{side + 1}"
+        )
+    count = grid[0] * grid[1]
+    if highest >= count:
+        raise SepiError(f"{views[highest]}: beyond the {count} views that {PARAMETERS} gives (num_cams_x, num_cams_y)")
+    missing = [number for number in range(count) if number not in views]
+    if missing:
+        raise SepiError(
+            f"{folder / f'input_Cam{missing[0]:03d}.png'}: view is missing "
+            f"({len(missing)} of the {count} of a {grid[0]}x{grid[1]} grid are)"
+        )
+    return [views[number] for number in range(count)], grid
+
+
+def _read_parameters(path: Path) -> _Parameters:
+    parser = configparser.ConfigParser(interpolation=None)
+    try:
+        parser.read_string(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise SepiError(f"{path}: cannot be read ({error.strerror})") from error
+    except UnicodeDecodeError as error:
+        raise SepiError(f"{path}: not a text file") from error
+    except configparser.Error as error:
+        raise SepiError(f"{path}: not of the form '[section]' and 'key = value' ({error.message})") from error
+    values = {key: value for section in parser.sections() for key, value in parser.items(section)}
+    limits = _pair(path, values, "disp_min", "disp_max", float)
+    if limits is not None and not (math.isfinite(limits[0]) and limits[0] < limits[1] < math.inf):
+        raise SepiError(
+            f"{path}: expected finite disp_min < disp_max in pixels per view step, got {limits[0]:g} and {limits[1]:g}"
+        )
+    return _Parameters(
+        grid=_positive(path, values, "num_cams_y", "num_cams_x"),
+        shape=_positive(path, values, "image_resolution_y_px", "image_resolution_x_px"),
+        disparity_range=None if limits is None else DisparityRange(*limits, "parameters"),
+        scene=values.get("scene") or None,
+    )
+
+
+def _positive(path: Path, values: dict[str, str], first: str, second: str) -> tuple[int, int] | None:
+    pair = _pair(path, values, first, second, int)
+    if pair is not None and min(pair) < 1:
+        raise SepiError(f"{path}: expected {first} and {second} of at least 1, got {pair[0]} and {pair[1]}")
+    return pair
+
+
+def _pair(
+    path: Path, values: dict[str, str], first: str, second: str, kind: Callable[[str], Number]
+) -> tuple[Number, Number] | None:
+    """Two numbers that come together or not at all."""
+    given = [key for key in (first, second) if key in values]
+    if not given:
+        return None
+    if len(given) == 1:
+        raise SepiError(f"{path}: {given[0]} is given, but {second if given == [first] else first} is not")
+    try:
+        return kind(values[first]), kind(values[second])
+    except ValueError as error:
+        raise SepiError(
+            f"{path}: expected {'whole ' if kind is int else ''}numbers for {first} and {second}, "
+            f"got '{values[first]}' and '{values[second]}'"
+        ) from error
+
+
+def _read_truth(path: Path, shape: tuple[int, int]) -> FloatMap | None:
+    if not path.is_file():
+        return None
+    truth = read_pfm(path)
+    if truth.shape != shape:
+        raise SepiError(f"{path}: ground truth is {truth.shape}, the views are {shape} (height, width)")
+    return truth
+
+
+def _read_masks(folder: Path, shape: tuple[int, int]) -> dict[str, BoolMap]:
+    masks = {}
+    for path in sorted(folder.glob("mask_*.png")):
+        name = path.stem.removeprefix("mask_")
+        if png_size(path) == shape:
+            values = read_png(path)
+            # white on black; anything else is not a region
+            if np.array_equal(values.min(2), values.max(2)) and np.isin(values, (0, values.max())).all():
+                masks[name] = values[:, :, 0] > 0
+                continue
+        if name in _EVALUATED:
+            raise SepiError(f"{path}: expected a black and white picture of the views' size {shape} (height, width)")
+    return masks
