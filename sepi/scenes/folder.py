@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-import cv2
 import numpy as np
-import numpy.typing as npt
 
 from sepi.errors import SepiError
 from sepi.io.files import atomic_folder
+from sepi.io.images import write_png
 from sepi.io.pfm import write_pfm
 from sepi.lightfield import LightField
 
@@ -48,12 +47,12 @@ def write_hci(light_field: LightField, folder: Path) -> None:
     settings = _settings(light_field)
     with atomic_folder(folder) as temporary:
         for number, view in enumerate(views.reshape(-1, *light_field.shape, 3)):
-            _write_png(temporary / f"input_Cam{number:03d}.png", view[..., ::-1])
+            write_png(temporary / f"input_Cam{number:03d}.png", view)
         (temporary / "parameters.cfg").write_text(settings, encoding="utf-8")
         if light_field.truth is not None:
             write_pfm(temporary / "gt_disp_lowres.pfm", light_field.truth)
         for name, mask in light_field.masks.items():
-            _write_png(temporary / f"mask_{name}.png", np.where(mask, np.uint8(255), np.uint8(0)))
+            write_png(temporary / f"mask_{name}.png", mask)
 
 
 def _settings(light_field: LightField) -> str:
@@ -86,11 +85,3 @@ def _settings(light_field: LightField) -> str:
     }
     blocks = ["\n".join([f"[{head}]", *(f"{k} = {v}" for k, v in keys.items())]) for head, keys in sections.items()]
     return "\n\n".join(blocks) + "\n"
-
-
-def _write_png(path: Path, values: npt.NDArray[np.uint8]) -> None:
-    """Write grey ``(H, W)`` or blue-green-red ``(H, W, 3)`` values."""
-    done, data = cv2.imencode(".png", values)
-    if not done:
-        raise SepiError(f"{path}: cannot be encoded as PNG")
-    path.write_bytes(data.tobytes())
