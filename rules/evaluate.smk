@@ -6,17 +6,17 @@ rule evaluate:
         maps="results/{dataset}/{scene}/stages/{path}/{stage}.h5",
     output:
         scores="results/{dataset}/{scene}/stages/{path}/{stage}.scores.h5",
-    wildcard_constraints:
-        stage="|".join(STAGES),
-    params:
-        code=lambda wildcards: code_digest("sepi.evaluate"),
     log:
         "logs/{dataset}/{scene}/{path}/{stage}.scores.log",
     benchmark:
         "benchmarks/{dataset}/{scene}/{path}/{stage}.scores.tsv"
+    wildcard_constraints:
+        stage="|".join(STAGES),
     threads: 1
     resources:
         mem_mb=memory_for(bytes_per_sample=4, bytes_per_pixel=200),
+    params:
+        code=lambda wildcards: code_digest("sepi.evaluate"),
     message:
         "{wildcards.dataset}/{wildcards.scene}: scores after {wildcards.stage} ({wildcards.path})"
     shell:

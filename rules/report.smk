@@ -31,18 +31,18 @@ rule table:
     output:
         data="reports/{table}.csv",
         page="reports/{table}.md",
-    wildcard_constraints:
-        table="|".join(TABLES),
-    params:
-        plan=PLAN.to_json(),
-        code=lambda wildcards: code_digest("sepi.report.tables"),
     log:
         "logs/{table}.log",
     benchmark:
         "benchmarks/{table}.tsv"
+    wildcard_constraints:
+        table="|".join(TABLES),
     threads: 1
     resources:
         mem_mb=500,
+    params:
+        plan=PLAN.to_json(),
+        code=lambda wildcards: code_digest("sepi.report.tables"),
     message:
         "table {wildcards.table}"
     shell:
@@ -56,9 +56,6 @@ rule maps:
         lambda wildcards: PLAN.map_inputs(wildcards.dataset, wildcards.scene),
     output:
         folder=directory("reports/maps/{dataset}/{scene}"),
-    params:
-        plan=plan_of_scene,
-        code=lambda wildcards: code_digest("sepi.report.figures"),
     log:
         "logs/{dataset}/{scene}/maps.log",
     benchmark:
@@ -66,6 +63,9 @@ rule maps:
     threads: 1
     resources:
         mem_mb=memory_for(bytes_per_sample=4, bytes_per_pixel=1000),
+    params:
+        plan=plan_of_scene,
+        code=lambda wildcards: code_digest("sepi.report.figures"),
     message:
         "{wildcards.dataset}/{wildcards.scene}: pictures"
     shell:

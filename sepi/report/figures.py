@@ -14,6 +14,7 @@ from sepi.command import SepiCommand
 from sepi.evaluate import WHOLE_MAP
 from sepi.io.files import atomic_path
 from sepi.io.hdf5 import read_light_field, read_stage
+from sepi.io.images import write_png
 from sepi.io.scores import Evaluation, read_evaluation
 from sepi.lightfield import LightField
 from sepi.report.pictures import (
@@ -25,7 +26,6 @@ from sepi.report.pictures import (
     map_picture,
     mask_picture,
     outline_picture,
-    write_png,
 )
 from sepi.report.plan import MAIN_VARIANT, Plan
 from sepi.stage import StageMaps
@@ -83,7 +83,7 @@ def error_panels(variant: str, evaluation: Evaluation) -> list[Panel]:
     if evaluation.error is None:
         return []
     mse = evaluation.scores["paper"][WHOLE_MAP]["mse100"]
-    title = f"{variant}: error ±{ERROR_LIMIT:g}, MSE x100 {mse:.2f}"
+    title = f"{variant}: error\n(±{ERROR_LIMIT:g}; MSE x100 {mse:.2f})"
     return [Panel(f"{variant}/error", title, error_picture(evaluation.error))]
 
 
@@ -92,7 +92,7 @@ def write_overview(path: Path, title: str, rows: Sequence[Sequence[Panel]]) -> N
     filled = [row for row in rows if row]
     columns = max(len(row) for row in filled)
     height, width = filled[0][0].picture.shape[:2]
-    panel_height = _PANEL * height / width + 0.3
+    panel_height = _PANEL * height / width + 0.4
     # no pyplot: its figures are global state
     figure = Figure(figsize=(_PANEL * columns, panel_height * len(filled) + 0.4), dpi=100, layout="constrained")
     FigureCanvasAgg(figure)

@@ -1,16 +1,13 @@
-"""From maps to pictures: arrays in, RGB arrays out, and their PNG files."""
+"""From maps to pictures: arrays in, RGB arrays out."""
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 import numpy.typing as npt
 from matplotlib import colormaps
 
-from sepi.io.files import atomic_path
 from sepi.lightfield import BoolMap, FloatMap, LightField
 
 Picture = npt.NDArray[np.uint8]
@@ -68,17 +65,3 @@ def outline_picture(centre: Picture, labels: npt.NDArray[np.integer[Any]]) -> Pi
     picture = centre.copy()
     picture[border] = _OUTLINE
     return picture
-
-
-def write_png(path: Path, picture: Picture) -> None:
-    """Write a picture as PNG, whole or not at all; equal pictures give equal bytes.
-
-    Raises
-    ------
-    SepiError
-        If the file cannot be written.
-    """
-    # OpenCV's order of channels is blue, green, red
-    _, encoded = cv2.imencode(".png", picture[:, :, ::-1], [cv2.IMWRITE_PNG_COMPRESSION, 6])
-    with atomic_path(path) as temporary:
-        temporary.write_bytes(encoded.tobytes())
