@@ -25,6 +25,7 @@ lint: $(READY)
 	$(BIN)/snakefmt --line-length 120 --check Snakefile rules
 
 clean:
+	find reports -mindepth 1 ! -name README.md -delete
 	rm -rf results logs benchmarks build *.egg-info .snakemake .pytest_cache .mypy_cache .ruff_cache .hypothesis
 
 # pinned versions, then the package itself in place; again only when one of these files changes
