@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import re
 from pathlib import Path
@@ -45,9 +46,9 @@ def main() -> None:
     """
 
 
-@main.command()
+@main.command(short_help="Compute the disparity map of the light field INPUT.")
 @click.argument("light_field_path", metavar="INPUT", type=_PATH)
-@click.option("-o", "--output", type=_PATH, help="Folder to write; INPUT's name with '-depth' unless given.")
+@click.option("-o", "--output", type=_PATH, help="Folder to write; ./NAME-depth after INPUT's name unless given.")
 @click.option("--variant", default="paper", show_default=True, help="Named choice of stages; see below.")
 @click.option(
     "--disparity-range",
@@ -91,7 +92,8 @@ def depth(
     steps = [
         step(stage, chosen.choices[stage], values) for stage, values in stage_parameters(chosen, parameters).items()
     ]
-    folder = output or Path(f"{light_field_path.resolve().stem}-depth")
+    whole = light_field_path.resolve()
+    folder = output or Path(f"{whole.name if whole.is_dir() else whole.stem}-depth")
     require_target(folder)
     light_field = settle_range(read_light_field(light_field_path), disparity_range)
     with progress_bar(light_field.name) as progress:
@@ -102,7 +104,7 @@ def depth(
     click.echo(f"written to {folder}/: {' '.join(RESULT_FILES)}")
 
 
-@main.command()
+@main.command(short_help="Score a disparity map against ground truth.")
 @click.argument("estimate", type=_PATH)
 @click.argument("truth", metavar="TRUTH|SCENE", type=_PATH)
 @click.option("--border", type=click.IntRange(min=0), help="Score with this many pixels left out on each side only.")
@@ -128,7 +130,7 @@ def evaluate(estimate: Path, truth: Path, border: int | None, as_json: bool) -> 
         click.echo(_table(scores))
 
 
-@main.command()
+@main.command(short_help="Show what is known about the light field INPUT.")
 @click.argument("light_field_path", metavar="INPUT", type=_PATH)
 def info(light_field_path: Path) -> None:
     """Show what is known about the light field INPUT, with an estimate of its disparity range."""
@@ -159,7 +161,7 @@ def info(light_field_path: Path) -> None:
         click.echo(f"{key + ':':17}{value}")
 
 
-@main.command()
+@main.command(short_help="Write built-in scenes with exact ground truth.")
 @click.argument("names", metavar="[NAME]...", nargs=-1)
 @click.option("-o", "--output", type=_PATH, default=Path("scenes"), show_default=True, help="Folder to write to.")
 @click.option("--size", type=click.IntRange(min=1), default=192, show_default=True, help="Pixels a side of a view.")
@@ -179,8 +181,9 @@ def scenes(names: tuple[str, ...], output: Path, size: int, views: int, only_lis
     from sepi.validation import require_known
 
     if only_list:
+        width = max(map(len, SCENES))
         for name, description in SCENES.items():
-            click.echo(f"{name:17}{description}")
+            click.echo(f"{name.ljust(width)}  {description}")
         return
     require_known("built-in scenes", names, SCENES)
     chosen = dict.fromkeys(names or SCENES)
@@ -238,11 +241,13 @@ def _read_map(path: Path) -> FloatMap:
     if path.suffix != ".npy":
         raise SepiError(f"{path}: expected a disparity map as .pfm, .h5 or .npy")
     try:
-        values = np.load(path)
+        with path.open("rb") as file:
+            # np.load also takes archives and pickles
+            values = np.lib.format.read_array(file, allow_pickle=False)
     except (OSError, ValueError, EOFError) as error:
-        raise SepiError(f"{path}: not a readable NumPy file ({error})") from error
+        raise SepiError(f"{path}: not a readable NumPy file ({' '.join(str(error).split())})") from error
     if values.ndim != 2 or values.dtype.kind not in "fiu":
-        raise SepiError(f"{path}: expected numbers of shape (H, W), got {values.dtype} of shape {values.shape}")
+        raise SepiError(f"{path}: expected an array of numbers of shape (H, W)")
     return np.asarray(values, np.float32)
 
 
@@ -284,10 +289,7 @@ def _table(scores: dict[str, dict[str, Scores]]) -> str:
     rows = [["protocol", "region", *heads.values()]]
     for protocol, regions in scores.items():
         for region, values in regions.items():
-            numbers = [values[key] for key in heads]
-            rows.append(
-                [protocol, region, *(f"{value:.3f}" if isinstance(value, float) else f"{value}" for value in numbers)]
-            )
+            rows.append([protocol, region, *(_cell(values[key]) for key in heads)])
     widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
     return "\n".join(
         "  ".join(
@@ -298,8 +300,15 @@ def _table(scores: dict[str, dict[str, Scores]]) -> str:
     )
 
 
+def _cell(value: float) -> str:
+    """A count as it is, a score with three decimals, a score over no pixels as a dash."""
+    if isinstance(value, int):
+        return f"{value}"
+    return "-" if math.isnan(value) else f"{value:.3f}"
+
+
 def _without_nan(value: Any) -> Any:
     """NaN, which JSON does not have, as null."""
     if isinstance(value, dict):
         return {key: _without_nan(inner) for key, inner in value.items()}
-    return None if value != value else value
+    return None if isinstance(value, float) and math.isnan(value) else value

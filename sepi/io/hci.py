@@ -121,13 +121,14 @@ def _numbered_views(folder: Path, grid: tuple[int, int] | None) -> tuple[list[Pa
 def _read_parameters(path: Path) -> _Parameters:
     parser = configparser.ConfigParser(interpolation=None)
     try:
-        parser.read_string(path.read_text(encoding="utf-8"))
+        parser.read_string(path.read_text(encoding="utf-8"), source=path.name)
     except OSError as error:
         raise SepiError(f"{path}: cannot be read ({error.strerror})") from error
     except UnicodeDecodeError as error:
         raise SepiError(f"{path}: not a text file") from error
     except configparser.Error as error:
-        raise SepiError(f"{path}: not of the form '[section]' and 'key = value' ({error.message})") from error
+        reason = " ".join(error.message.split())
+        raise SepiError(f"{path}: not of the form '[section]' and 'key = value' ({reason})") from error
     values = {key: value for section in parser.sections() for key, value in parser.items(section)}
     limits = _pair(path, values, "disp_min", "disp_max", float)
     if limits is not None and not (math.isfinite(limits[0]) and limits[0] < limits[1] < math.inf):
