@@ -65,6 +65,20 @@ def scene_of(wildcards):
     return SETTINGS.scene(wildcards.dataset, wildcards.scene)
 
 
+def ingest_source(wildcards):
+    """Where a scene comes from, as words for the ingest command."""
+    scene = scene_of(wildcards)
+    if scene.folder is None:
+        return ["--builtin", scene.name, "--size", str(scene.height)]
+    return [str(scene.folder)]
+
+
+def ingest_range(wildcards):
+    """The disparity range that the user set, as flags; none where the scene's own or an estimate serves."""
+    given = scene_of(wildcards).disparity_range
+    return [] if given is None else ["--disparity-range", *map(str, given)]
+
+
 def threads_for(wildcards):
     """Threads of a job: one for each 8 million samples, since small scenes gain more from jobs side by side."""
     return min(1 + scene_of(wildcards).samples // 8_000_000, 8)

@@ -1,21 +1,5 @@
-# Light fields: any format in, one HDF5 file out, with a disparity range and where that came from.
-
-
-def ingest_source(wildcards):
-    """Where a scene comes from, as words for the ingest command."""
-    scene = scene_of(wildcards)
-    if scene.folder is None:
-        return ["--builtin", scene.name, "--size", str(scene.height)]
-    return [str(scene.folder)]
-
-
-def ingest_range(wildcards):
-    """The disparity range that the user set, as flags; none where the scene's own or an estimate serves."""
-    given = scene_of(wildcards).disparity_range
-    return [] if given is None else ["--disparity-range", *map(str, given)]
-
-
-# A scene's views, range, ground truth and masks. Its pictures are the inputs: a changed or new one is read again.
+# Light fields: any format in, one HDF5 file out (views, disparity range and where that came from, ground truth, masks).
+# A scene's pictures are the inputs: a changed or new one is read again.
 rule ingest:
     input:
         files=lambda wildcards: scene_of(wildcards).files,
