@@ -6,6 +6,7 @@ import re
 import shutil
 import subprocess
 import sys
+import tomllib
 from collections.abc import Callable
 from pathlib import Path
 
@@ -13,6 +14,7 @@ import cv2
 import h5py
 import numpy as np
 import pytest
+import yaml
 from click.testing import CliRunner, Result
 
 import sepi
@@ -489,3 +491,25 @@ def test_ingest_reads_either_a_path_or_a_built_in_scene(tmp_path: Path, words: t
 def test_ingest_writes_nothing_on_bad_input(tmp_path: Path, words: tuple[str, ...]) -> None:
     error_of(ingested(*words, "--output", tmp_path / "lf.h5"))
     assert os.listdir(tmp_path) == []
+
+
+# --- what the project's front page promises
+
+
+def test_python_example_of_the_readme_runs(scene: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    scene.rename("moved")
+    Path("scenes").mkdir()
+    Path("moved").rename("scenes/pyramids")
+    readme = (Path(__file__).parents[1] / "README.md").read_text()
+    (example,) = re.findall(r"```python\n(.*?)```", readme, flags=re.DOTALL)
+    exec(compile(example, "README.md", "exec"), {})
+    assert capsys.readouterr().out.startswith("(64, 64) ")
+
+
+def test_citation_names_this_version() -> None:
+    root = Path(__file__).parents[1]
+    project = tomllib.loads((root / "pyproject.toml").read_text())["project"]
+    citation = yaml.safe_load((root / "CITATION.cff").read_text())
+    assert citation["version"] == project["version"]
+    assert citation["license"] == project["license"]
+    assert f"## {project['version']}" in (root / "CHANGELOG.md").read_text()
