@@ -49,7 +49,7 @@ def main() -> None:
 @main.command(short_help="Compute the disparity map of the light field INPUT.")
 @click.argument("light_field_path", metavar="INPUT", type=_PATH)
 @click.option("-o", "--output", type=_PATH, help="Folder to write; ./NAME-depth after INPUT's name unless given.")
-@click.option("--variant", default="paper", show_default=True, help="Named choice of stages; see below.")
+@click.option("--variant", default="paper", show_default=True, help="Named choice of stages; see above.")
 @click.option(
     "--disparity-range",
     nargs=2,
@@ -58,7 +58,13 @@ def main() -> None:
     help="Disparities to search, pixels per view step; the scene's own or an estimate unless given.",
 )
 @click.option("--threads", type=click.IntRange(min=1), help="Threads to use; one per core unless given.")
-@click.option("--set", "settings", multiple=True, metavar="KEY=VALUE", help="A parameter: STAGE.CHOICE.NAME=VALUE.")
+@click.option(
+    "--set",
+    "settings",
+    multiple=True,
+    metavar="KEY=VALUE",
+    help="Set a parameter, STAGE.CHOICE.NAME=VALUE; repeatable. config.yaml lists them.",
+)
 def depth(
     light_field_path: Path,
     output: Path | None,
