@@ -1,33 +1,66 @@
-"""Initial depth (preliminary)."""
+"""Initial depth (section IV-A, Eq. 1-5 of [1]_).
+
+``sepi`` takes, for every pixel of the centre view, the candidate whose line through the SEPI has the least colour
+variance (Eq. 3-4), and its distinctness as confidence (Eq. 5). The line meets one sample of each view, so this is a plane
+sweep (:mod:`sepi.sweep`); the construction itself is in :mod:`sepi.epi`.
+
+``structure_tensor`` is the initial depth that the paper's ablation puts in its place (:mod:`sepi.structure_tensor`).
+
+References
+----------
+.. [1] Zhou, Shi, Liu, Jin, Zhang, Hou: Light Field Depth Estimation via Stitched Epipolar Plane Images.
+"""
 
 from __future__ import annotations
 
-import numpy as np
-from pydantic import Field
-
 from sepi.command import stage_command
 from sepi.lightfield import LightField
-from sepi.stage import Choice, Parameters, Progress, StageMaps
+from sepi.stage import Choice, Progress, StageMaps
+from sepi.structure_tensor import StructureTensorParameters, structure_tensor_depth
+from sepi.sweep import SweepParameters, sweep
 
 
-class SepiParameters(Parameters):
-    """Parameters of the SEPI plane sweep."""
+def sepi(
+    light_field: LightField, previous: StageMaps | None, parameters: SweepParameters, progress: Progress
+) -> StageMaps:
+    """Depth from full SEPIs: all views, every candidate (Eq. 1-5).
 
-    candidates: int = Field(181, ge=3, le=4001, description="number of candidate disparities")
+    Parameters
+    ----------
+    light_field : LightField
+        With a known disparity range.
+    previous : None
+        The first stage builds on nothing.
+    parameters : SweepParameters
+    progress : callable
+
+    Returns
+    -------
+    StageMaps
+        ``disparity`` and ``confidence``, shape (H, W), float32.
+
+    Raises
+    ------
+    SepiError
+        If the disparity range is unknown.
+    """
+    result = sweep(light_field, parameters, progress=progress)
+    return StageMaps(result.disparity[0], result.confidence()[0])
 
 
-class StructureTensorParameters(Parameters):
-    """Parameters of the structure tensor."""
+def structure_tensor(
+    light_field: LightField, previous: StageMaps | None, parameters: StructureTensorParameters, progress: Progress
+) -> StageMaps:
+    """Depth from the structure tensor of single EPIs, for the ablation; arguments and result as for ``sepi``."""
+    disparity, confidence = structure_tensor_depth(light_field, parameters)
+    progress(1.0)
+    return StageMaps(disparity, confidence)
 
 
-def sepi(light_field: LightField, previous: StageMaps | None, parameters: SepiParameters, progress: Progress) -> StageMaps:
-    """Preliminary."""
-    known = light_field.known_range()
-    disparity = np.full(light_field.shape, (known.minimum + known.maximum) / 2, np.float32)
-    return StageMaps(disparity, np.ones_like(disparity))
-
-
-CHOICES = {"sepi": Choice(SepiParameters, sepi), "structure_tensor": Choice(StructureTensorParameters, sepi)}
+CHOICES = {
+    "sepi": Choice(SweepParameters, sepi),
+    "structure_tensor": Choice(StructureTensorParameters, structure_tensor),
+}
 
 if __name__ == "__main__":
     stage_command("initial", CHOICES)()

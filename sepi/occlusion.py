@@ -1,19 +1,232 @@
-"""Stage occlusion (preliminary)."""
+"""Depth at occlusions (section IV-B of [1]_).
+
+A pixel next to a nearer surface is hidden from the views on that surface's side, and the line through its full SEPI
+crosses the occluder. ``half_sepi`` repeats the slope computation with the views of one half, or of two halves at once:
+
+1. candidates: pixels near Canny edges of the centre view and near steps of the initial depth;
+2. mean shift on the patch of image and depth gives the surface that each pixel belongs to;
+3. side: by geometry the half away from the nearer surface is kept. (With positive disparity nearer, a nearer surface on
+   the right hides the pixel from the views on the right, so the left half is kept. The paper's sentence says the reverse.)
+4. half-SEPI depth and its confidence replace the full ones where they explain the views clearly better.
+
+``wang`` is the occlusion model of [2]_, which the paper's text compares with: the angular patch is split along the edge
+orientation, and the half with the smaller cost is kept. ``none`` hands the initial depth on.
+
+References
+----------
+.. [1] Zhou, Shi, Liu, Jin, Zhang, Hou: Light Field Depth Estimation via Stitched Epipolar Plane Images.
+.. [2] Wang, Efros, Ramamoorthi: Occlusion-aware depth estimation using light-field cameras. ICCV 2015.
+   doi:10.1109/ICCV.2015.398
+"""
 
 from __future__ import annotations
 
+import cv2
+import numpy as np
+import numpy.typing as npt
+from pydantic import Field
+
 from sepi.command import stage_command
-from sepi.lightfield import LightField
-from sepi.stage import Choice, NoParameters, Parameters, Progress, StageMaps
+from sepi.edges import CannyParameters, canny_edges, depth_steps, edge_angle
+from sepi.lightfield import BoolMap, FloatMap, LightField
+from sepi.mean_shift import patch_modes
+from sepi.stage import Choice, NoParameters, Progress, StageMaps, given
+from sepi.sweep import SweepParameters, SweepResult, sweep
+from sepi.view_groups import SIDES, half_planes, halves_and_quarters
 
 
-def none(light_field: LightField, previous: StageMaps | None, parameters: Parameters, progress: Progress) -> StageMaps:
-    """Preliminary."""
-    assert previous is not None
-    return previous
+class OcclusionParameters(SweepParameters, CannyParameters):
+    """What both occlusion models need: candidates, and when a half replaces the full SEPI."""
+
+    depth_step: float = Field(
+        0.3, gt=0, description="step of the initial depth that makes a candidate, pixels per view step"
+    )
+    candidate_reach: int = Field(8, ge=0, le=50, description="distance from an edge within which pixels are candidates, px")
+    gain_half: float = Field(0.03, ge=0, le=1, description="by how much a half must lower the mean cost (0..1)")
+    gain_quarter: float = Field(0.06, ge=0, le=1, description="by how much a quarter must lower the mean cost (0..1)")
+    min_change: float = Field(
+        0.1, ge=0, description="smaller changes keep the depth from all views, pixels per view step"
+    )
 
 
-CHOICES = {"half_sepi": Choice(NoParameters, none), "wang": Choice(NoParameters, none), "none": Choice(NoParameters, none)}
+class HalfSepiParameters(OcclusionParameters):
+    """Parameters of the half-SEPI."""
+
+    patch_radius: int = Field(4, ge=1, le=20, description="mean-shift patch of 2 r + 1 pixels")
+    patch_sigma_colour: float = Field(0.05, gt=0, description="mean-shift bandwidth, RGB distance, colours in 0..1")
+    patch_sigma_disparity: float = Field(0.3, gt=0, description="mean-shift bandwidth, pixels per view step")
+    side_reach: int = Field(8, ge=1, le=50, description="how far away the nearer surface is looked for, pixels")
+    side_step: float = Field(
+        0.1, ge=0, description="by how much the occluder must be nearer, pixels per view step"
+    )
+    gain_unconfirmed: float = Field(
+        0.03, ge=0, le=2, description="further gain asked for where no nearer surface is found on the hidden side"
+    )
+
+
+class WangParameters(OcclusionParameters):
+    """Parameters of the angular-patch split."""
+
+    directions: int = Field(8, ge=2, le=32, multiple_of=2, description="edge orientations over half a turn")
+
+
+def half_sepi(
+    light_field: LightField, previous: StageMaps | None, parameters: HalfSepiParameters, progress: Progress
+) -> StageMaps:
+    """Depth from half-SEPIs at occluded pixels.
+
+    Parameters
+    ----------
+    light_field : LightField
+        With a known disparity range.
+    previous : StageMaps
+        Initial depth.
+    parameters : HalfSepiParameters
+    progress : callable
+
+    Returns
+    -------
+    StageMaps
+        Adds ``occlusion_candidates`` and ``occluded``, bool, and ``occlusion_side``, uint8, the subset kept:
+        0 all views, 1-4 left, right, up, down half, 5-8 left-up, left-down, right-up, right-down quarter.
+    """
+    before = given(previous)
+    candidates = occlusion_candidates(light_field.centre, before.disparity, parameters)
+    views = halves_and_quarters(light_field.grid)
+    result = sweep(
+        light_field, parameters, groups=views.groups, subsets=views.subsets, wanted=candidates, progress=progress
+    )
+    surface = patch_modes(
+        light_field.centre,
+        before.disparity,
+        cv2.dilate(candidates.astype(np.uint8), _box(parameters.side_reach)) > 0,
+        radius=parameters.patch_radius,
+        sigma_colour=parameters.patch_sigma_colour,
+        sigma_disparity=parameters.patch_sigma_disparity,
+    )
+    cost = result.cost.copy()
+    for n, name in enumerate(views.names[1:], start=1):
+        sides = name.split("-")
+        nearer = nearer_on_hidden_side(surface, result.disparity[n], sides, parameters.side_reach, parameters.side_step)
+        cost[n] += parameters.gain_half if len(sides) == 1 else parameters.gain_quarter
+        cost[n] += np.where(nearer, 0, parameters.gain_unconfirmed).astype(np.float32)
+    return refined(before, result, cost, candidates, parameters.min_change)
+
+
+def wang(
+    light_field: LightField, previous: StageMaps | None, parameters: WangParameters, progress: Progress
+) -> StageMaps:
+    """Depth from the half of the angular patch, split along the edge, with the smaller cost.
+
+    Arguments and result as for ``half_sepi``; ``occlusion_side`` is the half plane's number, 0 where all views count.
+    """
+    before = given(previous)
+    candidates = occlusion_candidates(light_field.centre, before.disparity, parameters)
+    views = half_planes(light_field.grid, parameters.directions)
+    result = sweep(
+        light_field, parameters, groups=views.groups, subsets=views.subsets, wanted=candidates, progress=progress
+    )
+    # the two halves beside the edge have the edge's normal, and its reverse, as their middle
+    normal = edge_angle(light_field.centre, parameters)
+    first = np.floor(normal / np.pi * parameters.directions).astype(np.int64) % (2 * parameters.directions)
+    number = np.arange(2 * parameters.directions)[:, None, None]
+    beside = (number - first[None]) % parameters.directions == 0
+    cost = result.cost.copy()
+    cost[1:] = np.where(beside, cost[1:] + parameters.gain_half, np.inf)
+    return refined(before, result, cost, candidates, parameters.min_change)
+
+
+def none(
+    light_field: LightField, previous: StageMaps | None, parameters: NoParameters, progress: Progress
+) -> StageMaps:
+    """Initial depth as it is."""
+    return given(previous)
+
+
+def occlusion_candidates(centre: FloatMap, disparity: FloatMap, parameters: OcclusionParameters) -> BoolMap:
+    """Pixels within reach of an edge of the centre view or of a step of the depth map; shape (H, W), bool."""
+    edges = canny_edges(centre, parameters) | depth_steps(disparity, parameters.depth_step)
+    return np.asarray(cv2.dilate(edges.astype(np.uint8), _box(parameters.candidate_reach)) > 0)
+
+
+def nearer_on_hidden_side(
+    surface: FloatMap, disparity: FloatMap, sides: list[str], reach: int, step: float
+) -> BoolMap:
+    """Whether a nearer surface lies where it would hide the pixel from the views that are left out.
+
+    Parameters
+    ----------
+    surface : ndarray, shape (H, W), float32
+        Disparity of the surfaces.
+    disparity : ndarray, shape (H, W), float32
+        Disparity of the pixels by the views that are kept.
+    sides : list of str
+        The half that is kept, or the two whose overlap is; one hidden side is enough.
+    reach : int
+        Pixels.
+    step : float
+        By how much nearer, pixels per view step.
+
+    Returns
+    -------
+    ndarray, shape (H, W), bool
+    """
+    nearest = np.full(surface.shape, -np.inf, np.float32)
+    H, W = surface.shape
+    for side in sides:
+        dt, ds = SIDES[side]
+        for distance in range(1, reach + 1):
+            # the views kept lie towards (dt, ds), so the occluder lies the other way
+            dy, dx = -dt * distance, -ds * distance
+            here = np.s_[max(0, -dy) : H - max(0, dy), max(0, -dx) : W - max(0, dx)]
+            there = np.s_[max(0, dy) : H - max(0, -dy), max(0, dx) : W - max(0, -dx)]
+            np.maximum(nearest[here], surface[there], out=nearest[here])
+    return nearest > disparity + step
+
+
+def refined(
+    before: StageMaps, result: SweepResult, cost: npt.NDArray[np.float32], candidates: BoolMap, min_change: float
+) -> StageMaps:
+    """Initial maps with the depth and confidence of the subset of least cost where that is not all views.
+
+    Parameters
+    ----------
+    before : StageMaps
+    result : SweepResult
+        Subset 0 is all views.
+    cost : ndarray, shape (N, H, W), float32
+        Costs to choose by.
+    candidates : ndarray, shape (H, W), bool
+    min_change : float
+        Smaller changes of disparity keep the depth from all views.
+
+    Returns
+    -------
+    StageMaps
+    """
+    side = np.where(candidates, np.argmin(np.nan_to_num(cost, nan=np.inf), axis=0), 0)
+    chosen = np.take_along_axis(result.disparity, side[None], axis=0)[0]
+    confidence = np.take_along_axis(result.confidence(), side[None], axis=0)[0]
+    occluded = side > 0
+    changed = occluded & (np.abs(chosen - before.disparity) > min_change)
+    return before.updated(
+        np.where(changed, chosen, before.disparity),
+        np.where(occluded, confidence, before.confidence),
+        occlusion_candidates=candidates,
+        occluded=occluded,
+        occlusion_side=side.astype(np.uint8),
+    )
+
+
+def _box(radius: int) -> npt.NDArray[np.uint8]:
+    return np.ones((2 * radius + 1, 2 * radius + 1), np.uint8)
+
+
+CHOICES = {
+    "half_sepi": Choice(HalfSepiParameters, half_sepi),
+    "wang": Choice(WangParameters, wang),
+    "none": Choice(NoParameters, none),
+}
 
 if __name__ == "__main__":
     stage_command("occlusion", CHOICES)()

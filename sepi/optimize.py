@@ -1,19 +1,146 @@
-"""Stage optimize (preliminary)."""
+"""Global optimisation (section IV-D, Eq. 8-12 of [1]_).
+
+``wls`` minimises the weighted least squares energy of Eq. 8: fidelity to the refined depth where it deserves it (Eq. 9-10:
+the confidences of occluded, texture-less and other pixels, nothing where the depth changes abruptly), and smoothness on
+the 4-connected grid where the image is smooth (Eq. 11) and the depth uncertain (Eq. 12). ``none`` hands the depth on.
+
+References
+----------
+.. [1] Zhou, Shi, Liu, Jin, Zhang, Hou: Light Field Depth Estimation via Stitched Epipolar Plane Images.
+.. [2] Olson, Schroder: PyAMG: algebraic multigrid solvers in Python v4.0. 2018.
+"""
 
 from __future__ import annotations
 
+import cv2
+import numpy as np
+import numpy.typing as npt
+import pyamg
+import scipy.sparse as sparse
+from pydantic import Field
+
 from sepi.command import stage_command
-from sepi.lightfield import LightField
-from sepi.stage import Choice, NoParameters, Parameters, Progress, StageMaps
+from sepi.lightfield import FloatMap, LightField
+from sepi.stage import Choice, NoParameters, Parameters, Progress, StageMaps, given, relative_confidence
+
+FloatArray = npt.NDArray[np.float64]
+
+LEAST_CONFIDENCE = 0.01
+"""Keeps the system solvable where no pixel is trusted."""
+
+class WlsParameters(Parameters):
+    """Parameters of the weighted least squares."""
+
+    alpha: float = Field(1e-6, ge=0, description="weight of smoothness against data; for gradients of values 0..1 per px")
+    gradient_floor: float = Field(0.002, gt=0, description="image gradient below which all is equally smooth, 0..1 per px")
+    tau_0: float = Field(1000.0, ge=0, description="how sharply the data weight falls beyond tau_1")
+    tau_1: float = Field(0.2, ge=0, description="standard deviation of the depth in 3x3 pixels that marks a step, px per step")
+    step_weight: float = Field(
+        0.1, gt=0, le=1, description="share of its weight that the data keeps at a step, where Eq. 9 would leave none"
+    )
+    tau_2: float = Field(1.5, ge=0, description="how strongly confidence weakens smoothness")
+    textureless_confidence: float = Field(0.8, ge=0, le=1, description="c_tl, confidence of texture-less regions")
+    confidence_power: float = Field(4.0, gt=0, le=10, description="exponent on the confidence as data weight")
+    accuracy: float = Field(1e-8, gt=0, lt=1, description="relative residual at which the solver stops")
 
 
-def none(light_field: LightField, previous: StageMaps | None, parameters: Parameters, progress: Progress) -> StageMaps:
-    """Preliminary."""
-    assert previous is not None
-    return previous
+def wls(
+    light_field: LightField, previous: StageMaps | None, parameters: WlsParameters, progress: Progress
+) -> StageMaps:
+    """Globally optimised depth.
+
+    Parameters
+    ----------
+    light_field : LightField
+    previous : StageMaps
+        Depth after the texture-less stage, with the maps ``textureless`` and ``occluded`` where those stages ran.
+    parameters : WlsParameters
+    progress : callable
+
+    Returns
+    -------
+    StageMaps
+        ``confidence`` is the rectified confidence c' of Eq. 10.
+    """
+    before = given(previous)
+    confidence = rectified_confidence(before, parameters)
+    weight = data_weight(before.disparity, confidence, parameters)
+    smoothness = smoothness_coefficient(light_field.centre, confidence, parameters)
+    progress(0.1)
+    matrix, right = energy_system(before.disparity, weight, smoothness, parameters.alpha)
+    disparity = solve(matrix, right, before.disparity, parameters.accuracy)
+    return before.updated(disparity.astype(np.float32), confidence)
 
 
-CHOICES = {"wls": Choice(NoParameters, none), "none": Choice(NoParameters, none)}
+def none(
+    light_field: LightField, previous: StageMaps | None, parameters: NoParameters, progress: Progress
+) -> StageMaps:
+    """Depth after the texture-less stage as it is."""
+    return given(previous)
+
+
+def rectified_confidence(before: StageMaps, parameters: WlsParameters) -> FloatMap:
+    """c' of Eq. 10: of texture-less pixels a constant, else the stage's own (half-SEPI confidence where occluded)."""
+    own = relative_confidence(before.confidence)
+    return np.where(before.mask("textureless"), parameters.textureless_confidence, own).astype(np.float32)
+
+
+def data_weight(disparity: FloatMap, confidence: FloatMap, parameters: WlsParameters) -> FloatMap:
+    """w of Eq. 9: the confidence, or next to nothing where the depth's standard deviation in 3x3 pixels marks a step."""
+    mean = cv2.blur(disparity, (3, 3))
+    deviation = np.sqrt(np.maximum(cv2.blur((disparity - mean) ** 2, (3, 3)), 0))
+    cut = np.exp(-np.minimum(parameters.tau_0 * np.maximum(deviation - parameters.tau_1, 0), 80))
+    trust = np.maximum(confidence, LEAST_CONFIDENCE) ** parameters.confidence_power
+    return (trust * np.maximum(cut, parameters.step_weight)).astype(np.float32)
+
+
+def smoothness_coefficient(centre: FloatMap, confidence: FloatMap, parameters: WlsParameters) -> FloatMap:
+    """s = s_c s_t of Eq. 11-12; shape (H, W), float32."""
+    dx, dy = (cv2.Sobel(centre, cv2.CV_32F, *order, ksize=3, scale=1 / 8) for order in ((1, 0), (0, 1)))
+    squared = (np.atleast_3d(dx) ** 2 + np.atleast_3d(dy) ** 2).sum(axis=2)
+    return np.asarray(
+        np.exp(-parameters.tau_2 * confidence) / (squared + parameters.gradient_floor**2), np.float32
+    )
+
+
+def energy_system(
+    disparity: FloatMap, weight: FloatMap, smoothness: FloatMap, alpha: float
+) -> tuple[sparse.csr_matrix, FloatArray]:
+    """Normal equations of Eq. 8 on the 4-connected grid.
+
+    Each pair of neighbours stands twice in the sum, once with the coefficient of either pixel.
+
+    Returns
+    -------
+    matrix : sparse matrix, shape (H * W, H * W), float64
+        Symmetric, positive definite.
+    right : ndarray, shape (H * W,), float64
+    """
+    H, W = disparity.shape
+    index = np.arange(H * W).reshape(H, W)
+    s = alpha * smoothness.astype(np.float64)
+    first = np.concatenate([index[:, :-1].ravel(), index[:-1].ravel()])
+    second = np.concatenate([index[:, 1:].ravel(), index[1:].ravel()])
+    pair = np.concatenate([(s[:, :-1] + s[:, 1:]).ravel(), (s[:-1] + s[1:]).ravel()])
+    w = weight.astype(np.float64).ravel()
+    off = sparse.coo_matrix((-pair, (first, second)), shape=(H * W, H * W))
+    off = (off + off.T).tocsr()
+    diagonal = w - np.asarray(off.sum(axis=1)).ravel()
+    return (off + sparse.diags(diagonal)).tocsr(), w * disparity.ravel()
+
+
+def solve(matrix: sparse.csr_matrix, right: FloatArray, start: FloatMap, accuracy: float) -> FloatArray:
+    """Solve by conjugate gradients preconditioned with algebraic multigrid; shape of ``start``, float64.
+
+    Plain iterative solvers stop early on pixels of low weight, which the residual hardly sees; multigrid carries
+    information across them.
+    """
+    hierarchy = pyamg.ruge_stuben_solver(matrix)
+    solution = hierarchy.solve(right, x0=start.astype(np.float64).ravel(), tol=accuracy, accel="cg", maxiter=100)
+    return np.asarray(solution).reshape(start.shape)
+
+
+CHOICES = {"wls": Choice(WlsParameters, wls), "none": Choice(NoParameters, none)}
 
 if __name__ == "__main__":
     stage_command("optimize", CHOICES)()

@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import BaseModel, ConfigDict
 
+from sepi.errors import SepiError
 from sepi.lightfield import BoolMap, FloatMap, LightField
 
 Progress = Callable[[float], None]
@@ -85,3 +86,24 @@ class Choice:
 
     parameters: type[Parameters]
     run: StageFunction
+
+
+def given(previous: StageMaps | None) -> StageMaps:
+    """The maps of the stage before, for a stage that cannot be the first.
+
+    Raises
+    ------
+    SepiError
+        If there are none.
+    """
+    if previous is None:
+        raise SepiError("this stage refines a depth map: the maps of the stage before it are missing")
+    return previous
+
+
+def relative_confidence(confidence: FloatMap) -> FloatMap:
+    """Confidence relative to the scene's best (its 95th percentile), 0..1: noise lowers the confidence of all pixels."""
+    best = float(np.percentile(confidence, 95))
+    if best <= 0:
+        return np.zeros_like(confidence)
+    return np.clip(confidence / np.float32(best), 0, 1)

@@ -1,19 +1,213 @@
-"""Stage textureless (preliminary)."""
+"""Depth of texture-less regions (section IV-C, Eq. 6-7 of [1]_).
+
+``lti`` finds the superpixels that hold too little texture for a slope and gives them the depth that propagates, linearly,
+from the reliable edges of their neighbourhood:
+
+1. SLIC superpixels; texture points are Canny edges and pixels whose slope is distinct;
+2. local texture information, the share of texture points (Eq. 6); its threshold adapts to the scene: it lies where the
+   sorted LTI rises fastest;
+3. a robust plane for each superpixel; those with texture are held, the others are free;
+4. the coupled energy of data and continuity (Eq. 7), with the HSV mean-shift cue for which neighbours belong together;
+5. a plane smooths the depth it fits, but overrules only depth without support: neither distinct nor in agreement with its
+   neighbourhood (noise lowers the confidence of good depth too, but does not make it disagree).
+
+``none`` hands the depth on.
+
+References
+----------
+.. [1] Zhou, Shi, Liu, Jin, Zhang, Hou: Light Field Depth Estimation via Stitched Epipolar Plane Images.
+"""
 
 from __future__ import annotations
 
+import numpy as np
+from pydantic import Field
+
 from sepi.command import stage_command
-from sepi.lightfield import LightField
-from sepi.stage import Choice, NoParameters, Parameters, Progress, StageMaps
+from sepi.edges import CannyParameters, canny_edges
+from sepi.lightfield import BoolMap, FloatMap, LightField
+from sepi.planes import Coupling, basis, evaluate_planes, fit_planes, propagate
+from sepi.stage import Choice, NoParameters, Progress, StageMaps, given, relative_confidence
+from sepi.superpixels import FloatArray, Superpixels, borders, colour_modes, superpixels
 
 
-def none(light_field: LightField, previous: StageMaps | None, parameters: Parameters, progress: Progress) -> StageMaps:
-    """Preliminary."""
-    assert previous is not None
-    return previous
+class LtiParameters(CannyParameters):
+    """Parameters of the refinement by local texture information."""
+
+    superpixel_size: int = Field(15, ge=4, le=100, description="superpixel width up to 512x512 pixels, in pixels")
+    superpixel_size_large: int = Field(17, ge=4, le=100, description="superpixel width above 512x512 pixels, in pixels")
+    compactness: float = Field(10.0, gt=0, description="SLIC: weight of nearness against likeness of colour")
+    texture_confidence: float = Field(
+        0.8, ge=0, le=1, description="confidence from which a slope is distinct, relative to the scene's best"
+    )
+    texture_agreement: float = Field(
+        0.9, ge=0, le=1, description="share of agreeing neighbours from which a slope is taken for sound"
+    )
+    min_support: float = Field(
+        0.25, ge=0, le=1, description="share of texture points and agreeing slopes from which a superpixel is not overruled"
+    )
+    agreement_radius: int = Field(3, ge=1, le=10, description="neighbourhood of 2 r + 1 pixels")
+    agreement_difference: float = Field(
+        0.15, gt=0, description="difference up to which neighbours agree, pixels per view step"
+    )
+    lti_floor: float = Field(0.1, ge=0, le=1, description="least threshold of the LTI, share of texture points")
+    lti_ceiling: float = Field(0.4, ge=0, le=1, description="greatest threshold of the LTI, share of texture points")
+    colour_bandwidth: float = Field(0.03, gt=0, description="mean-shift bandwidth in the HSV cone of radius 1, height 1")
+    continuity: float = Field(0.3, ge=0, description="tau_out, weight of continuity between neighbours")
+    slope_continuity: float = Field(10.0, ge=0, description="weight of equal slopes against equal depth at the border")
+    tolerance: float = Field(0.05, gt=0, description="residual of an inlier, pixels per view step")
+    keep_confidence: float = Field(
+        0.7, ge=0, le=1, description="relative confidence from which a pixel's own depth resists a plane"
+    )
+    keep_share: float = Field(0.3, ge=0, le=1, description="share of resisting pixels that refuses a superpixel's plane")
 
 
-CHOICES = {"lti": Choice(NoParameters, none), "none": Choice(NoParameters, none)}
+def lti(
+    light_field: LightField, previous: StageMaps | None, parameters: LtiParameters, progress: Progress
+) -> StageMaps:
+    """Depth propagated into texture-less superpixels.
+
+    Parameters
+    ----------
+    light_field : LightField
+    previous : StageMaps
+        Depth after the occlusion stage.
+    parameters : LtiParameters
+    progress : callable
+
+    Returns
+    -------
+    StageMaps
+        Adds ``superpixels``, int32 labels; ``lti``, float32, of each pixel's superpixel; ``textureless``, bool, the
+        pixels whose depth was replaced.
+    """
+    before = given(previous)
+    confidence = relative_confidence(before.confidence)
+    segments = superpixels(light_field.centre, superpixel_size(light_field.shape, parameters), parameters.compactness)
+    progress(0.3)
+    agreement = slope_agreement(before.disparity, parameters.agreement_radius, parameters.agreement_difference)
+    agrees = agreement > parameters.texture_agreement
+    texture = canny_edges(light_field.centre, parameters) | (confidence > parameters.texture_confidence)
+    information = local_texture_information(segments, texture)
+    free = information < lti_threshold(information, parameters.lti_floor, parameters.lti_ceiling)
+    # doubtful depth is common here, so trust rises steeply with confidence
+    weight = confidence**4 * agreement**2
+    plane = propagated(light_field.centre, segments, free, before.disparity, weight, parameters)
+    progress(0.9)
+    unsupported = local_texture_information(segments, texture | agrees) < parameters.min_support
+    # a plane may smooth any depth, but overrule only what is neither distinct nor in agreement with its neighbours
+    overruled = np.abs(plane - before.disparity) > parameters.agreement_difference
+    resists = overruled & ((confidence > parameters.keep_confidence) | agrees | ~unsupported[segments.labels])
+    replaced = accepted(segments, free, resists, parameters.keep_share)
+    return before.updated(
+        np.where(replaced, plane, before.disparity),
+        before.confidence,
+        superpixels=segments.labels.astype(np.int32),
+        lti=information[segments.labels].astype(np.float32),
+        textureless=replaced,
+    )
+
+
+def none(
+    light_field: LightField, previous: StageMaps | None, parameters: NoParameters, progress: Progress
+) -> StageMaps:
+    """Depth after the occlusion stage as it is."""
+    return given(previous)
+
+
+def superpixel_size(shape: tuple[int, int], parameters: LtiParameters) -> int:
+    """Width of a superpixel for images of this height and width, pixels."""
+    return parameters.superpixel_size if shape[0] * shape[1] <= 512 * 512 else parameters.superpixel_size_large
+
+
+def slope_agreement(disparity: FloatMap, radius: int, difference: float) -> FloatMap:
+    """Share of a pixel's neighbours whose slope agrees with its own: noise in place of slopes does not agree.
+
+    Parameters
+    ----------
+    disparity : ndarray, shape (H, W), float32
+    radius : int
+        The neighbourhood is ``2 radius + 1`` pixels wide and high.
+    difference : float
+        Pixels per view step up to which two slopes agree.
+
+    Returns
+    -------
+    ndarray, shape (H, W), float32
+        0..1.
+    """
+    H, W = disparity.shape
+    size = 2 * radius + 1
+    padded = np.pad(disparity, radius, constant_values=np.nan)
+    agreeing = np.zeros((H, W), np.float32)
+    for dy in range(size):
+        for dx in range(size):
+            agreeing += np.abs(padded[dy : dy + H, dx : dx + W] - disparity) < difference
+    rows, columns = (
+        np.minimum(np.arange(n) + radius, n - 1) - np.maximum(np.arange(n) - radius, 0) + 1 for n in (H, W)
+    )
+    return np.asarray(agreeing / (rows[:, None] * columns), np.float32)
+
+
+def local_texture_information(segments: Superpixels, texture: BoolMap) -> FloatArray:
+    """Share of each superpixel's pixels that are texture points and not on its edge (Eq. 6); shape (N,), 0..1."""
+    return segments.means(texture & segments.interior())
+
+
+def lti_threshold(information: FloatArray, floor: float, ceiling: float) -> float:
+    """Adaptive threshold: the LTI at which the first-order difference of the sorted LTI is greatest.
+
+    Between superpixels without texture and superpixels with texture there are few, so the sorted LTI rises fastest there.
+    Differences are taken over a run of superpixels (3 %), since single ones are mostly zero or one pixel's worth.
+
+    Parameters
+    ----------
+    information : ndarray, shape (N,), float
+    floor, ceiling : float
+        Bounds of the threshold.
+
+    Returns
+    -------
+    float
+    """
+    ordered = np.sort(information)
+    run = max(1, round(0.03 * len(ordered)))
+    rise = ordered[run:] - ordered[:-run]
+    middle = 0.5 * (ordered[run:] + ordered[:-run])
+    inside = (middle >= floor) & (middle <= ceiling)
+    if not inside.any():
+        return floor if ordered[len(ordered) // 2] > ceiling else ceiling
+    return float(middle[inside][np.argmax(rise[inside])])
+
+
+def propagated(
+    centre: FloatMap,
+    segments: Superpixels,
+    free: BoolMap,
+    disparity: FloatMap,
+    weight: FloatMap,
+    parameters: LtiParameters,
+) -> FloatMap:
+    """Disparity of every pixel by the plane of its superpixel, after propagation; shape (H, W), float32."""
+    design = basis(segments)
+    planes = fit_planes(segments, disparity, weight, design, parameters.tolerance)
+    touching = borders(segments)
+    modes = colour_modes(centre, segments, parameters.colour_bandwidth)
+    apart = ((modes[touching.first] - modes[touching.second]) ** 2).sum(axis=1)
+    likeness = np.exp(-0.5 * apart / parameters.colour_bandwidth**2)
+    coupling = Coupling(parameters.continuity, parameters.slope_continuity, parameters.tolerance)
+    if free.any():
+        planes = propagate(segments, touching, likeness, planes, free, disparity, weight, design, coupling)
+    return evaluate_planes(segments, planes, design)
+
+
+def accepted(segments: Superpixels, free: BoolMap, resists: BoolMap, keep_share: float) -> BoolMap:
+    """Pixels that take the plane's depth: not those with a good depth of their own, nor where too many of them object."""
+    taken = free & (segments.means(resists) < keep_share)
+    return np.asarray(taken[segments.labels] & ~resists)
+
+
+CHOICES = {"lti": Choice(LtiParameters, lti), "none": Choice(NoParameters, none)}
 
 if __name__ == "__main__":
     stage_command("textureless", CHOICES)()
