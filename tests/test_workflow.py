@@ -101,11 +101,11 @@ def copy_of_the_project(folder: Path) -> Path:
 def workflow(tmp_path_factory: pytest.TempPathFactory) -> Workflow:
     """The workflow on a built-in scene and on a folder of pictures without parameters and ground truth, not yet run."""
     root = tmp_path_factory.mktemp("workflow")
-    scene = root / "scenes" / "training" / "box"
+    scene = root / "my scenes" / "training" / "box"
     write_hci(render("curved_occluders", size=SIZE, views=5), scene)
     for name in ("parameters.cfg", "gt_disp_lowres.pfm", *(path.name for path in scene.glob("mask_*"))):
         (scene / name).unlink()
-    return Workflow(copy_of_the_project(root / "tree"), root / "fresh", TINY | {"hci_root": str(root / "scenes")})
+    return Workflow(copy_of_the_project(root / "tree"), root / "fresh", TINY | {"hci_root": str(root / "my scenes")})
 
 
 @pytest.fixture(scope="module")
