@@ -1,9 +1,9 @@
 """Find the disparity range of a scene from its views alone.
 
 A coarse plane sweep over far more disparities than a scene has, with few views; then the extremes of the disparities
-that can be trusted: pixels with contrast, a low and unambiguous cost, and neighbours that agree. A range that is a bit
-too wide costs little; one that leaves out the nearest or farthest surface spoils that surface, so the choices below
-lean to the wide side.
+that can be trusted: pixels whose best match is unambiguous and whose neighbours agree. A range that is a bit too wide
+costs little; one that leaves out the nearest or farthest surface spoils that surface, so the choices below lean to the
+wide side.
 """
 
 from __future__ import annotations
@@ -36,13 +36,11 @@ _RADIUS = 2
 # largest difference that counts, full range = 1
 _TRUNCATION = 0.1
 
-# Trust: cost above the noise, as part of the pixel's contrast
-_MOST_RESIDUAL = 0.3
-# contrast above the noise, in units of the noise and of the full range
-_LEAST_CONTRAST = 0.4
-_FLAT = 1e-4
-# lowest cost to the lowest outside its valley
+# Trust: lowest cost as part of the lowest outside its valley. A limit on the cost itself would add nothing here, and
+# would have to know the noise.
 _MOST_AMBIGUITY = 0.8
+# mean above lowest cost, full range = 1: less is rounding
+_FLAT = 1e-4
 # pixels of the 5x5 neighbourhood, itself included, that agree within a candidate step
 _LEAST_SUPPORT = 13
 # trusted pixels that a range needs, as part of the picture, for the search to end
@@ -139,18 +137,7 @@ def _extents(most: float) -> list[float]:
 
 def _trusted(lowest: FloatMap, second: FloatMap, mean: FloatMap, disparity: FloatMap, step: float) -> BoolMap:
     """Pixels whose best candidate is believed, shape (H, W)."""
-    seen = np.isfinite(lowest)
-    if not seen.any():
-        return seen
-    # what a perfect match costs: in most scenes a fifth of the pixels match perfectly
-    noise = np.quantile(lowest[seen], 0.2)
-    contrast = mean - noise
-    believed = (
-        seen
-        & (lowest - noise < _MOST_RESIDUAL * contrast)
-        & (contrast > _LEAST_CONTRAST * noise + _FLAT)
-        & (lowest < _MOST_AMBIGUITY * second)
-    )
+    believed = (lowest < _MOST_AMBIGUITY * second) & (mean - lowest > _FLAT)
     return believed & (_support(believed, disparity, step) >= _LEAST_SUPPORT)
 
 

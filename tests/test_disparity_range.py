@@ -97,6 +97,24 @@ def test_noise_and_light_loss_towards_the_outer_views() -> None:
     assert known.maximum - known.minimum < 8
 
 
+def test_range_reaches_a_little_beyond_the_surfaces() -> None:
+    """The extremes of a scene are seldom where its texture is; a range of what was matched would cut them off."""
+    known = estimate_range(planes(-6, 6, square=60, size=128))
+    assert known.minimum < -6.4
+    assert known.maximum > 6.4
+
+
+def test_noise_on_a_wall_is_not_texture() -> None:
+    """Anything matches anything there; one lucky match among thousands would stretch the range to the search's ends."""
+    square = planes(1, 1, square=40, size=128).views
+    t, s, y, x, _ = np.indices(square.shape)
+    outside = np.maximum(abs(y + t - 2 - 64), abs(x + s - 2 - 64)) > 20
+    views = np.where(outside, 0.5, square) + np.random.default_rng(5).normal(0, 0.02, square.shape)
+    known = estimate_range(LightField(views.astype(np.float32), "wall"))
+    assert holds(known, 1, 1)
+    assert known.maximum - known.minimum < 2
+
+
 def test_the_truth_and_own_range_are_not_looked_at() -> None:
     light_field = planes(-2, 3, square=30)
     told = LightField(
