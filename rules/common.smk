@@ -6,15 +6,17 @@ import time
 from pathlib import Path
 
 from sepi.config import load_settings
-from sepi.digest import code_digest
+from sepi.digest import ROOT, code_digest
 from sepi.errors import SepiError
 from sepi.pipeline import STAGES, VARIANTS
 from sepi.validation import require_known
 
 STARTED = time.time()
 
-# jobs call `python`: the one that runs Snakemake, whether or not its environment is activated
-os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
+# jobs call `python`: the one that runs Snakemake, whether or not its environment is activated, and with the package
+# whose code the digests are made of
+for name, folder in {"PATH": Path(sys.executable).parent, "PYTHONPATH": ROOT}.items():
+    os.environ[name] = os.pathsep.join([str(folder), *filter(None, [os.environ.get(name)])])
 
 try:
     SETTINGS = load_settings(config)

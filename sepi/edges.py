@@ -15,8 +15,12 @@ class CannyParameters(Parameters):
     """Parameters of the Canny edges."""
 
     canny_sigma: float = Field(1.0, gt=0, le=10, description="smoothing before the edges, in pixels")
-    canny_low: float = Field(0.01, gt=0, le=1, description="gradient to which an edge is followed, grey values 0..1 per px")
-    canny_high: float = Field(0.025, gt=0, le=1, description="gradient at which an edge starts, grey values 0..1 per px")
+    canny_low: float = Field(
+        0.01, gt=0, le=1, description="gradient to which an edge is followed, grey values 0..1 per px"
+    )
+    canny_high: float = Field(
+        0.025, gt=0, le=1, description="gradient at which an edge starts, grey values 0..1 per px"
+    )
 
 
 # response of the 3x3 Sobel operator to a gradient of one grey level per pixel

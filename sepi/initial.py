@@ -1,8 +1,8 @@
 """Initial depth (section IV-A, Eq. 1-5 of [1]_).
 
 ``sepi`` takes, for every pixel of the centre view, the candidate whose line through the SEPI has the least colour
-variance (Eq. 3-4), and its distinctness as confidence (Eq. 5). The line meets one sample of each view, so this is a plane
-sweep (:mod:`sepi.sweep`); the construction itself is in :mod:`sepi.epi`.
+variance (Eq. 3-4), and its distinctness as confidence (Eq. 5). The line meets one sample of each view, so this is a
+plane sweep (:mod:`sepi.sweep`); the construction itself is in :mod:`sepi.epi`.
 
 ``structure_tensor`` is the initial depth that the paper's ablation puts in its place (:mod:`sepi.structure_tensor`).
 

@@ -1,4 +1,4 @@
-"""Mean shift of a patch of the image and of the depth map, the cue by which occlusion is confirmed (section IV-B of [1]_).
+"""Mean shift on a patch of the image and of the depth map: the cue that confirms occlusion (section IV-B of [1]_).
 
 Started at a pixel, mean shift climbs to the mode of the joint distribution of colour and disparity round it. The mode's
 disparity is that of the surface the pixel belongs to, free of the outliers that stand between two surfaces.

@@ -10,7 +10,7 @@ from sepi.lightfield import FloatMap
 # a second difference along both axes: blind to planes and to straight edges along the axes (Immerkaer 1996,
 # doi:10.1006/cviu.1996.0060); its response to white noise of standard deviation 1 has standard deviation 6
 _MASK = np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]], np.float32)
-_MEDIAN_TO_SIGMA = 1 / 0.6745
+_MEDIAN_TO_SIGMA: float = 1 / 0.6745
 
 
 def noise_level(image: FloatMap) -> float:
@@ -29,9 +29,9 @@ def noise_level(image: FloatMap) -> float:
         In the image's units, 0..1.
     """
     response = np.abs(cv2.filter2D(np.ascontiguousarray(image), cv2.CV_32F, _MASK))
-    return float(np.median(response)) * _MEDIAN_TO_SIGMA / 6
+    return float(np.median(response).item() * _MEDIAN_TO_SIGMA / 6)
 
 
 def residual_variance(image: FloatMap) -> float:
     """Expected squared residual, summed over channels, between two views of the same surface: noise of both views."""
-    return 2 * image.shape[2] * noise_level(image) ** 2
+    return float(2 * image.shape[2] * noise_level(image) ** 2)

@@ -6,7 +6,8 @@ crosses the occluder. ``half_sepi`` repeats the slope computation with the views
 1. candidates: pixels near Canny edges of the centre view and near steps of the initial depth;
 2. mean shift on the patch of image and depth gives the surface that each pixel belongs to;
 3. side: by geometry the half away from the nearer surface is kept. (With positive disparity nearer, a nearer surface on
-   the right hides the pixel from the views on the right, so the left half is kept. The paper's sentence says the reverse.)
+   the right hides the pixel from the views on the right, so the left half is kept. The paper's sentence says the
+   reverse.)
 4. half-SEPI depth and its confidence replace the full ones where they explain the views clearly better.
 
 ``wang`` is the occlusion model of [2]_, which the paper's text compares with: the angular patch is split along the edge
@@ -41,9 +42,11 @@ class OcclusionParameters(SweepParameters, CannyParameters):
     depth_step: float = Field(
         0.3, gt=0, description="step of the initial depth that makes a candidate, pixels per view step"
     )
-    candidate_reach: int = Field(8, ge=0, le=50, description="distance from an edge within which pixels are candidates, px")
-    gain_half: float = Field(0.03, ge=0, le=1, description="by how much a half must lower the mean cost (0..1)")
-    gain_quarter: float = Field(0.06, ge=0, le=1, description="by how much a quarter must lower the mean cost (0..1)")
+    candidate_reach: int = Field(
+        12, ge=0, le=50, description="distance from an edge within which pixels are candidates, px"
+    )
+    gain_half: float = Field(0.015, ge=0, le=1, description="by how much a half must lower the mean cost (0..1)")
+    gain_quarter: float = Field(0.03, ge=0, le=1, description="by how much a quarter must lower the mean cost (0..1)")
     min_change: float = Field(
         0.1, ge=0, description="smaller changes keep the depth from all views, pixels per view step"
     )
@@ -55,10 +58,8 @@ class HalfSepiParameters(OcclusionParameters):
     patch_radius: int = Field(4, ge=1, le=20, description="mean-shift patch of 2 r + 1 pixels")
     patch_sigma_colour: float = Field(0.05, gt=0, description="mean-shift bandwidth, RGB distance, colours in 0..1")
     patch_sigma_disparity: float = Field(0.3, gt=0, description="mean-shift bandwidth, pixels per view step")
-    side_reach: int = Field(8, ge=1, le=50, description="how far away the nearer surface is looked for, pixels")
-    side_step: float = Field(
-        0.1, ge=0, description="by how much the occluder must be nearer, pixels per view step"
-    )
+    side_reach: int = Field(16, ge=1, le=50, description="how far away the nearer surface is looked for, pixels")
+    side_step: float = Field(0.1, ge=0, description="by how much the occluder must be nearer, pixels per view step")
     gain_unconfirmed: float = Field(
         0.03, ge=0, le=2, description="further gain asked for where no nearer surface is found on the hidden side"
     )
@@ -149,9 +150,7 @@ def occlusion_candidates(centre: FloatMap, disparity: FloatMap, parameters: Occl
     return np.asarray(cv2.dilate(edges.astype(np.uint8), _box(parameters.candidate_reach)) > 0)
 
 
-def nearer_on_hidden_side(
-    surface: FloatMap, disparity: FloatMap, sides: list[str], reach: int, step: float
-) -> BoolMap:
+def nearer_on_hidden_side(surface: FloatMap, disparity: FloatMap, sides: list[str], reach: int, step: float) -> BoolMap:
     """Whether a nearer surface lies where it would hide the pixel from the views that are left out.
 
     Parameters

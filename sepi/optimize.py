@@ -1,8 +1,9 @@
 """Global optimisation (section IV-D, Eq. 8-12 of [1]_).
 
-``wls`` minimises the weighted least squares energy of Eq. 8: fidelity to the refined depth where it deserves it (Eq. 9-10:
-the confidences of occluded, texture-less and other pixels, nothing where the depth changes abruptly), and smoothness on
-the 4-connected grid where the image is smooth (Eq. 11) and the depth uncertain (Eq. 12). ``none`` hands the depth on.
+``wls`` minimises the weighted least squares energy of Eq. 8: fidelity to the refined depth where it deserves it (Eq.
+9-10: the confidences of occluded, texture-less and other pixels, nothing where the depth changes abruptly), and
+smoothness on the 4-connected grid where the image is smooth (Eq. 11) and the depth uncertain (Eq. 12). ``none`` hands
+the depth on.
 
 References
 ----------
@@ -28,13 +29,20 @@ FloatArray = npt.NDArray[np.float64]
 LEAST_CONFIDENCE = 0.01
 """Keeps the system solvable where no pixel is trusted."""
 
+
 class WlsParameters(Parameters):
     """Parameters of the weighted least squares."""
 
-    alpha: float = Field(1e-6, ge=0, description="weight of smoothness against data; for gradients of values 0..1 per px")
-    gradient_floor: float = Field(0.002, gt=0, description="image gradient below which all is equally smooth, 0..1 per px")
+    alpha: float = Field(
+        1e-6, ge=0, description="weight of smoothness against data; for gradients of values 0..1 per px"
+    )
+    gradient_floor: float = Field(
+        0.002, gt=0, description="image gradient below which all is equally smooth, 0..1 per px"
+    )
     tau_0: float = Field(1000.0, ge=0, description="how sharply the data weight falls beyond tau_1")
-    tau_1: float = Field(0.2, ge=0, description="standard deviation of the depth in 3x3 pixels that marks a step, px per step")
+    tau_1: float = Field(
+        0.2, ge=0, description="standard deviation of the depth in 3x3 pixels that marks a step, px per step"
+    )
     step_weight: float = Field(
         0.1, gt=0, le=1, description="share of its weight that the data keeps at a step, where Eq. 9 would leave none"
     )
@@ -80,13 +88,13 @@ def none(
 
 
 def rectified_confidence(before: StageMaps, parameters: WlsParameters) -> FloatMap:
-    """c' of Eq. 10: of texture-less pixels a constant, else the stage's own (half-SEPI confidence where occluded)."""
+    """C' of Eq. 10: of texture-less pixels a constant, else the stage's own (half-SEPI confidence where occluded)."""
     own = relative_confidence(before.confidence)
     return np.where(before.mask("textureless"), parameters.textureless_confidence, own).astype(np.float32)
 
 
 def data_weight(disparity: FloatMap, confidence: FloatMap, parameters: WlsParameters) -> FloatMap:
-    """w of Eq. 9: the confidence, or next to nothing where the depth's standard deviation in 3x3 pixels marks a step."""
+    """Weight w of Eq. 9: the confidence, or little of it where the depth's deviation in 3x3 pixels marks a step."""
     mean = cv2.blur(disparity, (3, 3))
     deviation = np.sqrt(np.maximum(cv2.blur((disparity - mean) ** 2, (3, 3)), 0))
     cut = np.exp(-np.minimum(parameters.tau_0 * np.maximum(deviation - parameters.tau_1, 0), 80))
@@ -95,12 +103,10 @@ def data_weight(disparity: FloatMap, confidence: FloatMap, parameters: WlsParame
 
 
 def smoothness_coefficient(centre: FloatMap, confidence: FloatMap, parameters: WlsParameters) -> FloatMap:
-    """s = s_c s_t of Eq. 11-12; shape (H, W), float32."""
+    """S = s_c s_t of Eq. 11-12; shape (H, W), float32."""
     dx, dy = (cv2.Sobel(centre, cv2.CV_32F, *order, ksize=3, scale=1 / 8) for order in ((1, 0), (0, 1)))
     squared = (np.atleast_3d(dx) ** 2 + np.atleast_3d(dy) ** 2).sum(axis=2)
-    return np.asarray(
-        np.exp(-parameters.tau_2 * confidence) / (squared + parameters.gradient_floor**2), np.float32
-    )
+    return np.asarray(np.exp(-parameters.tau_2 * confidence) / (squared + parameters.gradient_floor**2), np.float32)
 
 
 def energy_system(

@@ -1,6 +1,7 @@
 """Planes of disparity on superpixels: robust fits, and the coupled energy that propagates them (Eq. 7 of [1]_).
 
-A plane is ``(value, gx, gy)``: the disparity at the superpixel's centroid and its change over ``UNIT`` pixels in x and y.
+A plane is ``(value, gx, gy)``: the disparity at the superpixel's centroid and its change over ``UNIT`` pixels in x and
+y.
 
 References
 ----------
@@ -55,7 +56,7 @@ def basis(segments: Superpixels) -> FloatArray:
 def evaluate_planes(segments: Superpixels, planes: FloatArray, design: FloatArray) -> FloatMap:
     """Disparity of every pixel by the plane of its superpixel; shape (H, W), float32."""
     values = (design * planes[segments.labels.ravel()]).sum(axis=1)
-    return values.reshape(segments.labels.shape).astype(np.float32)
+    return np.asarray(values.reshape(segments.labels.shape), np.float32)
 
 
 def fit_planes(
@@ -76,14 +77,14 @@ def fit_planes(
     -------
     ndarray, shape (N, 3), float
     """
-    planes = np.zeros((len(segments), 3))
+    planes: FloatArray = np.zeros((len(segments), 3))
     planes[:, 0] = _medians(segments, disparity)
     # a weak pull to level keeps superpixels with few good pixels solvable
     ridge = np.diag([1e-6, 1e-2, 1e-2])
     for spread in _shrinking(tolerance):
         residual = evaluate_planes(segments, planes, design) - disparity
         left, right = _normal_equations(segments, disparity, weight / (1 + (residual / spread) ** 2) ** 2, design)
-        planes = np.linalg.solve(left + ridge, right[..., None])[..., 0]
+        planes = np.asarray(np.linalg.solve(left + ridge, right[..., None])[..., 0], np.float64)
     return planes
 
 
@@ -102,8 +103,8 @@ def propagate(
 
     The absolute values of Eq. 7 are minimised by re-weighting: of the data, ``|d_hat - d|``, and of the continuity,
     ``|d_hat - d_l|``, where ``d_l`` is the neighbour's plane continued linearly to the common border. The equation's
-    denominator, which weakens the coupling across a change of depth, is that re-weighting; its factor of likeness is the
-    colour cue. All free superpixels are solved for together, so depth travels from reliable edges inwards.
+    denominator, which weakens the coupling across a change of depth, is that re-weighting; its factor of likeness is
+    the colour cue. All free superpixels are solved for together, so depth travels from reliable edges inwards.
 
     Parameters
     ----------

@@ -102,8 +102,8 @@ def given(previous: StageMaps | None) -> StageMaps:
 
 
 def relative_confidence(confidence: FloatMap) -> FloatMap:
-    """Confidence relative to the scene's best (its 95th percentile), 0..1: noise lowers the confidence of all pixels."""
+    """Confidence relative to the scene's best (95th percentile), 0..1: noise lowers the confidence of all pixels."""
     best = float(np.percentile(confidence, 95))
     if best <= 0:
         return np.zeros_like(confidence)
-    return np.clip(confidence / np.float32(best), 0, 1)
+    return np.asarray(np.clip(confidence / np.float32(best), 0, 1), np.float32)

@@ -35,9 +35,7 @@ class StructureTensorParameters(Parameters):
     )
 
 
-def structure_tensor_depth(
-    light_field: LightField, parameters: StructureTensorParameters
-) -> tuple[FloatMap, FloatMap]:
+def structure_tensor_depth(light_field: LightField, parameters: StructureTensorParameters) -> tuple[FloatMap, FloatMap]:
     """Disparity and coherence of the more coherent of the horizontal and the vertical EPI.
 
     Parameters

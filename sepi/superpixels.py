@@ -45,11 +45,12 @@ class Superpixels:
 
     def sums(self, values: npt.NDArray[np.generic]) -> FloatArray:
         """Sum of a map over each superpixel; shape (N,)."""
-        return np.bincount(self.labels.ravel(), np.asarray(values, np.float64).ravel(), len(self))
+        weights = np.asarray(values, np.float64).ravel()
+        return np.asarray(np.bincount(self.labels.ravel(), weights, len(self)), np.float64)
 
     def means(self, values: npt.NDArray[np.generic]) -> FloatArray:
         """Mean of a map over each superpixel; shape (N,)."""
-        return self.sums(values) / self.sizes
+        return np.asarray(self.sums(values) / self.sizes, np.float64)
 
     def interior(self) -> BoolMap:
         """Pixels whose four neighbours all belong to the same superpixel; shape (H, W), bool."""
@@ -125,7 +126,9 @@ def borders(segments: Superpixels) -> Borders:
         low, high = np.minimum(a[y, x], b[y, x]), np.maximum(a[y, x], b[y, x])
         pieces.append(np.stack([low, high, x + offset[0], y + offset[1]], axis=1))
     sides = np.concatenate(pieces)
-    pairs, index = np.unique(sides[:, 0].astype(np.int64) * len(segments) + sides[:, 1].astype(np.int64), return_inverse=True)
+    pairs, index = np.unique(
+        sides[:, 0].astype(np.int64) * len(segments) + sides[:, 1].astype(np.int64), return_inverse=True
+    )
     lengths = np.bincount(index, minlength=len(pairs))
     sums = np.stack([np.bincount(index, sides[:, k], len(pairs)) for k in (2, 3)], axis=1)
     return Borders(pairs // len(segments), pairs % len(segments), lengths, sums / np.maximum(lengths, 1)[:, None])

@@ -43,7 +43,9 @@ class SweepParameters(Parameters):
         le=2,
         description="residual at which the robust photo-consistency is one half; RGB distance, colours in 0..1",
     )
-    window_radius: int = Field(3, ge=0, le=10, description="cost window of 2 r + 1 pixels; 0 aggregates nothing, in pixels")
+    window_radius: int = Field(
+        3, ge=0, le=10, description="cost window of 2 r + 1 pixels; 0 aggregates nothing, in pixels"
+    )
     window_sigma: float = Field(
         0.02,
         gt=0,
@@ -162,7 +164,8 @@ def _add_robust_gray(out: Any, a: Any, b: Any, c: Any, d: Any, g: Any, w: Any, s
 
 @njit(inline="always")
 def _add_robust_rgb(
-    out: Any, a0: Any, b0: Any, c0: Any, d0: Any, a1: Any, b1: Any, c1: Any, d1: Any, a2: Any, b2: Any, c2: Any, d2: Any,
+    out: Any,
+    a0: Any, b0: Any, c0: Any, d0: Any, a1: Any, b1: Any, c1: Any, d1: Any, a2: Any, b2: Any, c2: Any, d2: Any,
     g0: Any, g1: Any, g2: Any, w: Any, scale2: Any,
 ) -> None:  # fmt: skip
     """Add the robust residual of one run of pixels, three channels."""
@@ -202,8 +205,8 @@ def cost_row(views: Any, groups: Any, y: int, disparities: Any, scale2: Any, cos
     for t in range(T):
         # rows of this view row that any candidate touches, converted once for all candidates
         shift = -disparities * (t - t0)
-        low = max(0, min(H - 2, int(math.floor(y + shift.min()))))
-        high = max(0, min(H - 2, int(math.floor(y + shift.max())))) + 1
+        low = max(0, min(H - 2, math.floor(y + shift.min())))
+        high = max(0, min(H - 2, math.floor(y + shift.max()))) + 1
         for s in range(S):
             g = groups[t, s]
             if g < 0:
@@ -218,7 +221,7 @@ def cost_row(views: Any, groups: Any, y: int, disparities: Any, scale2: Any, cos
                 top = min(int(v), H - 2)
                 wy = np.float32(v - top)
                 u = -disparities[k] * (s - s0)
-                left = int(math.floor(u))
+                left = math.floor(u)
                 wx = np.float32(u - left)
                 # run of pixels whose sample lies inside the view
                 first = max(0, -left)
@@ -387,7 +390,7 @@ def _sweep_rows(
     size = 2 * radius + 1
     group_sizes = np.array([(groups == g).sum() for g in range(G)], np.float32)
     reach = max(abs(disparities[0]), abs(disparities[K - 1]))
-    margin = int(math.ceil(reach * max(views.shape[0], views.shape[1]) / 2)) + radius + 1
+    margin = math.ceil(reach * max(views.shape[0], views.shape[1]) / 2) + radius + 1
     tasks = max(1, (last - first + STRIP_ROWS_PER_THREAD - 1) // STRIP_ROWS_PER_THREAD)
     rows = (last - first + tasks - 1) // tasks
     for task in prange(tasks):

@@ -1,15 +1,15 @@
 """Depth of texture-less regions (section IV-C, Eq. 6-7 of [1]_).
 
-``lti`` finds the superpixels that hold too little texture for a slope and gives them the depth that propagates, linearly,
-from the reliable edges of their neighbourhood:
+``lti`` finds the superpixels that hold too little texture for a slope and gives them the depth that propagates,
+linearly, from the reliable edges of their neighbourhood:
 
 1. SLIC superpixels; texture points are Canny edges and pixels whose slope is distinct;
 2. local texture information, the share of texture points (Eq. 6); its threshold adapts to the scene: it lies where the
    sorted LTI rises fastest;
 3. a robust plane for each superpixel; those with texture are held, the others are free;
 4. the coupled energy of data and continuity (Eq. 7), with the HSV mean-shift cue for which neighbours belong together;
-5. a plane smooths the depth it fits, but overrules only depth without support: neither distinct nor in agreement with its
-   neighbourhood (noise lowers the confidence of good depth too, but does not make it disagree).
+5. a plane smooths the depth it fits, but overrules only depth without support: neither distinct nor in agreement with
+   its neighbourhood (noise lowers the confidence of good depth too, but does not make it disagree).
 
 ``none`` hands the depth on.
 
@@ -44,7 +44,10 @@ class LtiParameters(CannyParameters):
         0.9, ge=0, le=1, description="share of agreeing neighbours from which a slope is taken for sound"
     )
     min_support: float = Field(
-        0.25, ge=0, le=1, description="share of texture points and agreeing slopes from which a superpixel is not overruled"
+        0.25,
+        ge=0,
+        le=1,
+        description="share of texture points and agreeing slopes from which a superpixel is not overruled",
     )
     agreement_radius: int = Field(3, ge=1, le=10, description="neighbourhood of 2 r + 1 pixels")
     agreement_difference: float = Field(
@@ -52,14 +55,21 @@ class LtiParameters(CannyParameters):
     )
     lti_floor: float = Field(0.1, ge=0, le=1, description="least threshold of the LTI, share of texture points")
     lti_ceiling: float = Field(0.4, ge=0, le=1, description="greatest threshold of the LTI, share of texture points")
-    colour_bandwidth: float = Field(0.03, gt=0, description="mean-shift bandwidth in the HSV cone of radius 1, height 1")
+    colour_bandwidth: float = Field(
+        0.03, gt=0, description="mean-shift bandwidth in the HSV cone of radius 1, height 1"
+    )
     continuity: float = Field(0.3, ge=0, description="tau_out, weight of continuity between neighbours")
     slope_continuity: float = Field(10.0, ge=0, description="weight of equal slopes against equal depth at the border")
     tolerance: float = Field(0.05, gt=0, description="residual of an inlier, pixels per view step")
     keep_confidence: float = Field(
         0.7, ge=0, le=1, description="relative confidence from which a pixel's own depth resists a plane"
     )
-    keep_share: float = Field(0.3, ge=0, le=1, description="share of resisting pixels that refuses a superpixel's plane")
+    smoothing_difference: float = Field(
+        0.1, gt=0, description="change that counts as smoothing, not as overruling, pixels per view step"
+    )
+    keep_share: float = Field(
+        0.3, ge=0, le=1, description="share of resisting pixels that refuses a superpixel's plane"
+    )
 
 
 def lti(
@@ -96,7 +106,7 @@ def lti(
     progress(0.9)
     unsupported = local_texture_information(segments, texture | agrees) < parameters.min_support
     # a plane may smooth any depth, but overrule only what is neither distinct nor in agreement with its neighbours
-    overruled = np.abs(plane - before.disparity) > parameters.agreement_difference
+    overruled = np.abs(plane - before.disparity) > parameters.smoothing_difference
     resists = overruled & ((confidence > parameters.keep_confidence) | agrees | ~unsupported[segments.labels])
     replaced = accepted(segments, free, resists, parameters.keep_share)
     return before.updated(
@@ -157,8 +167,9 @@ def local_texture_information(segments: Superpixels, texture: BoolMap) -> FloatA
 def lti_threshold(information: FloatArray, floor: float, ceiling: float) -> float:
     """Adaptive threshold: the LTI at which the first-order difference of the sorted LTI is greatest.
 
-    Between superpixels without texture and superpixels with texture there are few, so the sorted LTI rises fastest there.
-    Differences are taken over a run of superpixels (3 %), since single ones are mostly zero or one pixel's worth.
+    Between superpixels without texture and superpixels with texture there are few, so the sorted LTI rises fastest
+    there. Differences are taken over a run of superpixels (3 %), since single ones are mostly zero or one pixel's
+    worth.
 
     Parameters
     ----------
@@ -202,7 +213,7 @@ def propagated(
 
 
 def accepted(segments: Superpixels, free: BoolMap, resists: BoolMap, keep_share: float) -> BoolMap:
-    """Pixels that take the plane's depth: not those with a good depth of their own, nor where too many of them object."""
+    """Pixels that take the plane's depth: none with a good depth of their own, nor where too many of those object."""
     taken = free & (segments.means(resists) < keep_share)
     return np.asarray(taken[segments.labels] & ~resists)
 

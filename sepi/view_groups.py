@@ -1,7 +1,7 @@
 """Parts of the view grid from which half-SEPIs are put together.
 
-A sweep sums the costs of groups of views; a subset is a union of groups. Occlusion at a straight edge hides the views on
-one side of a line through the centre of the grid, so the subsets worth asking for are halves and quarters.
+A sweep sums the costs of groups of views; a subset is a union of groups. Occlusion at a straight edge hides the views
+on one side of a line through the centre of the grid, so the subsets worth asking for are halves and quarters.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ QUARTERS = (("left", "up"), ("left", "down"), ("right", "up"), ("right", "down")
 
 
 def halves_and_quarters(grid: tuple[int, int]) -> ViewSubsets:
-    """All views, the four halves of the paper, and their four overlaps; the dividing row or column belongs to both sides.
+    """All views, the four halves of the paper, and their four overlaps; the dividing line belongs to both sides.
 
     Where a pixel is occluded horizontally and vertically at once, as at any slanted edge, the views it keeps are those
     of both halves.

@@ -1,0 +1,172 @@
+"""Occlusion stage: the side rule by geometry on a two-plane scene, candidates, and what it mends."""
+
+import numpy as np
+import pytest
+from scipy.ndimage import gaussian_filter
+
+from sepi.edges import CannyParameters, canny_edges, depth_steps, edge_angle
+from sepi.errors import SepiError
+from sepi.initial import CHOICES as INITIAL
+from sepi.lightfield import DisparityRange, LightField
+from sepi.mean_shift import patch_modes
+from sepi.occlusion import CHOICES, nearer_on_hidden_side
+from sepi.scenes import render
+from sepi.stage import no_progress
+from sepi.view_groups import half_planes, halves_and_quarters
+
+SIZE = 48
+EDGE = 24
+
+
+def two_planes(near_side: str) -> LightField:
+    """A near textured plane (disparity 2) covering one side of the picture, before a far one (disparity -1)."""
+    generator = np.random.default_rng(7)
+    # detail wider than a pixel, so that it is not taken for noise of the camera
+    far, near = (
+        (128 + gaussian_filter(generator.normal(0, 150, (3 * SIZE, 3 * SIZE, 3)), (1, 1, 0)))
+        .clip(0, 255)
+        .astype(np.uint8)
+        for _ in range(2)
+    )
+    axis = 1 if near_side in ("left", "right") else 0
+    grid = 5
+    views = np.empty((grid, grid, SIZE, SIZE, 3), np.uint8)
+    rows, columns = np.mgrid[:SIZE, :SIZE]
+    for t in range(grid):
+        for s in range(grid):
+            dt, ds = t - grid // 2, s - grid // 2
+            # both disparities are whole numbers: a view is a shifted copy, exact without interpolation
+            there = (columns if axis else rows) + 2 * (ds if axis else dt)
+            covered = there >= EDGE if near_side in ("right", "down") else there < EDGE
+            background = far[rows + SIZE - dt, columns + SIZE - ds]
+            foreground = near[rows + SIZE + 2 * dt, columns + SIZE + 2 * ds]
+            views[t, s] = np.where(covered[..., None], foreground, background)
+    place = columns if axis else rows
+    nearer = place >= EDGE if near_side in ("right", "down") else place < EDGE
+    truth = np.where(nearer, 2, -1).astype(np.float32)
+    return LightField(views, "two planes", disparity_range=DisparityRange(-1.5, 2.5, "given"), truth=truth)
+
+
+def run(light_field, choice="half_sepi", candidates=41):
+    initial = INITIAL["sepi"].run(light_field, None, INITIAL["sepi"].parameters(candidates=candidates), no_progress)
+    parameters = CHOICES[choice].parameters(**({} if choice == "none" else {"candidates": candidates}))
+    return initial, CHOICES[choice].run(light_field, initial, parameters, no_progress)
+
+
+@pytest.mark.parametrize(("near_side", "kept"), [("right", "left"), ("left", "right"), ("down", "up"), ("up", "down")])
+def test_half_away_from_the_nearer_surface_is_kept(near_side, kept):
+    """With the side rule the wrong way round (as in the paper's text) the occluder's views would be trusted."""
+    light_field = two_planes(near_side)
+    _, maps = run(light_field)
+    names = halves_and_quarters(light_field.grid).names
+    across = np.s_[15:-15, EDGE - 2 : EDGE] if near_side == "right" else None
+    if near_side == "left":
+        across = np.s_[15:-15, EDGE : EDGE + 2]
+    if near_side == "down":
+        across = np.s_[EDGE - 2 : EDGE, 15:-15]
+    if near_side == "up":
+        across = np.s_[EDGE : EDGE + 2, 15:-15]
+    sides = maps.extra["occlusion_side"][across]
+    assert np.mean([kept in names[side] for side in sides.ravel()]) > 0.9
+    opposite = {"left": "right", "right": "left", "up": "down", "down": "up"}[kept]
+    assert not any(opposite in names[side] for side in sides.ravel())
+
+
+@pytest.mark.parametrize("choice", ["half_sepi", "wang"])
+def test_depth_next_to_an_occluder_is_mended(choice):
+    light_field = two_planes("right")
+    initial, maps = run(light_field, choice)
+    beside = np.s_[6:-6, EDGE - 5 : EDGE]
+    before, after = (np.abs(m.disparity - light_field.truth)[beside] for m in (initial, maps))
+    assert after.mean() < 0.05
+    assert after.mean() <= before.mean()
+    # the confidence of a mended pixel is that of the views it kept, not of the occluder's
+    occluded = maps.extra["occluded"][beside]
+    assert maps.confidence[beside][occluded].mean() > initial.confidence[beside][occluded].mean()
+
+
+@pytest.mark.parametrize("scene", ["curved_occluders", "fine_structures"])
+def test_half_sepi_lowers_the_error_at_occlusions(scene):
+    light_field = render(scene, size=128)
+    initial, maps = run(light_field, candidates=91)
+    occluded = light_field.masks["occluded"]
+    before, after = (np.mean((m.disparity - light_field.truth)[occluded] ** 2) for m in (initial, maps))
+    assert after < 0.97 * before
+
+
+def test_nothing_changes_where_nothing_is_occluded():
+    light_field = render("fronto_parallel", size=64, views=5)
+    initial, maps = run(light_field)
+    np.testing.assert_array_equal(maps.disparity, initial.disparity)
+
+
+def test_none_hands_the_initial_depth_on():
+    light_field = two_planes("right")
+    initial, maps = run(light_field, "none")
+    assert maps is initial
+
+
+def test_stage_without_a_stage_before_it_is_an_error():
+    with pytest.raises(SepiError, match="stage before"):
+        CHOICES["none"].run(two_planes("right"), None, CHOICES["none"].parameters(), no_progress)
+
+
+def test_halves_and_quarters_partition_the_views():
+    views = halves_and_quarters((9, 9))
+    members = {n: subset[views.groups] for n, subset in zip(views.names, views.subsets, strict=True)}
+    assert members["full"].all()
+    assert members["left"][:, :5].all()
+    assert not members["left"][:, 5:].any()
+    assert members["up"][:5].all()
+    assert not members["up"][5:].any()
+    np.testing.assert_array_equal(members["right-down"], members["right"] & members["down"])
+
+
+def test_half_planes_face_their_direction():
+    """A half plane that faced the wrong way would keep the occluded views."""
+    directions = 8
+    views = half_planes((9, 9), directions)
+    t, s = np.mgrid[-4:5, -4:5]
+    for n in range(2 * directions):
+        member = views.subsets[1 + n][views.groups]
+        angle = (n + 0.5) * np.pi / directions
+        facing = s * np.cos(angle) + t * np.sin(angle)
+        away = (t != 0) | (s != 0)
+        assert member[(facing > 0.9) & away].all()
+        assert not member[(facing < -0.9) & away].any()
+
+
+def test_nearer_surface_is_found_only_on_the_hidden_side():
+    surface = np.zeros((9, 21), np.float32)
+    surface[:, 14:] = 1
+    pixel = np.zeros_like(surface)
+    left = nearer_on_hidden_side(surface, pixel, ["left"], 4, 0.1)
+    assert left[4, 10:14].all()
+    assert not left[4, :10].any()
+    assert not nearer_on_hidden_side(surface, pixel, ["right"], 4, 0.1)[4, :14].any()
+    assert nearer_on_hidden_side(surface, pixel, ["left", "up"], 4, 0.1)[4, 12]
+
+
+def test_mean_shift_pulls_outliers_to_their_surface_but_not_across():
+    disparity = np.zeros((20, 20), np.float32)
+    disparity[:, 10:] = 2
+    image = np.repeat((disparity / 4)[..., None], 3, axis=2)
+    speckled = disparity.copy()
+    speckled[5, 5] = 0.4
+    modes = patch_modes(
+        image, speckled, np.ones_like(disparity, bool), radius=4, sigma_colour=0.05, sigma_disparity=0.3
+    )
+    assert abs(modes[5, 5]) < 0.1
+    assert np.abs(modes - disparity)[:, [8, 9, 10, 11]].max() < 0.05
+
+
+def test_edges_follow_gradients_and_their_direction():
+    image = np.zeros((40, 40, 3), np.float32)
+    image[:, 20:] = 0.5
+    edges = canny_edges(image, CannyParameters())
+    assert edges[5:-5, 18:22].any(axis=1).all()
+    assert not edges[:, :15].any()
+    assert np.abs(edge_angle(image, CannyParameters())[20, 20]) < 0.1
+    assert np.abs(np.abs(edge_angle(image.transpose(1, 0, 2), CannyParameters())[20, 20]) - np.pi / 2) < 0.1
+    assert depth_steps(image[..., 0], 0.3)[:, 19:21].all()
+    assert not depth_steps(image[..., 0], 0.6).any()

@@ -1,0 +1,104 @@
+"""Global optimisation: the energy, its solver against a direct one, and what it does to a map."""
+
+import numpy as np
+import pytest
+from scipy.sparse.linalg import splu
+
+from sepi.lightfield import DisparityRange, LightField
+from sepi.optimize import CHOICES, WlsParameters, data_weight, energy_system, rectified_confidence, solve
+from sepi.scenes import render
+from sepi.stage import StageMaps, no_progress
+
+
+def light_field_of(centre: np.ndarray) -> LightField:
+    views = np.broadcast_to(centre, (3, 3, *centre.shape)).copy()
+    return LightField(views, "scene", disparity_range=DisparityRange(-2, 2, "given"))
+
+
+def run(light_field, maps, **values):
+    return CHOICES["wls"].run(light_field, maps, WlsParameters(**values), no_progress)
+
+
+def test_solver_agrees_with_a_direct_solve():
+    """Iterative solvers stop early where weights are tiny: pixels would be off by hundredths unnoticed."""
+    generator = np.random.default_rng(2)
+    shape = (90, 110)
+    disparity = generator.uniform(-2, 2, shape).astype(np.float32)
+    # weights over eight orders of magnitude, whole regions without any
+    weight = (10.0 ** generator.uniform(-8, 0, shape)).astype(np.float32)
+    weight[30:60, 40:90] = 1e-8
+    smoothness = (10.0 ** generator.uniform(1, 5, shape)).astype(np.float32)
+    matrix, right = energy_system(disparity, weight, smoothness, 1e-6)
+    direct = splu(matrix.tocsc()).solve(right).reshape(shape)
+    solved = solve(matrix, right, disparity, WlsParameters().accuracy)
+    assert np.abs(solved - direct).max() < 1e-3
+
+
+def test_energy_is_the_sum_of_equation_8():
+    generator = np.random.default_rng(4)
+    shape = (6, 5)
+    disparity, weight, smoothness, estimate = generator.uniform(0.1, 1, (4, *shape)).astype(np.float32)
+    alpha = 0.3
+    matrix, right = energy_system(disparity, weight, smoothness, alpha)
+    energy = 0.0
+    for y in range(shape[0]):
+        for x in range(shape[1]):
+            energy += weight[y, x] * (disparity[y, x] - estimate[y, x]) ** 2
+            for v, u in ((y - 1, x), (y + 1, x), (y, x - 1), (y, x + 1)):
+                if 0 <= v < shape[0] and 0 <= u < shape[1]:
+                    energy += alpha * smoothness[y, x] * (estimate[y, x] - estimate[v, u]) ** 2
+    flat = estimate.ravel().astype(np.float64)
+    quadratic = flat @ (matrix @ flat) - 2 * flat @ right + (weight * disparity**2).sum()
+    assert quadratic == pytest.approx(energy, rel=1e-5)
+
+
+def test_constant_depth_stays_as_it_is():
+    light_field = light_field_of(render("wall", size=64, views=3).views[1, 1])
+    flat = np.full(light_field.shape, 0.7, np.float32)
+    maps = run(light_field, StageMaps(flat, np.random.default_rng(0).random(flat.shape).astype(np.float32)))
+    np.testing.assert_allclose(maps.disparity, 0.7, atol=1e-5)
+
+
+def test_doubtful_outliers_are_pulled_to_their_surface():
+    light_field = light_field_of(np.full((60, 60, 3), 120, np.uint8))
+    disparity = np.zeros((60, 60), np.float32)
+    confidence = np.full_like(disparity, 0.9)
+    disparity[30, 30], confidence[30, 30] = 1.5, 0.05
+    assert abs(run(light_field, StageMaps(disparity, confidence)).disparity[30, 30]) < 0.05
+
+
+def test_depth_step_at_a_colour_edge_survives():
+    """Smoothing over object borders is what a user sees first."""
+    centre = np.full((60, 60, 3), 60, np.uint8)
+    centre[:, 30:] = 190
+    disparity = np.where(np.arange(60) < 30, -1, 1).astype(np.float32) * np.ones((60, 1), np.float32)
+    maps = run(light_field_of(centre), StageMaps(disparity, np.full_like(disparity, 0.8)))
+    assert np.abs(maps.disparity - disparity)[:, np.r_[:28, 32:60]].max() < 0.05
+    assert np.abs(maps.disparity - disparity).max() < 0.5
+
+
+def test_data_counts_less_at_steps_and_by_its_confidence():
+    """Eq. 9: full weight by confidence on a surface, next to none at a step."""
+    parameters = WlsParameters(confidence_power=1.0)
+    disparity = np.zeros((20, 20), np.float32)
+    disparity[:, 10:] = 2
+    weight = data_weight(disparity, np.full_like(disparity, 0.5), parameters)
+    np.testing.assert_allclose(weight[:, [2, 17]], 0.5)
+    np.testing.assert_allclose(weight[:, [9, 10]], 0.5 * parameters.step_weight)
+
+
+def test_texture_less_pixels_have_the_papers_confidence():
+    """Eq. 10: c_tl = 0.8 whatever the sweep thought of them."""
+    confidence = np.linspace(0.1, 0.9, 100, dtype=np.float32).reshape(10, 10)
+    textureless = np.zeros((10, 10), bool)
+    textureless[:3] = True
+    maps = StageMaps(confidence, confidence, {"textureless": textureless})
+    rectified = rectified_confidence(maps, WlsParameters())
+    np.testing.assert_allclose(rectified[:3], 0.8)
+    assert (np.diff(rectified[3:].ravel()) >= 0).all()
+
+
+def test_none_hands_the_depth_on():
+    light_field = light_field_of(np.full((20, 20, 3), 120, np.uint8))
+    maps = StageMaps(np.zeros((20, 20), np.float32), np.ones((20, 20), np.float32))
+    assert CHOICES["none"].run(light_field, maps, CHOICES["none"].parameters(), no_progress) is maps

@@ -1,0 +1,174 @@
+"""The plane sweep equals a plain NumPy twin, the paper's SEPI construction, and itself on any number of threads."""
+
+import numba
+import numpy as np
+import pytest
+from scipy.ndimage import map_coordinates
+
+from sepi.epi import line_cost, stitched_epi
+from sepi.errors import SepiError
+from sepi.lightfield import DisparityRange, LightField
+from sepi.noise import noise_level, residual_variance
+from sepi.scenes import render
+from sepi.sweep import SweepParameters, sweep
+from sepi.view_groups import halves_and_quarters
+
+
+def random_light_field(grid=(5, 4), shape=(14, 17), channels=3, dtype=np.uint8, seed=0):
+    generator = np.random.default_rng(seed)
+    views = generator.random((*grid, *shape, channels), np.float32)
+    if dtype != np.float32:
+        views = np.round(views * np.iinfo(dtype).max).astype(dtype)
+    return LightField(views, "random", disparity_range=DisparityRange(-1.3, 1.1, "given"))
+
+
+def twin(light_field, parameters, groups, subset):
+    """The sweep in plain NumPy and SciPy: one interpolation per view and candidate, one loop per window pixel."""
+    T, S = light_field.grid
+    t0, s0 = light_field.reference
+    H, W = light_field.shape
+    candidates = light_field.known_range().candidates(parameters.candidates)
+    centre = light_field.centre
+    noise = residual_variance(centre)
+    views = light_field.views / (np.iinfo(light_field.views.dtype).max if light_field.views.dtype != np.float32 else 1)
+    rows, columns = np.mgrid[:H, :W].astype(float)
+    sums, counts = np.zeros((2, len(candidates), H, W))
+    for t in range(T):
+        for s in range(S):
+            if (t, s) == (t0, s0) or not light_field.present[t, s] or not subset[groups[t, s]]:
+                continue
+            for k, d in enumerate(candidates.astype(float)):
+                y, x = rows - d * (t - t0), columns - d * (s - s0)
+                inside = (y >= 0) & (y <= H - 1) & (x >= 0) & (np.floor(x) + 1 <= W - 1)
+                sample = np.stack([map_coordinates(c, [y, x], order=1) for c in np.moveaxis(views[t, s], 2, 0)], axis=2)
+                squared = ((sample - centre) ** 2).sum(axis=2)
+                sums[k] += np.where(inside, squared / (squared + parameters.scale**2 + noise), 0)
+                counts[k] += inside
+    r = parameters.window_radius
+    cost, total = np.zeros_like(sums), np.zeros_like(counts)
+    for y in range(H):
+        for x in range(W):
+            for v in range(max(0, y - r), min(H, y + r + 1)):
+                for u in range(max(0, x - r), min(W, x + r + 1)):
+                    distance = ((centre[y, x].astype(float) - centre[v, u]) ** 2).sum()
+                    weight = np.exp(-0.5 * distance / (parameters.window_sigma**2 + noise))
+                    cost[:, y, x] += weight * sums[:, v, u]
+                    total[:, y, x] += weight * counts[:, v, u]
+    cost = np.where(total > 0, cost / np.maximum(total, 1e-300), 1)
+    best = cost.argmin(axis=0)
+    lowest = cost.min(axis=0)
+    near = np.clip(best, 1, len(candidates) - 2)
+    before, after = (np.take_along_axis(cost, near[None] + step, axis=0)[0] for step in (-1, 1))
+    with np.errstate(all="ignore"):
+        offset = np.where((best == near) & (lowest > 0), 0.5 * (before - after) / (before - 2 * lowest + after), 0)
+    step = (candidates[-1] - candidates[0]) / (len(candidates) - 1)
+    return candidates[best] + offset * step, lowest, cost.mean(axis=0)
+
+
+@pytest.mark.parametrize("radius", [0, 2])
+@pytest.mark.parametrize("channels", [1, 3])
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.float32])
+def test_sweep_equals_its_numpy_twin(radius, channels, dtype):
+    """Wrong sampling, borders, counts or weights would show as a wrong depth map."""
+    light_field = random_light_field(channels=channels, dtype=dtype)
+    parameters = SweepParameters(candidates=11, scale=0.3, window_radius=radius, window_sigma=0.5)
+    views = halves_and_quarters(light_field.grid)
+    result = sweep(light_field, parameters, groups=views.groups, subsets=views.subsets)
+    for n in (0, 1, 4, 6):
+        disparity, cost, mean = twin(light_field, parameters, views.groups, views.subsets[n])
+        np.testing.assert_allclose(result.cost[n], cost, atol=2e-5)
+        np.testing.assert_allclose(result.mean[n], mean, atol=2e-5)
+        # two candidates may tie within rounding
+        assert np.mean(np.abs(result.disparity[n] - disparity) > 2e-3) < 0.01
+
+
+def test_missing_views_are_left_out():
+    """A dark or absent view must not pull the depth of the others."""
+    whole = random_light_field()
+    present = np.ones(whole.grid, bool)
+    present[0, 1] = present[3, 3] = False
+    broken = whole.views.copy()
+    broken[~present] = 0
+    parameters = SweepParameters(candidates=7, scale=0.3, window_radius=1, window_sigma=0.5)
+    results = []
+    for views in (whole.views, broken):
+        light_field = LightField(views, "partial", present=present, disparity_range=whole.disparity_range)
+        results.append(sweep(light_field, parameters))
+    np.testing.assert_array_equal(results[0].disparity, results[1].disparity)
+
+
+@pytest.mark.parametrize("disparity", [-0.75, 0.0, 0.4])
+def test_sweep_visits_the_samples_of_the_stitched_epi(disparity):
+    """The fast sweep and the paper's construction (shift, concatenate, follow the line) are the same cost (Eq. 1-3)."""
+    light_field = random_light_field(shape=(12, 15))
+    light_field = light_field.with_range(DisparityRange(disparity - 0.5, disparity + 0.5, "given"))
+    parameters = SweepParameters(candidates=3, scale=0.3, window_radius=0)
+    scale = float(np.sqrt(parameters.scale**2 + residual_variance(light_field.centre)))
+    result = sweep(light_field, parameters)
+    for y, x in [(6, 7), (0, 3), (11, 14), (5, 1)]:
+        costs = [line_cost(light_field, y, x, disparity + offset, scale) for offset in (-0.5, 0, 0.5)]
+        assert result.cost[0, y, x] == pytest.approx(np.nanmin(costs), abs=1e-5)
+
+
+def test_true_slope_is_a_straight_line_in_the_stitched_epi():
+    """A drawn SEPI at the true disparity shows the pixel's colour all along one straight line."""
+    light_field = render("fronto_parallel", size=64, views=5)
+    y, x = 32, 30
+    at_truth = stitched_epi(light_field, y, float(light_field.truth[y, x]))
+    samples, valid = at_truth.along_line(x)
+    assert valid.sum() == 25
+    assert np.abs(samples - light_field.centre[y, x]).max() < 0.02
+    picture = at_truth.image()
+    assert picture.shape == (25, 64, 3)
+    columns = np.round(x - at_truth.disparity * at_truth.steps).astype(int)
+    drawn = (columns >= 0) & (columns < 64)
+    np.testing.assert_allclose(picture[drawn, columns[drawn]], samples[drawn], atol=0.02)
+    wrong, _ = stitched_epi(light_field, y, 0.0).along_line(x)
+    assert np.abs(wrong - light_field.centre[y, x]).max() > 0.05
+
+
+def test_stitched_epi_refuses_a_row_outside():
+    with pytest.raises(SepiError, match="row 99 lies outside"):
+        stitched_epi(random_light_field(), 99, 0.0)
+
+
+def test_equal_bytes_for_any_number_of_threads():
+    """A rerun on another machine must give the same file."""
+    light_field = render("curved_occluders", size=96, views=5)
+    parameters = SweepParameters(candidates=31)
+    threads = numba.get_num_threads()
+    results = []
+    try:
+        for number in (1, threads):
+            numba.set_num_threads(number)
+            results.append(sweep(light_field, parameters))
+    finally:
+        numba.set_num_threads(threads)
+    np.testing.assert_array_equal(results[0].disparity, results[1].disparity)
+    np.testing.assert_array_equal(results[0].cost, results[1].cost)
+
+
+def test_unwanted_pixels_stay_unknown_and_wanted_ones_unchanged():
+    light_field = random_light_field()
+    parameters = SweepParameters(candidates=5, scale=0.3, window_radius=2, window_sigma=0.5)
+    wanted = np.zeros(light_field.shape, bool)
+    wanted[[1, 7, 8], [3, 0, 16]] = True
+    some, whole = sweep(light_field, parameters, wanted=wanted), sweep(light_field, parameters)
+    assert np.isnan(some.disparity[0][~wanted]).all()
+    np.testing.assert_array_equal(some.disparity[0][wanted], whole.disparity[0][wanted])
+
+
+def test_unknown_range_is_an_error_that_says_what_to_give():
+    with pytest.raises(SepiError, match="disparity range unknown"):
+        sweep(LightField(random_light_field().views, "scene"), SweepParameters())
+
+
+def test_noise_level_is_the_noise_put_in():
+    """Scale and window follow the noise: an estimate off by far would blur clean scenes or trust noisy ones."""
+    generator = np.random.default_rng(1)
+    ramp = np.linspace(0.2, 0.8, 100, dtype=np.float32)
+    image = np.repeat((ramp[None] + 0 * ramp[:, None])[..., None], 3, axis=2)
+    assert noise_level(image) < 1e-4
+    for sigma in (0.01, 0.08):
+        noisy = (image + generator.normal(0, sigma, image.shape)).astype(np.float32)
+        assert noise_level(noisy) == pytest.approx(sigma, rel=0.1)

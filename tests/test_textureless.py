@@ -1,0 +1,171 @@
+"""Texture-less regions: LTI, its threshold, propagation of planes, and the promise never to make good depth worse."""
+
+import numpy as np
+import pytest
+from scipy.ndimage import binary_erosion, gaussian_filter
+
+from sepi.lightfield import DisparityRange, LightField
+from sepi.planes import Coupling, basis, evaluate_planes, fit_planes, propagate
+from sepi.scenes import render
+from sepi.stage import StageMaps, no_progress
+from sepi.superpixels import Superpixels, borders, colour_modes, superpixels
+from sepi.textureless import (
+    CHOICES,
+    LtiParameters,
+    local_texture_information,
+    lti_threshold,
+    slope_agreement,
+    superpixel_size,
+)
+
+
+def tiles(shape, size) -> Superpixels:
+    """Square superpixels."""
+    rows, columns = np.indices(shape)
+    labels = rows // size * -(-shape[1] // size) + columns // size
+    sizes = np.bincount(labels.ravel())
+    centroids = [np.bincount(labels.ravel(), axis.ravel()) / sizes for axis in (columns, rows)]
+    return Superpixels(labels, sizes, np.stack(centroids, axis=1))
+
+
+def bare_plane(seed=0, noise=True):
+    """A slanted plane whose inner part has no texture: noise instead of depth, and no confidence, there."""
+    generator = np.random.default_rng(seed)
+    rows, columns = np.mgrid[:120, :120]
+    truth = (0.01 * columns - 0.006 * rows).astype(np.float32)
+    bare = (np.abs(rows - 60) < 35) & (np.abs(columns - 60) < 35)
+    texture = gaussian_filter(generator.normal(0, 40, (120, 120, 1)), (1, 1, 0))
+    centre = np.repeat(np.where(bare[..., None], 128, 128 + texture), 3, axis=2).astype(np.uint8)
+    light_field = LightField(
+        np.broadcast_to(centre, (3, 3, *centre.shape)).copy(), "bare", disparity_range=DisparityRange(-2, 2, "given")
+    )
+    disparity = truth.copy()
+    if noise:
+        disparity[bare] = generator.uniform(-2, 2, bare.sum())
+    confidence = np.where(bare, 0.1, 0.9).astype(np.float32)
+    return light_field, truth, bare, StageMaps(disparity, confidence)
+
+
+def run(light_field, maps, **values):
+    return CHOICES["lti"].run(light_field, maps, LtiParameters(**values), no_progress)
+
+
+def test_depth_propagates_linearly_into_a_bare_surface():
+    light_field, truth, bare, maps = bare_plane()
+    refined = run(light_field, maps)
+    inner = binary_erosion(bare, iterations=15)  # a superpixel from the rim
+    assert np.abs(maps.disparity - truth)[inner].mean() > 0.5
+    assert np.abs(refined.disparity - truth)[inner].mean() < 0.01
+    assert np.abs(refined.disparity - truth).mean() < 0.3 * np.abs(maps.disparity - truth).mean()
+    assert refined.extra["textureless"][inner].mean() > 0.95
+    assert set(refined.extra) == {"superpixels", "lti", "textureless"}
+
+
+def test_good_depth_is_not_made_worse():
+    """Noise lowers confidence everywhere; a plane laid over sound depth would erase the scene."""
+    light_field, truth, _, _ = bare_plane()
+    rows, columns = np.indices(truth.shape)
+    truth = truth + ((rows // 12 + columns // 12) % 2).astype(np.float32)
+    maps = StageMaps(truth, np.full_like(truth, 0.2))
+    refined = run(light_field, maps)
+    assert np.abs(refined.disparity - truth).max() < 0.15
+
+
+@pytest.mark.parametrize("scene", ["dots", "curved_occluders", "pyramids", "stripes"])
+def test_never_worse_on_scenes_without_bare_surfaces(scene):
+    light_field = render(scene, size=128)
+    generator = np.random.default_rng(3)
+    noisy = light_field.truth + generator.normal(0, 0.03, light_field.shape).astype(np.float32)
+    maps = StageMaps(noisy, generator.uniform(0.2, 0.5, light_field.shape).astype(np.float32))
+    before, after = (np.mean((m.disparity - light_field.truth) ** 2) for m in (maps, run(light_field, maps)))
+    assert after <= 1.02 * before
+
+
+def test_none_hands_the_depth_on():
+    light_field, _, _, maps = bare_plane()
+    assert CHOICES["none"].run(light_field, maps, CHOICES["none"].parameters(), no_progress) is maps
+
+
+def test_lti_is_the_share_of_inner_texture_points():
+    """Eq. 6, counted by hand: texture on a superpixel's rim does not count."""
+    segments = tiles((20, 20), 10)
+    texture = np.zeros((20, 20), bool)
+    texture[1:4, 1:4] = True
+    texture[9, :10] = True
+    np.testing.assert_allclose(local_texture_information(segments, texture), [0.09, 0, 0, 0])
+
+
+def test_threshold_lies_where_the_sorted_lti_rises_fastest():
+    few_between = np.concatenate([np.linspace(0, 0.12, 300), [0.2, 0.25], np.linspace(0.32, 0.9, 300)])
+    threshold = lti_threshold(few_between, 0.05, 0.5)
+    assert 0.12 < threshold < 0.32
+
+
+def test_threshold_without_a_gap_stays_in_bounds():
+    assert lti_threshold(np.full(50, 0.95), 0.1, 0.4) == 0.1
+    assert lti_threshold(np.zeros(50), 0.1, 0.4) == 0.4
+
+
+def test_agreement_tells_noise_from_depth():
+    columns = np.indices((40, 40))[1]
+    plane = (0.02 * columns).astype(np.float32)
+    assert slope_agreement(plane, 3, 0.15).min() == 1
+    noise = np.random.default_rng(0).uniform(-2, 2, (40, 40)).astype(np.float32)
+    assert slope_agreement(noise, 3, 0.15).mean() < 0.15
+
+
+def test_robust_fit_ignores_outliers():
+    segments = tiles((30, 30), 15)
+    rows, columns = np.indices((30, 30))
+    truth = (0.5 + 0.02 * columns - 0.01 * rows).astype(np.float32)
+    spoiled = truth.copy()
+    spoiled[::3] += 1
+    design = basis(segments)
+    planes = fit_planes(segments, spoiled, np.ones_like(truth), design, 0.05)
+    assert np.abs(evaluate_planes(segments, planes, design) - truth).max() < 0.02
+
+
+def test_propagation_equals_the_plane_that_its_neighbours_lie_on():
+    """One unknown superpixel among planes of one surface, no data: the continuation is exact."""
+    segments = tiles((45, 45), 15)
+    rows, columns = np.indices((45, 45))
+    truth = (0.02 * columns - 0.01 * rows).astype(np.float32)
+    design = basis(segments)
+    planes = fit_planes(segments, truth, np.ones_like(truth), design, 0.05)
+    free = np.zeros(9, bool)
+    free[4] = True
+    planes[4] = [5, 5, 5]
+    touching = borders(segments)
+    solved = propagate(
+        segments, touching, np.ones(len(touching.first)), planes, free, truth, np.zeros_like(truth), design,
+        Coupling(continuity=1.0, slope=1.0, tolerance=0.05),
+    )  # fmt: skip
+    np.testing.assert_allclose(evaluate_planes(segments, solved, design), truth, atol=1e-3)
+    np.testing.assert_array_equal(solved[~free], planes[~free])
+
+
+def test_borders_of_tiles():
+    touching = borders(tiles((20, 20), 10))
+    pairs = list(zip(touching.first.tolist(), touching.second.tolist(), strict=True))
+    assert pairs == [(0, 1), (0, 2), (1, 3), (2, 3)]
+    assert touching.lengths.tolist() == [10, 10, 10, 10]
+    np.testing.assert_allclose(touching.midpoints[0], [9.5, 4.5])
+
+
+def test_superpixels_have_the_papers_sizes():
+    assert superpixel_size((512, 512), LtiParameters()) == 15
+    assert superpixel_size((768, 768), LtiParameters()) == 17
+    centre = render("wall", size=128, views=3).centre
+    segments = superpixels(centre, 15, 10.0)
+    assert 0.6 < len(segments) / (128**2 / 15**2) < 1.4
+    assert len(superpixels(centre[..., :1], 15, 10.0)) > 30
+
+
+def test_colour_modes_join_what_looks_alike():
+    segments = tiles((20, 40), 10)
+    centre = np.full((20, 40, 3), 0.5, np.float32)
+    centre[:, 20:] = [0.9, 0.1, 0.1]
+    centre[:, :10] += 0.005
+    modes = colour_modes(centre, segments, 0.03)
+    assert np.abs(modes[0] - modes[1]).max() < 0.01
+    assert np.abs(modes[1] - modes[2]).max() > 0.2
