@@ -49,7 +49,7 @@ class Workflow:
         config = self.folder / "config.yaml"
         config.write_text(yaml.safe_dump(self.config))
         snakefile = str(self.tree / "Snakefile")
-        words = ["-m", "snakemake", "--snakefile", snakefile, "--configfile", str(config), "--cores", "2"]
+        words = ["-m", "snakemake", "--snakefile", snakefile, "--configfile", str(config)]
         return [sys.executable, *words, *flags, "--", *targets]
 
     @property
