@@ -96,6 +96,10 @@ def lti(
     segments = superpixels(light_field.centre, superpixel_size(light_field.shape, parameters), parameters.compactness)
     progress(0.3)
     agreement = slope_agreement(before.disparity, parameters.agreement_radius, parameters.agreement_difference)
+    # where no candidate inside the range was best, neighbours agree about its end only
+    lowest, highest = light_field.known_range().candidates(2)
+    at_end = (before.disparity <= lowest) | (before.disparity >= highest)
+    agreement = np.where(at_end, np.float32(0), agreement)
     agrees = agreement > parameters.texture_agreement
     texture = canny_edges(light_field.centre, parameters) | (confidence > parameters.texture_confidence)
     information = local_texture_information(segments, texture)
