@@ -21,6 +21,9 @@ from sepi.errors import SepiError
 FloatMap = npt.NDArray[np.float32]
 BoolMap = npt.NDArray[np.bool_]
 
+MIN_SIZE = 8
+"""Least height and width of a view in pixels: about the window over which costs are aggregated."""
+
 
 @dataclass(frozen=True)
 class DisparityRange:
@@ -92,6 +95,10 @@ class LightField:
             raise SepiError(f"{self.name}: views must have shape (T, S, H, W, C) with C = 1 or 3, got {v.shape}")
         if v.shape[0] * v.shape[1] < 2:
             raise SepiError(f"{self.name}: depth needs at least two views, got a grid of {v.shape[0]}x{v.shape[1]}")
+        if min(v.shape[2:4]) < MIN_SIZE:
+            raise SepiError(
+                f"{self.name}: views must be at least {MIN_SIZE}x{MIN_SIZE} pixels, got {v.shape[3]}x{v.shape[2]}"
+            )
         if v.dtype not in (np.uint8, np.uint16, np.float32):
             raise SepiError(f"{self.name}: views must be uint8, uint16 or float32, got {v.dtype}")
         if self.present is None:
@@ -100,6 +107,8 @@ class LightField:
             raise SepiError(f"{self.name}: present must be bool of shape {v.shape[:2]}, got {self.present.shape}")
         if not self.present[self.reference]:
             raise SepiError(f"{self.name}: the centre view (t, s) = {self.reference} is missing; depth is made for it")
+        if self.present.sum() < 2:
+            raise SepiError(f"{self.name}: depth needs at least two views, only the centre view is present")
         if v.dtype == np.float32:
             _require_unit(self.name, v[self.present])
         for what, array in {"truth": self.truth, **self.masks}.items():

@@ -177,6 +177,8 @@ def nearer_on_hidden_side(surface: FloatMap, disparity: FloatMap, sides: list[st
         for distance in range(1, reach + 1):
             # the views kept lie towards (dt, ds), so the occluder lies the other way
             dy, dx = -dt * distance, -ds * distance
+            if abs(dy) >= H or abs(dx) >= W:
+                break
             here = np.s_[max(0, -dy) : H - max(0, dy), max(0, -dx) : W - max(0, dx)]
             there = np.s_[max(0, dy) : H - max(0, -dy), max(0, dx) : W - max(0, -dx)]
             np.maximum(nearest[here], surface[there], out=nearest[here])

@@ -15,7 +15,7 @@ from sepi.stage import StageMaps, no_progress
 
 pytestmark = pytest.mark.real
 
-# MSE x100 and Q25 x100 on the whole map: the paper's own figures for cotton; for antinous the paper's are 12.84 and 1.12
+# MSE x100 and Q25 x100 on the whole map, as the paper prints them for its own method
 BOUNDS = {"cotton": (1.20, 0.34), "antinous": (12.84, 1.12)}
 
 
@@ -69,7 +69,7 @@ def test_half_sepi_beats_the_split_angular_patch(hci: Path) -> None:
 
 
 def test_range_is_found_without_truth_or_parameters(hci: Path) -> None:
-    """antinous comes without parameters.cfg: a range that cut off its head or its wall would spoil the map."""
+    """Without parameters.cfg (antinous has none) a range that cut off the head or the wall would spoil the map."""
     light_field = scene(hci / "antinous")
     known = light_field.known_range()
     assert known.source == "estimated"

@@ -1,0 +1,67 @@
+"""All stages on odd but legal light fields, and the refusal of those that hold no depth."""
+
+import numpy as np
+import pytest
+
+import sepi
+from sepi.lightfield import DisparityRange, LightField
+from sepi.pipeline import VARIANTS
+
+CANDIDATES = {"initial": {"candidates": 21}, "occlusion": {"candidates": 21}}
+
+
+def light_field(shape, dtype=np.uint8, low=0.0, disparities=(-1.0, 1.0), **values) -> LightField:
+    views = np.random.default_rng(0).uniform(low, 1, shape)
+    views = views.astype(dtype) if dtype == np.float32 else (views * np.iinfo(dtype).max).astype(dtype)
+    return LightField(views, "odd", disparity_range=DisparityRange(*disparities, "given"), **values)
+
+
+ODD = {
+    "small": light_field((3, 3, 8, 8, 3)),
+    "narrow": light_field((3, 3, 30, 8, 3)),
+    "one row of views": light_field((1, 9, 20, 24, 3)),
+    "one column of views": light_field((9, 1, 20, 24, 3)),
+    "even grid": light_field((4, 2, 20, 24, 3)),
+    "two views": light_field((1, 2, 20, 24, 3)),
+    "grey": light_field((3, 3, 20, 24, 1)),
+    "16 bit": light_field((3, 3, 20, 24, 3), np.uint16),
+    "float": light_field((3, 3, 20, 24, 3), np.float32),
+    "one colour": light_field((3, 3, 20, 24, 3), low=1.0),
+    "black": LightField(np.zeros((3, 3, 20, 24, 3), np.uint8), "black", disparity_range=DisparityRange(-1, 1, "given")),
+    "range far from zero": light_field((3, 3, 20, 24, 3), disparities=(3.0, 9.0)),
+    "range wider than the picture": light_field((3, 3, 20, 24, 3), disparities=(-300.0, 300.0)),
+    "range beyond the picture": light_field((3, 3, 20, 24, 3), disparities=(100.0, 101.0)),
+    "missing views": light_field((3, 3, 20, 24, 3), present=np.array([[0, 1, 0], [1, 1, 1], [0, 0, 0]], bool)),
+}
+
+
+@pytest.mark.parametrize("name", ODD)
+@pytest.mark.parametrize("variant", ["paper", "no_sepi", "wang"])
+def test_odd_light_fields_get_finite_maps(name: str, variant: str) -> None:
+    """Someone's light field is never quite like a benchmark's: no crash, no NaN, nothing out of bounds."""
+    odd = ODD[name]
+    parameters = CANDIDATES if VARIANTS[variant].initial == "sepi" else {"occlusion": CANDIDATES["occlusion"]}
+    maps = sepi.estimate_depth(odd, variant=variant, parameters=parameters)
+    known = odd.known_range()
+    assert maps.disparity.shape == odd.shape
+    assert np.isfinite(maps.disparity).all()
+    assert maps.disparity.min() > known.minimum - 1
+    assert maps.disparity.max() < known.maximum + 1
+    assert maps.confidence.min() >= 0
+    assert maps.confidence.max() <= 1
+
+
+@pytest.mark.parametrize(
+    ("views", "present", "complaint"),
+    [
+        (np.zeros((3, 3, 7, 20, 3), np.uint8), None, "at least 8x8 pixels, got 20x7"),
+        (np.zeros((3, 3, 0, 20, 3), np.uint8), None, "shape"),
+        (np.zeros((3, 3, 20, 20, 4), np.uint8), None, "C = 1 or 3"),
+        (np.zeros((3, 3, 20, 20, 3)), None, "float32"),
+        (np.zeros((3, 3, 20, 20, 3), np.uint8), np.arange(9).reshape(3, 3) == 4, "only the centre view"),
+        (np.zeros((3, 3, 20, 20, 3), np.uint8), np.arange(9).reshape(3, 3) != 4, "centre view"),
+    ],
+)
+def test_light_fields_without_depth_are_refused(views, present, complaint) -> None:
+    with pytest.raises(sepi.SepiError, match=complaint):
+        LightField(views, "refused", present=present)
