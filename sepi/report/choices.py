@@ -51,7 +51,8 @@ ALTERNATIVES = (
     Alternative("data weight at steps as printed", "optimize", {"step_weight": 1e-6}),
     Alternative("no cut of the data weight at steps", "optimize", {"step_weight": 1.0}),
     Alternative("confidence itself as weight", "optimize", {"confidence_power": 1.0}),
-    Alternative("alpha tenfold", "optimize", {"alpha": 1e-5}),
+    Alternative("alpha a third", "optimize", {"alpha": 1e-6}),
+    Alternative("alpha threefold", "optimize", {"alpha": 1e-5}),
 )
 
 
