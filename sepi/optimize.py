@@ -34,7 +34,7 @@ class WlsParameters(Parameters):
     """Parameters of the weighted least squares."""
 
     alpha: float = Field(
-        1e-6, ge=0, description="weight of smoothness against data; for gradients of values 0..1 per px"
+        3e-6, ge=0, description="weight of smoothness against data; for gradients of values 0..1 per px"
     )
     gradient_floor: float = Field(
         0.002, gt=0, description="image gradient below which all is equally smooth, 0..1 per px"
