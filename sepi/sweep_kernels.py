@@ -3,7 +3,7 @@
 No cost volume is ever held: a thread keeps the cost rows of one aggregation window, and the minimum is taken as soon as
 a row is aggregated. Each row is summed by one thread in a fixed order: results do not depend on the number of threads.
 
-Every function works on one image row; only :func:`sweep_rows` runs in parallel.
+Functions work on one image row, or a part of it; only :func:`sweep_rows` runs in parallel.
 """
 
 from __future__ import annotations
@@ -16,6 +16,9 @@ from numba import njit, prange
 
 ROWS_PER_TASK = 64
 """Rows that a thread does at a stretch; the rows of the window above and below are done again by its neighbours."""
+
+TILE_WIDTH = 512
+"""Columns done at a time: bounds what a thread holds, whatever the width of the picture, and keeps it in the cache."""
 
 
 @njit(inline="always")
@@ -43,19 +46,21 @@ def _add_robust_rgb(
 
 
 @njit(cache=True, fastmath=True, error_model="numpy")
-def cost_row(views: Any, groups: Any, y: int, disparities: Any, scale2: Any, cost: Any, count: Any) -> None:
-    """Photo-consistency of row ``y``, summed over each group of views, for every candidate.
+def cost_row(
+    views: Any, groups: Any, y: int, begin: int, end: int, disparities: Any, scale2: Any, cost: Any, count: Any
+) -> None:
+    """Photo-consistency of columns ``begin..end`` of row ``y``, summed over each group of views, for every candidate.
 
     Parameters
     ----------
     views : ndarray, shape (T, S, C, H, W)
         C is 1 or 3.
     groups : ndarray, shape (T, S), int
-    y : int
+    y, begin, end : int
     disparities : ndarray, shape (K,), float32
     scale2 : float32
         Square of the robust scale, in the views' units.
-    cost, count : ndarray, shape (G, K, W), float32
+    cost, count : ndarray, shape (G, K, end - begin), float32
         Filled with the sum of the robust residuals (each 0..1) and the number of views that see the pixel.
     """
     T, S, C, H, W = views.shape
@@ -67,6 +72,9 @@ def cost_row(views: Any, groups: Any, y: int, disparities: Any, scale2: Any, cos
     centre = views[t0, s0, :, y].astype(np.float32)
     reach = max(abs(disparities[0]), abs(disparities[K - 1]))
     band = np.empty((C, int(2 * reach * max(t0, T - 1 - t0)) + 4, W), np.float32)
+    # columns that any view and candidate touches
+    side = math.ceil(reach * max(s0, S - 1 - s0)) + 1
+    leftmost, rightmost = max(0, begin - side), min(W, end + side)
     for t in range(T):
         # rows of this view row that any candidate touches, converted once for all candidates
         shift = -disparities * (t - t0)
@@ -78,7 +86,7 @@ def cost_row(views: Any, groups: Any, y: int, disparities: Any, scale2: Any, cos
                 continue
             for c in range(C):
                 for row in range(low, high + 1):
-                    band[c, row - low] = views[t, s, c, row]
+                    band[c, row - low, leftmost:rightmost] = views[t, s, c, row, leftmost:rightmost]
             for k in range(K):
                 v = y - disparities[k] * (t - t0)
                 if v < 0 or v > H - 1:
@@ -89,8 +97,8 @@ def cost_row(views: Any, groups: Any, y: int, disparities: Any, scale2: Any, cos
                 left = math.floor(u)
                 wx = np.float32(u - left)
                 # run of pixels whose sample lies inside the view
-                first = max(0, -left)
-                last = min(W, W - 1 - left)
+                first = max(begin, -left)
+                last = min(end, W - 1 - left)
                 if last <= first:
                     continue
                 i = first + left
@@ -99,7 +107,7 @@ def cost_row(views: Any, groups: Any, y: int, disparities: Any, scale2: Any, cos
                 w = ((1 - wy) * (1 - wx), (1 - wy) * wx, wy * (1 - wx), wy * wx)
                 if C == 3:
                     _add_robust_rgb(
-                        cost[g, k, first:last],
+                        cost[g, k, first - begin : last - begin],
                         band[0, n, i:j], band[0, n, i + 1 : j + 1], band[0, n + 1, i:j], band[0, n + 1, i + 1 : j + 1],
                         band[1, n, i:j], band[1, n, i + 1 : j + 1], band[1, n + 1, i:j], band[1, n + 1, i + 1 : j + 1],
                         band[2, n, i:j], band[2, n, i + 1 : j + 1], band[2, n + 1, i:j], band[2, n + 1, i + 1 : j + 1],
@@ -107,18 +115,18 @@ def cost_row(views: Any, groups: Any, y: int, disparities: Any, scale2: Any, cos
                     )  # fmt: skip
                 else:
                     _add_robust_gray(
-                        cost[g, k, first:last],
+                        cost[g, k, first - begin : last - begin],
                         band[0, n, i:j], band[0, n, i + 1 : j + 1], band[0, n + 1, i:j], band[0, n + 1, i + 1 : j + 1],
                         centre[0, first:last], w, scale2,
                     )  # fmt: skip
                 # how many views see a pixel: ends of the runs, summed up below
-                count[g, k, first] += 1
-                if last < W:
-                    count[g, k, last] -= 1
+                count[g, k, first - begin] += 1
+                if last < end:
+                    count[g, k, last - begin] -= 1
     for g in range(G):
         for k in range(K):
             n = np.float32(0)
-            for x in range(W):
+            for x in range(end - begin):
                 n += count[g, k, x]
                 count[g, k, x] = n
 
@@ -186,25 +194,22 @@ def _aggregate_row(ring: Any, y: int, H: int, weights: Any, first: int, last: in
 
 
 @njit(cache=True, error_model="numpy")
-def _count_window(counts: Any, y: int, H: int, weights: Any, margin: int, group_sizes: Any, out: Any) -> None:
-    """Weighted number of samples in the windows of row ``y``, per group and candidate."""
+def _count_window(counts: Any, y: int, H: int, weights: Any, first: int, last: int, group_sizes: Any, out: Any) -> None:
+    """Weighted number of samples in the windows of row ``y``; between columns ``first`` and ``last`` it is known."""
     G, K, W = out.shape
-    if y < margin or y >= H - margin or 2 * margin >= W:
-        _aggregate_row(counts, y, H, weights, 0, W, out)
-        return
-    # away from the border every view sees every pixel of the window: nothing to count
-    _aggregate_row(counts, y, H, weights, 0, margin, out)
-    _aggregate_row(counts, y, H, weights, W - margin, W, out)
+    _aggregate_row(counts, y, H, weights, 0, first, out)
+    _aggregate_row(counts, y, H, weights, last, W, out)
     for g in range(G):
         for k in range(K):
-            out[g, k, margin : W - margin] = group_sizes[g]
+            out[g, k, first:last] = group_sizes[g]
 
 
 @njit(cache=True, error_model="numpy")
 def _best_of_row(
-    sums: Any, counts: Any, subset: Any, wanted: Any, disparities: Any, disparity: Any, cost: Any, mean: Any
-) -> None:
-    """Minimum over the candidates of a row's costs, put together from the groups of one subset."""
+    sums: Any, counts: Any, subset: Any, wanted: Any, first: int, last: int, disparities: Any,
+    disparity: Any, cost: Any, mean: Any,
+) -> None:  # fmt: skip
+    """Minimum over the candidates, at wanted columns ``first..last``, of the costs of the groups of one subset."""
     G, K, W = sums.shape
     total = np.empty((K, W), np.float32)
     lowest = np.full(W, np.inf, np.float32)
@@ -227,7 +232,7 @@ def _best_of_row(
                 lowest[x] = row[x]
                 best[x] = k
     step = (disparities[K - 1] - disparities[0]) / np.float32(K - 1)
-    for x in range(W):
+    for x in range(first, last):
         if not wanted[x]:
             continue
         k = best[x]
@@ -243,39 +248,65 @@ def _best_of_row(
         mean[x] = over_candidates[x] / K
 
 
+@njit(cache=True, error_model="numpy")
+def _sweep_tile(
+    views: Any, guide: Any, groups: Any, subsets: Any, wanted: Any, top: int, bottom: int, begin: int, end: int,
+    disparities: Any, scale2: Any, radius: int, window_variance: Any, group_sizes: Any, margin: int,
+    disparity: Any, cost: Any, mean: Any,
+) -> None:  # fmt: skip
+    """Sweep rows ``top..bottom``, columns ``begin..end``; nearer than ``margin`` to the border, views are counted."""
+    H, W = views.shape[3:]
+    N, G = subsets.shape
+    K = disparities.size
+    size = 2 * radius + 1
+    # columns with those of the windows at both ends
+    left, right = max(0, begin - radius), min(W, end + radius)
+    width = right - left
+    ring = np.empty((size, G, K, width), np.float32)
+    counts = np.empty((size, G, K, width), np.float32)
+    weights = np.empty((size, size, width), np.float32)
+    window_costs = np.empty((G, K, width), np.float32)
+    window_counts = np.empty((G, K, width), np.float32)
+    tile_guide = guide[:, :, left:right].copy()
+    done = -1  # last row whose costs are in the ring
+    for y in range(top, bottom):
+        if not wanted[y, begin:end].any():
+            continue
+        for row in range(max(0, y - radius, done + 1), min(H, y + radius + 1)):
+            cost_row(views, groups, row, left, right, disparities, scale2, ring[row % size], counts[row % size])
+            done = row
+        window_weights(tile_guide, y, radius, window_variance, weights)
+        _aggregate_row(ring, y, H, weights, 0, width, window_costs)
+        # away from the border every view sees every pixel of the window: nothing to count
+        known_from, known_to = width, width
+        if margin <= y < H - margin:
+            known_from = min(width, max(0, margin - left))
+            known_to = max(known_from, min(width, W - margin - left))
+        _count_window(counts, y, H, weights, known_from, known_to, group_sizes, window_counts)
+        for n in range(N):
+            _best_of_row(
+                window_costs, window_counts, subsets[n], wanted[y, left:right], begin - left, end - left, disparities,
+                disparity[n, y, left:right], cost[n, y, left:right], mean[n, y, left:right],
+            )  # fmt: skip
+
+
 @njit(cache=True, parallel=True)
 def sweep_rows(
     views: Any, guide: Any, groups: Any, subsets: Any, wanted: Any, first: int, last: int, disparities: Any,
     scale2: Any, radius: int, window_variance: Any, disparity: Any, cost: Any, mean: Any,
 ) -> None:  # fmt: skip
     """Sweep rows ``first..last``, a run of them per thread."""
-    H, W = views.shape[3:]
-    N, G = subsets.shape
-    K = disparities.size
-    size = 2 * radius + 1
+    W = views.shape[4]
+    G = subsets.shape[1]
     group_sizes = np.array([(groups == g).sum() for g in range(G)], np.float32)
-    reach = max(abs(disparities[0]), abs(disparities[K - 1]))
+    reach = max(abs(disparities[0]), abs(disparities[-1]))
     margin = math.ceil(reach * max(views.shape[0], views.shape[1]) / 2) + radius + 1
     tasks = max(1, (last - first + ROWS_PER_TASK - 1) // ROWS_PER_TASK)
     rows = (last - first + tasks - 1) // tasks
     for task in prange(tasks):
-        ring = np.empty((size, G, K, W), np.float32)
-        counts = np.empty((size, G, K, W), np.float32)
-        weights = np.empty((size, size, W), np.float32)
-        window_costs = np.empty((G, K, W), np.float32)
-        window_counts = np.empty((G, K, W), np.float32)
-        done = -1  # last row whose costs are in the ring
-        for y in range(first + task * rows, min(last, first + (task + 1) * rows)):
-            if not wanted[y].any():
-                continue
-            for row in range(max(0, y - radius, done + 1), min(H, y + radius + 1)):
-                cost_row(views, groups, row, disparities, scale2, ring[row % size], counts[row % size])
-                done = row
-            window_weights(guide, y, radius, window_variance, weights)
-            _aggregate_row(ring, y, H, weights, 0, W, window_costs)
-            _count_window(counts, y, H, weights, margin, group_sizes, window_counts)
-            for n in range(N):
-                _best_of_row(
-                    window_costs, window_counts, subsets[n], wanted[y], disparities,
-                    disparity[n, y], cost[n, y], mean[n, y],
-                )  # fmt: skip
+        for begin in range(0, W, TILE_WIDTH):
+            _sweep_tile(
+                views, guide, groups, subsets, wanted, first + task * rows, min(last, first + (task + 1) * rows),
+                begin, min(W, begin + TILE_WIDTH), disparities, scale2, radius, window_variance, group_sizes, margin,
+                disparity, cost, mean,
+            )  # fmt: skip

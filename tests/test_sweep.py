@@ -11,6 +11,7 @@ from sepi.lightfield import DisparityRange, LightField
 from sepi.noise import noise_level, residual_variance
 from sepi.scenes import render
 from sepi.sweep import SweepParameters, sweep
+from sepi.sweep_kernels import TILE_WIDTH
 from sepi.view_groups import halves_and_quarters
 
 
@@ -80,6 +81,17 @@ def test_sweep_equals_its_numpy_twin(radius, channels, dtype):
         np.testing.assert_allclose(result.mean[n], mean, atol=2e-5)
         # two candidates may tie within rounding
         assert np.mean(np.abs(result.disparity[n] - disparity) > 2e-3) < 0.01
+
+
+def test_tiles_of_a_wide_picture_fit_together():
+    """Pictures wider than a tile: a seam, or a border counted in the middle, would run through the depth map."""
+    light_field = random_light_field(grid=(3, 3), shape=(9, 2 * TILE_WIDTH + 9))
+    parameters = SweepParameters(candidates=5, scale=0.3, window_radius=2, window_sigma=0.5)
+    groups = np.zeros(light_field.grid, int)
+    result = sweep(light_field, parameters)
+    _, cost, mean = twin(light_field, parameters, groups, np.ones(1, bool))
+    np.testing.assert_allclose(result.cost[0], cost, atol=2e-5)
+    np.testing.assert_allclose(result.mean[0], mean, atol=2e-5)
 
 
 def test_missing_views_are_left_out():
