@@ -86,7 +86,8 @@ def _sheared(
     weight = np.exp(-0.5 * (np.asarray(steps) / parameters.outer_sigma) ** 2).astype(np.float32)
 
     def tensor(a: FloatMap, b: FloatMap) -> FloatMap:
-        product = np.tensordot(weight / weight.sum(), (a * b).reshape(*moved.shape[:3], -1).sum(axis=3), axes=1)
+        # einsum, not tensordot: a BLAS product changes its last bits with the number of threads
+        product = np.einsum("s,syxc->yx", weight / weight.sum(), (a * b).reshape(*moved.shape[:3], -1))
         return _blurred(product.astype(np.float32), parameters.outer_sigma)
 
     xx, ss, xs = tensor(along_x, along_x), tensor(along_s, along_s), tensor(along_x, along_s)

@@ -160,7 +160,8 @@ def colour_modes(centre: FloatMap, segments: Superpixels, bandwidth: float) -> F
     for _ in range(50):
         distance = ((modes[:, None] - samples[None]) ** 2).sum(axis=2)
         weight = np.exp(-0.5 * distance / bandwidth**2)
-        moved = weight @ samples / weight.sum(axis=1, keepdims=True)
+        # einsum, not @: a BLAS product changes its last bits with the number of threads
+        moved = np.einsum("ij,jk->ik", weight, samples) / weight.sum(axis=1, keepdims=True)
         if np.abs(moved - modes).max() < 1e-3 * bandwidth:
             break
         modes = moved

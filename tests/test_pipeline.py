@@ -1,11 +1,17 @@
 """All stages on odd but legal light fields, and the refusal of those that hold no depth."""
 
+import os
+import subprocess
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 import sepi
 from sepi.lightfield import DisparityRange, LightField
 from sepi.pipeline import VARIANTS
+from sepi.scenes import render, write_hci
 
 CANDIDATES = {"initial": {"candidates": 21}, "occlusion": {"candidates": 21}}
 
@@ -65,3 +71,17 @@ def test_odd_light_fields_get_finite_maps(name: str, variant: str) -> None:
 def test_light_fields_without_depth_are_refused(views, present, complaint) -> None:
     with pytest.raises(sepi.SepiError, match=complaint):
         LightField(views, "refused", present=present)
+
+
+@pytest.mark.parametrize("variant", ["paper", "no_sepi"])
+def test_equal_files_for_any_number_of_threads(tmp_path: Path, variant: str) -> None:
+    """A result made on another machine must be the same, byte for byte: cores are not part of the input."""
+    write_hci(render("wall", size=128, views=5), tmp_path / "wall")
+    files = []
+    for threads in ("1", "2"):
+        out = tmp_path / threads
+        command = [sys.executable, "-m", "sepi", "depth", str(tmp_path / "wall"), "-o", str(out), "--variant", variant]
+        environment = {**os.environ, "OPENBLAS_NUM_THREADS": threads, "OMP_NUM_THREADS": threads}
+        subprocess.run([*command, "--threads", threads], env=environment, check=True, capture_output=True)
+        files.append({file.name: file.read_bytes() for file in out.iterdir()})
+    assert files[0] == files[1]
