@@ -21,8 +21,8 @@ from sepi.errors import SepiError
 FloatMap = npt.NDArray[np.float32]
 BoolMap = npt.NDArray[np.bool_]
 
-MIN_SIZE = 8
-"""Least height and width of a view in pixels: about the window over which costs are aggregated."""
+MIN_SIZE = 2
+"""Least height and width of a view in pixels: what a sample between pixels needs."""
 
 
 @dataclass(frozen=True)

@@ -161,14 +161,14 @@ def test_views_without_texture_say_so(level: float) -> None:
 
 def test_tiny_views_say_so() -> None:
     with pytest.raises(SepiError, match="cannot be estimated"):
-        estimate_range(LightField(np.zeros((2, 2, 1, 1, 1), np.uint8), "tiny"))
+        estimate_range(LightField(np.zeros((2, 2, 2, 2, 1), np.uint8), "tiny"))
 
 
-def test_only_the_centre_view_is_present() -> None:
-    present = np.zeros((3, 3), bool)
-    present[1, 1] = True
+def test_no_view_near_the_centre_is_present() -> None:
+    present = np.zeros((13, 13), bool)
+    present[6, 6] = present[0, 0] = True
     with pytest.raises(SepiError, match="no view within"):
-        estimate_range(LightField(np.zeros((3, 3, 8, 8, 1), np.uint8), "alone", present=present))
+        estimate_range(LightField(np.zeros((13, 13, 8, 8, 1), np.uint8), "apart", present=present))
 
 
 def test_given_range_wins_over_the_scenes_own() -> None:

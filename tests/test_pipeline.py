@@ -23,6 +23,7 @@ def light_field(shape, dtype=np.uint8, low=0.0, disparities=(-1.0, 1.0), **value
 
 
 ODD = {
+    "smallest": light_field((3, 3, 2, 2, 3)),
     "small": light_field((3, 3, 8, 8, 3)),
     "narrow": light_field((3, 3, 30, 8, 3)),
     "one row of views": light_field((1, 9, 20, 24, 3)),
@@ -60,7 +61,7 @@ def test_odd_light_fields_get_finite_maps(name: str, variant: str) -> None:
 @pytest.mark.parametrize(
     ("views", "present", "complaint"),
     [
-        (np.zeros((3, 3, 7, 20, 3), np.uint8), None, "at least 8x8 pixels, got 20x7"),
+        (np.zeros((3, 3, 1, 20, 3), np.uint8), None, "at least 2x2 pixels, got 20x1"),
         (np.zeros((3, 3, 0, 20, 3), np.uint8), None, "shape"),
         (np.zeros((3, 3, 20, 20, 4), np.uint8), None, "C = 1 or 3"),
         (np.zeros((3, 3, 20, 20, 3)), None, "float32"),
