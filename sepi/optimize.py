@@ -1,7 +1,7 @@
 """Global optimisation (section IV-D, Eq. 8-12 of [1]_).
 
 ``wls`` minimises the weighted least squares energy of Eq. 8: fidelity to the refined depth where it deserves it (Eq.
-9-10: the confidences of occluded, texture-less and other pixels, nothing where the depth changes abruptly), and
+9-10: the confidences of occluded, texture-less and other pixels, little where the depth changes abruptly), and
 smoothness on the 4-connected grid where the image is smooth (Eq. 11) and the depth uncertain (Eq. 12). ``none`` hands
 the depth on.
 
@@ -61,7 +61,7 @@ def wls(
     ----------
     light_field : LightField
     previous : StageMaps
-        Depth after the texture-less stage, with the maps ``textureless`` and ``occluded`` where those stages ran.
+        Depth after the texture-less stage, with the map ``textureless`` where that stage ran.
     parameters : WlsParameters
     progress : callable
 
