@@ -1,0 +1,183 @@
+"""How to read a light field where its files do not say it all, and how its views are put in their places.
+
+Readers find a grid of views in the files, the *given* grid. What :class:`ReadOptions` asks for turns it into the
+light field's grid: ``central`` cuts out its middle, ``order`` flips and transposes it, ``exclude`` leaves views out.
+Positions that a user gives (``exclude``, ``view``) are always those in the light field's own grid, as ``sepi info``
+counts them.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from sepi.errors import SepiError
+from sepi.validation import require_known
+
+Numbers = npt.NDArray[np.int64]
+
+AS_GIVEN = "as-given"
+
+ORDERS: dict[str, Callable[[Numbers], Numbers]] = {
+    AS_GIVEN: lambda grid: grid,
+    "flip-rows": lambda grid: grid[::-1],
+    "flip-columns": lambda grid: grid[:, ::-1],
+    "flip-both": lambda grid: grid[::-1, ::-1],
+    "transpose": lambda grid: grid.T,
+    "transpose-flip-rows": lambda grid: grid.T[::-1],
+    "transpose-flip-columns": lambda grid: grid.T[:, ::-1],
+    "transpose-flip-both": lambda grid: grid.T[::-1, ::-1],
+}
+"""The eight ways to lay out a grid: each takes the given grid to the light field's."""
+
+_MEANT_FOR = {
+    "grid": "files that do not say their grid themselves",
+    "pattern": "folders of views (--format images)",
+    "axes": "arrays (.mat, .npy, .npz)",
+    "variable": "files with several arrays (.mat, .npz)",
+    "follow_links": "folders",
+}
+
+_POSITION = re.compile(r"\s*(\d{1,6})\s*,\s*(\d{1,6})\s*")
+
+
+@dataclass(frozen=True)
+class ReadOptions:
+    """What the user says about a light field; None or empty where the reader is to find out.
+
+    Attributes
+    ----------
+    grid : tuple of int, optional
+        Rows and columns of the given grid.
+    pattern : str, optional
+        File name of a view with ``{row}`` and ``{column}``, or ``{number}``, for folders of pictures; ``*`` stands for
+        anything.
+    axes : str, optional
+        Axes of an array in order, of the letters T, S (view row and column), H, W, C: ``"HWTSC"``.
+    variable : str, optional
+        Name of the array in a file that holds several.
+    central : int, optional
+        Keep only the ``n x n`` views in the middle of the given grid; ``n`` is odd.
+    order : str
+        One of :data:`ORDERS`.
+    exclude : tuple of str
+        Views to leave out: positions ``"T,S"`` or file names.
+    view : tuple of int, optional
+        Position ``(t, s)`` of the view whose depth is wanted; the centre view unless given.
+    follow_links : bool
+        Read views that are links to files outside their folder.
+    """
+
+    grid: tuple[int, int] | None = None
+    pattern: str | None = None
+    axes: str | None = None
+    variable: str | None = None
+    central: int | None = None
+    order: str = AS_GIVEN
+    exclude: tuple[str, ...] = ()
+    view: tuple[int, int] | None = None
+    follow_links: bool = False
+
+
+def arranged(
+    source: str, grid: tuple[int, int], options: ReadOptions, names: Mapping[str, int] | None = None
+) -> Numbers:
+    """Which view of the given grid stands at each place of the light field's grid.
+
+    Parameters
+    ----------
+    source : str
+        Path, for messages.
+    grid : (int, int)
+        Rows and columns ``(T, S)`` of the given grid.
+    options : ReadOptions
+    names : mapping of str to int, optional
+        Number ``t * S + s`` of each file, so that views can be excluded by name.
+
+    Returns
+    -------
+    ndarray, int64
+        Number ``t * S + s`` in the given grid; -1 for excluded views.
+
+    Raises
+    ------
+    SepiError
+        If ``central``, ``order``, ``exclude`` or ``view`` does not fit the grid.
+    """
+    T, S = grid
+    require_known("order", [options.order], ORDERS)
+    numbers = np.arange(T * S).reshape(T, S)
+    if options.central is not None:
+        numbers = _central(source, numbers, options.central)
+    numbers = ORDERS[options.order](numbers)
+    if options.view is not None:
+        _require_inside(source, numbers, options.view)
+    excluded = [_excluded(source, view, numbers, names or {}) for view in options.exclude]
+    return np.where(np.isin(numbers, excluded), -1, numbers)
+
+
+def require_unused(source: str, options: ReadOptions, names: Iterable[str]) -> None:
+    """Raise where an option is given that a format has no use for.
+
+    Parameters
+    ----------
+    source : str
+        Path, for the message.
+    options : ReadOptions
+    names : iterable of str
+        Attributes of ``options`` that must be as they are unless given.
+
+    Raises
+    ------
+    SepiError
+        Naming the flag and what it is for.
+    """
+    unset = ReadOptions()
+    for name in names:
+        if getattr(options, name) != getattr(unset, name):
+            flag = "--" + name.replace("_", "-")
+            raise SepiError(f"{source}: {flag} does not apply to this format; it is for {_MEANT_FOR[name]}")
+
+
+def position(text: str) -> tuple[int, int] | None:
+    """``(t, s)`` from ``"T,S"``; None for any other text."""
+    match = _POSITION.fullmatch(text)
+    return None if match is None else (int(match[1]), int(match[2]))
+
+
+def _central(source: str, numbers: Numbers, side: int) -> Numbers:
+    T, S = numbers.shape
+    # around the centre view, as the light field's convention has it; an even grid has one row more before it than after
+    top, left = T // 2 - side // 2, S // 2 - side // 2
+    if side < 1 or side % 2 == 0 or top < 0 or left < 0 or top + side > T or left + side > S:
+        raise SepiError(
+            f"{source}: the central {side}x{side} views were asked for; expected an odd number that fits the grid of "
+            f"{T}x{S} views"
+        )
+    return numbers[top : top + side, left : left + side]
+
+
+def _excluded(source: str, view: str, numbers: Numbers, names: Mapping[str, int]) -> int:
+    place = position(view)
+    if place is not None:
+        _require_inside(source, numbers, place)
+        return int(numbers[place])
+    if view not in names:
+        found = f" (found: {', '.join(sorted(names)[:3])}, ...)" if names else ""
+        raise SepiError(
+            f"{source}: view '{view}' to exclude: expected a place ROW,COLUMN or the name of a view's file{found}"
+        )
+    return names[view]
+
+
+def _require_inside(source: str, numbers: Numbers, place: tuple[int, int]) -> None:
+    T, S = numbers.shape
+    if not (0 <= place[0] < T and 0 <= place[1] < S):
+        raise SepiError(
+            f"{source}: view {place[0]},{place[1]} lies outside the grid; rows go from 0 to {T - 1}, columns from 0 to "
+            f"{S - 1}"
+        )
