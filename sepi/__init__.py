@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from sepi.errors import SepiError
-    from sepi.io import read_light_field
     from sepi.lightfield import DisparityRange, LightField
     from sepi.pipeline import estimate_depth
+    from sepi.reading import read_light_field
 
     __version__: str
 
@@ -35,7 +35,7 @@ _HOME = {
     "LightField": "sepi.lightfield",
     "SepiError": "sepi.errors",
     "estimate_depth": "sepi.pipeline",
-    "read_light_field": "sepi.io",
+    "read_light_field": "sepi.reading",
 }
 
 

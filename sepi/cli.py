@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import json
-import math
 import os
 import re
+import time
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,12 +14,13 @@ import click
 
 from sepi.command import SepiGroup, progress_bar, use_threads
 from sepi.errors import SepiError
+from sepi.evaluate_command import evaluate
+from sepi.input_options import Geometry, Reading, camera_flags, reading_flags
 from sepi.provenance import package_version, result_attributes, step
 
 # Modules that are slow to import, such as the stages, are imported in the commands that need them.
 if TYPE_CHECKING:
-    from sepi.io.scores import Scores
-    from sepi.lightfield import DisparityRange, FloatMap, LightField
+    from sepi.lightfield import DisparityRange, LightField
     from sepi.pipeline import Variant
 
 _PATH = click.Path(path_type=Path)
@@ -65,6 +67,9 @@ def main() -> None:
     metavar="KEY=VALUE",
     help="Set a parameter, STAGE.CHOICE.NAME=VALUE; repeatable. config.yaml lists them.",
 )
+@click.option("--timing", is_flag=True, help="Also write runtime.txt: seconds, as a benchmark submission needs.")
+@camera_flags
+@reading_flags
 def depth(
     light_field_path: Path,
     output: Path | None,
@@ -72,11 +77,15 @@ def depth(
     disparity_range: tuple[float, float] | None,
     threads: int | None,
     settings: tuple[str, ...],
+    timing: bool,
+    geometry: Geometry | None,
+    reading: Reading,
 ) -> None:
     """Compute the disparity map of the light field INPUT.
 
-    INPUT is a folder of the HCI 4D light field benchmark (input_Cam000.png, ...) or an HDF5 file of this package.
-    Writes disparity.pfm, result.h5 (disparity, confidence, masks), disparity.png and confidence.png.
+    INPUT is a folder of views, a Lytro picture (*_eslf.png), an array (.mat, .npy, .npz) or an HDF5 file; 'sepi info'
+    shows how it is read, 'sepi check' whether its views are in the right order. Writes the disparity as numbers and in
+    colour, confidence, masks and a point cloud; depth in metres where the camera is known.
 
     Variants: paper (the whole method), no_sepi, no_occlusion, no_textureless, no_occlusion_no_textureless (parts of
     it switched off), wang (another treatment of occlusion).
@@ -85,13 +94,16 @@ def depth(
     Examples:
       sepi depth cotton
       sepi depth cotton -o maps --disparity-range -2 2
+      sepi depth flowers_eslf.png --central 7
+      sepi depth views --grid 5x5 --exclude 0,0 --exclude 0,4
       sepi depth cotton --variant no_occlusion --set initial.sepi.candidates=91
     """
     from sepi.ingest import settle_range
-    from sepi.io import read_light_field
-    from sepi.io.export import RESULT_FILES, require_target, write_result
+    from sepi.io.export import require_target, write_result
+    from sepi.io.files import atomic_path
     from sepi.pipeline import estimate_depth, stage_parameters, variant_named
 
+    started = time.perf_counter()
     use_threads(threads or os.cpu_count() or 1)
     chosen = variant_named(variant)
     parameters = _parameters(settings, variant, chosen)
@@ -101,70 +113,80 @@ def depth(
     whole = light_field_path.resolve()
     folder = output or Path(f"{whole.name if whole.is_dir() else whole.stem}-depth")
     require_target(folder)
-    light_field = settle_range(read_light_field(light_field_path), disparity_range)
+    light_field = reading.read(light_field_path, disparity_range=disparity_range)
+    if geometry is not None:
+        light_field = replace(light_field, camera=geometry.camera(light_field.shape))
+    light_field = settle_range(light_field)
     with progress_bar(light_field.name) as progress:
         maps = estimate_depth(light_field, chosen, parameters, progress)
-    write_result(folder, light_field, maps, result_attributes(light_field, variant, steps))
+    seconds = time.perf_counter() - started
+    files = write_result(folder, light_field, maps, result_attributes(light_field, variant, steps))
+    if timing:
+        with atomic_path(folder / "runtime.txt") as temporary:
+            temporary.write_text(f"{seconds:.3f}\n", encoding="ascii")
     click.echo(f"{light_field.name}: {_size(light_field)}")
     click.echo(f"disparity range: {_range(light_field.known_range())}")
-    click.echo(f"written to {folder}/: {' '.join(RESULT_FILES)}")
-
-
-@main.command(short_help="Score a disparity map against ground truth.")
-@click.argument("estimate", type=_PATH)
-@click.argument("truth", metavar="TRUTH|SCENE", type=_PATH)
-@click.option("--border", type=click.IntRange(min=0), help="Score with this many pixels left out on each side only.")
-@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
-def evaluate(estimate: Path, truth: Path, border: int | None, as_json: bool) -> None:
-    """Score the disparity map ESTIMATE against ground truth.
-
-    ESTIMATE is a PFM, an HDF5 file with a dataset 'disparity', a NumPy file (.npy), or a folder that 'sepi depth'
-    wrote. TRUTH is such a file; give the SCENE itself, a light field with ground truth, to have its occluded and
-    texture-less regions scored too.
-
-    Both protocols are used: 'paper' scores the whole map, 'benchmark' leaves out 15 pixels on each side.
-
-    \b
-    Examples:
-      sepi evaluate cotton-depth cotton
-      sepi evaluate estimate.pfm gt_disp_lowres.pfm --border 15 --json
-    """
-    scores = _scores(_read_map(estimate), truth, border)
-    if as_json:
-        click.echo(json.dumps(_without_nan(scores), indent=2, sort_keys=True))
-    else:
-        click.echo(_table(scores))
+    click.echo(f"written to {folder}/: {' '.join(files)}")
 
 
 @main.command(short_help="Show what is known about the light field INPUT.")
 @click.argument("light_field_path", metavar="INPUT", type=_PATH)
-def info(light_field_path: Path) -> None:
-    """Show what is known about the light field INPUT, with an estimate of its disparity range."""
-    from sepi.disparity_range import estimate_range
-    from sepi.io import format_of, read_light_field
+@reading_flags
+def info(light_field_path: Path, reading: Reading) -> None:
+    """Show what is known about the light field INPUT, with an estimate of its disparity range.
 
-    known_format = format_of(light_field_path)
-    light_field = read_light_field(light_field_path)
-    missing = [f"({t}, {s})" for t in range(light_field.grid[0]) for s in range(light_field.grid[1])]
-    missing = [view for view, present in zip(missing, light_field.present.ravel(), strict=True) if not present]
+    INPUT is anything that 'sepi depth' reads, with the same flags. Rows and columns of views are counted from 0.
+    """
+    from sepi.disparity_range import estimate_range
+    from sepi.io import format_of
+
+    known_format = format_of(light_field_path, reading.file_format)
+    light_field = reading.read(light_field_path)
+    t0, s0 = light_field.reference
+    missing = [f"{t},{s}" for t, s in zip(*(~light_field.present).nonzero(), strict=True)]
     own = light_field.disparity_range
     try:
         estimated = _range(estimate_range(light_field))
     except SepiError as error:
         estimated = str(error)
+    camera = light_field.camera
     lines = {
         "name": light_field.name,
         "format": known_format.name,
         "views": _size(light_field),
-        "pixels": f"{'RGB' if light_field.views.shape[4] == 3 else 'grey'}, {light_field.views.dtype}",
-        "missing views": ", ".join(missing) or "none",
+        "depth made for": f"view {t0},{s0}",
+        "missing views": f"{len(missing)}: {' '.join(missing)}" if missing else "none",
+        "pixels": _depth_of(light_field),
         "disparity range": "not given" if own is None else _range(own),
         "estimated range": estimated,
+        "metric depth": "unknown camera" if camera is None else f"{camera.scale:g} m / (disparity + {camera.offset:g})",
         "ground truth": "none" if light_field.truth is None else "yes",
         "masks": ", ".join(light_field.masks) or "none",
     }
     for key, value in lines.items():
         click.echo(f"{key + ':':17}{value}")
+    for note in light_field.notes:
+        click.echo(f"{'note:':17}{note}")
+
+
+@main.command(short_help="Check the order of the views of the light field INPUT.")
+@click.argument("light_field_path", metavar="INPUT", type=_PATH)
+@reading_flags
+def check(light_field_path: Path, reading: Reading) -> None:
+    """Check whether the views of the light field INPUT are in the order that depth needs.
+
+    Software does not agree on whether rows of views go up or down, columns left or right, or which of the two comes
+    first; in a wrong order depth is inside out or nonsense. The views tell: all eight orders are tried, and the flag
+    is named that sets INPUT right.
+    """
+    from sepi.view_order import check_order
+
+    light_field = reading.read(light_field_path, check_order=False)
+    found = check_order(light_field)
+    click.echo(f"{light_field.name}: {_size(light_field)}")
+    for word, misfit in found.fits.items():
+        click.echo(f"  {word:24}{misfit:8.4f}{'  best' if word == found.best and found.decided else ''}")
+    click.echo(found.verdict())
 
 
 @main.command(short_help="Write built-in scenes with exact ground truth.")
@@ -201,9 +223,21 @@ def scenes(names: tuple[str, ...], output: Path, size: int, views: int, only_lis
         click.echo(f"written: {output / name}/")
 
 
+for command in (evaluate,):
+    main.add_command(command)
+
+
 def _size(light_field: LightField) -> str:
     (rows, columns), (height, width) = light_field.grid, light_field.shape
-    return f"{columns}x{rows} views of {width}x{height} pixels"
+    present = int(light_field.present.sum())
+    number = "" if present == rows * columns else f", {present} of {rows * columns}"
+    return f"{rows}x{columns} views (rows x columns{number}) of {width}x{height} pixels"
+
+
+def _depth_of(light_field: LightField) -> str:
+    kind = light_field.views.dtype
+    bits = f"{8 * kind.itemsize} bit{' float' if kind.kind == 'f' else ''}"
+    return f"{'RGB' if light_field.views.shape[4] == 3 else 'grey'}, {bits}; values as stored, no gamma applied"
 
 
 def _range(known: DisparityRange) -> str:
@@ -227,94 +261,3 @@ def _parameters(settings: tuple[str, ...], name: str, variant: Variant) -> dict[
             value = text
         parameters.setdefault(stage, {})[field] = value
     return parameters
-
-
-def _read_map(path: Path) -> FloatMap:
-    """A disparity map from a PFM, HDF5 or NumPy file, or from the folder of a result."""
-    import numpy as np
-
-    from sepi.io.hdf5 import read_map
-    from sepi.io.pfm import read_pfm
-
-    if path.is_dir():
-        path = path / "disparity.pfm"
-    if not path.is_file():
-        raise SepiError(f"{path}: no such file")
-    if path.suffix == ".pfm":
-        return read_pfm(path)
-    if path.suffix in (".h5", ".hdf5"):
-        return read_map(path, "disparity")
-    if path.suffix != ".npy":
-        raise SepiError(f"{path}: expected a disparity map as .pfm, .h5 or .npy")
-    try:
-        with path.open("rb") as file:
-            # np.load also takes archives and pickles
-            values = np.lib.format.read_array(file, allow_pickle=False)
-    except (OSError, ValueError, EOFError) as error:
-        raise SepiError(f"{path}: not a readable NumPy file ({' '.join(str(error).split())})") from error
-    if values.ndim != 2 or values.dtype.kind not in "fiu":
-        raise SepiError(f"{path}: expected an array of numbers of shape (H, W)")
-    return np.asarray(values, np.float32)
-
-
-def _scores(disparity: FloatMap, truth: Path, border: int | None) -> dict[str, dict[str, Scores]]:
-    """Protocol to region to scores; the regions only where ``truth`` is a light field."""
-    from sepi.evaluate import PROTOCOLS, REGIONS, WHOLE_MAP, region_masks, score
-    from sepi.io import FORMATS, read_light_field
-
-    masks = {}
-    if any(known.matches(truth) for known in FORMATS):
-        light_field = read_light_field(truth)
-        if light_field.truth is None:
-            raise SepiError(f"{truth}: this light field has no ground truth")
-        values = light_field.truth
-        masks = region_masks(light_field)
-    else:
-        values = _read_map(truth)
-    if values.shape != disparity.shape:
-        raise SepiError(f"{truth}: ground truth is {values.shape}, the estimate {disparity.shape} (height, width)")
-    protocols = PROTOCOLS if border is None else {f"border {border}": border}
-    regions = REGIONS if masks else (WHOLE_MAP,)
-    return {
-        protocol: {region: score(disparity, values, left_out, masks.get(region)) for region in regions}
-        for protocol, left_out in protocols.items()
-    }
-
-
-def _table(scores: dict[str, dict[str, Scores]]) -> str:
-    """Scores as aligned columns."""
-    heads = {
-        "mse100": "MSE x100",
-        "q25": "Q25 x100",
-        "badpix007": "BadPix 0.07 %",
-        "badpix003": "BadPix 0.03 %",
-        "badpix001": "BadPix 0.01 %",
-        "non_finite": "non-finite",
-        "pixels": "pixels",
-    }
-    rows = [["protocol", "region", *heads.values()]]
-    for protocol, regions in scores.items():
-        for region, values in regions.items():
-            rows.append([protocol, region, *(_cell(values[key]) for key in heads)])
-    widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
-    return "\n".join(
-        "  ".join(
-            text.ljust(width) if column < 2 else text.rjust(width)
-            for column, (text, width) in enumerate(zip(row, widths, strict=True))
-        )
-        for row in rows
-    )
-
-
-def _cell(value: float) -> str:
-    """A count as it is, a score with three decimals, a score over no pixels as a dash."""
-    if isinstance(value, int):
-        return f"{value}"
-    return "-" if math.isnan(value) else f"{value:.3f}"
-
-
-def _without_nan(value: Any) -> Any:
-    """NaN, which JSON does not have, as null."""
-    if isinstance(value, dict):
-        return {key: _without_nan(inner) for key, inner in value.items()}
-    return None if isinstance(value, float) and math.isnan(value) else value

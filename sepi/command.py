@@ -6,13 +6,15 @@ workflow's rule calls.
 
 from __future__ import annotations
 
+import functools
 import json
 import resource
 import signal
 import sys
 import threading
 import time
-from collections.abc import Iterator, Mapping
+import warnings
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
@@ -23,7 +25,7 @@ import cv2
 import numba
 from tqdm import tqdm
 
-from sepi.errors import SepiError
+from sepi.errors import SepiError, SepiWarning
 from sepi.io.files import atomic_path
 from sepi.io.hdf5 import read_light_field, read_stage, write_stage
 from sepi.provenance import history_of, stage_attributes, step
@@ -55,16 +57,32 @@ class SepiGroup(click.Group):
 
 @contextmanager
 def shown_errors() -> Iterator[None]:
-    """Turn :class:`SepiError` into a line without traceback, and SIGTERM into an exit that removes unfinished files."""
+    """Turn :class:`SepiError` into a line without traceback, and SIGTERM into an exit that removes unfinished files.
+
+    A :class:`SepiWarning` becomes a line too, and the command goes on.
+    """
     main = threading.current_thread() is threading.main_thread()
     before = signal.signal(signal.SIGTERM, _exit_on_signal) if main else None
     try:
-        yield
+        with warnings.catch_warnings():
+            warnings.simplefilter("always", SepiWarning)
+            shown = warnings.showwarning
+            warnings.showwarning = functools.partial(_show_warning, shown)
+            yield
     except SepiError as error:
         raise _Shown(" ".join(str(error).split())) from error
     finally:
         if main:
             signal.signal(signal.SIGTERM, before)
+
+
+def _show_warning(
+    shown: Callable[..., None], message: Warning | str, category: type[Warning], *where: Any, **more: Any
+) -> None:
+    if issubclass(category, SepiWarning):
+        click.echo(f"sepi: warning: {' '.join(str(message).split())}", err=True)
+    else:
+        shown(message, category, *where, **more)
 
 
 def _exit_on_signal(number: int, _: FrameType | None) -> None:

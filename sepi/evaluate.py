@@ -124,11 +124,12 @@ def region_masks(light_field: LightField) -> dict[str, BoolMap]:
     """The masks ``occluded`` and ``textureless``, (H, W) bool: the scene's own, else computed from its ground truth."""
     if light_field.truth is None:
         raise SepiError(f"{light_field.name}: regions for evaluation need ground truth, and this scene has none")
-    own = light_field.masks
-    return {
-        "occluded": own["occluded"] if "occluded" in own else regions.occluded(light_field.truth, light_field.grid),
-        "textureless": own["textureless"] if "textureless" in own else regions.textureless(light_field.centre),
-    }
+    masks = dict(light_field.masks)
+    if "occluded" not in masks:
+        masks["occluded"] = regions.occluded(light_field.truth, light_field.grid, light_field.reference)
+    if "textureless" not in masks:
+        masks["textureless"] = regions.textureless(light_field.centre)
+    return {name: masks[name] for name in ("occluded", "textureless")}
 
 
 def _require_shape(what: str, values: FloatMap | BoolMap, estimate: FloatMap) -> None:

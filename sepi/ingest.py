@@ -9,7 +9,7 @@ import click
 
 from sepi.command import SepiCommand, use_threads, write_timing
 from sepi.disparity_range import estimate_range
-from sepi.io import read_light_field
+from sepi.input_options import Reading, reading_flags
 from sepi.io.hdf5 import write_light_field
 from sepi.lightfield import DisparityRange, LightField
 
@@ -37,6 +37,7 @@ def settle_range(light_field: LightField, given: tuple[float, float] | None = No
 @click.option("--size", type=click.IntRange(min=1), default=192, show_default=True, help="Built-in: pixels a side.")
 @click.option("--views", type=click.IntRange(min=2), default=9, show_default=True, help="Built-in: views a side.")
 @click.option("--disparity-range", nargs=2, type=float, metavar="MIN MAX", help="Pixels per view step.")
+@reading_flags
 @click.option("--threads", type=click.IntRange(min=1), default=1, show_default=True, help="Threads to use.")
 @click.option("--output", type=_PATH, required=True, help="HDF5 file to write.")
 @click.option("--timing", type=_PATH, help="JSON file to write: seconds and peak memory.")
@@ -46,6 +47,7 @@ def main(
     size: int,
     views: int,
     disparity_range: tuple[float, float] | None,
+    reading: Reading,
     threads: int,
     output: Path,
     timing: Path | None,
@@ -56,7 +58,7 @@ def main(
     if (path is None) == (builtin is None):
         raise click.UsageError("expected either PATH or --builtin NAME")
     if path is not None:
-        light_field = read_light_field(path)
+        light_field = reading.read(path)
     else:
         from sepi.scenes import render
 

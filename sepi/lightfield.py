@@ -3,9 +3,10 @@
 Conventions, shared by every module:
 
 - views are ``(T, S, H, W, C)``: ``t`` is the row of the view grid (top to bottom), ``s`` its column (left to right);
-- the centre view is ``(T // 2, S // 2)``;
-- disparity ``d`` is in pixels per view step, positive when nearer than the focus plane; the centre-view pixel
-  ``(y, x)`` is seen in view ``(t, s)`` at ``(y - d * (t - t0), x - d * (s - s0))``.
+- the centre view is ``(T // 2, S // 2)``; the *reference* view, whose depth is made, is the centre view unless another
+  is asked for;
+- disparity ``d`` is in pixels per view step, positive when nearer than the focus plane; the reference-view
+  pixel ``(y, x)`` is seen in view ``(t, s)`` at ``(y - d * (t - t0), x - d * (s - s0))``.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import numpy.typing as npt
 
+from sepi.camera import Camera
 from sepi.errors import SepiError
 
 FloatMap = npt.NDArray[np.float32]
@@ -67,18 +69,25 @@ class LightField:
     source : str
         Where the light field came from: a path or ``"built-in"``.
     present : ndarray, shape (T, S), bool
-        Which views exist; the centre view must. All, unless given.
+        Which views exist; the reference view must. All, unless given.
     disparity_range : DisparityRange or None
         None where nothing is known (it can be estimated from the views).
     truth : ndarray, shape (H, W), float32, or None
-        Ground-truth disparity of the centre view, for evaluation only.
+        Ground-truth disparity of the reference view, for evaluation only.
     masks : mapping of str to ndarray, shape (H, W), bool
         Named regions for evaluation (``"occluded"``, ``"textureless"``, ...).
+    view : tuple of int or None
+        Grid position ``(t0, s0)`` of the reference view; None: the centre view.
+    camera : Camera or None
+        Geometry that turns disparity into metric depth, where it is known.
+    notes : tuple of str
+        What the reader assumed or left out, for the user.
 
     Raises
     ------
     SepiError
-        If a shape or dtype is not as above, floats are not finite or far outside 0..1, or the centre view is missing.
+        If a shape or dtype is not as above, floats are not finite or far outside 0..1, or the reference view lies
+        outside the grid or is missing.
     """
 
     views: npt.NDArray[np.generic]
@@ -88,6 +97,9 @@ class LightField:
     disparity_range: DisparityRange | None = None
     truth: FloatMap | None = None
     masks: Mapping[str, BoolMap] = field(default_factory=dict)
+    view: tuple[int, int] | None = None
+    camera: Camera | None = None
+    notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         v = self.views
@@ -105,10 +117,17 @@ class LightField:
             object.__setattr__(self, "present", np.ones(v.shape[:2], bool))
         if self.present.shape != v.shape[:2] or self.present.dtype != bool:
             raise SepiError(f"{self.name}: present must be bool of shape {v.shape[:2]}, got {self.present.shape}")
+        t, s = self.reference
+        if not (0 <= t < v.shape[0] and 0 <= s < v.shape[1]):
+            raise SepiError(
+                f"{self.name}: view {t},{s} lies outside the grid; rows go from 0 to {v.shape[0] - 1}, "
+                f"columns from 0 to {v.shape[1] - 1}"
+            )
+        which = "centre view" if self.reference == (v.shape[0] // 2, v.shape[1] // 2) else "view"
         if not self.present[self.reference]:
-            raise SepiError(f"{self.name}: the centre view (t, s) = {self.reference} is missing; depth is made for it")
+            raise SepiError(f"{self.name}: the {which} (t, s) = {self.reference} is missing; depth is made for it")
         if self.present.sum() < 2:
-            raise SepiError(f"{self.name}: depth needs at least two views, only the centre view is present")
+            raise SepiError(f"{self.name}: depth needs at least two views, only the {which} {t},{s} is present")
         if v.dtype == np.float32:
             _require_unit(self.name, v[self.present])
         for what, array in {"truth": self.truth, **self.masks}.items():
@@ -119,8 +138,8 @@ class LightField:
 
     @property
     def reference(self) -> tuple[int, int]:
-        """Grid position ``(t0, s0)`` of the centre view."""
-        return self.views.shape[0] // 2, self.views.shape[1] // 2
+        """Grid position ``(t0, s0)`` of the reference view."""
+        return self.view or (self.views.shape[0] // 2, self.views.shape[1] // 2)
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -134,7 +153,7 @@ class LightField:
 
     @property
     def centre(self) -> FloatMap:
-        """The centre view as ``(H, W, C)`` float32 in 0..1."""
+        """The reference view as ``(H, W, C)`` float32 in 0..1."""
         return as_unit_float(self.views[self.reference])
 
     def known_range(self) -> DisparityRange:
@@ -152,6 +171,18 @@ class LightField:
     def with_range(self, disparity_range: DisparityRange) -> LightField:
         """The same light field with another disparity range."""
         return replace(self, disparity_range=disparity_range)
+
+    def seen_from(self, view: tuple[int, int]) -> LightField:
+        """The same light field with another reference view; ground truth and masks, which belong to a view, go.
+
+        Raises
+        ------
+        SepiError
+            If there is no such view.
+        """
+        if view == self.reference:
+            return self
+        return replace(self, view=view, truth=None, masks={})
 
 
 def _require_unit(name: str, values: npt.NDArray[np.generic]) -> None:

@@ -93,7 +93,7 @@ def half_sepi(
     """
     before = given(previous)
     candidates = occlusion_candidates(light_field.centre, before.disparity, parameters)
-    views = halves_and_quarters(light_field.grid)
+    views = halves_and_quarters(light_field.grid, light_field.reference)
     result = sweep(
         light_field, parameters, groups=views.groups, subsets=views.subsets, wanted=candidates, progress=progress
     )
@@ -123,7 +123,7 @@ def wang(
     """
     before = given(previous)
     candidates = occlusion_candidates(light_field.centre, before.disparity, parameters)
-    views = half_planes(light_field.grid, parameters.directions)
+    views = half_planes(light_field.grid, parameters.directions, light_field.reference)
     result = sweep(
         light_field, parameters, groups=views.groups, subsets=views.subsets, wanted=candidates, progress=progress
     )

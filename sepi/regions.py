@@ -29,8 +29,8 @@ _HALF_PIXEL = 0.501
 _STRETCH = 2.0
 
 
-def occluded(truth: FloatMap, grid: tuple[int, int]) -> BoolMap:
-    """Pixels of the centre view that at least one other view does not see.
+def occluded(truth: FloatMap, grid: tuple[int, int], reference: tuple[int, int] | None = None) -> BoolMap:
+    """Pixels of the reference view that at least one other view does not see.
 
     A pixel is hidden in a view if a nearer pixel lands within half a pixel of it there: what a z-buffer of that view
     would say. Instead of a buffer on the view's pixel grid, whose rounding marks slanted planes as hidden by
@@ -45,6 +45,8 @@ def occluded(truth: FloatMap, grid: tuple[int, int]) -> BoolMap:
         Disparity in pixels per view step; pixels that are not finite neither hide nor are hidden.
     grid : tuple of int
         Number of view rows and columns ``(T, S)``.
+    reference : tuple of int, optional
+        Place of the reference view; the centre unless given.
 
     Returns
     -------
@@ -52,7 +54,8 @@ def occluded(truth: FloatMap, grid: tuple[int, int]) -> BoolMap:
         A pixel that falls outside a view counts as seen by it.
     """
     rows, columns = grid
-    offsets = [(t - rows // 2, s - columns // 2) for t in range(rows) for s in range(columns)]
+    t0, s0 = reference or (rows // 2, columns // 2)
+    offsets = [(t - t0, s - s0) for t in range(rows) for s in range(columns)]
     # far views hide most: looking at them first ends the search early
     offsets.sort(key=lambda offset: -max(abs(offset[0]), abs(offset[1])))
     finite = np.isfinite(truth)

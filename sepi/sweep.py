@@ -1,7 +1,7 @@
 """The plane sweep: photo-consistency of every candidate disparity over all views or over groups of them (Eq. 3).
 
 The straight line through a SEPI meets one sample of every view, so Eq. 3 of [1]_ is a plane sweep: for a candidate
-``d`` the centre-view pixel ``(y, x)`` is compared with the bilinear sample of view ``(t, s)`` at
+``d`` the reference-view pixel ``(y, x)`` is compared with the bilinear sample of view ``(t, s)`` at
 ``(y - d (t - t0), x - d (s - s0))``. One ``(d, view)`` has one sub-pixel weight for the whole image, so a row is a run
 of contiguous multiply-adds that vectorises. Views are summed in *groups* (all of them for a SEPI; the parts from which
 half-SEPIs are put together), so one pass serves full and half SEPIs alike.
@@ -119,7 +119,7 @@ def sweep(
     H, W = light_field.shape
     groups = np.zeros(light_field.grid, np.int64) if groups is None else groups
     groups = np.where(light_field.present, groups, -1)
-    groups[light_field.reference] = -1  # the centre view agrees with itself at every candidate
+    groups[light_field.reference] = -1  # the reference view agrees with itself at every candidate
     subsets = np.eye(groups.max() + 1, dtype=bool) if subsets is None else subsets
     wanted = np.ones((H, W), bool) if wanted is None else wanted
     views = planar(light_field)
@@ -129,6 +129,7 @@ def sweep(
     for first in range(0, H, strip):
         sweep_rows(
             views,
+            *light_field.reference,
             np.ascontiguousarray(light_field.centre.transpose(2, 0, 1)),
             groups,
             subsets,

@@ -47,14 +47,17 @@ def _add_robust_rgb(
 
 @njit(cache=True, fastmath=True, error_model="numpy")
 def cost_row(
-    views: Any, groups: Any, y: int, begin: int, end: int, disparities: Any, scale2: Any, cost: Any, count: Any
-) -> None:
+    views: Any, t0: int, s0: int, groups: Any, y: int, begin: int, end: int, disparities: Any, scale2: Any, cost: Any,
+    count: Any,
+) -> None:  # fmt: skip
     """Photo-consistency of columns ``begin..end`` of row ``y``, summed over each group of views, for every candidate.
 
     Parameters
     ----------
     views : ndarray, shape (T, S, C, H, W)
         C is 1 or 3.
+    t0, s0 : int
+        Place of the reference view.
     groups : ndarray, shape (T, S), int
     y, begin, end : int
     disparities : ndarray, shape (K,), float32
@@ -64,14 +67,13 @@ def cost_row(
         Filled with the sum of the robust residuals (each 0..1) and the number of views that see the pixel.
     """
     T, S, C, H, W = views.shape
-    t0, s0 = T // 2, S // 2
     K = disparities.size
     G = cost.shape[0]
     cost[:] = 0
     count[:] = 0
     centre = views[t0, s0, :, y].astype(np.float32)
     reach = max(abs(disparities[0]), abs(disparities[K - 1]))
-    band = np.empty((C, int(2 * reach * max(t0, T - 1 - t0)) + 4, W), np.float32)
+    band = np.empty((C, min(H, int(2 * reach * max(t0, T - 1 - t0)) + 4), W), np.float32)
     # columns that any view and candidate touches
     side = math.ceil(reach * max(s0, S - 1 - s0)) + 1
     leftmost, rightmost = max(0, begin - side), min(W, end + side)
@@ -138,7 +140,7 @@ def window_weights(guide: Any, y: int, radius: int, variance: Any, weights: Any)
     Parameters
     ----------
     guide : ndarray, shape (C, H, W), float32
-        Centre view.
+        Reference view.
     y, radius : int
     variance : float32
         Squared colour distance of the fall-off.
@@ -250,8 +252,9 @@ def _best_of_row(
 
 @njit(cache=True, error_model="numpy")
 def _sweep_tile(
-    views: Any, guide: Any, groups: Any, subsets: Any, wanted: Any, top: int, bottom: int, begin: int, end: int,
-    disparities: Any, scale2: Any, radius: int, window_variance: Any, group_sizes: Any, margin: int,
+    views: Any, t0: int, s0: int, guide: Any, groups: Any, subsets: Any, wanted: Any,
+    top: int, bottom: int, begin: int, end: int, disparities: Any, scale2: Any, radius: int, window_variance: Any,
+    group_sizes: Any, margin: int,
     disparity: Any, cost: Any, mean: Any,
 ) -> None:  # fmt: skip
     """Sweep rows ``top..bottom``, columns ``begin..end``; nearer than ``margin`` to the border, views are counted."""
@@ -273,7 +276,9 @@ def _sweep_tile(
         if not wanted[y, begin:end].any():
             continue
         for row in range(max(0, y - radius, done + 1), min(H, y + radius + 1)):
-            cost_row(views, groups, row, left, right, disparities, scale2, ring[row % size], counts[row % size])
+            cost_row(
+                views, t0, s0, groups, row, left, right, disparities, scale2, ring[row % size], counts[row % size]
+            )  # fmt: skip
             done = row
         window_weights(tile_guide, y, radius, window_variance, weights)
         _aggregate_row(ring, y, H, weights, 0, width, window_costs)
@@ -292,7 +297,8 @@ def _sweep_tile(
 
 @njit(cache=True, parallel=True)
 def sweep_rows(
-    views: Any, guide: Any, groups: Any, subsets: Any, wanted: Any, first: int, last: int, disparities: Any,
+    views: Any, t0: int, s0: int, guide: Any, groups: Any, subsets: Any, wanted: Any,
+    first: int, last: int, disparities: Any,
     scale2: Any, radius: int, window_variance: Any, disparity: Any, cost: Any, mean: Any,
 ) -> None:  # fmt: skip
     """Sweep rows ``first..last``, a run of them per thread."""
@@ -300,13 +306,15 @@ def sweep_rows(
     G = subsets.shape[1]
     group_sizes = np.array([(groups == g).sum() for g in range(G)], np.float32)
     reach = max(abs(disparities[0]), abs(disparities[-1]))
-    margin = math.ceil(reach * max(views.shape[0], views.shape[1]) / 2) + radius + 1
+    farthest = max(t0, views.shape[0] - 1 - t0, s0, views.shape[1] - 1 - s0)
+    margin = math.ceil(reach * farthest) + radius + 1
     tasks = max(1, (last - first + ROWS_PER_TASK - 1) // ROWS_PER_TASK)
     rows = (last - first + tasks - 1) // tasks
     for task in prange(tasks):
         for begin in range(0, W, TILE_WIDTH):
             _sweep_tile(
-                views, guide, groups, subsets, wanted, first + task * rows, min(last, first + (task + 1) * rows),
-                begin, min(W, begin + TILE_WIDTH), disparities, scale2, radius, window_variance, group_sizes, margin,
+                views, t0, s0, guide, groups, subsets, wanted,
+                first + task * rows, min(last, first + (task + 1) * rows), begin, min(W, begin + TILE_WIDTH),
+                disparities, scale2, radius, window_variance, group_sizes, margin,
                 disparity, cost, mean,
             )  # fmt: skip

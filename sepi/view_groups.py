@@ -1,7 +1,7 @@
 """Parts of the view grid from which half-SEPIs are put together.
 
 A sweep sums the costs of groups of views; a subset is a union of groups. Occlusion at a straight edge hides the views
-on one side of a line through the centre of the grid, so the subsets worth asking for are halves and quarters.
+on one side of a line through the reference view, so the subsets worth asking for are halves and quarters.
 """
 
 from __future__ import annotations
@@ -33,12 +33,12 @@ class ViewSubsets:
 
 
 SIDES = {"left": (0, -1), "right": (0, 1), "up": (-1, 0), "down": (1, 0)}
-"""Direction ``(dt, ds)`` from the centre view towards the views that a half keeps."""
+"""Direction ``(dt, ds)`` from the reference view towards the views that a half keeps."""
 
 QUARTERS = (("left", "up"), ("left", "down"), ("right", "up"), ("right", "down"))
 
 
-def halves_and_quarters(grid: tuple[int, int]) -> ViewSubsets:
+def halves_and_quarters(grid: tuple[int, int], reference: tuple[int, int] | None = None) -> ViewSubsets:
     """All views, the four halves of the paper, and their four overlaps; the dividing line belongs to both sides.
 
     Where a pixel is occluded horizontally and vertically at once, as at any slanted edge, the views it keeps are those
@@ -48,13 +48,15 @@ def halves_and_quarters(grid: tuple[int, int]) -> ViewSubsets:
     ----------
     grid : (int, int)
         Rows and columns of views.
+    reference : (int, int), optional
+        Place of the reference view, from which sides are seen; the centre unless given.
 
     Returns
     -------
     ViewSubsets
         Named ``full``, the four ``SIDES``, then the ``QUARTERS`` as ``left-up`` and so on.
     """
-    t, s = (np.arange(size) - size // 2 for size in grid)
+    t, s = _steps(grid, reference)
     sign_t, sign_s = np.meshgrid(np.sign(t), np.sign(s), indexing="ij")
     groups = 3 * (sign_t + 1) + sign_s + 1
     # signs (dt, ds) of each group, in the order of their numbers
@@ -65,7 +67,7 @@ def halves_and_quarters(grid: tuple[int, int]) -> ViewSubsets:
     return ViewSubsets(groups, np.array(list(named.values())), tuple(named))
 
 
-def half_planes(grid: tuple[int, int], directions: int) -> ViewSubsets:
+def half_planes(grid: tuple[int, int], directions: int, reference: tuple[int, int] | None = None) -> ViewSubsets:
     """All views, then for each of ``directions`` edge orientations the views on its one and on its other side.
 
     Parameters
@@ -74,6 +76,8 @@ def half_planes(grid: tuple[int, int], directions: int) -> ViewSubsets:
         Rows and columns of views.
     directions : int
         Number of edge orientations over half a turn.
+    reference : (int, int), optional
+        Place of the reference view; the centre unless given.
 
     Returns
     -------
@@ -82,7 +86,7 @@ def half_planes(grid: tuple[int, int], directions: int) -> ViewSubsets:
         ``(n + 1/2) pi / directions``, measured from ``+s`` towards ``+t``.
     """
     sectors = 2 * directions
-    t, s = (np.arange(size) - size // 2 for size in grid)
+    t, s = _steps(grid, reference)
     angle = np.arctan2(*np.meshgrid(t, s, indexing="ij"))
     groups = np.round(angle * sectors / (2 * np.pi)).astype(np.int64) % sectors
     start = np.arange(sectors)[:, None]
@@ -90,3 +94,11 @@ def half_planes(grid: tuple[int, int], directions: int) -> ViewSubsets:
     inside = (np.arange(sectors)[None] - start + directions // 2 - 1) % sectors < directions
     subsets = np.concatenate([np.ones((1, sectors), bool), inside])
     return ViewSubsets(groups, subsets, ("full", *(f"half-plane {n}" for n in range(sectors))))
+
+
+def _steps(
+    grid: tuple[int, int], reference: tuple[int, int] | None
+) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+    """Steps of each row and of each column from the reference view."""
+    t0, s0 = reference or (grid[0] // 2, grid[1] // 2)
+    return np.arange(grid[0]) - t0, np.arange(grid[1]) - s0

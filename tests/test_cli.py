@@ -20,11 +20,11 @@ from click.testing import CliRunner, Result
 import sepi
 from sepi import ingest
 from sepi.cli import main
-from sepi.io import read_light_field
 from sepi.io.export import RESULT_FILES
 from sepi.io.hdf5 import read_attributes, read_stage, write_light_field
 from sepi.io.pfm import read_pfm, write_pfm
 from sepi.lightfield import LightField
+from sepi.reading import read_light_field
 from sepi.scenes import SCENES, render, write_hci
 
 # few candidates: these tests are about the commands, not about depth
@@ -77,7 +77,7 @@ def test_depth_writes_the_maps_and_says_so(scene: Path) -> None:
     called = call("depth", "pyramids", *FAST)
     assert called.exit_code == 0
     assert called.stderr == ""  # no progress bar where nobody watches
-    assert "pyramids: 3x3 views of 64x64 pixels" in called.stdout
+    assert "pyramids: 3x3 views (rows x columns) of 64x64 pixels" in called.stdout
     known = read_light_field(scene).known_range()
     assert f"disparity range: {known.minimum} to {known.maximum} pixels per view step (from the" in called.stdout
     assert "written to pyramids-depth/" in called.stdout
@@ -172,7 +172,7 @@ BAD: dict[str, tuple[Callable[[Path], object], tuple[str, ...], str]] = {
     "nothing there": (lambda s: None, ("absent",), "absent: no such file or folder"),
     "empty folder": (lambda s: (s.parent / "empty").mkdir(), ("empty",), "known format"),
     "folder of scenes": (lambda s: None, ("..",), "not a light field"),
-    "missing view": (lambda s: (s / "input_Cam004.png").unlink(), ("pyramids",), "input_Cam004.png: view is missing"),
+    "missing centre view": (lambda s: (s / "input_Cam004.png").unlink(), ("pyramids",), "centre view (t, s) = (1, 1)"),
     "one view": (lambda s: [(s / f"input_Cam00{i}.png").unlink() for i in range(1, 9)], ("pyramids",), "is missing"),
     "no view": (lambda s: [p.unlink() for p in s.glob("input*")], ("pyramids",), "no views"),
     "view twice": (
@@ -208,7 +208,7 @@ BAD: dict[str, tuple[Callable[[Path], object], tuple[str, ...], str]] = {
         ("pyramids",),
         "gt_disp_lowres.pfm: ground truth is (5, 5)",
     ),
-    "views without texture": (blank, ("pyramids",), "cannot be estimated"),
+    "views without texture": (blank, ("pyramids",), "view 1,1 is all of one colour"),
     "not an HDF5 file": (lambda s: (s.parent / "x.h5").write_text("x"), ("x.h5",), "x.h5: not a light field"),
     "NaN pixels": (lambda s: file_with_nan(s.parent), ("nan.h5",), "nan.h5: nan: float views must be finite"),
     "range of no width": (lambda s: None, ("pyramids", "--disparity-range", "1", "1"), "MIN < MAX"),
@@ -342,7 +342,8 @@ def test_bad_maps_are_one_line(
     Path("zipped.npz").rename("zipped.npy")
     with h5py.File("other.h5", "w") as file:
         file["depth"] = 1
-    write_light_field(Path("plain.h5"), LightField(np.zeros((2, 2, 6, 8, 1), np.uint8), "plain"))
+    views = np.random.default_rng(0).integers(0, 255, (2, 2, 6, 8, 1), np.uint8)
+    write_light_field(Path("plain.h5"), LightField(views, "plain"))
     assert message in error_of(call("evaluate", estimate, truth))
 
 
@@ -354,8 +355,9 @@ def test_info_shows_what_is_known(pyramids: Path) -> None:
     shown = {key: value.strip() for key, value in lines.items()}
     assert shown["name"] == "pyramids"
     assert shown["format"] == "HCI folder"
-    assert shown["views"] == "3x3 views of 64x64 pixels"
-    assert shown["pixels"] == "RGB, uint8"
+    assert shown["views"] == "3x3 views (rows x columns) of 64x64 pixels"
+    assert shown["depth made for"] == "view 1,1"
+    assert shown["pixels"] == "RGB, 8 bit; values as stored, no gamma applied"
     assert shown["missing views"] == "none"
     assert shown["disparity range"].endswith("(from the scene's parameters)")
     assert shown["estimated range"].endswith("(estimated from the views)")
@@ -366,12 +368,28 @@ def test_info_shows_what_is_known(pyramids: Path) -> None:
 def test_info_of_a_light_field_about_which_little_is_known(tmp_path: Path) -> None:
     present = np.ones((3, 2), bool)
     present[0, 1] = present[2, 0] = False
-    views = np.zeros((3, 2, 8, 9, 1), np.uint16)
-    write_light_field(tmp_path / "dark.h5", LightField(views, "dark", present=present))
+    views = np.full((3, 2, 8, 9, 1), 7, np.uint16)
+    views[:, :, 4, 4] = 9
+    write_light_field(tmp_path / "dark.h5", LightField(views, "dark", present=present, notes=("made up",)))
     called = call("info", tmp_path / "dark.h5")
     assert called.exit_code == 0
-    for text in ("2x3 views of 9x8 pixels", "grey, uint16", "(0, 1), (2, 0)", "not given", "cannot be estimated"):
+    for text in (
+        "3x2 views (rows x columns, 4 of 6) of 9x8 pixels",
+        "grey, 16 bit",
+        "2: 0,1 2,0",
+        "not given",
+        "cannot be estimated",
+        "unknown camera",
+        "made up",
+    ):
         assert text in called.stdout
+
+
+def test_info_says_which_view_of_an_even_grid_is_meant(tmp_path: Path) -> None:
+    """In a 4x4 grid no view is in the middle; a map of another view than expected is shifted everywhere."""
+    write_light_field(tmp_path / "even.h5", render("dots", size=64, views=4))
+    assert re.search(r"depth made for: +view 2,2\n", call("info", tmp_path / "even.h5").stdout)
+    assert re.search(r"depth made for: +view 1,2\n", call("info", tmp_path / "even.h5", "--view", "1,2").stdout)
 
 
 def test_scenes_are_written_and_read_back(tmp_path: Path) -> None:

@@ -11,8 +11,8 @@ from sepi.coarse_sweep import coarse_sweep
 from sepi.disparity_range import estimate_range
 from sepi.errors import SepiError
 from sepi.ingest import settle_range
-from sepi.io import read_light_field
 from sepi.lightfield import DisparityRange, LightField
+from sepi.reading import read_light_field
 from sepi.scenes import SCENES, render
 
 

@@ -8,9 +8,9 @@ import pytest
 
 from sepi.evaluate import score
 from sepi.ingest import settle_range
-from sepi.io import read_light_field
 from sepi.lightfield import LightField
 from sepi.pipeline import STAGES, VARIANTS
+from sepi.reading import read_light_field
 from sepi.stage import StageMaps, no_progress
 
 pytestmark = pytest.mark.real

@@ -10,9 +10,9 @@ import pytest
 from scipy import ndimage
 
 from sepi.errors import SepiError
-from sepi.io import read_light_field
 from sepi.io.pfm import read_pfm
 from sepi.lightfield import LightField
+from sepi.reading import read_light_field
 from sepi.scenes import SCENES, render, rendering, write_hci
 from sepi.scenes.definitions import DEFINITIONS
 from sepi.scenes.surfaces import Plane, Surface, circle, everywhere, rectangle

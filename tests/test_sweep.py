@@ -83,6 +83,19 @@ def test_sweep_equals_its_numpy_twin(radius, channels, dtype):
         assert np.mean(np.abs(result.disparity[n] - disparity) > 2e-3) < 0.01
 
 
+@pytest.mark.parametrize("view", [(0, 3), (4, 0), (1, 1)])
+def test_depth_of_another_view_than_the_centre(view):
+    """Steps counted from the wrong view would shift every sample of the depth map that was asked for."""
+    light_field = random_light_field().seen_from(view)
+    parameters = SweepParameters(candidates=11, scale=0.3, window_radius=1, window_sigma=0.5)
+    views = halves_and_quarters(light_field.grid, view)
+    result = sweep(light_field, parameters, groups=views.groups, subsets=views.subsets)
+    for n in range(len(views.names)):
+        _, cost, mean = twin(light_field, parameters, views.groups, views.subsets[n])
+        np.testing.assert_allclose(result.cost[n], cost, atol=2e-5)
+        np.testing.assert_allclose(result.mean[n], mean, atol=2e-5)
+
+
 def test_tiles_of_a_wide_picture_fit_together():
     """Pictures wider than a tile: a seam, or a border counted in the middle, would run through the depth map."""
     light_field = random_light_field(grid=(3, 3), shape=(9, 2 * TILE_WIDTH + 9))

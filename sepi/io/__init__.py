@@ -8,9 +8,11 @@ from pathlib import Path
 
 from sepi.errors import SepiError
 from sepi.io import hci, hdf5
-from sepi.lightfield import DisparityRange, LightField
+from sepi.io.options import ReadOptions
+from sepi.lightfield import LightField
+from sepi.validation import require_known
 
-__all__ = ["FORMATS", "Format", "format_of", "read_light_field"]
+__all__ = ["FORMATS", "Format", "ReadOptions", "format_of", "read"]
 
 
 @dataclass(frozen=True)
@@ -30,67 +32,75 @@ class Format:
     name: str
     description: str
     matches: Callable[[Path], bool]
-    read: Callable[[Path], LightField]
+    read: Callable[[Path, ReadOptions], LightField]
 
 
-FORMATS = (
-    Format("HCI folder", "a folder with input_Cam000.png, input_Cam001.png, ...", hci.matches, hci.read),
-    Format("sepi HDF5", "an HDF5 file written by this package", hdf5.matches, hdf5.read_light_field),
-)
-"""Known formats; the first that matches reads."""
+FORMATS = {
+    "hci": Format("HCI folder", "a folder with input_Cam000.png, input_Cam001.png, ...", hci.matches, hci.read),
+    "sepi": Format("sepi HDF5", "an HDF5 file written by this package", hdf5.matches, hdf5.read),
+}
+"""Word for ``--format`` to format; the first that matches reads."""
 
 
-def format_of(path: Path) -> Format:
+def format_of(path: Path, wanted: str | None = None) -> Format:
     """Find the format of a light field by looking at it.
+
+    Parameters
+    ----------
+    path : Path
+    wanted : str, optional
+        Key of :data:`FORMATS`, in place of looking.
 
     Raises
     ------
     SepiError
-        If there is nothing at ``path``, or it is of no known format.
+        If there is nothing at ``path``, or it is of no known format, or ``wanted`` is none.
     """
+    if wanted is not None:
+        require_known("format", [wanted], FORMATS)
     if not path.exists():
         raise SepiError(f"{path}: no such file or folder")
-    for known in FORMATS:
+    if wanted is not None:
+        return FORMATS[wanted]
+    for known in FORMATS.values():
         if known.matches(path):
             return known
-    known_formats = "; ".join(f"{known.name}: {known.description}" for known in FORMATS)
+    known_formats = "; ".join(f"{known.name}: {known.description}" for known in FORMATS.values())
     raise SepiError(f"{path}: not a light field of a known format ({known_formats}){_hint(path)}")
 
 
-def read_light_field(path: str | Path, *, disparity_range: tuple[float, float] | None = None) -> LightField:
-    """Read a light field of any known format.
+def read(path: Path, options: ReadOptions, wanted: str | None = None) -> LightField:
+    """Read a light field of any known format as its files have it.
 
     Parameters
     ----------
-    path : str or Path
+    path : Path
         File or folder.
-    disparity_range : tuple of float, optional
-        ``(minimum, maximum)`` in pixels per view step, in place of the scene's own.
+    options : ReadOptions
+    wanted : str, optional
+        Key of :data:`FORMATS`, in place of looking.
 
     Returns
     -------
     LightField
-        Its ``disparity_range`` is None if neither the scene nor the caller gives one.
+        Its ``disparity_range`` is None if the scene gives none.
 
     Raises
     ------
     SepiError
-        If nothing is there, the format is unknown, or the files are damaged or contradict each other.
+        If nothing is there, the format is unknown, or the files are damaged or contradict each other or the options.
     """
-    path = Path(path)
-    known = format_of(path)
+    known = format_of(path, wanted)
     try:
-        light_field = known.read(path)
+        light_field = known.read(path, options)
+        return light_field if options.view is None else light_field.seen_from(options.view)
     except SepiError as error:
         # what only the light field as a whole can find wrong
         raise error if str(path) in str(error) else SepiError(f"{path}: {error}") from error
-    if disparity_range is None:
-        return light_field
-    return light_field.with_range(DisparityRange(*disparity_range, "given"))
 
 
 def _hint(path: Path) -> str:
     """Name a light field in the folder, for who gave the folder of all scenes."""
     inner = sorted(path.iterdir()) if path.is_dir() else []
-    scene = next((entry for entry in inner if any(known.matches(entry) for known in FORMATS)), None)
+    scene = next((entry for entry in inner if any(known.matches(entry) for known in FORMATS.values())), None)
     return "" if scene is None else f"; it holds some, such as {scene}"

@@ -26,7 +26,9 @@ RESULT_FILES = ("disparity.pfm", "result.h5", "disparity.png", "confidence.png")
 _BEYOND = 0.005
 
 
-def write_result(folder: Path, light_field: LightField, maps: StageMaps, attributes: Mapping[str, Attribute]) -> None:
+def write_result(
+    folder: Path, light_field: LightField, maps: StageMaps, attributes: Mapping[str, Attribute]
+) -> tuple[str, ...]:
     """Write the maps of a light field.
 
     ``disparity.pfm`` and ``result.h5`` hold the numbers (pixels per view step; the HDF5 file also the confidence, the
@@ -45,6 +47,11 @@ def write_result(folder: Path, light_field: LightField, maps: StageMaps, attribu
     attributes : mapping
         What made the maps.
 
+    Returns
+    -------
+    tuple of str
+        Names of the files written.
+
     Raises
     ------
     SepiError
@@ -57,9 +64,10 @@ def write_result(folder: Path, light_field: LightField, maps: StageMaps, attribu
     require_target(folder)
     if folder.is_dir() and any(folder.iterdir()):
         _write_files(folder, maps, attributes)
-        return
-    with atomic_folder(folder) as temporary:
-        _write_files(temporary, maps, attributes)
+    else:
+        with atomic_folder(folder) as temporary:
+            _write_files(temporary, maps, attributes)
+    return RESULT_FILES
 
 
 def require_target(folder: Path) -> None:

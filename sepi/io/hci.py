@@ -1,7 +1,8 @@
 """Folders in the layout of the HCI 4D light field benchmark.
 
-``input_CamNNN.png`` is view ``NNN = S * t + s``. ``parameters.cfg``, ``gt_disp_lowres.pfm`` (disparity of the centre
-view) and ``mask_NAME.png`` (white regions) are read where present.
+``input_CamNNN.png`` is view ``NNN = S * t + s``. Views may be missing, but for the one whose depth is wanted.
+``parameters.cfg``, ``gt_disp_lowres.pfm`` (disparity of the centre view) and ``mask_NAME.png`` (white regions) are read
+where present.
 
 References
 ----------
@@ -21,9 +22,12 @@ from typing import TypeVar
 
 import numpy as np
 
+from sepi.camera import Camera, camera_from
 from sepi.errors import SepiError
-from sepi.io.images import png_size, read_png, read_views
+from sepi.io.images import png_size, read_png
+from sepi.io.options import ReadOptions, require_unused
 from sepi.io.pfm import read_pfm
+from sepi.io.view_files import read_arranged
 from sepi.lightfield import BoolMap, DisparityRange, FloatMap, LightField
 
 PARAMETERS = "parameters.cfg"
@@ -51,7 +55,7 @@ def matches(path: Path) -> bool:
     return path.is_dir() and ((path / PARAMETERS).is_file() or any(path.glob("input_Cam*.png")))
 
 
-def read(path: Path) -> LightField:
+def read(path: Path, options: ReadOptions) -> LightField:
     """Read a folder.
 
     Returns
@@ -62,30 +66,40 @@ def read(path: Path) -> LightField:
     Raises
     ------
     SepiError
-        If a view is missing, given twice, damaged or unlike the others, the parameters are nonsense, or ground truth
-        or masks do not fit the views.
+        If a view is given twice, damaged or unlike the others, no grid has as many views, the parameters are nonsense,
+        or ground truth or masks do not fit the views.
     """
+    require_unused(str(path), options, ("pattern", "axes", "variable"))
     parameters = _read_parameters(path / PARAMETERS) if (path / PARAMETERS).is_file() else _Parameters()
-    paths, grid = _numbered_views(path, parameters.grid)
-    views = read_views(paths)
-    shape = views.shape[1], views.shape[2]
+    files = _numbered_views(path)
+    grid = options.grid or parameters.grid or _square_grid(path, files)
+    _require_inside(path, files, grid, "--grid" if options.grid else PARAMETERS)
+    arranged = read_arranged(path, files, grid, options)
+    shape = arranged.views.shape[2], arranged.views.shape[3]
     if parameters.shape not in (None, shape):
         raise SepiError(
             f"{path / PARAMETERS}: image_resolution (y, x) = {parameters.shape}, but the views are {shape}; "
             "disparities change with the size, so set image_resolution, disp_min and disp_max for these views"
         )
+    # ground truth and masks belong to the centre view of the folder's own grid
+    with_truth = arranged.place_of(grid[0] // 2 * grid[1] + grid[1] // 2)
+    read_truth = with_truth is not None and options.view in (None, with_truth)
     return LightField(
-        views=views.reshape(*grid, *views.shape[1:]),
+        views=arranged.views,
         name=parameters.scene or path.resolve().name,
         source=str(path),
+        present=arranged.present,
+        view=with_truth if read_truth else options.view,
         disparity_range=parameters.disparity_range,
-        truth=_read_truth(path / TRUTH, shape),
-        masks=_read_masks(path, shape),
+        truth=_read_truth(path / TRUTH, shape) if read_truth else None,
+        masks=_read_masks(path, shape) if read_truth else {},
+        camera=_read_camera(path / PARAMETERS, shape),
+        notes=arranged.notes,
     )
 
 
-def _numbered_views(folder: Path, grid: tuple[int, int] | None) -> tuple[list[Path], tuple[int, int]]:
-    """Files of the views in order of their numbers, and the grid ``(T, S)``."""
+def _numbered_views(folder: Path) -> dict[int, Path]:
+    """Number of each view and its file."""
     views: dict[int, Path] = {}
     for path in sorted(folder.glob("input_Cam*.png")):
         match = _VIEW.fullmatch(path.name)
@@ -97,28 +111,33 @@ def _numbered_views(folder: Path, grid: tuple[int, int] | None) -> tuple[list[Pa
         views[number] = path
     if not views:
         raise SepiError(f"{folder}: no views (expected input_Cam000.png, input_Cam001.png, ...)")
+    return views
+
+
+def _square_grid(folder: Path, views: dict[int, Path]) -> tuple[int, int]:
+    """The square grid that ends with the last view."""
     highest = max(views)
     side = math.isqrt(highest + 1)
-    if grid is None and side**2 == highest + 1:
-        grid = side, side
-    if grid is None:
+    if side**2 != highest + 1:
         raise SepiError(
             f"{folder}: views up to {views[highest].name} make {highest + 1}, which is no square grid; "
-            f"give num_cams_x and num_cams_y in {PARAMETERS}, or all views of a grid such as {side + 1}x{side + 1}"
+            f"give --grid ROWSxCOLUMNS, or num_cams_x and num_cams_y in {PARAMETERS}, or all views of a grid such as "
+            f"{side + 1}x{side + 1}"
         )
+    return side, side
+
+
+def _require_inside(folder: Path, views: dict[int, Path], grid: tuple[int, int], source: str) -> None:
+    highest = max(views)
     count = grid[0] * grid[1]
     if highest >= count:
-        raise SepiError(f"{views[highest]}: beyond the {count} views that {PARAMETERS} gives (num_cams_x, num_cams_y)")
-    missing = [number for number in range(count) if number not in views]
-    if missing:
         raise SepiError(
-            f"{folder / f'input_Cam{missing[0]:03d}.png'}: view is missing "
-            f"({len(missing)} of the {count} of a {grid[0]}x{grid[1]} grid are)"
+            f"{views[highest]}: beyond the {count} views of the {grid[0]}x{grid[1]} grid that {source} gives"
         )
-    return [views[number] for number in range(count)], grid
 
 
-def _read_parameters(path: Path) -> _Parameters:
+def _values(path: Path) -> dict[str, str]:
+    """Key to value, of all sections together."""
     parser = configparser.ConfigParser(interpolation=None)
     try:
         parser.read_string(path.read_text(encoding="utf-8"), source=path.name)
@@ -129,7 +148,11 @@ def _read_parameters(path: Path) -> _Parameters:
     except configparser.Error as error:
         reason = " ".join(error.message.split())
         raise SepiError(f"{path}: not of the form '[section]' and 'key = value' ({reason})") from error
-    values = {key: value for section in parser.sections() for key, value in parser.items(section)}
+    return {key: value for section in parser.sections() for key, value in parser.items(section)}
+
+
+def _read_parameters(path: Path) -> _Parameters:
+    values = _values(path)
     limits = _pair(path, values, "disp_min", "disp_max", float)
     if limits is not None and not (math.isfinite(limits[0]) and limits[0] < limits[1] < math.inf):
         raise SepiError(
@@ -141,6 +164,26 @@ def _read_parameters(path: Path) -> _Parameters:
         disparity_range=None if limits is None else DisparityRange(*limits, "parameters"),
         scene=values.get("scene") or None,
     )
+
+
+def _read_camera(path: Path, shape: tuple[int, int]) -> Camera | None:
+    """Geometry from the parameters; None where they do not give all of it."""
+    if not path.is_file():
+        return None
+    values = _values(path)
+    keys = ("focal_length_mm", "baseline_mm", "focus_distance_m", "sensor_size_mm")
+    if not all(key in values for key in keys):
+        return None
+    numbers = {}
+    for key in keys:
+        try:
+            numbers[key] = float(values[key])
+        except ValueError as error:
+            raise SepiError(f"{path}: expected a number for {key}, got '{values[key]}'") from error
+    try:
+        return camera_from(**numbers, shape=shape)
+    except SepiError as error:
+        raise SepiError(f"{path}: {error}") from error
 
 
 def _positive(path: Path, values: dict[str, str], first: str, second: str) -> tuple[int, int] | None:

@@ -8,14 +8,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import astuple
 from pathlib import Path
 from typing import Any
 
 import h5py
 import numpy as np
 
+from sepi.camera import Camera
 from sepi.errors import SepiError
+from sepi.io.arrays import rearranged
 from sepi.io.files import atomic_path
+from sepi.io.options import ReadOptions, require_unused
 from sepi.lightfield import DisparityRange, FloatMap, LightField
 from sepi.stage import StageMaps
 
@@ -87,6 +91,12 @@ def write_light_field(path: Path, light_field: LightField) -> None:
         if known is not None:
             file.attrs["disparity_range"] = (known.minimum, known.maximum)
             file.attrs["disparity_range_source"] = known.source
+        if light_field.view is not None:
+            file.attrs["view"] = light_field.view
+        if light_field.camera is not None:
+            file.attrs["camera"] = astuple(light_field.camera)
+        if light_field.notes:
+            file.attrs["notes"] = list(light_field.notes)
         if light_field.truth is not None:
             file.create_dataset("truth", data=light_field.truth)
             file["truth"].attrs["units"] = UNITS["disparity"]
@@ -103,6 +113,15 @@ def matches(path: Path) -> bool:
             return "views" in file
     except OSError:
         return True
+
+
+def holds(path: Path, name: str) -> bool:
+    """Whether ``path`` is a readable HDF5 file with a dataset of this name."""
+    try:
+        with h5py.File(path, "r") as file:
+            return name in file
+    except OSError:
+        return False
 
 
 def read_light_field(path: Path) -> LightField:
@@ -122,15 +141,31 @@ def read_light_field(path: Path) -> LightField:
         if "disparity_range" in file.attrs:
             minimum, maximum = (float(value) for value in file.attrs["disparity_range"])
             known = DisparityRange(minimum, maximum, str(file.attrs["disparity_range_source"]))
+        view = file.attrs.get("view")
         return LightField(
             views=file["views"][...],
             name=str(file.attrs["name"]),
             source=str(file.attrs["source"]),
             present=file["present"][...].astype(bool),
+            view=None if view is None else (int(view[0]), int(view[1])),
+            camera=Camera(*map(float, file.attrs["camera"])) if "camera" in file.attrs else None,
+            notes=tuple(str(note) for note in file.attrs.get("notes", ())),
             disparity_range=known,
             truth=file["truth"][...].astype(np.float32) if "truth" in file else None,
             masks={name: file["masks"][name][...].astype(bool) for name in file.get("masks", {})},
         )
+
+
+def read(path: Path, options: ReadOptions) -> LightField:
+    """Read a light field written by ``write_light_field`` and arrange its views as asked for.
+
+    Raises
+    ------
+    SepiError
+        If the file is not such a file, or the options do not fit it.
+    """
+    require_unused(str(path), options, ("grid", "pattern", "axes", "variable", "follow_links"))
+    return rearranged(read_light_field(path), options)
 
 
 @contextmanager

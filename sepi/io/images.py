@@ -49,13 +49,21 @@ def read_png(path: Path) -> Pixels:
     return np.ascontiguousarray(channels).astype(np.uint16 if image.dtype == np.uint16 else np.uint8, copy=False)
 
 
-def read_views(paths: Sequence[Path]) -> Pixels:
+def read_views(paths: Sequence[Path], places: Sequence[int] | None = None, count: int | None = None) -> Pixels:
     """Read pictures that must be alike, several at a time.
+
+    Parameters
+    ----------
+    paths : sequence of Path
+    places : sequence of int, optional
+        Index of each in the result; one after the other unless given.
+    count : int, optional
+        Length of the result; as many as ``paths`` unless given.
 
     Returns
     -------
-    ndarray, shape (N, H, W, C), uint8 or uint16
-        In the order of ``paths``.
+    ndarray, shape (count, H, W, C), uint8 or uint16
+        Zero at places that no picture has.
 
     Raises
     ------
@@ -63,7 +71,8 @@ def read_views(paths: Sequence[Path]) -> Pixels:
         If a file cannot be read, or is not of the same size, depth and number of channels as the first.
     """
     first = read_png(paths[0])
-    views = np.empty((len(paths), *first.shape), first.dtype)
+    places = range(len(paths)) if places is None else places
+    views = np.zeros((len(paths) if count is None else count, *first.shape), first.dtype)
 
     def fill(index: int) -> None:
         image = read_png(paths[index])
@@ -72,7 +81,7 @@ def read_views(paths: Sequence[Path]) -> Pixels:
                 f"{paths[index]}: {_described(image)}, but {paths[0].name} is {_described(first)}; "
                 "all views must be alike"
             )
-        views[index] = image
+        views[places[index]] = image
 
     # decoding runs outside Python's lock, so threads share the work
     with ThreadPoolExecutor(min(8, os.cpu_count() or 1)) as pool:

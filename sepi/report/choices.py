@@ -16,9 +16,9 @@ import click
 from sepi.errors import SepiError
 from sepi.evaluate import score
 from sepi.ingest import settle_range
-from sepi.io import read_light_field
 from sepi.lightfield import LightField
 from sepi.pipeline import STAGES, variant_named
+from sepi.reading import read_light_field
 from sepi.scenes import SCENES, render
 from sepi.stage import StageMaps, no_progress
 

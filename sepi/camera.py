@@ -1,0 +1,100 @@
+"""From disparity to metric depth: what the camera's geometry says.
+
+Views are taken by cameras a baseline ``b`` apart and sheared so that a point at the focus distance ``F`` has disparity
+zero. With the focal length ``f`` in pixels, a point at depth ``Z`` has the disparity ``d = b f (1 / Z - 1 / F)``, so
+
+    Z = b f / (d + b f / F).
+
+This is the formula of the HCI 4D light field benchmark [1]_, whose ``beta`` is ``b f F``; it gives the focal length and
+the sensor size in millimetres, the size being that of the longer side of the picture.
+
+References
+----------
+.. [1] K. Honauer, O. Johannsen, D. Kondermann, B. Goldluecke, "A dataset and evaluation methodology for depth
+       estimation on 4D light fields", ACCV 2016. doi:10.1007/978-3-319-54187-7_2
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from sepi.errors import SepiError
+
+Map = npt.NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class Camera:
+    """Geometry of a light field's cameras.
+
+    Attributes
+    ----------
+    scale : float
+        ``b f``: depth times disparity above infinity's, metres times pixels per view step.
+    offset : float
+        ``b f / F``: what a disparity must be above for its point to lie before infinity, pixels per view step.
+    focal_px : float
+        Focal length in pixels.
+
+    Raises
+    ------
+    SepiError
+        If ``scale`` or ``focal_px`` is not a positive number, or ``offset`` not finite.
+    """
+
+    scale: float
+    offset: float
+    focal_px: float
+
+    def __post_init__(self) -> None:
+        positive = all(math.isfinite(value) and value > 0 for value in (self.scale, self.focal_px))
+        if not (positive and math.isfinite(self.offset)):
+            raise SepiError(
+                "camera: expected focal length, baseline, focus distance and sensor size to be positive numbers"
+            )
+
+    def depth(self, disparity: Map) -> Map:
+        """Depth in metres, float32, of disparities in pixels per view step; infinite at and beyond infinity."""
+        above = np.asarray(disparity, np.float64) + self.offset
+        with np.errstate(divide="ignore"):
+            return np.where(above > 0, self.scale / np.where(above > 0, above, 1), np.inf).astype(np.float32)
+
+
+def camera_from(
+    *,
+    focal_length_mm: float,
+    baseline_mm: float,
+    focus_distance_m: float,
+    sensor_size_mm: float,
+    shape: tuple[int, int],
+) -> Camera:
+    """Camera from the numbers of the HCI 4D benchmark's ``parameters.cfg``.
+
+    Parameters
+    ----------
+    focal_length_mm, sensor_size_mm : float
+        Focal length, and width or height of the sensor, whichever is longer, in millimetres.
+    baseline_mm : float
+        Distance between neighbouring cameras in millimetres.
+    focus_distance_m : float
+        Depth at which the disparity is zero, in metres; infinite for cameras that look straight ahead.
+    shape : (int, int)
+        Height and width of a view in pixels.
+
+    Raises
+    ------
+    SepiError
+        If a number is not positive.
+    """
+    if not all(value > 0 for value in (focal_length_mm, baseline_mm, focus_distance_m, sensor_size_mm)):
+        raise SepiError(
+            f"camera: expected positive numbers, got focal length {focal_length_mm:g} mm, baseline {baseline_mm:g} mm, "
+            f"focus distance {focus_distance_m:g} m, sensor size {sensor_size_mm:g} mm"
+        )
+    focal_px = focal_length_mm / sensor_size_mm * max(shape)
+    scale = baseline_mm / 1000 * focal_px
+    return Camera(scale, scale / focus_distance_m, focal_px)

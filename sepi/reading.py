@@ -1,0 +1,69 @@
+"""Read a light field of any format, ready for the stages: checked as a whole, and with a warning where its views seem
+to be in the wrong order.
+"""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+
+from sepi.errors import SepiError, SepiWarning
+from sepi.io import ReadOptions, read
+from sepi.lightfield import DisparityRange, LightField
+from sepi.view_order import order_warning
+
+
+def read_light_field(
+    path: str | Path,
+    *,
+    disparity_range: tuple[float, float] | None = None,
+    file_format: str | None = None,
+    options: ReadOptions | None = None,
+    check_order: bool = True,
+) -> LightField:
+    """Read a light field of any known format.
+
+    Parameters
+    ----------
+    path : str or Path
+        File or folder.
+    disparity_range : tuple of float, optional
+        ``(minimum, maximum)`` in pixels per view step, in place of the scene's own.
+    file_format : str, optional
+        A key of ``sepi.io.FORMATS``; found by looking unless given.
+    options : ReadOptions, optional
+        What the files do not say: grid, name pattern, axes, order, views to leave out, reference view.
+    check_order : bool
+        Warn (:class:`SepiWarning`) where another order of the views clearly fits better.
+
+    Returns
+    -------
+    LightField
+        Its ``disparity_range`` is None if neither the scene nor the caller gives one.
+
+    Raises
+    ------
+    SepiError
+        If nothing is there, the format is unknown, the files are damaged or contradict each other or the options, or
+        there is nothing to match in the views.
+    """
+    path = Path(path)
+    light_field = read(path, options or ReadOptions(), file_format)
+    _require_contrast(path, light_field)
+    if disparity_range is not None:
+        light_field = light_field.with_range(DisparityRange(*disparity_range, "given"))
+    if check_order:
+        warning = order_warning(light_field)
+        if warning is not None:
+            warnings.warn(f"{path}: {warning}", SepiWarning, stacklevel=2)
+    return light_field
+
+
+def _require_contrast(path: Path, light_field: LightField) -> None:
+    centre = light_field.centre
+    if (centre == centre[0, 0]).all():
+        colour = "black" if not centre.any() else "of one colour"
+        raise SepiError(
+            f"{path}: view {light_field.reference[0]},{light_field.reference[1]} is all {colour}; depth needs views "
+            "that show something"
+        )
