@@ -448,7 +448,7 @@ def maps_of(light_field: LightField) -> StageMaps:
 def test_result_holds_maps_and_what_made_them(tmp_path: Path, light_field: LightField) -> None:
     maps = maps_of(light_field)
     write_result(tmp_path / "out", light_field, maps, {"variant": "paper", "disparity_range": (-1.0, 2.0)})
-    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == sorted(RESULT_FILES)
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == sorted([*RESULT_FILES, "mask_occluded.png"])
     np.testing.assert_array_equal(read_pfm(tmp_path / "out/disparity.pfm"), maps.disparity)
     back = read_stage(tmp_path / "out/result.h5")
     np.testing.assert_array_equal(back.confidence, maps.confidence)
@@ -472,7 +472,7 @@ def test_other_files_in_the_result_folder_stay(tmp_path: Path, light_field: Ligh
     write_result(tmp_path / "out", light_field, maps_of(light_field), {})
     write_result(tmp_path / "out", light_field, maps_of(light_field), {})
     assert (tmp_path / "out/notes.txt").read_text() == "mine"
-    assert len(list((tmp_path / "out").iterdir())) == 1 + len(RESULT_FILES)
+    assert len(list((tmp_path / "out").iterdir())) == 2 + len(RESULT_FILES)  # and the mask
 
 
 def test_failed_result_leaves_no_folder(

@@ -2,41 +2,41 @@
 
 from __future__ import annotations
 
-import os
+import atexit
+import secrets
 import shutil
-import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from sepi.errors import SepiError
 
+# an interrupt may strike between any two instructions, also where no `finally` is in force: what is still listed when
+# the program ends was not finished, and is removed
+_unfinished: set[Path] = set()
+
 
 @contextmanager
 def atomic_path(path: Path) -> Iterator[Path]:
     """Give a temporary path beside ``path`` to write to; rename it on success, remove it on any failure.
 
+    The temporary file exists, empty. A link of that name is replaced, not followed.
+
     Raises
     ------
     SepiError
-        If the folder cannot be made or written to.
+        If the folder cannot be made or written to, or the disk is full.
     """
+    temporary = _temporary_for(path, path.suffix)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.stem}-", suffix=path.suffix)
-    except OSError as error:
-        raise SepiError(f"{path}: cannot be written ({error.strerror})") from error
-    os.close(handle)
-    temporary = Path(name)
-    try:
+        temporary.touch(exist_ok=False)
         yield temporary
-        # mkstemp makes private files; give the mode that open() would have given
-        temporary.chmod(0o666 & ~_umask())
         temporary.replace(path)
     except OSError as error:
         raise SepiError(f"{path}: cannot be written ({error.strerror or error})") from error
     finally:
-        temporary.unlink(missing_ok=True)
+        _remove(temporary)
 
 
 @contextmanager
@@ -46,27 +46,39 @@ def atomic_folder(path: Path) -> Iterator[Path]:
     Raises
     ------
     SepiError
-        If ``path`` exists and is not an empty folder, or cannot be made or written to.
+        If ``path`` exists and is not an empty folder, or cannot be made or written to, or the disk is full.
     """
     if path.exists() and not (path.is_dir() and not any(path.iterdir())):
         raise SepiError(f"{path}: exists already; remove it or choose a folder that does not exist")
+    temporary = _temporary_for(path, "")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        temporary = Path(tempfile.mkdtemp(dir=path.parent, prefix=f".{path.name}-"))
-    except OSError as error:
-        raise SepiError(f"{path}: cannot be written ({error.strerror})") from error
-    try:
+        temporary.mkdir()
         yield temporary
-        temporary.chmod(0o777 & ~_umask())
         temporary.replace(path)
     except OSError as error:
         raise SepiError(f"{path}: cannot be written ({error.strerror or error})") from error
     finally:
+        _remove(temporary)
+
+
+def _temporary_for(path: Path, suffix: str) -> Path:
+    # the token keeps two programs that write the same file apart; a long name is cut so that the whole fits
+    temporary = path.parent / f".{path.stem[:40]}-{secrets.token_hex(6)}{suffix}"
+    _unfinished.add(temporary)
+    return temporary
+
+
+def _remove(temporary: Path) -> None:
+    """Remove a temporary file or folder that was not renamed."""
+    if temporary.is_dir():
         shutil.rmtree(temporary, ignore_errors=True)
+    else:
+        temporary.unlink(missing_ok=True)
+    _unfinished.discard(temporary)
 
 
-def _umask() -> int:
-    """The process's mask of permissions, which can only be read by setting it."""
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
+@atexit.register
+def _remove_unfinished() -> None:
+    for temporary in list(_unfinished):
+        _remove(temporary)

@@ -16,8 +16,7 @@ import h5py
 import numpy as np
 
 from sepi.errors import SepiError
-from sepi.io.files import atomic_path
-from sepi.io.hdf5 import UNITS, Attribute, opened
+from sepi.io.hdf5 import UNITS, Attribute, created, opened
 from sepi.lightfield import BoolMap, FloatMap
 
 Scores = dict[str, float]
@@ -48,7 +47,7 @@ class Evaluation:
 
 def write_scores(path: Path, evaluation: Evaluation, attributes: Mapping[str, Attribute]) -> None:
     """Write an evaluation and the attributes that say what was evaluated; equal content gives equal bytes."""
-    with atomic_path(path) as temporary, h5py.File(temporary, "w") as file:
+    with created(path) as file:
         file.attrs["ground_truth"] = evaluation.error is not None
         for key, value in attributes.items():
             file.attrs[key] = value
