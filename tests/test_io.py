@@ -17,7 +17,7 @@ from sepi.errors import SepiError
 from sepi.io import export
 from sepi.io.export import RESULT_FILES, coloured, write_result
 from sepi.io.hdf5 import read_attributes, read_stage, write_light_field
-from sepi.io.images import read_png, read_views, write_png
+from sepi.io.images import read_picture, read_views, write_png
 from sepi.io.pfm import read_pfm, write_pfm
 from sepi.lightfield import DisparityRange, LightField
 from sepi.reading import read_light_field
@@ -297,8 +297,8 @@ def test_transparency_and_grey(tmp_path: Path) -> None:
     rgb = pixels(1)
     cv2.imwrite(str(tmp_path / "alpha.png"), np.dstack([rgb[:, :, ::-1], rgb[:, :, 0]]))
     cv2.imwrite(str(tmp_path / "grey.png"), rgb[:, :, 0])
-    np.testing.assert_array_equal(read_png(tmp_path / "alpha.png"), rgb)
-    np.testing.assert_array_equal(read_png(tmp_path / "grey.png"), rgb[:, :, :1])
+    np.testing.assert_array_equal(read_picture(tmp_path / "alpha.png"), rgb)
+    np.testing.assert_array_equal(read_picture(tmp_path / "grey.png"), rgb[:, :, :1])
 
 
 def test_views_come_in_the_order_asked_for(square: Path) -> None:
@@ -316,7 +316,7 @@ def test_written_picture_is_read_back(tmp_path: Path, kind: type) -> None:
 
 def test_mask_is_white_inside(tmp_path: Path) -> None:
     write_png(tmp_path / "mask.png", np.array([[True, False]]))
-    assert read_png(tmp_path / "mask.png")[:, :, 0].tolist() == [[255, 0]]
+    assert read_picture(tmp_path / "mask.png")[:, :, 0].tolist() == [[255, 0]]
 
 
 # --- PFM
@@ -454,8 +454,8 @@ def test_result_holds_maps_and_what_made_them(tmp_path: Path, light_field: Light
     np.testing.assert_array_equal(back.confidence, maps.confidence)
     np.testing.assert_array_equal(back.mask("occluded"), maps.extra["occluded"])
     assert read_attributes(tmp_path / "out/result.h5")["variant"] == "paper"
-    assert read_png(tmp_path / "out/disparity.png").shape == (12, 16, 3)
-    grey = read_png(tmp_path / "out/confidence.png")[:, :, 0]
+    assert read_picture(tmp_path / "out/disparity.png").shape == (12, 16, 3)
+    grey = read_picture(tmp_path / "out/confidence.png")[:, :, 0]
     np.testing.assert_allclose(grey / 255, maps.confidence, atol=0.5 / 255 + 1e-6)
 
 

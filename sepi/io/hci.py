@@ -24,7 +24,7 @@ import numpy as np
 
 from sepi.camera import Camera, camera_from
 from sepi.errors import SepiError
-from sepi.io.images import png_size, read_png
+from sepi.io.images import png_size, read_picture
 from sepi.io.options import ReadOptions, require_unused
 from sepi.io.pfm import read_pfm
 from sepi.io.view_files import read_arranged
@@ -225,7 +225,7 @@ def _read_masks(folder: Path, shape: tuple[int, int]) -> dict[str, BoolMap]:
     for path in sorted(folder.glob("mask_*.png")):
         name = path.stem.removeprefix("mask_")
         if png_size(path) == shape:
-            values = read_png(path)
+            values = read_picture(path)
             # white on black; anything else is not a region
             if np.array_equal(values.min(2), values.max(2)) and np.isin(values, (0, values.max())).all():
                 masks[name] = values[:, :, 0] > 0

@@ -1,12 +1,13 @@
-"""PNG pictures: views and masks in, views and maps out."""
+"""Pictures: views and masks in, views and maps out."""
 
 from __future__ import annotations
 
 import os
 import struct
-import zlib
-from collections.abc import Sequence
+import threading
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -16,37 +17,43 @@ import numpy.typing as npt
 
 from sepi.errors import SepiError
 from sepi.io.files import atomic_path
+from sepi.io.picture_headers import PNG_SIGNATURE, Header, header_of
 from sepi.lightfield import BoolMap
 
-Pixels = npt.NDArray[np.integer[Any]]
+Pixels = npt.NDArray[np.integer[Any] | np.floating[Any]]
 
-_SIGNATURE = b"\x89PNG\r\n\x1a\n"
+SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp", ".pgm", ".ppm", ".pnm"})
+"""Ends of names, in small letters, of the pictures that can be read."""
+
+_MAX_BYTES = 2**32
+
+# as far beyond 0..1 as light fields may go, for what resampling overshoots
+_LOWEST, _HIGHEST = -0.5, 1.5
 
 
-def read_png(path: Path) -> Pixels:
-    """Read a PNG.
+def read_picture(path: Path) -> Pixels:
+    """Read a PNG, JPEG, TIFF, BMP, WebP, PGM or PPM; its content tells which, not its name.
 
     Returns
     -------
-    ndarray, shape (H, W, C), uint8 or uint16
-        C is 1 for grey, 3 for RGB; transparency is left out.
+    ndarray, shape (H, W, C), uint8, uint16 or float32
+        C is 1 for grey, 3 for RGB; transparency is left out. Pixels are as stored: neither turned as a camera's
+        orientation says nor changed in brightness, but integers that end at another white, as in some PGM, span their
+        whole range.
 
     Raises
     ------
     SepiError
-        If the file is unreadable, not a PNG, or damaged.
+        If the file is unreadable, no picture of these kinds, cut off or damaged, of other numbers than 8 or 16 bit or
+        float32, or has float pixels that are not finite or far outside 0..1.
     """
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise SepiError(f"{path}: cannot be read ({error.strerror})") from error
-    # before OpenCV sees it, which would print its own words for a damaged file
-    _require_whole(path, data)
-    image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
-    if image is None:
-        raise SepiError(f"{path}: damaged PNG: its pixels cannot be decoded")
-    channels = image[:, :, None] if image.ndim == 2 else image[:, :, 2::-1]
-    return np.ascontiguousarray(channels).astype(np.uint16 if image.dtype == np.uint16 else np.uint8, copy=False)
+    data = _read_bytes(path)
+    header = header_of(path, data)
+    image = _pnm_pixels(path, data, header) if header.kind == "PNM" else _decoded(path, data, header)
+    if image.dtype == np.float32 and not (image.min() >= _LOWEST and image.max() <= _HIGHEST):
+        what = f"{image.min():g} to {image.max():g}" if np.isfinite(image).all() else "NaN or infinite ones"
+        raise SepiError(f"{path}: float pixels must be finite and within 0..1, got {what}; divide by white's value")
+    return image
 
 
 def read_views(paths: Sequence[Path], places: Sequence[int] | None = None, count: int | None = None) -> Pixels:
@@ -62,20 +69,23 @@ def read_views(paths: Sequence[Path], places: Sequence[int] | None = None, count
 
     Returns
     -------
-    ndarray, shape (count, H, W, C), uint8 or uint16
+    ndarray, shape (count, H, W, C), uint8, uint16 or float32
         Zero at places that no picture has.
 
     Raises
     ------
     SepiError
-        If a file cannot be read, or is not of the same size, depth and number of channels as the first.
+        If a file cannot be read, or is not of the same size, depth and number of channels as the first, or they take
+        more memory together than there is.
     """
-    first = read_png(paths[0])
+    first = read_picture(paths[0])
     places = range(len(paths)) if places is None else places
-    views = np.zeros((len(paths) if count is None else count, *first.shape), first.dtype)
+    count = len(paths) if count is None else count
+    _require_memory(paths[0].parent, first, count)
+    views = np.zeros((count, *first.shape), first.dtype)
 
     def fill(index: int) -> None:
-        image = read_png(paths[index])
+        image = read_picture(paths[index])
         if image.shape != first.shape or image.dtype != first.dtype:
             raise SepiError(
                 f"{paths[index]}: {_described(image)}, but {paths[0].name} is {_described(first)}; "
@@ -103,7 +113,7 @@ def png_size(path: Path) -> tuple[int, int]:
             head = file.read(24)
     except OSError as error:
         raise SepiError(f"{path}: cannot be read ({error.strerror})") from error
-    if len(head) < 24 or not head.startswith(_SIGNATURE):
+    if len(head) < 24 or not head.startswith(PNG_SIGNATURE):
         raise SepiError(f"{path}: not a PNG")
     width, height = struct.unpack(">II", head[16:24])
     return height, width
@@ -119,24 +129,96 @@ def write_png(path: Path, pixels: Pixels | BoolMap) -> None:
         temporary.write_bytes(data.tobytes())
 
 
-def _require_whole(path: Path, data: bytes) -> None:
-    """Raise unless ``data`` is a chain of undamaged PNG chunks up to the end mark."""
-    if not data.startswith(_SIGNATURE):
-        raise SepiError(f"{path}: not a PNG")
-    at = len(_SIGNATURE)
-    while at + 12 <= len(data):
-        length, kind = struct.unpack_from(">I4s", data, at)
-        end = at + 12 + length
-        if end > len(data):
-            break
-        if zlib.crc32(memoryview(data)[at + 4 : end - 4]) != struct.unpack_from(">I", data, end - 4)[0]:
-            raise SepiError(f"{path}: damaged PNG: checksum of chunk {kind.decode('ascii', 'replace')} is wrong")
-        if kind == b"IEND":
-            return
-        at = end
-    raise SepiError(f"{path}: damaged PNG: the file is cut off after {len(data)} bytes")
+def _read_bytes(path: Path) -> bytes:
+    try:
+        if path.is_symlink() and not path.exists():
+            raise SepiError(f"{path}: a link to {path.readlink()}, which does not exist")
+        if path.exists() and not path.is_dir() and not path.is_file():
+            raise SepiError(f"{path}: cannot be read (not a plain file)")
+        if path.stat().st_size > _MAX_BYTES:
+            raise SepiError(f"{path}: {path.stat().st_size} bytes are more than a picture has")
+        return path.read_bytes()
+    except OSError as error:
+        raise SepiError(f"{path}: cannot be read ({error.strerror})") from error
+
+
+def _decoded(path: Path, data: bytes, header: Header) -> Pixels:
+    """Pixels as OpenCV decodes them, in the order RGB."""
+    try:
+        with _silent_opencv():
+            image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
+    except cv2.error:
+        image = None
+    if image is None or image.shape[:2] != (header.height, header.width):
+        raise SepiError(f"{path}: damaged {header.kind}: its pixels cannot be decoded")
+    if image.dtype not in (np.uint8, np.uint16, np.float32):
+        raise SepiError(f"{path}: pixels of type {image.dtype}; expected 8 or 16 bit without sign, or float32")
+    if header.mixed_alpha and image.shape[2:] == (4,) and image[:, :, 3].min() < 255:
+        raise SepiError(f"{path}: a TIFF with transparent pixels, whose colours cannot be told; save it without alpha")
+    channels = image[:, :, None] if image.ndim == 2 else image[:, :, 2::-1]
+    # grey with transparency is decoded to colours
+    return np.ascontiguousarray(channels[:, :, :1] if header.grey else channels)
+
+
+def _pnm_pixels(path: Path, data: bytes, header: Header) -> Pixels:
+    """Pixels of a PGM or PPM, stretched to the whole range of their type."""
+    channels = 1 if header.grey else 3
+    count = header.height * header.width * channels
+    kind: np.dtype[Any] = np.dtype(np.uint8) if header.largest < 256 else np.dtype(">u2")
+    full = np.iinfo(kind).max
+    values: npt.NDArray[Any]
+    if header.digits:
+        texts = data[header.start :].split()[:count]
+        if len(texts) < count or not all(text.isdigit() and len(text) < 6 for text in texts):
+            raise SepiError(f"{path}: damaged PNM: expected {count} whole numbers")
+        values = np.array([int(text) for text in texts], np.int64)
+    else:
+        values = np.frombuffer(data, kind, count, header.start)
+    if values.max() > header.largest:
+        raise SepiError(f"{path}: damaged PNM: a value of {values.max()}, but white is {header.largest}")
+    if header.largest != full:
+        values = np.rint(values * (full / header.largest))
+    return values.astype(kind.newbyteorder("=")).reshape(header.height, header.width, channels)
+
+
+def _require_memory(folder: Path, view: Pixels, count: int) -> None:
+    """Raise where so many views like this take more memory than the machine has."""
+    try:
+        there = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    except (AttributeError, ValueError, OSError):  # not all systems tell
+        return
+    if view.nbytes * count > there:
+        raise SepiError(
+            f"{folder}: {count} views of {_described(view)} take {view.nbytes * count / 1e9:.1f} GB, more than the "
+            f"{there / 1e9:.1f} GB of memory; use fewer (--central) or smaller ones"
+        )
+
+
+_silence = threading.Lock()
+_silenced = 0
+_level = 0
+
+
+@contextmanager
+def _silent_opencv() -> Iterator[None]:
+    """Keep OpenCV from printing about pictures that this module reports itself; threads may overlap."""
+    global _silenced, _level
+    logging = cv2.utils.logging
+    with _silence:
+        if _silenced == 0:
+            _level = logging.getLogLevel()
+            logging.setLogLevel(logging.LOG_LEVEL_SILENT)
+        _silenced += 1
+    try:
+        yield
+    finally:
+        with _silence:
+            _silenced -= 1
+            if _silenced == 0:
+                logging.setLogLevel(_level)
 
 
 def _described(image: Pixels) -> str:
     height, width, channels = image.shape
-    return f"{width}x{height} {'RGB' if channels == 3 else 'grey'} of {8 * image.dtype.itemsize} bit"
+    bits = f"{8 * image.dtype.itemsize} bit{' float' if image.dtype.kind == 'f' else ''}"
+    return f"{width}x{height} {'RGB' if channels == 3 else 'grey'} of {bits}"
