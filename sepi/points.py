@@ -1,0 +1,214 @@
+"""A coloured point cloud from a disparity map.
+
+Axes are those of PLY viewers: x to the right, y up, z towards the viewer, so that the scene lies at negative z and
+shows upright and the right way round. The origin is the camera of the view that the disparity map belongs to.
+
+Where the camera is known, positions are in metres. Cameras look the same way and stand a baseline apart; their pictures
+are shifted so that a point at the focus distance is at the same pixel in all of them (:mod:`sepi.camera`). The shift
+moves the principal point: at the grid's centre view it is the middle of the picture ``(cx, cy)``, and in a view ``n``
+columns to its right ``cx + n * offset``, with the camera's ``offset`` in pixels per view step. So pixel ``(y, x)`` at
+depth ``Z`` is the point ::
+
+    X = (x - cx - n * offset) * Z / focal_px        Y = (y - cy - m * offset) * Z / focal_px
+
+for a view ``n`` columns to the right of and ``m`` rows below the centre view; X to the right and Y down, in metres.
+
+Where it is not known, the cloud is a relief: x and y in pixels from the middle, z the disparity, stretched so that its
+range is a third of the picture's width. Shape and proportions are then not those of the scene.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from sepi.camera import Camera
+from sepi.errors import SepiError
+from sepi.lightfield import BoolMap, FloatMap, LightField
+
+Positions = npt.NDArray[np.float32]
+Colours = npt.NDArray[np.uint8]
+
+# depth of a relief as part of the picture's width, and the part of the pixels beyond each end of what counts as its
+# range, so that a few wrong pixels do not flatten it
+_RELIEF = 1 / 3
+_BEYOND = 0.005
+
+
+@dataclass(frozen=True)
+class PointCloud:
+    """Coloured points.
+
+    Attributes
+    ----------
+    positions : ndarray, shape (N, 3), float32
+        x to the right, y up, z towards the viewer.
+    colours : ndarray, shape (N, 3), uint8
+        RGB.
+    metric : bool
+        Whether positions are in metres; otherwise x and y are pixels and z is ``stretch`` times the disparity.
+    stretch : float
+        Pixels per unit of disparity of a relief; 1 for a metric cloud.
+    """
+
+    positions: Positions
+    colours: Colours
+    metric: bool
+    stretch: float = 1.0
+
+    def comments(self) -> tuple[str, ...]:
+        """What the numbers are, for the file's header."""
+        if self.metric:
+            units = "metres; origin: camera of the view"
+        else:
+            units = f"x and y: pixels from the middle; z: disparity (pixels per view step) times {self.stretch!r}"
+        return "x right, y up, z towards the viewer", units
+
+
+def point_cloud(
+    light_field: LightField,
+    disparity: FloatMap,
+    confidence: FloatMap | None = None,
+    *,
+    min_confidence: float = 0.0,
+    max_depth: float | None = None,
+    step: int = 1,
+) -> PointCloud:
+    """Point cloud of a light field's reference view; see :func:`view_points`, which it calls.
+
+    Parameters
+    ----------
+    light_field : LightField
+        Gives the colours and, where it has one, the camera.
+    disparity, confidence, min_confidence, max_depth, step
+        As for :func:`view_points`.
+
+    Raises
+    ------
+    SepiError
+        As :func:`view_points`.
+    """
+    (t, s), (rows, columns) = light_field.reference, light_field.grid
+    return view_points(
+        light_field.views[t, s],
+        disparity,
+        confidence,
+        camera=light_field.camera,
+        from_centre=(t - rows // 2, s - columns // 2),
+        min_confidence=min_confidence,
+        max_depth=max_depth,
+        step=step,
+    )
+
+
+def view_points(
+    picture: npt.NDArray[np.generic],
+    disparity: FloatMap,
+    confidence: FloatMap | None = None,
+    *,
+    camera: Camera | None = None,
+    from_centre: tuple[int, int] = (0, 0),
+    min_confidence: float = 0.0,
+    max_depth: float | None = None,
+    step: int = 1,
+) -> PointCloud:
+    """Point cloud of one view; pixels without a finite disparity, and those at or beyond infinity, have no point.
+
+    Parameters
+    ----------
+    picture : ndarray, shape (H, W, C), uint8, uint16 or float
+        The view; C is 1 or 3 (RGB), floats are 0..1.
+    disparity : ndarray, shape (H, W), float32
+        Pixels per view step.
+    confidence : ndarray, shape (H, W), float32, optional
+        0..1; needed for ``min_confidence``.
+    camera : Camera, optional
+        Makes the cloud metric; a relief without.
+    from_centre : (int, int)
+        Rows below and columns to the right of the grid's centre view at which the view stands.
+    min_confidence : float
+        Leave out pixels of lower confidence.
+    max_depth : float, optional
+        Leave out points farther than this, metres.
+    step : int
+        Use every so-many-th row and column of pixels.
+
+    Raises
+    ------
+    SepiError
+        If the maps are not of the picture's size, a number is out of bounds, ``max_depth`` is given without a camera,
+        or ``min_confidence`` without a confidence.
+    """
+    for name, values in {"disparity": disparity, "confidence": confidence}.items():
+        if values is not None and values.shape != picture.shape[:2]:
+            raise SepiError(f"point cloud: {name} is {values.shape}, the view {picture.shape[:2]} (height, width)")
+    if step < 1:
+        raise SepiError(f"point cloud: expected a step of at least 1 pixel, got {step}")
+    used = np.zeros(disparity.shape, bool)
+    used[::step, ::step] = True
+    used &= np.isfinite(disparity) & _sure(confidence, min_confidence)
+    if camera is not None:
+        used &= _near(camera.depth(disparity), max_depth)
+        return _metric(picture, disparity, used, camera, from_centre)
+    if max_depth is not None:
+        raise SepiError("point cloud: a largest depth in metres needs the camera's geometry, which is not known")
+    return _relief(picture, disparity, used)
+
+
+def _sure(confidence: FloatMap | None, least: float) -> BoolMap | bool:
+    if not 0 <= least <= 1:
+        raise SepiError(f"point cloud: expected a least confidence within 0..1, got {least:g}")
+    if least == 0:
+        return True
+    if confidence is None:
+        raise SepiError("point cloud: a least confidence needs a confidence map")
+    # comparison with NaN is false: unknown confidence is none
+    return np.asarray(confidence >= least)
+
+
+def _near(depth: FloatMap, farthest: float | None) -> BoolMap:
+    if farthest is not None and not farthest > 0:
+        raise SepiError(f"point cloud: expected a positive largest depth in metres, got {farthest:g}")
+    near = np.isfinite(depth) & (depth > 0)
+    return near if farthest is None else near & (depth <= farthest)
+
+
+def _metric(
+    picture: npt.NDArray[np.generic], disparity: FloatMap, used: BoolMap, camera: Camera, from_centre: tuple[int, int]
+) -> PointCloud:
+    across, down = _from_middle(used)
+    depth = camera.depth(disparity[used]).astype(np.float64)
+    x = (across - from_centre[1] * camera.offset) * depth / camera.focal_px
+    y = (down - from_centre[0] * camera.offset) * depth / camera.focal_px
+    return PointCloud(_stacked(x, -y, -depth), _colours(picture[used]), metric=True)
+
+
+def _relief(picture: npt.NDArray[np.generic], disparity: FloatMap, used: BoolMap) -> PointCloud:
+    across, down = _from_middle(used)
+    values = disparity[used].astype(np.float64)
+    low, high = np.quantile(values, (_BEYOND, 1 - _BEYOND)) if values.size else (0.0, 0.0)
+    stretch = float(_RELIEF * used.shape[1] / (high - low)) if high > low else 1.0
+    return PointCloud(_stacked(across, -down, stretch * values), _colours(picture[used]), metric=False, stretch=stretch)
+
+
+def _from_middle(used: BoolMap) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+    """Pixels to the right of and below the middle of the picture, of each used pixel."""
+    y, x = np.nonzero(used)
+    return x - (used.shape[1] - 1) / 2, y - (used.shape[0] - 1) / 2
+
+
+def _stacked(*axes: npt.NDArray[np.float64]) -> Positions:
+    return np.stack(axes, axis=1).astype(np.float32)
+
+
+def _colours(pixels: npt.NDArray[Any]) -> Colours:
+    """Pixels (N, C) as 8-bit RGB (N, 3)."""
+    if np.issubdtype(pixels.dtype, np.floating):
+        values = 255.0 * np.clip(pixels, 0, 1)
+    else:
+        values = pixels * (255.0 / np.iinfo(pixels.dtype).max)
+    levels = np.rint(values).astype(np.uint8)
+    return np.repeat(levels, 3, axis=1) if levels.shape[1] == 1 else levels
