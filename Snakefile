@@ -41,4 +41,5 @@ rule ablation:
 
 
 onsuccess:
+    print_warnings()
     print_written([*report_files(), *ablation_files()], result_files(SETTINGS.variants))

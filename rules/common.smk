@@ -8,6 +8,7 @@ from pathlib import Path
 from sepi.config import load_settings
 from sepi.digest import ROOT, code_digest
 from sepi.errors import SepiError
+from sepi.io.export import RESULT_FILES
 from sepi.pipeline import STAGES, VARIANTS
 from sepi.validation import require_known
 
@@ -22,8 +23,6 @@ try:
     SETTINGS = load_settings(config)
 except SepiError as error:
     sys.exit(f"sepi: {error}")
-
-RESULT_NAMES = ["disparity.pfm", "result.h5", "disparity.png", "confidence.png"]
 
 
 wildcard_constraints:
@@ -53,7 +52,7 @@ def result_files(variants):
         f"results/{dataset}/{scene}/{variant}/{name}"
         for dataset, scene in SETTINGS.scenes
         for variant in variants
-        for name in RESULT_NAMES
+        for name in RESULT_FILES
     ]
 
 
@@ -70,9 +69,9 @@ def scene_of(wildcards):
 def ingest_source(wildcards):
     """Where a scene comes from, as words for the ingest command."""
     scene = scene_of(wildcards)
-    if scene.folder is None:
+    if scene.source is None:
         return ["--builtin", scene.name, "--size", str(scene.height)]
-    return [str(scene.folder)]
+    return [str(scene.source), *scene.flags]
 
 
 def ingest_range(wildcards):
@@ -98,9 +97,24 @@ def memory_for(bytes_per_sample, bytes_per_pixel=0):
     return memory
 
 
+def is_new(file):
+    """Whether this run wrote a file."""
+    return Path(file).exists() and Path(file).stat().st_mtime >= STARTED
+
+
+def print_warnings():
+    """Show what the readers of light fields warned of in this run; their messages lie in the logs."""
+    for dataset, scene in SETTINGS.scenes:
+        log = Path(f"logs/{dataset}/{scene}/ingest.log")
+        if is_new(log):
+            for line in log.read_text().splitlines():
+                if line.startswith("sepi: warning:"):
+                    print(line, flush=True)
+
+
 def print_written(tables, maps):
     """Name the tables and the folders of maps that this run wrote."""
-    new = [file for file in [*tables, *maps] if Path(file).exists() and Path(file).stat().st_mtime >= STARTED]
+    new = [file for file in [*tables, *maps] if is_new(file)]
     groups = {
         "Tables and figures": [file for file in new if file in tables],
         "Maps": list(dict.fromkeys(f"{Path(file).parent}/" for file in new if file in maps)),

@@ -1,4 +1,5 @@
-# The final maps of a variant, in a folder of its own, as `sepi depth` writes them.
+# The final maps of a variant, in a folder of its own, as `sepi depth` writes them; masks, and depth in metres where the
+# camera is known, come beside the files that are named here.
 
 
 rule export:
@@ -6,10 +7,7 @@ rule export:
         light_field="results/{dataset}/{scene}/lightfield.h5",
         maps=lambda wildcards: stage_file(wildcards.dataset, wildcards.scene, wildcards.variant, "optimize"),
     output:
-        disparity="results/{dataset}/{scene}/{variant}/disparity.pfm",
-        result="results/{dataset}/{scene}/{variant}/result.h5",
-        disparity_picture="results/{dataset}/{scene}/{variant}/disparity.png",
-        confidence_picture="results/{dataset}/{scene}/{variant}/confidence.png",
+        expand("results/{{dataset}}/{{scene}}/{{variant}}/{name}", name=RESULT_FILES),
     log:
         "logs/{dataset}/{scene}/{variant}/export.log",
     benchmark:

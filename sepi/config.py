@@ -11,7 +11,7 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from sepi.datasets import Scene, scenes_in
+from sepi.datasets import Scene, archive_scenes_in, own_scene, scenes_in
 from sepi.errors import SepiError
 from sepi.lightfield import DisparityRange
 from sepi.pipeline import STAGES, VARIANTS, Variant
@@ -44,6 +44,32 @@ def _default_stages() -> dict[str, dict[str, dict[str, Any] | None]]:
     }
 
 
+class OwnLightField(_Keys):
+    """Keys of one of the ``light_fields``: where it is, and the flags of ``sepi depth`` that say how to read it."""
+
+    path: str
+    format: str | None = None
+    grid: tuple[int, int] | None = None
+    pattern: str | None = None
+    axes: str | None = None
+    variable: str | None = None
+    central: int | None = None
+    order: str | None = None
+    exclude: list[str] = []
+    view: tuple[int, int] | None = None
+    follow_links: bool = False
+
+    @property
+    def flags(self) -> tuple[str, ...]:
+        """All but the path, as flags of the command line."""
+        pairs = {"grid": "x", "view": ","}
+        words: list[str] = []
+        for key, value in self.model_dump(exclude={"path", "exclude", "follow_links"}, exclude_none=True).items():
+            words += [f"--{key}", pairs[key].join(map(str, value)) if key in pairs else str(value)]
+        words += [word for view in self.exclude for word in ("--exclude", view)]
+        return (*words, "--follow-links") if self.follow_links else tuple(words)
+
+
 class Config(_Keys):
     """Keys of ``config.yaml``."""
 
@@ -55,6 +81,17 @@ class Config(_Keys):
         None,
         description="Dataset 'hci': a folder of HCI 4D benchmark scenes; every folder in it with input_Cam*.png is a "
         "scene, also below category folders such as training/. null for none.",
+    )
+    hci_old_root: str | None = Field(
+        None,
+        description="Dataset 'hci_old': a folder with HDF5 files of the HCI archive of 2013 (Wanner et al.). "
+        "null for none.",
+    )
+    light_fields: dict[str, dict[str, Any]] = Field(
+        {},
+        description="Dataset 'own': light fields of any format that 'sepi depth' reads, by a name of yours, such as "
+        "{lego: {path: /data/lego, grid: [17, 17]}}. Beside path: format, grid, pattern, axes, variable, central, "
+        "order, exclude, view, follow_links, which mean what the flags of 'sepi depth' mean.",
     )
     disparity_range: dict[str, tuple[float, float]] = Field(
         {},
@@ -170,8 +207,14 @@ def _scenes(config: Config) -> dict[tuple[str, str], Scene]:
     scenes = [Scene("builtin", name, None, (), _BUILTIN_VIEWS, size, size) for name in config.builtin.scenes]
     if config.hci_root:
         scenes += scenes_in(Path(config.hci_root).expanduser(), "hci", "config.hci_root")
+    if config.hci_old_root:
+        scenes += archive_scenes_in(Path(config.hci_old_root).expanduser(), "hci_old", "config.hci_old_root")
+    for name, values in config.light_fields.items():
+        where = f"config.light_fields.{name}"
+        own = validated(OwnLightField, values, where)
+        scenes.append(own_scene(name, Path(own.path).expanduser(), own.flags, where))
     if not scenes:
-        raise SepiError("config: no scene to run on; name some in builtin.scenes or set hci_root")
+        raise SepiError("config: no scene to run on; name some in builtin.scenes or light_fields, or set hci_root")
     return {(scene.dataset, scene.name): scene for scene in scenes}
 
 

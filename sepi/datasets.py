@@ -1,14 +1,16 @@
-"""The scenes that the workflow runs on: the built-in ones and those found in a folder of light fields."""
+"""The scenes that the workflow runs on: built-in ones, those found in a folder, and light fields named one by one."""
 
 from __future__ import annotations
 
+import math
 import re
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from sepi.errors import SepiError
+from sepi.io import hci_old
 from sepi.io.images import png_size
 
 VIEW_PATTERN = "input_Cam*.png"
@@ -16,6 +18,8 @@ VIEW_PATTERN = "input_Cam*.png"
 _OTHER_PATTERNS = ("parameters.cfg", "gt_disp_lowres.pfm", "*mask*.png")
 # a scene's name is a folder name below results/ and a word on the command line
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.+-]*")
+# a side of the benchmark's views
+_USUAL_SIDE = 512
 # root/scene, root/category/scene, and a level more
 _DEPTH = 3
 
@@ -28,8 +32,8 @@ class Scene:
     ----------
     dataset, name : str
         Together they name the scene's folder ``results/DATASET/NAME``.
-    folder : Path or None
-        Where its pictures are; None for a built-in scene.
+    source : Path or None
+        The folder or file to read; None for a built-in scene.
     files : tuple of Path
         What ingest reads: a change in one of them is a change of the scene.
     views : int
@@ -38,16 +42,19 @@ class Scene:
         Size of a view in pixels.
     disparity_range : tuple of float or None
         Range the user set, pixels per view step; None: the scene's own or an estimate.
+    flags : tuple of str
+        How ingest is to read it, as flags of its command line.
     """
 
     dataset: str
     name: str
-    folder: Path | None
+    source: Path | None
     files: tuple[Path, ...]
     views: int
     height: int
     width: int
     disparity_range: tuple[float, float] | None = None
+    flags: tuple[str, ...] = ()
 
     @property
     def samples(self) -> int:
@@ -77,15 +84,77 @@ def scenes_in(root: Path, dataset: str, where: str) -> list[Scene]:
     if not root.is_dir():
         raise SepiError(f"{where}: no folder '{root}'")
     scenes = [_scene_of(folder, dataset) for folder in _scene_folders(root.resolve(), _DEPTH)]
+    return _checked(scenes, where, f"no scene in '{root}' (expected folders with {VIEW_PATTERN})")
+
+
+def archive_scenes_in(root: Path, dataset: str, where: str) -> list[Scene]:
+    """Every light field of the HCI archive of 2013 below a folder, by name.
+
+    A scene is an HDF5 file with a dataset ``LF``. It has the file's name, or its folder's where the file is ``lf.h5``.
+
+    Parameters
+    ----------
+    root : Path
+        Folder to look in, or one such file.
+    dataset : str
+        Name of the dataset that the scenes belong to.
+    where : str
+        The key that named ``root``, for messages.
+
+    Raises
+    ------
+    SepiError
+        If there is no such folder, no scene in it, two scenes of one name, or a name that is no plain word.
+    """
+    if not root.exists():
+        raise SepiError(f"{where}: no folder '{root}'")
+    found = [root.resolve()] if root.is_file() else sorted(_files_below(root.resolve(), _DEPTH))
+    files = [path for path in found if hci_old.matches(path)]
+    scenes = []
+    for path in files:
+        name = path.parent.name if path.stem.lower() == "lf" else path.stem
+        scenes.append(Scene(dataset, name, path, (path,), *_rough_size((path,))))
+    return _checked(scenes, where, f"no scene in '{root}' (expected HDF5 files with a dataset LF)")
+
+
+def own_scene(name: str, source: Path, flags: tuple[str, ...], where: str) -> Scene:
+    """A light field of any format as a scene of dataset ``own``.
+
+    Raises
+    ------
+    SepiError
+        If nothing is there, or ``name`` is no plain word.
+    """
+    if not source.exists():
+        raise SepiError(f"{where}: no file or folder '{source}'")
+    source = source.resolve()
+    inside = [path for path in sorted(source.iterdir()) if path.is_file()] if source.is_dir() else [source]
+    files = tuple(path for path in inside if not path.name.startswith("."))
+    scene = Scene("own", name, source, files, *_rough_size(files), flags=flags)
+    return _checked([scene], where, "")[0]
+
+
+def _checked(scenes: list[Scene], where: str, none: str) -> list[Scene]:
+    """The scenes by name, each of a name that no other has and that can be a folder's."""
     if not scenes:
-        raise SepiError(f"{where}: no scene in '{root}' (expected folders with {VIEW_PATTERN})")
+        raise SepiError(f"{where}: {none}")
     for name, count in Counter(scene.name for scene in scenes).items():
         if count > 1:
-            both = " and ".join(str(scene.folder) for scene in scenes if scene.name == name)
+            both = " and ".join(str(scene.source) for scene in scenes if scene.name == name)
             raise SepiError(f"{where}: two scenes are called '{name}': {both}")
         if not _NAME.fullmatch(name):
-            raise SepiError(f"{where}: a scene's folder must be named with letters, digits and _ . + - only: '{name}'")
+            raise SepiError(f"{where}: a scene must be named with letters, digits and _ . + - only: '{name}'")
     return sorted(scenes, key=lambda scene: scene.name)
+
+
+def _files_below(folder: Path, depth: int) -> Iterator[Path]:
+    for inner in folder.iterdir():
+        if inner.name.startswith("."):
+            continue
+        if inner.is_file():
+            yield inner
+        elif depth and inner.is_dir():
+            yield from _files_below(inner, depth - 1)
 
 
 def _scene_folders(folder: Path, depth: int) -> Iterator[Path]:
@@ -100,13 +169,22 @@ def _scene_folders(folder: Path, depth: int) -> Iterator[Path]:
 def _scene_of(folder: Path, dataset: str) -> Scene:
     views = sorted(folder.glob(VIEW_PATTERN))
     others = sorted({path for pattern in _OTHER_PATTERNS for path in folder.glob(pattern)})
-    height, width = _size_of(views[0])
-    return Scene(dataset, folder.name, folder, (*views, *others), len(views), height, width)
+    return Scene(dataset, folder.name, folder, (*views, *others), *_rough_size(views))
 
 
-def _size_of(view: Path) -> tuple[int, int]:
-    """Height and width of a view; the benchmark's 512x512 where it is damaged, which ingest will say."""
+def _rough_size(files: Sequence[Path]) -> tuple[int, int, int]:
+    """Number of views, their height and width: what threads and memory of a job are reckoned from.
+
+    Files that are no pictures are taken for one array of 9x9 views; damaged ones are left to ingest, which will say so.
+    """
+    if not files:
+        return 1, _USUAL_SIDE, _USUAL_SIDE
     try:
-        return png_size(view)
+        return len(files), *png_size(files[0])
     except SepiError:
-        return 512, 512
+        pass
+    if len(files) > 1:
+        return len(files), _USUAL_SIDE, _USUAL_SIDE
+    views = 81
+    side = max(1, math.isqrt(files[0].stat().st_size // (3 * views)))
+    return views, side, side

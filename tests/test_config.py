@@ -4,6 +4,8 @@ import struct
 from pathlib import Path
 from typing import Any
 
+import h5py
+import numpy as np
 import pytest
 import yaml
 
@@ -67,7 +69,7 @@ def test_defaults_run_every_builtin_scene_and_variant() -> None:
         ({"builtin": {"size": "big"}}, "config.builtin.size: input should be a valid integer, got 'big'"),
         ({"builtin": {"size": 3}}, "config.builtin.size: input should be greater than or equal to 64, got 3"),
         ({"builtin": {"scenes": ["dotz"]}}, "config.builtin.scenes: unknown 'dotz'; did you mean 'dots'?"),
-        ({"builtin": {"scenes": []}}, "config: no scene to run on; name some in builtin.scenes or set hci_root"),
+        ({"builtin": {"scenes": []}}, "config: no scene to run on; name some in builtin.scenes or light_fields"),
         ({"builtin": None}, "config.builtin: input should be an object, got None"),
         ({"hci_root": "/nowhere"}, "config.hci_root: no folder '/nowhere'"),
         ({"stages": {"initail": {}}}, "config.stages: unknown 'initail'; did you mean 'initial'?"),
@@ -181,3 +183,68 @@ class TestFolderOfScenes:
         settings = self.settings(hci)
         assert settings.scenes_of("hci") == ["antinous", "cotton"]
         assert settings.scene("hci", "antinous").samples == 81 * 512 * 512
+
+
+class TestOwnLightFields:
+    """Light fields of any format go through the workflow, too."""
+
+    def test_flags_reach_ingest(self, tmp_path: Path) -> None:
+        (tmp_path / "lego.mat").write_bytes(bytes(3 * 81 * 100))
+        entry = {
+            "path": str(tmp_path / "lego.mat"),
+            "format": "matlab",
+            "grid": [9, 9],
+            "central": 5,
+            "order": "flip-rows",
+            "exclude": ["0,0", "4,4"],
+            "view": [2, 3],
+            "follow_links": True,
+        }
+        settings = load_settings({"light_fields": {"lego": entry}, "disparity_range": {"own/lego": [-1, 2]}})
+        scene = settings.scene("own", "lego")
+        words = "--format matlab --grid 9x9 --central 5 --order flip-rows --view 2,3 --exclude 0,0 --exclude 4,4"
+        assert scene.flags == (*words.split(), "--follow-links")
+        assert scene.files == (tmp_path / "lego.mat",)
+        assert scene.disparity_range == (-1, 2)
+        assert (scene.views, scene.height, scene.width) == (81, 10, 10)
+
+    def test_every_picture_of_a_folder_is_an_input(self, tmp_path: Path) -> None:
+        folder = make_scene(tmp_path / "flowers", views=4)
+        (folder / ".hidden").touch()
+        (folder / "below").mkdir()
+        scene = load_settings({"light_fields": {"a": {"path": str(folder)}}}).scene("own", "a")
+        assert [path.name for path in scene.files] == [f"input_Cam00{number}.png" for number in range(4)]
+        assert (scene.views, scene.height, scene.width) == (4, 30, 40)
+
+    @pytest.mark.parametrize(
+        ("entry", "expected"),
+        [
+            ({"path": "/nowhere"}, "config.light_fields.a: no file or folder '/nowhere'"),
+            ({}, "config.light_fields.a.path: field required"),
+            ({"path": "/", "gird": [3, 3]}, "config.light_fields.a: unknown 'gird'; did you mean 'grid'?"),
+            ({"path": "/", "grid": "3x3"}, "config.light_fields.a.grid: input should be a valid array, got '3x3'"),
+            ({"path": "/", "central": "big"}, "config.light_fields.a.central: input should be a valid integer"),
+            ("/data/lego", "config.light_fields.a: input should be an object, got '/data/lego'"),
+        ],
+    )
+    def test_a_wrong_entry_is_named(self, entry: Any, expected: str) -> None:
+        assert expected in message_of({"light_fields": {"a": entry}})
+
+    def test_a_name_that_is_no_plain_word_is_refused(self, tmp_path: Path) -> None:
+        assert "'my lego'" in message_of({"light_fields": {"my lego": {"path": str(tmp_path)}}})
+
+
+def test_archive_files_are_scenes_by_their_own_or_their_folders_name(tmp_path: Path) -> None:
+    for name in ("buddha.h5", "mona/lf.h5"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        with h5py.File(tmp_path / name, "w") as file:
+            file["LF"] = np.zeros((3, 3, 8, 8, 3), np.uint8)
+    with h5py.File(tmp_path / "other.h5", "w") as file:
+        file["x"] = 1
+    (tmp_path / "readme.txt").touch()
+    settings = load_settings({"hci_old_root": str(tmp_path)})
+    assert settings.scenes_of("hci_old") == ["buddha", "mona"]
+    assert settings.scene("hci_old", "mona").files == (tmp_path / "mona/lf.h5",)
+    (tmp_path / "empty").mkdir()
+    assert "expected HDF5 files" in message_of({"hci_old_root": str(tmp_path / "empty")})
+    assert "no folder" in message_of({"hci_old_root": str(tmp_path / "absent")})

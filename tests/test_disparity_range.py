@@ -181,6 +181,15 @@ def test_given_range_wins_over_the_scenes_own() -> None:
         settle_range(own, (1, 1))
 
 
+@pytest.mark.parametrize("limits", [(-1e9, 1e9), (0, 48), (-48, 1)])
+def test_a_range_beyond_the_views_is_refused(limits: tuple[float, float]) -> None:
+    """A typing error in the range would otherwise be hours of work on candidates that no view can show."""
+    light_field = LightField(np.zeros((3, 3, 32, 48, 1), np.uint8), "toy", source="toy.npy")
+    with pytest.raises(SepiError, match=r"toy\.npy: disparity range \(given\) .* less than the 48 pixels of a view"):
+        settle_range(light_field, limits)
+    assert settle_range(light_field, (-47, 47)).known_range().maximum == 47
+
+
 def sweep_in_numpy(
     reference: np.ndarray, views: np.ndarray, offsets: np.ndarray, candidates: np.ndarray, limit: float, radius: int
 ) -> np.ndarray:

@@ -16,12 +16,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import yaml
 from pydantic import ValidationError
 
 from sepi.io.hdf5 import read_attributes, read_stage
 from sepi.pipeline import STAGES, VARIANTS
+from sepi.reading import read_light_field
 from sepi.scenes import render, write_hci
 
 REPOSITORY = Path(__file__).parents[1]
@@ -317,6 +319,48 @@ class TestConfiguration:
         scenes = set(re.findall(r"(\w+/\w+): reading the light field", result.stdout))
         assert scenes == {"builtin/wall", "builtin/dots", "hci/box"}
 
+    @pytest.mark.parametrize(
+        "text",
+        ['hci_root: !!python/object/apply:os.system ["touch made-by-yaml"]', "a: !!python/name:os.system", "a: [1"],
+    )
+    def test_yaml_builds_no_objects(self, workflow: Workflow, tmp_path: Path, text: str) -> None:
+        """A configuration from someone else must not run programs."""
+        (tmp_path / "other.yaml").write_text(text)
+        there = replace(workflow, folder=tmp_path / "run")
+        result = there.run("all", flags=("--configfile", str(tmp_path / "other.yaml")))
+        assert result.returncode != 0
+        assert "Traceback" not in result.stdout
+        assert "not valid JSON or YAML" in result.stdout
+        assert not (there.folder / "made-by-yaml").exists()
+        assert not (there.folder / "results").exists()
+
+
+def test_own_light_fields_of_any_format_get_maps(workflow: Workflow, tmp_path: Path) -> None:
+    """Also those with views left out and in another order, and a wrong order is told at the end."""
+    views = render("curved_occluders", size=SIZE, views=5).views
+    np.save(tmp_path / "right.npy", views)
+    np.save(tmp_path / "turned.npy", views.transpose(1, 0, 2, 3, 4))
+    entries = {
+        "right": {"path": str(tmp_path / "right.npy"), "exclude": ["0,0"], "view": [2, 1]},
+        "turned": {"path": str(tmp_path / "turned.npy"), "order": "transpose"},
+        "wrong": {"path": str(tmp_path / "turned.npy")},
+    }
+    own = replace(workflow, folder=tmp_path / "run").with_config(hci_root=None, light_fields=entries)
+    targets = [f"results/own/{name}/paper/result.h5" for name in entries]
+    result = own.run(*targets)
+    assert result.returncode == 0, result.stdout
+    kept = read_light_field(own.folder / "results/own/right/lightfield.h5", check_order=False)
+    assert kept.reference == (2, 1)
+    assert np.argwhere(~kept.present).tolist() == [[0, 0]]
+    turned = read_light_field(own.folder / "results/own/turned/lightfield.h5", check_order=False)
+    np.testing.assert_array_equal(turned.views, views)
+    warnings = [line for line in result.stdout.splitlines() if line.startswith("sepi: warning:")]
+    assert len(warnings) == 1
+    assert "turned.npy" in warnings[0]
+    assert "--order transpose" in warnings[0]
+    again = own.with_config(light_fields=entries | {"turned": entries["turned"] | {"order": "as-given"}})
+    assert again.stage_plan(*targets)["ingest"] == 1
+
 
 def test_a_failed_job_shows_the_one_clear_line(workflow: Workflow, tmp_path: Path) -> None:
     """A user must not have to look for the log."""
@@ -339,7 +383,8 @@ def test_an_interrupted_run_leaves_no_half_file_and_resumes(
     """Ctrl-C at the terminal, or a machine that goes down, in the middle of writing a stage file."""
     slow = Workflow(copy_of_the_project(tmp_path / "tree"), tmp_path / "run", TINY)
     files = slow.tree / "sepi" / "io" / "files.py"
-    waiting = 'import time\n        time.sleep(float(os.environ.get("SLEEP", "0")))\n        temporary.replace(path)'
+    sleep = 'import os, time\n        time.sleep(float(os.environ.get("SLEEP", "0")))'
+    waiting = f"{sleep}\n        temporary.replace(path)"
     target = "results/builtin/dots/paper/result.h5"
     light_field = slow.folder / "results/builtin/dots/lightfield.h5"
     with edited(files, "temporary.replace(path)", waiting):
