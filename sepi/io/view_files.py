@@ -13,6 +13,9 @@ from sepi.io.images import Pixels, read_views
 from sepi.io.options import Numbers, ReadOptions, arranged
 from sepi.lightfield import BoolMap
 
+MAX_PLACES = 10_000
+"""More views than any grid has."""
+
 
 @dataclass(frozen=True)
 class Arranged:
@@ -59,6 +62,8 @@ def read_arranged(folder: Path, files: Mapping[int, Path], grid: tuple[int, int]
         If the options do not fit the grid, no view is left, or a file cannot be read, is a link out of the folder, or
         is unlike the others.
     """
+    if grid[0] * grid[1] > MAX_PLACES:
+        raise SepiError(f"{folder}: a grid of {grid[0]}x{grid[1]} views; expected at most {MAX_PLACES} views")
     numbers = arranged(str(folder), grid, options, {path.name: number for number, path in files.items()})
     present = np.isin(numbers, list(files))
     places = np.flatnonzero(present)
