@@ -78,7 +78,7 @@ def submission(results: tuple[Path, ...], output: Path, runtimes: tuple[str, ...
 
     \b
     Example:
-      for scene in hci/*/*/; do sepi depth "$scene" --timing; done
+      for scene in stratified/* training/* test/*; do sepi depth "$scene" --timing; done
       sepi submission *-depth -o submission.zip
     """
     from sepi.submission import Entry, entry_of, write_submission

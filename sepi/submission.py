@@ -127,22 +127,10 @@ def write_submission(path: Path, entries: Mapping[str, Entry], *, partial: bool 
     SepiError
         If the submission has a problem, as :func:`problems_of` finds it, or cannot be written.
     """
-    with tempfile.TemporaryDirectory(prefix="sepi-") as name:
-        files = {}
-        for scene, entry in entries.items():
-            files[f"{MAPS}/{scene}.pfm"] = entry.disparity
-            files[f"{RUNTIMES}/{scene}.txt"] = Path(name) / f"{scene}.txt"
-            files[f"{RUNTIMES}/{scene}.txt"].write_text(f"{entry.seconds:.10g}\n", encoding="ascii")
-        problems = _strangers(files) + _problems_in(files, {}, partial)
-        if problems:
-            more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
-            raise SepiError(f"{path}: not written: {problems[0]}{more}")
-        with atomic_path(path) as temporary, zipfile.ZipFile(temporary, "w") as archive:
-            for inner, file in sorted(files.items()):
-                # neither dates nor compression, which differ from run to run and from library to library
-                info = zipfile.ZipInfo(inner)
-                info.create_system, info.external_attr = 3, (stat.S_IFREG | 0o644) << 16
-                archive.writestr(info, file.read_bytes())
+    try:
+        _write(path, entries, partial)
+    except OSError as error:
+        raise SepiError(f"{path}: cannot be written ({error.strerror or error})") from error
 
 
 def problems_of(path: Path, *, partial: bool = False) -> list[str]:
@@ -174,6 +162,25 @@ def problems_of(path: Path, *, partial: bool = False) -> list[str]:
     except OSError as error:
         raise SepiError(f"{path}: cannot be read ({error.strerror or error})") from error
     raise SepiError(f"{path}: no such file or folder")
+
+
+def _write(path: Path, entries: Mapping[str, Entry], partial: bool) -> None:
+    with tempfile.TemporaryDirectory(prefix="sepi-") as name:
+        files = {}
+        for scene, entry in entries.items():
+            files[f"{MAPS}/{scene}.pfm"] = entry.disparity
+            files[f"{RUNTIMES}/{scene}.txt"] = Path(name) / f"{scene}.txt"
+            files[f"{RUNTIMES}/{scene}.txt"].write_text(f"{entry.seconds:.10g}\n", encoding="ascii")
+        problems = _strangers(files) + _problems_in(files, {}, partial)
+        if problems:
+            more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
+            raise SepiError(f"{path}: not written: {problems[0]}{more}")
+        with atomic_path(path) as temporary, zipfile.ZipFile(temporary, "w") as archive:
+            for inner, file in sorted(files.items()):
+                # neither dates nor compression, which differ from run to run and from library to library
+                info = zipfile.ZipInfo(inner)
+                info.create_system, info.external_attr = 3, (stat.S_IFREG | 0o644) << 16
+                archive.writestr(info, file.read_bytes())
 
 
 def _problems_of_archive(path: Path, partial: bool) -> list[str]:
