@@ -15,6 +15,7 @@ import click
 from sepi.command import SepiGroup, progress_bar, use_threads
 from sepi.errors import SepiError
 from sepi.evaluate_command import evaluate
+from sepi.export_commands import check_submission, points, submission
 from sepi.input_options import Geometry, Reading, camera_flags, reading_flags
 from sepi.provenance import package_version, result_attributes, step
 
@@ -223,7 +224,7 @@ def scenes(names: tuple[str, ...], output: Path, size: int, views: int, only_lis
         click.echo(f"written: {output / name}/")
 
 
-for command in (evaluate,):
+for command in (evaluate, points, submission, check_submission):
     main.add_command(command)
 
 

@@ -6,7 +6,7 @@ import atexit
 import secrets
 import shutil
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from sepi.errors import SepiError
@@ -74,7 +74,9 @@ def _remove(temporary: Path) -> None:
     if temporary.is_dir():
         shutil.rmtree(temporary, ignore_errors=True)
     else:
-        temporary.unlink(missing_ok=True)
+        # where the folder could not even be made there is nothing to remove
+        with suppress(OSError):
+            temporary.unlink(missing_ok=True)
     _unfinished.discard(temporary)
 
 

@@ -1,0 +1,66 @@
+"""Light fields without some of their views: a cross or a star of cameras, dark or damaged views left out."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from sepi.disparity_range import estimate_range
+from sepi.evaluate import score
+from sepi.lightfield import LightField
+from sepi.pipeline import VARIANTS, estimate_depth
+from sepi.scenes import render
+
+T, S = np.mgrid[:9, :9]
+SHAPES = {
+    "cross": (T == 4) | (S == 4),
+    "star": (T == 4) | (S == 4) | (T == S) | (T + S == 8),
+    "row": T == 4,
+    "corners gone": (np.abs(T - 4) + np.abs(S - 4)) < 7,
+    "upper left": (T <= 4) & (S <= 4),
+}
+
+
+@cache
+def scene() -> LightField:
+    return render("pyramids", size=96)
+
+
+def without(light_field: LightField, present: np.ndarray, filling: int = 0) -> LightField:
+    views = np.where(present[:, :, None, None, None], light_field.views, filling).astype(light_field.views.dtype)
+    return replace(light_field, views=views, present=present)
+
+
+def disparity_of(light_field: LightField, variant: str) -> np.ndarray:
+    few = {} if variant == "no_sepi" else {"initial": {"candidates": 61}}
+    return estimate_depth(light_field, variant, few).disparity
+
+
+@cache
+def whole_mse(variant: str) -> float:
+    return score(disparity_of(scene(), variant), scene().truth)["mse100"]
+
+
+@pytest.mark.parametrize("variant", VARIANTS)
+@pytest.mark.parametrize("shape", SHAPES)
+def test_every_variant_does_without_some_views(variant: str, shape: str) -> None:
+    """A stage that counts on the full grid would fail here, or give a map that is far worse."""
+    disparity = disparity_of(without(scene(), SHAPES[shape]), variant)
+    assert np.isfinite(disparity).all()
+    assert score(disparity, scene().truth)["mse100"] <= 2.5 * whole_mse(variant) + 1
+
+
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_what_missing_views_hold_is_never_used(variant: str) -> None:
+    """A view is left out because it is dark or damaged; it must not shine through."""
+    dark, bright = (disparity_of(without(scene(), SHAPES["star"], filling), variant) for filling in (0, 255))
+    np.testing.assert_array_equal(dark, bright)
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_range_is_estimated_without_some_views(shape: str) -> None:
+    known = estimate_range(without(scene(), SHAPES[shape]))
+    assert known.minimum <= scene().truth.min() + 0.05
+    assert known.maximum >= scene().truth.max() - 0.05
+    assert known.maximum - known.minimum < 3 * (scene().truth.max() - scene().truth.min())
