@@ -51,11 +51,9 @@ def read(path: Path, options: ReadOptions) -> LightField:
     """
     require_unused(str(path), options, ("pattern", "axes", "variable", "follow_links"))
     T, S = grid = options.grid or BLOCK
-    # the largest odd number that fits a small grid
-    usual = min(_CENTRAL, *(side - (side + 1) % 2 for side in grid)) if min(grid) > 0 else 1
-    central = options.central or usual
     if not 2 <= T * S <= MAX_PLACES:
         raise SepiError(f"{path}: --grid {T}x{S}: expected a grid of 2 to {MAX_PLACES} views")
+    central = options.central or _usual_side(grid)
     picture = read_picture(path)
     height, width = picture.shape[0] // T, picture.shape[1] // S
     if min(height, width) < MIN_SIZE:
@@ -71,7 +69,7 @@ def read(path: Path, options: ReadOptions) -> LightField:
         t, s = divmod(int(numbers[place]), S)
         views[place] = blocks[:, t, :, s]
     notes = []
-    if options.central is None and (central, central) != grid:
+    if options.central is None and central is not None and (central, central) != grid:
         notes.append(f"the {central}x{central} views in the middle of {T}x{S}; --central N takes another odd number")
     cropped = picture.shape[0] - height * T, picture.shape[1] - width * S
     if any(cropped):
@@ -81,6 +79,13 @@ def read(path: Path, options: ReadOptions) -> LightField:
     )
     dark = _dark_views(views, present, light_field.reference)
     return replace(light_field, notes=(*notes, *_dark_notes(dark)))
+
+
+def _usual_side(grid: tuple[int, int]) -> int | None:
+    """Side of the middle that is used unless another is asked for: 9 or, in a small grid, the largest odd number."""
+    side = min(_CENTRAL, *grid)
+    side -= (side + 1) % 2
+    return side if side > 1 else None
 
 
 def _dark_views(views: Pixels, present: BoolMap, reference: tuple[int, int]) -> list[tuple[int, int]]:

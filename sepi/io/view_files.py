@@ -86,7 +86,11 @@ def require_within(folder: Path, paths: Iterable[Path]) -> None:
     """
     home = folder.resolve()
     for path in paths:
-        if path.is_symlink() and not path.resolve().is_relative_to(home):
-            raise SepiError(
-                f"{path}: a link out of the folder, to {path.resolve()}; copy the file, or pass --follow-links"
-            )
+        if not path.is_symlink():
+            continue
+        try:
+            target = path.resolve()
+        except (OSError, RuntimeError) as error:
+            raise SepiError(f"{path}: a link that leads back to itself") from error
+        if not target.is_relative_to(home):
+            raise SepiError(f"{path}: a link out of the folder, to {target}; copy the file, or pass --follow-links")

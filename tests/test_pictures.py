@@ -1,0 +1,396 @@
+"""Pictures of every kind come in as other programs wrote them, pixel for pixel, or not at all: a picture that is
+decoded in part, or to other values than were stored, gives wrong depth without a word.
+"""
+
+import os
+import struct
+import zlib
+from collections.abc import Callable
+from pathlib import Path
+
+import cv2
+import imageio.v3 as imageio
+import numpy as np
+import pytest
+import tifffile
+from PIL import Image
+
+from sepi.errors import SepiError
+from sepi.io.images import read_picture, read_views
+
+RANDOM = np.random.default_rng(0)
+RGB8 = RANDOM.integers(0, 256, (40, 50, 3), np.uint8)
+RGB16 = RANDOM.integers(0, 65536, (40, 50, 3), np.uint16)
+RGBF = RANDOM.random((40, 50, 3), np.float32)
+GREY8, GREY16, GREYF = RGB8[:, :, :1], RGB16[:, :, :1], RGBF[:, :, :1]
+
+
+def smooth() -> np.ndarray:
+    y, x = np.mgrid[:40, :50]
+    return np.stack([4 * x, 5 * y, 100 + x + y], 2).astype(np.uint8)
+
+
+def alpha(rgb: np.ndarray, value: int | None = None) -> np.ndarray:
+    """The picture with transparency, random unless a value is given."""
+    return np.dstack([rgb, rgb[:, :, 0] if value is None else np.full_like(rgb[:, :, 0], value)])
+
+
+def flat(values: np.ndarray) -> np.ndarray:
+    return values[:, :, 0] if values.shape[2] == 1 else values
+
+
+def by_opencv(values: np.ndarray) -> Callable[[Path], object]:
+    bgr = values[:, :, 0] if values.shape[2] == 1 else values[:, :, [2, 1, 0, 3][: values.shape[2]]]
+    return lambda path: cv2.imwrite(str(path), bgr)
+
+
+def by_imageio(values: np.ndarray) -> Callable[[Path], object]:
+    return lambda path: imageio.imwrite(path, flat(values))
+
+
+def by_pillow(values: np.ndarray, **options: object) -> Callable[[Path], object]:
+    return lambda path: Image.fromarray(flat(values)).save(path, **options)
+
+
+def by_tifffile(values: np.ndarray, **options: object) -> Callable[[Path], object]:
+    options = {"photometric": "rgb" if values.shape[2] > 2 else "minisblack", **options}
+    return lambda path: tifffile.imwrite(path, flat(values), **options)
+
+
+def as_text(values: np.ndarray, white: int) -> Callable[[Path], object]:
+    form = b"P3" if values.shape[2] == 3 else b"P2"
+    head = form + b"\n# by hand\n%d %d\n%d\n" % (values.shape[1], values.shape[0], white)
+    return lambda path: path.write_bytes(head + b"\n".join(b"%d" % value for value in values.ravel()))
+
+
+def as_bytes(values: np.ndarray, white: int) -> Callable[[Path], object]:
+    form = b"P6" if values.shape[2] == 3 else b"P5"
+    head = form + b"\n%d\t%d # size\n%d\n" % (values.shape[1], values.shape[0], white)
+    return lambda path: path.write_bytes(head + values.astype(">u2" if white > 255 else "u1").tobytes())
+
+
+EXACT: dict[str, tuple[str, Callable[[Path], object], np.ndarray]] = {
+    "png grey 8": ("a.png", by_imageio(GREY8), GREY8),
+    "png grey 16": ("a.png", by_opencv(GREY16), GREY16),
+    "png RGB 8": ("a.png", by_pillow(RGB8), RGB8),
+    "png RGB 16": ("a.png", by_opencv(RGB16), RGB16),
+    "png RGBA 8": ("a.png", by_pillow(alpha(RGB8)), RGB8),
+    "png RGBA 16": ("a.png", by_opencv(alpha(RGB16)), RGB16),
+    "png grey with alpha": ("a.png", by_pillow(RGB8[:, :, :2]), GREY8),
+    "png capitals": ("A.PNG", by_opencv(RGB8), RGB8),
+    "bmp grey": ("a.bmp", by_pillow(GREY8), GREY8),
+    "bmp RGB": ("a.bmp", by_pillow(RGB8), RGB8),
+    "bmp RGBA": ("a.bmp", by_opencv(alpha(RGB8)), RGB8),
+    "tiff grey 8": ("a.tif", by_tifffile(GREY8), GREY8),
+    "tiff grey 16": ("a.tif", by_tifffile(GREY16), GREY16),
+    "tiff grey float": ("a.tiff", by_tifffile(GREYF), GREYF),
+    "tiff RGB 8": ("a.tif", by_imageio(RGB8), RGB8),
+    "tiff RGB 16": ("a.tiff", by_tifffile(RGB16), RGB16),
+    "tiff RGB float": ("a.tif", by_tifffile(RGBF), RGBF),
+    "tiff RGBA 8 opaque": ("a.tif", by_tifffile(alpha(RGB8, 255), extrasamples=["unassalpha"]), RGB8),
+    "tiff RGBA 16": ("a.tif", by_tifffile(alpha(RGB16), extrasamples=["unassalpha"]), RGB16),
+    "tiff RGBA float": ("a.tif", by_tifffile(alpha(RGBF), extrasamples=["unassalpha"]), RGBF),
+    "tiff RGBA 8 of OpenCV": ("a.tif", by_opencv(alpha(RGB8)), RGB8),
+    "tiff LZW of OpenCV": ("a.tif", by_opencv(RGB16), RGB16),
+    "tiff big endian": ("a.tif", by_tifffile(RGB16, byteorder=">"), RGB16),
+    "tiff float big endian": ("a.tif", by_tifffile(RGBF, byteorder=">"), RGBF),
+    "tiff of 64 bit offsets": ("a.tif", by_tifffile(RGB16, bigtiff=True), RGB16),
+    "tiff deflated": ("a.tif", by_tifffile(RGB16, compression="zlib", predictor=True), RGB16),
+    "tiff in tiles": ("a.tif", by_tifffile(RGB16, tile=(32, 32)), RGB16),
+    "tiff in strips": ("a.tif", by_tifffile(RGB8, rowsperstrip=7), RGB8),
+    "webp": ("a.webp", by_pillow(RGB8, lossless=True), RGB8),
+    "webp RGBA": ("a.webp", by_pillow(alpha(RGB8), lossless=True, exact=True), RGB8),
+    "pgm": ("a.pgm", by_pillow(GREY8), GREY8),
+    "pgm 16": ("a.pgm", by_opencv(GREY16), GREY16),
+    "ppm": ("a.ppm", by_imageio(RGB8), RGB8),
+    "ppm 16": ("a.ppm", by_opencv(RGB16), RGB16),
+    "pnm": ("a.pnm", by_opencv(RGB8), RGB8),
+    "pgm text": ("a.pgm", as_text(GREY8, 255), GREY8),
+    "ppm text 16": ("a.ppm", as_text(RGB16, 65535), RGB16),
+    "pgm of white 15": ("a.pgm", as_bytes(GREY8 // 17, 15), GREY8 // 17 * 17),
+    "ppm of 12 bit": ("a.ppm", as_bytes(RGB16 // 16, 4095), np.rint(RGB16 // 16 * (65535 / 4095))),
+    "png named jpg": ("a.jpg", lambda path: path.write_bytes(cv2.imencode(".png", RGB8[:, :, ::-1])[1]), RGB8),
+    "tiff named png": ("a.png", by_tifffile(RGB16), RGB16),
+}
+
+
+@pytest.mark.parametrize("case", EXACT)
+def test_picture_is_read_pixel_for_pixel(tmp_path: Path, case: str, capfd: pytest.CaptureFixture[str]) -> None:
+    name, write, pixels = EXACT[case]
+    write(tmp_path / name)
+    read = read_picture(tmp_path / name)
+    np.testing.assert_array_equal(read, pixels)
+    assert read.dtype in (np.uint8, np.uint16, np.float32)
+    assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize("options", [{}, {"progressive": True}, {"subsampling": 0}, {"restart_marker_blocks": 2}])
+@pytest.mark.parametrize("grey", [False, True])
+def test_jpeg_is_read_as_another_decoder_reads_it(tmp_path: Path, grey: bool, options: dict[str, object]) -> None:
+    pixels = smooth()[:, :, :1] if grey else smooth()
+    by_pillow(pixels, quality=95, **options)(tmp_path / "a.jpg")
+    read = read_picture(tmp_path / "a.jpg")
+    with Image.open(tmp_path / "a.jpg") as image:
+        np.testing.assert_allclose(flat(read).astype(int), np.asarray(image).astype(int), atol=2)
+    assert read.shape == pixels.shape
+    assert read.dtype == np.uint8
+
+
+def test_jpeg_with_a_thumbnail_and_bytes_after_its_end_is_whole(tmp_path: Path) -> None:
+    """Cameras write both; neither the thumbnail's size nor its end mark is the picture's."""
+    small = cv2.imencode(".jpg", smooth()[:8, :8])[1].tobytes()
+    whole = cv2.imencode(".jpg", smooth()[:, :, ::-1])[1].tobytes()
+    extra = b"\xff\xe1" + struct.pack(">H", len(small) + 2) + small
+    (tmp_path / "a.jpg").write_bytes(whole[:2] + extra + whole[2:] + b"\0\0camera")
+    assert read_picture(tmp_path / "a.jpg").shape == (40, 50, 3)
+
+
+def test_camera_orientation_does_not_turn_a_view(tmp_path: Path) -> None:
+    """A view on its side does not match its neighbours."""
+    exif = Image.Exif()
+    exif[0x0112] = 6
+    by_pillow(smooth(), exif=exif)(tmp_path / "a.jpg")
+    assert read_picture(tmp_path / "a.jpg").shape == (40, 50, 3)
+
+
+WHOLE: dict[str, Callable[[Path], object]] = {
+    "png": by_pillow(RGB8),
+    "jpg": by_pillow(smooth(), quality=95),
+    "bmp": by_pillow(RGB8),
+    "tif": by_tifffile(RGB16),
+    "tiff": by_opencv(smooth()),
+    "webp": by_pillow(RGB8, lossless=True),
+    "ppm": by_pillow(RGB8),
+    "pgm": as_text(GREY8 // 100, 2),
+}
+
+
+@pytest.mark.parametrize("ending", WHOLE)
+def test_picture_cut_off_anywhere_is_refused(tmp_path: Path, ending: str, capfd: pytest.CaptureFixture[str]) -> None:
+    """A decoder may fill the rest with grey; matching then finds depth in it."""
+    path = tmp_path / f"a.{ending}"
+    WHOLE[ending](path)
+    data = path.read_bytes()
+    for size in [*range(0, 60), len(data) // 3, len(data) // 2, len(data) - 40, len(data) - 3, len(data) - 1]:
+        path.write_bytes(data[:size])
+        with pytest.raises(SepiError) as caught:
+            read_picture(path)
+        message = str(caught.value)
+        assert message.startswith(f"{path}: ")
+        assert "\n" not in message
+    assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize("ending", WHOLE)
+def test_damage_anywhere_is_an_error_or_a_picture(
+    tmp_path: Path, ending: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """Nothing but SepiError comes out."""
+    path = tmp_path / f"a.{ending}"
+    WHOLE[ending](path)
+    data = np.frombuffer(path.read_bytes(), np.uint8)
+    refused = 0
+    random = np.random.default_rng(1)
+    for count in range(120):
+        spoilt = data.copy()
+        # near the ends, where headers and directories lie, and anywhere
+        reach = (60, 300, len(data))[count % 3]
+        places = random.integers(-reach // 2, reach // 2, 1 + count % 4)
+        spoilt[places] = random.integers(0, 256, len(places))
+        path.write_bytes(spoilt.tobytes())
+        try:
+            assert read_picture(path).ndim == 3
+        except SepiError:
+            refused += 1
+    assert refused > 5
+    if ending != "jpg":  # libjpeg has a word for damage that it goes on after
+        assert capfd.readouterr() == ("", "")
+
+
+def png(width: int, height: int) -> bytes:
+    """A PNG with a sound header of any size and next to no pixels."""
+
+    def chunk(kind: bytes, body: bytes) -> bytes:
+        return struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body))
+
+    header = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
+    body = chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(b"\0" * 1000)) + chunk(b"IEND", b"")
+    return b"\x89PNG\r\n\x1a\n" + body
+
+
+def tiff(**changes: int) -> bytes:
+    """A deflated TIFF of 16 pixels but for what its tags claim."""
+    pixels = zlib.compress(bytes(16))
+    tags = {
+        "width": (256, 4),
+        "height": (257, 4),
+        "bits": (258, 8),
+        "compression": (259, 8),
+        "photometric": (262, 1),
+        "start": (273, 8),
+        "samples": (277, 1),
+        "size": (279, len(pixels)),
+        "form": (339, 1),
+    }
+    entries = [(tag, changes.get(name, value)) for name, (tag, value) in tags.items()]
+    directory = b"".join(struct.pack("<HHII", tag, 4, 1, value) for tag, value in entries)
+    return b"II*\0" + struct.pack("<I", 8 + len(pixels)) + pixels + struct.pack("<H", len(tags)) + directory + bytes(4)
+
+
+def jpeg(width: int, height: int) -> bytes:
+    data = cv2.imencode(".jpg", smooth())[1].tobytes()
+    at = data.index(b"\xff\xc0") + 5
+    return data[:at] + struct.pack(">HH", height, width) + data[at + 4 :]
+
+
+def bmp(width: int, height: int, compression: int = 0) -> bytes:
+    header = struct.pack("<IiiHHIIiiII", 40, width, height, 1, 24, compression, 0, 0, 0, 0, 0)
+    return b"BM" + struct.pack("<IHHI", 254, 0, 0, 54) + header + bytes(200)
+
+
+def webp(width: int, height: int) -> bytes:
+    data = cv2.imencode(".webp", smooth(), [cv2.IMWRITE_WEBP_QUALITY, 101])[1].tobytes()
+    at = data.index(b"VP8L") + 9
+    return data[:at] + struct.pack("<I", (width - 1) | (height - 1) << 14) + data[at + 4 :]
+
+
+BAD: dict[str, tuple[bytes, str]] = {
+    "empty": (b"", "not a PNG, JPEG"),
+    "text": (b"hello, world; this is no picture of any kind at all", "not a PNG, JPEG"),
+    "GIF": (b"GIF89a" + bytes(100), "not a PNG, JPEG"),
+    "huge PNG": (png(60_000, 60_000), "60000x60000"),
+    "large PNG": (png(16_000, 16_000), "16000x16000"),
+    "PNG without pixels": (png(0, 5), "0x5"),
+    "huge JPEG": (jpeg(65_000, 65_000), "65000x65000"),
+    "large JPEG": (jpeg(16_000, 16_000), "16000x16000"),
+    "JPEG without height": (jpeg(50, 0), "50x0"),
+    "huge TIFF": (tiff(width=2**31, height=2**31), "2147483648"),
+    "large TIFF": (tiff(width=16_000, height=16_000), "16000x16000"),
+    "plain TIFF larger than its file": (tiff(compression=1, width=100, height=100), "bytes of pixels"),
+    "TIFF with pixels beyond its end": (tiff(start=10**6), "cut off"),
+    "TIFF of 12 bit": (tiff(bits=12), "12 bit"),
+    "TIFF of signed numbers": (tiff(bits=16, form=2), "signed"),
+    "TIFF of 64 bit": (tiff(bits=64, form=3), "64 bit float"),
+    "TIFF of 1 bit": (tiff(bits=1), "1 bit"),
+    "TIFF of two samples": (tiff(samples=2), "2 samples"),
+    "TIFF of 16 bit with white as zero": (tiff(bits=16, photometric=0), "black as zero"),
+    "TIFF in CMYK": (tiff(samples=4, photometric=5), "nor RGB"),
+    "huge BMP": (bmp(2**31 - 1, 2**31 - 1), "cut off"),
+    "huge BMP upside down": (bmp(2**30, -(2**31)), "cut off"),
+    "large compressed BMP": (bmp(16_000, 16_000, 1), "16000x16000"),
+    "BMP of no width": (bmp(0, 10), "0x10"),
+    "BMP of negative width": (bmp(-10, 10), "-10"),
+    "large WebP": (webp(16_383, 16_383), "16383x16383"),
+    "huge PGM": (b"P5 999999999 999999999 255\n" + bytes(100), "cut off"),
+    "huge PGM in digits": (b"P2 99999 99999 255\n" + b"1 " * 100, "cut off"),
+    "PGM with too few digits": (b"P2 3 2 255\n" + b"100 " * 5, "6 whole numbers"),
+    "PGM with letters": (b"P2 3 2 255\n" + b"100 " * 5 + b"white", "6 whole numbers"),
+    "PGM brighter than white": (b"P5 3 2 100\n" + bytes([101] * 6), "white is 100"),
+    "PGM with no white": (b"P5 3 2 0\n" + bytes(6), "white"),
+    "PGM with white too high": (b"P5 3 2 70000\n" + bytes(12), "70000"),
+    "PGM without size": (b"P5 # nothing\n" * 3, "P5 WIDTH HEIGHT WHITE"),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_bad_picture_is_one_line_that_names_it(tmp_path: Path, case: str, capfd: pytest.CaptureFixture[str]) -> None:
+    data, word = BAD[case]
+    path = tmp_path / "a.png"
+    path.write_bytes(data)
+    with pytest.raises(SepiError) as caught:
+        read_picture(path)
+    assert str(caught.value).startswith(f"{path}: ")
+    assert word in str(caught.value)
+    assert capfd.readouterr() == ("", "")
+
+
+def test_sound_header_beside_a_bad_one(tmp_path: Path) -> None:
+    """The makers of bad files make good ones too, so that what is refused is what was changed."""
+    sound = {(4, 4): tiff(), (40, 50): jpeg(50, 40), (5, 10): bmp(10, 5), (40, 50, 3): webp(50, 40)}
+    for shape, data in sound.items():
+        (tmp_path / "a").write_bytes(data)
+        assert read_picture(tmp_path / "a").shape[:2] == shape[:2]
+
+
+UNREAD: dict[str, tuple[Callable[[Path], object], str]] = {
+    "planes apart": (
+        by_tifffile(np.moveaxis(RGB16, 2, 0), photometric="rgb", planarconfig="separate"),
+        "save it interleaved",
+    ),
+    "half floats": (by_tifffile(RGBF.astype(np.float16)), "16 bit float"),
+    "64 bit floats": (by_tifffile(RGBF.astype(np.float64)), "64 bit float"),
+    "32 bit integers": (by_tifffile(GREY16.astype(np.uint32)), "32 bit"),
+    "transparent": (by_tifffile(alpha(RGB8), extrasamples=["unassalpha"]), "without alpha"),
+    "not a number": (by_tifffile(np.where(RGBF > 0.5, np.float32(np.nan), RGBF)), "NaN"),
+    "one pixel infinite": (by_tifffile(np.where(RGBF > 0.99, np.float32(np.inf), RGBF)), "infinite"),
+    "0 to 255": (by_tifffile(RGBF * 255), "within 0..1"),
+    "negative": (by_tifffile(RGBF - 1), "within 0..1"),
+}
+
+
+@pytest.mark.parametrize("case", UNREAD)
+def test_tiff_that_would_be_read_wrongly_is_refused(
+    tmp_path: Path, case: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """OpenCV decodes some of these to values that are not in the file."""
+    write, word = UNREAD[case]
+    write(tmp_path / "a.tif")
+    with pytest.raises(SepiError, match=word) as caught:
+        read_picture(tmp_path / "a.tif")
+    assert str(caught.value).startswith(f"{tmp_path / 'a.tif'}: ")
+    assert capfd.readouterr() == ("", "")
+
+
+def test_what_is_no_file(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe.png")
+    (tmp_path / "folder.png").mkdir()
+    (tmp_path / "gone.png").symlink_to(tmp_path / "nowhere.png")
+    (tmp_path / "sparse.png").touch()
+    os.truncate(tmp_path / "sparse.png", 2**33)
+    words = {"pipe": "not a plain file", "folder": "cannot be read", "gone": "does not exist", "sparse": "bytes"}
+    for name, word in words.items():
+        with pytest.raises(SepiError, match=rf"{name}\.png: .*{word}"):
+            read_picture(tmp_path / f"{name}.png")
+
+
+UNLIKE = {
+    "size": (RGB8[1:], "50x39"),
+    "depth": (RGB16, "16 bit"),
+    "float": (RGBF, "32 bit float"),
+    "channels": (GREY8, "grey"),
+}
+
+
+@pytest.mark.parametrize("case", UNLIKE)
+def test_views_of_two_sorts_are_refused(tmp_path: Path, case: str) -> None:
+    pixels, word = UNLIKE[case]
+    by_tifffile(RGB8)(tmp_path / "a.tif")
+    by_tifffile(pixels)(tmp_path / "b.tif")
+    with pytest.raises(SepiError, match=word) as caught:
+        read_views([tmp_path / "a.tif", tmp_path / "b.tif"])
+    assert "b.tif" in str(caught.value)
+
+
+def test_views_that_take_more_memory_than_there_is_are_refused(tmp_path: Path) -> None:
+    """The system would end the program without a word."""
+    by_pillow(np.zeros((3000, 3000, 3), np.uint8))(tmp_path / "a.png")
+    with pytest.raises(SepiError, match="memory"):
+        read_views([tmp_path / "a.png"], [0], 10**6)
+
+
+def test_opencv_speaks_again_after_a_picture(tmp_path: Path) -> None:
+    """Other users of OpenCV in the same program want its words."""
+    before = cv2.utils.logging.getLogLevel()
+    (tmp_path / "a.bmp").write_bytes(bmp(10, 10, 1))
+    with pytest.raises(SepiError):
+        read_picture(tmp_path / "a.bmp")
+    by_pillow(RGB8)(tmp_path / "a.bmp")
+    read_views([tmp_path / "a.bmp"] * 20)
+    assert cv2.utils.logging.getLogLevel() == before
+
+
+def test_png_with_fewer_rows_than_it_says_is_refused(tmp_path: Path) -> None:
+    """All its checksums are right."""
+    (tmp_path / "a.png").write_bytes(png(100, 100))
+    with pytest.raises(SepiError, match=r"a\.png: .*cannot be decoded"):
+        read_picture(tmp_path / "a.png")
