@@ -58,6 +58,7 @@ def points(
     if not len(cloud.positions):
         raise SepiError(f"{result_path}: no point is left; lower --min-confidence or raise --max-depth")
     path = output or (result_path if result_path.is_dir() else result_path.parent) / "points.ply"
+    _require_file(path)
     write_ply(path, cloud.positions, cloud.colours, cloud.comments())
     units = "metres" if cloud.metric else "relief: the camera is not known, so not to scale"
     click.echo(f"written: {path} ({len(cloud.positions)} points, {units})")
@@ -83,6 +84,7 @@ def submission(results: tuple[Path, ...], output: Path, runtimes: tuple[str, ...
     """
     from sepi.submission import Entry, entry_of, write_submission
 
+    _require_file(output)
     seconds = dict(_runtime(text) for text in runtimes)
     entries: dict[str, Entry] = {}
     folders: dict[str, Path] = {}
@@ -115,6 +117,12 @@ def check_submission(context: click.Context, path: Path, partial: bool) -> None:
     if problems:
         context.exit(1)
     click.echo(f"{path}: no problems")
+
+
+def _require_file(path: Path) -> None:
+    """Raise if something other than a file is there, such as /dev/stdout, which a file would take the place of."""
+    if path.exists() and not path.is_file():
+        raise SepiError(f"{path}: not a file; expected the name of a file to write")
 
 
 def _runtime(text: str) -> tuple[str, float]:

@@ -1,5 +1,6 @@
 """Point clouds: where the points lie, what colour they have, and that other programs read the file."""
 
+import os
 from dataclasses import replace
 from pathlib import Path
 
@@ -236,13 +237,17 @@ def test_camera_flags_give_metres(result: Path, tmp_path: Path) -> None:
 
 
 def test_clear_line_where_no_cloud_can_be_made(result: Path, tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "link").symlink_to(tmp_path / "pipe")
     cases = {
         (tmp_path / "gone",): "no such file",
         (tmp_path,): "result.h5",
         (result, "--max-depth", 3): "camera's geometry",
         (result, "--min-confidence", 2): "0..1",
         (result, "--min-confidence", 1): "no point is left",
-        (result, "-o", result): "directory",
+        (result, "-o", result): "toy-depth: not a file",
+        (result, "-o", tmp_path / "pipe"): "pipe: not a file",
+        (result, "-o", tmp_path / "link"): "link: not a file",
     }
     for words, expected in cases.items():
         called = call(*words)
@@ -250,4 +255,6 @@ def test_clear_line_where_no_cloud_can_be_made(result: Path, tmp_path: Path) -> 
         (line,) = called.stderr.splitlines()
         assert line.startswith("sepi: ")
         assert expected in line
+    assert (tmp_path / "pipe").is_fifo()
+    assert (tmp_path / "link").is_symlink()
     assert call(result, "--focal-length", 50).exit_code == 2
