@@ -124,6 +124,17 @@ def test_any_name_will_do(tmp_path: Path, name: str) -> None:
     assert names_in(tmp_path) == [name]
 
 
+def test_a_device_is_not_replaced_by_a_file(tmp_path: Path) -> None:
+    """``-o /dev/stdout`` as root would take standard output away from every program."""
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "link").symlink_to(tmp_path / "pipe")
+    for name in ("pipe", "link"):
+        with pytest.raises(SepiError, match=rf"{name}: cannot be written \(not a file\)"):
+            write_file(tmp_path / name)
+    assert names_in(tmp_path) == ["link", "pipe"]
+    assert (tmp_path / "link").is_symlink()
+
+
 def test_a_folder_is_not_overwritten_by_a_file(tmp_path: Path) -> None:
     (tmp_path / "map.txt").mkdir()
     with pytest.raises(SepiError, match=r"map\.txt: cannot be written"):

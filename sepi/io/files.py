@@ -25,8 +25,10 @@ def atomic_path(path: Path) -> Iterator[Path]:
     Raises
     ------
     SepiError
-        If the folder cannot be made or written to, or the disk is full.
+        If the folder cannot be made or written to, the disk is full, or ``path`` is a device, a pipe or a folder.
     """
+    if path.exists() and not path.is_file():
+        raise SepiError(f"{path}: cannot be written (not a file)")
     temporary = _temporary_for(path, path.suffix)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
