@@ -215,7 +215,13 @@ def test_views_stand_where_their_names_say(tmp_path: Path, case: str) -> None:
     assert format_of(folder).name == "folder of views"
     light_field = read(folder, options)
     assert places_of(light_field) == expected
-    assert any(note in text for text in light_field.notes)
+    assert note in " ".join(light_field.notes)
+    # what the user said is no assumption
+    assert ("in that order" in " ".join(light_field.notes)) == (
+        options.pattern is None
+        and "numbered" not in light_field.notes[0]
+        and "all have one" not in light_field.notes[0]
+    )
     assert light_field.name == "my scene"
     assert light_field.source == str(folder)
     if options.view:

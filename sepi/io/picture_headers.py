@@ -103,7 +103,8 @@ def _png(data: bytes) -> Header:
         if end > len(data):
             break
         if zlib.crc32(memoryview(data)[at + 4 : end - 4]) != struct.unpack_from(">I", data, end - 4)[0]:
-            raise _FaultError(f"damaged PNG: checksum of chunk {kind.decode('ascii', 'replace')} is wrong")
+            chunk = kind.decode("ascii") if kind.isalpha() else "without a name"
+            raise _FaultError(f"damaged PNG: checksum of chunk {chunk} is wrong")
         if kind == b"IEND":
             width, height, _, colour = struct.unpack_from(">IIBB", data, 16)
             return Header("PNG", height, width, grey=colour in (0, 4))

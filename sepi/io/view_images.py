@@ -128,7 +128,9 @@ def _by_row_and_column(path: Path, named: ViewNumbers, options: ReadOptions) -> 
             f"{grid[0]}x{grid[1]} grid that --grid gives does not hold"
         )
     first = next(iter(named.numbers))
-    notes = [f"names are taken for row and column, in that order ({first}); --order transpose if it is the other way"]
+    notes = []
+    if options.pattern is None:
+        notes = [f"names are taken for row and column, in that order ({first}); --order transpose if the other way"]
     if base[0] not in (0, 1) or base[1] not in (0, 1):
         notes.append(f"the names count rows from {base[0]}, columns from {base[1]}")
     notes += _step_notes(step)
