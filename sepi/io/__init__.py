@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from sepi.errors import SepiError
-from sepi.io import hci, hdf5
+from sepi.io import eslf, hci, hci_old, hdf5, matlab, numpy_files, view_images
 from sepi.io.options import ReadOptions
 from sepi.lightfield import LightField
 from sepi.validation import require_known
@@ -37,6 +37,14 @@ class Format:
 
 FORMATS = {
     "hci": Format("HCI folder", "a folder with input_Cam000.png, input_Cam001.png, ...", hci.matches, hci.read),
+    "images": Format(
+        "folder of views", "a folder with a numbered picture for each view", view_images.matches, view_images.read
+    ),
+    "eslf": Format("Lytro lenslet picture", "a picture NAME_eslf.png of a Lytro camera", eslf.matches, eslf.read),
+    # before the other kinds of HDF5: MATLAB's is told by its header or ending
+    "matlab": Format("MATLAB file", "an array in a .mat file, such as LF", matlab.matches, matlab.read),
+    "numpy": Format("NumPy file", "an array in a .npy or .npz file", numpy_files.matches, numpy_files.read),
+    "hci-old": Format("HCI-old HDF5", "an HDF5 file with LF (T, S, H, W, 3)", hci_old.matches, hci_old.read),
     "sepi": Format("sepi HDF5", "an HDF5 file written by this package", hdf5.matches, hdf5.read),
 }
 """Word for ``--format`` to format; the first that matches reads."""

@@ -15,10 +15,11 @@ from typing import Any
 
 import h5py
 import numpy as np
+import numpy.typing as npt
 
 from sepi.camera import Camera
 from sepi.errors import SepiError
-from sepi.io.arrays import rearranged
+from sepi.io.arrays import DEFLATE_RATIO, printable, rearranged
 from sepi.io.files import atomic_path
 from sepi.io.options import ReadOptions, require_unused
 from sepi.lightfield import DisparityRange, FloatMap, LightField
@@ -67,7 +68,7 @@ def read_map(path: Path, name: str) -> FloatMap:
         If the file is missing, not HDF5, or holds no such map.
     """
     with opened(path) as file:
-        values = np.asarray(file[name][...])
+        values = stored(path, file[name])
     if values.ndim != 2 or values.dtype.kind not in "fiu":
         raise SepiError(f"{path}: expected '{name}' as numbers of shape (H, W), got {values.dtype} {values.shape}")
     return values.astype(np.float32)
@@ -112,7 +113,7 @@ def matches(path: Path) -> bool:
     try:
         with h5py.File(path, "r") as file:
             return "views" in file
-    except OSError:
+    except (OSError, LookupError, ValueError, RuntimeError):
         return True
 
 
@@ -144,16 +145,16 @@ def read_light_field(path: Path) -> LightField:
             known = DisparityRange(minimum, maximum, str(file.attrs["disparity_range_source"]))
         view = file.attrs.get("view")
         return LightField(
-            views=file["views"][...],
+            views=stored(path, file["views"]),
             name=str(file.attrs["name"]),
             source=str(file.attrs["source"]),
-            present=file["present"][...].astype(bool),
+            present=stored(path, file["present"]).astype(bool),
             view=None if view is None else (int(view[0]), int(view[1])),
             camera=Camera(*map(float, file.attrs["camera"])) if "camera" in file.attrs else None,
             notes=tuple(str(note) for note in file.attrs.get("notes", ())),
             disparity_range=known,
-            truth=file["truth"][...].astype(np.float32) if "truth" in file else None,
-            masks={name: file["masks"][name][...].astype(bool) for name in file.get("masks", {})},
+            truth=stored(path, file["truth"]).astype(np.float32) if "truth" in file else None,
+            masks={name: stored(path, file["masks"][name]).astype(bool) for name in file.get("masks", {})},
         )
 
 
@@ -167,6 +168,37 @@ def read(path: Path, options: ReadOptions) -> LightField:
     """
     require_unused(str(path), options, ("grid", "pattern", "axes", "variable", "follow_links"))
     return rearranged(read_light_field(path), options)
+
+
+def require_stored(path: Path, dataset: h5py.Dataset) -> None:
+    """Raise unless a dataset's values can lie in the file, so that no memory is taken on the word of its shape.
+
+    Raises
+    ------
+    SepiError
+        If ``dataset`` is none, lies in another file, or claims more values than its bytes in the file can hold.
+    """
+    name = printable(str(dataset.name).lstrip("/"))
+    if not isinstance(dataset, h5py.Dataset) or dataset.shape is None:
+        raise SepiError(f"{path}: damaged HDF5 file: '{name}' is no array")
+    if dataset.is_virtual or dataset.external or dataset.file.filename != str(path):
+        raise SepiError(f"{path}: the values of '{name}' lie in another file; copy them into this one")
+    held = dataset.id.get_storage_size()
+    # what is not compressed is stored as it is, but for chunks never written
+    if held > path.stat().st_size or dataset.nbytes > held * (DEFLATE_RATIO if dataset.chunks else 1):
+        raise SepiError(f"{path}: damaged HDF5 file: '{name}' of shape {dataset.shape} cannot lie in {held} bytes")
+
+
+def stored(path: Path, dataset: h5py.Dataset) -> npt.NDArray[Any]:
+    """All values of a dataset.
+
+    Raises
+    ------
+    SepiError
+        As :func:`require_stored`.
+    """
+    require_stored(path, dataset)
+    return np.asarray(dataset[...])
 
 
 @contextmanager
@@ -183,12 +215,12 @@ def opened(path: Path) -> Iterator[h5py.File]:
     try:
         file = h5py.File(path, "r")
     except OSError as error:
-        raise SepiError(f"{path}: not a readable HDF5 file ({error})") from error
+        raise SepiError(f"{path}: not a readable HDF5 file ({printable(str(error))})") from error
     with file:
         try:
             yield file
-        except (OSError, KeyError, TypeError, ValueError, RuntimeError) as error:
-            raise SepiError(f"{path}: damaged HDF5 file ({error})") from error
+        except (ArithmeticError, AttributeError, LookupError, OSError, TypeError, ValueError, RuntimeError) as error:
+            raise SepiError(f"{path}: damaged HDF5 file ({printable(str(error))})") from error
 
 
 @contextmanager
