@@ -1,6 +1,7 @@
 """Light fields that arrive as arrays: every pixel at its place, and a clear word where that cannot be known."""
 
 import re
+import struct
 from pathlib import Path
 
 import h5py
@@ -13,6 +14,7 @@ from hypothesis import strategies as st
 from sepi.errors import SepiError
 from sepi.io import FORMATS, ReadOptions, read
 from sepi.io.arrays import light_field_from_array
+from sepi.io.hdf5 import write_light_field
 from sepi.lightfield import LightField
 
 T, S, H, W = 2, 3, 8, 10
@@ -64,6 +66,12 @@ def test_axes_of_colour_arrays_are_found_and_said(axes: str) -> None:
 def test_axes_of_grey_arrays_are_found(axes: str) -> None:
     light_field = taken(laid_out(GREY, axes))
     np.testing.assert_array_equal(light_field.views, GREY[..., None])
+
+
+def test_a_small_grid_of_grey_views_is_no_row_of_colour_pictures() -> None:
+    """The shape (16, 16, 3, 3) looks like 16 pictures in colour, 3 pixels wide."""
+    views = RNG.integers(1, 256, (3, 3, 16, 16), np.uint8)
+    np.testing.assert_array_equal(taken(laid_out(views, "HWTS")).views, views[..., None])
 
 
 def test_axes_may_be_lower_case() -> None:
@@ -261,6 +269,51 @@ def test_the_array_is_copied() -> None:
     light_field = taken(views)
     views[:] = 0
     np.testing.assert_array_equal(light_field.views, RGB)
+
+
+# --- this package's own files
+
+
+@pytest.fixture
+def own(tmp_path: Path) -> Path:
+    views = grid_of(np.float32)
+    truth = np.arange(80, dtype=np.float32).reshape(8, 10)
+    write_light_field(tmp_path / "own.h5", LightField(views, "own", truth=truth))
+    return tmp_path / "own.h5"
+
+
+def test_excluded_views_of_own_files_are_gone(own: Path) -> None:
+    """What is left out must not reach a later stage by another way."""
+    light_field = read(own, ReadOptions(exclude=("0,1",), order="flip-rows"))
+    assert np.argwhere(~light_field.present).tolist() == [[0, 1]]
+    assert not light_field.views[0, 1].any()
+    with h5py.File(own) as file:
+        np.testing.assert_array_equal(light_field.views[2], file["views"][0])
+        np.testing.assert_array_equal(light_field.truth, file["truth"])
+
+
+@pytest.mark.parametrize("name", ["views", "present", "truth"])
+def test_own_files_that_claim_more_than_they_hold(own: Path, name: str) -> None:
+    """A file of 2 KB may claim terabytes of fill values."""
+    with h5py.File(own, "a") as file:
+        del file[name]
+        file.create_dataset(name, (9, 9, 100_000, 100_000, 3), np.uint8)
+    with pytest.raises(SepiError, match=f"own.h5: damaged HDF5 file: '{name}' .* cannot lie in 0 bytes"):
+        read(own, ReadOptions())
+
+
+def test_shape_and_length_that_agree_on_a_lie(tmp_path: Path) -> None:
+    """Both stand in the header; what counts is the file."""
+    with h5py.File(tmp_path / "lie.h5", "w") as file:
+        file["LF"] = RGB
+    content = (tmp_path / "lie.h5").read_bytes()
+    shape, claimed = RGB.shape, (T, S, 100_000, 100_000, 3)
+    for old, new in ((struct.pack("<5Q", *shape), claimed), (struct.pack("<Q", RGB.size), [np.prod(claimed)])):
+        assert old in content
+        content = content.replace(old, struct.pack(f"<{len(new)}Q", *new))
+    (tmp_path / "lie.h5").write_bytes(content)
+    with pytest.raises(SepiError, match="lie.h5: damaged HDF5 file"):
+        read(tmp_path / "lie.h5", ReadOptions(), "hci-old")
 
 
 # --- damaged files of every format
