@@ -312,7 +312,7 @@ def test_shape_and_length_that_agree_on_a_lie(tmp_path: Path) -> None:
         assert old in content
         content = content.replace(old, struct.pack(f"<{len(new)}Q", *new))
     (tmp_path / "lie.h5").write_bytes(content)
-    with pytest.raises(SepiError, match="lie.h5: damaged HDF5 file"):
+    with pytest.raises(SepiError, match=r"lie\.h5: damaged HDF5 file"):
         read(tmp_path / "lie.h5", ReadOptions(), "hci-old")
 
 
