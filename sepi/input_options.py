@@ -98,7 +98,10 @@ _FLAGS = (
         "--pattern",
         help="Names of views in a folder: 'view_{row}_{column}.png' or 'img{number}.jpg'; * is anything.",
     ),
-    click.option("--axes", help="Axes of an array in order, of T S (view row, column), H W and C, such as HWTSC."),
+    click.option(
+        "--axes",
+        help="Axes of an array in order, such as HWTSC: T S (view row, column; N for both in one), H W and C (colour).",
+    ),
     click.option("--variable", help="Name of the array in a .mat or .npz file with several."),
     click.option("--central", type=click.IntRange(min=1), metavar="N", help="Use only the N x N views in the middle."),
     click.option("--order", default="as-given", help="Order of the views: a word that 'sepi check' names."),

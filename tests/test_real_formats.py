@@ -40,7 +40,8 @@ def test_equal_maps_from_every_format(hci: Path, name: str, tmp_path: Path) -> N
     maps = []
     for source in (hci / name, tmp_path / "array.npy", tmp_path / "matlab.mat", tmp_path / "own.h5"):
         out = tmp_path / f"{source.stem}-maps"
-        depth(source, "-o", out, "--disparity-range", *RANGES[name])
+        # fewer candidates than usual take half the time and say as much about where bytes come from
+        depth(source, "-o", out, "--disparity-range", *RANGES[name], "--set", "initial.sepi.candidates=61")
         # all but what names the source, and metric depth, for which an array has no camera
         shared = sorted(
             path.name for path in out.iterdir() if path.name not in ("result.h5", "depth.pfm", "points.ply")
@@ -71,13 +72,14 @@ def test_a_star_of_views_is_nearly_as_good_as_the_grid(hci: Path, name: str) -> 
 
 
 def test_a_view_off_the_centre(hci: Path) -> None:
-    """The known truth belongs to row 4; with the first two rows cut off that is row 2 of 7, not the centre."""
+    """The known truth belongs to row 4; with the first three rows cut off that is row 1 of 6, the centre row 3."""
     light_field = settle_range(read_light_field(hci / "cotton"))
-    cut = LightField(light_field.views[2:], "cut", disparity_range=light_field.disparity_range)
+    cut = LightField(light_field.views[3:], "cut", disparity_range=light_field.disparity_range)
     assert cut.reference == (3, 4)
-    assert mse(cut.seen_from((2, 4)), light_field.truth) <= 1.5 * mse(light_field, light_field.truth)
+    off_centre = mse(cut.seen_from((1, 4)), light_field.truth)
+    assert off_centre <= 1.5 * mse(light_field, light_field.truth)
     # the map of the centre view belongs to another place: the check can tell
-    assert mse(cut, light_field.truth) > 2 * mse(light_field, light_field.truth)
+    assert mse(cut, light_field.truth) > 2 * off_centre
 
 
 def test_lytro_picture_with_one_command(real_data: Path, tmp_path: Path) -> None:

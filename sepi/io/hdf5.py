@@ -27,7 +27,7 @@ from sepi.stage import StageMaps
 
 Attribute = str | float | int | tuple[float, float]
 
-UNITS = {"disparity": "pixels per view step", "confidence": "0..1"}
+UNITS = {"disparity": "pixels per view step", "confidence": "0..1", "depth": "metres"}
 
 
 def write_stage(path: Path, maps: StageMaps, attributes: Mapping[str, Attribute]) -> None:

@@ -57,7 +57,7 @@ class ReadOptions:
         File name of a view with ``{row}`` and ``{column}``, or ``{number}``, for folders of pictures; ``*`` stands for
         anything.
     axes : str, optional
-        Axes of an array in order, of the letters T, S (view row and column), H, W, C: ``"HWTSC"``.
+        Axes of an array in order, of the letters T, S (view row and column; N for both in one), H, W, C: ``"HWTSC"``.
     variable : str, optional
         Name of the array in a file that holds several.
     central : int, optional
