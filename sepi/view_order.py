@@ -19,7 +19,7 @@ from sepi.view_signs import occlusion_votes
 
 # Votes that the sign needs, and the part of them that must agree
 _FEWEST_VOTES = 30
-_MAJORITY = 0.75
+_MAJORITY = 0.8
 
 _FAULTS = {
     "flip-rows": "the rows of views run the other way",

@@ -25,11 +25,15 @@ _MOST_PIXELS = 200_000
 _SWEEP_RADIUS = 2
 _TRUNCATION = 1.5
 _FLAT = 0.02
-_MOST_AMBIGUITY = 0.8
+_MOST_AMBIGUITY = 0.6
 # Residuals: half width of the window, pixels; least that is taken for noise, the picture's variance = 1; as multiples
 # of the noise, those of pixels that are seen and that are hidden; least ratio of the two at one pixel
 _WINDOW_RADIUS = 2
 _LEAST_NOISE = 3e-4
+# what rounding to 8 bits adds to the square of a difference, full range = 1; most of it, the picture's variance = 1:
+# in pictures of a few grey levels, rounding looks like surfaces
+_ROUNDING = 1 / (6 * 255**2)
+_MOST_ROUNDING = 0.02
 _SEEN = 4.0
 _HIDDEN = 9.0
 _HIDDEN_TO_SEEN = 6.0
@@ -49,16 +53,21 @@ def occlusion_votes(views: Views, trial: Trial) -> tuple[int, int]:
     Returns
     -------
     greater, lesser : int
-        Pixels; both 0 where there are no views on opposite sides.
+        Pixels; both 0 where there are no views on opposite sides, or hardly any contrast.
     """
     reach, directions = _directions(views, trial.largest_disparity)
     if not directions:
         return 0, 0
     # in units of the picture's own contrast
     scale = np.float32(1 / max(float(views.plain((0, 0)).std()), 1e-6))
+    rounding = _ROUNDING * float(scale) ** 2
+    if rounding > _MOST_ROUNDING:
+        return 0, 0
     reference = _middle(views.plain((0, 0))) * scale
     steps = {direction: _at(direction, reach) for direction in directions}
-    pictures = {step: _middle(views.plain(step)) * scale for both in steps.values() for step in both}
+    pictures = {
+        step: _as_bright(_middle(views.plain(step)) * scale, reference) for both in steps.values() for step in both
+    }
     word = next(iter(trial.best))
     places = {step: (int(t), int(s)) for step in pictures for t, s in steps_under(word, [step])}
     movement = min(_MOST_MOVEMENT, math.ceil(1.15 * trial.largest_disparity * reach) + 1)
@@ -72,7 +81,7 @@ def occlusion_votes(views: Views, trial: Trial) -> tuple[int, int]:
         step: residuals(reference, picture, places[step][0], places[step][1], disparity, _WINDOW_RADIUS)
         for step, picture in pictures.items()
     }
-    noise = max(_LEAST_NOISE, _typical([values[trusted] for values in residual.values()]))
+    noise = max(_LEAST_NOISE, rounding, _typical([values[trusted] for values in residual.values()]))
     greater, lesser = 0, 0
     for t, s in directions:
         here, there = ([residual[step] for step in steps[direction]] for direction in ((t, s), (-t, -s)))
@@ -122,6 +131,12 @@ def _middle(picture: FloatMap) -> FloatMap:
     part = min(1.0, math.sqrt(_MOST_PIXELS / picture.size))
     rows, columns = (slice(round(n * (1 - part) / 2), round(n * (1 + part) / 2)) for n in picture.shape)
     return np.ascontiguousarray(picture[rows, columns])
+
+
+def _as_bright(picture: FloatMap, reference: FloatMap) -> FloatMap:
+    """A view with the mean of the reference: lenses darken the views towards the edge of the grid."""
+    mean = float(picture.mean())
+    return np.asarray(picture * np.float32(float(reference.mean()) / mean if mean > 0 else 1), np.float32)
 
 
 def _disparity(
