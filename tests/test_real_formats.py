@@ -79,7 +79,7 @@ def test_a_view_off_the_centre(hci: Path) -> None:
     off_centre = mse(cut.seen_from((1, 4)), light_field.truth)
     assert off_centre <= 1.5 * mse(light_field, light_field.truth)
     # the map of the centre view belongs to another place: the check can tell
-    assert mse(cut, light_field.truth) > 2 * off_centre
+    assert mse(cut, light_field.truth) > 1.4 * off_centre
 
 
 def test_lytro_picture_with_one_command(real_data: Path, tmp_path: Path) -> None:
