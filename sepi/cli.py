@@ -183,7 +183,7 @@ def check(light_field_path: Path, reading: Reading) -> None:
     from sepi.view_order import check_order
 
     light_field = reading.read(light_field_path, check_order=False)
-    found = check_order(light_field)
+    found = check_order(light_field, reading.options.order)
     click.echo(f"{light_field.name}: {_size(light_field)}")
     for word, misfit in found.fits.items():
         click.echo(f"  {word:24}{misfit:8.4f}{'  best' if word == found.best and found.decided else ''}")

@@ -48,12 +48,13 @@ def read_light_field(
         there is nothing to match in the views.
     """
     path = Path(path)
-    light_field = read(path, options or ReadOptions(), file_format)
+    options = options or ReadOptions()
+    light_field = read(path, options, file_format)
     _require_contrast(path, light_field)
     if disparity_range is not None:
         light_field = light_field.with_range(DisparityRange(*disparity_range, "given"))
     if check_order:
-        warning = order_warning(light_field)
+        warning = order_warning(light_field, options.order)
         if warning is not None:
             warnings.warn(f"{path}: {warning}", SepiWarning, stacklevel=2)
     return light_field

@@ -81,7 +81,7 @@ def test_depth_writes_the_maps_and_says_so(scene: Path) -> None:
     known = read_light_field(scene).known_range()
     assert f"disparity range: {known.minimum} to {known.maximum} pixels per view step (from the" in called.stdout
     masks = {"mask_occluded.png", "mask_occlusion_candidates.png", "mask_textureless.png"}
-    assert set(os.listdir("pyramids-depth")) == {*RESULT_FILES, *masks}
+    assert set(os.listdir("pyramids-depth")) == {*RESULT_FILES, *masks, "depth.pfm"}
     assert f"written to pyramids-depth/: {' '.join(RESULT_FILES[:-1])}" in called.stdout
     disparity = read_pfm(Path("pyramids-depth/disparity.pfm"))
     assert disparity.shape == (64, 64)
