@@ -349,6 +349,48 @@ def test_no_bytes_crash_the_pfm_reader(tmp_path_factory: pytest.TempPathFactory,
         assert read_pfm(path).ndim == 2
 
 
+NUMBERS = st.sampled_from(
+    ["0", "1", "-1", "2", "1e9", "999999999", "-0.0", "nan", "1.0.0", "", "\u0663", "+2", "1e999"]
+)
+
+
+@given(st.sampled_from(["Pf", "PF", "P5", "pf"]), NUMBERS, NUMBERS, NUMBERS, st.sampled_from([" ", "\n", "\t\r\n"]))
+def test_no_header_crashes_the_pfm_reader(
+    tmp_path_factory: pytest.TempPathFactory, magic: str, width: str, height: str, scale: str, space: str
+) -> None:
+    path = tmp_path_factory.mktemp("pfm") / "map.pfm"
+    path.write_bytes(space.join([magic, width, height, scale, ""]).encode() + bytes(8))
+    with contextlib.suppress(SepiError):
+        assert read_pfm(path).size == 2
+
+
+KEYS = st.sampled_from(
+    [
+        *("disp_min", "disp_max", "num_cams_x", "num_cams_y", "image_resolution_x_px", "image_resolution_y_px"),
+        *("focal_length_mm", "baseline_mm", "focus_distance_m", "sensor_size_mm", "scene", "[meta]", "other"),
+    ]
+)
+
+
+@given(st.lists(st.tuples(KEYS, st.sampled_from(["=", ":", " "]), NUMBERS | st.text(max_size=9))), st.text(max_size=20))
+def test_no_parameters_crash_the_reader(
+    tmp_path_factory: pytest.TempPathFactory, lines: list[tuple[str, str, str]], start: str
+) -> None:
+    """A parameters.cfg from elsewhere may hold anything."""
+    folder = tmp_path_factory.mktemp("cfg")
+    for number in range(4):
+        put(folder / f"input_Cam{number:03d}.png", pixels(number))
+    text = start + "\n[extrinsics]\n" + "\n".join("".join(line) for line in lines)
+    (folder / "parameters.cfg").write_bytes(text.encode("utf-8", "surrogatepass"))
+    message = "cfg"
+    try:
+        assert read_light_field(folder, check_order=False).views.shape[2:] == (12, 16, 3)
+    except SepiError as error:
+        message = str(error)
+    assert "cfg" in message
+    assert "\n" not in message
+
+
 # --- HDF5
 
 
