@@ -48,6 +48,12 @@ def validated(model: type[Model], values: Mapping[str, Any], where: str) -> Mode
         One line for the first key that is wrong: which, why, and what would be right.
     """
     _require_fields(model, values, where)
+    for key, value in values.items():
+        try:
+            json.dumps(value)
+        except TypeError as error:
+            # YAML can name Python objects
+            raise SepiError(f"{where}.{key}: expected numbers, text, lists or keys with values, got {value}") from error
     try:
         # by way of JSON, because strict models take a JSON list for a tuple but not a Python list
         return model.model_validate_json(json.dumps(dict(values), allow_nan=False))

@@ -320,17 +320,21 @@ class TestConfiguration:
         assert scenes == {"builtin/wall", "builtin/dots", "hci/box"}
 
     @pytest.mark.parametrize(
-        "text",
-        ['hci_root: !!python/object/apply:os.system ["touch made-by-yaml"]', "a: !!python/name:os.system", "a: [1"],
+        ("text", "message"),
+        [
+            ('hci_root: !!python/object/apply:os.system ["touch made-by-yaml"]', "not valid JSON or YAML"),
+            ("hci_root: !!python/name:os.system", "sepi: config.hci_root: expected numbers, text"),
+            ("hci_root: [1", "not valid JSON or YAML"),
+        ],
     )
-    def test_yaml_builds_no_objects(self, workflow: Workflow, tmp_path: Path, text: str) -> None:
+    def test_yaml_builds_no_objects(self, workflow: Workflow, tmp_path: Path, text: str, message: str) -> None:
         """A configuration from someone else must not run programs."""
         (tmp_path / "other.yaml").write_text(text)
         there = replace(workflow, folder=tmp_path / "run")
         result = there.run("all", flags=("--configfile", str(tmp_path / "other.yaml")))
         assert result.returncode != 0
         assert "Traceback" not in result.stdout
-        assert "not valid JSON or YAML" in result.stdout
+        assert message in result.stdout
         assert not (there.folder / "made-by-yaml").exists()
         assert not (there.folder / "results").exists()
 
