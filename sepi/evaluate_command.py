@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,10 +12,11 @@ import click
 
 from sepi.command import SepiCommand
 from sepi.errors import SepiError
+from sepi.input_options import Reading, reading_flags
 
 if TYPE_CHECKING:
     from sepi.io.scores import Scores
-    from sepi.lightfield import FloatMap
+    from sepi.lightfield import FloatMap, LightField
 
 _PATH = click.Path(path_type=Path)
 
@@ -24,12 +26,14 @@ _PATH = click.Path(path_type=Path)
 @click.argument("truth", metavar="TRUTH|SCENE", type=_PATH)
 @click.option("--border", type=click.IntRange(min=0), help="Score with this many pixels left out on each side only.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
-def evaluate(estimate: Path, truth: Path, border: int | None, as_json: bool) -> None:
+@reading_flags
+def evaluate(estimate: Path, truth: Path, border: int | None, as_json: bool, reading: Reading) -> None:
     """Score the disparity map ESTIMATE against ground truth.
 
     ESTIMATE is a PFM, an HDF5 file with a dataset 'disparity', a NumPy file (.npy), or a folder that 'sepi depth'
     wrote. TRUTH is such a file; give the SCENE itself, a light field with ground truth, to have its occluded and
-    texture-less regions scored too.
+    texture-less regions scored too. Give the flags of 'sepi depth' that say how to read the SCENE here, too. A folder
+    that 'sepi depth' wrote knows which view it belongs to.
 
     Both protocols are used: 'paper' scores the whole map, 'benchmark' leaves out 15 pixels on each side.
 
@@ -38,7 +42,7 @@ def evaluate(estimate: Path, truth: Path, border: int | None, as_json: bool) -> 
       sepi evaluate cotton-depth cotton
       sepi evaluate estimate.pfm gt_disp_lowres.pfm --border 15 --json
     """
-    scores = _scores(_read_map(estimate), truth, border)
+    scores = _scores(estimate, truth, border, reading)
     if as_json:
         click.echo(json.dumps(_without_nan(scores), indent=2, sort_keys=True))
     else:
@@ -82,18 +86,52 @@ def _read_map(path: Path) -> FloatMap:
     return np.asarray(values, np.float32)
 
 
-def _scores(disparity: FloatMap, truth: Path, border: int | None) -> dict[str, dict[str, Scores]]:
+def _view_of(path: Path) -> tuple[tuple[int, int], tuple[int, int]] | None:
+    """The view that a result's map belongs to, and the view grid; None for a map that does not say."""
+    from sepi.io.hdf5 import read_attributes
+
+    path = path / "result.h5" if path.is_dir() else path
+    if path.suffix not in (".h5", ".hdf5") or not path.is_file():
+        return None
+    attributes = read_attributes(path)
+    if not {"view_position", "grid"} <= set(attributes):
+        return None
+    (t, s), (rows, columns) = (map(int, attributes[name]) for name in ("view_position", "grid"))
+    return (t, s), (rows, columns)
+
+
+def _truth_of_scene(scene: Path, estimate: Path, reading: Reading) -> LightField:
+    """The light field with ground truth of the view that the estimate belongs to."""
+    belongs = _view_of(estimate)
+    if belongs is not None and reading.options.view is None:
+        reading = replace(reading, options=replace(reading.options, view=belongs[0]))
+    light_field = reading.read(scene, check_order=False)
+    if belongs is not None and belongs != (light_field.reference, light_field.grid):
+        (t, s), (rows, columns) = belongs
+        raise SepiError(
+            f"{estimate}: depth of view {t},{s} of {rows}x{columns} views, but {scene} is read as view "
+            f"{light_field.reference[0]},{light_field.reference[1]} of {light_field.grid[0]}x{light_field.grid[1]}; "
+            "give the flags here that 'sepi depth' had"
+        )
+    if light_field.truth is None:
+        raise SepiError(f"{scene}: no ground truth for view {light_field.reference[0]},{light_field.reference[1]}")
+    return light_field
+
+
+def _scores(estimate: Path, truth: Path, border: int | None, reading: Reading) -> dict[str, dict[str, Scores]]:
     """Protocol to region to scores; the regions only where ``truth`` is a light field."""
     from sepi.evaluate import PROTOCOLS, REGIONS, WHOLE_MAP, region_masks, score
-    from sepi.reading import read_light_field
 
+    disparity = _read_map(estimate)
     masks = {}
     if _is_map(truth):
         values = _read_map(truth)
+        views = _view_of(estimate), _view_of(truth)
+        if None not in views and views[0] != views[1]:
+            raise SepiError(f"{truth}: depth of another view than {estimate}; compare maps of one view")
     else:
-        light_field = read_light_field(truth, check_order=False)
-        if light_field.truth is None:
-            raise SepiError(f"{truth}: this light field has no ground truth")
+        light_field = _truth_of_scene(truth, estimate, reading)
+        assert light_field.truth is not None  # or it would have been refused
         values = light_field.truth
         masks = region_masks(light_field)
     if values.shape != disparity.shape:

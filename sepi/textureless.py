@@ -106,7 +106,10 @@ def lti(
     free = information < lti_threshold(information, parameters.lti_floor, parameters.lti_ceiling)
     # doubtful depth is common here, so trust rises steeply with confidence
     weight = confidence**4 * agreement**2
-    plane = propagated(light_field.centre, segments, free, before.disparity, weight, parameters)
+    # a plane continued far from its data may leave the range that was searched
+    plane = np.clip(
+        propagated(light_field.centre, segments, free, before.disparity, weight, parameters), lowest, highest
+    )
     progress(0.9)
     unsupported = local_texture_information(segments, texture | agrees) < parameters.min_support
     # a plane may smooth any depth, but overrule only what is neither distinct nor in agreement with its neighbours

@@ -322,6 +322,20 @@ def test_evaluate_scores_a_result_against_its_scene(pyramids: Path, result: Path
     ]
 
 
+def test_evaluate_knows_which_view_a_result_belongs_to(scene: Path, pyramids: Path) -> None:
+    """The truth is that of the centre view; another view's map has other numbers and would seem to be bad."""
+    assert call("depth", scene, "-o", "side", "--view", "0,1", *FAST).exit_code == 0
+    assert "no ground truth for view 0,1" in error_of(call("evaluate", "side", scene))
+    assert call("depth", scene, "-o", "centre", *FAST).exit_code == 0
+    assert "side: depth of another view than centre" in error_of(call("evaluate", "centre", "side"))
+    views, truth = read_light_field(pyramids).views, read_light_field(pyramids).truth
+    write_light_field(Path("cut.h5"), LightField(views[1:], "cut", truth=truth, view=(0, 1)))
+    assert call("depth", "cut.h5", "-o", "own", *FAST).exit_code == 0
+    assert call("evaluate", "own", "cut.h5").exit_code == 0
+    assert call("depth", "cut.h5", "-o", "turned", "--order", "flip-columns", *FAST).exit_code == 0
+    assert "0,1 of 3x3" in error_of(call("evaluate", "side", "cut.h5", "--view", "0,1"))
+
+
 def test_evaluate_gives_numbers_to_programs(tmp_path: Path) -> None:
     truth = np.zeros((40, 50), np.float32)
     estimate = truth.copy()
@@ -372,7 +386,7 @@ def test_evaluate_reads_every_kind_of_map(pyramids: Path, result: Path, tmp_path
         ("text.h5", "map.pfm", "text.h5: not a readable HDF5 file"),
         ("other.h5", "map.pfm", "other.h5: damaged HDF5 file"),
         ("picture.png", "map.pfm", "picture.png: expected a disparity map as .pfm, .h5 or .npy"),
-        ("map.pfm", "plain.h5", "plain.h5: this light field has no ground truth"),
+        ("map.pfm", "plain.h5", "plain.h5: no ground truth for view 1,1"),
     ],
 )
 def test_bad_maps_are_one_line(
