@@ -6,6 +6,7 @@ Examples
 >>> light_field = sepi.read_light_field("cotton")  # doctest: +SKIP
 >>> maps = sepi.estimate_depth(light_field)  # doctest: +SKIP
 >>> maps.disparity  # (H, W) float32, pixels per view step  # doctest: +SKIP
+>>> sepi.write_result("cotton-depth", light_field, maps)  # doctest: +SKIP
 """
 
 from __future__ import annotations
@@ -14,7 +15,9 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from sepi.errors import SepiError
+    from sepi.errors import SepiError, SepiWarning
+    from sepi.io.export import write_result
+    from sepi.io.options import ReadOptions
     from sepi.lightfield import DisparityRange, LightField
     from sepi.pipeline import estimate_depth
     from sepi.reading import read_light_field
@@ -24,18 +27,24 @@ if TYPE_CHECKING:
 __all__ = [
     "DisparityRange",
     "LightField",
+    "ReadOptions",
     "SepiError",
+    "SepiWarning",
     "__version__",
     "estimate_depth",
     "read_light_field",
+    "write_result",
 ]
 
 _HOME = {
     "DisparityRange": "sepi.lightfield",
     "LightField": "sepi.lightfield",
+    "ReadOptions": "sepi.io.options",
     "SepiError": "sepi.errors",
+    "SepiWarning": "sepi.errors",
     "estimate_depth": "sepi.pipeline",
     "read_light_field": "sepi.reading",
+    "write_result": "sepi.io.export",
 }
 
 

@@ -114,6 +114,8 @@ def depth(
     whole = light_field_path.resolve()
     folder = output or Path(f"{whole.name if whole.is_dir() else whole.stem}-depth")
     require_target(folder)
+    if whole == folder.resolve():
+        raise SepiError(f"{folder}: is the light field itself; choose another folder for the result")
     light_field = reading.read(light_field_path, disparity_range=disparity_range)
     if geometry is not None:
         light_field = replace(light_field, camera=geometry.camera(light_field.shape))
@@ -132,8 +134,9 @@ def depth(
 
 @main.command(short_help="Show what is known about the light field INPUT.")
 @click.argument("light_field_path", metavar="INPUT", type=_PATH)
+@camera_flags
 @reading_flags
-def info(light_field_path: Path, reading: Reading) -> None:
+def info(light_field_path: Path, geometry: Geometry | None, reading: Reading) -> None:
     """Show what is known about the light field INPUT, with an estimate of its disparity range.
 
     INPUT is anything that 'sepi depth' reads, with the same flags. Rows and columns of views are counted from 0.
@@ -150,7 +153,7 @@ def info(light_field_path: Path, reading: Reading) -> None:
         estimated = _range(estimate_range(light_field))
     except SepiError as error:
         estimated = str(error)
-    camera = light_field.camera
+    camera = light_field.camera if geometry is None else geometry.camera(light_field.shape)
     lines = {
         "name": light_field.name,
         "format": known_format.name,
@@ -158,7 +161,7 @@ def info(light_field_path: Path, reading: Reading) -> None:
         "depth made for": f"view {t0},{s0}",
         "missing views": f"{len(missing)}: {' '.join(missing)}" if missing else "none",
         "pixels": _depth_of(light_field),
-        "disparity range": "not given" if own is None else _range(own),
+        "disparity range": "none given; the estimate is used" if own is None else _range(own),
         "estimated range": estimated,
         "metric depth": "unknown camera" if camera is None else f"{camera.scale:g} m / (disparity + {camera.offset:g})",
         "ground truth": "none" if light_field.truth is None else "yes",
@@ -173,21 +176,25 @@ def info(light_field_path: Path, reading: Reading) -> None:
 @main.command(short_help="Check the order of the views of the light field INPUT.")
 @click.argument("light_field_path", metavar="INPUT", type=_PATH)
 @reading_flags
-def check(light_field_path: Path, reading: Reading) -> None:
+@click.pass_context
+def check(context: click.Context, light_field_path: Path, reading: Reading) -> None:
     """Check whether the views of the light field INPUT are in the order that depth needs.
 
     Software does not agree on whether rows of views go up or down, columns left or right, or which of the two comes
     first; in a wrong order depth is inside out or nonsense. The views tell: all eight orders are tried, and the flag
-    is named that sets INPUT right.
+    is named that sets INPUT right. Exits with 1 where another order clearly fits better.
     """
     from sepi.view_order import check_order
 
     light_field = reading.read(light_field_path, check_order=False)
     found = check_order(light_field, reading.options.order)
     click.echo(f"{light_field.name}: {_size(light_field)}")
+    click.echo("order, and by how much the views misfit in it (0 to 1; less is better):")
     for word, misfit in found.fits.items():
         click.echo(f"  {word:24}{misfit:8.4f}{'  best' if word == found.best and found.decided else ''}")
     click.echo(found.verdict())
+    if found.warning() is not None:
+        context.exit(1)
 
 
 @main.command(short_help="Write built-in scenes with exact ground truth.")

@@ -59,6 +59,8 @@ def points(
         raise SepiError(f"{result_path}: no point is left; lower --min-confidence or raise --max-depth")
     path = output or (result_path if result_path.is_dir() else result_path.parent) / "points.ply"
     _require_file(path)
+    if path.suffix.lower() != ".ply":
+        raise SepiError(f"{path}: expected a name that ends with .ply, the format of the file")
     write_ply(path, cloud.positions, cloud.colours, cloud.comments())
     units = "metres" if cloud.metric else "relief: the camera is not known, so not to scale"
     click.echo(f"written: {path} ({len(cloud.positions)} points, {units})")

@@ -103,6 +103,8 @@ class LightField:
 
     def __post_init__(self) -> None:
         v = self.views
+        if not isinstance(v, np.ndarray):
+            raise SepiError(f"{self.name}: views must be an array of shape (T, S, H, W, C), got a {type(v).__name__}")
         if v.ndim != 5 or v.shape[4] not in (1, 3) or 0 in v.shape:
             raise SepiError(f"{self.name}: views must have shape (T, S, H, W, C) with C = 1 or 3, got {v.shape}")
         if v.shape[0] * v.shape[1] < 2:

@@ -102,7 +102,7 @@ def estimate_depth(
     parameters: Mapping[str, Mapping[str, Any]] | None = None,
     progress: Progress = no_progress,
 ) -> StageMaps:
-    """Disparity, confidence and masks of the centre view of a light field.
+    """Disparity, confidence and masks of a light field's reference view.
 
     Parameters
     ----------

@@ -7,10 +7,15 @@ from __future__ import annotations
 import warnings
 from pathlib import Path
 
+import numpy as np
+
 from sepi.errors import SepiError, SepiWarning
 from sepi.io import ReadOptions, read
 from sepi.lightfield import DisparityRange, LightField
 from sepi.view_order import order_warning
+
+# 16-bit views darker than this, a sixteenth of the full scale, hold fewer bits or next to no light
+_NARROW = 4096
 
 
 def read_light_field(
@@ -53,11 +58,21 @@ def read_light_field(
     _require_contrast(path, light_field)
     if disparity_range is not None:
         light_field = light_field.with_range(DisparityRange(*disparity_range, "given"))
-    if check_order:
-        warning = order_warning(light_field, options.order)
-        if warning is not None:
-            warnings.warn(f"{path}: {warning}", SepiWarning, stacklevel=2)
+    found = [_depth_warning(light_field), order_warning(light_field, options.order) if check_order else None]
+    for warning in filter(None, found):
+        warnings.warn(f"{path}: {warning}", SepiWarning, stacklevel=2)
     return light_field
+
+
+def _depth_warning(light_field: LightField) -> str | None:
+    """Tell of 16-bit files that hold fewer bits: to the stages, such views are nearly black."""
+    view = light_field.views[light_field.reference]
+    brightest = int(view.max()) if view.dtype == np.uint16 else _NARROW
+    if brightest >= _NARROW:
+        return None
+    bits = brightest.bit_length()
+    advice = f"if the files hold {bits} bits, multiply them by {2 ** (16 - bits)}"
+    return f"its brightest pixel is {brightest} of 65535; {advice}"
 
 
 def _require_contrast(path: Path, light_field: LightField) -> None:

@@ -174,14 +174,32 @@ def test_a_warning_does_not_stop_the_depth(scene: Path) -> None:
     assert call("depth", "turned.npy", "-o", "right", "--order", "transpose", *FAST).stderr == ""
 
 
+def test_sixteen_bit_files_with_fewer_bits_are_told(scene: Path) -> None:
+    """Raw pictures of 12 bit are black to thresholds that count in parts of the full scale."""
+    views = read_light_field(scene).views.astype(np.uint16) << 4
+    np.save("raw.npy", views)
+    called = call("depth", "raw.npy", "-o", "out", *FAST)
+    assert called.exit_code == 0
+    assert "if the files hold 12 bits, multiply them by 16" in called.stderr
+    np.save("full.npy", views << 4)
+    assert "bits" not in call("depth", "full.npy", "-o", "full", *FAST).stderr
+
+
+def test_info_shows_the_camera_that_flags_give(scene: Path) -> None:
+    flags = ("--focal-length", 100, "--baseline", 50, "--focus-distance", 8, "--sensor-size", 36)
+    assert "8.88889 m / (disparity + 1.11111)" in call("info", scene, *flags).stdout
+
+
 def test_check_names_the_flag_that_sets_the_order_right(scene: Path) -> None:
     views = render("curved_occluders", size=96, views=5).views
     np.save("views.npy", views[:, ::-1])
     called = call("check", "views.npy")
-    assert called.exit_code == 0
+    assert called.exit_code == 1
     assert len([line for line in called.stdout.splitlines() if line.startswith("  ")]) == 8
     assert "--order flip-columns" in called.stdout.splitlines()[-1]
-    assert "--order" not in call("check", "views.npy", "--order", "flip-columns").stdout.splitlines()[-1]
+    right = call("check", "views.npy", "--order", "flip-columns")
+    assert right.exit_code == 0
+    assert "--order" not in right.stdout.splitlines()[-1]
 
 
 # --- bad input
@@ -275,6 +293,7 @@ BAD: dict[str, tuple[Callable[[Path], object], tuple[str, ...], str]] = {
         ("pyramids", "-o", "out"),
         "out: is a file; expected a folder",
     ),
+    "output is the input": (lambda s: None, ("pyramids", "-o", "pyramids"), "choose another folder"),
     "output below a file": (
         lambda s: (s.parent / "out").write_text("mine"),
         ("pyramids", "-o", "out/maps"),
@@ -438,7 +457,7 @@ def test_info_of_a_light_field_about_which_little_is_known(tmp_path: Path) -> No
         "3x2 views (rows x columns, 4 of 6) of 9x8 pixels",
         "grey, 16 bit",
         "2: 0,1 2,0",
-        "not given",
+        "none given; the estimate is used",
         "cannot be estimated",
         "unknown camera",
         "made up",
@@ -519,6 +538,17 @@ def test_each_command_has_help(command: str) -> None:
     assert called.exit_code == 0
     assert called.stdout.startswith("Usage:")
     assert command in call("--help").stdout
+
+
+def test_python_writes_what_the_command_writes(scene: Path, result: Path) -> None:
+    light_field = sepi.read_light_field(scene, options=sepi.ReadOptions(view=(1, 1)))
+    maps = sepi.estimate_depth(light_field, "paper", {"initial": {"candidates": 21}})
+    sepi.write_result("out", light_field, maps)
+    written, by_command = everything_in(Path("out")), everything_in(result)
+    assert set(written) == set(by_command)
+    assert {name for name in written if written[name] != by_command[name]} == {"result.h5"}
+    with pytest.raises(sepi.SepiError, match=r"mine: views must be an array of shape \(T, S, H, W, C\), got a list"):
+        sepi.LightField([[1, 2]], "mine")  # type: ignore[arg-type]
 
 
 def test_package_gives_its_names_and_no_others() -> None:

@@ -114,7 +114,7 @@ def test_dark_views_are_named_with_the_flag_that_leaves_them_out(tmp_path: Path)
 def test_any_picture_is_read_when_said_to_be_one(tmp_path: Path) -> None:
     views = stack((14, 14))
     path = put(tmp_path / "plain.bmp", lenslets(views))
-    with pytest.raises(SepiError, match="not a light field of a known format"):
+    with pytest.raises(SepiError, match="a single picture; give the folder of all views"):
         format_of(path)
     np.testing.assert_array_equal(read(path, ReadOptions(), "eslf").views, views[3:12, 3:12])
 

@@ -285,6 +285,10 @@ def test_nothing_there(tmp_path: Path) -> None:
     assert error_of(tmp_path / "absent").endswith("absent: no such file or folder")
 
 
+def test_one_view_of_many(square: Path) -> None:
+    assert "give the folder of all views" in error_of(square / "input_Cam003.png")
+
+
 def test_file_of_no_known_format(tmp_path: Path) -> None:
     (tmp_path / "notes.txt").write_text("hello")
     assert "not a light field of a known format" in error_of(tmp_path / "notes.txt")
@@ -475,7 +479,8 @@ def test_bad_file_is_one_line_that_names_it(tmp_path: Path, light_field: LightFi
 
 def test_a_result_is_not_taken_for_a_light_field(tmp_path: Path, light_field: LightField) -> None:
     write_result(tmp_path / "out", light_field, maps_of(light_field), {})
-    assert "known format" in error_of(tmp_path / "out" / "result.h5")
+    for path in (tmp_path / "out", tmp_path / "out" / "result.h5"):
+        assert "holds a disparity map, not a light field" in error_of(path)
 
 
 # --- results

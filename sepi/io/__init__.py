@@ -8,6 +8,7 @@ from pathlib import Path
 
 from sepi.errors import SepiError
 from sepi.io import eslf, hci, hci_old, hdf5, matlab, numpy_files, view_images
+from sepi.io.images import SUFFIXES
 from sepi.io.options import ReadOptions
 from sepi.lightfield import LightField
 from sepi.validation import require_known
@@ -36,16 +37,14 @@ class Format:
 
 
 FORMATS = {
-    "hci": Format("HCI folder", "a folder with input_Cam000.png, input_Cam001.png, ...", hci.matches, hci.read),
-    "images": Format(
-        "folder of views", "a folder with a numbered picture for each view", view_images.matches, view_images.read
-    ),
-    "eslf": Format("Lytro lenslet picture", "a picture NAME_eslf.png of a Lytro camera", eslf.matches, eslf.read),
+    "hci": Format("HCI folder", "input_Cam000.png, ...", hci.matches, hci.read),
+    "images": Format("folder of views", "a numbered picture for each", view_images.matches, view_images.read),
+    "eslf": Format("Lytro lenslet picture", "NAME_eslf.png", eslf.matches, eslf.read),
     # before the other kinds of HDF5: MATLAB's is told by its header or ending
-    "matlab": Format("MATLAB file", "an array in a .mat file, such as LF", matlab.matches, matlab.read),
-    "numpy": Format("NumPy file", "an array in a .npy or .npz file", numpy_files.matches, numpy_files.read),
-    "hci-old": Format("HCI-old HDF5", "an HDF5 file with LF (T, S, H, W, 3)", hci_old.matches, hci_old.read),
-    "sepi": Format("sepi HDF5", "an HDF5 file written by this package", hdf5.matches, hdf5.read),
+    "matlab": Format("MATLAB file", ".mat with an array such as LF", matlab.matches, matlab.read),
+    "numpy": Format("NumPy file", ".npy or .npz", numpy_files.matches, numpy_files.read),
+    "hci-old": Format("HCI-old HDF5", "with LF (T, S, H, W, 3)", hci_old.matches, hci_old.read),
+    "sepi": Format("sepi HDF5", "written by this package", hdf5.matches, hdf5.read),
 }
 """Word for ``--format`` to format; the first that matches reads."""
 
@@ -73,8 +72,8 @@ def format_of(path: Path, wanted: str | None = None) -> Format:
     for known in FORMATS.values():
         if known.matches(path):
             return known
-    known_formats = "; ".join(f"{known.name}: {known.description}" for known in FORMATS.values())
-    raise SepiError(f"{path}: not a light field of a known format ({known_formats}){_hint(path)}")
+    expected = ", ".join(f"{known.name} ({known.description})" for known in FORMATS.values())
+    raise SepiError(f"{path}: {_what_else(path)}; expected {expected}")
 
 
 def read(path: Path, options: ReadOptions, wanted: str | None = None) -> LightField:
@@ -104,11 +103,18 @@ def read(path: Path, options: ReadOptions, wanted: str | None = None) -> LightFi
         return light_field if options.view is None else light_field.seen_from(options.view)
     except SepiError as error:
         # what only the light field as a whole can find wrong
-        raise error if str(path) in str(error) else SepiError(f"{path}: {error}") from error
+        raise error if str(error).startswith(str(path)) else SepiError(f"{path}: {error}") from error
 
 
-def _hint(path: Path) -> str:
-    """Name a light field in the folder, for who gave the folder of all scenes."""
-    inner = sorted(path.iterdir()) if path.is_dir() else []
-    scene = next((entry for entry in inner if any(known.matches(entry) for known in FORMATS.values())), None)
-    return "" if scene is None else f"; it holds some, such as {scene}"
+def _what_else(path: Path) -> str:
+    """What a path that is no light field seems to be, for who gave the wrong one of several."""
+    result = path / "result.h5" if path.is_dir() else path
+    if hdf5.holds(result, "disparity"):
+        return "holds a disparity map, not a light field"
+    if path.is_file():
+        picture = path.suffix.lower() in SUFFIXES
+        return "a single picture; give the folder of all views" if picture else "not a light field of a known format"
+    inner = next((entry for entry in sorted(path.iterdir()) if any(f.matches(entry) for f in FORMATS.values())), None)
+    if inner is not None:
+        return f"a folder of light fields; give one of them, such as {inner}"
+    return "not a light field of a known format"

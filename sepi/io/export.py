@@ -80,7 +80,7 @@ class Result:
 
 
 def write_result(
-    folder: Path, light_field: LightField, maps: StageMaps, attributes: Mapping[str, Attribute]
+    folder: str | Path, light_field: LightField, maps: StageMaps, attributes: Mapping[str, Attribute] | None = None
 ) -> tuple[str, ...]:
     """Write the maps of a light field.
 
@@ -94,13 +94,13 @@ def write_result(
 
     Parameters
     ----------
-    folder : Path
+    folder : str or Path
         Made where it does not exist.
     light_field : LightField
         Where the maps come from.
     maps : StageMaps
         Of the light field's shape.
-    attributes : mapping
+    attributes : mapping, optional
         What made the maps.
 
     Returns
@@ -115,6 +115,8 @@ def write_result(
         a light field, or cannot be written.
     """
     _require_sound(light_field, maps)
+    folder = Path(folder)
+    attributes = attributes or {"scene": light_field.name, "source": light_field.source}
     require_target(folder)
     # the folder itself may be a link to where there is room
     target = folder.resolve()
