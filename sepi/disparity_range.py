@@ -36,6 +36,9 @@ _RADIUS = 2
 # largest difference that counts, full range = 1
 _TRUNCATION = 0.1
 
+# What is black, full range = 1
+_BLACK = 8 / 255
+
 # Trust: lowest cost as part of the lowest outside its valley. A limit on the cost itself would add nothing here, and
 # would have to know the noise.
 _MOST_AMBIGUITY = 0.8
@@ -78,12 +81,13 @@ def estimate_range(light_field: LightField) -> DisparityRange:
     offsets = np.array(positions, np.int64) - light_field.reference
     # the farthest view moves by one pixel from candidate to candidate
     step = 1 / int(abs(offsets).max())
+    seen = ~_dark_corners(light_field.centre, reference.shape)
     found: FloatMap = np.empty(0, np.float32)
     for extent in _extents(max(reference.shape) * step / 2):
         number = max(1, math.ceil(extent / step))
         candidates = (np.arange(-number, number + 1) * step).astype(np.float32)
         sweep = coarse_sweep(reference, views, offsets, candidates, np.float32(_TRUNCATION), _RADIUS)
-        trusted = sweep[3][_trusted(*sweep, step)]
+        trusted = sweep[3][_trusted(*sweep, step) & seen]
         if trusted.size > found.size:
             found = trusted
         if found.size > _ENOUGH * reference.size and abs(np.stack(_extremes(found))).max() < extent - max(1, 2 * step):
@@ -125,6 +129,19 @@ def _prepared(view: npt.NDArray[np.generic], factor: int) -> FloatMap:
         grey = cv2.resize(grey, size, interpolation=cv2.INTER_AREA)
     smooth = cv2.GaussianBlur(grey, (0, 0), _BLUR_SIGMA)
     return np.asarray(smooth - cv2.blur(smooth, (_HIGH_PASS, _HIGH_PASS)), np.float32)
+
+
+def _dark_corners(centre: FloatMap, shape: tuple[int, int]) -> BoolMap:
+    """What the lens leaves black in the corners, and what lies so near that the filters mix it in; of ``shape``.
+
+    The edge of such a corner moves from view to view as the lens has it, not as anything in the scene.
+    """
+    black = cv2.resize((centre.max(axis=2) < _BLACK).astype(np.uint8), shape[::-1], interpolation=cv2.INTER_AREA)
+    _, labels = cv2.connectedComponents(black)
+    corners = set(labels[[0, 0, -1, -1], [0, -1, 0, -1]].tolist()) - {0}
+    reach = 2 * (_HIGH_PASS + _RADIUS) + 1
+    dark = np.isin(labels, list(corners)).astype(np.uint8)
+    return cv2.dilate(dark, np.ones((reach, reach), np.uint8)) > 0
 
 
 def _extents(most: float) -> list[float]:

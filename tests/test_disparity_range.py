@@ -181,6 +181,20 @@ def test_given_range_wins_over_the_scenes_own() -> None:
         settle_range(own, (1, 1))
 
 
+def test_dark_corners_are_no_surfaces() -> None:
+    """A lens leaves the corners of Lytro pictures black; their edges move from view to view as nothing in the scene."""
+    light_field = render("wall", size=128, views=7)
+    clean = estimate_range(light_field)
+    y, x = np.mgrid[:128, :128] - 63.5
+    views = light_field.views.copy()
+    for t, s in np.ndindex(7, 7):
+        views[t, s][np.hypot(y - 4 * (t - 3), x - 4 * (s - 3)) > 76] = 1
+    vignetted = LightField(views, "vignetted")
+    known = estimate_range(vignetted)
+    assert known.minimum == pytest.approx(clean.minimum, abs=0.3)
+    assert known.maximum == pytest.approx(clean.maximum, abs=0.3)
+
+
 @pytest.mark.parametrize("limits", [(-1e9, 1e9), (0, 48), (-48, 1)])
 def test_a_range_beyond_the_views_is_refused(limits: tuple[float, float]) -> None:
     """A typing error in the range would otherwise be hours of work on candidates that no view can show."""
