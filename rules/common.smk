@@ -23,6 +23,8 @@ try:
     SETTINGS = load_settings(config)
 except SepiError as error:
     sys.exit(f"sepi: {error}")
+except OSError as error:
+    sys.exit(f"sepi: config: {error.filename}: {error.strerror}")
 
 
 wildcard_constraints:

@@ -100,7 +100,7 @@ def depth(
       sepi depth cotton --variant no_occlusion --set initial.sepi.candidates=91
     """
     from sepi.ingest import settle_range
-    from sepi.io.export import require_target, write_result
+    from sepi.io.export import RUNTIME, require_target, write_result
     from sepi.io.files import atomic_path
     from sepi.pipeline import estimate_depth, stage_parameters, variant_named
 
@@ -125,7 +125,7 @@ def depth(
     seconds = time.perf_counter() - started
     files = write_result(folder, light_field, maps, result_attributes(light_field, variant, steps))
     if timing:
-        with atomic_path(folder / "runtime.txt") as temporary:
+        with atomic_path(folder / RUNTIME) as temporary:
             temporary.write_text(f"{seconds:.3f}\n", encoding="ascii")
     click.echo(f"{light_field.name}: {_size(light_field)}")
     click.echo(f"disparity range: {_range(light_field.known_range())}")

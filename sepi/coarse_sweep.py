@@ -33,7 +33,7 @@ def coarse_sweep(
     Parameters
     ----------
     reference : ndarray, shape (H, W), float32
-        The centre view.
+        The reference view.
     views : ndarray, shape (V, H, W), float32
         Other views.
     offsets : ndarray, shape (V, 2), int64

@@ -32,6 +32,9 @@ from sepi.provenance import history_of, stage_attributes, step
 from sepi.stage import Choice, Progress
 from sepi.validation import validated
 
+# a workflow that stops its jobs; a terminal that is closed
+_ENDING = (signal.SIGTERM, signal.SIGHUP)
+
 
 class _Shown(click.ClickException):
     """A user's error as click shows it: ``sepi: MESSAGE`` on stderr, exit code 1."""
@@ -57,12 +60,13 @@ class SepiGroup(click.Group):
 
 @contextmanager
 def shown_errors() -> Iterator[None]:
-    """Turn :class:`SepiError` into a line without traceback, and SIGTERM into an exit that removes unfinished files.
+    """Turn :class:`SepiError` into a line without traceback, and signals into an exit that removes unfinished files.
 
-    A :class:`SepiWarning` becomes a line too, and the command goes on.
+    So does a path that the system refuses: a name that is too long, a folder that may not be read. A
+    :class:`SepiWarning` becomes a line too, and the command goes on.
     """
     main = threading.current_thread() is threading.main_thread()
-    before = signal.signal(signal.SIGTERM, _exit_on_signal) if main else None
+    before = {number: signal.signal(number, _exit_on_signal) for number in _ENDING} if main else {}
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("always", SepiWarning)
@@ -71,9 +75,13 @@ def shown_errors() -> Iterator[None]:
             yield
     except SepiError as error:
         raise _Shown(" ".join(str(error).split())) from error
+    except OSError as error:
+        if error.filename is None:
+            raise
+        raise _Shown(f"{error.filename}: {error.strerror}") from error
     finally:
-        if main:
-            signal.signal(signal.SIGTERM, before)
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 def _show_warning(

@@ -7,12 +7,14 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from sepi.datasets import Scene, archive_scenes_in, own_scene, scenes_in
 from sepi.errors import SepiError
+from sepi.io import FORMATS
+from sepi.io.options import ORDERS
 from sepi.lightfield import DisparityRange
 from sepi.pipeline import STAGES, VARIANTS, Variant
 from sepi.scenes import SCENES
@@ -21,6 +23,8 @@ from sepi.validation import require_known, validated
 
 # the built-in scenes have 9x9 views
 _BUILTIN_VIEWS = 81
+# keys whose values are text even where they look like numbers
+_TEXTS = ("path", "pattern", "variable", "exclude")
 _WORDS = {"true": True, "false": False, "null": None}
 
 
@@ -44,19 +48,23 @@ def _default_stages() -> dict[str, dict[str, dict[str, Any] | None]]:
     }
 
 
+_Count = Annotated[int, Field(ge=1)]
+_Place = Annotated[int, Field(ge=0)]
+
+
 class OwnLightField(_Keys):
     """Keys of one of the ``light_fields``: where it is, and the flags of ``sepi depth`` that say how to read it."""
 
-    path: str
+    path: str = Field(min_length=1)
     format: str | None = None
-    grid: tuple[int, int] | None = None
+    grid: tuple[_Count, _Count] | None = None
     pattern: str | None = None
     axes: str | None = None
     variable: str | None = None
-    central: int | None = None
+    central: _Count | None = None
     order: str | None = None
     exclude: list[str] = []
-    view: tuple[int, int] | None = None
+    view: tuple[_Place, _Place] | None = None
     follow_links: bool = False
 
     @property
@@ -185,7 +193,7 @@ def _with_numbers(value: Any, top: bool = True) -> Any:
     Snakemake reads ``--config 'builtin={size: 96}'`` with text for every value, and YAML takes 1e-4 for text.
     """
     if isinstance(value, Mapping):
-        return {key: _with_numbers(inner, False) for key, inner in value.items()}
+        return {key: inner if key in _TEXTS else _with_numbers(inner, False) for key, inner in value.items()}
     if isinstance(value, list):
         return [_with_numbers(inner, False) for inner in value]
     if top or not isinstance(value, str):
@@ -212,6 +220,8 @@ def _scenes(config: Config) -> dict[tuple[str, str], Scene]:
     for name, values in config.light_fields.items():
         where = f"config.light_fields.{name}"
         own = validated(OwnLightField, values, where)
+        require_known(f"{where}.order", filter(None, [own.order]), ORDERS)
+        require_known(f"{where}.format", filter(None, [own.format]), FORMATS)
         scenes.append(own_scene(name, Path(own.path).expanduser(), own.flags, where))
     if not scenes:
         raise SepiError("config: no scene to run on; name some in builtin.scenes or light_fields, or set hci_root")

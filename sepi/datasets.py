@@ -6,12 +6,13 @@ import math
 import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
 from sepi.errors import SepiError
 from sepi.io import hci_old
-from sepi.io.images import png_size
+from sepi.io.images import SUFFIXES, picture_size
 
 VIEW_PATTERN = "input_Cam*.png"
 # what a scene's folder may hold besides views, and ingest reads
@@ -175,16 +176,18 @@ def _scene_of(folder: Path, dataset: str) -> Scene:
 def _rough_size(files: Sequence[Path]) -> tuple[int, int, int]:
     """Number of views, their height and width: what threads and memory of a job are reckoned from.
 
-    Files that are no pictures are taken for one array of 9x9 views; damaged ones are left to ingest, which will say so.
+    Without pictures, or with a single one, the largest file is taken for an array of 9x9 views, or a picture of as
+    many; damaged ones are left to ingest, which will say so.
     """
-    if not files:
-        return 1, _USUAL_SIDE, _USUAL_SIDE
-    try:
-        return len(files), *png_size(files[0])
-    except SepiError:
-        pass
-    if len(files) > 1:
-        return len(files), _USUAL_SIDE, _USUAL_SIDE
-    views = 81
-    side = max(1, math.isqrt(files[0].stat().st_size // (3 * views)))
+    pictures = [path for path in files if path.suffix.lower() in SUFFIXES]
+    if len(pictures) > 1:
+        try:
+            return len(pictures), *picture_size(pictures[0])
+        except SepiError:
+            return len(pictures), _USUAL_SIDE, _USUAL_SIDE
+    views, values = 81, max((path.stat().st_size for path in files), default=0)
+    if pictures:
+        with suppress(SepiError):
+            values = 3 * math.prod(picture_size(pictures[0]))
+    side = max(1, math.isqrt(values // (3 * views)))
     return views, side, side

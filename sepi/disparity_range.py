@@ -36,8 +36,8 @@ _RADIUS = 2
 # largest difference that counts, full range = 1
 _TRUNCATION = 0.1
 
-# What is black, full range = 1
-_BLACK = 8 / 255
+# What is black, as part of the brightest there is
+_BLACK = 0.05
 
 # Trust: lowest cost as part of the lowest outside its valley. A limit on the cost itself would add nothing here, and
 # would have to know the noise.
@@ -57,7 +57,7 @@ _MARGIN = 0.06
 
 
 def estimate_range(light_field: LightField) -> DisparityRange:
-    """Disparity range of the centre view, found from the views.
+    """Disparity range of the reference view, found from the views.
 
     Parameters
     ----------
@@ -136,7 +136,9 @@ def _dark_corners(centre: FloatMap, shape: tuple[int, int]) -> BoolMap:
 
     The edge of such a corner moves from view to view as the lens has it, not as anything in the scene.
     """
-    black = cv2.resize((centre.max(axis=2) < _BLACK).astype(np.uint8), shape[::-1], interpolation=cv2.INTER_AREA)
+    brightness = centre.max(axis=2)
+    black = brightness < _BLACK * np.quantile(brightness, 0.99)
+    black = cv2.resize(black.astype(np.uint8), shape[::-1], interpolation=cv2.INTER_AREA)
     _, labels = cv2.connectedComponents(black)
     corners = set(labels[[0, 0, -1, -1], [0, -1, 0, -1]].tolist()) - {0}
     reach = 2 * (_HIGH_PASS + _RADIUS) + 1

@@ -1,4 +1,4 @@
-"""Edges of the centre view and steps of a depth map."""
+"""Edges of the reference view and steps of a depth map."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _SOBEL_GAIN = 8
 
 
 def canny_edges(centre: FloatMap, parameters: CannyParameters) -> BoolMap:
-    """Canny edges of the centre view; thresholds rise with its noise.
+    """Canny edges of the reference view; thresholds rise with its noise.
 
     Parameters
     ----------

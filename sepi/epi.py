@@ -37,7 +37,7 @@ class StitchedEpi:
     offsets : ndarray, shape (T * S,), float64
         Shift of each row to the right, pixels (Eq. 2).
     steps : ndarray, shape (T * S,), int
-        Place of each row along the stitched angular axis, ``s' - s0'`` = 0 for the centre view.
+        Place of each row along the stitched angular axis, ``s' - s0'`` = 0 for the reference view.
     inside : ndarray, shape (T * S,), bool
         Whether the corresponding EPI lies inside its view and the view is present.
     disparity : float
@@ -84,13 +84,13 @@ class StitchedEpi:
 
 
 def stitched_epi(light_field: LightField, y: int, disparity: float) -> StitchedEpi:
-    """Build the SEPI through row ``y`` of the centre view for one candidate (Eq. 1-2).
+    """Build the SEPI through row ``y`` of the reference view for one candidate (Eq. 1-2).
 
     Parameters
     ----------
     light_field : LightField
     y : int
-        Row of the centre view.
+        Row of the reference view.
     disparity : float
         Candidate, pixels per view step.
 
@@ -101,11 +101,11 @@ def stitched_epi(light_field: LightField, y: int, disparity: float) -> StitchedE
     Raises
     ------
     SepiError
-        If the row lies outside the centre view.
+        If the row lies outside the reference view.
     """
     (T, S), (H, W) = light_field.grid, light_field.shape
     if not 0 <= y < H:
-        raise SepiError(f"{light_field.name}: row {y} lies outside the centre view (0..{H - 1})")
+        raise SepiError(f"{light_field.name}: row {y} lies outside the reference view (0..{H - 1})")
     t0, s0 = light_field.reference
     channels = light_field.views.shape[4]
     rows = np.zeros((T, S, W, channels), np.float32)

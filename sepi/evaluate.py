@@ -126,7 +126,9 @@ def region_masks(light_field: LightField) -> dict[str, BoolMap]:
         raise SepiError(f"{light_field.name}: regions for evaluation need ground truth, and this scene has none")
     masks = dict(light_field.masks)
     if "occluded" not in masks:
-        masks["occluded"] = regions.occluded(light_field.truth, light_field.grid, light_field.reference)
+        masks["occluded"] = regions.occluded(
+            light_field.truth, light_field.grid, light_field.reference, light_field.present
+        )
     if "textureless" not in masks:
         masks["textureless"] = regions.textureless(light_field.centre)
     return {name: masks[name] for name in ("occluded", "textureless")}

@@ -63,6 +63,7 @@ def _read_map(path: Path) -> FloatMap:
     import numpy as np
 
     from sepi.io.hdf5 import read_map
+    from sepi.io.numpy_files import read_array
     from sepi.io.pfm import read_pfm
 
     if path.is_dir():
@@ -75,12 +76,7 @@ def _read_map(path: Path) -> FloatMap:
         return read_map(path, "disparity")
     if path.suffix != ".npy":
         raise SepiError(f"{path}: expected a disparity map as .pfm, .h5 or .npy")
-    try:
-        with path.open("rb") as file:
-            # np.load also takes archives and pickles
-            values = np.lib.format.read_array(file, allow_pickle=False)
-    except (OSError, ValueError, EOFError) as error:
-        raise SepiError(f"{path}: not a readable NumPy file ({' '.join(str(error).split())})") from error
+    values = read_array(path)
     if values.ndim != 2 or values.dtype.kind not in "fiu":
         raise SepiError(f"{path}: expected an array of numbers of shape (H, W)")
     return np.asarray(values, np.float32)

@@ -1,6 +1,6 @@
 """Initial depth (section IV-A, Eq. 1-5 of [1]_).
 
-``sepi`` takes, for every pixel of the centre view, the candidate whose line through the SEPI has the least colour
+``sepi`` takes, for every pixel of the reference view, the candidate whose line through the SEPI has the least colour
 variance (Eq. 3-4), and its distinctness as confidence (Eq. 5). The line meets one sample of each view, so this is a
 plane sweep (:mod:`sepi.sweep`); the construction itself is in :mod:`sepi.epi`.
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-# imported in the functions: `sepi --help` does without the libraries behind them
+# imported in the functions: `sepi --help` does without what they import
 if TYPE_CHECKING:
     from sepi.camera import Camera
     from sepi.io.options import ReadOptions

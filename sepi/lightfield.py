@@ -23,6 +23,12 @@ from sepi.errors import SepiError
 FloatMap = npt.NDArray[np.float32]
 BoolMap = npt.NDArray[np.bool_]
 
+RANGE_SOURCES = ("parameters", "given", "estimated")
+"""Where the range of a light field may come from."""
+
+LOWEST, HIGHEST = -0.5, 1.5
+"""As far beyond 0..1 as float views may go, for what resampling overshoots."""
+
 MIN_SIZE = 2
 """Least height and width of a view in pixels: what a sample between pixels needs."""
 
@@ -103,6 +109,9 @@ class LightField:
 
     def __post_init__(self) -> None:
         v = self.views
+        for key in ("name", "source"):
+            # names of files need not be text; what is not cannot be printed or stored
+            object.__setattr__(self, key, getattr(self, key).encode("utf-8", "replace").decode())
         if not isinstance(v, np.ndarray):
             raise SepiError(f"{self.name}: views must be an array of shape (T, S, H, W, C), got a {type(v).__name__}")
         if v.ndim != 5 or v.shape[4] not in (1, 3) or 0 in v.shape:
@@ -190,7 +199,7 @@ class LightField:
 def _require_unit(name: str, values: npt.NDArray[np.generic]) -> None:
     """Raise unless floats are finite and 0..1, but for what resampling overshoots."""
     low, high = float(values.min()), float(values.max())
-    if not (low >= -0.5 and high <= 1.5):
+    if not (low >= LOWEST and high <= HIGHEST):
         raise SepiError(f"{name}: float views must be finite and within 0..1, got {low:g} to {high:g}")
 
 

@@ -1,4 +1,4 @@
-"""Noise of the centre view: what a residual of two equal surfaces looks like before anything else goes wrong."""
+"""Noise of the reference view: what a residual of two equal surfaces looks like before anything else goes wrong."""
 
 from __future__ import annotations
 

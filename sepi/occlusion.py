@@ -3,7 +3,7 @@
 A pixel next to a nearer surface is hidden from the views on that surface's side, and the line through its full SEPI
 crosses the occluder. ``half_sepi`` repeats the slope computation with the views of one half, or of two halves at once:
 
-1. candidates: pixels near Canny edges of the centre view and near steps of the initial depth;
+1. candidates: pixels near Canny edges of the reference view and near steps of the initial depth;
 2. mean shift on the patch of image and depth gives the surface that each pixel belongs to;
 3. side: by geometry the half away from the nearer surface is kept. (With positive disparity nearer, a nearer surface on
    the right hides the pixel from the views on the right, so the left half is kept. The paper's sentence says the
@@ -145,7 +145,7 @@ def none(
 
 
 def occlusion_candidates(centre: FloatMap, disparity: FloatMap, parameters: OcclusionParameters) -> BoolMap:
-    """Pixels within reach of an edge of the centre view or of a step of the depth map; shape (H, W), bool."""
+    """Pixels within reach of an edge of the reference view or of a step of the depth map; shape (H, W), bool."""
     edges = canny_edges(centre, parameters) | depth_steps(disparity, parameters.depth_step)
     return np.asarray(cv2.dilate(edges.astype(np.uint8), _box(parameters.candidate_reach)) > 0)
 

@@ -1,4 +1,4 @@
-"""Regions for evaluation: where the ground truth says a view is blocked, and where the centre view has no texture.
+"""Regions for evaluation: where the ground truth says a view is blocked, and where the reference view has no texture.
 
 The paper names another work for its occluded region and defines no texture-less one. These definitions are the same for
 every scene and method, so that rows of a table compare. Estimators never see them.
@@ -29,7 +29,9 @@ _HALF_PIXEL = 0.501
 _STRETCH = 2.0
 
 
-def occluded(truth: FloatMap, grid: tuple[int, int], reference: tuple[int, int] | None = None) -> BoolMap:
+def occluded(
+    truth: FloatMap, grid: tuple[int, int], reference: tuple[int, int] | None = None, present: BoolMap | None = None
+) -> BoolMap:
     """Pixels of the reference view that at least one other view does not see.
 
     A pixel is hidden in a view if a nearer pixel lands within half a pixel of it there: what a z-buffer of that view
@@ -47,6 +49,8 @@ def occluded(truth: FloatMap, grid: tuple[int, int], reference: tuple[int, int] 
         Number of view rows and columns ``(T, S)``.
     reference : tuple of int, optional
         Place of the reference view; the centre unless given.
+    present : ndarray, shape (T, S), bool, optional
+        Which views there are; all unless given.
 
     Returns
     -------
@@ -55,19 +59,24 @@ def occluded(truth: FloatMap, grid: tuple[int, int], reference: tuple[int, int] 
     """
     rows, columns = grid
     t0, s0 = reference or (rows // 2, columns // 2)
-    offsets = [(t - t0, s - s0) for t in range(rows) for s in range(columns)]
+    offsets = [
+        (t - t0, s - s0)
+        for t in range(rows)
+        for s in range(columns)
+        if (t, s) != (t0, s0) and (present is None or present[t, s])
+    ]
     # far views hide most: looking at them first ends the search early
     offsets.sort(key=lambda offset: -max(abs(offset[0]), abs(offset[1])))
     finite = np.isfinite(truth)
-    if not finite.any() or len(offsets) < 2:
+    if not finite.any() or not offsets:
         return np.zeros(truth.shape, bool)
     filled = np.where(finite, truth, -np.inf).astype(np.float64)
-    hidden: BoolMap = _hidden(filled, np.array(offsets[:-1], np.int64), float(truth[finite].max()))
+    hidden: BoolMap = _hidden(filled, np.array(offsets, np.int64), float(truth[finite].max()))
     return hidden
 
 
 def textureless(centre: FloatMap) -> BoolMap:
-    """Pixels of the centre view round which the image hardly changes.
+    """Pixels of the reference view round which the image hardly changes.
 
     The energy is the squared gradient, averaged over the channels and over a window of ``WINDOW`` pixels; its root is
     compared with ``ENERGY_THRESHOLD``. Patches and holes under ``SMALLEST_AREA`` are removed.

@@ -21,6 +21,7 @@ import cv2
 import numpy as np
 from pydantic import Field
 
+from sepi.errors import SepiError
 from sepi.lightfield import FloatMap, LightField, as_unit_float
 from sepi.stage import Parameters
 
@@ -50,6 +51,11 @@ def structure_tensor_depth(light_field: LightField, parameters: StructureTensorP
         Within the disparity range.
     confidence : ndarray, shape (H, W), float32
         Coherence, 0..1.
+
+    Raises
+    ------
+    SepiError
+        If neither the row nor the column of the reference view has three views.
     """
     t0, s0 = light_field.reference
     known = light_field.known_range()
@@ -57,6 +63,11 @@ def structure_tensor_depth(light_field: LightField, parameters: StructureTensorP
     confidence = np.zeros(light_field.shape, np.float32)
     row = [(s - s0, light_field.views[t0, s]) for s in range(light_field.grid[1]) if light_field.present[t0, s]]
     column = [(t - t0, light_field.views[t, s0]) for t in range(light_field.grid[0]) if light_field.present[t, s0]]
+    if max(len(row), len(column)) < 3:
+        raise SepiError(
+            f"{light_field.name}: the structure tensor needs at least three views in the row or in the column of view "
+            f"{t0},{s0}; it has {len(row)} and {len(column)}"
+        )
     # a vertical EPI is the horizontal one of the transposed views
     for views, transposed in ((row, False), (column, True)):
         if len(views) < 3:
@@ -77,7 +88,7 @@ def structure_tensor_depth(light_field: LightField, parameters: StructureTensorP
 def _sheared(
     steps: list[int], images: list[FloatMap], shear: int, parameters: StructureTensorParameters
 ) -> tuple[FloatMap, FloatMap]:
-    """Disparity and coherence at the centre view from horizontal EPIs sheared by a whole disparity."""
+    """Disparity and coherence at the reference view from horizontal EPIs sheared by a whole disparity."""
     # after the shear a surface of disparity `shear` stands still from view to view
     moved = np.stack([_shifted(image, shear * step) for step, image in zip(steps, images, strict=True)])
     smooth = np.stack([_blurred(view, parameters.inner_sigma) for view in moved])

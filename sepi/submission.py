@@ -27,7 +27,7 @@ from pathlib import Path
 import numpy as np
 
 from sepi.errors import SepiError
-from sepi.io.export import read_result
+from sepi.io.export import RUNTIME, read_result
 from sepi.io.files import atomic_path
 from sepi.io.pfm import read_pfm
 from sepi.validation import require_known
@@ -101,7 +101,7 @@ def entry_of(folder: Path, runtimes: Mapping[str, float]) -> tuple[str, Entry]:
     require_known(f"{folder}: scenes of the benchmark", [scene], SCENES)
     if scene in runtimes:
         return scene, Entry(folder / "disparity.pfm", runtimes[scene])
-    path = folder / "runtime.txt"
+    path = folder / RUNTIME
     if not path.is_file():
         raise SepiError(f"{path}: no such file; run 'sepi depth --timing', or give --runtime {scene}=SECONDS")
     seconds, problem = _seconds_in(path)

@@ -1,4 +1,4 @@
-"""Superpixels of the centre view: their geometry, neighbours, and which of them look alike (section IV-C of [1]_).
+"""Superpixels of the reference view: their geometry, neighbours, and which of them look alike (section IV-C of [1]_).
 
 References
 ----------

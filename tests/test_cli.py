@@ -156,10 +156,21 @@ def test_depth_in_metres_with_the_cameras_geometry(scene: Path) -> None:
     assert "missing: --sensor-size" in call("depth", scene, *flags[:-2]).stderr
 
 
+def test_a_file_name_that_is_no_text(scene: Path) -> None:
+    """Old archives hold names in other encodings."""
+    name = os.fsdecode(b"caf\xe9.npy")
+    np.save(name, read_light_field(scene).views)
+    assert call("depth", name, "-o", "out", *FAST).exit_code == 0
+    assert read_attributes(Path("out/result.h5"))["scene"] == "caf?"
+
+
 def test_depth_with_run_time(scene: Path) -> None:
     """Only on request: two runs give the same bytes otherwise."""
     assert call("depth", scene, "-o", "out", "--timing", *FAST).exit_code == 0
     assert 0 < float(Path("out/runtime.txt").read_text()) < 600
+    # the time of another run is not this one's
+    assert call("depth", scene, "-o", "out", *FAST).exit_code == 0
+    assert not Path("out/runtime.txt").exists()
 
 
 def test_a_warning_does_not_stop_the_depth(scene: Path) -> None:
@@ -236,7 +247,11 @@ def blank(scene: Path) -> None:
 BAD: dict[str, tuple[Callable[[Path], object], tuple[str, ...], str]] = {
     "nothing there": (lambda s: None, ("absent",), "absent: no such file or folder"),
     "empty folder": (lambda s: (s.parent / "empty").mkdir(), ("empty",), "known format"),
-    "folder of scenes": (lambda s: None, ("..",), "not a light field"),
+    "folder of scenes": (
+        lambda s: shutil.copytree(s, s.parent / "scenes" / "a"),
+        ("scenes",),
+        "a folder of light fields; give one of them, such as scenes/a",
+    ),
     "missing centre view": (lambda s: (s / "input_Cam004.png").unlink(), ("pyramids",), "centre view (t, s) = (1, 1)"),
     "one view": (lambda s: [(s / f"input_Cam00{i}.png").unlink() for i in range(1, 9)], ("pyramids",), "is missing"),
     "no view": (lambda s: [p.unlink() for p in s.glob("input*")], ("pyramids",), "no views"),
@@ -397,10 +412,13 @@ def test_evaluate_reads_every_kind_of_map(pyramids: Path, result: Path, tmp_path
         ("absent.pfm", "map.pfm", "absent.pfm: no such file"),
         ("map.pfm", "absent", "absent: no such file"),
         ("small.pfm", "map.pfm", "(6, 8), the estimate (5, 5)"),
-        ("text.npy", "map.pfm", "text.npy: not a readable NumPy file"),
+        ("text.npy", "map.pfm", "text.npy: not a NumPy file"),
         ("cube.npy", "map.pfm", "cube.npy: expected an array of numbers of shape (H, W)"),
-        ("zipped.npy", "map.pfm", "zipped.npy: not a readable NumPy file"),
+        ("zipped.npy", "map.pfm", "zipped.npy: not a NumPy file"),
         ("words.npy", "map.pfm", "words.npy: expected an array"),
+        ("lie.npy", "map.pfm", "lie.npy: damaged NumPy file"),
+        ("damaged.h5", "map.pfm", "damaged.h5"),
+        ("map.pfm", "damaged.h5", "damaged.h5"),
         ("text.pfm", "map.pfm", "text.pfm: not a one-channel PFM"),
         ("text.h5", "map.pfm", "text.h5: not a readable HDF5 file"),
         ("other.h5", "map.pfm", "other.h5: damaged HDF5 file"),
@@ -414,6 +432,13 @@ def test_bad_maps_are_one_line(
     monkeypatch.chdir(tmp_path)
     write_pfm(Path("map.pfm"), np.zeros((6, 8), np.float32))
     write_pfm(Path("small.pfm"), np.zeros((5, 5), np.float32))
+    with Path("lie.npy").open("wb") as file:
+        header = {"descr": "<f8", "fortran_order": False, "shape": (10**6, 10**6)}
+        np.lib.format.write_array_header_1_0(file, header)
+    with h5py.File("damaged.h5", "w") as file:
+        file["disparity"] = np.zeros((99, 99))
+    data = Path("damaged.h5").read_bytes()
+    Path("damaged.h5").write_bytes(data[:100] + bytes(700) + data[800:])
     for name in ("text.npy", "text.pfm", "text.h5", "picture.png"):
         Path(name).write_text("hello")
     np.save("cube.npy", np.zeros((2, 3, 4)))

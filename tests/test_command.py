@@ -15,7 +15,7 @@ import pytest
 from click.testing import CliRunner, Result
 from pydantic import Field
 
-from sepi.command import progress_bar, stage_command
+from sepi.command import SepiCommand, progress_bar, stage_command
 from sepi.errors import SepiError
 from sepi.io.hdf5 import read_attributes, read_stage, write_light_field
 from sepi.lightfield import DisparityRange, LightField
@@ -206,3 +206,25 @@ def test_no_progress_bar_in_a_pipe(capfd: pytest.CaptureFixture[str]) -> None:
         progress(1.0)
     captured = capfd.readouterr()
     assert captured.out + captured.err == ""
+
+
+def test_a_path_that_the_system_refuses_is_one_line() -> None:
+    """A name pasted twice, or a folder of somebody else's."""
+
+    @click.command(cls=SepiCommand)
+    def command() -> None:
+        Path("x" * 300).stat()
+
+    result = CliRunner().invoke(command)
+    assert error_of(result).endswith("x: File name too long")
+
+
+def test_a_closed_terminal_ends_the_command_as_a_stop_does() -> None:
+    @click.command(cls=SepiCommand)
+    def command() -> None:
+        os.kill(os.getpid(), signal.SIGHUP)
+        time.sleep(5)
+
+    before = signal.getsignal(signal.SIGHUP)
+    assert CliRunner().invoke(command).exit_code == 128 + signal.SIGHUP
+    assert signal.getsignal(signal.SIGHUP) == before

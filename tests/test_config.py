@@ -223,12 +223,30 @@ class TestOwnLightFields:
             ({}, "config.light_fields.a.path: field required"),
             ({"path": "/", "gird": [3, 3]}, "config.light_fields.a: unknown 'gird'; did you mean 'grid'?"),
             ({"path": "/", "grid": "3x3"}, "config.light_fields.a.grid: input should be a valid array, got '3x3'"),
+            ({"path": ""}, "config.light_fields.a.path: string should have at least 1 character"),
+            (
+                {"path": "/", "order": "flip-row"},
+                "a.order: unknown 'flip-row'; did you mean 'flip-rows'",
+            ),
+            ({"path": "/", "format": "nmupy"}, "config.light_fields.a.format: unknown 'nmupy'; did you mean 'numpy'"),
+            ({"path": "/", "central": 0}, "config.light_fields.a.central: input should be greater than or equal to 1"),
+            (
+                {"path": "/", "view": [-1, 2]},
+                "light_fields.a.view.0: input should be greater than or equal to 0",
+            ),
             ({"path": "/", "central": "big"}, "config.light_fields.a.central: input should be a valid integer"),
             ("/data/lego", "config.light_fields.a: input should be an object, got '/data/lego'"),
         ],
     )
     def test_a_wrong_entry_is_named(self, entry: Any, expected: str) -> None:
         assert expected in message_of({"light_fields": {"a": entry}})
+
+    def test_texts_that_look_like_numbers_stay_texts(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.chdir(tmp_path)
+        np.save("2024", np.zeros(1))
+        Path("2024.npy").rename("2024")
+        entry = {"path": "2024", "variable": "5", "grid": ["3", "3"]}
+        assert load_settings({"light_fields": {"a": entry}}).scene("own", "a").flags[-1] == "5"
 
     def test_a_name_that_is_no_plain_word_is_refused(self, tmp_path: Path) -> None:
         assert "'my lego'" in message_of({"light_fields": {"my lego": {"path": str(tmp_path)}}})

@@ -155,7 +155,8 @@ def test_files_of_an_earlier_run_do_not_outlive_it(tmp_path: Path, light_field: 
     a user's own files stay, masks among them.
     """
     write_result(tmp_path, light_field, maps, {})
-    own = {"notes.txt": b"mine", "runtime.txt": b"1.5\n", "mask_broken.png": b"\x89PNG"}
+    (tmp_path / "runtime.txt").write_text("1.5\n")
+    own = {"notes.txt": b"mine", "mask_broken.png": b"\x89PNG"}
     for name, data in own.items():
         (tmp_path / name).write_bytes(data)
     assert cv2.imwrite(str(tmp_path / "mask_mine.png"), np.zeros(SHAPE, np.uint8))

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from sepi.disparity_range import estimate_range
+from sepi.errors import SepiError
 from sepi.evaluate import score
 from sepi.lightfield import LightField
 from sepi.pipeline import VARIANTS, estimate_depth
@@ -64,3 +65,9 @@ def test_range_is_estimated_without_some_views(shape: str) -> None:
     assert known.minimum <= scene().truth.min() + 0.05
     assert known.maximum >= scene().truth.max() - 0.05
     assert known.maximum - known.minimum < 3 * (scene().truth.max() - scene().truth.min())
+
+
+def test_structure_tensor_says_what_it_needs() -> None:
+    """It looks at one row and one column of views; without them a map of one value would look like a result."""
+    with pytest.raises(SepiError, match="three views in the row or in the column of view 4,4; it has 1 and 1"):
+        disparity_of(without(scene(), T == S), "no_sepi")

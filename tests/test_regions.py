@@ -31,6 +31,18 @@ def two_planes(near: float = 1.0, far: float = 0.0) -> np.ndarray:
     return truth
 
 
+def test_views_that_are_missing_hide_nothing() -> None:
+    """A pixel that only a missing view does not see is no harder than others."""
+    truth = np.zeros((24, 24), np.float32)
+    truth[8:16, 8:16] = 3
+    present = np.zeros((5, 5), bool)
+    present[2, :] = True
+    row_only = occluded(truth, (5, 5), None, present)
+    assert row_only.any()
+    assert not row_only[:8].any()
+    assert occluded(truth, (5, 5))[:8].any()
+
+
 def test_two_planes_hide_a_band_round_the_nearer_one() -> None:
     """One view step moves the nearer plane by one pixel against the other: a band of one pixel is hidden."""
     hidden = occluded(two_planes(), (3, 3))

@@ -11,8 +11,8 @@ import numpy as np
 import numpy.typing as npt
 
 from sepi.errors import SepiError
-from sepi.io.options import Numbers, ReadOptions, arranged
-from sepi.lightfield import BoolMap, LightField
+from sepi.io.options import Numbers, ReadOptions, arranged, place_of
+from sepi.lightfield import HIGHEST, LOWEST, BoolMap, LightField
 from sepi.validation import require_known
 
 Array = npt.NDArray[np.generic]
@@ -23,8 +23,6 @@ DEFLATE_RATIO = 1100
 # "N" is the number t * S + s of a view
 _LAYOUTS = ("TSHWC", "TSHW", "NHWC")
 _AXES_HELP = "T, S: row and column of the view; H, W: of the pixel; C: colour"
-# floats may leave 0..1 by this much, for what resampling overshoots
-_OVERSHOOT = 0.5
 # positions that a note lists
 _LISTED = 12
 
@@ -74,9 +72,7 @@ def light_field_from_array(
     stack = _as_stack(source, array, letters, options.grid)
     numbers = arranged(source, stack.grid, options)
     filled = _filled(source, stack, numbers, kind)
-    # the reference view is the given grid's centre wherever the order puts it
-    middle = stack.grid[0] // 2 * stack.grid[1] + stack.grid[1] // 2
-    reference = options.view or _place_of(numbers, middle)
+    reference = options.view or (numbers.shape[0] // 2, numbers.shape[1] // 2)
     if reference in filled.blank:
         raise SepiError(
             f"{source}: view {reference[0]},{reference[1]} is black (all zeros) or NaN, so taken as missing; depth is "
@@ -88,7 +84,7 @@ def light_field_from_array(
         name=name,
         source=source,
         present=filled.present,
-        view=None if reference == (numbers.shape[0] // 2, numbers.shape[1] // 2) else reference,
+        view=options.view,
         notes=(*notes, *assumed, *stack.notes, *filled.notes),
     )
 
@@ -109,8 +105,8 @@ def rearranged(light_field: LightField, options: ReadOptions) -> LightField:
     views = light_field.views.reshape(T * S, *light_field.views.shape[2:])[numbers]
     present = light_field.present.ravel()[numbers] & (numbers >= 0)
     views[~present] = 0
-    place = _place_of(numbers, light_field.reference[0] * S + light_field.reference[1])
-    if place is not None:
+    place = place_of(numbers, light_field.reference[0] * S + light_field.reference[1])
+    if place is not None and (light_field.view is not None or light_field.truth is not None):
         return replace(light_field, views=views, present=present, view=place)
     return replace(light_field, views=views, present=present, view=options.view, truth=None, masks={})
 
@@ -328,15 +324,9 @@ def _is_known(source: str, place: tuple[int, int], view: Array) -> bool:
             f"{where} holds values that are not finite (NaN or infinite); mend it, or leave it out with "
             f"--exclude {place[0]},{place[1]}"
         )
-    if low < -_OVERSHOOT or high > 1 + _OVERSHOOT:
+    if low < LOWEST or high > HIGHEST:
         raise SepiError(
             f"{where} has values from {low:g} to {high:g}; floats are expected within 0..1, so divide them by their "
             "full scale (255 for 8 bit), or store uint8 or uint16"
         )
     return True
-
-
-def _place_of(numbers: Numbers, number: int) -> tuple[int, int] | None:
-    """Where a view of the given grid stands; None where it was left out."""
-    places = np.argwhere(numbers == number)
-    return (int(places[0][0]), int(places[0][1])) if len(places) else None

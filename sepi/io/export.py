@@ -9,7 +9,7 @@ import os
 import re
 import struct
 import zlib
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -20,7 +20,7 @@ import numpy.typing as npt
 
 from sepi.camera import Camera
 from sepi.errors import SepiError
-from sepi.io.files import atomic_folder, atomic_path
+from sepi.io.files import atomic_files, atomic_folder, atomic_path
 from sepi.io.hdf5 import Attribute, opened, stored, write_stage
 from sepi.io.images import write_png
 from sepi.io.pfm import write_pfm
@@ -41,6 +41,9 @@ RESULT_FILES = (
     RESULT,
 )
 """What :func:`write_result` always writes; ``depth.pfm`` and ``mask_NAME.png`` come with what it is given."""
+
+RUNTIME = "runtime.txt"
+"""Seconds that the command took, which it writes on request."""
 
 _DEPTH = "depth.pfm"
 
@@ -89,8 +92,8 @@ def write_result(
     of each boolean map, ``points.ply``, ``depth.pfm`` in metres where the light field has a camera, and ``result.h5``
     with everything: all maps, the view itself, the camera and ``attributes``. Equal content gives equal bytes.
 
-    A new folder appears whole or not at all; in an existing one each file is replaced at once, masks and depth of an
-    earlier run that this one does not make are removed, and other files are left alone.
+    A new folder appears whole or not at all; in an existing one the files are replaced when all are written, masks,
+    depth and run time of an earlier run that this one does not make are removed, and other files are left alone.
 
     Parameters
     ----------
@@ -120,10 +123,11 @@ def write_result(
     require_target(folder)
     # the folder itself may be a link to where there is room
     target = folder.resolve()
-    if target.is_dir() and any(target.iterdir()):
-        return _write_files(target, light_field, maps, attributes)
-    with atomic_folder(target) as temporary:
-        return _write_files(temporary, light_field, maps, attributes)
+    existing = target.is_dir() and any(target.iterdir())
+    with atomic_files(target) if existing else atomic_folder(target) as temporary:
+        names = _write_files(temporary, light_field, maps, attributes)
+    _remove_others(target, names)
+    return names
 
 
 def require_target(folder: Path) -> None:
@@ -214,8 +218,6 @@ def _write_files(
 ) -> tuple[str, ...]:
     masks = {f"mask_{name}.png": values for name, values in maps.extra.items() if values.dtype == bool}
     depth = {} if light_field.camera is None else {_DEPTH: light_field.camera.depth(maps.disparity)}
-    _remove_others(folder, {*masks, *depth})
-
     write_pfm(folder / "disparity.pfm", maps.disparity)
     with atomic_path(folder / "disparity.npy") as temporary, temporary.open("wb") as file:
         np.save(file, maps.disparity.astype("<f4"), allow_pickle=False)
@@ -243,10 +245,10 @@ def _write_all(path: Path, light_field: LightField, maps: StageMaps, attributes:
     write_stage(path, maps.updated(maps.disparity, maps.confidence, **more), {**attributes, **known})
 
 
-def _remove_others(folder: Path, made: set[str]) -> None:
+def _remove_others(folder: Path, made: Collection[str]) -> None:
     """Remove what an earlier run wrote and this one does not make."""
-    depth = [path for path in [folder / _DEPTH] if path.is_file()]
-    for path in depth + [path for path in folder.glob("mask_*.png") if _is_own_mask(path)]:
+    known = [path for path in (folder / _DEPTH, folder / RUNTIME) if path.is_file()]
+    for path in known + [path for path in folder.glob("mask_*.png") if _is_own_mask(path)]:
         if path.name not in made:
             try:
                 path.unlink()

@@ -64,6 +64,27 @@ def atomic_folder(path: Path) -> Iterator[Path]:
         _remove(temporary)
 
 
+@contextmanager
+def atomic_files(folder: Path) -> Iterator[Path]:
+    """Give a temporary folder inside ``folder`` to fill; move its files up on success, in order of their making.
+
+    Raises
+    ------
+    SepiError
+        If ``folder`` cannot be written to, or the disk is full.
+    """
+    temporary = _temporary_for(folder / "files", "")
+    try:
+        temporary.mkdir()
+        yield temporary
+        for path in sorted(temporary.iterdir(), key=lambda path: path.stat().st_mtime_ns):
+            path.replace(folder / path.name)
+    except OSError as error:
+        raise SepiError(f"{folder}: cannot be written ({error.strerror or error})") from error
+    finally:
+        _remove(temporary)
+
+
 def _temporary_for(path: Path, suffix: str) -> Path:
     # the token keeps two programs that write the same file apart; a long name is cut so that the whole fits
     temporary = path.parent / f".{path.stem[:40]}-{secrets.token_hex(6)}{suffix}"

@@ -25,7 +25,7 @@ import numpy as np
 from sepi.camera import Camera, camera_from
 from sepi.errors import SepiError
 from sepi.io.images import png_size, read_picture
-from sepi.io.options import ReadOptions, require_unused
+from sepi.io.options import ReadOptions, place_of, require_unused
 from sepi.io.pfm import read_pfm
 from sepi.io.view_files import read_arranged
 from sepi.lightfield import BoolMap, DisparityRange, FloatMap, LightField
@@ -82,8 +82,8 @@ def read(path: Path, options: ReadOptions) -> LightField:
             "disparities change with the size, so set image_resolution, disp_min and disp_max for these views"
         )
     # ground truth and masks belong to the centre view of the folder's own grid
-    with_truth = arranged.place_of(grid[0] // 2 * grid[1] + grid[1] // 2)
-    read_truth = with_truth is not None and options.view in (None, with_truth)
+    with_truth = place_of(arranged.numbers, grid[0] // 2 * grid[1] + grid[1] // 2)
+    read_truth = with_truth is not None and options.view in (None, with_truth) and _has_truth(path)
     return LightField(
         views=arranged.views,
         name=parameters.scene or path.resolve().name,
@@ -94,7 +94,6 @@ def read(path: Path, options: ReadOptions) -> LightField:
         truth=_read_truth(path / TRUTH, shape) if read_truth else None,
         masks=_read_masks(path, shape) if read_truth else {},
         camera=_read_camera(path / PARAMETERS, shape),
-        notes=arranged.notes,
     )
 
 
@@ -209,6 +208,10 @@ def _pair(
             f"{path}: expected {'whole ' if kind is int else ''}numbers for {first} and {second}, "
             f"got '{values[first]}' and '{values[second]}'"
         ) from error
+
+
+def _has_truth(folder: Path) -> bool:
+    return (folder / TRUTH).is_file() or any(folder.glob("mask_*.png"))
 
 
 def _read_truth(path: Path, shape: tuple[int, int]) -> FloatMap | None:

@@ -22,7 +22,7 @@ from sepi.errors import SepiError
 from sepi.io.arrays import DEFLATE_RATIO, printable, rearranged
 from sepi.io.files import atomic_path
 from sepi.io.options import ReadOptions, require_unused
-from sepi.lightfield import DisparityRange, FloatMap, LightField
+from sepi.lightfield import RANGE_SOURCES, DisparityRange, FloatMap, LightField
 from sepi.stage import StageMaps
 
 Attribute = str | float | int | tuple[float, float]
@@ -88,17 +88,17 @@ def write_light_field(path: Path, light_field: LightField) -> None:
         file.create_dataset("views", data=light_field.views)
         file["views"].attrs["axes"] = "t s y x channel"
         file.create_dataset("present", data=light_field.present)
-        file.attrs["name"] = light_field.name
-        file.attrs["source"] = light_field.source
+        file.attrs["name"] = _fixed(light_field.name)
+        file.attrs["source"] = _fixed(light_field.source)
         if known is not None:
             file.attrs["disparity_range"] = (known.minimum, known.maximum)
-            file.attrs["disparity_range_source"] = known.source
+            file.attrs["disparity_range_source"] = _fixed(known.source)
         if light_field.view is not None:
             file.attrs["view"] = light_field.view
         if light_field.camera is not None:
             file.attrs["camera"] = astuple(light_field.camera)
         if light_field.notes:
-            file.attrs["notes"] = list(light_field.notes)
+            file.attrs["notes"] = [_fixed(note) for note in light_field.notes]
         if light_field.truth is not None:
             file.create_dataset("truth", data=light_field.truth)
             file["truth"].attrs["units"] = UNITS["disparity"]
@@ -119,10 +119,12 @@ def matches(path: Path) -> bool:
 
 def holds(path: Path, name: str) -> bool:
     """Whether ``path`` is a readable HDF5 file with a dataset of this name."""
+    if not path.is_file() or not h5py.is_hdf5(path):
+        return False
     try:
         with h5py.File(path, "r") as file:
             return name in file
-    except OSError:
+    except (OSError, LookupError, ValueError, RuntimeError):
         return False
 
 
@@ -142,16 +144,16 @@ def read_light_field(path: Path) -> LightField:
         known = None
         if "disparity_range" in file.attrs:
             minimum, maximum = (float(value) for value in file.attrs["disparity_range"])
-            known = DisparityRange(minimum, maximum, str(file.attrs["disparity_range_source"]))
+            known = DisparityRange(minimum, maximum, _known_source(path, _text(path, file, "disparity_range_source")))
         view = file.attrs.get("view")
         return LightField(
             views=stored(path, file["views"]),
-            name=str(file.attrs["name"]),
-            source=str(file.attrs["source"]),
+            name=_text(path, file, "name"),
+            source=_text(path, file, "source"),
             present=stored(path, file["present"]).astype(bool),
             view=None if view is None else (int(view[0]), int(view[1])),
             camera=Camera(*map(float, file.attrs["camera"])) if "camera" in file.attrs else None,
-            notes=tuple(str(note) for note in file.attrs.get("notes", ())),
+            notes=tuple(_text(path, file, "notes").split("\0")) if "notes" in file.attrs else (),
             disparity_range=known,
             truth=stored(path, file["truth"]).astype(np.float32) if "truth" in file else None,
             masks={name: stored(path, file["masks"][name]).astype(bool) for name in file.get("masks", {})},
@@ -237,6 +239,26 @@ def created(path: Path) -> Iterator[h5py.File]:
             yield file
         if disk.failure is not None:
             raise disk.failure
+
+
+def _fixed(text: str) -> np.bytes_:
+    """Text to be stored at a fixed length; HDF5 may hang on a damaged file that holds text of variable length."""
+    return np.bytes_(text.encode() or b"\0")
+
+
+def _text(path: Path, file: h5py.File, key: str) -> str:
+    """Text of an attribute; several texts are joined by NUL."""
+    kind = file.attrs.get_id(key).get_type()
+    if not isinstance(kind, h5py.h5t.TypeStringID) or kind.is_variable_str():
+        raise SepiError(f"{path}: not a light field of this package: attribute '{key}' is no text of fixed length")
+    values = np.ravel(file.attrs[key]).tolist()
+    return "\0".join(value.decode("utf-8", "replace") for value in values)
+
+
+def _known_source(path: Path, source: str) -> str:
+    if source not in RANGE_SOURCES:
+        raise SepiError(f"{path}: damaged: a disparity range {source!r}; expected one of {', '.join(RANGE_SOURCES)}")
+    return source
 
 
 class _Disk(io.FileIO):

@@ -18,7 +18,7 @@ import numpy.typing as npt
 from sepi.errors import SepiError
 from sepi.io.files import atomic_path
 from sepi.io.picture_headers import PNG_SIGNATURE, Header, header_of
-from sepi.lightfield import BoolMap
+from sepi.lightfield import HIGHEST, LOWEST, BoolMap
 
 Pixels = npt.NDArray[np.integer[Any] | np.floating[Any]]
 
@@ -26,9 +26,6 @@ SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp",
 """Ends of names, in small letters, of the pictures that can be read."""
 
 _MAX_BYTES = 2**32
-
-# as far beyond 0..1 as light fields may go, for what resampling overshoots
-_LOWEST, _HIGHEST = -0.5, 1.5
 
 
 def read_picture(path: Path) -> Pixels:
@@ -50,7 +47,7 @@ def read_picture(path: Path) -> Pixels:
     data = _read_bytes(path)
     header = header_of(path, data)
     image = _pnm_pixels(path, data, header) if header.kind == "PNM" else _decoded(path, data, header)
-    if image.dtype == np.float32 and not (image.min() >= _LOWEST and image.max() <= _HIGHEST):
+    if image.dtype == np.float32 and not (image.min() >= LOWEST and image.max() <= HIGHEST):
         what = f"{image.min():g} to {image.max():g}" if np.isfinite(image).all() else "NaN or infinite ones"
         raise SepiError(f"{path}: float pixels must be finite and within 0..1, got {what}; divide by white's value")
     return image
@@ -117,6 +114,21 @@ def png_size(path: Path) -> tuple[int, int]:
         raise SepiError(f"{path}: not a PNG")
     width, height = struct.unpack(">II", head[16:24])
     return height, width
+
+
+def picture_size(path: Path) -> tuple[int, int]:
+    """Height and width in pixels of a picture of any kind that is read; of a PNG from the header alone.
+
+    Raises
+    ------
+    SepiError
+        If the file is unreadable, or no such picture.
+    """
+    try:
+        return png_size(path)
+    except SepiError:
+        header = header_of(path, _read_bytes(path))
+        return header.height, header.width
 
 
 def write_png(path: Path, pixels: Pixels | BoolMap) -> None:

@@ -84,6 +84,8 @@ def variables(path: Path) -> dict[str, Variable]:
             while at < size:
                 file.seek(at)
                 kind, held = struct.unpack(order + "II", file.read(8))
+                if kind == 0:
+                    raise _damaged(path, "zeros stand where a variable should begin")
                 if at + 8 + held > size:
                     raise _damaged(path, f"it ends {at + 8 + held - size} bytes too early")
                 variable = _variable(path, file, order, kind, (at + 8, held))

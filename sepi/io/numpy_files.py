@@ -81,6 +81,18 @@ def read(path: Path, options: ReadOptions) -> LightField:
     return light_field_from_array(array, name=path.stem, source=str(path), options=options)
 
 
+def read_array(path: Path) -> Array:
+    """The array of a ``.npy`` file, mapped: its values are read when they are used.
+
+    Raises
+    ------
+    SepiError
+        If the file cannot be read, is damaged or holds Python objects.
+    """
+    with _damage_named(path), path.open("rb") as file:
+        return _read_npy(path, file)
+
+
 def _read_npy(path: Path, file: IO[bytes]) -> Array:
     header = _read_header(str(path), file)
     _require_values(str(path), header, path.stat().st_size - header.size)

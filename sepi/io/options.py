@@ -143,6 +143,12 @@ def require_unused(source: str, options: ReadOptions, names: Iterable[str]) -> N
             raise SepiError(f"{source}: {flag} does not apply to this format; it is for {_MEANT_FOR[name]}")
 
 
+def place_of(numbers: Numbers, number: int) -> tuple[int, int] | None:
+    """Where a view of the given grid stands, ``(t, s)``; None where it was left out."""
+    places = np.argwhere(numbers == number)
+    return (int(places[0][0]), int(places[0][1])) if len(places) else None
+
+
 def position(text: str) -> tuple[int, int] | None:
     """``(t, s)`` from ``"T,S"``; None for any other text."""
     match = _POSITION.fullmatch(text)

@@ -99,10 +99,6 @@ def read_evaluation(path: Path) -> Evaluation:
         )
 
 
-def _floats(cell: h5py.Group) -> Scores:
-    return {name: float(value) for name, value in cell.attrs.items()}
-
-
 def _require_scores(path: Path, file: h5py.File) -> None:
     if "ground_truth" not in file.attrs:
         raise SepiError(f"{path}: not a score file (written by python -m sepi.evaluate): no attribute 'ground_truth'")

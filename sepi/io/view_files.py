@@ -28,19 +28,11 @@ class Arranged:
     present : ndarray, shape (T, S), bool
     numbers : ndarray, shape (T, S), int64
         Number of each view in the given grid; -1 for excluded ones.
-    notes : tuple of str
-        What was left out of the pictures, for the user.
     """
 
     views: Pixels
     present: BoolMap
     numbers: Numbers
-    notes: tuple[str, ...]
-
-    def place_of(self, number: int) -> tuple[int, int] | None:
-        """Where a view of the given grid stands; None where it was left out."""
-        places = np.argwhere(self.numbers == number)
-        return (int(places[0][0]), int(places[0][1])) if len(places) else None
 
 
 def read_arranged(folder: Path, files: Mapping[int, Path], grid: tuple[int, int], options: ReadOptions) -> Arranged:
@@ -73,7 +65,7 @@ def read_arranged(folder: Path, files: Mapping[int, Path], grid: tuple[int, int]
     if not options.follow_links:
         require_within(folder, paths)
     views = read_views(paths, [int(place) for place in places], numbers.size)
-    return Arranged(views.reshape(*numbers.shape, *views.shape[1:]), present, numbers, ())
+    return Arranged(views.reshape(*numbers.shape, *views.shape[1:]), present, numbers)
 
 
 def require_within(folder: Path, paths: Iterable[Path]) -> None:

@@ -79,7 +79,7 @@ def read(path: Path, options: ReadOptions) -> LightField:
         source=str(path),
         present=arranged.present,
         view=options.view,
-        notes=(*_left_out(unlike), *layout.notes, *arranged.notes),
+        notes=(*_left_out(unlike), *layout.notes),
     )
 
 

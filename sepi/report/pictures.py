@@ -31,7 +31,7 @@ def disparity_limits(light_field: LightField) -> tuple[float, float]:
 
 
 def centre_picture(light_field: LightField) -> Picture:
-    """The centre view."""
+    """The reference view."""
     centre = np.rint(255 * np.clip(light_field.centre, 0, 1)).astype(np.uint8)
     return np.repeat(centre, 3, axis=2) if centre.shape[2] == 1 else centre
 
@@ -51,14 +51,14 @@ def error_picture(error: FloatMap) -> Picture:
 
 
 def mask_picture(centre: Picture, mask: BoolMap) -> Picture:
-    """A mask (H, W) in orange over the darkened centre view."""
+    """A mask (H, W) in orange over the darkened reference view."""
     dark = centre.astype(np.float32) / 2
     dark[mask] = (dark[mask] + _MASK) / 2 + 32
     return np.clip(dark, 0, 255).astype(np.uint8)
 
 
 def outline_picture(centre: Picture, labels: npt.NDArray[np.integer[Any]]) -> Picture:
-    """Borders between regions of equal label (H, W) in yellow over the centre view."""
+    """Borders between regions of equal label (H, W) in yellow over the reference view."""
     border = np.zeros(labels.shape, bool)
     border[:, 1:] |= labels[:, 1:] != labels[:, :-1]
     border[1:] |= labels[1:] != labels[:-1]
