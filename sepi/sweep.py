@@ -91,8 +91,8 @@ def sweep(
 ) -> SweepResult:
     """Sweep the candidate disparities and keep the best one of each pixel and subset of views.
 
-    Scale and window are widened by the noise of the reference view, so that noise alone neither looks like a mismatch nor
-    like another surface.
+    Scale and window are widened by the noise of the reference view, so that noise alone neither looks like a mismatch
+    nor like another surface.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The pictures of a scene: reference view, truth, disparity after each stage, errors, masks; and one sheet of them all."""
+"""Pictures of a scene: reference view, truth, disparity after each stage, errors, masks; and one sheet of them all."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class Panel:
 def scene_panels(light_field: LightField, evaluation: Evaluation) -> list[Panel]:
     """What does not depend on the variant: reference view, and ground truth with its regions where there is any."""
     centre = centre_picture(light_field)
-    panels = [Panel("centre", "reference view", centre)]
+    panels = [Panel("centre", "centre view", centre)]
     if light_field.truth is not None:
         truth = map_picture(light_field.truth, disparity_limits(light_field))
         panels.append(Panel("truth", "ground truth", truth))
