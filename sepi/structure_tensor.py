@@ -55,7 +55,7 @@ def structure_tensor_depth(light_field: LightField, parameters: StructureTensorP
     Raises
     ------
     SepiError
-        If neither the row nor the column of the reference view has three views.
+        If the reference view is alone in its row and in its column.
     """
     t0, s0 = light_field.reference
     known = light_field.known_range()
@@ -63,14 +63,13 @@ def structure_tensor_depth(light_field: LightField, parameters: StructureTensorP
     confidence = np.zeros(light_field.shape, np.float32)
     row = [(s - s0, light_field.views[t0, s]) for s in range(light_field.grid[1]) if light_field.present[t0, s]]
     column = [(t - t0, light_field.views[t, s0]) for t in range(light_field.grid[0]) if light_field.present[t, s0]]
-    if max(len(row), len(column)) < 3:
+    if max(len(row), len(column)) < 2:
         raise SepiError(
-            f"{light_field.name}: the structure tensor needs at least three views in the row or in the column of view "
-            f"{t0},{s0}; it has {len(row)} and {len(column)}"
+            f"{light_field.name}: the structure tensor needs a second view in the row or in the column of view {t0},{s0}"
         )
     # a vertical EPI is the horizontal one of the transposed views
     for views, transposed in ((row, False), (column, True)):
-        if len(views) < 3:
+        if len(views) < 2:
             continue
         steps = [step for step, _ in views]
         images = [as_unit_float(view.transpose(1, 0, 2) if transposed else view) for _, view in views]
