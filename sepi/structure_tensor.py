@@ -65,7 +65,7 @@ def structure_tensor_depth(light_field: LightField, parameters: StructureTensorP
     column = [(t - t0, light_field.views[t, s0]) for t in range(light_field.grid[0]) if light_field.present[t, s0]]
     if max(len(row), len(column)) < 2:
         raise SepiError(
-            f"{light_field.name}: the structure tensor needs a second view in the row or in the column of view {t0},{s0}"
+            f"{light_field.name}: the structure tensor needs a second view in the row or the column of view {t0},{s0}"
         )
     # a vertical EPI is the horizontal one of the transposed views
     for views, transposed in ((row, False), (column, True)):

@@ -121,6 +121,7 @@ def sweep(
     groups = np.where(light_field.present, groups, -1)
     groups[light_field.reference] = -1  # the reference view agrees with itself at every candidate
     subsets = np.eye(groups.max() + 1, dtype=bool) if subsets is None else subsets
+    groups, subsets = _without_empty(groups, subsets)
     wanted = np.ones((H, W), bool) if wanted is None else wanted
     views = planar(light_field)
     noise = residual_variance(light_field.centre)
@@ -146,3 +147,12 @@ def sweep(
         )
         progress(min(H, first + strip) / H)
     return result
+
+
+def _without_empty(groups: npt.NDArray[np.int64], subsets: BoolMap) -> tuple[npt.NDArray[np.int64], BoolMap]:
+    """Groups numbered through, and the subsets of them, without those that have no view."""
+    used = np.unique(groups[groups >= 0])
+    numbers = np.full(subsets.shape[1] + 1, -1)
+    numbers[used] = np.arange(len(used))
+    # -1, no group, picks the last number, which is -1
+    return numbers[groups], np.ascontiguousarray(subsets[:, used])

@@ -69,5 +69,5 @@ def test_range_is_estimated_without_some_views(shape: str) -> None:
 
 def test_structure_tensor_says_what_it_needs() -> None:
     """It looks at one row and one column of views; without them a map of one value would look like a result."""
-    with pytest.raises(SepiError, match="a second view in the row or in the column of view 4,4"):
+    with pytest.raises(SepiError, match="a second view in the row or the column of view 4,4"):
         disparity_of(without(scene(), T == S), "no_sepi")
