@@ -1,7 +1,8 @@
-"""Mean shift on a patch of the image and of the depth map: the cue that confirms occlusion (section IV-B of [1]_).
+"""Mean shift [2]_, which climbs from a point to the mode of the distribution round it.
 
-Started at a pixel, mean shift climbs to the mode of the joint distribution of colour and disparity round it. The mode's
-disparity is that of the surface the pixel belongs to, free of the outliers that stand between two surfaces.
+On a patch of the image and of the depth map it confirms occlusion (section IV-B of [1]_): started at a pixel, it ends
+at the disparity of the surface that the pixel belongs to, free of the outliers that stand between two surfaces. On the
+colours of superpixels it finds those that belong together (section IV-C).
 
 References
 ----------
@@ -15,11 +16,15 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 from numba import njit, prange
 
 from sepi.lightfield import BoolMap, FloatMap
 
 ITERATIONS = 5
+
+MOST_ITERATIONS, ACCURACY = 50, 1e-3
+"""Where the search for a mode of samples ends: steps, or a step's part of the bandwidth."""
 
 
 def patch_modes(
@@ -83,3 +88,48 @@ def _patch_modes(image: Any, disparity: Any, wanted: Any, radius: int, factor: A
                 for c in range(C):
                     colour[c] = moved[c] / total
             modes[y, x] = depth
+
+
+def sample_modes(samples: npt.NDArray[np.float64], bandwidth: float) -> npt.NDArray[np.float64]:
+    """Mode that each of a few thousand samples belongs to, by a Gaussian kernel.
+
+    Parameters
+    ----------
+    samples : ndarray, shape (N, D), float64
+    bandwidth : float
+        Standard deviation of the kernel, in the samples' units.
+
+    Returns
+    -------
+    ndarray, shape (N, D), float64
+        Samples of one cluster get the same point but for the accuracy.
+    """
+    modes = np.ascontiguousarray(samples, np.float64).copy()
+    _sample_modes(np.ascontiguousarray(samples, np.float64), float(bandwidth), modes)
+    return modes
+
+
+@njit(cache=True, parallel=True)
+def _sample_modes(samples: Any, bandwidth: float, modes: Any) -> None:
+    N, D = samples.shape
+    factor = -0.5 / bandwidth**2
+    for n in prange(N):
+        moved = np.empty(D)
+        for _ in range(MOST_ITERATIONS):
+            total = 0.0
+            moved[:] = 0
+            for m in range(N):
+                distance = 0.0
+                for d in range(D):
+                    distance += (samples[m, d] - modes[n, d]) ** 2
+                weight = np.exp(factor * distance)
+                total += weight
+                for d in range(D):
+                    moved[d] += weight * samples[m, d]
+            step = 0.0
+            for d in range(D):
+                moved[d] /= total
+                step = max(step, abs(moved[d] - modes[n, d]))
+                modes[n, d] = moved[d]
+            if step < ACCURACY * bandwidth:
+                break

@@ -17,6 +17,7 @@ import numpy.typing as npt
 from skimage.segmentation import slic
 
 from sepi.lightfield import BoolMap, FloatMap
+from sepi.mean_shift import sample_modes
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
@@ -156,13 +157,4 @@ def colour_modes(centre: FloatMap, segments: Superpixels, bandwidth: float) -> F
     chroma = saturation * value
     cone = (chroma * np.cos(np.radians(hue)), chroma * np.sin(np.radians(hue)), value)
     samples = np.stack([segments.means(axis) for axis in cone], axis=1)
-    modes = samples.copy()
-    for _ in range(50):
-        distance = ((modes[:, None] - samples[None]) ** 2).sum(axis=2)
-        weight = np.exp(-0.5 * distance / bandwidth**2)
-        # einsum, not @: a BLAS product changes its last bits with the number of threads
-        moved = np.einsum("ij,jk->ik", weight, samples) / weight.sum(axis=1, keepdims=True)
-        if np.abs(moved - modes).max() < 1e-3 * bandwidth:
-            break
-        modes = moved
-    return modes
+    return sample_modes(samples, bandwidth)

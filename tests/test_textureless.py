@@ -5,6 +5,7 @@ import pytest
 from scipy.ndimage import binary_erosion, gaussian_filter
 
 from sepi.lightfield import DisparityRange, LightField
+from sepi.mean_shift import sample_modes
 from sepi.planes import Coupling, basis, evaluate_planes, fit_planes, propagate
 from sepi.scenes import render
 from sepi.stage import StageMaps, no_progress
@@ -169,3 +170,18 @@ def test_colour_modes_join_what_looks_alike():
     modes = colour_modes(centre, segments, 0.03)
     assert np.abs(modes[0] - modes[1]).max() < 0.01
     assert np.abs(modes[1] - modes[2]).max() > 0.2
+
+
+def test_sample_modes_equal_their_numpy_twin():
+    """Superpixels of one colour that end at different points are kept apart, and depth does not travel between them."""
+    generator = np.random.default_rng(3)
+    centres = generator.random((5, 3))
+    samples = np.repeat(centres, 20, axis=0) + generator.normal(0, 0.01, (100, 3))
+    modes = sample_modes(samples, 0.03)
+    expected = samples.copy()
+    for _ in range(200):
+        weight = np.exp(-0.5 * ((expected[:, None] - samples[None]) ** 2).sum(axis=2) / 0.03**2)
+        expected = weight @ samples / weight.sum(axis=1, keepdims=True)
+    np.testing.assert_allclose(modes, expected, atol=0.03 * 0.01)
+    for cluster in modes.reshape(5, 20, 3):
+        assert np.ptp(cluster, axis=0).max() < 0.03 * 0.01
