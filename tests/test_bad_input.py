@@ -1,8 +1,9 @@
 """Bad input of every kind, given to ``sepi depth`` as a user would: one clear line, exit code 1, nothing written."""
 
 import os
+import tempfile
 import zipfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -338,16 +339,46 @@ def test_there_are_many_cases() -> None:
     assert len(CASES) >= 50
 
 
-@pytest.mark.skipif(os.geteuid() == 0, reason="root may read and write everywhere")
-@pytest.mark.parametrize("words", ["in", "in.npy -o locked/out"])
-def test_unreadable_input_and_unwritable_target(words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    npy()
+@pytest.fixture
+def as_nobody(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """An open folder to work in, without the rights of root, who may read and write everywhere."""
+    with tempfile.TemporaryDirectory(prefix="sepi-test-") as folder:
+        monkeypatch.chdir(folder)
+        Path(folder).chmod(0o777)
+        root = os.geteuid() == 0
+        if root:
+            # all that the command imports when it runs, from places that nobody may not read
+            assert CliRunner().invoke(main, ["depth", str(npy(name="first.npy"))]).exit_code == 0
+            os.seteuid(65534)
+        try:
+            yield Path(folder)
+        finally:
+            if root:
+                os.seteuid(0)
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ("in", "in/view_1_1.png: cannot be read (Permission denied)"),
+        ("in.npy", "in.npy: cannot be read (Permission denied)"),
+        ("closed/in", "closed/in"),
+        ("open.npy -o locked/out", "locked/out: cannot be written"),
+    ],
+)
+def test_unreadable_input_and_unwritable_target(as_nobody: Path, words: str, message: str) -> None:
     pictures()[4].chmod(0)
+    npy().chmod(0)
+    npy(name="open.npy")
+    Path("closed").mkdir(mode=0o000)
     Path("locked").mkdir(mode=0o500)
     called = CliRunner().invoke(main, ["depth", *words.split()])
+    assert isinstance(called.exception, SystemExit), called.exception
     assert called.exit_code == 1
-    assert "cannot be" in called.stderr
+    (line,) = called.stderr.splitlines()
+    assert message in line
+    Path("closed").chmod(0o700)
+    assert list(Path("locked").iterdir()) == []
 
 
 @pytest.mark.parametrize("name", ["mit Leerzeichen", "Größe-光場", "-minus", "a.b.c", "%s{x}"])
