@@ -11,7 +11,7 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from sepi.datasets import Scene, archive_scenes_in, own_scene, scenes_in
+from sepi.datasets import Scene, own_scene, scenes_in
 from sepi.errors import SepiError
 from sepi.io import FORMATS
 from sepi.io.options import ORDERS
@@ -216,7 +216,7 @@ def _scenes(config: Config) -> dict[tuple[str, str], Scene]:
     if config.hci_root:
         scenes += scenes_in(Path(config.hci_root).expanduser(), "hci", "config.hci_root")
     if config.hci_old_root:
-        scenes += archive_scenes_in(Path(config.hci_old_root).expanduser(), "hci_old", "config.hci_old_root")
+        scenes += scenes_in(Path(config.hci_old_root).expanduser(), "hci_old", "config.hci_old_root")
     for name, values in config.light_fields.items():
         where = f"config.light_fields.{name}"
         own = validated(OwnLightField, values, where)

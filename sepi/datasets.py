@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -64,41 +64,18 @@ class Scene:
 
 
 def scenes_in(root: Path, dataset: str, where: str) -> list[Scene]:
-    """Every light field below a folder, by name.
+    """Every light field of a dataset below a folder, by name.
 
-    A scene is a folder with ``input_Cam*.png``; ``root`` may be one itself, or hold scenes or categories of scenes.
-
-    Parameters
-    ----------
-    root : Path
-        Folder to look in.
-    dataset : str
-        Name of the dataset that the scenes belong to.
-    where : str
-        The key that named ``root``, for messages.
-
-    Raises
-    ------
-    SepiError
-        If there is no such folder, no scene in it, two scenes of one name, or a name that is no plain word.
-    """
-    if not root.is_dir():
-        raise SepiError(f"{where}: no folder '{root}'")
-    scenes = [_scene_of(folder, dataset) for folder in _scene_folders(root.resolve(), _DEPTH)]
-    return _checked(scenes, where, f"no scene in '{root}' (expected folders with {VIEW_PATTERN})")
-
-
-def archive_scenes_in(root: Path, dataset: str, where: str) -> list[Scene]:
-    """Every light field of the HCI archive of 2013 below a folder, by name.
-
-    A scene is an HDF5 file with a dataset ``LF``. It has the file's name, or its folder's where the file is ``lf.h5``.
+    A scene of ``hci`` is a folder with ``input_Cam*.png``; ``root`` may be one itself, or hold scenes or categories of
+    scenes. A scene of ``hci_old`` is an HDF5 file with a dataset ``LF``; it has the file's name, or its folder's where
+    the file is ``lf.h5``.
 
     Parameters
     ----------
     root : Path
         Folder to look in, or one such file.
     dataset : str
-        Name of the dataset that the scenes belong to.
+        ``"hci"`` or ``"hci_old"``.
     where : str
         The key that named ``root``, for messages.
 
@@ -107,15 +84,18 @@ def archive_scenes_in(root: Path, dataset: str, where: str) -> list[Scene]:
     SepiError
         If there is no such folder, no scene in it, two scenes of one name, or a name that is no plain word.
     """
-    if not root.exists():
+    find, expected = _FINDERS[dataset]
+    if not (root.is_dir() or (root.is_file() and dataset == "hci_old")):
         raise SepiError(f"{where}: no folder '{root}'")
-    found = [root.resolve()] if root.is_file() else sorted(_files_below(root.resolve(), _DEPTH))
-    files = [path for path in found if hci_old.matches(path)]
-    scenes = []
-    for path in files:
-        name = path.parent.name if path.stem.lower() == "lf" else path.stem
-        scenes.append(Scene(dataset, name, path, (path,), *_rough_size((path,))))
-    return _checked(scenes, where, f"no scene in '{root}' (expected HDF5 files with a dataset LF)")
+    scenes = list(find(root.resolve()))
+    if not scenes:
+        raise SepiError(f"{where}: no scene in '{root}' (expected {expected})")
+    for name, count in Counter(scene.name for scene in scenes).items():
+        _require_plain(name, where)
+        if count > 1:
+            both = " and ".join(str(scene.source) for scene in scenes if scene.name == name)
+            raise SepiError(f"{where}: two scenes are called '{name}': {both}")
+    return sorted(scenes, key=lambda scene: scene.name)
 
 
 def own_scene(name: str, source: Path, flags: tuple[str, ...], where: str) -> Scene:
@@ -126,51 +106,46 @@ def own_scene(name: str, source: Path, flags: tuple[str, ...], where: str) -> Sc
     SepiError
         If nothing is there, or ``name`` is no plain word.
     """
+    _require_plain(name, where)
     if not source.exists():
         raise SepiError(f"{where}: no file or folder '{source}'")
     source = source.resolve()
     inside = [path for path in sorted(source.iterdir()) if path.is_file()] if source.is_dir() else [source]
     files = tuple(path for path in inside if not path.name.startswith("."))
-    scene = Scene("own", name, source, files, *_rough_size(files), flags=flags)
-    return _checked([scene], where, "")[0]
+    return Scene("own", name, source, files, *_rough_size(files), flags=flags)
 
 
-def _checked(scenes: list[Scene], where: str, none: str) -> list[Scene]:
-    """The scenes by name, each of a name that no other has and that can be a folder's."""
-    if not scenes:
-        raise SepiError(f"{where}: {none}")
-    for name, count in Counter(scene.name for scene in scenes).items():
-        if count > 1:
-            both = " and ".join(str(scene.source) for scene in scenes if scene.name == name)
-            raise SepiError(f"{where}: two scenes are called '{name}': {both}")
-        if not _NAME.fullmatch(name):
-            raise SepiError(f"{where}: a scene must be named with letters, digits and _ . + - only: '{name}'")
-    return sorted(scenes, key=lambda scene: scene.name)
+def _require_plain(name: str, where: str) -> None:
+    if not _NAME.fullmatch(name):
+        raise SepiError(f"{where}: a scene must be named with letters, digits and _ . + - only: '{name}'")
 
 
-def _files_below(folder: Path, depth: int) -> Iterator[Path]:
-    for inner in folder.iterdir():
-        if inner.name.startswith("."):
-            continue
-        if inner.is_file():
-            yield inner
-        elif depth and inner.is_dir():
-            yield from _files_below(inner, depth - 1)
-
-
-def _scene_folders(folder: Path, depth: int) -> Iterator[Path]:
-    if any(folder.glob(VIEW_PATTERN)):
-        yield folder
+def _benchmark_scenes(folder: Path, depth: int = _DEPTH) -> Iterator[Scene]:
+    views = sorted(folder.glob(VIEW_PATTERN))
+    if views:
+        others = sorted({path for pattern in _OTHER_PATTERNS for path in folder.glob(pattern)})
+        yield Scene("hci", folder.name, folder, (*views, *others), *_rough_size(views))
     elif depth:
         for inner in sorted(folder.iterdir()):
             if inner.is_dir() and not inner.name.startswith("."):
-                yield from _scene_folders(inner, depth - 1)
+                yield from _benchmark_scenes(inner, depth - 1)
 
 
-def _scene_of(folder: Path, dataset: str) -> Scene:
-    views = sorted(folder.glob(VIEW_PATTERN))
-    others = sorted({path for pattern in _OTHER_PATTERNS for path in folder.glob(pattern)})
-    return Scene(dataset, folder.name, folder, (*views, *others), *_rough_size(views))
+def _archive_scenes(path: Path, depth: int = _DEPTH + 1) -> Iterator[Scene]:
+    if path.is_dir() and depth:
+        for inner in sorted(path.iterdir()):
+            if not inner.name.startswith("."):
+                yield from _archive_scenes(inner, depth - 1)
+    elif hci_old.matches(path):
+        name = path.parent.name if path.stem.lower() == "lf" else path.stem
+        yield Scene("hci_old", name, path, (path,), *_rough_size((path,)))
+
+
+# dataset to what yields its scenes below a folder, and what is looked for
+_FINDERS: dict[str, tuple[Callable[[Path], Iterator[Scene]], str]] = {
+    "hci": (_benchmark_scenes, f"folders with {VIEW_PATTERN}"),
+    "hci_old": (_archive_scenes, f"HDF5 files with a dataset {hci_old.VIEWS}"),
+}
 
 
 def _rough_size(files: Sequence[Path]) -> tuple[int, int, int]:

@@ -68,39 +68,20 @@ class PointCloud:
         return "x right, y up, z towards the viewer", units
 
 
-def point_cloud(
-    light_field: LightField,
-    disparity: FloatMap,
-    confidence: FloatMap | None = None,
-    *,
-    min_confidence: float = 0.0,
-    max_depth: float | None = None,
-    step: int = 1,
-) -> PointCloud:
-    """Point cloud of a light field's reference view; see :func:`view_points`, which it calls.
-
-    Parameters
-    ----------
-    light_field : LightField
-        Gives the colours and, where it has one, the camera.
-    disparity, confidence, min_confidence, max_depth, step
-        As for :func:`view_points`.
+def point_cloud(light_field: LightField, disparity: FloatMap) -> PointCloud:
+    """Every point of a light field's reference view, in its colours, and metric where it has a camera.
 
     Raises
     ------
     SepiError
-        As :func:`view_points`.
+        If ``disparity`` is not of the view's shape (H, W).
     """
     (t, s), (rows, columns) = light_field.reference, light_field.grid
     return view_points(
         light_field.views[t, s],
         disparity,
-        confidence,
         camera=light_field.camera,
         from_centre=(t - rows // 2, s - columns // 2),
-        min_confidence=min_confidence,
-        max_depth=max_depth,
-        step=step,
     )
 
 

@@ -335,10 +335,6 @@ def test_bad_input(
     assert sorted(path for path in Path().rglob("*") if path.is_dir()) == folders
 
 
-def test_there_are_many_cases() -> None:
-    assert len(CASES) >= 50
-
-
 @pytest.fixture
 def as_nobody(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """An open folder to work in, without the rights of root, who may read and write everywhere."""

@@ -118,14 +118,15 @@ def test_unsure_far_and_skipped_pixels_are_left_out() -> None:
     disparity[0] = -2  # 12 m
     confidence = np.full((H, W), 0.5, np.float32)
     confidence[1], confidence[2, 0] = 0.4, np.nan
-    scene = light_field(camera=CAMERA)
-    assert len(point_cloud(scene, disparity, confidence, min_confidence=0.5).positions) == (H - 1) * W - 1
-    near = point_cloud(scene, disparity, max_depth=4.0)
+    view = light_field().views[2, 3]
+    sure = view_points(view, disparity, confidence, camera=CAMERA, min_confidence=0.5)
+    assert len(sure.positions) == (H - 1) * W - 1
+    near = view_points(view, disparity, camera=CAMERA, max_depth=4.0)
     assert len(near.positions) == (H - 1) * W
     assert (near.positions[:, 2] == -4).all()
-    thin = point_cloud(scene, disparity, step=10)
+    thin = view_points(view, disparity, camera=CAMERA, step=10)
     assert len(thin.positions) == 2 * 4
-    np.testing.assert_array_equal(thin.colours, scene.views[2, 3][::10, ::10].reshape(-1, 3))
+    np.testing.assert_array_equal(thin.colours, view[::10, ::10].reshape(-1, 3))
 
 
 BAD_CALLS = {

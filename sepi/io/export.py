@@ -224,7 +224,7 @@ def _write_files(
     _write_16bit(folder / "disparity_16bit.png", maps.disparity)
     write_png(folder / "disparity.png", coloured(maps.disparity))
     write_png(folder / "confidence.png", _levels(maps.confidence))
-    cloud = point_cloud(light_field, maps.disparity, maps.confidence)
+    cloud = point_cloud(light_field, maps.disparity)
     write_ply(folder / "points.ply", cloud.positions, cloud.colours, cloud.comments())
     for name, values in depth.items():
         write_pfm(folder / name, values)

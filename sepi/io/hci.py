@@ -70,7 +70,8 @@ def read(path: Path, options: ReadOptions) -> LightField:
         or ground truth or masks do not fit the views.
     """
     require_unused(str(path), options, ("pattern", "axes", "variable"))
-    parameters = _read_parameters(path / PARAMETERS) if (path / PARAMETERS).is_file() else _Parameters()
+    values = _values(path / PARAMETERS) if (path / PARAMETERS).is_file() else {}
+    parameters = _read_parameters(path / PARAMETERS, values)
     files = _numbered_views(path)
     grid = options.grid or parameters.grid or _square_grid(path, files)
     _require_inside(path, files, grid, "--grid" if options.grid else PARAMETERS)
@@ -93,7 +94,7 @@ def read(path: Path, options: ReadOptions) -> LightField:
         disparity_range=parameters.disparity_range,
         truth=_read_truth(path / TRUTH, shape) if read_truth else None,
         masks=_read_masks(path, shape) if read_truth else {},
-        camera=_read_camera(path / PARAMETERS, shape),
+        camera=_read_camera(path / PARAMETERS, values, shape),
     )
 
 
@@ -150,8 +151,7 @@ def _values(path: Path) -> dict[str, str]:
     return {key: value for section in parser.sections() for key, value in parser.items(section)}
 
 
-def _read_parameters(path: Path) -> _Parameters:
-    values = _values(path)
+def _read_parameters(path: Path, values: dict[str, str]) -> _Parameters:
     limits = _pair(path, values, "disp_min", "disp_max", float)
     if limits is not None and not (math.isfinite(limits[0]) and limits[0] < limits[1] < math.inf):
         raise SepiError(
@@ -165,11 +165,8 @@ def _read_parameters(path: Path) -> _Parameters:
     )
 
 
-def _read_camera(path: Path, shape: tuple[int, int]) -> Camera | None:
+def _read_camera(path: Path, values: dict[str, str], shape: tuple[int, int]) -> Camera | None:
     """Geometry from the parameters; None where they do not give all of it."""
-    if not path.is_file():
-        return None
-    values = _values(path)
     keys = ("focal_length_mm", "baseline_mm", "focus_distance_m", "sensor_size_mm")
     if not all(key in values for key in keys):
         return None

@@ -23,7 +23,7 @@ import numpy.typing as npt
 from sepi.camera import Camera
 from sepi.errors import SepiError
 from sepi.io.arrays import light_field_from_array
-from sepi.io.hdf5 import opened, require_stored, stored
+from sepi.io.hdf5 import holds, opened, require_stored, stored
 from sepi.io.options import ReadOptions, arranged, require_unused
 from sepi.lightfield import FloatMap, LightField
 
@@ -37,13 +37,7 @@ _SIZES = {"vRes": 0, "hRes": 1, "yRes": 2, "xRes": 3, "channels": 4}
 
 def matches(path: Path) -> bool:
     """Whether ``path`` is a readable HDF5 file with a dataset ``LF``."""
-    if not path.is_file() or not h5py.is_hdf5(path):
-        return False
-    try:
-        with h5py.File(path, "r") as file:
-            return VIEWS in file
-    except Exception:
-        return False
+    return holds(path, VIEWS)
 
 
 def read(path: Path, options: ReadOptions) -> LightField:
