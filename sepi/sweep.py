@@ -5,7 +5,7 @@ The straight line through a SEPI meets one sample of every view, so Eq. 3 of [1]
 ``(y - d (t - t0), x - d (s - s0))``. One ``(d, view)`` has one sub-pixel weight for the whole image, so a row is a run
 of contiguous multiply-adds that vectorises. Views are summed in *groups* (all of them for a SEPI; the parts from which
 half-SEPIs are put together), so one pass serves full and half SEPIs alike.
-The compiled loops are in :mod:`sepi.sweep_kernels`.
+The compiled loops are in :mod:`sepi.photo_consistency` and :mod:`sepi.sweep_kernels`.
 
 References
 ----------
@@ -23,8 +23,9 @@ from pydantic import Field
 
 from sepi.lightfield import BoolMap, FloatMap, LightField
 from sepi.noise import residual_variance
+from sepi.photo_consistency import sample_offsets
 from sepi.stage import Parameters, Progress, no_progress
-from sepi.sweep_kernels import ROWS_PER_TASK, sweep_rows
+from sepi.sweep_kernels import sweep_rows
 
 
 class SweepParameters(Parameters):
@@ -126,7 +127,10 @@ def sweep(
     views = planar(light_field)
     noise = residual_variance(light_field.centre)
     result = SweepResult(*(np.full((len(subsets), H, W), np.nan, np.float32) for _ in range(3)))
-    strip = ROWS_PER_TASK * get_num_threads()
+    disparities = light_field.known_range().candidates(parameters.candidates)
+    (T, S), (t0, s0) = light_field.grid, light_field.reference
+    rows = _rows_at_a_stretch(H, get_num_threads())
+    strip = rows * get_num_threads()
     for first in range(0, H, strip):
         sweep_rows(
             views,
@@ -137,7 +141,10 @@ def sweep(
             wanted,
             first,
             min(H, first + strip),
-            light_field.known_range().candidates(parameters.candidates),
+            rows,
+            disparities,
+            *sample_offsets(disparities, np.arange(T) - t0),
+            *sample_offsets(disparities, np.arange(S) - s0),
             np.float32((parameters.scale**2 + noise) * full_scale(views.dtype) ** 2),
             parameters.window_radius,
             np.float32(parameters.window_sigma**2 + noise),
@@ -147,6 +154,14 @@ def sweep(
         )
         progress(min(H, first + strip) / H)
     return result
+
+
+def _rows_at_a_stretch(height: int, threads: int) -> int:
+    """Rows of one task: four tasks for each thread, so that all have work and progress shows.
+
+    Rows of the window above and below a task are done again by its neighbours, so tasks must not be too low.
+    """
+    return max(16, min(128, -(-height // (4 * threads))))
 
 
 def _without_empty(groups: npt.NDArray[np.int64], subsets: BoolMap) -> tuple[npt.NDArray[np.int64], BoolMap]:

@@ -1,9 +1,11 @@
 """Compiled loops of the plane sweep.
 
 No cost volume is ever held: a thread keeps the cost rows of one aggregation window, and the minimum is taken as soon as
-a row is aggregated. Each row is summed by one thread in a fixed order: results do not depend on the number of threads.
+a pixel is aggregated. There the candidates of all groups of a pixel lie side by side: a window's weight is loaded once
+for all of them, and a pixel's costs stay in the first cache until its minima are found. Each pixel is summed by one
+thread in a fixed order: results do not depend on the number of threads.
 
-Functions work on one image row, or a part of it; only :func:`sweep_rows` runs in parallel.
+Only :func:`sweep_rows` runs in parallel.
 """
 
 from __future__ import annotations
@@ -14,126 +16,13 @@ from typing import Any
 import numpy as np
 from numba import njit, prange
 
-ROWS_PER_TASK = 64
-"""Rows that a thread does at a stretch; the rows of the window above and below are done again by its neighbours."""
+from sepi.photo_consistency import cost_row, count_views
 
-SHORTEST_GAP = 32
-"""Columns between wanted pixels that are done rather than skipped: short runs do not pay."""
+SHORTEST_GAP = 128
+"""Columns between wanted pixels that are done rather than skipped: starting anew costs as much."""
 
 TILE_WIDTH = 512
 """Columns done at a time: bounds what a thread holds, whatever the width of the picture, and keeps it in the cache."""
-
-
-@njit(inline="always")
-def _add_robust_gray(out: Any, a: Any, b: Any, g: Any, w: Any, scale2: Any) -> None:
-    """Add the robust residual of one run of pixels, one channel; ``a``, ``b``: rows above and below the samples."""
-    for x in range(out.size):
-        r = w[0] * a[x] + w[1] * a[x + 1] + w[2] * b[x] + w[3] * b[x + 1] - g[x]
-        r2 = r * r
-        out[x] += r2 / (r2 + scale2)
-
-
-@njit(inline="always")
-def _add_robust_rgb(
-    out: Any, a0: Any, b0: Any, a1: Any, b1: Any, a2: Any, b2: Any, g0: Any, g1: Any, g2: Any, w: Any, scale2: Any
-) -> None:
-    """Add the robust residual of one run of pixels, three channels."""
-    for x in range(out.size):
-        r0 = w[0] * a0[x] + w[1] * a0[x + 1] + w[2] * b0[x] + w[3] * b0[x + 1] - g0[x]
-        r1 = w[0] * a1[x] + w[1] * a1[x + 1] + w[2] * b1[x] + w[3] * b1[x + 1] - g1[x]
-        r2 = w[0] * a2[x] + w[1] * a2[x + 1] + w[2] * b2[x] + w[3] * b2[x + 1] - g2[x]
-        z = r0 * r0 + r1 * r1 + r2 * r2
-        out[x] += z / (z + scale2)
-
-
-@njit(cache=True, fastmath=True, error_model="numpy")
-def cost_row(
-    views: Any, t0: int, s0: int, groups: Any, y: int, begin: int, end: int, origin: int, disparities: Any, scale2: Any,
-    cost: Any, count: Any,
-) -> None:  # fmt: skip
-    """Photo-consistency of columns ``begin..end`` of row ``y``, summed over each group of views, for every candidate.
-
-    Parameters
-    ----------
-    views : ndarray, shape (T, S, C, H, W)
-        C is 1 or 3.
-    t0, s0 : int
-        Place of the reference view.
-    groups : ndarray, shape (T, S), int
-    y, begin, end : int
-    origin : int
-        Column of the picture that the first column of ``cost`` and ``count`` stands for.
-    disparities : ndarray, shape (K,), float32
-    scale2 : float32
-        Square of the robust scale, in the views' units.
-    cost, count : ndarray, shape (G, K, n), float32
-        Filled with the sum of the robust residuals (each 0..1) and the number of views that see the pixel.
-    """
-    T, S, C, H, W = views.shape
-    K = disparities.size
-    G = cost.shape[0]
-    cost[:] = 0
-    count[:] = 0
-    centre = views[t0, s0, :, y].astype(np.float32)
-    reach = max(abs(disparities[0]), abs(disparities[K - 1]))
-    band = np.empty((C, min(H, int(2 * reach * max(t0, T - 1 - t0)) + 4), W), np.float32)
-    # columns that any view and candidate touches
-    side = math.ceil(reach * max(s0, S - 1 - s0)) + 1
-    leftmost, rightmost = max(0, begin - side), min(W, end + side)
-    for t in range(T):
-        # rows of this view row that any candidate touches, converted once for all candidates
-        shift = -disparities * (t - t0)
-        low = max(0, min(H - 2, math.floor(y + shift.min())))
-        high = max(0, min(H - 2, math.floor(y + shift.max()))) + 1
-        for s in range(S):
-            g = groups[t, s]
-            if g < 0:
-                continue
-            for c in range(C):
-                for row in range(low, high + 1):
-                    band[c, row - low, leftmost:rightmost] = views[t, s, c, row, leftmost:rightmost]
-            for k in range(K):
-                v = y - disparities[k] * (t - t0)
-                if v < 0 or v > H - 1:
-                    continue
-                top = min(int(v), H - 2)
-                wy = np.float32(v - top)
-                u = -disparities[k] * (s - s0)
-                left = math.floor(u)
-                wx = np.float32(u - left)
-                # run of pixels whose sample lies inside the view
-                first = max(begin, -left)
-                last = min(end, W - 1 - left)
-                if last <= first:
-                    continue
-                i = first + left
-                j = last + left
-                n = top - low
-                # a plain 1 is a 64-bit number, and would make all that follows 64 bits wide
-                ry, rx = np.float32(1) - wy, np.float32(1) - wx
-                w = (ry * rx, ry * wx, wy * rx, wy * wx)
-                if C == 3:
-                    _add_robust_rgb(
-                        cost[g, k, first - origin : last - origin],
-                        band[0, n, i : j + 1], band[0, n + 1, i : j + 1], band[1, n, i : j + 1],
-                        band[1, n + 1, i : j + 1], band[2, n, i : j + 1], band[2, n + 1, i : j + 1],
-                        centre[0, first:last], centre[1, first:last], centre[2, first:last], w, scale2,
-                    )  # fmt: skip
-                else:
-                    _add_robust_gray(
-                        cost[g, k, first - origin : last - origin],
-                        band[0, n, i : j + 1], band[0, n + 1, i : j + 1], centre[0, first:last], w, scale2,
-                    )  # fmt: skip
-                # how many views see a pixel: ends of the runs, summed up below
-                count[g, k, first - origin] += 1
-                if last < end:
-                    count[g, k, last - origin] -= 1
-    for g in range(G):
-        for k in range(K):
-            n = np.float32(0)
-            for x in range(begin - origin, end - origin):
-                n += count[g, k, x]
-                count[g, k, x] = n
 
 
 @njit(cache=True, fastmath=True, error_model="numpy")
@@ -178,214 +67,234 @@ def window_weights(guide: Any, y: int, begin: int, end: int, radius: int, varian
 
 
 @njit(inline="always")
-def _add_seven(
-    target: Any, w0: Any, w1: Any, w2: Any, w3: Any, w4: Any, w5: Any, w6: Any,
-    a0: Any, a1: Any, a2: Any, a3: Any, a4: Any, a5: Any, a6: Any,
-) -> None:  # fmt: skip
-    """Add a row of the usual window, seven columns wide, at once: the target is loaded and stored once only."""
-    for x in range(target.size):
-        target[x] += (
-            (w0[x] * a0[x] + w1[x] * a1[x]) + (w2[x] * a2[x] + w3[x] * a3[x]) + (w4[x] * a4[x] + w5[x] * a5[x])
-            + w6[x] * a6[x]
-        )  # fmt: skip
+def _add_seven(target: Any, w: Any, a0: Any, a1: Any, a2: Any, a3: Any, a4: Any, a5: Any, a6: Any) -> None:
+    """Add a row of the usual window, seven pixels wide, at once: the target is loaded and stored once only."""
+    for k in range(target.size):
+        target[k] += (
+            (w[0] * a0[k] + w[1] * a1[k]) + (w[2] * a2[k] + w[3] * a3[k]) + (w[4] * a4[k] + w[5] * a5[k]) + w[6] * a6[k]
+        )
 
 
 @njit(cache=True, fastmath=True, error_model="numpy")
-def _aggregate_row(ring: Any, y: int, H: int, weights: Any, first: int, last: int, out: Any) -> None:
-    """Weighted sum of the rows round row ``y`` at columns ``first..last``; ``ring`` holds row ``r`` at ``r % size``.
-
-    ``ring`` has ``size - 1`` columns more than ``out``: those of the windows at both ends.
-    """
-    G, K, _ = out.shape
-    size = weights.shape[0]
-    radius = size // 2
-    n = last - first
-    for g in range(G):
-        for k in range(K):
-            target = out[g, k, first:last]
-            target[:] = 0
-            for i in range(size):
-                row = y + i - radius
-                if row < 0 or row >= H:
-                    continue
-                a = ring[row % size, g, k, first : last + size - 1]
-                if size == 7:
-                    _add_seven(
-                        target,
-                        weights[i, 0, first:last], weights[i, 1, first:last], weights[i, 2, first:last],
-                        weights[i, 3, first:last], weights[i, 4, first:last], weights[i, 5, first:last],
-                        weights[i, 6, first:last],
-                        a[0:n], a[1 : n + 1], a[2 : n + 2], a[3 : n + 3], a[4 : n + 4], a[5 : n + 5], a[6 : n + 6],
-                    )  # fmt: skip
-                else:
-                    for j in range(size):
-                        weight, source = weights[i, j, first:last], a[j : j + n]
-                        for x in range(n):
-                            target[x] += weight[x] * source[x]
-
-
-@njit(cache=True, error_model="numpy")
-def _best_of_run(
-    sums: Any, counts: Any, first: int, last: int, subset: Any, known: bool, wanted: Any, disparities: Any, total: Any,
-    disparity: Any, cost: Any, mean: Any,
-) -> None:  # fmt: skip
-    """Minimum over the candidates, at the wanted columns of ``first..last``, of the costs of the groups of one subset.
+def _aggregate(ring: Any, y: int, x: int, H: int, weights: Any, window: Any) -> None:
+    """Weighted sum over the window of pixel ``(y, x)``, of all groups and candidates at once.
 
     Parameters
     ----------
-    sums, counts : ndarray, shape (G, K, W), float32
-        Costs and numbers of samples of each group.
-    first, last : int
-    subset : ndarray, shape (G,), bool
-    known : bool
-        Whether every candidate has the numbers of samples of the first.
-    wanted : ndarray, shape (last - first,), bool
-    disparities : ndarray, shape (K,), float32
-    total : ndarray, shape (K, W), float32
-        Scratch.
-    disparity, cost, mean : ndarray, shape (last - first,), float32
-        Filled where wanted.
+    ring : ndarray, shape (size, n, G K), float32
+        Rows of costs, row ``r`` at ``r % size``, column ``x - radius`` at ``x``.
+    y, x, H : int
+    weights : ndarray, shape (size, size, n), float32
+    window : ndarray, shape (G K,), float32
+        Filled.
     """
-    G, K, _ = sums.shape
-    n = last - first
-    lowest = np.full(n, np.inf, np.float32)
-    best = np.zeros(n, np.int32)
-    over_candidates = np.zeros(n, np.float32)
-    number = np.empty(n, np.float32)
+    size = weights.shape[0]
+    window[:] = 0
+    for i in range(size):
+        row = y + i - size // 2
+        if row < 0 or row >= H:
+            continue
+        a = ring[row % size]
+        w = weights[i, :, x]
+        if size == 7:
+            _add_seven(
+                window, (w[0], w[1], w[2], w[3], w[4], w[5], w[6]),
+                a[x], a[x + 1], a[x + 2], a[x + 3], a[x + 4], a[x + 5], a[x + 6],
+            )  # fmt: skip
+        else:
+            for j in range(size):
+                weight, source = w[j], a[x + j]
+                for k in range(window.size):
+                    window[k] += weight * source[k]
+
+
+@njit(cache=True, fastmath=True, error_model="numpy")
+def _mean_costs(sums: Any, counts: Any, known: bool, subset: Any, total: Any) -> None:
+    """Mean cost of each candidate over the views of one subset of groups.
+
+    Parameters
+    ----------
+    sums : ndarray, shape (G, K), float32
+    counts : ndarray, shape (G, K), float32
+        Numbers of samples; of all candidates those of the first, where ``known``.
+    known : bool
+    subset : ndarray, shape (G,), bool
+    total : ndarray, shape (K,), float32
+        Filled.
+    """
+    G, K = sums.shape
+    total[:] = 0
+    number = np.float32(0)
+    for g in range(G):
+        if subset[g]:
+            number += counts[g, 0]
+            source = sums[g]
+            for k in range(K):
+                total[k] += source[k]
+    if known:
+        for k in range(K):
+            total[k] /= number
+        return
     for k in range(K):
-        row = total[k, 0:n]
-        row[:] = 0
-        if k == 0 or not known:
-            number[:] = 0
+        number = np.float32(0)
         for g in range(G):
             if subset[g]:
-                source = sums[g, k, first:last]
-                for x in range(n):
-                    row[x] += source[x]
-                if k == 0 or not known:
-                    source = counts[g, k, first:last]
-                    for x in range(n):
-                        number[x] += source[x]
-        for x in range(n):
-            # a candidate that no view of the subset sees is no match
-            value = row[x] / number[x] if number[x] > 0 else np.float32(1)
-            row[x] = value
-            over_candidates[x] += value
-            better = value < lowest[x]
-            lowest[x] = value if better else lowest[x]
-            best[x] = np.int32(k) if better else best[x]
+                number += counts[g, k]
+        # a candidate that no view of the subset sees is no match
+        total[k] = total[k] / number if number > 0 else np.float32(1)
+
+
+@njit(cache=True, fastmath=True, error_model="numpy")
+def _best_candidate(costs: Any, disparities: Any) -> Any:
+    """Disparity at the lowest of the costs, refined below the candidate step; that cost; the mean of all."""
+    K = disparities.size
+    lowest, total = costs[0], np.float32(0)
+    for k in range(K):
+        lowest = min(lowest, costs[k])
+        total += costs[k]
+    best = 0
+    while costs[best] != lowest:
+        best += 1
+    offset = np.float32(0)
+    # a perfect match needs no parabola, and the ends of the range allow none
+    if lowest > 0 and 0 < best < K - 1:
+        before, after = costs[best - 1], costs[best + 1]
+        curvature = before - 2 * lowest + after
+        if curvature > 0:
+            offset = np.float32(0.5) * (before - after) / curvature
     step = (disparities[K - 1] - disparities[0]) / np.float32(K - 1)
-    for x in range(n):
-        if not wanted[x]:
-            continue
-        k = best[x]
-        offset = np.float32(0)
-        # a perfect match needs no parabola, and the ends of the range allow none
-        if lowest[x] > 0 and 0 < k < K - 1:
-            before, after = total[k - 1, x], total[k + 1, x]
-            curvature = before - 2 * lowest[x] + after
-            if curvature > 0:
-                offset = np.float32(0.5) * (before - after) / curvature
-        disparity[x] = disparities[k] + offset * step
-        cost[x] = lowest[x]
-        mean[x] = over_candidates[x] / K
+    return disparities[best] + offset * step, lowest, total / np.float32(K)
 
 
 @njit(cache=True)
-def _wanted_runs(wanted: Any, runs: Any) -> int:
-    """Runs of columns that hold all wanted ones, into ``runs (N, 2)``, and how many; a short gap does not end a run."""
+def _needed_runs(wanted: Any, y: int, begin: int, end: int, radius: int, runs: Any) -> int:
+    """Runs of columns of row ``y`` that windows of wanted pixels touch, into ``runs (N, 2)``, and how many.
+
+    A short gap does not end a run. Rows of all tasks count, lest a run, and with it the way a compiler sums it up,
+    depend on how the rows are shared out.
+    """
+    H, W = wanted.shape
     number = 0
-    for x in range(wanted.size):
-        if not wanted[x]:
+    for x in range(begin, end):
+        needed = False
+        for row in range(max(0, y - radius), min(H, y + radius + 1)):
+            needed |= wanted[row, x]
+        if not needed:
             continue
-        if number and x - runs[number - 1, 1] < SHORTEST_GAP:
-            runs[number - 1, 1] = x + 1
+        first, last = max(0, x - radius), min(W, x + radius + 1)
+        if number and first - runs[number - 1, 1] < SHORTEST_GAP:
+            runs[number - 1, 1] = last
         else:
-            runs[number] = x, x + 1
+            runs[number] = first, last
             number += 1
     return number
+
+
+@njit(cache=True)
+def _transpose(costs: Any, columns: int, target: Any) -> None:
+    """The first columns of ``costs (G, K, N)`` as ``target (n, G K)``."""
+    G, K, _ = costs.shape
+    # a few columns at a time: their pixels of the target stay in the first cache
+    for begin in range(0, columns, 16):
+        end = min(columns, begin + 16)
+        for g in range(G):
+            for k in range(K):
+                source = costs[g, k]
+                for x in range(begin, end):
+                    target[x, g * K + k] = source[x]
+
+
+@njit(cache=True, error_model="numpy")
+def _fill_row(
+    views: Any, t0: int, s0: int, groups: Any, wanted: Any, row: int, begin: int, end: int, margin: int, radius: int,
+    down: Any, fy: Any, across: Any, fx: Any, scale2: Any, costs: Any, runs: Any, ring_row: Any, counts_row: Any,
+) -> None:  # fmt: skip
+    """Costs of one row into ``ring_row (n, G K)`` where they are needed, and near the border the views that see it."""
+    H, W = wanted.shape
+    origin = begin - radius
+    for r in range(_needed_runs(wanted, row, begin, end, radius, runs)):
+        first, last = runs[r]
+        cost_row(views, t0, s0, groups, row, first, last, down, fy, across, fx, scale2, costs)
+        _transpose(costs, last - first, ring_row[first - origin :])
+        # windows of pixels near the border reach this far
+        inner = margin + radius
+        if inner <= row < H - inner:
+            left, right = min(last, inner), max(first, W - inner)
+        else:
+            left, right = last, last
+        if first < left:
+            count_views(groups, H, W, row, first, left, down, fy, across, counts_row[first - origin :])
+        if max(right, left) < last:
+            from_column = max(right, left)
+            count_views(groups, H, W, row, from_column, last, down, fy, across, counts_row[from_column - origin :])
 
 
 @njit(cache=True, error_model="numpy")
 def _sweep_tile(
     views: Any, t0: int, s0: int, guide: Any, groups: Any, subsets: Any, wanted: Any,
-    top: int, bottom: int, begin: int, end: int, disparities: Any, scale2: Any, radius: int, window_variance: Any,
-    group_sizes: Any, margin: int,
+    top: int, bottom: int, begin: int, end: int, disparities: Any, down: Any, fy: Any, across: Any, fx: Any,
+    scale2: Any, radius: int, window_variance: Any, margin: int,
     disparity: Any, cost: Any, mean: Any,
 ) -> None:  # fmt: skip
     """Sweep rows ``top..bottom``, columns ``begin..end``; nearer than ``margin`` to the border, views are counted."""
-    H, W = views.shape[3:]
+    H, W = wanted.shape
     N, G = subsets.shape
     K = disparities.size
     size = 2 * radius + 1
     width = end - begin
-    # a row's costs, with those of the windows at both ends; zero outside the picture
-    ring = np.zeros((size, G, K, width + 2 * radius), np.float32)
-    counts = np.zeros((size, G, K, width + 2 * radius), np.float32)
+    # costs of the rows of a window, with the columns of the windows at both ends; zero outside the picture
+    ring = np.zeros((size, width + 2 * radius, G * K), np.float32)
+    counts = np.zeros((size, width + 2 * radius, G * K), np.float32)
+    costs = np.empty((G, K, width + 2 * radius), np.float32)
+    runs = np.empty((width // SHORTEST_GAP + 2, 2), np.int64)
     weights = np.empty((size, size, width), np.float32)
-    window_costs = np.empty((G, K, width), np.float32)
-    window_counts = np.empty((G, K, width), np.float32)
-    known_counts = np.empty((G, 1, width), np.float32)
+    sums = np.empty(G * K, np.float32)
+    numbers = np.empty(G * K, np.float32)
+    group_sizes = np.empty((G, K), np.float32)
     for g in range(G):
-        known_counts[g] = group_sizes[g]
-    total = np.empty((K, width), np.float32)
-    runs = np.empty((width // SHORTEST_GAP + 1, 2), np.int64)
+        group_sizes[g] = (groups == g).sum()
+    total = np.empty(K, np.float32)
     done = -1  # last row whose costs are in the ring
     for y in range(top, bottom):
-        number = _wanted_runs(wanted[y, begin:end], runs)
-        if number == 0:
+        if not wanted[y, begin:end].any():
             continue
         for row in range(max(0, y - radius, done + 1), min(H, y + radius + 1)):
-            cost_row(
-                views, t0, s0, groups, row, max(0, begin - radius), min(W, end + radius), begin - radius, disparities,
-                scale2, ring[row % size], counts[row % size],
+            _fill_row(
+                views, t0, s0, groups, wanted, row, begin, end, margin, radius, down, fy, across, fx, scale2, costs,
+                runs, ring[row % size], counts[row % size],
             )  # fmt: skip
             done = row
         window_weights(guide, y, begin, end, radius, window_variance, weights)
-        # away from the border every view sees every pixel of the window: nothing to count
-        known_from, known_to = end, end
-        if margin <= y < H - margin:
-            known_from = min(end, max(begin, margin))
-            known_to = max(known_from, min(end, W - margin))
-        for r in range(number):
-            _aggregate_row(ring, y, H, weights, runs[r, 0], runs[r, 1], window_costs)
-            for part in range(3):
-                # left of what is known, known, right of it
-                a = max(begin + runs[r, 0], (begin, known_from, known_to)[part])
-                b = min(begin + runs[r, 1], (known_from, known_to, end)[part])
-                if a >= b:
-                    continue
-                known = part == 1
-                if not known:
-                    _aggregate_row(counts, y, H, weights, a - begin, b - begin, window_counts)
-                numbers = known_counts if known else window_counts
-                for n in range(N):
-                    _best_of_run(
-                        window_costs, numbers, a - begin, b - begin, subsets[n], known, wanted[y, a:b],
-                        disparities, total, disparity[n, y, a:b], cost[n, y, a:b], mean[n, y, a:b],
-                    )  # fmt: skip
+        for x in range(begin, end):
+            if not wanted[y, x]:
+                continue
+            _aggregate(ring, y, x - begin, H, weights, sums)
+            # away from the border every view sees every pixel of the window: nothing to count
+            known = margin <= y < H - margin and margin <= x < W - margin
+            if not known:
+                _aggregate(counts, y, x - begin, H, weights, numbers)
+            seen = group_sizes if known else numbers.reshape(G, K)
+            for n in range(N):
+                _mean_costs(sums.reshape(G, K), seen, known, subsets[n], total)
+                disparity[n, y, x], cost[n, y, x], mean[n, y, x] = _best_candidate(total, disparities)
 
 
 @njit(cache=True, parallel=True)
 def sweep_rows(
     views: Any, t0: int, s0: int, guide: Any, groups: Any, subsets: Any, wanted: Any,
-    first: int, last: int, disparities: Any,
+    first: int, last: int, rows: int, disparities: Any, down: Any, fy: Any, across: Any, fx: Any,
     scale2: Any, radius: int, window_variance: Any, disparity: Any, cost: Any, mean: Any,
 ) -> None:  # fmt: skip
-    """Sweep rows ``first..last``, a run of them per thread."""
+    """Sweep rows ``first..last``, so many ``rows`` of them at a stretch."""
     W = views.shape[4]
-    G = subsets.shape[1]
-    group_sizes = np.array([(groups == g).sum() for g in range(G)], np.float32)
     reach = max(abs(disparities[0]), abs(disparities[-1]))
     farthest = max(t0, views.shape[0] - 1 - t0, s0, views.shape[1] - 1 - s0)
     margin = math.ceil(reach * farthest) + radius + 1
-    tasks = max(1, (last - first + ROWS_PER_TASK - 1) // ROWS_PER_TASK)
-    rows = (last - first + tasks - 1) // tasks
-    for task in prange(tasks):
+    for task in prange((last - first + rows - 1) // rows):
         for begin in range(0, W, TILE_WIDTH):
             _sweep_tile(
                 views, t0, s0, guide, groups, subsets, wanted,
                 first + task * rows, min(last, first + (task + 1) * rows), begin, min(W, begin + TILE_WIDTH),
-                disparities, scale2, radius, window_variance, group_sizes, margin,
+                disparities, down, fy, across, fx, scale2, radius, window_variance, margin,
                 disparity, cost, mean,
             )  # fmt: skip

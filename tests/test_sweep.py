@@ -9,9 +9,10 @@ from sepi.epi import line_cost, stitched_epi
 from sepi.errors import SepiError
 from sepi.lightfield import DisparityRange, LightField
 from sepi.noise import noise_level, residual_variance
+from sepi.photo_consistency import cost_row, sample_offsets
 from sepi.scenes import render
 from sepi.sweep import SweepParameters, sweep
-from sepi.sweep_kernels import TILE_WIDTH
+from sepi.sweep_kernels import SHORTEST_GAP, TILE_WIDTH
 from sepi.view_groups import halves_and_quarters
 
 
@@ -161,16 +162,45 @@ def test_equal_bytes_for_any_number_of_threads():
     """A rerun on another machine must give the same file."""
     light_field = render("curved_occluders", size=96, views=5)
     parameters = SweepParameters(candidates=31)
+    views = halves_and_quarters(light_field.grid)
+    scattered = np.random.default_rng(0).random(light_field.shape) < 0.01
     threads = numba.get_num_threads()
-    results = []
-    try:
-        for number in (1, threads):
-            numba.set_num_threads(number)
-            results.append(sweep(light_field, parameters))
-    finally:
-        numba.set_num_threads(threads)
-    np.testing.assert_array_equal(results[0].disparity, results[1].disparity)
-    np.testing.assert_array_equal(results[0].cost, results[1].cost)
+    for subsets, wanted in ((None, None), (views.subsets, scattered)):
+        results = []
+        try:
+            # the number of threads decides how the rows are shared out
+            for number in (1, threads):
+                numba.set_num_threads(number)
+                groups = None if subsets is None else views.groups
+                results.append(sweep(light_field, parameters, groups=groups, subsets=subsets, wanted=wanted))
+        finally:
+            numba.set_num_threads(threads)
+        for name in ("disparity", "cost", "mean"):
+            np.testing.assert_array_equal(getattr(results[0], name), getattr(results[1], name))
+
+
+def test_candidates_done_together_equal_candidates_done_alone():
+    """Dense candidates share the pixels that they read: a weight of one used for the other would blur the minimum."""
+    light_field = random_light_field(shape=(20, 40))
+    views = np.ascontiguousarray(light_field.views.transpose(0, 1, 4, 2, 3))
+    disparities = np.linspace(-1.3, 1.3, 61).astype(np.float32)
+    groups = halves_and_quarters(light_field.grid).groups
+    down = sample_offsets(disparities, np.arange(5) - 2)
+    across = sample_offsets(disparities, np.arange(4) - 2)
+    shared = (np.diff(down[0]) == 0).mean() * (np.diff(across[0]) == 0).mean()
+    assert 0.5 < shared < 1, "some candidates read the same pixels, some do not"
+    together, alone = np.empty((2, 9, 61, 40), np.float32)
+    for y in (0, 9, 19):
+        cost_row(views, 2, 2, groups, y, 0, 40, *down, *across, np.float32(900), together)
+        for k in range(61):
+            one = np.s_[:, k : k + 1]
+            single = np.empty((9, 1, 40), np.float32)
+            cost_row(
+                views, 2, 2, groups, y, 0, 40, *(np.ascontiguousarray(a[one]) for a in (*down, *across)),
+                np.float32(900), single,
+            )  # fmt: skip
+            alone[:, k] = single[:, 0]
+        np.testing.assert_allclose(together, alone, rtol=1e-5, atol=1e-6)
 
 
 def test_unwanted_pixels_stay_unknown_and_wanted_ones_unchanged():
@@ -181,6 +211,17 @@ def test_unwanted_pixels_stay_unknown_and_wanted_ones_unchanged():
     some, whole = sweep(light_field, parameters, wanted=wanted), sweep(light_field, parameters)
     assert np.isnan(some.disparity[0][~wanted]).all()
     np.testing.assert_array_equal(some.disparity[0][wanted], whole.disparity[0][wanted])
+
+
+def test_wanted_pixels_far_apart_equal_the_whole_picture():
+    """Columns between are passed over: a window cut short there would change the depth of the pixels beside."""
+    light_field = random_light_field(grid=(3, 3), shape=(9, 4 * SHORTEST_GAP))
+    parameters = SweepParameters(candidates=5, scale=0.3, window_radius=2, window_sigma=0.5)
+    wanted = np.zeros(light_field.shape, bool)
+    wanted[[0, 3, 3, 8], [5, 4, 2 * SHORTEST_GAP, 4 * SHORTEST_GAP - 1]] = True
+    some, whole = sweep(light_field, parameters, wanted=wanted), sweep(light_field, parameters)
+    for name in ("disparity", "cost", "mean"):
+        np.testing.assert_allclose(getattr(some, name)[0][wanted], getattr(whole, name)[0][wanted], rtol=1e-5)
 
 
 def test_unknown_range_is_an_error_that_says_what_to_give():
