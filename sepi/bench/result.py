@@ -1,0 +1,90 @@
+"""A benchmark's result: what was measured where, as JSON."""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+from dataclasses import asdict, dataclass
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from sepi.bench.measure import Measurement
+from sepi.errors import SepiError
+from sepi.io.files import atomic_path
+from sepi.provenance import package_version
+
+FORMAT = 1
+LIBRARIES = ("numpy", "scipy", "numba", "opencv-python-headless", "h5py", "pyamg")
+
+
+@dataclass(frozen=True)
+class Result:
+    """What one run measured.
+
+    Attributes
+    ----------
+    machine : mapping
+        Processor, cores and versions; no names of hosts or users.
+    settings : mapping
+        Scene, size, views, candidates, threads, repeats.
+    measurements : tuple of Measurement
+    """
+
+    machine: dict[str, Any]
+    settings: dict[str, Any]
+    measurements: tuple[Measurement, ...]
+
+    def group(self, name: str) -> dict[str, Measurement]:
+        """Measurements of one group by name."""
+        return {m.name: m for m in self.measurements if m.group == name}
+
+
+def this_machine() -> dict[str, Any]:
+    """Processor, cores that may be used, and versions."""
+    return {
+        "processor": _processor(),
+        "cores": len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count(),
+        "system": platform.system(),
+        "python": platform.python_version(),
+        "sepi": package_version(),
+        **{library: version(library) for library in LIBRARIES},
+    }
+
+
+def write(result: Result, path: Path) -> None:
+    """Write a result as JSON."""
+    content = {"format": FORMAT, **asdict(result)}
+    with atomic_path(path) as temporary:
+        temporary.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
+
+
+def read(path: Path) -> Result:
+    """Read a result.
+
+    Raises
+    ------
+    SepiError
+        If the file is missing or no result of a benchmark.
+    """
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+        if content["format"] != FORMAT:
+            raise SepiError(f"{path}: a benchmark's result of format {content['format']}, expected {FORMAT}")
+        measurements = tuple(Measurement(**{**m, "seconds": tuple(m["seconds"])}) for m in content["measurements"])
+        return Result(content["machine"], content["settings"], measurements)
+    except OSError as error:
+        raise SepiError(f"{path}: {error.strerror}") from error
+    except (ValueError, KeyError, TypeError) as error:
+        raise SepiError(f"{path}: not a benchmark's result (expected the JSON that `run` wrote)") from error
+
+
+def _processor() -> str:
+    try:
+        for line in Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():
+            if line.startswith("model name"):
+                return line.partition(":")[2].strip()
+    except OSError:
+        pass
+    return platform.processor() or platform.machine()
