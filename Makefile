@@ -1,6 +1,7 @@
 # make        environment, then `snakemake all` on the built-in scenes
 # make test   environment, then the whole test suite
 # make lint   style, format and types
+# make bench  environment, then times, memory and growth of the pipeline, to reports/
 # make clean  remove results and everything else that was made, but for the environment
 
 # the first Python here that is new enough
@@ -9,7 +10,7 @@ PYTHON := $(shell for p in python3 python3.11 python3.12 python3.13; do \
 BIN := .venv/bin
 READY := .venv/ready
 
-.PHONY: all test lint clean
+.PHONY: all test lint bench clean
 .DEFAULT_GOAL := all
 
 all: $(READY)
@@ -23,6 +24,9 @@ lint: $(READY)
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
 	$(BIN)/snakefmt --line-length 120 --check Snakefile rules
+
+bench: $(READY)
+	$(BIN)/python -m sepi.bench run
 
 clean:
 	find reports -mindepth 1 ! -name README.md -delete

@@ -157,11 +157,11 @@ def sweep(
 
 
 def _rows_at_a_stretch(height: int, threads: int) -> int:
-    """Rows of one task: four tasks for each thread, so that all have work and progress shows.
+    """Rows of one task: two tasks for each thread, so that all have work and progress shows.
 
     Rows of the window above and below a task are done again by its neighbours, so tasks must not be too low.
     """
-    return max(16, min(128, -(-height // (4 * threads))))
+    return max(16, min(128, -(-height // (2 * threads))))
 
 
 def _without_empty(groups: npt.NDArray[np.int64], subsets: BoolMap) -> tuple[npt.NDArray[np.int64], BoolMap]:

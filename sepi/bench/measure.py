@@ -157,7 +157,8 @@ def measured_command(group: str, name: str, words: Sequence[str], repeats: int) 
             [sys.executable, *words], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
         )
         assert process.stderr is not None  # it is a pipe
-        said = process.stderr.read()
+        with process.stderr as pipe:
+            said = pipe.read()
         _, status, usage = os.wait4(process.pid, 0)
         process.returncode = os.waitstatus_to_exitcode(status)
         seconds.append(time.perf_counter() - started)

@@ -25,9 +25,15 @@ Solver = Callable[[Any, Vector, Vector, float], Vector]
 MOST_STEPS = 20_000
 
 
-def ruge_stuben(matrix: Any, right: Vector, start: Vector, accuracy: float) -> Vector:
-    """The project's own: conjugate gradients with classical algebraic multigrid."""
+def own(matrix: Any, right: Vector, start: Vector, accuracy: float) -> Vector:
+    """The project's: Jacobi, and multigrid where that does not arrive soon."""
     return solve(matrix, right, start.astype(np.float32), accuracy)
+
+
+def ruge_stuben(matrix: Any, right: Vector, start: Vector, accuracy: float) -> Vector:
+    """Conjugate gradients with classical algebraic multigrid."""
+    hierarchy = pyamg.ruge_stuben_solver(matrix)
+    return np.asarray(hierarchy.solve(right, x0=start, tol=accuracy, accel="cg", maxiter=500))
 
 
 def smoothed_aggregation(matrix: Any, right: Vector, start: Vector, accuracy: float) -> Vector:
@@ -59,6 +65,7 @@ def direct(matrix: Any, right: Vector, start: Vector, accuracy: float) -> Vector
 
 SOLVERS: dict[str, Solver] = {
     "direct (SuperLU)": direct,
+    "sepi's": own,
     "multigrid, Ruge-Stuben + CG": ruge_stuben,
     "multigrid, smoothed aggregation + CG": smoothed_aggregation,
     "Jacobi + CG": jacobi,
