@@ -99,7 +99,7 @@ def _measure(scene: Scene, settings: dict[str, Any], groups: set[str], small: bo
     if "solvers" in groups:
         cases += solvers.cases(scene, threads)
     if "storage" in groups:
-        cases += storage.cases(scene, threads)
+        cases += storage.cases(scene, threads, list(storage.OPTIONS)[: 2 if small else None])
     if groups & {"growth", "large"}:
         cases += _growth_cases(scene, settings, groups, small)
     found = []

@@ -12,6 +12,9 @@ from sepi.pipeline import Variant, stage_parameters
 SIZE, VIEWS = 256, 9
 """Where the others stand while one of them grows."""
 
+SIZE_FOR_THREADS = 512
+"""Threads are for large pictures."""
+
 LARGE = (1024, 17)
 """Size and views a side of the large light field."""
 
@@ -37,6 +40,8 @@ def cases(folder: Path, growth: Growth, candidates: int, threads: int, variant: 
     for axis, values in with_threads.items():
         for value in values:
             at = {"size": _size(growth), "views": _views(growth), "candidates": candidates, "threads": threads}
+            if axis == "threads":
+                at["size"] = min(SIZE_FOR_THREADS, max(growth["size"]))
             at[axis] = value
             path = folder / f"{at['size']}x{at['views']}.h5"
             found += _both(f"{axis} {value}", path, at, variant)

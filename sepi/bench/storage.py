@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -60,11 +61,11 @@ def _size(path: Path) -> Figures:
     return {"megabytes": path.stat().st_size / 1e6}
 
 
-def cases(scene: Scene, threads: int) -> list[Case]:
+def cases(scene: Scene, threads: int, options: Sequence[str] = tuple(OPTIONS)) -> list[Case]:
     """Writing, then reading, of each content with each option."""
     return [
         Case(f"storage, {way.__name__}", f"{content}: {option}", way, (scene, content, option), threads=threads)
         for content in ("views", "maps", "masks")
-        for option in OPTIONS
+        for option in options
         for way in (write, read)
     ]
