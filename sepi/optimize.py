@@ -16,7 +16,6 @@ from __future__ import annotations
 import cv2
 import numpy as np
 import numpy.typing as npt
-import pyamg
 import scipy.sparse as sparse
 from pydantic import Field
 from scipy.sparse.linalg import cg
@@ -150,6 +149,8 @@ def solve(matrix: sparse.csr_matrix, right: FloatArray, start: FloatMap, accurac
     inverse = sparse.diags_array(1 / matrix.diagonal())
     solution, missed = cg(matrix, right, x0=vector, rtol=accuracy, maxiter=STEPS_BEFORE_MULTIGRID, M=inverse)
     if missed:
+        import pyamg  # slow to import, seldom needed
+
         hierarchy = pyamg.ruge_stuben_solver(matrix)
         solution = hierarchy.solve(right, x0=solution, tol=accuracy, accel="cg", maxiter=100)
     return np.asarray(solution).reshape(start.shape)

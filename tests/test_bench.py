@@ -1,4 +1,4 @@
-"""The benchmark: its measurements are of what they say, its plain implementations compute the same, its tables add up."""
+"""The benchmark measures what it says, its plain implementations compute the same, its tables add up."""
 
 import json
 import platform
@@ -59,21 +59,21 @@ class TestMeasuring:
         assert len(measured(Case("g", "n", holding, (1,), once=True), 4).seconds) == 1
 
     def test_failing_case_is_named(self) -> None:
-        with pytest.raises(SepiError, match="^benchmark g, n: ValueError: too bright$"):
+        with pytest.raises(SepiError, match=r"^benchmark g, n: ValueError: too bright$"):
             measured(Case("g", "n", failing), 1)
 
     def test_command_is_timed_from_start_to_end(self) -> None:
         found = measured_command("g", "n", ["-c", "import time; time.sleep(0.3)"], 2)
         assert len(found.seconds) == 2
         assert 0.3 < found.median < 3
-        with pytest.raises(SepiError, match="benchmark g, n: .*no such thing"):
+        with pytest.raises(SepiError, match=r"benchmark g, n: .*no such thing"):
             measured_command("g", "n", ["-c", "raise SystemExit('no such thing')"], 1)
 
 
 @pytest.mark.parametrize("warp", [by_numpy, by_scipy, by_opencv])
 @pytest.mark.parametrize("name", ["curved_occluders", "stripes"])
 def test_plain_implementations_give_the_compiled_costs(name: str, warp: Warp) -> None:
-    """A yardstick that computes something else measures nothing; this also bounds the rounding of the compiled sweep."""
+    """A yardstick that computes something else measures nothing. Bounds the compiled sweep's rounding, too."""
     light_field = render(name, size=64, views=5)
     parameters = SweepParameters(candidates=13)
     disparity, lowest = plain_sweep(light_field, parameters, warp)

@@ -1,6 +1,7 @@
 """Global optimisation: the energy, its solver against a direct one, and what it does to a map."""
 
 import numpy as np
+import pyamg
 import pytest
 from scipy.sparse.linalg import splu
 
@@ -19,7 +20,8 @@ def run(light_field, maps, **values):
     return CHOICES["wls"].run(light_field, maps, WlsParameters(**values), no_progress)
 
 
-def test_solver_agrees_with_a_direct_solve():
+@pytest.mark.parametrize(("alpha", "multigrid"), [(1e-10, False), (1e-6, True), (1e-3, True)])
+def test_solver_agrees_with_a_direct_solve(alpha, multigrid, monkeypatch):
     """Iterative solvers stop early where weights are tiny: pixels would be off by hundredths unnoticed."""
     generator = np.random.default_rng(2)
     shape = (90, 110)
@@ -28,10 +30,14 @@ def test_solver_agrees_with_a_direct_solve():
     weight = (10.0 ** generator.uniform(-8, 0, shape)).astype(np.float32)
     weight[30:60, 40:90] = 1e-8
     smoothness = (10.0 ** generator.uniform(1, 5, shape)).astype(np.float32)
-    matrix, right = energy_system(disparity, weight, smoothness, 1e-6)
+    matrix, right = energy_system(disparity, weight, smoothness, alpha)
+    hierarchies = []
+    ruge_stuben = pyamg.ruge_stuben_solver
+    monkeypatch.setattr(pyamg, "ruge_stuben_solver", lambda matrix: hierarchies.append(1) or ruge_stuben(matrix))
     direct = splu(matrix.tocsc()).solve(right).reshape(shape)
     solved = solve(matrix, right, disparity, WlsParameters().accuracy)
     assert np.abs(solved - direct).max() < 1e-3
+    assert bool(hierarchies) == multigrid, "both ways are tested"
 
 
 def test_energy_is_the_sum_of_equation_8():

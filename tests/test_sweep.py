@@ -1,5 +1,10 @@
 """The plane sweep equals a plain NumPy twin, the paper's SEPI construction, and itself on any number of threads."""
 
+import os
+import subprocess
+import sys
+from pathlib import Path
+
 import numba
 import numpy as np
 import pytest
@@ -238,3 +243,22 @@ def test_noise_level_is_the_noise_put_in():
     for sigma in (0.01, 0.08):
         noisy = (image + generator.normal(0, sigma, image.shape)).astype(np.float32)
         assert noise_level(noisy) == pytest.approx(sigma, rel=0.1)
+
+
+def test_kernels_are_compiled_once(tmp_path):
+    """A job that compiles takes half a minute instead of a second."""
+    program = (
+        "import numpy as np\n"
+        "from sepi.lightfield import DisparityRange, LightField\n"
+        "from sepi.sweep import SweepParameters, sweep\n"
+        "from sepi.sweep_kernels import sweep_rows\n"
+        "views = np.random.default_rng(0).integers(0, 255, (3, 3, 8, 9, 1), np.uint8)\n"
+        "sweep(LightField(views, 'x', disparity_range=DisparityRange(-1, 1, 'given')), SweepParameters(candidates=3))\n"
+        "print(sum(sweep_rows.stats.cache_hits.values()), sum(sweep_rows.stats.cache_misses.values()))\n"
+    )
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path), "PYTHONPATH": str(Path(__file__).parents[1])}
+    said = [
+        subprocess.run([sys.executable, "-c", program], env=environment, check=True, capture_output=True, text=True)
+        for _ in range(2)
+    ]
+    assert [run.stdout.split() for run in said] == [["0", "1"], ["1", "0"]]
