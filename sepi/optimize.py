@@ -29,7 +29,7 @@ FloatArray = npt.NDArray[np.float64]
 LEAST_CONFIDENCE = 0.01
 """Keeps the system solvable where no pixel is trusted."""
 
-STEPS_BEFORE_MULTIGRID = 150
+STEPS_BEFORE_MULTIGRID = 200
 """As long as setting up the multigrid takes."""
 
 
@@ -52,7 +52,9 @@ class WlsParameters(Parameters):
     tau_2: float = Field(1.5, ge=0, description="how strongly confidence weakens smoothness")
     textureless_confidence: float = Field(0.8, ge=0, le=1, description="c_tl, confidence of texture-less regions")
     confidence_power: float = Field(4.0, gt=0, le=10, description="exponent on the confidence as data weight")
-    accuracy: float = Field(1e-8, gt=0, lt=1, description="relative residual at which the solver stops")
+    accuracy: float = Field(
+        1e-12, gt=0, lt=1, description="relative residual at which the solver stops; pixels of low weight need it small"
+    )
 
 
 def wls(

@@ -20,7 +20,7 @@ def run(light_field, maps, **values):
     return CHOICES["wls"].run(light_field, maps, WlsParameters(**values), no_progress)
 
 
-@pytest.mark.parametrize(("alpha", "multigrid"), [(1e-10, False), (1e-6, True), (1e-3, True)])
+@pytest.mark.parametrize(("alpha", "multigrid"), [(1e-12, False), (1e-6, True), (1e-3, True)])
 def test_solver_agrees_with_a_direct_solve(alpha, multigrid, monkeypatch):
     """Iterative solvers stop early where weights are tiny: pixels would be off by hundredths unnoticed."""
     generator = np.random.default_rng(2)
@@ -36,7 +36,7 @@ def test_solver_agrees_with_a_direct_solve(alpha, multigrid, monkeypatch):
     monkeypatch.setattr(pyamg, "ruge_stuben_solver", lambda matrix: hierarchies.append(1) or ruge_stuben(matrix))
     direct = splu(matrix.tocsc()).solve(right).reshape(shape)
     solved = solve(matrix, right, disparity, WlsParameters().accuracy)
-    assert np.abs(solved - direct).max() < 1e-3
+    assert np.abs(solved - direct).max() < 1e-4
     assert bool(hierarchies) == multigrid, "both ways are tested"
 
 
