@@ -66,6 +66,7 @@ class TestMeasuring:
         found = measured_command("g", "n", ["-c", "import time; time.sleep(0.3)"], 2)
         assert len(found.seconds) == 2
         assert 0.3 < found.median < 3
+        assert found.peak_memory_mb < 50, "a bare interpreter: not the memory of the process that measures"
         with pytest.raises(SepiError, match=r"benchmark g, n: .*no such thing"):
             measured_command("g", "n", ["-c", "raise SystemExit('no such thing')"], 1)
 

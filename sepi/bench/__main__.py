@@ -18,7 +18,7 @@ from sepi.command import SepiGroup
 from sepi.errors import SepiError
 from sepi.io.files import atomic_path
 from sepi.pipeline import stage_parameters, variant_named
-from sepi.report.layout import Report, Section, as_markdown
+from sepi.report.layout import Report, Section, Table, as_markdown
 from sepi.scenes import SCENES
 
 _PATH = click.Path(path_type=Path)
@@ -138,7 +138,7 @@ def _page(result: Result) -> str:
     machine = ", ".join(f"{key} {value}" for key, value in result.machine.items())
     settings = ", ".join(f"{key} {value}" for key, value in result.settings.items())
     caption = f"Medians. {settings}.\n\nMachine: {machine}."
-    return as_markdown(Report("Benchmark", caption, tables.whole({}), tables.sections(result)))
+    return as_markdown(Report("Benchmark", caption, Table((), ()), tables.sections(result)))
 
 
 if __name__ == "__main__":

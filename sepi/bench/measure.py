@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import json
 import multiprocessing
-import os
 import statistics
 import subprocess
 import sys
@@ -142,28 +142,31 @@ def _measure(case: Case, repeats: int, sender: Connection) -> None:
         sender.send(" ".join(f"{type(error).__name__}: {error}".split()))
 
 
+# a process of its own, since a new process inherits the peak memory of the one that starts it
+_STARTER = """
+import json, resource, subprocess, sys, time
+started = time.perf_counter()
+code = subprocess.run(sys.argv[1:], stdout=subprocess.DEVNULL).returncode
+seconds = time.perf_counter() - started
+print(json.dumps([seconds, resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss, code]))
+"""
+
+
 def measured_command(group: str, name: str, words: Sequence[str], repeats: int) -> Measurement:
-    """Measure a command as a user would: the whole process from start to end; once before, to warm the disk.
+    """Measure a Python command as a user would: the whole process from start to end; once before, to warm the disk.
 
     Raises
     ------
     SepiError
         If it fails; the message holds its last words.
     """
-    seconds, memory = [], 0.0
+    seconds, peaks = [], []
     for _ in range(repeats + 1):
-        started = time.perf_counter()
-        process = subprocess.Popen(
-            [sys.executable, *words], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
-        )
-        assert process.stderr is not None  # it is a pipe
-        with process.stderr as pipe:
-            said = pipe.read()
-        _, status, usage = os.wait4(process.pid, 0)
-        process.returncode = os.waitstatus_to_exitcode(status)
-        seconds.append(time.perf_counter() - started)
-        # never below this small process's own, which a new one inherits
-        memory = max(memory, usage.ru_maxrss / (2**20 if sys.platform == "darwin" else 2**10))
-        if process.returncode:
-            raise SepiError(f"benchmark {group}, {name}: {' '.join(said.split()[-40:])}")
-    return Measurement(group, name, tuple(seconds[1:]), memory)
+        command = [sys.executable, "-I", "-S", "-c", _STARTER, sys.executable, *words]
+        called = subprocess.run(command, capture_output=True, text=True, check=True)
+        taken, peak, code = json.loads(called.stdout)
+        if code:
+            raise SepiError(f"benchmark {group}, {name}: {' '.join(called.stderr.split()[-40:])}")
+        seconds.append(taken)
+        peaks.append(peak / (2**20 if sys.platform == "darwin" else 2**10))
+    return Measurement(group, name, tuple(seconds[1:]), max(peaks))
