@@ -1,7 +1,8 @@
 """Compiled photo-consistency: how well each candidate disparity fits the views, for one row of the picture.
 
 One ``(candidate, view)`` has one sub-pixel weight for the whole picture, so a row is a run of contiguous multiply-adds
-that vectorises. Candidates next to each other mostly read the same pixels with other weights, so two are done at once.
+that vectorises. Candidates next to each other mostly read the same pixels with other weights; of colour pictures, two are
+done at once.
 """
 
 from __future__ import annotations
@@ -76,9 +77,9 @@ def _add_two_rgb(
         q1 = v[0] * a1[x] + v[1] * a1[x + 1] + v[2] * b1[x] + v[3] * b1[x + 1] - g[1][x]
         q2 = v[0] * a2[x] + v[1] * a2[x + 1] + v[2] * b2[x] + v[3] * b2[x + 1] - g[2][x]
         z = r0 * r0 + r1 * r1 + r2 * r2
-        y = q0 * q0 + q1 * q1 + q2 * q2
+        o = q0 * q0 + q1 * q1 + q2 * q2
         out[x] += z / (z + scale2)
-        other[x] += y / (y + scale2)
+        other[x] += o / (o + scale2)
 
 
 @njit(cache=True, fastmath=True, error_model="numpy")
@@ -155,7 +156,7 @@ def cost_row(
     rows = 2
     for t in range(T):
         rows = max(rows, down[t].max() - down[t].min() + 2)
-    band = np.empty((C, rows, W), np.float32)
+    band = np.empty((C, min(H, rows), W), np.float32)
     for t in range(T):
         low = max(0, min(H - 2, y + down[t].min()))
         high = max(0, min(H - 2, y + down[t].max())) + 1
@@ -189,18 +190,27 @@ def count_views(
     """
     T, S = groups.shape
     K = down.shape[1]
+    G = counts.shape[1] // K
+    # views of each group and view column that have the row, at each candidate
+    having = np.zeros((G, S, K), np.float32)
+    some = np.zeros((G, S), np.bool_)
+    for t in range(T):
+        for s in range(S):
+            g = groups[t, s]
+            if g < 0:
+                continue
+            some[g, s] = True
+            for k in range(K):
+                top = y + down[t, k]
+                if top >= 0 and (top < H - 1 or (top == H - 1 and fy[t, k] == 0)):
+                    having[g, s, k] += np.float32(1)
     for x in range(begin, end):
-        number = counts[x - begin]
-        number[:] = 0
-        for t in range(T):
+        counts[x - begin] = 0
+        for g in range(G):
+            number = counts[x - begin, g * K : (g + 1) * K]
             for s in range(S):
-                g = groups[t, s]
-                if g < 0:
-                    continue
-                of_group = number[g * K : (g + 1) * K]
-                whole, below, left = down[t], fy[t], across[s]
-                for k in range(K):
-                    top = y + whole[k]
-                    inside_rows = top >= 0 and (top < H - 1 or (top == H - 1 and below[k] == 0))
-                    inside_columns = x + left[k] >= 0 and x + left[k] < W - 1
-                    of_group[k] += np.float32(1) if inside_rows and inside_columns else np.float32(0)
+                if some[g, s]:
+                    left, of_column = across[s], having[g, s]
+                    for k in range(K):
+                        inside = x + left[k] >= 0 and x + left[k] < W - 1
+                        number[k] += of_column[k] if inside else np.float32(0)

@@ -34,7 +34,7 @@ class SweepParameters(Parameters):
     candidates: int = Field(181, ge=3, le=4001, description="number of candidate disparities, uniform over the range")
     scale: float = Field(
         0.0165,
-        gt=0,
+        ge=1e-6,
         le=2,
         description="residual at which the robust photo-consistency is one half; RGB distance, colours in 0..1",
     )
@@ -43,7 +43,7 @@ class SweepParameters(Parameters):
     )
     window_sigma: float = Field(
         0.02,
-        gt=0,
+        ge=1e-6,
         le=10,
         description="colour distance at which a window pixel's weight falls; RGB distance, colours in 0..1",
     )

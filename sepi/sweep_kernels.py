@@ -133,7 +133,8 @@ def _mean_costs(sums: Any, counts: Any, known: bool, subset: Any, total: Any) ->
                 total[k] += source[k]
     if known:
         for k in range(K):
-            total[k] /= number
+            # a subset without views matches nothing
+            total[k] = total[k] / number if number > 0 else np.float32(1)
         return
     for k in range(K):
         number = np.float32(0)
@@ -153,7 +154,7 @@ def _best_candidate(costs: Any, disparities: Any) -> Any:
         lowest = min(lowest, costs[k])
         total += costs[k]
     best = 0
-    while costs[best] != lowest:
+    while best < K - 1 and costs[best] != lowest:
         best += 1
     offset = np.float32(0)
     # a perfect match needs no parabola, and the ends of the range allow none

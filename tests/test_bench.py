@@ -1,9 +1,10 @@
 """The benchmark measures what it says, its plain implementations compute the same, its tables add up."""
 
 import json
-import platform
+import signal
 import subprocess
 import sys
+import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,7 +13,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from sepi.bench import tables
+from sepi.bench import plan, tables
 from sepi.bench.__main__ import main
 from sepi.bench.measure import Case, Measurement, Prepared, measured, measured_command
 from sepi.bench.plain import Warp, by_numpy, by_opencv, by_scipy, plain_sweep
@@ -105,7 +106,7 @@ class TestTables:
         found = result(
             measurement("floor", "sample", 2.0, operations=4e9),
             measurement("floor", "multiply-add of the window", 1.0, operations=1e10),
-            measurement("stages", "initial", 5.0, samples=4e9, **{WINDOW_OPERATIONS: 5e9}),
+            measurement("stages", "initial", 5.0, samples=4e9, channels=3, **{WINDOW_OPERATIONS: 5e9}),
             measurement("stages", "optimize", 5.0),
         )
         assert tables.floor_seconds(found, found.group("stages")["initial"]) == pytest.approx(2.5)
@@ -178,7 +179,7 @@ def test_machine_names_no_host_and_no_user() -> None:
     """Results are passed on."""
     machine = this_machine()
     assert {"processor", "cores", "python", "numba"} <= set(machine)
-    assert platform.node() not in str(machine)
+    assert not {"node", "host", "user", "path"} & set(machine)
 
 
 def test_small_run_measures_everything(tmp_path: Path) -> None:
@@ -192,15 +193,55 @@ def test_small_run_measures_everything(tmp_path: Path) -> None:
     assert groups >= {"whole", "stages", "floor", "growth, initial", "growth, all stages", "beside", "solvers"}
     assert all(min(m["seconds"]) > 0 and m["peak_memory_mb"] > 0 for m in content["measurements"])
     stages = {m["name"]: m["figures"] for m in content["measurements"] if m["group"] == "stages"}
+    assert content["settings"]["views"] == "5x5"
     assert stages["initial"]["samples"] == 24 * 21 * 64 * 64
     assert 0 < stages["optimize"]["mse100"] < stages["initial"]["mse100"]
     page = (tmp_path / "bench.md").read_text()
-    for heading in ("Whole", "Steps", "Growth with size", "Initial stage beside plain ones", "HDF5 compression"):
+    for heading in (
+        "Whole",
+        "Steps",
+        "Growth with size, built-in scene",
+        "Initial stage beside plain ones",
+        "HDF5 compression",
+    ):
         assert f"## {heading}\n" in page
     assert cv2.imread(str(tmp_path / "bench.png")) is not None
     again = CliRunner().invoke(main, ["compare", *[str(tmp_path / "bench.json")] * 2])
     assert again.exit_code == 0
     assert again.stdout.count("| 1.00 |") >= len(content["measurements"])
+
+
+def test_more_threads_than_cores(tmp_path: Path) -> None:
+    """Figures of eight threads that were measured with two would mislead."""
+    called = CliRunner().invoke(main, ["run", "--small", "--threads", "999", "--output", str(tmp_path)])
+    assert called.exit_code == 1
+    assert "--threads 999: this machine runs at most" in called.stderr
+
+
+def test_failing_cases_do_not_lose_the_others(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture) -> None:
+    found, failed = plan._all_measured([Case("g", "bad", failing), Case("g", "good", holding, (1,))], 1)
+    assert [m.name for m in found] == ["good"]
+    assert failed == 1
+    assert "sepi: warning: benchmark g, bad: ValueError: too bright" in capsys.readouterr().err
+
+
+def test_interrupted_command_leaves_nothing_running(tmp_path: Path) -> None:
+    """A benchmark that is stopped must not go on in the background."""
+    mark = tmp_path / "mark"
+    child = f"import pathlib, time; pathlib.Path({str(mark)!r}).write_text('x'); time.sleep(60)"
+    program = f"from sepi.bench.measure import measured_command; measured_command('g', 'n', ['-c', {child!r}], 1)"
+    process = subprocess.Popen([sys.executable, "-c", program], stderr=subprocess.DEVNULL, start_new_session=True)
+    try:
+        deadline = time.monotonic() + 60
+        while not mark.exists() and time.monotonic() < deadline:
+            time.sleep(0.05)
+        process.send_signal(signal.SIGINT)
+        assert process.wait(30) != 0
+        commands = [path.read_bytes() for path in Path("/proc").glob("[0-9]*/cmdline")]
+        assert not [words for words in commands if str(mark).encode() in words]
+    finally:
+        process.kill()
+        process.wait()
 
 
 def test_unknown_scene(tmp_path: Path) -> None:

@@ -229,6 +229,18 @@ def test_wanted_pixels_far_apart_equal_the_whole_picture():
         np.testing.assert_allclose(getattr(some, name)[0][wanted], getattr(whole, name)[0][wanted], rtol=1e-5)
 
 
+def test_subset_without_views_matches_nothing():
+    """Seen from a corner of the grid, some halves hold no view: their cost is the worst, and never the reason to hang."""
+    light_field = random_light_field(grid=(3, 3), shape=(40, 44)).seen_from((0, 0))
+    views = halves_and_quarters(light_field.grid, (0, 0))
+    parameters = SweepParameters(candidates=5, scale=0.3, window_radius=1, window_sigma=0.5)
+    result = sweep(light_field, parameters, groups=views.groups, subsets=views.subsets)
+    empty = [views.names.index(name) for name in ("left-up",)]
+    for name in ("cost", "mean"):
+        assert (getattr(result, name)[empty] == 1).all()
+    assert np.isfinite(result.disparity).all()
+
+
 def test_unknown_range_is_an_error_that_says_what_to_give():
     with pytest.raises(SepiError, match="disparity range unknown"):
         sweep(LightField(random_light_field().views, "scene"), SweepParameters())

@@ -20,6 +20,7 @@ PASSES = 20_000
 
 @njit(cache=True, parallel=True, fastmath=True, error_model="numpy")
 def _samples(threads: int, passes: int, data: Any, out: Any) -> None:
+    """Operations of samples, over ``data (threads, 7, N)``, added to ``out (threads, N)``."""
     for thread in prange(threads):
         a, b, c, d, g = data[thread, 0], data[thread, 1], data[thread, 2], data[thread, 3], data[thread, 4]
         target = out[thread]
@@ -37,17 +38,21 @@ def _samples(threads: int, passes: int, data: Any, out: Any) -> None:
 
 @njit(cache=True, parallel=True, fastmath=True, error_model="numpy")
 def _windows(threads: int, passes: int, data: Any, out: Any) -> None:
+    """Rows of a window, seven numbers of ``data (threads, 7, N)`` each, added to ``out (threads, N)``."""
     for thread in prange(threads):
         a = data[thread]
         target = out[thread]
         for n in range(passes):
             w = np.float32(n) * np.float32(1e-9)
+            # different weights, or a compiler would add before it multiplies
+            w1, w2, w3 = np.float32(0.01), np.float32(0.02), np.float32(0.03)
+            w4, w5, w6 = np.float32(0.04), np.float32(0.05), np.float32(0.06)
             for x in range(target.size):
                 target[x] += (
-                    (w * a[0, x] + a[1, x] * w)
-                    + (w * a[2, x] + w * a[3, x])
-                    + (w * a[4, x] + w * a[5, x])
-                    + w * a[6, x]
+                    (w * a[0, x] + w1 * a[1, x])
+                    + (w2 * a[2, x] + w3 * a[3, x])
+                    + (w4 * a[4, x] + w5 * a[5, x])
+                    + w6 * a[6, x]
                 )
 
 

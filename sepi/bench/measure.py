@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import multiprocessing
+import os
+import signal
 import statistics
 import subprocess
 import sys
@@ -103,7 +105,7 @@ def measured(case: Case, repeats: int) -> Measurement:
     """
     context = multiprocessing.get_context("spawn")
     receiver, sender = context.Pipe(duplex=False)
-    process = context.Process(target=_measure, args=(case, repeats, sender))
+    process = context.Process(target=_measure, args=(case, repeats, sender), daemon=True)
     process.start()
     sender.close()
     try:
@@ -163,10 +165,23 @@ def measured_command(group: str, name: str, words: Sequence[str], repeats: int) 
     seconds, peaks = [], []
     for _ in range(repeats + 1):
         command = [sys.executable, "-I", "-S", "-c", _STARTER, sys.executable, *words]
-        called = subprocess.run(command, capture_output=True, text=True, check=True)
-        taken, peak, code = json.loads(called.stdout)
+        said, complained = _output(command)
+        taken, peak, code = json.loads(said)
         if code:
-            raise SepiError(f"benchmark {group}, {name}: {' '.join(called.stderr.split()[-40:])}")
+            raise SepiError(f"benchmark {group}, {name}: {' '.join(complained.split()[-40:])}")
         seconds.append(taken)
         peaks.append(peak / (2**20 if sys.platform == "darwin" else 2**10))
     return Measurement(group, name, tuple(seconds[1:]), max(peaks))
+
+
+def _output(command: Sequence[str]) -> tuple[str, str]:
+    """What a command prints and complains; nothing that it started is left running when this is interrupted."""
+    process = subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
+    )
+    try:
+        return process.communicate()
+    except BaseException:
+        os.killpg(process.pid, signal.SIGKILL)
+        process.communicate()
+        raise

@@ -149,10 +149,10 @@ def prepare(scene: Path, candidates: int, warp: Warp) -> Prepared:
 
 
 def cases(scene: Path, candidates: int, threads: int) -> list[Case]:
-    """The plain sweeps, at few candidates: their time is that of a candidate, whatever their number."""
+    """The plain sweeps, each once: long enough to measure, and nothing in them is compiled at the first call."""
     known = {"candidates": float(candidates)}
     rivals = {"NumPy slices": by_numpy, "SciPy ndimage.shift": by_scipy, "OpenCV warpAffine": by_opencv}
     return [
-        Case("beside", name, prepare, (scene, candidates, warp), known, threads=threads)
+        Case("beside", name, prepare, (scene, candidates, warp), known, threads=threads, once=True)
         for name, warp in rivals.items()
     ]

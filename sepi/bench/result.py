@@ -72,7 +72,11 @@ def read(path: Path) -> Result:
         content = json.loads(path.read_text(encoding="utf-8"))
         if content["format"] != FORMAT:
             raise SepiError(f"{path}: a benchmark's result of format {content['format']}, expected {FORMAT}")
-        measurements = tuple(Measurement(**{**m, "seconds": tuple(m["seconds"])}) for m in content["measurements"])
+        measurements = tuple(
+            Measurement(**{**m, "seconds": tuple(map(float, m["seconds"]))}) for m in content["measurements"]
+        )
+        if not all(m.seconds for m in measurements):
+            raise ValueError
         return Result(content["machine"], content["settings"], measurements)
     except OSError as error:
         raise SepiError(f"{path}: {error.strerror}") from error

@@ -75,12 +75,14 @@ def initial(path: Path, settings: Parameters) -> Prepared:
     return Prepared(lambda: STAGES["initial"]["sepi"].run(light_field, None, settings, no_progress))
 
 
-def cases(scene: Scene, variant: Variant, settings: dict[str, Parameters], threads: int) -> list[Case]:
-    """Each step from files to maps, in order."""
+def cases(
+    scene: Scene, variant: Variant, settings: dict[str, Parameters], threads: int, range_unknown: bool
+) -> list[Case]:
+    """Each step from files to maps, in order; the range is estimated where the scene does not give it."""
     steps: list[tuple[str, Any, tuple[Any, ...]]] = [
         ("read the views", read, (scene,)),
         ("check their order", check_order, (scene,)),
-        ("estimate the range", find_range, (scene,)),
+        *([("estimate the range", find_range, (scene,))] if range_unknown else []),
         *((name, stage, (scene, name, choice, settings[name])) for name, choice in variant.choices.items()),
         ("write the maps", write, (scene,)),
     ]
@@ -125,5 +127,6 @@ def _operations(light_field: LightField, name: str, choice: str, settings: Any, 
     window = (2 * settings.window_radius + 1) ** 2
     return {
         "samples": float(samples),
+        "channels": float(light_field.views.shape[-1]),
         WINDOW_OPERATIONS: pixels * settings.candidates * groups * window,
     }

@@ -18,7 +18,10 @@ def sections(result: Result) -> list[Section]:
     for heading, table in (
         ("Whole", whole(result.group("whole") | result.group("large"))),
         ("Steps", steps(result)),
-        *((f"Growth with {axis}", growth(result, axis)) for axis in ("size", "views", "candidates", "threads")),
+        *(
+            (f"Growth with {axis}, built-in scene", growth(result, axis))
+            for axis in ("size", "views", "candidates", "threads")
+        ),
         ("Initial stage beside plain ones", beside(result)),
         ("Solvers of the global optimisation", solvers(result.group("solvers"))),
         ("HDF5 compression", storage(result)),
@@ -61,9 +64,9 @@ def steps(result: Result) -> Table:
 
 
 def floor_seconds(result: Result, measurement: Measurement) -> float | None:
-    """Seconds that a sweep's multiply-adds alone would take on this machine; None for other measurements."""
+    """Seconds that a sweep's operations alone would take on this machine; None for other steps and for grey views."""
     prices = {name: m.median / m.figures["operations"] for name, m in result.group("floor").items()}
-    if not prices or "samples" not in measurement.figures:
+    if not prices or measurement.figures.get("channels") != 3:
         return None
     return (
         measurement.figures["samples"] * prices["sample"]
