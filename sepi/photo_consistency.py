@@ -1,8 +1,8 @@
 """Compiled photo-consistency: how well each candidate disparity fits the views, for one row of the picture.
 
 One ``(candidate, view)`` has one sub-pixel weight for the whole picture, so a row is a run of contiguous multiply-adds
-that vectorises. Candidates next to each other mostly read the same pixels with other weights; of colour pictures, two are
-done at once.
+that vectorises. Candidates next to each other mostly read the same pixels with other weights; of colour pictures, two
+are done at once.
 """
 
 from __future__ import annotations

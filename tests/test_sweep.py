@@ -230,7 +230,7 @@ def test_wanted_pixels_far_apart_equal_the_whole_picture():
 
 
 def test_subset_without_views_matches_nothing():
-    """Seen from a corner of the grid, some halves hold no view: their cost is the worst, and never the reason to hang."""
+    """Seen from a corner of the grid, some parts hold no view: their cost is the worst there is, and is a number."""
     light_field = random_light_field(grid=(3, 3), shape=(40, 44)).seen_from((0, 0))
     views = halves_and_quarters(light_field.grid, (0, 0))
     parameters = SweepParameters(candidates=5, scale=0.3, window_radius=1, window_sigma=0.5)
