@@ -129,8 +129,12 @@ def peak_memory_mb() -> float:
         # ru_maxrss below would start at what the parent held
         return next(int(line.split()[1]) for line in status.splitlines() if line.startswith("VmHWM")) / 2**10
     except (OSError, StopIteration):
-        peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-        return peak / (2**20 if sys.platform == "darwin" else 2**10)
+        return megabytes(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+
+
+def megabytes(maxrss: int) -> float:
+    """A peak memory as the system states it (``ru_maxrss``), in MB."""
+    return maxrss / (2**20 if sys.platform == "darwin" else 2**10)
 
 
 def write_timing(path: Path, started: float, threads: int) -> None:

@@ -219,15 +219,16 @@ def _fill_row(
         _transpose(costs, last - first, ring_row[first - origin :])
         # windows of pixels near the border reach this far
         inner = margin + radius
+        left, right = last, last
         if inner <= row < H - inner:
-            left, right = min(last, inner), max(first, W - inner)
-        else:
-            left, right = last, last
-        if first < left:
-            count_views(groups, H, W, row, first, left, down, fy, across, counts_row[first - origin :])
-        if max(right, left) < last:
-            from_column = max(right, left)
-            count_views(groups, H, W, row, from_column, last, down, fy, across, counts_row[from_column - origin :])
+            left = min(last, inner)
+            right = max(first, left, W - inner)
+        for begin_counted, end_counted in ((first, left), (right, last)):
+            if begin_counted < end_counted:
+                count_views(
+                    groups, H, W, row, begin_counted, end_counted, down, fy, across,
+                    counts_row[begin_counted - origin :],
+                )  # fmt: skip
 
 
 @njit(cache=True, error_model="numpy")

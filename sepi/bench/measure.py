@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from multiprocessing.connection import Connection
 from typing import Any
 
-from sepi.command import peak_memory_mb, use_threads
+from sepi.command import megabytes, peak_memory_mb, use_threads
 from sepi.errors import SepiError
 
 Figures = dict[str, float]
@@ -170,7 +170,7 @@ def measured_command(group: str, name: str, words: Sequence[str], repeats: int) 
         if code:
             raise SepiError(f"benchmark {group}, {name}: {' '.join(complained.split()[-40:])}")
         seconds.append(taken)
-        peaks.append(peak / (2**20 if sys.platform == "darwin" else 2**10))
+        peaks.append(megabytes(peak))
     return Measurement(group, name, tuple(seconds[1:]), max(peaks))
 
 

@@ -9,7 +9,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from sepi.bench.result import Result
-from sepi.bench.tables import beside
+from sepi.bench.tables import AXES, beside
 from sepi.io.files import atomic_path
 
 
@@ -19,7 +19,7 @@ def write(result: Result, path: Path) -> None:
     FigureCanvasAgg(figure)
     first, *others, last = figure.subplots(2, 3).ravel()
     _steps(first, result)
-    for panel, axis in zip(others, ("size", "views", "candidates", "threads"), strict=True):
+    for panel, axis in zip(others, AXES, strict=True):
         _growth(panel, result, axis)
     _beside(last, result)
     with atomic_path(path) as temporary:
@@ -40,9 +40,8 @@ def _growth(panel: Any, result: Result, axis: str) -> None:
             continue
         x, y = [m.figures[axis] for m in points], [m.median for m in points]
         panel.loglog(x, y, "o-", color=colour, label=group.removeprefix("growth, "))
-        power = {"size": 2, "views": 2, "candidates": 1, "threads": -1}[axis]
         last = (len(x) - 1) if axis != "threads" else 0
-        panel.loglog(x, [y[last] * (value / x[last]) ** power for value in x], ":", color=colour)
+        panel.loglog(x, [y[last] * (value / x[last]) ** AXES[axis] for value in x], ":", color=colour)
         panel.set_xticks(x, [f"{value:g}" for value in x])
         panel.minorticks_off()
         panel.legend()

@@ -11,6 +11,9 @@ from sepi.report.layout import Cell, Section, Table
 
 Measurements = Mapping[str, Measurement]
 
+AXES = {"size": 2, "views": 2, "candidates": 1, "threads": -1}
+"""What grows, and the power of it that time grows with if it is linear in pixels, views, candidates and work."""
+
 
 def sections(result: Result) -> list[Section]:
     """Every table for which there are measurements."""
@@ -18,10 +21,7 @@ def sections(result: Result) -> list[Section]:
     for heading, table in (
         ("Whole", whole(result.group("whole") | result.group("large"))),
         ("Steps", steps(result)),
-        *(
-            (f"Growth with {axis}, built-in scene", growth(result, axis))
-            for axis in ("size", "views", "candidates", "threads")
-        ),
+        *((f"Growth with {axis}, built-in scene", growth(result, axis)) for axis in AXES),
         ("Initial stage beside plain ones", beside(result)),
         ("Solvers of the global optimisation", solvers(result.group("solvers"))),
         ("HDF5 compression", storage(result)),
