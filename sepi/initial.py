@@ -4,6 +4,9 @@
 variance (Eq. 3-4), and its distinctness as confidence (Eq. 5). The line meets one sample of each view, so this is a
 plane sweep (:mod:`sepi.sweep`); the construction itself is in :mod:`sepi.epi`.
 
+``semi_global`` compares colours and fine detail (:mod:`sepi.layers`) over all views, and smooths the costs semi-globally
+(:mod:`sepi.semi_global`); ``semi_global_colours`` does so without the detail.
+
 ``structure_tensor`` is the initial depth that the paper's ablation puts in its place (:mod:`sepi.structure_tensor`).
 
 References
@@ -14,6 +17,7 @@ References
 from __future__ import annotations
 
 from sepi.command import stage_command
+from sepi.layered_sweep import AllViewsColoursParameters, AllViewsParameters, depth_from_all_views
 from sepi.lightfield import LightField
 from sepi.stage import Choice, Progress, StageMaps
 from sepi.structure_tensor import StructureTensorParameters, structure_tensor_depth
@@ -48,6 +52,14 @@ def sepi(
     return StageMaps(result.disparity[0], result.confidence()[0])
 
 
+def semi_global(
+    light_field: LightField, previous: StageMaps | None, parameters: AllViewsParameters, progress: Progress
+) -> StageMaps:
+    """Depth from the two layers of all views, smoothed semi-globally; arguments and result as for ``sepi``."""
+    result = depth_from_all_views(light_field, parameters, progress)
+    return StageMaps(result.disparity, result.confidence)
+
+
 def structure_tensor(
     light_field: LightField, previous: StageMaps | None, parameters: StructureTensorParameters, progress: Progress
 ) -> StageMaps:
@@ -59,6 +71,8 @@ def structure_tensor(
 
 CHOICES = {
     "sepi": Choice(SweepParameters, sepi),
+    "semi_global": Choice(AllViewsParameters, semi_global),
+    "semi_global_colours": Choice(AllViewsColoursParameters, semi_global),
     "structure_tensor": Choice(StructureTensorParameters, structure_tensor),
 }
 

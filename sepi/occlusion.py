@@ -13,6 +13,10 @@ crosses the occluder. ``half_sepi`` repeats the slope computation with the views
 ``wang`` is the occlusion model of [2]_, which the paper's text compares with: the angular patch is split along the edge
 orientation, and the half with the smaller cost is kept. ``none`` hands the initial depth on.
 
+``visibility`` chooses the views one by one: those in which nothing of the map so far covers the pixel
+(:mod:`sepi.layered_sweep`); pixels that a depth step runs through then go to the surface that fills most of them
+(:mod:`sepi.colour_mixture`). ``visibility_unmixed`` leaves the last step out, ``visibility_colours`` the detail layer.
+
 References
 ----------
 .. [1] Zhou, Shi, Liu, Jin, Zhang, Hou: Light Field Depth Estimation via Stitched Epipolar Plane Images.
@@ -29,11 +33,18 @@ from pydantic import Field
 
 from sepi.command import stage_command
 from sepi.edges import CannyParameters, canny_edges, depth_steps, edge_angle
+from sepi.layered_sweep import (
+    UnmixedParameters,
+    VisibilityColoursParameters,
+    VisibilityParameters,
+    depth_from_visible_views,
+)
 from sepi.lightfield import BoolMap, FloatMap, LightField
 from sepi.mean_shift import patch_modes
 from sepi.stage import Choice, NoParameters, Progress, StageMaps, given
 from sepi.sweep import SweepParameters, SweepResult, sweep
 from sepi.view_groups import SIDES, half_planes, halves_and_quarters
+from sepi.visibility_kernels import covered_somewhere
 
 
 class OcclusionParameters(SweepParameters, CannyParameters):
@@ -137,6 +148,24 @@ def wang(
     return refined(before, result, cost, candidates, parameters.min_change)
 
 
+def visibility(
+    light_field: LightField, previous: StageMaps | None, parameters: VisibilityParameters, progress: Progress
+) -> StageMaps:
+    """Depth from the views that see each pixel, as the map so far tells.
+
+    Arguments and result as for ``half_sepi``; ``occluded`` is where some view does not see the pixel.
+    """
+    before = given(previous)
+    result = depth_from_visible_views(light_field, before.disparity, parameters, progress)
+    return before.updated(
+        result.disparity,
+        result.confidence,
+        occluded=covered_somewhere(
+            result.disparity, light_field.present, *light_field.reference, np.float32(parameters.cover)
+        ),
+    )
+
+
 def none(
     light_field: LightField, previous: StageMaps | None, parameters: NoParameters, progress: Progress
 ) -> StageMaps:
@@ -226,6 +255,9 @@ def _box(radius: int) -> npt.NDArray[np.uint8]:
 CHOICES = {
     "half_sepi": Choice(HalfSepiParameters, half_sepi),
     "wang": Choice(WangParameters, wang),
+    "visibility": Choice(VisibilityParameters, visibility),
+    "visibility_unmixed": Choice(UnmixedParameters, visibility),
+    "visibility_colours": Choice(VisibilityColoursParameters, visibility),
     "none": Choice(NoParameters, none),
 }
 

@@ -2,8 +2,12 @@
 
 ``wls`` minimises the weighted least squares energy of Eq. 8: fidelity to the refined depth where it deserves it (Eq.
 9-10: the confidences of occluded, texture-less and other pixels, little where the depth changes abruptly), and
-smoothness on the 4-connected grid where the image is smooth (Eq. 11) and the depth uncertain (Eq. 12). ``none`` hands
-the depth on.
+smoothness on the 4-connected grid where the image is smooth (Eq. 11) and the depth uncertain (Eq. 12).
+
+``second_order`` goes back to the views instead: Gauss-Newton steps on their residuals (:mod:`sepi.gauss_newton`) bring
+the depth below the candidate step, and second-order smoothing (:mod:`sepi.second_order`), which leaves planes free,
+weighs each pixel by how much the views know about it. ``gauss_newton`` leaves out the smoothing,
+``second_order_colours`` the detail layer. ``none`` hands the depth on.
 
 References
 ----------
@@ -21,7 +25,10 @@ from pydantic import Field
 from scipy.sparse.linalg import cg
 
 from sepi.command import stage_command
+from sepi.gauss_newton import information, prepared, view_mean, windowed_step
+from sepi.layers import LayerParameters, Layers, split_layers
 from sepi.lightfield import FloatMap, LightField
+from sepi.second_order import bend_matrix, bend_weights, solve_smooth
 from sepi.stage import Choice, NoParameters, Parameters, Progress, StageMaps, given, relative_confidence
 
 FloatArray = npt.NDArray[np.float64]
@@ -31,6 +38,13 @@ LEAST_CONFIDENCE = 0.01
 
 STEPS_BEFORE_MULTIGRID = 200
 """As long as setting up the multigrid takes."""
+
+
+UNIFORM_WEIGHT = 0.05
+"""Weight of a plane that was put into a region without texture; planes cost nothing, so little holds it."""
+
+LEAST_RELIABILITY = 1e-3
+LEAST_SMOOTHNESS = 1e-8
 
 
 class WlsParameters(Parameters):
@@ -55,6 +69,46 @@ class WlsParameters(Parameters):
     accuracy: float = Field(
         1e-12, gt=0, lt=1, description="relative residual at which the solver stops; pixels of low weight need it small"
     )
+
+
+class SecondOrderParameters(LayerParameters):
+    """Parameters of Gauss-Newton refinement and second-order smoothing."""
+
+    refinements: int = Field(1, ge=0, le=20, description="Gauss-Newton steps before the first smoothing")
+    refinement_radius: int = Field(3, ge=0, le=20, description="window of these steps, 2 r + 1 pixels")
+    solves: int = Field(2, ge=0, le=10, description="rounds of one Gauss-Newton step and one smoothing")
+    solve_radius: int = Field(2, ge=0, le=20, description="window of the steps of these rounds, 2 r + 1 pixels")
+    longest_step: float = Field(0.05, gt=0, description="longest Gauss-Newton step, pixels per view step")
+    cover: float = Field(0.15, ge=0, description="by how much a cover must be nearer, pixels per view step")
+    strength: float = Field(10.0, ge=0, description="weight of the smoothness; the best-known tenth of pixels weighs 1")
+    bend: float = Field(0.05, gt=0, description="second difference of the depth that marks a step, pixels per view step")
+    smooth_colour: float = Field(
+        0.1, gt=0, description="RGB distance at which smoothness falls, colours in 0..1; noise adds to it"
+    )
+    reliable_confidence: float = Field(
+        0.5, gt=0, le=1, description="confidence within two pixels from which bends in the data are believed"
+    )
+    solve_accuracy: float = Field(3e-4, gt=0, lt=1, description="relative residual at which the solver stops")
+    most_steps: int = Field(200, ge=1, description="steps after which the solver stops anyway")
+
+
+class GaussNewtonParameters(SecondOrderParameters):
+    """Parameters of the refinement without smoothing."""
+
+    refinements: int = Field(3, ge=0, le=20, description="Gauss-Newton steps before the first smoothing")
+    solves: int = Field(0, ge=0, le=10, description="rounds of one Gauss-Newton step and one smoothing")
+
+
+class SecondOrderColoursParameters(SecondOrderParameters):
+    """Parameters of refinement and smoothing by colours alone."""
+
+    colour_scale: float = Field(
+        0.0164,
+        ge=1e-6,
+        le=2,
+        description="residual of the colours at which their cost is one half; RGB distance, colours in 0..1",
+    )
+    detail_share: float = Field(0.0, ge=0, le=1, description="share of the detail in the cost; 0 uses colours alone")
 
 
 def wls(
@@ -83,6 +137,66 @@ def wls(
     matrix, right = energy_system(before.disparity, weight, smoothness, parameters.alpha)
     disparity = solve(matrix, right, before.disparity, parameters.accuracy)
     return before.updated(disparity.astype(np.float32), confidence)
+
+
+def second_order(
+    light_field: LightField, previous: StageMaps | None, parameters: SecondOrderParameters, progress: Progress
+) -> StageMaps:
+    """Depth refined on the views and smoothed, planes being free.
+
+    Arguments as for ``wls``.
+
+    Returns
+    -------
+    StageMaps
+        ``confidence`` is that of the stage before.
+    """
+    before = given(previous)
+    layers = split_layers(light_field, parameters)
+    matching = prepared(light_field, layers, parameters)
+    disparity = before.disparity
+    uniform = before.mask("textureless")
+    reliability = np.where(uniform, 1, reliable(before.confidence, parameters)).astype(np.float32)
+    total = parameters.refinements + parameters.solves
+    for i in range(total):
+        progress((i + 0.5) / (total + 1))
+        smooth = i >= parameters.refinements
+        if i <= parameters.refinements:
+            # later steps are too small to change it
+            mean = view_mean(matching, disparity, parameters.cover)
+        gradient, curvature = information(matching, mean, disparity, parameters.cover)
+        radius = parameters.solve_radius if smooth else parameters.refinement_radius
+        step, curvature = windowed_step(gradient, curvature, radius, parameters.longest_step)
+        # where no view knows anything, a step would follow the noise
+        target = disparity + np.where(uniform, np.float32(0), step)
+        if smooth:
+            weight = np.minimum(curvature / max(float(np.percentile(curvature, 90)), 1e-9), 1) * reliability
+            weight = np.where(uniform, np.float32(UNIFORM_WEIGHT), weight)
+            target = smoothed(target, disparity, weight, reliability, layers, parameters)
+        disparity = target
+    return before.updated(disparity, before.confidence)
+
+
+def reliable(confidence: FloatMap, parameters: SecondOrderParameters) -> FloatMap:
+    """How far the data is believed, 0..1: by the best confidence within two pixels, since edges lower it."""
+    best = cv2.dilate(confidence, np.ones((5, 5), np.uint8))
+    return np.asarray(np.clip(best / parameters.reliable_confidence, LEAST_RELIABILITY, 1) ** 2, np.float32)
+
+
+def smoothed(
+    target: FloatMap,
+    shape: FloatMap,
+    weight: FloatMap,
+    reliability: FloatMap,
+    layers: Layers,
+    parameters: SecondOrderParameters,
+) -> FloatMap:
+    """Second-order smoothing of ``target``, whose bends are looked for in ``shape``; all shapes (H, W)."""
+    variance = parameters.smooth_colour**2 + 4 * layers.noise
+    weights = bend_weights(shape, layers.guide, reliability, parameters.bend, variance)
+    weights = [parameters.strength * w + LEAST_SMOOTHNESS for w in weights]
+    matrix = bend_matrix(weights, target.shape)
+    return solve_smooth(matrix, weight, target, parameters.solve_accuracy, parameters.most_steps)
 
 
 def none(
@@ -158,7 +272,13 @@ def solve(matrix: sparse.csr_matrix, right: FloatArray, start: FloatMap, accurac
     return np.asarray(solution).reshape(start.shape)
 
 
-CHOICES = {"wls": Choice(WlsParameters, wls), "none": Choice(NoParameters, none)}
+CHOICES = {
+    "wls": Choice(WlsParameters, wls),
+    "second_order": Choice(SecondOrderParameters, second_order),
+    "gauss_newton": Choice(GaussNewtonParameters, second_order),
+    "second_order_colours": Choice(SecondOrderColoursParameters, second_order),
+    "none": Choice(NoParameters, none),
+}
 
 if __name__ == "__main__":
     stage_command("optimize", CHOICES)()

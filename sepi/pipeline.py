@@ -55,6 +55,7 @@ class Variant:
 
 
 VARIANTS: dict[str, Variant] = {
+    "best": Variant("semi_global", "visibility", "uniform_planes", "second_order"),
     "paper": Variant("sepi", "half_sepi", "lti", "wls"),
     "no_sepi": Variant("structure_tensor", "half_sepi", "lti", "wls"),
     "no_occlusion": Variant("sepi", "none", "lti", "wls"),

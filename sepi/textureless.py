@@ -11,7 +11,8 @@ linearly, from the reliable edges of their neighbourhood:
 5. a plane smooths the depth it fits, but overrules only depth without support: neither distinct nor in agreement with
    its neighbourhood (noise lowers the confidence of good depth too, but does not make it disagree).
 
-``none`` hands the depth on.
+``uniform_planes`` tells texture-less regions by the noise and gives each the plane that its border supports
+(:mod:`sepi.uniform_regions`). ``none`` hands the depth on.
 
 References
 ----------
@@ -29,6 +30,7 @@ from sepi.lightfield import BoolMap, FloatMap, LightField
 from sepi.planes import Coupling, basis, evaluate_planes, fit_planes, propagate
 from sepi.stage import Choice, NoParameters, Progress, StageMaps, given, relative_confidence
 from sepi.superpixels import FloatArray, Superpixels, borders, colour_modes, superpixels
+from sepi.uniform_regions import UniformPlanesParameters, filled
 
 
 class LtiParameters(CannyParameters):
@@ -123,6 +125,29 @@ def lti(
         lti=information[segments.labels].astype(np.float32),
         textureless=replaced,
     )
+
+
+def uniform_planes(
+    light_field: LightField, previous: StageMaps | None, parameters: UniformPlanesParameters, progress: Progress
+) -> StageMaps:
+    """Planes in regions whose texture is no more than noise.
+
+    Parameters
+    ----------
+    light_field : LightField
+    previous : StageMaps
+        Depth after the occlusion stage.
+    parameters : UniformPlanesParameters
+    progress : callable
+
+    Returns
+    -------
+    StageMaps
+        Adds ``textureless``, bool: the regions that were given a plane.
+    """
+    before = given(previous)
+    disparity, uniform = filled(light_field, before, parameters)
+    return before.updated(disparity, before.confidence, textureless=uniform)
 
 
 def none(
@@ -225,7 +250,11 @@ def accepted(segments: Superpixels, free: BoolMap, resists: BoolMap, keep_share:
     return np.asarray(taken[segments.labels] & ~resists)
 
 
-CHOICES = {"lti": Choice(LtiParameters, lti), "none": Choice(NoParameters, none)}
+CHOICES = {
+    "lti": Choice(LtiParameters, lti),
+    "uniform_planes": Choice(UniformPlanesParameters, uniform_planes),
+    "none": Choice(NoParameters, none),
+}
 
 if __name__ == "__main__":
     stage_command("textureless", CHOICES)()

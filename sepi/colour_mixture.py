@@ -1,0 +1,125 @@
+"""Which side of a depth step a pixel belongs to, by the mixture of colours in it.
+
+A pixel that an edge runs through mixes the colours ``F`` of the nearer surface and ``B`` of the farther one, and its
+residuals are small at the nearer disparity, with which the edge moves: depth maps are one pixel too wide there. Its
+colour ``I`` tells how much of it the nearer surface covers, ``(I - B) (F - B) / |F - B|^2``, with ``F`` and ``B`` from
+clean pixels close by; where that is little, the pixel goes to the farther surface.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numba import njit, prange
+from pydantic import Field
+
+from sepi.lightfield import FloatMap
+from sepi.stage import Parameters
+
+_WIDTH = 1.0  # of the window's weights, pixels
+_LEAST_WEIGHT = 0.05  # of clean pixels of each side, in pixels right beside
+
+
+class MixtureParameters(Parameters):
+    """Parameters of the decision by colour mixture."""
+
+    mixture: float = Field(
+        0.3, ge=0, le=1, description="covered share up to which a pixel goes to the farther surface; 0 moves none"
+    )
+    mixture_step: float = Field(0.3, gt=0, description="depth step beside which pixels mix, pixels per view step")
+    mixture_reach: int = Field(4, ge=1, le=20, description="how far away clean colours are looked for, in pixels")
+    mixture_contrast: float = Field(
+        9.0, ge=0, description="least squared colour difference of the two sides, in units of their variance"
+    )
+
+
+def farther_where_little_covered(
+    disparity: FloatMap, guide: FloatMap, noise: float, parameters: MixtureParameters
+) -> FloatMap:
+    """Disparity map whose mixed pixels at steps belong to the surface that covers most of them.
+
+    Parameters
+    ----------
+    disparity : ndarray, shape (H, W), float32
+        Pixels per view step.
+    guide : ndarray, shape (H, W, 3), float32
+        Reference view, 0..1.
+    noise : float
+        Expected squared residual by noise, summed over RGB.
+    parameters : MixtureParameters
+
+    Returns
+    -------
+    ndarray, shape (H, W), float32
+    """
+    if parameters.mixture == 0:
+        return disparity
+    return _decided(
+        disparity,
+        guide,
+        parameters.mixture_step,
+        parameters.mixture_reach,
+        parameters.mixture_contrast,
+        parameters.mixture,
+        # a hundredth of full scale counts as equal even without noise
+        1e-4 + noise,
+    )
+
+
+@njit(inline="always")
+def _clean(disparity: Any, y: int, x: int, middle: Any, near: Any) -> bool:
+    """Whether a pixel and its eight neighbours all lie on one side."""
+    H, W = disparity.shape
+    for row in range(max(0, y - 1), min(H, y + 2)):
+        for column in range(max(0, x - 1), min(W, x + 2)):
+            if (disparity[row, column] > middle) != near:
+                return False
+    return True
+
+
+@njit(parallel=True, cache=True)
+def _decided(
+    disparity: Any, guide: Any, step: Any, reach: int, contrast: Any, share: Any, least_variance: Any
+) -> Any:
+    H, W = disparity.shape
+    out = disparity.copy()
+    for y in prange(H):
+        sums = np.empty((2, 6))  # for each side: weight, disparity, RGB, squared RGB
+        for x in range(W):
+            d = disparity[y, x]
+            lowest, highest = d, d
+            for row in range(max(0, y - 1), min(H, y + 2)):
+                for column in range(max(0, x - 1), min(W, x + 2)):
+                    lowest, highest = min(lowest, disparity[row, column]), max(highest, disparity[row, column])
+            middle = (lowest + highest) / 2
+            if highest - lowest < step or d <= middle:
+                continue
+            sums[:] = 0
+            for row in range(max(0, y - reach), min(H, y + reach + 1)):
+                for column in range(max(0, x - reach), min(W, x + reach + 1)):
+                    q = disparity[row, column]
+                    # surfaces beyond the two do not count
+                    if q > highest + step or q < lowest - step or not _clean(disparity, row, column, middle, q > middle):
+                        continue
+                    w = math.exp(-((row - y) ** 2 + (column - x) ** 2) / (2 * _WIDTH**2))
+                    side = sums[1 if q > middle else 0]
+                    side[0] += w
+                    side[1] += w * q
+                    for c in range(3):
+                        side[2 + c] += w * guide[row, column, c]
+                        side[5] += w * guide[row, column, c] ** 2
+            if sums[0, 0] < _LEAST_WEIGHT or sums[1, 0] < _LEAST_WEIGHT:
+                continue
+            distance, covered, variance = 0.0, 0.0, least_variance
+            for side in range(2):
+                variance += sums[side, 5] / sums[side, 0]
+            for c in range(3):
+                far, near = sums[0, 2 + c] / sums[0, 0], sums[1, 2 + c] / sums[1, 0]
+                distance += (near - far) ** 2
+                covered += (guide[y, x, c] - far) * (near - far)
+                variance -= far * far + near * near
+            if distance > contrast * variance and covered < share * distance:
+                out[y, x] = sums[0, 1] / sums[0, 0]
+    return out
