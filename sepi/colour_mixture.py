@@ -80,9 +80,7 @@ def _clean(disparity: Any, y: int, x: int, middle: Any, near: Any) -> bool:
 
 
 @njit(parallel=True, cache=True)
-def _decided(
-    disparity: Any, guide: Any, step: Any, reach: int, contrast: Any, share: Any, least_variance: Any
-) -> Any:
+def _decided(disparity: Any, guide: Any, step: Any, reach: int, contrast: Any, share: Any, least_variance: Any) -> Any:
     H, W = disparity.shape
     out = disparity.copy()
     for y in prange(H):
@@ -101,7 +99,11 @@ def _decided(
                 for column in range(max(0, x - reach), min(W, x + reach + 1)):
                     q = disparity[row, column]
                     # surfaces beyond the two do not count
-                    if q > highest + step or q < lowest - step or not _clean(disparity, row, column, middle, q > middle):
+                    if (
+                        q > highest + step
+                        or q < lowest - step
+                        or not _clean(disparity, row, column, middle, q > middle)
+                    ):
                         continue
                     w = math.exp(-((row - y) ** 2 + (column - x) ** 2) / (2 * _WIDTH**2))
                     side = sums[1 if q > middle else 0]

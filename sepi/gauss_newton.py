@@ -146,9 +146,7 @@ def information(matching: Matching, mean: FloatMap, disparity: FloatMap, cover: 
     return gradient, curvature
 
 
-def windowed_step(
-    gradient: FloatMap, curvature: FloatMap, radius: int, longest: float
-) -> tuple[FloatMap, FloatMap]:
+def windowed_step(gradient: FloatMap, curvature: FloatMap, radius: int, longest: float) -> tuple[FloatMap, FloatMap]:
     """Step of each pixel, and its curvature, over a window of ``2 radius + 1`` pixels.
 
     Parameters
@@ -178,5 +176,3 @@ def spline_derivatives(image: FloatMap) -> tuple[FloatMap, FloatMap]:
         across[..., c] = cv2.sepFilter2D(coefficients, -1, _DIFFERENCE, _SMOOTH, borderType=border)
         down[..., c] = cv2.sepFilter2D(coefficients, -1, _SMOOTH, _DIFFERENCE, borderType=border)
     return down, across
-
-

@@ -148,7 +148,13 @@ def _sample(splines: Any, first: int, y: Any, x: Any) -> Any:
 def _seen(y: Any, x: Any, nearest: Any, limit: Any) -> bool:
     """Whether a place lies in a view and nothing nearer covers it."""
     H, W = nearest.shape
-    return y >= 0 and x >= 0 and y <= H - 1 and x <= W - 1 and nearest[int(y + np.float32(0.5)), int(x + np.float32(0.5))] <= limit
+    return (
+        y >= 0
+        and x >= 0
+        and y <= H - 1
+        and x <= W - 1
+        and nearest[int(y + np.float32(0.5)), int(x + np.float32(0.5))] <= limit
+    )
 
 
 @njit(parallel=True, cache=True, fastmath=True, error_model="numpy")

@@ -4,8 +4,8 @@
 variance (Eq. 3-4), and its distinctness as confidence (Eq. 5). The line meets one sample of each view, so this is a
 plane sweep (:mod:`sepi.sweep`); the construction itself is in :mod:`sepi.epi`.
 
-``semi_global`` compares colours and fine detail (:mod:`sepi.layers`) over all views, and smooths the costs semi-globally
-(:mod:`sepi.semi_global`); ``semi_global_colours`` does so without the detail.
+``semi_global`` compares colours and fine detail (:mod:`sepi.layers`) over all views, and smooths the costs
+semi-globally (:mod:`sepi.semi_global`); ``semi_global_colours`` does so without the detail.
 
 ``structure_tensor`` is the initial depth that the paper's ablation puts in its place (:mod:`sepi.structure_tensor`).
 

@@ -43,7 +43,7 @@ class AllViewsParameters(LayeredSweepParameters):
 class VisibilityParameters(LayeredSweepParameters, MixtureParameters):
     """Parameters of the sweep over the views that see a pixel."""
 
-    passes: int = Field(2, ge=1, le=10, description="how often visibility and depth are computed anew")
+    passes: int = Field(3, ge=1, le=10, description="how often visibility and depth are computed anew")
     cover: float = Field(0.15, ge=0, description="by how much a cover must be nearer, pixels per view step")
     hidden_weight: float = Field(0.01, ge=0, le=1, description="weight of a view in which the pixel is covered")
 
@@ -63,7 +63,7 @@ class AllViewsColoursParameters(AllViewsParameters):
 
 
 class VisibilityColoursParameters(VisibilityParameters):
-    """Parameters of the sweep over the views that see a pixel, by colours alone: their scale must tell surfaces apart."""
+    """Parameters of that sweep by colours alone, whose scale must then tell surfaces apart."""
 
     colour_scale: float = Field(
         0.0164,

@@ -74,14 +74,16 @@ class WlsParameters(Parameters):
 class SecondOrderParameters(LayerParameters):
     """Parameters of Gauss-Newton refinement and second-order smoothing."""
 
-    refinements: int = Field(1, ge=0, le=20, description="Gauss-Newton steps before the first smoothing")
+    refinements: int = Field(0, ge=0, le=20, description="Gauss-Newton steps before the first smoothing")
     refinement_radius: int = Field(3, ge=0, le=20, description="window of these steps, 2 r + 1 pixels")
     solves: int = Field(2, ge=0, le=10, description="rounds of one Gauss-Newton step and one smoothing")
     solve_radius: int = Field(2, ge=0, le=20, description="window of the steps of these rounds, 2 r + 1 pixels")
     longest_step: float = Field(0.05, gt=0, description="longest Gauss-Newton step, pixels per view step")
     cover: float = Field(0.15, ge=0, description="by how much a cover must be nearer, pixels per view step")
-    strength: float = Field(10.0, ge=0, description="weight of the smoothness; the best-known tenth of pixels weighs 1")
-    bend: float = Field(0.05, gt=0, description="second difference of the depth that marks a step, pixels per view step")
+    strength: float = Field(5.0, ge=0, description="weight of the smoothness; the best-known tenth of pixels weighs 1")
+    bend: float = Field(
+        0.05, gt=0, description="second difference of the depth that marks a step, pixels per view step"
+    )
     smooth_colour: float = Field(
         0.1, gt=0, description="RGB distance at which smoothness falls, colours in 0..1; noise adds to it"
     )

@@ -59,7 +59,9 @@ def bend_weights(
         Of shapes (H, W - 2), (H - 2, W) and (H - 1, W - 1).
     """
 
-    def weight(places: tuple[Corner, ...], factors: tuple[float, ...], pairs: tuple[tuple[int, int], ...]) -> FloatArray:
+    def weight(
+        places: tuple[Corner, ...], factors: tuple[float, ...], pairs: tuple[tuple[int, int], ...]
+    ) -> FloatArray:
         difference = np.asarray(sum(f * disparity[p].astype(np.float64) for f, p in zip(factors, places, strict=True)))
         trust = np.minimum.reduce([reliability[p] for p in places])
         colour = sum(((guide[places[a]] - guide[places[b]]) ** 2).sum(axis=2) for a, b in pairs)
@@ -77,9 +79,7 @@ def bend_matrix(weights: list[FloatArray], shape: tuple[int, int]) -> sparse.csr
     """Matrix of the smoothness term: ``d^T A d`` is the weighted sum of squared second differences."""
     numbers = np.arange(shape[0] * shape[1], dtype=np.int32).reshape(shape)
     total = sparse.csr_matrix((numbers.size, numbers.size))
-    for places, factors, weight in zip(
-        (_ALONG_X, _ALONG_Y, _ACROSS), (_SECOND, _SECOND, _MIXED), weights, strict=True
-    ):
+    for places, factors, weight in zip((_ALONG_X, _ALONG_Y, _ACROSS), (_SECOND, _SECOND, _MIXED), weights, strict=True):
         root = np.sqrt(weight).ravel()
         rows = np.tile(np.arange(root.size, dtype=np.int32), len(places))
         columns = np.concatenate([numbers[p].ravel() for p in places])
@@ -125,9 +125,7 @@ def _two_levels(matrix: sparse.csr_matrix, shape: tuple[int, ...]) -> LinearOper
     coarse = (onto @ matrix @ planes).tocsc()
     # blocks of one pixel's width have slopes that do nothing
     coarse = coarse + sparse.diags(np.full(coarse.shape[0], 1e-9 * max(float(coarse.diagonal().max()), 1e-9)))
-    factors = splu(
-        coarse.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
-    )
+    factors = splu(coarse.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
     inverse = 1 / matrix.diagonal()
 
     def apply(residual: FloatArray) -> FloatArray:

@@ -42,7 +42,7 @@ def z_buffers(disparity: Any, present: Any, t0: int, s0: int) -> Any:
         for y in range(H):
             for x in range(W):
                 d = disparity[y, x]
-                top, left = int(math.floor(y - d * (t - t0))), int(math.floor(x - d * (s - s0)))
+                top, left = math.floor(y - d * (t - t0)), math.floor(x - d * (s - s0))
                 for row in range(max(top, 0), min(top + 2, H)):
                     for column in range(max(left, 0), min(left + 2, W)):
                         buffer[row, column] = max(buffer[row, column], d)
@@ -102,7 +102,7 @@ def _add_view(
         down, across = y - d * dt, -d * ds
         if down < 0 or down > H - 1:
             continue
-        top, left = min(int(down), H - 2), int(math.floor(across))
+        top, left = min(int(down), H - 2), math.floor(across)
         fy, fx = np.float32(down - top), np.float32(across - left)
         first, last = max(0, -left), min(W, W - 1 - left)
         if last <= first:
@@ -170,7 +170,7 @@ def sweep_rows(
     K = disparities.size
     layers = 2 if detail.shape[2] else 1
     reach = max(abs(disparities[0]), abs(disparities[K - 1])) * max(t0, T - 1 - t0)
-    rows = min(H, 2 * int(math.ceil(reach)) + 3)
+    rows = min(H, 2 * math.ceil(reach) + 3)
     for y in prange(begin, end):
         total, weight = np.zeros((K, W), np.float32), np.zeros((K, W), np.float32)
         seen = np.empty(W, np.float32)
@@ -182,8 +182,8 @@ def sweep_rows(
                 _load(detail[t0, s0, c, y], detail_unit, centre[1, c])
         for t in range(T):
             ends = (y - disparities[0] * (t - t0), y - disparities[K - 1] * (t - t0))
-            low = max(0, min(H - 2, int(math.floor(min(ends)))))
-            high = max(0, min(H - 2, int(math.floor(max(ends))))) + 1
+            low = max(0, min(H - 2, math.floor(min(ends))))
+            high = max(0, min(H - 2, math.floor(max(ends)))) + 1
             for s in range(S):
                 if not present[t, s] or (t == t0 and s == s0):
                     continue
