@@ -1,7 +1,7 @@
 # Light field depth by stitched epipolar plane images: from light fields to the paper's tables.
 #
 #   snakemake all         tables, figures and maps of every configured dataset
-#   snakemake ablation    the five columns of the paper's table 4, and Wang's occlusion stage
+#   snakemake ablation    the five columns of the paper's table 4, Wang's occlusion stage, and the parts of variant best
 #   snakemake -- FILE     one file: results/DATASET/SCENE/VARIANT/disparity.pfm
 #
 # docs/workflow.md explains targets, configuration and what makes a job run again.
@@ -21,17 +21,17 @@ include: "rules/evaluate.smk"
 include: "rules/report.smk"
 
 
-# Tables and figures, and the maps of the paper's method and of variants that the user added
+# Tables and figures, and the maps of the most accurate variant, of the paper's, and of variants that the user added
 rule all:
     default_target: True
     input:
         report_files(),
-        result_files(["paper", *SETTINGS.own_variants]),
+        result_files(["best", "paper", *SETTINGS.own_variants]),
     message:
         "all tables, figures and maps are made"
 
 
-# Table 4 and the maps of all its variants, the text's comparison with Wang et al. included
+# Table 4, the ablation of variant best, and the maps of all their variants
 rule ablation:
     input:
         ablation_files(),

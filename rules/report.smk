@@ -8,14 +8,14 @@ PLAN = Plan(Path("results"), {name: SETTINGS.scenes_of(name) for name in SETTING
 
 
 def report_files():
-    """Every table, and the folder of pictures of every configured scene."""
-    tables = [f"reports/{table}.{ending}" for table in TABLES for ending in ("csv", "md")]
+    """Every table but the ablation of ``best``, and the folder of pictures of every configured scene."""
+    tables = [f"reports/{table}.{ending}" for table in TABLES if table != "ablation_best" for ending in ("csv", "md")]
     return tables + [f"reports/maps/{dataset}/{scene}" for dataset, scene in SETTINGS.scenes]
 
 
 def ablation_files():
-    """The paper's table 4."""
-    return ["reports/table4_ablation.csv", "reports/table4_ablation.md"]
+    """The paper's table 4, and the ablation of ``best``."""
+    return [f"reports/{table}.{ending}" for table in ("table4_ablation", "ablation_best") for ending in ("csv", "md")]
 
 
 def plan_of_scene(wildcards):
@@ -23,7 +23,8 @@ def plan_of_scene(wildcards):
     return Plan(PLAN.results, {wildcards.dataset: [wildcards.scene]}, VARIANT_CHOICES).to_json()
 
 
-# One of the tables 1 to 4, the scores after each stage, or the run times; each from the files it needs and no others.
+# One of the tables 1 to 4, the ablation of best, its confidence, the scores after each stage, or the run times; each
+# from the files it needs and no others.
 rule table:
     input:
         measured=lambda wildcards: PLAN.table_inputs(wildcards.table),

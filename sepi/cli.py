@@ -52,7 +52,7 @@ def main() -> None:
 @main.command(short_help="Compute the disparity map of the light field INPUT.")
 @click.argument("light_field_path", metavar="INPUT", type=_PATH)
 @click.option("-o", "--output", type=_PATH, help="Folder to write; ./NAME-depth after INPUT's name unless given.")
-@click.option("--variant", default="paper", show_default=True, help="Named choice of stages; see above.")
+@click.option("--variant", default="best", show_default=True, help="Named choice of stages; see above.")
 @click.option(
     "--disparity-range",
     nargs=2,
@@ -88,8 +88,9 @@ def depth(
     shows how it is read, 'sepi check' whether its views are in the right order. Writes the disparity as numbers and in
     colour, confidence, masks and a point cloud; depth in metres where the camera is known.
 
-    Variants: paper (the whole method), no_sepi, no_occlusion, no_textureless, no_occlusion_no_textureless (parts of
-    it switched off), wang (another treatment of occlusion).
+    Variants: best (the most accurate), paper (the method as published), no_sepi, no_occlusion, no_textureless,
+    no_occlusion_no_textureless (parts of it switched off), wang (another treatment of occlusion); best_no_detail and
+    others that docs/best.md lists (parts of best switched off).
 
     \b
     Examples:
@@ -97,7 +98,7 @@ def depth(
       sepi depth cotton -o maps --disparity-range -2 2
       sepi depth flowers_eslf.png --central 7
       sepi depth views --grid 5x5 --exclude 0,0 --exclude 0,4
-      sepi depth cotton --variant no_occlusion --set initial.sepi.candidates=91
+      sepi depth cotton --variant paper --set initial.sepi.candidates=91
     """
     from sepi.ingest import settle_range
     from sepi.io.export import RUNTIME, require_target, write_result

@@ -56,7 +56,7 @@ def farther_where_little_covered(
     """
     if parameters.mixture == 0:
         return disparity
-    return _decided(
+    decided: FloatMap = _decided(
         disparity,
         guide,
         parameters.mixture_step,
@@ -66,6 +66,7 @@ def farther_where_little_covered(
         # a hundredth of full scale counts as equal even without noise
         1e-4 + noise,
     )
+    return decided
 
 
 @njit(inline="always")

@@ -109,7 +109,8 @@ class Config(_Keys):
     variants: dict[str, dict[str, str]] = Field(
         {name: variant.choices for name, variant in VARIANTS.items()},
         description="A choice for each stage. 'paper' is the method; 'paper' to 'no_occlusion_no_textureless' are the "
-        "columns of its table 4. These have fixed meanings; add variants of your own beside them.",
+        "columns of its table 4. 'best' is the most accurate variant, 'best_...' are the same with one part switched "
+        "off. These have fixed meanings; add variants of your own beside them.",
     )
     stages: dict[str, dict[str, dict[str, Any] | None]] = Field(
         default_factory=_default_stages, description="Parameters of each stage, by choice."

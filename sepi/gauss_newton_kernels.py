@@ -145,7 +145,7 @@ def _sample(splines: Any, first: int, y: Any, x: Any) -> Any:
 
 
 @njit(inline="always")
-def _seen(y: Any, x: Any, nearest: Any, limit: Any) -> bool:
+def _seen(y: Any, x: Any, nearest: Any, limit: Any) -> Any:
     """Whether a place lies in a view and nothing nearer covers it."""
     H, W = nearest.shape
     return (

@@ -43,6 +43,12 @@ STEPS_BEFORE_MULTIGRID = 200
 UNIFORM_WEIGHT = 0.05
 """Weight of a plane that was put into a region without texture; planes cost nothing, so little holds it."""
 
+IGNORANCE = 0.01
+"""What a view's information of 1 / px^2 adds to the bend, in the confidence; pixels per view step."""
+
+HALF_CONFIDENT_BEND = 0.01
+"""Bend at which the confidence is one half, pixels per view step."""
+
 LEAST_RELIABILITY = 1e-3
 LEAST_SMOOTHNESS = 1e-8
 
@@ -151,7 +157,7 @@ def second_order(
     Returns
     -------
     StageMaps
-        ``confidence`` is that of the stage before.
+        ``confidence`` is that of :func:`smooth_confidence`.
     """
     before = given(previous)
     layers = split_layers(light_field, parameters)
@@ -176,7 +182,27 @@ def second_order(
             weight = np.where(uniform, np.float32(UNIFORM_WEIGHT), weight)
             target = smoothed(target, disparity, weight, reliability, layers, parameters)
         disparity = target
-    return before.updated(disparity, before.confidence)
+    return before.updated(disparity, smooth_confidence(disparity, curvature))
+
+
+def smooth_confidence(disparity: FloatMap, curvature: FloatMap) -> FloatMap:
+    """Confidence by how much the surface bends round a pixel and how little the views know about it.
+
+    Parameters
+    ----------
+    disparity : ndarray, shape (H, W), float32
+    curvature : ndarray, shape (H, W), float32
+        Information on the disparity, 1 / (pixels per view step)^2.
+
+    Returns
+    -------
+    ndarray, shape (H, W), float32
+        ``h / (h + b + i / sqrt(curvature))`` with the mean second difference ``b`` over 5x5 pixels,
+        ``h = HALF_CONFIDENT_BEND`` and ``i = IGNORANCE``. Near depth steps, where errors are large, it is close to 0.
+    """
+    bend = cv2.blur(np.abs(cv2.Laplacian(disparity, cv2.CV_32F)), (5, 5))
+    unknown = np.maximum(bend, 0) + IGNORANCE / np.sqrt(curvature + np.float32(1e-3))
+    return np.asarray(HALF_CONFIDENT_BEND / (HALF_CONFIDENT_BEND + unknown), np.float32)
 
 
 def reliable(confidence: FloatMap, parameters: SecondOrderParameters) -> FloatMap:

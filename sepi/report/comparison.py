@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from sepi.evaluate import PROTOCOLS, REGIONS, WHOLE_MAP
 from sepi.report import published
 from sepi.report.layout import Cell, Report, Row, Section, Table, printed, short
-from sepi.report.plan import MAIN_VARIANT, Plan, Runs
+from sepi.report.plan import BEST_VARIANT, MAIN_VARIANT, Plan, Runs
 from sepi.report.published import Method, SceneTable
 
 # what a row is, as the CSV files say it
@@ -38,17 +38,20 @@ def scene_table(runs: Runs, score: str, paper: SceneTable, title: str) -> Report
     methods = [method for method in published.methods().values() if method.column]
     rows: list[Row] = []
     for dataset in _datasets(runs.plan):
-        ours = {scene: runs.final(dataset, scene, score) for scene in runs.scored(dataset)}
-        rows += _scene_rows(dataset, ours, paper, methods)
-        rows += _average_rows(dataset, ours, paper, methods)
-    heads = ["scene", "this code", *(_head(method) for method in methods)]
+        ours = {
+            scene: [runs.final(dataset, scene, score, variant=variant) for variant in runs.plan.compared]
+            for scene in runs.scored(dataset)
+        }
+        rows += _scene_rows(dataset, ours, paper, methods, len(runs.plan.compared))
+        rows += _average_rows(dataset, ours, paper, methods, len(runs.plan.compared))
+    heads = ["scene", *map(_own_head, runs.plan.compared), *(_head(method) for method in methods)]
     return Report(
         title,
-        f"{_PROTOCOL} This code: variant `{MAIN_VARIANT}`. Other columns: as the paper prints them; empty where the "
-        f"scene was in the method's training set. {_LEARNED} A scene without a figure of this code is not at hand; one "
+        f"{_PROTOCOL} This code: variants {_own_names(runs.plan)}. Other columns: as the paper prints them; empty "
+        f"where the scene was in the method's training set. {_LEARNED} A scene without a figure of this code is not at hand; one "
         "without published figures is not in the paper. The average of the scenes at hand is empty where a method has "
         "no figure for one of them.",
-        Table(["dataset", "scene", "row", "ours", *(method.key for method in methods)], rows),
+        Table(["dataset", "scene", "row", *_own_keys(runs.plan), *(method.key for method in methods)], rows),
         [
             Section(_dataset_title(dataset), Table(heads, [[row[1], *row[3:]] for row in group]))
             for dataset, group in _by_dataset(rows).items()
@@ -61,9 +64,11 @@ def region_table(runs: Runs) -> Report:
     regions = [region for region in REGIONS if region != WHOLE_MAP]
     datasets = [dataset for dataset in _datasets(runs.plan) if dataset in published.DATASETS or runs.scored(dataset)]
     columns = [(dataset, region) for dataset in datasets for region in regions]
-    ours = [_region_average(runs, dataset, region) for dataset, region in columns]
-    rows: list[Row] = [["ours", "none", *ours]]
-    labels: list[Cell] = ["this code"]
+    rows: list[Row] = [
+        [key, "none", *(_region_average(runs, dataset, region, variant) for dataset, region in columns)]
+        for key, variant in zip(_own_keys(runs.plan), runs.plan.compared, strict=True)
+    ]
+    labels: list[Cell] = [_own_head(variant) for variant in runs.plan.compared]
     for method in published.methods().values():
         theirs = {dataset: published.table3().get(dataset, {}).get(method.key) for dataset in datasets}
         if any(theirs.values()):
@@ -75,8 +80,8 @@ def region_table(runs: Runs) -> Report:
     heads = ["method", *(f"{dataset}, {region}" for dataset, region in columns)]
     return Report(
         "Table 3: MSE x100 in occluded and texture-less regions",
-        f"{_PROTOCOL} This code: variant `{MAIN_VARIANT}`, average of the scenes at hand that have such a region "
-        f"({at_hand}). Other rows: as the paper prints them, over all scenes of the data set. "
+        f"{_PROTOCOL} This code: variants {_own_names(runs.plan)}, average of the scenes at hand that have such a "
+        f"region ({at_hand}). Other rows: as the paper prints them, over all scenes of the data set. "
         f"{REGIONS_NOTE} {_LEARNED}",
         Table(["method", "learning", *(f"{dataset}_{region}" for dataset, region in columns)], rows),
         [Section("", Table(heads, [[label, *row[2:]] for label, row in zip(labels, rows, strict=True)]))],
@@ -85,7 +90,7 @@ def region_table(runs: Runs) -> Report:
 
 def ablation_table(runs: Runs) -> Report:
     """Table 4: MSE of every variant over the map and both regions, per scene, averaged, and published."""
-    variants = list(runs.plan.variants)
+    variants = runs.plan.listed
     cells = [(variant, region) for variant in variants for region in REGIONS]
     rows: list[Row] = []
     for dataset in _datasets(runs.plan):
@@ -107,32 +112,38 @@ def ablation_table(runs: Runs) -> Report:
     return Report(
         "Table 4: ablation, MSE x100 (whole map / occluded / texture-less)",
         f"{_PROTOCOL} The first five variants are the columns of the paper's table 4 in its order; `wang` is the "
-        f"comparison in its text (published for the whole map only). {REGIONS_NOTE}",
+        f"comparison in its text (published for the whole map only), `{BEST_VARIANT}` this project's own. "
+        f"{REGIONS_NOTE}",
         Table(["dataset", "scene", "row", "region", *variants], rows),
         [Section(_dataset_title(dataset), _joined(variants, group)) for dataset, group in _by_dataset(rows).items()],
     )
 
 
-def _scene_rows(dataset: str, ours: Mapping[str, float], paper: SceneTable, methods: Sequence[Method]) -> list[Row]:
-    """The paper's scenes in its order, then those it does not have."""
+def _scene_rows(
+    dataset: str, ours: Mapping[str, Sequence[float]], paper: SceneTable, methods: Sequence[Method], own: int
+) -> list[Row]:
+    """The paper's scenes in its order, then those it does not have; ``own`` figures of ours in each row."""
     own_names = {published.paper_scene(dataset, scene) or scene: scene for scene in ours}
     rows: list[Row] = []
     for name in dict.fromkeys([*paper.scenes(dataset), *own_names]):
         figures = paper.cells.get((dataset, name), {})
-        own = ours[own_names[name]] if name in own_names else None
-        rows.append([dataset, name, _SCENE, own, *(printed(figures.get(method.key)) for method in methods)])
+        found: Sequence[Cell] = ours[own_names[name]] if name in own_names else [None] * own
+        rows.append([dataset, name, _SCENE, *found, *(printed(figures.get(method.key)) for method in methods)])
     return rows
 
 
-def _average_rows(dataset: str, ours: Mapping[str, float], paper: SceneTable, methods: Sequence[Method]) -> list[Row]:
+def _average_rows(
+    dataset: str, ours: Mapping[str, Sequence[float]], paper: SceneTable, methods: Sequence[Method], own: int
+) -> list[Row]:
     rows: list[Row] = []
     if ours:
         figures = [paper.cells.get((dataset, published.paper_scene(dataset, scene) or ""), {}) for scene in ours]
         theirs = [printed(_mean_of_all([cells.get(method.key) for cells in figures])) for method in methods]
-        rows.append([dataset, _average_label(len(ours)), _AVERAGE, _mean(ours.values()), *theirs])
+        means = [_mean(figures) for figures in zip(*ours.values(), strict=True)]
+        rows.append([dataset, _average_label(len(ours)), _AVERAGE, *means, *theirs])
     if dataset in paper.averages:
         theirs = [printed(paper.averages[dataset].get(method.key)) for method in methods]
-        rows.append([dataset, _printed_label(len(paper.scenes(dataset))), _PRINTED_AVERAGE, None, *theirs])
+        rows.append([dataset, _printed_label(len(paper.scenes(dataset))), _PRINTED_AVERAGE, *[None] * own, *theirs])
     return rows
 
 
@@ -155,9 +166,22 @@ def _joined(variants: Sequence[str], rows: Sequence[Row]) -> Table:
     return Table(["scene", *variants], lines)
 
 
-def _region_average(runs: Runs, dataset: str, region: str) -> float | None:
+def _region_average(runs: Runs, dataset: str, region: str, variant: str) -> float | None:
     scenes = runs.scored(dataset)
-    return _mean(runs.final(dataset, scene, "mse100", region) for scene in scenes) if scenes else None
+    return _mean(runs.final(dataset, scene, "mse100", region, variant) for scene in scenes) if scenes else None
+
+
+def _own_head(variant: str) -> str:
+    return f"this code, {variant}"
+
+
+def _own_names(plan: Plan) -> str:
+    return " and ".join(f"`{variant}`" for variant in plan.compared)
+
+
+def _own_keys(plan: Plan) -> list[str]:
+    """Names of our own figures in the CSV files: ``ours`` is the paper's method."""
+    return ["ours" if variant == MAIN_VARIANT else f"ours_{variant}" for variant in plan.compared]
 
 
 def _mean(values: Iterable[float]) -> float:

@@ -17,6 +17,7 @@ from sepi.io.hdf5 import read_light_field, read_stage
 from sepi.io.images import write_png
 from sepi.io.scores import Evaluation, read_evaluation
 from sepi.lightfield import LightField
+from sepi.report.confidence import write_curves
 from sepi.report.pictures import (
     ERROR_LIMIT,
     Picture,
@@ -114,12 +115,16 @@ def write_scene(plan: Plan, dataset: str, scene: str, folder: Path) -> None:
     light_field = read_light_field(plan.light_field_file(dataset, scene))
     maps = {
         variant: {stage: read_stage(plan.stage_file(dataset, scene, variant, stage)) for stage in plan.stages}
-        for variant in plan.variants
+        for variant in plan.listed
     }
     last = plan.stages[-1]
     evaluations = {
         variant: read_evaluation(plan.stage_file(dataset, scene, variant, last, "scores.h5")) for variant in maps
     }
+    for variant in plan.compared:
+        error = evaluations[variant].error
+        if error is not None:
+            write_curves(folder / variant / "sparsification.png", maps[variant][last].confidence, error)
     common = scene_panels(light_field, evaluations[MAIN_VARIANT])
     stages = {variant: stage_panels(light_field, variant, found) for variant, found in maps.items()}
     details = {variant: detail_panels(light_field, variant, found[last]) for variant, found in maps.items()}

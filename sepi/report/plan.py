@@ -15,15 +15,21 @@ from typing import Any
 from sepi.errors import SepiError
 from sepi.evaluate import WHOLE_MAP
 from sepi.io.scores import Scores, read_scores
+from sepi.pipeline import PARTS_OF_BEST
 
 MAIN_VARIANT = "paper"
-"""The variant whose figures stand for this project beside the published ones."""
+"""The variant that does what the paper describes; its figures stand beside the published ones."""
+
+BEST_VARIANT = "best"
+"""The most accurate variant, whose figures stand there too."""
 
 TABLES: dict[str, str] = {
-    "table1_mse": "final maps of the main variant",
-    "table2_q25": "final maps of the main variant",
-    "table3_regions": "final maps of the main variant",
+    "table1_mse": "final maps of the variants that stand beside the published figures",
+    "table2_q25": "final maps of the variants that stand beside the published figures",
+    "table3_regions": "final maps of the variants that stand beside the published figures",
     "table4_ablation": "final maps of every variant",
+    "ablation_best": "final maps and timings of the best variant and of those with one part of it switched off",
+    "confidence": "final maps of the variants that stand beside the published figures",
     "stages": "maps after every stage of every variant",
     "runtime": "timings of every stage of every variant",
 }
@@ -106,21 +112,45 @@ class Plan:
         """
         if table not in TABLES:
             raise SepiError(f"unknown table '{table}'; there are: {', '.join(TABLES)}")
-        variants = list(self.variants) if table in ("table4_ablation", "stages", "runtime") else [MAIN_VARIANT]
-        stages = self.stages if table in ("stages", "runtime") else self.stages[-1:]
-        ending = "time.json" if table == "runtime" else "scores.h5"
+        last = self.stages[-1:]
+        of_table: dict[str, tuple[Sequence[str], Sequence[tuple[str, str]]]] = {
+            "table4_ablation": (self.listed, [(stage, "scores.h5") for stage in last]),
+            "stages": (self.listed, [(stage, "scores.h5") for stage in self.stages]),
+            "runtime": (self.listed, [(stage, "time.json") for stage in self.stages]),
+            "ablation_best": (
+                self.parts,
+                [*((stage, "scores.h5") for stage in last), *((stage, "time.json") for stage in self.stages)],
+            ),
+            "confidence": (self.compared, [(stage, ending) for stage in last for ending in ("h5", "scores.h5")]),
+        }
+        variants, endings = of_table.get(table, (self.compared, [(stage, "scores.h5") for stage in last]))
         files = [
             self.stage_file(dataset, scene, variant, stage, ending)
             for dataset, scene in self.pairs
             for variant in variants
-            for stage in stages
+            for stage, ending in endings
         ]
         return list(dict.fromkeys(files))
+
+    @property
+    def compared(self) -> list[str]:
+        """Variants that stand beside the published figures, where the plan has them."""
+        return [variant for variant in (BEST_VARIANT, MAIN_VARIANT) if variant in self.variants]
+
+    @property
+    def parts(self) -> list[str]:
+        """The best variant and those with one part of it switched off, where the plan has them."""
+        return [variant for variant in PARTS_OF_BEST if variant in self.variants]
+
+    @property
+    def listed(self) -> list[str]:
+        """All variants but those with one part of the best one switched off, which have a table of their own."""
+        return [variant for variant in self.variants if variant not in PARTS_OF_BEST or variant == BEST_VARIANT]
 
     def map_inputs(self, dataset: str, scene: str) -> list[Path]:
         """The files that the pictures of a scene are made from, each once."""
         files = [self.light_field_file(dataset, scene)]
-        for variant in self.variants:
+        for variant in self.listed:
             files += [self.stage_file(dataset, scene, variant, stage) for stage in self.stages]
             files.append(self.stage_file(dataset, scene, variant, self.stages[-1], "scores.h5"))
         return list(dict.fromkeys(files))

@@ -46,7 +46,8 @@ def runtime_table(runs: Runs) -> Report:
     stages = runs.plan.stages
     for dataset, scene in runs.plan.pairs:
         lines: list[Row] = []
-        for variant, choices in runs.plan.variants.items():
+        for variant in runs.plan.listed:
+            choices = runs.plan.variants[variant]
             timings = {stage: runs.timing(dataset, scene, variant, stage) for stage in stages}
             total = sum(timing.seconds for timing in timings.values())
             peak = max(timing.peak_memory_mb for timing in timings.values())
@@ -75,8 +76,8 @@ def runtime_table(runs: Runs) -> Report:
 
 def _score_rows(runs: Runs, dataset: str, scene: str, protocol: str) -> list[Row]:
     rows: list[Row] = []
-    for variant, choices in runs.plan.variants.items():
-        for stage, choice in choices.items():
+    for variant in runs.plan.listed:
+        for stage, choice in runs.plan.variants[variant].items():
             for region, scores in _regions(runs, dataset, scene, variant, stage, protocol):
                 figures: list[Cell] = [scores[name] for name in SCORES]
                 counts = [int(scores[name]) for name in COUNTS]
@@ -86,8 +87,8 @@ def _score_rows(runs: Runs, dataset: str, scene: str, protocol: str) -> list[Row
 
 def _score_page(runs: Runs, dataset: str, scene: str, protocol: str) -> Table:
     lines: list[Row] = []
-    for variant, choices in runs.plan.variants.items():
-        for stage, choice in choices.items():
+    for variant in runs.plan.listed:
+        for stage, choice in runs.plan.variants[variant].items():
             cells = dict(_regions(runs, dataset, scene, variant, stage, protocol))
             regions = [scores["mse100"] for region, scores in cells.items() if region != WHOLE_MAP]
             lines.append([variant, f"{stage} ({choice})", *(cells[WHOLE_MAP][name] for name in SCORES), *regions])

@@ -10,7 +10,9 @@ import click
 from sepi.command import SepiCommand
 from sepi.report import published
 from sepi.report.comparison import ablation_table, region_table, scene_table
+from sepi.report.confidence import confidence_table
 from sepi.report.layout import Report, write
+from sepi.report.parts import parts_table
 from sepi.report.plan import TABLES, Plan, Runs
 from sepi.report.stages import runtime_table, stage_table
 
@@ -19,6 +21,8 @@ BUILDERS: dict[str, Callable[[Runs], Report]] = {
     "table2_q25": lambda runs: scene_table(runs, "q25", published.table2(), "Table 2: Q25 x100"),
     "table3_regions": region_table,
     "table4_ablation": ablation_table,
+    "ablation_best": parts_table,
+    "confidence": confidence_table,
     "stages": stage_table,
     "runtime": runtime_table,
 }

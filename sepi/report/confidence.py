@@ -1,0 +1,129 @@
+"""What the confidence is worth: errors by decile of confidence, and sparsification curves [1]_.
+
+References
+----------
+.. [1] Ilg et al.: Uncertainty estimates and multi-hypotheses networks for optical flow. ECCV 2018.
+   doi:10.1007/978-3-030-01234-2_40
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from sepi.io.files import atomic_path
+from sepi.io.hdf5 import read_stage
+from sepi.io.scores import read_evaluation
+from sepi.lightfield import FloatMap
+from sepi.report.layout import Cell, Report, Row, Section, Table
+from sepi.report.plan import Runs
+
+DECILES = 10
+
+_STEPS = 100
+
+FloatArray = npt.NDArray[np.float64]
+
+
+def decile_errors(confidence: FloatMap, error: FloatMap) -> tuple[FloatArray, FloatArray]:
+    """Errors of the tenths of the pixels, from the most confident to the least.
+
+    Parameters
+    ----------
+    confidence, error : ndarray, shape (H, W), float32
+        Pixels whose error is not finite are left out.
+
+    Returns
+    -------
+    squared, absolute : ndarray, shape (10,), float64
+        Mean squared and mean absolute error of each tenth, times 100.
+    """
+    ordered = _by_confidence(confidence, error)
+    tenths = np.array_split(ordered, DECILES)
+    return (
+        np.array([100 * np.mean(tenth**2) for tenth in tenths]),
+        np.array([100 * np.mean(np.abs(tenth)) for tenth in tenths]),
+    )
+
+
+def sparsification(confidence: FloatMap, error: FloatMap) -> FloatArray:
+    """Mean absolute error of the pixels that stay when the least confident are taken away.
+
+    Parameters
+    ----------
+    confidence, error : ndarray, shape (H, W), float32
+
+    Returns
+    -------
+    ndarray, shape (100,), float64
+        Times 100; with 0, 1, ... 99 % of the pixels taken away.
+    """
+    sums = np.cumsum(np.abs(_by_confidence(confidence, error)))
+    kept = np.maximum(1, np.rint(sums.size * (1 - np.arange(_STEPS) / _STEPS))).astype(np.int64)
+    return np.asarray(100 * sums[kept - 1] / kept)
+
+
+def oracle(error: FloatMap) -> FloatArray:
+    """The curve of :func:`sparsification` for a confidence that knows the errors: none can lie lower."""
+    return sparsification(-np.abs(error), error)
+
+
+def confidence_table(runs: Runs) -> Report:
+    """Mean errors by decile of confidence and the area under the sparsification curve, beside the oracle's."""
+    rows: list[Row] = []
+    lines: list[Row] = []
+    last = runs.plan.stages[-1]
+    for dataset in runs.plan.scenes:
+        for scene in runs.scored(dataset):
+            for variant in runs.plan.compared:
+                confidence = read_stage(runs.plan.stage_file(dataset, scene, variant, last)).confidence
+                error = read_evaluation(runs.plan.stage_file(dataset, scene, variant, last, "scores.h5")).error
+                if error is None:
+                    continue
+                squared, absolute = decile_errors(confidence, error)
+                area, least = sparsification(confidence, error).mean(), oracle(error).mean()
+                areas: list[Cell] = [float(area), float(least), float(np.abs(error[np.isfinite(error)]).mean() * 100)]
+                for name, figures in (("mse100", squared), ("mae100", absolute)):
+                    rows.append([dataset, scene, variant, name, *map(float, figures), *areas])
+                lines.append([f"{dataset}/{scene}", variant, *map(float, absolute), *areas])
+    tenths = [f"decile {i}" for i in range(1, DECILES + 1)]
+    return Report(
+        "Confidence",
+        "Mean absolute error x100 of each tenth of the pixels, from the most confident (1) to the least (10); mean "
+        "squared errors are in the CSV file. Area: mean of the sparsification curve, which is the mean absolute error "
+        "x100 of the pixels left when the least confident are taken away, from none to 99 %; oracle: the same when the "
+        "pixels with the largest errors go first, which nothing can beat; random: the error of all pixels, which is "
+        "what a confidence that says nothing reaches. Curves: `maps/DATASET/SCENE/VARIANT/sparsification.png`. Whole "
+        "map.",
+        Table(["dataset", "scene", "variant", "error", *tenths, "area", "oracle", "random"], rows),
+        [Section("", Table(["scene", "variant", *tenths, "area", "oracle", "random"], lines))],
+    )
+
+
+def write_curves(path: Path, confidence: FloatMap, error: FloatMap) -> None:
+    """Plot the sparsification curve of a map beside the oracle's; equal maps give equal bytes."""
+    figure = Figure(figsize=(5, 3.5), dpi=100, layout="constrained")
+    FigureCanvasAgg(figure)
+    axis = figure.subplots()
+    taken = np.arange(_STEPS)
+    for name, curve, style in (
+        ("by confidence", sparsification(confidence, error), "-"),
+        ("oracle", oracle(error), "--"),
+    ):
+        axis.plot(taken, curve, style, label=f"{name}, area {curve.mean():.3f}")
+    axis.set_xlabel("pixels taken away / %")
+    axis.set_ylabel("mean absolute error x100 / px per view step")
+    axis.set_ylim(bottom=0)
+    axis.legend()
+    with atomic_path(path) as temporary:
+        figure.savefig(temporary, format="png", metadata={"Software": None})
+
+
+def _by_confidence(confidence: FloatMap, error: FloatMap) -> FloatArray:
+    known = np.isfinite(error)
+    order = np.argsort(-confidence[known], kind="stable")
+    return np.asarray(error[known][order], np.float64)
