@@ -29,37 +29,39 @@ _HORIZON = 16  # powers of the pole are below float32's precision from here on
 
 
 @njit(inline="always")
-def _filter_line(line: Any) -> None:
-    """Cubic spline coefficients of one line, in place."""
-    n = line.size
-    total, power = np.float32(0), np.float32(1)
-    for i in range(min(n, _HORIZON)):
-        total += power * line[i]
-        power *= _POLE
-    line[0] = total * _GAIN
-    for i in range(1, n):
-        line[i] = _GAIN * line[i] + _POLE * line[i - 1]
-    line[n - 1] = _LAST * (line[n - 1] + _POLE * line[n - 2])
-    for i in range(n - 2, -1, -1):
-        line[i] = _POLE * (line[i + 1] - line[i])
+def _weight_at_start(i: int, n: int) -> Any:
+    """Weight of sample ``i`` of ``n`` in the first value of the causal filter; the line is mirrored for ever."""
+    if n > _HORIZON:
+        return _POLE**i if i < _HORIZON else np.float32(0)
+    period = 2 * n - 2
+    total = _POLE**i if i == 0 or i == n - 1 else _POLE**i + _POLE ** (period - i)
+    return total / (np.float32(1) - _POLE**period)
 
 
-@njit(cache=True, fastmath=True)
+@njit(cache=True)
 def spline_coefficients(image: Any) -> Any:
-    """Cubic spline coefficients of an image (H, W), float32."""
+    """Cubic spline coefficients of an image (H, W), float32; both at least 2."""
     H, W = image.shape
     out = image.astype(np.float32)
     for y in range(H):
-        _filter_line(out[y])
+        line = out[y]
+        first = np.float32(0)
+        for x in range(min(W, _HORIZON)):
+            first += _weight_at_start(x, W) * line[x]
+        line[0] = first * _GAIN
+        for x in range(1, W):
+            line[x] = _GAIN * line[x] + _POLE * line[x - 1]
+        line[W - 1] = _LAST * (line[W - 1] + _POLE * line[W - 2])
+        for x in range(W - 2, -1, -1):
+            line[x] = _POLE * (line[x + 1] - line[x])
     # columns together: all rows are run through once forth and once back
-    first = np.zeros(W, np.float32)
-    power = np.float32(1)
+    top = np.zeros(W, np.float32)
     for y in range(min(H, _HORIZON)):
+        weight = np.float32(_weight_at_start(y, H))
         for x in range(W):
-            first[x] += power * out[y, x]
-        power *= _POLE
+            top[x] += weight * out[y, x]
     for x in range(W):
-        out[0, x] = first[x] * _GAIN
+        out[0, x] = top[x] * _GAIN
     for y in range(1, H):
         for x in range(W):
             out[y, x] = _GAIN * out[y, x] + _POLE * out[y - 1, x]

@@ -51,7 +51,7 @@ class LayerParameters(Parameters):
     detail_share: float = Field(0.6, ge=0, le=1, description="share of the detail in the cost; 0 uses colours alone")
     base_radius: int = Field(4, ge=1, le=20, description="bilateral window of 2 r + 1 pixels that takes detail out")
     base_sigma_colour: float = Field(
-        0.0314, gt=0, le=2, description="colour difference that counts as an edge of the base, colours in 0..1"
+        0.0314, gt=0, le=2, description="sum of the RGB differences that counts as an edge of the base, colours in 0..1"
     )
     base_sigma_space: float = Field(4.0, gt=0, le=20, description="width of the base's window, in pixels")
 
@@ -101,7 +101,7 @@ def split_layers(light_field: LightField, parameters: LayerParameters) -> Layers
     channels = 3 // views.shape[4]
     # grey counts as three equal channels, so that scales mean the same for grey and colour
     noise = channels * residual_variance(light_field.centre)
-    edge = float(np.hypot(parameters.base_sigma_colour, 3 * noise_level(light_field.centre)))
+    edge = float(np.hypot(parameters.base_sigma_colour, 3 * noise_level(light_field.centre))) / channels
     if parameters.detail_share > 0:
         detail = _detail_of_views(light_field, parameters.base_radius, edge, parameters.base_sigma_space)
     else:

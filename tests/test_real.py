@@ -11,6 +11,7 @@ from sepi.ingest import settle_range
 from sepi.lightfield import LightField
 from sepi.pipeline import STAGES, VARIANTS
 from sepi.reading import read_light_field
+from sepi.report.confidence import decile_errors
 from sepi.stage import StageMaps, no_progress
 
 pytestmark = pytest.mark.real
@@ -75,3 +76,25 @@ def test_range_is_found_without_truth_or_parameters(hci: Path) -> None:
     assert known.source == "estimated"
     assert known.minimum < light_field.truth.min()
     assert known.maximum > light_field.truth.max()
+
+
+# MSE x100, Q25 x100 and BadPix 0.07 % on the whole map
+BEST_BOUNDS = {"cotton": (0.35, 0.09, 1.3), "antinous": (4.0, 0.40, 8.0)}
+
+
+@pytest.mark.parametrize("name", BEST_BOUNDS)
+def test_best_variant_reaches_its_figures(hci: Path, name: str) -> None:
+    result = scores(hci / name, "best")
+    mse, q25, badpix = BEST_BOUNDS[name]
+    assert result["mse100"] <= mse
+    assert result["q25"] <= q25
+    assert result["badpix007"] <= badpix
+    assert result["non_finite"] == 0
+
+
+@pytest.mark.parametrize("name", BEST_BOUNDS)
+def test_error_falls_with_confidence(hci: Path, name: str) -> None:
+    """Who keeps the confident pixels must get the better ones, all the way down."""
+    final = maps_after(hci / name, tuple(VARIANTS["best"].choices.values()))
+    for errors in decile_errors(final.confidence, final.disparity - scene(hci / name).truth):
+        assert np.all(np.diff(errors) > 0), errors

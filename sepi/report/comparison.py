@@ -48,9 +48,9 @@ def scene_table(runs: Runs, score: str, paper: SceneTable, title: str) -> Report
     return Report(
         title,
         f"{_PROTOCOL} This code: variants {_own_names(runs.plan)}. Other columns: as the paper prints them; empty "
-        f"where the scene was in the method's training set. {_LEARNED} A scene without a figure of this code is not at hand; one "
-        "without published figures is not in the paper. The average of the scenes at hand is empty where a method has "
-        "no figure for one of them.",
+        f"where the scene was in the method's training set. {_LEARNED} A scene without a figure of this code is not at "
+        "hand; one without published figures is not in the paper. The average of the scenes at hand is empty where a "
+        "method has no figure for one of them.",
         Table(["dataset", "scene", "row", *_own_keys(runs.plan), *(method.key for method in methods)], rows),
         [
             Section(_dataset_title(dataset), Table(heads, [[row[1], *row[3:]] for row in group]))

@@ -1,0 +1,147 @@
+"""What variant ``best`` adds to the paper's stages: detail, visibility, mixed pixels, uniform regions, confidence."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sepi.colour_mixture import MixtureParameters, farther_where_little_covered
+from sepi.evaluate import score
+from sepi.layers import DETAIL_UNIT, LayerParameters, split_layers
+from sepi.lightfield import DisparityRange, LightField
+from sepi.pipeline import PARTS_OF_BEST, VARIANTS, estimate_depth
+from sepi.report.confidence import decile_errors, oracle, sparsification
+from sepi.scenes import render
+from sepi.uniform_regions import UniformPlanesParameters, supporting_plane, uniform_regions
+
+
+@pytest.mark.parametrize(
+    ("name", "mean_error"), [("fronto_parallel", 1e-3), ("slanted_plane", 4e-3), ("pyramids", 1e-2)]
+)
+def test_mean_error_on_exact_truth(name: str, mean_error: float) -> None:
+    scene = render(name, size=128)
+    found = estimate_depth(replace(scene, truth=None), "best").disparity
+    assert np.abs(found - scene.truth)[4:-4, 4:-4].mean() <= mean_error
+
+
+@pytest.mark.parametrize("name", ["fine_structures", "dots", "stripes", "wall"])
+def test_best_is_better_than_the_paper_below_a_pixel(name: str) -> None:
+    """The most accurate variant has to be that on thin things, under noise, and without texture."""
+    scene = render(name, size=128)
+    best, paper = (score(estimate_depth(scene, v).disparity, scene.truth) for v in ("best", "paper"))
+    assert best["q25"] < paper["q25"]
+    assert best["badpix007"] < paper["badpix007"]
+
+
+def glossy(scene: LightField) -> LightField:
+    """The scene with a brightness that changes smoothly with the view, as a gloss does, by up to 3 %."""
+    views = scene.views.astype(np.float32) / 255
+    T, S, H, W, _ = views.shape
+    t, s, y, x = np.ogrid[:T, :S, :H, :W]
+    gloss = 0.004 * ((t - T // 2) * np.sin(y / 17) + (s - S // 2) * np.cos(x / 23))
+    return replace(scene, views=np.clip(views * (1 + gloss[..., None]), 0, 1).astype(np.float32))
+
+
+def test_gloss_does_not_move_faint_texture() -> None:
+    """On a surface of faint texture, brightness that changes with the view pulls colours alone aside."""
+    scene = render("slanted_plane", size=128)
+    faint = replace(scene, views=np.round(110 + (scene.views.astype(np.float32) - 110) * 0.12).astype(np.uint8))
+    errors = {
+        variant: np.abs(estimate_depth(glossy(faint), variant).disparity - scene.truth)[8:-8, 8:-8].mean()
+        for variant in ("best", "best_no_detail")
+    }
+    assert errors["best"] < 0.02
+    assert errors["best"] < 0.5 * errors["best_no_detail"]
+
+
+def test_detail_leaves_out_shading_and_edges() -> None:
+    """Smooth brightness and strong edges stay in the base, faint texture is the detail."""
+    y, x = np.mgrid[:40, :40]
+    shading = 0.3 + 0.002 * x
+    texture = 0.01 * np.sin(2.5 * x) * np.sin(2.2 * y)
+    step = np.where(x >= 20, 0.4, 0)
+    view = np.repeat((shading + texture + step)[..., None], 3, axis=2).astype(np.float32)
+    field = LightField(np.broadcast_to(view, (1, 2, 40, 40, 3)).copy(), "s")
+    detail = split_layers(field, LayerParameters()).detail[0, 0, 0] * DETAIL_UNIT
+    inner = detail[6:-6, 6:-6]
+    assert np.corrcoef(inner.ravel(), texture[6:-6, 6:-6].ravel())[0, 1] > 0.95
+    assert np.abs(inner).max() < 0.03
+
+
+def test_layers_are_made_once_for_the_stages_of_a_run() -> None:
+    scene = render("dots", size=64)
+    one, two = (split_layers(scene, LayerParameters()).detail for _ in range(2))
+    assert one is two
+    other = split_layers(scene, LayerParameters(base_radius=2)).detail
+    assert not np.array_equal(one, other)
+
+
+def test_mixed_pixels_go_to_the_surface_that_fills_them() -> None:
+    """A depth map that is one pixel too wide at an edge: the pixel there is mostly background."""
+    guide = np.full((20, 20, 3), 0.2, np.float32)
+    guide[:, 10:] = 0.8
+    guide[:, 9] = 0.2 + 0.2 * 0.6
+    wide = np.zeros((20, 20), np.float32)
+    wide[:, 9:] = 1
+    found = farther_where_little_covered(wide, guide, 0.0, MixtureParameters())
+    expected = np.zeros((20, 20), np.float32)
+    expected[:, 10:] = 1
+    np.testing.assert_allclose(found, expected, atol=1e-6)
+    # mostly foreground, or no contrast to tell by: left as it is
+    guide[:, 9] = 0.2 + 0.8 * 0.6
+    np.testing.assert_array_equal(farther_where_little_covered(wide, guide, 0.0, MixtureParameters()), wide)
+    flat = np.full_like(guide, 0.5)
+    np.testing.assert_array_equal(farther_where_little_covered(wide, flat, 0.0, MixtureParameters()), wide)
+
+
+def test_uniform_is_what_the_noise_explains() -> None:
+    """Faint texture above the noise is texture, whatever its contrast; noise is not."""
+    random = np.random.default_rng(0)
+    mean = np.full((60, 80, 3), 0.5) + random.normal(0, 1e-3, (60, 80, 3))
+    mean[:, 40:] += 6e-3 * random.normal(0, 1, (60, 40, 1))
+    confidence = np.zeros((60, 80), np.float32)
+    found = uniform_regions(mean.astype(np.float32), 1e-6, confidence, UniformPlanesParameters(growth=0))
+    assert found[:, :34].mean() > 0.95
+    assert not found[:, 46:].any()
+
+
+def test_plane_is_nowhere_nearer_than_most_of_the_border() -> None:
+    """Half of the border belongs to things that stand before the region; what lies behind it cannot be."""
+    y, x = np.mgrid[:30, :40]
+    truth = -0.5 + 0.01 * x
+    disparity = truth.copy()
+    disparity[:, 30:] = 1.5
+    border = np.zeros((30, 40), bool)
+    border[[0, -1]] = border[:, [0, -1]] = True
+    plane = supporting_plane(border, disparity.astype(np.float32), UniformPlanesParameters(), np.random.default_rng(0))
+    assert plane is not None
+    np.testing.assert_allclose(plane[0] + plane[1] * x + plane[2] * y, truth, atol=1e-3)
+    assert supporting_plane(np.zeros((30, 40), bool), disparity, UniformPlanesParameters(), None) is None
+
+
+def test_parts_of_best_differ_from_it_in_one_thing() -> None:
+    """A row of the ablation that changes more says nothing about the part."""
+    assert next(iter(PARTS_OF_BEST)) == "best"
+    assert set(PARTS_OF_BEST) == {name for name in VARIANTS if name.startswith("best")}
+    for name in PARTS_OF_BEST:
+        different = [s for s, c in VARIANTS[name].choices.items() if VARIANTS["best"].choices[s] != c]
+        assert len(different) == {"best": 0, "best_no_detail": 3}.get(name, 1)
+
+
+def test_sparsification_is_what_its_name_says() -> None:
+    error = np.array([[1.0, -2.0], [3.0, np.nan]], np.float32)
+    confidence = np.array([[0.9, 0.1], [0.5, 1.0]], np.float32)
+    curve = sparsification(confidence, error)
+    assert curve[0] == pytest.approx(200)
+    assert curve[-1] == pytest.approx(100)
+    assert oracle(error)[0] == pytest.approx(200)
+    assert np.all(oracle(error) <= curve + 1e-9)
+    squared, absolute = decile_errors(np.arange(20, dtype=np.float32), np.arange(20, dtype=np.float32))
+    assert absolute[0] == pytest.approx(1850)
+    assert squared[-1] == pytest.approx(50)
+
+
+def test_range_narrower_than_the_scene_is_no_crash() -> None:
+    scene = render("pyramids", size=64)
+    narrow = scene.with_range(DisparityRange(0.0, 0.1, "given"))
+    assert np.isfinite(estimate_depth(narrow, "best").disparity).all()
