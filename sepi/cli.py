@@ -259,7 +259,9 @@ def _parameters(settings: tuple[str, ...], name: str, variant: Variant) -> dict[
     for setting in settings:
         match = re.fullmatch(r"(\w+)\.(\w+)\.(\w+)=(.*)", setting)
         if match is None:
-            raise SepiError(f"--set {setting}: expected STAGE.CHOICE.NAME=VALUE, such as initial.sepi.candidates=91")
+            raise SepiError(
+                f"--set {setting}: expected STAGE.CHOICE.NAME=VALUE, such as initial.semi_global.candidates=91"
+            )
         stage, choice, field, text = match.groups()
         if variant.choices.get(stage) != choice:
             used = ", ".join(f"{stage}.{choice}" for stage, choice in variant.choices.items())

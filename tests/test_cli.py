@@ -28,7 +28,7 @@ from sepi.reading import read_light_field
 from sepi.scenes import SCENES, render, write_hci
 
 # few candidates: these tests are about the commands, not about depth
-FAST = ("--threads", "2", "--set", "initial.sepi.candidates=21")
+FAST = ("--threads", "2", "--set", "initial.semi_global.candidates=21")
 
 
 @pytest.fixture(scope="session")
@@ -80,7 +80,7 @@ def test_depth_writes_the_maps_and_says_so(scene: Path) -> None:
     assert "pyramids: 3x3 views (rows x columns) of 64x64 pixels" in called.stdout
     known = read_light_field(scene).known_range()
     assert f"disparity range: {known.minimum} to {known.maximum} pixels per view step (from the" in called.stdout
-    masks = {"mask_occluded.png", "mask_occlusion_candidates.png", "mask_textureless.png"}
+    masks = {"mask_occluded.png", "mask_textureless.png"}
     assert set(os.listdir("pyramids-depth")) == {*RESULT_FILES, *masks, "depth.pfm"}
     assert f"written to pyramids-depth/: {' '.join(RESULT_FILES[:-1])}" in called.stdout
     disparity = read_pfm(Path("pyramids-depth/disparity.pfm"))
@@ -90,14 +90,14 @@ def test_depth_writes_the_maps_and_says_so(scene: Path) -> None:
 
 
 def test_result_says_what_made_it(scene: Path) -> None:
-    call("depth", scene, "-o", "out", "--variant", "no_occlusion", "--disparity-range", -2, 2, *FAST)
+    call("depth", scene, "-o", "out", "--variant", "best_wls", "--disparity-range", -2, 2, *FAST)
     attributes = read_attributes(Path("out/result.h5"))
     assert attributes["scene"] == "pyramids"
-    assert attributes["variant"] == "no_occlusion"
+    assert attributes["variant"] == "best_wls"
     assert attributes["disparity_range"].tolist() == [-2, 2]
     assert attributes["disparity_range_source"] == "given"
     steps = json.loads(attributes["made_from"])
-    assert [step["choice"] for step in steps] == ["sepi", "none", "lti", "wls"]
+    assert [step["choice"] for step in steps] == ["semi_global", "visibility", "uniform_planes", "wls"]
     assert steps[0]["parameters"]["candidates"] == 21
     with h5py.File("out/result.h5") as file:
         assert file["disparity"].attrs["units"] == "pixels per view step"
@@ -134,7 +134,7 @@ def test_depth_from_the_file_that_ingest_wrote(scene: Path) -> None:
 
 
 def test_python_gives_the_same_map_as_the_command(scene: Path, result: Path) -> None:
-    maps = sepi.estimate_depth(sepi.read_light_field(scene), "paper", {"initial": {"candidates": 21}})
+    maps = sepi.estimate_depth(sepi.read_light_field(scene), "best", {"initial": {"candidates": 21}})
     np.testing.assert_array_equal(maps.disparity, read_pfm(result / "disparity.pfm"))
 
 
@@ -294,14 +294,22 @@ BAD: dict[str, tuple[Callable[[Path], object], tuple[str, ...], str]] = {
     "range of no width": (lambda s: None, ("pyramids", "--disparity-range", "1", "1"), "MIN < MAX"),
     "range not finite": (lambda s: None, ("pyramids", "--disparity-range", "nan", "1"), "finite"),
     "unknown variant": (lambda s: None, ("pyramids", "--variant", "papr"), "did you mean 'paper'"),
-    "unknown parameter": (lambda s: None, ("pyramids", "--set", "initial.sepi.candidate=9"), "did you mean"),
+    "unknown parameter": (lambda s: None, ("pyramids", "--set", "initial.semi_global.candidate=9"), "did you mean"),
     "parameter of another variant": (
         lambda s: None,
         ("pyramids", "--set", "occlusion.wang.x=9"),
         "does not use occlusion.wang",
     ),
-    "parameter out of bounds": (lambda s: None, ("pyramids", "--set", "initial.sepi.candidates=0"), "candidates"),
-    "parameter of the wrong type": (lambda s: None, ("pyramids", "--set", "initial.sepi.candidates=few"), "'few'"),
+    "parameter out of bounds": (
+        lambda s: None,
+        ("pyramids", "--set", "initial.semi_global.candidates=0"),
+        "candidates",
+    ),
+    "parameter of the wrong type": (
+        lambda s: None,
+        ("pyramids", "--set", "initial.semi_global.candidates=few"),
+        "'few'",
+    ),
     "parameter without value": (lambda s: None, ("pyramids", "--set", "candidates"), "STAGE.CHOICE.NAME=VALUE"),
     "output is a file": (
         lambda s: (s.parent / "out").write_text("mine"),
@@ -567,7 +575,7 @@ def test_each_command_has_help(command: str) -> None:
 
 def test_python_writes_what_the_command_writes(scene: Path, result: Path) -> None:
     light_field = sepi.read_light_field(scene, options=sepi.ReadOptions(view=(1, 1)))
-    maps = sepi.estimate_depth(light_field, "paper", {"initial": {"candidates": 21}})
+    maps = sepi.estimate_depth(light_field, "best", {"initial": {"candidates": 21}})
     sepi.write_result("out", light_field, maps)
     written, by_command = everything_in(Path("out")), everything_in(result)
     assert set(written) == set(by_command)

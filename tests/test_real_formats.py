@@ -41,7 +41,7 @@ def test_equal_maps_from_every_format(hci: Path, name: str, tmp_path: Path) -> N
     for source in (hci / name, tmp_path / "array.npy", tmp_path / "matlab.mat", tmp_path / "own.h5"):
         out = tmp_path / f"{source.stem}-maps"
         # fewer candidates than usual take half the time and say as much about where bytes come from
-        depth(source, "-o", out, "--disparity-range", *RANGES[name], "--set", "initial.sepi.candidates=61")
+        depth(source, "-o", out, "--disparity-range", *RANGES[name], "--set", "initial.semi_global.candidates=61")
         # all but what names the source, and metric depth, for which an array has no camera
         shared = sorted(
             path.name for path in out.iterdir() if path.name not in ("result.h5", "depth.pfm", "points.ply")
@@ -54,7 +54,7 @@ def test_equal_maps_from_every_format(hci: Path, name: str, tmp_path: Path) -> N
 
 
 def mse(light_field: LightField, truth: np.ndarray) -> float:
-    return score(estimate_depth(light_field).disparity, truth)["mse100"]
+    return score(estimate_depth(light_field, "paper").disparity, truth)["mse100"]
 
 
 @pytest.mark.parametrize("name", RANGES)

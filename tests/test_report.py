@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from sepi import pipeline
 from sepi.errors import SepiError
 from sepi.evaluate import evaluation_of
 from sepi.io.hdf5 import write_light_field, write_stage
@@ -27,7 +28,7 @@ VARIANTS = {
 }
 # error added to the truth after each stage; the scenes' own is added too
 STAGE_ERROR = {"initial": 0.4, "occlusion": 0.3, "textureless": 0.2, "optimize": 0.1}
-VARIANT_ERROR = {"paper": 0.0, "no_occlusion": 0.1, "wang": 0.2}
+VARIANT_ERROR = {"paper": 0.0, "no_occlusion": 0.1, "wang": 0.2, "best": -0.05, "best_wls": 0.3}
 SCENE_ERROR = {"dots": 0.0, "flat": 0.1, "cotton": 0.0, "mine": 0.1, "picture": 0.0}
 
 
@@ -56,11 +57,15 @@ def stage_maps(scene: LightField, variant: str, stage: str) -> StageMaps:
 @pytest.fixture(scope="module")
 def plan(tmp_path_factory: pytest.TempPathFactory) -> Plan:
     """Results of five scenes (one built-in called like a benchmark scene, one picture without truth) and 3 variants."""
-    made = Plan(tmp_path_factory.mktemp("results"), SCENES, VARIANTS)
+    return with_results(Plan(tmp_path_factory.mktemp("results"), SCENES, VARIANTS))
+
+
+def with_results(made: Plan) -> Plan:
+    """The plan, its result files written."""
     for dataset, name in made.pairs:
         scene = light_field(name)
         write_light_field(made.light_field_file(dataset, name), scene)
-        for variant in VARIANTS:
+        for variant in made.variants:
             for stage in made.stages:
                 maps = stage_maps(scene, variant, stage)
                 write_stage(made.stage_file(dataset, name, variant, stage), maps, {"stage": stage})
@@ -219,6 +224,30 @@ def test_tables_read_only_their_declared_inputs(table: str, plan: Plan, tmp_path
     assert (tmp_path / "reports" / f"{table}.csv").is_file()
 
 
+def test_best_has_its_columns_and_an_ablation_of_its_own(tmp_path: Path) -> None:
+    """The default variant must be seen beside the paper's; its reduced variants do not crowd the other tables."""
+    variants = VARIANTS | {name: pipeline.VARIANTS[name].choices for name in ("best", "best_wls")}
+    made = with_results(Plan(tmp_path / "results", {"hci": ["cotton", "picture"]}, variants))
+    run(tables.command, made, tmp_path / "reports")
+    mse = only(rows_of(tmp_path / "reports", "table1_mse"), dataset="hci", scene="Cotton")
+    assert (mse["ours_best"], mse["ours"], mse["zhou"]) == ("0.2500", "1.0000", "1.20")
+    assert "| this code, best | this code, paper |" in (tmp_path / "reports/table2_q25.md").read_text()
+    assert only(rows_of(tmp_path / "reports", "table3_regions"), method="ours_best")["hci_textureless"] == "0.2500"
+    table4 = rows_of(tmp_path / "reports", "table4_ablation")
+    assert "best" in table4[0]
+    assert "best_wls" not in table4[0]
+    parts = rows_of(tmp_path / "reports", "ablation_best")
+    assert [(row["variant"], row["mse100"], row["seconds"]) for row in parts] == [
+        ("best", "0.2500", "6.0000"),
+        ("best_wls", "16.0000", "6.0000"),
+    ]
+    confidence = rows_of(tmp_path / "reports", "confidence")
+    assert {row["variant"] for row in confidence} == {"best", "paper"}
+    row = only(confidence, variant="best", error="mae100")
+    assert float(row["decile 1"]) == pytest.approx(5, abs=1e-3)
+    assert float(row["area"]) == pytest.approx(float(row["oracle"]), abs=1e-3)
+
+
 def test_variants_share_the_files_of_their_first_stages(plan: Plan) -> None:
     files = [plan.stage_file("hci", "cotton", variant, "initial") for variant in VARIANTS]
     assert len(set(files)) == 1
@@ -256,6 +285,7 @@ def test_pictures_of_a_scene(plan: Plan, tmp_path: Path) -> None:
     common = {"overview.png", "centre.png", "truth.png", "occluded_truth.png", "textureless_truth.png"}
     stages = {"1_initial", "2_occlusion", "3_textureless", "4_optimize"}
     each = stages | {"error", "confidence", "occluded", "textureless", "superpixels"}
+    common.add("paper/sparsification.png")
     assert written == common | {f"{variant}/{name}.png" for variant in VARIANTS for name in each}
     centre = cv2.imread(str(tmp_path / "centre.png"))[:, :, ::-1]
     np.testing.assert_array_equal(centre, light_field("cotton").views[1, 1])

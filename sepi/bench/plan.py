@@ -9,16 +9,15 @@ from tqdm import tqdm
 
 from sepi.bench import floor, growth, plain, solvers, stages, storage
 from sepi.bench.measure import Case, Measurement, measured
-from sepi.bench.scene import Scene, prepare_files, prepare_grown, prepare_render
+from sepi.bench.scene import VARIANT, Scene, prepare_files, prepare_grown, prepare_render
 from sepi.errors import SepiError
 from sepi.io.hdf5 import read_light_field
 from sepi.pipeline import stage_parameters, variant_named
 
-GROUPS = ("stages", "growth", "beside", "solvers", "storage", "large")
-VARIANT = "paper"
 GROWTH_REPEATS = 3
 """Long enough to see how time grows, short enough to wait for."""
 
+GROUPS = ("stages", "growth", "beside", "solvers", "storage", "large")
 GROWING_SCENE = "curved_occluders"
 
 

@@ -18,6 +18,9 @@ from sepi.scenes import SCENES, render
 from sepi.scenes.folder import write_hci
 from sepi.stage import Parameters, StageMaps, no_progress
 
+VARIANT = "paper"
+"""Variant whose steps are measured."""
+
 
 @dataclass(frozen=True)
 class Scene:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from sepi.bench.measure import Case, Figures, Measurement, Prepared, measured_command
-from sepi.bench.scene import Scene, maps_before
+from sepi.bench.scene import VARIANT, Scene, maps_before
 from sepi.disparity_range import estimate_range
 from sepi.evaluate import score
 from sepi.io.export import write_result
@@ -93,6 +93,7 @@ def command(scene: Scene, threads: int, repeats: int, candidates: int) -> Measur
     """The command ``sepi depth``, from its start to its end: files to maps."""
     output = scene.folder / "depth"
     words = ["-m", "sepi", "depth", str(scene.source), "--output", str(output), "--threads", str(threads)]
+    words += ["--variant", VARIANT]
     words += [f"--set={name}.candidates={candidates}" for name in ("initial.sepi", "occlusion.half_sepi")]
     return measured_command("whole", "sepi depth, files to maps", words, repeats)
 

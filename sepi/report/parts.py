@@ -5,7 +5,7 @@ from __future__ import annotations
 from sepi.evaluate import PROTOCOLS, WHOLE_MAP
 from sepi.pipeline import PARTS_OF_BEST
 from sepi.report.layout import Cell, Report, Row, Section, Table
-from sepi.report.plan import Runs
+from sepi.report.plan import BEST_VARIANT, Runs
 
 _SCORES = {"mse100": "MSE x100", "q25": "Q25 x100", "badpix007": "BadPix 0.07 %"}
 
@@ -15,7 +15,7 @@ def parts_table(runs: Runs) -> Report:
     rows: list[Row] = []
     sections = []
     for dataset in runs.plan.scenes:
-        for scene in runs.scored(dataset):
+        for scene in runs.scored(dataset, BEST_VARIANT) if runs.plan.parts else ():
             lines: list[Row] = []
             for variant in runs.plan.parts:
                 scores = runs.scores(dataset, scene, variant)["paper"][WHOLE_MAP]

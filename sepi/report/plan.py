@@ -177,10 +177,10 @@ class Runs:
             self._scores[path] = read_scores(path)
         return self._scores[path]
 
-    def scored(self, dataset: str) -> list[str]:
-        """Scenes of a data set that have ground truth, and so scores."""
+    def scored(self, dataset: str, variant: str = MAIN_VARIANT) -> list[str]:
+        """Scenes of a data set that have ground truth, and so scores; looked for with one of the variants."""
         scenes = self.plan.scenes.get(dataset, ())
-        return [scene for scene in scenes if self.scores(dataset, scene, MAIN_VARIANT)]
+        return [scene for scene in scenes if self.scores(dataset, scene, variant)]
 
     def final(
         self, dataset: str, scene: str, score: str, region: str = WHOLE_MAP, variant: str = MAIN_VARIANT
