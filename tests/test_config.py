@@ -84,7 +84,8 @@ def test_defaults_run_every_builtin_scene_and_variant() -> None:
         ),
         (
             {"variants": {"mine": {"initial": "sepi"}}},
-            "config.variants.mine: no choice for stage 'occlusion' (one of half_sepi, wang, visibility, visibility_unmixed, visibility_colours, none)",
+            "config.variants.mine: no choice for stage 'occlusion' (one of half_sepi, wang, visibility, "
+            "visibility_unmixed, visibility_colours, none)",
         ),
         (
             {"variants": {"mine": VARIANTS["paper"].choices | {"occlusion": "halfsepi"}}},

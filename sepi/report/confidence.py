@@ -94,11 +94,12 @@ def confidence_table(runs: Runs) -> Report:
     tenths = [f"decile {i}" for i in range(1, DECILES + 1)]
     return Report(
         "Confidence",
-        f"Protocol: paper (border {PROTOCOLS['paper']}, the whole map). Mean absolute error x100 of each tenth of the pixels, from the "
-        "most confident (1) to the least (10); mean squared errors are in the CSV file. Area: mean of the sparsification curve, which is the mean absolute error "
-        "x100 of the pixels left when the least confident are taken away, from none to 99 %; oracle: the same when the "
-        "pixels with the largest errors go first, which nothing can beat; random: the error of all pixels, which is "
-        "what a confidence that says nothing reaches. Curves: `maps/DATASET/SCENE/VARIANT/sparsification.png`.",
+        f"Protocol: paper (border {PROTOCOLS['paper']}, the whole map). Mean absolute error x100 of each tenth of the "
+        "pixels, from the most confident (1) to the least (10); mean squared errors are in the CSV file. Area: mean of "
+        "the sparsification curve, which is the mean absolute error x100 of the pixels left when the least confident "
+        "are taken away, from none to 99 %; oracle: the same when the pixels with the largest errors go first, which "
+        "nothing can beat; random: the error of all pixels, which is what a confidence that says nothing reaches. "
+        "Curves: `maps/DATASET/SCENE/VARIANT/sparsification.png`.",
         Table(["dataset", "scene", "variant", "error", *tenths, "area", "oracle", "random"], rows),
         [Section("", Table(["scene", "variant", *tenths, "area", "oracle", "random"], lines))],
     )
