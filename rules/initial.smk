@@ -11,7 +11,7 @@ rule initial:
         "benchmarks/{dataset}/{scene}/{initial}/initial.tsv"
     threads: threads_for
     resources:
-        mem_mb=memory_for(bytes_per_sample=8, bytes_per_pixel=400),
+        mem_mb=memory_for(bytes_per_sample=13, bytes_per_pixel=1300),
     params:
         parameters=parameters_of("initial"),
         code=code_digest("sepi.initial"),

@@ -12,7 +12,7 @@ rule occlusion:
         "benchmarks/{dataset}/{scene}/{initial}/{occlusion}/occlusion.tsv"
     threads: threads_for
     resources:
-        mem_mb=memory_for(bytes_per_sample=10, bytes_per_pixel=800),
+        mem_mb=memory_for(bytes_per_sample=18, bytes_per_pixel=1400),
     params:
         parameters=parameters_of("occlusion"),
         code=code_digest("sepi.occlusion"),

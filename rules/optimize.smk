@@ -12,7 +12,7 @@ rule optimize:
         "benchmarks/{dataset}/{scene}/{initial}/{occlusion}/{textureless}/{optimize}/optimize.tsv"
     threads: threads_for
     resources:
-        mem_mb=memory_for(bytes_per_sample=4, bytes_per_pixel=1500),
+        mem_mb=memory_for(bytes_per_sample=30, bytes_per_pixel=1500),
     params:
         parameters=parameters_of("optimize"),
         code=code_digest("sepi.optimize"),

@@ -12,7 +12,7 @@ rule textureless:
         "benchmarks/{dataset}/{scene}/{initial}/{occlusion}/{textureless}/textureless.tsv"
     threads: threads_for
     resources:
-        mem_mb=memory_for(bytes_per_sample=4, bytes_per_pixel=500),
+        mem_mb=memory_for(bytes_per_sample=17, bytes_per_pixel=500),
     params:
         parameters=parameters_of("textureless"),
         code=code_digest("sepi.textureless"),

@@ -107,12 +107,12 @@ def _decided(disparity: Any, guide: Any, step: Any, reach: int, contrast: Any, s
                     ):
                         continue
                     w = math.exp(-((row - y) ** 2 + (column - x) ** 2) / (2 * _WIDTH**2))
-                    side = sums[1 if q > middle else 0]
-                    side[0] += w
-                    side[1] += w * q
+                    own = sums[1 if q > middle else 0]
+                    own[0] += w
+                    own[1] += w * q
                     for c in range(3):
-                        side[2 + c] += w * guide[row, column, c]
-                        side[5] += w * guide[row, column, c] ** 2
+                        own[2 + c] += w * guide[row, column, c]
+                        own[5] += w * guide[row, column, c] ** 2
             if sums[0, 0] < _LEAST_WEIGHT or sums[1, 0] < _LEAST_WEIGHT:
                 continue
             distance, covered, variance = 0.0, 0.0, least_variance

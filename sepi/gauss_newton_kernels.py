@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 from numba import njit, prange
 
-SPLINE_UNIT = np.float32(1 / 8192)
-"""Value of one step of a spline coefficient, which is stored as int16; coefficients overshoot 0..1."""
+SPLINE_UNIT = np.float32(1 / 3400)
+"""Value of one step of a spline coefficient, stored as int16; a checkerboard of -0.5 and 1.5 has some of +-9.5."""
 
 _POLE = np.float32(math.sqrt(3) - 2)
 _GAIN = np.float32((1 - (math.sqrt(3) - 2)) * (1 - 1 / (math.sqrt(3) - 2)))

@@ -14,7 +14,7 @@ References
 
 from __future__ import annotations
 
-import weakref
+import zlib
 from dataclasses import dataclass
 
 import cv2
@@ -30,7 +30,7 @@ DETAIL_UNIT = 1 / 32000
 """Value of one step of the detail, which is stored as int16: colours differ by at most 1."""
 
 
-_KEPT: dict[str, tuple[weakref.ref[npt.NDArray[np.generic]], tuple[object, ...], npt.NDArray[np.int16]]] = {}
+_KEPT: dict[tuple[object, ...], npt.NDArray[np.int16]] = {}
 
 
 class LayerParameters(Parameters):
@@ -115,18 +115,24 @@ def split_layers(light_field: LightField, parameters: LayerParameters) -> Layers
 def _detail_of_views(light_field: LightField, radius: int, edge: float, width: float) -> npt.NDArray[np.int16]:
     """Each view without its edge-preserving mean; shape (T, S, 3, H, W).
 
-    The last light field's detail is kept as long as its views are: the stages of one run ask for it again.
+    The detail of the last light field is kept, since the stages of one run ask for it again.
     """
     views = light_field.views
-    key = (light_field.present.tobytes(), radius, edge, width)
-    kept = _KEPT.get("last")
-    if kept is not None and kept[0]() is views and kept[1] == key:
-        return kept[2]
+    content = zlib.crc32(np.ascontiguousarray(views).data)
+    key = (content, views.shape, views.dtype, light_field.present.tobytes(), radius, edge, width)
+    if key in _KEPT:
+        return _KEPT[key]
     detail = np.zeros((*light_field.grid, 3, *light_field.shape), np.int16)
     for t, s in np.argwhere(light_field.present):
         view = as_unit_float(views[t, s])
         base = cv2.bilateralFilter(np.ascontiguousarray(view), 2 * radius + 1, edge, width).reshape(view.shape)
         # of grey views the one channel goes to all three
         detail[t, s] = np.rint(np.clip(view - base, -1, 1) / DETAIL_UNIT).astype(np.int16).transpose(2, 0, 1)
-    _KEPT["last"] = (weakref.ref(views, lambda _: _KEPT.clear()), key, detail)
+    forget_layers()
+    _KEPT[key] = detail
     return detail
+
+
+def forget_layers() -> None:
+    """Free what is kept of the last light field."""
+    _KEPT.clear()

@@ -153,7 +153,12 @@ def visibility(
 ) -> StageMaps:
     """Depth from the views that see each pixel, as the map so far tells.
 
-    Arguments and result as for ``half_sepi``; ``occluded`` is where some view does not see the pixel.
+    Arguments as for ``half_sepi``.
+
+    Returns
+    -------
+    StageMaps
+        Adds ``occluded``, bool: pixels that something nearer covers in some view.
     """
     before = given(previous)
     result = depth_from_visible_views(light_field, before.disparity, parameters, progress)

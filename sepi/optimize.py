@@ -17,11 +17,13 @@ References
 
 from __future__ import annotations
 
+from typing import Self
+
 import cv2
 import numpy as np
 import numpy.typing as npt
 import scipy.sparse as sparse
-from pydantic import Field
+from pydantic import Field, model_validator
 from scipy.sparse.linalg import cg
 
 from sepi.command import stage_command
@@ -49,7 +51,7 @@ IGNORANCE = 0.01
 HALF_CONFIDENT_BEND = 0.01
 """Bend at which the confidence is one half, pixels per view step."""
 
-LEAST_RELIABILITY = 1e-3
+LEAST_RELIABILITY = 1e-6
 LEAST_SMOOTHNESS = 1e-8
 
 
@@ -98,6 +100,12 @@ class SecondOrderParameters(LayerParameters):
     )
     solve_accuracy: float = Field(3e-4, gt=0, lt=1, description="relative residual at which the solver stops")
     most_steps: int = Field(200, ge=1, description="steps after which the solver stops anyway")
+
+    @model_validator(mode="after")
+    def _does_something(self) -> Self:
+        if self.refinements + self.solves == 0:
+            raise ValueError("refinements and solves cannot both be 0; the choice 'none' hands the depth on")
+        return self
 
 
 class GaussNewtonParameters(SecondOrderParameters):
@@ -208,7 +216,7 @@ def smooth_confidence(disparity: FloatMap, curvature: FloatMap) -> FloatMap:
 def reliable(confidence: FloatMap, parameters: SecondOrderParameters) -> FloatMap:
     """How far the data is believed, 0..1: by the best confidence within two pixels, since edges lower it."""
     best = cv2.dilate(confidence, np.ones((5, 5), np.uint8))
-    return np.asarray(np.clip(best / parameters.reliable_confidence, LEAST_RELIABILITY, 1) ** 2, np.float32)
+    return np.asarray(np.clip((best / parameters.reliable_confidence) ** 2, LEAST_RELIABILITY, 1), np.float32)
 
 
 def smoothed(

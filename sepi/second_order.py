@@ -101,7 +101,7 @@ def solve_smooth(
     weight, data : ndarray, shape (H, W), float32
         ``w`` and ``z``; the data is also where the solver starts.
     accuracy : float
-        Residual, relative to the right side, at which the solver stops.
+        Residual, relative to the data's deviations from their mean, at which the solver stops.
     most_steps : int
         Steps after which it stops anyway.
 
@@ -112,10 +112,13 @@ def solve_smooth(
     w = weight.ravel().astype(np.float64) + 1e-9
     matrix = (smoothness + sparse.diags(w)).tocsr()
     start = data.ravel().astype(np.float64)
+    # smoothness does not know constants: without the mean, the accuracy does not depend on where zero lies
+    mean = np.average(start, weights=w)
+    start = start - mean
     solution, _ = cg(
         matrix, w * start, x0=start, rtol=accuracy, atol=0, maxiter=most_steps, M=_two_levels(matrix, data.shape)
     )
-    return np.asarray(solution, np.float32).reshape(data.shape)
+    return np.asarray(solution + mean, np.float32).reshape(data.shape)
 
 
 def _two_levels(matrix: sparse.csr_matrix, shape: tuple[int, ...]) -> LinearOperator:

@@ -23,7 +23,10 @@ from sepi.lightfield import FloatMap
 from sepi.stage import Parameters
 
 SAME_MINIMUM = 0.25
-"""Candidates this close to the winner belong to the same minimum, pixels per view step."""
+"""Candidates this close to the winner belong to the same minimum, pixels per view step..."""
+
+SAME_SHARE = 0.1
+"""...but no more than this share of the range."""
 
 HALF_CONFIDENT = 0.05
 """Margin of cost at which the confidence is one half."""
@@ -87,7 +90,8 @@ def smooth_and_choose(
     averaged = aggregate(cost, guide, parameters.window_radius, variance)
     penalties = parameters.small_penalty, parameters.large_penalty, parameters.colour_weakening
     smoothed = semi_global(averaged, guide, *(np.float32(p) for p in penalties))
-    disparity, margin = choose(smoothed, averaged, disparities, np.float32(SAME_MINIMUM))
+    same = min(SAME_MINIMUM, SAME_SHARE * float(disparities[-1] - disparities[0]))
+    disparity, margin = choose(smoothed, averaged, disparities, np.float32(same))
     margin = np.maximum(margin, 0)
     return SmoothedResult(disparity, (margin / (margin + np.float32(HALF_CONFIDENT))).astype(np.float32))
 
@@ -200,7 +204,7 @@ def choose(smoothed: Any, averaged: Any, disparities: Any, same: Any) -> Any:
     Returns
     -------
     disparity, margin : ndarray, shape (H, W), float32
-        The margin is negative where another minimum is lower before smoothing, 1 where there is no other.
+        The margin is negative where another minimum is lower before smoothing, 0 where there is no other.
     """
     H, W, K = smoothed.shape
     disparity, margin = np.empty((H, W), np.float32), np.empty((H, W), np.float32)
@@ -221,5 +225,5 @@ def choose(smoothed: Any, averaged: Any, disparities: Any, same: Any) -> Any:
                     own = min(own, averaged[y, x, k])
                 else:
                     other = min(other, averaged[y, x, k])
-            margin[y, x] = min(np.float32(1), other - own)
+            margin[y, x] = other - own if other < _UNREACHABLE else np.float32(0)
     return disparity, margin

@@ -147,6 +147,7 @@ def uniform_planes(
     """
     before = given(previous)
     disparity, uniform = filled(light_field, before, parameters)
+    progress(1.0)
     return before.updated(disparity, before.confidence, textureless=uniform)
 
 

@@ -26,9 +26,10 @@ from sepi.layers import LayerParameters, split_layers
 from sepi.lightfield import BoolMap, FloatMap, LightField
 from sepi.noise import noise_level
 from sepi.stage import Parameters, StageMaps
+from sepi.sweep import full_scale
 
-QUANTISATION = 0.3 / 255
-"""Noise of 8-bit rounding, below which no view's noise is believed."""
+LEAST_NOISE = 1e-5
+"""Noise below which rounding of float32 is noise too; integers have at least 0.3 levels by rounding."""
 
 _PIXELS_OF_A_PLANE = 12  # least border to fit one to
 
@@ -75,12 +76,20 @@ def filled(light_field: LightField, before: StageMaps, parameters: UniformPlanes
     -------
     disparity : ndarray, shape (H, W), float32
     uniform : ndarray, shape (H, W), bool
+        The regions that have a plane.
+
+    Raises
+    ------
+    SepiError
+        If the disparity range is unknown.
     """
     colours = LayerParameters(colour_scale=parameters.colour_scale, detail_share=0.0)
     matching = prepared(light_field, split_layers(light_field, colours), colours)
     mean = view_mean(matching, before.disparity, parameters.cover)
     views = int(light_field.present.sum())
-    variance = max(noise_level(light_field.centre), QUANTISATION) ** 2 / views
+    rounding = 0.3 / full_scale(light_field.views.dtype) if light_field.views.dtype != np.float32 else 0.0
+    variance = max(noise_level(light_field.centre), rounding, LEAST_NOISE) ** 2 / views
+    known = light_field.known_range()
     uniform = uniform_regions(mean, variance, before.confidence, parameters)
     disparity = before.disparity.copy()
     labels, _ = ndimage.label(uniform)
@@ -98,7 +107,9 @@ def filled(light_field: LightField, before: StageMaps, parameters: UniformPlanes
             uniform[around][own] = False
         else:
             y, x = np.nonzero(own)
-            disparity[around][own] = plane[0] + plane[1] * x + plane[2] * y
+            values = plane[0] + plane[1] * x + plane[2] * y
+            # a plane that its border holds at one side only may lead anywhere
+            disparity[around][own] = np.clip(values, known.minimum, known.maximum)
     return disparity, uniform
 
 

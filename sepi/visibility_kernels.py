@@ -93,8 +93,8 @@ def _add_view(
     band: Any, low: int, centre: Any, y: int, dt: int, ds: int, disparities: Any, nearest: Any, tolerance: Any,
     hidden: Any, scales: Any, shares: Any, seen: Any, total: Any, weight: Any,
 ) -> None:  # fmt: skip
-    """Add one view, whose rows from ``low`` on are in ``band (layers, 3, rows, W)``, at every candidate."""
-    layers, _, _, W = band.shape
+    """Add one view, whose rows from ``low`` on are in ``band (layers, 3, rows, W + 1)``, at every candidate."""
+    layers, W = band.shape[0], band.shape[3] - 1
     H = nearest.shape[0]
     one = np.float32(1)
     for k in range(disparities.size):
@@ -104,7 +104,8 @@ def _add_view(
             continue
         top, left = min(int(down), H - 2), math.floor(across)
         fy, fx = np.float32(down - top), np.float32(across - left)
-        first, last = max(0, -left), min(W, W - 1 - left)
+        # on the last column itself nothing beyond it is read with any weight
+        first, last = max(0, -left), min(W, W - left if fx == 0 else W - 1 - left)
         if last <= first:
             continue
         n, i, j = top - low, first + left, last + left + 1
@@ -175,7 +176,8 @@ def sweep_rows(
         total, weight = np.zeros((K, W), np.float32), np.zeros((K, W), np.float32)
         seen = np.empty(W, np.float32)
         centre = np.empty((layers, 3, W), np.float32)
-        band = np.empty((layers, 3, rows, W), np.float32)
+        # one column more, which is read but weighs nothing
+        band = np.zeros((layers, 3, rows, W + 1), np.float32)
         for c in range(3):
             _load(colours[t0, s0, c, y], colour_unit, centre[0, c])
             if layers == 2:
@@ -189,9 +191,9 @@ def sweep_rows(
                     continue
                 for c in range(3):
                     for row in range(low, high + 1):
-                        _load(colours[t, s, c, row], colour_unit, band[0, c, row - low])
+                        _load(colours[t, s, c, row], colour_unit, band[0, c, row - low, :W])
                         if layers == 2:
-                            _load(detail[t, s, c, row], detail_unit, band[1, c, row - low])
+                            _load(detail[t, s, c, row], detail_unit, band[1, c, row - low, :W])
                 _add_view(
                     band, low, centre, y, t - t0, s - s0, disparities, nearest[t, s], tolerance, hidden, scales,
                     shares, seen, total, weight,

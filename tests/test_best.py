@@ -72,6 +72,8 @@ def test_layers_are_made_once_for_the_stages_of_a_run() -> None:
     scene = render("dots", size=64)
     one, two = (split_layers(scene, LayerParameters()).detail for _ in range(2))
     assert one is two
+    scene.views[0, 0] = 255 - scene.views[0, 0]
+    assert not np.array_equal(one, split_layers(scene, LayerParameters()).detail)
     other = split_layers(scene, LayerParameters(base_radius=2)).detail
     assert not np.array_equal(one, other)
 
@@ -136,6 +138,9 @@ def test_sparsification_is_what_its_name_says() -> None:
     assert curve[-1] == pytest.approx(100)
     assert oracle(error)[0] == pytest.approx(200)
     assert np.all(oracle(error) <= curve + 1e-9)
+    unknown = np.full((2, 2), np.nan, np.float32)
+    assert np.isnan(sparsification(confidence, unknown)).all()
+    assert np.isnan(decile_errors(confidence, unknown)).all()
     squared, absolute = decile_errors(np.arange(20, dtype=np.float32), np.arange(20, dtype=np.float32))
     assert absolute[0] == pytest.approx(1850)
     assert squared[-1] == pytest.approx(50)

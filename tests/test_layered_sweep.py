@@ -49,7 +49,7 @@ def sweep_twin(light_field, layers, nearest, disparities, cover, hidden, scales,
             if (t, s) == (t0, s0):
                 continue
             y, x = rows - d * (t - t0), columns - d * (s - s0)
-            inside = (y >= 0) & (y <= H - 1) & (x >= 0) & (np.floor(x) + 1 <= W - 1)
+            inside = (y >= 0) & (y <= H - 1) & (x >= 0) & (x <= W - 1)
             seen = np.ones((H, W))
             if nearest is not None:
                 # halves go down, as the kernel's comparison of fractions does

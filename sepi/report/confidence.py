@@ -41,13 +41,13 @@ def decile_errors(confidence: FloatMap, error: FloatMap) -> tuple[FloatArray, Fl
     Returns
     -------
     squared, absolute : ndarray, shape (10,), float64
-        Mean squared and mean absolute error of each tenth, times 100.
+        Mean squared and mean absolute error of each tenth, times 100; NaN where there is no pixel.
     """
     ordered = _by_confidence(confidence, error)
     tenths = np.array_split(ordered, DECILES)
     return (
-        np.array([100 * np.mean(tenth**2) for tenth in tenths]),
-        np.array([100 * np.mean(np.abs(tenth)) for tenth in tenths]),
+        np.array([100 * np.mean(tenth**2) if tenth.size else np.nan for tenth in tenths]),
+        np.array([100 * np.mean(np.abs(tenth)) if tenth.size else np.nan for tenth in tenths]),
     )
 
 
@@ -61,9 +61,11 @@ def sparsification(confidence: FloatMap, error: FloatMap) -> FloatArray:
     Returns
     -------
     ndarray, shape (100,), float64
-        Times 100; with 0, 1, ... 99 % of the pixels taken away.
+        Times 100; with 0, 1, ... 99 % of the pixels taken away. NaN where no error is finite.
     """
     sums = np.cumsum(np.abs(_by_confidence(confidence, error)))
+    if sums.size == 0:
+        return np.full(_STEPS, np.nan)
     kept = np.maximum(1, np.rint(sums.size * (1 - np.arange(_STEPS) / _STEPS))).astype(np.int64)
     return np.asarray(100 * sums[kept - 1] / kept)
 
@@ -87,7 +89,7 @@ def confidence_table(runs: Runs) -> Report:
                     continue
                 squared, absolute = decile_errors(confidence, error)
                 area, least = sparsification(confidence, error).mean(), oracle(error).mean()
-                areas: list[Cell] = [float(area), float(least), float(np.abs(error[np.isfinite(error)]).mean() * 100)]
+                areas: list[Cell] = [float(area), float(least), float(sparsification(confidence, error)[0])]
                 for name, figures in (("mse100", squared), ("mae100", absolute)):
                     rows.append([dataset, scene, variant, name, *map(float, figures), *areas])
                 lines.append([f"{dataset}/{scene}", variant, *map(float, absolute), *areas])

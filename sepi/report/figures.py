@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import click
+import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
@@ -123,7 +124,7 @@ def write_scene(plan: Plan, dataset: str, scene: str, folder: Path) -> None:
     }
     for variant in plan.compared:
         error = evaluations[variant].error
-        if error is not None:
+        if error is not None and np.isfinite(error).any():
             write_curves(folder / variant / "sparsification.png", maps[variant][last].confidence, error)
     common = scene_panels(light_field, evaluations[MAIN_VARIANT])
     stages = {variant: stage_panels(light_field, variant, found) for variant, found in maps.items()}

@@ -27,11 +27,11 @@ TABLES: dict[str, str] = {
     "table1_mse": "final maps of the variants that stand beside the published figures",
     "table2_q25": "final maps of the variants that stand beside the published figures",
     "table3_regions": "final maps of the variants that stand beside the published figures",
-    "table4_ablation": "final maps of every variant",
+    "table4_ablation": "final maps of every variant but the parts of the best one",
     "ablation_best": "final maps and timings of the best variant and of those with one part of it switched off",
     "confidence": "final maps of the variants that stand beside the published figures",
-    "stages": "maps after every stage of every variant",
-    "runtime": "timings of every stage of every variant",
+    "stages": "maps after every stage of the same variants",
+    "runtime": "timings of every stage of the same variants",
 }
 """Name of each table and what it is made from."""
 
@@ -140,7 +140,7 @@ class Plan:
     @property
     def parts(self) -> list[str]:
         """The best variant and those with one part of it switched off, where the plan has them."""
-        return [variant for variant in PARTS_OF_BEST if variant in self.variants]
+        return [v for v in PARTS_OF_BEST if v in self.variants] if BEST_VARIANT in self.variants else []
 
     @property
     def listed(self) -> list[str]:
