@@ -16,6 +16,8 @@ from typing import Any
 import numpy as np
 from numba import njit, prange
 
+from sepi.exact_math import EXACT
+
 SPLINE_UNIT = np.float32(1 / 3400)
 """Value of one step of a spline coefficient, stored as int16; a checkerboard of -0.5 and 1.5 has some of +-9.5."""
 
@@ -159,7 +161,7 @@ def _seen(y: Any, x: Any, nearest: Any, limit: Any) -> Any:
     )
 
 
-@njit(parallel=True, cache=True, fastmath=True, error_model="numpy")
+@njit(parallel=True, cache=True, fastmath=EXACT, error_model="numpy")
 def mean_of_views(splines: Any, present: Any, t0: int, s0: int, disparity: Any, nearest: Any, cover: Any, scales: Any,
                   reference: Any) -> Any:  # fmt: skip
     """Mean of the views that see each pixel, those unlike the reference view counting less; shape (H, W, C), float32.
@@ -208,7 +210,7 @@ def mean_of_views(splines: Any, present: Any, t0: int, s0: int, disparity: Any, 
     return out
 
 
-@njit(parallel=True, cache=True, fastmath=True, error_model="numpy")
+@njit(parallel=True, cache=True, fastmath=EXACT, error_model="numpy")
 def normal_equations(splines: Any, present: Any, t0: int, s0: int, disparity: Any, nearest: Any, cover: Any,
                      scales: Any, shares: Any, mean: Any, down: Any, across: Any) -> Any:  # fmt: skip
     """Gauss-Newton sums of each pixel over the views that see it.

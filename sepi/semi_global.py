@@ -19,6 +19,7 @@ import numpy as np
 from numba import njit, prange
 from pydantic import Field
 
+from sepi.exact_math import EXACT
 from sepi.lightfield import FloatMap
 from sepi.stage import Parameters
 
@@ -96,7 +97,7 @@ def smooth_and_choose(
     return SmoothedResult(disparity, (margin / (margin + np.float32(HALF_CONFIDENT))).astype(np.float32))
 
 
-@njit(parallel=True, cache=True, fastmath=True, error_model="numpy")
+@njit(parallel=True, cache=True, fastmath=EXACT, error_model="numpy")
 def aggregate(cost: Any, guide: Any, radius: int, variance: Any) -> Any:
     """Mean over a window with weights ``exp(-|colour difference|^2 / (2 variance))``; (K, H, W) to (H, W, K)."""
     K, H, W = cost.shape
@@ -151,7 +152,7 @@ def _start(cost: Any, path: Any) -> Any:
     return cost.min()
 
 
-@njit(parallel=True, cache=True, fastmath=True)
+@njit(parallel=True, cache=True, fastmath=EXACT)
 def semi_global(cost: Any, guide: Any, small: Any, large: Any, weakening: Any) -> Any:
     """Sum of the smoothed costs along eight paths; shapes (H, W, K), float32."""
     H, W, K = cost.shape

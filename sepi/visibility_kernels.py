@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 from numba import njit, prange
 
+from sepi.exact_math import EXACT
+
 EMPTY = np.float32(-1e9)
 """Disparity in a z-buffer where no pixel of the reference view falls: nothing is nearer."""
 
@@ -88,7 +90,7 @@ def _add_layer(
         total[x] += share * seen[x] * z / (z + scale2)
 
 
-@njit(cache=True, fastmath=True, error_model="numpy")
+@njit(cache=True, fastmath=EXACT, error_model="numpy")
 def _add_view(
     band: Any, low: int, centre: Any, y: int, dt: int, ds: int, disparities: Any, nearest: Any, tolerance: Any,
     hidden: Any, scales: Any, shares: Any, seen: Any, total: Any, weight: Any,
@@ -137,7 +139,7 @@ def _load(row: Any, unit: Any, out: Any) -> None:
         out[x] = np.float32(row[x]) * unit
 
 
-@njit(parallel=True, cache=True, fastmath=True, error_model="numpy")
+@njit(parallel=True, cache=True, fastmath=EXACT, error_model="numpy")
 def sweep_rows(
     colours: Any, colour_unit: Any, detail: Any, detail_unit: Any, present: Any, t0: int, s0: int, nearest: Any,
     disparities: Any, tolerance: Any, hidden: Any, scales: Any, shares: Any, begin: int, end: int, cost: Any,

@@ -1,6 +1,10 @@
 """What variant ``best`` adds to the paper's stages: detail, visibility, mixed pixels, uniform regions, confidence."""
 
+import os
+import subprocess
+import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -150,3 +154,18 @@ def test_range_narrower_than_the_scene_is_no_crash() -> None:
     scene = render("pyramids", size=64)
     narrow = scene.with_range(DisparityRange(0.0, 0.1, "given"))
     assert np.isfinite(estimate_depth(narrow, "best").disparity).all()
+
+
+def test_first_run_gives_the_bytes_of_later_ones(tmp_path: Path) -> None:
+    """Freshly compiled kernels round as those loaded from disk do; else two machines would never agree."""
+    program = (
+        "import sys; from sepi.scenes import render; from sepi.pipeline import estimate_depth;"
+        "maps = estimate_depth(render('pyramids', size=64), 'best', {'initial': {'candidates': 21}});"
+        "sys.stdout.buffer.write(maps.disparity.tobytes() + maps.confidence.tobytes())"
+    )
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path), "PYTHONPATH": str(Path(__file__).parents[1])}
+    first, second = (
+        subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, check=True).stdout
+        for _ in range(2)
+    )
+    assert first == second
