@@ -119,7 +119,7 @@ def write_curves(path: Path, confidence: FloatMap, error: FloatMap) -> None:
     ):
         axis.plot(taken, curve, style, label=f"{name}, area {curve.mean():.3f}")
     axis.set_xlabel("pixels taken away / %")
-    axis.set_ylabel("mean absolute error x100 / px per view step")
+    axis.set_ylabel("mean absolute error x100 / px")
     axis.set_ylim(bottom=0)
     axis.legend()
     with atomic_path(path) as temporary:
