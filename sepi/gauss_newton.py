@@ -18,7 +18,6 @@ import numpy.typing as npt
 from sepi.gauss_newton_kernels import MARGIN, mean_of_views, normal_equations, spline_coefficients, view_splines
 from sepi.layers import DETAIL_UNIT, LayerParameters, Layers
 from sepi.lightfield import BoolMap, FloatMap, LightField
-from sepi.visibility_kernels import z_buffers
 
 _SMOOTH = np.array([1, 4, 1], np.float32) / 6
 _DIFFERENCE = np.array([-1, 0, 1], np.float32) / 2
@@ -81,7 +80,7 @@ def prepared(light_field: LightField, layers: Layers, parameters: LayerParameter
     )
 
 
-def view_mean(matching: Matching, disparity: FloatMap, cover: float) -> FloatMap:
+def view_mean(matching: Matching, disparity: FloatMap, nearest: FloatMap, cover: float) -> FloatMap:
     """Mean of the views that see each pixel.
 
     Parameters
@@ -89,6 +88,8 @@ def view_mean(matching: Matching, disparity: FloatMap, cover: float) -> FloatMap
     matching : Matching
     disparity : ndarray, shape (H, W), float32
         Pixels per view step.
+    nearest : ndarray, shape (T, S, H, W), float32
+        z-buffers of the map in the views.
     cover : float
         By how much a cover must be nearer, pixels per view step.
 
@@ -96,7 +97,6 @@ def view_mean(matching: Matching, disparity: FloatMap, cover: float) -> FloatMap
     -------
     ndarray, shape (H, W, C), float32
     """
-    nearest = z_buffers(disparity, matching.present, *matching.place)
     mean: FloatMap = mean_of_views(
         matching.splines,
         matching.present,
@@ -110,7 +110,9 @@ def view_mean(matching: Matching, disparity: FloatMap, cover: float) -> FloatMap
     return mean
 
 
-def information(matching: Matching, mean: FloatMap, disparity: FloatMap, cover: float) -> tuple[FloatMap, FloatMap]:
+def information(
+    matching: Matching, mean: FloatMap, disparity: FloatMap, nearest: FloatMap, cover: float
+) -> tuple[FloatMap, FloatMap]:
     """Gradient and curvature of the cost of each pixel, before any window.
 
     Parameters
@@ -120,6 +122,8 @@ def information(matching: Matching, mean: FloatMap, disparity: FloatMap, cover: 
         From :func:`view_mean`; of a slightly different map is good enough.
     disparity : ndarray, shape (H, W), float32
         Pixels per view step.
+    nearest : ndarray, shape (T, S, H, W), float32
+        z-buffers of the map in the views.
     cover : float
         By how much a cover must be nearer, pixels per view step.
 
@@ -128,7 +132,6 @@ def information(matching: Matching, mean: FloatMap, disparity: FloatMap, cover: 
     gradient, curvature : ndarray, shape (H, W), float32
         The curvature is the information on the disparity, 1 / (pixels per view step)^2.
     """
-    nearest = z_buffers(disparity, matching.present, *matching.place)
     down, across = spline_derivatives(mean)
     gradient, curvature = normal_equations(
         matching.splines,

@@ -17,7 +17,12 @@ References
 from __future__ import annotations
 
 from sepi.command import stage_command
-from sepi.layered_sweep import AllViewsColoursParameters, AllViewsParameters, depth_from_all_views
+from sepi.layered_sweep import (
+    AllViewsColoursParameters,
+    AllViewsParameters,
+    LayeredSweepParameters,
+    depth_from_all_views,
+)
 from sepi.lightfield import LightField
 from sepi.stage import Choice, Progress, StageMaps
 from sepi.structure_tensor import StructureTensorParameters, structure_tensor_depth
@@ -53,7 +58,7 @@ def sepi(
 
 
 def semi_global(
-    light_field: LightField, previous: StageMaps | None, parameters: AllViewsParameters, progress: Progress
+    light_field: LightField, previous: StageMaps | None, parameters: LayeredSweepParameters, progress: Progress
 ) -> StageMaps:
     """Depth from the two layers of all views, smoothed semi-globally; arguments and result as for ``sepi``."""
     result = depth_from_all_views(light_field, parameters, progress)

@@ -13,10 +13,10 @@ import numpy as np
 from pydantic import Field
 
 from sepi.colour_mixture import MixtureParameters, farther_where_little_covered
-from sepi.layers import DETAIL_UNIT, LayerParameters, Layers, split_layers
+from sepi.layers import COLOURS_ALONE_SCALE, DETAIL_UNIT, LayerParameters, Layers, split_layers
 from sepi.lightfield import FloatMap, LightField
 from sepi.semi_global import SmoothedResult, SmoothingParameters, smooth_and_choose
-from sepi.stage import Progress
+from sepi.stage import Progress, with_defaults
 from sepi.visibility_kernels import sweep_rows, z_buffers
 
 ROWS_PER_REPORT = 128
@@ -29,17 +29,6 @@ class LayeredSweepParameters(LayerParameters, SmoothingParameters):
     candidates: int = Field(91, ge=3, le=4001, description="number of candidate disparities, uniform over the range")
 
 
-class AllViewsParameters(LayeredSweepParameters):
-    """Parameters of the first depth map: a narrow scale of the colours bears with views that do not see the pixel."""
-
-    colour_scale: float = Field(
-        0.0077,
-        ge=1e-6,
-        le=2,
-        description="residual of the colours at which their cost is one half; RGB distance, colours in 0..1",
-    )
-
-
 class VisibilityParameters(LayeredSweepParameters, MixtureParameters):
     """Parameters of the sweep over the views that see a pixel."""
 
@@ -48,30 +37,25 @@ class VisibilityParameters(LayeredSweepParameters, MixtureParameters):
     hidden_weight: float = Field(0.01, ge=0, le=1, description="weight of a view in which the pixel is covered")
 
 
-class UnmixedParameters(VisibilityParameters):
-    """Parameters of the sweep over the views that see a pixel, without the decision by colour mixture."""
-
-    mixture: float = Field(
-        0.0, ge=0, le=1, description="covered share up to which a pixel goes to the farther surface; 0 moves none"
-    )
-
-
-class AllViewsColoursParameters(AllViewsParameters):
-    """Parameters of the first depth map from colours alone."""
-
-    detail_share: float = Field(0.0, ge=0, le=1, description="share of the detail in the cost; 0 uses colours alone")
-
-
-class VisibilityColoursParameters(VisibilityParameters):
-    """Parameters of that sweep by colours alone, whose scale must then tell surfaces apart."""
-
-    colour_scale: float = Field(
-        0.0164,
-        ge=1e-6,
-        le=2,
-        description="residual of the colours at which their cost is one half; RGB distance, colours in 0..1",
-    )
-    detail_share: float = Field(0.0, ge=0, le=1, description="share of the detail in the cost; 0 uses colours alone")
+AllViewsParameters = with_defaults(
+    LayeredSweepParameters,
+    "AllViewsParameters",
+    "Parameters of the first depth map: a narrow scale of the colours bears with views that do not see the pixel.",
+    colour_scale=0.0077,
+)
+AllViewsColoursParameters = with_defaults(
+    AllViewsParameters, "AllViewsColoursParameters", "The same from colours alone.", detail_share=0.0
+)
+UnmixedParameters = with_defaults(
+    VisibilityParameters, "UnmixedParameters", "Visible views without the decision by colour mixture.", mixture=0.0
+)
+VisibilityColoursParameters = with_defaults(
+    VisibilityParameters,
+    "VisibilityColoursParameters",
+    "Visible views by colours alone.",
+    colour_scale=COLOURS_ALONE_SCALE,
+    detail_share=0.0,
+)
 
 
 def depth_from_all_views(

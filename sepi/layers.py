@@ -29,6 +29,8 @@ from sepi.stage import Parameters
 DETAIL_UNIT = 1 / 32000
 """Value of one step of the detail, which is stored as int16: colours differ by at most 1."""
 
+COLOURS_ALONE_SCALE = 0.0164
+"""Scale of the colours without detail: then they must tell surfaces apart."""
 
 _KEPT: dict[tuple[object, ...], npt.NDArray[np.int16]] = {}
 

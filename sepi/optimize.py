@@ -28,10 +28,11 @@ from scipy.sparse.linalg import cg
 
 from sepi.command import stage_command
 from sepi.gauss_newton import information, prepared, view_mean, windowed_step
-from sepi.layers import LayerParameters, Layers, split_layers
+from sepi.layers import COLOURS_ALONE_SCALE, LayerParameters, Layers, split_layers
 from sepi.lightfield import FloatMap, LightField
 from sepi.second_order import bend_matrix, bend_weights, solve_smooth
-from sepi.stage import Choice, NoParameters, Parameters, Progress, StageMaps, given, relative_confidence
+from sepi.stage import Choice, NoParameters, Parameters, Progress, StageMaps, given, relative_confidence, with_defaults
+from sepi.visibility_kernels import z_buffers
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -108,23 +109,16 @@ class SecondOrderParameters(LayerParameters):
         return self
 
 
-class GaussNewtonParameters(SecondOrderParameters):
-    """Parameters of the refinement without smoothing."""
-
-    refinements: int = Field(3, ge=0, le=20, description="Gauss-Newton steps before the first smoothing")
-    solves: int = Field(0, ge=0, le=10, description="rounds of one Gauss-Newton step and one smoothing")
-
-
-class SecondOrderColoursParameters(SecondOrderParameters):
-    """Parameters of refinement and smoothing by colours alone."""
-
-    colour_scale: float = Field(
-        0.0164,
-        ge=1e-6,
-        le=2,
-        description="residual of the colours at which their cost is one half; RGB distance, colours in 0..1",
-    )
-    detail_share: float = Field(0.0, ge=0, le=1, description="share of the detail in the cost; 0 uses colours alone")
+GaussNewtonParameters = with_defaults(
+    SecondOrderParameters, "GaussNewtonParameters", "Refinement without smoothing.", refinements=3, solves=0
+)
+SecondOrderColoursParameters = with_defaults(
+    SecondOrderParameters,
+    "SecondOrderColoursParameters",
+    "Refinement and smoothing by colours alone.",
+    colour_scale=COLOURS_ALONE_SCALE,
+    detail_share=0.0,
+)
 
 
 def wls(
@@ -177,10 +171,11 @@ def second_order(
     for i in range(total):
         progress((i + 0.5) / (total + 1))
         smooth = i >= parameters.refinements
+        nearest = z_buffers(disparity, matching.present, *matching.place)
         if i <= parameters.refinements:
             # later steps are too small to change it
-            mean = view_mean(matching, disparity, parameters.cover)
-        gradient, curvature = information(matching, mean, disparity, parameters.cover)
+            mean = view_mean(matching, disparity, nearest, parameters.cover)
+        gradient, curvature = information(matching, mean, disparity, nearest, parameters.cover)
         radius = parameters.solve_radius if smooth else parameters.refinement_radius
         step, curvature = windowed_step(gradient, curvature, radius, parameters.longest_step)
         # where no view knows anything, a step would follow the noise

@@ -27,6 +27,7 @@ from sepi.lightfield import BoolMap, FloatMap, LightField
 from sepi.noise import noise_level
 from sepi.stage import Parameters, StageMaps
 from sepi.sweep import full_scale
+from sepi.visibility_kernels import z_buffers
 
 LEAST_NOISE = 1e-5
 """Noise below which rounding of float32 is noise too; integers have at least 0.3 levels by rounding."""
@@ -40,7 +41,6 @@ class UniformPlanesParameters(Parameters):
     colour_scale: float = Field(
         0.0316, ge=1e-6, le=2, description="residual at which a view counts half in the mean; RGB distance, 0..1"
     )
-
     window_radius: int = Field(4, ge=1, le=20, description="gradients are averaged over 2 r + 1 pixels")
     noise_factor: float = Field(
         4.0, gt=0, description="squared gradient, in units of what noise explains, below which a region is uniform"
@@ -85,7 +85,8 @@ def filled(light_field: LightField, before: StageMaps, parameters: UniformPlanes
     """
     colours = LayerParameters(colour_scale=parameters.colour_scale, detail_share=0.0)
     matching = prepared(light_field, split_layers(light_field, colours), colours)
-    mean = view_mean(matching, before.disparity, parameters.cover)
+    nearest = z_buffers(before.disparity, light_field.present, *light_field.reference)
+    mean = view_mean(matching, before.disparity, nearest, parameters.cover)
     views = int(light_field.present.sum())
     rounding = 0.3 / full_scale(light_field.views.dtype) if light_field.views.dtype != np.float32 else 0.0
     variance = max(noise_level(light_field.centre), rounding, LEAST_NOISE) ** 2 / views

@@ -8,12 +8,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from pydantic import ValidationError
 
 from sepi.colour_mixture import MixtureParameters, farther_where_little_covered
 from sepi.evaluate import score
 from sepi.layers import DETAIL_UNIT, LayerParameters, split_layers
 from sepi.lightfield import DisparityRange, LightField
-from sepi.pipeline import PARTS_OF_BEST, VARIANTS, estimate_depth
+from sepi.pipeline import PARTS_OF_BEST, STAGES, VARIANTS, estimate_depth
 from sepi.report.confidence import decile_errors, oracle, sparsification
 from sepi.scenes import render
 from sepi.uniform_regions import UniformPlanesParameters, supporting_plane, uniform_regions
@@ -169,3 +170,21 @@ def test_first_run_gives_the_bytes_of_later_ones(tmp_path: Path) -> None:
         for _ in range(2)
     )
     assert first == second
+
+
+def test_a_part_switched_off_keeps_all_but_its_default() -> None:
+    """A reduced choice with other bounds or descriptions would be documented and checked differently."""
+    full, reduced = (STAGES["occlusion"][name].parameters for name in ("visibility", "visibility_colours"))
+    assert {
+        key for key in full.model_fields if full.model_fields[key].default != reduced.model_fields[key].default
+    } == {
+        "colour_scale",
+        "detail_share",
+    }
+    for key, field in full.model_fields.items():
+        assert reduced.model_fields[key].metadata == field.metadata
+        assert reduced.model_fields[key].description == field.description
+    with pytest.raises(ValidationError):
+        reduced(detail_share=2.0)
+    with pytest.raises(ValidationError, match="cannot both be 0"):
+        STAGES["optimize"]["gauss_newton"].parameters(refinements=0)

@@ -85,8 +85,9 @@ def test_sums_over_the_views_equal_a_plain_twin() -> None:
     layers = split_layers(light_field, parameters)
     matching = prepared(light_field, layers, parameters)
     disparity = np.random.default_rng(3).uniform(-0.9, 0.9, (10, 12)).astype(np.float32)
-    mean = view_mean(matching, disparity, 0.2)
-    gradient, curvature = information(matching, mean, disparity, 0.2)
+    nearest = z_buffers(disparity, present, *light_field.reference)
+    mean = view_mean(matching, disparity, nearest, 0.2)
+    gradient, curvature = information(matching, mean, disparity, nearest, 0.2)
     expected = sums_twin(light_field, layers, parameters, disparity, 0.2)
     np.testing.assert_allclose(mean, expected[0], atol=1e-3)
     for found, twin in ((gradient, expected[1]), (curvature, expected[2])):
@@ -120,7 +121,9 @@ def test_steps_end_at_the_true_disparity() -> None:
     matching = prepared(scene, split_layers(scene, parameters), parameters)
     disparity = (scene.truth + 0.02).astype(np.float32)
     for _ in range(3):
-        gradient, curvature = information(matching, view_mean(matching, disparity, 0.15), disparity, 0.15)
+        nearest = z_buffers(disparity, scene.present, *scene.reference)
+        mean = view_mean(matching, disparity, nearest, 0.15)
+        gradient, curvature = information(matching, mean, disparity, nearest, 0.15)
         disparity = disparity + windowed_step(gradient, curvature, 3, 0.05)[0]
     assert np.abs(disparity - scene.truth)[8:-8, 8:-8].mean() < 1.5e-3
 
