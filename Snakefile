@@ -18,6 +18,7 @@ include: "rules/textureless.smk"
 include: "rules/optimize.smk"
 include: "rules/export.smk"
 include: "rules/evaluate.smk"
+include: "rules/external.smk"
 include: "rules/report.smk"
 
 

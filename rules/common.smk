@@ -105,13 +105,14 @@ def is_new(file):
 
 
 def print_warnings():
-    """Show what the readers of light fields warned of in this run; their messages lie in the logs."""
+    """Show what the readers of light fields and of other methods' maps warned of in this run, from their logs."""
     for dataset, scene in SETTINGS.scenes:
-        log = Path(f"logs/{dataset}/{scene}/ingest.log")
-        if is_new(log):
-            for line in log.read_text().splitlines():
-                if line.startswith("sepi: warning:"):
-                    print(line, flush=True)
+        for rule in ("ingest", "external"):
+            log = Path(f"logs/{dataset}/{scene}/{rule}.log")
+            if is_new(log):
+                for line in log.read_text().splitlines():
+                    if line.startswith("sepi: warning:"):
+                        print(line, flush=True)
 
 
 def print_written(tables, maps):

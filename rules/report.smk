@@ -1,62 +1,190 @@
-# What a reader looks at, below reports/: tables beside the published figures, and pictures of every scene.
+# What a reader looks at, below reports/: a page with everything, its numbers, tables, charts, and pictures of every scene.
 
-from sepi.report.plan import TABLES, Plan
+import json
+
+from sepi.report.page import TEMPLATES
+from sepi.report.plan import PARTS_TABLES, TABLES, Plan
 from sepi.report.published import FOLDER as PUBLISHED
 
 VARIANT_CHOICES = {name: variant.choices for name, variant in SETTINGS.variants.items()}
-PLAN = Plan(Path("results"), {name: SETTINGS.scenes_of(name) for name in SETTINGS.datasets}, VARIANT_CHOICES)
+SCENES_BY_DATASET = {name: SETTINGS.scenes_of(name) for name in SETTINGS.datasets}
+PLAN = Plan(Path("results"), SCENES_BY_DATASET, VARIANT_CHOICES, list(SETTINGS.external))
+
+MAIN_TABLES = [table for table in TABLES if table not in PARTS_TABLES]
+PARTS = "reports/report_parts.json" if SETTINGS.report.parts_of_best else []
+
+
+def table_files(tables):
+    """Each of the tables as CSV, Markdown and LaTeX."""
+    return [f"reports/{table}.{ending}" for table in tables for ending in ("csv", "md", "tex")]
+
+
+def figure_files(names):
+    """Each of the charts as PNG and PDF."""
+    return [f"reports/figures/{name}.{ending}" for name in names for ending in ("png", "pdf")]
 
 
 def report_files():
-    """Every table but the ablation of ``best``, and the folder of pictures of every configured scene."""
-    tables = [f"reports/{table}.{ending}" for table in TABLES if table != "ablation_best" for ending in ("csv", "md")]
-    return tables + [f"reports/maps/{dataset}/{scene}" for dataset, scene in SETTINGS.scenes]
+    """The page, its numbers, every table and chart but those of the parts of ``best``, and pictures of every scene."""
+    pictures = [f"reports/maps/{dataset}/{scene}" for dataset, scene in SETTINGS.scenes]
+    charts = figure_files(["ablation", "time_and_memory"])
+    return ["reports/index.html", "reports/report.json", *table_files(MAIN_TABLES), *charts, *pictures]
 
 
 def ablation_files():
     """The paper's table 4, and the ablation of ``best``."""
-    return [f"reports/{table}.{ending}" for table in ("table4_ablation", "ablation_best") for ending in ("csv", "md")]
+    return [*table_files(["table4_ablation", *PARTS_TABLES]), *figure_files(["ablation", "ablation_best"])]
 
 
 def plan_of_scene(wildcards):
     """The plan for one scene alone, so that another scene in the configuration does not redraw it."""
-    return Plan(PLAN.results, {wildcards.dataset: [wildcards.scene]}, VARIANT_CHOICES).to_json()
+    return Plan(PLAN.results, {wildcards.dataset: [wildcards.scene]}, VARIANT_CHOICES, PLAN.external).to_json()
 
 
-# One of the tables 1 to 4, the ablation of best, its confidence, the scores after each stage, or the run times; each
-# from the files it needs and no others.
-rule table:
+def pixels_of(wildcards):
+    """The pixels of a scene that the configuration asks for, as JSON."""
+    return json.dumps(SETTINGS.report.pixels.get(f"{wildcards.dataset}/{wildcards.scene}", []))
+
+
+# Every number of the report in one file: scores, times, facts about the scenes, and the tables made of them. The numbers
+# of best's parts have a file of their own (report_parts), since `all` does not run those variants.
+rule numbers:
     input:
-        measured=lambda wildcards: PLAN.table_inputs(wildcards.table),
+        measured=lambda wildcards: PLAN.number_inputs(parts=wildcards.which == "_parts"),
         published=sorted(PUBLISHED.glob("*.csv")),
     output:
-        data="reports/{table}.csv",
-        page="reports/{table}.md",
+        "reports/report{which}.json",
     log:
-        "logs/{table}.log",
+        "logs/report{which}.log",
     benchmark:
-        "benchmarks/{table}.tsv"
+        "benchmarks/report{which}.tsv"
     wildcard_constraints:
-        table="|".join(TABLES),
+        which="|_parts",
     threads: 1
     resources:
-        mem_mb=500,
+        mem_mb=1000,
     params:
         plan=PLAN.to_json(),
-        code=lambda wildcards: code_digest("sepi.report.tables"),
+        parameters=SETTINGS.all_parameters_json(),
+        flags=lambda wildcards: "--parts" if wildcards.which else "",
+        code=code_digest("sepi.report.numbers"),
     message:
-        "table {wildcards.table}"
+        "numbers of the report"
     shell:
-        "python -m sepi.report.tables --results results --plan {params.plan:q} --table {wildcards.table} "
-        "--output reports 2> {log:q}"
+        "python -m sepi.report.numbers --results results --plan {params.plan:q} --parameters {params.parameters:q} "
+        "{params.flags} --output {output:q} 2> {log:q}"
 
 
-# Pictures of a scene: centre view, ground truth, each stage and variant, errors, masks, and all on overview.png.
+# Tables 1 to 4, the scores after each stage, the run times and the worth of the confidence
+rule tables:
+    input:
+        "reports/report.json",
+    output:
+        report(
+            expand("reports/{table}.csv", table=MAIN_TABLES),
+            caption="captions/tables.rst",
+            category="Tables",
+        ),
+        expand("reports/{table}.{ending}", table=MAIN_TABLES, ending=["md", "tex"]),
+    log:
+        "logs/tables.log",
+    benchmark:
+        "benchmarks/tables.tsv"
+    threads: 1
+    params:
+        code=code_digest("sepi.report.tables"),
+    message:
+        "tables"
+    shell:
+        "python -m sepi.report.tables --numbers {input:q} --output reports 2> {log:q}"
+
+
+# What each part of variant best gains and costs
+rule parts_table:
+    input:
+        "reports/report_parts.json",
+    output:
+        report(
+            expand("reports/{table}.csv", table=PARTS_TABLES),
+            caption="captions/tables.rst",
+            category="Tables",
+        ),
+        expand("reports/{table}.{ending}", table=PARTS_TABLES, ending=["md", "tex"]),
+    log:
+        "logs/parts_table.log",
+    benchmark:
+        "benchmarks/parts_table.tsv"
+    threads: 1
+    params:
+        code=code_digest("sepi.report.tables"),
+    message:
+        "table of the parts of best"
+    shell:
+        "python -m sepi.report.tables --numbers {input:q} --output reports 2> {log:q}"
+
+
+# Charts of the numbers, for a paper
+rule charts:
+    input:
+        "reports/report.json",
+    output:
+        report(
+            multiext("reports/figures/ablation", ".png", ".pdf"), caption="captions/ablation.rst", category="Charts"
+        ),
+        report(
+            multiext("reports/figures/time_and_memory", ".png", ".pdf"), caption="captions/time.rst", category="Charts"
+        ),
+    log:
+        "logs/charts.log",
+    benchmark:
+        "benchmarks/charts.tsv"
+    threads: 1
+    params:
+        code=code_digest("sepi.report.charts"),
+    message:
+        "charts"
+    shell:
+        "python -m sepi.report.charts --numbers {input:q} --chart ablation --chart time_and_memory "
+        "--output reports/figures 2> {log:q}"
+
+
+# Chart of the parts of variant best
+rule parts_chart:
+    input:
+        "reports/report_parts.json",
+    output:
+        report(
+            multiext("reports/figures/ablation_best", ".png", ".pdf"),
+            caption="captions/ablation.rst",
+            category="Charts",
+        ),
+    log:
+        "logs/parts_chart.log",
+    benchmark:
+        "benchmarks/parts_chart.tsv"
+    threads: 1
+    params:
+        code=code_digest("sepi.report.charts"),
+    message:
+        "chart of the parts of best"
+    shell:
+        "python -m sepi.report.charts --numbers {input:q} --chart ablation_best --output reports/figures 2> {log:q}"
+
+
+# Pictures of a scene: reference view, ground truth, each stage and variant, errors, masks, other methods' maps, and all
+# on a sheet (overview); single pixels that the method is shown at work on (pixels); and the scene for the page.
 rule maps:
     input:
         lambda wildcards: PLAN.map_inputs(wildcards.dataset, wildcards.scene),
     output:
-        folder=directory("reports/maps/{dataset}/{scene}"),
+        folder=report(
+            directory("reports/maps/{dataset}/{scene}"),
+            patterns=["{name}.png"],
+            caption="captions/maps.rst",
+            category="Scenes",
+            subcategory="{dataset}/{scene}",
+        ),
+        page="reports/page/{dataset}/{scene}.json",
     log:
         "logs/{dataset}/{scene}/maps.log",
     benchmark:
@@ -66,9 +194,59 @@ rule maps:
         mem_mb=memory_for(bytes_per_sample=4, bytes_per_pixel=1000),
     params:
         plan=plan_of_scene,
+        pixels=pixels_of,
         code=lambda wildcards: code_digest("sepi.report.figures"),
     message:
         "{wildcards.dataset}/{wildcards.scene}: pictures"
     shell:
         "python -m sepi.report.figures --results results --plan {params.plan:q} "
-        "--dataset {wildcards.dataset:q} --scene {wildcards.scene:q} --output {output.folder:q} 2> {log:q}"
+        "--dataset {wildcards.dataset:q} --scene {wildcards.scene:q} --pixels {params.pixels:q} "
+        "--output {output.folder:q} --page {output.page:q} 2> {log:q}"
+
+
+# The rules themselves, as Snakemake draws them
+rule graph:
+    input:
+        [workflow.main_snakefile, *sorted(Path(workflow.basedir, "rules").glob("*.smk"))],
+    output:
+        "reports/page/rules.svg",
+    log:
+        "logs/graph.log",
+    benchmark:
+        "benchmarks/graph.tsv"
+    threads: 1
+    params:
+        # other methods' maps add a rule
+        config=json.dumps({"external": {"other": "maps/{scene}.pfm"}} if SETTINGS.external else {}),
+        code=code_digest("sepi.report.graph"),
+    message:
+        "rule graph"
+    shell:
+        "python -m sepi.report.graph --snakefile {input[0]:q} --config {params.config:q} --output {output:q} 2> {log:q}"
+
+
+# The page: all numbers, tables and scenes in one file
+rule page:
+    input:
+        numbers="reports/report.json",
+        parts=PARTS,
+        graph="reports/page/rules.svg",
+        scenes=[f"reports/page/{dataset}/{scene}.json" for dataset, scene in SETTINGS.scenes],
+        templates=TEMPLATES,
+    output:
+        report("reports/index.html", caption="captions/page.rst", category="Page"),
+    log:
+        "logs/page.log",
+    benchmark:
+        "benchmarks/page.tsv"
+    threads: 1
+    resources:
+        mem_mb=1000,
+    params:
+        parts=f"--parts {PARTS}" if PARTS else "",
+        code=code_digest("sepi.report.page"),
+    message:
+        "page of the report"
+    shell:
+        "python -m sepi.report.page --numbers {input.numbers:q} {params.parts} --graph {input.graph:q} "
+        "--output {output:q} {input.scenes:q} 2> {log:q}"

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from sepi.command import SepiGroup, progress_bar, use_threads
+from sepi.compare_command import compare
 from sepi.errors import SepiError
 from sepi.evaluate_command import evaluate
 from sepi.export_commands import check_submission, points, submission
@@ -232,7 +233,7 @@ def scenes(names: tuple[str, ...], output: Path, size: int, views: int, only_lis
         click.echo(f"written: {output / name}/")
 
 
-for command in (evaluate, points, submission, check_submission):
+for command in (evaluate, compare, points, submission, check_submission):
     main.add_command(command)
 
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import math
+import os
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -14,6 +16,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from sepi.datasets import Scene, own_scene, scenes_in
 from sepi.errors import SepiError
 from sepi.io import FORMATS
+from sepi.io.maps import SUFFIXES, map_file
 from sepi.io.options import ORDERS
 from sepi.lightfield import DisparityRange
 from sepi.pipeline import STAGES, VARIANTS, Variant
@@ -78,6 +81,44 @@ class OwnLightField(_Keys):
         return (*words, "--follow-links") if self.follow_links else tuple(words)
 
 
+class ExternalMaps(_Keys):
+    """Keys of one of the ``external`` methods: where its disparity maps are, and what their values mean."""
+
+    path: str = Field(min_length=1)
+    scale: float | None = None
+    offset: float = 0.0
+
+    def file(self, dataset: str, scene: str) -> Path:
+        """The map of a scene: the file that is there, or else the one that was expected."""
+        place = Path(os.path.expanduser(self.path.replace("{dataset}", dataset).replace("{scene}", scene)))
+        if "{scene}" in self.path:
+            # os.path: a folder that may not be entered has no maps, and is no error here
+            return map_file(place) if os.path.isdir(place) else place
+        try:
+            names = sorted(os.listdir(place))
+        except OSError:
+            names = []
+        wanted = [f"{scene}{suffix}" for suffix in SUFFIXES]
+        exact = [name for name in wanted if name in names]
+        alike = [other for name in wanted for other in names if other.casefold() == name.casefold()]
+        files = (place / name for name in (*exact, *alike))
+        return next(filter(os.path.isfile, files), place / wanted[0])
+
+
+class Report(_Keys):
+    """Keys of ``report``."""
+
+    pixels: dict[str, list[tuple[_Place, _Place]]] = Field(
+        {},
+        description="pixels to look into beside those chosen automatically, such as {hci/cotton: [[200, 310]]}: row "
+        "and column",
+    )
+    parts_of_best: bool = Field(
+        False,
+        description="whether the page also shows the ablation of 'best'; its variants are then run by 'all', too",
+    )
+
+
 class Config(_Keys):
     """Keys of ``config.yaml``."""
 
@@ -101,6 +142,13 @@ class Config(_Keys):
         "{lego: {path: /data/lego, grid: [17, 17]}}. Beside path: format, grid, pattern, axes, variable, central, "
         "order, exclude, view, follow_links, which mean what the flags of 'sepi depth' mean.",
     )
+    external: dict[str, dict[str, Any]] = Field(
+        {},
+        description="Disparity maps that other methods made, by the method's name, to be scored and shown beside ours: "
+        "a folder with SCENE.pfm, .npy, .png or .h5, a file pattern such as {SPO: '/maps/{dataset}/{scene}/spo.pfm'}, "
+        "or {path: ..., scale: ..., offset: ...} where disparity = value * scale + offset.",
+    )
+    report: Report = Field(Report(), description="The report's page.")
     disparity_range: dict[str, tuple[float, float]] = Field(
         {},
         description="Disparity range of single scenes in pixels per view step, such as {hci/cotton: [-1.6, 1.5]}. "
@@ -129,11 +177,17 @@ class Settings:
         The built-in variants, then the user's own.
     parameters : mapping of stage to choice to Parameters
         What each stage runs with.
+    external : mapping of str to ExternalMaps
+        Other methods, and where their maps are.
+    report : Report
+        What the report's page shows beside the rest.
     """
 
     scenes: Mapping[tuple[str, str], Scene]
     variants: Mapping[str, Variant]
     parameters: Mapping[str, Mapping[str, Parameters]]
+    external: Mapping[str, ExternalMaps]
+    report: Report
 
     @property
     def datasets(self) -> list[str]:
@@ -165,6 +219,33 @@ class Settings:
         """Parameters of a stage's choice as JSON with sorted keys."""
         return json.dumps(self.parameters[stage][choice].model_dump(mode="json"), sort_keys=True)
 
+    def all_parameters_json(self) -> str:
+        """Parameters of every choice of every stage as JSON."""
+        return json.dumps(
+            {
+                stage: {choice: values.model_dump(mode="json") for choice, values in choices.items()}
+                for stage, choices in self.parameters.items()
+            }
+        )
+
+    def external_files(self, dataset: str, name: str) -> dict[str, Path]:
+        """Method to the file of its map of a scene, whether or not it is there.
+
+        Raises
+        ------
+        SepiError
+            If there is no such scene.
+        """
+        scene = self.scene(dataset, name)
+        return {method: maps.file(scene.dataset, scene.name) for method, maps in self.external.items()}
+
+    def external_json(self, dataset: str, name: str) -> str:
+        """What ``python -m sepi.external`` is to read for a scene, in the order of the configuration."""
+        files = self.external_files(dataset, name)
+        return json.dumps(
+            {method: maps.model_dump() | {"path": str(files[method])} for method, maps in self.external.items()}
+        )
+
 
 def load_settings(values: Mapping[str, Any]) -> Settings:
     """Check a configuration (as read from YAML) and find its scenes.
@@ -174,7 +255,8 @@ def load_settings(values: Mapping[str, Any]) -> Settings:
     SepiError
         One line that names the first key, scene, variant, stage or choice that is wrong, and what would be right.
     """
-    config = validated(Config, {key: _with_numbers(value) for key, value in values.items()}, "config")
+    spelled = {key: _with_numbers(value) for key, value in _with_paths(values).items()}
+    config = validated(Config, spelled, "config")
     scenes = _scenes(config)
     ranges = {}
     for name, (minimum, maximum) in config.disparity_range.items():
@@ -185,7 +267,20 @@ def load_settings(values: Mapping[str, Any]) -> Settings:
         {key: replace(scene, disparity_range=ranges.get("/".join(key))) for key, scene in scenes.items()},
         dict(VARIANTS) | {name: _variant(name, choices) for name, choices in config.variants.items()},
         _parameters(config.stages),
+        {name: _external(name, entry, config.variants) for name, entry in config.external.items()},
+        _report(config.report, scenes),
     )
+
+
+def _with_paths(values: Mapping[str, Any]) -> Mapping[str, Any]:
+    """A method's path alone under ``external`` as ``{path: ...}``."""
+    external = values.get("external")
+    if not isinstance(external, Mapping):
+        return values
+    return {
+        **values,
+        "external": {name: {"path": entry} if isinstance(entry, str) else entry for name, entry in external.items()},
+    }
 
 
 def _with_numbers(value: Any, top: bool = True) -> Any:
@@ -255,3 +350,37 @@ def _parameters(stages: Mapping[str, Mapping[str, Mapping[str, Any] | None]]) ->
         }
         for stage, choices in STAGES.items()
     }
+
+
+def _report(report: Report, scenes: Mapping[tuple[str, str], Scene]) -> Report:
+    """The report's keys, their pixels checked against the sizes of the scenes."""
+    named = {"/".join(key): scene for key, scene in scenes.items()}
+    require_known("config.report.pixels", report.pixels, named)
+    for name, pixels in report.pixels.items():
+        scene = named[name]
+        for y, x in pixels:
+            if y >= scene.height or x >= scene.width:
+                raise SepiError(
+                    f"config.report.pixels.{name}: row {y}, column {x} lies outside the view, which has {scene.height} "
+                    f"rows and {scene.width} columns, counted from 0"
+                )
+    return report
+
+
+def _external(name: str, entry: Mapping[str, Any], variants: Mapping[str, object]) -> ExternalMaps:
+    where = f"config.external.{name}"
+    maps = validated(ExternalMaps, entry, where)
+    if name in VARIANTS or name in variants:
+        raise SepiError(f"{where}: a variant has this name; give the method another")
+    if not name.strip() or name != name.strip() or "/" in name or name.startswith(".") or not name.isprintable():
+        raise SepiError(f"{where}: a method's name must be printable text without '/', not beginning with '.'")
+    require_known(f"{where}.path", re.findall(r"\{[^{}]*\}", maps.path), ("{dataset}", "{scene}"))
+    place = Path(os.path.expanduser(maps.path))
+    if "{scene}" not in maps.path and (place.is_file() or (place.suffix.lower() in SUFFIXES and not place.is_dir())):
+        # one file would be taken for the map of every scene
+        raise SepiError(
+            f"{where}.path: '{maps.path}' is one file; write {{scene}} for the scene's name, or give the folder"
+        )
+    if maps.scale == 0:
+        raise SepiError(f"{where}.scale: must not be 0, or every disparity would be the offset")
+    return maps

@@ -14,7 +14,7 @@ import yaml
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from sepi.config import Builtin, Config
+from sepi.config import Builtin, Config, Report
 from sepi.pipeline import STAGES
 
 
@@ -29,8 +29,8 @@ def default_yaml() -> str:
     for key, field in Config.model_fields.items():
         lines += _comment(field, "")
         default = field.get_default(call_default_factory=True)
-        if key == "builtin":
-            lines += ["builtin:", *_fields(Builtin, "  ")]
+        if key in ("builtin", "report"):
+            lines += [f"{key}:", *_fields(Builtin if key == "builtin" else Report, "  ")]
         elif key == "variants":
             lines += ["variants:", *(f"  {name}: {_flow(choices)}" for name, choices in default.items())]
         elif key == "stages":

@@ -1,5 +1,6 @@
 """The workflow's configuration: a typing error must be named, not ignored, and config.yaml must tell the truth."""
 
+import json
 import struct
 from pathlib import Path
 from typing import Any
@@ -267,3 +268,109 @@ def test_archive_files_are_scenes_by_their_own_or_their_folders_name(tmp_path: P
     (tmp_path / "empty").mkdir()
     assert "expected HDF5 files" in message_of({"hci_old_root": str(tmp_path / "empty")})
     assert "no folder" in message_of({"hci_old_root": str(tmp_path / "absent")})
+
+
+class TestExternal:
+    """Maps of other methods are found where the user says, and a wrong entry is named before anything runs."""
+
+    def file(self, path: str, dataset: str = "hci", scene: str = "cotton") -> Path:
+        return load_settings({"external": {"SPO": path}}).external["SPO"].file(dataset, scene)
+
+    def test_none_by_default(self) -> None:
+        assert load_settings({}).external == {}
+
+    def test_a_folder_means_the_file_of_the_scenes_name(self, tmp_path: Path) -> None:
+        assert self.file(str(tmp_path)) == tmp_path / "cotton.pfm"
+        for name in ("other.pfm", "cotton.txt", "Cotton.PFM", "cotton.h5", "cotton.png", "cotton.npy", "cotton.pfm"):
+            (tmp_path / name).touch()
+            if name.lower().startswith("cotton") and not name.endswith("txt"):
+                # each in turn is preferred to those before it
+                assert self.file(str(tmp_path)) == tmp_path / name
+        (tmp_path / "below.pfm").mkdir()
+        assert self.file(str(tmp_path), scene="below") == tmp_path / "below.pfm"
+
+    def test_a_folder_that_is_not_there_stops_nothing(self) -> None:
+        """Its cells of the report say that there is no file."""
+        assert self.file("/nowhere") == Path("/nowhere/cotton.pfm")
+        assert self.file("/nowhere/{scene}.png") == Path("/nowhere/cotton.png")
+
+    def test_a_pattern_names_dataset_and_scene(self, tmp_path: Path) -> None:
+        assert self.file("/maps/{dataset}/{scene}/{scene}_spo.npy") == Path("/maps/hci/cotton/cotton_spo.npy")
+        (tmp_path / "hci").mkdir()
+        (tmp_path / "hci" / "Cotton.npy").touch()
+        assert self.file(f"{tmp_path}/{{dataset}}") == tmp_path / "hci/Cotton.npy"
+
+    def test_a_pattern_may_name_folders_that_depth_wrote(self, tmp_path: Path) -> None:
+        (tmp_path / "cotton-depth").mkdir()
+        assert self.file(f"{tmp_path}/{{scene}}-depth") == tmp_path / "cotton-depth/disparity.pfm"
+
+    def test_home_and_working_folder(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setenv("HOME", str(tmp_path))
+        monkeypatch.chdir(tmp_path)
+        (tmp_path / "maps").mkdir()
+        (tmp_path / "maps" / "cotton.npy").touch()
+        assert self.file("~/maps") == tmp_path / "maps/cotton.npy"
+        assert self.file("maps") == Path("maps/cotton.npy")
+
+    def test_what_the_command_is_told(self, tmp_path: Path) -> None:
+        (tmp_path / "dots.npy").touch()
+        entries = {"SPO": "/nowhere", "AMNorm": {"path": str(tmp_path), "scale": -1, "offset": 0.5}}
+        settings = load_settings({"external": entries})
+        assert settings.external_files("builtin", "dots") == {
+            "SPO": Path("/nowhere/dots.pfm"),
+            "AMNorm": tmp_path / "dots.npy",
+        }
+        told = json.loads(settings.external_json("builtin", "dots"))
+        assert list(told) == ["SPO", "AMNorm"]
+        assert told["SPO"] == {"path": "/nowhere/dots.pfm", "scale": None, "offset": 0.0}
+        assert told["AMNorm"] == {"path": f"{tmp_path}/dots.npy", "scale": -1.0, "offset": 0.5}
+        with pytest.raises(SepiError, match="unknown 'dotz'; did you mean 'dots'"):
+            settings.external_files("builtin", "dotz")
+
+    def test_texts_that_look_like_numbers(self) -> None:
+        """A folder may be called 2024; a scale is a number also where Snakemake hands over text."""
+        settings = load_settings({"external": {"a": "2024", "b": {"path": "1e-1", "scale": "-1", "offset": "1e-1"}}})
+        assert settings.external["a"].file("hci", "cotton") == Path("2024/cotton.pfm")
+        assert settings.external["b"].file("hci", "cotton") == Path("1e-1/cotton.pfm")
+        assert (settings.external["b"].scale, settings.external["b"].offset) == (-1, 0.1)
+
+    @pytest.mark.parametrize(
+        ("entry", "expected"),
+        [
+            (5, "config.external.SPO: input should be an object, got 5"),
+            (None, "config.external.SPO: input should be an object, got None"),
+            ("", "config.external.SPO.path: string should have at least 1 character"),
+            ({}, "config.external.SPO.path: field required"),
+            ({"path": 2024}, "config.external.SPO.path: input should be a valid string, got 2024"),
+            ({"path": "/", "scal": 1}, "config.external.SPO: unknown 'scal'; did you mean 'scale'?"),
+            ({"path": "/", "scale": "big"}, "config.external.SPO.scale: input should be a valid number, got 'big'"),
+            ({"path": "/", "scale": 0}, "config.external.SPO.scale: must not be 0"),
+            ({"path": "/", "offset": None}, "config.external.SPO.offset: input should be a valid number, got None"),
+            ("/maps/{scen}", "config.external.SPO.path: unknown '{scen}'; did you mean '{scene}'?"),
+            ("/maps/cotton.pfm", "config.external.SPO.path: '/maps/cotton.pfm' is one file; write {scene}"),
+        ],
+    )
+    def test_a_wrong_entry_is_named(self, entry: Any, expected: str) -> None:
+        assert expected in message_of({"external": {"SPO": entry}})
+
+    def test_one_file_for_all_scenes_is_refused(self, tmp_path: Path) -> None:
+        """It would be scored against every other scene's ground truth."""
+        (tmp_path / "spo").touch()
+        assert "is one file; write {scene}" in message_of({"external": {"SPO": str(tmp_path / "spo")}})
+        (tmp_path / "maps.pfm").mkdir()
+        assert self.file(str(tmp_path / "maps.pfm")) == tmp_path / "maps.pfm/cotton.pfm"
+
+    @pytest.mark.parametrize("name", ["", " ", "a/b", "..", ".a", " a", "a\nb"])
+    def test_a_name_that_cannot_be_shown_or_stored(self, name: str) -> None:
+        with pytest.raises(SepiError, match="a method's name must be printable text without '/'"):
+            load_settings({"external": {name: "/maps"}})
+
+    def test_names_of_other_methods_are_free(self) -> None:
+        names = ["SPO", "EPINET-Lite", "Ours (v2)", "Müller et al. 2019", "2024"]
+        assert list(load_settings({"external": dict.fromkeys(names, "/maps")}).external) == names
+
+    @pytest.mark.parametrize("name", ["best", "mine"])
+    def test_a_variants_name_is_refused(self, name: str) -> None:
+        """Two columns of one name could not be told apart."""
+        values = {"variants": {"mine": VARIANTS["wang"].choices}, "external": {name: "/maps"}}
+        assert message_of(values) == f"config.external.{name}: a variant has this name; give the method another"

@@ -51,15 +51,7 @@ def write_scores(path: Path, evaluation: Evaluation, attributes: Mapping[str, At
         file.attrs["ground_truth"] = evaluation.error is not None
         for key, value in attributes.items():
             file.attrs[key] = value
-        for protocol, regions in evaluation.scores.items():
-            for region, scores in regions.items():
-                file.create_group(f"scores/{protocol}/{region}").attrs.update(scores)
-        if evaluation.error is not None:
-            file.create_dataset("error", data=evaluation.error)
-            file["error"].attrs["units"] = UNITS["disparity"]
-        for name, mask in evaluation.regions.items():
-            dataset = file.create_dataset(f"regions/{name}", data=mask, compression="gzip", compression_opts=1)
-            dataset.attrs["source"] = evaluation.region_sources[name]
+        put_evaluation(file, evaluation)
 
 
 def read_scores(path: Path) -> dict[str, dict[str, Scores]]:
@@ -72,12 +64,7 @@ def read_scores(path: Path) -> dict[str, dict[str, Scores]]:
     """
     with opened(path) as file:
         _require_scores(path, file)
-        return {
-            protocol: {
-                region: {key: float(value) for key, value in group.attrs.items()} for region, group in regions.items()
-            }
-            for protocol, regions in file.get("scores", {}).items()
-        }
+        return scores_in(file)
 
 
 def read_evaluation(path: Path) -> Evaluation:
@@ -88,15 +75,41 @@ def read_evaluation(path: Path) -> Evaluation:
     SepiError
         If the file is missing, not HDF5, or not a score file.
     """
-    scores = read_scores(path)
     with opened(path) as file:
-        regions: Mapping[str, Any] = file.get("regions", {})
-        return Evaluation(
-            scores=scores,
-            error=file["error"][...].astype(np.float32) if "error" in file else None,
-            regions={name: mask[...].astype(bool) for name, mask in regions.items()},
-            region_sources={name: str(mask.attrs["source"]) for name, mask in regions.items()},
-        )
+        _require_scores(path, file)
+        return evaluation_in(file)
+
+
+def put_evaluation(group: h5py.Group, evaluation: Evaluation) -> None:
+    """Write an evaluation into an empty group, or a file's root."""
+    for protocol, regions in evaluation.scores.items():
+        for region, scores in regions.items():
+            group.create_group(f"scores/{protocol}/{region}").attrs.update(scores)
+    if evaluation.error is not None:
+        group.create_dataset("error", data=evaluation.error)
+        group["error"].attrs["units"] = UNITS["disparity"]
+    for name, mask in evaluation.regions.items():
+        dataset = group.create_dataset(f"regions/{name}", data=mask, compression="gzip", compression_opts=1)
+        dataset.attrs["source"] = evaluation.region_sources[name]
+
+
+def scores_in(group: h5py.Group) -> dict[str, dict[str, Scores]]:
+    """The scores alone of what :func:`put_evaluation` wrote: protocol to region to scores."""
+    return {
+        protocol: {region: {key: float(value) for key, value in cell.attrs.items()} for region, cell in regions.items()}
+        for protocol, regions in group.get("scores", {}).items()
+    }
+
+
+def evaluation_in(group: h5py.Group) -> Evaluation:
+    """What :func:`put_evaluation` wrote."""
+    regions: Mapping[str, Any] = group.get("regions", {})
+    return Evaluation(
+        scores=scores_in(group),
+        error=group["error"][...].astype(np.float32) if "error" in group else None,
+        regions={name: mask[...].astype(bool) for name, mask in regions.items()},
+        region_sources={name: str(mask.attrs["source"]) for name, mask in regions.items()},
+    )
 
 
 def _require_scores(path: Path, file: h5py.File) -> None:

@@ -1,28 +1,92 @@
-"""Tables 1 to 4: this project's figures beside those the paper prints."""
+"""Tables 1 and 2: this project's figures beside those the paper prints, and beside those of imported maps."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 
-from sepi.evaluate import PROTOCOLS, REGIONS, WHOLE_MAP
+from sepi.evaluate import PROTOCOLS
+from sepi.external import NO_FILE
 from sepi.report import published
-from sepi.report.layout import Cell, Report, Row, Section, Table, printed, short
-from sepi.report.plan import BEST_VARIANT, MAIN_VARIANT, Plan, Runs
+from sepi.report.layout import (
+    IMPORTED,
+    OURS,
+    PUBLISHED,
+    RATIO,
+    TEXT,
+    Cell,
+    Column,
+    Entry,
+    Grid,
+    Line,
+    Report,
+    Row,
+    Section,
+    Table,
+    printed,
+    ranks,
+)
+from sepi.report.plan import MAIN_VARIANT, Plan
 from sepi.report.published import Method, SceneTable
+from sepi.report.runs import Runs
 
-# what a row is, as the CSV files say it
-_SCENE, _AVERAGE, _PRINTED_AVERAGE = "scene", "average", "average printed"
+SCENE, AVERAGE, PRINTED_AVERAGE = "scene", "average", "average printed"
+"""What a row is, as the CSV files say it."""
 
-_PROTOCOL = f"Protocol: paper (border {PROTOCOLS['paper']}, the whole map)."
-_LEARNED = "* learned, supervised; ** learned, unsupervised."
+PROTOCOL_NOTE = f"Protocol: paper (border {PROTOCOLS['paper']}, the whole map)."
+LEARNED_NOTE = "* learned, supervised; ** learned, unsupervised."
+IMPORTED_NOTE = (
+    "Imported: maps that other methods made, scored here as ours are; they are not ranked, since nothing says whether "
+    "their method is learned."
+)
 REGIONS_NOTE = (
     "Regions are those of `sepi.regions`, or the exact ones that a built-in scene brings; the paper's are not known."
 )
 
+# the paper's own among the methods whose figures it prints
+_PAPERS_METHOD = "zhou"
+
+
+@dataclass(frozen=True)
+class _Compared:
+    """A row of table 1 or 2: figures of our variants, of the published methods by key, and of the imported ones."""
+
+    name: str
+    kind: str
+    ours: Sequence[float | None]
+    theirs: Mapping[str, float | None]
+    imported: Mapping[str, Cell]
+
+    @property
+    def ratios(self) -> list[float | None]:
+        """Our figures divided by that of the paper's method."""
+        paper = self.theirs.get(_PAPERS_METHOD)
+        return [figure / paper if figure is not None and paper else None for figure in self.ours]
+
+    def row(self, methods: Sequence[Method]) -> list[Cell]:
+        """For the CSV file."""
+        theirs = [printed(self.theirs.get(method.key)) for method in methods]
+        return [self.name, self.kind, *self.ours, *self.ratios, *theirs, *self.imported.values()]
+
+    def line(self, methods: Sequence[Method], imported: Sequence[str]) -> Line:
+        """For the page: with marks, and with some of the imported methods."""
+        unlearned = [self.theirs.get(method.key) if method.learning == "none" else None for method in methods]
+        marks = ranks([*self.ours, *unlearned])
+        texts = [printed(self.theirs.get(method.key)) for method in methods]
+        own = len(self.ours)
+        entries = [
+            Entry(self.name, TEXT),
+            *(Entry(figure, OURS, mark) for figure, mark in zip(self.ours, marks[:own], strict=True)),
+            *(Entry(ratio, RATIO) for ratio in self.ratios),
+            *(Entry(text, PUBLISHED, mark) for text, mark in zip(texts, marks[own:], strict=True)),
+            *(Entry(self.imported.get(method), IMPORTED) for method in imported),
+        ]
+        return Line(entries, self.kind, at_hand=any(figure is not None for figure in self.ours))
+
 
 def scene_table(runs: Runs, score: str, paper: SceneTable, title: str) -> Report:
-    """Table 1 or 2: a row per scene; our figure and the published one of every method.
+    """Table 1 or 2: a row per scene; our figure, the published one of every method, and those of imported maps.
 
     Parameters
     ----------
@@ -35,156 +99,139 @@ def scene_table(runs: Runs, score: str, paper: SceneTable, title: str) -> Report
     title : str
         Of the page.
     """
+    plan = runs.plan
     methods = [method for method in published.methods().values() if method.column]
     rows: list[Row] = []
-    for dataset in _datasets(runs.plan):
-        ours = {
-            scene: [runs.final(dataset, scene, score, variant=variant) for variant in runs.plan.compared]
-            for scene in runs.scored(dataset)
-        }
-        rows += _scene_rows(dataset, ours, paper, methods, len(runs.plan.compared))
-        rows += _average_rows(dataset, ours, paper, methods, len(runs.plan.compared))
-    heads = ["scene", *map(_own_head, runs.plan.compared), *(_head(method) for method in methods)]
+    sections = []
+    for dataset in datasets_of(plan):
+        found = [*_scene_rows(runs, dataset, score, paper), *_average_rows(runs, dataset, score, paper)]
+        imported = [method for method in plan.external if has_column(runs, dataset, method)]
+        columns = [
+            Column("scene", TEXT),
+            *(Column(own_head(variant), OURS) for variant in plan.compared),
+            *(Column(f"{variant} / published", RATIO) for variant in plan.compared),
+            *(Column(method_head(method), PUBLISHED) for method in methods),
+            *(Column(imported_head(method), IMPORTED) for method in imported),
+        ]
+        rows += [[dataset, *one.row(methods)] for one in found]
+        grid = Grid(columns, [one.line(methods, imported) for one in found])
+        sections.append(Section(dataset_title(dataset), grid.without_empty()))
+    ratios = ["ratio" if variant == MAIN_VARIANT else f"ratio_{variant}" for variant in plan.compared]
+    keys = ["dataset", "scene", "row", *own_keys(plan), *ratios, *(method.key for method in methods)]
     return Report(
         title,
-        f"{_PROTOCOL} This code: variants {_own_names(runs.plan)}. Other columns: as the paper prints them; empty "
-        f"where the scene was in the method's training set. {_LEARNED} A scene without a figure of this code is not at "
-        "hand; one without published figures is not in the paper. The average of the scenes at hand is empty where a "
-        "method has no figure for one of them.",
-        Table(["dataset", "scene", "row", *_own_keys(runs.plan), *(method.key for method in methods)], rows),
-        [
-            Section(_dataset_title(dataset), Table(heads, [[row[1], *row[3:]] for row in group]))
-            for dataset, group in _by_dataset(rows).items()
-        ],
+        f"{PROTOCOL_NOTE} This code: variants {own_names(plan)}; then each figure of these divided by the published "
+        f"one of the paper's method, {published.methods()[_PAPERS_METHOD].label}. Other columns: as the paper prints "
+        f"them; empty where the scene was in the method's training set. {LEARNED_NOTE} A scene without a figure of "
+        "this code is not at hand; one without published figures is not in the paper. The average of the scenes at "
+        "hand is empty where a method has no figure for one of them." + (f" {IMPORTED_NOTE}" if plan.external else ""),
+        Table([*keys, *imported_keys(plan, keys)], rows),
+        sections,
+        "Marked: best and second best in a row, of this code and the published methods that are not learned",
     )
 
 
-def region_table(runs: Runs) -> Report:
-    """Table 3: average MSE over occluded and texture-less regions, ours and published."""
-    regions = [region for region in REGIONS if region != WHOLE_MAP]
-    datasets = [dataset for dataset in _datasets(runs.plan) if dataset in published.DATASETS or runs.scored(dataset)]
-    columns = [(dataset, region) for dataset in datasets for region in regions]
-    rows: list[Row] = [
-        [key, "none", *(_region_average(runs, dataset, region, variant) for dataset, region in columns)]
-        for key, variant in zip(_own_keys(runs.plan), runs.plan.compared, strict=True)
-    ]
-    labels: list[Cell] = [_own_head(variant) for variant in runs.plan.compared]
-    for method in published.methods().values():
-        theirs = {dataset: published.table3().get(dataset, {}).get(method.key) for dataset in datasets}
-        if any(theirs.values()):
-            rows.append(
-                [method.key, method.learning, *(_printed(theirs[dataset], region) for dataset, region in columns)]
-            )
-            labels.append(_head(method))
-    at_hand = "; ".join(f"{dataset}: {', '.join(runs.scored(dataset)) or 'none'}" for dataset in datasets)
-    heads = ["method", *(f"{dataset}, {region}" for dataset, region in columns)]
-    return Report(
-        "Table 3: MSE x100 in occluded and texture-less regions",
-        f"{_PROTOCOL} This code: variants {_own_names(runs.plan)}, average of the scenes at hand that have such a "
-        f"region ({at_hand}). Other rows: as the paper prints them, over all scenes of the data set. "
-        f"{REGIONS_NOTE} {_LEARNED}",
-        Table(["method", "learning", *(f"{dataset}_{region}" for dataset, region in columns)], rows),
-        [Section("", Table(heads, [[label, *row[2:]] for label, row in zip(labels, rows, strict=True)]))],
-    )
-
-
-def ablation_table(runs: Runs) -> Report:
-    """Table 4: MSE of every variant over the map and both regions, per scene, averaged, and published."""
-    variants = runs.plan.listed
-    cells = [(variant, region) for variant in variants for region in REGIONS]
-    rows: list[Row] = []
-    for dataset in _datasets(runs.plan):
-        scenes = runs.scored(dataset)
-        ours = {
-            scene: {cell: runs.final(dataset, scene, "mse100", variant=cell[0], region=cell[1]) for cell in cells}
-            for scene in scenes
-        }
-        for scene in scenes:
-            rows += _ablation_rows([dataset, scene, _SCENE], variants, ours[scene])
-        if scenes:
-            means = {cell: _mean(ours[scene][cell] for scene in scenes) for cell in cells}
-            rows += _ablation_rows([dataset, _average_label(len(scenes)), _AVERAGE], variants, means)
-        if dataset in published.table4():
-            paper = published.table4()[dataset]
-            label = _printed_label(len(published.table1().scenes(dataset)))
-            figures = {cell: _printed(paper.get(cell[0]), cell[1]) for cell in cells}
-            rows += _ablation_rows([dataset, label, _PRINTED_AVERAGE], variants, figures)
-    return Report(
-        "Table 4: ablation, MSE x100 (whole map / occluded / texture-less)",
-        f"{_PROTOCOL} The first five variants are the columns of the paper's table 4 in its order; `wang` is the "
-        f"comparison in its text (published for the whole map only), `{BEST_VARIANT}` this project's own. "
-        f"{REGIONS_NOTE}",
-        Table(["dataset", "scene", "row", "region", *variants], rows),
-        [Section(_dataset_title(dataset), _joined(variants, group)) for dataset, group in _by_dataset(rows).items()],
-    )
-
-
-def _scene_rows(
-    dataset: str, ours: Mapping[str, Sequence[float]], paper: SceneTable, methods: Sequence[Method], own: int
-) -> list[Row]:
-    """The paper's scenes in its order, then those it does not have; ``own`` figures of ours in each row."""
-    own_names = {published.paper_scene(dataset, scene) or scene: scene for scene in ours}
-    rows: list[Row] = []
+def _scene_rows(runs: Runs, dataset: str, score: str, paper: SceneTable) -> list[_Compared]:
+    """The paper's scenes in its order, then those it does not have."""
+    own_names = {published.paper_scene(dataset, scene) or scene: scene for scene in runs.scored(dataset)}
+    rows = []
     for name in dict.fromkeys([*paper.scenes(dataset), *own_names]):
-        figures = paper.cells.get((dataset, name), {})
-        found: Sequence[Cell] = ours[own_names[name]] if name in own_names else [None] * own
-        rows.append([dataset, name, _SCENE, *found, *(printed(figures.get(method.key)) for method in methods)])
+        scene = own_names.get(name)
+        ours: list[float | None] = [None] * len(runs.plan.compared)
+        imported: dict[str, Cell] = dict.fromkeys(runs.plan.external)
+        if scene is not None:
+            ours = [runs.final(dataset, scene, score, variant=variant) for variant in runs.plan.compared]
+            imported = {method: imported_cell(runs, dataset, scene, method, score) for method in runs.plan.external}
+        rows.append(_Compared(name, SCENE, ours, paper.cells.get((dataset, name), {}), imported))
     return rows
 
 
-def _average_rows(
-    dataset: str, ours: Mapping[str, Sequence[float]], paper: SceneTable, methods: Sequence[Method], own: int
-) -> list[Row]:
-    rows: list[Row] = []
-    if ours:
-        figures = [paper.cells.get((dataset, published.paper_scene(dataset, scene) or ""), {}) for scene in ours]
-        theirs = [printed(_mean_of_all([cells.get(method.key) for cells in figures])) for method in methods]
-        means = [_mean(figures) for figures in zip(*ours.values(), strict=True)]
-        rows.append([dataset, _average_label(len(ours)), _AVERAGE, *means, *theirs])
+def _average_rows(runs: Runs, dataset: str, score: str, paper: SceneTable) -> list[_Compared]:
+    plan, scenes = runs.plan, runs.scored(dataset)
+    nothing: dict[str, Cell] = dict.fromkeys(plan.external)
+    rows = []
+    if scenes:
+        figures = [paper.cells.get((dataset, published.paper_scene(dataset, scene) or ""), {}) for scene in scenes]
+        theirs = {key: _mean_of_all([cells.get(key) for cells in figures]) for key in published.methods()}
+        ours = [mean(runs.final(dataset, scene, score, variant=name) for scene in scenes) for name in plan.compared]
+        imported = {
+            method: _mean_of_all([runs.external_score(dataset, scene, method, score) for scene in scenes])
+            for method in plan.external
+        }
+        rows.append(_Compared(average_label(len(scenes)), AVERAGE, ours, theirs, nothing | imported))
     if dataset in paper.averages:
-        theirs = [printed(paper.averages[dataset].get(method.key)) for method in methods]
-        rows.append([dataset, _printed_label(len(paper.scenes(dataset))), _PRINTED_AVERAGE, *[None] * own, *theirs])
+        label = printed_label(len(paper.scenes(dataset)))
+        rows.append(_Compared(label, PRINTED_AVERAGE, [None] * len(plan.compared), paper.averages[dataset], nothing))
     return rows
 
 
-def _ablation_rows(
-    start: Sequence[Cell], variants: Sequence[str], figures: Mapping[tuple[str, str], Cell]
-) -> list[Row]:
-    return [[*start, region, *(figures[variant, region] for variant in variants)] for region in REGIONS]
+def has_column(runs: Runs, dataset: str, method: str) -> bool:
+    """Whether an imported method belongs on a data set's page.
+
+    One that has files, but none for this data set, does not; one without any file does, or nobody would see that.
+    """
+    with_file = {name for name, scene in runs.plan.pairs if runs.external_problem(name, scene, method) != NO_FILE}
+    return dataset in with_file or (not with_file and dataset in runs.plan.scenes)
 
 
-def _joined(variants: Sequence[str], rows: Sequence[Row]) -> Table:
-    """The rows of a data set, one per scene: the regions of a variant in one cell, as the paper has them."""
-    groups: dict[Cell, list[Row]] = {}
-    for row in rows:
-        groups.setdefault(row[1], []).append(row[4:])
-    lines: list[Row] = []
-    for name, regions in groups.items():
-        cells = [[short(row[column]) for row in regions] for column in range(len(variants))]
-        # a figure published without those of the regions stands alone
-        lines.append([name, *("/".join(filter(None, cell)) or None for cell in cells)])
-    return Table(["scene", *variants], lines)
+def imported_cell(runs: Runs, dataset: str, scene: str, method: str, score: str) -> Cell:
+    """The score of an imported map by the paper's protocol, or what is wrong with it."""
+    figure = runs.external_score(dataset, scene, method, score)
+    return (runs.external_problem(dataset, scene, method) or None) if figure is None else figure
 
 
-def _region_average(runs: Runs, dataset: str, region: str, variant: str) -> float | None:
-    scenes = runs.scored(dataset)
-    return _mean(runs.final(dataset, scene, "mse100", region, variant) for scene in scenes) if scenes else None
+def imported_keys(plan: Plan, taken: Iterable[str]) -> list[str]:
+    """Names of the imported methods in the CSV files; one that is taken is told apart."""
+    known = set(taken)
+    return [imported_head(method) if method in known else method for method in plan.external]
 
 
-def _own_head(variant: str) -> str:
+def imported_head(method: str) -> str:
+    """Head of an imported method's column."""
+    return f"{method} (imported)"
+
+
+def own_head(variant: str) -> str:
+    """Head of a column of our figures."""
     return f"this code, {variant}"
 
 
-def _own_names(plan: Plan) -> str:
+def own_names(plan: Plan) -> str:
+    """The variants whose figures are compared, for a caption."""
     return " and ".join(f"`{variant}`" for variant in plan.compared)
 
 
-def _own_keys(plan: Plan) -> list[str]:
+def own_keys(plan: Plan) -> list[str]:
     """Names of our own figures in the CSV files: ``ours`` is the paper's method."""
     return ["ours" if variant == MAIN_VARIANT else f"ours_{variant}" for variant in plan.compared]
 
 
-def _mean(values: Iterable[float]) -> float:
+def method_head(method: Method) -> str:
+    """Head of a published method's column."""
+    return method.label + {"none": "", "supervised": "*", "unsupervised": "**"}[method.learning]
+
+
+def datasets_of(plan: Plan) -> list[str]:
+    """Data sets at hand, then the paper's others."""
+    return list(dict.fromkeys([*plan.scenes, *published.DATASETS]))
+
+
+def dataset_title(dataset: str) -> str:
+    """Name of a data set, with the paper's where it has one."""
+    return f"{dataset}: {published.DATASETS[dataset]}" if dataset in published.DATASETS else dataset
+
+
+def average_label(count: int) -> str:
+    """Name of the row with averages of our figures."""
+    return f"Average of {count} scene{'s' * (count != 1)} at hand"
+
+
+def printed_label(count: int) -> str:
+    """Name of the row with the paper's averages."""
+    return f"Average as printed ({count} scenes)"
+
+
+def mean(values: Iterable[float]) -> float:
     """Mean of the scores that exist; NaN where none does (a scene may have no such region)."""
     known = [value for value in values if not math.isnan(value)]
     return sum(known) / len(known) if known else math.nan
@@ -194,35 +241,3 @@ def _mean_of_all(values: Sequence[float | None]) -> float | None:
     """Mean, or None where a value is missing: an average over other scenes would not compare."""
     known = [value for value in values if value is not None]
     return sum(known) / len(known) if known and len(known) == len(values) else None
-
-
-def _printed(figures: published.Regions | None, region: str) -> str | None:
-    return None if figures is None else printed(getattr(figures, "overall" if region == WHOLE_MAP else region))
-
-
-def _datasets(plan: Plan) -> list[str]:
-    """Data sets at hand, then the paper's others."""
-    return list(dict.fromkeys([*plan.scenes, *published.DATASETS]))
-
-
-def _by_dataset(rows: Sequence[Row]) -> dict[str, list[Row]]:
-    groups: dict[str, list[Row]] = {}
-    for row in rows:
-        groups.setdefault(str(row[0]), []).append(row)
-    return groups
-
-
-def _average_label(count: int) -> str:
-    return f"Average of {count} scene{'s' * (count != 1)} at hand"
-
-
-def _printed_label(count: int) -> str:
-    return f"Average as printed ({count} scenes)"
-
-
-def _head(method: Method) -> str:
-    return method.label + {"none": "", "supervised": "*", "unsupervised": "**"}[method.learning]
-
-
-def _dataset_title(dataset: str) -> str:
-    return f"{dataset}: {published.DATASETS[dataset]}" if dataset in published.DATASETS else dataset

@@ -8,20 +8,17 @@ References
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 
 from sepi.evaluate import PROTOCOLS
-from sepi.io.files import atomic_path
-from sepi.io.hdf5 import read_stage
-from sepi.io.scores import read_evaluation
 from sepi.lightfield import FloatMap
-from sepi.report.layout import Cell, Report, Row, Section, Table
-from sepi.report.plan import Runs
+from sepi.report.layout import OURS, TEXT, Cell, Column, Entry, Grid, Line, Report, Row, Section, Table
+from sepi.report.runs import Runs
+from sepi.report.saving import new_figure, save
 
 DECILES = 10
 
@@ -78,22 +75,20 @@ def oracle(error: FloatMap) -> FloatArray:
 def confidence_table(runs: Runs) -> Report:
     """Mean errors by decile of confidence and the area under the sparsification curve, beside the oracle's."""
     rows: list[Row] = []
-    lines: list[Row] = []
-    last = runs.plan.stages[-1]
+    lines: list[Line] = []
     for dataset in runs.plan.scenes:
         for scene in runs.scored(dataset):
             for variant in runs.plan.compared:
-                confidence = read_stage(runs.plan.stage_file(dataset, scene, variant, last)).confidence
-                error = read_evaluation(runs.plan.stage_file(dataset, scene, variant, last, "scores.h5")).error
-                if error is None:
+                found = runs.confidence(dataset, scene, variant)
+                if found is None:
                     continue
-                squared, absolute = decile_errors(confidence, error)
-                area, least = sparsification(confidence, error).mean(), oracle(error).mean()
-                areas: list[Cell] = [float(area), float(least), float(sparsification(confidence, error)[0])]
-                for name, figures in (("mse100", squared), ("mae100", absolute)):
-                    rows.append([dataset, scene, variant, name, *map(float, figures), *areas])
-                lines.append([f"{dataset}/{scene}", variant, *map(float, absolute), *areas])
+                areas: list[Cell] = [_mean(found["curve"]), _mean(found["oracle"]), found["curve"][0]]
+                for name, figures in (("mse100", found["squared"]), ("mae100", found["absolute"])):
+                    rows.append([dataset, scene, variant, name, *figures, *areas])
+                figures_shown = [*found["absolute"], *areas]
+                lines.append(Line([Entry(f"{dataset}/{scene}", TEXT), Entry(variant, TEXT), *_own(figures_shown)]))
     tenths = [f"decile {i}" for i in range(1, DECILES + 1)]
+    heads = [Column(head, OURS) for head in (*tenths, "area", "oracle", "random")]
     return Report(
         "Confidence",
         f"Protocol: paper (border {PROTOCOLS['paper']}, the whole map). Mean absolute error x100 of each tenth of the "
@@ -103,14 +98,13 @@ def confidence_table(runs: Runs) -> Report:
         "nothing can beat; random: the error of all pixels, which is what a confidence that says nothing reaches. "
         "Curves: `maps/DATASET/SCENE/VARIANT/sparsification.png`.",
         Table(["dataset", "scene", "variant", "error", *tenths, "area", "oracle", "random"], rows),
-        [Section("", Table(["scene", "variant", *tenths, "area", "oracle", "random"], lines))],
+        [Section("", Grid([Column("scene", TEXT), Column("variant", TEXT), *heads], lines))],
     )
 
 
-def write_curves(path: Path, confidence: FloatMap, error: FloatMap) -> None:
-    """Plot the sparsification curve of a map beside the oracle's; equal maps give equal bytes."""
-    figure = Figure(figsize=(5, 3.5), dpi=100, layout="constrained")
-    FigureCanvasAgg(figure)
+def write_curves(folder: Path, confidence: FloatMap, error: FloatMap) -> None:
+    """Plot the sparsification curve of a map beside the oracle's as ``sparsification.png`` and ``.pdf``."""
+    figure = new_figure(5, 3.5)
     axis = figure.subplots()
     taken = np.arange(_STEPS)
     for name, curve, style in (
@@ -122,8 +116,15 @@ def write_curves(path: Path, confidence: FloatMap, error: FloatMap) -> None:
     axis.set_ylabel("mean absolute error x100 / px")
     axis.set_ylim(bottom=0)
     axis.legend()
-    with atomic_path(path) as temporary:
-        figure.savefig(temporary, format="png", metadata={"Software": None})
+    save(figure, folder, "sparsification")
+
+
+def _own(figures: Sequence[Cell]) -> list[Entry]:
+    return [Entry(figure, OURS) for figure in figures]
+
+
+def _mean(values: Sequence[float]) -> float:
+    return float(np.mean(values))
 
 
 def _by_confidence(confidence: FloatMap, error: FloatMap) -> FloatArray:

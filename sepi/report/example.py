@@ -33,7 +33,7 @@ def panels() -> list[Panel]:
 @click.argument("output", type=click.Path(path_type=Path))
 def main(output: Path) -> None:
     """Write the example picture to OUTPUT."""
-    write_overview(output, "", [panels()])
+    write_overview(output.parent, output.stem, "", [panels()], endings=("png",))
 
 
 if __name__ == "__main__":

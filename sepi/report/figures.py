@@ -1,18 +1,23 @@
-"""Pictures of a scene: reference view, truth, disparity after each stage, errors, masks; and one sheet of them all."""
+"""Pictures of a scene, and what the page needs of it.
+
+Reference view, truth, disparity after each stage, errors, masks and other methods' maps as PNG; a sheet of them all,
+the confidence's curves and single pixels as figures (PNG and PDF).
+"""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import click
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 
 from sepi.command import SepiCommand
 from sepi.evaluate import WHOLE_MAP
+from sepi.io.external import read_imported
 from sepi.io.files import atomic_path
 from sepi.io.hdf5 import read_light_field, read_stage
 from sepi.io.images import write_png
@@ -30,6 +35,10 @@ from sepi.report.pictures import (
     outline_picture,
 )
 from sepi.report.plan import MAIN_VARIANT, Plan
+from sepi.report.probe_figure import write_probes
+from sepi.report.saving import BOTH, new_figure, save
+from sepi.report.scene_panels import SceneResults, viewer_of
+from sepi.report.scene_probes import Place, page_probes, scene_probes
 from sepi.stage import StageMaps
 
 # width of a panel of the overview in inches; 100 dots each
@@ -89,50 +98,82 @@ def error_panels(variant: str, evaluation: Evaluation) -> list[Panel]:
     return [Panel(f"{variant}/error", title, error_picture(evaluation.error))]
 
 
-def write_overview(path: Path, title: str, rows: Sequence[Sequence[Panel]]) -> None:
+def imported_panels(results: SceneResults) -> list[Panel]:
+    """Other methods' maps, and their errors where there is ground truth."""
+    limits = disparity_limits(results.light_field)
+    panels = []
+    for method, (disparity, evaluation) in results.imported.items():
+        picture = map_picture(disparity, limits)
+        panels.append(Panel(f"imported/{method}/disparity", f"{method} (imported)", picture))
+        panels += [
+            Panel(f"imported/{method}/error", error.title, error.picture)
+            for error in error_panels(f"{method} (imported)", evaluation)
+        ]
+    return panels
+
+
+def write_overview(
+    folder: Path, name: str, title: str, rows: Sequence[Sequence[Panel]], endings: Sequence[str] = BOTH
+) -> None:
     """All panels on one sheet, with their titles; equal panels give equal bytes."""
     filled = [row for row in rows if row]
     columns = max(len(row) for row in filled)
     height, width = filled[0][0].picture.shape[:2]
     panel_height = _PANEL * height / width + 0.4
-    # no pyplot: its figures are global state
-    figure = Figure(figsize=(_PANEL * columns, panel_height * len(filled) + 0.4), dpi=100, layout="constrained")
-    FigureCanvasAgg(figure)
-    figure.suptitle(title)
-    axes = figure.subplots(len(filled), columns, squeeze=False)
-    for row_axes, row in zip(axes, filled, strict=True):
-        for axis in row_axes:
+    size = (_PANEL * columns, panel_height * len(filled) + 0.4)
+    figure = new_figure(*size, layout=None)
+    figure.suptitle(title, y=1 - 0.12 / size[1])
+    # places by hand: a layout engine takes longer than all the rest
+    for number, row in enumerate(filled):
+        bottom = size[1] - 0.4 - (number + 1) * panel_height
+        for column, panel in enumerate(row):
+            place = (column * _PANEL + 0.05, bottom + 0.05, _PANEL - 0.1, panel_height - 0.4)
+            axis = figure.add_axes([place[0] / size[0], place[1] / size[1], place[2] / size[0], place[3] / size[1]])
             axis.set_axis_off()
-        for axis, panel in zip(row_axes, row, strict=False):
             axis.imshow(panel.picture, interpolation="antialiased")
             axis.set_title(panel.title, fontsize=8)
-    with atomic_path(path) as temporary:
-        # matplotlib would write its version into the file
-        figure.savefig(temporary, format="png", metadata={"Software": None})
+    save(figure, folder, name, endings)
 
 
-def write_scene(plan: Plan, dataset: str, scene: str, folder: Path) -> None:
-    """Write every picture of a scene below ``folder``, and ``overview.png``."""
-    light_field = read_light_field(plan.light_field_file(dataset, scene))
+def read_results(plan: Plan, dataset: str, scene: str) -> SceneResults:
+    """Everything that is shown of a scene, from its files."""
     maps = {
         variant: {stage: read_stage(plan.stage_file(dataset, scene, variant, stage)) for stage in plan.stages}
         for variant in plan.listed
     }
     last = plan.stages[-1]
-    evaluations = {
-        variant: read_evaluation(plan.stage_file(dataset, scene, variant, last, "scores.h5")) for variant in maps
-    }
-    for variant in plan.compared:
-        error = evaluations[variant].error
+    imported = read_imported(plan.external_file(dataset, scene)) if plan.external else {}
+    return SceneResults(
+        light_field=read_light_field(plan.light_field_file(dataset, scene)),
+        maps=maps,
+        evaluations={
+            variant: read_evaluation(plan.stage_file(dataset, scene, variant, last, "scores.h5")) for variant in maps
+        },
+        compared=plan.compared,
+        imported={
+            method: (found.disparity, found.evaluation)
+            for method, found in imported.items()
+            if found.disparity is not None
+        },
+    )
+
+
+def write_scene(results: SceneResults, title: str, folder: Path) -> None:
+    """Write every picture of a scene below ``folder``, and the sheet ``overview`` of them."""
+    light_field = results.light_field
+    for variant in results.compared:
+        error = results.evaluations[variant].error
         if error is not None and np.isfinite(error).any():
-            write_curves(folder / variant / "sparsification.png", maps[variant][last].confidence, error)
-    common = scene_panels(light_field, evaluations[MAIN_VARIANT])
-    stages = {variant: stage_panels(light_field, variant, found) for variant, found in maps.items()}
-    details = {variant: detail_panels(light_field, variant, found[last]) for variant, found in maps.items()}
-    errors = {variant: error_panels(variant, evaluation) for variant, evaluation in evaluations.items()}
-    for panel in [*common, *(p for group in (stages, details, errors) for panels in group.values() for p in panels)]:
+            write_curves(folder / variant, results.final(variant).confidence, error)
+    common = scene_panels(light_field, results.evaluations[MAIN_VARIANT])
+    stages = {variant: stage_panels(light_field, variant, found) for variant, found in results.maps.items()}
+    details = {variant: detail_panels(light_field, variant, results.final(variant)) for variant in results.maps}
+    errors = {variant: error_panels(variant, evaluation) for variant, evaluation in results.evaluations.items()}
+    imported = imported_panels(results)
+    groups = [panels for group in (stages, details, errors) for panels in group.values()]
+    for panel in [*common, *(panel for panels in groups for panel in panels), *imported]:
         write_png(folder / f"{panel.name}.png", panel.picture)
-    others = [variant for variant in maps if variant != MAIN_VARIANT]
+    others = [variant for variant in results.maps if variant != MAIN_VARIANT]
     sheet = [
         common,
         [*stages[MAIN_VARIANT], *errors[MAIN_VARIANT]],
@@ -140,7 +181,22 @@ def write_scene(plan: Plan, dataset: str, scene: str, folder: Path) -> None:
         [stages[variant][-1] for variant in others],
         [panel for variant in others for panel in errors[variant]],
     ]
-    write_overview(folder / "overview.png", f"{dataset}/{scene}", sheet)
+    write_overview(folder, "overview", title, sheet)
+
+
+def page_json(results: SceneResults, dataset: str, scene: str, probes: list[dict[str, Any]]) -> dict[str, Any]:
+    """What the page needs of a scene."""
+    viewer = viewer_of(results)
+    reserved = len(json.dumps(probes))
+    best = f"{results.compared[0]}/{list(results.maps[results.compared[0]])[-1]}"
+    return {
+        "dataset": dataset,
+        "scene": scene,
+        "grid": list(results.light_field.grid),
+        "first": {"a": "centre", "b": best},
+        **viewer.to_json(reserved),
+        "probes": probes,
+    }
 
 
 @click.command(name="python -m sepi.report.figures", cls=SepiCommand)
@@ -148,10 +204,24 @@ def write_scene(plan: Plan, dataset: str, scene: str, folder: Path) -> None:
 @click.option("--plan", "plan_text", required=True, help="JSON: scenes per data set, choices per variant and stage.")
 @click.option("--dataset", required=True, help="Data set of the scene.")
 @click.option("--scene", required=True, help="Scene to draw.")
+@click.option("--pixels", default="[]", show_default=True, help="JSON: pixels to look into, [[row, column], ...].")
 @click.option("--output", type=click.Path(path_type=Path), required=True, help="Folder to write to.")
-def command(results: Path, plan_text: str, dataset: str, scene: str, output: Path) -> None:
+@click.option("--page", type=click.Path(path_type=Path), help="JSON file to write: the scene for the page.")
+def command(
+    results: Path, plan_text: str, dataset: str, scene: str, pixels: str, output: Path, page: Path | None
+) -> None:
     """Write the pictures of one scene."""
-    write_scene(Plan.from_json(results, plan_text), dataset, scene, output)
+    plan = Plan.from_json(results, plan_text)
+    found = read_results(plan, dataset, scene)
+    asked = [Place(int(y), int(x), "asked for") for y, x in json.loads(pixels)]
+    probes = scene_probes(found, plan.stage_file(dataset, scene, MAIN_VARIANT, plan.stages[-1]), asked)
+    write_scene(found, f"{dataset}/{scene}", output)
+    if probes:
+        write_probes(output / "pixels", probes)
+    if page is not None:
+        with atomic_path(page) as temporary:
+            text = json.dumps(page_json(found, dataset, scene, page_probes(probes)), separators=(",", ":"))
+            temporary.write_text(text, encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 from matplotlib import colormaps
+from matplotlib.colors import Colormap, ListedColormap
+from skimage.color import lab2rgb, rgb2lab
 
 from sepi.lightfield import BoolMap, FloatMap, LightField
 
@@ -16,16 +19,39 @@ Picture = npt.NDArray[np.uint8]
 ERROR_LIMIT = 0.2
 """Error in pixels per view step at the ends of the colour scale of error maps, the same in all of them."""
 
+# ends of the scale of errors: too far and too near; blue and red-brown are told apart by every kind of eye
+_FAR, _NEAR = (0, 62, 150), (150, 40, 0)
+
 _UNKNOWN = (1.0, 0.0, 1.0)  # magenta is in none of the colour scales
 _MASK = np.array([255, 64, 32], np.float32)
 _OUTLINE = np.array([255, 220, 0], np.uint8)
 
 
+@cache
+def error_scale() -> ListedColormap:
+    """Colours of signed errors: lightness falls evenly from white in the middle to both ends (CIELAB)."""
+    ends = rgb2lab(np.array([_FAR, _NEAR], np.float64) / 255)
+    white = np.array([100.0, 0.0, 0.0])
+    share = np.linspace(0, 1, 128)[:, None]
+    half = [white + share * (end - white) for end in ends]
+    # the middle stands once: zero is white exactly
+    colours = np.concatenate([half[0][::-1], half[1][1:]])
+    return ListedColormap(np.clip(lab2rgb(colours), 0, 1).tolist(), name="error")
+
+
+def scale_colours(scale: str | Colormap) -> npt.NDArray[np.uint8]:
+    """The 256 colours of a scale, (256, 3) uint8, from its low end to its high one."""
+    colours = colormaps[scale] if isinstance(scale, str) else scale
+    levels: npt.NDArray[np.uint8] = colours(np.linspace(0, 1, 256), bytes=True)
+    return levels[:, :3]
+
+
 def disparity_limits(light_field: LightField) -> tuple[float, float]:
-    """Ends of the colour scale of a scene: those of its ground truth, else of its disparity range."""
+    """Ends of the colour scale of a scene: those of its ground truth, else, or where it is flat, of its range."""
     if light_field.truth is not None and np.isfinite(light_field.truth).any():
         known = light_field.truth[np.isfinite(light_field.truth)]
-        return float(known.min()), float(known.max())
+        if known.min() < known.max():
+            return float(known.min()), float(known.max())
     known_range = light_field.known_range()
     return known_range.minimum, known_range.maximum
 
@@ -36,18 +62,19 @@ def centre_picture(light_field: LightField) -> Picture:
     return np.repeat(centre, 3, axis=2) if centre.shape[2] == 1 else centre
 
 
-def map_picture(values: FloatMap, limits: tuple[float, float], scale: str = "viridis") -> Picture:
+def map_picture(values: FloatMap, limits: tuple[float, float], scale: str | Colormap = "viridis") -> Picture:
     """A map (H, W) in matplotlib's colour scale ``scale``, which spans ``limits``; unknown values are magenta."""
     low, high = limits
     unit = (values.astype(np.float64) - low) / max(high - low, 1e-9)
     unit[~np.isfinite(unit)] = np.nan
-    colours: npt.NDArray[Any] = colormaps[scale].with_extremes(bad=_UNKNOWN)(np.clip(unit, 0, 1), bytes=True)
+    chosen = colormaps[scale] if isinstance(scale, str) else scale
+    colours: npt.NDArray[Any] = chosen.with_extremes(bad=_UNKNOWN)(np.clip(unit, 0, 1), bytes=True)
     return colours[:, :, :3].astype(np.uint8)
 
 
 def error_picture(error: FloatMap) -> Picture:
     """A signed error map (H, W): red where the estimate is too near, blue where too far, magenta where unknown."""
-    return map_picture(error, (-ERROR_LIMIT, ERROR_LIMIT), "seismic")
+    return map_picture(error, (-ERROR_LIMIT, ERROR_LIMIT), error_scale())
 
 
 def mask_picture(centre: Picture, mask: BoolMap) -> Picture:
@@ -59,9 +86,14 @@ def mask_picture(centre: Picture, mask: BoolMap) -> Picture:
 
 def outline_picture(centre: Picture, labels: npt.NDArray[np.integer[Any]]) -> Picture:
     """Borders between regions of equal label (H, W) in yellow over the reference view."""
+    picture = centre.copy()
+    picture[outlines(labels)] = _OUTLINE
+    return picture
+
+
+def outlines(labels: npt.NDArray[np.integer[Any]]) -> BoolMap:
+    """Pixels whose left or upper neighbour has another label, (H, W) bool."""
     border = np.zeros(labels.shape, bool)
     border[:, 1:] |= labels[:, 1:] != labels[:, :-1]
     border[1:] |= labels[1:] != labels[:-1]
-    picture = centre.copy()
-    picture[border] = _OUTLINE
-    return picture
+    return border

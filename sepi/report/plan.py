@@ -1,6 +1,6 @@
-"""Which scenes and variants a report is about, and where their files lie.
+"""Which scenes, variants and imported methods a report is about, and where their files lie.
 
-The workflow declares the inputs of each table from here, and the tables read nothing else.
+The workflow declares the inputs of the report's numbers from here, and they are collected from nothing else.
 """
 
 from __future__ import annotations
@@ -8,13 +8,10 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 from sepi.errors import SepiError
-from sepi.evaluate import WHOLE_MAP
-from sepi.io.scores import Scores, read_scores
 from sepi.pipeline import PARTS_OF_BEST
 
 MAIN_VARIANT = "paper"
@@ -35,10 +32,13 @@ TABLES: dict[str, str] = {
 }
 """Name of each table and what it is made from."""
 
+PARTS_TABLES = ("ablation_best",)
+"""Tables of the best variant's parts; they are made from numbers of their own."""
+
 
 @dataclass(frozen=True)
 class Plan:
-    """Scenes and variants of a report.
+    """Scenes, variants and imported methods of a report.
 
     Attributes
     ----------
@@ -48,15 +48,20 @@ class Plan:
         Data set to its scenes, in the order of the tables.
     variants : mapping of str to mapping
         Variant to stage to choice, in order; the stages are the same for all.
+    external : sequence of str
+        Methods whose maps are imported, in the order of the tables.
     """
 
     results: Path
     scenes: Mapping[str, Sequence[str]]
     variants: Mapping[str, Mapping[str, str]]
+    external: Sequence[str] = ()
 
     @classmethod
     def from_json(cls, results: Path, text: str) -> Plan:
-        """Plan from JSON ``{"scenes": {DATASET: [SCENE...]}, "variants": {VARIANT: {STAGE: CHOICE}}}``.
+        """Plan from JSON ``{"scenes": {DATASET: [SCENE]}, "variants": {VARIANT: {STAGE: CHOICE}}}``.
+
+        Imported methods, ``"external": [NAME]``, may be added.
 
         Raises
         ------
@@ -67,13 +72,14 @@ class Plan:
             values = json.loads(text)
             plan = cls(
                 results,
-                {dataset: tuple(map(str, names)) for dataset, names in values["scenes"].items()},
+                {dataset: _names(names) for dataset, names in values["scenes"].items()},
                 {name: {stage: str(word) for stage, word in c.items()} for name, c in values["variants"].items()},
+                _names(values.get("external", ())),
             )
         except (ValueError, KeyError, TypeError, AttributeError) as error:
             raise SepiError(
-                "plan: expected JSON such as "
-                f'{{"scenes": {{DATASET: [SCENE]}}, "variants": {{VARIANT: {{STAGE: CHOICE}}}}}} ({error})'
+                'plan: expected JSON such as {"scenes": {DATASET: [SCENE]}, "variants": {VARIANT: {STAGE: CHOICE}}, '
+                f'"external": [NAME]}} ({error})'
             ) from error
         if MAIN_VARIANT not in plan.variants:
             raise SepiError(f"plan: no variant '{MAIN_VARIANT}', which stands beside the published figures")
@@ -81,7 +87,15 @@ class Plan:
 
     def to_json(self) -> str:
         """The text that :meth:`from_json` reads; the results' folder is not part of it."""
-        return json.dumps({"scenes": self.scenes, "variants": self.variants})
+        return json.dumps(self.content())
+
+    def content(self) -> dict[str, Any]:
+        """Scenes, variants and imported methods as JSON has them."""
+        return {
+            "scenes": {dataset: list(names) for dataset, names in self.scenes.items()},
+            "variants": {variant: dict(choices) for variant, choices in self.variants.items()},
+            "external": list(self.external),
+        }
 
     @property
     def stages(self) -> list[str]:
@@ -99,37 +113,36 @@ class Plan:
 
     def stage_file(self, dataset: str, scene: str, variant: str, stage: str, ending: str = "h5") -> Path:
         """The file of a stage of a variant, or one beside it: ``ending`` is ``"scores.h5"`` or ``"time.json"``."""
-        words = list(self.variants[variant].values())[: self.stages.index(stage) + 1]
-        return self.results.joinpath(dataset, scene, "stages", *words, f"{stage}.{ending}")
+        folder = self.results / dataset / scene / "stages" / self.stage_key(variant, stage)
+        return folder / f"{stage}.{ending}"
 
-    def table_inputs(self, table: str) -> list[Path]:
-        """The files that a table is made from, each once.
+    def external_file(self, dataset: str, scene: str) -> Path:
+        """The maps and scores of all imported methods for a scene."""
+        return self.results / dataset / scene / "external.h5"
 
-        Raises
-        ------
-        SepiError
-            If there is no such table.
+    def stage_key(self, variant: str, stage: str) -> str:
+        """What names a stage of a variant in the numbers: its choices so far; variants that begin alike share it."""
+        return "/".join(list(self.variants[variant].values())[: self.stages.index(stage) + 1])
+
+    def number_inputs(self, parts: bool = False) -> list[Path]:
+        """The files that the numbers are collected from, each once.
+
+        Parameters
+        ----------
+        parts : bool
+            The numbers of :data:`PARTS_TABLES`, instead of those of all other tables.
         """
-        if table not in TABLES:
-            raise SepiError(f"unknown table '{table}'; there are: {', '.join(TABLES)}")
-        last = self.stages[-1:]
-        of_table: dict[str, tuple[Sequence[str], Sequence[tuple[str, str]]]] = {
-            "table4_ablation": (self.listed, [(stage, "scores.h5") for stage in last]),
-            "stages": (self.listed, [(stage, "scores.h5") for stage in self.stages]),
-            "runtime": (self.listed, [(stage, "time.json") for stage in self.stages]),
-            "ablation_best": (
-                self.parts,
-                [*((stage, "scores.h5") for stage in last), *((stage, "time.json") for stage in self.stages)],
-            ),
-            "confidence": (self.compared, [(stage, ending) for stage in last for ending in ("h5", "scores.h5")]),
-        }
-        variants, endings = of_table.get(table, (self.compared, [(stage, "scores.h5") for stage in last]))
-        files = [
-            self.stage_file(dataset, scene, variant, stage, ending)
-            for dataset, scene in self.pairs
-            for variant in variants
-            for stage, ending in endings
-        ]
+        last = self.stages[-1]
+        scored = [last] if parts else self.stages
+        files: list[Path] = []
+        for dataset, scene in self.pairs:
+            for variant in self.parts if parts else self.listed:
+                files += [self.stage_file(dataset, scene, variant, stage, "scores.h5") for stage in scored]
+                files += [self.stage_file(dataset, scene, variant, stage, "time.json") for stage in self.stages]
+            if not parts:
+                files.append(self.light_field_file(dataset, scene))
+                files += [self.stage_file(dataset, scene, variant, last) for variant in self.compared]
+                files += [self.external_file(dataset, scene)] if self.external else []
         return list(dict.fromkeys(files))
 
     @property
@@ -153,58 +166,11 @@ class Plan:
         for variant in self.listed:
             files += [self.stage_file(dataset, scene, variant, stage) for stage in self.stages]
             files.append(self.stage_file(dataset, scene, variant, self.stages[-1], "scores.h5"))
+        files += [self.external_file(dataset, scene)] if self.external else []
         return list(dict.fromkeys(files))
 
 
-@dataclass(frozen=True)
-class Timing:
-    """What a stage took: wall-clock seconds and peak memory in MB."""
-
-    seconds: float
-    peak_memory_mb: float
-
-
-@dataclass(frozen=True)
-class Runs:
-    """The scores and timings of a plan, each file read once and only when asked for."""
-
-    plan: Plan
-
-    def scores(self, dataset: str, scene: str, variant: str, stage: str | None = None) -> dict[str, dict[str, Scores]]:
-        """Protocol to region to scores after a stage, the last unless given; empty without ground truth."""
-        path = self.plan.stage_file(dataset, scene, variant, stage or self.plan.stages[-1], "scores.h5")
-        if path not in self._scores:
-            self._scores[path] = read_scores(path)
-        return self._scores[path]
-
-    def scored(self, dataset: str, variant: str = MAIN_VARIANT) -> list[str]:
-        """Scenes of a data set that have ground truth, and so scores; looked for with one of the variants."""
-        scenes = self.plan.scenes.get(dataset, ())
-        return [scene for scene in scenes if self.scores(dataset, scene, variant)]
-
-    def final(
-        self, dataset: str, scene: str, score: str, region: str = WHOLE_MAP, variant: str = MAIN_VARIANT
-    ) -> float:
-        """A score of a final map by the paper's protocol."""
-        return self.scores(dataset, scene, variant)["paper"][region][score]
-
-    def timing(self, dataset: str, scene: str, variant: str, stage: str) -> Timing:
-        """What a stage took.
-
-        Raises
-        ------
-        SepiError
-            If its timing file is missing or not one.
-        """
-        path = self.plan.stage_file(dataset, scene, variant, stage, "time.json")
-        try:
-            values: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-            return Timing(float(values["seconds"]), float(values["peak_memory_mb"]))
-        except OSError as error:
-            raise SepiError(f"{path}: cannot be read ({error.strerror})") from error
-        except (ValueError, KeyError, TypeError) as error:
-            raise SepiError(f'{path}: expected {{"seconds": ..., "peak_memory_mb": ...}} ({error})') from error
-
-    @cached_property
-    def _scores(self) -> dict[Path, dict[str, dict[str, Scores]]]:
-        return {}
+def _names(value: Any) -> tuple[str, ...]:
+    if not isinstance(value, list | tuple):
+        raise TypeError(f"expected a list of names, got {value!r}")
+    return tuple(map(str, value))

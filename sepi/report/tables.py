@@ -1,4 +1,4 @@
-"""The command that writes the tables of the report, each as CSV and Markdown."""
+"""The command that writes the tables of the report, each as CSV, Markdown and LaTeX."""
 
 from __future__ import annotations
 
@@ -8,12 +8,17 @@ from pathlib import Path
 import click
 
 from sepi.command import SepiCommand
+from sepi.errors import SepiError
 from sepi.report import published
-from sepi.report.comparison import ablation_table, region_table, scene_table
+from sepi.report.ablation import ablation_table
+from sepi.report.comparison import scene_table
 from sepi.report.confidence import confidence_table
-from sepi.report.layout import Report, write
+from sepi.report.latex import as_latex
+from sepi.report.layout import Report, as_csv, as_markdown, write
 from sepi.report.parts import parts_table
-from sepi.report.plan import TABLES, Plan, Runs
+from sepi.report.plan import TABLES
+from sepi.report.region_comparison import region_table
+from sepi.report.runs import Runs, read_numbers
 from sepi.report.stages import runtime_table, stage_table
 
 BUILDERS: dict[str, Callable[[Runs], Report]] = {
@@ -30,15 +35,21 @@ BUILDERS: dict[str, Callable[[Runs], Report]] = {
 
 
 @click.command(name="python -m sepi.report.tables", cls=SepiCommand)
-@click.option("--results", type=click.Path(path_type=Path), required=True, help="Folder of the results.")
-@click.option("--plan", "plan_text", required=True, help="JSON: scenes per data set, choices per variant and stage.")
+@click.option("--numbers", "path", type=click.Path(path_type=Path), required=True, help="From sepi.report.numbers.")
 @click.option("--table", "names", type=click.Choice(list(TABLES)), multiple=True, help="Table to write; default: all.")
 @click.option("--output", type=click.Path(path_type=Path), required=True, help="Folder to write to.")
-def command(results: Path, plan_text: str, names: tuple[str, ...], output: Path) -> None:
-    """Write tables of the report as CSV and Markdown."""
-    runs = Runs(Plan.from_json(results, plan_text))
-    for name in names or TABLES:
-        write(BUILDERS[name](runs), output, name)
+def command(path: Path, names: tuple[str, ...], output: Path) -> None:
+    """Write the tables of a report's numbers as CSV, Markdown and LaTeX."""
+    numbers = read_numbers(path)
+    for name in names:
+        if name not in numbers["tables"]:
+            raise SepiError(f"{path}: no table '{name}'; it holds: {', '.join(numbers['tables'])}")
+    runs = Runs(numbers)
+    for name in names or numbers["tables"]:
+        report = BUILDERS[name](runs)
+        write(output / f"{name}.csv", as_csv(report.data))
+        write(output / f"{name}.md", as_markdown(report))
+        write(output / f"{name}.tex", as_latex(report, name))
 
 
 if __name__ == "__main__":

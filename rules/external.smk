@@ -1,0 +1,31 @@
+# Disparity maps that other methods made of a scene (config key `external`), scored like ours. A file that is missing or
+# wrong stops nothing: its problem is in the output and in the log.
+
+
+def external_inputs(wildcards):
+    """The maps that are there: one that appears later is a new input, and the scene's maps are read again."""
+    files = SETTINGS.external_files(wildcards.dataset, wildcards.scene)
+    return [str(file) for file in files.values() if os.path.isfile(file) and os.access(file, os.R_OK)]
+
+
+rule external:
+    input:
+        light_field="results/{dataset}/{scene}/lightfield.h5",
+        maps=external_inputs,
+    output:
+        maps="results/{dataset}/{scene}/external.h5",
+    log:
+        "logs/{dataset}/{scene}/external.log",
+    benchmark:
+        "benchmarks/{dataset}/{scene}/external.tsv"
+    threads: 1
+    resources:
+        mem_mb=memory_for(bytes_per_sample=4, bytes_per_pixel=200 + 10 * len(SETTINGS.external)),
+    params:
+        maps=lambda wildcards: SETTINGS.external_json(wildcards.dataset, wildcards.scene),
+        code=code_digest("sepi.external"),
+    message:
+        "{wildcards.dataset}/{wildcards.scene}: maps of other methods"
+    shell:
+        "python -m sepi.external --light-field {input.light_field:q} --maps {params.maps:q} --output {output.maps:q} "
+        "2> {log:q}"

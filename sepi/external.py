@@ -1,0 +1,133 @@
+"""Other methods' disparity maps of a scene: read, checked and scored like this package's own.
+
+A map that is missing or wrong is told, not an error: the report shows it as a cell with its problem.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import warnings
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import click
+import numpy as np
+from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
+
+from sepi.command import SepiCommand
+from sepi.errors import SepiError, SepiWarning
+from sepi.evaluate import evaluation_of, region_masks
+from sepi.io.external import Imported, write_imported
+from sepi.io.hdf5 import read_light_field
+from sepi.io.maps import map_file, read_disparity
+from sepi.lightfield import LightField
+
+NO_FILE = "no file"
+NOT_READABLE = "not readable"
+NO_VALUE = "no finite value"
+
+
+class MapFile(BaseModel):
+    """A file with a disparity map, and what its values mean: the arguments of :func:`sepi.io.maps.read_disparity`."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+    path: str
+    scale: float | None = None
+    offset: float = 0.0
+
+
+_MAP_FILES = TypeAdapter(dict[str, MapFile])
+
+
+def import_maps(light_field: LightField, files: Mapping[str, MapFile]) -> dict[str, Imported]:
+    """Read and score the maps that other methods made of a light field.
+
+    What is wrong with a map is told by a :class:`SepiWarning` that names method, scene, file and reason. Values that
+    are not finite are kept, counted in such a warning, and scored as bad pixels.
+
+    Parameters
+    ----------
+    light_field : LightField
+        The scene; without ground truth there are no scores.
+    files : mapping of str to MapFile
+        Method to the file of its map.
+
+    Returns
+    -------
+    dict of str to Imported
+        In the order of ``files``. A file that is missing, cannot be read, has another size than the views or no finite
+        value has its problem (``no file``, ``not readable``, ``800x600 instead of 512x512`` as width x height,
+        ``no finite value``) and no map.
+    """
+    found = {method: _read(light_field, method, file) for method, file in files.items()}
+    if light_field.truth is None or all(imported.disparity is None for imported in found.values()):
+        return found
+    # masks of a scene that brings none take longer than all else here, and are the same for every method
+    with_masks = replace(light_field, masks=region_masks(light_field))
+    sources = {name: "scene" if name in light_field.masks else "computed" for name in with_masks.masks}
+    for method, imported in found.items():
+        if imported.disparity is not None:
+            evaluation = replace(evaluation_of(with_masks, imported.disparity), region_sources=sources)
+            found[method] = replace(imported, evaluation=evaluation)
+    return found
+
+
+def _read(light_field: LightField, method: str, file: MapFile) -> Imported:
+    """The map of a method or its problem, without scores."""
+    path = Path(file.path)
+    digest = ""
+
+    def tell(reason: str) -> None:
+        warnings.warn(f"external {method}, scene {light_field.name}: {reason}", SepiWarning, stacklevel=3)
+
+    def without_map(problem: str, reason: str) -> Imported:
+        tell(reason)
+        return Imported(str(path), problem, digest)
+
+    try:
+        path = map_file(path)
+        if not path.is_file():
+            return without_map(NO_FILE, f"{path}: no such file")
+        with path.open("rb") as opened:
+            digest = hashlib.file_digest(opened, "sha256").hexdigest()
+        disparity = read_disparity(path, scale=file.scale, offset=file.offset)
+    except SepiError as error:
+        return without_map(NOT_READABLE, str(error))
+    except OSError as error:
+        return without_map(NOT_READABLE, f"{path}: cannot be read ({error.strerror})")
+    if disparity.shape != light_field.shape:
+        got, expected = (f"{width}x{height}" for height, width in (disparity.shape, light_field.shape))
+        return without_map(f"{got} instead of {expected}", f"{path}: {got} pixels, but the views have {expected}")
+    unknown = np.count_nonzero(~np.isfinite(disparity))
+    if unknown == disparity.size:
+        return without_map(NO_VALUE, f"{path}: none of its values is finite")
+    if unknown:
+        tell(f"{path}: {unknown} of {disparity.size} values are not finite; they count as bad pixels")
+    return Imported(str(path), "", digest, disparity)
+
+
+def _map_files(text: str) -> dict[str, MapFile]:
+    try:
+        return _MAP_FILES.validate_json(text)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        where = ".".join(["--maps", *map(str, first["loc"])])
+        raise SepiError(
+            f'{where}: {first["msg"]}; expected JSON such as {{"SPO": {{"path": "SPO/cotton.pfm"}}}}'
+        ) from error
+
+
+@click.command(name="python -m sepi.external", cls=SepiCommand)
+@click.option("--light-field", "light_field_path", type=click.Path(path_type=Path), required=True, help="From ingest.")
+@click.option("--maps", required=True, help='JSON: {"METHOD": {"path": FILE, "scale": NUMBER, "offset": NUMBER}, ...}.')
+@click.option("--output", type=click.Path(path_type=Path), required=True, help="File to write (HDF5).")
+def command(light_field_path: Path, maps: str, output: Path) -> None:
+    """Read and score the disparity maps that other methods made of a light field."""
+    files = _map_files(maps)
+    write_imported(output, import_maps(read_light_field(light_field_path), files))
+
+
+if __name__ == "__main__":
+    command()

@@ -1,0 +1,91 @@
+"""The report's charts as figures for a paper (PNG and PDF): the ablation, and time and memory of the stages."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+
+from sepi.command import SepiCommand
+from sepi.report.page_data import ablation_bars, part_bars, stage_times
+from sepi.report.runs import Runs, read_numbers
+from sepi.report.saving import new_figure, save
+
+_OURS, _PUBLISHED = "#4a7fae", "#b9bfc5"
+_STAGES = ("#3b5b92", "#2a8c8c", "#7ab648", "#d9b430", "#b25d2c", "#7d4f9e")
+
+
+def write_bars(folder: Path, name: str, groups: Sequence[dict[str, Any]]) -> None:
+    """A panel of bars for each group of :func:`sepi.report.page_data.ablation_bars`; nothing without groups."""
+    columns = min(3, len(groups))
+    lines = -(-len(groups) // columns)
+    height = 0.9 + 0.32 * max(len(group["rows"]) for group in groups)
+    figure = new_figure(4.2 * columns, height * lines)
+    axes = figure.subplots(lines, columns, squeeze=False).ravel()
+    for axis in axes[len(groups) :]:
+        axis.set_axis_off()
+    for axis, group in zip(axes, groups, strict=False):
+        place = np.arange(len(group["rows"]))
+        for shift, key, colour, label in ((-0.2, "ours", _OURS, "this code"), (0.2, "published", _PUBLISHED, "paper")):
+            values = [row[key] if row[key] is not None else np.nan for row in group["rows"]]
+            if not np.isnan(values).all():
+                bars = axis.barh(place + shift, values, 0.38, color=colour, label=label)
+                axis.bar_label(bars, ["" if np.isnan(value) else f"{value:.2f}" for value in values], fontsize=6)
+        axis.set_yticks(place, [row["variant"] for row in group["rows"]], fontsize=7)
+        axis.invert_yaxis()
+        axis.margins(x=0.15)
+        count = f", {group['scenes']} scenes" if group["scenes"] > 1 else ""
+        axis.set_title(f"{group['dataset']}, {group['region']}{count}", fontsize=8)
+        axis.tick_params(axis="x", labelsize=7)
+        axis.set_xlabel("MSE x100", fontsize=7)
+    axes[0].legend(fontsize=7)
+    save(figure, folder, name)
+
+
+def write_times(folder: Path, name: str, rows: Sequence[dict[str, Any]]) -> None:
+    """Seconds of the stages, stacked, beside the peak memory of each; a bar per scene and variant."""
+    figure = new_figure(9, 1.2 + 0.3 * len(rows))
+    time, memory = figure.subplots(1, 2, sharey=True)
+    place = np.arange(len(rows))
+    left = np.zeros(len(rows))
+    stages = [stage["stage"] for stage in rows[0]["stages"]]
+    for number, stage in enumerate(stages):
+        seconds = np.array([row["stages"][number]["seconds"] for row in rows])
+        peaks = [row["stages"][number]["memory"] for row in rows]
+        colour = _STAGES[number % len(_STAGES)]
+        time.barh(place, seconds, 0.7, left=left, color=colour, label=stage)
+        shift = (number + 0.5) / len(stages) - 0.5
+        memory.barh(place + 0.7 * shift, peaks, 0.6 / len(stages), color=colour)
+        left += seconds
+    time.set_yticks(place, [f"{row['scene']}, {row['variant']}" for row in rows], fontsize=7)
+    time.invert_yaxis()
+    time.set_xlabel("seconds", fontsize=8)
+    memory.set_xlabel("peak memory / MB", fontsize=8)
+    time.legend(fontsize=7)
+    save(figure, folder, name)
+
+
+CHARTS: dict[str, Callable[[Path, str, Runs], None]] = {
+    "ablation": lambda folder, name, runs: write_bars(folder, name, ablation_bars(runs)),
+    "time_and_memory": lambda folder, name, runs: write_times(folder, name, stage_times(runs)),
+    "ablation_best": lambda folder, name, runs: write_bars(folder, name, part_bars(runs)),
+}
+"""Name of each chart to the function that writes it."""
+
+
+@click.command(name="python -m sepi.report.charts", cls=SepiCommand)
+@click.option("--numbers", "numbers_path", type=click.Path(path_type=Path), required=True, help="Numbers (JSON).")
+@click.option("--chart", "names", type=click.Choice(list(CHARTS)), multiple=True, required=True, help="What to draw.")
+@click.option("--output", type=click.Path(path_type=Path), required=True, help="Folder to write to.")
+def command(numbers_path: Path, names: tuple[str, ...], output: Path) -> None:
+    """Write charts of the report, each as PNG and PDF."""
+    runs = Runs(read_numbers(numbers_path))
+    for name in names:
+        CHARTS[name](output, name, runs)
+
+
+if __name__ == "__main__":
+    command()

@@ -1,0 +1,303 @@
+"""All numbers of the report in one JSON file: the command that collects them, and what they are made of.
+
+The tables, and the page that shows them, are made from this file and from nothing else.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import os
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import asdict
+from datetime import datetime
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+import numpy.typing as npt
+
+from sepi.bench.result import this_machine
+from sepi.command import SepiCommand
+from sepi.errors import SepiError
+from sepi.evaluate import BAD_PIXEL, PROTOCOLS, REGIONS
+from sepi.io.external import read_imported_scores
+from sepi.io.hdf5 import read_light_field, read_stage
+from sepi.io.scores import Scores, read_evaluation, read_scores
+from sepi.report.confidence import decile_errors, oracle, sparsification
+from sepi.report.layout import as_json, write
+from sepi.report.plan import PARTS_TABLES, TABLES, Plan
+from sepi.report.runs import Runs
+from sepi.report.tables import BUILDERS
+
+LIBRARIES = (
+    "numpy",
+    "scipy",
+    "scikit-image",
+    "opencv-python-headless",
+    "h5py",
+    "numba",
+    "pyamg",
+    "pydantic",
+    "matplotlib",
+    "snakemake",
+)
+"""Distributions whose versions are told."""
+
+_SCORES = ("mse100", "q25", *BAD_PIXEL)
+_COUNTS = ("non_finite", "pixels")
+
+Parameters = Mapping[str, Mapping[str, Mapping[str, Any]]]
+"""Stage to choice to parameter to value."""
+
+
+def collect(plan: Plan, parameters: Parameters | None = None, parts: bool = False) -> dict[str, Any]:
+    """The numbers of a report, read from ``plan.number_inputs(parts)``.
+
+    Parameters
+    ----------
+    plan : Plan
+        Scenes, variants and imported methods.
+    parameters : mapping, optional
+        Stage to choice to what the workflow ran it with; choices that no variant uses are left out.
+    parts : bool
+        Collect what the ablation of the best variant needs, instead of what all other tables need.
+
+    Returns
+    -------
+    dict
+        As JSON has it: text, numbers, None (also for NaN), lists and dictionaries. ``made``: date, versions, machine;
+        ``protocols``: name to border; ``plan``; ``parameters``; ``scenes``: a list, each with ``dataset``, ``scene``,
+        ``light_field``, ``stages`` (path of choices to ``stage``, ``scores``, ``seconds``, ``peak_memory_mb``),
+        ``confidence`` (variant to errors) and ``external`` (method to ``problem``, ``source``, ``sha256``, ``scores``);
+        ``tables``: name to :func:`sepi.report.layout.as_json`. With ``parts``, scenes have ``stages`` only, and
+        ``scores`` is None but after the last stage.
+
+    Raises
+    ------
+    SepiError
+        If a file is missing or not what it should be.
+    """
+    numbers: dict[str, Any] = {
+        "made": made_here(),
+        "protocols": dict(PROTOCOLS),
+        "plan": plan.content(),
+        "parameters": _used(plan, parameters or {}, parts),
+        "scenes": [_scene(plan, dataset, scene, parts) for dataset, scene in plan.pairs],
+    }
+    numbers = _without_nan(numbers)
+    runs = Runs(numbers)
+    tables = {name: as_json(BUILDERS[name](runs)) for name in TABLES if (name in PARTS_TABLES) == parts}
+    return numbers | {"tables": tables}
+
+
+def made_here() -> dict[str, Any]:
+    """When and with what a report was made; no names of hosts or users."""
+    machine = this_machine()
+    libraries = {}
+    for name in LIBRARIES:
+        with suppress(PackageNotFoundError):
+            libraries[name] = version(name)
+    return {
+        "date": datetime.now().astimezone().isoformat(timespec="seconds"),
+        "version": machine["sepi"],
+        "python": machine["python"],
+        "machine": {
+            "processor": machine["processor"],
+            "cores": machine["cores"],
+            "memory_gb": _memory_gb(),
+            "system": machine["system"],
+        },
+        "libraries": libraries,
+    }
+
+
+def as_text(value: Any) -> str:
+    """JSON in which what holds no lists or dictionaries stands on one line, so that a difference is easy to read."""
+    return _json(value, "") + "\n"
+
+
+def _scene(plan: Plan, dataset: str, scene: str, parts: bool) -> dict[str, Any]:
+    found: dict[str, Any] = {"dataset": dataset, "scene": scene}
+    if parts:
+        return found | {"stages": _stages(plan, dataset, scene, parts)}
+    return found | {
+        "light_field": _light_field(plan.light_field_file(dataset, scene)),
+        "stages": _stages(plan, dataset, scene, parts),
+        "confidence": _confidence(plan, dataset, scene),
+        "external": _external(plan, dataset, scene),
+    }
+
+
+def _light_field(path: Path) -> dict[str, Any]:
+    """What a light field is, with digests of its pixels and its ground truth."""
+    found = read_light_field(path)
+    known = found.disparity_range
+    return {
+        "grid": list(found.grid),
+        "shape": list(found.shape),
+        "channels": found.views.shape[4],
+        "dtype": str(found.views.dtype),
+        "source": found.source,
+        "range": None if known is None else [known.minimum, known.maximum],
+        "range_source": None if known is None else known.source,
+        "truth": found.truth is not None,
+        "masks": sorted(found.masks),
+        "notes": list(found.notes),
+        "camera": None if found.camera is None else asdict(found.camera),
+        "sha256": _digest(found.views),
+        "truth_sha256": None if found.truth is None else _digest(found.truth),
+    }
+
+
+def _stages(plan: Plan, dataset: str, scene: str, parts: bool) -> dict[str, Any]:
+    """Scores and times by the path of a stage's choices; a stage that variants share is there once."""
+    found: dict[str, Any] = {}
+    for variant in plan.parts if parts else plan.listed:
+        for stage in plan.stages:
+            key = plan.stage_key(variant, stage)
+            if key not in found:
+                # of the parts, only the last stage is scored
+                is_scored = not parts or stage == plan.stages[-1]
+                scores_file = plan.stage_file(dataset, scene, variant, stage, "scores.h5")
+                found[key] = {
+                    "stage": stage,
+                    "scores": _ordered(scores_file, read_scores(scores_file)) if is_scored else None,
+                    **_timing(plan.stage_file(dataset, scene, variant, stage, "time.json")),
+                }
+    return found
+
+
+def _timing(path: Path) -> dict[str, float]:
+    try:
+        values = json.loads(path.read_text(encoding="utf-8"))
+        return {key: float(values[key]) for key in ("seconds", "peak_memory_mb")}
+    except OSError as error:
+        raise SepiError(f"{path}: cannot be read ({error.strerror})") from error
+    except (ValueError, KeyError, TypeError) as error:
+        raise SepiError(f'{path}: expected {{"seconds": ..., "peak_memory_mb": ...}} ({error})') from error
+
+
+def _confidence(plan: Plan, dataset: str, scene: str) -> dict[str, dict[str, list[float]]]:
+    """Errors by confidence of the compared variants' final maps; nothing without ground truth."""
+    found = {}
+    for variant in plan.compared:
+        last = plan.stages[-1]
+        error = read_evaluation(plan.stage_file(dataset, scene, variant, last, "scores.h5")).error
+        confidence = read_stage(plan.stage_file(dataset, scene, variant, last)).confidence
+        if error is not None:
+            squared, absolute = decile_errors(confidence, error)
+            curves = {"curve": sparsification(confidence, error), "oracle": oracle(error)}
+            lists = {"squared": squared, "absolute": absolute, **curves}
+            found[variant] = {name: values.tolist() for name, values in lists.items()}
+    return found
+
+
+def _external(plan: Plan, dataset: str, scene: str) -> dict[str, Any]:
+    """Scores of the imported methods, or what is wrong with their maps."""
+    if not plan.external:
+        return {}
+    path = plan.external_file(dataset, scene)
+    imported = read_imported_scores(path)
+    missing = [method for method in plan.external if method not in imported]
+    if missing:
+        raise SepiError(f"{path}: no method '{missing[0]}'; it holds: {', '.join(imported) or 'none'}")
+    return {
+        method: {
+            "problem": imported[method].problem,
+            "source": imported[method].source,
+            "sha256": imported[method].sha256,
+            "scores": _ordered(path, imported[method].evaluation.scores),
+        }
+        for method in plan.external
+    }
+
+
+def _ordered(path: Path, scores: Mapping[str, Mapping[str, Scores]]) -> dict[str, Any]:
+    """Scores in the order of protocols, regions and names, counts as whole numbers."""
+    try:
+        return {
+            protocol: {
+                region: {name: scores[protocol][region][name] for name in _SCORES}
+                | {name: int(scores[protocol][region][name]) for name in _COUNTS}
+                for region in REGIONS
+            }
+            for protocol in PROTOCOLS
+            if scores
+        }
+    except KeyError as error:
+        raise SepiError(f"{path}: not all scores are there: {error} is missing; evaluate the map again") from error
+
+
+def _used(plan: Plan, parameters: Parameters, parts: bool) -> dict[str, dict[str, Any]]:
+    """Parameters of the choices of these numbers' variants."""
+    used: dict[str, dict[str, Any]] = {}
+    for stage in plan.stages:
+        words = dict.fromkeys(plan.variants[variant][stage] for variant in (plan.parts if parts else plan.listed))
+        known = parameters.get(stage, {})
+        used[stage] = {word: dict(known[word]) for word in words if word in known}
+    return used
+
+
+def _digest(values: npt.NDArray[Any]) -> str:
+    return hashlib.sha256(np.ascontiguousarray(values).data.cast("B")).hexdigest()
+
+
+def _memory_gb() -> float | None:
+    try:
+        return round(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 2**30, 1)
+    except (AttributeError, OSError, ValueError):
+        return None
+
+
+def _without_nan(value: Any) -> Any:
+    """JSON has no NaN and no infinity: None stands for a number that is none."""
+    if isinstance(value, dict):
+        return {key: _without_nan(inner) for key, inner in value.items()}
+    if isinstance(value, list):
+        return [_without_nan(inner) for inner in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def _json(value: Any, indent: str) -> str:
+    inner = list(value.values()) if isinstance(value, dict) else value if isinstance(value, list) else []
+    if not any(isinstance(one, dict | list) for one in inner):
+        return json.dumps(value, allow_nan=False, ensure_ascii=False)
+    deeper = indent + " "
+    if isinstance(value, dict):
+        texts = [f"{json.dumps(key, ensure_ascii=False)}: {_json(one, deeper)}" for key, one in value.items()]
+    else:
+        texts = [_json(one, deeper) for one in inner]
+    lines = f",\n{deeper}".join(texts)
+    opening, closing = "{}" if isinstance(value, dict) else "[]"
+    return f"{opening}\n{deeper}{lines}\n{indent}{closing}"
+
+
+def _parameters(text: str) -> Parameters:
+    try:
+        value = json.loads(text)
+        return {stage: {word: dict(found) for word, found in choices.items()} for stage, choices in value.items()}
+    except (ValueError, TypeError, AttributeError) as error:
+        raise SepiError(
+            f'--parameters: expected JSON such as {{"initial": {{"sepi": {{"candidates": 91}}}}}} ({error})'
+        ) from error
+
+
+@click.command(name="python -m sepi.report.numbers", cls=SepiCommand)
+@click.option("--results", type=click.Path(path_type=Path), required=True, help="Folder of the results.")
+@click.option("--plan", "plan_text", required=True, help="JSON: scenes per data set, choices per variant and stage.")
+@click.option("--parameters", default="{}", show_default=True, help="JSON: parameters per stage and choice.")
+@click.option("--parts", is_flag=True, help="What the ablation of the best variant needs, and nothing else.")
+@click.option("--output", type=click.Path(path_type=Path), required=True, help="JSON file to write.")
+def command(results: Path, plan_text: str, parameters: str, parts: bool, output: Path) -> None:
+    """Collect all numbers of the report in one JSON file."""
+    plan = Plan.from_json(results, plan_text)
+    write(output, as_text(collect(plan, _parameters(parameters), parts)))
+
+
+if __name__ == "__main__":
+    command()

@@ -1,0 +1,168 @@
+"""The page ``reports/index.html``: everything in one file, which opens from disk and asks for nothing else."""
+
+from __future__ import annotations
+
+import base64
+import json
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import click
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup, escape
+
+from sepi.command import SepiCommand
+from sepi.errors import SepiError
+from sepi.io.files import atomic_path
+from sepi.report import page_data, published
+from sepi.report.pictures import error_scale, scale_colours
+from sepi.report.plan import TABLES
+from sepi.report.runs import Runs, read_numbers
+
+SCRIPTS = ("unpack.js", "panels.js", "viewer.js", "cloud.js", "pixel.js", "tables.js", "page.js")
+"""Scripts of a page, in the order in which they are run."""
+
+
+TEMPLATES = sorted((Path(__file__).parent / "templates").iterdir())
+"""Files that a page is put together from."""
+
+
+def environment() -> Environment:
+    """Jinja2's environment for the templates beside this module; a name that is not given is an error."""
+    made = Environment(
+        loader=PackageLoader("sepi.report"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    made.filters["embedded"] = embedded
+    made.filters["prose"] = prose
+    return made
+
+
+def embedded(value: Any) -> Markup:
+    """A value as JSON that may stand inside a script element."""
+    # "</script" and "<!--" would end or change it
+    return Markup(json.dumps(value, separators=(",", ":"), ensure_ascii=False).replace("<", "\\u003c"))
+
+
+def prose(text: str) -> Markup:
+    """Text whose words in backticks are names in code."""
+    return Markup(re.sub("`([^`]+)`", r"<code>\1</code>", str(escape(text))))
+
+
+def colour_scales() -> dict[str, str]:
+    """The colour scales of the viewer, 256 times RGB each, in base64."""
+    scales = {"disparity": "viridis", "grey": "gray", "error": error_scale()}
+    return {name: base64.b64encode(scale_colours(scale).tobytes()).decode("ascii") for name, scale in scales.items()}
+
+
+def page_of(
+    numbers: Mapping[str, Any],
+    scenes: Sequence[Mapping[str, Any]],
+    graph: str,
+    parts: Mapping[str, Any] | None = None,
+) -> str:
+    """The page of a report.
+
+    Parameters
+    ----------
+    numbers : mapping
+        As ``sepi.report.numbers`` collects them.
+    scenes : sequence of mapping
+        As ``sepi.report.figures`` writes them.
+    graph : str
+        SVG of the rule graph.
+    parts : mapping, optional
+        The numbers of the best variant's parts.
+
+    Returns
+    -------
+    str
+        HTML.
+    """
+    runs = Runs(numbers)
+    tables = {name: numbers["tables"][name] for name in TABLES if name in numbers["tables"]}
+    if parts is not None:
+        tables |= {name: table for name, table in parts["tables"].items() if name not in tables}
+    return (
+        environment()
+        .get_template("index.html.j2")
+        .render(
+            title="sepi: light field depth by stitched epipolar plane images",
+            numbers=numbers,
+            variants=page_data.shown_variants(runs, parts),
+            tables=tables,
+            headline=page_data.headline(runs),
+            missing=page_data.missing_scenes(runs),
+            dataset_titles=published.DATASETS,
+            bars=page_data.ablation_bars(runs),
+            part_bars=[] if parts is None else page_data.part_bars(Runs(parts)),
+            times=page_data.stage_times(runs),
+            total_seconds=page_data.total_seconds(numbers),
+            parameters=page_data.parameter_rows(numbers),
+            graph=Markup(graph),
+            scenes=embedded_scenes(scenes),
+            first=scenes[0] if scenes else None,
+            first_title=page_data.first_scene(runs),
+            scales=colour_scales(),
+            scripts=SCRIPTS,
+        )
+    )
+
+
+def embedded_scenes(scenes: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """Scenes as the template takes them: an identifier, a title, and the JSON."""
+    return [
+        {"id": f"scene-{number}", "title": f"{scene['dataset']}/{scene['scene']}", "text": embedded(scene)}
+        for number, scene in enumerate(scenes)
+    ]
+
+
+def read_scene(path: Path) -> dict[str, Any]:
+    """Read what ``sepi.report.figures`` wrote of a scene for the page.
+
+    Raises
+    ------
+    SepiError
+        If the file is missing or not such a file.
+    """
+    try:
+        scene = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise SepiError(f"{path}: cannot be read ({error.strerror})") from error
+    except ValueError as error:
+        raise SepiError(f"{path}: not JSON ({error}); expected what python -m sepi.report.figures writes") from error
+    if not isinstance(scene, dict) or not {"dataset", "scene", "panels", "arrays"} <= scene.keys():
+        raise SepiError(f"{path}: not a scene of a report, which python -m sepi.report.figures writes")
+    return scene
+
+
+_FILE = click.Path(path_type=Path)
+
+
+@click.command(name="python -m sepi.report.page", cls=SepiCommand)
+@click.option("--numbers", "numbers_path", type=_FILE, required=True, help="Numbers of the report (JSON).")
+@click.option("--parts", "parts_path", type=_FILE, help="Numbers of the best variant's parts (JSON).")
+@click.option("--graph", "graph_path", type=_FILE, required=True, help="Rule graph (SVG).")
+@click.option("--output", type=_FILE, required=True, help="Page to write.")
+@click.argument("scenes", nargs=-1, type=_FILE)
+def command(
+    numbers_path: Path, parts_path: Path | None, graph_path: Path, output: Path, scenes: tuple[Path, ...]
+) -> None:
+    """Write the page of a report, with the SCENES that sepi.report.figures prepared, in this order."""
+    html = page_of(
+        read_numbers(numbers_path),
+        [read_scene(path) for path in scenes],
+        graph_path.read_text(encoding="utf-8"),
+        None if parts_path is None else read_numbers(parts_path),
+    )
+    with atomic_path(output) as temporary:
+        temporary.write_text(html, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    command()

@@ -1,0 +1,139 @@
+"""The scores and timings that the tables are made of, looked up in the numbers of a report."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from sepi.errors import SepiError
+from sepi.evaluate import WHOLE_MAP
+from sepi.io.scores import Scores
+from sepi.report.plan import MAIN_VARIANT, Plan
+
+Numbers = Mapping[str, Any]
+"""What :func:`sepi.report.numbers.collect` found, as JSON has it."""
+
+
+@dataclass(frozen=True)
+class Timing:
+    """What a stage took: wall-clock seconds and peak memory in MB."""
+
+    seconds: float
+    peak_memory_mb: float
+
+
+@dataclass(frozen=True)
+class Runs:
+    """The scores and timings of a plan, from the numbers of a report."""
+
+    numbers: Numbers
+
+    @cached_property
+    def plan(self) -> Plan:
+        """Scenes, variants and imported methods; its files are not at hand."""
+        return Plan.from_json(Path(), json.dumps(self.numbers["plan"]))
+
+    def light_field(self, dataset: str, scene: str) -> dict[str, Any]:
+        """What is known about a light field: ``grid``, ``shape``, ``range``, ``sha256`` and more."""
+        found: dict[str, Any] = self._scene(dataset, scene)["light_field"]
+        return found
+
+    def scores(self, dataset: str, scene: str, variant: str, stage: str | None = None) -> dict[str, dict[str, Scores]]:
+        """Protocol to region to scores after a stage, the last unless given; empty without ground truth."""
+        stage = stage or self.plan.stages[-1]
+        found = self._stage(dataset, scene, variant, stage)["scores"]
+        if found is None:
+            raise SepiError(f"{dataset}/{scene}: these numbers have no scores of {variant} after {stage}")
+        return _with_nan(found)
+
+    def scored(self, dataset: str, variant: str = MAIN_VARIANT) -> list[str]:
+        """Scenes of a data set that have ground truth, and so scores; looked for with one of the variants."""
+        scenes = self.plan.scenes.get(dataset, ())
+        return [scene for scene in scenes if self.scores(dataset, scene, variant)]
+
+    def final(
+        self, dataset: str, scene: str, score: str, region: str = WHOLE_MAP, variant: str = MAIN_VARIANT
+    ) -> float:
+        """A score of a final map by the paper's protocol."""
+        return self.scores(dataset, scene, variant)["paper"][region][score]
+
+    def timing(self, dataset: str, scene: str, variant: str, stage: str) -> Timing:
+        """What a stage took."""
+        values = self._stage(dataset, scene, variant, stage)
+        return Timing(values["seconds"], values["peak_memory_mb"])
+
+    def confidence(self, dataset: str, scene: str, variant: str) -> dict[str, list[float]] | None:
+        """``squared``, ``absolute``, ``curve`` and ``oracle`` of a final map; None without ground truth."""
+        found = self._scene(dataset, scene)["confidence"].get(variant)
+        return None if found is None else {name: [_number(v) for v in values] for name, values in found.items()}
+
+    def external_scores(self, dataset: str, scene: str, method: str) -> dict[str, dict[str, Scores]]:
+        """Protocol to region to scores of an imported map; empty without a map that can be scored."""
+        return _with_nan(self._scene(dataset, scene)["external"][method]["scores"])
+
+    def external_score(
+        self,
+        dataset: str,
+        scene: str,
+        method: str,
+        score: str,
+        region: str = WHOLE_MAP,
+        protocol: str = "paper",
+    ) -> float | None:
+        """A score of an imported map; None without a map that can be scored."""
+        scores = self.external_scores(dataset, scene, method)
+        return scores[protocol][region][score] if scores else None
+
+    def external_problem(self, dataset: str, scene: str, method: str) -> str:
+        """Why an imported map has no scores, in a few words; empty where it has some, or the scene has no truth."""
+        return str(self._scene(dataset, scene)["external"][method]["problem"])
+
+    def _scene(self, dataset: str, scene: str) -> dict[str, Any]:
+        return self._scenes[dataset, scene]
+
+    def _stage(self, dataset: str, scene: str, variant: str, stage: str) -> dict[str, Any]:
+        key = self.plan.stage_key(variant, stage)
+        stages: dict[str, dict[str, Any]] = self._scene(dataset, scene)["stages"]
+        if key not in stages:
+            raise SepiError(f"{dataset}/{scene}: these numbers have nothing of {variant} ({key})")
+        return stages[key]
+
+    @cached_property
+    def _scenes(self) -> dict[tuple[str, str], dict[str, Any]]:
+        return {(values["dataset"], values["scene"]): values for values in self.numbers["scenes"]}
+
+
+def read_numbers(path: Path) -> dict[str, Any]:
+    """Read the numbers that ``python -m sepi.report.numbers`` wrote.
+
+    Raises
+    ------
+    SepiError
+        If the file is missing or not such a file.
+    """
+    try:
+        numbers = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise SepiError(f"{path}: cannot be read ({error.strerror})") from error
+    except ValueError as error:
+        raise SepiError(f"{path}: not JSON ({error}); expected what python -m sepi.report.numbers writes") from error
+    if not isinstance(numbers, dict) or not {"plan", "scenes", "tables"} <= numbers.keys():
+        raise SepiError(f"{path}: not the numbers of a report, which python -m sepi.report.numbers writes")
+    return numbers
+
+
+def _with_nan(scores: Mapping[str, Mapping[str, Mapping[str, float | None]]]) -> dict[str, dict[str, Scores]]:
+    return {
+        protocol: {region: {name: _number(value) for name, value in found.items()} for region, found in regions.items()}
+        for protocol, regions in scores.items()
+    }
+
+
+def _number(value: float | None) -> float:
+    """JSON has no NaN: a score over no pixels is null there."""
+    return math.nan if value is None else float(value)

@@ -1,0 +1,69 @@
+"""Single pixels of a scene that the report looks into: those asked for, and a few that show how the method works."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sepi.noise import residual_variance
+from sepi.provenance import history_of
+from sepi.report.plan import BEST_VARIANT, MAIN_VARIANT
+from sepi.report.probe import Probe, probe, to_json
+from sepi.report.probe_pixels import InterestingPixel as Place
+from sepi.report.probe_pixels import interesting_pixels
+from sepi.report.scene_panels import SceneResults
+from sepi.sweep import SweepParameters
+
+__all__ = ["Place", "page_probes", "scene_probes"]
+
+
+def scene_probes(results: SceneResults, final_file: Path, asked: Sequence[Place]) -> list[Probe]:
+    """What the paper's method sees at single pixels of a scene.
+
+    Parameters
+    ----------
+    results : SceneResults
+    final_file : Path
+        File of the last stage of the paper's method: it knows the sweep's parameters.
+    asked : sequence of Place
+        Pixels to look into beside the automatic ones.
+
+    Returns
+    -------
+    list of Probe
+        Those asked for first; pixels without a depth are left out.
+    """
+    maps = results.final(MAIN_VARIANT)
+    light_field = results.light_field
+    places = [*asked, *interesting_pixels(light_field, maps, light_field.truth)]
+    noise = residual_variance(light_field.centre)
+    parameters = sweep_parameters(final_file)
+    return [
+        probe(
+            light_field,
+            place.y,
+            place.x,
+            maps=maps,
+            parameters=parameters,
+            best=results.final(BEST_VARIANT) if BEST_VARIANT in results.maps else None,
+            label=place.label,
+            noise=noise,
+        )
+        for place in places
+        if np.isfinite(maps.disparity[place.y, place.x])
+    ]
+
+
+def page_probes(probes: Sequence[Probe]) -> list[dict[str, Any]]:
+    """Probes as the page takes them."""
+    return [to_json(found) for found in probes]
+
+
+def sweep_parameters(final_file: Path) -> SweepParameters:
+    """The parameters of the sweep that a final map of the paper's method began with; else the defaults."""
+    steps = history_of(final_file) if final_file.is_file() else []
+    known = {} if not steps else steps[0]["parameters"]
+    return SweepParameters(**{name: known[name] for name in SweepParameters.model_fields if name in known})

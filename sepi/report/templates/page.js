@@ -1,0 +1,50 @@
+"use strict";
+
+/* The page: its theme, and the scene that is looked at. */
+
+Sepi.theme = () => {
+  const button = Sepi.byId("theme");
+  const dark = () => document.documentElement.dataset.theme === "dark" ||
+    (!document.documentElement.dataset.theme && matchMedia("(prefers-color-scheme: dark)").matches);
+  const name = () => (button.textContent = dark() ? "light" : "dark");
+  button.addEventListener("click", () => {
+    document.documentElement.dataset.theme = dark() ? "light" : "dark";
+    name();
+  });
+  name();
+};
+
+Sepi.start = () => {
+  Sepi.theme();
+  const root = Sepi.byId("viewer");
+  if (!root) return;
+  const pixels = Sepi.byId("pixel") ? new Sepi.Pixels(Sepi.byId("pixel")) : null;
+  const cloud = new Sepi.Cloud(Sepi.byId("cloud"));
+  const viewer = new Sepi.Viewer(root, (x, y) => pixels?.nearest(x, y));
+  Sepi.viewer = viewer;
+  const select = Sepi.byId("scene");
+  const show = async () => {
+    const scene = Sepi.json(select.value);
+    pixels?.show(scene);
+    await viewer.show(scene);
+    cloud.show(viewer.panels);
+    root.dataset.scene = select.value;
+  };
+  for (const [id, step] of [["previous", -1], ["next", 1]]) {
+    Sepi.byId(id)?.addEventListener("click", () => {
+      const count = select.options.length;
+      select.selectedIndex = (select.selectedIndex + step + count) % count;
+      show();
+    });
+  }
+  select.addEventListener("change", show);
+  document.querySelectorAll("[data-show]").forEach((link) =>
+    link.addEventListener("click", () => {
+      select.value = link.dataset.show;
+      show();
+    }),
+  );
+  show();
+};
+
+Sepi.start();

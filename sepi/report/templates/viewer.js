@@ -1,0 +1,352 @@
+"use strict";
+
+/* The maps of a scene: a slider to wipe between any two, the numbers under the cursor, close-ups in every panel. */
+
+/** Half the side of a close-up in pixels of the maps. */
+Sepi.REACH = 20;
+
+Sepi.Viewer = class {
+  /**
+   * @param {HTMLElement} root Holds the elements with data-part attributes that the page's template makes.
+   * @param {(x: number, y: number) => void} chosen Called with the pixel of a click, in pixels of the maps.
+   */
+  constructor(root, chosen = () => {}) {
+    this.root = root;
+    this.chosen = chosen;
+    this.cursor = null;
+    this.turn = 0; // of show(): what an earlier scene began is dropped
+    this.marks = [];
+    this.wipe = this.part("wipe");
+    this.slider = this.part("slider");
+    this.visible = new Set();
+    this.watcher = new IntersectionObserver((entries) => this.seen(entries), { rootMargin: "200px" });
+    this.slider.addEventListener("input", () => this.drawWipe());
+    for (const side of ["a", "b"]) this.part(side).addEventListener("change", () => this.select());
+    this.part("swap").addEventListener("click", () => this.swap());
+    this.part("close-ups").addEventListener("change", () => this.drawGrid());
+    this.follow(this.wipe, true);
+    addEventListener("resize", () => this.drawGrid());
+  }
+
+  part(name) {
+    return this.root.querySelector(`[data-part="${name}"]`);
+  }
+
+  /** Show a scene. */
+  async show(scene) {
+    this.turn += 1;
+    this.scene = scene;
+    this.panels = new Sepi.Panels(scene);
+    this.cursor = null;
+    this.root.style.setProperty("--ratio", scene.width / scene.height);
+    this.wipe.width = scene.width;
+    this.wipe.height = scene.height;
+    this.fillSelects();
+    this.fillGrid();
+    await this.select();
+  }
+
+  fillSelects() {
+    const { list } = this.panels;
+    for (const side of ["a", "b"]) {
+      const before = this.part(side).value;
+      this.part(side).replaceChildren(...Sepi.options(list));
+      this.part(side).value = this.panels.get(before) ? before : this.first(side);
+    }
+  }
+
+  /** What is shown before anything is chosen: the reference view beside the first final map. */
+  first(side) {
+    const named = this.scene.first?.[side];
+    return named && this.panels.get(named) ? named : this.panels.list[side === "a" ? 0 : this.panels.list.length > 1 ? 1 : 0].key;
+  }
+
+  key(side) {
+    return this.part(side).value;
+  }
+
+  async swap() {
+    const [a, b] = [this.key("a"), this.key("b")];
+    this.part("a").value = b;
+    this.part("b").value = a;
+    await this.select();
+  }
+
+  async choose(side, key) {
+    this.part(side).value = key;
+    await this.select();
+  }
+
+  async select() {
+    const turn = this.turn;
+    const keys = { a: this.key("a"), b: this.key("b") };
+    const shown = {};
+    for (const side of ["a", "b"]) {
+      const panel = this.panels.get(keys[side]);
+      shown[side] = { panel, picture: await this.panels.picture(panel.key), values: await this.panels.values(panel) };
+      if (panel.confidence !== undefined) shown[side].confidence = await this.panels.arrays.get(panel.confidence);
+    }
+    const truth = this.panels.truth && (await this.panels.arrays.get(this.panels.truth.map));
+    if (turn !== this.turn || keys.a !== this.key("a") || keys.b !== this.key("b")) return;
+    this.shown = shown;
+    this.truth = truth;
+    this.part("legends").replaceChildren(
+      ...["a", "b"].map((side) =>
+        Sepi.element(
+          "div",
+          {},
+          Sepi.element("b", {}, side.toUpperCase()),
+          ` ${shown[side].panel.title} `,
+          Sepi.legend(this.panels, shown[side].panel),
+          Sepi.element("small", {}, shown[side].panel.note ?? ""),
+        ),
+      ),
+    );
+    this.drawWipe();
+    this.readOut();
+    this.root.dataset.shown = `${keys.a} ${keys.b}`;
+  }
+
+  drawWipe() {
+    if (!this.shown) return;
+    const { width, height } = this.scene;
+    const context = this.wipe.getContext("2d");
+    const border = Math.round((this.slider.value / 1000) * width);
+    context.drawImage(this.shown.a.picture, 0, 0);
+    if (border < width) {
+      context.drawImage(this.shown.b.picture, border, 0, width - border, height, border, 0, width - border, height);
+    }
+    this.part("line").style.left = `${this.slider.value / 10}%`;
+    this.slider.setAttribute("aria-valuetext", `${Math.round(this.slider.value / 10)} % of A`);
+    for (const side of ["a", "b"]) this.closeUp(this.part(`close-${side}`), this.shown[side].picture);
+  }
+
+  /** Pixels of the maps under a pointer over an element that shows all of them. */
+  pixel(element, event) {
+    const box = element.getBoundingClientRect();
+    const place = (at, start, length, count) =>
+      Math.max(0, Math.min(count - 1, Math.floor(((at - start) / length) * count)));
+    return [
+      place(event.clientX, box.left, box.width, this.scene.width),
+      place(event.clientY, box.top, box.height, this.scene.height),
+    ];
+  }
+
+  /** Let the cursor follow the pointer over an element; a drag over the large picture moves the slider. */
+  follow(element, wipes = false) {
+    let start = null;
+    const moved = (event) => this.moveTo(...this.pixel(element, event));
+    element.addEventListener("pointerdown", (event) => {
+      start = event.clientX;
+      moved(event);
+    });
+    element.addEventListener("pointermove", (event) => {
+      if (wipes && event.buttons && start !== null && Math.abs(event.clientX - start) > 3) {
+        const box = element.getBoundingClientRect();
+        this.slider.value = Math.round((1000 * (event.clientX - box.left)) / box.width);
+        this.drawWipe();
+        start = -1e9; // a drag, however short the rest of it
+      }
+      moved(event);
+    });
+    element.addEventListener("click", (event) => {
+      if (start !== -1e9) this.chosen(...this.pixel(element, event));
+    });
+    element.addEventListener("keydown", (event) => {
+      const step = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }[event.key];
+      const [x, y] = this.cursor ?? [this.scene.width >> 1, this.scene.height >> 1];
+      if (step) {
+        const far = event.shiftKey ? 10 : 1;
+        this.moveTo(
+          Math.max(0, Math.min(this.scene.width - 1, x + far * step[0])),
+          Math.max(0, Math.min(this.scene.height - 1, y + far * step[1])),
+        );
+      } else if (event.key === "Enter") this.chosen(x, y);
+      else return;
+      event.preventDefault();
+    });
+  }
+
+  moveTo(x, y) {
+    this.cursor = [x, y];
+    this.pending ??= requestAnimationFrame(() => {
+      this.pending = undefined;
+      this.readOut();
+      for (const side of ["a", "b"]) this.closeUp(this.part(`close-${side}`), this.shown[side].picture);
+      this.drawGrid();
+    });
+  }
+
+  /** Numbers under the cursor. */
+  readOut() {
+    if (!this.shown) return;
+    const set = (name, text) => (this.part(name).textContent = text);
+    const marker = this.part("marker");
+    marker.hidden = this.cursor === null;
+    const i = this.cursor ? this.cursor[1] * this.scene.width + this.cursor[0] : -1;
+    const number = (values, decimals) => {
+      if (i < 0 || !values) return "–";
+      return Number.isNaN(values[i]) ? "unknown" : values[i].toFixed(decimals);
+    };
+    const truth = this.panels.truth;
+    set("truth", number(this.truth, truth ? this.panels.decimals(truth) : 0));
+    for (const side of ["a", "b"]) {
+      const { panel, values, confidence } = this.shown[side];
+      const decimals = values ? this.panels.decimals(panel) : 0;
+      set(`value-${side}`, number(values, decimals));
+      const compares = panel.kind === "disparity" && this.truth && panel !== truth;
+      set(`error-${side}`, compares ? number(values.map ? this.errors(side) : null, decimals) : "–");
+      set(`confidence-${side}`, confidence ? number(confidence, this.panels.arrays.decimals(panel.confidence)) : "–");
+    }
+    if (!this.cursor) return set("pixel", "move over a map");
+    const [x, y] = this.cursor.map((place) => place * this.scene.stride);
+    set("pixel", `x ${x}, y ${y}`);
+    marker.style.left = `${(100 * (this.cursor[0] + 0.5)) / this.scene.width}%`;
+    marker.style.top = `${(100 * (this.cursor[1] + 0.5)) / this.scene.height}%`;
+  }
+
+  /** Errors of what a side shows, made when they are first read out. */
+  errors(side) {
+    const shown = this.shown[side];
+    shown.errors ??= shown.values.map((value, i) => value - this.truth[i]);
+    return shown.errors;
+  }
+
+  /** The surroundings of the cursor, magnified. */
+  closeUp(canvas, picture) {
+    const context = canvas.getContext("2d");
+    context.imageSmoothingEnabled = false;
+    context.clearRect(0, 0, canvas.width, canvas.height);
+    if (this.cursor) this.magnify(context, picture, 0, 0, canvas.width);
+  }
+
+  magnify(context, picture, left, top, side) {
+    const span = 2 * Sepi.REACH + 1;
+    const [x, y] = this.cursor.map((place) => place - Sepi.REACH);
+    const pixel = side / span;
+    context.fillStyle = "#808080";
+    context.fillRect(left, top, side, side);
+    context.save();
+    context.beginPath();
+    context.rect(left, top, side, side);
+    context.clip();
+    context.drawImage(picture, left - x * pixel, top - y * pixel, picture.width * pixel, picture.height * pixel);
+    context.restore();
+    context.strokeStyle = "#fff";
+    context.lineWidth = 1;
+    context.strokeRect(left + Sepi.REACH * pixel, top + Sepi.REACH * pixel, pixel, pixel);
+  }
+
+  /** One small panel for each, under the headings of their groups. */
+  fillGrid() {
+    this.watcher.disconnect();
+    this.visible.clear();
+    this.tiles = new Map();
+    const groups = new Map();
+    const changes = Sepi.byId("changes");
+    changes?.replaceChildren(Sepi.element("div", { className: "tiles" }));
+    for (const panel of this.panels.list) {
+      const tile = this.tile(panel);
+      if (changes && panel.kind === "change") changes.firstChild.append(tile);
+      else if (groups.has(panel.group)) groups.get(panel.group).push(tile);
+      else groups.set(panel.group, [tile]);
+    }
+    this.part("grid").replaceChildren(
+      ...[...groups].map(([title, tiles]) =>
+        Sepi.element(
+          "section",
+          {},
+          Sepi.element("h4", {}, title),
+          Sepi.element("div", { className: "tiles" }, ...tiles),
+        ),
+      ),
+    );
+  }
+
+  tile(panel) {
+    const canvas = Sepi.canvas(10, 10);
+    canvas.setAttribute("role", "img");
+    canvas.setAttribute("aria-label", `${panel.title}${panel.note ? `: ${panel.note}` : ""}`);
+    canvas.style.aspectRatio = `${this.scene.width} / ${this.scene.height}`;
+    const buttons = ["a", "b"].map((side) => {
+      const button = Sepi.element("button", { type: "button", title: `show as ${side.toUpperCase()}` }, side.toUpperCase());
+      button.setAttribute("aria-label", `show ${panel.title} as ${side.toUpperCase()}`);
+      button.addEventListener("click", () => this.choose(side, panel.key));
+      return button;
+    });
+    const caption = Sepi.element(
+      "figcaption",
+      {},
+      Sepi.element("span", { className: "pair" }, ...buttons),
+      panel.title,
+      Sepi.element("small", {}, panel.note ?? ""),
+    );
+    const figure = Sepi.element("figure", {}, canvas, caption);
+    figure.dataset.key = panel.key;
+    this.follow(canvas);
+    this.tiles.set(canvas, panel.key);
+    this.watcher.observe(canvas);
+    return figure;
+  }
+
+  seen(entries) {
+    for (const { target, isIntersecting } of entries) {
+      if (isIntersecting) this.visible.add(target);
+      else this.visible.delete(target);
+    }
+    this.drawGrid();
+  }
+
+  drawGrid() {
+    for (const canvas of this.visible) this.drawTile(canvas);
+  }
+
+  async drawTile(canvas) {
+    const key = this.tiles.get(canvas);
+    if (!key) return;
+    const turn = this.turn;
+    const picture = await this.panels.picture(key);
+    if (turn !== this.turn) return;
+    const width = Math.round(canvas.clientWidth * devicePixelRatio);
+    const height = Math.round(canvas.clientHeight * devicePixelRatio);
+    if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
+    const context = canvas.getContext("2d");
+    context.imageSmoothingEnabled = width < picture.width;
+    context.drawImage(picture, 0, 0, width, height);
+    if (!this.cursor) return;
+    this.drawCursor(context, width, height, picture);
+  }
+
+  /** The cursor in a small panel, and its close-up in the corner that is farther away. */
+  drawCursor(context, width, height, picture) {
+    const [x, y] = [
+      ((this.cursor[0] + 0.5) * width) / this.scene.width,
+      ((this.cursor[1] + 0.5) * height) / this.scene.height,
+    ];
+    const half = (Sepi.REACH * width) / this.scene.width;
+    for (const [colour, wider] of [["#000", 1], ["#fff", 0]]) {
+      context.lineWidth = devicePixelRatio;
+      context.strokeStyle = colour;
+      context.strokeRect(x - half - wider, y - half - wider, 2 * (half + wider), 2 * (half + wider));
+    }
+    if (!this.part("close-ups").checked) return;
+    const side = Math.round(0.46 * Math.min(width, height));
+    const left = x < width / 2 ? width - side : 0;
+    this.magnify(context, picture, left, height - side, side);
+    for (const [colour, inset] of [["#000", 0.5], ["#fff", 1.5]]) {
+      context.strokeStyle = colour;
+      context.lineWidth = 1;
+      context.strokeRect(left + inset, height - side + inset, side - 2 * inset, side - 2 * inset);
+    }
+  }
+};
+
+/** Options of a select, under the headings of their groups. */
+Sepi.options = (list) => {
+  const groups = new Map();
+  for (const { group, key, title } of list) {
+    if (!groups.has(group)) groups.set(group, Sepi.element("optgroup", { label: group }));
+    groups.get(group).append(Sepi.element("option", { value: key }, title));
+  }
+  return [...groups.values()];
+};

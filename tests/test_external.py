@@ -1,0 +1,247 @@
+"""Maps of other methods: scored like ours, and whatever is wrong with one is told and stops nothing."""
+
+import json
+import os
+import warnings
+from dataclasses import replace
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+
+from sepi.errors import SepiError, SepiWarning
+from sepi.evaluate import evaluation_of
+from sepi.external import MapFile, command, import_maps
+from sepi.io.external import Imported, read_imported, read_imported_scores, write_imported
+from sepi.io.hdf5 import write_light_field
+from sepi.io.pfm import write_pfm
+from sepi.lightfield import LightField
+from sepi.reading import read_light_field
+
+SHAPE = (40, 44)
+
+
+@pytest.fixture
+def light_field() -> LightField:
+    random = np.random.default_rng(1)
+    views = random.integers(0, 256, (3, 3, *SHAPE, 3), np.uint8)
+    truth = random.normal(size=SHAPE).astype(np.float32)
+    return LightField(views, "noise", truth=truth, masks={"textureless": truth > 1})
+
+
+@pytest.fixture
+def estimate(light_field: LightField) -> np.ndarray:
+    assert light_field.truth is not None
+    return light_field.truth + np.random.default_rng(2).normal(scale=0.05, size=SHAPE).astype(np.float32)
+
+
+def saved(path: Path, values: np.ndarray) -> MapFile:
+    write_pfm(path, values)
+    return MapFile(path=str(path))
+
+
+def call(folder: Path, light_field: LightField, maps: str) -> Result:
+    write_light_field(folder / "lightfield.h5", light_field)
+    files = {"--light-field": folder / "lightfield.h5", "--maps": maps, "--output": folder / "external.h5"}
+    return CliRunner().invoke(command, [str(part) for pair in files.items() for part in pair], catch_exceptions=False)
+
+
+class TestImport:
+    def test_scores_are_those_of_our_own_maps(
+        self, tmp_path: Path, light_field: LightField, estimate: np.ndarray
+    ) -> None:
+        imported = import_maps(light_field, {"SPO": saved(tmp_path / "noise.pfm", estimate)})["SPO"]
+        expected = evaluation_of(light_field, estimate)
+        assert imported.problem == ""
+        assert imported.source == str(tmp_path / "noise.pfm")
+        np.testing.assert_array_equal(imported.disparity, estimate)
+        assert imported.evaluation.scores == expected.scores
+        assert imported.evaluation.region_sources == expected.region_sources
+        assert expected.region_sources == {"occluded": "computed", "textureless": "scene"}
+        np.testing.assert_array_equal(imported.evaluation.error, expected.error)
+        for name, mask in expected.regions.items():
+            np.testing.assert_array_equal(imported.evaluation.regions[name], mask)
+
+    def test_methods_keep_their_order(self, tmp_path: Path, light_field: LightField, estimate: np.ndarray) -> None:
+        """The report's columns come as the user wrote them."""
+        names = ["SPO", "AMNorm", "z", "CAE 2017", "m10", "m2"]
+        files = {name: saved(tmp_path / f"{name}.pfm", estimate) for name in names}
+        found = import_maps(light_field, files)
+        write_imported(tmp_path / "external.h5", found)
+        assert list(read_imported(tmp_path / "external.h5")) == names
+
+    def test_scale_and_offset_reach_the_map(
+        self, tmp_path: Path, light_field: LightField, estimate: np.ndarray
+    ) -> None:
+        file = saved(tmp_path / "noise.pfm", -2 * estimate + 3)
+        imported = import_maps(light_field, {"SPO": file.model_copy(update={"scale": -0.5, "offset": 1.5})})["SPO"]
+        np.testing.assert_allclose(imported.disparity, estimate, atol=1e-5)
+
+    def test_without_truth_there_are_maps_but_no_scores(self, tmp_path: Path, light_field: LightField) -> None:
+        bare = replace(light_field, truth=None, masks={})
+        imported = import_maps(bare, {"SPO": saved(tmp_path / "noise.pfm", np.ones(SHAPE, np.float32))})["SPO"]
+        assert imported.problem == ""
+        assert imported.disparity is not None
+        assert imported.evaluation.scores == {}
+
+    def test_unknown_pixels_are_counted_and_bad(
+        self, tmp_path: Path, light_field: LightField, estimate: np.ndarray
+    ) -> None:
+        estimate[20, 20:23] = [np.nan, np.inf, -np.inf]
+        file = saved(tmp_path / "noise.pfm", estimate)
+        with pytest.warns(SepiWarning, match=r"external SPO, scene noise: .*noise\.pfm: 3 of 1760 values"):
+            imported = import_maps(light_field, {"SPO": file})["SPO"]
+        assert imported.problem == ""
+        np.testing.assert_array_equal(imported.disparity, estimate)
+        whole = imported.evaluation.scores["paper"]["all"]
+        assert whole["non_finite"] == 3
+        assert whole["badpix007"] >= 100 * 3 / 1760
+
+    @pytest.mark.parametrize(
+        ("values", "problem", "reason"),
+        [
+            (None, "no file", "no such file"),
+            (b"", "not readable", "not a one-channel PFM"),
+            (b"Pf\n44 40\n-1\n1234", "not readable", "expected 7040 bytes"),
+            (np.zeros((44, 40)), "40x44 instead of 44x40", "40x44 pixels, but the views have 44x40"),
+            (np.full(SHAPE, np.nan), "no finite value", "none of its values is finite"),
+            (np.full(SHAPE, np.inf), "no finite value", "none of its values is finite"),
+        ],
+    )
+    def test_a_problem_is_told_and_the_others_still_come(
+        self, tmp_path: Path, light_field: LightField, estimate: np.ndarray, values: object, problem: str, reason: str
+    ) -> None:
+        path = tmp_path / "bad.pfm"
+        if isinstance(values, bytes):
+            path.write_bytes(values)
+        elif isinstance(values, np.ndarray):
+            write_pfm(path, values.astype(np.float32))
+        files = {"bad": MapFile(path=str(path)), "good": saved(tmp_path / "good.pfm", estimate)}
+        with pytest.warns(SepiWarning) as caught:
+            found = import_maps(light_field, files)
+        (line,) = (str(warning.message) for warning in caught)
+        assert line.startswith(f"external bad, scene noise: {path}: ")
+        assert reason in line
+        assert found["bad"].problem == problem
+        assert found["bad"].disparity is None
+        assert found["bad"].evaluation.scores == {}
+        assert (found["bad"].sha256 == "") == (values is None)
+        assert found["good"].problem == ""
+        assert found["good"].evaluation.scores["paper"]["all"]["mse100"] > 0
+
+    @pytest.mark.skipif(os.geteuid() == 0, reason="root may read everything")
+    def test_a_file_that_may_not_be_read(self, tmp_path: Path, light_field: LightField) -> None:
+        file = saved(tmp_path / "noise.pfm", np.ones(SHAPE, np.float32))
+        (tmp_path / "noise.pfm").chmod(0)
+        with pytest.warns(SepiWarning, match="Permission denied"):
+            assert import_maps(light_field, {"SPO": file})["SPO"].problem == "not readable"
+
+    def test_a_name_that_no_file_can_have(self, light_field: LightField) -> None:
+        with pytest.warns(SepiWarning, match="too long"):
+            assert import_maps(light_field, {"SPO": MapFile(path="a" * 300 + ".pfm")})["SPO"].problem == "not readable"
+
+
+class TestFile:
+    def imported(self, light_field: LightField, estimate: np.ndarray) -> Imported:
+        return Imported("maps/noise.pfm", "", "ab" * 32, estimate, evaluation_of(light_field, estimate))
+
+    def test_comes_back_unchanged(self, tmp_path: Path, light_field: LightField, estimate: np.ndarray) -> None:
+        imported = self.imported(light_field, estimate)
+        maps = {"SPO": imported, "lost": Imported("maps/ü.pfm", "no file")}
+        write_imported(tmp_path / "a.h5", maps)
+        back = read_imported(tmp_path / "a.h5")
+        assert list(back) == ["SPO", "lost"]
+        assert back["lost"] == maps["lost"]
+        assert (back["SPO"].source, back["SPO"].sha256) == (imported.source, imported.sha256)
+        assert back["SPO"].evaluation.scores == imported.evaluation.scores
+        np.testing.assert_array_equal(back["SPO"].disparity, estimate)
+        np.testing.assert_array_equal(back["SPO"].evaluation.error, imported.evaluation.error)
+        assert set(back["SPO"].evaluation.regions) == {"occluded", "textureless"}
+        write_imported(tmp_path / "b.h5", maps)
+        assert (tmp_path / "a.h5").read_bytes() == (tmp_path / "b.h5").read_bytes()
+
+    def test_scores_alone(self, tmp_path: Path, light_field: LightField, estimate: np.ndarray) -> None:
+        """Tables need no maps."""
+        imported = self.imported(light_field, estimate)
+        write_imported(tmp_path / "a.h5", {"SPO": imported, "lost": Imported("x", "no file")})
+        back = read_imported_scores(tmp_path / "a.h5")
+        assert list(back) == ["SPO", "lost"]
+        assert back["SPO"].evaluation.scores == imported.evaluation.scores
+        assert (back["SPO"].disparity, back["SPO"].evaluation.error, back["SPO"].evaluation.regions) == (None, None, {})
+        assert back["lost"].problem == "no file"
+
+    def test_maps_say_their_unit_and_masks_take_no_room(
+        self, tmp_path: Path, light_field: LightField, estimate: np.ndarray
+    ) -> None:
+        write_imported(tmp_path / "a.h5", {"SPO": self.imported(light_field, estimate)})
+        with h5py.File(tmp_path / "a.h5") as file:
+            assert file["methods/SPO/disparity"].attrs["units"] == "pixels per view step"
+            assert file["methods/SPO/regions/occluded"].compression == "gzip"
+
+    def test_no_method_at_all(self, tmp_path: Path) -> None:
+        write_imported(tmp_path / "a.h5", {})
+        assert read_imported(tmp_path / "a.h5") == {}
+
+    def test_another_file_is_a_clear_error(self, tmp_path: Path, light_field: LightField) -> None:
+        write_light_field(tmp_path / "lightfield.h5", light_field)
+        with pytest.raises(SepiError, match=r"lightfield\.h5: not a file of other methods' maps"):
+            read_imported(tmp_path / "lightfield.h5")
+
+
+class TestCommand:
+    def test_writes_what_is_found_and_shows_what_is_wrong(
+        self, tmp_path: Path, light_field: LightField, estimate: np.ndarray
+    ) -> None:
+        write_pfm(tmp_path / "noise.pfm", estimate)
+        maps = {
+            "SPO": {"path": str(tmp_path / "noise.pfm"), "scale": None, "offset": 0.0},
+            "AMNorm": {"path": str(tmp_path / "absent.pfm"), "scale": 2, "offset": 0},
+        }
+        result = call(tmp_path, light_field, json.dumps(maps))
+        assert result.exit_code == 0, result.output
+        assert result.stdout == ""
+        assert result.stderr.splitlines() == [
+            f"sepi: warning: external AMNorm, scene noise: {tmp_path / 'absent.pfm'}: no such file"
+        ]
+        back = read_imported(tmp_path / "external.h5")
+        assert [imported.problem for imported in back.values()] == ["", "no file"]
+        assert back["SPO"].evaluation.scores == evaluation_of(light_field, estimate).scores
+        written = (tmp_path / "external.h5").read_bytes()
+        assert call(tmp_path, light_field, json.dumps(maps)).exit_code == 0
+        assert (tmp_path / "external.h5").read_bytes() == written
+
+    @pytest.mark.parametrize(
+        ("maps", "message"),
+        [
+            ("SPO", "--maps: Invalid JSON"),
+            ("[]", "--maps: "),
+            ('{"SPO": {}}', "--maps.SPO.path: Field required"),
+            ('{"SPO": {"path": 5}}', "--maps.SPO.path: "),
+            ('{"SPO": {"path": "a", "scal": 5}}', "--maps.SPO.scal: "),
+            ('{"SPO": {"path": "a", "scale": "5"}}', "--maps.SPO.scale: "),
+        ],
+    )
+    def test_wrong_json_is_one_line(self, tmp_path: Path, light_field: LightField, maps: str, message: str) -> None:
+        result = call(tmp_path, light_field, maps)
+        assert result.exit_code == 1
+        assert len(result.stderr.splitlines()) == 1
+        assert message in result.stderr
+        assert not (tmp_path / "external.h5").exists()
+
+
+@pytest.mark.real
+def test_published_maps_score_as_an_independent_program_scores_them(hci: Path, real_data: Path) -> None:
+    """SPO on cotton: a slip in orientation, sign or border would put every imported method in a wrong light."""
+    folder = real_data / "published_maps"
+    if not folder.is_dir():
+        pytest.skip(f"no published maps at {folder}")
+    scene = read_light_field(hci / "cotton")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        imported = import_maps(scene, {"SPO": MapFile(path=str(folder / "SPO" / "cotton.pfm"))})["SPO"]
+    scores = imported.evaluation.scores
+    assert scores["paper"]["all"]["mse100"] == pytest.approx(1.7786, abs=5e-5)
+    assert scores["benchmark"]["all"]["mse100"] == pytest.approx(1.3130, abs=5e-5)
+    assert scores["paper"]["all"]["non_finite"] == 0
