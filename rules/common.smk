@@ -1,6 +1,7 @@
 # What all rules share: the checked configuration, and the names, threads and memory that follow from it.
 
 import os
+import re
 import sys
 import time
 from pathlib import Path
@@ -106,13 +107,19 @@ def is_new(file):
 
 def print_warnings():
     """Show what the readers of light fields and of other methods' maps warned of in this run, from their logs."""
+    missing = {}
     for dataset, scene in SETTINGS.scenes:
         for rule in ("ingest", "external"):
             log = Path(f"logs/{dataset}/{scene}/{rule}.log")
-            if is_new(log):
-                for line in log.read_text().splitlines():
-                    if line.startswith("sepi: warning:"):
-                        print(line, flush=True)
+            for line in log.read_text().splitlines() if is_new(log) else ():
+                absent = re.match(r"sepi: warning: external (.+), scene .+: no such file$", line)
+                if absent:
+                    missing.setdefault(absent[1], []).append(scene)
+                elif line.startswith("sepi: warning:"):
+                    print(line, flush=True)
+    # a method rarely has maps of all scenes: one line for each method
+    for method, scenes in missing.items():
+        print(f"sepi: warning: external {method}: no map of {', '.join(scenes)}", flush=True)
 
 
 def print_written(tables, maps):

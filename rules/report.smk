@@ -128,9 +128,7 @@ rule charts:
     input:
         "reports/report.json",
     output:
-        report(
-            multiext("reports/figures/ablation", ".png", ".pdf"), caption="captions/ablation.rst", category="Charts"
-        ),
+        report(multiext("reports/figures/ablation", ".png", ".pdf"), caption="captions/ablation.rst", category="Charts"),
         report(
             multiext("reports/figures/time_and_memory", ".png", ".pdf"), caption="captions/time.rst", category="Charts"
         ),
@@ -217,7 +215,7 @@ rule graph:
     threads: 1
     params:
         # other methods' maps add a rule
-        config=json.dumps({"external": {"other": "maps/{scene}.pfm"}} if SETTINGS.external else {}),
+        config=lambda wildcards: json.dumps({"external": {"other": "maps/{scene}.pfm"}} if SETTINGS.external else {}),
         code=code_digest("sepi.report.graph"),
     message:
         "rule graph"

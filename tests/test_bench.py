@@ -17,10 +17,11 @@ from sepi.bench import plan, tables
 from sepi.bench.__main__ import main
 from sepi.bench.measure import Case, Measurement, Prepared, measured, measured_command
 from sepi.bench.plain import Warp, by_numpy, by_opencv, by_scipy, plain_sweep
-from sepi.bench.result import Result, read, this_machine, write
+from sepi.bench.result import Result, read, write
 from sepi.bench.solvers import SOLVERS
 from sepi.bench.stages import WINDOW_OPERATIONS
 from sepi.errors import SepiError
+from sepi.machine import this_machine
 from sepi.optimize import energy_system
 from sepi.scenes import render
 from sepi.sweep import SweepParameters, sweep

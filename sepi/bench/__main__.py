@@ -11,11 +11,12 @@ import numba
 
 from sepi.bench import plot, tables
 from sepi.bench.plan import GROUPS, measure
-from sepi.bench.result import Result, read, this_machine, write
+from sepi.bench.result import Result, read, write
 from sepi.bench.scene import Scene
 from sepi.command import SepiGroup
 from sepi.errors import SepiError
 from sepi.io.files import atomic_path
+from sepi.machine import this_machine
 from sepi.report.layout import Report, Section, Table, as_markdown
 from sepi.scenes import SCENES
 

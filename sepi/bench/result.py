@@ -3,20 +3,15 @@
 from __future__ import annotations
 
 import json
-import os
-import platform
 from dataclasses import asdict, dataclass
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 from sepi.bench.measure import Measurement
 from sepi.errors import SepiError
 from sepi.io.files import atomic_path
-from sepi.provenance import package_version
 
 FORMAT = 1
-LIBRARIES = ("numpy", "scipy", "numba", "opencv-python-headless", "h5py", "pyamg")
 
 
 @dataclass(frozen=True)
@@ -39,18 +34,6 @@ class Result:
     def group(self, name: str) -> dict[str, Measurement]:
         """Measurements of one group by name."""
         return {m.name: m for m in self.measurements if m.group == name}
-
-
-def this_machine() -> dict[str, Any]:
-    """Processor, cores that may be used, and versions."""
-    return {
-        "processor": _processor(),
-        "cores": len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count(),
-        "system": platform.system(),
-        "python": platform.python_version(),
-        "sepi": package_version(),
-        **{library: version(library) for library in LIBRARIES},
-    }
 
 
 def write(result: Result, path: Path) -> None:
@@ -82,13 +65,3 @@ def read(path: Path) -> Result:
         raise SepiError(f"{path}: {error.strerror}") from error
     except (ValueError, KeyError, TypeError) as error:
         raise SepiError(f"{path}: not a benchmark's result (expected the JSON that `run` wrote)") from error
-
-
-def _processor() -> str:
-    try:
-        for line in Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():
-            if line.startswith("model name"):
-                return line.partition(":")[2].strip()
-    except OSError:
-        pass
-    return platform.processor() or platform.machine()

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
 
 import click
 import numpy as np
 
 from sepi.command import SepiCommand
-from sepi.report.page_data import ablation_bars, part_bars, stage_times
+from sepi.report.page_data import BarGroup, StageTimes, ablation_bars, part_bars, stage_times
 from sepi.report.runs import Runs, read_numbers
 from sepi.report.saving import new_figure, save
 
@@ -18,49 +17,53 @@ _OURS, _PUBLISHED = "#4a7fae", "#b9bfc5"
 _STAGES = ("#3b5b92", "#2a8c8c", "#7ab648", "#d9b430", "#b25d2c", "#7d4f9e")
 
 
-def write_bars(folder: Path, name: str, groups: Sequence[dict[str, Any]]) -> None:
-    """A panel of bars for each group of :func:`sepi.report.page_data.ablation_bars`; nothing without groups."""
+def write_bars(folder: Path, name: str, groups: Sequence[BarGroup]) -> None:
+    """A panel of bars for each group of :func:`sepi.report.page_data.ablation_bars`; a sentence where there is none."""
+    if not groups:
+        figure = new_figure(4.2, 1)
+        figure.text(0.5, 0.5, "no scene with ground truth", ha="center", va="center", fontsize=8)
+        return save(figure, folder, name)
     columns = min(3, len(groups))
     lines = -(-len(groups) // columns)
-    height = 0.9 + 0.32 * max(len(group["rows"]) for group in groups)
+    height = 0.9 + 0.32 * max(len(group.rows) for group in groups)
     figure = new_figure(4.2 * columns, height * lines)
     axes = figure.subplots(lines, columns, squeeze=False).ravel()
     for axis in axes[len(groups) :]:
         axis.set_axis_off()
     for axis, group in zip(axes, groups, strict=False):
-        place = np.arange(len(group["rows"]))
+        place = np.arange(len(group.rows))
         for shift, key, colour, label in ((-0.2, "ours", _OURS, "this code"), (0.2, "published", _PUBLISHED, "paper")):
-            values = [row[key] if row[key] is not None else np.nan for row in group["rows"]]
+            values = np.array([getattr(row, key) for row in group.rows], np.float64)
             if not np.isnan(values).all():
                 bars = axis.barh(place + shift, values, 0.38, color=colour, label=label)
                 axis.bar_label(bars, ["" if np.isnan(value) else f"{value:.2f}" for value in values], fontsize=6)
-        axis.set_yticks(place, [row["variant"] for row in group["rows"]], fontsize=7)
+        axis.set_yticks(place, [row.variant for row in group.rows], fontsize=7)
         axis.invert_yaxis()
         axis.margins(x=0.15)
-        count = f", {group['scenes']} scenes" if group["scenes"] > 1 else ""
-        axis.set_title(f"{group['dataset']}, {group['region']}{count}", fontsize=8)
+        count = f", {group.scenes} scenes" if group.scenes > 1 else ""
+        axis.set_title(f"{group.dataset}, {group.region}{count}", fontsize=8)
         axis.tick_params(axis="x", labelsize=7)
         axis.set_xlabel("MSE x100", fontsize=7)
     axes[0].legend(fontsize=7)
-    save(figure, folder, name)
+    return save(figure, folder, name)
 
 
-def write_times(folder: Path, name: str, rows: Sequence[dict[str, Any]]) -> None:
+def write_times(folder: Path, name: str, rows: Sequence[StageTimes]) -> None:
     """Seconds of the stages, stacked, beside the peak memory of each; a bar per scene and variant."""
     figure = new_figure(9, 1.2 + 0.3 * len(rows))
     time, memory = figure.subplots(1, 2, sharey=True)
     place = np.arange(len(rows))
     left = np.zeros(len(rows))
-    stages = [stage["stage"] for stage in rows[0]["stages"]]
+    stages = list(rows[0].seconds)
     for number, stage in enumerate(stages):
-        seconds = np.array([row["stages"][number]["seconds"] for row in rows])
-        peaks = [row["stages"][number]["memory"] for row in rows]
+        seconds = np.array([row.seconds[stage] for row in rows])
+        peaks = [row.memory[stage] for row in rows]
         colour = _STAGES[number % len(_STAGES)]
         time.barh(place, seconds, 0.7, left=left, color=colour, label=stage)
         shift = (number + 0.5) / len(stages) - 0.5
         memory.barh(place + 0.7 * shift, peaks, 0.6 / len(stages), color=colour)
         left += seconds
-    time.set_yticks(place, [f"{row['scene']}, {row['variant']}" for row in rows], fontsize=7)
+    time.set_yticks(place, [f"{row.scene}, {row.variant}" for row in rows], fontsize=7)
     time.invert_yaxis()
     time.set_xlabel("seconds", fontsize=8)
     memory.set_xlabel("peak memory / MB", fontsize=8)

@@ -122,16 +122,20 @@ def write_overview(
     panel_height = _PANEL * height / width + 0.4
     size = (_PANEL * columns, panel_height * len(filled) + 0.4)
     figure = new_figure(*size, layout=None)
-    figure.suptitle(title, y=1 - 0.12 / size[1])
-    # places by hand: a layout engine takes longer than all the rest
+    # one frame for all pictures, whose unit is an inch: many frames are slow to draw
+    sheet = figure.add_axes((0, 0, 1, 1))
+    sheet.set_axis_off()
+    sheet.text(size[0] / 2, size[1] - 0.1, title, fontsize=12, ha="center", va="top")
     for number, row in enumerate(filled):
         bottom = size[1] - 0.4 - (number + 1) * panel_height
         for column, panel in enumerate(row):
-            place = (column * _PANEL + 0.05, bottom + 0.05, _PANEL - 0.1, panel_height - 0.4)
-            axis = figure.add_axes([place[0] / size[0], place[1] / size[1], place[2] / size[0], place[3] / size[1]])
-            axis.set_axis_off()
-            axis.imshow(panel.picture, interpolation="antialiased")
-            axis.set_title(panel.title, fontsize=8)
+            left, top = column * _PANEL + 0.05, bottom + panel_height - 0.35
+            extent = (left, left + _PANEL - 0.1, bottom + 0.05, top)
+            sheet.imshow(panel.picture, extent=extent, aspect="auto", interpolation="antialiased")
+            sheet.text(left + _PANEL / 2 - 0.05, top + 0.04, panel.title, fontsize=8, ha="center", va="bottom")
+    # pictures set limits of their own
+    sheet.set_xlim(0, size[0])
+    sheet.set_ylim(0, size[1])
     save(figure, folder, name, endings)
 
 
@@ -180,6 +184,8 @@ def write_scene(results: SceneResults, title: str, folder: Path) -> None:
         details[MAIN_VARIANT],
         [stages[variant][-1] for variant in others],
         [panel for variant in others for panel in errors[variant]],
+        [panel for panel in imported if not panel.name.endswith("/error")],
+        [panel for panel in imported if panel.name.endswith("/error")],
     ]
     write_overview(folder, "overview", title, sheet)
 

@@ -117,9 +117,10 @@ def layers(edges: Edges) -> tuple[list[list[str]], list[list[str]]]:
     above: dict[str, list[str]] = {name: [] for name in makers}
     ways = []
     for maker, user in edges:
-        passed = [f"{maker}>{user}>{row}" for row in range(level[maker] + 1, level[user])]
-        for name, row in zip(passed, range(level[maker] + 1, level[user]), strict=True):
-            rows[row].append(name)
+        between = range(level[maker] + 1, level[user])
+        passed = [f"{maker}>{user}>{number}" for number in between]
+        for name, number in zip(passed, between, strict=True):
+            rows[number].append(name)
         way = [maker, *passed, user]
         for upper, lower in pairwise(way):
             above.setdefault(lower, []).append(upper)

@@ -21,13 +21,13 @@ import click
 import numpy as np
 import numpy.typing as npt
 
-from sepi.bench.result import this_machine
 from sepi.command import SepiCommand
 from sepi.errors import SepiError
 from sepi.evaluate import BAD_PIXEL, PROTOCOLS, REGIONS
 from sepi.io.external import read_imported_scores
 from sepi.io.hdf5 import read_light_field, read_stage
 from sepi.io.scores import Scores, read_evaluation, read_scores
+from sepi.machine import this_machine
 from sepi.report.confidence import decile_errors, oracle, sparsification
 from sepi.report.layout import as_json, write
 from sepi.report.plan import PARTS_TABLES, TABLES, Plan

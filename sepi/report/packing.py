@@ -31,6 +31,8 @@ _ACTIVITIES = (1, 2, 3, 5, 9, 17, 33)
 
 # largest number of levels that two bytes tell apart, one of them being the unknown
 _LEVELS = 2**16 - 1
+# largest whole number of steps that is counted exactly
+_LARGEST = 2**52
 
 
 def packed_map(values: FloatMap, step: float) -> dict[str, Any]:
@@ -41,7 +43,7 @@ def packed_map(values: FloatMap, step: float) -> dict[str, Any]:
     values : ndarray, shape (H, W), float
         Values that are not finite are unknown.
     step : float
-        Grows to the next power of ten where 65534 steps do not span the values.
+        Grows tenfold, or by more such factors, where 65533 steps do not span the values.
 
     Returns
     -------
@@ -70,7 +72,8 @@ def _wide_enough(values: FloatMap, step: float) -> float:
     known = values[np.isfinite(values)]
     if known.size == 0:
         return step
-    while (float(known.max()) - float(known.min())) / step > _LEVELS - 2:
+    low, high = float(known.min()), float(known.max())
+    while (high - low) / step > _LEVELS - 2 or max(-low, high) / step > _LARGEST:
         step *= 10
     return step
 

@@ -12,6 +12,7 @@ from typing import Any
 import click
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
+from matplotlib.colors import Colormap
 
 from sepi.command import SepiCommand
 from sepi.errors import SepiError
@@ -40,6 +41,7 @@ def environment() -> Environment:
     )
     made.filters["embedded"] = embedded
     made.filters["prose"] = prose
+    made.filters["breakable"] = breakable
     return made
 
 
@@ -54,9 +56,14 @@ def prose(text: str) -> Markup:
     return Markup(re.sub("`([^`]+)`", r"<code>\1</code>", str(escape(text))))
 
 
+def breakable(name: str) -> Markup:
+    """A name that may go on in the next line after ``_`` and ``/``."""
+    return Markup(re.sub("([_/])", r"\1<wbr>", str(escape(name))))
+
+
 def colour_scales() -> dict[str, str]:
     """The colour scales of the viewer, 256 times RGB each, in base64."""
-    scales = {"disparity": "viridis", "grey": "gray", "error": error_scale()}
+    scales: dict[str, str | Colormap] = {"disparity": "viridis", "grey": "gray", "error": error_scale()}
     return {name: base64.b64encode(scale_colours(scale).tobytes()).decode("ascii") for name, scale in scales.items()}
 
 
@@ -85,6 +92,8 @@ def page_of(
         HTML.
     """
     runs = Runs(numbers)
+    first_title = page_data.first_scene(runs)
+    shown = [scene for scene in scenes if f"{scene['dataset']}/{scene['scene']}" == first_title] or scenes
     tables = {name: numbers["tables"][name] for name in TABLES if name in numbers["tables"]}
     if parts is not None:
         tables |= {name: table for name, table in parts["tables"].items() if name not in tables}
@@ -106,8 +115,8 @@ def page_of(
             parameters=page_data.parameter_rows(numbers),
             graph=Markup(graph),
             scenes=embedded_scenes(scenes),
-            first=scenes[0] if scenes else None,
-            first_title=page_data.first_scene(runs),
+            first=shown[0] if shown else None,
+            first_title=first_title,
             scales=colour_scales(),
             scripts=SCRIPTS,
         )

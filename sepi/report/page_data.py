@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from dataclasses import dataclass
 from typing import Any
 
 from sepi.evaluate import REGIONS, WHOLE_MAP
@@ -11,9 +12,6 @@ from sepi.report import published
 from sepi.report.runs import Numbers, Runs
 
 _METHOD_OF_THE_PAPER = "zhou"
-
-# a stage of 0.00 s would have no bar at all
-_LEAST_SHARE = 0.3
 
 
 def headline(runs: Runs) -> list[dict[str, Any]]:
@@ -51,92 +49,112 @@ def missing_scenes(runs: Runs) -> dict[str, list[str]]:
     return found
 
 
-def ablation_bars(runs: Runs) -> list[dict[str, Any]]:
-    """Average MSE x100 of every listed variant beside the published one, a group per data set and region.
+@dataclass(frozen=True)
+class Bar:
+    """MSE x100 of a variant; None where there is no figure."""
 
-    Returns
-    -------
-    list of dict
-        ``dataset``, ``region``, ``scenes`` (how many are averaged), ``largest``, and ``rows``: ``variant``, ``ours``,
-        ``published``; None where there is no figure.
+    variant: str
+    ours: float | None
+    published: float | None = None
+
+
+@dataclass(frozen=True)
+class BarGroup:
+    """Bars that are drawn to one scale.
+
+    Attributes
+    ----------
+    dataset, region : str
+        What they are about.
+    scenes : int
+        How many scenes our figures are averages of.
+    rows : list of Bar
     """
+
+    dataset: str
+    region: str
+    scenes: int
+    rows: list[Bar]
+
+    @property
+    def figures(self) -> list[float]:
+        """All figures that there are."""
+        return [figure for row in self.rows for figure in (row.ours, row.published) if figure is not None]
+
+    @property
+    def largest(self) -> float:
+        """The figure of the longest bar; 1 where all are zero."""
+        return max(self.figures) or 1.0
+
+
+def ablation_bars(runs: Runs) -> list[BarGroup]:
+    """Average MSE x100 of every listed variant beside the published one, a group per data set and region."""
     groups = []
     for dataset in dict.fromkeys([*published.DATASETS, *runs.plan.scenes]):
         scenes = runs.scored(dataset)
         theirs = published.table4().get(dataset, {})
         for region in REGIONS:
             rows = [
-                {
-                    "variant": variant,
-                    "ours": _mean(runs.final(dataset, scene, "mse100", region, variant) for scene in scenes),
-                    "published": _published(theirs.get(variant), region),
-                }
+                Bar(
+                    variant,
+                    _mean(runs.final(dataset, scene, "mse100", region, variant) for scene in scenes),
+                    _published(theirs.get(variant), region),
+                )
                 for variant in runs.plan.listed
             ]
-            figures = [row[key] for row in rows for key in ("ours", "published")]
-            known = [figure for figure in figures if isinstance(figure, float)]
-            if known:
-                groups.append(
-                    {
-                        "dataset": dataset,
-                        "region": "whole map" if region == WHOLE_MAP else region,
-                        "scenes": len(scenes),
-                        "largest": max(known),
-                        "rows": rows,
-                    }
-                )
-    return groups
+            groups.append(BarGroup(dataset, "whole map" if region == WHOLE_MAP else region, len(scenes), rows))
+    return [group for group in groups if group.figures]
 
 
-def part_bars(parts: Runs) -> list[dict[str, Any]]:
+def part_bars(parts: Runs) -> list[BarGroup]:
     """MSE x100 of the best variant and of those with a part of it switched off, a group per scene."""
-    groups = []
-    for dataset, scene in parts.plan.pairs:
-        if not parts.plan.parts or not parts.scores(dataset, scene, parts.plan.parts[0]):
-            continue
-        rows = [
-            {"variant": variant, "ours": parts.final(dataset, scene, "mse100", variant=variant), "published": None}
-            for variant in parts.plan.parts
-        ]
-        largest = max(row["ours"] for row in rows)
-        groups.append(
-            {"dataset": f"{dataset}/{scene}", "region": "whole map", "scenes": 1, "largest": largest, "rows": rows}
+    names = parts.plan.parts
+    pairs = [pair for pair in parts.plan.pairs if names and parts.scores(*pair, names[0])]
+    return [
+        BarGroup(
+            f"{dataset}/{scene}",
+            "whole map",
+            1,
+            [Bar(variant, parts.final(dataset, scene, "mse100", variant=variant)) for variant in names],
         )
-    return groups
+        for dataset, scene in pairs
+    ]
 
 
-def stage_times(runs: Runs) -> list[dict[str, Any]]:
-    """What every stage of the compared variants took, per scene.
+@dataclass(frozen=True)
+class StageTimes:
+    """What every stage of a variant took on a scene: seconds and peak memory in MB, by stage."""
 
-    Returns
-    -------
-    list of dict
-        ``scene``, ``variant``, ``total`` seconds, ``peak`` MB, and ``stages``: ``stage``, ``seconds``, ``memory`` and
-        ``share`` of the longest total in percent.
-    """
+    scene: str
+    variant: str
+    seconds: dict[str, float]
+    memory: dict[str, float]
+
+    @property
+    def total(self) -> float:
+        """Seconds of all stages."""
+        return sum(self.seconds.values())
+
+    @property
+    def peak(self) -> float:
+        """Peak memory of the largest stage, MB."""
+        return max(self.memory.values())
+
+
+def stage_times(runs: Runs) -> list[StageTimes]:
+    """What every stage of the compared variants took, per scene."""
     rows = []
     for dataset, scene in runs.plan.pairs:
         for variant in runs.plan.compared:
             timings = {stage: runs.timing(dataset, scene, variant, stage) for stage in runs.plan.stages}
             rows.append(
-                {
-                    "scene": f"{dataset}/{scene}",
-                    "variant": variant,
-                    "total": sum(timing.seconds for timing in timings.values()),
-                    "peak": max(timing.peak_memory_mb for timing in timings.values()),
-                    "stages": [
-                        {"stage": stage, "seconds": timing.seconds, "memory": timing.peak_memory_mb}
-                        for stage, timing in timings.items()
-                    ],
-                }
+                StageTimes(
+                    f"{dataset}/{scene}",
+                    variant,
+                    {stage: timing.seconds for stage, timing in timings.items()},
+                    {stage: timing.peak_memory_mb for stage, timing in timings.items()},
+                )
             )
-    longest = max((row["total"] for row in rows), default=1.0) or 1.0
-    largest = max((row["peak"] for row in rows), default=1.0) or 1.0
-    for row in rows:
-        row["peak_share"] = 100 * row["peak"] / largest
-        for stage in row["stages"]:
-            stage["share"] = max(_LEAST_SHARE, 100 * stage["seconds"] / longest)
-            stage["memory_share"] = max(_LEAST_SHARE, 100 * stage["memory"] / largest)
     return rows
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any, Literal
 
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
@@ -11,13 +12,17 @@ from matplotlib.figure import Figure
 from sepi.io.files import atomic_path
 
 # matplotlib would write its version and the time into the files
-_UNSIGNED = {"png": {"Software": None}, "pdf": {"Creator": None, "Producer": None, "CreationDate": None}}
+_OPTIONS: dict[str, dict[str, Any]] = {
+    # noisy maps hardly get smaller by more effort
+    "png": {"metadata": {"Software": None}, "pil_kwargs": {"compress_level": 3}},
+    "pdf": {"metadata": {"Creator": None, "Producer": None, "CreationDate": None}},
+}
 
 BOTH = ("png", "pdf")
 """Endings of a figure: to look at, and for a paper."""
 
 
-def new_figure(width: float, height: float, layout: str | None = "constrained") -> Figure:
+def new_figure(width: float, height: float, layout: Literal["constrained"] | None = "constrained") -> Figure:
     """An empty figure of this size in inches, 100 dots each; no pyplot, whose figures are global state."""
     figure = Figure(figsize=(width, height), dpi=100, layout=layout)
     FigureCanvasAgg(figure)
@@ -28,4 +33,4 @@ def save(figure: Figure, folder: Path, name: str, endings: Sequence[str] = BOTH)
     """Write a figure as ``NAME.ENDING`` for each of the endings ``png`` and ``pdf``, each whole or not at all."""
     for ending in endings:
         with atomic_path(folder / f"{name}.{ending}") as temporary:
-            figure.savefig(temporary, format=ending, metadata=_UNSIGNED[ending])
+            figure.savefig(temporary, format=ending, **_OPTIONS[ending])

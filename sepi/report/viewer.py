@@ -24,6 +24,8 @@ from sepi.report.pictures import Picture
 ROLES = ("final", "confidence", "other")
 """What a map is kept for, which decides in how fine steps."""
 
+_MASK = "mask"
+
 PRECISIONS = (
     (0.001, 0.01, 0.002),
     (0.001, 0.01, 0.005),
@@ -39,6 +41,8 @@ PRECISIONS = (
 # Characters for each pixel: ten scenes of 512x512 and the page round them stay below 15 MB. Imported maps come on top.
 _BUDGET = 5.2
 _BUDGET_IMPORTED = 0.2
+# a smaller scene may take as much as one of 512x512
+_LEAST_PIXELS = 2**18
 
 # larger pictures are thinned out, so that a browser can hold all their maps
 _MOST_PIXELS = 2**20
@@ -46,6 +50,20 @@ _MOST_PIXELS = 2**20
 # of the reference view: the second where the first takes more than so many characters for each pixel
 _PICTURE_QUALITIES = (95, 80)
 _PICTURE_SHARE = 0.4
+
+
+@dataclass(frozen=True)
+class _Array:
+    """A map and its role, or a mask."""
+
+    values: FloatMap
+    role: str
+
+    def packed(self, step: float) -> dict[str, Any]:
+        return packed_mask(self.values.astype(bool)) if self.role == _MASK else packed_map(self.values, step)
+
+    def size(self, step: float) -> int:
+        return len(self.packed(step)["data"]) if self.role == _MASK else packed_size(self.values, step)
 
 
 @dataclass
@@ -72,7 +90,7 @@ class Viewer:
     camera: Camera | None = None
     from_centre: tuple[int, int] = (0, 0)
     panels: list[dict[str, Any]] = field(default_factory=list)
-    _arrays: dict[str, tuple[FloatMap | BoolMap, str]] = field(default_factory=dict)
+    _arrays: dict[str, _Array] = field(default_factory=dict)
     _imported: int = 0
 
     def map(self, values: FloatMap, role: str = "other") -> int:
@@ -81,7 +99,7 @@ class Viewer:
 
     def mask(self, values: BoolMap) -> int:
         """Keep a mask (H, W); returns its number."""
-        return self._number(self._thinned(values.astype(bool)), "mask")
+        return self._number(self._thinned(values.astype(np.float32)), _MASK)
 
     def imported(self, values: FloatMap) -> int:
         """Keep a map of another method, which may take its own share of characters; returns its number."""
@@ -124,7 +142,8 @@ class Viewer:
         """
         picture = "" if self.picture is None else _webp(self._thinned(self.picture))
         height, width = (len(range(0, side, self.stride)) for side in self.shape)
-        budget = (_BUDGET + _BUDGET_IMPORTED * self._imported) * height * width - reserved - len(picture)
+        share = (_BUDGET + _BUDGET_IMPORTED * self._imported) * max(_LEAST_PIXELS, height * width)
+        budget = share - reserved - len(picture)
         steps = self._affordable_steps(budget)
         return {
             "height": height,
@@ -134,22 +153,18 @@ class Viewer:
             "camera": self._camera_json(),
             "picture": picture,
             "panels": self.panels,
-            "arrays": [
-                packed_mask(values) if role == "mask" else packed_map(values, steps[role])
-                for values, role in self._arrays.values()
-            ],
+            "arrays": [array.packed(steps[array.role]) for array in self._arrays.values()],
         }
 
     def _affordable_steps(self, budget: float) -> dict[str, float]:
         """Steps of each role: the finest that keep all arrays within a number of characters, or the coarsest."""
-        masks = sum(len(packed_mask(values)["data"]) for values, role in self._arrays.values() if role == "mask")
-        maps = [(values, role) for values, role in self._arrays.values() if role != "mask"]
-        size = cache(lambda number, step: packed_size(maps[number][0], step))
+        arrays = list(self._arrays.values())
+        size = cache(lambda number, step: arrays[number].size(step))
         for precision in PRECISIONS:
-            steps = dict(zip(ROLES, precision, strict=True))
-            total = masks
-            for number, (_, role) in enumerate(maps):
-                total += size(number, steps[role])
+            steps = dict(zip((*ROLES, _MASK), (*precision, 1.0), strict=True))
+            total = 0
+            for number, array in enumerate(arrays):
+                total += size(number, steps[array.role])
                 if total > budget:
                     break
             else:
@@ -169,12 +184,13 @@ class Viewer:
     def _thinned(self, values: Any) -> Any:
         return values[:: self.stride, :: self.stride]
 
-    def _number(self, values: FloatMap | BoolMap, role: str) -> int:
-        key = hashlib.sha256(np.ascontiguousarray(values).tobytes()).hexdigest() + str(values.dtype)
-        before = self._arrays.get(key, (values, role))[1]
+    def _number(self, values: FloatMap, role: str) -> int:
+        kind = "mask" if role == _MASK else "map"
+        key = kind + hashlib.sha256(np.ascontiguousarray(values).tobytes()).hexdigest()
+        before = self._arrays.get(key)
         # an equal map that is held more finely serves both
-        finer = min(before, role, key=[*ROLES, "mask"].index)
-        self._arrays[key] = (values, finer)
+        finer = role if before is None else min(before.role, role, key=[*ROLES, _MASK].index)
+        self._arrays[key] = _Array(values, finer)
         return list(self._arrays).index(key)
 
 

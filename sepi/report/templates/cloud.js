@@ -196,7 +196,7 @@ Sepi.splat = ({ positions, colours, n }, pixels, width, height, [yaw, pitch], zo
   const [cy, sy, cp, sp] = [Math.cos(yaw), Math.sin(yaw), Math.cos(pitch), Math.sin(pitch)];
   const away = 3.2; // of the eye from the middle
   const focal = 0.42 * Math.min(width, height) * away * zoom;
-  const size = Math.max(1, Math.min(6, Math.ceil((2.2 * focal) / away / Math.sqrt(n || 1))));
+  const spacing = (2.4 * focal) / Math.sqrt(n || 1); // of points at distance 1
   let drawn = 0;
   for (let i = 0; i < n; i++) {
     const x = positions[3 * i];
@@ -205,6 +205,7 @@ Sepi.splat = ({ positions, colours, n }, pixels, width, height, [yaw, pitch], zo
     const turned = -sy * x + cy * z;
     const far = away - sp * y + cp * turned;
     if (far < 0.1) continue;
+    const size = Math.max(1, Math.min(6, Math.ceil(spacing / far)));
     const left = Math.round(width / 2 + (focal * (cy * x + sy * z)) / far - size / 2);
     const top = Math.round(height / 2 + (focal * (cp * y + sp * turned)) / far - size / 2);
     if (left < 0 || top < 0 || left + size > width || top + size > height) continue;

@@ -2,8 +2,11 @@
 
 /* What the method sees at a pixel: its stitched EPIs, its cost curves, the views that are kept. */
 
+/** Columns of a SEPI picture. */
+Sepi.SEPI_WIDTH = 49;
+
 // Okabe and Ito's colours, told apart by every kind of eye
-Sepi.CURVES = { left: "#0072b2", right: "#d55e00", up: "#009e73", down: "#cc79a7" };
+Sepi.CURVES = { left: "#e69f00", right: "#56b4e9", up: "#009e73", down: "#d55e00" };
 
 Sepi.Pixels = class {
   /** @param {HTMLElement} root Holds the elements with data-part attributes that the page's template makes. */
@@ -74,6 +77,9 @@ Sepi.Pixels = class {
   }
 
   pictures(probe) {
+    const [rows, columns] = this.scene.grid;
+    // known before they are decoded, so that nothing below jumps
+    const size = { width: Sepi.SEPI_WIDTH, height: rows * columns };
     const names = {
       minimum: "SEPI at the least cost",
       chosen: "SEPI at the chosen candidate",
@@ -87,7 +93,7 @@ Sepi.Pixels = class {
       return Sepi.element(
         "figure",
         {},
-        Sepi.element("div", { className: "sepi" }, Sepi.element("img", { src, alt: title })),
+        Sepi.element("div", { className: "sepi" }, Sepi.element("img", { src, alt: title, ...size })),
         Sepi.element("figcaption", {}, title),
       );
     });

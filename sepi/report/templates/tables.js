@@ -20,11 +20,12 @@ Sepi.sortable = (table) => {
 /** Rows by a column; averages and rows without a figure there stay at the end. */
 Sepi.sorted = (rows, column, order) => {
   const sign = order === "ascending" ? 1 : -1;
-  const last = (row) => (row.dataset.kind?.startsWith("average") ? 2 : row.cells[column].textContent.trim() ? 0 : 1);
+  const numeric = rows.some((row) => row.cells[column].dataset.value !== undefined);
+  const empty = ({ dataset, textContent }) => (numeric ? dataset.value === undefined : !textContent.trim());
+  const last = (row) => (row.dataset.kind?.startsWith("average") ? 2 : empty(row.cells[column]) ? 1 : 0);
   const compare = (one, other) => {
     const [a, b] = [one.cells[column].dataset, other.cells[column].dataset];
     if (a.value !== undefined && b.value !== undefined) return a.value - b.value;
-    if ((a.value === undefined) !== (b.value === undefined)) return a.value === undefined ? 1 : -1;
     return one.cells[column].textContent.localeCompare(other.cells[column].textContent, "en", { numeric: true });
   };
   return [...rows].sort((one, other) => last(one) - last(other) || sign * compare(one, other));

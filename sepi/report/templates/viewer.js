@@ -36,6 +36,7 @@ Sepi.Viewer = class {
   async show(scene) {
     this.turn += 1;
     this.scene = scene;
+    this.shown = null;
     this.panels = new Sepi.Panels(scene);
     this.cursor = null;
     this.root.style.setProperty("--ratio", scene.width / scene.height);
@@ -171,6 +172,7 @@ Sepi.Viewer = class {
     this.cursor = [x, y];
     this.pending ??= requestAnimationFrame(() => {
       this.pending = undefined;
+      if (!this.shown) return;
       this.readOut();
       for (const side of ["a", "b"]) this.closeUp(this.part(`close-${side}`), this.shown[side].picture);
       this.drawGrid();
