@@ -62,7 +62,8 @@ rule numbers:
         which="|_parts",
     threads: 1
     resources:
-        mem_mb=1000,
+        # light fields are read one after the other
+        mem_mb=500 + max(scene.samples for scene in SETTINGS.scenes.values()) * 8 // 2**20,
     params:
         plan=PLAN.to_json(),
         parameters=SETTINGS.all_parameters_json(),

@@ -682,7 +682,7 @@ def test_pictures_of_a_scene(plan: Plan, tmp_path: Path) -> None:
     common = {"overview.png", "centre.png", "truth.png", "occluded_truth.png", "textureless_truth.png"}
     stages = {"1_initial", "2_occlusion", "3_textureless", "4_optimize"}
     each = stages | {"error", "confidence", "occluded", "textureless", "superpixels"}
-    common.add("paper/sparsification.png")
+    common |= {"paper/sparsification.png", "pixels.png"}
     assert written == common | {f"{variant}/{name}.png" for variant in VARIANTS for name in each}
     centre = cv2.imread(str(tmp_path / "centre.png"))[:, :, ::-1]
     np.testing.assert_array_equal(centre, light_field("cotton").views[1, 1])

@@ -4,6 +4,8 @@ One complete run is shared by the tests; most of them then only ask Snakemake wh
 """
 
 import copy
+import csv
+import json
 import os
 import re
 import shutil
@@ -279,6 +281,85 @@ class TestRerun:
             "optimize": 2,
             "export": 2,
         }
+
+
+class TestReport:
+    def test_the_page_and_its_files_are_made(self, finished: Workflow) -> None:
+        """What a researcher opens, and what goes into a paper."""
+        reports = finished.folder / "reports"
+        page = (reports / "index.html").read_text()
+        for scene in ("builtin/dots", "hci/box"):
+            assert f">{scene}</option>" in page
+        for rule in ("initial", "occlusion", "textureless", "optimize", "numbers", "page"):
+            assert f">{rule}</text>" in page
+        assert "0.0165" in page  # a parameter of the paper's sweep
+        for table in (
+            "table1_mse",
+            "table2_q25",
+            "table3_regions",
+            "table4_ablation",
+            "stages",
+            "runtime",
+            "confidence",
+        ):
+            for ending in ("csv", "md", "tex"):
+                assert (reports / f"{table}.{ending}").stat().st_size > 0
+        figures = [reports / "figures" / name for name in ("ablation", "time_and_memory")]
+        figures += [reports / "maps/builtin/dots" / name for name in ("overview", "pixels", "best/sparsification")]
+        for figure in figures:
+            assert figure.with_suffix(".png").read_bytes().startswith(b"\x89PNG")
+            assert figure.with_suffix(".pdf").read_bytes().startswith(b"%PDF")
+        assert {scene["scene"] for scene in json.loads((reports / "report.json").read_text())["scenes"]} == {
+            "dots",
+            "box",
+        }
+
+    def test_a_pixel_asked_for_redraws_its_scene_alone(self, finished: Workflow) -> None:
+        asked = finished.with_config(report={"pixels": {"builtin/dots": [[20, 30]]}})
+        assert asked.plan("all") == {"all": 1, "maps": 1, "page": 1}
+
+    def test_the_parts_of_best_can_be_shown(self, finished: Workflow) -> None:
+        plan = finished.with_config(report={"parts_of_best": True}).plan("all")
+        assert plan["optimize"] == PARTS["optimize"]
+        assert plan["page"] == 1
+
+    def test_wrong_and_missing_maps_of_other_methods_stop_nothing(self, finished: Workflow, tmp_path: Path) -> None:
+        """The report still comes; the cell and a line at the end say what is wrong."""
+        truth = read_light_field(finished.folder / "results/builtin/dots/lightfield.h5", check_order=False).truth
+        assert truth is not None
+        holed = truth + np.float32(0.1)
+        holed[:10] = np.nan
+        for method, values in {"good": truth + np.float32(0.1), "holed": holed, "small": truth[:40]}.items():
+            (tmp_path / method).mkdir()
+            np.save(tmp_path / method / "dots.npy", values)
+        methods = {name: str(tmp_path / name) for name in ("good", "holed", "small", "absent")}
+        folder = tmp_path / "run"
+        shutil.copytree(finished.folder, folder, symlinks=True)
+        compared = replace(finished, folder=folder).with_config(external=methods)
+        result = compared.run("all")
+        assert result.returncode == 0, result.stdout
+        with (folder / "reports/table1_mse.csv").open(newline="") as file:
+            row = next(row for row in csv.DictReader(file) if (row["scene"], row["row"]) == ("dots", "scene"))
+        wrong = f"{SIZE}x40 instead of {SIZE}x{SIZE}"
+        cells = {"good": "1.0000", "holed": "1.0000", "small": wrong, "absent": "no file"}
+        assert {name: row[name] for name in cells} == cells
+        lines = [line for line in result.stdout.splitlines() if line.startswith("sepi: warning: external")]
+        assert any("external small, scene dots" in line and f"{SIZE}x40" in line for line in lines)
+        assert any("external holed, scene dots" in line and str(10 * SIZE) in line for line in lines)
+        assert "sepi: warning: external absent: no map of dots, box" in lines
+        page = (folder / "reports/index.html").read_text()
+        assert "good (imported)" in page
+        assert '"imported/good"' in page
+        assert '"imported/small"' not in page
+        assert compared.plan("all") == {}
+
+    def test_snakemakes_own_report_works(self, finished: Workflow) -> None:
+        """For provenance: each file with its category and caption."""
+        result = finished.run("all", flags=("--report", "provenance.html"))
+        assert result.returncode == 0, result.stdout
+        text = (finished.folder / "provenance.html").read_text()
+        for word in ("Tables", "Charts", "Scenes", "table1_mse.csv", "MSE x100 with single parts of the method"):
+            assert word in text
 
 
 class TestTargets:

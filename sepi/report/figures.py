@@ -35,10 +35,12 @@ from sepi.report.pictures import (
     outline_picture,
 )
 from sepi.report.plan import MAIN_VARIANT, Plan
+from sepi.report.probe import Probe, to_json
 from sepi.report.probe_figure import write_probes
+from sepi.report.probe_pixels import InterestingPixel
 from sepi.report.saving import BOTH, new_figure, save
 from sepi.report.scene_panels import SceneResults, viewer_of
-from sepi.report.scene_probes import Place, page_probes, scene_probes
+from sepi.report.scene_probes import scene_probes
 from sepi.stage import StageMaps
 
 # width of a panel of the overview in inches; 100 dots each
@@ -190,10 +192,11 @@ def write_scene(results: SceneResults, title: str, folder: Path) -> None:
     write_overview(folder, "overview", title, sheet)
 
 
-def page_json(results: SceneResults, dataset: str, scene: str, probes: list[dict[str, Any]]) -> dict[str, Any]:
+def page_json(results: SceneResults, dataset: str, scene: str, probes: Sequence[Probe]) -> dict[str, Any]:
     """What the page needs of a scene."""
     viewer = viewer_of(results)
-    reserved = len(json.dumps(probes))
+    seen = [to_json(found) for found in probes]
+    reserved = len(json.dumps(seen))
     best = f"{results.compared[0]}/{list(results.maps[results.compared[0]])[-1]}"
     return {
         "dataset": dataset,
@@ -201,7 +204,7 @@ def page_json(results: SceneResults, dataset: str, scene: str, probes: list[dict
         "grid": list(results.light_field.grid),
         "first": {"a": "centre", "b": best},
         **viewer.to_json(reserved),
-        "probes": probes,
+        "probes": seen,
     }
 
 
@@ -219,14 +222,14 @@ def command(
     """Write the pictures of one scene."""
     plan = Plan.from_json(results, plan_text)
     found = read_results(plan, dataset, scene)
-    asked = [Place(int(y), int(x), "asked for") for y, x in json.loads(pixels)]
+    asked = [InterestingPixel(int(y), int(x), "asked for") for y, x in json.loads(pixels)]
     probes = scene_probes(found, plan.stage_file(dataset, scene, MAIN_VARIANT, plan.stages[-1]), asked)
     write_scene(found, f"{dataset}/{scene}", output)
     if probes:
         write_probes(output / "pixels", probes)
     if page is not None:
         with atomic_path(page) as temporary:
-            text = json.dumps(page_json(found, dataset, scene, page_probes(probes)), separators=(",", ":"))
+            text = json.dumps(page_json(found, dataset, scene, probes), separators=(",", ":"))
             temporary.write_text(text, encoding="utf-8")
 
 

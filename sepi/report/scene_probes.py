@@ -4,23 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from sepi.noise import residual_variance
 from sepi.provenance import history_of
 from sepi.report.plan import BEST_VARIANT, MAIN_VARIANT
-from sepi.report.probe import Probe, probe, to_json
-from sepi.report.probe_pixels import InterestingPixel as Place
-from sepi.report.probe_pixels import interesting_pixels
+from sepi.report.probe import Probe, probe
+from sepi.report.probe_pixels import InterestingPixel, interesting_pixels
 from sepi.report.scene_panels import SceneResults
 from sepi.sweep import SweepParameters
 
-__all__ = ["Place", "page_probes", "scene_probes"]
 
-
-def scene_probes(results: SceneResults, final_file: Path, asked: Sequence[Place]) -> list[Probe]:
+def scene_probes(results: SceneResults, final_file: Path, asked: Sequence[InterestingPixel]) -> list[Probe]:
     """What the paper's method sees at single pixels of a scene.
 
     Parameters
@@ -28,7 +24,7 @@ def scene_probes(results: SceneResults, final_file: Path, asked: Sequence[Place]
     results : SceneResults
     final_file : Path
         File of the last stage of the paper's method: it knows the sweep's parameters.
-    asked : sequence of Place
+    asked : sequence of InterestingPixel
         Pixels to look into beside the automatic ones.
 
     Returns
@@ -55,11 +51,6 @@ def scene_probes(results: SceneResults, final_file: Path, asked: Sequence[Place]
         for place in places
         if np.isfinite(maps.disparity[place.y, place.x])
     ]
-
-
-def page_probes(probes: Sequence[Probe]) -> list[dict[str, Any]]:
-    """Probes as the page takes them."""
-    return [to_json(found) for found in probes]
 
 
 def sweep_parameters(final_file: Path) -> SweepParameters:

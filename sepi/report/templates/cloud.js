@@ -205,7 +205,7 @@ Sepi.splat = ({ positions, colours, n }, pixels, width, height, [yaw, pitch], zo
     const turned = -sy * x + cy * z;
     const far = away - sp * y + cp * turned;
     if (far < 0.1) continue;
-    const size = Math.max(1, Math.min(6, Math.ceil(spacing / far)));
+    const size = Math.max(1, Math.min(40, Math.ceil(spacing / far)));
     const left = Math.round(width / 2 + (focal * (cy * x + sy * z)) / far - size / 2);
     const top = Math.round(height / 2 + (focal * (cp * y + sp * turned)) / far - size / 2);
     if (left < 0 || top < 0 || left + size > width || top + size > height) continue;

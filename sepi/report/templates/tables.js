@@ -28,7 +28,9 @@ Sepi.sorted = (rows, column, order) => {
     if (a.value !== undefined && b.value !== undefined) return a.value - b.value;
     return one.cells[column].textContent.localeCompare(other.cells[column].textContent, "en", { numeric: true });
   };
-  return [...rows].sort((one, other) => last(one) - last(other) || sign * compare(one, other));
+  return [...rows].sort(
+    (one, other) => last(one) - last(other) || (last(one) === 2 ? 0 : sign * compare(one, other)),
+  );
 };
 
 document.querySelectorAll("table.sortable").forEach(Sepi.sortable);

@@ -15,7 +15,6 @@ Sepi.Viewer = class {
     this.chosen = chosen;
     this.cursor = null;
     this.turn = 0; // of show(): what an earlier scene began is dropped
-    this.marks = [];
     this.wipe = this.part("wipe");
     this.slider = this.part("slider");
     this.visible = new Set();
@@ -44,7 +43,20 @@ Sepi.Viewer = class {
     this.wipe.height = scene.height;
     this.fillSelects();
     this.fillGrid();
+    this.mark(scene.probes);
     await this.select();
+  }
+
+  /** Show where the prepared pixels are. */
+  mark(probes) {
+    const { width, height, stride } = this.scene;
+    const marks = probes.map(({ x, y, label }, number) => {
+      const mark = Sepi.element("span", { className: "mark", title: label }, `${number + 1}`);
+      mark.style.left = `${(100 * (x / stride + 0.5)) / width}%`;
+      mark.style.top = `${(100 * (y / stride + 0.5)) / height}%`;
+      return mark;
+    });
+    this.part("marks").replaceChildren(...marks);
   }
 
   fillSelects() {
