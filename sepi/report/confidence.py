@@ -104,8 +104,9 @@ def confidence_table(runs: Runs) -> Report:
 
 def write_curves(folder: Path, confidence: FloatMap, error: FloatMap) -> None:
     """Plot the sparsification curve of a map beside the oracle's as ``sparsification.png`` and ``.pdf``."""
-    figure = new_figure(5, 3.5)
-    axis = figure.subplots()
+    # margins by hand: a layout engine takes longer than the rest
+    figure = new_figure(5, 3.5, layout=None)
+    axis = figure.add_axes((0.14, 0.14, 0.83, 0.83))
     taken = np.arange(_STEPS)
     for name, curve, style in (
         ("by confidence", sparsification(confidence, error), "-"),

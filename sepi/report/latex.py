@@ -73,7 +73,9 @@ def _environment(report: Report, section: Section, label: str) -> list[str]:
     grid = section.grid
     wide = _is_wide(grid)
     environment = "table*" if wide else "table"
-    title = f"{report.title}; {section.heading}" if section.heading else report.title
+    # LaTeX numbers tables itself
+    title = re.sub(r"^Table \d+: ", "", report.title)
+    title = f"{title}; {section.heading}" if section.heading else title
     marked = rf" {escaped(report.marked)} (\textbf{{bold}}, \underline{{underlined}})." if report.marked else ""
     alignment = "".join("l" if column.kind == TEXT else "r" for column in grid.columns)
     heads = [escaped(column.head) for column in grid.columns]
