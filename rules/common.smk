@@ -1,12 +1,13 @@
 # What all rules share: the checked configuration, and the names, threads and memory that follow from it.
 
+import json
 import os
 import re
 import sys
 import time
 from pathlib import Path
 
-from sepi.config import load_settings
+from sepi.config import GRAPH_CONFIG, load_settings
 from sepi.digest import ROOT, code_digest
 from sepi.errors import SepiError
 from sepi.io.export import RESULT_FILES
@@ -20,8 +21,11 @@ STARTED = time.time()
 for name, folder in {"PATH": Path(sys.executable).parent, "PYTHONPATH": ROOT}.items():
     os.environ[name] = os.pathsep.join([str(folder), *filter(None, [os.environ.get(name)])])
 
+# the rule graph is drawn of a configuration that stands for all others: sepi.report.graph
+GIVEN = json.loads(os.environ[GRAPH_CONFIG]) if GRAPH_CONFIG in os.environ else config
+
 try:
-    SETTINGS = load_settings(config)
+    SETTINGS = load_settings(GIVEN)
 except SepiError as error:
     sys.exit(f"sepi: {error}")
 except OSError as error:
@@ -114,7 +118,7 @@ def print_warnings():
             for line in log.read_text().splitlines() if is_new(log) else ():
                 absent = re.match(r"sepi: warning: external (.+), scene .+: no such file$", line)
                 if absent:
-                    missing.setdefault(absent[1], []).append(scene)
+                    missing.setdefault(absent[1], []).append(f"{dataset}/{scene}")
                 elif line.startswith("sepi: warning:"):
                     print(line, flush=True)
     # a method rarely has maps of all scenes: one line for each method

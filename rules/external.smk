@@ -23,9 +23,10 @@ rule external:
         mem_mb=memory_for(bytes_per_sample=4, bytes_per_pixel=200 + 10 * len(SETTINGS.external)),
     params:
         maps=lambda wildcards: SETTINGS.external_json(wildcards.dataset, wildcards.scene),
+        scene="{dataset}/{scene}",
         code=code_digest("sepi.external"),
     message:
         "{wildcards.dataset}/{wildcards.scene}: maps of other methods"
     shell:
-        "python -m sepi.external --light-field {input.light_field:q} --maps {params.maps:q} --output {output.maps:q} "
+        "python -m sepi.external --light-field {input.light_field:q} --maps {params.maps:q} --scene {params.scene:q} --output {output.maps:q} "
         "2> {log:q}"

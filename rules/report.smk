@@ -1,7 +1,5 @@
 # What a reader looks at, below reports/: a page with everything, its numbers, tables, charts, and pictures of every scene.
 
-import json
-
 from sepi.report.page import TEMPLATES
 from sepi.report.plan import PARTS_TABLES, TABLES, Plan
 from sepi.report.published import FOLDER as PUBLISHED
@@ -28,7 +26,9 @@ def report_files():
     """The page, its numbers, every table and chart but those of the parts of ``best``, and pictures of every scene."""
     pictures = [f"reports/maps/{dataset}/{scene}" for dataset, scene in SETTINGS.scenes]
     charts = figure_files(["ablation", "time_and_memory"])
-    return ["reports/index.html", "reports/report.json", *table_files(MAIN_TABLES), *charts, *pictures]
+    parts = ablation_files() if PARTS else []
+    tables = table_files(MAIN_TABLES)
+    return list(dict.fromkeys(["reports/index.html", "reports/report.json", *tables, *charts, *parts, *pictures]))
 
 
 def ablation_files():
@@ -65,8 +65,9 @@ rule numbers:
         # light fields are read one after the other
         mem_mb=500 + max(scene.samples for scene in SETTINGS.scenes.values()) * 8 // 2**20,
     params:
-        plan=PLAN.to_json(),
-        parameters=SETTINGS.all_parameters_json(),
+        # functions: braces in names are no wildcards
+        plan=lambda wildcards: PLAN.to_json(),
+        parameters=lambda wildcards: SETTINGS.variants_json(PLAN.parts if wildcards.which else PLAN.listed),
         flags=lambda wildcards: "--parts" if wildcards.which else "",
         code=code_digest("sepi.report.numbers"),
     message:

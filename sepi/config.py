@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-import os
-import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
@@ -15,8 +13,8 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from sepi.datasets import Scene, own_scene, scenes_in
 from sepi.errors import SepiError
+from sepi.external_config import ExternalMaps, external_maps
 from sepi.io import FORMATS
-from sepi.io.maps import SUFFIXES, map_file
 from sepi.io.options import ORDERS
 from sepi.lightfield import DisparityRange
 from sepi.pipeline import STAGES, VARIANTS, Variant
@@ -24,6 +22,11 @@ from sepi.scenes import SCENES
 from sepi.stage import Parameters
 from sepi.validation import require_known, validated
 
+GRAPH_CONFIG = "SEPI_GRAPH_CONFIG"
+"""Environment variable with a configuration (JSON) in place of the workflow's own; the rule graph is asked for so."""
+
+# names of folders and panels that stand beside those of variants
+_RESERVED = ("stages", "imported", "truth", "centre")
 # the built-in scenes have 9x9 views
 _BUILTIN_VIEWS = 81
 # keys whose values are text even where they look like numbers
@@ -79,30 +82,6 @@ class OwnLightField(_Keys):
             words += [f"--{key}", pairs[key].join(map(str, value)) if key in pairs else str(value)]
         words += [word for view in self.exclude for word in ("--exclude", view)]
         return (*words, "--follow-links") if self.follow_links else tuple(words)
-
-
-class ExternalMaps(_Keys):
-    """Keys of one of the ``external`` methods: where its disparity maps are, and what their values mean."""
-
-    path: str = Field(min_length=1)
-    scale: float | None = None
-    offset: float = 0.0
-
-    def file(self, dataset: str, scene: str) -> Path:
-        """The map of a scene: the file that is there, or else the one that was expected."""
-        place = Path(os.path.expanduser(self.path.replace("{dataset}", dataset).replace("{scene}", scene)))
-        if "{scene}" in self.path:
-            # os.path: a folder that may not be entered has no maps, and is no error here
-            return map_file(place) if os.path.isdir(place) else place
-        try:
-            names = sorted(os.listdir(place))
-        except OSError:
-            names = []
-        wanted = [f"{scene}{suffix}" for suffix in SUFFIXES]
-        exact = [name for name in wanted if name in names]
-        alike = [other for name in wanted for other in names if other.casefold() == name.casefold()]
-        files = (place / name for name in (*exact, *alike))
-        return next(filter(os.path.isfile, files), place / wanted[0])
 
 
 class Report(_Keys):
@@ -219,11 +198,14 @@ class Settings:
         """Parameters of a stage's choice as JSON with sorted keys."""
         return json.dumps(self.parameters[stage][choice].model_dump(mode="json"), sort_keys=True)
 
-    def all_parameters_json(self) -> str:
-        """Parameters of every choice of every stage as JSON."""
+    def variants_json(self, variants: Iterable[str]) -> str:
+        """Stage to choice to parameters as JSON, of the choices that some of these variants use."""
+        used = {pair for name in variants for pair in self.variants[name].choices.items()}
         return json.dumps(
             {
-                stage: {choice: values.model_dump(mode="json") for choice, values in choices.items()}
+                stage: {
+                    word: values.model_dump(mode="json") for word, values in choices.items() if (stage, word) in used
+                }
                 for stage, choices in self.parameters.items()
             }
         )
@@ -267,7 +249,7 @@ def load_settings(values: Mapping[str, Any]) -> Settings:
         {key: replace(scene, disparity_range=ranges.get("/".join(key))) for key, scene in scenes.items()},
         dict(VARIANTS) | {name: _variant(name, choices) for name, choices in config.variants.items()},
         _parameters(config.stages),
-        {name: _external(name, entry, config.variants) for name, entry in config.external.items()},
+        {name: external_maps(name, entry, config.variants) for name, entry in config.external.items()},
         _report(config.report, scenes),
     )
 
@@ -334,8 +316,8 @@ def _variant(name: str, choices: Mapping[str, str]) -> Variant:
         require_known(f"{where}.{stage}", [choice], STAGES[stage])
     if name in VARIANTS and dict(choices) != VARIANTS[name].choices:
         raise SepiError(f"{where}: a built-in variant has a fixed meaning; give yours another name")
-    if not name.isidentifier() or name == "stages":
-        raise SepiError(f"{where}: a variant's name must be letters, digits and _, and not 'stages'")
+    if not name.isidentifier() or name in _RESERVED:
+        raise SepiError(f"{where}: a variant's name must be letters, digits and _, and none of {', '.join(_RESERVED)}")
     return Variant(**choices)
 
 
@@ -365,22 +347,3 @@ def _report(report: Report, scenes: Mapping[tuple[str, str], Scene]) -> Report:
                     f"rows and {scene.width} columns, counted from 0"
                 )
     return report
-
-
-def _external(name: str, entry: Mapping[str, Any], variants: Mapping[str, object]) -> ExternalMaps:
-    where = f"config.external.{name}"
-    maps = validated(ExternalMaps, entry, where)
-    if name in VARIANTS or name in variants:
-        raise SepiError(f"{where}: a variant has this name; give the method another")
-    if not name.strip() or name != name.strip() or "/" in name or name.startswith(".") or not name.isprintable():
-        raise SepiError(f"{where}: a method's name must be printable text without '/', not beginning with '.'")
-    require_known(f"{where}.path", re.findall(r"\{[^{}]*\}", maps.path), ("{dataset}", "{scene}"))
-    place = Path(os.path.expanduser(maps.path))
-    if "{scene}" not in maps.path and (place.is_file() or (place.suffix.lower() in SUFFIXES and not place.is_dir())):
-        # one file would be taken for the map of every scene
-        raise SepiError(
-            f"{where}.path: '{maps.path}' is one file; write {{scene}} for the scene's name, or give the folder"
-        )
-    if maps.scale == 0:
-        raise SepiError(f"{where}.scale: must not be 0, or every disparity would be the offset")
-    return maps

@@ -41,7 +41,7 @@ class MapFile(BaseModel):
 _MAP_FILES = TypeAdapter(dict[str, MapFile])
 
 
-def import_maps(light_field: LightField, files: Mapping[str, MapFile]) -> dict[str, Imported]:
+def import_maps(light_field: LightField, files: Mapping[str, MapFile], scene: str = "") -> dict[str, Imported]:
     """Read and score the maps that other methods made of a light field.
 
     What is wrong with a map is told by a :class:`SepiWarning` that names method, scene, file and reason. Values that
@@ -53,6 +53,8 @@ def import_maps(light_field: LightField, files: Mapping[str, MapFile]) -> dict[s
         The scene; without ground truth there are no scores.
     files : mapping of str to MapFile
         Method to the file of its map.
+    scene : str
+        What messages call the scene; the light field's own name unless given.
 
     Returns
     -------
@@ -61,7 +63,7 @@ def import_maps(light_field: LightField, files: Mapping[str, MapFile]) -> dict[s
         value has its problem (``no file``, ``not readable``, ``800x600 instead of 512x512`` as width x height,
         ``no finite value``) and no map.
     """
-    found = {method: _read(light_field, method, file) for method, file in files.items()}
+    found = {method: _read(light_field, scene or light_field.name, method, file) for method, file in files.items()}
     if light_field.truth is None or all(imported.disparity is None for imported in found.values()):
         return found
     # masks of a scene that brings none take longer than all else here, and are the same for every method
@@ -74,13 +76,13 @@ def import_maps(light_field: LightField, files: Mapping[str, MapFile]) -> dict[s
     return found
 
 
-def _read(light_field: LightField, method: str, file: MapFile) -> Imported:
+def _read(light_field: LightField, scene: str, method: str, file: MapFile) -> Imported:
     """The map of a method or its problem, without scores."""
     path = Path(file.path)
     digest = ""
 
     def tell(reason: str) -> None:
-        warnings.warn(f"external {method}, scene {light_field.name}: {reason}", SepiWarning, stacklevel=3)
+        warnings.warn(f"external {method}, scene {scene}: {reason}", SepiWarning, stacklevel=3)
 
     def without_map(problem: str, reason: str) -> Imported:
         tell(reason)
@@ -122,11 +124,12 @@ def _map_files(text: str) -> dict[str, MapFile]:
 @click.command(name="python -m sepi.external", cls=SepiCommand)
 @click.option("--light-field", "light_field_path", type=click.Path(path_type=Path), required=True, help="From ingest.")
 @click.option("--maps", required=True, help='JSON: {"METHOD": {"path": FILE, "scale": NUMBER, "offset": NUMBER}, ...}.')
+@click.option("--scene", default="", help="What messages call the scene; the light field's own name unless given.")
 @click.option("--output", type=click.Path(path_type=Path), required=True, help="File to write (HDF5).")
-def command(light_field_path: Path, maps: str, output: Path) -> None:
+def command(light_field_path: Path, maps: str, scene: str, output: Path) -> None:
     """Read and score the disparity maps that other methods made of a light field."""
     files = _map_files(maps)
-    write_imported(output, import_maps(read_light_field(light_field_path), files))
+    write_imported(output, import_maps(read_light_field(light_field_path), files, scene))
 
 
 if __name__ == "__main__":

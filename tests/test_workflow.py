@@ -344,9 +344,10 @@ class TestReport:
         cells = {"good": "1.0000", "holed": "1.0000", "small": wrong, "absent": "no file"}
         assert {name: row[name] for name in cells} == cells
         lines = [line for line in result.stdout.splitlines() if line.startswith("sepi: warning: external")]
-        assert any("external small, scene dots" in line and f"{SIZE}x40" in line for line in lines)
-        assert any("external holed, scene dots" in line and str(10 * SIZE) in line for line in lines)
-        assert "sepi: warning: external absent: no map of dots, box" in lines
+        assert any("external small, scene builtin/dots" in line and f"{SIZE}x40" in line for line in lines)
+        assert any("external holed, scene builtin/dots" in line and str(10 * SIZE) in line for line in lines)
+        assert "sepi: warning: external absent: no map of builtin/dots, hci/box" in lines
+        assert "| 1.00 (16 % unknown) |" in (folder / "reports/table1_mse.md").read_text()
         page = (folder / "reports/index.html").read_text()
         assert "good (imported)" in page
         assert '"imported/good"' in page

@@ -114,7 +114,7 @@ def _read_png(path: Path, scaled: bool) -> FloatMap:
     if not scaled:
         raise SepiError(
             f"{path}: a PNG without the text chunks 'scale' and 'offset' does not say what its levels mean; give a "
-            "scale (disparity = level * scale + offset)"
+            "scale (disparity = level * scale + offset) where it is configured, or write the map as .pfm or .npy"
         )
     return levels.astype(np.float32)
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import click
 import numpy as np
+from matplotlib.patches import Patch
 
 from sepi.command import SepiCommand
 from sepi.report.page_data import BarGroup, StageTimes, ablation_bars, part_bars, stage_times
@@ -32,19 +33,21 @@ def write_bars(folder: Path, name: str, groups: Sequence[BarGroup]) -> None:
         axis.set_axis_off()
     for axis, group in zip(axes, groups, strict=False):
         place = np.arange(len(group.rows))
-        for shift, key, colour, label in ((-0.2, "ours", _OURS, "this code"), (0.2, "published", _PUBLISHED, "paper")):
+        for shift, key, colour in ((-0.2, "ours", _OURS), (0.2, "published", _PUBLISHED)):
             values = np.array([getattr(row, key) for row in group.rows], np.float64)
             if not np.isnan(values).all():
-                bars = axis.barh(place + shift, values, 0.38, color=colour, label=label)
+                bars = axis.barh(place + shift, values, 0.38, color=colour)
                 axis.bar_label(bars, ["" if np.isnan(value) else f"{value:.2f}" for value in values], fontsize=6)
         axis.set_yticks(place, [row.variant for row in group.rows], fontsize=7)
         axis.invert_yaxis()
         axis.margins(x=0.15)
         count = f", {group.scenes} scenes" if group.scenes > 1 else ""
-        axis.set_title(f"{group.dataset}, {group.region}{count}", fontsize=8)
+        axis.set_title(f"{group.dataset}, {group.region}{count}", fontsize=8, parse_math=False)
         axis.tick_params(axis="x", labelsize=7)
         axis.set_xlabel("MSE x100", fontsize=7)
-    axes[0].legend(fontsize=7)
+    labels = {"this code, scenes at hand": _OURS, "the paper, all its scenes": _PUBLISHED}
+    handles = [Patch(color=colour, label=label) for label, colour in labels.items()]
+    figure.legend(handles=handles, fontsize=7, loc="outside upper center", ncols=2)
     return save(figure, folder, name)
 
 
@@ -63,7 +66,7 @@ def write_times(folder: Path, name: str, rows: Sequence[StageTimes]) -> None:
         shift = (number + 0.5) / len(stages) - 0.5
         memory.barh(place + 0.7 * shift, peaks, 0.6 / len(stages), color=colour)
         left += seconds
-    time.set_yticks(place, [f"{row.scene}, {row.variant}" for row in rows], fontsize=7)
+    time.set_yticks(place, [f"{row.scene}, {row.variant}" for row in rows], fontsize=7, parse_math=False)
     time.invert_yaxis()
     time.set_xlabel("seconds", fontsize=8)
     memory.set_xlabel("peak memory / MB", fontsize=8)

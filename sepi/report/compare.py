@@ -108,7 +108,16 @@ def _viewer(found: Comparison) -> Viewer:
         for key, name, number in zip("ab", found.names, numbers, strict=True):
             viewer.panel("Errors", f"{key}/error", f"{name}: error", "error", map=number, minus=truth)
         title = f"{found.names[0]} beside {found.names[1]}: which is nearer to the truth"
-        viewer.panel("Errors", "change", title, "change", map=numbers[1], minus=numbers[0], truth=truth)
+        viewer.panel(
+            "Errors",
+            "change",
+            title,
+            "change",
+            map=numbers[1],
+            minus=numbers[0],
+            truth=truth,
+            ends=["farther", "nearer"],
+        )
     return viewer
 
 

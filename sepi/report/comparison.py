@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
-from sepi.evaluate import PROTOCOLS
+from sepi.evaluate import PROTOCOLS, WHOLE_MAP
 from sepi.external import NO_FILE
 from sepi.report import published
 from sepi.report.layout import (
@@ -44,9 +44,6 @@ REGIONS_NOTE = (
     "Regions are those of `sepi.regions`, or the exact ones that a built-in scene brings; the paper's are not known."
 )
 
-# the paper's own among the methods whose figures it prints
-_PAPERS_METHOD = "zhou"
-
 
 @dataclass(frozen=True)
 class _Compared:
@@ -57,11 +54,12 @@ class _Compared:
     ours: Sequence[float | None]
     theirs: Mapping[str, float | None]
     imported: Mapping[str, Cell]
+    notes: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def ratios(self) -> list[float | None]:
         """Our figures divided by that of the paper's method."""
-        paper = self.theirs.get(_PAPERS_METHOD)
+        paper = self.theirs.get(published.PAPERS_METHOD)
         return [figure / paper if figure is not None and paper else None for figure in self.ours]
 
     def row(self, methods: Sequence[Method]) -> list[Cell]:
@@ -80,7 +78,7 @@ class _Compared:
             *(Entry(figure, OURS, mark) for figure, mark in zip(self.ours, marks[:own], strict=True)),
             *(Entry(ratio, RATIO) for ratio in self.ratios),
             *(Entry(text, PUBLISHED, mark) for text, mark in zip(texts, marks[own:], strict=True)),
-            *(Entry(self.imported.get(method), IMPORTED) for method in imported),
+            *(Entry(self.imported.get(name), IMPORTED, note=self.notes.get(name, "")) for name in imported),
         ]
         return Line(entries, self.kind, at_hand=any(figure is not None for figure in self.ours))
 
@@ -115,16 +113,18 @@ def scene_table(runs: Runs, score: str, paper: SceneTable, title: str) -> Report
         ]
         rows += [[dataset, *one.row(methods)] for one in found]
         grid = Grid(columns, [one.line(methods, imported) for one in found])
-        sections.append(Section(dataset_title(dataset), grid.without_empty()))
+        if found:
+            sections.append(Section(dataset_title(dataset), grid.without_empty()))
     ratios = ["ratio" if variant == MAIN_VARIANT else f"ratio_{variant}" for variant in plan.compared]
     keys = ["dataset", "scene", "row", *own_keys(plan), *ratios, *(method.key for method in methods)]
     return Report(
         title,
         f"{PROTOCOL_NOTE} This code: variants {own_names(plan)}; then each figure of these divided by the published "
-        f"one of the paper's method, {published.methods()[_PAPERS_METHOD].label}. Other columns: as the paper prints "
-        f"them; empty where the scene was in the method's training set. {LEARNED_NOTE} A scene without a figure of "
-        "this code is not at hand; one without published figures is not in the paper. The average of the scenes at "
-        "hand is empty where a method has no figure for one of them." + (f" {IMPORTED_NOTE}" if plan.external else ""),
+        f"one of the paper's method, {published.methods()[published.PAPERS_METHOD].label}. Other columns: as the paper "
+        f"prints them; empty where the scene was in the method's training set. {LEARNED_NOTE} A scene without a figure "
+        "of this code is not at hand, or has no ground truth here; one without published figures is not in the paper. "
+        "The average of the scenes at hand is empty where a method has no figure for one of them."
+        + (f" {IMPORTED_NOTE}" if plan.external else ""),
         Table([*keys, *imported_keys(plan, keys)], rows),
         sections,
         "Marked: best and second best in a row, of this code and the published methods that are not learned",
@@ -139,10 +139,12 @@ def _scene_rows(runs: Runs, dataset: str, score: str, paper: SceneTable) -> list
         scene = own_names.get(name)
         ours: list[float | None] = [None] * len(runs.plan.compared)
         imported: dict[str, Cell] = dict.fromkeys(runs.plan.external)
+        notes: dict[str, str] = {}
         if scene is not None:
             ours = [runs.final(dataset, scene, score, variant=variant) for variant in runs.plan.compared]
             imported = {method: imported_cell(runs, dataset, scene, method, score) for method in runs.plan.external}
-        rows.append(_Compared(name, SCENE, ours, paper.cells.get((dataset, name), {}), imported))
+            notes = {method: unknown_note(runs, dataset, scene, method) for method in runs.plan.external}
+        rows.append(_Compared(name, SCENE, ours, paper.cells.get((dataset, name), {}), imported, notes))
     return rows
 
 
@@ -178,6 +180,13 @@ def imported_cell(runs: Runs, dataset: str, scene: str, method: str, score: str)
     """The score of an imported map by the paper's protocol, or what is wrong with it."""
     figure = runs.external_score(dataset, scene, method, score)
     return (runs.external_problem(dataset, scene, method) or None) if figure is None else figure
+
+
+def unknown_note(runs: Runs, dataset: str, scene: str, method: str) -> str:
+    """How much of an imported map is not finite, which its mean squared error does not show; empty where all is."""
+    scores = runs.external_scores(dataset, scene, method)
+    whole = scores["paper"][WHOLE_MAP] if scores else {"pixels": 0}
+    return f"{100 * whole['non_finite'] / whole['pixels']:.0f} % unknown" if whole.get("non_finite") else ""
 
 
 def imported_keys(plan: Plan, taken: Iterable[str]) -> list[str]:

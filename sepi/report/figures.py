@@ -43,6 +43,8 @@ from sepi.report.scene_panels import SceneResults, viewer_of
 from sepi.report.scene_probes import scene_probes
 from sepi.stage import StageMaps
 
+_ASKED = "asked for"
+
 # width of a panel of the overview in inches; 100 dots each
 _PANEL = 3.0
 
@@ -59,7 +61,7 @@ class Panel:
 def scene_panels(light_field: LightField, evaluation: Evaluation) -> list[Panel]:
     """What does not depend on the variant: reference view, and ground truth with its regions where there is any."""
     centre = centre_picture(light_field)
-    panels = [Panel("centre", "centre view", centre)]
+    panels = [Panel("centre", "reference view", centre)]
     if light_field.truth is not None:
         truth = map_picture(light_field.truth, disparity_limits(light_field))
         panels.append(Panel("truth", "ground truth", truth))
@@ -88,7 +90,25 @@ def detail_panels(light_field: LightField, variant: str, final: StageMaps) -> li
     if "superpixels" in final.extra:
         picture = outline_picture(centre, final.extra["superpixels"])
         panels.append(Panel(f"{variant}/superpixels", f"{variant}: superpixels", picture))
+    if "lti" in final.extra:
+        panels.append(Panel(f"{variant}/lti", f"{variant}: LTI", map_picture(final.extra["lti"], (0, 1), "gray")))
     return panels
+
+
+def change_panels(evaluations: Mapping[str, Evaluation]) -> list[Panel]:
+    """How much farther from the truth each variant is than the paper's method; nothing without ground truth."""
+    full = evaluations[MAIN_VARIANT].error
+    if full is None:
+        return []
+    return [
+        Panel(
+            f"{variant}/change",
+            f"{MAIN_VARIANT} beside {variant}\n(red: mended, blue: harmed)",
+            error_picture(np.abs(evaluation.error) - np.abs(full)),
+        )
+        for variant, evaluation in evaluations.items()
+        if variant != MAIN_VARIANT and evaluation.error is not None
+    ]
 
 
 def error_panels(variant: str, evaluation: Evaluation) -> list[Panel]:
@@ -127,14 +147,15 @@ def write_overview(
     # one frame for all pictures, whose unit is an inch: many frames are slow to draw
     sheet = figure.add_axes((0, 0, 1, 1))
     sheet.set_axis_off()
-    sheet.text(size[0] / 2, size[1] - 0.1, title, fontsize=12, ha="center", va="top")
+    sheet.text(size[0] / 2, size[1] - 0.1, title, fontsize=12, ha="center", va="top", parse_math=False)
     for number, row in enumerate(filled):
         bottom = size[1] - 0.4 - (number + 1) * panel_height
         for column, panel in enumerate(row):
             left, top = column * _PANEL + 0.05, bottom + panel_height - 0.35
             extent = (left, left + _PANEL - 0.1, bottom + 0.05, top)
             sheet.imshow(panel.picture, extent=extent, aspect="auto", interpolation="antialiased")
-            sheet.text(left + _PANEL / 2 - 0.05, top + 0.04, panel.title, fontsize=8, ha="center", va="bottom")
+            place = (left + _PANEL / 2 - 0.05, top + 0.04)
+            sheet.text(*place, panel.title, fontsize=8, ha="center", va="bottom", parse_math=False)
     # pictures set limits of their own
     sheet.set_xlim(0, size[0])
     sheet.set_ylim(0, size[1])
@@ -161,6 +182,7 @@ def read_results(plan: Plan, dataset: str, scene: str) -> SceneResults:
             for method, found in imported.items()
             if found.disparity is not None
         },
+        problems={method: found.problem for method, found in imported.items() if found.disparity is None},
     )
 
 
@@ -176,8 +198,9 @@ def write_scene(results: SceneResults, title: str, folder: Path) -> None:
     details = {variant: detail_panels(light_field, variant, results.final(variant)) for variant in results.maps}
     errors = {variant: error_panels(variant, evaluation) for variant, evaluation in results.evaluations.items()}
     imported = imported_panels(results)
+    changes = change_panels(results.evaluations)
     groups = [panels for group in (stages, details, errors) for panels in group.values()]
-    for panel in [*common, *(panel for panels in groups for panel in panels), *imported]:
+    for panel in [*common, *(panel for panels in groups for panel in panels), *changes, *imported]:
         write_png(folder / f"{panel.name}.png", panel.picture)
     others = [variant for variant in results.maps if variant != MAIN_VARIANT]
     sheet = [
@@ -186,6 +209,7 @@ def write_scene(results: SceneResults, title: str, folder: Path) -> None:
         details[MAIN_VARIANT],
         [stages[variant][-1] for variant in others],
         [panel for variant in others for panel in errors[variant]],
+        changes,
         [panel for panel in imported if not panel.name.endswith("/error")],
         [panel for panel in imported if panel.name.endswith("/error")],
     ]
@@ -196,7 +220,8 @@ def page_json(results: SceneResults, dataset: str, scene: str, probes: Sequence[
     """What the page needs of a scene."""
     viewer = viewer_of(results)
     seen = [to_json(found) for found in probes]
-    reserved = len(json.dumps(seen))
+    # pixels that were asked for come on top of a scene's share
+    reserved = len(json.dumps([found for found in seen if found["label"] != _ASKED]))
     best = f"{results.compared[0]}/{list(results.maps[results.compared[0]])[-1]}"
     return {
         "dataset": dataset,
@@ -205,6 +230,7 @@ def page_json(results: SceneResults, dataset: str, scene: str, probes: Sequence[
         "first": {"a": "centre", "b": best},
         **viewer.to_json(reserved),
         "probes": seen,
+        "problems": dict(results.problems),
     }
 
 
@@ -222,7 +248,7 @@ def command(
     """Write the pictures of one scene."""
     plan = Plan.from_json(results, plan_text)
     found = read_results(plan, dataset, scene)
-    asked = [InterestingPixel(int(y), int(x), "asked for") for y, x in json.loads(pixels)]
+    asked = [InterestingPixel(int(y), int(x), _ASKED) for y, x in json.loads(pixels)]
     probes = scene_probes(found, plan.stage_file(dataset, scene, MAIN_VARIANT, plan.stages[-1]), asked)
     write_scene(found, f"{dataset}/{scene}", output)
     if probes:

@@ -7,10 +7,12 @@ from __future__ import annotations
 
 import html
 import json
+import os
 import re
 import subprocess
 import sys
 import tempfile
+import warnings
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
@@ -18,7 +20,8 @@ from pathlib import Path
 import click
 
 from sepi.command import SepiCommand
-from sepi.errors import SepiError
+from sepi.config import GRAPH_CONFIG
+from sepi.errors import SepiError, SepiWarning
 from sepi.io.files import atomic_path
 
 Edges = Sequence[tuple[str, str]]
@@ -42,14 +45,14 @@ def rule_edges(snakefile: Path, config: Mapping[str, object]) -> list[tuple[str,
         If Snakemake does not say.
     """
     small = {**config, "builtin": {"scenes": ["dots"]}}
+    # in a folder of its own: the one that is worked in is locked
     with tempfile.TemporaryDirectory() as folder:
-        # in a folder of its own: the one that is worked in is locked
-        configfile = Path(folder) / "graph.json"
-        configfile.write_text(json.dumps(small), encoding="utf-8")
-        words = ["--snakefile", str(snakefile.resolve()), "--configfile", str(configfile), "--rulegraph", "mermaid-js"]
+        words = ["--snakefile", str(snakefile.resolve()), "--rulegraph", "mermaid-js"]
         run = subprocess.run(
             [sys.executable, "-m", "snakemake", *words, "--", "all"],
             cwd=folder,
+            # in place of a configuration that is not known here, whose relative paths would mean nothing
+            env=os.environ | {GRAPH_CONFIG: json.dumps(small)},
             capture_output=True,
             text=True,
             check=False,
@@ -187,7 +190,12 @@ def drawn(edges: Edges) -> str:
 @click.option("--output", type=click.Path(path_type=Path), required=True, help="SVG file to write.")
 def command(snakefile: Path, config: str, output: Path) -> None:
     """Draw the rules that 'snakemake all' runs."""
-    picture = drawn(rule_edges(snakefile, json.loads(config)))
+    try:
+        picture = drawn(rule_edges(snakefile, json.loads(config)))
+    except SepiError as error:
+        # the page is worth more than its graph
+        warnings.warn(str(error), SepiWarning, stacklevel=1)
+        picture = '<p class="soft">Snakemake gave no rule graph; logs/graph.log says why.</p>\n'
     with atomic_path(output) as temporary:
         temporary.write_text(picture, encoding="utf-8")
 

@@ -57,16 +57,19 @@ class Entry:
         Of the kinds above.
     mark : str or None
         :data:`BEST` or :data:`SECOND`.
+    note : str
+        What must be known of the figure, after it.
     """
 
     cell: Cell
     kind: str = FIGURE
     mark: str | None = None
+    note: str = ""
 
     @property
     def text(self) -> str:
         """As a page shows it, without the mark's sign."""
-        return short(self.cell)
+        return f"{short(self.cell)} ({self.note})" if self.note else short(self.cell)
 
     @property
     def value(self) -> float | None:

@@ -9,7 +9,7 @@ import hashlib
 import json
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict
 from datetime import datetime
@@ -70,8 +70,9 @@ def collect(plan: Plan, parameters: Parameters | None = None, parts: bool = Fals
     Returns
     -------
     dict
-        As JSON has it: text, numbers, None (also for NaN), lists and dictionaries. ``made``: date, versions, machine;
-        ``protocols``: name to border; ``plan``; ``parameters``; ``scenes``: a list, each with ``dataset``, ``scene``,
+        As JSON has it: text, numbers, None (also for NaN), lists and dictionaries. ``made``: date of the newest
+        result, versions, machine; ``protocols``: name to border; ``plan``; ``parameters``; ``scenes``: a list, each
+        with ``dataset``, ``scene``,
         ``light_field``, ``stages`` (path of choices to ``stage``, ``scores``, ``seconds``, ``peak_memory_mb``),
         ``confidence`` (variant to errors) and ``external`` (method to ``problem``, ``source``, ``sha256``, ``scores``);
         ``tables``: name to :func:`sepi.report.layout.as_json`. With ``parts``, scenes have ``stages`` only, and
@@ -83,7 +84,7 @@ def collect(plan: Plan, parameters: Parameters | None = None, parts: bool = Fals
         If a file is missing or not what it should be.
     """
     numbers: dict[str, Any] = {
-        "made": made_here(),
+        "made": made_here(plan.number_inputs(parts)),
         "protocols": dict(PROTOCOLS),
         "plan": plan.content(),
         "parameters": _used(plan, parameters or {}, parts),
@@ -95,15 +96,17 @@ def collect(plan: Plan, parameters: Parameters | None = None, parts: bool = Fals
     return numbers | {"tables": tables}
 
 
-def made_here() -> dict[str, Any]:
-    """When and with what a report was made; no names of hosts or users."""
+def made_here(files: Sequence[Path]) -> dict[str, Any]:
+    """When the newest of the files was made, and with what they were collected; no names of hosts or users."""
+    # not the time of day: equal results give equal numbers
+    newest = max((file.stat().st_mtime for file in files if file.is_file()), default=0.0)
     machine = this_machine()
     libraries = {}
     for name in LIBRARIES:
         with suppress(PackageNotFoundError):
             libraries[name] = version(name)
     return {
-        "date": datetime.now().astimezone().isoformat(timespec="seconds"),
+        "date": datetime.fromtimestamp(newest).astimezone().isoformat(timespec="seconds"),
         "version": machine["sepi"],
         "python": machine["python"],
         "machine": {

@@ -15,18 +15,19 @@ from markupsafe import Markup, escape
 from matplotlib.colors import Colormap
 
 from sepi.command import SepiCommand
-from sepi.errors import SepiError
 from sepi.io.files import atomic_path
 from sepi.report import page_data, published
 from sepi.report.pictures import error_scale, scale_colours
 from sepi.report.plan import TABLES
-from sepi.report.runs import Runs, read_numbers
+from sepi.report.runs import Runs, read_json, read_numbers
 
 SCRIPTS = ("unpack.js", "panels.js", "viewer.js", "cloud.js", "pixel.js", "tables.js", "page.js")
 """Scripts of a page, in the order in which they are run."""
 
 
-TEMPLATES = sorted((Path(__file__).parent / "templates").iterdir())
+TEMPLATES = sorted(
+    path for path in (Path(__file__).parent / "templates").iterdir() if path.suffix in (".j2", ".js", ".css")
+)
 """Files that a page is put together from."""
 
 
@@ -111,7 +112,7 @@ def page_of(
             bars=page_data.ablation_bars(runs),
             part_bars=[] if parts is None else page_data.part_bars(Runs(parts)),
             times=page_data.stage_times(runs),
-            total_seconds=page_data.total_seconds(numbers),
+            total_seconds=page_data.total_seconds(*filter(None, (numbers, parts))),
             parameters=page_data.parameter_rows(numbers),
             graph=Markup(graph),
             scenes=embedded_scenes(scenes),
@@ -139,15 +140,7 @@ def read_scene(path: Path) -> dict[str, Any]:
     SepiError
         If the file is missing or not such a file.
     """
-    try:
-        scene = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise SepiError(f"{path}: cannot be read ({error.strerror})") from error
-    except ValueError as error:
-        raise SepiError(f"{path}: not JSON ({error}); expected what python -m sepi.report.figures writes") from error
-    if not isinstance(scene, dict) or not {"dataset", "scene", "panels", "arrays"} <= scene.keys():
-        raise SepiError(f"{path}: not a scene of a report, which python -m sepi.report.figures writes")
-    return scene
+    return read_json(path, {"dataset", "scene", "panels", "arrays"}, "a scene of a report", "sepi.report.figures")
 
 
 _FILE = click.Path(path_type=Path)

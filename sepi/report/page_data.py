@@ -11,8 +11,6 @@ from sepi.evaluate import REGIONS, WHOLE_MAP
 from sepi.report import published
 from sepi.report.runs import Numbers, Runs
 
-_METHOD_OF_THE_PAPER = "zhou"
-
 
 def headline(runs: Runs) -> list[dict[str, Any]]:
     """Scenes that the paper has too: our figures beside the published ones.
@@ -29,7 +27,7 @@ def headline(runs: Runs) -> list[dict[str, Any]]:
             if name is None:
                 continue
             theirs = [
-                table.cells[dataset, name].get(_METHOD_OF_THE_PAPER)
+                table.cells[dataset, name].get(published.PAPERS_METHOD)
                 for table in (published.table1(), published.table2())
             ]
             ours = {
@@ -158,9 +156,15 @@ def stage_times(runs: Runs) -> list[StageTimes]:
     return rows
 
 
-def total_seconds(numbers: Numbers) -> float:
-    """Seconds of all stage processes, each once."""
-    return float(sum(stage["seconds"] for scene in numbers["scenes"] for stage in scene["stages"].values()))
+def total_seconds(*reports: Numbers) -> float:
+    """Seconds of all stage processes in some numbers, each once."""
+    seconds = {
+        (scene["dataset"], scene["scene"], key): stage["seconds"]
+        for numbers in reports
+        for scene in numbers["scenes"]
+        for key, stage in scene["stages"].items()
+    }
+    return float(sum(seconds.values()))
 
 
 def parameter_rows(numbers: Numbers) -> list[tuple[str, list[tuple[str, Any]]]]:

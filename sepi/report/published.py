@@ -20,6 +20,9 @@ FOLDER = Path(__file__).parent / "published"
 AVERAGE = "Average"
 """Name of the average rows in the paper's tables 1 and 2."""
 
+PAPERS_METHOD = "zhou"
+"""Key of the paper's own method."""
+
 DATASETS: dict[str, str] = {"hci": "HCI 4D light field benchmark", "hci_old": "HCI Blender (2013)"}
 """Data sets of the paper, under the names that this project gives them."""
 

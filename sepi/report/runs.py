@@ -116,15 +116,33 @@ def read_numbers(path: Path) -> dict[str, Any]:
     SepiError
         If the file is missing or not such a file.
     """
+    return read_json(path, {"plan", "scenes", "tables"}, "the numbers of a report", "sepi.report.numbers")
+
+
+def read_json(path: Path, keys: set[str], what: str, module: str) -> dict[str, Any]:
+    """Read a JSON object that must have certain keys.
+
+    Parameters
+    ----------
+    path : Path
+    keys : set of str
+    what, module : str
+        What the file should be, and which module writes such files; for the message.
+
+    Raises
+    ------
+    SepiError
+        If the file is missing or not such a file.
+    """
     try:
-        numbers = json.loads(path.read_text(encoding="utf-8"))
+        found = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise SepiError(f"{path}: cannot be read ({error.strerror})") from error
     except ValueError as error:
-        raise SepiError(f"{path}: not JSON ({error}); expected what python -m sepi.report.numbers writes") from error
-    if not isinstance(numbers, dict) or not {"plan", "scenes", "tables"} <= numbers.keys():
-        raise SepiError(f"{path}: not the numbers of a report, which python -m sepi.report.numbers writes")
-    return numbers
+        raise SepiError(f"{path}: not JSON ({error}); expected what python -m {module} writes") from error
+    if not isinstance(found, dict) or not keys <= found.keys():
+        raise SepiError(f"{path}: not {what}, which python -m {module} writes")
+    return found
 
 
 def _with_nan(scores: Mapping[str, Mapping[str, Mapping[str, float | None]]]) -> dict[str, dict[str, Scores]]:

@@ -13,7 +13,7 @@ from sepi.report.plan import MAIN_VARIANT
 from sepi.report.viewer import Viewer
 from sepi.stage import StageMaps
 
-# what the picture of a detected region is called; the two variants detect different things
+# titles of what a variant took for a region, which need not be the region that is scored
 _DETECTED = {"occluded": "occluded, detected", "textureless": "texture-less, detected"}
 
 
@@ -32,6 +32,8 @@ class SceneResults:
         Variants of which every stage is shown.
     imported : mapping of str to (ndarray (H, W), Evaluation)
         Other methods' maps.
+    problems : mapping of str to str
+        Other methods without a map, and why.
     """
 
     light_field: LightField
@@ -39,6 +41,7 @@ class SceneResults:
     evaluations: Mapping[str, Evaluation]
     compared: list[str]
     imported: Mapping[str, tuple[FloatMap, Evaluation]] = field(default_factory=dict)
+    problems: Mapping[str, str] = field(default_factory=dict)
 
     def final(self, variant: str) -> StageMaps:
         """The maps after the last stage."""
@@ -162,7 +165,8 @@ def _add_details(viewer: Viewer, results: SceneResults, confidence: Mapping[str,
                 number = viewer.mask(final.mask(region))
                 viewer.panel(group, f"{variant}/mask/{region}", f"{variant}: {title}", "mask", map=number)
         if "superpixels" in final.extra:
-            number = viewer.mask(outlines(final.extra["superpixels"]))
+            # thinned out first: lines of one pixel would break
+            number = viewer.kept_mask(outlines(viewer.thinned(final.extra["superpixels"])))
             viewer.panel(group, f"{variant}/superpixels", f"{variant}: superpixels", "outline", map=number)
         if "lti" in final.extra:
             title = f"{variant}: local texture intensity (LTI)"

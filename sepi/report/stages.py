@@ -96,8 +96,8 @@ def runtime_table(runs: Runs) -> Report:
     heads = ["dataset", "scene", "variant", "stage", "choice", "seconds", "peak_memory_mb"]
     return Report(
         "Run time per stage",
-        "Wall-clock seconds of each stage's process, reading and writing included, on the machine that made this "
-        "report. Variants that begin alike share their first stages: such a stage is listed with each of them, but ran "
+        "Wall-clock seconds of each stage's process, reading and writing included, on the machine that ran "
+        "it. Variants that begin alike share their first stages: such a stage is listed with each of them, but ran "
         "once. Published: the paper's averages for 512x512 pixels and 9x9 views on an Intel Core i7-8700, nothing in "
         "parallel; published / this code is how many times the total of this code's `paper` fits into theirs, for "
         "scenes of that size only; the machines differ.",

@@ -32,14 +32,17 @@ PRECISIONS = (
     (0.001, 0.02, 0.01),
     (0.001, 0.02, 0.02),
     (0.001, 0.05, 0.02),
-    (0.002, 0.05, 0.02),
-    (0.002, 0.05, 0.05),
-    (0.005, 0.05, 0.05),
+    (0.001, 0.05, 0.03),
+    (0.001, 0.05, 0.05),
+    (0.001, 0.05, 0.1),
+    (0.002, 0.1, 0.1),
+    (0.005, 0.1, 0.1),
+    (0.01, 0.2, 0.2),
 )
 """Steps of the maps of each role, from the finest; the first is taken that keeps the scene within its share."""
 
 # Characters for each pixel: ten scenes of 512x512 and the page round them stay below 15 MB. Imported maps come on top.
-_BUDGET = 5.2
+_BUDGET = 5.4
 _BUDGET_IMPORTED = 0.2
 # a smaller scene may take as much as one of 512x512
 _LEAST_PIXELS = 2**18
@@ -95,11 +98,15 @@ class Viewer:
 
     def map(self, values: FloatMap, role: str = "other") -> int:
         """Keep a map (H, W) of one of :data:`ROLES`; returns the number that panels call it by."""
-        return self._number(self._thinned(values.astype(np.float32)), role)
+        return self._number(self.thinned(values.astype(np.float32)), role)
 
     def mask(self, values: BoolMap) -> int:
         """Keep a mask (H, W); returns its number."""
-        return self._number(self._thinned(values.astype(np.float32)), _MASK)
+        return self.kept_mask(self.thinned(values))
+
+    def kept_mask(self, values: BoolMap) -> int:
+        """Keep a mask that is thinned out already; returns its number."""
+        return self._number(values.astype(np.float32), _MASK)
 
     def imported(self, values: FloatMap) -> int:
         """Keep a map of another method, which may take its own share of characters; returns its number."""
@@ -119,8 +126,9 @@ class Viewer:
         kind : str
             ``picture``, ``disparity``, ``error``, ``change``, ``confidence``, ``grey``, ``mask`` or ``outline``.
         **more
-            ``map``: number of its array; ``minus``: of the array taken from it; ``confidence``: of the confidence
-            that is read out beside it; ``note``: what is to be said of it.
+            ``map``: number of its array; ``minus``: of the array taken from it; ``truth``: of the truth that both are
+            compared with; ``confidence``: of the confidence that is read out beside it; ``note``: what is to be said
+            of it; ``ends``: words for the low and the high end of its scale.
         """
         if any(panel["key"] == key for panel in self.panels):
             raise ValueError(f"two panels are called {key!r}")
@@ -140,7 +148,7 @@ class Viewer:
         reserved : int
             Characters that what stands beside it takes of the scene's share.
         """
-        picture = "" if self.picture is None else _webp(self._thinned(self.picture))
+        picture = "" if self.picture is None else _webp(self.thinned(self.picture))
         height, width = (len(range(0, side, self.stride)) for side in self.shape)
         share = (_BUDGET + _BUDGET_IMPORTED * self._imported) * max(_LEAST_PIXELS, height * width)
         budget = share - reserved - len(picture)
@@ -181,7 +189,8 @@ class Viewer:
             "from_centre": list(self.from_centre),
         }
 
-    def _thinned(self, values: Any) -> Any:
+    def thinned(self, values: Any) -> Any:
+        """The rows and columns of an array (H, W, ...) that are kept."""
         return values[:: self.stride, :: self.stride]
 
     def _number(self, values: FloatMap, role: str) -> int:
@@ -204,6 +213,6 @@ def _webp(picture: Picture) -> str:
         flipped = np.ascontiguousarray(picture[:, :, ::-1])
         _, data = cv2.imencode(".webp", flipped, [cv2.IMWRITE_WEBP_QUALITY, quality])
         text = data_uri("image/webp", data.tobytes())
-        if len(text) <= _PICTURE_SHARE * picture.shape[0] * picture.shape[1]:
+        if len(text) <= _PICTURE_SHARE * max(_LEAST_PIXELS, picture.shape[0] * picture.shape[1]):
             break
     return text

@@ -20,7 +20,7 @@ Sepi.Cloud = class {
     this.canvas.addEventListener("wheel", (event) => this.wheel(event), { passive: false });
     this.canvas.addEventListener("keydown", (event) => this.key(event));
     this.canvas.addEventListener("dblclick", () => this.reset());
-    new IntersectionObserver(([entry]) => entry.isIntersecting && this.load()).observe(this.canvas);
+    new IntersectionObserver((entries) => entries.at(-1).isIntersecting && this.load()).observe(this.canvas);
     addEventListener("resize", () => this.request());
   }
 

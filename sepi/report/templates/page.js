@@ -18,6 +18,10 @@ Sepi.start = () => {
   Sepi.theme();
   const root = Sepi.byId("viewer");
   if (!root) return;
+  if (!("DecompressionStream" in window)) {
+    root.prepend(Sepi.element("p", {}, "The maps need a browser of 2023 or later (DecompressionStream)."));
+    return;
+  }
   const pixels = Sepi.byId("pixel") ? new Sepi.Pixels(Sepi.byId("pixel")) : null;
   const cloud = new Sepi.Cloud(Sepi.byId("cloud"));
   const viewer = new Sepi.Viewer(root, (x, y) => pixels?.nearest(x, y));
@@ -38,12 +42,6 @@ Sepi.start = () => {
     });
   }
   select.addEventListener("change", show);
-  document.querySelectorAll("[data-show]").forEach((link) =>
-    link.addEventListener("click", () => {
-      select.value = link.dataset.show;
-      show();
-    }),
-  );
   show();
 };
 

@@ -116,7 +116,7 @@ Sepi.legend = (panels, panel) => {
   });
   const bar = Sepi.element("span", { className: "bar" });
   bar.style.background = `linear-gradient(to right, ${stops.join(",")})`;
-  const words = {
+  const words = panel.ends ?? {
     disparity: ["far", "near"],
     error: ["too far", "too near"],
     change: ["harmed", "mended"],

@@ -44,7 +44,7 @@ Sepi.Pixels = class {
     this.select(number);
     const asked = `${this.scene.dataset}/${this.scene.scene}: [[${stride * y}, ${stride * x}]]`;
     this.part("asked").textContent =
-      distance(this.probes[number]) < 0.5
+      distance(this.probes[number]) < stride
         ? ""
         : `You clicked x ${stride * x}, y ${stride * y}; the nearest prepared pixel is shown. ` +
           `To have that one: config.yaml, report, pixels: {${asked}}`;
@@ -137,7 +137,9 @@ Sepi.shape = (name, attributes = {}, ...children) => {
 
 /** Cost over the candidates, of all views and of the halves and quarters of the view grid. */
 Sepi.curves = (probe) => {
-  const [width, height, left, bottom, top] = [620, 300, 44, 40, 38];
+  // letters keep their size on a phone
+  const width = matchMedia("(max-width: 800px)").matches ? 380 : 620;
+  const [height, left, bottom, top] = [300, 44, 40, 38];
   const costs = Object.fromEntries(
     Object.entries(probe.costs).map(([name, text]) => [name, new Uint16Array(Sepi.bytes(text).buffer)]),
   );

@@ -14,6 +14,10 @@ Sepi.element = (name, properties = {}, ...children) => {
   return made;
 };
 
+/** A name that may go on in the next line after _ and /. */
+Sepi.breakable = (name) =>
+  name.split(/(?<=[_/])/).flatMap((piece, i) => (i ? [Sepi.element("wbr"), piece] : [piece]));
+
 Sepi.canvas = (width, height) => Sepi.element("canvas", { width, height });
 
 /** JSON that stands in the page under this id. */

@@ -111,13 +111,19 @@ Sepi.Viewer = class {
           Sepi.element("b", {}, side.toUpperCase()),
           ` ${shown[side].panel.title} `,
           Sepi.legend(this.panels, shown[side].panel),
-          Sepi.element("small", {}, shown[side].panel.note ?? ""),
+          Sepi.element("small", {}, this.small(shown[side].panel)),
         ),
       ),
     );
     this.drawWipe();
     this.readOut();
     this.root.dataset.shown = `${keys.a} ${keys.b}`;
+  }
+
+  /** What is to be said of a panel: its scores, and how finely the page holds it. */
+  small(panel) {
+    const step = this.scene.arrays[panel.map]?.step;
+    return [panel.note, step && `held in steps of ${step}`].filter(Boolean).join("; ");
   }
 
   drawWipe() {
@@ -165,6 +171,7 @@ Sepi.Viewer = class {
     element.addEventListener("click", (event) => {
       if (start !== -1e9) this.chosen(...this.pixel(element, event));
     });
+    if (!wipes) return;
     element.addEventListener("keydown", (event) => {
       const step = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }[event.key];
       const [x, y] = this.cursor ?? [this.scene.width >> 1, this.scene.height >> 1];
@@ -209,7 +216,7 @@ Sepi.Viewer = class {
       const decimals = values ? this.panels.decimals(panel) : 0;
       set(`value-${side}`, number(values, decimals));
       const compares = panel.kind === "disparity" && this.truth && panel !== truth;
-      set(`error-${side}`, compares ? number(values.map ? this.errors(side) : null, decimals) : "–");
+      set(`error-${side}`, compares ? number(this.errors(side), decimals) : "–");
       set(`confidence-${side}`, confidence ? number(confidence, this.panels.arrays.decimals(panel.confidence)) : "–");
     }
     if (!this.cursor) return set("pixel", "move over a map");
@@ -265,6 +272,7 @@ Sepi.Viewer = class {
       else if (groups.has(panel.group)) groups.get(panel.group).push(tile);
       else groups.set(panel.group, [tile]);
     }
+    const problems = Object.entries(this.scene.problems ?? {}).map(([method, why]) => `${method}: ${why}`);
     this.part("grid").replaceChildren(
       ...[...groups].map(([title, tiles]) =>
         Sepi.element(
@@ -274,6 +282,7 @@ Sepi.Viewer = class {
           Sepi.element("div", { className: "tiles" }, ...tiles),
         ),
       ),
+      Sepi.element("p", { className: "soft" }, problems.length ? `Not imported: ${problems.join("; ")}.` : ""),
     );
   }
 
@@ -292,7 +301,7 @@ Sepi.Viewer = class {
       "figcaption",
       {},
       Sepi.element("span", { className: "pair" }, ...buttons),
-      panel.title,
+      ...Sepi.breakable(panel.title),
       Sepi.element("small", {}, panel.note ?? ""),
     );
     const figure = Sepi.element("figure", {}, canvas, caption);
