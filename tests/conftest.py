@@ -1,9 +1,14 @@
-"""Shared fixtures: where the real light fields are, and whether their absence is an error."""
+"""Shared fixtures: real light fields and a browser, and whether their absence is an error; a small report."""
 
 import os
+from collections.abc import Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import pytest
+
+if TYPE_CHECKING:
+    from page_example import Example
 
 # beside a checkout, unless the environment names another place
 DATA = Path(os.environ.get("SEPI_DATA", Path(__file__).parents[2] / "shared" / "data"))
@@ -23,3 +28,29 @@ def real_data() -> Path:
 def hci(real_data: Path) -> Path:
     """Folder of HCI 4D benchmark scenes (cotton, antinous)."""
     return real_data / "hci_new"
+
+
+@pytest.fixture(scope="session")
+def browser() -> Iterator[Any]:
+    """A headless Chromium; absent, it skips the test, or fails it where it is required."""
+    from browser import launched
+
+    with launched() as found:
+        yield found
+
+
+@pytest.fixture(scope="session")
+def example(tmp_path_factory: pytest.TempPathFactory) -> "Example":
+    """A small report, computed for real, and its page."""
+    from page_example import make_example
+
+    return make_example(tmp_path_factory.mktemp("example"))
+
+
+@pytest.fixture
+def page(browser: Any, example: "Example") -> Iterator[Any]:
+    """The page of the small report at desktop width, light; nothing may complain or leave the page."""
+    from browser import opened
+
+    with opened(browser, example.page, color_scheme="light") as found:
+        yield found

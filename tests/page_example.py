@@ -1,0 +1,168 @@
+"""A small report, computed for real: variants paper and best on three scenes of 64 pixels, and other methods' maps."""
+
+import json
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sepi.camera import Camera
+from sepi.errors import SepiWarning
+from sepi.evaluate import evaluation_of
+from sepi.external import MapFile, import_maps
+from sepi.io.external import Imported, write_imported
+from sepi.io.hdf5 import read_light_field, read_stage, write_light_field, write_stage
+from sepi.io.pfm import write_pfm
+from sepi.io.scores import write_scores
+from sepi.layers import forget_layers
+from sepi.lightfield import FloatMap, LightField
+from sepi.pipeline import STAGES, VARIANTS, stage_parameters
+from sepi.provenance import stage_attributes, step
+from sepi.report import numbers
+from sepi.report.figures import page_json, read_results
+from sepi.report.graph import drawn
+from sepi.report.page import page_of
+from sepi.report.plan import MAIN_VARIANT, Plan
+from sepi.report.probe_pixels import InterestingPixel
+from sepi.report.scene_probes import scene_probes
+from sepi.scenes import render
+from sepi.stage import StageMaps, no_progress
+
+SIZE, VIEWS = 64, 5
+COTTON, DOTS, PICTURE = ("hci", "cotton"), ("builtin", "dots"), ("own", "picture")
+COTTON_TITLE, DOTS_TITLE, PICTURE_TITLE = ("/".join(scene) for scene in (COTTON, DOTS, PICTURE))
+ASKED = {COTTON: (20, 41)}
+"""Pixels, row and column, that the configuration asks for."""
+
+UNKNOWN = (slice(30, 34), slice(6, 12))
+"""Rows and columns that the imported map does not know."""
+
+EDGES = [("ingest", "initial"), ("initial", "numbers"), ("initial", "maps"), ("numbers", "page"), ("maps", "page")]
+# of a camera that sees the scene in front of it
+_CAMERA = Camera(scale=40.0, offset=8.0, focal_px=90.0)
+
+
+@dataclass(frozen=True)
+class Example:
+    """Results in a folder, and the page made of them.
+
+    Attributes
+    ----------
+    plan : Plan
+    numbers : dict
+        As ``sepi.report.numbers`` collects them.
+    scenes : list of dict
+        What the page has of every scene.
+    page : Path
+    """
+
+    plan: Plan
+    numbers: dict[str, Any]
+    scenes: list[dict[str, Any]]
+    page: Path
+
+    def light_field(self, scene: tuple[str, str]) -> LightField:
+        return read_light_field(self.plan.light_field_file(*scene))
+
+    def final(self, scene: tuple[str, str], variant: str) -> StageMaps:
+        """The maps after the last stage, from their file."""
+        return self.stage(scene, variant, self.plan.stages[-1])
+
+    def stage(self, scene: tuple[str, str], variant: str, stage: str) -> StageMaps:
+        return read_stage(self.plan.stage_file(*scene, variant, stage))
+
+    @cached_property
+    def imported(self) -> FloatMap:
+        """The map of the other method for the scene cotton."""
+        truth = self.light_field(COTTON).truth
+        assert truth is not None
+        return imported_map(truth)
+
+
+def small_light_field(scene: tuple[str, str]) -> LightField:
+    """A scene of the example: with a camera and a hole in its truth, as it is, or without ground truth."""
+    name = "curved_occluders" if scene == COTTON else "dots"
+    found = replace(render(name, size=SIZE, views=VIEWS), name=scene[1])
+    if scene == COTTON:
+        assert found.truth is not None
+        truth = found.truth.copy()
+        truth[:3, :3] = np.nan
+        return replace(found, camera=_CAMERA, truth=truth)
+    return replace(found, truth=None, masks={}) if scene == PICTURE else found
+
+
+def imported_map(truth: FloatMap) -> FloatMap:
+    """The truth with an error, unknown in places."""
+    noise = np.random.default_rng(3).normal(0, 0.05, truth.shape).astype(np.float32)
+    found = np.nan_to_num(truth) + noise
+    found[UNKNOWN] = np.nan
+    return found
+
+
+def make_example(folder: Path) -> Example:
+    """Run the stages, score them, and make the page."""
+    variants = {name: VARIANTS[name].choices for name in (MAIN_VARIANT, "best")}
+    pairs = (DOTS, COTTON, PICTURE)
+    plan = Plan(folder / "results", {dataset: [name] for dataset, name in pairs}, variants, ("SPO", "wrong_size"))
+    for scene in pairs:
+        write_results(plan, scene)
+    parameters = {
+        stage: {word: choice.parameters().model_dump(mode="json") for word, choice in choices.items()}
+        for stage, choices in STAGES.items()
+    }
+    found = json.loads(numbers.as_text(numbers.collect(plan, parameters)))
+    scenes = [scene_json(plan, scene) for scene in pairs]
+    page = folder / "index.html"
+    page.write_text(page_of(found, scenes, drawn(EDGES)), encoding="utf-8")
+    return Example(plan, found, scenes, page)
+
+
+def write_results(plan: Plan, scene: tuple[str, str]) -> None:
+    """Every file of a scene that the report reads."""
+    light_field = small_light_field(scene)
+    write_light_field(plan.light_field_file(*scene), light_field)
+    for variant in plan.variants:
+        run_stages(plan, scene, light_field, variant)
+    maps = imported_maps(plan, light_field) if scene == COTTON else {}
+    absent = {method: Imported(f"/maps/{method}/{light_field.name}.pfm", "no file") for method in plan.external}
+    write_imported(plan.external_file(*scene), absent | maps)
+
+
+def run_stages(plan: Plan, scene: tuple[str, str], light_field: LightField, variant: str) -> None:
+    settings = stage_parameters(VARIANTS[variant])
+    maps: StageMaps | None = None
+    steps = []
+    for number, (stage, choice) in enumerate(plan.variants[variant].items()):
+        maps = STAGES[stage][choice].run(light_field, maps, settings[stage], no_progress)
+        steps.append(step(stage, choice, settings[stage]))
+        attributes = stage_attributes(light_field, steps)
+        write_stage(plan.stage_file(*scene, variant, stage), maps, attributes)
+        evaluation = evaluation_of(light_field, maps.disparity)
+        write_scores(plan.stage_file(*scene, variant, stage, "scores.h5"), evaluation, attributes)
+        timing = {"seconds": 1.5 + number, "peak_memory_mb": 200 + 10 * number}
+        plan.stage_file(*scene, variant, stage, "time.json").write_text(json.dumps(timing))
+    forget_layers()
+
+
+def imported_maps(plan: Plan, light_field: LightField) -> Mapping[str, Imported]:
+    """One method's map with unknown pixels, and one of the wrong size."""
+    assert light_field.truth is not None
+    files = {"SPO": imported_map(light_field.truth), "wrong_size": np.zeros((5, 7), np.float32)}
+    for method, values in files.items():
+        write_pfm(plan.results / f"{method}.pfm", values)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SepiWarning)
+        return import_maps(light_field, {name: MapFile(path=str(plan.results / f"{name}.pfm")) for name in files})
+
+
+def scene_json(plan: Plan, scene: tuple[str, str]) -> dict[str, Any]:
+    """What the page has of a scene, as its JSON file brings it."""
+    results = read_results(plan, *scene)
+    asked = [InterestingPixel(*ASKED[scene], "asked for")] if scene in ASKED else []
+    probes = scene_probes(results, plan.stage_file(*scene, MAIN_VARIANT, plan.stages[-1]), asked)
+    found: dict[str, Any] = json.loads(json.dumps(page_json(results, *scene, probes)))
+    return found
