@@ -123,7 +123,9 @@ def print_warnings():
                     print(line, flush=True)
     # a method rarely has maps of all scenes: one line for each method
     for method, scenes in missing.items():
-        print(f"sepi: warning: external {method}: no map of {', '.join(scenes)}", flush=True)
+        others = f" and {len(scenes) - 3} others" if len(scenes) > 4 else ""
+        named = ", ".join(scenes[:3] if others else scenes)
+        print(f"sepi: warning: external {method}: no map of {named}{others}", flush=True)
 
 
 def print_written(tables, maps):
