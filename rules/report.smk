@@ -179,7 +179,7 @@ rule maps:
     output:
         folder=report(
             directory("reports/maps/{dataset}/{scene}"),
-            patterns=["{name}.png"],
+            patterns=["overview.png"],
             caption="captions/maps.rst",
             category="Scenes",
             subcategory="{dataset}/{scene}",

@@ -344,8 +344,11 @@ def score_of(
 
 
 def test_headline_figures(runs: Runs, example: Example) -> None:
-    """Ours beside the paper's, for the scenes that the paper has."""
-    (row,) = page_data.headline(runs)
+    """Ours beside the paper's, for the scenes that the paper has; then the others."""
+    row, other = page_data.headline(runs)
+    assert other["scene"] == "builtin/dots"
+    assert other["published"] == [None, None]
+    assert other["ours"]["paper"] == [score_of(example, DOTS, "paper", "all", name) for name in ("mse100", "q25")]
     assert row["scene"] == "hci/cotton"
     assert row["published"] == [1.20, 0.34]
     expected = {v: [score_of(example, COTTON, v, "all", name) for name in ("mse100", "q25")] for v in ("best", "paper")}

@@ -39,7 +39,7 @@ from sepi.report.probe import Probe, to_json
 from sepi.report.probe_figure import write_probes
 from sepi.report.probe_pixels import InterestingPixel
 from sepi.report.saving import BOTH, new_figure, save
-from sepi.report.scene_panels import SceneResults, viewer_of
+from sepi.report.scene_panels import SceneResults, compared_pair, viewer_of
 from sepi.report.scene_probes import scene_probes
 from sepi.stage import StageMaps
 
@@ -96,19 +96,16 @@ def detail_panels(light_field: LightField, variant: str, final: StageMaps) -> li
 
 
 def change_panels(evaluations: Mapping[str, Evaluation]) -> list[Panel]:
-    """How much farther from the truth each variant is than the paper's method; nothing without ground truth."""
-    full = evaluations[MAIN_VARIANT].error
-    if full is None:
-        return []
-    return [
-        Panel(
-            f"{variant}/change",
-            f"{MAIN_VARIANT} beside {variant}\n(red: mended, blue: harmed)",
-            error_picture(np.abs(evaluation.error) - np.abs(full)),
-        )
-        for variant, evaluation in evaluations.items()
-        if variant != MAIN_VARIANT and evaluation.error is not None
-    ]
+    """How much farther from the truth a variant is than the one it is compared with; nothing without ground truth."""
+    errors = {name: evaluation.error for name, evaluation in evaluations.items() if evaluation.error is not None}
+    panels = []
+    for variant in errors:
+        if variant != MAIN_VARIANT:
+            better, worse = compared_pair(variant)
+            title = f"{better} beside {worse}\n(red: mended, blue: harmed)"
+            picture = error_picture(np.abs(errors[worse]) - np.abs(errors[better]))
+            panels.append(Panel(f"{variant}/change", title, picture))
+    return panels
 
 
 def error_panels(variant: str, evaluation: Evaluation) -> list[Panel]:

@@ -13,14 +13,14 @@ from sepi.report.runs import Numbers, Runs
 
 
 def headline(runs: Runs) -> list[dict[str, Any]]:
-    """Scenes that the paper has too: our figures beside the published ones.
+    """Scenes that the paper has too: our figures beside the published ones; then the averages of the others.
 
     Returns
     -------
     list of dict
         ``scene``; ``published``: MSE x100 and Q25 x100; ``ours``: variant to the same two.
     """
-    rows = []
+    rows: list[dict[str, Any]] = []
     for dataset in published.DATASETS:
         for scene in runs.scored(dataset):
             name = published.paper_scene(dataset, scene)
@@ -35,6 +35,18 @@ def headline(runs: Runs) -> list[dict[str, Any]]:
                 for variant in runs.plan.compared
             }
             rows.append({"scene": f"{dataset}/{scene}", "published": theirs, "ours": ours})
+    for dataset in runs.plan.scenes:
+        scenes = [scene for scene in runs.scored(dataset) if published.paper_scene(dataset, scene) is None]
+        if scenes:
+            name = f"{dataset}, average of {len(scenes)}" if len(scenes) > 1 else f"{dataset}/{scenes[0]}"
+            means = {
+                variant: [
+                    _mean(runs.final(dataset, scene, score, variant=variant) for scene in scenes)
+                    for score in ("mse100", "q25")
+                ]
+                for variant in runs.plan.compared
+            }
+            rows.append({"scene": name, "published": [None, None], "ours": means})
     return rows
 
 
@@ -88,7 +100,7 @@ class BarGroup:
 def ablation_bars(runs: Runs) -> list[BarGroup]:
     """Average MSE x100 of every listed variant beside the published one, a group per data set and region."""
     groups = []
-    for dataset in dict.fromkeys([*published.DATASETS, *runs.plan.scenes]):
+    for dataset in dict.fromkeys([*runs.plan.scenes, *published.DATASETS]):
         scenes = runs.scored(dataset)
         theirs = published.table4().get(dataset, {})
         for region in REGIONS:

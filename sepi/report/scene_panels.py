@@ -9,7 +9,7 @@ from sepi.evaluate import WHOLE_MAP
 from sepi.io.scores import Evaluation
 from sepi.lightfield import FloatMap, LightField
 from sepi.report.pictures import centre_picture, disparity_limits, outlines
-from sepi.report.plan import MAIN_VARIANT
+from sepi.report.plan import BEST_VARIANT, MAIN_VARIANT
 from sepi.report.viewer import Viewer
 from sepi.stage import StageMaps
 
@@ -100,7 +100,7 @@ def _add_stages(viewer: Viewer, results: SceneResults) -> dict[str, int]:
             viewer.panel(
                 f"Stages of {variant}",
                 f"{variant}/{stage}",
-                f"{variant} {number}: {stage}",
+                f"{variant} {number}: {stage}{', final' if stage == last else ''}",
                 "disparity",
                 map=viewer.map(found.disparity, "final" if stage == last else "other"),
                 confidence=confidence[variant] if stage == last else None,
@@ -114,7 +114,7 @@ def _add_finals(
     """Final maps of all variants, and their errors; the number of each map."""
     finals = {
         variant: viewer.map(results.final(variant).disparity, "final" if variant in results.compared else "other")
-        for variant in results.maps
+        for variant in [*results.compared, *(name for name in results.maps if name not in results.compared)]
     }
     for variant, number in finals.items():
         more = {"map": number, "confidence": confidence.get(variant), "note": note_of(results.evaluations[variant])}
@@ -137,20 +137,26 @@ def _add_imported(viewer: Viewer, results: SceneResults, truth: int | None) -> N
 
 
 def _add_changes(viewer: Viewer, finals: Mapping[str, int], truth: int | None) -> None:
-    """Where a variant is farther from the truth, and where nearer, than the paper's method with all its parts."""
+    """Where a variant is farther from the truth, and where nearer, than the one it is compared with."""
     if truth is None:
         return
-    for variant, number in finals.items():
+    for variant in finals:
         if variant != MAIN_VARIANT:
+            better, worse = compared_pair(variant)
             viewer.panel(
-                f"What {MAIN_VARIANT} mends and harms beside the others",
+                "What parts mend and harm",
                 f"{variant}/change",
-                f"{MAIN_VARIANT} beside {variant}",
+                f"{better} beside {worse}",
                 "change",
-                map=number,
-                minus=finals[MAIN_VARIANT],
+                map=finals[worse],
+                minus=finals[better],
                 truth=truth,
             )
+
+
+def compared_pair(variant: str) -> tuple[str, str]:
+    """The method with a part, and the one without: the paper's beside its reductions, the best beside the paper's."""
+    return (BEST_VARIANT, MAIN_VARIANT) if variant == BEST_VARIANT else (MAIN_VARIANT, variant)
 
 
 def _add_details(viewer: Viewer, results: SceneResults, confidence: Mapping[str, int]) -> None:

@@ -96,11 +96,12 @@ def runtime_table(runs: Runs) -> Report:
     heads = ["dataset", "scene", "variant", "stage", "choice", "seconds", "peak_memory_mb"]
     return Report(
         "Run time per stage",
-        "Wall-clock seconds of each stage's process, reading and writing included, on the machine that ran "
-        "it. Variants that begin alike share their first stages: such a stage is listed with each of them, but ran "
-        "once. Published: the paper's averages for 512x512 pixels and 9x9 views on an Intel Core i7-8700, nothing in "
-        "parallel; published / this code is how many times the total of this code's `paper` fits into theirs, for "
-        "scenes of that size only; the machines differ.",
+        "Wall-clock seconds of each stage's process, reading and writing included, on the machine that ran it; in the "
+        "first run after an installation, the first stages also compiled their kernels. Variants that begin alike "
+        "share their first stages: such a stage is listed with each of them, but ran once. Published: the paper's "
+        "averages for 512x512 pixels and 9x9 views on an Intel Core i7-8700, nothing in parallel; published / this "
+        "code is how many times the total of this code's `paper` fits into theirs, for scenes of that size only; the "
+        "machines differ.",
         Table([*heads, "published_seconds", "ratio"], rows),
         sections,
     )

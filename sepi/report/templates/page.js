@@ -25,12 +25,15 @@ Sepi.start = () => {
   const pixels = Sepi.byId("pixel") ? new Sepi.Pixels(Sepi.byId("pixel")) : null;
   const cloud = new Sepi.Cloud(Sepi.byId("cloud"));
   const viewer = new Sepi.Viewer(root, (x, y) => pixels?.nearest(x, y));
+  if (pixels) pixels.selected = (number) => viewer.markChosen(number);
   Sepi.viewer = viewer;
   const select = Sepi.byId("scene");
   const show = async () => {
     const scene = Sepi.json(select.value);
     pixels?.show(scene);
-    await viewer.show(scene);
+    const shown = viewer.show(scene);
+    if (pixels) viewer.markChosen(pixels.number);
+    await shown;
     cloud.show(viewer.panels);
     root.dataset.scene = select.value;
   };

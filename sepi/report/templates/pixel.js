@@ -12,6 +12,7 @@ Sepi.Pixels = class {
   /** @param {HTMLElement} root Holds the elements with data-part attributes that the page's template makes. */
   constructor(root) {
     this.root = root;
+    this.selected = () => {};
   }
 
   part(name) {
@@ -57,7 +58,7 @@ Sepi.Pixels = class {
     const value = (d) => (d === null || d === undefined ? "unknown" : d.toFixed(3));
     const occlusion = `${probe.occluded ? "occluded" : "not occluded"}; kept: ${Sepi.subset(probe.side)}`;
     const facts = {
-      pixel: `x ${probe.x}, y ${probe.y}`,
+      pixel: `x ${probe.x}, y ${probe.y} ([${probe.y}, ${probe.x}] in the configuration)`,
       "chosen by paper": value(probe.chosen),
       "chosen by best": value(probe.best),
       "least cost": `${value(probe.minimum)} (all views); lowest of all with: ${Sepi.subset(probe.best_subset)}`,
@@ -74,6 +75,8 @@ Sepi.Pixels = class {
     this.part("sepis").replaceChildren(...this.pictures(probe));
     this.part("curves").replaceChildren(Sepi.curves(probe));
     this.root.dataset.pixel = `${probe.x} ${probe.y}`;
+    this.number = number;
+    this.selected(number);
   }
 
   pictures(probe) {

@@ -59,6 +59,14 @@ Sepi.Viewer = class {
     this.part("marks").replaceChildren(...marks);
   }
 
+  /** Show which of the prepared pixels is looked into. */
+  markChosen(number) {
+    [...this.part("marks").children].forEach((mark, i) => mark.classList.toggle("chosen", i === number));
+    const label = this.scene?.probes[number]?.label;
+    const link = this.part("chosen");
+    if (link && label) link.textContent = `what the method sees at pixel ${number + 1}, ${label}`;
+  }
+
   fillSelects() {
     const { list } = this.panels;
     for (const side of ["a", "b"]) {
@@ -238,12 +246,14 @@ Sepi.Viewer = class {
     const context = canvas.getContext("2d");
     context.imageSmoothingEnabled = false;
     context.clearRect(0, 0, canvas.width, canvas.height);
-    if (this.cursor) this.magnify(context, picture, 0, 0, canvas.width);
+    this.magnify(context, picture, 0, 0, canvas.width);
   }
 
   magnify(context, picture, left, top, side) {
     const span = 2 * Sepi.REACH + 1;
-    const [x, y] = this.cursor.map((place) => place - Sepi.REACH);
+    // before anything is pointed at, the middle
+    const middle = [this.scene.width >> 1, this.scene.height >> 1];
+    const [x, y] = (this.cursor ?? middle).map((place) => place - Sepi.REACH);
     const pixel = side / span;
     context.fillStyle = "#808080";
     context.fillRect(left, top, side, side);
