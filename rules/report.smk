@@ -179,7 +179,7 @@ rule maps:
     output:
         folder=report(
             directory("reports/maps/{dataset}/{scene}"),
-            patterns=["overview.png"],
+            patterns=["{name,overview}.png"],
             caption="captions/maps.rst",
             category="Scenes",
             subcategory="{dataset}/{scene}",

@@ -139,14 +139,15 @@ def write_overview(
     columns = max(len(row) for row in filled)
     height, width = filled[0][0].picture.shape[:2]
     panel_height = _PANEL * height / width + 0.4
-    size = (_PANEL * columns, panel_height * len(filled) + 0.4)
+    head = 0.4 if title else 0.0
+    size = (_PANEL * columns, panel_height * len(filled) + head)
     figure = new_figure(*size, layout=None)
     # one frame for all pictures, whose unit is an inch: many frames are slow to draw
     sheet = figure.add_axes((0, 0, 1, 1))
     sheet.set_axis_off()
     sheet.text(size[0] / 2, size[1] - 0.1, title, fontsize=12, ha="center", va="top", parse_math=False)
     for number, row in enumerate(filled):
-        bottom = size[1] - 0.4 - (number + 1) * panel_height
+        bottom = size[1] - head - (number + 1) * panel_height
         for column, panel in enumerate(row):
             left, top = column * _PANEL + 0.05, bottom + panel_height - 0.35
             extent = (left, left + _PANEL - 0.1, bottom + 0.05, top)
