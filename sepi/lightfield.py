@@ -153,6 +153,12 @@ class LightField:
         return self.view or (self.views.shape[0] // 2, self.views.shape[1] // 2)
 
     @property
+    def from_centre(self) -> tuple[int, int]:
+        """Rows below and columns to the right of the grid's centre view at which the reference view stands."""
+        (t, s), (rows, columns) = self.reference, self.grid
+        return t - rows // 2, s - columns // 2
+
+    @property
     def shape(self) -> tuple[int, int]:
         """Height and width of a view in pixels."""
         return self.views.shape[2], self.views.shape[3]

@@ -76,12 +76,11 @@ def point_cloud(light_field: LightField, disparity: FloatMap) -> PointCloud:
     SepiError
         If ``disparity`` is not of the view's shape (H, W).
     """
-    (t, s), (rows, columns) = light_field.reference, light_field.grid
     return view_points(
-        light_field.views[t, s],
+        light_field.views[light_field.reference],
         disparity,
         camera=light_field.camera,
-        from_centre=(t - rows // 2, s - columns // 2),
+        from_centre=light_field.from_centre,
     )
 
 

@@ -23,7 +23,8 @@ def write_bars(folder: Path, name: str, groups: Sequence[BarGroup]) -> None:
     if not groups:
         figure = new_figure(4.2, 1)
         figure.text(0.5, 0.5, "no scene with ground truth", ha="center", va="center", fontsize=8)
-        return save(figure, folder, name)
+        save(figure, folder, name)
+        return
     columns = min(3, len(groups))
     lines = -(-len(groups) // columns)
     height = 0.9 + 0.32 * max(len(group.rows) for group in groups)
@@ -48,7 +49,7 @@ def write_bars(folder: Path, name: str, groups: Sequence[BarGroup]) -> None:
     labels = {"this code, scenes at hand": _OURS, "the paper, all its scenes": _PUBLISHED}
     handles = [Patch(color=colour, label=label) for label, colour in labels.items()]
     figure.legend(handles=handles, fontsize=7, loc="outside upper center", ncols=2)
-    return save(figure, folder, name)
+    save(figure, folder, name)
 
 
 def write_times(folder: Path, name: str, rows: Sequence[StageTimes]) -> None:

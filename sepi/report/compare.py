@@ -93,7 +93,8 @@ def _viewer(found: Comparison) -> Viewer:
     light_field = found.light_field
     picture = None if light_field is None else centre_picture(light_field)
     camera = None if light_field is None else light_field.camera
-    viewer = Viewer((a.shape[0], a.shape[1]), _limits(found), picture, camera, _from_centre(light_field))
+    from_centre = (0, 0) if light_field is None else light_field.from_centre
+    viewer = Viewer((a.shape[0], a.shape[1]), _limits(found), picture, camera, from_centre)
     if picture is not None:
         viewer.panel("Scene", "centre", "reference view", "picture")
     numbers = [viewer.map(values, "final") for values in (a, b)]
@@ -129,13 +130,6 @@ def _limits(found: Comparison) -> tuple[float, float]:
         return 0.0, 1.0
     low, high = (float(end) for end in np.quantile(known, (_BEYOND, 1 - _BEYOND)))
     return (low, high) if low < high else (low - 0.5, high + 0.5)
-
-
-def _from_centre(light_field: LightField | None) -> tuple[int, int]:
-    if light_field is None:
-        return 0, 0
-    (t, s), (rows, columns) = light_field.reference, light_field.grid
-    return t - rows // 2, s - columns // 2
 
 
 def _score_section(found: Comparison) -> dict[str, Any] | None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -162,8 +163,10 @@ def write_overview(
 
 def read_results(plan: Plan, dataset: str, scene: str) -> SceneResults:
     """Everything that is shown of a scene, from its files."""
+    # variants that begin alike share files
+    read = cache(read_stage)
     maps = {
-        variant: {stage: read_stage(plan.stage_file(dataset, scene, variant, stage)) for stage in plan.stages}
+        variant: {stage: read(plan.stage_file(dataset, scene, variant, stage)) for stage in plan.stages}
         for variant in plan.listed
     }
     last = plan.stages[-1]

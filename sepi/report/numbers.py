@@ -72,11 +72,10 @@ def collect(plan: Plan, parameters: Parameters | None = None, parts: bool = Fals
     dict
         As JSON has it: text, numbers, None (also for NaN), lists and dictionaries. ``made``: date of the newest
         result, versions, machine; ``protocols``: name to border; ``plan``; ``parameters``; ``scenes``: a list, each
-        with ``dataset``, ``scene``,
-        ``light_field``, ``stages`` (path of choices to ``stage``, ``scores``, ``seconds``, ``peak_memory_mb``),
-        ``confidence`` (variant to errors) and ``external`` (method to ``problem``, ``source``, ``sha256``, ``scores``);
-        ``tables``: name to :func:`sepi.report.layout.as_json`. With ``parts``, scenes have ``stages`` only, and
-        ``scores`` is None but after the last stage.
+        with ``dataset``, ``scene``, ``light_field``, ``stages`` (path of choices to ``stage``, ``scores``,
+        ``seconds``, ``peak_memory_mb``), ``confidence`` (variant to errors) and ``external`` (method to ``problem``,
+        ``source``, ``sha256``, ``scores``); ``tables``: name to :func:`sepi.report.layout.as_json`. With ``parts``,
+        scenes have ``stages`` only, and ``scores`` is None but after the last stage.
 
     Raises
     ------

@@ -9,6 +9,7 @@ from typing import Any
 
 from sepi.evaluate import REGIONS, WHOLE_MAP
 from sepi.report import published
+from sepi.report.comparison import datasets_of, mean
 from sepi.report.runs import Numbers, Runs
 
 
@@ -100,7 +101,7 @@ class BarGroup:
 def ablation_bars(runs: Runs) -> list[BarGroup]:
     """Average MSE x100 of every listed variant beside the published one, a group per data set and region."""
     groups = []
-    for dataset in dict.fromkeys([*runs.plan.scenes, *published.DATASETS]):
+    for dataset in datasets_of(runs.plan):
         scenes = runs.scored(dataset)
         theirs = published.table4().get(dataset, {})
         for region in REGIONS:
@@ -209,5 +210,5 @@ def _published(figures: published.Regions | None, region: str) -> float | None:
 
 
 def _mean(values: Iterable[float]) -> float | None:
-    known = [value for value in values if not math.isnan(value)]
-    return sum(known) / len(known) if known else None
+    found = mean(values)
+    return None if math.isnan(found) else found

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import base64
+from collections.abc import Sequence
 from functools import cache
 from typing import Any
 
+import cv2
 import numpy as np
 import numpy.typing as npt
 from matplotlib import colormaps
@@ -58,8 +61,19 @@ def disparity_limits(light_field: LightField) -> tuple[float, float]:
 
 def centre_picture(light_field: LightField) -> Picture:
     """The reference view."""
-    centre = np.rint(255 * np.clip(light_field.centre, 0, 1)).astype(np.uint8)
-    return np.repeat(centre, 3, axis=2) if centre.shape[2] == 1 else centre
+    return as_rgb(light_field.centre)
+
+
+def as_rgb(colours: FloatMap) -> Picture:
+    """Colours 0..1 of one or three channels, (H, W, C), as RGB."""
+    picture = np.rint(255 * np.clip(colours, 0, 1)).astype(np.uint8)
+    return np.repeat(picture, 3, axis=2) if picture.shape[2] == 1 else picture
+
+
+def picture_uri(picture: Picture, kind: str, options: Sequence[int] = ()) -> str:
+    """A picture as an address that holds it; ``kind`` is ``"png"`` or ``"webp"``, ``options`` are OpenCV's."""
+    _, data = cv2.imencode(f".{kind}", cv2.cvtColor(picture, cv2.COLOR_RGB2BGR), list(options))
+    return f"data:image/{kind};base64,{base64.b64encode(data.tobytes()).decode('ascii')}"
 
 
 def map_picture(values: FloatMap, limits: tuple[float, float], scale: str | Colormap = "viridis") -> Picture:

@@ -20,17 +20,17 @@ MAIN_VARIANT = "paper"
 BEST_VARIANT = "best"
 """The most accurate variant, whose figures stand there too."""
 
-TABLES: dict[str, str] = {
-    "table1_mse": "final maps of the variants that stand beside the published figures",
-    "table2_q25": "final maps of the variants that stand beside the published figures",
-    "table3_regions": "final maps of the variants that stand beside the published figures",
-    "table4_ablation": "final maps of every variant but the parts of the best one",
-    "ablation_best": "final maps and timings of the best variant and of those with one part of it switched off",
-    "confidence": "final maps of the variants that stand beside the published figures",
-    "stages": "maps after every stage of the same variants",
-    "runtime": "timings of every stage of the same variants",
-}
-"""Name of each table and what it is made from."""
+TABLES = (
+    "table1_mse",
+    "table2_q25",
+    "table3_regions",
+    "table4_ablation",
+    "ablation_best",
+    "confidence",
+    "stages",
+    "runtime",
+)
+"""Names of the tables, in the order of the page."""
 
 PARTS_TABLES = ("ablation_best",)
 """Tables of the best variant's parts; they are made from numbers of their own."""

@@ -21,7 +21,7 @@ from sepi.epi import stitched_epi
 from sepi.errors import SepiError
 from sepi.lightfield import BoolMap, FloatMap, LightField, as_unit_float
 from sepi.report.contrast import contrast_of, stretched
-from sepi.report.pictures import Picture
+from sepi.report.pictures import Picture, as_rgb, picture_uri
 from sepi.report.probe_curves import Curves, cost_curves, require_inside
 from sepi.stage import StageMaps
 from sepi.sweep import SweepParameters
@@ -176,7 +176,7 @@ def sepi_picture(
     weight = (position - left).astype(np.float32)[:, :, None]
     number = np.arange(len(sepi.rows))[:, None]
     samples = (1 - weight) * sepi.rows[number, left] + weight * sepi.rows[number, left + 1]
-    pixels = np.where(inside[:, :, None], _rgb(samples), np.uint8(GREY))
+    pixels = np.where(inside[:, :, None], as_rgb(samples), np.uint8(GREY))
     line = half_width + (np.zeros_like(upright) if sheared else upright)
     return SepiPicture(pixels, inside, line, float(disparity))
 
@@ -264,7 +264,7 @@ def probe(
         textureless=bool(maps.mask("textureless")[y, x]),
         pictures=pictures,
         patch=pictures["chosen"].pixels[:, half_width].reshape(*light_field.grid, 3),
-        crop=_rgb(as_unit_float(around)),
+        crop=as_rgb(as_unit_float(around)),
         crop_origin=(top, left),
     )
 
@@ -301,20 +301,16 @@ def to_json(found: Probe) -> dict[str, Any]:
         "sepi": {
             name: {
                 "disparity": _short(picture.disparity),
-                "src": _data_uri(
+                "src": picture_uri(
                     stretched(picture.pixels, picture.inside, limits), "webp", [cv2.IMWRITE_WEBP_QUALITY, WEBP_QUALITY]
                 ),
             }
             for name, picture in found.pictures.items()
         },
-        "patch": _data_uri(stretched(found.patch, found.patch_inside, limits), "png", [cv2.IMWRITE_PNG_COMPRESSION, 9]),
+        "patch": picture_uri(
+            stretched(found.patch, found.patch_inside, limits), "png", [cv2.IMWRITE_PNG_COMPRESSION, 9]
+        ),
     }
-
-
-def _rgb(colours: FloatMap) -> Picture:
-    """Colours 0..1 of one or three channels as RGB."""
-    picture = np.rint(255 * np.clip(colours, 0, 1)).astype(np.uint8)
-    return np.repeat(picture, 3, axis=2) if picture.shape[2] == 1 else picture
 
 
 def _finite(value: float) -> float | None:
@@ -332,8 +328,3 @@ def _quantised(costs: FloatMap) -> npt.NDArray[np.uint16]:
 
 def _base64(values: npt.NDArray[Any]) -> str:
     return base64.b64encode(values.tobytes()).decode()
-
-
-def _data_uri(picture: Picture, kind: str, options: list[int]) -> str:
-    encoded = cv2.imencode(f".{kind}", cv2.cvtColor(picture, cv2.COLOR_RGB2BGR), options)[1]
-    return f"data:image/{kind};base64,{_base64(encoded)}"

@@ -51,13 +51,12 @@ class SceneResults:
 def viewer_of(results: SceneResults) -> Viewer:
     """The viewer of a scene, all its panels in it."""
     light_field = results.light_field
-    (t, s), (rows, columns) = light_field.reference, light_field.grid
     viewer = Viewer(
         light_field.shape,
         disparity_limits(light_field),
         centre_picture(light_field),
         light_field.camera,
-        (t - rows // 2, s - columns // 2),
+        light_field.from_centre,
     )
     truth = _add_scene(viewer, results)
     confidence = _add_stages(viewer, results)

@@ -54,7 +54,6 @@ def scene_probes(results: SceneResults, final_file: Path, asked: Sequence[Intere
 
 
 def sweep_parameters(final_file: Path) -> SweepParameters:
-    """The parameters of the sweep that a final map of the paper's method began with; else the defaults."""
-    steps = history_of(final_file) if final_file.is_file() else []
-    known = {} if not steps else steps[0]["parameters"]
+    """The parameters of the sweep that a final map of the paper's method began with."""
+    known = history_of(final_file)[0]["parameters"]
     return SweepParameters(**{name: known[name] for name in SweepParameters.model_fields if name in known})

@@ -36,7 +36,7 @@ BUILDERS: dict[str, Callable[[Runs], Report]] = {
 
 @click.command(name="python -m sepi.report.tables", cls=SepiCommand)
 @click.option("--numbers", "path", type=click.Path(path_type=Path), required=True, help="From sepi.report.numbers.")
-@click.option("--table", "names", type=click.Choice(list(TABLES)), multiple=True, help="Table to write; default: all.")
+@click.option("--table", "names", type=click.Choice(TABLES), multiple=True, help="Table to write; default: all.")
 @click.option("--output", type=click.Path(path_type=Path), required=True, help="Folder to write to.")
 def command(path: Path, names: tuple[str, ...], output: Path) -> None:
     """Write the tables of a report's numbers as CSV, Markdown and LaTeX."""

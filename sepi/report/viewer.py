@@ -6,7 +6,6 @@ itself. ``templates/viewer.js`` draws them.
 
 from __future__ import annotations
 
-import base64
 import hashlib
 import math
 from dataclasses import dataclass, field
@@ -19,7 +18,7 @@ import numpy as np
 from sepi.camera import Camera
 from sepi.lightfield import BoolMap, FloatMap
 from sepi.report.packing import packed_map, packed_mask, packed_size
-from sepi.report.pictures import Picture
+from sepi.report.pictures import ERROR_LIMIT, Picture, picture_uri
 
 ROLES = ("final", "confidence", "other")
 """What a map is kept for, which decides in how fine steps."""
@@ -158,6 +157,7 @@ class Viewer:
             "width": width,
             "stride": self.stride,
             "limits": list(self.limits),
+            "error_limit": ERROR_LIMIT,
             "camera": self._camera_json(),
             "picture": picture,
             "panels": self.panels,
@@ -203,16 +203,9 @@ class Viewer:
         return list(self._arrays).index(key)
 
 
-def data_uri(mime: str, data: bytes) -> str:
-    """Bytes as an address that holds them."""
-    return f"data:{mime};base64,{base64.b64encode(data).decode('ascii')}"
-
-
 def _webp(picture: Picture) -> str:
     for quality in _PICTURE_QUALITIES:
-        flipped = np.ascontiguousarray(picture[:, :, ::-1])
-        _, data = cv2.imencode(".webp", flipped, [cv2.IMWRITE_WEBP_QUALITY, quality])
-        text = data_uri("image/webp", data.tobytes())
+        text = picture_uri(np.ascontiguousarray(picture), "webp", [cv2.IMWRITE_WEBP_QUALITY, quality])
         if len(text) <= _PICTURE_SHARE * max(_LEAST_PIXELS, picture.shape[0] * picture.shape[1]):
             break
     return text

@@ -3,7 +3,6 @@
 /* Pictures of panels: colours for values, masks over the reference view. */
 
 Sepi.UNKNOWN = [255, 0, 255]; // magenta is in none of the scales
-Sepi.ERROR_LIMIT = 0.2;
 
 /** Scales of 256 colours, [r, g, b, r, ...], by name. */
 Sepi.scales = () => {
@@ -30,7 +29,8 @@ Sepi.Panels = class {
 
   /** Colour scale of a panel, and the values at its ends. */
   scale(panel) {
-    if (panel.kind === "error" || panel.kind === "change") return ["error", -Sepi.ERROR_LIMIT, Sepi.ERROR_LIMIT];
+    const limit = this.scene.error_limit;
+    if (panel.kind === "error" || panel.kind === "change") return ["error", -limit, limit];
     if (panel.kind === "confidence" || panel.kind === "grey") return ["grey", 0, 1];
     return ["disparity", ...this.scene.limits];
   }
