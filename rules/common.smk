@@ -11,7 +11,9 @@ from sepi.config import GRAPH_CONFIG, load_settings
 from sepi.digest import ROOT, code_digest
 from sepi.errors import SepiError
 from sepi.io.export import RESULT_FILES
-from sepi.pipeline import STAGES, VARIANTS
+from sepi.pipeline import HANDED_ON, STAGES, VARIANTS, key_of, stage_of
+from sepi.report.plan import Plan
+from sepi.run_log import show_progress
 from sepi.validation import require_known
 
 STARTED = time.time()
@@ -32,6 +34,11 @@ except OSError as error:
     sys.exit(f"sepi: config: {error.filename}: {error.strerror}")
 
 
+VARIANT_CHOICES = {name: variant.choices for name, variant in SETTINGS.variants.items()}
+SCENES_BY_DATASET = {name: SETTINGS.scenes_of(name) for name in SETTINGS.datasets}
+PLAN = Plan(Path("results"), SCENES_BY_DATASET, VARIANT_CHOICES, list(SETTINGS.external))
+
+
 wildcard_constraints:
     dataset="[^/]+",
     scene="[^/]+",
@@ -47,10 +54,27 @@ def light_field_file(dataset, scene):
     return f"results/{dataset}/{scene}/lightfield.h5"
 
 
-def stage_file(dataset, scene, variant, stage, ending="h5"):
-    """The file of a stage of a variant; ``ending`` names a file beside it ("scores.h5", "time.json")."""
+def choices_that_run(stage):
+    """Pattern of a stage's choices, without the one that hands maps on: that is no job."""
+    return "|".join(choice for choice in STAGES[stage] if choice != HANDED_ON)
+
+
+def file_before(stage):
+    """Function of wildcards: the file with the maps that a stage is given, of the last stage before it that ran."""
+    before = list(STAGES)[: list(STAGES).index(stage)]
+
+    def file(wildcards):
+        choices = {name: wildcards[name] for name in before}
+        key = key_of(choices, before[-1])
+        return f"results/{wildcards.dataset}/{wildcards.scene}/stages/{key}/{stage_of(choices, key)}.h5"
+
+    return file
+
+
+def final_file(dataset, scene, variant):
+    """The file with the final maps of a variant."""
     require_known("variant", [variant], SETTINGS.variants)
-    return f"results/{dataset}/{scene}/stages/{SETTINGS.variants[variant].path(stage)}/{stage}.{ending}"
+    return PLAN.stage_file(dataset, scene, variant, PLAN.stages[-1])
 
 
 def result_files(variants):
@@ -138,3 +162,11 @@ def print_written(tables, maps):
     for title, files in groups.items():
         if files:
             print(f"{title} written:", *dict.fromkeys(files), sep="\n  ", flush=True)
+
+
+# a progress bar, or a line for each job; a dry run is as Snakemake shows it
+RUN_LOG = (
+    show_progress(logger)
+    if workflow.is_main_process and not (workflow.dryrun or workflow.output_settings.verbose)
+    else None
+)

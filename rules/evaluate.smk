@@ -1,24 +1,26 @@
-# Scores of the disparity after any stage of any variant (paper, section V): both protocols, all regions.
-# A scene without ground truth gets a score file that says so.
+# Scores of a scene's disparity maps, after every stage of every variant (paper, section V): both protocols, all regions.
+# One job for a scene, and only maps that changed are scored again: the old file stays until the new one is there. A scene
+# without ground truth gets a score file that says so. The parts of variant best have a file of their own, as in the report.
 rule evaluate:
     input:
         light_field="results/{dataset}/{scene}/lightfield.h5",
-        maps="results/{dataset}/{scene}/stages/{path}/{stage}.h5",
+        maps=lambda wildcards: PLAN.scored_files(wildcards.dataset, wildcards.scene, parts=wildcards.which == "_parts"),
     output:
-        scores="results/{dataset}/{scene}/stages/{path}/{stage}.scores.h5",
+        scores=update("results/{dataset}/{scene}/scores{which}.h5"),
     log:
-        "logs/{dataset}/{scene}/{path}/{stage}.scores.log",
+        "logs/{dataset}/{scene}/scores{which}.log",
     benchmark:
-        "benchmarks/{dataset}/{scene}/{path}/{stage}.scores.tsv"
+        "benchmarks/{dataset}/{scene}/scores{which}.tsv"
     wildcard_constraints:
-        stage="|".join(STAGES),
+        which="|_parts",
     threads: 1
     resources:
-        mem_mb=memory_for(bytes_per_sample=4, bytes_per_pixel=200),
+        mem_mb=lambda wildcards, input: memory_for(4, bytes_per_pixel=200 + 50 * len(input.maps))(wildcards),
     params:
+        stages="results/{dataset}/{scene}/stages",
         code=lambda wildcards: code_digest("sepi.evaluate"),
     message:
-        "{wildcards.dataset}/{wildcards.scene}: scores after {wildcards.stage} ({wildcards.path})"
+        "{wildcards.dataset}/{wildcards.scene}: scores"
     shell:
-        "python -m sepi.evaluate --light-field {input.light_field:q} --stage {input.maps:q} --output {output.scores:q} "
-        "2> {log:q}"
+        "python -m sepi.evaluate --light-field {input.light_field:q} --stages {params.stages:q} --code {params.code} "
+        "--output {output.scores:q} {input.maps:q} 2> {log:q}"

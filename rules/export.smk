@@ -5,7 +5,7 @@
 rule export:
     input:
         light_field="results/{dataset}/{scene}/lightfield.h5",
-        maps=lambda wildcards: stage_file(wildcards.dataset, wildcards.scene, wildcards.variant, "optimize"),
+        maps=lambda wildcards: final_file(wildcards.dataset, wildcards.scene, wildcards.variant),
     output:
         expand("results/{{dataset}}/{{scene}}/{{variant}}/{name}", name=RESULT_FILES),
     log:

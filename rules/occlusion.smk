@@ -1,8 +1,8 @@
-# Occluded regions (paper, section IV-B): depth from the unoccluded half of the views, or none.
+# Occluded regions (paper, section IV-B): depth from the unoccluded half of the views, or none, which is no job.
 rule occlusion:
     input:
         light_field="results/{dataset}/{scene}/lightfield.h5",
-        previous="results/{dataset}/{scene}/stages/{initial}/initial.h5",
+        previous=file_before("occlusion"),
     output:
         maps="results/{dataset}/{scene}/stages/{initial}/{occlusion}/occlusion.h5",
         timing="results/{dataset}/{scene}/stages/{initial}/{occlusion}/occlusion.time.json",
@@ -10,6 +10,8 @@ rule occlusion:
         "logs/{dataset}/{scene}/{initial}/{occlusion}/occlusion.log",
     benchmark:
         "benchmarks/{dataset}/{scene}/{initial}/{occlusion}/occlusion.tsv"
+    wildcard_constraints:
+        occlusion=choices_that_run("occlusion"),
     threads: threads_for
     resources:
         mem_mb=memory_for(bytes_per_sample=18, bytes_per_pixel=1400),

@@ -1,8 +1,8 @@
-# Global optimisation (paper, section IV-D, Eq. 8-12): weighted least squares over the whole map, or none.
+# Global optimisation (paper, section IV-D, Eq. 8-12): weighted least squares over the whole map, or none, which is no job.
 rule optimize:
     input:
         light_field="results/{dataset}/{scene}/lightfield.h5",
-        previous="results/{dataset}/{scene}/stages/{initial}/{occlusion}/{textureless}/textureless.h5",
+        previous=file_before("optimize"),
     output:
         maps="results/{dataset}/{scene}/stages/{initial}/{occlusion}/{textureless}/{optimize}/optimize.h5",
         timing="results/{dataset}/{scene}/stages/{initial}/{occlusion}/{textureless}/{optimize}/optimize.time.json",
@@ -10,6 +10,8 @@ rule optimize:
         "logs/{dataset}/{scene}/{initial}/{occlusion}/{textureless}/{optimize}/optimize.log",
     benchmark:
         "benchmarks/{dataset}/{scene}/{initial}/{occlusion}/{textureless}/{optimize}/optimize.tsv"
+    wildcard_constraints:
+        optimize=choices_that_run("optimize"),
     threads: threads_for
     resources:
         mem_mb=memory_for(bytes_per_sample=30, bytes_per_pixel=1500),

@@ -1,12 +1,7 @@
 # What a reader looks at, below reports/: a page with everything, its numbers, tables, charts, and pictures of every scene.
 
-from sepi.report.page import TEMPLATES
-from sepi.report.plan import PARTS_TABLES, TABLES, Plan
+from sepi.report.plan import PARTS_TABLES, TABLES, TEMPLATES
 from sepi.report.published import FOLDER as PUBLISHED
-
-VARIANT_CHOICES = {name: variant.choices for name, variant in SETTINGS.variants.items()}
-SCENES_BY_DATASET = {name: SETTINGS.scenes_of(name) for name in SETTINGS.datasets}
-PLAN = Plan(Path("results"), SCENES_BY_DATASET, VARIANT_CHOICES, list(SETTINGS.external))
 
 MAIN_TABLES = [table for table in TABLES if table not in PARTS_TABLES]
 PARTS = "reports/report_parts.json" if SETTINGS.report.parts_of_best else []

@@ -1,8 +1,8 @@
-# Texture-less regions (paper, section IV-C, Eq. 6-7): superpixels filled from their reliable edges, or none.
+# Texture-less regions (paper, section IV-C, Eq. 6-7): superpixels filled from their reliable edges, or none, which is no job.
 rule textureless:
     input:
         light_field="results/{dataset}/{scene}/lightfield.h5",
-        previous="results/{dataset}/{scene}/stages/{initial}/{occlusion}/occlusion.h5",
+        previous=file_before("textureless"),
     output:
         maps="results/{dataset}/{scene}/stages/{initial}/{occlusion}/{textureless}/textureless.h5",
         timing="results/{dataset}/{scene}/stages/{initial}/{occlusion}/{textureless}/textureless.time.json",
@@ -10,6 +10,8 @@ rule textureless:
         "logs/{dataset}/{scene}/{initial}/{occlusion}/{textureless}/textureless.log",
     benchmark:
         "benchmarks/{dataset}/{scene}/{initial}/{occlusion}/{textureless}/textureless.tsv"
+    wildcard_constraints:
+        textureless=choices_that_run("textureless"),
     threads: threads_for
     resources:
         mem_mb=memory_for(bytes_per_sample=17, bytes_per_pixel=500),

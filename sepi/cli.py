@@ -104,14 +104,16 @@ def depth(
     from sepi.ingest import settle_range
     from sepi.io.export import RUNTIME, require_target, write_result
     from sepi.io.files import atomic_path
-    from sepi.pipeline import estimate_depth, stage_parameters, variant_named
+    from sepi.pipeline import HANDED_ON, estimate_depth, stage_parameters, variant_named
 
     started = time.perf_counter()
     use_threads(threads or os.cpu_count() or 1)
     chosen = variant_named(variant)
     parameters = _parameters(settings, variant, chosen)
     steps = [
-        step(stage, chosen.choices[stage], values) for stage, values in stage_parameters(chosen, parameters).items()
+        step(stage, chosen.choices[stage], values)
+        for stage, values in stage_parameters(chosen, parameters).items()
+        if chosen.choices[stage] != HANDED_ON
     ]
     whole = light_field_path.resolve()
     folder = output or Path(f"{whole.name if whole.is_dir() else whole.stem}-depth")
@@ -144,7 +146,7 @@ def info(light_field_path: Path, geometry: Geometry | None, reading: Reading) ->
     INPUT is anything that 'sepi depth' reads, with the same flags. Rows and columns of views are counted from 0.
     """
     from sepi.disparity_range import estimate_range
-    from sepi.io import format_of
+    from sepi.io.formats import format_of
 
     known_format = format_of(light_field_path, reading.file_format)
     light_field = reading.read(light_field_path)

@@ -10,6 +10,7 @@ import atexit
 import functools
 import gc
 import json
+import os
 import resource
 import signal
 import sys
@@ -23,15 +24,12 @@ from types import FrameType
 from typing import IO, Any
 
 import click
-import cv2
-import numba
-from tqdm import tqdm
 
 from sepi.errors import SepiError, SepiWarning
 from sepi.io.files import atomic_path
 from sepi.io.hdf5 import read_light_field, read_stage, write_stage
 from sepi.provenance import history_of, stage_attributes, step
-from sepi.stage import Choice, Progress
+from sepi.stage import Choice, Progress, no_progress
 from sepi.validation import validated
 
 # a workflow that stops its jobs; a terminal that is closed
@@ -106,8 +104,12 @@ def _exit_on_signal(number: int, _: FrameType | None) -> None:
 @contextmanager
 def progress_bar(label: str) -> Iterator[Progress]:
     """A bar from 0 to 100 % on a terminal, silence elsewhere; yields the function to call with the fraction done."""
-    # disable=None: tqdm looks whether stderr is a terminal
-    with tqdm(total=100, desc=label, disable=None, leave=False, bar_format="{desc} {percentage:3.0f}% |{bar}|") as bar:
+    if not sys.stderr.isatty():
+        yield no_progress
+        return
+    from tqdm import tqdm
+
+    with tqdm(total=100, desc=label, leave=False, bar_format="{desc} {percentage:3.0f}% |{bar}|") as bar:
 
         def progress(fraction: float) -> None:
             bar.update(round(100 * min(max(fraction, 0.0), 1.0)) - bar.n)
@@ -116,10 +118,23 @@ def progress_bar(label: str) -> Iterator[Progress]:
 
 
 def use_threads(count: int) -> None:
-    """Let numba and OpenCV use at most ``count`` threads (fewer where the machine has fewer cores)."""
-    # numba refuses more threads than it started with
-    numba.set_num_threads(min(count, numba.config.NUMBA_NUM_THREADS))  # type: ignore[attr-defined]
-    cv2.setNumThreads(count)
+    """Let numba and OpenCV use at most ``count`` threads (fewer where the machine has fewer cores).
+
+    Neither is imported for that, since not every job needs them: what is not there yet is told when it starts.
+    """
+    if "numba" in sys.modules:
+        import numba
+
+        # numba refuses more threads than it started with
+        numba.set_num_threads(min(count, numba.config.NUMBA_NUM_THREADS))  # type: ignore[attr-defined]
+    else:
+        os.environ["NUMBA_NUM_THREADS"] = str(min(count, os.cpu_count() or 1))
+    if "cv2" in sys.modules:
+        import cv2
+
+        cv2.setNumThreads(count)
+    else:
+        os.environ["OPENCV_FOR_THREADS_NUM"] = str(count)
 
 
 def peak_memory_mb() -> float:

@@ -14,7 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from sepi.datasets import Scene, own_scene, scenes_in
 from sepi.errors import SepiError
 from sepi.external_config import ExternalMaps, external_maps
-from sepi.io import FORMATS
+from sepi.io.formats import FORMATS
 from sepi.io.options import ORDERS
 from sepi.lightfield import DisparityRange
 from sepi.pipeline import STAGES, VARIANTS, Variant

@@ -83,7 +83,12 @@ def _tree(file: Path) -> ast.Module:
     return ast.parse(file.read_bytes(), str(file))
 
 
-def _imports(module: str, root: Path) -> Iterator[str]:
+@cache
+def _imports(module: str, root: Path) -> frozenset[str]:
+    return frozenset(_imported_by(module, root))
+
+
+def _imported_by(module: str, root: Path) -> Iterator[str]:
     file = _file_of(module, root)
     package = module.split(".")[0]
     for node in ast.walk(_tree(file)):
@@ -112,7 +117,9 @@ def _absolute(node: ast.ImportFrom, module: str, is_package: bool) -> str:
     return ".".join([*parts[: len(parts) - up], *([node.module] if node.module else [])])
 
 
+@cache
 def _code(file: Path) -> str:
+    """The syntax tree of a file without docstrings; remembered, since most files belong to several commands."""
     tree = _WithoutDocstrings().visit(_tree(file))
     return ast.dump(tree)
 

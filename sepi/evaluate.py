@@ -6,18 +6,21 @@ reported, where the benchmark's own toolkit counts it as good. Pixels without fi
 
 from __future__ import annotations
 
+import hashlib
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import click
 import numpy as np
+import numpy.typing as npt
 
-from sepi import regions
 from sepi.command import SepiCommand
 from sepi.errors import SepiError
 from sepi.io.hdf5 import read_light_field, read_stage
-from sepi.io.scores import Evaluation, Scores, write_scores
+from sepi.io.scores import Evaluation, Scored, Scores, read_evaluations, write_scores
 from sepi.lightfield import BoolMap, FloatMap, LightField
-from sepi.provenance import history_of, stage_attributes
+from sepi.provenance import scene_attributes
 
 PROTOCOLS: dict[str, int] = {"paper": 0, "benchmark": 15}
 """Protocol to the pixels left out on each side."""
@@ -99,39 +102,115 @@ def evaluate(light_field: LightField, disparity: FloatMap) -> dict[str, dict[str
 
 def evaluation_of(light_field: LightField, disparity: FloatMap) -> Evaluation:
     """Like :func:`evaluate`, with the error map and the masks that were used."""
-    if disparity.shape != light_field.shape:
-        raise SepiError(
-            f"{light_field.name}: a disparity map must have the views' shape {light_field.shape}, got {disparity.shape}"
-        )
-    truth = light_field.truth
-    if truth is None:
-        return Evaluation()
+    return evaluations_of(light_field, {"": disparity})[""]
+
+
+def evaluations_of(light_field: LightField, maps: Mapping[str, FloatMap]) -> dict[str, Evaluation]:
+    """:func:`evaluation_of` for several maps of one light field, by name; the masks are found once for all.
+
+    Raises
+    ------
+    SepiError
+        If a map does not have the light field's shape.
+    """
+    for disparity in maps.values():
+        if disparity.shape != light_field.shape:
+            raise SepiError(
+                f"{light_field.name}: a disparity map must have the views' shape {light_field.shape}, "
+                f"got {disparity.shape}"
+            )
+    if light_field.truth is None or not maps:
+        return {name: Evaluation() for name in maps}
     masks = region_masks(light_field)
-    known = np.isfinite(truth) & np.isfinite(disparity)
-    error = np.subtract(disparity, truth, out=np.full(truth.shape, np.nan, np.float32), where=known)
-    return Evaluation(
-        scores={
-            protocol: {region: score(disparity, truth, border, masks.get(region)) for region in REGIONS}
-            for protocol, border in PROTOCOLS.items()
-        },
-        error=error,
-        regions=masks,
-        region_sources={name: "scene" if name in light_field.masks else "computed" for name in masks},
-    )
+    sources = {name: "scene" if name in light_field.masks else "computed" for name in masks}
+    return {
+        name: Evaluation(
+            scores={
+                protocol: {region: score(disparity, light_field.truth, border, masks.get(region)) for region in REGIONS}
+                for protocol, border in PROTOCOLS.items()
+            },
+            error=_error(disparity, light_field.truth),
+            regions=masks,
+            region_sources=sources,
+        )
+        for name, disparity in maps.items()
+    }
+
+
+def score_maps(
+    light_field: LightField, maps: Mapping[str, FloatMap], known: Mapping[str, Scored], code: str = ""
+) -> tuple[dict[str, Scored], list[str]]:
+    """The evaluation of every map, taken from ``known`` where that was made of the same.
+
+    Parameters
+    ----------
+    light_field : LightField
+    maps : mapping of str to ndarray, shape (H, W), float32
+        Name to disparity in pixels per view step.
+    known : mapping of str to Scored
+        Earlier evaluations, by name.
+    code : str
+        Digest of the code that evaluates: what other code found is not kept.
+
+    Returns
+    -------
+    scored : dict of str to Scored
+        In the order of ``maps``.
+    anew : list of str
+        Those that were not kept.
+
+    Raises
+    ------
+    SepiError
+        If a map does not have the light field's shape.
+    """
+    scene = _digest_of_scene(light_field, code)
+    made_of = {name: _digest(scene, disparity) for name, disparity in maps.items()}
+    anew = [name for name in maps if name not in known or known[name].made_of != made_of[name]]
+    found = evaluations_of(light_field, {name: maps[name] for name in anew})
+    scored = {name: Scored(made_of[name], found[name]) if name in found else known[name] for name in maps}
+    return scored, anew
 
 
 def region_masks(light_field: LightField) -> dict[str, BoolMap]:
     """The masks ``occluded`` and ``textureless``, (H, W) bool: the scene's own, else computed from its ground truth."""
     if light_field.truth is None:
         raise SepiError(f"{light_field.name}: regions for evaluation need ground truth, and this scene has none")
+    names = ("occluded", "textureless")
     masks = dict(light_field.masks)
-    if "occluded" not in masks:
-        masks["occluded"] = regions.occluded(
-            light_field.truth, light_field.grid, light_field.reference, light_field.present
-        )
-    if "textureless" not in masks:
-        masks["textureless"] = regions.textureless(light_field.centre)
-    return {name: masks[name] for name in ("occluded", "textureless")}
+    if not masks.keys() >= set(names):
+        from sepi import regions
+
+        if "occluded" not in masks:
+            masks["occluded"] = regions.occluded(
+                light_field.truth, light_field.grid, light_field.reference, light_field.present
+            )
+        if "textureless" not in masks:
+            masks["textureless"] = regions.textureless(light_field.centre)
+    return {name: masks[name] for name in names}
+
+
+def _error(disparity: FloatMap, truth: FloatMap) -> FloatMap:
+    """Estimate minus truth; NaN where either is unknown."""
+    known = np.isfinite(truth) & np.isfinite(disparity)
+    return np.subtract(disparity, truth, out=np.full(truth.shape, np.nan, np.float32), where=known)
+
+
+def _digest_of_scene(light_field: LightField, code: str) -> str:
+    """Digest of all but the map that decides its scores: ground truth, masks, and what masks are computed from."""
+    grid = (light_field.grid, light_field.reference)
+    facts = [code, grid, list(light_field.masks), list(REGIONS), PROTOCOLS, BAD_PIXEL]
+    arrays: list[npt.NDArray[Any]] = [light_field.present, *light_field.masks.values()]
+    arrays += [] if light_field.truth is None else [light_field.truth, light_field.centre]
+    return _digest(repr(facts), *arrays)
+
+
+def _digest(text: str, *arrays: npt.NDArray[Any]) -> str:
+    total = hashlib.sha256(text.encode())
+    for values in arrays:
+        total.update(f"{values.shape} {values.dtype}".encode())
+        total.update(np.ascontiguousarray(values).data.cast("B"))
+    return total.hexdigest()
 
 
 def _require_shape(what: str, values: FloatMap | BoolMap, estimate: FloatMap) -> None:
@@ -148,18 +227,39 @@ def _quarter(error: FloatMap) -> float:
     return float(np.sort(error)[int(0.25 * error.size)]) if error.size else float("nan")
 
 
+_PATH = click.Path(path_type=Path)
+
+
 @click.command(name="python -m sepi.evaluate", cls=SepiCommand)
-@click.option("--light-field", "light_field_path", type=click.Path(path_type=Path), required=True, help="From ingest.")
-@click.option("--stage", "stage_path", type=click.Path(path_type=Path), required=True, help="Stage file to score.")
-@click.option("--output", type=click.Path(path_type=Path), required=True, help="Score file to write (HDF5).")
-def command(light_field_path: Path, stage_path: Path, output: Path) -> None:
-    """Score a stage's disparity map against the light field's ground truth, if it has one."""
+@click.option("--light-field", "light_field_path", type=_PATH, required=True, help="From ingest.")
+@click.option("--stages", type=_PATH, required=True, help="Folder of the stage files; their places name the maps.")
+@click.option("--code", default="", help="Digest of the code: maps that other code scored are scored anew.")
+@click.option("--output", type=_PATH, required=True, help="Score file (HDF5) to write; what still holds is kept.")
+@click.argument("paths", nargs=-1, type=_PATH, metavar="STAGE_FILE...", required=True)
+def command(light_field_path: Path, stages: Path, code: str, output: Path, paths: tuple[Path, ...]) -> None:
+    """Score the disparity maps of stage files against the light field's ground truth, if it has one."""
     light_field = read_light_field(light_field_path)
-    steps = history_of(stage_path)
-    evaluation = evaluation_of(light_field, read_stage(stage_path).disparity)
-    if evaluation.error is None:
+    maps = {_name_in(stages, path): read_stage(path).disparity for path in paths}
+    scored, anew = score_maps(light_field, maps, _known(output), code)
+    write_scores(output, scored, scene_attributes(light_field))
+    if light_field.truth is None:
         click.echo(f"{light_field.name}: no ground truth, no scores", err=True)
-    write_scores(output, evaluation, stage_attributes(light_field, steps))
+    else:
+        click.echo(f"{light_field.name}: {len(anew)} of {len(maps)} maps scored anew: {', '.join(anew)}", err=True)
+
+
+def _name_in(stages: Path, path: Path) -> str:
+    if not path.parent.is_relative_to(stages):
+        raise SepiError(f"{path}: not below {stages}, the folder of the stage files (--stages)")
+    return path.parent.relative_to(stages).as_posix()
+
+
+def _known(output: Path) -> dict[str, Scored]:
+    """Earlier evaluations; none from a file that is no score file of this version."""
+    try:
+        return read_evaluations(output)
+    except SepiError:
+        return {}
 
 
 if __name__ == "__main__":

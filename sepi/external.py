@@ -17,7 +17,7 @@ from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 
 from sepi.command import SepiCommand
 from sepi.errors import SepiError, SepiWarning
-from sepi.evaluate import evaluation_of, region_masks
+from sepi.evaluate import evaluations_of
 from sepi.io.external import Imported, write_imported
 from sepi.io.hdf5 import read_light_field
 from sepi.io.maps import map_file, read_disparity
@@ -64,15 +64,9 @@ def import_maps(light_field: LightField, files: Mapping[str, MapFile], scene: st
         ``no finite value``) and no map.
     """
     found = {method: _read(light_field, scene or light_field.name, method, file) for method, file in files.items()}
-    if light_field.truth is None or all(imported.disparity is None for imported in found.values()):
-        return found
-    # masks of a scene that brings none take longer than all else here, and are the same for every method
-    with_masks = replace(light_field, masks=region_masks(light_field))
-    sources = {name: "scene" if name in light_field.masks else "computed" for name in with_masks.masks}
-    for method, imported in found.items():
-        if imported.disparity is not None:
-            evaluation = replace(evaluation_of(with_masks, imported.disparity), region_sources=sources)
-            found[method] = replace(imported, evaluation=evaluation)
+    maps = {method: imported.disparity for method, imported in found.items() if imported.disparity is not None}
+    for method, evaluation in evaluations_of(light_field, maps).items():
+        found[method] = replace(found[method], evaluation=evaluation)
     return found
 
 

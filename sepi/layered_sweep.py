@@ -17,7 +17,6 @@ from sepi.layers import COLOURS_ALONE_SCALE, DETAIL_UNIT, LayerParameters, Layer
 from sepi.lightfield import FloatMap, LightField
 from sepi.semi_global import SmoothedResult, SmoothingParameters, smooth_and_choose
 from sepi.stage import Progress, with_defaults
-from sepi.visibility_kernels import sweep_rows, z_buffers
 
 ROWS_PER_REPORT = 128
 """Rows of the picture between two calls of the progress function."""
@@ -107,6 +106,8 @@ def depth_from_visible_views(
     SepiError
         If the disparity range is unknown.
     """
+    from sepi.visibility_kernels import z_buffers
+
     layers = split_layers(light_field, parameters)
     n = parameters.passes
     for i in range(n):
@@ -134,6 +135,8 @@ def _swept(
     parameters: LayeredSweepParameters,
     progress: Progress,
 ) -> SmoothedResult:
+    from sepi.visibility_kernels import sweep_rows
+
     H, W = light_field.shape
     disparities = light_field.known_range().candidates(parameters.candidates)
     cost = np.empty((parameters.candidates, H, W), np.float32)

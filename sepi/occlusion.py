@@ -40,11 +40,9 @@ from sepi.layered_sweep import (
     depth_from_visible_views,
 )
 from sepi.lightfield import BoolMap, FloatMap, LightField
-from sepi.mean_shift import patch_modes
 from sepi.stage import Choice, NoParameters, Progress, StageMaps, given
 from sepi.sweep import SweepParameters, SweepResult, sweep
 from sepi.view_groups import SIDES, half_planes, halves_and_quarters
-from sepi.visibility_kernels import covered_somewhere
 
 
 class OcclusionParameters(SweepParameters, CannyParameters):
@@ -102,6 +100,8 @@ def half_sepi(
         Adds ``occlusion_candidates`` and ``occluded``, bool, and ``occlusion_side``, uint8, the subset kept:
         0 all views, 1-4 left, right, up, down half, 5-8 left-up, left-down, right-up, right-down quarter.
     """
+    from sepi.mean_shift import patch_modes
+
     before = given(previous)
     candidates = occlusion_candidates(light_field.centre, before.disparity, parameters)
     views = halves_and_quarters(light_field.grid, light_field.reference)
@@ -160,6 +160,8 @@ def visibility(
     StageMaps
         Adds ``occluded``, bool: pixels that something nearer covers in some view.
     """
+    from sepi.visibility_kernels import covered_somewhere
+
     before = given(previous)
     result = depth_from_visible_views(light_field, before.disparity, parameters, progress)
     return before.updated(

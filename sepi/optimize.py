@@ -17,22 +17,20 @@ References
 
 from __future__ import annotations
 
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 import cv2
 import numpy as np
 import numpy.typing as npt
-import scipy.sparse as sparse
 from pydantic import Field, model_validator
-from scipy.sparse.linalg import cg
 
 from sepi.command import stage_command
-from sepi.gauss_newton import information, prepared, view_mean, windowed_step
 from sepi.layers import COLOURS_ALONE_SCALE, LayerParameters, Layers, split_layers
 from sepi.lightfield import FloatMap, LightField
-from sepi.second_order import bend_matrix, bend_weights, solve_smooth
 from sepi.stage import Choice, NoParameters, Parameters, Progress, StageMaps, given, relative_confidence, with_defaults
-from sepi.visibility_kernels import z_buffers
+
+if TYPE_CHECKING:
+    import scipy.sparse as sparse
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -161,6 +159,9 @@ def second_order(
     StageMaps
         ``confidence`` is that of :func:`smooth_confidence`.
     """
+    from sepi.gauss_newton import information, prepared, view_mean, windowed_step
+    from sepi.visibility_kernels import z_buffers
+
     before = given(previous)
     layers = split_layers(light_field, parameters)
     matching = prepared(light_field, layers, parameters)
@@ -223,6 +224,8 @@ def smoothed(
     parameters: SecondOrderParameters,
 ) -> FloatMap:
     """Second-order smoothing of ``target``, whose bends are looked for in ``shape``; all shapes (H, W)."""
+    from sepi.second_order import bend_matrix, bend_weights, solve_smooth
+
     variance = parameters.smooth_colour**2 + 4 * layers.noise
     weights = bend_weights(shape, layers.guide, reliability, parameters.bend, variance)
     weights = [parameters.strength * w + LEAST_SMOOTHNESS for w in weights]
@@ -272,6 +275,8 @@ def energy_system(
         Symmetric, positive definite.
     right : ndarray, shape (H * W,), float64
     """
+    import scipy.sparse as sparse
+
     H, W = disparity.shape
     index = np.arange(H * W).reshape(H, W)
     s = alpha * smoothness.astype(np.float64)
@@ -292,6 +297,9 @@ def solve(matrix: sparse.csr_matrix, right: FloatArray, start: FloatMap, accurac
     to set up as that takes to arrive. What has not arrived after a few steps is left to multigrid, whose steps do not
     grow in number with smoothness or with regions that have hardly any data.
     """
+    import scipy.sparse as sparse
+    from scipy.sparse.linalg import cg
+
     vector = start.astype(np.float64).ravel()
     inverse = sparse.diags_array(1 / matrix.diagonal())
     solution, missed = cg(matrix, right, x0=vector, rtol=accuracy, maxiter=STEPS_BEFORE_MULTIGRID, M=inverse)

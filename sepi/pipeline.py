@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Any
 
 from sepi import initial, occlusion, optimize, textureless
-from sepi.disparity_range import estimate_range
 from sepi.layers import forget_layers
 from sepi.lightfield import LightField
 from sepi.stage import Choice, Parameters, Progress, StageMaps, no_progress
@@ -20,6 +19,9 @@ STAGES: dict[str, dict[str, Choice]] = {
     "optimize": optimize.CHOICES,
 }
 """Stage to its choices, in the order in which the stages run."""
+
+HANDED_ON = "none"
+"""The choice of a stage that hands on the maps of the stage before: it is no job and has no file."""
 
 # rough part of the running time, for the progress bar only
 _SHARE = {"initial": 0.25, "occlusion": 0.35, "textureless": 0.1, "optimize": 0.3}
@@ -49,10 +51,28 @@ class Variant:
         """Stage to choice, in the order of the stages."""
         return {stage: getattr(self, stage) for stage in STAGES}
 
-    def path(self, stage: str) -> str:
-        """The choices up to ``stage`` as a relative path; variants that begin alike share it."""
-        words = list(self.choices.values())
-        return "/".join(words[: list(STAGES).index(stage) + 1])
+
+def key_of(choices: Mapping[str, str], stage: str) -> str:
+    """What names the maps after a stage: the choices up to the stage that made them, ``"sepi/half_sepi/lti"``.
+
+    Variants that begin alike share it, and a stage that hands maps on has that of the stage before. It is the folder of
+    the stage file.
+
+    Parameters
+    ----------
+    choices : mapping of str to str
+        Stage to choice, in the order of the stages.
+    stage : str
+    """
+    words = list(choices.values())[: list(choices).index(stage) + 1]
+    while words[-1] == HANDED_ON:
+        words.pop()
+    return "/".join(words)
+
+
+def stage_of(choices: Mapping[str, str], key: str) -> str:
+    """The stage that made the maps which :func:`key_of` names."""
+    return list(choices)[key.count("/")]
 
 
 VARIANTS: dict[str, Variant] = {
@@ -154,6 +174,8 @@ def estimate_depth(
     chosen = variant_named(variant) if isinstance(variant, str) else variant
     settings = stage_parameters(chosen, parameters)
     if light_field.disparity_range is None:
+        from sepi.disparity_range import estimate_range
+
         light_field = light_field.with_range(estimate_range(light_field))
     maps: StageMaps | None = None
     done = 0.0

@@ -45,7 +45,7 @@ def stage_attributes(light_field: LightField, steps: Sequence[Step]) -> dict[str
     """
     *before, last = steps
     return {
-        **_scene_attributes(light_field),
+        **scene_attributes(light_field),
         "stage": last["stage"],
         "choice": last["choice"],
         "parameters": json.dumps(last["parameters"], sort_keys=True),
@@ -56,7 +56,7 @@ def stage_attributes(light_field: LightField, steps: Sequence[Step]) -> dict[str
 def result_attributes(light_field: LightField, variant: str, steps: Sequence[Step]) -> dict[str, Attribute]:
     """Attributes of a variant's result: ``made_from`` holds every step."""
     return {
-        **_scene_attributes(light_field),
+        **scene_attributes(light_field),
         "variant": variant,
         "made_from": json.dumps(list(steps), sort_keys=True),
     }
@@ -80,7 +80,8 @@ def history_of(path: Path | None) -> list[Step]:
         raise SepiError(f"{path}: not a stage file: its attributes do not say what made it ({error})") from error
 
 
-def _scene_attributes(light_field: LightField) -> dict[str, Attribute]:
+def scene_attributes(light_field: LightField) -> dict[str, Attribute]:
+    """Attributes that tell which light field a file is about, and its disparity range, which must be known."""
     known = light_field.known_range()
     return {
         "scene": light_field.name,

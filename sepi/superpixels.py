@@ -14,10 +14,8 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 import numpy.typing as npt
-from skimage.segmentation import slic
 
 from sepi.lightfield import BoolMap, FloatMap
-from sepi.mean_shift import sample_modes
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
@@ -100,6 +98,8 @@ def superpixels(centre: FloatMap, size: int, compactness: float) -> Superpixels:
     compactness : float
         Weight of nearness against likeness of colour, as in scikit-image.
     """
+    from skimage.segmentation import slic
+
     H, W = centre.shape[:2]
     labels = slic(
         centre if centre.shape[2] == 3 else centre[..., 0],
@@ -151,6 +151,8 @@ def colour_modes(centre: FloatMap, segments: Superpixels, bandwidth: float) -> F
     ndarray, shape (N, 3), float
         Points of the HSV cone; superpixels of one cluster share a point.
     """
+    from sepi.mean_shift import sample_modes
+
     rgb = centre if centre.shape[2] == 3 else np.repeat(centre, 3, axis=2)
     hue, saturation, value = np.moveaxis(cv2.cvtColor(np.ascontiguousarray(rgb), cv2.COLOR_RGB2HSV), 2, 0)
     # hue is an angle that means little where colour is weak, so it goes into a cone

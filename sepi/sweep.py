@@ -18,14 +18,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from numba import get_num_threads
 from pydantic import Field
 
 from sepi.lightfield import BoolMap, FloatMap, LightField
 from sepi.noise import residual_variance
-from sepi.photo_consistency import sample_offsets
 from sepi.stage import Parameters, Progress, no_progress
-from sepi.sweep_kernels import sweep_rows
 
 
 class SweepParameters(Parameters):
@@ -117,6 +114,11 @@ def sweep(
     SepiError
         If the disparity range is unknown.
     """
+    from numba import get_num_threads
+
+    from sepi.photo_consistency import sample_offsets
+    from sepi.sweep_kernels import sweep_rows
+
     H, W = light_field.shape
     groups = np.zeros(light_field.grid, np.int64) if groups is None else groups
     groups = np.where(light_field.present, groups, -1)

@@ -27,7 +27,6 @@ from pydantic import Field
 from sepi.command import stage_command
 from sepi.edges import CannyParameters, canny_edges
 from sepi.lightfield import BoolMap, FloatMap, LightField
-from sepi.planes import Coupling, basis, evaluate_planes, fit_planes, propagate
 from sepi.stage import Choice, NoParameters, Progress, StageMaps, given, relative_confidence
 from sepi.superpixels import FloatArray, Superpixels, borders, colour_modes, superpixels
 from sepi.uniform_regions import UniformPlanesParameters, filled
@@ -233,6 +232,8 @@ def propagated(
     parameters: LtiParameters,
 ) -> FloatMap:
     """Disparity of every pixel by the plane of its superpixel, after propagation; shape (H, W), float32."""
+    from sepi.planes import Coupling, basis, evaluate_planes, fit_planes, propagate
+
     design = basis(segments)
     planes = fit_planes(segments, disparity, weight, design, parameters.tolerance)
     touching = borders(segments)

@@ -19,15 +19,12 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 from pydantic import Field
-from scipy import ndimage
 
-from sepi.gauss_newton import prepared, view_mean
 from sepi.layers import LayerParameters, split_layers
 from sepi.lightfield import BoolMap, FloatMap, LightField
 from sepi.noise import noise_level
 from sepi.stage import Parameters, StageMaps
 from sepi.sweep import full_scale
-from sepi.visibility_kernels import z_buffers
 
 LEAST_NOISE = 1e-5
 """Noise below which rounding of float32 is noise too; integers have at least 0.3 levels by rounding."""
@@ -83,6 +80,11 @@ def filled(light_field: LightField, before: StageMaps, parameters: UniformPlanes
     SepiError
         If the disparity range is unknown.
     """
+    from scipy import ndimage
+
+    from sepi.gauss_newton import prepared, view_mean
+    from sepi.visibility_kernels import z_buffers
+
     colours = LayerParameters(colour_scale=parameters.colour_scale, detail_share=0.0)
     matching = prepared(light_field, split_layers(light_field, colours), colours)
     nearest = z_buffers(before.disparity, light_field.present, *light_field.reference)

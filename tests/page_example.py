@@ -12,7 +12,7 @@ import numpy as np
 
 from sepi.camera import Camera
 from sepi.errors import SepiWarning
-from sepi.evaluate import evaluation_of
+from sepi.evaluate import score_maps
 from sepi.external import MapFile, import_maps
 from sepi.io.external import Imported, write_imported
 from sepi.io.hdf5 import read_light_field, read_stage, write_light_field, write_stage
@@ -21,7 +21,7 @@ from sepi.io.scores import write_scores
 from sepi.layers import forget_layers
 from sepi.lightfield import FloatMap, LightField
 from sepi.pipeline import STAGES, VARIANTS, stage_parameters
-from sepi.provenance import stage_attributes, step
+from sepi.provenance import scene_attributes, stage_attributes, step
 from sepi.report import numbers
 from sepi.report.figures import page_json, read_results
 from sepi.report.graph import drawn
@@ -127,6 +127,7 @@ def write_results(plan: Plan, scene: tuple[str, str]) -> None:
     write_light_field(plan.light_field_file(*scene), light_field)
     for variant in plan.variants:
         run_stages(plan, scene, light_field, variant)
+    write_plan_scores(plan, scene, light_field)
     maps = imported_maps(plan, light_field) if scene == COTTON else {}
     absent = {method: Imported(f"/maps/{method}/{light_field.name}.pfm", "no file") for method in plan.external}
     write_imported(plan.external_file(*scene), absent | maps)
@@ -141,11 +142,18 @@ def run_stages(plan: Plan, scene: tuple[str, str], light_field: LightField, vari
         steps.append(step(stage, choice, settings[stage]))
         attributes = stage_attributes(light_field, steps)
         write_stage(plan.stage_file(*scene, variant, stage), maps, attributes)
-        evaluation = evaluation_of(light_field, maps.disparity)
-        write_scores(plan.stage_file(*scene, variant, stage, "scores.h5"), evaluation, attributes)
         timing = {"seconds": 1.5 + number, "peak_memory_mb": 200 + 10 * number}
         plan.stage_file(*scene, variant, stage, "time.json").write_text(json.dumps(timing))
     forget_layers()
+
+
+def write_plan_scores(plan: Plan, scene: tuple[str, str], light_field: LightField) -> None:
+    """The score file of a scene, from its stage files."""
+    folder = plan.stages_folder(*scene)
+    maps = {
+        file.parent.relative_to(folder).as_posix(): read_stage(file).disparity for file in plan.scored_files(*scene)
+    }
+    write_scores(plan.scores_file(*scene), score_maps(light_field, maps, {})[0], scene_attributes(light_field))
 
 
 def imported_maps(plan: Plan, light_field: LightField) -> Mapping[str, Imported]:

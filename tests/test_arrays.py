@@ -12,9 +12,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sepi.errors import SepiError
-from sepi.io import FORMATS, ReadOptions, read
 from sepi.io.arrays import light_field_from_array
+from sepi.io.formats import FORMATS, read
 from sepi.io.hdf5 import write_light_field
+from sepi.io.options import ReadOptions
 from sepi.lightfield import LightField
 
 T, S, H, W = 2, 3, 8, 10

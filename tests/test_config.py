@@ -13,7 +13,7 @@ import yaml
 from sepi.config import Settings, load_settings
 from sepi.config_file import default_yaml
 from sepi.errors import SepiError
-from sepi.pipeline import STAGES, VARIANTS
+from sepi.pipeline import STAGES, VARIANTS, key_of
 from sepi.scenes import SCENES
 
 CONFIG = Path(__file__).parents[1] / "config.yaml"
@@ -125,8 +125,9 @@ def test_own_variants_come_beside_the_builtin_ones() -> None:
     mine = VARIANTS["paper"].choices | {"optimize": "none"}
     settings = load_settings({"variants": {"mine": mine}})
     assert settings.own_variants == ["mine"]
-    assert settings.variants["mine"].path("textureless") == settings.variants["paper"].path("textureless")
-    assert settings.variants["mine"].path("optimize") != settings.variants["paper"].path("optimize")
+    mine, paper = (settings.variants[name].choices for name in ("mine", "paper"))
+    assert key_of(mine, "textureless") == key_of(paper, "textureless")
+    assert key_of(mine, "optimize") != key_of(paper, "optimize")
 
 
 class TestFolderOfScenes:

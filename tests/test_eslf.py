@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from sepi.errors import SepiError
-from sepi.io import eslf, format_of, read
+from sepi.io import eslf
+from sepi.io.formats import format_of, read
 from sepi.io.options import ReadOptions
 
 

@@ -1,5 +1,6 @@
 """Scores: by hand, against a plain twin, with unknown pixels, and as the command that the workflow calls."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import h5py
@@ -11,7 +12,7 @@ from sepi import regions
 from sepi.errors import SepiError
 from sepi.evaluate import command, evaluate, evaluation_of, score
 from sepi.io.hdf5 import write_light_field, write_stage
-from sepi.io.scores import read_evaluation, read_scores
+from sepi.io.scores import read_evaluations, read_scores
 from sepi.lightfield import DisparityRange, LightField
 from sepi.stage import StageMaps
 
@@ -147,55 +148,132 @@ def test_wrong_shape_is_a_clear_error() -> None:
         score(np.zeros((2, 2), np.float32), np.zeros((2, 3), np.float32))
 
 
-def run_command(folder: Path, light_field: LightField, disparity: np.ndarray, output: str = "scores.h5") -> Path:
+def run_command(
+    folder: Path, light_field: LightField, maps: dict[str, np.ndarray], output: str = "scores.h5", code: str = "1"
+) -> tuple[Path, str]:
+    """Score these maps as the workflow does; the score file, and what the command said."""
     write_light_field(folder / "lightfield.h5", light_field)
-    write_stage(folder / "initial.h5", StageMaps(disparity, np.ones_like(disparity)), STAGE_ATTRIBUTES)
-    files = {"--light-field": folder / "lightfield.h5", "--stage": folder / "initial.h5", "--output": folder / output}
-    arguments = [str(part) for pair in files.items() for part in pair]
-    result = CliRunner().invoke(command, arguments, catch_exceptions=False)
+    stages = folder / "stages"
+    for name, disparity in maps.items():
+        write_stage(stages / name / "stage.h5", StageMaps(disparity, np.ones_like(disparity)), STAGE_ATTRIBUTES)
+    files = [stages / name / "stage.h5" for name in maps]
+    options = ["--light-field", folder / "lightfield.h5", "--stages", stages, "--output", folder / output]
+    words = [str(word) for word in [*options, "--code", code, *files]]
+    result = CliRunner().invoke(command, words, catch_exceptions=False)
     assert result.exit_code == 0, result.output
-    return folder / output
+    return folder / output, result.stderr
+
+
+def noisy(truth: np.ndarray, seed: int) -> np.ndarray:
+    noise = np.random.default_rng(seed).normal(scale=0.05, size=truth.shape)
+    return truth + noise.astype(np.float32)
 
 
 def test_command_writes_what_evaluate_finds(tmp_path: Path) -> None:
-    random = np.random.default_rng(5)
-    truth = random.normal(size=(40, 40)).astype(np.float32)
-    estimate = truth + random.normal(scale=0.05, size=truth.shape).astype(np.float32)
+    truth = np.random.default_rng(5).normal(size=(40, 40)).astype(np.float32)
+    maps = {"sepi": noisy(truth, 6), "sepi/half_sepi": noisy(truth, 7)}
     light_field = scene(truth)
-    path = run_command(tmp_path, light_field, estimate)
-    written = read_scores(path)
-    expected = evaluate(light_field, estimate)
-    assert set(written) == {"paper", "benchmark"}
-    for protocol, cells in expected.items():
-        for region, scores in cells.items():
-            assert written[protocol][region] == pytest.approx(scores, nan_ok=True)
-    back = read_evaluation(path)
-    assert back.error is not None
-    np.testing.assert_array_equal(back.error, estimate - truth)
-    assert set(back.regions) == {"occluded", "textureless"}
-    assert path.read_bytes() == run_command(tmp_path, light_field, estimate, "again.h5").read_bytes()
+    path, _ = run_command(tmp_path, light_field, maps)
+    written, back = read_scores(path), read_evaluations(path)
+    assert list(written) == list(back) == list(maps)
+    for name, estimate in maps.items():
+        assert set(written[name]) == {"paper", "benchmark"}
+        for protocol, cells in evaluate(light_field, estimate).items():
+            for region, scores in cells.items():
+                assert written[name][protocol][region] == pytest.approx(scores, nan_ok=True)
+        found = back[name].evaluation
+        assert found.error is not None
+        np.testing.assert_array_equal(found.error, estimate - truth)
+        assert set(found.regions) == {"occluded", "textureless"}
+        assert found.region_sources == {"occluded": "computed", "textureless": "computed"}
+    assert path.read_bytes() == run_command(tmp_path, light_field, maps, "again.h5")[0].read_bytes()
+
+
+TRUTH = np.random.default_rng(5).normal(size=(40, 40)).astype(np.float32)
+MAPS = {name: noisy(TRUTH, seed) for seed, name in enumerate(["sepi", "sepi/none/lti", "semi_global"])}
+
+
+class TestOnlyWhatChangedIsScoredAnew:
+    """A scene has one score file: a change in one variant must not cost the scores of all, nor leave old ones."""
+
+    def test_a_changed_map(self, tmp_path: Path) -> None:
+        run_command(tmp_path, scene(TRUTH), MAPS)
+        changed = MAPS | {"sepi/none/lti": noisy(TRUTH, 9)}
+        path, told = run_command(tmp_path, scene(TRUTH), changed)
+        assert "1 of 3 maps scored anew: sepi/none/lti" in told
+        assert path.read_bytes() == run_command(tmp_path, scene(TRUTH), changed, "fresh.h5")[0].read_bytes()
+
+    def test_a_further_map_and_one_less(self, tmp_path: Path) -> None:
+        run_command(tmp_path, scene(TRUTH), MAPS)
+        others = {"wang": noisy(TRUTH, 9), **{name: MAPS[name] for name in ("semi_global", "sepi")}}
+        path, told = run_command(tmp_path, scene(TRUTH), others)
+        assert "1 of 3 maps scored anew: wang" in told
+        assert path.read_bytes() == run_command(tmp_path, scene(TRUTH), others, "fresh.h5")[0].read_bytes()
+
+    def test_nothing_changed(self, tmp_path: Path) -> None:
+        run_command(tmp_path, scene(TRUTH), MAPS)
+        assert "0 of 3 maps scored anew" in run_command(tmp_path, scene(TRUTH), MAPS)[1]
+
+    @pytest.mark.parametrize("what", ["truth", "mask", "picture", "code"])
+    def test_what_changes_all_scores(self, tmp_path: Path, what: str) -> None:
+        run_command(tmp_path, scene(TRUTH), MAPS)
+        light_field = scene(TRUTH)
+        if what == "truth":
+            light_field = scene(TRUTH + np.float32(0.1))
+        elif what == "mask":
+            light_field = scene(TRUTH, {"occluded": np.eye(40, dtype=bool)})
+        elif what == "picture":
+            light_field = replace(light_field, views=light_field.views // 2)
+        path, told = run_command(tmp_path, light_field, MAPS, code="2" if what == "code" else "1")
+        assert "3 of 3 maps scored anew" in told
+        fresh, _ = run_command(tmp_path, light_field, MAPS, "fresh.h5", code="2" if what == "code" else "1")
+        assert path.read_bytes() == fresh.read_bytes()
+
+    def test_a_file_that_cannot_be_read_is_made_anew(self, tmp_path: Path) -> None:
+        """Left by an older version, or damaged."""
+        (tmp_path / "scores.h5").write_bytes(b"something else")
+        path, told = run_command(tmp_path, scene(TRUTH), MAPS)
+        assert "3 of 3 maps scored anew" in told
+        assert list(read_scores(path)) == list(MAPS)
 
 
 def test_command_says_that_there_is_no_truth(tmp_path: Path) -> None:
     """A real picture goes through the workflow: a file is written, without scores."""
-    path = run_command(tmp_path, scene(None), np.zeros((40, 40), np.float32))
-    assert read_scores(path) == {}
-    assert read_evaluation(path).error is None
+    path, told = run_command(tmp_path, scene(None), {"sepi": np.zeros((40, 40), np.float32)})
+    assert "no ground truth, no scores" in told
+    assert read_scores(path) == {"sepi": {}}
+    assert read_evaluations(path)["sepi"].evaluation.error is None
     with h5py.File(path) as file:
         assert not file.attrs["ground_truth"]
-        assert file.attrs["stage"] == "initial"
+        assert file.attrs["scene"] == "noise"
 
 
 def test_command_on_a_foreign_file_is_one_line(tmp_path: Path) -> None:
     write_light_field(tmp_path / "lightfield.h5", scene(None))
-    arguments = ["--light-field", str(tmp_path / "lightfield.h5"), "--output", str(tmp_path / "out.h5")]
-    result = CliRunner().invoke(command, [*arguments, "--stage", str(tmp_path / "absent.h5")])
+    options = ["--light-field", tmp_path / "lightfield.h5", "--stages", tmp_path, "--output", tmp_path / "out.h5"]
+    absent = tmp_path / "sepi" / "absent.h5"
+    result = CliRunner().invoke(command, [str(word) for word in [*options, absent]])
     assert result.exit_code == 1
-    assert result.output.strip() == f"sepi: {tmp_path / 'absent.h5'}: no such file"
+    assert result.output.strip() == f"sepi: {absent}: no such file"
     assert not (tmp_path / "out.h5").exists()
+
+
+def test_a_map_from_elsewhere_is_refused(tmp_path: Path) -> None:
+    """Its name would be wrong, and so the row of the table."""
+    write_light_field(tmp_path / "lightfield.h5", scene(None))
+    options = ["--light-field", tmp_path / "lightfield.h5", "--stages", tmp_path / "a", "--output", tmp_path / "out.h5"]
+    result = CliRunner().invoke(command, [str(word) for word in [*options, tmp_path / "b" / "sepi" / "initial.h5"]])
+    assert result.exit_code == 1
+    assert f"not below {tmp_path / 'a'}" in result.output
 
 
 def test_reading_scores_from_another_file_is_a_clear_error(tmp_path: Path) -> None:
     write_light_field(tmp_path / "lightfield.h5", scene(None))
     with pytest.raises(SepiError, match="not a score file"):
         read_scores(tmp_path / "lightfield.h5")
+
+
+def test_a_map_that_was_not_scored_is_named(tmp_path: Path) -> None:
+    path, _ = run_command(tmp_path, scene(None), {"sepi": np.zeros((40, 40), np.float32)})
+    with pytest.raises(SepiError, match=r"no scores of 'sepi/wang'; it holds: sepi$"):
+        read_evaluations(path, ["sepi/wang"])

@@ -9,8 +9,8 @@ import pytest
 
 from sepi.camera import Camera
 from sepi.errors import SepiError
-from sepi.io import ReadOptions, format_of, read
-from sepi.io.options import ORDERS
+from sepi.io.formats import format_of, read
+from sepi.io.options import ORDERS, ReadOptions
 from sepi.lightfield import LightField
 
 T, S, H, W = 3, 5, 8, 10

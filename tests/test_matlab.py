@@ -11,7 +11,8 @@ import pytest
 import scipy.io
 
 from sepi.errors import SepiError
-from sepi.io import ReadOptions, format_of, read
+from sepi.io.formats import format_of, read
+from sepi.io.options import ReadOptions
 from sepi.lightfield import LightField
 
 RNG = np.random.default_rng(3)

@@ -16,10 +16,10 @@ from click.testing import CliRunner
 
 from sepi import pipeline
 from sepi.errors import SepiError
-from sepi.evaluate import evaluation_of
+from sepi.evaluate import evaluation_of, score_maps
 from sepi.external import NO_FILE
 from sepi.io.external import Imported, write_imported
-from sepi.io.hdf5 import write_light_field, write_stage
+from sepi.io.hdf5 import read_stage, write_light_field, write_stage
 from sepi.io.scores import Evaluation, write_scores
 from sepi.lightfield import DisparityRange, LightField
 from sepi.report import figures, numbers, pictures, tables
@@ -84,14 +84,18 @@ def with_results(made: Plan) -> Plan:
         scene = light_field(name)
         write_light_field(made.light_field_file(dataset, name), scene)
         for variant in made.variants:
-            for stage in made.stages:
+            for stage in (stage for stage in made.stages if made.runs_stage(variant, stage)):
                 maps = stage_maps(scene, variant, stage)
                 step = {"stage": stage, "choice": made.variants[variant][stage], "parameters": "{}", "made_from": "[]"}
                 write_stage(made.stage_file(dataset, name, variant, stage), maps, step)
-                scores = made.stage_file(dataset, name, variant, stage, "scores.h5")
-                write_scores(scores, evaluation_of(scene, maps.disparity), {"stage": stage})
                 timing = made.stage_file(dataset, name, variant, stage, "time.json")
                 timing.write_text(json.dumps({"seconds": 1.5, "peak_memory_mb": 200 + 10 * len(stage)}))
+        folder = made.stages_folder(dataset, name)
+        for parts in (False, True):
+            files = made.scored_files(dataset, name, parts)
+            disparity = {file.parent.relative_to(folder).as_posix(): read_stage(file).disparity for file in files}
+            scored = score_maps(scene, disparity, {})[0]
+            write_scores(made.scores_file(dataset, name, parts), scored, {"scene": name})
         if made.external:
             maps = {method: imported_map(scene, EXTERNAL[method][name]) for method in made.external}
             write_imported(made.external_file(dataset, name), maps)
@@ -374,8 +378,31 @@ def test_variants_share_the_files_of_their_first_stages(plan: Plan) -> None:
     files = [plan.stage_file("hci", "cotton", variant, "initial") for variant in VARIANTS]
     assert len(set(files)) == 1
     assert files[0] == plan.results / "hci/cotton/stages/sepi/initial.h5"
-    # of each scene: scores and times of ten stages, the light field, and the paper's final maps
-    assert len(plan.number_inputs()) == 5 * (2 * (1 + 3 * 3) + 2)
+    # of each scene: scores, times of nine stages, the light field, and the paper's final maps
+    assert len(plan.number_inputs()) == 5 * (1 + 1 + 3 * 3 - 1 + 2)
+
+
+def test_a_stage_that_hands_its_maps_on_has_no_file_but_scores(plan: Plan) -> None:
+    """Choice none is no job: what is asked for after it is the file before, and its time is nothing."""
+    initial = plan.stage_file("hci", "cotton", "paper", "initial")
+    assert plan.stage_file("hci", "cotton", "no_occlusion", "occlusion") == initial
+    assert plan.stage_file("hci", "cotton", "no_occlusion", "textureless") == (
+        plan.results / "hci/cotton/stages/sepi/none/lti/textureless.h5"
+    )
+    numbers_of = Runs(collect(plan))
+    scores, handed_on = (
+        numbers_of.scores("hci", "cotton", "no_occlusion", stage) for stage in ("initial", "occlusion")
+    )
+    assert handed_on == scores
+    assert numbers_of.timing("hci", "cotton", "no_occlusion", "occlusion").seconds == 0
+    assert numbers_of.timing("hci", "cotton", "no_occlusion", "optimize").seconds == 1.5
+
+
+def test_the_last_stage_may_hand_its_maps_on() -> None:
+    choices = {"initial": "sepi", "occlusion": "none", "textureless": "none", "optimize": "none"}
+    made = Plan(Path("results"), SCENES, VARIANTS | {"mine": choices})
+    assert made.stage_file("hci", "cotton", "mine", "optimize") == Path("results/hci/cotton/stages/sepi/initial.h5")
+    assert made.made_by("mine", "optimize") == "initial"
 
 
 @pytest.mark.parametrize(
@@ -404,7 +431,7 @@ def test_a_plan_comes_back_from_its_text(plan: Plan) -> None:
     assert whole.external_file("hci", "cotton") in whole.map_inputs("hci", "cotton")
 
 
-@pytest.mark.parametrize("ending", ["lightfield.h5", "initial.scores.h5", "time.json", "optimize.h5", "external.h5"])
+@pytest.mark.parametrize("ending", ["lightfield.h5", "scores.h5", "time.json", "optimize.h5", "external.h5"])
 @pytest.mark.parametrize("content", [None, b"", b"[1]"])
 def test_a_missing_or_broken_file_is_one_line(
     ending: str, content: bytes | None, complete: Plan, tmp_path: Path

@@ -16,7 +16,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sepi.errors import SepiError
-from sepi.io import format_of, read
+from sepi.io.formats import format_of, read
 from sepi.io.options import ReadOptions
 from sepi.io.view_names import numbers_from_likeness, numbers_from_pattern
 from sepi.lightfield import LightField

@@ -1,14 +1,15 @@
-"""Score files: what the evaluation of one disparity map found.
+"""Score files: what the evaluation of a scene's disparity maps found.
 
-Layout: a group ``scores/PROTOCOL/REGION`` per cell with one attribute per score, the signed error map ``error (H, W)``
-and the masks ``regions/NAME (H, W)``. Where the scene has no ground truth there is none of these, and the root
-attribute ``ground_truth`` is False.
+Layout: a group ``maps/NAME`` per map, in it a group ``scores/PROTOCOL/REGION`` per cell with one attribute per score,
+the signed error map ``error (H, W)`` and the masks ``regions/NAME (H, W)``; the masks are the same for every map, and
+stored once. Where the scene has no ground truth the groups of the maps are empty, and the root attribute
+``ground_truth`` is False.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,8 @@ import numpy as np
 from sepi.errors import SepiError
 from sepi.io.hdf5 import UNITS, Attribute, created, opened
 from sepi.lightfield import BoolMap, FloatMap
+
+_MAPS = "maps"
 
 Scores = dict[str, float]
 """Score to value, for one protocol and region."""
@@ -45,30 +48,46 @@ class Evaluation:
     region_sources: Mapping[str, str] = field(default_factory=dict)
 
 
-def write_scores(path: Path, evaluation: Evaluation, attributes: Mapping[str, Attribute]) -> None:
-    """Write an evaluation and the attributes that say what was evaluated; equal content gives equal bytes."""
+@dataclass(frozen=True)
+class Scored:
+    """The evaluation of one map, and what it was made of.
+
+    Attributes
+    ----------
+    made_of : str
+        Digest of all that decides the scores; a map with the same digest need not be evaluated again.
+    evaluation : Evaluation
+    """
+
+    made_of: str
+    evaluation: Evaluation
+
+
+def write_scores(path: Path, maps: Mapping[str, Scored], attributes: Mapping[str, Attribute]) -> None:
+    """Write the evaluations of a scene's maps, by name, and the attributes of the scene.
+
+    Equal content gives equal bytes. A name is a path such as ``"sepi/half_sepi"``.
+    """
     with created(path) as file:
-        file.attrs["ground_truth"] = evaluation.error is not None
+        file.attrs["ground_truth"] = any(scored.evaluation.error is not None for scored in maps.values())
         for key, value in attributes.items():
             file.attrs[key] = value
-        put_evaluation(file, evaluation)
+        groups = file.create_group(_MAPS, track_order=True)
+        first: h5py.Group | None = None
+        for name, scored in maps.items():
+            group = groups.create_group(_stored_name(name))
+            group.attrs["made_of"] = scored.made_of
+            if first is None:
+                put_evaluation(group, scored.evaluation)
+                first = group
+            else:
+                put_evaluation(group, replace(scored.evaluation, regions={}))
+                for region in scored.evaluation.regions:
+                    group[f"regions/{region}"] = first[f"regions/{region}"]
 
 
-def read_scores(path: Path) -> dict[str, dict[str, Scores]]:
-    """Protocol to region to scores; empty where the scene has no ground truth.
-
-    Raises
-    ------
-    SepiError
-        If the file is missing, not HDF5, or not a score file.
-    """
-    with opened(path) as file:
-        _require_scores(path, file)
-        return scores_in(file)
-
-
-def read_evaluation(path: Path) -> Evaluation:
-    """Everything in a score file.
+def read_scores(path: Path) -> dict[str, dict[str, dict[str, Scores]]]:
+    """Map to protocol to region to scores; without protocols where the scene has no ground truth.
 
     Raises
     ------
@@ -76,19 +95,36 @@ def read_evaluation(path: Path) -> Evaluation:
         If the file is missing, not HDF5, or not a score file.
     """
     with opened(path) as file:
-        _require_scores(path, file)
-        return evaluation_in(file)
+        return {_name(key): scores_in(group) for key, group in _maps(path, file).items()}
+
+
+def read_evaluations(path: Path, names: Collection[str] | None = None) -> dict[str, Scored]:
+    """Everything that a score file holds of these maps, or of all.
+
+    Raises
+    ------
+    SepiError
+        If the file is missing, not HDF5, not a score file, or has nothing of one of the maps.
+    """
+    with opened(path) as file:
+        maps = _maps(path, file)
+        known = [_name(key) for key in maps]
+        for name in names or ():
+            if name not in known:
+                raise SepiError(f"{path}: no scores of '{name}'; it holds: {', '.join(known) or 'none'}")
+        groups = {name: maps[_stored_name(name)] for name in (known if names is None else names)}
+        return {name: Scored(str(group.attrs["made_of"]), evaluation_in(group)) for name, group in groups.items()}
 
 
 def put_evaluation(group: h5py.Group, evaluation: Evaluation) -> None:
-    """Write an evaluation into an empty group, or a file's root."""
-    for protocol, regions in evaluation.scores.items():
-        for region, scores in regions.items():
-            group.create_group(f"scores/{protocol}/{region}").attrs.update(scores)
+    """Write an evaluation into an empty group, or a file's root; once read and written again it is the same bytes."""
+    for protocol, regions in sorted(evaluation.scores.items()):
+        for region, scores in sorted(regions.items()):
+            group.create_group(f"scores/{protocol}/{region}").attrs.update(sorted(scores.items()))
     if evaluation.error is not None:
         group.create_dataset("error", data=evaluation.error)
         group["error"].attrs["units"] = UNITS["disparity"]
-    for name, mask in evaluation.regions.items():
+    for name, mask in sorted(evaluation.regions.items()):
         dataset = group.create_dataset(f"regions/{name}", data=mask, compression="gzip", compression_opts=1)
         dataset.attrs["source"] = evaluation.region_sources[name]
 
@@ -96,7 +132,7 @@ def put_evaluation(group: h5py.Group, evaluation: Evaluation) -> None:
 def scores_in(group: h5py.Group) -> dict[str, dict[str, Scores]]:
     """The scores alone of what :func:`put_evaluation` wrote: protocol to region to scores."""
     return {
-        protocol: {region: {key: float(value) for key, value in cell.attrs.items()} for region, cell in regions.items()}
+        protocol: {region: {key: value.item() for key, value in cell.attrs.items()} for region, cell in regions.items()}
         for protocol, regions in group.get("scores", {}).items()
     }
 
@@ -112,6 +148,16 @@ def evaluation_in(group: h5py.Group) -> Evaluation:
     )
 
 
-def _require_scores(path: Path, file: h5py.File) -> None:
-    if "ground_truth" not in file.attrs:
+def _maps(path: Path, file: h5py.File) -> h5py.Group:
+    if "ground_truth" not in file.attrs or _MAPS not in file:
         raise SepiError(f"{path}: not a score file (written by python -m sepi.evaluate): no attribute 'ground_truth'")
+    return file[_MAPS]
+
+
+def _stored_name(name: str) -> str:
+    # HDF5 would take a slash for a group of groups
+    return name.replace("/", ".")
+
+
+def _name(stored: str) -> str:
+    return stored.replace(".", "/")

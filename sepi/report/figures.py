@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import click
+import cv2
 import numpy as np
 
 from sepi.command import SepiCommand
@@ -22,7 +23,7 @@ from sepi.io.external import read_imported
 from sepi.io.files import atomic_path
 from sepi.io.hdf5 import read_light_field, read_stage
 from sepi.io.images import write_png
-from sepi.io.scores import Evaluation, read_evaluation
+from sepi.io.scores import Evaluation, read_evaluations
 from sepi.lightfield import LightField
 from sepi.report.confidence import write_curves
 from sepi.report.pictures import (
@@ -46,8 +47,9 @@ from sepi.stage import StageMaps
 
 _ASKED = "asked for"
 
-# width of a panel of the overview in inches; 100 dots each
+# width of a panel of the overview in inches, and dots in an inch
 _PANEL = 3.0
+_DOTS = 100
 
 
 @dataclass(frozen=True)
@@ -152,13 +154,22 @@ def write_overview(
         for column, panel in enumerate(row):
             left, top = column * _PANEL + 0.05, bottom + panel_height - 0.35
             extent = (left, left + _PANEL - 0.1, bottom + 0.05, top)
-            sheet.imshow(panel.picture, extent=extent, aspect="auto", interpolation="antialiased")
+            sheet.imshow(_in_dots(panel.picture, extent), extent=extent, aspect="auto", interpolation="none")
             place = (left + _PANEL / 2 - 0.05, top + 0.04)
             sheet.text(*place, panel.title, fontsize=8, ha="center", va="bottom", parse_math=False)
     # pictures set limits of their own
     sheet.set_xlim(0, size[0])
     sheet.set_ylim(0, size[1])
     save(figure, folder, name, endings)
+
+
+def _in_dots(picture: Picture, extent: tuple[float, float, float, float]) -> Picture:
+    """A picture in the size in dots at which it is drawn; matplotlib would take longer, and once for each file."""
+    left, right, bottom, top = extent
+    size = (round((right - left) * _DOTS), round((top - bottom) * _DOTS))
+    shrinks = size[0] < picture.shape[1]
+    dots = cv2.resize(picture, size, interpolation=cv2.INTER_AREA if shrinks else cv2.INTER_LINEAR)
+    return np.asarray(dots, np.uint8)
 
 
 def read_results(plan: Plan, dataset: str, scene: str) -> SceneResults:
@@ -169,14 +180,13 @@ def read_results(plan: Plan, dataset: str, scene: str) -> SceneResults:
         variant: {stage: read(plan.stage_file(dataset, scene, variant, stage)) for stage in plan.stages}
         for variant in plan.listed
     }
-    last = plan.stages[-1]
+    keys = {variant: plan.stage_key(variant, plan.stages[-1]) for variant in maps}
+    scored = read_evaluations(plan.scores_file(dataset, scene), list(keys.values()))
     imported = read_imported(plan.external_file(dataset, scene)) if plan.external else {}
     return SceneResults(
         light_field=read_light_field(plan.light_field_file(dataset, scene)),
         maps=maps,
-        evaluations={
-            variant: read_evaluation(plan.stage_file(dataset, scene, variant, last, "scores.h5")) for variant in maps
-        },
+        evaluations={variant: scored[key].evaluation for variant, key in keys.items()},
         compared=plan.compared,
         imported={
             method: (found.disparity, found.evaluation)

@@ -26,7 +26,7 @@ from sepi.errors import SepiError
 from sepi.evaluate import BAD_PIXEL, PROTOCOLS, REGIONS
 from sepi.io.external import read_imported_scores
 from sepi.io.hdf5 import read_light_field, read_stage
-from sepi.io.scores import Scores, read_evaluation, read_scores
+from sepi.io.scores import Scores, read_evaluations, read_scores
 from sepi.machine import this_machine
 from sepi.report.confidence import decile_errors, oracle, sparsification
 from sepi.report.layout import as_json, write
@@ -159,18 +159,20 @@ def _light_field(path: Path) -> dict[str, Any]:
 def _stages(plan: Plan, dataset: str, scene: str, parts: bool) -> dict[str, Any]:
     """Scores and times by the path of a stage's choices; a stage that variants share is there once."""
     found: dict[str, Any] = {}
+    scores_file = plan.scores_file(dataset, scene, parts)
+    scores = read_scores(scores_file)
     for variant in plan.parts if parts else plan.listed:
         for stage in plan.stages:
             key = plan.stage_key(variant, stage)
+            # of the parts, only the last stage is scored
+            is_scored = not parts or stage == plan.stages[-1]
             if key not in found:
-                # of the parts, only the last stage is scored
-                is_scored = not parts or stage == plan.stages[-1]
-                scores_file = plan.stage_file(dataset, scene, variant, stage, "scores.h5")
-                found[key] = {
-                    "stage": stage,
-                    "scores": _ordered(scores_file, read_scores(scores_file)) if is_scored else None,
-                    **_timing(plan.stage_file(dataset, scene, variant, stage, "time.json")),
-                }
+                timing = _timing(plan.stage_file(dataset, scene, variant, stage, "time.json"))
+                found[key] = {"stage": plan.made_by(variant, stage), "scores": None, **timing}
+            if is_scored:
+                if key not in scores:
+                    raise SepiError(f"{scores_file}: no scores of '{key}'; it holds: {', '.join(scores) or 'none'}")
+                found[key]["scores"] = _ordered(scores_file, scores[key])
     return found
 
 
@@ -187,9 +189,11 @@ def _timing(path: Path) -> dict[str, float]:
 def _confidence(plan: Plan, dataset: str, scene: str) -> dict[str, dict[str, list[float]]]:
     """Errors by confidence of the compared variants' final maps; nothing without ground truth."""
     found = {}
-    for variant in plan.compared:
-        last = plan.stages[-1]
-        error = read_evaluation(plan.stage_file(dataset, scene, variant, last, "scores.h5")).error
+    last = plan.stages[-1]
+    keys = {variant: plan.stage_key(variant, last) for variant in plan.compared}
+    scored = read_evaluations(plan.scores_file(dataset, scene), list(keys.values()))
+    for variant, key in keys.items():
+        error = scored[key].evaluation.error
         confidence = read_stage(plan.stage_file(dataset, scene, variant, last)).confidence
         if error is not None:
             squared, absolute = decile_errors(confidence, error)

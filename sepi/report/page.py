@@ -25,12 +25,6 @@ SCRIPTS = ("unpack.js", "panels.js", "viewer.js", "cloud.js", "pixel.js", "table
 """Scripts of a page, in the order in which they are run."""
 
 
-TEMPLATES = sorted(
-    path for path in (Path(__file__).parent / "templates").iterdir() if path.suffix in (".j2", ".js", ".css")
-)
-"""Files that a page is put together from."""
-
-
 def environment() -> Environment:
     """Jinja2's environment for the templates beside this module; a name that is not given is an error."""
     made = Environment(

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from sepi.errors import SepiError
-from sepi.pipeline import PARTS_OF_BEST
+from sepi.pipeline import HANDED_ON, PARTS_OF_BEST, key_of, stage_of
 
 MAIN_VARIANT = "paper"
 """The variant that does what the paper describes; its figures stand beside the published ones."""
@@ -31,6 +31,11 @@ TABLES = (
     "runtime",
 )
 """Names of the tables, in the order of the page."""
+
+TEMPLATES = sorted(
+    path for path in (Path(__file__).parent / "templates").iterdir() if path.suffix in (".j2", ".js", ".css")
+)
+"""Files that the page is put together from."""
 
 PARTS_TABLES = ("ablation_best",)
 """Tables of the best variant's parts; they are made from numbers of their own."""
@@ -111,18 +116,37 @@ class Plan:
         """The light field of a scene."""
         return self.results / dataset / scene / "lightfield.h5"
 
+    def stages_folder(self, dataset: str, scene: str) -> Path:
+        """The folder of a scene's stage files."""
+        return self.results / dataset / scene / "stages"
+
     def stage_file(self, dataset: str, scene: str, variant: str, stage: str, ending: str = "h5") -> Path:
-        """The file of a stage of a variant, or one beside it: ``ending`` is ``"scores.h5"`` or ``"time.json"``."""
-        folder = self.results / dataset / scene / "stages" / self.stage_key(variant, stage)
-        return folder / f"{stage}.{ending}"
+        """The file with a variant's maps after a stage, or one beside it: ``ending`` is ``"time.json"``.
+
+        It is that of an earlier stage where this one hands its maps on.
+        """
+        folder = self.stages_folder(dataset, scene) / self.stage_key(variant, stage)
+        return folder / f"{self.made_by(variant, stage)}.{ending}"
+
+    def scores_file(self, dataset: str, scene: str, parts: bool = False) -> Path:
+        """The scores of a scene's maps; with ``parts``, of those that the ablation of the best variant needs."""
+        return self.results / dataset / scene / f"scores{'_parts' if parts else ''}.h5"
 
     def external_file(self, dataset: str, scene: str) -> Path:
         """The maps and scores of all imported methods for a scene."""
         return self.results / dataset / scene / "external.h5"
 
     def stage_key(self, variant: str, stage: str) -> str:
-        """What names a stage of a variant in the numbers: its choices so far; variants that begin alike share it."""
-        return "/".join(list(self.variants[variant].values())[: self.stages.index(stage) + 1])
+        """What names a variant's maps after a stage, in numbers and scores: :func:`sepi.pipeline.key_of`."""
+        return key_of(self.variants[variant], stage)
+
+    def made_by(self, variant: str, stage: str) -> str:
+        """The stage that made a variant's maps after ``stage``: itself, or an earlier one whose maps it hands on."""
+        return stage_of(self.variants[variant], self.stage_key(variant, stage))
+
+    def runs_stage(self, variant: str, stage: str) -> bool:
+        """Whether a stage of a variant does anything; else it hands on what it is given."""
+        return self.variants[variant][stage] != HANDED_ON
 
     def number_inputs(self, parts: bool = False) -> list[Path]:
         """The files that the numbers are collected from, each once.
@@ -133,17 +157,22 @@ class Plan:
             The numbers of :data:`PARTS_TABLES`, instead of those of all other tables.
         """
         last = self.stages[-1]
-        scored = [last] if parts else self.stages
         files: list[Path] = []
         for dataset, scene in self.pairs:
+            files.append(self.scores_file(dataset, scene, parts))
             for variant in self.parts if parts else self.listed:
-                files += [self.stage_file(dataset, scene, variant, stage, "scores.h5") for stage in scored]
                 files += [self.stage_file(dataset, scene, variant, stage, "time.json") for stage in self.stages]
             if not parts:
                 files.append(self.light_field_file(dataset, scene))
                 files += [self.stage_file(dataset, scene, variant, last) for variant in self.compared]
                 files += [self.external_file(dataset, scene)] if self.external else []
         return list(dict.fromkeys(files))
+
+    def scored_files(self, dataset: str, scene: str, parts: bool = False) -> list[Path]:
+        """The stage files whose maps are scored, each once: after every stage, with ``parts`` after the last one."""
+        stages = self.stages[-1:] if parts else self.stages
+        variants = self.parts if parts else self.listed
+        return list(dict.fromkeys(self.stage_file(dataset, scene, v, stage) for v in variants for stage in stages))
 
     @property
     def compared(self) -> list[str]:
@@ -162,10 +191,8 @@ class Plan:
 
     def map_inputs(self, dataset: str, scene: str) -> list[Path]:
         """The files that the pictures of a scene are made from, each once."""
-        files = [self.light_field_file(dataset, scene)]
-        for variant in self.listed:
-            files += [self.stage_file(dataset, scene, variant, stage) for stage in self.stages]
-            files.append(self.stage_file(dataset, scene, variant, self.stages[-1], "scores.h5"))
+        files = [self.light_field_file(dataset, scene), self.scores_file(dataset, scene)]
+        files += self.scored_files(dataset, scene)
         files += [self.external_file(dataset, scene)] if self.external else []
         return list(dict.fromkeys(files))
 

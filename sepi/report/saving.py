@@ -14,7 +14,7 @@ from sepi.io.files import atomic_path
 # matplotlib would write its version and the time into the files
 _OPTIONS: dict[str, dict[str, Any]] = {
     # noisy maps hardly get smaller by more effort
-    "png": {"metadata": {"Software": None}, "pil_kwargs": {"compress_level": 3}},
+    "png": {"metadata": {"Software": None}, "pil_kwargs": {"compress_level": 1}},
     "pdf": {"metadata": {"Creator": None, "Producer": None, "CreationDate": None}},
 }
 

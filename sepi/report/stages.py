@@ -98,10 +98,10 @@ def runtime_table(runs: Runs) -> Report:
         "Run time per stage",
         "Wall-clock seconds of each stage's process, reading and writing included, on the machine that ran it; in the "
         "first run after an installation, the first stages also compiled their kernels. Variants that begin alike "
-        "share their first stages: such a stage is listed with each of them, but ran once. Published: the paper's "
-        "averages for 512x512 pixels and 9x9 views on an Intel Core i7-8700, nothing in parallel; published / this "
-        "code is how many times the total of this code's `paper` fits into theirs, for scenes of that size only; the "
-        "machines differ.",
+        "share their first stages: such a stage is listed with each of them, but ran once. A stage that hands its maps "
+        "on (choice `none`) is no process and has no time. Published: the paper's averages for 512x512 pixels and 9x9 "
+        "views on an Intel Core i7-8700, nothing in parallel; published / this code is how many times the total of "
+        "this code's `paper` fits into theirs, for scenes of that size only; the machines differ.",
         Table([*heads, "published_seconds", "ratio"], rows),
         sections,
     )
@@ -116,14 +116,19 @@ def _time_rows(runs: Runs, dataset: str, scene: str, variant: str) -> list[list[
     light_field = runs.light_field(dataset, scene)
     compares = (light_field["shape"], light_field["grid"]) == _PUBLISHED_SIZE
 
-    def row(stage: str, choice: str | None, seconds: float, peak: float) -> list[Cell]:
+    def row(stage: str, choice: str | None, seconds: float | None, peak: float | None) -> list[Cell]:
         theirs = paper.get(stage)
         ratio = theirs / seconds if compares and theirs is not None and seconds else None
         return [stage, choice, seconds, peak, printed(theirs), ratio]
 
     total = sum(timing.seconds for timing in timings.values())
     peak = max(timing.peak_memory_mb for timing in timings.values())
-    each = [row(stage, choices[stage], found.seconds, found.peak_memory_mb) for stage, found in timings.items()]
+    each = [
+        row(stage, choices[stage], found.seconds, found.peak_memory_mb)
+        if runs.plan.runs_stage(variant, stage)
+        else row(stage, choices[stage], None, None)
+        for stage, found in timings.items()
+    ]
     return [*each, row("total", None, total, peak)]
 
 

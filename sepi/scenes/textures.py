@@ -8,8 +8,6 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
-from scipy import fft
-from skimage import data
 
 from sepi.lightfield import FloatMap
 
@@ -65,6 +63,8 @@ def photograph(name: str, tint: Colour, *, grain: float = 0.05, seed: int = 0) -
     ndarray, shape (PERIOD, PERIOD, 3), float32
         Values in 0..1.
     """
+    from skimage import data
+
     # lifted out of black and white, where clipping would leave nothing to match
     picture = 0.12 + 0.76 * np.asarray(getattr(data, name)(), np.float64) / 255
     if picture.ndim == 2:
@@ -99,6 +99,8 @@ def shading(colour: Colour, amplitude: float) -> FloatMap:
 def _bands(rng: np.random.Generator, finest: float, coarsest: float) -> npt.NDArray[np.float64]:
     """Four independent fields of unit variance, shape (4, PERIOD, PERIOD)."""
     white = rng.standard_normal((4, PERIOD, PERIOD))
+    from scipy import fft
+
     frequency = np.hypot(fft.fftfreq(PERIOD)[:, None], fft.rfftfreq(PERIOD)[None, :])
     # amplitude 1/f is equal energy per octave; the flanks are smooth so that no ripples appear
     with np.errstate(divide="ignore"):

@@ -1,0 +1,115 @@
+"""What a run of the workflow says of itself: a progress bar on a terminal, one line for each job elsewhere.
+
+Snakemake's own handler prints three lines and more for each job. :func:`show_progress` puts one in its place that
+listens to the same events; what went wrong is shown as Snakemake shows it, in full.
+"""
+
+from __future__ import annotations
+
+import logging
+import re
+import sys
+from typing import Any, TextIO
+
+from snakemake_interface_logger_plugins.common import LogEvent
+from tqdm import tqdm
+
+# what Snakemake says of its own doings
+_CHATTER = re.compile(
+    r"Building DAG|Using shell|Provided cores|Rules claiming|Select jobs|Execute \d|Assuming unrestricted|Complete log"
+)
+# said by this handler in fewer words, or by no one
+_REPLACED = {LogEvent.JOB_STARTED, LogEvent.RESOURCES_INFO, LogEvent.WORKFLOW_STARTED}
+
+
+class RunLog(logging.Handler):
+    """Shows the progress of a run.
+
+    Parameters
+    ----------
+    usual : logging.Handler
+        Snakemake's own, for what is shown as ever.
+    stream : text file
+        Where the progress goes: as a bar if it is a terminal.
+    """
+
+    def __init__(self, usual: logging.Handler, stream: TextIO) -> None:
+        super().__init__()
+        self._usual = usual
+        self._stream = stream
+        self._bar: tqdm[Any] | None = None
+        self._total = self._begun = 0
+        self._running: dict[int, str] = {}
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Show what a record tells of the run, if anything."""
+        event = getattr(record, "event", None)
+        if event == LogEvent.RUN_INFO:
+            self._start(int(record.stats["total"]))  # type: ignore[attr-defined]
+        elif event == LogEvent.JOB_INFO:
+            self._begin(record.jobid, record.rule_msg or record.rule_name)  # type: ignore[attr-defined]
+        elif event == LogEvent.JOB_FINISHED:
+            self._running.pop(record.job_id, None)  # type: ignore[attr-defined]
+        elif event == LogEvent.PROGRESS:
+            self._advance(record.done, record.total)  # type: ignore[attr-defined]
+        elif event not in _REPLACED and not (event is None and _CHATTER.match(record.getMessage())):
+            self._pass_on(record)
+
+    def close(self) -> None:
+        """End the bar, so that what is printed next stands below it."""
+        if self._bar is not None:
+            self._bar.close()
+            self._bar = None
+        super().close()
+
+    def _start(self, total: int) -> None:
+        self._total = total
+        if self._stream.isatty():
+            layout = "{n_fmt} of {total_fmt} |{bar:30}| {elapsed}  {desc}"
+            self._bar = tqdm(total=total, bar_format=layout, file=self._stream, dynamic_ncols=True, mininterval=0)
+        else:
+            print(f"{total} jobs", file=self._stream, flush=True)
+
+    def _begin(self, job: int, message: str) -> None:
+        self._begun += 1
+        self._running[job] = message
+        if self._bar is None:
+            print(f"{self._begun:{len(str(self._total))}} of {self._total}  {message}", file=self._stream, flush=True)
+        else:
+            self._bar.set_description_str(self._in_hand())
+
+    def _advance(self, done: int, total: int) -> None:
+        if self._bar is not None:
+            self._bar.total = total
+            self._bar.set_description_str(self._in_hand(), refresh=False)
+            self._bar.update(done - self._bar.n)
+            if done == total:
+                self.close()
+
+    def _in_hand(self) -> str:
+        return "; ".join(self._running.values())
+
+    def _pass_on(self, record: logging.LogRecord) -> None:
+        if self._bar is not None:
+            self._bar.clear()
+        if self._usual.filter(record):
+            self._usual.emit(record)
+        if self._bar is not None:
+            self._bar.refresh()
+
+
+def show_progress(logger: logging.Logger) -> RunLog | None:
+    """Let a :class:`RunLog` show what Snakemake's own handler would; nothing where the user chose another handler.
+
+    Parameters
+    ----------
+    logger : logging.Logger
+        Snakemake's.
+    """
+    usual = next((handler for handler in logger.handlers if type(handler).__name__ == "ColorizingTextHandler"), None)
+    if usual is None:
+        return None
+    logger.removeHandler(usual)
+    shown = RunLog(usual, getattr(usual, "stream", sys.stderr))
+    logger.addHandler(shown)
+    return shown

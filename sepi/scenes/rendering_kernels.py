@@ -1,0 +1,184 @@
+"""Compiled loops of the exact rendering (:mod:`sepi.scenes.rendering`)."""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+import numpy.typing as npt
+
+from sepi.lightfield import BoolMap, FloatMap
+
+# A surface hides a point only if it is nearer by more than rounding (points on the edge between two faces).
+TOLERANCE = 1e-9
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+
+
+@numba.njit(cache=True)
+def _fill_row(
+    first_edge: IntArray,
+    planes: FloatArray,
+    edges: FloatArray,
+    y: float,
+    samples: int,
+    crossings: FloatArray,
+    depth: FloatArray,
+    owner: IntArray,
+) -> None:
+    """Nearest disparity and its surface at the sub-samples of one row at height ``y``.
+
+    Even-odd rule; intervals are closed on the left and open on the right, so that neighbours leave no gap.
+    """
+    width = depth.shape[0]
+    depth[:] = -np.inf
+    owner[:] = -1
+    for p in range(planes.shape[0]):
+        count = 0
+        for e in range(first_edge[p], first_edge[p + 1]):
+            y0, y1 = edges[e, 1], edges[e, 3]
+            if (y0 <= y) != (y1 <= y):
+                crossings[count] = edges[e, 0] + (y - y0) * (edges[e, 2] - edges[e, 0]) / (y1 - y0)
+                count += 1
+        # few crossings, mostly two: a sort by insertion
+        for i in range(1, count):
+            crossing, place = crossings[i], i
+            while place > 0 and crossings[place - 1] > crossing:
+                crossings[place] = crossings[place - 1]
+                place -= 1
+            crossings[place] = crossing
+        at_zero = planes[p, 0] + planes[p, 2] * y
+        for i in range(0, count - 1, 2):
+            first = max(0, int(np.ceil((max(crossings[i], -1.0) + 0.5) * samples - 0.5)))
+            last = int(np.ceil((min(crossings[i + 1], float(width)) + 0.5) * samples - 0.5))
+            for column in range(first, min(width, last)):
+                d = at_zero + planes[p, 1] * ((column + 0.5) / samples - 0.5)
+                if d > depth[column]:
+                    depth[column] = d
+                    owner[column] = p
+
+
+@numba.njit(cache=True)
+def nearest(
+    first_edge: IntArray, planes: FloatArray, edges: FloatArray, disparity: FloatArray, owner: IntArray
+) -> None:
+    """Fill ``disparity`` and ``owner`` at the pixel centres."""
+    crossings = np.empty(edges.shape[0])
+    for row in range(disparity.shape[0]):
+        _fill_row(first_edge, planes, edges, float(row), 1, crossings, disparity[row], owner[row])
+
+
+@numba.njit(cache=True)
+def shade(
+    first_edge: IntArray,
+    texels: FloatMap,
+    first_texel: IntArray,
+    side: IntArray,
+    edges: FloatArray,
+    planes: FloatArray,
+    v: int,
+    u: int,
+    samples: int,
+    picture: FloatMap,
+) -> None:
+    """Add up the textures under all sub-samples of each pixel, and average."""
+    size = picture.shape[0]
+    crossings = np.empty(edges.shape[0])
+    depth = np.empty(size * samples)
+    owner = np.empty(size * samples, np.int64)
+    weight_x, weight_y = np.empty(4), np.empty(4)
+    column_of = np.empty(4, np.int64)
+    for row in range(size * samples):
+        y = (row + 0.5) / samples - 0.5
+        _fill_row(first_edge, planes, edges, y, samples, crossings, depth, owner)
+        for column in range(size * samples):
+            p = owner[column]
+            if p < 0:
+                continue
+            x = (column + 0.5) / samples - 0.5
+            m = side[p]
+            ix = _spline_weights(x + u * depth[column], weight_x)
+            iy = _spline_weights(y + v * depth[column], weight_y)
+            # the texture goes on periodically; a division for every texel would take longer than all the rest
+            at = ix % m
+            for i in range(4):
+                column_of[i] = first_texel[p] + at
+                at = at + 1 if at + 1 < m else 0
+            at = iy % m
+            red = green = blue = 0.0
+            for j in range(4):
+                line = at * m
+                at = at + 1 if at + 1 < m else 0
+                # along the row first: the four rows do not wait for each other
+                a, b = texels[line + column_of[0]], texels[line + column_of[1]]
+                c, d = texels[line + column_of[2]], texels[line + column_of[3]]
+                w0, w1, w2, w3 = weight_x[0], weight_x[1], weight_x[2], weight_x[3]
+                red += weight_y[j] * ((w0 * a[0] + w1 * b[0]) + (w2 * c[0] + w3 * d[0]))
+                green += weight_y[j] * ((w0 * a[1] + w1 * b[1]) + (w2 * c[1] + w3 * d[1]))
+                blue += weight_y[j] * ((w0 * a[2] + w1 * b[2]) + (w2 * c[2] + w3 * d[2]))
+            pixel = picture[row // samples, column // samples]
+            pixel[0] += red
+            pixel[1] += green
+            pixel[2] += blue
+    picture /= samples * samples
+
+
+@numba.njit(cache=True)
+def _spline_weights(position: float, weights: FloatArray) -> int:
+    """Cubic B-spline weights at ``position``; gives the index of the first of the four texels."""
+    base = np.floor(position)
+    f = position - base
+    g = 1 - f
+    weights[0] = g * g * g / 6
+    weights[1] = 2 / 3 - 0.5 * f * f * (1 + g)
+    weights[2] = 2 / 3 - 0.5 * g * g * (1 + f)
+    weights[3] = f * f * f / 6
+    return int(base) - 1
+
+
+@numba.njit(cache=True)
+def hide(
+    edges: FloatArray,
+    first_edge: IntArray,
+    planes: FloatArray,
+    boxes: FloatArray,
+    disparity: FloatArray,
+    v: int,
+    u: int,
+    hidden: BoolMap,
+) -> None:
+    """Mark the pixels whose point is hidden in one view."""
+    height, width = disparity.shape
+    for row in range(height):
+        for column in range(width):
+            d = disparity[row, column]
+            x, y = column - u * d, row - v * d
+            if hidden[row, column] or not (-0.5 <= x < width - 0.5 and -0.5 <= y < height - 0.5):
+                continue
+            for p in range(planes.shape[0]):
+                stretch = 1 - planes[p, 1] * u - planes[p, 2] * v
+                if abs(stretch) < TOLERANCE:
+                    continue
+                other = (planes[p, 0] + planes[p, 1] * x + planes[p, 2] * y) / stretch
+                cx, cy = x + u * other, y + v * other
+                if (
+                    other > d + TOLERANCE
+                    and boxes[p, 0] <= cx <= boxes[p, 2]
+                    and boxes[p, 1] <= cy <= boxes[p, 3]
+                    and _inside(edges, first_edge[p], first_edge[p + 1], cx, cy)
+                ):
+                    hidden[row, column] = True
+                    break
+
+
+@numba.njit(cache=True)
+def _inside(edges: FloatArray, begin: int, end: int, x: float, y: float) -> bool:
+    """Even-odd rule: does a ray to the right cross the outline an odd number of times?"""
+    odd = False
+    for e in range(begin, end):
+        y0, y1 = edges[e, 1], edges[e, 3]
+        if (y0 <= y) != (y1 <= y):
+            at = edges[e, 0] + (y - y0) * (edges[e, 2] - edges[e, 0]) / (y1 - y0)
+            if at > x:
+                odd = not odd
+    return odd
