@@ -1,5 +1,6 @@
 # make        environment, then `snakemake all` on the built-in scenes
-# make test   environment, then the whole test suite
+# make check  environment, then the fast part of the tests: for every save
+# make test   environment, then the whole test suite, on all cores
 # make lint   style, format and types
 # make bench  environment, then times, memory and growth of the pipeline, to reports/
 # make clean  remove results and everything else that was made, but for the environment
@@ -10,14 +11,20 @@ PYTHON := $(shell for p in python3 python3.11 python3.12 python3.13; do \
 BIN := .venv/bin
 READY := .venv/ready
 
-.PHONY: all test lint bench clean
+.PHONY: all check test lint bench clean
 .DEFAULT_GOAL := all
 
 all: $(READY)
 	$(BIN)/snakemake all
 
+# a worker of pytest for each core, and one thread in each
+TESTS := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 NUMBA_NUM_THREADS=1 $(BIN)/python -m pytest --numprocesses auto --dist loadgroup
+
+check: $(READY)
+	$(TESTS) -m "not real and not workflow and not browser and not slow"
+
 test: $(READY)
-	$(BIN)/python -m pytest
+	$(TESTS)
 
 lint: $(READY)
 	$(BIN)/ruff check
@@ -32,7 +39,7 @@ clean:
 	find reports -mindepth 1 ! -name README.md -delete
 	rm -rf results logs benchmarks build *.egg-info .snakemake .pytest_cache .mypy_cache .ruff_cache .hypothesis
 
-# pinned versions, then the package itself in place; again only when one of these files changes
+# pinned versions, then the package itself in place and its kernels compiled; again only when one of these files changes
 $(READY): requirements.lock pyproject.toml
 	@test -n "$(PYTHON)" || { echo "make: Python 3.11 or newer is needed (as python3 or python3.11)" >&2; exit 1; }
 	@$(PYTHON) -c 'import venv, ensurepip' 2>/dev/null || { \
@@ -40,4 +47,5 @@ $(READY): requirements.lock pyproject.toml
 	$(PYTHON) -m venv .venv
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --requirement requirements.lock
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
+	$(BIN)/python -m sepi.warm_up
 	touch $@

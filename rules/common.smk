@@ -167,6 +167,6 @@ def print_written(tables, maps):
 # a progress bar, or a line for each job; a dry run is as Snakemake shows it
 RUN_LOG = (
     show_progress(logger)
-    if workflow.is_main_process and not (workflow.dryrun or workflow.output_settings.verbose)
+    if workflow.is_main_process and not (workflow.output_settings.dryrun or workflow.output_settings.verbose)
     else None
 )

@@ -3,6 +3,7 @@
 import base64
 import os
 import shutil
+import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -100,7 +101,7 @@ def opened(
         page.wait_for_selector("#viewer[data-shown]")
         yield page
         # errors of what the last action began
-        page.wait_for_timeout(50)
+        settled(page)
         if told is None:
             assert not wrong, wrong
     finally:
@@ -110,6 +111,22 @@ def opened(
 def complains(message: Any) -> bool:
     """Whether a console message is an error or a warning."""
     return message.type in ("error", "warning")
+
+
+def settled(page: Any) -> None:
+    """Wait until what was asked of the page is drawn: a drawing that was ordered is done two frames later."""
+    page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => done())))")
+
+
+def changed_pixels(page: Any, selector: str, before: Pixels) -> Pixels:
+    """What a canvas shows once it no longer shows ``before``: a map may have to be unpacked first."""
+    end = time.monotonic() + _PATIENCE / 1000
+    while True:
+        settled(page)
+        now = canvas_pixels(page, selector)
+        if now.shape != before.shape or (now != before).any():
+            return now
+        assert time.monotonic() < end, f"{selector} shows what it showed before"
 
 
 def canvas_pixels(page: Any, selector: str) -> Pixels:

@@ -14,6 +14,24 @@ if TYPE_CHECKING:
 DATA = Path(os.environ.get("SEPI_DATA", Path(__file__).parents[2] / "shared" / "data"))
 
 
+# fixtures that take long to make, and what their tests are marked with
+_MARKS = {"real_data": "real", "browser": "browser"}
+# tests that share what takes long to make run in one process; each kind in one of its own
+_GROUPS = {"real_data": "real", "example": "page", "browser": "page", "workflow": "workflow"}
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark tests by what they need, and keep those together that share it when several processes run the tests."""
+    for item in items:
+        needed = getattr(item, "fixturenames", ())
+        for fixture, mark in _MARKS.items():
+            if fixture in needed:
+                item.add_marker(mark)
+        group = next((group for fixture, group in _GROUPS.items() if fixture in needed), None)
+        if group is not None:
+            item.add_marker(pytest.mark.xdist_group(group))
+
+
 @pytest.fixture(scope="session")
 def real_data() -> Path:
     """Folder of the real light fields; absent data skips the test, or fails it where they are required."""

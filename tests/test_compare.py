@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from browser import canvas_pixels, choose, map_pixels, opened, part, place_of, point_at, read_out
+from browser import canvas_pixels, choose, map_pixels, opened, part, place_of, point_at, read_out, settled
 from click.testing import CliRunner, Result
 
 from sepi.cli import main
@@ -120,13 +120,13 @@ def test_a_point_cloud_without_a_picture(page: Any) -> None:
     """Coloured by disparity, since there is no view; it turns."""
     page.locator(CLOUD).scroll_into_view_if_needed()
     page.wait_for_selector(f"{CLOUD}[data-points]")
-    page.wait_for_timeout(100)
+    settled(page)
     assert page.input_value('[data-part="cloud-colours"]') == "disparity"
     assert page.locator('[data-part="cloud-colours"] option[value="view"]').is_disabled()
     before = canvas_pixels(page, CLOUD)
     assert len(np.unique(before.reshape(-1, 4), axis=0)) > 20
     page.press(CLOUD, "ArrowLeft")
-    page.wait_for_timeout(100)
+    settled(page)
     assert (canvas_pixels(page, CLOUD) != before).any()
 
 

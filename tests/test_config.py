@@ -181,7 +181,6 @@ class TestFolderOfScenes:
         with pytest.raises(SepiError, match="scene of dataset 'hci': unknown 'coton'; did you mean 'cotton'"):
             self.settings(tmp_path).scene("hci", "coton")
 
-    @pytest.mark.real
     def test_the_benchmark_folder_as_it_is_handed_out(self, hci: Path) -> None:
         settings = self.settings(hci)
         assert settings.scenes_of("hci") == ["antinous", "cotton"]

@@ -54,7 +54,6 @@ def test_built_in_scenes(name: str) -> None:
     assert known.maximum - known.minimum < 1.5 * np.ptp(truth) + 0.8
 
 
-@pytest.mark.real
 @pytest.mark.parametrize("name", ["cotton", "antinous"])
 @pytest.mark.parametrize("every", [1, 2])
 def test_real_scenes(hci: Path, name: str, every: int) -> None:

@@ -231,7 +231,6 @@ class TestCommand:
         assert not (tmp_path / "external.h5").exists()
 
 
-@pytest.mark.real
 def test_published_maps_score_as_an_independent_program_scores_them(hci: Path, real_data: Path) -> None:
     """SPO on cotton: a slip in orientation, sign or border would put every imported method in a wrong light."""
     folder = real_data / "published_maps"

@@ -131,6 +131,7 @@ def test_names_are_no_markup() -> None:
     assert [text.text for text in picture.iter("text")] == ["<b&\"'", "x"]
 
 
+@pytest.mark.workflow
 def test_the_workflows_own_graph(tmp_path: Path) -> None:
     """Snakemake itself is asked; the four stages follow each other, and all end in the page."""
     before = set(REPOSITORY.iterdir())
@@ -145,6 +146,7 @@ def test_the_workflows_own_graph(tmp_path: Path) -> None:
     svg_of(edges)
 
 
+@pytest.mark.workflow
 def test_without_a_graph_the_page_says_so_and_still_comes(tmp_path: Path) -> None:
     """A version of Snakemake that draws otherwise must not cost the whole report."""
     snakefile = tmp_path / "Snakefile"
@@ -159,6 +161,7 @@ def test_without_a_graph_the_page_says_so_and_still_comes(tmp_path: Path) -> Non
     assert "no rule graph" in output.read_text()
 
 
+@pytest.mark.workflow
 def test_the_users_own_configuration_does_not_reach_the_graph(tmp_path: Path) -> None:
     """An edited config.yaml beside the Snakefile: its relative paths and its scenes mean nothing to the graph."""
     tree = tmp_path / "tree"

@@ -569,7 +569,6 @@ def test_colours_of_a_map_without_contrast(value: float) -> None:
 # --- real scenes
 
 
-@pytest.mark.real
 @pytest.mark.parametrize(("name", "low", "high"), [("cotton", -1.465, 1.364), ("antinous", -3.131, 2.689)])
 def test_real_scene(hci: Path, name: str, low: float, high: float) -> None:
     """Numbers, ground truth and parameters as the benchmark publishes them; antinous comes without parameters here."""
@@ -583,7 +582,6 @@ def test_real_scene(hci: Path, name: str, low: float, high: float) -> None:
     assert light_field.disparity_range == own
 
 
-@pytest.mark.real
 def test_real_scene_with_a_view_missing(hci: Path, tmp_path: Path) -> None:
     """What is left of an incomplete download is used; only the view whose depth is made must be there."""
     shutil.copytree(hci / "cotton", tmp_path / "cotton")

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from browser import CLOUD, WIPE, choose, complains, opened, part, place_of, point_at, show_scene
+from browser import CLOUD, WIPE, choose, complains, opened, part, place_of, point_at, settled, show_scene
 from page_example import COTTON_TITLE, DOTS_TITLE, EDGES, PICTURE_TITLE, Example
 
 from sepi.report.graph import drawn
@@ -21,7 +21,7 @@ def test_the_page_opens_from_disk_and_asks_for_nothing(browser: Any, example: Ex
         page.on("request", lambda request: requests.append(request.url))
         for section in page.query_selector_all("section[id]"):
             section.scroll_into_view_if_needed()
-            page.wait_for_timeout(30)
+            settled(page)
         page.wait_for_selector(f"{CLOUD}[data-points]")
         for title in (COTTON_TITLE, DOTS_TITLE, PICTURE_TITLE):
             show_scene(page, title)
@@ -214,10 +214,18 @@ def test_everything_has_a_name_for_those_who_do_not_see_it(page: Any) -> None:
     assert all(after - before <= 1 for before, after in pairwise(levels))
 
 
+def test_the_page_opens_on_maps(page: Any) -> None:
+    """What a newcomer waited for is seen without scrolling, and tables of published figures come later."""
+    assert page.evaluate("document.querySelector('main section').id") == "scenes"
+    box = page.locator(WIPE).bounding_box()
+    assert box["y"] < 450
+    assert (canvas_pixels(page, WIPE)[:, :, 3] == 255).all()
+
+
 def test_everything_is_reached_by_the_keyboard(page: Any) -> None:
     """Where the focus is, is seen."""
     page.keyboard.press("Tab")
-    assert page.evaluate("document.activeElement.textContent") == "Overview"
+    assert page.evaluate("document.activeElement.textContent") == "Scenes"
     style = page.evaluate("getComputedStyle(document.activeElement).outlineStyle")
     assert style != "none"
     for selector in (WIPE, CLOUD, '[data-part="slider"]', "#scene", ".scroll"):
@@ -232,7 +240,7 @@ def test_nothing_jumps(browser: Any, example: Example, width: int) -> None:
     The choices are made by scripts: a browser does not count what moves under a reader's hand.
     """
     with opened(browser, example.page, width, 844) as page:
-        page.wait_for_timeout(200)
+        settled(page)
         assert page.evaluate("jumped") < 0.1
         for place in ("#scenes", WIPE, '[data-part="grid"]'):
             look_at(page, place)
@@ -245,19 +253,19 @@ def test_nothing_jumps(browser: Any, example: Example, width: int) -> None:
                     }""",
                     title,
                 )
-                page.wait_for_timeout(150)
+                settled(page)
             assert page.evaluate("jumped") < 0.1, place
         look_at(page, "#pixel-section")
         for number in range(3):
             page.eval_on_selector_all('[data-part="pixels"] button', "(all, number) => all[number].click()", number)
-            page.wait_for_timeout(60)
+            settled(page)
         assert page.evaluate("jumped") < 0.1
 
 
 def look_at(page: Any, selector: str) -> None:
     """Scroll there, and count jumps from now on."""
     page.eval_on_selector(selector, "(element) => element.scrollIntoView({ block: 'start' })")
-    page.wait_for_timeout(150)
+    settled(page)
     page.evaluate("window.jumped = 0")
 
 

@@ -11,6 +11,7 @@ from browser import (
     as_shown,
     border_is,
     canvas_pixels,
+    changed_pixels,
     choose,
     map_pixels,
     opened,
@@ -18,6 +19,7 @@ from browser import (
     place_of,
     point_at,
     read_out,
+    settled,
     show_scene,
     touch,
 )
@@ -37,7 +39,7 @@ def visible_tile(page: Any, key: str) -> str:
     """Selector of a small panel, once it is in sight and drawn."""
     page.locator(tile(key)).scroll_into_view_if_needed()
     page.wait_for_function("(selector) => document.querySelector(selector).width > 10", arg=tile(key))
-    page.wait_for_timeout(100)
+    settled(page)
     return tile(key)
 
 
@@ -177,11 +179,11 @@ def test_the_cursor_moves_by_the_keyboard(page: Any, example: Example) -> None:
     page.locator(WIPE).focus()
     for key, expected in (("ArrowRight", (33, 32)), ("ArrowUp", (33, 31)), ("Shift+ArrowLeft", (23, 31))):
         page.keyboard.press(key)
-        page.wait_for_timeout(60)
+        settled(page)
         assert read_out(page)["pixel"] == "x {}, y {}".format(*expected)
     for _ in range(5):
         page.keyboard.press("Shift+ArrowLeft")
-    page.wait_for_timeout(60)
+    settled(page)
     assert read_out(page)["pixel"] == "x 0, y 31", "the cursor must stay in the picture"
     assert float(read_out(page)["value b"]) == as_shown(example.final(COTTON, "best").disparity[31, 0])
 
@@ -242,7 +244,7 @@ def test_close_ups_in_all_panels_follow_the_cursor(page: Any, x: int, y: int) ->
     point_at(page, 32, 20, tile(keys[1]))
     before = {key: canvas_pixels(page, tile(key)) for key in keys}
     point_at(page, x, y, tile(keys[1]))
-    page.wait_for_timeout(100)
+    settled(page)
     for key in keys:
         now = canvas_pixels(page, tile(key))
         assert (now != before[key]).any(), key
@@ -276,7 +278,7 @@ def test_the_slider_works_by_touch(browser: Any, example: Example) -> None:
     with opened(browser, example.page, 390, 844, has_touch=True, is_mobile=True, device_scale_factor=2) as page:
         places = [place_of(page, WIPE, x, 20) for x in (30, 36, 42, 48)]
         touch(page, {0: places})
-        page.wait_for_timeout(100)
+        settled(page)
         assert abs(int(page.input_value('[data-part="slider"]')) / 1000 - 48.5 / SIZE) < 0.02
         assert read_out(page)["pixel"] == "x 48, y 20"
 
@@ -287,8 +289,7 @@ def test_another_scene_changes_everything(page: Any, example: Example) -> None:
     cloud, picture = canvas_pixels(page, CLOUD), canvas_pixels(page, WIPE)
     choose(page, b="paper/optimize")
     show_scene(page, DOTS_TITLE)
-    page.wait_for_timeout(200)
-    assert (canvas_pixels(page, CLOUD) != cloud).any()
+    changed_pixels(page, CLOUD, cloud)
     assert (canvas_pixels(page, WIPE) != picture).any()
     assert page.input_value('[data-part="b"]') == "paper/optimize", "the map that was looked at stays chosen"
     assert part(page, "pixels").startswith("1 textured and sure")
@@ -323,8 +324,11 @@ def test_what_an_earlier_scene_began_is_not_shown(page: Any) -> None:
         """() => {
           const quick = Sepi.unpackMap;
           Sepi.unpackMap = async (...given) => {
-            if (window.slow) await new Promise((done) => setTimeout(done, 400));
-            return quick(...given);
+            const late = window.slow;
+            if (late) await new Promise((done) => setTimeout(done, 400));
+            const found = await quick(...given);
+            if (late) window.late = true;
+            return found;
           };
         }"""
     )
@@ -334,12 +338,13 @@ def test_what_an_earlier_scene_began_is_not_shown(page: Any) -> None:
     # a pointer that moves meanwhile finds nothing to read
     page.mouse.move(*place_of(page, WIPE, 10, 10))
     page.mouse.move(*place_of(page, WIPE, 30, 30))
-    page.wait_for_timeout(100)
+    settled(page)
     assert read_out(page)["pixel"] != "x 30, y 30", "numbers of the scene before"
     page.evaluate("window.slow = false")
     page.select_option("#scene", label=PICTURE_TITLE)
     page.wait_for_function("() => Sepi.viewer.shown")
-    page.wait_for_timeout(600)
+    page.wait_for_function("() => window.late")
+    settled(page)
     assert page.evaluate("Sepi.viewer.scene.scene") == "picture"
     assert border_is(page, SIZE // 2)
     selector = visible_tile(page, "best/initial")

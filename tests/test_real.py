@@ -1,47 +1,22 @@
 """The whole method on real benchmark scenes: the figures it has to reach, and what each stage is worth."""
 
-from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
+from real_scenes import final_maps, final_scores, maps_after, scene
 
 from sepi.evaluate import score
-from sepi.ingest import settle_range
-from sepi.lightfield import LightField
-from sepi.pipeline import STAGES, VARIANTS
-from sepi.reading import read_light_field
+from sepi.pipeline import VARIANTS
 from sepi.report.confidence import decile_errors
-from sepi.stage import StageMaps, no_progress
-
-pytestmark = pytest.mark.real
 
 # MSE x100 and Q25 x100 on the whole map, as the paper prints them for its own method
 BOUNDS = {"cotton": (1.20, 0.34), "antinous": (12.84, 1.12)}
 
 
-@cache
-def scene(folder: Path) -> LightField:
-    return settle_range(read_light_field(folder))
-
-
-@cache
-def maps_after(folder: Path, choices: tuple[str, ...]) -> StageMaps:
-    """Maps after the stages named; variants share what they have in common."""
-    before = maps_after(folder, choices[:-1]) if len(choices) > 1 else None
-    choice = STAGES[list(STAGES)[len(choices) - 1]][choices[-1]]
-    return choice.run(scene(folder), before, choice.parameters(), no_progress)
-
-
-def scores(folder: Path, variant: str) -> dict[str, float]:
-    light_field = scene(folder)
-    final = maps_after(folder, tuple(VARIANTS[variant].choices.values()))
-    return score(final.disparity, light_field.truth)
-
-
 @pytest.mark.parametrize("name", BOUNDS)
 def test_paper_variant_reaches_the_published_figures(hci: Path, name: str) -> None:
-    result = scores(hci / name, "paper")
+    result = final_scores(hci / name, "paper")
     mse, q25 = BOUNDS[name]
     assert result["mse100"] <= mse
     assert result["q25"] <= q25
@@ -52,7 +27,7 @@ def test_paper_variant_reaches_the_published_figures(hci: Path, name: str) -> No
 @pytest.mark.parametrize("variant", ["no_sepi", "no_occlusion", "no_textureless", "no_occlusion_no_textureless"])
 def test_every_part_is_worth_its_place(hci: Path, name: str, variant: str) -> None:
     """Table 4: with a part missing the depth is worse."""
-    assert scores(hci / name, variant)["mse100"] > scores(hci / name, "paper")["mse100"]
+    assert final_scores(hci / name, variant)["mse100"] > final_scores(hci / name, "paper")["mse100"]
 
 
 @pytest.mark.parametrize("name", BOUNDS)
@@ -65,7 +40,7 @@ def test_each_stage_lowers_the_error(hci: Path, name: str) -> None:
 
 def test_half_sepi_beats_the_split_angular_patch(hci: Path) -> None:
     """The paper's text: Wang's occlusion model in place of the half-SEPI is worse on average."""
-    averages = {v: np.mean([scores(hci / name, v)["mse100"] for name in BOUNDS]) for v in ("paper", "wang")}
+    averages = {v: np.mean([final_scores(hci / name, v)["mse100"] for name in BOUNDS]) for v in ("paper", "wang")}
     assert averages["paper"] < averages["wang"]
 
 
@@ -84,7 +59,7 @@ BEST_BOUNDS = {"cotton": (0.35, 0.09, 1.3), "antinous": (4.0, 0.40, 8.0)}
 
 @pytest.mark.parametrize("name", BEST_BOUNDS)
 def test_best_variant_reaches_its_figures(hci: Path, name: str) -> None:
-    result = scores(hci / name, "best")
+    result = final_scores(hci / name, "best")
     mse, q25, badpix = BEST_BOUNDS[name]
     assert result["mse100"] <= mse
     assert result["q25"] <= q25
@@ -95,6 +70,6 @@ def test_best_variant_reaches_its_figures(hci: Path, name: str) -> None:
 @pytest.mark.parametrize("name", BEST_BOUNDS)
 def test_error_falls_with_confidence(hci: Path, name: str) -> None:
     """Who keeps the confident pixels must get the better ones, all the way down."""
-    final = maps_after(hci / name, tuple(VARIANTS["best"].choices.values()))
+    final = final_maps(hci / name, "best")
     for errors in decile_errors(final.confidence, final.disparity - scene(hci / name).truth):
         assert np.all(np.diff(errors) > 0), errors

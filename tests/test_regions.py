@@ -127,7 +127,6 @@ def test_small_patches_and_holes_are_cleaned_up() -> None:
     assert not textureless(noise).any()
 
 
-@pytest.mark.real
 @pytest.mark.parametrize(("name", "hidden", "flat"), [("cotton", 0.038, 0.36), ("antinous", 0.092, 0.56)])
 def test_real_scenes_have_plausible_regions(hci: Path, name: str, hidden: float, flat: float) -> None:
     """Parts of the map, checked by eye once: bands beside the busts' outlines; walls, shade and smooth stone."""

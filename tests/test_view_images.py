@@ -473,7 +473,6 @@ def test_no_name_takes_long(name: str) -> None:
     assert time.perf_counter() - started < 1
 
 
-@pytest.mark.real
 def test_lytro_views_are_read(real_data: Path) -> None:
     """9x9 views numbered from 01, under a scene's number."""
     folder = real_data / "lytro" / "2067"

@@ -228,7 +228,6 @@ def test_a_large_parallax_is_found() -> None:
         assert found.best in (word, TURNED[word])
 
 
-@pytest.mark.real
 @pytest.mark.parametrize("name", ["cotton", "antinous"])
 def test_real_scenes_in_every_order(hci: Path, name: str) -> None:
     files = sorted((hci / name).glob("input_Cam*.png"))
@@ -236,7 +235,6 @@ def test_real_scenes_in_every_order(hci: Path, name: str) -> None:
     every_order_is_named(grey_field(pictures.reshape(9, 9, *pictures.shape[1:])))
 
 
-@pytest.mark.real
 def test_a_lytro_picture_in_every_order(real_data: Path) -> None:
     folder = real_data / "lytro" / "2067"
     rows = [[cv2.imread(str(folder / f"2067_{t:02}_{s:02}.png")) for s in range(1, 10)] for t in range(1, 10)]

@@ -25,9 +25,12 @@ import yaml
 from pydantic import ValidationError
 
 from sepi.io.hdf5 import read_attributes, read_stage
+from sepi.io.scores import read_scores
 from sepi.pipeline import STAGES, VARIANTS
 from sepi.reading import read_light_field
 from sepi.scenes import render, write_hci
+
+pytestmark = pytest.mark.workflow
 
 REPOSITORY = Path(__file__).parents[1]
 SIZE = 64
@@ -39,10 +42,12 @@ TINY = {
         "occlusion": {"visibility": {"candidates": 21, "passes": 1}},
     },
 }
-# two scenes, the paper's six variants and best; stage files that variants share are made once
-COMPLETE = {"ingest": 2, "initial": 6, "occlusion": 10, "textureless": 14, "optimize": 14}
+# two scenes, the paper's six variants and best; stage files that variants share are made once, choice none is no job
+COMPLETE = {"ingest": 2, "initial": 6, "occlusion": 8, "textureless": 10, "optimize": 14}
+# the variant of the fewest stages
+QUICK = "no_occlusion_no_textureless"
 # what the ablation of best asks for beyond that
-PARTS = {"initial": 2, "occlusion": 8, "textureless": 10, "optimize": 14}
+PARTS = {"initial": 2, "occlusion": 8, "textureless": 8, "optimize": 14}
 
 
 @dataclass(frozen=True)
@@ -159,9 +164,10 @@ class TestAll:
         attributes = read_attributes(last)
         assert attributes["disparity_range_source"] == "estimated"
         assert (attributes["stage"], attributes["choice"], attributes["scene"]) == ("optimize", "wls", "box")
-        for choice in ("sepi", "none", "lti"):
-            assert f'"choice": "{choice}"' in attributes["made_from"]
-        assert '"candidates": 21' in attributes["made_from"]
+        before = json.loads(attributes["made_from"])
+        # what hands its maps on did nothing
+        assert [(step["stage"], step["choice"]) for step in before] == [("initial", "sepi"), ("textureless", "lti")]
+        assert before[0]["parameters"]["candidates"] == 21
         assert read_stage(last).disparity.shape == (SIZE, SIZE)
 
     def test_every_job_has_a_log_and_a_benchmark(self, finished: Workflow) -> None:
@@ -198,9 +204,9 @@ def other_parameters(stage: str, choice: str) -> dict[str, Any]:
 
 # the jobs that a change in each stage's choice asks for, over both scenes and all seven variants
 RERUNS = [
-    ("initial", "sepi", {"initial": 2, "occlusion": 6, "textureless": 10, "optimize": 10}),
+    ("initial", "sepi", {"initial": 2, "occlusion": 4, "textureless": 6, "optimize": 10}),
     ("initial", "structure_tensor", {"initial": 2, "occlusion": 2, "textureless": 2, "optimize": 2}),
-    ("occlusion", "half_sepi", {"occlusion": 4, "textureless": 6, "optimize": 6}),
+    ("occlusion", "half_sepi", {"occlusion": 4, "textureless": 4, "optimize": 6}),
     ("occlusion", "wang", {"occlusion": 2, "textureless": 2, "optimize": 2}),
     ("textureless", "lti", {"textureless": 8, "optimize": 8}),
     ("optimize", "wls", {"optimize": 12}),
@@ -231,8 +237,8 @@ class TestRerun:
     @pytest.mark.parametrize("stage", ["initial", "textureless"])
     def test_a_changed_module_reruns_its_stage_and_what_follows(self, finished: Workflow, stage: str) -> None:
         expected = {
-            "initial": {"initial": 6, "occlusion": 10, "textureless": 14, "optimize": 14},
-            "textureless": {"textureless": 14, "optimize": 14},
+            "initial": {"initial": 6, "occlusion": 8, "textureless": 10, "optimize": 14},
+            "textureless": {"textureless": 10, "optimize": 10},
         }
         with edited(finished.tree / "sepi" / f"{stage}.py", "\nCHOICES", "\n_MORE = 1\n\nCHOICES"):
             assert finished.stage_plan("all") == expected[stage]
@@ -260,7 +266,7 @@ class TestRerun:
         finally:
             picture.write_bytes(before)
             os.utime(picture, ns=(times.st_atime_ns, times.st_mtime_ns))
-        assert plan == {"ingest": 1, "initial": 3, "occlusion": 5, "textureless": 7, "optimize": 7}
+        assert plan == {"ingest": 1, "initial": 3, "occlusion": 4, "textureless": 5, "optimize": 7}
 
     def test_a_given_range_reruns_its_scene(self, finished: Workflow) -> None:
         given = finished.with_config(disparity_range={"hci/box": [-3, 3]})
@@ -274,13 +280,33 @@ class TestRerun:
         assert given.plan("results/builtin/dots/paper/result.h5") == {}
 
     def test_an_own_variant_shares_what_it_can(self, finished: Workflow) -> None:
-        mine = VARIANTS["paper"].choices | {"optimize": "none"}
+        """What hands its maps on is no job, wherever it stands."""
+        mine = {"initial": "structure_tensor", "occlusion": "none", "textureless": "lti", "optimize": "none"}
         plan = finished.with_config(variants={"mine": mine}).plan("all")
-        assert {rule: plan.get(rule) for rule in [*COMPLETE, "export"]} == {
+        assert {rule: plan.get(rule) for rule in [*COMPLETE, "evaluate", "export"]} == {
             **dict.fromkeys(COMPLETE),
-            "optimize": 2,
+            "textureless": 2,
+            "evaluate": 2,
             "export": 2,
         }
+
+    def test_only_a_changed_map_is_scored_anew(self, finished: Workflow, tmp_path: Path) -> None:
+        """The scores of a scene are one job, whatever changed of it."""
+        shutil.copytree(finished.folder, tmp_path / "run", symlinks=True)
+        stages = copy.deepcopy(TINY["stages"])
+        stages["optimize"] = {"second_order": other_parameters("optimize", "second_order")}
+        changed = replace(finished, folder=tmp_path / "run").with_config(stages=stages)
+        target = "results/builtin/dots/scores.h5"
+        assert changed.plan(target) == {"optimize": 1, "evaluate": 1}
+        result = changed.run(target)
+        assert result.returncode == 0, result.stdout
+        told = (changed.folder / "logs/builtin/dots/scores.log").read_text()
+        assert "1 of 19 maps scored anew: semi_global/visibility/uniform_planes/second_order" in told
+        before, after = (read_scores(flow.folder / target) for flow in (finished, changed))
+        # a score over no pixels is NaN, which equals nothing
+        assert [name for name in after if str(after[name]) != str(before[name])] == [
+            "semi_global/visibility/uniform_planes/second_order"
+        ]
 
 
 class TestReport:
@@ -374,7 +400,6 @@ class TestTargets:
         assert workflow.plan("results/hci/box/no_occlusion/disparity.pfm") == {
             "ingest": 1,
             "initial": 1,
-            "occlusion": 1,
             "textureless": 1,
             "optimize": 1,
             "export": 1,
@@ -444,9 +469,11 @@ def test_own_light_fields_of_any_format_get_maps(workflow: Workflow, tmp_path: P
         "wrong": {"path": str(tmp_path / "turned.npy")},
     }
     own = replace(workflow, folder=tmp_path / "run").with_config(hci_root=None, light_fields=entries)
-    targets = [f"results/own/{name}/paper/result.h5" for name in entries]
-    result = own.run(*targets)
+    maps = f"results/own/right/{QUICK}/result.h5"
+    targets = [f"results/own/{name}/lightfield.h5" for name in entries]
+    result = own.run(*targets, maps)
     assert result.returncode == 0, result.stdout
+    assert read_attributes(own.folder / maps)["variant"] == QUICK
     kept = read_light_field(own.folder / "results/own/right/lightfield.h5", check_order=False)
     assert kept.reference == (2, 1)
     assert np.argwhere(~kept.present).tolist() == [[0, 0]]
@@ -483,7 +510,7 @@ def test_an_interrupted_run_leaves_no_half_file_and_resumes(
     files = slow.tree / "sepi" / "io" / "files.py"
     sleep = 'import os, time\n        time.sleep(float(os.environ.get("SLEEP", "0")))'
     waiting = f"{sleep}\n        temporary.replace(path)"
-    target = "results/builtin/dots/paper/result.h5"
+    target = f"results/builtin/dots/{QUICK}/result.h5"
     light_field = slow.folder / "results/builtin/dots/lightfield.h5"
     with edited(files, "temporary.replace(path)", waiting):
         process = subprocess.Popen(
