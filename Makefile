@@ -1,6 +1,7 @@
 # make        environment, then `snakemake all` on the built-in scenes
 # make check  environment, then the fast part of the tests: for every save
 # make test   environment, then the whole test suite, on all cores
+# make coverage  the whole test suite in one process, and the share of lines and branches that it runs
 # make lint   style, format and types
 # make bench  environment, then times, memory and growth of the pipeline, to reports/
 # make clean  remove results and everything else that was made, but for the environment
@@ -11,20 +12,30 @@ PYTHON := $(shell for p in python3 python3.11 python3.12 python3.13; do \
 BIN := .venv/bin
 READY := .venv/ready
 
-.PHONY: all check test lint bench clean
+.PHONY: all check test coverage lint bench clean
 .DEFAULT_GOAL := all
 
 all: $(READY)
 	$(BIN)/snakemake all
 
 # a worker of pytest for each core, and one thread in each
-TESTS := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 NUMBA_NUM_THREADS=1 $(BIN)/python -m pytest --numprocesses auto --dist loadgroup
+TESTS := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 NUMBA_NUM_THREADS=1 $(BIN)/python -m pytest --numprocesses auto
 
 check: $(READY)
 	$(TESTS) -m "not real and not workflow and not browser and not slow"
 
 test: $(READY)
 	$(TESTS)
+
+# absolute, since tests start processes elsewhere
+coverage: export COVERAGE_RCFILE := $(CURDIR)/pyproject.toml
+coverage: export COVERAGE_FILE := $(CURDIR)/build/coverage/data
+coverage: $(READY)
+	rm -rf build/coverage
+	mkdir -p build/coverage
+	-$(BIN)/coverage run -m pytest
+	$(BIN)/coverage combine --quiet
+	$(BIN)/coverage report --skip-covered --skip-empty
 
 lint: $(READY)
 	$(BIN)/ruff check

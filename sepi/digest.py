@@ -91,7 +91,7 @@ def _imports(module: str, root: Path) -> frozenset[str]:
 def _imported_by(module: str, root: Path) -> Iterator[str]:
     file = _file_of(module, root)
     package = module.split(".")[0]
-    for node in ast.walk(_tree(file)):
+    for node in _statements(_tree(file).body):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names if alias.name.split(".")[0] == package)
         elif isinstance(node, ast.ImportFrom):
@@ -120,22 +120,27 @@ def _absolute(node: ast.ImportFrom, module: str, is_package: bool) -> str:
 @cache
 def _code(file: Path) -> str:
     """The syntax tree of a file without docstrings; remembered, since most files belong to several commands."""
-    tree = _WithoutDocstrings().visit(_tree(file))
+    tree = _tree(file)
+    for node in [tree, *_statements(tree.body)]:
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef) and _is_text(
+            node.body[:1]
+        ):
+            node.body = node.body[1:]
     return ast.dump(tree)
 
 
-class _WithoutDocstrings(ast.NodeTransformer):
-    """Drops the string that a module, class or function begins with."""
+def _statements(body: list[ast.stmt]) -> Iterator[ast.stmt]:
+    """All statements of a body and of those in it; expressions, of which there are far more, are not looked into."""
+    for node in body:
+        yield node
+        for inner in (node, *getattr(node, "handlers", ()), *getattr(node, "cases", ())):
+            for field in ("body", "orelse", "finalbody") if inner is node else ("body",):
+                yield from _statements(getattr(inner, field, []))
 
-    def generic_visit(self, node: ast.AST) -> ast.AST:
-        super().generic_visit(node)
-        body = getattr(node, "body", None)
-        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef) and body:
-            first = body[0]
-            if (
-                isinstance(first, ast.Expr)
-                and isinstance(first.value, ast.Constant)
-                and isinstance(first.value.value, str)
-            ):
-                node.body = body[1:]
-        return node
+
+def _is_text(first: list[ast.stmt]) -> bool:
+    """Whether a body's first statement, if any, is its docstring."""
+    return any(
+        isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant) and isinstance(node.value.value, str)
+        for node in first
+    )

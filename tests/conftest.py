@@ -14,22 +14,43 @@ if TYPE_CHECKING:
 DATA = Path(os.environ.get("SEPI_DATA", Path(__file__).parents[2] / "shared" / "data"))
 
 
-# fixtures that take long to make, and what their tests are marked with
+# what a test is marked with for a fixture that it uses
 _MARKS = {"real_data": "real", "browser": "browser"}
-# tests that share what takes long to make run in one process; each kind in one of its own
-_GROUPS = {"real_data": "real", "example": "page", "browser": "page", "workflow": "workflow"}
+# what takes longest is begun first, so that several processes end at about the same time
+_FIRST = ("real", "workflow", "slow", "browser")
+# files whose tests share what takes long to make: real maps, a run of the workflow, a report, kernels for other types
+_TOGETHER = {
+    **dict.fromkeys(["test_real", "test_real_formats"], "real"),
+    **dict.fromkeys(["test_compare", "test_packing", "test_page", "test_page_browser"], "page"),
+    **dict.fromkeys(["test_page_cloud", "test_page_pixels", "test_page_viewer"], "page"),
+    "test_pipeline": "types",
+    "test_workflow": "workflow",
+}
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark tests by what they need, and keep those together that share it when several processes run the tests."""
+    """Mark tests by the fixtures that they use, and put those first that take long."""
     for item in items:
-        needed = getattr(item, "fixturenames", ())
         for fixture, mark in _MARKS.items():
-            if fixture in needed:
+            if fixture in getattr(item, "fixturenames", ()):
                 item.add_marker(mark)
-        group = next((group for fixture, group in _GROUPS.items() if fixture in needed), None)
-        if group is not None:
-            item.add_marker(pytest.mark.xdist_group(group))
+    items.sort(key=lambda item: min((n for n, mark in enumerate(_FIRST) if item.get_closest_marker(mark)), default=9))
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
+    """Where several processes run the tests, those of :data:`_TOGETHER` stay in one; the others go where there is time.
+
+    Marks for groups (``--dist loadgroup``) are lost between pytest 9 and pytest-xdist 3.8.
+    """
+    from xdist.scheduler import LoadScopeScheduling
+
+    class Scheduler(LoadScopeScheduling):
+        def _split_scope(self, nodeid: str) -> str:
+            return _TOGETHER.get(Path(nodeid.partition("::")[0]).stem, nodeid)
+
+    config.option.loadscopereorder = False
+    return Scheduler(config, log)
 
 
 @pytest.fixture(scope="session")

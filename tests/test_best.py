@@ -47,6 +47,7 @@ def glossy(scene: LightField) -> LightField:
     return replace(scene, views=np.clip(views * (1 + gloss[..., None]), 0, 1).astype(np.float32))
 
 
+@pytest.mark.slow
 def test_gloss_does_not_move_faint_texture() -> None:
     """On a surface of faint texture, brightness that changes with the view pulls colours alone aside."""
     scene = render("slanted_plane", size=128)
@@ -157,6 +158,7 @@ def test_range_narrower_than_the_scene_is_no_crash() -> None:
     assert np.isfinite(estimate_depth(narrow, "best").disparity).all()
 
 
+@pytest.mark.slow
 def test_first_run_gives_the_bytes_of_later_ones(tmp_path: Path) -> None:
     """Freshly compiled kernels round as those loaded from disk do; else two machines would never agree."""
     program = (

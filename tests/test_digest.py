@@ -15,6 +15,9 @@ FILES = {
     "pkg/shared.py": "value = 1\n",
     "pkg/extra.py": "extra = 1\n",
     "pkg/lazy.py": "def g():\n    import pkg.extra\n    return pkg.extra\n",
+    "pkg/deep.py": "try:\n    x = 1\nexcept ValueError:\n    import pkg.extra\nfinally:\n    from pkg import shared\n"
+    "with open('x'):\n    match x:\n        case 1:\n            from pkg.io import reader\n"
+    "if x:\n    pass\nelse:\n    from pkg.io.files import path\n",
     "pkg/names.py": "from pkg.io import read\n",
     "pkg/io/__init__.py": "from pkg.io.reader import read\n",
     "pkg/io/reader.py": "from pkg.io.files import path\n\ndef read():\n    return path\n",
@@ -48,6 +51,8 @@ def test_imports_are_followed(tree: Path) -> None:
     assert imported_modules("pkg.one", tree) == {"pkg.one", "pkg.shared", "pkg.io.reader", "pkg.io.files"}
     assert imported_modules("pkg.two", tree) == {"pkg.two", "pkg.shared", "pkg.io.files"}
     assert imported_modules("pkg.lazy", tree) == {"pkg.lazy", "pkg.extra"}
+    deep = {"pkg.deep", "pkg.extra", "pkg.shared", "pkg.io.reader", "pkg.io.files"}
+    assert imported_modules("pkg.deep", tree) == deep
     assert imported_modules("pkg.names", tree) == {"pkg.names", "pkg.io", "pkg.io.reader", "pkg.io.files"}
 
 

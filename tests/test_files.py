@@ -215,6 +215,7 @@ def started(scene: Path, folder: Path) -> "subprocess.Popen[str]":
     )
 
 
+@pytest.mark.slow
 def test_depth_stopped_at_any_time_leaves_all_of_the_maps_or_none(scene: Path, tmp_path: Path) -> None:
     (tmp_path / "whole").mkdir()
     begun = time.monotonic()

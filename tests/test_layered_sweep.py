@@ -14,7 +14,7 @@ from sepi.layered_sweep import (
 from sepi.layers import DETAIL_UNIT, LayerParameters, split_layers
 from sepi.lightfield import DisparityRange, LightField
 from sepi.scenes import render
-from sepi.semi_global import aggregate, choose, semi_global
+from sepi.semi_global_kernels import aggregate, choose, semi_global
 from sepi.visibility_kernels import EMPTY, covered_somewhere, sweep_rows, z_buffers
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from browser import CLOUD, WIPE, choose, complains, opened, part, place_of, point_at, settled, show_scene
+from browser import CLOUD, WIPE, canvas_pixels, choose, complains, opened, part, place_of, point_at, settled, show_scene
 from page_example import COTTON_TITLE, DOTS_TITLE, EDGES, PICTURE_TITLE, Example
 
 from sepi.report.graph import drawn

@@ -103,7 +103,9 @@ def measured(case: Case, repeats: int) -> Measurement:
     SepiError
         If the case fails; the message is that of its error.
     """
-    context = multiprocessing.get_context("spawn")
+    # forked from a process that has imported everything and done nothing: no case inherits another's memory
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload(["sepi.bench.plan"])
     receiver, sender = context.Pipe(duplex=False)
     process = context.Process(target=_measure, args=(case, repeats, sender), daemon=True)
     process.start()
