@@ -1,7 +1,7 @@
 # make        environment, then `snakemake all` on the built-in scenes
 # make check  environment, then the fast part of the tests: for every save
 # make test   environment, then the whole test suite, on all cores
-# make coverage  the whole test suite in one process, and the share of lines and branches that it runs
+# make coverage  the whole test suite, and the share of lines and branches that it runs
 # make lint   style, format and types
 # make bench  environment, then times, memory and growth of the pipeline, to reports/
 # make clean  remove results and everything else that was made, but for the environment
@@ -33,7 +33,7 @@ coverage: export COVERAGE_FILE := $(CURDIR)/build/coverage/data
 coverage: $(READY)
 	rm -rf build/coverage
 	mkdir -p build/coverage
-	-$(BIN)/coverage run -m pytest
+	-$(BIN)/coverage run -m pytest --numprocesses auto
 	$(BIN)/coverage combine --quiet
 	$(BIN)/coverage report --skip-covered --skip-empty
 

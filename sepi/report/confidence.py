@@ -18,7 +18,6 @@ from sepi.evaluate import PROTOCOLS
 from sepi.lightfield import FloatMap
 from sepi.report.layout import OURS, TEXT, Cell, Column, Entry, Grid, Line, Report, Row, Section, Table
 from sepi.report.runs import Runs
-from sepi.report.saving import new_figure, save
 
 DECILES = 10
 
@@ -104,6 +103,9 @@ def confidence_table(runs: Runs) -> Report:
 
 def write_curves(folder: Path, confidence: FloatMap, error: FloatMap) -> None:
     """Plot the sparsification curve of a map beside the oracle's as ``sparsification.png`` and ``.pdf``."""
+    # slow to import, and not needed for the tables
+    from sepi.report.saving import new_figure, save
+
     # margins by hand: a layout engine takes longer than the rest
     figure = new_figure(5, 3.5, layout=None)
     axis = figure.add_axes((0.14, 0.14, 0.83, 0.83))

@@ -1,0 +1,77 @@
+"""What a command loads before it does anything: a job of the workflow is often shorter than an import."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sepi.io.hdf5 import write_light_field, write_stage
+from sepi.scenes import render
+from sepi.stage import StageMaps
+
+SLOW = ("numba", "scipy", "skimage", "matplotlib", "pyamg", "jinja2", "snakemake", "tqdm")
+"""Libraries that take longer to import than many a job takes."""
+
+MODULES = (
+    "sepi",
+    "sepi.cli",
+    "sepi.initial",
+    "sepi.occlusion",
+    "sepi.textureless",
+    "sepi.optimize",
+    "sepi.evaluate",
+    "sepi.ingest",
+    "sepi.export",
+    "sepi.pipeline",
+    # what every start of the workflow loads
+    "sepi.config",
+    "sepi.digest",
+    "sepi.report.plan",
+    # jobs at its end
+    "sepi.report.numbers",
+    "sepi.report.tables",
+)
+
+
+def loaded(program: str) -> set[str]:
+    """Those of :data:`SLOW` that a program has loaded at its end."""
+    told = f"{program}\nimport sys\nprint(*(name for name in {SLOW!r} if name in sys.modules))"
+    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[1])}
+    done = subprocess.run([sys.executable, "-c", told], env=environment, capture_output=True, text=True, check=True)
+    return set(done.stdout.split())
+
+
+@pytest.mark.parametrize("module", MODULES)
+def test_nothing_slow_is_imported_before_it_is_needed(module: str) -> None:
+    assert loaded(f"import {module}") == set()
+
+
+def test_a_stage_without_kernels_does_not_wait_for_numba(tmp_path: Path) -> None:
+    """Six of seven variants end with the paper's optimisation, which is milliseconds of work for a small scene."""
+    light_field = render("dots", size=64, views=3)
+    maps = StageMaps(np.zeros(light_field.shape, np.float32), np.ones(light_field.shape, np.float32))
+    write_light_field(tmp_path / "lightfield.h5", light_field)
+    attributes = {"stage": "initial", "choice": "sepi", "parameters": "{}", "made_from": "[]"}
+    write_stage(tmp_path / "initial.h5", maps, attributes)
+    files = {"--light-field": "lightfield.h5", "--previous": "initial.h5", "--output": "optimize.h5"}
+    words = ["--choice", "wls", *(str(part) for name, file in files.items() for part in (name, tmp_path / file))]
+    program = f"from sepi.optimize import *\nstage_command('optimize', CHOICES)({words!r}, standalone_mode=False)"
+    assert loaded(program) == {"scipy"}
+    assert (tmp_path / "optimize.h5").is_file()
+
+
+@pytest.mark.parametrize("before", ["", "import numba, cv2\n"])
+def test_threads_are_kept_to_whether_or_not_libraries_are_there(before: str) -> None:
+    """Asked for one thread, a job must not take the cores of the jobs beside it."""
+    program = (
+        f"{before}from sepi.command import use_threads\nuse_threads(1)\nimport numba, cv2\n"
+        "assert numba.get_num_threads() == 1, numba.get_num_threads()\n"
+        "assert cv2.getNumThreads() == 1, cv2.getNumThreads()"
+    )
+    environment = {name: value for name, value in os.environ.items() if not name.endswith("_NUM_THREADS")}
+    environment["PYTHONPATH"] = str(Path(__file__).parents[1])
+    done = subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
