@@ -133,6 +133,7 @@ def test_a_point_cloud_without_a_picture(page: Any) -> None:
 def test_a_click_and_the_grid(page: Any) -> None:
     """There are no prepared pixels here: a click must do no harm."""
     page.mouse.click(*place_of(page, '[data-part="wipe"]', 20, 20))
+    settled(page)
     assert read_out(page)["pixel"] == "x 20, y 20"
     page.locator('figure[data-key="difference"]').get_by_role("button", name="as A").click()
     page.wait_for_selector('#viewer[data-shown="difference b"]')

@@ -109,10 +109,9 @@ def test_the_point_cloud_turns_by_the_mouse(page: Any) -> None:
     page.mouse.move(x, y)
     assert angles(page) == pytest.approx([start[0] + 0.6, start[1] + 0.2], abs=0.03), "turns without a button"
     scrolled = page.evaluate("scrollY")
-    covered = drawn_share(canvas_pixels(page, CLOUD))
+    far = canvas_pixels(page, CLOUD)
     page.mouse.wheel(0, -200)
-    settled(page)
-    assert drawn_share(canvas_pixels(page, CLOUD)) > covered
+    assert drawn_share(changed_pixels(page, CLOUD, far)) > drawn_share(far)
     assert page.evaluate("scrollY") == scrolled
     page.click('[data-part="cloud-reset"]')
     settled(page)
