@@ -1,5 +1,6 @@
 """The command of a stage, as the workflow calls it: what it writes, and what it leaves behind when it fails."""
 
+import io
 import json
 import os
 import signal
@@ -206,6 +207,25 @@ def test_no_progress_bar_in_a_pipe(capfd: pytest.CaptureFixture[str]) -> None:
         progress(1.0)
     captured = capfd.readouterr()
     assert captured.out + captured.err == ""
+
+
+def test_a_progress_bar_on_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Terminal(io.StringIO):
+        def isatty(self) -> bool:
+            return True
+
+    terminal = Terminal()
+    monkeypatch.setattr("sys.stderr", terminal)
+    with progress_bar("toy") as progress:
+        for fraction in (0.0, 0.5, 0.5, 1.0, 1.5):
+            progress(fraction)
+        # tqdm draws no more often than a reader sees
+        time.sleep(0.15)
+        progress(0.7)
+    shown = terminal.getvalue()
+    assert "toy   0% |" in shown
+    assert "toy  70% |" in shown
+    assert shown.endswith("\r"), "the bar is gone when the work is done"
 
 
 def test_a_path_that_the_system_refuses_is_one_line() -> None:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import sepi
+from sepi.disparity_range import estimate_range
 from sepi.lightfield import DisparityRange, LightField
 from sepi.pipeline import VARIANTS
 from sepi.scenes import render, write_hci
@@ -56,6 +57,16 @@ def test_odd_light_fields_get_finite_maps(name: str, variant: str) -> None:
     assert maps.disparity.max() < known.maximum + 1
     assert maps.confidence.min() >= 0
     assert maps.confidence.max() <= 1
+
+
+def test_an_unknown_range_is_estimated() -> None:
+    """In the Python API, too: an array of views alone is enough."""
+    whole = render("pyramids", size=64, views=5)
+    alone = LightField(whole.views, "alone")
+    maps = sepi.estimate_depth(alone, variant="no_occlusion_no_textureless")
+    known = sepi.estimate_depth(alone.with_range(estimate_range(alone)), variant="no_occlusion_no_textureless")
+    np.testing.assert_array_equal(maps.disparity, known.disparity)
+    assert np.median(np.abs(maps.disparity - whole.truth)) < 0.1
 
 
 @pytest.mark.parametrize(

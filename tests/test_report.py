@@ -20,7 +20,7 @@ from sepi.evaluate import evaluation_of, score_maps
 from sepi.external import NO_FILE
 from sepi.io.external import Imported, write_imported
 from sepi.io.hdf5 import read_stage, write_light_field, write_stage
-from sepi.io.scores import Evaluation, write_scores
+from sepi.io.scores import Evaluation, read_evaluations, write_scores
 from sepi.lightfield import DisparityRange, LightField
 from sepi.report import figures, numbers, pictures, tables
 from sepi.report.latex import as_latex
@@ -396,6 +396,17 @@ def test_a_stage_that_hands_its_maps_on_has_no_file_but_scores(plan: Plan) -> No
     assert handed_on == scores
     assert numbers_of.timing("hci", "cotton", "no_occlusion", "occlusion").seconds == 0
     assert numbers_of.timing("hci", "cotton", "no_occlusion", "optimize").seconds == 1.5
+
+
+def test_a_map_without_scores_is_named(plan: Plan, tmp_path: Path) -> None:
+    """Scores of an earlier configuration, say: a table must not go on without a row."""
+    there = linked(plan, tmp_path / "results", False)
+    path = there.scores_file("hci", "cotton")
+    scored = read_evaluations(path)
+    path.unlink()
+    write_scores(path, {"sepi": scored["sepi"]}, {"scene": "cotton"})
+    with pytest.raises(SepiError, match=r"cotton/scores.h5: no scores of 'sepi/half_sepi'; it holds: sepi$"):
+        collect(there)
 
 
 def test_the_last_stage_may_hand_its_maps_on() -> None:
