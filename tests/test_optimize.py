@@ -6,7 +6,15 @@ import pytest
 from scipy.sparse.linalg import splu
 
 from sepi.lightfield import DisparityRange, LightField
-from sepi.optimize import CHOICES, WlsParameters, data_weight, energy_system, rectified_confidence, solve
+from sepi.optimize import (
+    CHOICES,
+    WlsParameters,
+    data_weight,
+    energy_system,
+    rectified_confidence,
+    smoothness_coefficient,
+    solve,
+)
 from sepi.scenes import render
 from sepi.stage import StageMaps, no_progress
 
@@ -38,6 +46,18 @@ def test_solver_agrees_with_a_direct_solve(alpha, multigrid, monkeypatch):
     solved = solve(matrix, right, disparity, WlsParameters().accuracy)
     assert np.abs(solved - direct).max() < 1e-4
     assert bool(hierarchies) == multigrid, "both ways are tested"
+
+
+def test_smoothness_is_weaker_at_edges_and_where_depth_is_sure():
+    """Eq. 11-12: else texture would be smoothed over, or noise believed."""
+    parameters = WlsParameters()
+    centre = np.zeros((7, 9, 3), np.float32)
+    centre[:, 5:] = 0.4
+    low, high = (smoothness_coefficient(centre, np.full((7, 9), c, np.float32), parameters) for c in (0.0, 1.0))
+    np.testing.assert_allclose(high / low, np.exp(-parameters.tau_2), rtol=1e-5)
+    # away from the edge no gradient is left but the floor; at it, a step of 0.4 in three channels, halved by Sobel
+    np.testing.assert_allclose(low[:, 1], 1 / parameters.gradient_floor**2, rtol=1e-5)
+    np.testing.assert_allclose(low[:, 4], 1 / (3 * 0.2**2 + parameters.gradient_floor**2), rtol=1e-5)
 
 
 def test_energy_is_the_sum_of_equation_8():

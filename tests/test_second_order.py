@@ -128,6 +128,19 @@ def test_steps_end_at_the_true_disparity() -> None:
     assert np.abs(disparity - scene.truth)[8:-8, 8:-8].mean() < 1.5e-3
 
 
+def test_steps_are_those_of_newton_and_no_longer_than_allowed() -> None:
+    """Far from the minimum the linearisation does not hold: an uncut step would throw a pixel off its surface."""
+    gradient, curvature = np.full((9, 9), 0.3, np.float32), np.full((9, 9), 10.0, np.float32)
+    gradient[:, 5:] *= -100
+    step, information_there = windowed_step(gradient, curvature, 0, 0.05)
+    np.testing.assert_allclose(step[:, :5], 0.03, rtol=1e-5)
+    np.testing.assert_allclose(step[:, 5:], -0.05, rtol=1e-5)
+    np.testing.assert_allclose(information_there, 10)
+    # a window takes the mean of both before they are divided
+    wide, _ = windowed_step(gradient, curvature, 1, 9.0)
+    np.testing.assert_allclose(wide[4, 4], (2 * 0.3 - 30) / 3 / 10, rtol=1e-4)
+
+
 def plane(shape=(20, 24)):
     y, x = np.mgrid[: shape[0], : shape[1]]
     return (0.3 + 0.02 * x - 0.01 * y).astype(np.float32)
