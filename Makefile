@@ -18,8 +18,9 @@ READY := .venv/ready
 all: $(READY)
 	$(BIN)/snakemake all
 
-# a worker of pytest for each core, and one thread in each
-TESTS := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 NUMBA_NUM_THREADS=1 $(BIN)/python -m pytest --numprocesses auto
+# a worker of pytest for each core, and one thread in each; of numba's threads tests/conftest.py takes care
+ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
+TESTS := $(ONE_THREAD) $(BIN)/python -m pytest --numprocesses auto
 
 check: $(READY)
 	$(TESTS) -m "not real and not workflow and not browser and not slow"
@@ -33,9 +34,8 @@ coverage: export COVERAGE_FILE := $(CURDIR)/build/coverage/data
 coverage: $(READY)
 	rm -rf build/coverage
 	mkdir -p build/coverage
-	-$(BIN)/coverage run -m pytest --numprocesses auto
-	$(BIN)/coverage combine --quiet
-	$(BIN)/coverage report --skip-covered --skip-empty
+	$(ONE_THREAD) $(BIN)/coverage run -m pytest --numprocesses auto; status=$$?; \
+	$(BIN)/coverage combine --quiet && $(BIN)/coverage report --skip-covered --skip-empty; exit $$status
 
 lint: $(READY)
 	$(BIN)/ruff check

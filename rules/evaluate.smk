@@ -1,12 +1,13 @@
 # Scores of a scene's disparity maps, after every stage of every variant (paper, section V): both protocols, all regions.
-# One job for a scene, and only maps that changed are scored again: the old file stays until the new one is there. A scene
+# One job for a scene, in which only maps that changed are scored again: what was found before is kept beside the output, in
+# a file that only this job knows. (An output marked by update() would count as up to date after a job that failed.) A scene
 # without ground truth gets a score file that says so. The parts of variant best have a file of their own, as in the report.
 rule evaluate:
     input:
         light_field="results/{dataset}/{scene}/lightfield.h5",
         maps=lambda wildcards: PLAN.scored_files(wildcards.dataset, wildcards.scene, parts=wildcards.which == "_parts"),
     output:
-        scores=update("results/{dataset}/{scene}/scores{which}.h5"),
+        scores="results/{dataset}/{scene}/scores{which}.h5",
     log:
         "logs/{dataset}/{scene}/scores{which}.log",
     benchmark:
@@ -18,9 +19,10 @@ rule evaluate:
         mem_mb=lambda wildcards, input: memory_for(4, bytes_per_pixel=200 + 50 * len(input.maps))(wildcards),
     params:
         stages="results/{dataset}/{scene}/stages",
+        kept="results/{dataset}/{scene}/scores{which}.kept.h5",
         code=lambda wildcards: code_digest("sepi.evaluate"),
     message:
         "{wildcards.dataset}/{wildcards.scene}: scores"
     shell:
         "python -m sepi.evaluate --light-field {input.light_field:q} --stages {params.stages:q} --code {params.code} "
-        "--output {output.scores:q} {input.maps:q} 2> {log:q}"
+        "--kept {params.kept:q} --output {output.scores:q} {input.maps:q} 2> {log:q}"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import re
 import time
 from dataclasses import replace
@@ -12,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from sepi.command import SepiGroup, progress_bar, use_threads
+from sepi.command import SepiGroup, available_cores, progress_bar, use_threads
 from sepi.compare_command import compare
 from sepi.errors import SepiError
 from sepi.evaluate_command import evaluate
@@ -107,7 +106,7 @@ def depth(
     from sepi.pipeline import HANDED_ON, estimate_depth, stage_parameters, variant_named
 
     started = time.perf_counter()
-    use_threads(threads or os.cpu_count() or 1)
+    use_threads(threads or available_cores())
     chosen = variant_named(variant)
     parameters = _parameters(settings, variant, chosen)
     steps = [

@@ -130,6 +130,11 @@ def progress_bar(label: str) -> Iterator[Progress]:
         yield progress
 
 
+def available_cores() -> int:
+    """Cores that this process may use: a container or a scheduler may give it fewer than the machine has."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
 def use_threads(count: int) -> None:
     """Let numba and OpenCV use at most ``count`` threads (fewer where the machine has fewer cores).
 
@@ -141,7 +146,7 @@ def use_threads(count: int) -> None:
         # numba refuses more threads than it started with
         numba.set_num_threads(min(count, numba.config.NUMBA_NUM_THREADS))  # type: ignore[attr-defined]
     else:
-        os.environ["NUMBA_NUM_THREADS"] = str(min(count, os.cpu_count() or 1))
+        os.environ["NUMBA_NUM_THREADS"] = str(min(count, int(os.environ.get("NUMBA_NUM_THREADS", available_cores()))))
     if "cv2" in sys.modules:
         import cv2
 

@@ -7,7 +7,10 @@ reported, where the benchmark's own toolkit counts it as good. Pixels without fi
 from __future__ import annotations
 
 import hashlib
+import shutil
 from collections.abc import Mapping
+from contextlib import suppress
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
@@ -17,8 +20,9 @@ import numpy.typing as npt
 
 from sepi.command import SepiCommand
 from sepi.errors import SepiError
+from sepi.io.files import atomic_path
 from sepi.io.hdf5 import read_light_field, read_stage
-from sepi.io.scores import Evaluation, Scored, Scores, read_evaluations, write_scores
+from sepi.io.scores import Evaluation, Scored, Scores, map_name, read_evaluations, write_scores
 from sepi.lightfield import BoolMap, FloatMap, LightField
 from sepi.provenance import scene_attributes
 
@@ -165,10 +169,10 @@ def score_maps(
         If a map does not have the light field's shape.
     """
     scene = _digest_of_scene(light_field, code)
-    made_of = {name: _digest(scene, disparity) for name, disparity in maps.items()}
-    anew = [name for name in maps if name not in known or known[name].made_of != made_of[name]]
+    digests = {name: _digest(scene, disparity) for name, disparity in maps.items()}
+    anew = [name for name in maps if name not in known or known[name].digest != digests[name]]
     found = evaluations_of(light_field, {name: maps[name] for name in anew})
-    scored = {name: Scored(made_of[name], found[name]) if name in found else known[name] for name in maps}
+    scored = {name: Scored(digests[name], found[name]) if name in found else known[name] for name in maps}
     return scored, anew
 
 
@@ -197,12 +201,21 @@ def _error(disparity: FloatMap, truth: FloatMap) -> FloatMap:
 
 
 def _digest_of_scene(light_field: LightField, code: str) -> str:
-    """Digest of all but the map that decides its scores: ground truth, masks, and what masks are computed from."""
+    """Digest of what decides the scores beside the map: code, ground truth, masks, and what masks are computed from."""
     grid = (light_field.grid, light_field.reference)
-    facts = [code, grid, list(light_field.masks), list(REGIONS), PROTOCOLS, BAD_PIXEL]
+    facts = [code, _versions(), grid, list(light_field.masks), list(REGIONS), PROTOCOLS, BAD_PIXEL]
     arrays: list[npt.NDArray[Any]] = [light_field.present, *light_field.masks.values()]
     arrays += [] if light_field.truth is None else [light_field.truth, light_field.centre]
     return _digest(repr(facts), *arrays)
+
+
+def _versions() -> list[str]:
+    """Versions of the libraries that masks are computed with; of those that are there under this name."""
+    found = [np.__version__]
+    for name in ("scipy", "numba", "opencv-python-headless"):
+        with suppress(PackageNotFoundError):
+            found.append(version(name))
+    return found
 
 
 def _digest(text: str, *arrays: npt.NDArray[Any]) -> str:
@@ -234,30 +247,30 @@ _PATH = click.Path(path_type=Path)
 @click.option("--light-field", "light_field_path", type=_PATH, required=True, help="From ingest.")
 @click.option("--stages", type=_PATH, required=True, help="Folder of the stage files; their places name the maps.")
 @click.option("--code", default="", help="Digest of the code: maps that other code scored are scored anew.")
-@click.option("--output", type=_PATH, required=True, help="Score file (HDF5) to write; what still holds is kept.")
+@click.option("--kept", type=_PATH, help="Score file of an earlier call: what still holds in it is taken over.")
+@click.option("--output", type=_PATH, required=True, help="Score file (HDF5) to write, and then to keep.")
 @click.argument("paths", nargs=-1, type=_PATH, metavar="STAGE_FILE...", required=True)
-def command(light_field_path: Path, stages: Path, code: str, output: Path, paths: tuple[Path, ...]) -> None:
+def command(
+    light_field_path: Path, stages: Path, code: str, kept: Path | None, output: Path, paths: tuple[Path, ...]
+) -> None:
     """Score the disparity maps of stage files against the light field's ground truth, if it has one."""
     light_field = read_light_field(light_field_path)
-    maps = {_name_in(stages, path): read_stage(path).disparity for path in paths}
-    scored, anew = score_maps(light_field, maps, _known(output), code)
+    maps = {map_name(stages, path): read_stage(path).disparity for path in paths}
+    scored, anew = score_maps(light_field, maps, {} if kept is None else _known(kept), code)
     write_scores(output, scored, scene_attributes(light_field))
+    if kept is not None:
+        with atomic_path(kept) as temporary:
+            shutil.copyfile(output, temporary)
     if light_field.truth is None:
         click.echo(f"{light_field.name}: no ground truth, no scores", err=True)
     else:
         click.echo(f"{light_field.name}: {len(anew)} of {len(maps)} maps scored anew: {', '.join(anew)}", err=True)
 
 
-def _name_in(stages: Path, path: Path) -> str:
-    if not path.parent.is_relative_to(stages):
-        raise SepiError(f"{path}: not below {stages}, the folder of the stage files (--stages)")
-    return path.parent.relative_to(stages).as_posix()
-
-
-def _known(output: Path) -> dict[str, Scored]:
+def _known(kept: Path) -> dict[str, Scored]:
     """Earlier evaluations; none from a file that is no score file of this version."""
     try:
-        return read_evaluations(output)
+        return read_evaluations(kept)
     except SepiError:
         return {}
 

@@ -19,7 +19,7 @@ _CHATTER = re.compile(
     r"Building DAG|Using shell|Provided cores|Rules claiming|Select jobs|Execute \d|Assuming unrestricted|Complete log"
 )
 # said by this handler in fewer words, or by no one
-_REPLACED = {LogEvent.JOB_STARTED, LogEvent.RESOURCES_INFO, LogEvent.WORKFLOW_STARTED}
+_SILENT = {LogEvent.JOB_STARTED, LogEvent.JOB_FINISHED, LogEvent.RESOURCES_INFO, LogEvent.WORKFLOW_STARTED}
 
 
 class RunLog(logging.Handler):
@@ -39,20 +39,27 @@ class RunLog(logging.Handler):
         self._stream = stream
         self._bar: tqdm[Any] | None = None
         self._total = self._begun = 0
+        self._failed = False
         self._running: dict[int, str] = {}
 
     def emit(self, record: logging.LogRecord) -> None:
         """Show what a record tells of the run, if anything."""
         event = getattr(record, "event", None)
+        if event == LogEvent.JOB_FINISHED:
+            self._running.pop(record.job_id, None)  # type: ignore[attr-defined]
+        elif event == LogEvent.JOB_ERROR:
+            self._running.pop(getattr(record, "jobid", -1), None)
+        self._failed |= record.levelno >= logging.ERROR
+        # what --quiet leaves out
+        if not self._usual.filter(record):
+            return
         if event == LogEvent.RUN_INFO:
             self._start(int(record.stats["total"]))  # type: ignore[attr-defined]
         elif event == LogEvent.JOB_INFO:
             self._begin(record.jobid, record.rule_msg or record.rule_name)  # type: ignore[attr-defined]
-        elif event == LogEvent.JOB_FINISHED:
-            self._running.pop(record.job_id, None)  # type: ignore[attr-defined]
         elif event == LogEvent.PROGRESS:
             self._advance(record.done, record.total)  # type: ignore[attr-defined]
-        elif event not in _REPLACED and not (event is None and _CHATTER.match(record.getMessage())):
+        elif event not in _SILENT and (event is not None or self._failed or not _CHATTER.match(record.getMessage())):
             self._pass_on(record)
 
     def close(self) -> None:
@@ -92,8 +99,7 @@ class RunLog(logging.Handler):
     def _pass_on(self, record: logging.LogRecord) -> None:
         if self._bar is not None:
             self._bar.clear()
-        if self._usual.filter(record):
-            self._usual.emit(record)
+        self._usual.emit(record)
         if self._bar is not None:
             self._bar.refresh()
 

@@ -1,9 +1,9 @@
-"""Compile every kernel ahead of the first run: ``python -m sepi.warm_up``.
+"""Compile the kernels for views of 8-bit colours ahead of the first run: ``python -m sepi.warm_up``.
 
 Compiled code is kept on disk, beside the package or in ``NUMBA_CACHE_DIR``, so this is done once in an environment.
 Without it the first jobs of a workflow compile what they need, several of them the same at the same time. Here every
-stage of enough variants runs on a tiny light field, in as many processes as there are cores, since one process compiles
-one function at a time.
+stage of enough variants runs on a tiny light field, in two processes, since one compiles one function at a time.
+Kernels for grey, 16-bit and float views are compiled when they are first needed.
 """
 
 from __future__ import annotations

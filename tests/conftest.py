@@ -28,6 +28,14 @@ _TOGETHER = {
 }
 
 
+def pytest_configure() -> None:
+    """One thread for each of several processes; tests of threads ask for more by themselves."""
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        import numba
+
+        numba.set_num_threads(1)
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Mark tests by the fixtures that they use, and put those first that take long."""
     for item in items:

@@ -17,7 +17,7 @@ from sepi.external import MapFile, import_maps
 from sepi.io.external import Imported, write_imported
 from sepi.io.hdf5 import read_light_field, read_stage, write_light_field, write_stage
 from sepi.io.pfm import write_pfm
-from sepi.io.scores import write_scores
+from sepi.io.scores import map_name, write_scores
 from sepi.layers import forget_layers
 from sepi.lightfield import FloatMap, LightField
 from sepi.pipeline import STAGES, VARIANTS, stage_parameters
@@ -150,9 +150,7 @@ def run_stages(plan: Plan, scene: tuple[str, str], light_field: LightField, vari
 def write_plan_scores(plan: Plan, scene: tuple[str, str], light_field: LightField) -> None:
     """The score file of a scene, from its stage files."""
     folder = plan.stages_folder(*scene)
-    maps = {
-        file.parent.relative_to(folder).as_posix(): read_stage(file).disparity for file in plan.scored_files(*scene)
-    }
+    maps = {map_name(folder, file): read_stage(file).disparity for file in plan.scored_files(*scene)}
     write_scores(plan.scores_file(*scene), score_maps(light_field, maps, {})[0], scene_attributes(light_field))
 
 

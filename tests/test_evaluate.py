@@ -158,6 +158,8 @@ def run_command(
         write_stage(stages / name / "stage.h5", StageMaps(disparity, np.ones_like(disparity)), STAGE_ATTRIBUTES)
     files = [stages / name / "stage.h5" for name in maps]
     options = ["--light-field", folder / "lightfield.h5", "--stages", stages, "--output", folder / output]
+    # what an earlier call for the same output found
+    options += ["--kept", folder / f"{output}.kept.h5"]
     words = [str(word) for word in [*options, "--code", code, *files]]
     result = CliRunner().invoke(command, words, catch_exceptions=False)
     assert result.exit_code == 0, result.output
@@ -231,7 +233,7 @@ class TestOnlyWhatChangedIsScoredAnew:
 
     def test_a_file_that_cannot_be_read_is_made_anew(self, tmp_path: Path) -> None:
         """Left by an older version, or damaged."""
-        (tmp_path / "scores.h5").write_bytes(b"something else")
+        (tmp_path / "scores.h5.kept.h5").write_bytes(b"something else")
         path, told = run_command(tmp_path, scene(TRUTH), MAPS)
         assert "3 of 3 maps scored anew" in told
         assert list(read_scores(path)) == list(MAPS)

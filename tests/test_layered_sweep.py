@@ -4,6 +4,7 @@ import numba
 import numpy as np
 import pytest
 from scipy.ndimage import map_coordinates
+from several_threads import several_threads
 
 from sepi.layered_sweep import (
     AllViewsParameters,
@@ -190,7 +191,7 @@ def test_depth_is_the_same_on_any_number_of_threads() -> None:
     before = numba.get_num_threads()
     found = []
     try:
-        for threads in (1, before):
+        for threads in (1, several_threads()):
             numba.set_num_threads(threads)
             first = depth_from_all_views(scene, AllViewsParameters(candidates=21), lambda _: None)
             result = depth_from_visible_views(

@@ -85,7 +85,7 @@ def test_light_fields_without_depth_are_refused(views, present, complaint) -> No
         LightField(views, "refused", present=present)
 
 
-@pytest.mark.parametrize("variant", ["paper", "no_sepi"])
+@pytest.mark.parametrize("variant", ["paper", "no_sepi", "best"])
 @pytest.mark.slow
 def test_equal_files_for_any_number_of_threads(tmp_path: Path, variant: str) -> None:
     """A result made on another machine must be the same, byte for byte: cores are not part of the input."""

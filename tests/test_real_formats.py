@@ -43,6 +43,21 @@ def test_every_format_gives_the_same_light_field(hci: Path, name: str, tmp_path:
     np.testing.assert_array_equal(own.truth, folder.truth)
 
 
+def test_one_map_from_a_folder_and_from_an_array(hci: Path, tmp_path: Path) -> None:
+    """By the command, byte for byte, what does not name the source or need a camera."""
+    np.save(tmp_path / "array.npy", scene(hci / "cotton").views)
+    found = []
+    for source in (hci / "cotton", tmp_path / "array.npy"):
+        out = tmp_path / f"{source.stem}-maps"
+        words = ["depth", source, "-o", out, "--disparity-range", "-1.6", "1.5"]
+        words += ["--variant", "no_occlusion_no_textureless", "--set", "initial.sepi.candidates=31"]
+        called = CliRunner().invoke(main, [str(word) for word in words])
+        assert (called.exit_code, called.stderr) == (0, "")
+        names = ("confidence.png", "disparity.npy", "disparity.pfm", "disparity.png", "disparity_16bit.png")
+        found.append({name: (out / name).read_bytes() for name in names})
+    assert found[0] == found[1]
+
+
 def small_map(whole: LightField, views: np.ndarray) -> np.ndarray:
     """What variant best makes of a part of the views."""
     part = LightField(views, "part", disparity_range=whole.disparity_range)

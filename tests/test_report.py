@@ -20,7 +20,7 @@ from sepi.evaluate import evaluation_of, score_maps
 from sepi.external import NO_FILE
 from sepi.io.external import Imported, write_imported
 from sepi.io.hdf5 import read_stage, write_light_field, write_stage
-from sepi.io.scores import Evaluation, read_evaluations, write_scores
+from sepi.io.scores import Evaluation, map_name, read_evaluations, write_scores
 from sepi.lightfield import DisparityRange, LightField
 from sepi.report import figures, numbers, pictures, tables
 from sepi.report.latex import as_latex
@@ -93,7 +93,7 @@ def with_results(made: Plan) -> Plan:
         folder = made.stages_folder(dataset, name)
         for parts in (False, True):
             files = made.scored_files(dataset, name, parts)
-            disparity = {file.parent.relative_to(folder).as_posix(): read_stage(file).disparity for file in files}
+            disparity = {map_name(folder, file): read_stage(file).disparity for file in files}
             scored = score_maps(scene, disparity, {})[0]
             write_scores(made.scores_file(dataset, name, parts), scored, {"scene": name})
         if made.external:

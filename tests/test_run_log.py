@@ -77,6 +77,41 @@ def test_what_went_wrong_is_shown_as_ever(stream: io.StringIO) -> None:
     assert usual.shown == ["Error in rule scores", "Shutting down, this might take some time."]
 
 
+def test_what_quiet_leaves_out_is_left_out() -> None:
+    """``--quiet`` is a filter of Snakemake's own handler."""
+    stream = io.StringIO()
+    logger = logging.Logger("snakemake")
+    usual = ColorizingTextHandler(stream)
+    usual.addFilter(lambda record: record.levelno >= logging.ERROR)
+    logger.addHandler(usual)
+    show_progress(logger)
+    logger.info("Job stats: ...", extra={"event": LogEvent.RUN_INFO, "stats": {"total": 2}})
+    logger.info("Rule: a", extra={"event": LogEvent.JOB_INFO, "jobid": 1, "rule_msg": "a", "rule_name": "a"})
+    logger.error("Error in rule a", extra={"event": LogEvent.JOB_ERROR, "jobid": 1})
+    assert stream.getvalue() == ""
+    assert usual.shown == ["Error in rule a"]
+
+
+def test_a_job_that_failed_is_no_longer_in_hand_and_its_log_is_named() -> None:
+    stream = Terminal()
+    logger = logging.Logger("snakemake")
+    usual = ColorizingTextHandler(stream)
+    logger.addHandler(usual)
+    show_progress(logger)
+    logger.info("Job stats: ...", extra={"event": LogEvent.RUN_INFO, "stats": {"total": 3}})
+    logger.info("Complete log(s): before")
+    for number, name in enumerate(("bad", "good"), start=1):
+        told = {"event": LogEvent.JOB_INFO, "jobid": number, "rule_msg": name, "rule_name": name}
+        logger.info("Rule: job", extra=told)
+    logger.error("Error in rule bad", extra={"event": LogEvent.JOB_ERROR, "jobid": 1})
+    logger.info("Finished jobid: 2", extra={"event": LogEvent.JOB_FINISHED, "job_id": 2})
+    logger.info("Rule: job", extra={"event": LogEvent.JOB_INFO, "jobid": 3, "rule_msg": "last", "rule_name": "last"})
+    assert stream.getvalue().split("\r")[-1].strip().endswith("last")
+    assert "bad" not in stream.getvalue().split("\r")[-1]
+    logger.info("Complete log(s): here")
+    assert usual.shown == ["Error in rule bad", "Complete log(s): here"]
+
+
 def test_another_handler_of_the_users_stays() -> None:
     """``--logger`` names one: that is the user's word."""
     logger = logging.Logger("snakemake")

@@ -63,6 +63,24 @@ def test_a_stage_without_kernels_does_not_wait_for_numba(tmp_path: Path) -> None
     assert (tmp_path / "optimize.h5").is_file()
 
 
+@pytest.mark.parametrize("limit", ["environment", "affinity"])
+def test_no_more_threads_than_were_given(limit: str) -> None:
+    """A scheduler gives a job one core of many: with more threads than that, its neighbours wait."""
+    narrow = "import os\nos.sched_setaffinity(0, {min(os.sched_getaffinity(0))})\n" if limit == "affinity" else ""
+    program = (
+        f"{narrow}from sepi.command import use_threads\nuse_threads(64)\nimport numba\n"
+        "assert numba.get_num_threads() == 1, numba.get_num_threads()"
+    )
+    environment = {name: value for name, value in os.environ.items() if not name.endswith("_NUM_THREADS")}
+    environment["PYTHONPATH"] = str(Path(__file__).parents[1])
+    if limit == "environment":
+        environment["NUMBA_NUM_THREADS"] = "1"
+    elif not hasattr(os, "sched_setaffinity"):
+        pytest.skip("this system knows no affinity")
+    done = subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
 @pytest.mark.parametrize("before", ["", "import numba, cv2\n"])
 def test_threads_are_kept_to_whether_or_not_libraries_are_there(before: str) -> None:
     """Asked for one thread, a job must not take the cores of the jobs beside it."""

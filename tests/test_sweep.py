@@ -9,6 +9,7 @@ import numba
 import numpy as np
 import pytest
 from scipy.ndimage import map_coordinates
+from several_threads import several_threads
 
 from sepi.epi import line_cost, stitched_epi
 from sepi.errors import SepiError
@@ -169,17 +170,17 @@ def test_equal_bytes_for_any_number_of_threads():
     parameters = SweepParameters(candidates=31)
     views = halves_and_quarters(light_field.grid)
     scattered = np.random.default_rng(0).random(light_field.shape) < 0.01
-    threads = numba.get_num_threads()
+    before = numba.get_num_threads()
     for subsets, wanted in ((None, None), (views.subsets, scattered)):
         results = []
         try:
             # the number of threads decides how the rows are shared out
-            for number in (1, threads):
+            for number in (1, several_threads()):
                 numba.set_num_threads(number)
                 groups = None if subsets is None else views.groups
                 results.append(sweep(light_field, parameters, groups=groups, subsets=subsets, wanted=wanted))
         finally:
-            numba.set_num_threads(threads)
+            numba.set_num_threads(before)
         for name in ("disparity", "cost", "mean"):
             np.testing.assert_array_equal(getattr(results[0], name), getattr(results[1], name))
 

@@ -298,6 +298,15 @@ class TestRerun:
         changed = replace(finished, folder=tmp_path / "run").with_config(stages=stages)
         target = "results/builtin/dots/scores.h5"
         assert changed.plan(target) == {"optimize": 1, "evaluate": 1}
+        # a job that fails leaves no old scores that count as new
+        kept = changed.folder / "results/builtin/dots/scores.kept.h5"
+        kept.rename(tmp_path / "kept.h5")
+        kept.mkdir()
+        assert changed.run(target).returncode != 0
+        assert not (changed.folder / target).exists()
+        assert changed.plan(target) == {"evaluate": 1}
+        kept.rmdir()
+        (tmp_path / "kept.h5").rename(kept)
         result = changed.run(target)
         assert result.returncode == 0, result.stdout
         told = (changed.folder / "logs/builtin/dots/scores.log").read_text()
@@ -469,11 +478,11 @@ def test_own_light_fields_of_any_format_get_maps(workflow: Workflow, tmp_path: P
         "wrong": {"path": str(tmp_path / "turned.npy")},
     }
     own = replace(workflow, folder=tmp_path / "run").with_config(hci_root=None, light_fields=entries)
-    maps = f"results/own/right/{QUICK}/result.h5"
+    maps = [f"results/own/{name}/{QUICK}/result.h5" for name in ("right", "turned")]
     targets = [f"results/own/{name}/lightfield.h5" for name in entries]
-    result = own.run(*targets, maps)
+    result = own.run(*targets, *maps)
     assert result.returncode == 0, result.stdout
-    assert read_attributes(own.folder / maps)["variant"] == QUICK
+    assert [read_attributes(own.folder / file)["variant"] for file in maps] == [QUICK, QUICK]
     kept = read_light_field(own.folder / "results/own/right/lightfield.h5", check_order=False)
     assert kept.reference == (2, 1)
     assert np.argwhere(~kept.present).tolist() == [[0, 0]]

@@ -21,7 +21,7 @@ LARGE = (1024, 17)
 Growth = dict[str, list[int]]
 
 FULL: Growth = {"size": [128, 256, 512, 1024], "views": [3, 5, 7, 9, 13, 17], "candidates": [46, 91, 181, 362]}
-SMALL: Growth = {"size": [64, 128], "views": [3], "candidates": [11]}
+SMALL: Growth = {"size": [64, 128], "views": [3], "candidates": [11, 21]}
 
 
 def sizes(growth: Growth, large: bool) -> dict[str, tuple[int, int]]:

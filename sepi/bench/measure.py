@@ -103,9 +103,9 @@ def measured(case: Case, repeats: int) -> Measurement:
     SepiError
         If the case fails; the message is that of its error.
     """
-    # forked from a process that has imported everything and done nothing: no case inherits another's memory
+    # forked from a process that has imported what all cases need and done nothing: none inherits another's memory
     context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload(["sepi.bench.plan"])
+    context.set_forkserver_preload(["sepi.bench.plan", "sepi.sweep_kernels", "sepi.mean_shift", "skimage.segmentation"])
     receiver, sender = context.Pipe(duplex=False)
     process = context.Process(target=_measure, args=(case, repeats, sender), daemon=True)
     process.start()

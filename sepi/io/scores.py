@@ -50,17 +50,30 @@ class Evaluation:
 
 @dataclass(frozen=True)
 class Scored:
-    """The evaluation of one map, and what it was made of.
+    """The evaluation of one map, and a fingerprint of what it was made from.
 
     Attributes
     ----------
-    made_of : str
+    digest : str
         Digest of all that decides the scores; a map with the same digest need not be evaluated again.
     evaluation : Evaluation
     """
 
-    made_of: str
+    digest: str
     evaluation: Evaluation
+
+
+def map_name(stages: Path, file: Path) -> str:
+    """Name of the map in a stage file: the file's place in the folder of a scene's stage files.
+
+    Raises
+    ------
+    SepiError
+        If it is not in that folder.
+    """
+    if not file.parent.is_relative_to(stages):
+        raise SepiError(f"{file}: not below {stages}, the folder of the stage files")
+    return file.parent.relative_to(stages).as_posix()
 
 
 def write_scores(path: Path, maps: Mapping[str, Scored], attributes: Mapping[str, Attribute]) -> None:
@@ -76,7 +89,7 @@ def write_scores(path: Path, maps: Mapping[str, Scored], attributes: Mapping[str
         first: h5py.Group | None = None
         for name, scored in maps.items():
             group = groups.create_group(_stored_name(name))
-            group.attrs["made_of"] = scored.made_of
+            group.attrs["digest"] = scored.digest
             if first is None:
                 put_evaluation(group, scored.evaluation)
                 first = group
@@ -113,7 +126,7 @@ def read_evaluations(path: Path, names: Collection[str] | None = None) -> dict[s
             if name not in known:
                 raise SepiError(f"{path}: no scores of '{name}'; it holds: {', '.join(known) or 'none'}")
         groups = {name: maps[_stored_name(name)] for name in (known if names is None else names)}
-        return {name: Scored(str(group.attrs["made_of"]), evaluation_in(group)) for name, group in groups.items()}
+        return {name: Scored(str(group.attrs["digest"]), evaluation_in(group)) for name, group in groups.items()}
 
 
 def put_evaluation(group: h5py.Group, evaluation: Evaluation) -> None:
