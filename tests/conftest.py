@@ -28,14 +28,6 @@ _TOGETHER = {
 }
 
 
-def pytest_configure() -> None:
-    """One thread for each of several processes; tests of threads ask for more by themselves."""
-    if "PYTEST_XDIST_WORKER" in os.environ:
-        import numba
-
-        numba.set_num_threads(1)
-
-
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Mark tests by the fixtures that they use, and put those first that take long."""
     for item in items:
@@ -59,6 +51,15 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
 
     config.option.loadscopereorder = False
     return Scheduler(config, log)
+
+
+@pytest.fixture(autouse=True)
+def one_thread() -> None:
+    """One thread for each of several processes; a command under test, or a test of threads, asks for more by itself."""
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        import numba
+
+        numba.set_num_threads(1)
 
 
 @pytest.fixture(scope="session")
