@@ -165,8 +165,5 @@ def print_written(tables, maps):
 
 
 # a progress bar, or a line for each job; a dry run is as Snakemake shows it
-RUN_LOG = (
+if workflow.is_main_process and not (workflow.output_settings.dryrun or workflow.output_settings.verbose):
     show_progress(logger)
-    if workflow.is_main_process and not (workflow.output_settings.dryrun or workflow.output_settings.verbose)
-    else None
-)

@@ -64,7 +64,7 @@ class SepiGroup(click.Group):
 @contextmanager
 def _rare_collections() -> Iterator[None]:
     """Look for cycles a hundredth as often: libraries that are imported make objects that stay, and to look through
-    those again and again takes a tenth of a short job.
+    those again and again takes a twentieth of a short job.
     """
     before = gc.get_threshold()
     gc.set_threshold(100 * before[0], *before[1:])
