@@ -44,7 +44,7 @@ lint: $(READY)
 	$(BIN)/snakefmt --line-length 120 --check Snakefile rules
 
 bench: $(READY)
-	$(BIN)/python -m sepi.bench run
+	$(BIN)/python -m bench run
 
 clean:
 	find reports -mindepth 1 ! -name README.md -delete
@@ -58,5 +58,5 @@ $(READY): requirements.lock pyproject.toml
 	$(PYTHON) -m venv .venv
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --requirement requirements.lock
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
-	$(BIN)/python -m sepi.warm_up
+	$(BIN)/python -m sepi.cli.warm_up
 	touch $@

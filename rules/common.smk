@@ -7,13 +7,13 @@ import sys
 import time
 from pathlib import Path
 
-from sepi.config import GRAPH_CONFIG, load_settings
-from sepi.digest import ROOT, code_digest
+from sepi.workflow.config import GRAPH_CONFIG, load_settings
+from sepi.workflow.code_digest import ROOT, code_digest
 from sepi.errors import SepiError
-from sepi.io.export import RESULT_FILES
+from sepi.io.result_folder import RESULT_FILES
 from sepi.pipeline import HANDED_ON, STAGES, VARIANTS, key_of, stage_of
 from sepi.report.plan import Plan
-from sepi.run_log import show_progress
+from sepi.workflow.run_log import show_progress
 from sepi.validation import require_known
 
 STARTED = time.time()

@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from sepi.errors import SepiError, SepiWarning
-    from sepi.io.export import write_result
-    from sepi.io.options import ReadOptions
+    from sepi.io.readers.options import ReadOptions
+    from sepi.io.result_folder import write_result
     from sepi.lightfield import DisparityRange, LightField
     from sepi.pipeline import estimate_depth
     from sepi.reading import read_light_field
@@ -39,19 +39,19 @@ __all__ = [
 _HOME = {
     "DisparityRange": "sepi.lightfield",
     "LightField": "sepi.lightfield",
-    "ReadOptions": "sepi.io.options",
+    "ReadOptions": "sepi.io.readers.options",
     "SepiError": "sepi.errors",
     "SepiWarning": "sepi.errors",
     "estimate_depth": "sepi.pipeline",
     "read_light_field": "sepi.reading",
-    "write_result": "sepi.io.export",
+    "write_result": "sepi.io.result_folder",
 }
 
 
 def __getattr__(name: str) -> Any:
     # on first use: the pipeline imports every stage, which `sepi --help` and the commands of single stages do without
     if name == "__version__":
-        from sepi.provenance import package_version
+        from sepi.io.provenance import package_version
 
         return package_version()
     if name in _HOME:

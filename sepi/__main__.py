@@ -1,5 +1,5 @@
 """``python -m sepi``: the same as the command ``sepi``."""
 
-from sepi.cli import main
+from sepi.cli.main import main
 
 main(prog_name="sepi")

@@ -28,7 +28,7 @@ import click
 from sepi.errors import SepiError, SepiWarning
 from sepi.io.files import atomic_path
 from sepi.io.hdf5 import read_light_field, read_stage, write_stage
-from sepi.provenance import history_of, stage_attributes, step
+from sepi.io.provenance import history_of, stage_attributes, step
 from sepi.stage import Choice, Progress, no_progress
 from sepi.validation import validated
 

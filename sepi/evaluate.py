@@ -22,9 +22,9 @@ from sepi.command import SepiCommand
 from sepi.errors import SepiError
 from sepi.io.files import atomic_path
 from sepi.io.hdf5 import read_light_field, read_stage
+from sepi.io.provenance import scene_attributes
 from sepi.io.scores import Evaluation, Scored, Scores, map_name, read_evaluations, write_scores
 from sepi.lightfield import BoolMap, FloatMap, LightField
-from sepi.provenance import scene_attributes
 
 PROTOCOLS: dict[str, int] = {"paper": 0, "benchmark": 15}
 """Protocol to the pixels left out on each side."""
@@ -86,7 +86,7 @@ def evaluate(light_field: LightField, disparity: FloatMap) -> dict[str, dict[str
     Parameters
     ----------
     light_field : LightField
-        Its own masks ``occluded`` and ``textureless`` are used where it has them, else those of ``sepi.regions``.
+        Its own masks ``occluded`` and ``textureless`` are used where it has them, else those of ``sepi.scoring.regions``.
     disparity : ndarray, shape (H, W), float32
         Pixels per view step.
 
@@ -183,7 +183,7 @@ def region_masks(light_field: LightField) -> dict[str, BoolMap]:
     names = ("occluded", "textureless")
     masks = dict(light_field.masks)
     if not masks.keys() >= set(names):
-        from sepi import regions
+        from sepi.scoring import regions
 
         if "occluded" not in masks:
             masks["occluded"] = regions.occluded(

@@ -7,9 +7,9 @@ from pathlib import Path
 import click
 
 from sepi.command import SepiCommand
-from sepi.io.export import write_result
 from sepi.io.hdf5 import read_light_field, read_stage
-from sepi.provenance import history_of, result_attributes
+from sepi.io.provenance import history_of, result_attributes
+from sepi.io.result_folder import write_result
 
 _PATH = click.Path(path_type=Path)
 

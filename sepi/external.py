@@ -18,9 +18,9 @@ from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 from sepi.command import SepiCommand
 from sepi.errors import SepiError, SepiWarning
 from sepi.evaluate import evaluations_of
-from sepi.io.external import Imported, write_imported
+from sepi.io.disparity_maps import map_file, read_disparity
+from sepi.io.external_maps import Imported, write_imported
 from sepi.io.hdf5 import read_light_field
-from sepi.io.maps import map_file, read_disparity
 from sepi.lightfield import LightField
 
 NO_FILE = "no file"
@@ -29,7 +29,7 @@ NO_VALUE = "no finite value"
 
 
 class MapFile(BaseModel):
-    """A file with a disparity map, and what its values mean: the arguments of :func:`sepi.io.maps.read_disparity`."""
+    """A file with a disparity map, and what its values mean: the arguments of :func:`sepi.io.disparity_maps.read_disparity`."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import click
 
+from sepi.cli.input_options import Reading, reading_flags
 from sepi.command import SepiCommand, use_threads, write_timing
 from sepi.errors import SepiError
-from sepi.input_options import Reading, reading_flags
 from sepi.io.hdf5 import write_light_field
 from sepi.lightfield import DisparityRange, LightField
 
@@ -28,7 +28,7 @@ def settle_range(light_field: LightField, given: tuple[float, float] | None = No
     if given is not None:
         light_field = light_field.with_range(DisparityRange(*given, "given"))
     if light_field.disparity_range is None:
-        from sepi.disparity_range import estimate_range
+        from sepi.inspection.disparity_range import estimate_range
 
         return light_field.with_range(estimate_range(light_field))
     known, side = light_field.disparity_range, max(light_field.shape)

@@ -2,12 +2,12 @@
 
 ``sepi`` takes, for every pixel of the reference view, the candidate whose line through the SEPI has the least colour
 variance (Eq. 3-4), and its distinctness as confidence (Eq. 5). The line meets one sample of each view, so this is a
-plane sweep (:mod:`sepi.sweep`); the construction itself is in :mod:`sepi.epi`.
+plane sweep (:mod:`sepi.matching.plane_sweep`); the construction itself is in :mod:`sepi.matching.stitched_epi`.
 
-``semi_global`` compares colours and fine detail (:mod:`sepi.layers`) over all views, and smooths the costs
-semi-globally (:mod:`sepi.semi_global`); ``semi_global_colours`` does so without the detail.
+``semi_global`` compares colours and fine detail (:mod:`sepi.matching.base_detail`) over all views, and smooths the costs
+semi-globally (:mod:`sepi.matching.semi_global`); ``semi_global_colours`` does so without the detail.
 
-``structure_tensor`` is the initial depth that the paper's ablation puts in its place (:mod:`sepi.structure_tensor`).
+``structure_tensor`` is the initial depth that the paper's ablation puts in its place (:mod:`sepi.matching.structure_tensor`).
 
 References
 ----------
@@ -17,16 +17,16 @@ References
 from __future__ import annotations
 
 from sepi.command import stage_command
-from sepi.layered_sweep import (
+from sepi.lightfield import LightField
+from sepi.matching.plane_sweep import SweepParameters, sweep
+from sepi.matching.structure_tensor import StructureTensorParameters, structure_tensor_depth
+from sepi.matching.visibility_sweep import (
     AllViewsColoursParameters,
     AllViewsParameters,
     LayeredSweepParameters,
     depth_from_all_views,
 )
-from sepi.lightfield import LightField
 from sepi.stage import Choice, Progress, StageMaps
-from sepi.structure_tensor import StructureTensorParameters, structure_tensor_depth
-from sepi.sweep import SweepParameters, sweep
 
 
 def sepi(

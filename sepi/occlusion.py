@@ -14,8 +14,8 @@ crosses the occluder. ``half_sepi`` repeats the slope computation with the views
 orientation, and the half with the smaller cost is kept. ``none`` hands the initial depth on.
 
 ``visibility`` chooses the views one by one: those in which nothing of the map so far covers the pixel
-(:mod:`sepi.layered_sweep`); pixels that a depth step runs through then go to the surface that fills most of them
-(:mod:`sepi.colour_mixture`). ``visibility_unmixed`` leaves the last step out, ``visibility_colours`` the detail layer.
+(:mod:`sepi.matching.visibility_sweep`); pixels that a depth step runs through then go to the surface that fills most of them
+(:mod:`sepi.image.mixed_pixels`). ``visibility_unmixed`` leaves the last step out, ``visibility_colours`` the detail layer.
 
 References
 ----------
@@ -32,17 +32,17 @@ import numpy.typing as npt
 from pydantic import Field
 
 from sepi.command import stage_command
-from sepi.edges import CannyParameters, canny_edges, depth_steps, edge_angle
-from sepi.layered_sweep import (
+from sepi.image.edges import CannyParameters, canny_edges, depth_steps, edge_angle
+from sepi.lightfield import BoolMap, FloatMap, LightField
+from sepi.matching.plane_sweep import SweepParameters, SweepResult, sweep
+from sepi.matching.view_subsets import SIDES, half_planes, halves_and_quarters
+from sepi.matching.visibility_sweep import (
     UnmixedParameters,
     VisibilityColoursParameters,
     VisibilityParameters,
     depth_from_visible_views,
 )
-from sepi.lightfield import BoolMap, FloatMap, LightField
 from sepi.stage import Choice, NoParameters, Progress, StageMaps, given
-from sepi.sweep import SweepParameters, SweepResult, sweep
-from sepi.view_groups import SIDES, half_planes, halves_and_quarters
 
 
 class OcclusionParameters(SweepParameters, CannyParameters):
@@ -100,7 +100,7 @@ def half_sepi(
         Adds ``occlusion_candidates`` and ``occluded``, bool, and ``occlusion_side``, uint8, the subset kept:
         0 all views, 1-4 left, right, up, down half, 5-8 left-up, left-down, right-up, right-down quarter.
     """
-    from sepi.mean_shift import patch_modes
+    from sepi.image.mean_shift import patch_modes
 
     before = given(previous)
     candidates = occlusion_candidates(light_field.centre, before.disparity, parameters)
@@ -160,7 +160,7 @@ def visibility(
     StageMaps
         Adds ``occluded``, bool: pixels that something nearer covers in some view.
     """
-    from sepi.visibility_kernels import covered_somewhere
+    from sepi.matching.visibility_kernels import covered_somewhere
 
     before = given(previous)
     result = depth_from_visible_views(light_field, before.disparity, parameters, progress)

@@ -4,8 +4,8 @@
 9-10: the confidences of occluded, texture-less and other pixels, little where the depth changes abruptly), and
 smoothness on the 4-connected grid where the image is smooth (Eq. 11) and the depth uncertain (Eq. 12).
 
-``second_order`` goes back to the views instead: Gauss-Newton steps on their residuals (:mod:`sepi.gauss_newton`) bring
-the depth below the candidate step, and second-order smoothing (:mod:`sepi.second_order`), which leaves planes free,
+``second_order`` goes back to the views instead: Gauss-Newton steps on their residuals (:mod:`sepi.matching.gauss_newton`) bring
+the depth below the candidate step, and second-order smoothing (:mod:`sepi.regularization.second_order`), which leaves planes free,
 weighs each pixel by how much the views know about it. ``gauss_newton`` leaves out the smoothing,
 ``second_order_colours`` the detail layer. ``none`` hands the depth on.
 
@@ -25,8 +25,8 @@ import numpy.typing as npt
 from pydantic import Field, model_validator
 
 from sepi.command import stage_command
-from sepi.layers import COLOURS_ALONE_SCALE, LayerParameters, Layers, split_layers
 from sepi.lightfield import FloatMap, LightField
+from sepi.matching.base_detail import COLOURS_ALONE_SCALE, LayerParameters, Layers, split_layers
 from sepi.stage import Choice, NoParameters, Parameters, Progress, StageMaps, given, relative_confidence, with_defaults
 
 if TYPE_CHECKING:
@@ -159,8 +159,8 @@ def second_order(
     StageMaps
         ``confidence`` is that of :func:`smooth_confidence`.
     """
-    from sepi.gauss_newton import information, prepared, view_mean, windowed_step
-    from sepi.visibility_kernels import z_buffers
+    from sepi.matching.gauss_newton import information, prepared, view_mean, windowed_step
+    from sepi.matching.visibility_kernels import z_buffers
 
     before = given(previous)
     layers = split_layers(light_field, parameters)
@@ -224,7 +224,7 @@ def smoothed(
     parameters: SecondOrderParameters,
 ) -> FloatMap:
     """Second-order smoothing of ``target``, whose bends are looked for in ``shape``; all shapes (H, W)."""
-    from sepi.second_order import bend_matrix, bend_weights, solve_smooth
+    from sepi.regularization.second_order import bend_matrix, bend_weights, solve_smooth
 
     variance = parameters.smooth_colour**2 + 4 * layers.noise
     weights = bend_weights(shape, layers.guide, reliability, parameters.bend, variance)

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from sepi import initial, occlusion, optimize, textureless
-from sepi.layers import forget_layers
 from sepi.lightfield import LightField
+from sepi.matching.base_detail import forget_layers
 from sepi.stage import Choice, Parameters, Progress, StageMaps, no_progress
 from sepi.validation import require_known, unknown, validated
 
@@ -174,7 +174,7 @@ def estimate_depth(
     chosen = variant_named(variant) if isinstance(variant, str) else variant
     settings = stage_parameters(chosen, parameters)
     if light_field.disparity_range is None:
-        from sepi.disparity_range import estimate_range
+        from sepi.inspection.disparity_range import estimate_range
 
         light_field = light_field.with_range(estimate_range(light_field))
     maps: StageMaps | None = None

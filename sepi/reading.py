@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from sepi.errors import SepiError, SepiWarning
-from sepi.io.formats import read
-from sepi.io.options import ReadOptions
+from sepi.io.readers.formats import read
+from sepi.io.readers.options import ReadOptions
 from sepi.lightfield import DisparityRange, LightField
 
 # 16-bit views darker than this, a sixteenth of the full scale, hold fewer bits or next to no light
@@ -35,7 +35,7 @@ def read_light_field(
     disparity_range : tuple of float, optional
         ``(minimum, maximum)`` in pixels per view step, in place of the scene's own.
     file_format : str, optional
-        A key of ``sepi.io.formats.FORMATS``; found by looking unless given.
+        A key of ``sepi.io.readers.formats.FORMATS``; found by looking unless given.
     options : ReadOptions, optional
         What the files do not say: grid, name pattern, axes, order, views to leave out, reference view.
     check_order : bool
@@ -60,7 +60,7 @@ def read_light_field(
         light_field = light_field.with_range(DisparityRange(*disparity_range, "given"))
     found = [_depth_warning(light_field)]
     if check_order:
-        from sepi.view_order import order_warning
+        from sepi.inspection.view_order import order_warning
 
         found.append(order_warning(light_field, options.order))
     for warning in filter(None, found):

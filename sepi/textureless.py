@@ -12,7 +12,7 @@ linearly, from the reliable edges of their neighbourhood:
    its neighbourhood (noise lowers the confidence of good depth too, but does not make it disagree).
 
 ``uniform_planes`` tells texture-less regions by the noise and gives each the plane that its border supports
-(:mod:`sepi.uniform_regions`). ``none`` hands the depth on.
+(:mod:`sepi.regularization.uniform_regions`). ``none`` hands the depth on.
 
 References
 ----------
@@ -25,11 +25,11 @@ import numpy as np
 from pydantic import Field
 
 from sepi.command import stage_command
-from sepi.edges import CannyParameters, canny_edges
+from sepi.image.edges import CannyParameters, canny_edges
+from sepi.image.superpixels import FloatArray, Superpixels, borders, colour_modes, superpixels
 from sepi.lightfield import BoolMap, FloatMap, LightField
+from sepi.regularization.uniform_regions import UniformPlanesParameters, filled
 from sepi.stage import Choice, NoParameters, Progress, StageMaps, given, relative_confidence
-from sepi.superpixels import FloatArray, Superpixels, borders, colour_modes, superpixels
-from sepi.uniform_regions import UniformPlanesParameters, filled
 
 
 class LtiParameters(CannyParameters):
@@ -232,7 +232,7 @@ def propagated(
     parameters: LtiParameters,
 ) -> FloatMap:
     """Disparity of every pixel by the plane of its superpixel, after propagation; shape (H, W), float32."""
-    from sepi.planes import Coupling, basis, evaluate_planes, fit_planes, propagate
+    from sepi.regularization.planes import Coupling, basis, evaluate_planes, fit_planes, propagate
 
     design = basis(segments)
     planes = fit_planes(segments, disparity, weight, design, parameters.tolerance)

@@ -14,21 +14,21 @@ from sepi.camera import Camera
 from sepi.errors import SepiWarning
 from sepi.evaluate import score_maps
 from sepi.external import MapFile, import_maps
-from sepi.io.external import Imported, write_imported
+from sepi.io.external_maps import Imported, write_imported
 from sepi.io.hdf5 import read_light_field, read_stage, write_light_field, write_stage
 from sepi.io.pfm import write_pfm
+from sepi.io.provenance import scene_attributes, stage_attributes, step
 from sepi.io.scores import map_name, write_scores
-from sepi.layers import forget_layers
 from sepi.lightfield import FloatMap, LightField
+from sepi.matching.base_detail import forget_layers
 from sepi.pipeline import STAGES, VARIANTS, stage_parameters
-from sepi.provenance import scene_attributes, stage_attributes, step
 from sepi.report import numbers
 from sepi.report.figures import page_json, read_results
 from sepi.report.graph import drawn
 from sepi.report.page import page_of
 from sepi.report.plan import MAIN_VARIANT, Plan
-from sepi.report.probe_pixels import InterestingPixel
-from sepi.report.scene_probes import scene_probes
+from sepi.report.probes.pixels import InterestingPixel
+from sepi.report.probes.scene_probes import scene_probes
 from sepi.scenes import render
 from sepi.stage import StageMaps, no_progress
 

@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from sepi.colour_mixture import MixtureParameters, farther_where_little_covered
 from sepi.evaluate import score
-from sepi.layers import DETAIL_UNIT, LayerParameters, split_layers
+from sepi.image.mixed_pixels import MixtureParameters, farther_where_little_covered
 from sepi.lightfield import DisparityRange, LightField
+from sepi.matching.base_detail import DETAIL_UNIT, LayerParameters, split_layers
 from sepi.pipeline import PARTS_OF_BEST, STAGES, VARIANTS, estimate_depth
-from sepi.report.confidence import decile_errors, oracle, sparsification
+from sepi.regularization.uniform_regions import UniformPlanesParameters, supporting_plane, uniform_regions
+from sepi.report.tabular.confidence import decile_errors, oracle, sparsification
 from sepi.scenes import render
-from sepi.uniform_regions import UniformPlanesParameters, supporting_plane, uniform_regions
 
 
 @pytest.mark.parametrize(

@@ -19,8 +19,8 @@ from pydantic import Field
 from sepi.command import SepiCommand, progress_bar, stage_command
 from sepi.errors import SepiError
 from sepi.io.hdf5 import read_attributes, read_stage, write_light_field
+from sepi.io.provenance import history_of
 from sepi.lightfield import DisparityRange, LightField
-from sepi.provenance import history_of
 from sepi.stage import Choice, NoParameters, Parameters, Progress, StageMaps
 
 

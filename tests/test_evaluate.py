@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from sepi import regions
 from sepi.errors import SepiError
 from sepi.evaluate import command, evaluate, evaluation_of, score
 from sepi.io.hdf5 import write_light_field, write_stage
 from sepi.io.scores import read_evaluations, read_scores
 from sepi.lightfield import DisparityRange, LightField
+from sepi.scoring import regions
 from sepi.stage import StageMaps
 
 STAGE_ATTRIBUTES = {"stage": "initial", "choice": "sepi", "parameters": "{}", "made_from": "[]", "version": "0"}

@@ -14,7 +14,7 @@ from click.testing import CliRunner, Result
 from sepi.errors import SepiError, SepiWarning
 from sepi.evaluate import evaluation_of
 from sepi.external import MapFile, command, import_maps
-from sepi.io.external import Imported, read_imported, read_imported_scores, write_imported
+from sepi.io.external_maps import Imported, read_imported, read_imported_scores, write_imported
 from sepi.io.hdf5 import write_light_field
 from sepi.io.pfm import write_pfm
 from sepi.lightfield import LightField

@@ -6,9 +6,9 @@ import pytest
 
 from sepi.initial import CHOICES
 from sepi.lightfield import DisparityRange, LightField
+from sepi.matching.plane_sweep import SweepParameters
 from sepi.scenes import render
 from sepi.stage import no_progress
-from sepi.sweep import SweepParameters
 
 
 def depth(light_field, choice="sepi", **values):

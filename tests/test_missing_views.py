@@ -6,9 +6,9 @@ from functools import cache
 import numpy as np
 import pytest
 
-from sepi.disparity_range import estimate_range
 from sepi.errors import SepiError
 from sepi.evaluate import score
+from sepi.inspection.disparity_range import estimate_range
 from sepi.lightfield import LightField
 from sepi.pipeline import VARIANTS, estimate_depth
 from sepi.scenes import render

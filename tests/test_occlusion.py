@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter
 
-from sepi.edges import CannyParameters, canny_edges, depth_steps, edge_angle
 from sepi.errors import SepiError
+from sepi.image.edges import CannyParameters, canny_edges, depth_steps, edge_angle
+from sepi.image.mean_shift import patch_modes
 from sepi.initial import CHOICES as INITIAL
 from sepi.lightfield import DisparityRange, LightField
-from sepi.mean_shift import patch_modes
+from sepi.matching.view_subsets import half_planes, halves_and_quarters
 from sepi.occlusion import CHOICES, nearer_on_hidden_side
 from sepi.scenes import render
 from sepi.stage import no_progress
-from sepi.view_groups import half_planes, halves_and_quarters
 
 SIZE = 48
 EDGE = 24

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import sepi
-from sepi.disparity_range import estimate_range
+from sepi.inspection.disparity_range import estimate_range
 from sepi.lightfield import DisparityRange, LightField
 from sepi.pipeline import VARIANTS
 from sepi.scenes import render, write_hci

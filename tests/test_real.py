@@ -8,7 +8,7 @@ from real_scenes import final_maps, final_scores, maps_after, scene
 
 from sepi.evaluate import score
 from sepi.pipeline import VARIANTS
-from sepi.report.confidence import decile_errors
+from sepi.report.tabular.confidence import decile_errors
 
 # MSE x100 and Q25 x100 on the whole map, as the paper prints them for its own method
 BOUNDS = {"cotton": (1.20, 0.34), "antinous": (12.84, 1.12)}

@@ -17,7 +17,7 @@ SLOW = ("numba", "scipy", "skimage", "matplotlib", "pyamg", "jinja2", "snakemake
 
 MODULES = (
     "sepi",
-    "sepi.cli",
+    "sepi.cli.main",
     "sepi.initial",
     "sepi.occlusion",
     "sepi.textureless",
@@ -27,8 +27,8 @@ MODULES = (
     "sepi.export",
     "sepi.pipeline",
     # what every start of the workflow loads
-    "sepi.config",
-    "sepi.digest",
+    "sepi.workflow.config",
+    "sepi.workflow.code_digest",
     "sepi.report.plan",
     # jobs at its end
     "sepi.report.numbers",

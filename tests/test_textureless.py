@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from scipy.ndimage import binary_erosion, gaussian_filter
 
+from sepi.image.mean_shift import sample_modes
+from sepi.image.superpixels import Superpixels, borders, colour_modes, superpixels
 from sepi.lightfield import DisparityRange, LightField
-from sepi.mean_shift import sample_modes
-from sepi.planes import Coupling, basis, evaluate_planes, fit_planes, propagate
+from sepi.regularization.planes import Coupling, basis, evaluate_planes, fit_planes, propagate
 from sepi.scenes import render
 from sepi.stage import StageMaps, no_progress
-from sepi.superpixels import Superpixels, borders, colour_modes, superpixels
 from sepi.textureless import (
     CHOICES,
     LtiParameters,

@@ -1,4 +1,4 @@
-"""Reading light fields, whatever their format (:mod:`sepi.io.formats`), and writing results.
+"""Reading light fields, whatever their format (:mod:`sepi.io.readers.formats`), and writing results.
 
 Nothing is imported here: a job that reads one HDF5 file loads no reader of another format.
 """

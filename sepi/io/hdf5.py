@@ -19,9 +19,9 @@ import numpy.typing as npt
 
 from sepi.camera import Camera
 from sepi.errors import SepiError
-from sepi.io.arrays import DEFLATE_RATIO, printable, rearranged
 from sepi.io.files import atomic_path
-from sepi.io.options import ReadOptions, require_unused
+from sepi.io.readers.arrays import DEFLATE_RATIO, printable, rearranged
+from sepi.io.readers.options import ReadOptions, require_unused
 from sepi.lightfield import RANGE_SOURCES, DisparityRange, FloatMap, LightField
 from sepi.stage import StageMaps
 

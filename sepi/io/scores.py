@@ -39,7 +39,7 @@ class Evaluation:
     regions : mapping of str to ndarray, shape (H, W), bool
         The masks that the scores of a region were taken over.
     region_sources : mapping of str to str
-        ``"scene"`` (the scene brought the mask) or ``"computed"`` (by ``sepi.regions``).
+        ``"scene"`` (the scene brought the mask) or ``"computed"`` (by ``sepi.scoring.regions``).
     """
 
     scores: Mapping[str, Mapping[str, Scores]] = field(default_factory=dict)

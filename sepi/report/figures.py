@@ -19,14 +19,14 @@ import numpy as np
 
 from sepi.command import SepiCommand
 from sepi.evaluate import WHOLE_MAP
-from sepi.io.external import read_imported
+from sepi.io.external_maps import read_imported
 from sepi.io.files import atomic_path
 from sepi.io.hdf5 import read_light_field, read_stage
 from sepi.io.images import write_png
 from sepi.io.scores import Evaluation, read_evaluations
 from sepi.lightfield import LightField
-from sepi.report.confidence import write_curves
-from sepi.report.pictures import (
+from sepi.report.plan import MAIN_VARIANT, Plan
+from sepi.report.plots.pictures import (
     ERROR_LIMIT,
     Picture,
     centre_picture,
@@ -36,13 +36,13 @@ from sepi.report.pictures import (
     mask_picture,
     outline_picture,
 )
-from sepi.report.plan import MAIN_VARIANT, Plan
-from sepi.report.probe import Probe, to_json
-from sepi.report.probe_figure import write_probes
-from sepi.report.probe_pixels import InterestingPixel
-from sepi.report.saving import BOTH, new_figure, save
-from sepi.report.scene_panels import SceneResults, compared_pair, viewer_of
-from sepi.report.scene_probes import scene_probes
+from sepi.report.plots.saving import BOTH, new_figure, save
+from sepi.report.probes.figure import write_probes
+from sepi.report.probes.pixels import InterestingPixel
+from sepi.report.probes.probe import Probe, to_json
+from sepi.report.probes.scene_probes import scene_probes
+from sepi.report.tabular.confidence import write_curves
+from sepi.report.web.scene_panels import SceneResults, compared_pair, viewer_of
 from sepi.stage import StageMaps
 
 _ASKED = "asked for"

@@ -20,9 +20,9 @@ from pathlib import Path
 import click
 
 from sepi.command import SepiCommand
-from sepi.config import GRAPH_CONFIG
 from sepi.errors import SepiError, SepiWarning
 from sepi.io.files import atomic_path
+from sepi.workflow.config import GRAPH_CONFIG
 
 Edges = Sequence[tuple[str, str]]
 """Pairs of rules: the one that makes something, and the one that needs it."""

@@ -24,15 +24,15 @@ import numpy.typing as npt
 from sepi.command import SepiCommand
 from sepi.errors import SepiError
 from sepi.evaluate import BAD_PIXEL, PROTOCOLS, REGIONS
-from sepi.io.external import read_imported_scores
+from sepi.io.external_maps import read_imported_scores
 from sepi.io.hdf5 import read_light_field, read_stage
 from sepi.io.scores import Scores, read_evaluations, read_scores
-from sepi.machine import this_machine
-from sepi.report.confidence import decile_errors, oracle, sparsification
-from sepi.report.layout import as_json, write
 from sepi.report.plan import PARTS_TABLES, TABLES, Plan
 from sepi.report.runs import Runs
 from sepi.report.tables import BUILDERS
+from sepi.report.tabular.confidence import decile_errors, oracle, sparsification
+from sepi.report.tabular.layout import as_json, write
+from sepi.workflow.machine import this_machine
 
 LIBRARIES = (
     "numpy",
@@ -74,7 +74,7 @@ def collect(plan: Plan, parameters: Parameters | None = None, parts: bool = Fals
         result, versions, machine; ``protocols``: name to border; ``plan``; ``parameters``; ``scenes``: a list, each
         with ``dataset``, ``scene``, ``light_field``, ``stages`` (path of choices to ``stage``, ``scores``,
         ``seconds``, ``peak_memory_mb``), ``confidence`` (variant to errors) and ``external`` (method to ``problem``,
-        ``source``, ``sha256``, ``scores``); ``tables``: name to :func:`sepi.report.layout.as_json`. With ``parts``,
+        ``source``, ``sha256``, ``scores``); ``tables``: name to :func:`sepi.report.tabular.layout.as_json`. With ``parts``,
         scenes have ``stages`` only, and ``scores`` is None but after the last stage.
 
     Raises

@@ -16,10 +16,11 @@ from matplotlib.colors import Colormap
 
 from sepi.command import SepiCommand
 from sepi.io.files import atomic_path
-from sepi.report import page_data, published
-from sepi.report.pictures import error_scale, scale_colours
+from sepi.report import published
 from sepi.report.plan import TABLES
+from sepi.report.plots.pictures import error_scale, scale_colours
 from sepi.report.runs import Runs, read_json, read_numbers
+from sepi.report.web import page_data
 
 SCRIPTS = ("unpack.js", "panels.js", "viewer.js", "cloud.js", "pixel.js", "tables.js", "page.js")
 """Scripts of a page, in the order in which they are run."""
@@ -28,7 +29,7 @@ SCRIPTS = ("unpack.js", "panels.js", "viewer.js", "cloud.js", "pixel.js", "table
 def environment() -> Environment:
     """Jinja2's environment for the templates beside this module; a name that is not given is an error."""
     made = Environment(
-        loader=PackageLoader("sepi.report"),
+        loader=PackageLoader("sepi.report.web"),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,

@@ -33,7 +33,7 @@ TABLES = (
 """Names of the tables, in the order of the page."""
 
 TEMPLATES = sorted(
-    path for path in (Path(__file__).parent / "templates").iterdir() if path.suffix in (".j2", ".js", ".css")
+    path for path in (Path(__file__).parent / "web" / "templates").iterdir() if path.suffix in (".j2", ".js", ".css")
 )
 """Files that the page is put together from."""
 

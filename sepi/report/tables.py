@@ -10,16 +10,16 @@ import click
 from sepi.command import SepiCommand
 from sepi.errors import SepiError
 from sepi.report import published
-from sepi.report.ablation import ablation_table
-from sepi.report.comparison import scene_table
-from sepi.report.confidence import confidence_table
-from sepi.report.latex import as_latex
-from sepi.report.layout import Report, as_csv, as_markdown, write
-from sepi.report.parts import parts_table
 from sepi.report.plan import TABLES
-from sepi.report.region_comparison import region_table
 from sepi.report.runs import Runs, read_numbers
-from sepi.report.stages import runtime_table, stage_table
+from sepi.report.tabular.ablation import ablation_table
+from sepi.report.tabular.comparison import scene_table
+from sepi.report.tabular.confidence import confidence_table
+from sepi.report.tabular.latex import as_latex
+from sepi.report.tabular.layout import Report, as_csv, as_markdown, write
+from sepi.report.tabular.parts import parts_table
+from sepi.report.tabular.region_comparison import region_table
+from sepi.report.tabular.stages import runtime_table, stage_table
 
 BUILDERS: dict[str, Callable[[Runs], Report]] = {
     "table1_mse": lambda runs: scene_table(runs, "mse100", published.table1(), "Table 1: MSE x100"),

@@ -1,0 +1,54 @@
+"""A benchmark's result as one picture."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from bench.result import Result
+from bench.tables import AXES, beside
+from sepi.io.files import atomic_path
+
+
+def write(result: Result, path: Path) -> None:
+    """Draw where the time goes, how it grows, and the plain implementations beside ours; as PNG."""
+    figure = Figure(figsize=(13, 7), layout="constrained")
+    FigureCanvasAgg(figure)
+    first, *others, last = figure.subplots(2, 3).ravel()
+    _steps(first, result)
+    for panel, axis in zip(others, AXES, strict=True):
+        _growth(panel, result, axis)
+    _beside(last, result)
+    with atomic_path(path) as temporary:
+        # no version of the library, so that equal results give equal files
+        figure.savefig(temporary, dpi=100, format="png", metadata={"Software": None})
+
+
+def _steps(panel: Any, result: Result) -> None:
+    measurements = list(result.group("stages").values())[::-1]
+    panel.barh([m.name for m in measurements], [m.median for m in measurements], color="tab:blue")
+    panel.set(title="from files to maps", xlabel="seconds")
+
+
+def _growth(panel: Any, result: Result, axis: str) -> None:
+    for group, colour in (("growth, initial", "tab:blue"), ("growth, all stages", "tab:orange")):
+        points = [m for name, m in result.group(group).items() if name.startswith(f"{axis} ")]
+        if not points:
+            continue
+        x, y = [m.figures[axis] for m in points], [m.median for m in points]
+        panel.loglog(x, y, "o-", color=colour, label=group.removeprefix("growth, "))
+        last = (len(x) - 1) if axis != "threads" else 0
+        panel.loglog(x, [y[last] * (value / x[last]) ** AXES[axis] for value in x], ":", color=colour)
+        panel.set_xticks(x, [f"{value:g}" for value in x])
+        panel.minorticks_off()
+        panel.legend()
+    panel.set(title=f"growth with {axis} (dotted: linear)", xlabel=axis, ylabel="seconds")
+
+
+def _beside(panel: Any, result: Result) -> None:
+    rows = list(beside(result).rows)[::-1]
+    panel.barh([str(row[0]) for row in rows], [float(str(row[1])) for row in rows], color="tab:green", log=True)
+    panel.set(title="initial stage beside plain ones", xlabel="seconds per candidate")

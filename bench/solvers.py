@@ -1,0 +1,113 @@
+"""Solvers of the global optimisation's sparse system, each to the same residual (Eq. 8)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pyamg
+import scipy.sparse as sparse
+from scipy.sparse import linalg
+
+from bench.measure import Case, Figures, Prepared
+from bench.scene import Scene, maps_before
+from sepi.errors import SepiError
+from sepi.io.hdf5 import read_light_field
+from sepi.optimize import WlsParameters, data_weight, energy_system, rectified_confidence, smoothness_coefficient, solve
+
+Vector = npt.NDArray[np.float64]
+Solver = Callable[[Any, Vector, Vector, float], Vector]
+"""Takes matrix, right side, start and the relative residual to reach."""
+
+MOST_STEPS = 20_000
+
+
+def own(matrix: Any, right: Vector, start: Vector, accuracy: float) -> Vector:
+    """The project's: Jacobi, and multigrid where that does not arrive soon."""
+    return solve(matrix, right, start.astype(np.float32), accuracy)
+
+
+def ruge_stuben(matrix: Any, right: Vector, start: Vector, accuracy: float) -> Vector:
+    """Conjugate gradients with classical algebraic multigrid."""
+    hierarchy = pyamg.ruge_stuben_solver(matrix)
+    return np.asarray(hierarchy.solve(right, x0=start, tol=accuracy, accel="cg", maxiter=500))
+
+
+def smoothed_aggregation(matrix: Any, right: Vector, start: Vector, accuracy: float) -> Vector:
+    """Conjugate gradients with multigrid by smoothed aggregation."""
+    hierarchy = pyamg.smoothed_aggregation_solver(matrix)
+    return np.asarray(hierarchy.solve(right, x0=start, tol=accuracy, accel="cg", maxiter=500))
+
+
+def jacobi(matrix: Any, right: Vector, start: Vector, accuracy: float) -> Vector:
+    """Conjugate gradients with the diagonal."""
+    return _conjugate_gradients(matrix, right, start, accuracy, sparse.diags_array(1 / matrix.diagonal()))
+
+
+def incomplete(matrix: Any, right: Vector, start: Vector, accuracy: float) -> Vector:
+    """Conjugate gradients with an incomplete factorisation."""
+    factors = linalg.spilu(
+        matrix.tocsc(), drop_tol=1e-4, fill_factor=10, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0
+    )
+    return _conjugate_gradients(matrix, right, start, accuracy, linalg.LinearOperator(matrix.shape, factors.solve))
+
+
+def direct(matrix: Any, right: Vector, start: Vector, accuracy: float) -> Vector:
+    """Sparse factorisation, ordered for a symmetric matrix."""
+    factors = linalg.splu(
+        matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0, options={"SymmetricMode": True}
+    )
+    return np.asarray(factors.solve(right))
+
+
+SOLVERS: dict[str, Solver] = {
+    "direct (SuperLU)": direct,
+    "sepi's": own,
+    "multigrid, Ruge-Stuben + CG": ruge_stuben,
+    "multigrid, smoothed aggregation + CG": smoothed_aggregation,
+    "Jacobi + CG": jacobi,
+    "incomplete LU + CG": incomplete,
+}
+"""Name to solver, the exact one first."""
+
+
+def _conjugate_gradients(matrix: Any, right: Vector, start: Vector, accuracy: float, inverse: Any) -> Vector:
+    solution, missed = linalg.cg(matrix, right, x0=start, rtol=accuracy, maxiter=MOST_STEPS, M=inverse)
+    if missed:
+        raise SepiError(f"no convergence in {MOST_STEPS} steps")
+    return np.asarray(solution)
+
+
+def prepare(scene: Scene, solver: Solver, exact: Path) -> Prepared:
+    """Solve a scene's system; the first solver leaves its solution in ``exact`` for the others to be held against."""
+    light_field = read_light_field(scene.light_field)
+    before = maps_before(scene, "optimize")
+    assert before is not None  # it is not the first stage
+    parameters = WlsParameters()
+    confidence = rectified_confidence(before, parameters)
+    weight = data_weight(before.disparity, confidence, parameters)
+    smoothness = smoothness_coefficient(light_field.centre, confidence, parameters)
+    matrix, right = energy_system(before.disparity, weight, smoothness, parameters.alpha)
+    start = before.disparity.astype(np.float64).ravel()
+
+    def figures(solution: Vector) -> Figures:
+        if not exact.exists():
+            np.save(exact, solution)
+        difference = np.abs(solution - np.load(exact))
+        residual = np.linalg.norm(right - matrix @ solution) / np.linalg.norm(right)
+        return {
+            "residual": float(residual),
+            "largest_difference": float(difference.max()),
+            "mean_difference": float(difference.mean()),
+        }
+
+    return Prepared(lambda: solver(matrix, right, start, parameters.accuracy), figures)
+
+
+def cases(scene: Scene, threads: int) -> list[Case]:
+    """Each solver, the exact one first."""
+    exact = scene.folder / "exact.npy"
+    return [Case("solvers", name, prepare, (scene, solver, exact), threads=threads) for name, solver in SOLVERS.items()]

@@ -1,0 +1,74 @@
+"""The command ``sepi compare``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from sepi.cli.input_options import Reading, reading_flags
+from sepi.cli.scene_argument import require_one_view, scene_of
+from sepi.command import SepiCommand
+from sepi.errors import SepiError
+
+_PATH = click.Path(path_type=Path)
+
+
+@click.command(cls=SepiCommand, short_help="Show two disparity maps side by side on a page.")
+@click.argument("a", metavar="A", type=_PATH)
+@click.argument("b", metavar="B", type=_PATH)
+@click.argument("truth", metavar="[TRUTH|SCENE]", type=_PATH, required=False)
+@click.option("-o", "--output", type=_PATH, default=Path("compare.html"), show_default=True, help="Page to write.")
+@reading_flags
+def compare(a: Path, b: Path, truth: Path | None, output: Path, reading: Reading) -> None:
+    """Show the disparity maps A and B side by side on a page.
+
+    A and B are maps of any program: PFM, HDF5 with a dataset 'disparity', NumPy (.npy), 'disparity_16bit.png', or a
+    folder that 'sepi depth' wrote. TRUTH is such a map, too; give the SCENE itself, a light field, to see its view
+    beside the maps, and to have regions scored. The page is one file and needs no network: a slider wipes between any
+    two of the maps, their differences and their errors; numbers and close-ups follow the cursor; a point cloud turns.
+
+    \b
+    Examples:
+      sepi compare cotton-depth spo.pfm cotton
+      sepi compare before.pfm after.pfm gt_disp_lowres.pfm -o page.html
+    """
+    from sepi.cli.evaluate import score_table
+    from sepi.io.disparity_maps import is_disparity, read_disparity
+    from sepi.io.files import atomic_path
+    from sepi.report.web.comparison_page import Comparison, comparison_page, printed_scores
+
+    maps = read_disparity(a), read_disparity(b)
+    require_one_view(a, b)
+    light_field, values = None, None
+    if truth is not None and is_disparity(truth):
+        values = read_disparity(truth)
+        require_one_view(a, truth)
+    elif truth is not None:
+        light_field = scene_of(truth, a, reading)
+        values = light_field.truth
+    _require_shape(b, maps[1].shape, a, maps[0].shape)
+    if truth is not None:
+        shape = values.shape if values is not None else light_field.shape if light_field is not None else ()
+        _require_shape(truth, shape, a, maps[0].shape)
+    found = Comparison(_names(a, b), maps, values, light_field)
+    with atomic_path(output) as temporary:
+        temporary.write_text(comparison_page(found), encoding="utf-8")
+    for name, scores in printed_scores(found).items():
+        click.echo(f"{name}\n{score_table(scores)}\n")
+    click.echo(f"written: {output}")
+
+
+def _require_shape(path: Path, shape: tuple[int, ...], first: Path, wanted: tuple[int, ...]) -> None:
+    if shape != wanted:
+        raise SepiError(f"{path}: is {shape}, but {first} is {wanted} (height, width)")
+
+
+def _names(a: Path, b: Path) -> tuple[str, str]:
+    """The last parts of two paths, as many as it takes to tell them apart."""
+    parts = [path.resolve().parts for path in (a, b)]
+    for count in range(1, max(map(len, parts)) + 1):
+        one, other = ("/".join(words[-count:]) for words in parts)
+        if one != other:
+            return one, other
+    return f"{parts[0][-1]} (A)", f"{parts[1][-1]} (B)"

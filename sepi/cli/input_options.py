@@ -1,0 +1,157 @@
+"""Flags of every command that reads a light field."""
+
+from __future__ import annotations
+
+import functools
+import re
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+# imported in the functions: `sepi --help` does without what they import
+if TYPE_CHECKING:
+    from sepi.camera import Camera
+    from sepi.io.readers.options import ReadOptions
+    from sepi.lightfield import LightField
+
+
+class _Pair(click.ParamType[tuple[int, int]]):
+    """Two whole numbers with a sign between them, such as 9x9 or 4,4."""
+
+    def __init__(self, name: str, separators: str) -> None:
+        self.name = name
+        self._form = re.compile(rf"\s*(\d{{1,6}})\s*[{separators}]\s*(\d{{1,6}})\s*")
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[int, int]:
+        match = self._form.fullmatch(value) if isinstance(value, str) else None
+        if match is None:
+            self.fail(f"expected {self.name}, got {value!r}", param, ctx)
+        return int(match[1]), int(match[2])
+
+
+GRID = _Pair("ROWSxCOLUMNS", "xX×")
+PLACE = _Pair("ROW,COLUMN", ",")
+
+
+@dataclass(frozen=True)
+class Reading:
+    """How the flags say to read a light field."""
+
+    file_format: str | None
+    options: ReadOptions
+
+    def read(
+        self, path: Path, *, disparity_range: tuple[float, float] | None = None, check_order: bool = True
+    ) -> LightField:
+        """The light field at ``path``; warns where another order of its views fits better.
+
+        Raises
+        ------
+        SepiError
+            As :func:`sepi.read_light_field`.
+        """
+        from sepi.reading import read_light_field
+
+        return read_light_field(
+            path,
+            disparity_range=disparity_range,
+            file_format=self.file_format,
+            options=self.options,
+            check_order=check_order,
+        )
+
+
+@dataclass(frozen=True)
+class Geometry:
+    """The flags of the camera's geometry."""
+
+    focal_length_mm: float
+    baseline_mm: float
+    focus_distance_m: float
+    sensor_size_mm: float
+
+    def camera(self, shape: tuple[int, int]) -> Camera:
+        """Camera of views of this height and width.
+
+        Raises
+        ------
+        SepiError
+            If a number is not positive.
+        """
+        from sepi.camera import camera_from
+
+        return camera_from(**asdict(self), shape=shape)
+
+
+_FLAGS = (
+    click.option(
+        "--format",
+        "file_format",
+        metavar="FORMAT",
+        help="hci, hci-old, images, eslf, matlab, numpy or sepi; found by looking unless given.",
+    ),
+    click.option("--grid", type=GRID, metavar="ROWSxCOLUMNS", help="Grid of views in the files."),
+    click.option(
+        "--pattern",
+        help="Names of views in a folder: 'view_{row}_{column}.png' or 'img{number}.jpg'; * is anything.",
+    ),
+    click.option(
+        "--axes",
+        help="Axes of an array in order, such as HWTSC: T S (view row, column; N for both in one), H W and C (colour).",
+    ),
+    click.option("--variable", help="Name of the array in a .mat or .npz file with several."),
+    click.option("--central", type=click.IntRange(min=1), metavar="N", help="Use only the N x N views in the middle."),
+    click.option("--order", default="as-given", help="Order of the views: a word that 'sepi check' names."),
+    click.option(
+        "--exclude", multiple=True, metavar="VIEW", help="Leave a view out: ROW,COLUMN from 0, or its file; repeatable."
+    ),
+    click.option("--view", type=PLACE, metavar="ROW,COLUMN", help="View whose depth is made; the centre unless given."),
+    click.option("--follow-links", is_flag=True, help="Read views that are links out of their folder."),
+)
+
+
+def reading_flags(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Give a command the flags that say how to read a light field; it gets them as one argument ``reading``."""
+
+    @functools.wraps(command)
+    def with_reading(*args: Any, file_format: str | None, follow_links: bool, **values: Any) -> Any:
+        from sepi.io.readers.options import ReadOptions
+
+        names = ("grid", "pattern", "axes", "variable", "central", "order", "exclude", "view")
+        options = ReadOptions(**{name: values.pop(name) for name in names}, follow_links=follow_links)
+        return command(*args, reading=Reading(file_format, options), **values)
+
+    for flag in reversed(_FLAGS):
+        with_reading = flag(with_reading)
+    return with_reading
+
+
+def camera_flags(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Give a command the flags of the camera's geometry; it gets them as one argument ``geometry``, None without."""
+
+    @functools.wraps(command)
+    def with_geometry(*args: Any, **values: Any) -> Any:
+        flags = {name: values.pop(name) for name in _GEOMETRY}
+        missing = [_flag(name) for name, value in flags.items() if value is None]
+        if 0 < len(missing) < len(flags):
+            raise click.UsageError(f"metric depth needs {', '.join(map(_flag, flags))}; missing: {', '.join(missing)}")
+        return command(*args, geometry=None if missing else Geometry(**flags), **values)
+
+    for name, (unit, text) in reversed(_GEOMETRY.items()):
+        with_geometry = click.option(_flag(name), name, type=float, metavar=unit, help=text)(with_geometry)
+    return with_geometry
+
+
+_GEOMETRY = {
+    "focal_length_mm": ("MM", "Focal length, millimetres; with the next three: metric depth."),
+    "baseline_mm": ("MM", "Distance from camera to camera, millimetres."),
+    "focus_distance_m": ("M", "Depth at which nothing moves from view to view, metres; inf for parallel cameras."),
+    "sensor_size_mm": ("MM", "Longer side of the sensor, millimetres."),
+}
+
+
+def _flag(name: str) -> str:
+    return "--" + name.rpartition("_")[0].replace("_", "-")

@@ -1,0 +1,276 @@
+"""The command ``sepi``."""
+
+from __future__ import annotations
+
+import json
+import re
+import time
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from sepi.cli.compare import compare
+from sepi.cli.evaluate import evaluate
+from sepi.cli.input_options import Geometry, Reading, camera_flags, reading_flags
+from sepi.cli.results import check_submission, points, submission
+from sepi.command import SepiGroup, available_cores, progress_bar, use_threads
+from sepi.errors import SepiError
+from sepi.io.provenance import package_version, result_attributes, step
+
+# Modules that are slow to import, such as the stages, are imported in the commands that need them.
+if TYPE_CHECKING:
+    from sepi.lightfield import DisparityRange, LightField
+    from sepi.pipeline import Variant
+
+_PATH = click.Path(path_type=Path)
+_RANGE_SOURCES = {
+    "parameters": "from the scene's parameters",
+    "given": "as given",
+    "estimated": "estimated from the views",
+}
+
+
+@click.group(cls=SepiGroup, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(package_version(), message="%(prog)s %(version)s")
+def main() -> None:
+    """Depth from light fields by stitched epipolar plane images.
+
+    A light field is a grid of views of one scene, each taken from a camera position a step to the side of the next.
+    Its disparity map says, for each pixel of the centre view, by how many pixels it moves from view to view: the
+    more, the nearer.
+
+    \b
+    Try it on a built-in scene:
+      sepi scenes pyramids -o scenes
+      sepi depth scenes/pyramids
+      sepi evaluate pyramids-depth scenes/pyramids
+    """
+
+
+@main.command(short_help="Compute the disparity map of the light field INPUT.")
+@click.argument("light_field_path", metavar="INPUT", type=_PATH)
+@click.option("-o", "--output", type=_PATH, help="Folder to write; ./NAME-depth after INPUT's name unless given.")
+@click.option("--variant", default="best", show_default=True, help="Named choice of stages; see above.")
+@click.option(
+    "--disparity-range",
+    nargs=2,
+    type=float,
+    metavar="MIN MAX",
+    help="Disparities to search, pixels per view step; the scene's own or an estimate unless given.",
+)
+@click.option("--threads", type=click.IntRange(min=1), help="Threads to use; one per core unless given.")
+@click.option(
+    "--set",
+    "settings",
+    multiple=True,
+    metavar="KEY=VALUE",
+    help="Set a parameter, STAGE.CHOICE.NAME=VALUE; repeatable. config.yaml lists them.",
+)
+@click.option("--timing", is_flag=True, help="Also write runtime.txt: seconds, as a benchmark submission needs.")
+@camera_flags
+@reading_flags
+def depth(
+    light_field_path: Path,
+    output: Path | None,
+    variant: str,
+    disparity_range: tuple[float, float] | None,
+    threads: int | None,
+    settings: tuple[str, ...],
+    timing: bool,
+    geometry: Geometry | None,
+    reading: Reading,
+) -> None:
+    """Compute the disparity map of the light field INPUT.
+
+    INPUT is a folder of views, a Lytro picture (*_eslf.png), an array (.mat, .npy, .npz) or an HDF5 file; 'sepi info'
+    shows how it is read, 'sepi check' whether its views are in the right order. Writes the disparity as numbers and in
+    colour, confidence, masks and a point cloud; depth in metres where the camera is known.
+
+    Variants: best (the most accurate), paper (the method as published), no_sepi, no_occlusion, no_textureless,
+    no_occlusion_no_textureless (parts of it switched off), wang (another treatment of occlusion); best_no_detail and
+    others that docs/best.md lists (parts of best switched off).
+
+    \b
+    Examples:
+      sepi depth cotton
+      sepi depth cotton -o maps --disparity-range -2 2
+      sepi depth flowers_eslf.png --central 7
+      sepi depth views --grid 5x5 --exclude 0,0 --exclude 0,4
+      sepi depth cotton --variant paper --set initial.sepi.candidates=91
+    """
+    from sepi.ingest import settle_range
+    from sepi.io.files import atomic_path
+    from sepi.io.result_folder import RUNTIME, require_target, write_result
+    from sepi.pipeline import HANDED_ON, estimate_depth, stage_parameters, variant_named
+
+    started = time.perf_counter()
+    use_threads(threads or available_cores())
+    chosen = variant_named(variant)
+    parameters = _parameters(settings, variant, chosen)
+    steps = [
+        step(stage, chosen.choices[stage], values)
+        for stage, values in stage_parameters(chosen, parameters).items()
+        if chosen.choices[stage] != HANDED_ON
+    ]
+    whole = light_field_path.resolve()
+    folder = output or Path(f"{whole.name if whole.is_dir() else whole.stem}-depth")
+    require_target(folder)
+    if whole == folder.resolve():
+        raise SepiError(f"{folder}: is the light field itself; choose another folder for the result")
+    light_field = reading.read(light_field_path, disparity_range=disparity_range)
+    if geometry is not None:
+        light_field = replace(light_field, camera=geometry.camera(light_field.shape))
+    light_field = settle_range(light_field)
+    with progress_bar(light_field.name) as progress:
+        maps = estimate_depth(light_field, chosen, parameters, progress)
+    seconds = time.perf_counter() - started
+    files = write_result(folder, light_field, maps, result_attributes(light_field, variant, steps))
+    if timing:
+        with atomic_path(folder / RUNTIME) as temporary:
+            temporary.write_text(f"{seconds:.3f}\n", encoding="ascii")
+    click.echo(f"{light_field.name}: {_size(light_field)}")
+    click.echo(f"disparity range: {_range(light_field.known_range())}")
+    click.echo(f"written to {folder}/: {' '.join(files)}")
+
+
+@main.command(short_help="Show what is known about the light field INPUT.")
+@click.argument("light_field_path", metavar="INPUT", type=_PATH)
+@camera_flags
+@reading_flags
+def info(light_field_path: Path, geometry: Geometry | None, reading: Reading) -> None:
+    """Show what is known about the light field INPUT, with an estimate of its disparity range.
+
+    INPUT is anything that 'sepi depth' reads, with the same flags. Rows and columns of views are counted from 0.
+    """
+    from sepi.inspection.disparity_range import estimate_range
+    from sepi.io.readers.formats import format_of
+
+    known_format = format_of(light_field_path, reading.file_format)
+    light_field = reading.read(light_field_path)
+    t0, s0 = light_field.reference
+    missing = [f"{t},{s}" for t, s in zip(*(~light_field.present).nonzero(), strict=True)]
+    own = light_field.disparity_range
+    try:
+        estimated = _range(estimate_range(light_field))
+    except SepiError as error:
+        estimated = str(error)
+    camera = light_field.camera if geometry is None else geometry.camera(light_field.shape)
+    lines = {
+        "name": light_field.name,
+        "format": known_format.name,
+        "views": _size(light_field),
+        "depth made for": f"view {t0},{s0}",
+        "missing views": f"{len(missing)}: {' '.join(missing)}" if missing else "none",
+        "pixels": _depth_of(light_field),
+        "disparity range": "none given; the estimate is used" if own is None else _range(own),
+        "estimated range": estimated,
+        "metric depth": "unknown camera" if camera is None else f"{camera.scale:g} m / (disparity + {camera.offset:g})",
+        "ground truth": "none" if light_field.truth is None else "yes",
+        "masks": ", ".join(light_field.masks) or "none",
+    }
+    for key, value in lines.items():
+        click.echo(f"{key + ':':17}{value}")
+    for note in light_field.notes:
+        click.echo(f"{'note:':17}{note}")
+
+
+@main.command(short_help="Check the order of the views of the light field INPUT.")
+@click.argument("light_field_path", metavar="INPUT", type=_PATH)
+@reading_flags
+@click.pass_context
+def check(context: click.Context, light_field_path: Path, reading: Reading) -> None:
+    """Check whether the views of the light field INPUT are in the order that depth needs.
+
+    Software does not agree on whether rows of views go up or down, columns left or right, or which of the two comes
+    first; in a wrong order depth is inside out or nonsense. The views tell: all eight orders are tried, and the flag
+    is named that sets INPUT right. Exits with 1 where another order clearly fits better.
+    """
+    from sepi.inspection.view_order import check_order
+
+    light_field = reading.read(light_field_path, check_order=False)
+    found = check_order(light_field, reading.options.order)
+    click.echo(f"{light_field.name}: {_size(light_field)}")
+    click.echo("order, and by how much the views misfit in it (0 to 1; less is better):")
+    for word, misfit in found.fits.items():
+        click.echo(f"  {word:24}{misfit:8.4f}{'  best' if word == found.best and found.decided else ''}")
+    click.echo(found.verdict())
+    if found.warning() is not None:
+        context.exit(1)
+
+
+@main.command(short_help="Write built-in scenes with exact ground truth.")
+@click.argument("names", metavar="[NAME]...", nargs=-1)
+@click.option("-o", "--output", type=_PATH, default=Path("scenes"), show_default=True, help="Folder to write to.")
+@click.option("--size", type=click.IntRange(min=1), default=192, show_default=True, help="Pixels a side of a view.")
+@click.option("--views", type=click.IntRange(min=2), default=9, show_default=True, help="Views a side of the grid.")
+@click.option("--list", "only_list", is_flag=True, help="List the scenes and write nothing.")
+def scenes(names: tuple[str, ...], output: Path, size: int, views: int, only_list: bool) -> None:
+    """Write built-in scenes, with exact ground truth, as HCI 4D benchmark folders.
+
+    All of them unless NAMEs are given.
+
+    \b
+    Examples:
+      sepi scenes --list
+      sepi scenes pyramids stripes -o scenes --size 256
+    """
+    from sepi.scenes import SCENES, render, write_hci
+    from sepi.validation import require_known
+
+    if only_list:
+        width = max(map(len, SCENES))
+        for name, description in SCENES.items():
+            click.echo(f"{name.ljust(width)}  {description}")
+        return
+    require_known("built-in scenes", names, SCENES)
+    chosen = dict.fromkeys(names or SCENES)
+    for name in chosen:
+        if (output / name).exists():
+            raise SepiError(f"{output / name}: exists already; remove it or choose another folder with -o")
+    for name in chosen:
+        write_hci(render(name, size=size, views=views), output / name)
+        click.echo(f"written: {output / name}/")
+
+
+for command in (evaluate, compare, points, submission, check_submission):
+    main.add_command(command)
+
+
+def _size(light_field: LightField) -> str:
+    (rows, columns), (height, width) = light_field.grid, light_field.shape
+    present = int(light_field.present.sum())
+    number = "" if present == rows * columns else f", {present} of {rows * columns}"
+    return f"{rows}x{columns} views (rows x columns{number}) of {width}x{height} pixels"
+
+
+def _depth_of(light_field: LightField) -> str:
+    kind = light_field.views.dtype
+    bits = f"{8 * kind.itemsize} bit{' float' if kind.kind == 'f' else ''}"
+    return f"{'RGB' if light_field.views.shape[4] == 3 else 'grey'}, {bits}; values as stored, no gamma applied"
+
+
+def _range(known: DisparityRange) -> str:
+    return f"{known.minimum:g} to {known.maximum:g} pixels per view step ({_RANGE_SOURCES[known.source]})"
+
+
+def _parameters(settings: tuple[str, ...], name: str, variant: Variant) -> dict[str, dict[str, Any]]:
+    """Stage to field to value from ``STAGE.CHOICE.NAME=VALUE`` of the command line."""
+    parameters: dict[str, dict[str, Any]] = {}
+    for setting in settings:
+        match = re.fullmatch(r"(\w+)\.(\w+)\.(\w+)=(.*)", setting)
+        if match is None:
+            raise SepiError(
+                f"--set {setting}: expected STAGE.CHOICE.NAME=VALUE, such as initial.semi_global.candidates=91"
+            )
+        stage, choice, field, text = match.groups()
+        if variant.choices.get(stage) != choice:
+            used = ", ".join(f"{stage}.{choice}" for stage, choice in variant.choices.items())
+            raise SepiError(f"--set {setting}: variant {name} does not use {stage}.{choice}; it uses {used}")
+        try:
+            value = json.loads(text)
+        except ValueError:
+            value = text
+        parameters.setdefault(stage, {})[field] = value
+    return parameters

@@ -1,0 +1,139 @@
+"""The commands ``sepi points``, ``sepi submission`` and ``sepi check-submission``: what becomes of finished maps."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import click
+
+from sepi.cli.input_options import Geometry, camera_flags
+from sepi.command import SepiCommand
+from sepi.errors import SepiError
+
+_PATH = click.Path(path_type=Path)
+_PARTIAL = click.option("--partial", is_flag=True, help="Take fewer than the benchmark's 12 scenes.")
+
+
+@click.command(cls=SepiCommand, short_help="Write the point cloud of a finished disparity map.")
+@click.argument("result_path", metavar="RESULT", type=_PATH)
+@click.option("-o", "--output", type=_PATH, help="PLY file to write; points.ply beside the result unless given.")
+@click.option("--min-confidence", type=float, default=0.0, metavar="X", help="Leave out less sure pixels; 0 to 1.")
+@click.option("--max-depth", type=float, metavar="M", help="Leave out points farther than this many metres.")
+@click.option("--step", type=click.IntRange(min=1), default=1, metavar="N", help="Use every Nth row and column only.")
+@camera_flags
+def points(
+    result_path: Path,
+    output: Path | None,
+    min_confidence: float,
+    max_depth: float | None,
+    step: int,
+    geometry: Geometry | None,
+) -> None:
+    """Write the coloured point cloud of RESULT as a PLY file.
+
+    RESULT is a folder that 'sepi depth' wrote, or its result.h5. Points are in metres where the scene's files or the
+    flags give the camera; otherwise they are a relief with x and y in pixels. docs/outputs.md describes both.
+
+    \b
+    Examples:
+      sepi points cotton-depth --min-confidence 0.5 --max-depth 6
+      sepi points views-depth -o views.ply --focal-length 50 --baseline 10 --focus-distance 2 --sensor-size 36
+    """
+    from sepi.io.ply import write_ply
+    from sepi.io.point_cloud import view_points
+    from sepi.io.result_folder import read_result
+
+    result = read_result(result_path)
+    cloud = view_points(
+        result.picture,
+        result.disparity,
+        result.confidence,
+        camera=result.camera if geometry is None else geometry.camera(result.disparity.shape),
+        from_centre=result.from_centre,
+        min_confidence=min_confidence,
+        max_depth=max_depth,
+        step=step,
+    )
+    if not len(cloud.positions):
+        raise SepiError(f"{result_path}: no point is left; lower --min-confidence or raise --max-depth")
+    path = output or (result_path if result_path.is_dir() else result_path.parent) / "points.ply"
+    _require_file(path)
+    if path.suffix.lower() != ".ply":
+        raise SepiError(f"{path}: expected a name that ends with .ply, the format of the file")
+    write_ply(path, cloud.positions, cloud.colours, cloud.comments())
+    units = "metres" if cloud.metric else "relief: the camera is not known, so not to scale"
+    click.echo(f"written: {path} ({len(cloud.positions)} points, {units})")
+
+
+@click.command(cls=SepiCommand, short_help="Pack results as a submission to the HCI 4D benchmark.")
+@click.argument("results", metavar="RESULT...", nargs=-1, required=True, type=_PATH)
+@click.option("-o", "--output", type=_PATH, default=Path("submission.zip"), show_default=True, help="Zip to write.")
+@click.option(
+    "--runtime", "runtimes", multiple=True, metavar="SCENE=SECONDS", help="In place of runtime.txt; repeatable."
+)
+@_PARTIAL
+def submission(results: tuple[Path, ...], output: Path, runtimes: tuple[str, ...], partial: bool) -> None:
+    """Pack RESULTs as a submission to the HCI 4D light field benchmark.
+
+    Each RESULT is a folder that 'sepi depth --timing' wrote for one of the benchmark's 12 scenes. The submission is
+    checked first; one with problems is not written.
+
+    \b
+    Example:
+      for scene in stratified/* training/* test/*; do sepi depth "$scene" --timing; done
+      sepi submission *-depth -o submission.zip
+    """
+    from sepi.scoring.hci_submission import Entry, entry_of, write_submission
+
+    _require_file(output)
+    seconds = dict(_runtime(text) for text in runtimes)
+    entries: dict[str, Entry] = {}
+    folders: dict[str, Path] = {}
+    for folder in results:
+        scene, entry = entry_of(folder, seconds)
+        if scene in entries:
+            raise SepiError(f"{folder}: scene {scene} is given twice, also as {folders[scene]}")
+        entries[scene], folders[scene] = entry, folder
+    for scene in seconds.keys() - entries.keys():
+        raise SepiError(f"--runtime {scene}: no result of this scene is given")
+    write_submission(output, entries, partial=partial)
+    click.echo(f"written: {output} ({len(entries)} scenes)")
+
+
+@click.command("check-submission", cls=SepiCommand, short_help="Check a submission to the HCI 4D benchmark.")
+@click.argument("path", metavar="ZIP|FOLDER", type=_PATH)
+@_PARTIAL
+@click.pass_context
+def check_submission(context: click.Context, path: Path, partial: bool) -> None:
+    """Check a submission to the HCI 4D light field benchmark.
+
+    Prints a line for each problem and exits with 1 if there is any. More is checked than the benchmark does on upload:
+    values that are not finite, run times that are not positive, files that do not belong.
+    """
+    from sepi.scoring.hci_submission import problems_of
+
+    problems = problems_of(path, partial=partial)
+    for problem in problems:
+        click.echo(problem)
+    if problems:
+        context.exit(1)
+    click.echo(f"{path}: no problems")
+
+
+def _require_file(path: Path) -> None:
+    """Raise if something other than a file is there, such as /dev/stdout, which a file would take the place of."""
+    if path.exists() and not path.is_file():
+        raise SepiError(f"{path}: not a file; expected the name of a file to write")
+
+
+def _runtime(text: str) -> tuple[str, float]:
+    """Scene and seconds of ``SCENE=SECONDS``."""
+    scene, sign, number = text.partition("=")
+    try:
+        seconds = float(number)
+    except ValueError:
+        seconds = math.nan
+    if not (scene and sign and 0 < seconds < math.inf):
+        raise SepiError(f"--runtime {text}: expected SCENE=SECONDS with a positive number, such as cotton=12.5")
+    return scene, seconds

@@ -1,0 +1,64 @@
+"""The argument TRUTH|SCENE of the commands that score maps: a map, or a light field read from the view of the maps."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from sepi.cli.input_options import Reading
+from sepi.errors import SepiError
+
+if TYPE_CHECKING:
+    from sepi.lightfield import LightField
+
+View = tuple[tuple[int, int], tuple[int, int]]
+"""Place of a view, and rows and columns of the grid it is in."""
+
+
+def view_of(path: Path) -> View | None:
+    """The view that a result's map belongs to, and the view grid; None for a map that does not say."""
+    from sepi.io.hdf5 import read_attributes
+
+    path = path / "result.h5" if path.is_dir() else path
+    if path.suffix not in (".h5", ".hdf5") or not path.is_file():
+        return None
+    attributes = read_attributes(path)
+    if not {"view_position", "grid"} <= set(attributes):
+        return None
+    (t, s), (rows, columns) = (map(int, attributes[name]) for name in ("view_position", "grid"))
+    return (t, s), (rows, columns)
+
+
+def require_one_view(estimate: Path, other: Path) -> None:
+    """Raise if two maps say that they belong to different views.
+
+    Raises
+    ------
+    SepiError
+    """
+    views = view_of(estimate), view_of(other)
+    if None not in views and views[0] != views[1]:
+        raise SepiError(f"{other}: depth of another view than {estimate}; compare maps of one view")
+
+
+def scene_of(scene: Path, estimate: Path, reading: Reading) -> LightField:
+    """The light field, seen from the view that the estimate belongs to.
+
+    Raises
+    ------
+    SepiError
+        If it cannot be read, or not from that view.
+    """
+    belongs = view_of(estimate)
+    if belongs is not None and reading.options.view is None:
+        reading = replace(reading, options=replace(reading.options, view=belongs[0]))
+    light_field = reading.read(scene, check_order=False)
+    if belongs is not None and belongs != (light_field.reference, light_field.grid):
+        (t, s), (rows, columns) = belongs
+        raise SepiError(
+            f"{estimate}: depth of view {t},{s} of {rows}x{columns} views, but {scene} is read as view "
+            f"{light_field.reference[0]},{light_field.reference[1]} of {light_field.grid[0]}x{light_field.grid[1]}; "
+            "give the flags here that 'sepi depth' had"
+        )
+    return light_field

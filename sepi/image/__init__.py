@@ -1,0 +1,1 @@
+"""What is computed from one view alone: noise, edges, colours, superpixels."""

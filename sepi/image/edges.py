@@ -1,0 +1,82 @@
+"""Edges of the reference view and steps of a depth map."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from pydantic import Field
+
+from sepi.image.noise import noise_level
+from sepi.lightfield import BoolMap, FloatMap
+from sepi.stage import Parameters
+
+
+class CannyParameters(Parameters):
+    """Parameters of the Canny edges."""
+
+    canny_sigma: float = Field(1.0, gt=0, le=10, description="smoothing before the edges, in pixels")
+    canny_low: float = Field(
+        0.01, gt=0, le=1, description="gradient to which an edge is followed, grey values 0..1 per px"
+    )
+    canny_high: float = Field(
+        0.025, gt=0, le=1, description="gradient at which an edge starts, grey values 0..1 per px"
+    )
+
+
+# response of the 3x3 Sobel operator to a gradient of one grey level per pixel
+_SOBEL_GAIN = 8
+
+
+def canny_edges(centre: FloatMap, parameters: CannyParameters) -> BoolMap:
+    """Canny edges of the reference view; thresholds rise with its noise.
+
+    Parameters
+    ----------
+    centre : ndarray, shape (H, W, C), float32
+        Values in 0..1.
+    parameters : CannyParameters
+
+    Returns
+    -------
+    ndarray, shape (H, W), bool
+    """
+    smooth = _smooth_grey(centre, parameters.canny_sigma)
+    noise = noise_level(smooth[..., None])
+    dx, dy = (cv2.Sobel(smooth, cv2.CV_32F, *order, ksize=3) for order in ((1, 0), (0, 1)))
+    # Canny takes 16-bit derivatives
+    scale = 16384 / _SOBEL_GAIN
+    low, high = (scale * _SOBEL_GAIN * (value + 2 * noise) for value in (parameters.canny_low, parameters.canny_high))
+    edges = cv2.Canny((scale * dx).astype(np.int16), (scale * dy).astype(np.int16), low, high, L2gradient=True)
+    return np.asarray(edges > 0)
+
+
+def edge_angle(centre: FloatMap, parameters: CannyParameters) -> FloatMap:
+    """Angle of the normal of the strongest edge near each pixel, from ``+x`` towards ``+y``.
+
+    Parameters
+    ----------
+    centre : ndarray, shape (H, W, C), float32
+    parameters : CannyParameters
+
+    Returns
+    -------
+    ndarray, shape (H, W), float32
+        Radians, -pi..pi.
+    """
+    smooth = _smooth_grey(centre, parameters.canny_sigma)
+    dx, dy = (cv2.Sobel(smooth, cv2.CV_32F, *order, ksize=3) for order in ((1, 0), (0, 1)))
+    # double angles let opposite normals add up
+    wide = 4 * parameters.canny_sigma
+    along = cv2.GaussianBlur(dx * dx - dy * dy, (0, 0), wide)
+    across = cv2.GaussianBlur(2 * dx * dy, (0, 0), wide)
+    return np.asarray(0.5 * np.arctan2(across, along), np.float32)
+
+
+def depth_steps(disparity: FloatMap, step: float) -> BoolMap:
+    """Pixels whose 3x3 neighbourhood spans more than ``step`` pixels of disparity per view step; (H, W), bool."""
+    box = np.ones((3, 3), np.uint8)
+    return np.asarray(cv2.dilate(disparity, box) - cv2.erode(disparity, box) > step)
+
+
+def _smooth_grey(centre: FloatMap, sigma: float) -> FloatMap:
+    return np.asarray(cv2.GaussianBlur(centre.mean(axis=2), (0, 0), sigma), np.float32)

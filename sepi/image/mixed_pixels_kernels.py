@@ -1,0 +1,74 @@
+"""Compiled loops of the decision by colour mixture (:mod:`sepi.image.mixed_pixels`)."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numba import njit, prange
+
+_WIDTH = 1.0  # of the window's weights, pixels
+_LEAST_WEIGHT = 0.05  # of clean pixels of each side, in pixels right beside
+
+
+@njit(inline="always")
+def _clean(disparity: Any, y: int, x: int, middle: Any, near: Any) -> bool:
+    """Whether a pixel and its eight neighbours all lie on one side."""
+    H, W = disparity.shape
+    for row in range(max(0, y - 1), min(H, y + 2)):
+        for column in range(max(0, x - 1), min(W, x + 2)):
+            if (disparity[row, column] > middle) != near:
+                return False
+    return True
+
+
+@njit(parallel=True, cache=True)
+def decided_pixels(
+    disparity: Any, guide: Any, step: Any, reach: int, contrast: Any, share: Any, least_variance: Any
+) -> Any:
+    """The map whose mixed pixels belong to the surface that covers most of them; shapes (H, W) and (H, W, 3)."""
+    H, W = disparity.shape
+    out = disparity.copy()
+    for y in prange(H):
+        sums = np.empty((2, 6))  # for each side: weight, disparity, RGB, squared RGB
+        for x in range(W):
+            d = disparity[y, x]
+            lowest, highest = d, d
+            for row in range(max(0, y - 1), min(H, y + 2)):
+                for column in range(max(0, x - 1), min(W, x + 2)):
+                    lowest, highest = min(lowest, disparity[row, column]), max(highest, disparity[row, column])
+            middle = (lowest + highest) / 2
+            if highest - lowest < step or d <= middle:
+                continue
+            sums[:] = 0
+            for row in range(max(0, y - reach), min(H, y + reach + 1)):
+                for column in range(max(0, x - reach), min(W, x + reach + 1)):
+                    q = disparity[row, column]
+                    # surfaces beyond the two do not count
+                    if (
+                        q > highest + step
+                        or q < lowest - step
+                        or not _clean(disparity, row, column, middle, q > middle)
+                    ):
+                        continue
+                    w = math.exp(-((row - y) ** 2 + (column - x) ** 2) / (2 * _WIDTH**2))
+                    own = sums[1 if q > middle else 0]
+                    own[0] += w
+                    own[1] += w * q
+                    for c in range(3):
+                        own[2 + c] += w * guide[row, column, c]
+                        own[5] += w * guide[row, column, c] ** 2
+            if sums[0, 0] < _LEAST_WEIGHT or sums[1, 0] < _LEAST_WEIGHT:
+                continue
+            distance, covered, variance = 0.0, 0.0, least_variance
+            for side in range(2):
+                variance += sums[side, 5] / sums[side, 0]
+            for c in range(3):
+                far, near = sums[0, 2 + c] / sums[0, 0], sums[1, 2 + c] / sums[1, 0]
+                distance += (near - far) ** 2
+                covered += (guide[y, x, c] - far) * (near - far)
+                variance -= far * far + near * near
+            if distance > contrast * variance and covered < share * distance:
+                out[y, x] = sums[0, 1] / sums[0, 0]
+    return out

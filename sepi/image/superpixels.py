@@ -1,0 +1,162 @@
+"""Superpixels of the reference view: their geometry, neighbours, and which of them look alike (section IV-C of [1]_).
+
+References
+----------
+.. [1] Zhou, Shi, Liu, Jin, Zhang, Hou: Light Field Depth Estimation via Stitched Epipolar Plane Images.
+.. [2] Achanta et al.: SLIC superpixels compared to state-of-the-art superpixel methods. TPAMI 34(11), 2012.
+   doi:10.1109/TPAMI.2012.120
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from sepi.lightfield import BoolMap, FloatMap
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Superpixels:
+    """A partition of the image.
+
+    Attributes
+    ----------
+    labels : ndarray, shape (H, W), int
+        0..N-1, each present.
+    sizes : ndarray, shape (N,), int
+        Pixels.
+    centroids : ndarray, shape (N, 2), float
+        ``(x, y)`` in pixels.
+    """
+
+    labels: IntArray
+    sizes: IntArray
+    centroids: FloatArray
+
+    def __len__(self) -> int:
+        return len(self.sizes)
+
+    def sums(self, values: npt.NDArray[np.generic]) -> FloatArray:
+        """Sum of a map over each superpixel; shape (N,)."""
+        weights = np.asarray(values, np.float64).ravel()
+        return np.asarray(np.bincount(self.labels.ravel(), weights, len(self)), np.float64)
+
+    def means(self, values: npt.NDArray[np.generic]) -> FloatArray:
+        """Mean of a map over each superpixel; shape (N,)."""
+        return np.asarray(self.sums(values) / self.sizes, np.float64)
+
+    def interior(self) -> BoolMap:
+        """Pixels whose four neighbours all belong to the same superpixel; shape (H, W), bool."""
+        inside = np.ones(self.labels.shape, bool)
+        across, down = self.labels[:, 1:] != self.labels[:, :-1], self.labels[1:] != self.labels[:-1]
+        inside[:, 1:] &= ~across
+        inside[:, :-1] &= ~across
+        inside[1:] &= ~down
+        inside[:-1] &= ~down
+        return inside
+
+
+@dataclass(frozen=True)
+class Borders:
+    """Pairs of superpixels that touch.
+
+    Attributes
+    ----------
+    first, second : ndarray, shape (E,), int
+        ``first < second``.
+    lengths : ndarray, shape (E,), int
+        Length of the border in pixels.
+    midpoints : ndarray, shape (E, 2), float
+        ``(x, y)`` of the middle of the border.
+    """
+
+    first: IntArray
+    second: IntArray
+    lengths: IntArray
+    midpoints: FloatArray
+
+    def subset(self, keep: BoolMap) -> Borders:
+        """Some of the pairs."""
+        return Borders(self.first[keep], self.second[keep], self.lengths[keep], self.midpoints[keep])
+
+
+def superpixels(centre: FloatMap, size: int, compactness: float) -> Superpixels:
+    """SLIC superpixels of about ``size x size`` pixels.
+
+    Parameters
+    ----------
+    centre : ndarray, shape (H, W, C), float32
+        Values in 0..1.
+    size : int
+        Pixels.
+    compactness : float
+        Weight of nearness against likeness of colour, as in scikit-image.
+    """
+    from skimage.segmentation import slic
+
+    H, W = centre.shape[:2]
+    labels = slic(
+        centre if centre.shape[2] == 3 else centre[..., 0],
+        n_segments=max(1, H * W // size**2),
+        compactness=compactness,
+        start_label=0,
+        channel_axis=2 if centre.shape[2] == 3 else None,
+    )
+    labels = np.unique(labels, return_inverse=True)[1].reshape(H, W).astype(np.int64)
+    sizes = np.bincount(labels.ravel())
+    rows, columns = np.indices((H, W))
+    sums = [np.bincount(labels.ravel(), axis.ravel().astype(np.float64)) for axis in (columns, rows)]
+    return Superpixels(labels, sizes, np.stack(sums, axis=1) / sizes[:, None])
+
+
+def borders(segments: Superpixels) -> Borders:
+    """Which superpixels touch, along how many pixel sides, and where."""
+    labels = segments.labels
+    pieces = []
+    for a, b, offset in (
+        (labels[:, :-1], labels[:, 1:], (0.5, 0.0)),
+        (labels[:-1], labels[1:], (0.0, 0.5)),
+    ):
+        y, x = np.nonzero(a != b)
+        low, high = np.minimum(a[y, x], b[y, x]), np.maximum(a[y, x], b[y, x])
+        pieces.append(np.stack([low, high, x + offset[0], y + offset[1]], axis=1))
+    sides = np.concatenate(pieces)
+    pairs, index = np.unique(
+        sides[:, 0].astype(np.int64) * len(segments) + sides[:, 1].astype(np.int64), return_inverse=True
+    )
+    lengths = np.bincount(index, minlength=len(pairs))
+    sums = np.stack([np.bincount(index, sides[:, k], len(pairs)) for k in (2, 3)], axis=1)
+    return Borders(pairs // len(segments), pairs % len(segments), lengths, sums / np.maximum(lengths, 1)[:, None])
+
+
+def colour_modes(centre: FloatMap, segments: Superpixels, bandwidth: float) -> FloatArray:
+    """Mean-shift mode of each superpixel's mean colour in HSV space: the propagation cue of section IV-C.
+
+    Parameters
+    ----------
+    centre : ndarray, shape (H, W, C), float32
+        Values in 0..1.
+    segments : Superpixels
+    bandwidth : float
+        Standard deviation of the kernel in the HSV cone (radius and height 1).
+
+    Returns
+    -------
+    ndarray, shape (N, 3), float
+        Points of the HSV cone; superpixels of one cluster share a point.
+    """
+    from sepi.image.mean_shift import sample_modes
+
+    rgb = centre if centre.shape[2] == 3 else np.repeat(centre, 3, axis=2)
+    hue, saturation, value = np.moveaxis(cv2.cvtColor(np.ascontiguousarray(rgb), cv2.COLOR_RGB2HSV), 2, 0)
+    # hue is an angle that means little where colour is weak, so it goes into a cone
+    chroma = saturation * value
+    cone = (chroma * np.cos(np.radians(hue)), chroma * np.sin(np.radians(hue)), value)
+    samples = np.stack([segments.means(axis) for axis in cone], axis=1)
+    return sample_modes(samples, bandwidth)

@@ -1,0 +1,255 @@
+"""How well views fit together under each order of their grid, but for the sign of the disparities.
+
+Points of one view are matched with other views under each layout, over disparities of both signs: in the right layout
+each point has a disparity at which all views agree.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from sepi.inspection.view_order_kernels import layout_misfits
+from sepi.io.readers.options import ORDERS
+from sepi.lightfield import FloatMap, LightField
+
+REACH = 8
+"""Views up to this many steps away are looked at."""
+
+Step = tuple[int, int]
+
+# Larger pictures are reduced by a whole factor; smaller ones tell nothing
+_MOST_PIXELS = 300_000
+_LEAST_SIDE = 16
+_BLUR_SIGMA = 0.8
+_HIGH_PASS = 9
+
+# Steps to the views that are tried first, and how many views; movement in the farthest of them, pixels, that is
+# searched, and its step; reductions that reach disparities beyond that
+_FIRST_REACH = 4
+_MOST_VIEWS = 16
+_MOVEMENT = 10
+_MOVEMENT_STEP = 0.6
+_REDUCTIONS = (2, 4)
+# Half width of a patch, pixels; points along a side of the picture
+_PATCH_RADIUS = 2
+_CELLS = 24
+# Clear: fewest points, next layout's misfit over the best's, and how many standard errors their difference is
+_FEWEST_POINTS = 30
+_CLEAR_RATIO = 1.1
+_CLEAR_ERRORS = 8.0
+# Misfit of a point that is matched, and part of those that may lie at an end of the search
+_MATCHED = 0.5
+_AT_END = 0.02
+
+
+class Views:
+    """The views about the middle of the grid, reduced and filtered when they are first asked for.
+
+    Attributes
+    ----------
+    steps : list of (int, int)
+        From the view in the middle to each other one that is present: rows and columns of views.
+    shape : (int, int)
+        Height and width, pixels, as reduced.
+    """
+
+    def __init__(self, light_field: LightField) -> None:
+        self._views = light_field.views
+        self._factor = max(1, math.ceil(math.sqrt(math.prod(light_field.shape) / _MOST_PIXELS)))
+        self._grey: dict[tuple[int, int, int], FloatMap] = {}
+        places = np.argwhere(light_field.present)
+        distance = abs(places - np.array(light_field.grid) // 2).sum(axis=1)
+        self._middle = places[distance.argmin()]
+        self.steps: list[Step] = [(int(t), int(s)) for t, s in places - self._middle if (t, s) != (0, 0)]
+        height, width = light_field.shape
+        self.shape = (height // self._factor, width // self._factor)
+
+    def plain(self, step: Step, factor: int = 1) -> FloatMap:
+        """Grey, slightly blurred view, (H, W) float32 in 0..1, reduced by a further factor."""
+        key = (*step, factor)
+        if key not in self._grey:
+            self._grey[key] = self._read(step, self._factor * factor)
+        return self._grey[key]
+
+    def detail(self, step: Step, factor: int) -> FloatMap:
+        """The same, high-pass filtered: differences of brightness between views do not count."""
+        grey = self.plain(step, factor)
+        return np.asarray(grey - cv2.blur(grey, (_HIGH_PASS, _HIGH_PASS)), np.float32)
+
+    def _read(self, step: Step, factor: int) -> FloatMap:
+        view = self._views[self._middle[0] + step[0], self._middle[1] + step[1]]
+        size = (max(1, view.shape[1] // factor), max(1, view.shape[0] // factor))
+        reduced = cv2.resize(view, size, interpolation=cv2.INTER_AREA) if factor > 1 else view
+        reduced = reduced.reshape(size[1], size[0], -1)
+        grey = cv2.cvtColor(reduced, cv2.COLOR_RGB2GRAY) if reduced.shape[2] == 3 else reduced[:, :, 0]
+        largest = np.iinfo(grey.dtype).max if np.issubdtype(grey.dtype, np.integer) else 1
+        return np.asarray(cv2.GaussianBlur(grey.astype(np.float32) / largest, (0, 0), _BLUR_SIGMA), np.float32)
+
+
+@dataclass(frozen=True)
+class Trial:
+    """Layouts compared by the views at one distance.
+
+    Attributes
+    ----------
+    layouts : list of dict
+        Words of each layout, with the sign that they give to its disparities.
+    misfit, disparity : ndarrays, shape (P, L), float32
+        Of each point under each layout: 0..1, and pixels per view step.
+    extent : float
+        Largest disparity searched, pixels per view step.
+    """
+
+    layouts: list[dict[str, int]]
+    misfit: FloatMap
+    disparity: FloatMap
+    extent: float
+
+    def misfits(self) -> dict[str, float]:
+        """Mean misfit of each word."""
+        mean = self.misfit.mean(axis=0)
+        return {word: float(mean[n]) for n, layout in enumerate(self.layouts) for word in layout}
+
+    @property
+    def best(self) -> dict[str, int]:
+        """Words of the layout that fits best, with their signs."""
+        return self.layouts[self._ranking[0]]
+
+    @property
+    def gap(self) -> float:
+        """By how much the next layout's misfit is above the best's."""
+        return float(self._difference.mean())
+
+    @property
+    def errors(self) -> float:
+        """The gap in standard errors."""
+        return self.gap * math.sqrt(len(self.misfit)) / max(float(self._difference.std()), 1e-6)
+
+    @property
+    def clear(self) -> bool:
+        """Whether the best layout is clearly better than any other."""
+        best, following = self.misfit.mean(axis=0)[self._ranking[:2]]
+        return bool(following >= _CLEAR_RATIO * best and self.errors >= _CLEAR_ERRORS)
+
+    @property
+    def largest_disparity(self) -> float:
+        """Largest absolute disparity under the best layout, but for a few outliers."""
+        best = self._ranking[0]
+        matched = abs(self.disparity[self.misfit[:, best] < _MATCHED, best])
+        return float(np.quantile(matched, 1 - _AT_END)) if matched.size else self.extent
+
+    @property
+    def within(self) -> bool:
+        """Whether the search goes beyond the scene's disparities."""
+        return self.largest_disparity < 0.95 * self.extent
+
+    @property
+    def _ranking(self) -> list[int]:
+        return [int(n) for n in self.misfit.mean(axis=0).argsort(kind="stable")]
+
+    @property
+    def _difference(self) -> FloatMap:
+        best, following = self._ranking[:2]
+        return np.asarray(self.misfit[:, following] - self.misfit[:, best], np.float32)
+
+
+def best_trial(views: Views) -> Trial | None:
+    """The first trial that is clear and whose search is wide enough, or else the clearest; None if there is nothing."""
+    best: Trial | None = None
+    for reach, factor in _distances(views):
+        trial = _tried(views, reach, factor)
+        if trial is None:
+            continue
+        if trial.clear and trial.within:
+            return trial
+        if best is None or trial.errors > best.errors:
+            best = trial
+    return best
+
+
+def steps_under(word: str, steps: list[Step]) -> npt.NDArray[np.int64]:
+    """Steps of views after their grid is laid out anew by an order, shape (V, 2)."""
+    grid = ORDERS[word](np.arange(9).reshape(3, 3))
+    # where the views one row and one column after the centre go
+    matrix = np.stack([np.argwhere(grid == view)[0] - 1 for view in (7, 5)])
+    return np.asarray(np.array(steps, np.int64).reshape(-1, 2) @ matrix, np.int64)
+
+
+def _distances(views: Views) -> Iterator[tuple[int, int]]:
+    """Steps to the farthest view used, and further reduction: a middle distance, nearer ones, a farther one."""
+    farthest = min(REACH, max(max(map(abs, step)) for step in views.steps))
+    reach = min(farthest, _FIRST_REACH)
+    while reach >= 1:
+        yield reach, 1
+        reach //= 2
+    for factor in _REDUCTIONS:
+        yield 1, factor
+    if farthest > _FIRST_REACH:
+        yield farthest, 1
+
+
+def _tried(views: Views, reach: int, factor: int) -> Trial | None:
+    """Compare the layouts by the views about ``reach`` steps away; None where they say nothing."""
+    steps = _ring(views.steps, reach)
+    layouts, offsets = _layouts(steps)
+    if len(layouts) < 2 or min(views.shape) // factor < _LEAST_SIDE:
+        return None
+    reference = views.detail((0, 0), factor)
+    points = _points(reference)
+    if len(points) < _FEWEST_POINTS:
+        return None
+    count = round(_MOVEMENT / _MOVEMENT_STEP)
+    candidates = (np.arange(-count, count + 1) * (_MOVEMENT_STEP / abs(offsets).max())).astype(np.float32)
+    others = np.stack([views.detail(step, factor) for step in steps])
+    misfit, disparity = layout_misfits(reference, others, offsets, candidates, points, _PATCH_RADIUS)
+    return Trial(layouts, misfit, disparity * factor, float(candidates[-1]) * factor)
+
+
+def _ring(steps: list[Step], reach: int) -> list[Step]:
+    """Views beyond half of ``reach``; first those along the axes and diagonals, and farther ones."""
+
+    def rank(step: Step) -> tuple[int, int, Step]:
+        t, s = abs(step[0]), abs(step[1])
+        return min(t, s, abs(t - s)), -max(t, s), step
+
+    return sorted((step for step in steps if reach / 2 < max(map(abs, step)) <= reach), key=rank)[:_MOST_VIEWS]
+
+
+def _layouts(steps: list[Step]) -> tuple[list[dict[str, int]], FloatMap]:
+    """Words that put these views at the same places but for the sign, and those places, shape (L, V, 2)."""
+    layouts: list[dict[str, int]] = []
+    places: list[npt.NDArray[np.int64]] = []
+    for word in ORDERS:
+        place = steps_under(word, steps)
+        for layout, known in zip(layouts, places, strict=True):
+            if np.array_equal(place, known) or np.array_equal(place, -known):
+                layout[word] = 1 if np.array_equal(place, known) else -1
+                break
+        else:
+            layouts.append({word: 1})
+            places.append(place)
+    return layouts, np.stack(places).astype(np.float32)
+
+
+def _points(detail: FloatMap) -> npt.NDArray[np.int64]:
+    """Pixels ``(y, x)`` to match, shape (P, 2): the one of each cell of the picture that is most like a corner."""
+    H, W = detail.shape
+    # away from the border as far as views move, where the picture is large enough
+    edge = min(_MOVEMENT, min(H, W) // 4) + _PATCH_RADIUS + 1
+    strength = cv2.cornerMinEigenVal(detail, 5)[edge : H - edge, edge : W - edge]
+    side = max(2, math.ceil(math.sqrt(strength.size) / _CELLS))
+    rows, columns = strength.shape[0] // side, strength.shape[1] // side
+    if rows * columns == 0:
+        return np.empty((0, 2), np.int64)
+    cells = strength[: rows * side, : columns * side].reshape(rows, side, columns, side).swapaxes(1, 2)
+    flat = cells.reshape(rows, columns, side * side)
+    place = flat.argmax(axis=2)
+    y = np.arange(rows)[:, None] * side + place // side + edge
+    x = np.arange(columns)[None] * side + place % side + edge
+    return np.asarray(np.stack([y, x], axis=2)[flat.max(axis=2) > 0], np.int64)

@@ -1,0 +1,151 @@
+"""Whether the views are in the right order, found from the views alone.
+
+A grid of views can be laid out in eight ways: rows and columns of views each run one way or the other, and either comes
+first. Only in the right one do all views agree on the disparities. Turning the grid by half a turn changes nothing but
+the sign of every disparity, so this leaves two orders in which near and far are exchanged; occlusion tells those apart.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from sepi.inspection.disparity_sign import occlusion_votes
+from sepi.inspection.view_layouts import Views, best_trial
+from sepi.io.readers.options import AS_GIVEN, ORDERS, Numbers
+from sepi.lightfield import LightField
+
+# Votes that the sign needs, and the part of them that must agree
+_FEWEST_VOTES = 30
+_MAJORITY = 0.8
+
+_FAULTS = {
+    "flip-rows": "the rows of views run the other way",
+    "flip-columns": "the columns of views run the other way",
+    "flip-both": "rows and columns of views run the other way, so that near and far are exchanged",
+    "transpose": "rows and columns of views are exchanged",
+    "transpose-flip-rows": "rows and columns of views are exchanged, and one of them runs the other way",
+    "transpose-flip-columns": "rows and columns of views are exchanged, and one of them runs the other way",
+    "transpose-flip-both": "rows and columns of views are exchanged, and both run the other way",
+}
+
+# no two orders of it are equal
+_GRID = np.arange(6).reshape(2, 3)
+
+
+@dataclass(frozen=True)
+class OrderCheck:
+    """How well each order of the views fits.
+
+    Attributes
+    ----------
+    fits : mapping of str to float
+        Word of ``sepi.io.readers.options.ORDERS`` to misfit, 0..1, lower is better; in the order of ``ORDERS``.
+    best : str
+        Word of the lowest misfit; of equal ones the given order, then the first.
+    decided : bool
+        Whether the views fit clearly better in this order than in others, but for exchanging near and far.
+    sign_decided : bool
+        Whether occlusion tells near from far.
+    given : str
+        Order in which the light field was read.
+    """
+
+    fits: Mapping[str, float]
+    best: str
+    decided: bool
+    sign_decided: bool
+    given: str = AS_GIVEN
+
+    def verdict(self) -> str:
+        """One line for the user."""
+        if not self.decided:
+            return (
+                "cannot tell: no order fits clearly better than the others (too little texture, or too little movement "
+                "between the views)"
+            )
+        if self.best != self.given:
+            return self._advice()
+        if self.sign_decided:
+            return "the views are in the right order"
+        return (
+            f"the views are in the right order, but near and far cannot be told apart here; if depth comes out inside "
+            f"out, read it with --order {self._turned()}"
+        )
+
+    def warning(self) -> str | None:
+        """What to read the light field with instead; None unless another order is clearly better."""
+        return self._advice() if self.decided and self.best != self.given else None
+
+    def _advice(self) -> str:
+        fault = _FAULTS[self.best] if self.given == AS_GIVEN else f"--order {self.given} does not fit"
+        advice = f"{fault}: read it with --order {self.best}"
+        if self.sign_decided:
+            return advice
+        return f"{advice}, or {self._turned()} if depth comes out inside out"
+
+    def _turned(self) -> str:
+        """The best order with near and far exchanged."""
+        return _word(ORDERS["flip-both"](ORDERS[self.best](_GRID)))
+
+
+def check_order(light_field: LightField, given: str = AS_GIVEN) -> OrderCheck:
+    """Find out in which order the views fit together.
+
+    Parameters
+    ----------
+    light_field : LightField
+        Its disparity range, truth and reference view are not looked at.
+    given : str
+        Order in which it was read; the words of the result are to take its place.
+
+    Returns
+    -------
+    OrderCheck
+    """
+    views = Views(light_field)
+    trial = best_trial(views)
+    if trial is None:
+        return OrderCheck(dict.fromkeys(ORDERS, 1.0), given, decided=False, sign_decided=False, given=given)
+    misfits = trial.misfits()
+    sign_decided = False
+    if trial.clear:
+        greater, lesser = occlusion_votes(views, trial)
+        votes = greater + lesser
+        sign_decided = votes >= _FEWEST_VOTES and max(greater, lesser) >= _MAJORITY * votes
+        if sign_decided:
+            # at most half way to the next layout: the wrong sign is still the better layout
+            for word, sign in trial.best.items():
+                misfits[word] += trial.gap / 2 * (lesser if sign > 0 else greater) / votes
+    # from changes of the light field at hand to orders that take the place of the given one
+    fits = {word: misfits[_change(given, word)] for word in ORDERS}
+    best = min(ORDERS, key=lambda word: (fits[word], word != given))
+    return OrderCheck(fits, best, trial.clear, sign_decided, given)
+
+
+def order_warning(light_field: LightField, given: str = AS_GIVEN) -> str | None:
+    """A sentence that names the order to read a light field in, where that is clearly not the given one.
+
+    Parameters
+    ----------
+    light_field : LightField
+    given : str
+        Order in which it was read.
+
+    Returns
+    -------
+    str or None
+    """
+    return check_order(light_field, given).warning()
+
+
+def _change(given: str, wanted: str) -> str:
+    """The order that takes a grid read in order ``given`` to what reading it in order ``wanted`` gives."""
+    target = ORDERS[wanted](_GRID)
+    return next(word for word in ORDERS if np.array_equal(ORDERS[word](ORDERS[given](_GRID)), target))
+
+
+def _word(grid: Numbers) -> str:
+    return next(word for word in ORDERS if np.array_equal(ORDERS[word](_GRID), grid))

@@ -1,0 +1,153 @@
+"""One disparity map of any program: the place where a file of any kind becomes an array."""
+
+from __future__ import annotations
+
+import math
+import struct
+from pathlib import Path
+
+import numpy as np
+
+from sepi.errors import SepiError
+from sepi.io.hdf5 import holds, read_map
+from sepi.io.images import read_picture
+from sepi.io.pfm import read_pfm
+from sepi.io.picture_headers import PNG_SIGNATURE
+from sepi.io.readers.numpy_files import read_array
+from sepi.lightfield import FloatMap
+
+_HDF5 = (".h5", ".hdf5")
+
+SUFFIXES: tuple[str, ...] = (".pfm", ".npy", ".png", *_HDF5)
+"""Ends of names of the files that are read, in small letters."""
+
+_DATASET = "disparity"
+_GREY = 0
+# text chunks of `disparity_16bit.png`
+_SCALE, _OFFSET = "scale", "offset"
+
+
+def map_file(path: Path) -> Path:
+    """The file with the map: ``path`` itself, or ``disparity.pfm`` in a folder that ``sepi depth`` wrote."""
+    return path / "disparity.pfm" if path.is_dir() else path
+
+
+def is_disparity(path: Path) -> bool:
+    """Whether ``path`` is one disparity map rather than a light field; of a PNG, whether its text chunks say so."""
+    if path.is_dir():
+        return map_file(path).is_file()
+    suffix = path.suffix.lower()
+    if suffix in _HDF5:
+        return holds(path, _DATASET)
+    if suffix == ".png":
+        return path.is_file() and {_SCALE, _OFFSET} <= set(_png_texts(_bytes_of(path)))
+    return suffix in SUFFIXES
+
+
+def read_disparity(path: Path, *, scale: float | None = None, offset: float = 0.0) -> FloatMap:
+    """Read one disparity map.
+
+    Parameters
+    ----------
+    path : Path
+        A one-channel PFM; a NumPy file (``.npy``) with an array of numbers of shape (H, W); an HDF5 file with such a
+        dataset ``disparity``; a grey PNG of 8 or 16 bit; or a folder that ``sepi depth`` wrote. A PNG with the text
+        chunks ``scale`` and ``offset``, as ``disparity_16bit.png`` has them, holds what these say, 0 being unknown.
+    scale, offset : float
+        What the file holds is multiplied by ``scale`` (1 unless given), then ``offset`` is added: -1 turns a map of
+        opposite sign. A PNG without these text chunks needs a scale; its values are levels, and none means unknown.
+
+    Returns
+    -------
+    ndarray, shape (H, W), float32
+        Disparity in pixels per view step, top row first; NaN where it is unknown.
+
+    Raises
+    ------
+    SepiError
+        If there is no such file, it is damaged or no such map, or a PNG does not say what its levels mean.
+    """
+    path = map_file(path)
+    if not path.is_file():
+        raise SepiError(f"{path}: no such file")
+    # numbers beyond float32 become infinite, and count as unknown
+    with np.errstate(over="ignore", invalid="ignore"):
+        values = _read(path, scaled=scale is not None)
+        if scale is None and offset == 0:
+            return values
+        return np.asarray(values.astype(np.float64) * (1 if scale is None else scale) + offset, np.float32)
+
+
+def _read(path: Path, scaled: bool) -> FloatMap:
+    suffix = path.suffix.lower()
+    if suffix == ".pfm":
+        return read_pfm(path)
+    if suffix in _HDF5:
+        return read_map(path, _DATASET)
+    if suffix == ".npy":
+        return _read_npy(path)
+    if suffix == ".png":
+        return _read_png(path, scaled)
+    raise _no_map(path)
+
+
+def _read_npy(path: Path) -> FloatMap:
+    values = read_array(path)
+    if values.ndim != 2 or values.dtype.kind not in "fiu":
+        raise SepiError(f"{path}: expected an array of numbers of shape (H, W)")
+    return np.asarray(values, np.float32)
+
+
+def _read_png(path: Path, scaled: bool) -> FloatMap:
+    data = _bytes_of(path)
+    if not data.startswith(PNG_SIGNATURE):
+        raise _no_map(path)
+    levels = read_picture(path)[:, :, 0].astype(np.float64)
+    # the header chunk comes first; levels of fewer bits would have been stretched to 8
+    bits, colour = data[24:26]
+    if colour != _GREY or bits not in (8, 16):
+        raise _no_map(path)
+    texts = _png_texts(data)
+    if {_SCALE, _OFFSET} <= set(texts):
+        own_scale, own_offset = (_number(path, key, texts[key]) for key in (_SCALE, _OFFSET))
+        return np.where(levels > 0, (levels - 1) * own_scale + own_offset, np.nan).astype(np.float32)
+    if not scaled:
+        raise SepiError(
+            f"{path}: a PNG without the text chunks 'scale' and 'offset' does not say what its levels mean; give a "
+            "scale (disparity = level * scale + offset) where it is configured, or write the map as .pfm or .npy"
+        )
+    return levels.astype(np.float32)
+
+
+def _png_texts(data: bytes) -> dict[str, str]:
+    """Key to text of a PNG's uncompressed text chunks; none of what is no PNG."""
+    texts = {}
+    at = len(PNG_SIGNATURE)
+    while data.startswith(PNG_SIGNATURE) and at + 12 <= len(data):
+        length, kind = struct.unpack_from(">I4s", data, at)
+        if kind == b"tEXt":
+            key, _, text = data[at + 8 : at + 8 + length].partition(b"\0")
+            texts[key.decode("latin-1")] = text.decode("latin-1")
+        at += 12 + length
+    return texts
+
+
+def _number(path: Path, key: str, text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise SepiError(f"{path}: text chunk '{key}' must be a number, got {text[:40]!r}")
+    return value
+
+
+def _bytes_of(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise SepiError(f"{path}: cannot be read ({error.strerror})") from error
+
+
+def _no_map(path: Path) -> SepiError:
+    return SepiError(f"{path}: expected a disparity map as .pfm, .h5 or .npy, or as grey .png of 8 or 16 bit")

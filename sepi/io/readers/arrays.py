@@ -1,0 +1,332 @@
+"""Light fields that arrive as one array."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from sepi.errors import SepiError
+from sepi.io.readers.options import Numbers, ReadOptions, arranged, place_of
+from sepi.lightfield import HIGHEST, LOWEST, BoolMap, LightField
+from sepi.validation import require_known
+
+Array = npt.NDArray[np.generic]
+
+DEFLATE_RATIO = 1100
+"""Bytes that a byte can unpack to; zlib's limit is 1032."""
+
+# "N" is the number t * S + s of a view
+_LAYOUTS = ("TSHWC", "TSHW", "NHWC")
+_AXES_HELP = "T, S: row and column of the view; H, W: of the pixel; C: colour"
+# positions that a note lists
+_LISTED = 12
+
+
+def light_field_from_array(
+    array: Array,
+    *,
+    name: str,
+    source: str,
+    options: ReadOptions,
+    axes: str | None = None,
+    notes: Sequence[str] = (),
+) -> LightField:
+    """A light field from an array of all its views.
+
+    Views that are all zeros, or NaN throughout, are taken as missing (light field cameras have none in the corners,
+    and their software pads with zeros), unless all views are. A fourth channel is left out: transparency, or a weight.
+
+    Parameters
+    ----------
+    array : ndarray of 4 or 5 axes, uint8, uint16, float32 or float64
+        Integers span their whole range, floats 0..1.
+    name, source : str
+        Of the light field.
+    options : ReadOptions
+        ``axes``, ``grid``, ``central``, ``order``, ``exclude`` and ``view`` are used.
+    axes : str, optional
+        Order of the axes where the format fixes it, as ``options.axes`` gives it elsewhere; guessed from the shape
+        where neither is given.
+    notes : sequence of str
+        What the reader assumed, to be passed on to the user.
+
+    Returns
+    -------
+    LightField
+        Views uint8, uint16 or float32 at their places, zero where missing.
+
+    Raises
+    ------
+    SepiError
+        If the axes cannot be told apart or contradict the options, the values are of another type or range, or a view
+        that is not excluded holds some values that are not finite.
+    """
+    kind = _pixel_type(source, array.dtype)
+    given = axes or options.axes
+    letters = _found_axes(source, array.shape, options.grid) if given is None else _checked_axes(source, array, given)
+    stack = _as_stack(source, array, letters, options.grid)
+    numbers = arranged(source, stack.grid, options)
+    filled = _filled(source, stack, numbers, kind)
+    reference = options.view or (numbers.shape[0] // 2, numbers.shape[1] // 2)
+    if reference in filled.blank:
+        raise SepiError(
+            f"{source}: view {reference[0]},{reference[1]} is black (all zeros) or NaN, so taken as missing; depth is "
+            "made for it, unless --view ROW,COLUMN names another"
+        )
+    assumed = [] if given else [f"axes taken as {' '.join(letters)}; --axes sets them otherwise"]
+    return LightField(
+        views=filled.views,
+        name=name,
+        source=source,
+        present=filled.present,
+        view=options.view,
+        notes=(*notes, *assumed, *stack.notes, *filled.notes),
+    )
+
+
+def rearranged(light_field: LightField, options: ReadOptions) -> LightField:
+    """A light field whose views are arranged as asked for; ground truth and masks stay with the view they belong to.
+
+    Raises
+    ------
+    SepiError
+        If the options do not fit its grid.
+    """
+    numbers = arranged(light_field.source or light_field.name, light_field.grid, options)
+    T, S = light_field.grid
+    if np.array_equal(numbers, np.arange(T * S).reshape(T, S)):
+        return light_field
+    # -1 picks the last view, which `present` then leaves out
+    views = light_field.views.reshape(T * S, *light_field.views.shape[2:])[numbers]
+    present = light_field.present.ravel()[numbers] & (numbers >= 0)
+    views[~present] = 0
+    place = place_of(numbers, light_field.reference[0] * S + light_field.reference[1])
+    if place is not None and (light_field.view is not None or light_field.truth is not None):
+        return replace(light_field, views=views, present=present, view=place)
+    return replace(light_field, views=views, present=present, view=options.view, truth=None, masks={})
+
+
+def variable_of(source: str, shapes: Mapping[str, tuple[int, ...]], wanted: str | None) -> str:
+    """Name of the array that is the light field, of those in a file.
+
+    Parameters
+    ----------
+    source : str
+        Path, for messages.
+    shapes : mapping of str to tuple of int
+        Name of each array of numbers to its shape.
+    wanted : str, optional
+        The user's choice. Without: the only array of 4 or 5 axes, or ``LF`` among several.
+
+    Raises
+    ------
+    SepiError
+        If there is no such array, or several.
+    """
+    if wanted is not None:
+        require_known(f"{source}: --variable", [wanted], shapes)
+        return wanted
+    fitting = [name for name, shape in shapes.items() if len(shape) in (4, 5)]
+    if len(fitting) == 1:
+        return fitting[0]
+    if "LF" in fitting:
+        return "LF"
+    listed = ", ".join(
+        f"{printable(name)} {'x'.join(map(str, shapes[name]))}" for name in list(fitting or shapes)[:_LISTED]
+    )
+    if fitting:
+        raise SepiError(f"{source}: holds several arrays of 4 or 5 axes; choose one with --variable: {listed}")
+    raise SepiError(f"{source}: holds no array of numbers of 4 or 5 axes (found: {listed or 'nothing'})")
+
+
+def printable(text: str) -> str:
+    """Text from a file as one line, whatever is in it."""
+    return " ".join("".join(letter if letter.isprintable() else " " for letter in text).split())
+
+
+@dataclass(frozen=True)
+class _Stack:
+    """Views of the given grid by number."""
+
+    grid: tuple[int, int]
+    shape: tuple[int, int, int]
+    view: Callable[[int], Array]
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class _Filled:
+    """Views at their places; ``blank`` are those that are there but hold nothing."""
+
+    views: Array
+    present: BoolMap
+    blank: tuple[tuple[int, int], ...]
+    notes: tuple[str, ...]
+
+
+def _pixel_type(source: str, kind: np.dtype[Any]) -> np.dtype[Any]:
+    """The type in a light field for values of this type, whatever their byte order."""
+    if kind.kind == "u" and kind.itemsize in (1, 2):
+        return np.dtype(f"u{kind.itemsize}")
+    if kind.kind == "f" and kind.itemsize in (4, 8):
+        return np.dtype(np.float32)
+    raise SepiError(f"{source}: values of type {kind}; expected uint8, uint16, or float32 or float64 within 0..1")
+
+
+def _checked_axes(source: str, array: Array, text: str) -> str:
+    letters = text.upper()
+    if sorted(letters) not in [sorted(layout) for layout in _LAYOUTS]:
+        raise SepiError(
+            f"{source}: --axes {text}: expected T, S, H and W once each, and C where there are colours, in the array's "
+            f"order, such as HWTSC ({_AXES_HELP})"
+        )
+    if len(letters) != array.ndim:
+        raise SepiError(f"{source}: --axes {text} names {len(letters)} axes, the array has {array.ndim}: {array.shape}")
+    return letters
+
+
+def _found_axes(source: str, shape: tuple[int, ...], grid: tuple[int, int] | None) -> str:
+    """The order of the axes that the shape suggests."""
+    found: list[str] = []
+    if len(shape) == 5:
+        channel = _channel_axis(shape)
+        if channel is not None:
+            pair = _pairs_in_order((*shape[:channel], *shape[channel + 1 :]))
+            found = [letters[:channel] + "C" + letters[channel:] for letters in pair]
+    elif len(shape) == 4:
+        found = _pairs_in_order(shape)
+        # a narrow third axis is rather a grid's than a picture's
+        if shape[3] in (1, 3, 4) and shape[2] > 4:
+            if grid is not None and shape[0] == math.prod(grid):
+                return "NHWC"
+            if grid is None and math.isqrt(shape[0]) ** 2 == shape[0]:
+                found.append("NHWC")
+            elif not found:
+                raise SepiError(
+                    f"{source}: {shape[0]} views of shape {shape[1:]} make no "
+                    f"{'square grid' if grid is None else f'grid of {grid[0]}x{grid[1]}'}; "
+                    "say their grid with --grid ROWSxCOLUMNS"
+                )
+    else:
+        raise SepiError(f"{source}: expected an array of 4 or 5 axes, got {len(shape)}: {shape}")
+    if len(found) == 1:
+        return found[0]
+    raise SepiError(
+        f"{source}: the shape {shape} does not tell which axis is which; say it with --axes, such as "
+        f"--axes {'TSHWC' if len(shape) == 5 else 'TSHW'} ({_AXES_HELP})"
+    )
+
+
+def _channel_axis(shape: tuple[int, ...]) -> int | None:
+    """The axis of colours: the last one if it can be, else the only one that can be; None where that is not clear."""
+    if shape[-1] in (1, 3, 4):
+        # RGB and alpha, or a 4 x 4 grid of RGB views
+        return None if shape[-1] == 4 and 3 in shape[:-1] else len(shape) - 1
+    colours = [axis for axis, size in enumerate(shape) if size in (3, 4)]
+    fitting = colours or [axis for axis, size in enumerate(shape) if size == 1]
+    return fitting[0] if len(fitting) == 1 else None
+
+
+def _pairs_in_order(shape: tuple[int, ...]) -> list[str]:
+    """TSHW where the first two of four axes are clearly smaller than the others, HWTS the other way round."""
+    first, last = shape[:2], shape[2:]
+    if 2 * max(first) <= min(last):
+        return ["TSHW"]
+    return ["HWTS"] if 2 * max(last) <= min(first) else []
+
+
+def _as_stack(source: str, array: Array, letters: str, grid: tuple[int, int] | None) -> _Stack:
+    """The array as views ``(H, W, C)`` by number, without copying."""
+    size = dict(zip(letters, array.shape, strict=True))
+    if 0 in array.shape:
+        raise SepiError(f"{source}: the array is empty: {array.shape}")
+    if size.setdefault("C", 1) not in (1, 3, 4):
+        raise SepiError(
+            f"{source}: the axis of colours (axes {' '.join(letters)}) has size {size['C']}; expected 1, 3 or 4"
+        )
+    notes = ["4th channel (transparency or weight) left out"] if size["C"] == 4 else []
+    if "N" in letters:
+        side = math.isqrt(size["N"])
+        if grid is None:
+            notes.append(f"views taken as a grid of {side}x{side}, row by row; --grid sets it otherwise")
+            grid = side, side
+    elif grid not in (None, (size["T"], size["S"])):
+        raise SepiError(
+            f"{source}: --grid {grid[0]}x{grid[1]}, but the array has {size['T']}x{size['S']} views "
+            f"(axes {' '.join(letters)})"
+        )
+    rows, columns = grid or (size["T"], size["S"])
+    if rows * columns != size.get("N", rows * columns):
+        raise SepiError(f"{source}: {size['N']} views make no grid of {rows}x{columns}; --grid ROWSxCOLUMNS sets it")
+    order = [letters.index(letter) for letter in ("NHWC" if "N" in letters else "TSHWC") if letter in letters]
+    views = array.transpose(order)
+    if "C" not in letters:
+        views = views[..., None]
+
+    def view(number: int) -> Array:
+        place = (number,) if "N" in letters else divmod(number, columns)
+        # grey stays grey, the fourth channel goes
+        found: Array = views[place][..., :3]
+        return found
+
+    return _Stack((rows, columns), (size["H"], size["W"], min(size["C"], 3)), view, tuple(notes))
+
+
+def _filled(source: str, stack: _Stack, numbers: Numbers, kind: np.dtype[Any]) -> _Filled:
+    """Put the views in their places; those left out are not even looked at."""
+    views: Array = np.zeros((*numbers.shape, *stack.shape), kind)
+    present = np.zeros(numbers.shape, bool)
+    black: list[tuple[int, int]] = []
+    unknown: list[tuple[int, int]] = []
+    for t, s in np.argwhere(numbers >= 0).tolist():
+        view = stack.view(int(numbers[t, s]))
+        if kind.kind == "f" and not _is_known(source, (t, s), view):
+            unknown.append((t, s))
+            continue
+        views[t, s] = view
+        present[t, s] = views[t, s].any()
+        if not present[t, s]:
+            black.append((t, s))
+    notes = []
+    if not present.any():
+        # a light field that is all black is none with all views missing
+        for place in black:
+            present[place] = True
+        black = []
+    for what, places in (("all zeros", black), ("NaN throughout", unknown)):
+        if places:
+            more = f" and {len(places) - _LISTED} more" if len(places) > _LISTED else ""
+            listed = " ".join(f"{t},{s}" for t, s in places[:_LISTED])
+            notes.append(f"views that are {what} taken as missing: {listed}{more}")
+    return _Filled(views, present, (*black, *unknown), tuple(notes))
+
+
+def _is_known(source: str, place: tuple[int, int], view: Array) -> bool:
+    """Whether a view of floats holds values; False for NaN throughout.
+
+    Raises
+    ------
+    SepiError
+        If some are not finite, or far outside 0..1.
+    """
+    where = f"{source}: view {place[0]},{place[1]}"
+    with np.errstate(invalid="ignore"):
+        low, high = float(view.min()), float(view.max())
+    if not (math.isfinite(low) and math.isfinite(high)):
+        if np.isnan(view).all():
+            return False
+        raise SepiError(
+            f"{where} holds values that are not finite (NaN or infinite); mend it, or leave it out with "
+            f"--exclude {place[0]},{place[1]}"
+        )
+    if low < LOWEST or high > HIGHEST:
+        raise SepiError(
+            f"{where} has values from {low:g} to {high:g}; floats are expected within 0..1, so divide them by their "
+            "full scale (255 for 8 bit), or store uint8 or uint16"
+        )
+    return True

@@ -1,0 +1,103 @@
+"""Pictures of a Lytro camera as the Stanford Lytro Light Field Archive has them: ``NAME_eslf.png``.
+
+Under each lenslet of the picture lies a block of pixels, one of each view: the pixel ``(t, s)`` of all blocks together
+is the view ``(t, s)``. Views near the corners see little light.
+
+References
+----------
+.. [1] A. Raj, M. Lowney, R. Shah, G. Wetzstein, "Stanford Lytro Light Field Archive", 2016.
+       http://lightfields.stanford.edu/LF2016.html
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from sepi.errors import SepiError
+from sepi.io.images import SUFFIXES, Pixels, read_picture
+from sepi.io.readers.options import ReadOptions, arranged, require_unused
+from sepi.io.readers.view_files import MAX_PLACES
+from sepi.lightfield import MIN_SIZE, BoolMap, LightField
+
+BLOCK = (14, 14)
+"""Rows and columns of pixels under a lenslet in the archive's pictures."""
+
+_CENTRAL = 9
+_DARK = 0.2
+
+
+def matches(path: Path) -> bool:
+    """Whether ``path`` is a picture with ``eslf`` in its name."""
+    return "eslf" in path.name.lower() and path.suffix.lower() in SUFFIXES and path.is_file()
+
+
+def read(path: Path, options: ReadOptions) -> LightField:
+    """Read a picture; the middle 9x9 views of it unless the options ask for others.
+
+    Parameters
+    ----------
+    path : Path
+        Any picture.
+    options : ReadOptions
+        ``grid`` is the size of the block under a lenslet.
+
+    Raises
+    ------
+    SepiError
+        If the picture is damaged or too small for its grid of views, or the options do not fit.
+    """
+    require_unused(str(path), options, ("pattern", "axes", "variable", "follow_links"))
+    T, S = grid = options.grid or BLOCK
+    if not 2 <= T * S <= MAX_PLACES:
+        raise SepiError(f"{path}: --grid {T}x{S}: expected a grid of 2 to {MAX_PLACES} views")
+    central = options.central or _usual_side(grid)
+    picture = read_picture(path)
+    height, width = picture.shape[0] // T, picture.shape[1] // S
+    if min(height, width) < MIN_SIZE:
+        raise SepiError(
+            f"{path}: {picture.shape[1]}x{picture.shape[0]} pixels with {T}x{S} views under each lenslet make views of "
+            f"{width}x{height} pixels; expected at least {MIN_SIZE}x{MIN_SIZE}"
+        )
+    numbers = arranged(str(path), grid, replace(options, central=central))
+    present = numbers >= 0
+    blocks = picture[: height * T, : width * S].reshape(height, T, width, S, -1)
+    views = np.zeros((*numbers.shape, height, width, picture.shape[2]), picture.dtype)
+    for place in zip(*present.nonzero(), strict=True):
+        t, s = divmod(int(numbers[place]), S)
+        views[place] = blocks[:, t, :, s]
+    notes = []
+    if options.central is None and central is not None and (central, central) != grid:
+        notes.append(f"the {central}x{central} views in the middle of {T}x{S}; --central N takes another odd number")
+    cropped = picture.shape[0] - height * T, picture.shape[1] - width * S
+    if any(cropped):
+        notes.append(f"{cropped[0]} pixel rows and {cropped[1]} columns beyond the last whole lenslet were left out")
+    light_field = LightField(
+        views=views, name=path.resolve().stem, source=str(path), present=present, view=options.view, notes=tuple(notes)
+    )
+    dark = _dark_views(views, present, light_field.reference)
+    return replace(light_field, notes=(*notes, *_dark_notes(dark)))
+
+
+def _usual_side(grid: tuple[int, int]) -> int | None:
+    """Side of the middle that is used unless another is asked for: 9 or, in a small grid, the largest odd number."""
+    side = min(_CENTRAL, *grid)
+    side -= (side + 1) % 2
+    return side if side > 1 else None
+
+
+def _dark_views(views: Pixels, present: BoolMap, reference: tuple[int, int]) -> list[tuple[int, int]]:
+    """Places of views that are much darker than the reference view."""
+    brightness = views.mean(axis=(2, 3, 4), dtype=np.float64)
+    dark = present & (brightness < _DARK * brightness[reference])
+    return [(int(t), int(s)) for t, s in np.argwhere(dark)]
+
+
+def _dark_notes(dark: list[tuple[int, int]]) -> list[str]:
+    if not dark:
+        return []
+    flags = " ".join(f"--exclude {t},{s}" for t, s in dark)
+    views = "1 view is" if len(dark) == 1 else f"{len(dark)} views are"
+    return [f"{views} darker than a fifth of the view that depth is made for; to leave out: {flags}"]

@@ -1,0 +1,119 @@
+"""The formats of light fields: which one a path is of, and reading it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from sepi.errors import SepiError
+from sepi.io import hdf5
+from sepi.io.images import SUFFIXES
+from sepi.io.readers import eslf, hci, hci_2013, image_folder, matlab, numpy_files
+from sepi.io.readers.options import ReadOptions
+from sepi.lightfield import LightField
+from sepi.validation import require_known
+
+
+@dataclass(frozen=True)
+class Format:
+    """One format of light fields.
+
+    Attributes
+    ----------
+    name, description : str
+        For messages.
+    matches : callable
+        Whether a path looks like this format; quick, and never raises.
+    read : callable
+        Reads it, or raises :class:`SepiError`.
+    """
+
+    name: str
+    description: str
+    matches: Callable[[Path], bool]
+    read: Callable[[Path, ReadOptions], LightField]
+
+
+FORMATS = {
+    "hci": Format("HCI folder", "input_Cam000.png, ...", hci.matches, hci.read),
+    "images": Format("folder of views", "a numbered picture for each", image_folder.matches, image_folder.read),
+    "eslf": Format("Lytro lenslet picture", "NAME_eslf.png", eslf.matches, eslf.read),
+    # before the other kinds of HDF5: MATLAB's is told by its header or ending
+    "matlab": Format("MATLAB file", ".mat with an array such as LF", matlab.matches, matlab.read),
+    "numpy": Format("NumPy file", ".npy or .npz", numpy_files.matches, numpy_files.read),
+    "hci-old": Format("HCI-old HDF5", "with LF (T, S, H, W, 3)", hci_2013.matches, hci_2013.read),
+    "sepi": Format("sepi HDF5", "written by this package", hdf5.matches, hdf5.read),
+}
+"""Word for ``--format`` to format; the first that matches reads."""
+
+
+def format_of(path: Path, wanted: str | None = None) -> Format:
+    """Find the format of a light field by looking at it.
+
+    Parameters
+    ----------
+    path : Path
+    wanted : str, optional
+        Key of :data:`FORMATS`, in place of looking.
+
+    Raises
+    ------
+    SepiError
+        If there is nothing at ``path``, or it is of no known format, or ``wanted`` is none.
+    """
+    if wanted is not None:
+        require_known("format", [wanted], FORMATS)
+    if not path.exists():
+        raise SepiError(f"{path}: no such file or folder")
+    if wanted is not None:
+        return FORMATS[wanted]
+    for known in FORMATS.values():
+        if known.matches(path):
+            return known
+    expected = ", ".join(f"{known.name} ({known.description})" for known in FORMATS.values())
+    raise SepiError(f"{path}: {_what_else(path)}; expected {expected}")
+
+
+def read(path: Path, options: ReadOptions, wanted: str | None = None) -> LightField:
+    """Read a light field of any known format as its files have it.
+
+    Parameters
+    ----------
+    path : Path
+        File or folder.
+    options : ReadOptions
+    wanted : str, optional
+        Key of :data:`FORMATS`, in place of looking.
+
+    Returns
+    -------
+    LightField
+        Its ``disparity_range`` is None if the scene gives none.
+
+    Raises
+    ------
+    SepiError
+        If nothing is there, the format is unknown, or the files are damaged or contradict each other or the options.
+    """
+    known = format_of(path, wanted)
+    try:
+        light_field = known.read(path, options)
+        return light_field if options.view is None else light_field.seen_from(options.view)
+    except SepiError as error:
+        # what only the light field as a whole can find wrong
+        raise error if str(error).startswith(str(path)) else SepiError(f"{path}: {error}") from error
+
+
+def _what_else(path: Path) -> str:
+    """What a path that is no light field seems to be, for who gave the wrong one of several."""
+    result = path / "result.h5" if path.is_dir() else path
+    if hdf5.holds(result, "disparity"):
+        return "holds a disparity map, not a light field"
+    if path.is_file():
+        picture = path.suffix.lower() in SUFFIXES
+        return "a single picture; give the folder of all views" if picture else "not a light field of a known format"
+    inner = next((entry for entry in sorted(path.iterdir()) if any(f.matches(entry) for f in FORMATS.values())), None)
+    if inner is not None:
+        return f"a folder of light fields; give one of them, such as {inner}"
+    return "not a light field of a known format"

@@ -1,0 +1,88 @@
+"""Light fields that arrive as one picture file for each view."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from sepi.errors import SepiError
+from sepi.io.images import Pixels, read_views
+from sepi.io.readers.options import Numbers, ReadOptions, arranged
+from sepi.lightfield import BoolMap
+
+MAX_PLACES = 10_000
+"""More views than any grid has."""
+
+
+@dataclass(frozen=True)
+class Arranged:
+    """Views at their places.
+
+    Attributes
+    ----------
+    views : ndarray, shape (T, S, H, W, C)
+        Zero where a view is missing.
+    present : ndarray, shape (T, S), bool
+    numbers : ndarray, shape (T, S), int64
+        Number of each view in the given grid; -1 for excluded ones.
+    """
+
+    views: Pixels
+    present: BoolMap
+    numbers: Numbers
+
+
+def read_arranged(folder: Path, files: Mapping[int, Path], grid: tuple[int, int], options: ReadOptions) -> Arranged:
+    """Read the views of a grid and put them in their places; those left out are not even opened.
+
+    Parameters
+    ----------
+    folder : Path
+        For messages; no view may be a link out of it unless the options say so.
+    files : mapping of int to Path
+        Number ``t * S + s`` in the given grid to file; numbers without a file are missing views.
+    grid : (int, int)
+        Rows and columns of the given grid.
+    options : ReadOptions
+
+    Raises
+    ------
+    SepiError
+        If the options do not fit the grid, no view is left, or a file cannot be read, is a link out of the folder, or
+        is unlike the others.
+    """
+    if grid[0] * grid[1] > MAX_PLACES:
+        raise SepiError(f"{folder}: a grid of {grid[0]}x{grid[1]} views; expected at most {MAX_PLACES} views")
+    numbers = arranged(str(folder), grid, options, {path.name: number for number, path in files.items()})
+    present = np.isin(numbers, list(files))
+    places = np.flatnonzero(present)
+    paths = [files[int(number)] for number in numbers.ravel()[places]]
+    if not paths:
+        raise SepiError(f"{folder}: no view is left")
+    if not options.follow_links:
+        require_within(folder, paths)
+    views = read_views(paths, [int(place) for place in places], numbers.size)
+    return Arranged(views.reshape(*numbers.shape, *views.shape[1:]), present, numbers)
+
+
+def require_within(folder: Path, paths: Iterable[Path]) -> None:
+    """Raise if one of the files is a link that leads out of the folder.
+
+    Raises
+    ------
+    SepiError
+        Naming the link and where it leads.
+    """
+    home = folder.resolve()
+    for path in paths:
+        if not path.is_symlink():
+            continue
+        try:
+            target = path.resolve()
+        except (OSError, RuntimeError) as error:
+            raise SepiError(f"{path}: a link that leads back to itself") from error
+        if not target.is_relative_to(home):
+            raise SepiError(f"{path}: a link out of the folder, to {target}; copy the file, or pass --follow-links")

@@ -1,0 +1,307 @@
+"""The folder of final maps: numbers for programs, pictures and points for people.
+
+docs/outputs.md describes the files.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import struct
+import zlib
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from sepi.camera import Camera
+from sepi.errors import SepiError
+from sepi.io.files import atomic_files, atomic_folder, atomic_path
+from sepi.io.hdf5 import Attribute, opened, stored, write_stage
+from sepi.io.images import write_png
+from sepi.io.pfm import write_pfm
+from sepi.io.ply import write_ply
+from sepi.io.point_cloud import point_cloud
+from sepi.lightfield import BoolMap, FloatMap, LightField
+from sepi.stage import StageMaps
+
+RESULT = "result.h5"
+
+RESULT_FILES = (
+    "disparity.pfm",
+    "disparity.npy",
+    "disparity_16bit.png",
+    "disparity.png",
+    "confidence.png",
+    "points.ply",
+    RESULT,
+)
+"""What :func:`write_result` always writes; ``depth.pfm`` and ``mask_NAME.png`` come with what it is given."""
+
+RUNTIME = "runtime.txt"
+"""Seconds that the command took, which it writes on request."""
+
+_DEPTH = "depth.pfm"
+
+# part of the pixels beyond each end of the colour scale, so that a few wrong pixels do not use it up
+_BEYOND = 0.005
+
+# PNG: signature and header chunk, which all files begin with; further chunks may follow
+_PNG_START = 8 + 25
+# says which masks are this module's, so that those of an earlier run can be told from a user's own
+_MASK_TEXT = {"Software": "sepi", "Description": "mask: 255 inside, 0 outside"}
+
+
+@dataclass(frozen=True)
+class Result:
+    """What ``result.h5`` holds of the view that the maps belong to.
+
+    Attributes
+    ----------
+    scene : str
+        Name of the scene.
+    picture : ndarray, shape (H, W, C), uint8, uint16 or float32
+        The view.
+    disparity, confidence : ndarray, shape (H, W), float32
+        Pixels per view step; 0..1.
+    camera : Camera or None
+        Where it is known.
+    from_centre : (int, int)
+        Rows below and columns to the right of the grid's centre view at which the view stands.
+    """
+
+    scene: str
+    picture: npt.NDArray[np.generic]
+    disparity: FloatMap
+    confidence: FloatMap
+    camera: Camera | None
+    from_centre: tuple[int, int]
+
+
+def write_result(
+    folder: str | Path, light_field: LightField, maps: StageMaps, attributes: Mapping[str, Attribute] | None = None
+) -> tuple[str, ...]:
+    """Write the maps of a light field.
+
+    Disparity as ``disparity.pfm``, ``disparity.npy`` and ``disparity_16bit.png`` (numbers) and ``disparity.png``
+    (colours, from far, dark blue, to near, yellow), ``confidence.png`` from black (0) to white (1), ``mask_NAME.png``
+    of each boolean map, ``points.ply``, ``depth.pfm`` in metres where the light field has a camera, and ``result.h5``
+    with everything: all maps, the view itself, the camera and ``attributes``. Equal content gives equal bytes.
+
+    A new folder appears whole or not at all; in an existing one the files are replaced when all are written, masks,
+    depth and run time of an earlier run that this one does not make are removed, and other files are left alone.
+
+    Parameters
+    ----------
+    folder : str or Path
+        Made where it does not exist.
+    light_field : LightField
+        Where the maps come from.
+    maps : StageMaps
+        Of the light field's shape.
+    attributes : mapping, optional
+        What made the maps.
+
+    Returns
+    -------
+    tuple of str
+        Names of the files written.
+
+    Raises
+    ------
+    SepiError
+        If the maps are not of the light field's shape or the confidence not within 0..1, or the folder is a file, holds
+        a light field, or cannot be written.
+    """
+    _require_sound(light_field, maps)
+    folder = Path(folder)
+    attributes = attributes or {"scene": light_field.name, "source": light_field.source}
+    require_target(folder)
+    # the folder itself may be a link to where there is room
+    target = folder.resolve()
+    existing = target.is_dir() and any(target.iterdir())
+    with atomic_files(target) if existing else atomic_folder(target) as temporary:
+        names = _write_files(temporary, light_field, maps, attributes)
+    _remove_others(target, names)
+    return names
+
+
+def require_target(folder: Path) -> None:
+    """Raise unless a folder of this name can be made or written to; for telling before a long computation.
+
+    Raises
+    ------
+    SepiError
+        If ``folder`` is a file or holds a light field, or it or its nearest existing parent is not a writable folder.
+    """
+    if folder.exists() and not folder.is_dir():
+        raise SepiError(f"{folder}: is a file; expected a folder to write to")
+    existing = next(path for path in (folder, *folder.absolute().parents) if path.exists())
+    if not existing.is_dir() or not os.access(existing, os.W_OK | os.X_OK):
+        raise SepiError(f"{folder}: cannot be written ({existing} is not a writable folder)")
+    # masks of the scene would be replaced by those of the result, which have the same names
+    if folder.is_dir() and any(folder.glob("input_Cam*.png")):
+        raise SepiError(f"{folder}: holds the views of a light field; choose another folder for the result")
+
+
+def read_result(path: Path) -> Result:
+    """Read back what a result says about its view.
+
+    Parameters
+    ----------
+    path : Path
+        Folder written by :func:`write_result`, or its ``result.h5``.
+
+    Raises
+    ------
+    SepiError
+        If there is no such file, or it is damaged or not such a result.
+    """
+    path = path / RESULT if path.is_dir() else path
+    with opened(path) as file:
+        attributes = dict(file.attrs)
+        needed = {"view", "disparity", "confidence"} - set(file) | {"view_position", "grid"} - set(attributes)
+        if needed:
+            raise SepiError(f"{path}: not a result of 'sepi depth': {', '.join(sorted(needed))} missing")
+        picture, disparity, confidence = (stored(path, file[name]) for name in ("view", "disparity", "confidence"))
+        (t, s), (rows, columns) = (map(int, attributes[name]) for name in ("view_position", "grid"))
+        try:
+            camera = Camera(*map(float, attributes["camera"])) if "camera" in attributes else None
+        except SepiError as error:
+            raise SepiError(f"{path}: damaged: {error}") from error
+    alike = disparity.shape == confidence.shape == picture.shape[:2]
+    if not alike or picture.shape[2:] not in ((1,), (3,)):
+        raise SepiError(f"{path}: damaged: view {picture.shape} and disparity {disparity.shape} do not fit together")
+    return Result(
+        scene=str(attributes.get("scene", "")),
+        picture=picture,
+        disparity=disparity.astype(np.float32),
+        confidence=confidence.astype(np.float32),
+        camera=camera,
+        from_centre=(t - rows // 2, s - columns // 2),
+    )
+
+
+def coloured(values: FloatMap) -> npt.NDArray[np.uint8]:
+    """A map (H, W) in perceptually uniform colours, (H, W, 3) RGB; black where it is not finite."""
+    finite = np.isfinite(values)
+    low, high = np.quantile(values[finite], (_BEYOND, 1 - _BEYOND)) if finite.any() else (0.0, 0.0)
+    # a constant map gets the middle colour
+    unit = (values - low) / (high - low) if high > low else np.full(values.shape, 0.5)
+    levels = _levels(np.where(finite, unit, 0))
+    colours = np.asarray(cv2.applyColorMap(levels, cv2.COLORMAP_VIRIDIS), np.uint8)[:, :, ::-1].copy()
+    colours[~finite] = 0
+    return colours
+
+
+def _require_sound(light_field: LightField, maps: StageMaps) -> None:
+    for name, values in maps.all().items():
+        if values.shape != light_field.shape:
+            raise SepiError(
+                f"{light_field.name}: maps must have the views' shape {light_field.shape}, got {name} of {values.shape}"
+            )
+        if values.dtype == bool and not re.fullmatch(r"[\w-]+", name):
+            raise SepiError(f"{light_field.name}: map '{name}': expected a name of letters, digits, '-' and '_'")
+    if ((maps.confidence < 0) | (maps.confidence > 1)).any():
+        raise SepiError(
+            f"{light_field.name}: confidence must lie within 0..1, got {np.nanmin(maps.confidence):g} to "
+            f"{np.nanmax(maps.confidence):g}"
+        )
+
+
+def _write_files(
+    folder: Path, light_field: LightField, maps: StageMaps, attributes: Mapping[str, Attribute]
+) -> tuple[str, ...]:
+    masks = {f"mask_{name}.png": values for name, values in maps.extra.items() if values.dtype == bool}
+    depth = {} if light_field.camera is None else {_DEPTH: light_field.camera.depth(maps.disparity)}
+    write_pfm(folder / "disparity.pfm", maps.disparity)
+    with atomic_path(folder / "disparity.npy") as temporary, temporary.open("wb") as file:
+        np.save(file, maps.disparity.astype("<f4"), allow_pickle=False)
+    _write_16bit(folder / "disparity_16bit.png", maps.disparity)
+    write_png(folder / "disparity.png", coloured(maps.disparity))
+    write_png(folder / "confidence.png", _levels(maps.confidence))
+    cloud = point_cloud(light_field, maps.disparity)
+    write_ply(folder / "points.ply", cloud.positions, cloud.colours, cloud.comments())
+    for name, values in depth.items():
+        write_pfm(folder / name, values)
+    for name, mask in masks.items():
+        _write_with_text(folder / name, mask, _MASK_TEXT)
+    _write_all(folder / RESULT, light_field, maps, attributes)
+    return (*RESULT_FILES[:-1], *depth, *masks, RESULT)
+
+
+def _write_all(path: Path, light_field: LightField, maps: StageMaps, attributes: Mapping[str, Attribute]) -> None:
+    """Write every map, the view and where it stands, the camera and what made the maps as one HDF5 file."""
+    camera = light_field.camera
+    more: dict[str, npt.NDArray[Any]] = {"view": light_field.views[light_field.reference]}
+    known: dict[str, Any] = {"view_position": light_field.reference, "grid": light_field.grid}
+    if camera is not None:
+        more["depth"] = camera.depth(maps.disparity)
+        known["camera"] = (camera.scale, camera.offset, camera.focal_px)
+    write_stage(path, maps.updated(maps.disparity, maps.confidence, **more), {**attributes, **known})
+
+
+def _remove_others(folder: Path, made: Collection[str]) -> None:
+    """Remove what an earlier run wrote and this one does not make."""
+    known = [path for path in (folder / _DEPTH, folder / RUNTIME) if path.is_file()]
+    for path in known + [path for path in folder.glob("mask_*.png") if _is_own_mask(path)]:
+        if path.name not in made:
+            try:
+                path.unlink()
+            except OSError as error:
+                raise SepiError(f"{path}: an earlier run's file cannot be removed ({error.strerror})") from error
+
+
+def _is_own_mask(path: Path) -> bool:
+    text = _text_chunks(_MASK_TEXT)
+    try:
+        with path.open("rb") as file:
+            return file.read(_PNG_START + len(text))[_PNG_START:] == text
+    except OSError:
+        return False
+
+
+def _write_16bit(path: Path, disparity: FloatMap) -> None:
+    """Write disparity as 16-bit grey levels: 0 where it is not finite, 1 to 65535 from its least to its greatest."""
+    finite = np.isfinite(disparity)
+    values = disparity[finite].astype(np.float64)
+    low, high = (float(values.min()), float(values.max())) if values.size else (0.0, 0.0)
+    scale = (high - low) / 65534 if high > low else 1.0
+    levels = np.zeros(disparity.shape, np.uint16)
+    levels[finite] = np.rint((values - low) / scale) + 1
+    _write_with_text(
+        path,
+        levels,
+        {
+            "Description": "disparity = (value - 1) * scale + offset; value 0: unknown",
+            "scale": repr(scale),
+            "offset": repr(low),
+            "units": "pixels per view step",
+        },
+    )
+
+
+def _write_with_text(path: Path, pixels: BoolMap | npt.NDArray[np.uint16], texts: Mapping[str, str]) -> None:
+    """Write a PNG with text chunks right after its header."""
+    with atomic_path(path) as temporary:
+        write_png(temporary, pixels)
+        data = temporary.read_bytes()
+        temporary.write_bytes(data[:_PNG_START] + _text_chunks(texts) + data[_PNG_START:])
+
+
+def _text_chunks(texts: Mapping[str, str]) -> bytes:
+    chunks = b""
+    for key, text in texts.items():
+        body = b"tEXt" + f"{key}\0{text}".encode("latin-1")
+        chunks += struct.pack(">I", len(body) - 4) + body + struct.pack(">I", zlib.crc32(body))
+    return chunks
+
+
+def _levels(unit: npt.NDArray[np.floating[Any]]) -> npt.NDArray[np.uint8]:
+    """0..1 as 0..255; not finite as 0."""
+    known = np.nan_to_num(unit, posinf=0, neginf=0)
+    return np.asarray(np.rint(255 * np.clip(known, 0, 1)), np.uint8)

@@ -1,0 +1,1 @@
+"""What compares views: costs of candidate disparities, and refinement on the residuals."""

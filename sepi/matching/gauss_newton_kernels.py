@@ -1,0 +1,260 @@
+"""Compiled loops of the Gauss-Newton refinement: cubic splines of the views, and sums over the views that see a pixel.
+
+Spline coefficients are computed as in [1]_: a recursive filter along each axis, mirrored at the ends.
+
+References
+----------
+.. [1] Unser: Splines, a perfect fit for signal and image processing. IEEE Signal Processing Magazine 16(6), 1999.
+   doi:10.1109/79.799930
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numba import njit, prange
+
+from sepi.matching.fastmath import EXACT
+
+SPLINE_UNIT = np.float32(1 / 3400)
+"""Value of one step of a spline coefficient, stored as int16; a checkerboard of -0.5 and 1.5 has some of +-9.5."""
+
+_POLE = np.float32(math.sqrt(3) - 2)
+_GAIN = np.float32((1 - (math.sqrt(3) - 2)) * (1 - 1 / (math.sqrt(3) - 2)))
+_LAST = np.float32((math.sqrt(3) - 2) / ((math.sqrt(3) - 2) ** 2 - 1))
+MARGIN = 2
+"""Coefficients beyond each side of a view."""
+
+_HORIZON = 16  # powers of the pole are below float32's precision from here on
+
+
+@njit(inline="always")
+def _weight_at_start(i: int, n: int) -> Any:
+    """Weight of sample ``i`` of ``n`` in the first value of the causal filter; the line is mirrored for ever."""
+    if n > _HORIZON:
+        return _POLE**i if i < _HORIZON else np.float32(0)
+    period = 2 * n - 2
+    total = _POLE**i if i == 0 or i == n - 1 else _POLE**i + _POLE ** (period - i)
+    return total / (np.float32(1) - _POLE**period)
+
+
+@njit(cache=True)
+def spline_coefficients(image: Any) -> Any:
+    """Cubic spline coefficients of an image (H, W), float32; both at least 2."""
+    H, W = image.shape
+    out = image.astype(np.float32)
+    for y in range(H):
+        line = out[y]
+        first = np.float32(0)
+        for x in range(min(W, _HORIZON)):
+            first += _weight_at_start(x, W) * line[x]
+        line[0] = first * _GAIN
+        for x in range(1, W):
+            line[x] = _GAIN * line[x] + _POLE * line[x - 1]
+        line[W - 1] = _LAST * (line[W - 1] + _POLE * line[W - 2])
+        for x in range(W - 2, -1, -1):
+            line[x] = _POLE * (line[x + 1] - line[x])
+    # columns together: all rows are run through once forth and once back
+    top = np.zeros(W, np.float32)
+    for y in range(min(H, _HORIZON)):
+        weight = np.float32(_weight_at_start(y, H))
+        for x in range(W):
+            top[x] += weight * out[y, x]
+    for x in range(W):
+        out[0, x] = top[x] * _GAIN
+    for y in range(1, H):
+        for x in range(W):
+            out[y, x] = _GAIN * out[y, x] + _POLE * out[y - 1, x]
+    for x in range(W):
+        out[H - 1, x] = _LAST * (out[H - 1, x] + _POLE * out[H - 2, x])
+    for y in range(H - 2, -1, -1):
+        for x in range(W):
+            out[y, x] = _POLE * (out[y + 1, x] - out[y, x])
+    return out
+
+
+@njit(inline="always")
+def _mirrored(i: int, n: int) -> int:
+    i = -i if i < 0 else i
+    return max(0, 2 * (n - 1) - i) if i >= n else i
+
+
+@njit(parallel=True, cache=True)
+def view_splines(planes: Any, unit: Any, present: Any, first: int, out: Any) -> None:
+    """Coefficients of every view's three channels, into channels ``first..first + 2`` of ``out``.
+
+    Parameters
+    ----------
+    planes : ndarray, shape (T, S, 3, H, W)
+    unit : float32
+        What the values are multiplied with.
+    present : ndarray, shape (T, S), bool
+    first : int
+    out : ndarray, shape (T, S, H + 2 MARGIN, W + 2 MARGIN, C), int16
+        Mirrored in the margins.
+    """
+    T, S = present.shape
+    for view in prange(T * S):
+        t, s = view // S, view % S
+        if present[t, s]:
+            for c in range(3):
+                plane = planes[t, s, c].astype(np.float32) * unit
+                coefficients = spline_coefficients(plane)
+                H, W = plane.shape
+                for y in range(-MARGIN, H + MARGIN):
+                    for x in range(-MARGIN, W + MARGIN):
+                        value = coefficients[_mirrored(y, H), _mirrored(x, W)] / SPLINE_UNIT
+                        out[t, s, y + MARGIN, x + MARGIN, first + c] = np.int16(math.floor(value + np.float32(0.5)))
+
+
+@njit(inline="always")
+def _spline_weights(f: Any) -> Any:
+    """Weights of the four coefficients round a place, a fraction ``f`` after the second."""
+    g = np.float32(1) - f
+    sixth, half, two_thirds = np.float32(1 / 6), np.float32(0.5), np.float32(2 / 3)
+    return (
+        g * g * g * sixth,
+        two_thirds - f * f * (np.float32(1) - f * half),
+        two_thirds - g * g * (np.float32(1) - g * half),
+        f * f * f * sixth,
+    )
+
+
+@njit(inline="always")
+def _row(splines: Any, row: int, left: int, first: int, b: Any) -> Any:
+    """Three channels at four coefficients of a row, weighted."""
+    p, q, r, s = splines[row, left], splines[row, left + 1], splines[row, left + 2], splines[row, left + 3]
+    return (
+        b[0] * p[first] + b[1] * q[first] + b[2] * r[first] + b[3] * s[first],
+        b[0] * p[first + 1] + b[1] * q[first + 1] + b[2] * r[first + 1] + b[3] * s[first + 1],
+        b[0] * p[first + 2] + b[1] * q[first + 2] + b[2] * r[first + 2] + b[3] * s[first + 2],
+    )
+
+
+@njit(inline="always")
+def _sample(splines: Any, first: int, y: Any, x: Any) -> Any:
+    """Three channels of a view at a place inside it; ``splines`` has a margin of two coefficients on each side."""
+    top, left = int(y), int(x)
+    a, b = _spline_weights(np.float32(y - top)), _spline_weights(np.float32(x - left))
+    # the margin of 2 and the one coefficient before
+    p, q = _row(splines, top + 1, left + 1, first, b), _row(splines, top + 2, left + 1, first, b)
+    r, s = _row(splines, top + 3, left + 1, first, b), _row(splines, top + 4, left + 1, first, b)
+    return (
+        (a[0] * p[0] + a[1] * q[0] + a[2] * r[0] + a[3] * s[0]) * SPLINE_UNIT,
+        (a[0] * p[1] + a[1] * q[1] + a[2] * r[1] + a[3] * s[1]) * SPLINE_UNIT,
+        (a[0] * p[2] + a[1] * q[2] + a[2] * r[2] + a[3] * s[2]) * SPLINE_UNIT,
+    )
+
+
+@njit(inline="always")
+def _seen(y: Any, x: Any, nearest: Any, limit: Any) -> Any:
+    """Whether a place lies in a view and nothing nearer covers it."""
+    H, W = nearest.shape
+    return (
+        y >= 0
+        and x >= 0
+        and y <= H - 1
+        and x <= W - 1
+        and nearest[int(y + np.float32(0.5)), int(x + np.float32(0.5))] <= limit
+    )
+
+
+@njit(parallel=True, cache=True, fastmath=EXACT, error_model="numpy")
+def mean_of_views(splines: Any, present: Any, t0: int, s0: int, disparity: Any, nearest: Any, cover: Any, scales: Any,
+                  reference: Any) -> Any:  # fmt: skip
+    """Mean of the views that see each pixel, those unlike the reference view counting less; shape (H, W, C), float32.
+
+    Parameters
+    ----------
+    splines : ndarray, shape (T, S, H + 2 MARGIN, W + 2 MARGIN, C), int16
+        C is 3 or 6: colours, detail.
+    present : ndarray, shape (T, S), bool
+    t0, s0 : int
+        Place of the reference view.
+    disparity : ndarray, shape (H, W), float32
+    nearest : ndarray, shape (T, S, H, W), float32
+        z-buffers.
+    cover : float32
+        By how much a cover must be nearer.
+    scales : ndarray, shape (C / 3,), float32
+        Square of the robust scale of each layer.
+    reference : ndarray, shape (H, W, C), float32
+    """
+    T, S = present.shape
+    H, W, C = reference.shape
+    out = np.empty((H, W, C), np.float32)
+    for y in prange(H):
+        for x in range(W):
+            d = disparity[y, x]
+            for layer in range(C // 3):
+                c, scale = 3 * layer, scales[layer]
+                m0, m1, m2 = reference[y, x, c], reference[y, x, c + 1], reference[y, x, c + 2]
+                total0, total1, total2, weight = m0, m1, m2, np.float32(1)
+                for t in range(T):
+                    for s in range(S):
+                        fy = np.float32(y) - d * np.float32(t - t0)
+                        fx = np.float32(x) - d * np.float32(s - s0)
+                        if not present[t, s] or (t == t0 and s == s0) or not _seen(fy, fx, nearest[t, s], d + cover):
+                            continue
+                        v0, v1, v2 = _sample(splines[t, s], c, fy, fx)
+                        z = (v0 - m0) ** 2 + (v1 - m1) ** 2 + (v2 - m2) ** 2
+                        w = scale / (scale + z)
+                        w *= w
+                        weight += w
+                        total0 += w * v0
+                        total1 += w * v1
+                        total2 += w * v2
+                out[y, x, c], out[y, x, c + 1], out[y, x, c + 2] = total0 / weight, total1 / weight, total2 / weight
+    return out
+
+
+@njit(parallel=True, cache=True, fastmath=EXACT, error_model="numpy")
+def normal_equations(splines: Any, present: Any, t0: int, s0: int, disparity: Any, nearest: Any, cover: Any,
+                     scales: Any, shares: Any, mean: Any, down: Any, across: Any) -> Any:  # fmt: skip
+    """Gauss-Newton sums of each pixel over the views that see it.
+
+    Parameters
+    ----------
+    splines, present, t0, s0, disparity, nearest, cover, scales
+        As in :func:`mean_of_views`.
+    shares : ndarray, shape (C / 3,), float32
+        Share of each layer.
+    mean, down, across : ndarray, shape (H, W, C), float32
+        Mean of the views and its derivatives along y and x.
+
+    Returns
+    -------
+    gradient, curvature : ndarray, shape (H, W), float32
+        Their ratio is the step towards less cost, in pixels per view step.
+    """
+    T, S = present.shape
+    H, W, C = mean.shape
+    gradient, curvature = np.zeros((H, W), np.float32), np.zeros((H, W), np.float32)
+    for y in prange(H):
+        for x in range(W):
+            d = disparity[y, x]
+            for layer in range(C // 3):
+                c, scale = 3 * layer, scales[layer]
+                m0, m1, m2 = mean[y, x, c], mean[y, x, c + 1], mean[y, x, c + 2]
+                y0, y1, y2 = down[y, x, c], down[y, x, c + 1], down[y, x, c + 2]
+                x0, x1, x2 = across[y, x, c], across[y, x, c + 1], across[y, x, c + 2]
+                slope, bend = np.float32(0), np.float32(0)
+                for t in range(T):
+                    for s in range(S):
+                        dt, ds = np.float32(t - t0), np.float32(s - s0)
+                        fy, fx = np.float32(y) - d * dt, np.float32(x) - d * ds
+                        if not present[t, s] or (t == t0 and s == s0) or not _seen(fy, fx, nearest[t, s], d + cover):
+                            continue
+                        v0, v1, v2 = _sample(splines[t, s], c, fy, fx)
+                        r0, r1, r2 = v0 - m0, v1 - m1, v2 - m2
+                        g0, g1, g2 = y0 * dt + x0 * ds, y1 * dt + x1 * ds, y2 * dt + x2 * ds
+                        # derivative of z / (z + scale) with respect to z
+                        w = scale / (scale + r0 * r0 + r1 * r1 + r2 * r2)
+                        w *= w / scale
+                        slope += w * (r0 * g0 + r1 * g1 + r2 * g2)
+                        bend += w * (g0 * g0 + g1 * g1 + g2 * g2)
+                gradient[y, x] += shares[layer] * slope
+                curvature[y, x] += shares[layer] * bend
+    return gradient, curvature

@@ -1,0 +1,175 @@
+"""The plane sweep: photo-consistency of every candidate disparity over all views or over groups of them (Eq. 3).
+
+The straight line through a SEPI meets one sample of every view, so Eq. 3 of [1]_ is a plane sweep: for a candidate
+``d`` the reference-view pixel ``(y, x)`` is compared with the bilinear sample of view ``(t, s)`` at
+``(y - d (t - t0), x - d (s - s0))``. One ``(d, view)`` has one sub-pixel weight for the whole image, so a row is a run
+of contiguous multiply-adds that vectorises. Views are summed in *groups* (all of them for a SEPI; the parts from which
+half-SEPIs are put together), so one pass serves full and half SEPIs alike.
+The compiled loops are in :mod:`sepi.matching.photo_consistency` and :mod:`sepi.matching.plane_sweep_kernels`.
+
+References
+----------
+.. [1] Zhou, Shi, Liu, Jin, Zhang, Hou: Light Field Depth Estimation via Stitched Epipolar Plane Images.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from pydantic import Field
+
+from sepi.image.noise import residual_variance
+from sepi.lightfield import BoolMap, FloatMap, LightField
+from sepi.stage import Parameters, Progress, no_progress
+
+
+class SweepParameters(Parameters):
+    """Parameters of a plane sweep."""
+
+    candidates: int = Field(181, ge=3, le=4001, description="number of candidate disparities, uniform over the range")
+    scale: float = Field(
+        0.0165,
+        ge=1e-6,
+        le=2,
+        description="residual at which the robust photo-consistency is one half; RGB distance, colours in 0..1",
+    )
+    window_radius: int = Field(
+        3, ge=0, le=10, description="cost window of 2 r + 1 pixels; 0 aggregates nothing, in pixels"
+    )
+    window_sigma: float = Field(
+        0.02,
+        ge=1e-6,
+        le=10,
+        description="colour distance at which a window pixel's weight falls; RGB distance, colours in 0..1",
+    )
+
+
+@dataclass(frozen=True)
+class SweepResult:
+    """Best candidate of each pixel for each of N subsets of the views.
+
+    Attributes
+    ----------
+    disparity, cost, mean : ndarray, shape (N, H, W), float32
+        Disparity at the minimum, refined below the candidate step by a parabola; the cost there (0..1); the mean cost
+        over all candidates. NaN where a pixel was not asked for.
+    """
+
+    disparity: FloatMap
+    cost: FloatMap
+    mean: FloatMap
+
+    def confidence(self) -> FloatMap:
+        """Eq. 5, mean over minimum, brought from 1..inf to 0..1 as ``1 - min / mean``; 0 where all costs are zero."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            confidence = np.where(self.mean > 0, 1 - self.cost / self.mean, 0)
+        return np.clip(confidence, 0, 1).astype(np.float32)
+
+
+def planar(light_field: LightField) -> npt.NDArray[np.generic]:
+    """Views as ``(T, S, C, H, W)``, each channel's rows contiguous, in their own number type."""
+    return np.ascontiguousarray(light_field.views.transpose(0, 1, 4, 2, 3))
+
+
+def full_scale(dtype: npt.DTypeLike) -> float:
+    """Pixel value that stands for 1.0."""
+    return float(np.iinfo(dtype).max) if np.issubdtype(dtype, np.integer) else 1.0
+
+
+def sweep(
+    light_field: LightField,
+    parameters: SweepParameters,
+    *,
+    groups: npt.NDArray[np.int64] | None = None,
+    subsets: BoolMap | None = None,
+    wanted: BoolMap | None = None,
+    progress: Progress = no_progress,
+) -> SweepResult:
+    """Sweep the candidate disparities and keep the best one of each pixel and subset of views.
+
+    Scale and window are widened by the noise of the reference view, so that noise alone neither looks like a mismatch
+    nor like another surface.
+
+    Parameters
+    ----------
+    light_field : LightField
+        With a known disparity range.
+    parameters : SweepParameters
+    groups : ndarray, shape (T, S), int, optional
+        Group of each view, 0..G-1; -1 leaves a view out. Default: one group of all.
+    subsets : ndarray, shape (N, G), bool, optional
+        Which groups make up each subset. Default: each group by itself.
+    wanted : ndarray, shape (H, W), bool, optional
+        Pixels to be done. Default: all.
+    progress : callable, optional
+
+    Returns
+    -------
+    SweepResult
+
+    Raises
+    ------
+    SepiError
+        If the disparity range is unknown.
+    """
+    from numba import get_num_threads
+
+    from sepi.matching.photo_consistency import sample_offsets
+    from sepi.matching.plane_sweep_kernels import sweep_rows
+
+    H, W = light_field.shape
+    groups = np.zeros(light_field.grid, np.int64) if groups is None else groups
+    groups = np.where(light_field.present, groups, -1)
+    groups[light_field.reference] = -1  # the reference view agrees with itself at every candidate
+    subsets = np.eye(groups.max() + 1, dtype=bool) if subsets is None else subsets
+    groups, subsets = _without_empty(groups, subsets)
+    wanted = np.ones((H, W), bool) if wanted is None else wanted
+    views = planar(light_field)
+    noise = residual_variance(light_field.centre)
+    result = SweepResult(*(np.full((len(subsets), H, W), np.nan, np.float32) for _ in range(3)))
+    disparities = light_field.known_range().candidates(parameters.candidates)
+    (T, S), (t0, s0) = light_field.grid, light_field.reference
+    rows = _rows_at_a_stretch(H, get_num_threads())
+    strip = rows * get_num_threads()
+    for first in range(0, H, strip):
+        sweep_rows(
+            views,
+            *light_field.reference,
+            np.ascontiguousarray(light_field.centre.transpose(2, 0, 1)),
+            groups,
+            subsets,
+            wanted,
+            first,
+            min(H, first + strip),
+            rows,
+            disparities,
+            *sample_offsets(disparities, np.arange(T) - t0),
+            *sample_offsets(disparities, np.arange(S) - s0),
+            np.float32((parameters.scale**2 + noise) * full_scale(views.dtype) ** 2),
+            parameters.window_radius,
+            np.float32(parameters.window_sigma**2 + noise),
+            result.disparity,
+            result.cost,
+            result.mean,
+        )
+        progress(min(H, first + strip) / H)
+    return result
+
+
+def _rows_at_a_stretch(height: int, threads: int) -> int:
+    """Rows of one task: two tasks for each thread, so that all have work and progress shows.
+
+    Rows of the window above and below a task are done again by its neighbours, so tasks must not be too low.
+    """
+    return max(16, min(128, -(-height // (2 * threads))))
+
+
+def _without_empty(groups: npt.NDArray[np.int64], subsets: BoolMap) -> tuple[npt.NDArray[np.int64], BoolMap]:
+    """Groups numbered through, and the subsets of them, without those that have no view."""
+    used = np.unique(groups[groups >= 0])
+    numbers = np.full(subsets.shape[1] + 1, -1)
+    numbers[used] = np.arange(len(used))
+    # -1, no group, picks the last number, which is -1
+    return numbers[groups], np.ascontiguousarray(subsets[:, used])

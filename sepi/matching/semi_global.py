@@ -1,0 +1,95 @@
+"""Semi-global smoothing of a cost volume [1]_, after averaging over pixels of one's own colour.
+
+The volume is averaged over a small window with weights that fall quickly with the difference of colour, so that edges
+stay where the colours change, and then smoothed along eight paths: a change by one candidate costs ``small_penalty``,
+a larger one ``large_penalty``, which is weakened where the colours change. The compiled loops are in
+:mod:`sepi.matching.semi_global_kernels`.
+
+References
+----------
+.. [1] Hirschmuller: Stereo processing by semiglobal matching and mutual information. IEEE TPAMI 30(2), 2008.
+   doi:10.1109/TPAMI.2007.1166
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from pydantic import Field
+
+from sepi.lightfield import FloatMap
+from sepi.stage import Parameters
+
+SAME_MINIMUM = 0.25
+"""Candidates this close to the winner belong to the same minimum, pixels per view step..."""
+
+SAME_SHARE = 0.1
+"""...but no more than this share of the range."""
+
+HALF_CONFIDENT = 0.05
+"""Margin of cost at which the confidence is one half."""
+
+
+class SmoothingParameters(Parameters):
+    """Parameters of aggregation and semi-global smoothing."""
+
+    window_radius: int = Field(2, ge=0, le=10, description="cost window of 2 r + 1 pixels, in pixels")
+    window_sigma: float = Field(
+        0.01, ge=1e-6, le=10, description="colour distance at which a window pixel's weight falls, colours in 0..1"
+    )
+    small_penalty: float = Field(0.02, ge=0, description="cost of a change by one candidate along a path")
+    large_penalty: float = Field(1.0, ge=0, description="cost of a larger change where the colour stays")
+    colour_weakening: float = Field(
+        50.0, ge=0, description="how much a colour change weakens the larger penalty, per sum of RGB differences"
+    )
+
+
+@dataclass(frozen=True)
+class SmoothedResult:
+    """What the smoothed volume says of each pixel.
+
+    Attributes
+    ----------
+    disparity : ndarray, shape (H, W), float32
+        Winner, refined by a parabola; pixels per view step.
+    confidence : ndarray, shape (H, W), float32
+        0..1: ``m / (m + HALF_CONFIDENT)`` of the margin ``m`` by which the averaged cost of every other minimum
+        exceeds that of the winner's; 0 where it does not.
+    """
+
+    disparity: FloatMap
+    confidence: FloatMap
+
+
+def smooth_and_choose(
+    cost: FloatMap, disparities: FloatMap, guide: FloatMap, noise: float, parameters: SmoothingParameters
+) -> SmoothedResult:
+    """Average, smooth, and take the best candidate of each pixel.
+
+    Parameters
+    ----------
+    cost : ndarray, shape (K, H, W), float32
+        0..1.
+    disparities : ndarray, shape (K,), float32
+        Uniform, pixels per view step.
+    guide : ndarray, shape (H, W, 3), float32
+        Reference view, 0..1.
+    noise : float
+        Expected squared residual by noise, summed over RGB; widens the window's colour weights.
+    parameters : SmoothingParameters
+
+    Returns
+    -------
+    SmoothedResult
+    """
+    from sepi.matching.semi_global_kernels import aggregate, choose, semi_global
+
+    variance = np.float32(parameters.window_sigma**2 + noise)
+    averaged = aggregate(cost, guide, parameters.window_radius, variance)
+    penalties = parameters.small_penalty, parameters.large_penalty, parameters.colour_weakening
+    smoothed = semi_global(averaged, guide, *(np.float32(p) for p in penalties))
+    same = min(SAME_MINIMUM, SAME_SHARE * float(disparities[-1] - disparities[0]))
+    disparity, margin = choose(smoothed, averaged, disparities, np.float32(same))
+    margin = np.maximum(margin, 0)
+    return SmoothedResult(disparity, (margin / (margin + np.float32(HALF_CONFIDENT))).astype(np.float32))

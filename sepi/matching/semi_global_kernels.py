@@ -1,0 +1,145 @@
+"""Compiled loops of the semi-global smoothing (:mod:`sepi.matching.semi_global`)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba import njit, prange
+
+from sepi.matching.fastmath import EXACT
+
+_UNREACHABLE = np.float32(1e9)
+
+
+@njit(parallel=True, cache=True, fastmath=EXACT, error_model="numpy")
+def aggregate(cost: Any, guide: Any, radius: int, variance: Any) -> Any:
+    """Mean over a window with weights ``exp(-|colour difference|^2 / (2 variance))``; (K, H, W) to (H, W, K)."""
+    K, H, W = cost.shape
+    out = np.empty((H, W, K), np.float32)
+    for y in prange(H):
+        total, sum_of_weights = np.zeros((K, W), np.float32), np.zeros(W, np.float32)
+        weight = np.empty(W, np.float32)
+        for row in range(max(0, y - radius), min(H, y + radius + 1)):
+            for dx in range(-radius, radius + 1):
+                first, last = max(0, -dx), min(W, W - dx)
+                for x in range(first, last):
+                    distance = np.float32(0)
+                    for c in range(3):
+                        distance += (guide[y, x, c] - guide[row, x + dx, c]) ** 2
+                    weight[x] = np.exp(-distance / (2 * variance))
+                    sum_of_weights[x] += weight[x]
+                for k in range(K):
+                    source, target, w = cost[k, row, first + dx : last + dx], total[k, first:last], weight[first:last]
+                    for x in range(target.size):
+                        target[x] += w[x] * source[x]
+        for x in range(W):
+            for k in range(K):
+                out[y, x, k] = total[k, x] / sum_of_weights[x]
+    return out
+
+
+@njit(inline="always")
+def _step(before: Any, least: Any, cost: Any, small: Any, large: Any, path: Any) -> Any:
+    """One pixel further along a path; ``before`` and ``path`` have an unreachable candidate at either end."""
+    for k in range(cost.size):
+        best = min(before[k + 1], least + large)
+        best = min(best, min(before[k], before[k + 2]) + small)
+        path[k + 1] = cost[k] + best - least
+    least_here = path[1]
+    for k in range(1, cost.size):
+        least_here = min(least_here, path[k + 1])
+    return least_here
+
+
+@njit(inline="always")
+def _large_penalty(guide: Any, y: int, x: int, row: int, column: int, small: Any, large: Any, weakening: Any) -> Any:
+    change = np.float32(0)
+    for c in range(3):
+        change += abs(guide[y, x, c] - guide[row, column, c])
+    return max(small * np.float32(1.5), large / (np.float32(1) + change * weakening))
+
+
+@njit(inline="always")
+def _start(cost: Any, path: Any) -> Any:
+    for k in range(cost.size):
+        path[k + 1] = cost[k]
+    return cost.min()
+
+
+@njit(parallel=True, cache=True, fastmath=EXACT)
+def semi_global(cost: Any, guide: Any, small: Any, large: Any, weakening: Any) -> Any:
+    """Sum of the smoothed costs along eight paths; shapes (H, W, K), float32."""
+    H, W, K = cost.shape
+    out = np.zeros((H, W, K), np.float32)
+    for y in prange(H):
+        for dx in (1, -1):
+            before, path = np.full(K + 2, _UNREACHABLE, np.float32), np.full(K + 2, _UNREACHABLE, np.float32)
+            least = np.float32(0)
+            for i in range(W):
+                x = i if dx > 0 else W - 1 - i
+                if i == 0:
+                    least = _start(cost[y, x], path)
+                else:
+                    p = _large_penalty(guide, y, x, y, x - dx, small, large, weakening)
+                    least = _step(before, least, cost[y, x], small, p, path)
+                for k in range(K):
+                    out[y, x, k] += path[k + 1]
+                before, path = path, before
+    for dy in (1, -1):
+        for dx in (0, 1, -1):
+            above = np.full((W, K + 2), _UNREACHABLE, np.float32)
+            row = np.full((W, K + 2), _UNREACHABLE, np.float32)
+            least_above, least_row = np.zeros(W, np.float32), np.zeros(W, np.float32)
+            for i in range(H):
+                y = i if dy > 0 else H - 1 - i
+                for x in prange(W):
+                    if i == 0 or x - dx < 0 or x - dx >= W:
+                        least_row[x] = _start(cost[y, x], row[x])
+                    else:
+                        p = _large_penalty(guide, y, x, y - dy, x - dx, small, large, weakening)
+                        least_row[x] = _step(above[x - dx], least_above[x - dx], cost[y, x], small, p, row[x])
+                    for k in range(K):
+                        out[y, x, k] += row[x, k + 1]
+                above, row = row, above
+                least_above, least_row = least_row, least_above
+    return out
+
+
+@njit(parallel=True, cache=True)
+def choose(smoothed: Any, averaged: Any, disparities: Any, same: Any) -> Any:
+    """Winner of each pixel, refined by a parabola, and by how much the averaged cost of other minima exceeds its own.
+
+    Parameters
+    ----------
+    smoothed, averaged : ndarray, shape (H, W, K), float32
+    disparities : ndarray, shape (K,), float32
+    same : float32
+        Candidates closer to the winner belong to its minimum, pixels per view step.
+
+    Returns
+    -------
+    disparity, margin : ndarray, shape (H, W), float32
+        The margin is negative where another minimum is lower before smoothing, 0 where there is no other.
+    """
+    H, W, K = smoothed.shape
+    disparity, margin = np.empty((H, W), np.float32), np.empty((H, W), np.float32)
+    spacing = (disparities[K - 1] - disparities[0]) / (K - 1)
+    for y in prange(H):
+        for x in range(W):
+            best = np.argmin(smoothed[y, x])
+            offset = np.float32(0)
+            if 0 < best < K - 1:
+                a, b, c = smoothed[y, x, best - 1], smoothed[y, x, best], smoothed[y, x, best + 1]
+                bend = a - 2 * b + c
+                if bend > 1e-9:
+                    offset = np.float32(0.5) * (a - c) / bend
+            disparity[y, x] = disparities[best] + offset * spacing
+            own, other = _UNREACHABLE, _UNREACHABLE
+            for k in range(K):
+                if abs(disparities[k] - disparity[y, x]) <= same or k == best:
+                    own = min(own, averaged[y, x, k])
+                else:
+                    other = min(other, averaged[y, x, k])
+            margin[y, x] = other - own if other < _UNREACHABLE else np.float32(0)
+    return disparity, margin

@@ -1,0 +1,154 @@
+"""Stitched epipolar plane images as the paper builds them (section III, Eq. 1-2 of [1]_), for drawing and tests.
+
+An EPI ``E_{y,t}(x, s)`` stacks row ``y`` of the views of grid row ``t``. A scene point of disparity ``d`` draws the
+line ``x = x0 - d (s - s0)`` into it, and a parallel line into each corresponding EPI ``E_{y_j,t_j}`` with
+``y_j = y0 - d (t_j - t0)``. Shifting the EPI of ``j = t_j - t0`` by ``-d N_s j`` (Eq. 2; the paper writes ``j N_s /
+k`` with the slope ``k = 1/d`` and the opposite sign convention) puts all lines onto one, and concatenating them (Eq.
+1) gives an image with ``N_t N_s`` rows.
+
+The estimator does not build these images: :mod:`sepi.matching.plane_sweep` visits the same samples directly.
+
+References
+----------
+.. [1] Zhou, Shi, Liu, Jin, Zhang, Hou: Light Field Depth Estimation via Stitched Epipolar Plane Images.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sepi.errors import SepiError
+from sepi.lightfield import FloatMap, LightField, as_unit_float
+
+
+@dataclass(frozen=True)
+class StitchedEpi:
+    """A SEPI for one centre-view pixel and one candidate disparity.
+
+    The rows keep their own samples; ``offsets`` says how far each is shifted. Only drawing resamples them, so samples
+    along the line are as exact as the views.
+
+    Attributes
+    ----------
+    rows : ndarray, shape (T * S, W, C), float32
+        Rows of the corresponding EPIs, 0..1, ordered by ``t``, then ``s``.
+    offsets : ndarray, shape (T * S,), float64
+        Shift of each row to the right, pixels (Eq. 2).
+    steps : ndarray, shape (T * S,), int
+        Place of each row along the stitched angular axis, ``s' - s0'`` = 0 for the reference view.
+    inside : ndarray, shape (T * S,), bool
+        Whether the corresponding EPI lies inside its view and the view is present.
+    disparity : float
+        Candidate, pixels per view step.
+    """
+
+    rows: FloatMap
+    offsets: np.ndarray
+    steps: np.ndarray
+    inside: np.ndarray
+    disparity: float
+
+    def along_line(self, x: int) -> tuple[FloatMap, np.ndarray]:
+        """Samples on the line of the candidate's slope through column ``x`` of the centre row.
+
+        Returns
+        -------
+        samples : ndarray, shape (T * S, C), float32
+            Linear interpolation between the row's pixels.
+        valid : ndarray, shape (T * S,), bool
+            Whether the sample lies inside its view.
+        """
+        position = x - self.disparity * self.steps - self.offsets
+        left = np.floor(position).astype(int)
+        width = self.rows.shape[1]
+        valid = self.inside & (left >= 0) & (left + 1 < width)
+        left = np.clip(left, 0, width - 2)
+        weight = (position - left)[:, None]
+        number = np.arange(len(self.rows))
+        samples = (1 - weight) * self.rows[number, left] + weight * self.rows[number, left + 1]
+        return samples.astype(np.float32), valid
+
+    def image(self) -> FloatMap:
+        """The SEPI as a picture, shape (T * S, W, C): shifted rows resampled to whole pixels, zero outside."""
+        width = self.rows.shape[1]
+        picture = np.zeros_like(self.rows)
+        for number, (row, offset) in enumerate(zip(self.rows, self.offsets, strict=True)):
+            for channel in range(row.shape[1]):
+                picture[number, :, channel] = np.interp(
+                    np.arange(width) - offset, np.arange(width), row[:, channel], left=0, right=0
+                )
+        picture[~self.inside] = 0
+        return picture
+
+
+def stitched_epi(light_field: LightField, y: int, disparity: float) -> StitchedEpi:
+    """Build the SEPI through row ``y`` of the reference view for one candidate (Eq. 1-2).
+
+    Parameters
+    ----------
+    light_field : LightField
+    y : int
+        Row of the reference view.
+    disparity : float
+        Candidate, pixels per view step.
+
+    Returns
+    -------
+    StitchedEpi
+
+    Raises
+    ------
+    SepiError
+        If the row lies outside the reference view.
+    """
+    (T, S), (H, W) = light_field.grid, light_field.shape
+    if not 0 <= y < H:
+        raise SepiError(f"{light_field.name}: row {y} lies outside the reference view (0..{H - 1})")
+    t0, s0 = light_field.reference
+    channels = light_field.views.shape[4]
+    rows = np.zeros((T, S, W, channels), np.float32)
+    inside = np.zeros((T, S), bool)
+    offsets = np.zeros((T, S))
+    steps = np.zeros((T, S), int)
+    for t in range(T):
+        j = t - t0
+        row = y - disparity * j
+        offsets[t] = -disparity * S * j
+        steps[t] = S * j + np.arange(S) - s0
+        if not 0 <= row <= H - 1:
+            continue
+        top = min(int(np.floor(row)), H - 2)
+        above, below = as_unit_float(light_field.views[t, :, top]), as_unit_float(light_field.views[t, :, top + 1])
+        rows[t] = (1 - (row - top)) * above + (row - top) * below
+        inside[t] = light_field.present[t]
+    return StitchedEpi(
+        rows.reshape(T * S, W, channels), offsets.ravel(), steps.ravel(), inside.ravel(), float(disparity)
+    )
+
+
+def line_cost(light_field: LightField, y: int, x: int, disparity: float, scale: float) -> float:
+    """Mean robust colour difference along the SEPI's line to the centre-view pixel (Eq. 3, robust kernel).
+
+    Parameters
+    ----------
+    light_field : LightField
+    y, x : int
+        Centre-view pixel.
+    disparity : float
+        Candidate, pixels per view step.
+    scale : float
+        Residual at which ``r^2 / (r^2 + scale^2)`` is one half; colours in 0..1.
+
+    Returns
+    -------
+    float
+        0..1; NaN if no view sees the pixel.
+    """
+    samples, valid = stitched_epi(light_field, y, disparity).along_line(x)
+    t0, s0 = light_field.reference
+    valid = valid.copy()
+    valid[t0 * light_field.grid[1] + s0] = False
+    squared = ((samples - light_field.centre[y, x]) ** 2).sum(axis=1)[valid]
+    return float(np.mean(squared / (squared + scale**2))) if squared.size else float("nan")

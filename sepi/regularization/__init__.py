@@ -1,0 +1,1 @@
+"""What smooths or completes a disparity map."""

@@ -1,0 +1,194 @@
+"""Planes of disparity on superpixels: robust fits, and the coupled energy that propagates them (Eq. 7 of [1]_).
+
+A plane is ``(value, gx, gy)``: the disparity at the superpixel's centroid and its change over ``UNIT`` pixels in x and
+y.
+
+References
+----------
+.. [1] Zhou, Shi, Liu, Jin, Zhang, Hou: Light Field Depth Estimation via Stitched Epipolar Plane Images.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sparse
+from scipy.sparse.linalg import spsolve
+
+from sepi.image.superpixels import Borders, FloatArray, Superpixels
+from sepi.lightfield import BoolMap, FloatMap
+
+UNIT = 15.0
+"""Length over which gradients are measured, pixels: about a superpixel, so that the three unknowns are alike."""
+
+ITERATIONS = 10
+"""Re-weightings of the absolute values; the tolerance shrinks with each."""
+
+
+@dataclass(frozen=True)
+class Coupling:
+    """Weights of the coupled energy.
+
+    Attributes
+    ----------
+    continuity : float
+        tau_out: weight of agreement between neighbours against a superpixel's worth of data.
+    slope : float
+        Weight of equal slopes against equal values at the common border.
+    tolerance : float
+        Disagreement, pixels per view step, beyond which data or neighbour is taken for an outlier.
+    """
+
+    continuity: float
+    slope: float
+    tolerance: float
+
+
+def basis(segments: Superpixels) -> FloatArray:
+    """Value of each of the three plane parameters at every pixel; shape (H * W, 3)."""
+    rows, columns = np.indices(segments.labels.shape)
+    labels = segments.labels.ravel()
+    offset = np.stack([columns.ravel(), rows.ravel()], axis=1) - segments.centroids[labels]
+    return np.column_stack([np.ones(len(labels)), offset / UNIT])
+
+
+def evaluate_planes(segments: Superpixels, planes: FloatArray, design: FloatArray) -> FloatMap:
+    """Disparity of every pixel by the plane of its superpixel; shape (H, W), float32."""
+    values = (design * planes[segments.labels.ravel()]).sum(axis=1)
+    return np.asarray(values.reshape(segments.labels.shape), np.float32)
+
+
+def fit_planes(
+    segments: Superpixels, disparity: FloatMap, weight: FloatMap, design: FloatArray, tolerance: float
+) -> FloatArray:
+    """Robust plane of each superpixel by itself, from the median disparity by re-weighted least squares.
+
+    Parameters
+    ----------
+    segments : Superpixels
+    disparity, weight : ndarray, shape (H, W), float32
+    design : ndarray, shape (H * W, 3)
+        From :func:`basis`.
+    tolerance : float
+        Residual of an inlier, pixels per view step.
+
+    Returns
+    -------
+    ndarray, shape (N, 3), float
+    """
+    planes: FloatArray = np.zeros((len(segments), 3))
+    planes[:, 0] = _medians(segments, disparity)
+    # a weak pull to level keeps superpixels with few good pixels solvable
+    ridge = np.diag([1e-6, 1e-2, 1e-2])
+    for spread in _shrinking(tolerance):
+        residual = evaluate_planes(segments, planes, design) - disparity
+        left, right = _normal_equations(segments, disparity, weight / (1 + (residual / spread) ** 2) ** 2, design)
+        planes = np.asarray(np.linalg.solve(left + ridge, right[..., None])[..., 0], np.float64)
+    return planes
+
+
+def propagate(
+    segments: Superpixels,
+    touching: Borders,
+    likeness: FloatArray,
+    planes: FloatArray,
+    free: BoolMap,
+    disparity: FloatMap,
+    weight: FloatMap,
+    design: FloatArray,
+    coupling: Coupling,
+) -> FloatArray:
+    """Minimise the coupled energy over the planes of the free superpixels, the others held (Eq. 7).
+
+    The absolute values of Eq. 7 are minimised by re-weighting: of the data, ``|d_hat - d|``, and of the continuity,
+    ``|d_hat - d_l|``, where ``d_l`` is the neighbour's plane continued linearly to the common border. The equation's
+    denominator, which weakens the coupling across a change of depth, is that re-weighting; its factor of likeness is
+    the colour cue. All free superpixels are solved for together, so depth travels from reliable edges inwards.
+
+    Parameters
+    ----------
+    segments : Superpixels
+    touching : Borders
+    likeness : ndarray, shape (E,), float
+        0..1 for each border: whether the two sides belong together.
+    planes : ndarray, shape (N, 3), float
+        Of the held superpixels, and a start for the others.
+    free : ndarray, shape (N,), bool
+    disparity, weight : ndarray, shape (H, W), float32
+        Data.
+    design : ndarray, shape (H * W, 3)
+    coupling : Coupling
+
+    Returns
+    -------
+    ndarray, shape (N, 3), float
+    """
+    touched = free[touching.first] | free[touching.second]
+    touching, likeness = touching.subset(touched), likeness[touched]
+    at_first, at_second = (
+        np.column_stack([np.ones(len(likeness)), (touching.midpoints - segments.centroids[side]) / UNIT])
+        for side in (touching.first, touching.second)
+    )
+    strength = coupling.continuity * likeness * touching.lengths / UNIT
+    weight = np.where(free[segments.labels], weight, 0)
+    unknown = np.repeat(free, 3)
+    solution = planes.copy()
+    trust = np.ones(len(likeness))
+    data_weight = weight
+    for spread in _shrinking(coupling.tolerance):
+        left, right = _normal_equations(segments, disparity, data_weight, design)
+        continuity = _continuity(touching, at_first, at_second, strength * trust, coupling.slope, len(segments))
+        system = sparse.block_diag(left / UNIT**2, format="csr") + continuity + 1e-9 * sparse.eye_array(unknown.size)
+        system = system.tocsr()[unknown]
+        known = system[:, ~unknown] @ solution.ravel()[~unknown]
+        solved = spsolve(system[:, unknown].tocsc(), right.ravel()[unknown] / UNIT**2 - known)
+        solution[free] = solved.reshape(-1, 3)
+        residual = evaluate_planes(segments, solution, design) - disparity
+        data_weight = weight / (1 + (residual / spread) ** 2)
+        step = (at_first * solution[touching.first]).sum(axis=1) - (at_second * solution[touching.second]).sum(axis=1)
+        trust = 1 / (1 + (step / spread) ** 2)
+    return solution
+
+
+def _shrinking(tolerance: float) -> list[float]:
+    """Tolerances from wide to the final one, so that the first guess does not decide who is an outlier."""
+    return [max(tolerance, 0.5 * 0.6**k) for k in range(ITERATIONS)]
+
+
+def _medians(segments: Superpixels, values: FloatMap) -> FloatArray:
+    order = np.lexsort((values.ravel(), segments.labels.ravel()))
+    starts = np.concatenate([[0], np.cumsum(segments.sizes)[:-1]])
+    return np.asarray(values.ravel()[order][starts + segments.sizes // 2], np.float64)
+
+
+def _normal_equations(
+    segments: Superpixels, disparity: FloatMap, weight: FloatMap, design: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Weighted least squares of each superpixel's data: matrices (N, 3, 3) and right sides (N, 3)."""
+    weighted = design * weight.reshape(-1, 1)
+    right = np.stack([segments.sums(weighted[:, p] * disparity.ravel()) for p in range(3)], axis=1)
+    left = np.empty((len(segments), 3, 3))
+    for p in range(3):
+        for q in range(p, 3):
+            left[:, p, q] = left[:, q, p] = segments.sums(weighted[:, p] * design[:, q])
+    return left, right
+
+
+def _continuity(
+    touching: Borders, at_first: FloatArray, at_second: FloatArray, strength: FloatArray, slope: float, count: int
+) -> sparse.csr_array:
+    """Quadratic form of the disagreement of neighbours: of values at the border's middle, and of slopes."""
+    number = len(strength)
+    rows = np.arange(number)
+    triples = []
+    for p in range(3):
+        triples.append((rows, 3 * touching.first + p, at_first[:, p]))
+        triples.append((rows, 3 * touching.second + p, -at_second[:, p]))
+    root = np.full(number, np.sqrt(slope))
+    for p in (1, 2):
+        triples.append((rows + p * number, 3 * touching.first + p, root))
+        triples.append((rows + p * number, 3 * touching.second + p, -root))
+    row, column, value = (np.concatenate(parts) for parts in zip(*triples, strict=True))
+    difference = sparse.csr_array((value, (row, column)), shape=(3 * number, 3 * count))
+    return difference.T @ sparse.diags_array(np.tile(strength, 3)) @ difference

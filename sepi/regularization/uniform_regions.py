@@ -1,0 +1,186 @@
+"""Regions without texture, told from faint texture by the noise, and planes for them.
+
+The mean of all views that see a pixel has a small fraction of one view's noise. A region is uniform where the mean's
+gradients are no larger than that noise explains: then no view knows anything about its depth, whatever a threshold on
+contrast says. (This takes the place of the paper's LTI, section IV-C of [1]_.)
+
+What is known lies on its border. An edge moves with the nearer of the two surfaces that meet there, so the region is
+nowhere nearer than its border: the plane sought agrees with as much of the border as possible, while border that
+would lie *behind* it counts against it. Border that is nearer belongs to what stands before the region.
+
+References
+----------
+.. [1] Zhou, Shi, Liu, Jin, Zhang, Hou: Light Field Depth Estimation via Stitched Epipolar Plane Images.
+"""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+from pydantic import Field
+
+from sepi.image.noise import noise_level
+from sepi.lightfield import BoolMap, FloatMap, LightField
+from sepi.matching.base_detail import LayerParameters, split_layers
+from sepi.matching.plane_sweep import full_scale
+from sepi.stage import Parameters, StageMaps
+
+LEAST_NOISE = 1e-5
+"""Noise below which rounding of float32 is noise too; integers have at least 0.3 levels by rounding."""
+
+_PIXELS_OF_A_PLANE = 12  # least border to fit one to
+
+
+class UniformPlanesParameters(Parameters):
+    """Parameters of uniform regions and their planes."""
+
+    colour_scale: float = Field(
+        0.0316, ge=1e-6, le=2, description="residual at which a view counts half in the mean; RGB distance, 0..1"
+    )
+    window_radius: int = Field(4, ge=1, le=20, description="gradients are averaged over 2 r + 1 pixels")
+    noise_factor: float = Field(
+        4.0, gt=0, description="squared gradient, in units of what noise explains, below which a region is uniform"
+    )
+    growth: int = Field(
+        8, ge=0, le=50, description="how far beyond the window's reach a region grows into its own colour, in pixels"
+    )
+    colour_tolerance: float = Field(
+        0.0102, ge=0, le=1, description="RGB distance that counts as the region's colour, colours in 0..1"
+    )
+    grow_confidence: float = Field(0.75, ge=0, le=1, description="confidence beyond which a pixel keeps its own depth")
+    least_area: int = Field(50, ge=1, description="smaller regions are left alone, in pixels")
+    border_confidence: float = Field(0.3, ge=0, le=1, description="confidence from which a border pixel counts")
+    tolerance: float = Field(0.05, gt=0, description="distance from the plane of what agrees, pixels per view step")
+    contradiction: float = Field(
+        2.0, ge=0, description="weight of border behind the plane against border that agrees with it"
+    )
+    least_agreement: float = Field(0.25, ge=0, le=1, description="share of the border without which there is no plane")
+    trials: int = Field(500, ge=1, description="planes tried for each region")
+    cover: float = Field(0.15, ge=0, description="by how much a cover must be nearer, pixels per view step")
+
+
+def filled(light_field: LightField, before: StageMaps, parameters: UniformPlanesParameters) -> tuple[FloatMap, BoolMap]:
+    """Disparity with planes in uniform regions, and these regions.
+
+    Parameters
+    ----------
+    light_field : LightField
+    before : StageMaps
+    parameters : UniformPlanesParameters
+
+    Returns
+    -------
+    disparity : ndarray, shape (H, W), float32
+    uniform : ndarray, shape (H, W), bool
+        The regions that have a plane.
+
+    Raises
+    ------
+    SepiError
+        If the disparity range is unknown.
+    """
+    from scipy import ndimage
+
+    from sepi.matching.gauss_newton import prepared, view_mean
+    from sepi.matching.visibility_kernels import z_buffers
+
+    colours = LayerParameters(colour_scale=parameters.colour_scale, detail_share=0.0)
+    matching = prepared(light_field, split_layers(light_field, colours), colours)
+    nearest = z_buffers(before.disparity, light_field.present, *light_field.reference)
+    mean = view_mean(matching, before.disparity, nearest, parameters.cover)
+    views = int(light_field.present.sum())
+    rounding = 0.3 / full_scale(light_field.views.dtype) if light_field.views.dtype != np.float32 else 0.0
+    variance = max(noise_level(light_field.centre), rounding, LEAST_NOISE) ** 2 / views
+    known = light_field.known_range()
+    uniform = uniform_regions(mean, variance, before.confidence, parameters)
+    disparity = before.disparity.copy()
+    labels, _ = ndimage.label(uniform)
+    random = np.random.default_rng(0)
+    for number, place in enumerate(ndimage.find_objects(labels), start=1):
+        around = tuple(slice(max(side.start - 2, 0), side.stop + 2) for side in place)
+        own = labels[around] == number
+        if own.sum() < parameters.least_area:
+            uniform[around][own] = False
+            continue
+        border = cv2.dilate(own.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
+        border &= ~uniform[around] & (before.confidence[around] > parameters.border_confidence)
+        plane = supporting_plane(border, before.disparity[around], parameters, random)
+        if plane is None:
+            uniform[around][own] = False
+        else:
+            y, x = np.nonzero(own)
+            values = plane[0] + plane[1] * x + plane[2] * y
+            # a plane that its border holds at one side only may lead anywhere
+            disparity[around][own] = np.clip(values, known.minimum, known.maximum)
+    return disparity, uniform
+
+
+def uniform_regions(
+    mean: FloatMap, variance: float, confidence: FloatMap, parameters: UniformPlanesParameters
+) -> BoolMap:
+    """Where the mean of the views varies no more than its noise.
+
+    Parameters
+    ----------
+    mean : ndarray, shape (H, W, 3), float32
+        Colours, 0..1.
+    variance : float
+        Of the noise of one channel of the mean.
+    confidence : ndarray, shape (H, W), float32
+    parameters : UniformPlanesParameters
+
+    Returns
+    -------
+    ndarray, shape (H, W), bool
+    """
+    down, across = np.gradient(mean, axis=(0, 1))
+    size = 2 * parameters.window_radius + 1
+    energy = cv2.blur((down**2 + across**2).sum(axis=2), (size, size))
+    # central differences halve the noise along each of the two axes; three channels
+    core = energy < parameters.noise_factor * 3 * variance
+    if not core.any():
+        return np.asarray(core)
+    size += 2 * parameters.growth
+    near = cv2.blur(core.astype(np.float32), (size, size))
+    colour = cv2.blur(mean * core[..., None].astype(np.float32), (size, size)) / np.maximum(near, 1e-9)[..., None]
+    alike = ((mean - colour) ** 2).sum(axis=2) < 27 * variance + parameters.colour_tolerance**2
+    # a running sum leaves rounding errors where there is nothing
+    return np.asarray(core | ((near > 0.5 / size**2) & alike & (confidence < parameters.grow_confidence)))
+
+
+def supporting_plane(
+    border: BoolMap, disparity: FloatMap, parameters: UniformPlanesParameters, random: np.random.Generator
+) -> npt.NDArray[np.float64] | None:
+    """Plane that most of a border agrees with and little of it lies behind.
+
+    Parameters
+    ----------
+    border : ndarray, shape (h, w), bool
+    disparity : ndarray, shape (h, w), float32
+    parameters : UniformPlanesParameters
+    random : numpy.random.Generator
+
+    Returns
+    -------
+    ndarray, shape (3,), or None
+        ``a, b, c`` of ``a + b x + c y``; None where too little of the border agrees.
+    """
+    y, x = np.nonzero(border)
+    values = disparity[border].astype(np.float64)
+    if values.size < _PIXELS_OF_A_PLANE:
+        return None
+    places = np.stack([np.ones(values.size), x, y], axis=1)
+    best, chosen = -np.inf, None
+    for _ in range(parameters.trials):
+        three = random.choice(values.size, 3, replace=False)
+        if abs(np.linalg.det(places[three])) < 1e-9:
+            continue
+        residual = values - places @ np.linalg.solve(places[three], values[three])
+        agreement = np.abs(residual) < parameters.tolerance
+        score = agreement.sum() - parameters.contradiction * (residual < -parameters.tolerance).sum()
+        if score > best:
+            best, chosen = score, agreement
+    if chosen is None or chosen.sum() < max(3, parameters.least_agreement * values.size):
+        return None
+    return np.asarray(np.linalg.lstsq(places[chosen], values[chosen], rcond=None)[0])

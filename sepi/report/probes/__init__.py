@@ -1,0 +1,1 @@
+"""The method at work on single pixels."""

@@ -1,0 +1,158 @@
+"""The cost curves of a single pixel: what the sweep minimises there (Eq. 3-5 of [1]_).
+
+:func:`sepi.matching.plane_sweep.sweep` never holds a cost curve; here those of one pixel are computed again, in plain NumPy on the few
+samples that its aggregation window meets.
+
+References
+----------
+.. [1] Zhou, Shi, Liu, Jin, Zhang, Hou: Light Field Depth Estimation via Stitched Epipolar Plane Images.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from sepi.errors import SepiError
+from sepi.image.noise import residual_variance
+from sepi.lightfield import FloatMap, LightField, as_unit_float
+from sepi.matching.photo_consistency import sample_offsets
+from sepi.matching.plane_sweep import SweepParameters
+from sepi.matching.view_subsets import halves_and_quarters
+
+
+@dataclass(frozen=True)
+class Curves:
+    """Cost of every candidate at one pixel, for all views and for the halves and quarters of the view grid.
+
+    Attributes
+    ----------
+    disparities : ndarray, shape (K,), float32
+        Candidates, uniform, pixels per view step.
+    names : tuple of str, length N
+        Subsets of the views, as :func:`sepi.matching.view_subsets.halves_and_quarters` names them.
+    costs : ndarray, shape (N, K), float32
+        Aggregated mean of the robust photo-consistency (Eq. 3), 0..1; 1 where no view of the subset sees the pixel.
+    """
+
+    disparities: FloatMap
+    names: tuple[str, ...]
+    costs: FloatMap
+
+    def minimum(self, name: str = "full") -> tuple[float, float]:
+        """Disparity at a subset's lowest cost, refined below the candidate step by a parabola, and that cost (Eq. 4).
+
+        As the sweep takes it: the first of equal minima; no parabola at the ends or through a perfect match.
+        """
+        costs = self.costs[self.names.index(name)].astype(np.float64)
+        best = int(costs.argmin())
+        offset = 0.0
+        if costs[best] > 0 and 0 < best < len(costs) - 1:
+            before, lowest, after = costs[best - 1 : best + 2]
+            curvature = before - 2 * lowest + after
+            offset = 0.5 * (before - after) / curvature if curvature > 0 else 0.0
+        step = float(self.disparities[-1] - self.disparities[0]) / (len(costs) - 1)
+        return float(self.disparities[best]) + offset * step, float(costs[best])
+
+    def best_subset(self) -> str:
+        """Name of the subset with the lowest cost of all; the first of equal ones."""
+        return self.names[int(self.costs.min(axis=1).argmin())]
+
+
+def cost_curves(
+    light_field: LightField, y: int, x: int, parameters: SweepParameters, *, noise: float | None = None
+) -> Curves:
+    """Cost of every candidate at one pixel, as :func:`sepi.matching.plane_sweep.sweep` minimises it.
+
+    Parameters
+    ----------
+    light_field : LightField
+        With a known disparity range.
+    y, x : int
+        Pixel of the reference view.
+    parameters : SweepParameters
+    noise : float, optional
+        ``residual_variance(light_field.centre)``, the same for all pixels; computed unless given.
+
+    Returns
+    -------
+    Curves
+
+    Raises
+    ------
+    SepiError
+        If the pixel lies outside the reference view or the disparity range is unknown.
+    """
+    require_inside(light_field, y, x)
+    (T, S), (t0, s0), (H, W) = light_field.grid, light_field.reference, light_field.shape
+    disparities = light_field.known_range().candidates(parameters.candidates)
+    noise = residual_variance(light_field.centre) if noise is None else noise
+    r = parameters.window_radius
+    rows = np.arange(max(0, y - r), min(H, y + r + 1))
+    columns = np.arange(max(0, x - r), min(W, x + r + 1))
+    centre = as_unit_float(light_field.views[t0, s0][np.ix_(rows, columns)]).transpose(2, 0, 1)
+    difference = centre - centre[:, y - rows[0], x - columns[0], None, None]
+    weights = np.exp(-0.5 * (difference**2).sum(axis=0) / np.float32(parameters.window_sigma**2 + noise))
+    weights = (weights / weights.sum()).astype(np.float32)
+    scale2 = np.float32(parameters.scale**2 + noise)
+    views = halves_and_quarters(light_field.grid, light_field.reference)
+    sums, counts = np.zeros((2, views.subsets.shape[1], len(disparities)), np.float32)
+    down, fy = sample_offsets(disparities, np.arange(T) - t0)
+    across, fx = sample_offsets(disparities, np.arange(S) - s0)
+    for t, s in np.argwhere(light_field.present):
+        if (t, s) == (t0, s0):
+            continue
+        top, left = rows + down[t][:, None], columns + across[s][:, None]
+        # as the sweep counts: a sample on the last row needs none below, one on the last column does not count
+        inside_y = (top >= 0) & ((top < H - 1) | ((top == H - 1) & (fy[t] == 0)[:, None]))
+        inside_x = (left >= 0) & (left < W - 1)
+        squared = _squared_residuals(light_field.views[t, s], centre, top, left, fy[t], fx[s])
+        residual = squared / (squared + scale2)
+        if not (inside_y.all() and inside_x.all()):
+            residual *= inside_y[:, :, None] & inside_x[:, None]
+        group = views.groups[t, s]
+        sums[group] += np.einsum("kyx,yx->k", residual, weights)
+        counts[group] += ((inside_y @ weights) * inside_x).sum(axis=1)
+    total, number = views.subsets.astype(np.float32) @ sums, views.subsets.astype(np.float32) @ counts
+    costs = np.divide(total, number, out=np.ones_like(total), where=number > 0)
+    return Curves(disparities, views.names, costs)
+
+
+def require_inside(light_field: LightField, y: int, x: int) -> None:
+    """Raise :class:`sepi.errors.SepiError` unless the pixel lies in the reference view."""
+    H, W = light_field.shape
+    if not (0 <= y < H and 0 <= x < W):
+        raise SepiError(
+            f"{light_field.name}: pixel (y, x) = ({y}, {x}) lies outside the reference view; "
+            f"rows go from 0 to {H - 1}, columns from 0 to {W - 1}"
+        )
+
+
+def _squared_residuals(
+    view: npt.NDArray[np.generic],
+    centre: FloatMap,
+    top: npt.NDArray[np.int64],
+    left: npt.NDArray[np.int64],
+    fy: FloatMap,
+    fx: FloatMap,
+) -> FloatMap:
+    """Squared colour differences (K, h, w) of the window (C, h, w) to its bilinear samples in a view (H, W, C).
+
+    ``top (K, h)`` and ``left (K, w)`` are the samples' whole pixels, ``fy`` and ``fx (K,)`` their fractions. What lies
+    outside the view is sampled at its edge.
+    """
+    H, W, _ = view.shape
+    rows = np.clip(np.arange(top.min(), top.max() + 2), 0, H - 1)
+    columns = np.clip(np.arange(left.min(), left.max() + 2), 0, W - 1)
+    crop = as_unit_float(view[rows[:, None], columns]).transpose(2, 0, 1)
+    size = (centre.shape[1] + 1, centre.shape[2] + 1)
+    windows = np.lib.stride_tricks.sliding_window_view(crop, size, axis=(1, 2))
+    block = windows[:, top[:, 0] - top.min(), left[:, 0] - left.min()]
+    fy, fx = fy[:, None, None], fx[:, None, None]
+    above, below = block[:, :, :-1], block[:, :, 1:]
+    level = above + fy * (below - above)
+    sample = level[..., :-1] + fx * (level[..., 1:] - level[..., :-1])
+    sample -= centre[:, None]
+    return np.asarray(np.einsum("ckyx,ckyx->kyx", sample, sample), np.float32)

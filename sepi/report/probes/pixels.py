@@ -1,0 +1,176 @@
+"""Pixels worth a look, chosen from the maps of a variant: sure, occluded on each side, texture-less, wrong, unsure.
+
+Truth only helps to find the largest error; this is for display, no estimator calls it.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from sepi.lightfield import BoolMap, FloatMap, LightField
+from sepi.matching.view_subsets import SIDES, halves_and_quarters
+from sepi.stage import StageMaps
+
+COUNT = 8
+"""Pixels that are chosen unless fewer are asked for: one of each kind."""
+
+APART = 12
+"""Least distance between two of them, pixels."""
+
+BORDER = 8
+"""Distance from the picture's border that they keep where the picture is large enough, pixels."""
+
+# side in pixels of the windows over which a property must hold, lest a single odd pixel is chosen
+_WINDOW = 5
+# distance within which the occluder of a pixel is looked for, and a sure pixel has no depth step, pixels
+_REACH = 10
+# disparity from end to end of a neighbourhood beyond which it has a depth step, pixels per view step
+_DEPTH_STEP = 0.3
+# step to the occluder beyond which a larger one is no clearer, pixels per view step
+_CLEAR_STEP = 2.0
+# gradient (full range per pixel) beyond which more texture is no better to look at
+_CLEAR_TEXTURE = 0.03
+
+
+class InterestingPixel(NamedTuple):
+    """A pixel of the reference view and why it is worth a look."""
+
+    y: int
+    x: int
+    label: str
+
+
+def interesting_pixels(
+    light_field: LightField, maps: StageMaps, truth: FloatMap | None, count: int = COUNT
+) -> list[InterestingPixel]:
+    """Choose pixels that show how the method works and where it fails.
+
+    In order, as far as the scene has them: textured and sure; occluded, by the half of the views that is kept, the
+    clearest first; texture-less; of the largest error; unsure. Equal input gives equal pixels.
+
+    Parameters
+    ----------
+    light_field : LightField
+    maps : StageMaps
+        Final maps of a variant; its masks and ``occlusion_side`` are used where it has them.
+    truth : ndarray, shape (H, W), float32, or None
+        True disparity; may hold values that are not finite.
+    count : int
+        At most so many.
+
+    Returns
+    -------
+    list of InterestingPixel
+        Distinct, at least ``APART`` from each other, and ``BORDER`` from the picture's border where it is large enough.
+    """
+    texture = _texture(light_field.centre)
+    scores = [
+        ("textured and sure", _sure(texture, maps)),
+        *_occluded(texture, maps),
+        _textureless(texture, maps),
+        ("largest error", _wrong(maps.disparity, truth)),
+        ("textured but unsure", _unsure(texture, maps)),
+    ]
+    free = _inner(light_field.shape)
+    found: list[InterestingPixel] = []
+    for label, score in scores:
+        if len(found) >= count or not free.any():
+            break
+        # a score of zero is no case of its kind
+        values = np.where(free, np.nan_to_num(score), 0)
+        y, x = (int(place) for place in np.unravel_index(values.argmax(), values.shape))
+        if values[y, x] > 0:
+            found.append(InterestingPixel(y, x, label))
+            rows, columns = np.ogrid[: free.shape[0], : free.shape[1]]
+            free &= (rows - y) ** 2 + (columns - x) ** 2 >= APART**2
+    return found
+
+
+def _texture(centre: FloatMap) -> FloatMap:
+    """Strength of the gradient around each pixel, full range per pixel; shape (H, W)."""
+    energy = np.zeros(centre.shape[:2], np.float32)
+    for channel in range(centre.shape[2]):
+        plane = np.ascontiguousarray(centre[:, :, channel])
+        for dx, dy in ((1, 0), (0, 1)):
+            # Scharr's weights sum to 32 per pixel of distance
+            energy += np.square(cv2.Scharr(plane, cv2.CV_32F, dx, dy) / 32)
+    return np.sqrt(_blurred(energy / centre.shape[2]))
+
+
+def _sure(texture: FloatMap, maps: StageMaps) -> FloatMap:
+    sure = _blurred(maps.confidence) * np.minimum(texture / _CLEAR_TEXTURE, 1)
+    alone = ~(maps.mask("occluded") | maps.mask("textureless"))
+    smooth = alone & (_spread(maps.disparity, _REACH) < _DEPTH_STEP)
+    return np.where(smooth if smooth.any() else alone, sure, 0).astype(np.float32)
+
+
+def _occluded(texture: FloatMap, maps: StageMaps) -> list[tuple[str, FloatMap]]:
+    """A label and score for each half of the views that is kept somewhere, the highest score first."""
+    names = halves_and_quarters((3, 3)).names
+    side = maps.extra.get("occlusion_side", np.zeros(maps.disparity.shape, np.uint8))
+    # a map that changes from pixel to pixel has been smoothed over the edge, or is not sure which side is which
+    even = 1 / (1 + _spread(maps.disparity, 1) / _DEPTH_STEP)
+    clear = even * np.minimum(texture / _CLEAR_TEXTURE, 1) * np.nan_to_num(maps.confidence)
+    scores = []
+    for name, (dt, ds) in SIDES.items():
+        kept = side == names.index(name)
+        # the views kept lie towards (dt, ds), so the occluder lies the other way
+        step = _nearest_towards(maps.disparity, -dt, -ds) - maps.disparity
+        step = np.clip(np.nan_to_num(step), 0, _CLEAR_STEP)
+        score = np.where(kept, _blurred(kept.astype(np.float32)) * step * clear, 0).astype(np.float32)
+        scores.append((f"occluded, {name} half kept", score))
+    return sorted(scores, key=lambda labelled: -float(labelled[1].max()))
+
+
+def _nearest_towards(disparity: FloatMap, dy: int, dx: int) -> FloatMap:
+    """Largest disparity on the stretch from each pixel in direction ``(dy, dx)``, itself included."""
+    kernel = np.zeros((2 * _REACH + 1, 2 * _REACH + 1), np.uint8)
+    steps = np.arange(_REACH + 1)
+    kernel[_REACH + dy * steps, _REACH + dx * steps] = 1
+    return np.asarray(cv2.dilate(np.nan_to_num(disparity), kernel), np.float32)
+
+
+def _spread(disparity: FloatMap, radius: int) -> FloatMap:
+    """Largest less smallest disparity of the square neighbourhood of each pixel."""
+    kernel = np.ones((2 * radius + 1, 2 * radius + 1), np.uint8)
+    finite = np.nan_to_num(disparity)
+    return np.asarray(cv2.dilate(finite, kernel) - cv2.erode(finite, kernel), np.float32)
+
+
+def _textureless(texture: FloatMap, maps: StageMaps) -> tuple[str, FloatMap]:
+    """A label, and how far inside the texture-less regions; without any, how little texture there is."""
+    mask = maps.mask("textureless")
+    if not mask.any():
+        return "least texture", np.asarray(1 / (1 + texture / _CLEAR_TEXTURE), np.float32)
+    # a frame, so that a picture without any texture has a middle too
+    framed = np.pad(mask.astype(np.uint8), 1)
+    inside = cv2.distanceTransform(framed, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)[1:-1, 1:-1]
+    return "texture-less", np.asarray(inside, np.float32)
+
+
+def _wrong(disparity: FloatMap, truth: FloatMap | None) -> FloatMap:
+    if truth is None:
+        return np.zeros_like(disparity)
+    return _blurred(np.nan_to_num(np.abs(disparity - truth), nan=0.0, posinf=0.0))
+
+
+def _unsure(texture: FloatMap, maps: StageMaps) -> FloatMap:
+    doubt = np.clip(1 - _blurred(maps.confidence), 0, 1) * np.minimum(texture / _CLEAR_TEXTURE, 1)
+    return np.where(maps.mask("occluded") | maps.mask("textureless"), 0, doubt).astype(np.float32)
+
+
+def _blurred(values: FloatMap) -> FloatMap:
+    finite = np.ascontiguousarray(np.nan_to_num(values), np.float32)
+    return np.asarray(cv2.blur(finite, (_WINDOW, _WINDOW)), np.float32)
+
+
+def _inner(shape: tuple[int, int]) -> BoolMap:
+    """Pixels away from the border, as far as the picture has any."""
+    inner: npt.NDArray[np.bool_] = np.zeros(shape, bool)
+    y, x = (min(BORDER, (size - 1) // 2) for size in shape)
+    inner[y : shape[0] - y, x : shape[1] - x] = True
+    return inner

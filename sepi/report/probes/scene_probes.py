@@ -1,0 +1,59 @@
+"""Single pixels of a scene that the report looks into: those asked for, and a few that show how the method works."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from sepi.image.noise import residual_variance
+from sepi.io.provenance import history_of
+from sepi.matching.plane_sweep import SweepParameters
+from sepi.report.plan import BEST_VARIANT, MAIN_VARIANT
+from sepi.report.probes.pixels import InterestingPixel, interesting_pixels
+from sepi.report.probes.probe import Probe, probe
+from sepi.report.web.scene_panels import SceneResults
+
+
+def scene_probes(results: SceneResults, final_file: Path, asked: Sequence[InterestingPixel]) -> list[Probe]:
+    """What the paper's method sees at single pixels of a scene.
+
+    Parameters
+    ----------
+    results : SceneResults
+    final_file : Path
+        File of the last stage of the paper's method: it knows the sweep's parameters.
+    asked : sequence of InterestingPixel
+        Pixels to look into beside the automatic ones.
+
+    Returns
+    -------
+    list of Probe
+        Those asked for first; pixels without a depth are left out.
+    """
+    maps = results.final(MAIN_VARIANT)
+    light_field = results.light_field
+    places = [*asked, *interesting_pixels(light_field, maps, light_field.truth)]
+    noise = residual_variance(light_field.centre)
+    parameters = sweep_parameters(final_file)
+    return [
+        probe(
+            light_field,
+            place.y,
+            place.x,
+            maps=maps,
+            parameters=parameters,
+            best=results.final(BEST_VARIANT) if BEST_VARIANT in results.maps else None,
+            label=place.label,
+            noise=noise,
+        )
+        for place in places
+        if np.isfinite(maps.disparity[place.y, place.x])
+    ]
+
+
+def sweep_parameters(final_file: Path) -> SweepParameters:
+    """The parameters of the sweep that a final map of the paper's method began with."""
+    known = history_of(final_file)[0]["parameters"]
+    return SweepParameters(**{name: known[name] for name in SweepParameters.model_fields if name in known})

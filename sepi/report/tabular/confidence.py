@@ -1,0 +1,136 @@
+"""What the confidence is worth: errors by decile of confidence, and sparsification curves [1]_.
+
+References
+----------
+.. [1] Ilg et al.: Uncertainty estimates and multi-hypotheses networks for optical flow. ECCV 2018.
+   doi:10.1007/978-3-030-01234-2_40
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from sepi.evaluate import PROTOCOLS
+from sepi.lightfield import FloatMap
+from sepi.report.runs import Runs
+from sepi.report.tabular.layout import OURS, TEXT, Cell, Column, Entry, Grid, Line, Report, Row, Section, Table
+
+DECILES = 10
+
+_STEPS = 100
+
+FloatArray = npt.NDArray[np.float64]
+
+
+def decile_errors(confidence: FloatMap, error: FloatMap) -> tuple[FloatArray, FloatArray]:
+    """Errors of the tenths of the pixels, from the most confident to the least.
+
+    Parameters
+    ----------
+    confidence, error : ndarray, shape (H, W), float32
+        Pixels whose error is not finite are left out.
+
+    Returns
+    -------
+    squared, absolute : ndarray, shape (10,), float64
+        Mean squared and mean absolute error of each tenth, times 100; NaN where there is no pixel.
+    """
+    ordered = _by_confidence(confidence, error)
+    tenths = np.array_split(ordered, DECILES)
+    return (
+        np.array([100 * np.mean(tenth**2) if tenth.size else np.nan for tenth in tenths]),
+        np.array([100 * np.mean(np.abs(tenth)) if tenth.size else np.nan for tenth in tenths]),
+    )
+
+
+def sparsification(confidence: FloatMap, error: FloatMap) -> FloatArray:
+    """Mean absolute error of the pixels that stay when the least confident are taken away.
+
+    Parameters
+    ----------
+    confidence, error : ndarray, shape (H, W), float32
+
+    Returns
+    -------
+    ndarray, shape (100,), float64
+        Times 100; with 0, 1, ... 99 % of the pixels taken away. NaN where no error is finite.
+    """
+    sums = np.cumsum(np.abs(_by_confidence(confidence, error)))
+    if sums.size == 0:
+        return np.full(_STEPS, np.nan)
+    kept = np.maximum(1, np.rint(sums.size * (1 - np.arange(_STEPS) / _STEPS))).astype(np.int64)
+    return np.asarray(100 * sums[kept - 1] / kept)
+
+
+def oracle(error: FloatMap) -> FloatArray:
+    """The curve of :func:`sparsification` for a confidence that knows the errors: none can lie lower."""
+    return sparsification(-np.abs(error), error)
+
+
+def confidence_table(runs: Runs) -> Report:
+    """Mean errors by decile of confidence and the area under the sparsification curve, beside the oracle's."""
+    rows: list[Row] = []
+    lines: list[Line] = []
+    for dataset in runs.plan.scenes:
+        for scene in runs.scored(dataset):
+            for variant in runs.plan.compared:
+                found = runs.confidence(dataset, scene, variant)
+                if found is None:
+                    continue
+                areas: list[Cell] = [_mean(found["curve"]), _mean(found["oracle"]), found["curve"][0]]
+                for name, figures in (("mse100", found["squared"]), ("mae100", found["absolute"])):
+                    rows.append([dataset, scene, variant, name, *figures, *areas])
+                figures_shown = [*found["absolute"], *areas]
+                lines.append(Line([Entry(f"{dataset}/{scene}", TEXT), Entry(variant, TEXT), *_own(figures_shown)]))
+    tenths = [f"decile {i}" for i in range(1, DECILES + 1)]
+    heads = [Column(head, OURS) for head in (*tenths, "area", "oracle", "random")]
+    return Report(
+        "Confidence",
+        f"Protocol: paper (border {PROTOCOLS['paper']}, the whole map). Mean absolute error x100 of each tenth of the "
+        "pixels, from the most confident (1) to the least (10); mean squared errors are in the CSV file. Area: mean of "
+        "the sparsification curve, which is the mean absolute error x100 of the pixels left when the least confident "
+        "are taken away, from none to 99 %; oracle: the same when the pixels with the largest errors go first, which "
+        "nothing can beat; random: the error of all pixels, which is what a confidence that says nothing reaches. "
+        "Curves: `maps/DATASET/SCENE/VARIANT/sparsification.png`.",
+        Table(["dataset", "scene", "variant", "error", *tenths, "area", "oracle", "random"], rows),
+        [Section("", Grid([Column("scene", TEXT), Column("variant", TEXT), *heads], lines))],
+    )
+
+
+def write_curves(folder: Path, confidence: FloatMap, error: FloatMap) -> None:
+    """Plot the sparsification curve of a map beside the oracle's as ``sparsification.png`` and ``.pdf``."""
+    # slow to import, and not needed for the tables
+    from sepi.report.plots.saving import new_figure, save
+
+    # margins by hand: a layout engine takes longer than the rest
+    figure = new_figure(5, 3.5, layout=None)
+    axis = figure.add_axes((0.14, 0.14, 0.83, 0.83))
+    taken = np.arange(_STEPS)
+    for name, curve, style in (
+        ("by confidence", sparsification(confidence, error), "-"),
+        ("oracle", oracle(error), "--"),
+    ):
+        axis.plot(taken, curve, style, label=f"{name}, area {curve.mean():.3f}")
+    axis.set_xlabel("pixels taken away / %")
+    axis.set_ylabel("mean absolute error x100 / px")
+    axis.set_ylim(bottom=0)
+    axis.legend()
+    save(figure, folder, "sparsification")
+
+
+def _own(figures: Sequence[Cell]) -> list[Entry]:
+    return [Entry(figure, OURS) for figure in figures]
+
+
+def _mean(values: Sequence[float]) -> float:
+    return float(np.mean(values))
+
+
+def _by_confidence(confidence: FloatMap, error: FloatMap) -> FloatArray:
+    known = np.isfinite(error)
+    order = np.argsort(-confidence[known], kind="stable")
+    return np.asarray(error[known][order], np.float64)

@@ -1,0 +1,161 @@
+"""A small page about two disparity maps: the report's viewer, and their scores where there is ground truth."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from sepi.evaluate import PROTOCOLS, REGIONS, WHOLE_MAP, region_masks, score
+from sepi.io.scores import Scores
+from sepi.lightfield import FloatMap, LightField
+from sepi.report.page import SCRIPTS, colour_scales, embedded_scenes, environment
+from sepi.report.plots.pictures import centre_picture
+from sepi.report.web.viewer import Viewer
+
+# part of the pixels beyond each end of the colour scale, so that a few wrong ones do not use it up
+_BEYOND = 0.005
+
+_SHOWN = {"mse100": "MSE x100", "q25": "Q25 x100", "badpix007": "BadPix 0.07 %", "non_finite": "not finite"}
+
+AllScores = dict[str, dict[str, Scores]]
+"""Protocol to region to scores."""
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Two maps of one view, and what is known about it.
+
+    Attributes
+    ----------
+    names : (str, str)
+    maps : (ndarray, ndarray), shape (H, W), float32
+        Pixels per view step.
+    truth : ndarray, shape (H, W), float32, or None
+    light_field : LightField or None
+        Gives the reference view and the regions.
+    """
+
+    names: tuple[str, str]
+    maps: tuple[FloatMap, FloatMap]
+    truth: FloatMap | None = None
+    light_field: LightField | None = None
+    scores: tuple[AllScores, ...] = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "scores", tuple(self._scores(values) for values in self.maps) if self._known else ())
+
+    @property
+    def _known(self) -> bool:
+        return self.truth is not None
+
+    def _scores(self, values: FloatMap) -> AllScores:
+        assert self.truth is not None
+        scene = self.light_field
+        masks = region_masks(scene) if scene is not None and scene.truth is not None else {}
+        regions = REGIONS if masks else (WHOLE_MAP,)
+        return {
+            protocol: {region: score(values, self.truth, border, masks.get(region)) for region in regions}
+            for protocol, border in PROTOCOLS.items()
+        }
+
+
+def comparison_page(found: Comparison) -> str:
+    """The page, HTML."""
+    viewer = _viewer(found)
+    scene = {
+        "dataset": found.names[0],
+        "scene": found.names[1],
+        "grid": [1, 1],
+        "first": {"a": "a", "b": "b"},
+        **viewer.to_json(),
+        "probes": [],
+    }
+    return (
+        environment()
+        .get_template("compare.html.j2")
+        .render(
+            title=f"{found.names[0]} beside {found.names[1]}",
+            names=found.names,
+            section=_score_section(found),
+            scenes=embedded_scenes([scene]),
+            first=scene,
+            scales=colour_scales(),
+            scripts=[name for name in SCRIPTS if name != "pixel.js"],
+        )
+    )
+
+
+def _viewer(found: Comparison) -> Viewer:
+    a, b = found.maps
+    light_field = found.light_field
+    picture = None if light_field is None else centre_picture(light_field)
+    camera = None if light_field is None else light_field.camera
+    from_centre = (0, 0) if light_field is None else light_field.from_centre
+    viewer = Viewer((a.shape[0], a.shape[1]), _limits(found), picture, camera, from_centre)
+    if picture is not None:
+        viewer.panel("Scene", "centre", "reference view", "picture")
+    numbers = [viewer.map(values, "final") for values in (a, b)]
+    truth = None if found.truth is None else viewer.map(found.truth, "final")
+    if truth is not None:
+        viewer.panel("Scene", "truth", "ground truth", "disparity", map=truth)
+    for key, name, number in zip("ab", found.names, numbers, strict=True):
+        viewer.panel("Maps", key, name, "disparity", map=number)
+    title = f"{found.names[0]} less {found.names[1]}"
+    viewer.panel("Maps", "difference", title, "error", map=numbers[0], minus=numbers[1])
+    if truth is not None:
+        for key, name, number in zip("ab", found.names, numbers, strict=True):
+            viewer.panel("Errors", f"{key}/error", f"{name}: error", "error", map=number, minus=truth)
+        title = f"{found.names[0]} beside {found.names[1]}: which is nearer to the truth"
+        viewer.panel(
+            "Errors",
+            "change",
+            title,
+            "change",
+            map=numbers[1],
+            minus=numbers[0],
+            truth=truth,
+            ends=["farther", "nearer"],
+        )
+    return viewer
+
+
+def _limits(found: Comparison) -> tuple[float, float]:
+    """Ends of the scale of disparity: those of the truth, else what nearly all pixels of both maps lie between."""
+    shown = found.maps if found.truth is None else (found.truth,)
+    known = np.concatenate([values[np.isfinite(values)] for values in shown])
+    if known.size == 0:
+        return 0.0, 1.0
+    low, high = (float(end) for end in np.quantile(known, (_BEYOND, 1 - _BEYOND)))
+    return (low, high) if low < high else (low - 0.5, high + 0.5)
+
+
+def _score_section(found: Comparison) -> dict[str, Any] | None:
+    """A table for the page: a row per protocol and region, each score of both maps, the better one marked."""
+    if not found.scores:
+        return None
+    columns = [{"head": head, "kind": "text"} for head in ("protocol", "region")]
+    columns += [{"head": f"{head}, {name}", "kind": "ours"} for head in _SHOWN.values() for name in found.names]
+    rows = []
+    for protocol, regions in found.scores[0].items():
+        for region in regions:
+            cells = [{"text": text, "value": None, "kind": "text", "mark": None} for text in (protocol, region)]
+            for name in _SHOWN:
+                pair = [scores[protocol][region][name] for scores in found.scores]
+                cells += [_cell(value, pair) for value in pair]
+            rows.append({"kind": "", "at_hand": True, "cells": cells})
+    return {"heading": "", "columns": columns, "rows": rows}
+
+
+def _cell(value: float, pair: list[float]) -> dict[str, Any]:
+    known = not np.isnan(value)
+    text = "n/a" if not known else str(value) if isinstance(value, int) else f"{value:.3f}"
+    better = known and value == min(pair) and pair[0] != pair[1]
+    return {"text": text, "value": value if known else None, "kind": "ours", "mark": "best" if better else None}
+
+
+def printed_scores(found: Comparison) -> Mapping[str, AllScores]:
+    """Name of each map to its scores; empty without ground truth."""
+    return dict(zip(found.names, found.scores, strict=False))

@@ -1,0 +1,214 @@
+"""What the page shows beside the tables, from the numbers: headline figures, ablation, times, provenance."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+from sepi.evaluate import REGIONS, WHOLE_MAP
+from sepi.report import published
+from sepi.report.runs import Numbers, Runs
+from sepi.report.tabular.comparison import datasets_of, mean
+
+
+def headline(runs: Runs) -> list[dict[str, Any]]:
+    """Scenes that the paper has too: our figures beside the published ones; then the averages of the others.
+
+    Returns
+    -------
+    list of dict
+        ``scene``; ``published``: MSE x100 and Q25 x100; ``ours``: variant to the same two.
+    """
+    rows: list[dict[str, Any]] = []
+    for dataset in published.DATASETS:
+        for scene in runs.scored(dataset):
+            name = published.paper_scene(dataset, scene)
+            if name is None:
+                continue
+            theirs = [
+                table.cells[dataset, name].get(published.PAPERS_METHOD)
+                for table in (published.table1(), published.table2())
+            ]
+            ours = {
+                variant: [runs.final(dataset, scene, score, variant=variant) for score in ("mse100", "q25")]
+                for variant in runs.plan.compared
+            }
+            rows.append({"scene": f"{dataset}/{scene}", "published": theirs, "ours": ours})
+    for dataset in runs.plan.scenes:
+        scenes = [scene for scene in runs.scored(dataset) if published.paper_scene(dataset, scene) is None]
+        if scenes:
+            name = f"{dataset}, average of {len(scenes)}" if len(scenes) > 1 else f"{dataset}/{scenes[0]}"
+            means = {
+                variant: [
+                    _mean(runs.final(dataset, scene, score, variant=variant) for scene in scenes)
+                    for score in ("mse100", "q25")
+                ]
+                for variant in runs.plan.compared
+            }
+            rows.append({"scene": name, "published": [None, None], "ours": means})
+    return rows
+
+
+def missing_scenes(runs: Runs) -> dict[str, list[str]]:
+    """Scenes of the paper that are not at hand, by data set."""
+    found = {}
+    for dataset in published.DATASETS:
+        here = {published.paper_scene(dataset, scene) for scene in runs.plan.scenes.get(dataset, ())}
+        found[dataset] = [scene for scene in published.table1().scenes(dataset) if scene not in here]
+    return found
+
+
+@dataclass(frozen=True)
+class Bar:
+    """MSE x100 of a variant; None where there is no figure."""
+
+    variant: str
+    ours: float | None
+    published: float | None = None
+
+
+@dataclass(frozen=True)
+class BarGroup:
+    """Bars that are drawn to one scale.
+
+    Attributes
+    ----------
+    dataset, region : str
+        What they are about.
+    scenes : int
+        How many scenes our figures are averages of.
+    rows : list of Bar
+    """
+
+    dataset: str
+    region: str
+    scenes: int
+    rows: list[Bar]
+
+    @property
+    def figures(self) -> list[float]:
+        """All figures that there are."""
+        return [figure for row in self.rows for figure in (row.ours, row.published) if figure is not None]
+
+    @property
+    def largest(self) -> float:
+        """The figure of the longest bar; 1 where all are zero."""
+        return max(self.figures) or 1.0
+
+
+def ablation_bars(runs: Runs) -> list[BarGroup]:
+    """Average MSE x100 of every listed variant beside the published one, a group per data set and region."""
+    groups = []
+    for dataset in datasets_of(runs.plan):
+        scenes = runs.scored(dataset)
+        theirs = published.table4().get(dataset, {})
+        for region in REGIONS:
+            rows = [
+                Bar(
+                    variant,
+                    _mean(runs.final(dataset, scene, "mse100", region, variant) for scene in scenes),
+                    _published(theirs.get(variant), region),
+                )
+                for variant in runs.plan.listed
+            ]
+            groups.append(BarGroup(dataset, "whole map" if region == WHOLE_MAP else region, len(scenes), rows))
+    return [group for group in groups if group.figures]
+
+
+def part_bars(parts: Runs) -> list[BarGroup]:
+    """MSE x100 of the best variant and of those with a part of it switched off, a group per scene."""
+    names = parts.plan.parts
+    pairs = [pair for pair in parts.plan.pairs if names and parts.scores(*pair, names[0])]
+    return [
+        BarGroup(
+            f"{dataset}/{scene}",
+            "whole map",
+            1,
+            [Bar(variant, parts.final(dataset, scene, "mse100", variant=variant)) for variant in names],
+        )
+        for dataset, scene in pairs
+    ]
+
+
+@dataclass(frozen=True)
+class StageTimes:
+    """What every stage of a variant took on a scene: seconds and peak memory in MB, by stage."""
+
+    scene: str
+    variant: str
+    seconds: dict[str, float]
+    memory: dict[str, float]
+
+    @property
+    def total(self) -> float:
+        """Seconds of all stages."""
+        return sum(self.seconds.values())
+
+    @property
+    def peak(self) -> float:
+        """Peak memory of the largest stage, MB."""
+        return max(self.memory.values())
+
+
+def stage_times(runs: Runs) -> list[StageTimes]:
+    """What every stage of the compared variants took, per scene."""
+    rows = []
+    for dataset, scene in runs.plan.pairs:
+        for variant in runs.plan.compared:
+            timings = {stage: runs.timing(dataset, scene, variant, stage) for stage in runs.plan.stages}
+            rows.append(
+                StageTimes(
+                    f"{dataset}/{scene}",
+                    variant,
+                    {stage: timing.seconds for stage, timing in timings.items()},
+                    {stage: timing.peak_memory_mb for stage, timing in timings.items()},
+                )
+            )
+    return rows
+
+
+def total_seconds(*reports: Numbers) -> float:
+    """Seconds of all stage processes in some numbers, each once."""
+    seconds = {
+        (scene["dataset"], scene["scene"], key): stage["seconds"]
+        for numbers in reports
+        for scene in numbers["scenes"]
+        for key, stage in scene["stages"].items()
+    }
+    return float(sum(seconds.values()))
+
+
+def parameter_rows(numbers: Numbers) -> list[tuple[str, list[tuple[str, Any]]]]:
+    """Stage and choice, and its parameters."""
+    return [
+        (f"{stage}: {choice}", list(values.items()))
+        for stage, choices in numbers["parameters"].items()
+        for choice, values in choices.items()
+    ]
+
+
+def shown_variants(runs: Runs, parts: Numbers | None) -> dict[str, dict[str, str]]:
+    """Variants that the page has figures of, and their choice for each stage."""
+    names = [*runs.plan.listed, *(runs.plan.parts if parts is not None else ())]
+    return {name: dict(runs.plan.variants[name]) for name in dict.fromkeys(names)}
+
+
+def first_scene(runs: Runs) -> str:
+    """The scene that is shown first: one that the paper has, else the last, the built-in ones being ordered so."""
+    known = [pair for pair in runs.plan.pairs if published.paper_scene(*pair) is not None]
+    return "/".join(known[0] if known else runs.plan.pairs[-1])
+
+
+def _published(figures: published.Regions | None, region: str) -> float | None:
+    if figures is None:
+        return None
+    name = "overall" if region == WHOLE_MAP else region
+    found: float | None = getattr(figures, name)
+    return found
+
+
+def _mean(values: Iterable[float]) -> float | None:
+    found = mean(values)
+    return None if math.isnan(found) else found

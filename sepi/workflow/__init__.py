@@ -1,0 +1,1 @@
+"""What the Snakemake workflow needs: configuration, datasets, digests of the code, its log."""

@@ -1,0 +1,349 @@
+"""The workflow's configuration: the model of ``config.yaml``, its check, and what the rules are told."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from sepi.errors import SepiError
+from sepi.io.readers.formats import FORMATS
+from sepi.io.readers.options import ORDERS
+from sepi.lightfield import DisparityRange
+from sepi.pipeline import STAGES, VARIANTS, Variant
+from sepi.scenes import SCENES
+from sepi.stage import Parameters
+from sepi.validation import require_known, validated
+from sepi.workflow.datasets import Scene, own_scene, scenes_in
+from sepi.workflow.external_config import ExternalMaps, external_maps
+
+GRAPH_CONFIG = "SEPI_GRAPH_CONFIG"
+"""Environment variable with a configuration (JSON) in place of the workflow's own; the rule graph is asked for so."""
+
+# names of folders and panels that stand beside those of variants
+_RESERVED = ("stages", "imported", "truth", "centre")
+# the built-in scenes have 9x9 views
+_BUILTIN_VIEWS = 81
+# keys whose values are text even where they look like numbers
+_TEXTS = ("path", "pattern", "variable", "exclude")
+_WORDS = {"true": True, "false": False, "null": None}
+
+
+class _Keys(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+
+class Builtin(_Keys):
+    """Keys of ``builtin``."""
+
+    scenes: list[str] = Field(
+        list(SCENES), description="which of the built-in scenes to use, in the order of the tables; [] for none"
+    )
+    size: int = Field(192, ge=64, le=1024, description="height and width of a view in pixels")
+
+
+def _default_stages() -> dict[str, dict[str, dict[str, Any] | None]]:
+    return {
+        stage: {word: choice.parameters().model_dump() for word, choice in choices.items()}
+        for stage, choices in STAGES.items()
+    }
+
+
+_Count = Annotated[int, Field(ge=1)]
+_Place = Annotated[int, Field(ge=0)]
+
+
+class OwnLightField(_Keys):
+    """Keys of one of the ``light_fields``: where it is, and the flags of ``sepi depth`` that say how to read it."""
+
+    path: str = Field(min_length=1)
+    format: str | None = None
+    grid: tuple[_Count, _Count] | None = None
+    pattern: str | None = None
+    axes: str | None = None
+    variable: str | None = None
+    central: _Count | None = None
+    order: str | None = None
+    exclude: list[str] = []
+    view: tuple[_Place, _Place] | None = None
+    follow_links: bool = False
+
+    @property
+    def flags(self) -> tuple[str, ...]:
+        """All but the path, as flags of the command line."""
+        pairs = {"grid": "x", "view": ","}
+        words: list[str] = []
+        for key, value in self.model_dump(exclude={"path", "exclude", "follow_links"}, exclude_none=True).items():
+            words += [f"--{key}", pairs[key].join(map(str, value)) if key in pairs else str(value)]
+        words += [word for view in self.exclude for word in ("--exclude", view)]
+        return (*words, "--follow-links") if self.follow_links else tuple(words)
+
+
+class Report(_Keys):
+    """Keys of ``report``."""
+
+    pixels: dict[str, list[tuple[_Place, _Place]]] = Field(
+        {},
+        description="pixels to look into beside those chosen automatically, such as {hci/cotton: [[200, 310]]}: row "
+        "and column",
+    )
+    parts_of_best: bool = Field(
+        False,
+        description="whether the page also shows the ablation of 'best'; its variants are then run by 'all', too",
+    )
+
+
+class Config(_Keys):
+    """Keys of ``config.yaml``."""
+
+    builtin: Builtin = Field(
+        Builtin(),
+        description="Dataset 'builtin': light fields that the package renders itself, with exact ground truth.",
+    )
+    hci_root: str | None = Field(
+        None,
+        description="Dataset 'hci': a folder of HCI 4D benchmark scenes; every folder in it with input_Cam*.png is a "
+        "scene, also below category folders such as training/. null for none.",
+    )
+    hci_old_root: str | None = Field(
+        None,
+        description="Dataset 'hci_old': a folder with HDF5 files of the HCI archive of 2013 (Wanner et al.). "
+        "null for none.",
+    )
+    light_fields: dict[str, dict[str, Any]] = Field(
+        {},
+        description="Dataset 'own': light fields of any format that 'sepi depth' reads, by a name of yours, such as "
+        "{lego: {path: /data/lego, grid: [17, 17]}}. Beside path: format, grid, pattern, axes, variable, central, "
+        "order, exclude, view, follow_links, which mean what the flags of 'sepi depth' mean.",
+    )
+    external: dict[str, dict[str, Any]] = Field(
+        {},
+        description="Disparity maps that other methods made, by the method's name, to be scored and shown beside ours: "
+        "a folder with SCENE.pfm, .npy, .png or .h5, a file pattern such as {SPO: '/maps/{dataset}/{scene}/spo.pfm'}, "
+        "or {path: ..., scale: ..., offset: ...} where disparity = value * scale + offset.",
+    )
+    report: Report = Field(Report(), description="The report's page.")
+    disparity_range: dict[str, tuple[float, float]] = Field(
+        {},
+        description="Disparity range of single scenes in pixels per view step, such as {hci/cotton: [-1.6, 1.5]}. "
+        "Other scenes have the range of their own parameters.cfg, or one estimated from the views.",
+    )
+    variants: dict[str, dict[str, str]] = Field(
+        {name: variant.choices for name, variant in VARIANTS.items()},
+        description="A choice for each stage. 'paper' is the method; 'paper' to 'no_occlusion_no_textureless' are the "
+        "columns of its table 4. 'best' is the most accurate variant, 'best_...' are the same with one part switched "
+        "off. These have fixed meanings; add variants of your own beside them.",
+    )
+    stages: dict[str, dict[str, dict[str, Any] | None]] = Field(
+        default_factory=_default_stages, description="Parameters of each stage, by choice."
+    )
+
+
+@dataclass(frozen=True)
+class Settings:
+    """A checked configuration.
+
+    Attributes
+    ----------
+    scenes : mapping of (dataset, scene) to Scene
+        Every scene to run on, in the tables' order.
+    variants : mapping of str to Variant
+        The built-in variants, then the user's own.
+    parameters : mapping of stage to choice to Parameters
+        What each stage runs with.
+    external : mapping of str to ExternalMaps
+        Other methods, and where their maps are.
+    report : Report
+        What the report's page shows beside the rest.
+    """
+
+    scenes: Mapping[tuple[str, str], Scene]
+    variants: Mapping[str, Variant]
+    parameters: Mapping[str, Mapping[str, Parameters]]
+    external: Mapping[str, ExternalMaps]
+    report: Report
+
+    @property
+    def datasets(self) -> list[str]:
+        """Names of the datasets that have scenes."""
+        return list(dict.fromkeys(dataset for dataset, _ in self.scenes))
+
+    @property
+    def own_variants(self) -> list[str]:
+        """Names of the variants that the user added."""
+        return [name for name in self.variants if name not in VARIANTS]
+
+    def scenes_of(self, dataset: str) -> list[str]:
+        """Names of a dataset's scenes."""
+        return [name for other, name in self.scenes if other == dataset]
+
+    def scene(self, dataset: str, name: str) -> Scene:
+        """A scene by name.
+
+        Raises
+        ------
+        SepiError
+            If there is none; the message suggests the nearest.
+        """
+        require_known("dataset", [dataset], self.datasets)
+        require_known(f"scene of dataset '{dataset}'", [name], self.scenes_of(dataset))
+        return self.scenes[dataset, name]
+
+    def parameters_json(self, stage: str, choice: str) -> str:
+        """Parameters of a stage's choice as JSON with sorted keys."""
+        return json.dumps(self.parameters[stage][choice].model_dump(mode="json"), sort_keys=True)
+
+    def variants_json(self, variants: Iterable[str]) -> str:
+        """Stage to choice to parameters as JSON, of the choices that some of these variants use."""
+        used = {pair for name in variants for pair in self.variants[name].choices.items()}
+        return json.dumps(
+            {
+                stage: {
+                    word: values.model_dump(mode="json") for word, values in choices.items() if (stage, word) in used
+                }
+                for stage, choices in self.parameters.items()
+            }
+        )
+
+    def external_files(self, dataset: str, name: str) -> dict[str, Path]:
+        """Method to the file of its map of a scene, whether or not it is there.
+
+        Raises
+        ------
+        SepiError
+            If there is no such scene.
+        """
+        scene = self.scene(dataset, name)
+        return {method: maps.file(scene.dataset, scene.name) for method, maps in self.external.items()}
+
+    def external_json(self, dataset: str, name: str) -> str:
+        """What ``python -m sepi.external`` is to read for a scene, in the order of the configuration."""
+        files = self.external_files(dataset, name)
+        return json.dumps(
+            {method: maps.model_dump() | {"path": str(files[method])} for method, maps in self.external.items()}
+        )
+
+
+def load_settings(values: Mapping[str, Any]) -> Settings:
+    """Check a configuration (as read from YAML) and find its scenes.
+
+    Raises
+    ------
+    SepiError
+        One line that names the first key, scene, variant, stage or choice that is wrong, and what would be right.
+    """
+    spelled = {key: _with_numbers(value) for key, value in _with_paths(values).items()}
+    config = validated(Config, spelled, "config")
+    scenes = _scenes(config)
+    ranges = {}
+    for name, (minimum, maximum) in config.disparity_range.items():
+        require_known("config.disparity_range", [name], [f"{dataset}/{scene}" for dataset, scene in scenes])
+        DisparityRange(minimum, maximum, f"config.disparity_range of {name}")
+        ranges[name] = (minimum, maximum)
+    return Settings(
+        {key: replace(scene, disparity_range=ranges.get("/".join(key))) for key, scene in scenes.items()},
+        dict(VARIANTS) | {name: _variant(name, choices) for name, choices in config.variants.items()},
+        _parameters(config.stages),
+        {name: external_maps(name, entry, config.variants) for name, entry in config.external.items()},
+        _report(config.report, scenes),
+    )
+
+
+def _with_paths(values: Mapping[str, Any]) -> Mapping[str, Any]:
+    """A method's path alone under ``external`` as ``{path: ...}``."""
+    external = values.get("external")
+    if not isinstance(external, Mapping):
+        return values
+    return {
+        **values,
+        "external": {name: {"path": entry} if isinstance(entry, str) else entry for name, entry in external.items()},
+    }
+
+
+def _with_numbers(value: Any, top: bool = True) -> Any:
+    """Numbers, true, false and null that were left as text below a key.
+
+    Snakemake reads ``--config 'builtin={size: 96}'`` with text for every value, and YAML takes 1e-4 for text.
+    """
+    if isinstance(value, Mapping):
+        return {key: inner if key in _TEXTS else _with_numbers(inner, False) for key, inner in value.items()}
+    if isinstance(value, list):
+        return [_with_numbers(inner, False) for inner in value]
+    if top or not isinstance(value, str):
+        return value
+    if value in _WORDS:
+        return _WORDS[value]
+    for kind in (int, float):
+        try:
+            number = kind(value)
+        except ValueError:
+            continue
+        return number if math.isfinite(number) else value
+    return value
+
+
+def _scenes(config: Config) -> dict[tuple[str, str], Scene]:
+    require_known("config.builtin.scenes", config.builtin.scenes, SCENES)
+    size = config.builtin.size
+    scenes = [Scene("builtin", name, None, (), _BUILTIN_VIEWS, size, size) for name in config.builtin.scenes]
+    if config.hci_root:
+        scenes += scenes_in(Path(config.hci_root).expanduser(), "hci", "config.hci_root")
+    if config.hci_old_root:
+        scenes += scenes_in(Path(config.hci_old_root).expanduser(), "hci_old", "config.hci_old_root")
+    for name, values in config.light_fields.items():
+        where = f"config.light_fields.{name}"
+        own = validated(OwnLightField, values, where)
+        require_known(f"{where}.order", filter(None, [own.order]), ORDERS)
+        require_known(f"{where}.format", filter(None, [own.format]), FORMATS)
+        scenes.append(own_scene(name, Path(own.path).expanduser(), own.flags, where))
+    if not scenes:
+        raise SepiError("config: no scene to run on; name some in builtin.scenes or light_fields, or set hci_root")
+    return {(scene.dataset, scene.name): scene for scene in scenes}
+
+
+def _variant(name: str, choices: Mapping[str, str]) -> Variant:
+    where = f"config.variants.{name}"
+    require_known(where, choices, STAGES)
+    missing = [stage for stage in STAGES if stage not in choices]
+    if missing:
+        raise SepiError(f"{where}: no choice for stage '{missing[0]}' (one of {', '.join(STAGES[missing[0]])})")
+    for stage, choice in choices.items():
+        require_known(f"{where}.{stage}", [choice], STAGES[stage])
+    if name in VARIANTS and dict(choices) != VARIANTS[name].choices:
+        raise SepiError(f"{where}: a built-in variant has a fixed meaning; give yours another name")
+    if not name.isidentifier() or name in _RESERVED:
+        raise SepiError(f"{where}: a variant's name must be letters, digits and _, and none of {', '.join(_RESERVED)}")
+    return Variant(**choices)
+
+
+def _parameters(stages: Mapping[str, Mapping[str, Mapping[str, Any] | None]]) -> dict[str, dict[str, Parameters]]:
+    require_known("config.stages", stages, STAGES)
+    for stage, choices in stages.items():
+        require_known(f"config.stages.{stage}", choices, STAGES[stage])
+    return {
+        stage: {
+            word: validated(choice.parameters, stages.get(stage, {}).get(word) or {}, f"config.stages.{stage}.{word}")
+            for word, choice in choices.items()
+        }
+        for stage, choices in STAGES.items()
+    }
+
+
+def _report(report: Report, scenes: Mapping[tuple[str, str], Scene]) -> Report:
+    """The report's keys, their pixels checked against the sizes of the scenes."""
+    named = {"/".join(key): scene for key, scene in scenes.items()}
+    require_known("config.report.pixels", report.pixels, named)
+    for name, pixels in report.pixels.items():
+        scene = named[name]
+        for y, x in pixels:
+            if y >= scene.height or x >= scene.width:
+                raise SepiError(
+                    f"config.report.pixels.{name}: row {y}, column {x} lies outside the view, which has {scene.height} "
+                    f"rows and {scene.width} columns, counted from 0"
+                )
+    return report

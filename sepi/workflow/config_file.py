@@ -1,0 +1,94 @@
+"""The commented file ``config.yaml``, made from the models: every key with its default, unit and meaning.
+
+``python -m sepi.workflow.config_file`` prints it.
+"""
+
+from __future__ import annotations
+
+import json
+import textwrap
+from typing import Any
+
+import click
+import yaml
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+
+from sepi.pipeline import STAGES
+from sepi.workflow.config import Builtin, Config, Report
+
+
+def default_yaml() -> str:
+    """The text of ``config.yaml``: every key with its default, and a comment with its meaning, unit and bounds."""
+    lines = [
+        "# Configuration of the workflow (docs/workflow.md). Every key may be left out: these are the defaults.",
+        "# To change a value: edit it here, or give a file of your own (--configfile FILE), or --config KEY=VALUE.",
+        "# This file is made from the code: python -m sepi.workflow.config_file > config.yaml",
+        "",
+    ]
+    for key, field in Config.model_fields.items():
+        lines += _comment(field, "")
+        default = field.get_default(call_default_factory=True)
+        if key in ("builtin", "report"):
+            lines += [f"{key}:", *_fields(Builtin if key == "builtin" else Report, "  ")]
+        elif key == "variants":
+            lines += ["variants:", *(f"  {name}: {_flow(choices)}" for name, choices in default.items())]
+        elif key == "stages":
+            lines += ["stages:", *_stage_lines()]
+        else:
+            lines.append(f"{key}: {_flow(default)}")
+        lines.append("")
+    return "\n".join(lines)
+
+
+def _stage_lines() -> list[str]:
+    lines = []
+    for stage, choices in STAGES.items():
+        lines.append(f"  {stage}:")
+        for word, choice in choices.items():
+            fields = _fields(choice.parameters, "      ")
+            lines += [f"    {word}:", *fields] if fields else [f"    {word}: {{}}"]
+    return lines
+
+
+def _fields(model: type[BaseModel], indent: str) -> list[str]:
+    lines = []
+    for name, field in model.model_fields.items():
+        lines += _comment(field, indent)
+        lines.append(f"{indent}{name}: {_flow(field.get_default(call_default_factory=True))}")
+    return lines
+
+
+def _comment(field: FieldInfo, indent: str) -> list[str]:
+    bounds = _bounds(field)
+    text = f"{field.description or ''}{f' ({bounds})' if bounds else ''}"
+    return textwrap.wrap(text, 118, initial_indent=f"{indent}# ", subsequent_indent=f"{indent}# ")
+
+
+def _bounds(field: FieldInfo) -> str:
+    signs = {"ge": ">=", "gt": ">", "le": "<=", "lt": "<"}
+    found = [
+        f"{sign} {getattr(item, name)}"
+        for item in field.metadata
+        for name, sign in signs.items()
+        if hasattr(item, name)
+    ]
+    return ", ".join(found)
+
+
+def _flow(value: Any) -> str:
+    """A value as YAML on one line."""
+    plain = json.loads(json.dumps(value))
+    text = yaml.safe_dump(plain, default_flow_style=True, width=10**6, sort_keys=False)
+    # a bare scalar is followed by a line that ends the document
+    return text.split("\n")[0]
+
+
+@click.command(help="Print config.yaml with every default.")
+def main() -> None:
+    """Print ``config.yaml``."""
+    click.echo(default_yaml(), nl=False)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,168 @@
+"""The scenes that the workflow runs on: built-in ones, those found in a folder, and light fields named one by one."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from sepi.errors import SepiError
+from sepi.io.images import SUFFIXES, picture_size
+from sepi.io.readers import hci_2013
+
+VIEW_PATTERN = "input_Cam*.png"
+# what a scene's folder may hold besides views, and ingest reads
+_OTHER_PATTERNS = ("parameters.cfg", "gt_disp_lowres.pfm", "*mask*.png")
+# a scene's name is a folder name below results/ and a word on the command line
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.+-]*")
+# a side of the benchmark's views
+_USUAL_SIDE = 512
+# root/scene, root/category/scene, and a level more
+_DEPTH = 3
+
+
+@dataclass(frozen=True)
+class Scene:
+    """One light field of the workflow.
+
+    Attributes
+    ----------
+    dataset, name : str
+        Together they name the scene's folder ``results/DATASET/NAME``.
+    source : Path or None
+        The folder or file to read; None for a built-in scene.
+    files : tuple of Path
+        What ingest reads: a change in one of them is a change of the scene.
+    views : int
+        Number of views.
+    height, width : int
+        Size of a view in pixels.
+    disparity_range : tuple of float or None
+        Range the user set, pixels per view step; None: the scene's own or an estimate.
+    flags : tuple of str
+        How ingest is to read it, as flags of its command line.
+    """
+
+    dataset: str
+    name: str
+    source: Path | None
+    files: tuple[Path, ...]
+    views: int
+    height: int
+    width: int
+    disparity_range: tuple[float, float] | None = None
+    flags: tuple[str, ...] = ()
+
+    @property
+    def samples(self) -> int:
+        """Number of pixels of all views together."""
+        return self.views * self.height * self.width
+
+
+def scenes_in(root: Path, dataset: str, where: str) -> list[Scene]:
+    """Every light field of a dataset below a folder, by name.
+
+    A scene of ``hci`` is a folder with ``input_Cam*.png``; ``root`` may be one itself, or hold scenes or categories of
+    scenes. A scene of ``hci_old`` is an HDF5 file with a dataset ``LF``; it has the file's name, or its folder's where
+    the file is ``lf.h5``.
+
+    Parameters
+    ----------
+    root : Path
+        Folder to look in, or one such file.
+    dataset : str
+        ``"hci"`` or ``"hci_old"``.
+    where : str
+        The key that named ``root``, for messages.
+
+    Raises
+    ------
+    SepiError
+        If there is no such folder, no scene in it, two scenes of one name, or a name that is no plain word.
+    """
+    find, expected = _FINDERS[dataset]
+    if not (root.is_dir() or (root.is_file() and dataset == "hci_old")):
+        raise SepiError(f"{where}: no folder '{root}'")
+    scenes = list(find(root.resolve()))
+    if not scenes:
+        raise SepiError(f"{where}: no scene in '{root}' (expected {expected})")
+    for name, count in Counter(scene.name for scene in scenes).items():
+        _require_plain(name, where)
+        if count > 1:
+            both = " and ".join(str(scene.source) for scene in scenes if scene.name == name)
+            raise SepiError(f"{where}: two scenes are called '{name}': {both}")
+    return sorted(scenes, key=lambda scene: scene.name)
+
+
+def own_scene(name: str, source: Path, flags: tuple[str, ...], where: str) -> Scene:
+    """A light field of any format as a scene of dataset ``own``.
+
+    Raises
+    ------
+    SepiError
+        If nothing is there, or ``name`` is no plain word.
+    """
+    _require_plain(name, where)
+    if not source.exists():
+        raise SepiError(f"{where}: no file or folder '{source}'")
+    source = source.resolve()
+    inside = [path for path in sorted(source.iterdir()) if path.is_file()] if source.is_dir() else [source]
+    files = tuple(path for path in inside if not path.name.startswith("."))
+    return Scene("own", name, source, files, *_rough_size(files), flags=flags)
+
+
+def _require_plain(name: str, where: str) -> None:
+    if not _NAME.fullmatch(name):
+        raise SepiError(f"{where}: a scene must be named with letters, digits and _ . + - only: '{name}'")
+
+
+def _benchmark_scenes(folder: Path, depth: int = _DEPTH) -> Iterator[Scene]:
+    views = sorted(folder.glob(VIEW_PATTERN))
+    if views:
+        others = sorted({path for pattern in _OTHER_PATTERNS for path in folder.glob(pattern)})
+        yield Scene("hci", folder.name, folder, (*views, *others), *_rough_size(views))
+    elif depth:
+        for inner in sorted(folder.iterdir()):
+            if inner.is_dir() and not inner.name.startswith("."):
+                yield from _benchmark_scenes(inner, depth - 1)
+
+
+def _archive_scenes(path: Path, depth: int = _DEPTH + 1) -> Iterator[Scene]:
+    if path.is_dir() and depth:
+        for inner in sorted(path.iterdir()):
+            if not inner.name.startswith("."):
+                yield from _archive_scenes(inner, depth - 1)
+    elif hci_2013.matches(path):
+        name = path.parent.name if path.stem.lower() == "lf" else path.stem
+        yield Scene("hci_old", name, path, (path,), *_rough_size((path,)))
+
+
+# dataset to what yields its scenes below a folder, and what is looked for
+_FINDERS: dict[str, tuple[Callable[[Path], Iterator[Scene]], str]] = {
+    "hci": (_benchmark_scenes, f"folders with {VIEW_PATTERN}"),
+    "hci_old": (_archive_scenes, f"HDF5 files with a dataset {hci_2013.VIEWS}"),
+}
+
+
+def _rough_size(files: Sequence[Path]) -> tuple[int, int, int]:
+    """Number of views, their height and width: what threads and memory of a job are reckoned from.
+
+    Without pictures, or with a single one, the largest file is taken for an array of 9x9 views, or a picture of as
+    many; damaged ones are left to ingest, which will say so.
+    """
+    pictures = [path for path in files if path.suffix.lower() in SUFFIXES]
+    if len(pictures) > 1:
+        try:
+            return len(pictures), *picture_size(pictures[0])
+        except SepiError:
+            return len(pictures), _USUAL_SIDE, _USUAL_SIDE
+    views, values = 81, max((path.stat().st_size for path in files), default=0)
+    if pictures:
+        with suppress(SepiError):
+            values = 3 * math.prod(picture_size(pictures[0]))
+    side = max(1, math.isqrt(values // (3 * views)))
+    return views, side, side

@@ -1,0 +1,253 @@
+"""The benchmark measures what it says, its plain implementations compute the same, its tables add up."""
+
+import json
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from bench import plan, tables
+from bench.__main__ import main
+from bench.measure import Case, Measurement, Prepared, measured, measured_command
+from bench.plain import Warp, by_numpy, by_opencv, by_scipy, plain_sweep
+from bench.result import Result, read, write
+from bench.solvers import SOLVERS
+from bench.stages import WINDOW_OPERATIONS
+from sepi.errors import SepiError
+from sepi.matching.plane_sweep import SweepParameters, sweep
+from sepi.optimize import energy_system
+from sepi.scenes import render
+from sepi.workflow.machine import this_machine
+
+
+def holding(megabytes: int) -> Prepared:
+    return Prepared(lambda: np.ones(megabytes * 2**17), lambda array: {"sum": float(array.sum())})
+
+
+def failing() -> Prepared:
+    def call() -> None:
+        raise ValueError("too\nbright")
+
+    return Prepared(call)
+
+
+def measurement(group: str, name: str, seconds: float, **figures: float) -> Measurement:
+    return Measurement(group, name, (seconds, seconds, 9 * seconds), 100.0, figures)
+
+
+def result(*measurements: Measurement) -> Result:
+    return Result({"processor": "abacus"}, {"scene": "dots", "candidates": 10, "threads": 1}, measurements)
+
+
+class TestMeasuring:
+    def test_memory_is_of_the_case_alone(self) -> None:
+        """Memory left over from another case would hide what a stage needs."""
+        large, small = (measured(Case("g", "n", holding, (megabytes,)), 1) for megabytes in (300, 1))
+        assert large.peak_memory_mb - small.peak_memory_mb == pytest.approx(300, abs=30)
+        assert large.figures["sum"] == 300 * 2**17
+
+    def test_median_of_the_repetitions(self) -> None:
+        found = measured(Case("g", "n", holding, (1,), {"known": 3.0}), 4)
+        assert len(found.seconds) == 4
+        assert found.median == np.median(found.seconds)
+        assert found.figures == {"known": 3.0, "sum": 2.0**17}
+        assert len(measured(Case("g", "n", holding, (1,), once=True), 4).seconds) == 1
+
+    def test_failing_case_is_named(self) -> None:
+        with pytest.raises(SepiError, match=r"^benchmark g, n: ValueError: too bright$"):
+            measured(Case("g", "n", failing), 1)
+
+    def test_command_is_timed_from_start_to_end(self) -> None:
+        found = measured_command("g", "n", ["-c", "import time; time.sleep(0.3)"], 2)
+        assert len(found.seconds) == 2
+        assert 0.3 < found.median < 3
+        assert found.peak_memory_mb < 50, "a bare interpreter: not the memory of the process that measures"
+        with pytest.raises(SepiError, match=r"benchmark g, n: .*no such thing"):
+            measured_command("g", "n", ["-c", "raise SystemExit('no such thing')"], 1)
+
+
+@pytest.mark.parametrize("warp", [by_numpy, by_scipy, by_opencv])
+@pytest.mark.parametrize("name", ["curved_occluders", "stripes"])
+def test_plain_implementations_give_the_compiled_costs(name: str, warp: Warp) -> None:
+    """A yardstick that computes something else measures nothing. Bounds the compiled sweep's rounding, too."""
+    light_field = render(name, size=64, views=5)
+    parameters = SweepParameters(candidates=13)
+    disparity, lowest = plain_sweep(light_field, parameters, warp)
+    own = sweep(light_field, parameters)
+    # costs of 0..1, summed over 24 views in single precision
+    assert np.abs(lowest - own.cost[0]).max() < 1e-5
+    step = 2 * np.diff(light_field.known_range().candidates(13))[0]
+    # the compiled sweep refines by a parabola; two candidates may tie
+    assert np.mean(np.abs(disparity - own.disparity[0]) > step) < 0.002
+
+
+def test_every_solver_gives_the_exact_solution() -> None:
+    """Times of solvers compare only where all of them solve; pixels without weight are the hard ones."""
+    generator = np.random.default_rng(0)
+    disparity, weight, smoothness = generator.random((3, 30, 40)).astype(np.float32)
+    weight[10:20, 10:30] = 1e-8
+    matrix, right = energy_system(disparity, weight, smoothness, 0.01)
+    exact = SOLVERS["direct (SuperLU)"](matrix, right, disparity.ravel(), 1e-10)
+    assert np.abs(matrix @ exact - right).max() < 1e-12
+    for solver in SOLVERS.values():
+        solution = solver(matrix, right, np.zeros(1200), 1e-10)
+        np.testing.assert_allclose(solution.ravel(), exact, atol=1e-5)
+
+
+class TestTables:
+    def test_part_of_the_floor(self) -> None:
+        """The page says how near a sweep comes to its arithmetic alone."""
+        found = result(
+            measurement("floor", "sample", 2.0, operations=4e9),
+            measurement("floor", "multiply-add of the window", 1.0, operations=1e10),
+            measurement("stages", "initial", 5.0, samples=4e9, channels=3, **{WINDOW_OPERATIONS: 5e9}),
+            measurement("stages", "optimize", 5.0),
+        )
+        assert tables.floor_seconds(found, found.group("stages")["initial"]) == pytest.approx(2.5)
+        rows = {row[0]: row for row in tables.steps(found).rows}
+        assert "50 %" in rows["initial"]
+        assert rows["optimize"][5] is None
+        assert rows["sum"][1] == "10.0"
+
+    def test_time_per_sample_and_speed_up(self) -> None:
+        found = result(
+            *(
+                measurement(group, f"{axis} {value}", seconds, size=10, views=2, candidates=5, threads=value)
+                for group in ("growth, initial", "growth, all stages")
+                for axis, value, seconds in (("candidates", 5, 2e-6), ("threads", 1, 8.0), ("threads", 2, 4.0))
+            )
+        )
+        assert tables.growth(found, "threads").rows[1][:3] == [2, "4.00", "2.00"]
+        # 2 microseconds for 100 pixels, 4 views, 5 candidates
+        assert tables.growth(found, "candidates").rows[0][2] == "1.00"
+
+    def test_times_the_plain_ones(self) -> None:
+        found = result(
+            measurement("stages", "initial", 20.0),
+            measurement("beside", "slow", 40.0, candidates=2, mean_difference=0, largest_difference=0),
+        )
+        assert tables.beside(found).rows[1][:3] == ["slow", "20.0", "10.0"]
+
+
+class TestCompare:
+    @pytest.fixture
+    def files(self, tmp_path: Path) -> tuple[Path, Path]:
+        before, after = tmp_path / "before.json", tmp_path / "after.json"
+        write(result(measurement("stages", "initial", 2.0, mse100=1.5), measurement("stages", "gone", 1.0)), before)
+        write(result(measurement("stages", "initial", 1.0, mse100=1.5), measurement("stages", "new", 1.0)), after)
+        return before, after
+
+    def test_ratio_of_what_both_measured(self, files: tuple[Path, Path]) -> None:
+        called = CliRunner().invoke(main, ["compare", *map(str, files)])
+        assert called.exit_code == 0
+        assert "| stages: initial | 2.00 | 1.00 | 0.50 | 100 | 100 | 1.50 | 1.50 |" in called.stdout
+        assert "gone" not in called.stdout
+        assert called.stderr == ""
+
+    def test_other_settings_are_pointed_out(self, files: tuple[Path, Path]) -> None:
+        """A ratio of two machines or two sizes is not one of two versions."""
+        other = replace(read(files[1]), machine={"processor": "slide rule"}, settings={"scene": "dots"})
+        write(other, files[1])
+        called = CliRunner().invoke(main, ["compare", *map(str, files)])
+        assert "not the same processor: abacus before, slide rule after" in called.stderr
+        assert "not the same threads: 1 before, None after" in called.stderr
+
+    @pytest.mark.parametrize("content", [None, "", "[1]", "{}", '{"format": 99}', '{"format": 1, "measurements": 3}'])
+    def test_not_a_result(self, files: tuple[Path, Path], content: str | None) -> None:
+        files[1].unlink()
+        if content is not None:
+            files[1].write_text(content)
+        called = CliRunner().invoke(main, ["compare", *map(str, files)])
+        assert called.exit_code == 1
+        assert called.stderr.count("\n") == 1
+        assert str(files[1]) in called.stderr
+
+    def test_nothing_in_common(self, files: tuple[Path, Path]) -> None:
+        write(result(measurement("solvers", "Jacobi", 1.0)), files[1])
+        called = CliRunner().invoke(main, ["compare", *map(str, files)])
+        assert called.exit_code == 1
+        assert "nothing was measured in both" in called.stderr
+
+
+def test_machine_names_no_host_and_no_user() -> None:
+    """Results are passed on."""
+    machine = this_machine()
+    assert {"processor", "cores", "python", "numba"} <= set(machine)
+    assert not {"node", "host", "user", "path"} & set(machine)
+
+
+@pytest.mark.slow
+def test_small_run_measures_everything(tmp_path: Path) -> None:
+    """The command of `make bench`, on a tiny scene: files to read, to compute with, and to look at."""
+    words = [sys.executable, "-m", "bench", "run", "--small", "--output", str(tmp_path)]
+    called = subprocess.run(words, capture_output=True, text=True, check=False)
+    assert called.returncode == 0, called.stderr
+    assert called.stderr == "", "quiet in a pipe"
+    content = json.loads((tmp_path / "bench.json").read_text())
+    groups = {m["group"] for m in content["measurements"]}
+    assert groups >= {"whole", "stages", "floor", "growth, initial", "growth, all stages", "beside", "solvers"}
+    assert all(min(m["seconds"]) > 0 and m["peak_memory_mb"] > 0 for m in content["measurements"])
+    stages = {m["name"]: m["figures"] for m in content["measurements"] if m["group"] == "stages"}
+    assert content["settings"]["views"] == "5x5"
+    assert stages["initial"]["samples"] == 24 * 21 * 64 * 64
+    assert 0 < stages["optimize"]["mse100"] < stages["initial"]["mse100"]
+    page = (tmp_path / "bench.md").read_text()
+    for heading in (
+        "Whole",
+        "Steps",
+        "Growth with size, built-in scene",
+        "Initial stage beside plain ones",
+        "HDF5 compression",
+    ):
+        assert f"## {heading}\n" in page
+    assert cv2.imread(str(tmp_path / "bench.png")) is not None
+    again = CliRunner().invoke(main, ["compare", *[str(tmp_path / "bench.json")] * 2])
+    assert again.exit_code == 0
+    assert again.stdout.count("| 1.00 |") >= len(content["measurements"])
+
+
+def test_more_threads_than_cores(tmp_path: Path) -> None:
+    """Figures of eight threads that were measured with two would mislead."""
+    called = CliRunner().invoke(main, ["run", "--small", "--threads", "999", "--output", str(tmp_path)])
+    assert called.exit_code == 1
+    assert "--threads 999: this machine runs at most" in called.stderr
+
+
+def test_failing_cases_do_not_lose_the_others(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture) -> None:
+    found, failed = plan._all_measured([Case("g", "bad", failing), Case("g", "good", holding, (1,))], 1)
+    assert [m.name for m in found] == ["good"]
+    assert failed == 1
+    assert "sepi: warning: benchmark g, bad: ValueError: too bright" in capsys.readouterr().err
+
+
+def test_interrupted_command_leaves_nothing_running(tmp_path: Path) -> None:
+    """A benchmark that is stopped must not go on in the background."""
+    mark = tmp_path / "mark"
+    child = f"import pathlib, time; pathlib.Path({str(mark)!r}).write_text('x'); time.sleep(60)"
+    program = f"from bench.measure import measured_command; measured_command('g', 'n', ['-c', {child!r}], 1)"
+    process = subprocess.Popen([sys.executable, "-c", program], stderr=subprocess.DEVNULL, start_new_session=True)
+    try:
+        deadline = time.monotonic() + 60
+        while not mark.exists() and time.monotonic() < deadline:
+            time.sleep(0.05)
+        process.send_signal(signal.SIGINT)
+        assert process.wait(30) != 0
+        commands = [path.read_bytes() for path in Path("/proc").glob("[0-9]*/cmdline")]
+        assert not [words for words in commands if str(mark).encode() in words]
+    finally:
+        process.kill()
+        process.wait()
+
+
+def test_unknown_scene(tmp_path: Path) -> None:
+    called = CliRunner().invoke(main, ["run", "--scene", "nowhere", "--output", str(tmp_path / "out")])
+    assert called.exit_code == 1
+    assert "nowhere: neither a built-in scene" in called.stderr
+    assert not (tmp_path / "out").exists()

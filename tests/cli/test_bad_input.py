@@ -1,0 +1,391 @@
+"""Bad input of every kind, given to ``sepi depth`` as a user would: one clear line, exit code 1, nothing written."""
+
+import os
+import tempfile
+import zipfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import cv2
+import h5py
+import numpy as np
+import pytest
+import scipy.io
+from click.testing import CliRunner
+
+from sepi.cli.main import main
+from sepi.scenes import render
+
+VIEWS = render("dots", size=64, views=3).views
+
+Spoil = Callable[[], object]
+
+
+def pictures(names: str = "view_{t}_{s}.png", views: np.ndarray = VIEWS, folder: str = "in") -> list[Path]:
+    """A folder of views, written by OpenCV."""
+    Path(folder).mkdir()
+    paths = []
+    for t, s in np.ndindex(views.shape[:2]):
+        paths.append(Path(folder, names.format(t=t, s=s, n=t * views.shape[1] + s)))
+        assert cv2.imwrite(str(paths[-1]), views[t, s][:, :, ::-1])
+    return paths
+
+
+def cut(path: Path, part: float = 0.5) -> None:
+    path.write_bytes(path.read_bytes()[: int(path.stat().st_size * part)])
+
+
+def cut_picture(ending: str, part: float = 0.5) -> Spoil:
+    return lambda: cut(pictures("view_{t}_{s}" + ending)[4], part)
+
+
+def npy(array: np.ndarray = VIEWS, name: str = "in.npy") -> Path:
+    np.save(name, array)
+    return Path(name)
+
+
+def npy_header(shape: tuple[int, ...], kind: str = "|u1") -> None:
+    """A NumPy file that claims to be larger than it is."""
+    with Path("in.npy").open("wb") as file:
+        np.lib.format.write_array_header_1_0(file, {"descr": kind, "fortran_order": False, "shape": shape})
+        file.write(bytes(1000))
+
+
+def mat(name: str = "in.mat", **arrays: Any) -> Path:
+    scipy.io.savemat(name, arrays or {"LF": VIEWS}, do_compression=True)
+    return Path(name)
+
+
+def hdf5(make: Callable[[h5py.File], object], name: str = "in.h5") -> Path:
+    with h5py.File(name, "w") as file:
+        make(file)
+    return Path(name)
+
+
+def floats(t: int, s: int, value: float) -> np.ndarray:
+    views = VIEWS.astype(np.float32) / 255
+    views[t, s, 5, 6] = value
+    return views
+
+
+def png_claiming(width: int, height: int) -> bytes:
+    """A PNG whose header, with a right checksum, claims a size that its few bytes cannot hold."""
+    import struct
+    import zlib
+
+    def chunk(kind: bytes, body: bytes) -> bytes:
+        return struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body))
+
+    head = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
+    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + chunk(b"IDAT", zlib.compress(bytes(99))) + chunk(b"IEND", b"")
+
+
+def other(path: Path, image: np.ndarray) -> None:
+    assert cv2.imwrite(str(path), image)
+
+
+def npz_member_claiming_too_much() -> None:
+    npy_header((10**6, 10**6))
+    with zipfile.ZipFile("in.npz", "w") as archive:
+        archive.write("in.npy", "LF.npy")
+    Path("in.npy").unlink()
+
+
+def one_view_only() -> None:
+    for path in pictures()[1:]:
+        path.unlink()
+
+
+def linked_out() -> None:
+    path = pictures()[3]
+    path.rename("elsewhere.png")
+    path.symlink_to(Path("elsewhere.png").resolve())
+
+
+def zero_views() -> None:
+    np.savez("in.npz", LF=np.zeros((0, 3, 64, 64, 3), np.uint8))
+
+
+def pickled() -> None:
+    np.save("in.npy", np.array([{"a": 1}], dtype=object), allow_pickle=True)
+
+
+# what is made, the words after `sepi depth`, and what the one line must say
+CASES: dict[str, tuple[Spoil, str, tuple[str, ...]]] = {
+    # pictures
+    "picture cut off: png": (cut_picture(".png"), "in", ("view_1_1.png", "cut off")),
+    "picture cut off: jpg": (cut_picture(".jpg", 0.9), "in", ("view_1_1.jpg", "cut off")),
+    "picture cut off: bmp": (cut_picture(".bmp"), "in", ("view_1_1.bmp", "cut off")),
+    "picture cut off: tif": (cut_picture(".tif"), "in", ("view_1_1.tif", "cut off")),
+    "picture cut off: ppm": (cut_picture(".ppm"), "in", ("view_1_1.ppm", "cut off")),
+    "picture cut off: webp": (cut_picture(".webp"), "in", ("view_1_1.webp", "cut off")),
+    "picture that is text": (lambda: pictures()[2].write_text("hello"), "in", ("view_0_2.png", "not a PNG")),
+    "picture of no bytes": (lambda: pictures()[2].write_bytes(b""), "in", ("view_0_2.png", "not a PNG")),
+    "picture with an absurd size": (
+        lambda: pictures()[2].write_bytes(png_claiming(100_000, 100_000)),
+        "in",
+        ("view_0_2.png", "100000x100000"),
+    ),
+    "picture of no width": (
+        lambda: pictures()[2].write_bytes(png_claiming(0, 64)),
+        "in",
+        ("view_0_2.png", "0x64"),
+    ),
+    "pictures of two sizes": (
+        lambda: other(pictures()[5], np.zeros((64, 60, 3), np.uint8)),
+        "in",
+        ("view_1_2.png", "60x64", "alike"),
+    ),
+    "pictures of two depths": (
+        lambda: other(pictures()[5], np.zeros((64, 64, 3), np.uint16)),
+        "in",
+        ("view_1_2.png", "16 bit", "alike"),
+    ),
+    "grey among colour": (
+        lambda: other(pictures()[5], np.zeros((64, 64), np.uint8)),
+        "in",
+        ("view_1_2.png", "grey", "alike"),
+    ),
+    "NaN in a float picture": (
+        lambda: pictures("view_{t}_{s}.tif", floats(1, 2, np.nan)),
+        "in",
+        ("view_1_2.tif", "finite"),
+    ),
+    "infinite float picture": (
+        lambda: pictures("view_{t}_{s}.tif", floats(1, 2, np.inf)),
+        "in",
+        ("view_1_2.tif", "finite"),
+    ),
+    "float picture of 0..255": (
+        lambda: pictures("view_{t}_{s}.tif", VIEWS.astype(np.float32)),
+        "in",
+        (".tif", "0..1"),
+    ),
+    # names and grids
+    "empty folder": (lambda: Path("in").mkdir(), "in", ("in: ", "known format")),
+    "folder without pictures": (
+        lambda: (Path("in").mkdir(), Path("in/a.txt").touch()),
+        "in",
+        ("in: ", "known format"),
+    ),
+    "nothing there": (lambda: None, "in", ("in: no such file or folder",)),
+    "one view": (one_view_only, "in", ("in", "known format")),
+    "view number twice": (
+        lambda: (pictures(), other(Path("in/view_01_02.png"), VIEWS[0, 0])),
+        "in",
+        ("view_01_02.png", "view_1_2.png"),
+    ),
+    "running number twice": (
+        lambda: (pictures("img{n}.png"), other(Path("in/img04.png"), VIEWS[0, 0])),
+        "in",
+        ("img04.png", "img4.png"),
+    ),
+    "running number missing": (
+        lambda: pictures("img{n}.png")[5].unlink(),
+        "in",
+        ("in", "--grid"),
+    ),
+    "centre view missing": (lambda: pictures()[4].unlink(), "in", ("in", "(t, s) = (1, 1) is missing")),
+    "wrong grid": (lambda: pictures(), "in --grid 2x2", ("in", "2x2")),
+    "grid that is no grid of that many": (lambda: pictures("img{n}.png"), "in --grid 2x3", ("in", "2x3")),
+    "absurd number in a name": (
+        lambda: other(pictures()[0].with_name("view_999999_1.png"), VIEWS[0, 0]),
+        "in",
+        ("in", "1000000x3", "--pattern"),
+    ),
+    "pattern that fits no name": (lambda: pictures(), "in --pattern img{number}.png", ("in", "img{number}.png")),
+    "pattern without numbers": (lambda: pictures(), "in --pattern view.png", ("view.png", "{row}")),
+    "pattern with half a place": (lambda: pictures(), "in --pattern view_{row}_1.png", ("{column}",)),
+    "link out of the folder": (linked_out, "in", ("view_1_0.png", "link", "--follow-links")),
+    "link to nowhere": (
+        lambda: (pictures()[3].unlink(), Path("in/view_1_0.png").symlink_to("gone.png")),
+        "in",
+        ("view_1_0.png",),
+    ),
+    # what the views show
+    "all black": (lambda: pictures(views=np.zeros_like(VIEWS)), "in", ("in", "black")),
+    "of one colour": (lambda: pictures(views=np.full_like(VIEWS, 90)), "in", ("in", "one colour")),
+    # arrays
+    "npy cut off": (lambda: cut(npy()), "in.npy", ("in.npy",)),
+    "npy of text": (lambda: Path("in.npy").write_text("hello"), "in.npy", ("in.npy", "not a NumPy file")),
+    "npy with an absurd size": (lambda: npy_header((9, 9, 10**5, 10**5, 3)), "in.npy", ("in.npy",)),
+    "npy of objects": (pickled, "in.npy", ("in.npy",)),
+    "npy of two axes": (lambda: npy(np.zeros((8, 8), np.uint8)), "in.npy", ("in.npy", "axes")),
+    "npy of three axes": (lambda: npy(VIEWS[0, 0]), "in.npy", ("in.npy", "axes")),
+    "npy with NaN": (lambda: npy(floats(1, 2, np.nan)), "in.npy", ("in.npy", "1,2", "--exclude")),
+    "npy with infinity": (lambda: npy(floats(1, 2, -np.inf)), "in.npy", ("in.npy", "1,2", "--exclude")),
+    "npy of floats 0..255": (lambda: npy(VIEWS.astype(np.float32)), "in.npy", ("in.npy", "0..1")),
+    "npy of complex numbers": (lambda: npy(VIEWS.astype(np.complex64)), "in.npy", ("in.npy", "complex64")),
+    "axes that are none": (lambda: npy(), "in.npy --axes ABCDE", ("ABCDE",)),
+    "axes twice": (lambda: npy(), "in.npy --axes TTHWC", ("TTHWC",)),
+    "too few axes": (lambda: npy(), "in.npy --axes TSHW", ("in.npy", "TSHW")),
+    "npz of nothing": (lambda: np.savez("in.npz"), "in.npz", ("in.npz",)),
+    "npz without views": (zero_views, "in.npz", ("in.npz",)),
+    "npz cut off": (lambda: (np.savez("in.npz", LF=VIEWS), cut(Path("in.npz"))), "in.npz", ("in.npz",)),
+    "npz with an absurd size": (npz_member_claiming_too_much, "in.npz", ("in.npz",)),
+    "npz of two light fields": (lambda: np.savez("in.npz", a=VIEWS, b=VIEWS), "in.npz", ("a", "b", "--variable")),
+    "npz without the variable": (lambda: np.savez("in.npz", a=VIEWS), "in.npz --variable b", ("in.npz", "'b'", "a")),
+    "mat cut off": (lambda: cut(mat()), "in.mat", ("in.mat",)),
+    "mat of text": (lambda: Path("in.mat").write_text("hello"), "in.mat", ("in.mat",)),
+    "mat without a light field": (lambda: mat(x=np.zeros((3, 3))), "in.mat", ("in.mat",)),
+    "mat 7.3 cut off": (
+        lambda: cut(hdf5(lambda f: f.create_dataset("LF", data=VIEWS.T), "in.mat"), 0.7),
+        "in.mat",
+        ("in.mat",),
+    ),
+    "mat 7.3 with an absurd size": (
+        lambda: hdf5(lambda f: f.create_dataset("LF", (3, 10**5, 10**5, 9, 9), np.uint8, chunks=True), "in.mat"),
+        "in.mat",
+        ("in.mat",),
+    ),
+    # HDF5
+    "HDF5 cut off": (lambda: cut(hdf5(lambda f: f.create_dataset("LF", data=VIEWS))), "in.h5", ("in.h5",)),
+    "HDF5 without views": (lambda: hdf5(lambda f: f.create_dataset("x", data=1)), "in.h5", ("in.h5", "known format")),
+    "HDF5 with an absurd size": (
+        lambda: hdf5(lambda f: f.create_dataset("LF", (9, 9, 10**5, 10**5, 3), np.uint8)),
+        "in.h5",
+        ("in.h5",),
+    ),
+    "HCI-old with depth of another size": (
+        lambda: hdf5(
+            lambda f: (
+                f.create_dataset("LF", data=VIEWS),
+                f.create_dataset("GT_DEPTH", data=np.ones((3, 3, 9, 9))),
+                f.attrs.update({"dH": 1.0, "focalLength": 1.0, "shift": 0.0}),
+            )
+        ),
+        "in.h5",
+        ("in.h5", "GT_DEPTH"),
+    ),
+    # lenslet pictures
+    "lenslet picture that is too small": (
+        lambda: other(Path("a_eslf.png"), VIEWS[0, 0][:20, :20]),
+        "a_eslf.png",
+        ("a_eslf.png",),
+    ),
+    "lenslet picture cut off": (
+        lambda: (other(Path("a_eslf.png"), np.tile(VIEWS[0, 0], (4, 4, 1))), cut(Path("a_eslf.png"))),
+        "a_eslf.png",
+        ("a_eslf.png", "cut off"),
+    ),
+    # flags
+    "unknown format": (lambda: npy(), "in.npy --format nmupy", ("did you mean 'numpy'",)),
+    "format that does not fit": (lambda: npy(), "in.npy --format matlab", ("in.npy",)),
+    "folder where a file is meant": (lambda: pictures(), "in --format numpy", ("in",)),
+    "file where a folder is meant": (lambda: npy(), "in.npy --format images", ("in.npy",)),
+    "unknown order": (lambda: npy(), "in.npy --order flip-row", ("did you mean 'flip-rows'",)),
+    "view outside the grid": (lambda: npy(), "in.npy --view 3,0", ("in.npy", "3,0", "outside the grid")),
+    "view left out that is wanted": (lambda: npy(), "in.npy --exclude 1,1", ("in.npy", "(1, 1) is missing")),
+    "view left out that is not there": (lambda: npy(), "in.npy --exclude 7,1", ("in.npy", "7,1", "outside the grid")),
+    "file left out that is not there": (lambda: pictures(), "in --exclude x.png", ("x.png",)),
+    "every view but one left out": (
+        lambda: npy(VIEWS[:1, :2]),
+        "in.npy --axes TSHWC --exclude 0,0",
+        ("in.npy", "at least two views"),
+    ),
+    "even middle": (lambda: npy(), "in.npy --central 2", ("in.npy", "odd")),
+    "middle larger than the grid": (lambda: npy(), "in.npy --central 5", ("in.npy", "5x5")),
+    "flag of another format": (lambda: pictures(), "in --axes TSHWC", ("in", "--axes")),
+    "inverted range": (lambda: npy(), "in.npy --disparity-range 2 1", ("MIN < MAX",)),
+    "range of no width": (lambda: npy(), "in.npy --disparity-range 1 1", ("MIN < MAX",)),
+    "huge range": (lambda: npy(), "in.npy --disparity-range -1e9 1e9", ("in.npy", "1e+09", "64 pixels")),
+    "range of NaN": (lambda: npy(), "in.npy --disparity-range nan 1", ("finite",)),
+    "camera of negative length": (
+        lambda: npy(),
+        "in.npy --focal-length -1 --baseline 1 --focus-distance 1 --sensor-size 1",
+        ("positive",),
+    ),
+    # where the maps go
+    "target is a file": (lambda: (npy(), Path("out").touch()), "in.npy -o out", ("out: is a file",)),
+    "target below a file": (lambda: (npy(), Path("out").touch()), "in.npy -o out/maps", ("out/maps: cannot be",)),
+    "target is the light field": (
+        lambda: pictures("input_Cam{n:03}.png"),
+        "in -o in",
+        ("in: holds the views of a light field",),
+    ),
+}
+
+
+def everything() -> dict[str, bytes]:
+    return {str(path): path.read_bytes() for path in Path().rglob("*") if path.is_file()}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_bad_input(
+    case: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    make, words, expected = CASES[case]
+    make()
+    before = everything()
+    folders = sorted(path for path in Path().rglob("*") if path.is_dir())
+    called = CliRunner().invoke(main, ["depth", *words.split()])
+    assert called.exit_code == 1, called.output
+    assert isinstance(called.exception, SystemExit)
+    assert called.stdout == ""
+    (line,) = called.stderr.splitlines()
+    assert line.startswith("sepi: ")
+    for text in expected:
+        assert text in line
+    assert len(line) < 600
+    # libraries print nothing of their own, and nothing is written or left over
+    assert capfd.readouterr() == ("", "")
+    assert everything() == before
+    assert sorted(path for path in Path().rglob("*") if path.is_dir()) == folders
+
+
+@pytest.fixture
+def as_nobody(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """An open folder to work in, without the rights of root, who may read and write everywhere."""
+    with tempfile.TemporaryDirectory(prefix="sepi-test-") as folder:
+        monkeypatch.chdir(folder)
+        Path(folder).chmod(0o777)
+        root = os.geteuid() == 0
+        if root:
+            # all that the command imports when it runs, from places that nobody may not read
+            assert CliRunner().invoke(main, ["depth", str(npy(name="first.npy"))]).exit_code == 0
+            os.seteuid(65534)
+        try:
+            yield Path(folder)
+        finally:
+            if root:
+                os.seteuid(0)
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ("in", "in/view_1_1.png: cannot be read (Permission denied)"),
+        ("in.npy", "in.npy: cannot be read (Permission denied)"),
+        ("closed/in", "closed/in"),
+        ("open.npy -o locked/out", "locked/out: cannot be written"),
+    ],
+)
+def test_unreadable_input_and_unwritable_target(as_nobody: Path, words: str, message: str) -> None:
+    pictures()[4].chmod(0)
+    npy().chmod(0)
+    npy(name="open.npy")
+    Path("closed").mkdir(mode=0o000)
+    Path("locked").mkdir(mode=0o500)
+    called = CliRunner().invoke(main, ["depth", *words.split()])
+    assert isinstance(called.exception, SystemExit), called.exception
+    assert called.exit_code == 1
+    (line,) = called.stderr.splitlines()
+    assert message in line
+    Path("closed").chmod(0o700)
+    assert list(Path("locked").iterdir()) == []
+
+
+@pytest.mark.parametrize("name", ["mit Leerzeichen", "Größe-光場", "-minus", "a.b.c", "%s{x}"])
+def test_names_with_spaces_and_letters_of_any_script(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """People name folders as they like, and their maps must come out beside them."""
+    monkeypatch.chdir(tmp_path)
+    for path in pictures("{t} é {s}.png"):
+        path.rename(path.with_name(path.name.replace("é", name.replace("/", "").replace("-", ""))))
+    Path("in").rename(name)
+    called = CliRunner().invoke(main, ["depth", "--set", "initial.semi_global.candidates=11", "--", name])
+    assert called.exit_code == 0, called.output
+    assert Path(f"{name}-depth/disparity.pfm").is_file()

@@ -1,0 +1,657 @@
+"""The commands as a user calls them: what they print and write, and one clear line when something is wrong."""
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+
+import cv2
+import h5py
+import numpy as np
+import pytest
+import yaml
+from click.testing import CliRunner, Result
+
+import sepi
+from sepi import ingest
+from sepi.cli.main import main
+from sepi.io.hdf5 import read_attributes, read_stage, write_light_field
+from sepi.io.pfm import read_pfm, write_pfm
+from sepi.io.result_folder import RESULT_FILES
+from sepi.lightfield import LightField
+from sepi.reading import read_light_field
+from sepi.scenes import SCENES, render, write_hci
+
+# few candidates: these tests are about the commands, not about depth
+FAST = ("--threads", "2", "--set", "initial.semi_global.candidates=21")
+
+
+@pytest.fixture(scope="session")
+def pyramids(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("scenes") / "pyramids"
+    write_hci(render("pyramids", size=64, views=3), folder)
+    return folder
+
+
+@pytest.fixture
+def scene(pyramids: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A copy of a small scene, to spoil, in the current folder."""
+    monkeypatch.chdir(tmp_path)
+    return Path(shutil.copytree(pyramids, tmp_path / "pyramids"))
+
+
+@pytest.fixture(scope="session")
+def result(pyramids: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("results") / "maps"
+    assert call("depth", pyramids, "-o", folder, *FAST).exit_code == 0
+    return folder
+
+
+def call(*words: object) -> Result:
+    return CliRunner().invoke(main, [str(word) for word in words])
+
+
+def error_of(called: Result) -> str:
+    """The one line that a failed command prints."""
+    assert called.exit_code == 1, called.output
+    assert called.stdout == ""
+    assert isinstance(called.exception, SystemExit)
+    (line,) = called.stderr.splitlines()
+    assert line.startswith("sepi: ")
+    return line
+
+
+def everything_in(folder: Path) -> dict[str, bytes]:
+    return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+# --- depth
+
+
+def test_depth_writes_the_maps_and_says_so(scene: Path) -> None:
+    called = call("depth", "pyramids", *FAST)
+    assert called.exit_code == 0
+    assert called.stderr == ""  # no progress bar where nobody watches
+    assert "pyramids: 3x3 views (rows x columns) of 64x64 pixels" in called.stdout
+    known = read_light_field(scene).known_range()
+    assert f"disparity range: {known.minimum} to {known.maximum} pixels per view step (from the" in called.stdout
+    masks = {"mask_occluded.png", "mask_textureless.png"}
+    assert set(os.listdir("pyramids-depth")) == {*RESULT_FILES, *masks, "depth.pfm"}
+    assert f"written to pyramids-depth/: {' '.join(RESULT_FILES[:-1])}" in called.stdout
+    disparity = read_pfm(Path("pyramids-depth/disparity.pfm"))
+    assert disparity.shape == (64, 64)
+    assert np.isfinite(disparity).all()
+    np.testing.assert_array_equal(read_stage(Path("pyramids-depth/result.h5")).disparity, disparity)
+
+
+def test_result_says_what_made_it(scene: Path) -> None:
+    call("depth", scene, "-o", "out", "--variant", "best_wls", "--disparity-range", -2, 2, *FAST)
+    attributes = read_attributes(Path("out/result.h5"))
+    assert attributes["scene"] == "pyramids"
+    assert attributes["variant"] == "best_wls"
+    assert attributes["disparity_range"].tolist() == [-2, 2]
+    assert attributes["disparity_range_source"] == "given"
+    steps = json.loads(attributes["made_from"])
+    assert [step["choice"] for step in steps] == ["semi_global", "visibility", "uniform_planes", "wls"]
+    assert steps[0]["parameters"]["candidates"] == 21
+    with h5py.File("out/result.h5") as file:
+        assert file["disparity"].attrs["units"] == "pixels per view step"
+
+
+def test_unknown_range_is_estimated(scene: Path) -> None:
+    (scene / "parameters.cfg").unlink()
+    called = call("depth", scene, "-o", "out", *FAST)
+    assert "estimated from the views" in called.stdout
+    assert read_attributes(Path("out/result.h5"))["disparity_range_source"] == "estimated"
+
+
+def test_no_ground_truth_reaches_the_estimate(scene: Path) -> None:
+    """A depth map that changes with the ground truth beside the views is not an estimate."""
+    call("depth", scene, "-o", "with", *FAST)
+    for name in ("gt_disp_lowres.pfm", "mask_occluded.png", "mask_textureless.png"):
+        (scene / name).unlink()
+    call("depth", scene, "-o", "without", *FAST)
+    assert everything_in(Path("with")) == everything_in(Path("without"))
+
+
+def test_depth_again_replaces_its_own_files_with_equal_ones(scene: Path) -> None:
+    call("depth", scene, "-o", "out", *FAST)
+    before = everything_in(Path("out"))
+    assert call("depth", scene, "-o", "out", *FAST).exit_code == 0
+    assert everything_in(Path("out")) == before
+
+
+def test_depth_from_the_file_that_ingest_wrote(scene: Path) -> None:
+    CliRunner().invoke(ingest.main, [str(scene), "--output", "lf.h5"])
+    call("depth", "lf.h5", "-o", "from-file", *FAST)
+    call("depth", scene, "-o", "from-folder", *FAST)
+    assert everything_in(Path("from-file")) == everything_in(Path("from-folder"))
+
+
+def test_python_gives_the_same_map_as_the_command(scene: Path, result: Path) -> None:
+    maps = sepi.estimate_depth(sepi.read_light_field(scene), "best", {"initial": {"candidates": 21}})
+    np.testing.assert_array_equal(maps.disparity, read_pfm(result / "disparity.pfm"))
+
+
+def test_depth_of_another_view(scene: Path) -> None:
+    called = call("depth", scene, "-o", "out", "--view", "0,2", *FAST)
+    assert called.exit_code == 0
+    assert read_attributes(Path("out/result.h5"))["view_position"].tolist() == [0, 2]
+    with h5py.File("out/result.h5") as file:
+        np.testing.assert_array_equal(file["view"], read_light_field(scene).views[0, 2])
+
+
+def test_depth_in_metres_with_the_cameras_geometry(scene: Path) -> None:
+    flags = ("--focal-length", 100, "--baseline", 50, "--focus-distance", 8, "--sensor-size", 36)
+    called = call("depth", scene, "-o", "out", *flags, *FAST)
+    assert "depth.pfm" in called.stdout
+    disparity = read_pfm(Path("out/disparity.pfm")).astype(np.float64)
+    focal = 100 / 36 * 64
+    np.testing.assert_allclose(read_pfm(Path("out/depth.pfm")), 1 / (disparity / (0.05 * focal) + 1 / 8), rtol=1e-5)
+    assert "missing: --sensor-size" in call("depth", scene, *flags[:-2]).stderr
+
+
+def test_a_file_name_that_is_no_text(scene: Path) -> None:
+    """Old archives hold names in other encodings."""
+    name = os.fsdecode(b"caf\xe9.npy")
+    np.save(name, read_light_field(scene).views)
+    assert call("depth", name, "-o", "out", *FAST).exit_code == 0
+    assert read_attributes(Path("out/result.h5"))["scene"] == "caf?"
+
+
+def test_depth_with_run_time(scene: Path) -> None:
+    """Only on request: two runs give the same bytes otherwise."""
+    assert call("depth", scene, "-o", "out", "--timing", *FAST).exit_code == 0
+    assert 0 < float(Path("out/runtime.txt").read_text()) < 600
+    # the time of another run is not this one's
+    assert call("depth", scene, "-o", "out", *FAST).exit_code == 0
+    assert not Path("out/runtime.txt").exists()
+
+
+def test_a_warning_does_not_stop_the_depth(scene: Path) -> None:
+    """Views in the wrong order give a map that looks like one; the user must hear of it, and of the way out."""
+    views = render("curved_occluders", size=96, views=5).views
+    np.save("turned.npy", views.transpose(1, 0, 2, 3, 4))
+    called = call("depth", "turned.npy", "-o", "out", *FAST)
+    assert called.exit_code == 0
+    (line,) = called.stderr.splitlines()
+    assert line.startswith("sepi: warning: turned.npy: ")
+    assert "--order transpose" in line
+    assert call("depth", "turned.npy", "-o", "right", "--order", "transpose", *FAST).stderr == ""
+
+
+def test_sixteen_bit_files_with_fewer_bits_are_told(scene: Path) -> None:
+    """Raw pictures of 12 bit are black to thresholds that count in parts of the full scale."""
+    views = read_light_field(scene).views.astype(np.uint16) << 4
+    np.save("raw.npy", views)
+    called = call("depth", "raw.npy", "-o", "out", *FAST)
+    assert called.exit_code == 0
+    assert "if the files hold 12 bits, multiply them by 16" in called.stderr
+    np.save("full.npy", views << 4)
+    assert "bits" not in call("depth", "full.npy", "-o", "full", *FAST).stderr
+
+
+def test_info_shows_the_camera_that_flags_give(scene: Path) -> None:
+    flags = ("--focal-length", 100, "--baseline", 50, "--focus-distance", 8, "--sensor-size", 36)
+    assert "8.88889 m / (disparity + 1.11111)" in call("info", scene, *flags).stdout
+
+
+def test_check_names_the_flag_that_sets_the_order_right(scene: Path) -> None:
+    views = render("curved_occluders", size=96, views=5).views
+    np.save("views.npy", views[:, ::-1])
+    called = call("check", "views.npy")
+    assert called.exit_code == 1
+    assert len([line for line in called.stdout.splitlines() if line.startswith("  ")]) == 8
+    assert "--order flip-columns" in called.stdout.splitlines()[-1]
+    right = call("check", "views.npy", "--order", "flip-columns")
+    assert right.exit_code == 0
+    assert "--order" not in right.stdout.splitlines()[-1]
+
+
+# --- bad input
+
+
+def spoil_png(path: Path) -> None:
+    path.write_bytes(path.read_bytes()[:300])
+
+
+def configure(scene: Path, key: str, value: str) -> None:
+    path = scene / "parameters.cfg"
+    text, count = re.subn(rf"^{key} = .*$", f"{key} = {value}", path.read_text(), flags=re.MULTILINE)
+    assert count == 1
+    path.write_text(text)
+
+
+def other_size(path: Path) -> None:
+    cv2.imwrite(str(path), np.zeros((64, 60, 3), np.uint8))
+
+
+def file_with_nan(folder: Path) -> None:
+    write_light_field(folder / "nan.h5", LightField(np.zeros((2, 2, 8, 8, 1), np.float32), "nan"))
+    with h5py.File(folder / "nan.h5", "r+") as file:
+        file["views"][0, 0, 0, 0, 0] = np.nan
+
+
+def blank(scene: Path) -> None:
+    (scene / "parameters.cfg").unlink()
+    for path in scene.glob("input_Cam*.png"):
+        cv2.imwrite(str(path), np.full((64, 64, 3), 90, np.uint8))
+
+
+# what is done to the scene, the words of the command, and what the line must say
+BAD: dict[str, tuple[Callable[[Path], object], tuple[str, ...], str]] = {
+    "nothing there": (lambda s: None, ("absent",), "absent: no such file or folder"),
+    "empty folder": (lambda s: (s.parent / "empty").mkdir(), ("empty",), "known format"),
+    "folder of scenes": (
+        lambda s: shutil.copytree(s, s.parent / "scenes" / "a"),
+        ("scenes",),
+        "a folder of light fields; give one of them, such as scenes/a",
+    ),
+    "missing centre view": (lambda s: (s / "input_Cam004.png").unlink(), ("pyramids",), "centre view (t, s) = (1, 1)"),
+    "one view": (lambda s: [(s / f"input_Cam00{i}.png").unlink() for i in range(1, 9)], ("pyramids",), "is missing"),
+    "no view": (lambda s: [p.unlink() for p in s.glob("input*")], ("pyramids",), "no views"),
+    "view twice": (
+        lambda s: shutil.copy(s / "input_Cam004.png", s / "input_Cam4.png"),
+        ("pyramids",),
+        "input_Cam4.png: view 4 is given twice",
+    ),
+    "wrong size": (lambda s: other_size(s / "input_Cam005.png"), ("pyramids",), "input_Cam005.png: 60x64"),
+    "truncated PNG": (lambda s: spoil_png(s / "input_Cam007.png"), ("pyramids",), "input_Cam007.png: damaged PNG"),
+    "no PNG": (lambda s: (s / "input_Cam007.png").write_text("x"), ("pyramids",), "input_Cam007.png: not a PNG"),
+    "nonsense parameters": (
+        lambda s: configure(s, "disp_min", "far"),
+        ("pyramids",),
+        "parameters.cfg: expected numbers",
+    ),
+    "range the wrong way round": (
+        lambda s: configure(s, "disp_min", "9"),
+        ("pyramids",),
+        "parameters.cfg: expected finite disp_min < disp_max",
+    ),
+    "binary parameters": (
+        lambda s: (s / "parameters.cfg").write_bytes(b"\x80\x81"),
+        ("pyramids",),
+        "parameters.cfg: not a text file",
+    ),
+    "wrong grid": (
+        lambda s: configure(s, "num_cams_x", "2"),
+        ("pyramids",),
+        "input_Cam008.png: beyond the 6 views",
+    ),
+    "truth of another size": (
+        lambda s: write_pfm(s / "gt_disp_lowres.pfm", np.zeros((5, 5), np.float32)),
+        ("pyramids",),
+        "gt_disp_lowres.pfm: ground truth is (5, 5)",
+    ),
+    "views without texture": (blank, ("pyramids",), "view 1,1 is all of one colour"),
+    "not an HDF5 file": (lambda s: (s.parent / "x.h5").write_text("x"), ("x.h5",), "x.h5: not a light field"),
+    "NaN pixels": (lambda s: file_with_nan(s.parent), ("nan.h5",), "nan.h5: nan: float views must be finite"),
+    "range of no width": (lambda s: None, ("pyramids", "--disparity-range", "1", "1"), "MIN < MAX"),
+    "range not finite": (lambda s: None, ("pyramids", "--disparity-range", "nan", "1"), "finite"),
+    "unknown variant": (lambda s: None, ("pyramids", "--variant", "papr"), "did you mean 'paper'"),
+    "unknown parameter": (lambda s: None, ("pyramids", "--set", "initial.semi_global.candidate=9"), "did you mean"),
+    "parameter of another variant": (
+        lambda s: None,
+        ("pyramids", "--set", "occlusion.wang.x=9"),
+        "does not use occlusion.wang",
+    ),
+    "parameter out of bounds": (
+        lambda s: None,
+        ("pyramids", "--set", "initial.semi_global.candidates=0"),
+        "candidates",
+    ),
+    "parameter of the wrong type": (
+        lambda s: None,
+        ("pyramids", "--set", "initial.semi_global.candidates=few"),
+        "'few'",
+    ),
+    "parameter without value": (lambda s: None, ("pyramids", "--set", "candidates"), "STAGE.CHOICE.NAME=VALUE"),
+    "output is a file": (
+        lambda s: (s.parent / "out").write_text("mine"),
+        ("pyramids", "-o", "out"),
+        "out: is a file; expected a folder",
+    ),
+    "output is the input": (lambda s: None, ("pyramids", "-o", "pyramids"), "choose another folder"),
+    "output below a file": (
+        lambda s: (s.parent / "out").write_text("mine"),
+        ("pyramids", "-o", "out/maps"),
+        "out/maps: cannot be written",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_bad_input_is_one_line_and_nothing_is_written(scene: Path, case: str) -> None:
+    spoil, words, message = BAD[case]
+    spoil(scene)
+    before = everything_in(scene.parent)
+    assert message in error_of(call("depth", *words))
+    assert everything_in(scene.parent) == before
+    assert not Path("pyramids-depth").exists()
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
+def test_unwritable_output(scene: Path) -> None:
+    Path("locked").mkdir(mode=0o500)
+    assert "locked/out: cannot be written" in error_of(call("depth", scene, "-o", "locked/out"))
+
+
+@pytest.mark.parametrize(
+    "words",
+    [("depth",), ("depht", "x"), ("depth", "x", "--threads", "0"), ("depth", "x", "--disparity-range", "1"), ("--no",)],
+)
+def test_wrong_usage_is_exit_code_two(words: tuple[str, ...]) -> None:
+    called = call(*words)
+    assert called.exit_code == 2
+    assert called.stderr.splitlines()[-1].startswith("Error: ")
+
+
+# --- evaluate
+
+
+def test_evaluate_scores_a_result_against_its_scene(pyramids: Path, result: Path) -> None:
+    called = call("evaluate", result, pyramids)
+    assert called.exit_code == 0
+    lines = called.stdout.splitlines()
+    assert lines[0].split()[:3] == ["protocol", "region", "MSE"]
+    assert [line.split()[:2] for line in lines[1:]] == [
+        [protocol, region] for protocol in ("paper", "benchmark") for region in ("all", "occluded", "textureless")
+    ]
+
+
+def test_evaluate_knows_which_view_a_result_belongs_to(scene: Path, pyramids: Path) -> None:
+    """The truth is that of the centre view; another view's map has other numbers and would seem to be bad."""
+    assert call("depth", scene, "-o", "side", "--view", "0,1", *FAST).exit_code == 0
+    assert "no ground truth for view 0,1" in error_of(call("evaluate", "side", scene))
+    assert call("depth", scene, "-o", "centre", *FAST).exit_code == 0
+    assert "side: depth of another view than centre" in error_of(call("evaluate", "centre", "side"))
+    views, truth = read_light_field(pyramids).views, read_light_field(pyramids).truth
+    write_light_field(Path("cut.h5"), LightField(views[1:], "cut", truth=truth, view=(0, 1)))
+    assert call("depth", "cut.h5", "-o", "own", *FAST).exit_code == 0
+    assert call("evaluate", "own", "cut.h5").exit_code == 0
+    assert call("depth", "cut.h5", "-o", "turned", "--order", "flip-columns", *FAST).exit_code == 0
+    assert "0,1 of 3x3" in error_of(call("evaluate", "side", "cut.h5", "--view", "0,1"))
+
+
+def test_evaluate_gives_numbers_to_programs(tmp_path: Path) -> None:
+    truth = np.zeros((40, 50), np.float32)
+    estimate = truth.copy()
+    estimate[:, :10] = 1
+    estimate[20, 30] = np.nan
+    write_pfm(tmp_path / "truth.pfm", truth)
+    np.save(tmp_path / "estimate.npy", estimate)
+    scores = json.loads(call("evaluate", tmp_path / "estimate.npy", tmp_path / "truth.pfm", "--json").stdout)
+    assert scores["paper"]["all"]["pixels"] == 2000
+    assert scores["paper"]["all"]["non_finite"] == 1
+    assert scores["paper"]["all"]["mse100"] == pytest.approx(100 * 400 / 1999)
+    assert scores["paper"]["all"]["badpix007"] == pytest.approx(100 * 401 / 2000)
+    # the benchmark leaves the wrong columns out
+    assert scores["benchmark"]["all"]["mse100"] == 0
+
+
+def test_evaluate_with_another_border(tmp_path: Path) -> None:
+    write_pfm(tmp_path / "map.pfm", np.zeros((40, 50), np.float32))
+    words = ("evaluate", tmp_path / "map.pfm", tmp_path / "map.pfm")
+    scores = json.loads(call(*words, "--border", 4, "--json").stdout)
+    assert list(scores) == ["border 4"]
+    assert scores["border 4"]["all"]["pixels"] == 32 * 42
+    # nothing is left: no number, and no NaN, which is not JSON
+    assert json.loads(call(*words, "--border", 30, "--json").stdout)["border 30"]["all"]["mse100"] is None
+    assert call(*words, "--border", 30).stdout.splitlines()[1].split()[3] == "-"
+
+
+def test_evaluate_reads_every_kind_of_map(pyramids: Path, result: Path, tmp_path: Path) -> None:
+    np.save(tmp_path / "map.npy", read_pfm(result / "disparity.pfm").astype(np.float64))
+    texts = {
+        call("evaluate", estimate, pyramids).stdout
+        for estimate in (result, result / "disparity.pfm", result / "result.h5", tmp_path / "map.npy")
+    }
+    assert len(texts) == 1
+
+
+@pytest.mark.parametrize(
+    ("estimate", "truth", "message"),
+    [
+        ("absent.pfm", "map.pfm", "absent.pfm: no such file"),
+        ("map.pfm", "absent", "absent: no such file"),
+        ("small.pfm", "map.pfm", "(6, 8), the estimate (5, 5)"),
+        ("text.npy", "map.pfm", "text.npy: not a NumPy file"),
+        ("cube.npy", "map.pfm", "cube.npy: expected an array of numbers of shape (H, W)"),
+        ("zipped.npy", "map.pfm", "zipped.npy: not a NumPy file"),
+        ("words.npy", "map.pfm", "words.npy: expected an array"),
+        ("lie.npy", "map.pfm", "lie.npy: damaged NumPy file"),
+        ("damaged.h5", "map.pfm", "damaged.h5"),
+        ("map.pfm", "damaged.h5", "damaged.h5"),
+        ("text.pfm", "map.pfm", "text.pfm: not a one-channel PFM"),
+        ("text.h5", "map.pfm", "text.h5: not a readable HDF5 file"),
+        ("other.h5", "map.pfm", "other.h5: damaged HDF5 file"),
+        ("picture.png", "map.pfm", "picture.png: expected a disparity map as .pfm, .h5 or .npy"),
+        ("map.pfm", "plain.h5", "plain.h5: no ground truth for view 1,1"),
+    ],
+)
+def test_bad_maps_are_one_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, estimate: str, truth: str, message: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    write_pfm(Path("map.pfm"), np.zeros((6, 8), np.float32))
+    write_pfm(Path("small.pfm"), np.zeros((5, 5), np.float32))
+    with Path("lie.npy").open("wb") as file:
+        header = {"descr": "<f8", "fortran_order": False, "shape": (10**6, 10**6)}
+        np.lib.format.write_array_header_1_0(file, header)
+    with h5py.File("damaged.h5", "w") as file:
+        file["disparity"] = np.zeros((99, 99))
+    data = Path("damaged.h5").read_bytes()
+    Path("damaged.h5").write_bytes(data[:100] + bytes(700) + data[800:])
+    for name in ("text.npy", "text.pfm", "text.h5", "picture.png"):
+        Path(name).write_text("hello")
+    np.save("cube.npy", np.zeros((2, 3, 4)))
+    np.save("words.npy", np.array([["a", "b"]]))
+    np.savez("zipped", values=np.zeros((6, 8)))
+    Path("zipped.npz").rename("zipped.npy")
+    with h5py.File("other.h5", "w") as file:
+        file["depth"] = 1
+    views = np.random.default_rng(0).integers(0, 255, (2, 2, 6, 8, 1), np.uint8)
+    write_light_field(Path("plain.h5"), LightField(views, "plain"))
+    assert message in error_of(call("evaluate", estimate, truth))
+
+
+# --- info and scenes
+
+
+def test_info_shows_what_is_known(pyramids: Path) -> None:
+    lines = dict(line.split(":", 1) for line in call("info", pyramids).stdout.splitlines())
+    shown = {key: value.strip() for key, value in lines.items()}
+    assert shown["name"] == "pyramids"
+    assert shown["format"] == "HCI folder"
+    assert shown["views"] == "3x3 views (rows x columns) of 64x64 pixels"
+    assert shown["depth made for"] == "view 1,1"
+    assert shown["pixels"] == "RGB, 8 bit; values as stored, no gamma applied"
+    assert shown["missing views"] == "none"
+    assert shown["disparity range"].endswith("(from the scene's parameters)")
+    assert shown["estimated range"].endswith("(estimated from the views)")
+    assert shown["ground truth"] == "yes"
+    assert shown["masks"] == "occluded, textureless"
+
+
+def test_info_of_a_light_field_about_which_little_is_known(tmp_path: Path) -> None:
+    present = np.ones((3, 2), bool)
+    present[0, 1] = present[2, 0] = False
+    views = np.full((3, 2, 8, 9, 1), 7, np.uint16)
+    views[:, :, 4, 4] = 9
+    write_light_field(tmp_path / "dark.h5", LightField(views, "dark", present=present, notes=("made up",)))
+    called = call("info", tmp_path / "dark.h5")
+    assert called.exit_code == 0
+    for text in (
+        "3x2 views (rows x columns, 4 of 6) of 9x8 pixels",
+        "grey, 16 bit",
+        "2: 0,1 2,0",
+        "none given; the estimate is used",
+        "cannot be estimated",
+        "unknown camera",
+        "made up",
+    ):
+        assert text in called.stdout
+
+
+def test_info_says_which_view_of_an_even_grid_is_meant(tmp_path: Path) -> None:
+    """In a 4x4 grid no view is in the middle; a map of another view than expected is shifted everywhere."""
+    write_light_field(tmp_path / "even.h5", render("dots", size=64, views=4))
+    assert re.search(r"depth made for: +view 2,2\n", call("info", tmp_path / "even.h5").stdout)
+    assert re.search(r"depth made for: +view 1,2\n", call("info", tmp_path / "even.h5", "--view", "1,2").stdout)
+
+
+def test_scenes_are_written_and_read_back(tmp_path: Path) -> None:
+    words = ("--size", 64, "--views", 3, "-o", tmp_path / "made")
+    called = call("scenes", "dots", "stripes", *words)
+    assert called.exit_code == 0
+    assert sorted(os.listdir(tmp_path / "made")) == ["dots", "stripes"]
+    np.testing.assert_array_equal(
+        read_light_field(tmp_path / "made/dots").views, render("dots", size=64, views=3).views
+    )
+    before = everything_in(tmp_path)
+    assert "made/stripes: exists already" in error_of(call("scenes", "wall", "stripes", *words))
+    assert everything_in(tmp_path) == before
+
+
+def test_scenes_list_names_them_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert [line.split()[0] for line in call("scenes", "--list").stdout.splitlines()] == list(SCENES)
+    assert os.listdir(tmp_path) == []
+
+
+def test_unknown_scene_is_named(tmp_path: Path) -> None:
+    message = error_of(call("scenes", "pyramid", "-o", tmp_path / "made"))
+    assert "did you mean 'pyramids'" in message
+    assert not (tmp_path / "made").exists()
+
+
+# --- the program
+
+
+def run(*words: str, cwd: Path) -> subprocess.CompletedProcess[str]:
+    source = Path(__file__).parents[2]
+    return subprocess.run(
+        [sys.executable, "-m", "sepi", *words],
+        cwd=cwd,
+        env={**os.environ, "PYTHONPATH": str(source)},
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+
+
+def test_program_runs_and_fails_without_traceback(pyramids: Path, tmp_path: Path) -> None:
+    good = run("depth", str(pyramids), *FAST, cwd=tmp_path)
+    assert (good.returncode, good.stderr) == (0, "")
+    assert set(RESULT_FILES) < set(os.listdir(tmp_path / "pyramids-depth"))
+    bad = run("depth", "absent", cwd=tmp_path)
+    assert (bad.returncode, bad.stdout) == (1, "")
+    assert bad.stderr == "sepi: absent: no such file or folder\n"
+    assert run("--version", cwd=tmp_path).stdout == f"sepi {sepi.__version__}\n"
+
+
+def test_help_starts_without_the_slow_libraries(tmp_path: Path) -> None:
+    """Every import that --help can do without is time that each command takes before it says anything."""
+    slow = ["scipy.ndimage", "scipy.sparse", "skimage", "matplotlib", "pyamg", "sepi.initial"]
+    code = f"import sys, sepi.cli.main; print(*[name for name in {slow} if name in sys.modules])"
+    source = str(Path(__file__).parents[2])
+    done = subprocess.run([sys.executable, "-c", code], cwd=source, capture_output=True, text=True, check=True)
+    assert done.stdout.split() == []
+
+
+@pytest.mark.parametrize("command", ["depth", "evaluate", "info", "check", "scenes", "points", "submission"])
+def test_each_command_has_help(command: str) -> None:
+    called = call(command, "--help")
+    assert called.exit_code == 0
+    assert called.stdout.startswith("Usage:")
+    assert command in call("--help").stdout
+
+
+def test_python_writes_what_the_command_writes(scene: Path, result: Path) -> None:
+    light_field = sepi.read_light_field(scene, options=sepi.ReadOptions(view=(1, 1)))
+    maps = sepi.estimate_depth(light_field, "best", {"initial": {"candidates": 21}})
+    sepi.write_result("out", light_field, maps)
+    written, by_command = everything_in(Path("out")), everything_in(result)
+    assert set(written) == set(by_command)
+    assert {name for name in written if written[name] != by_command[name]} == {"result.h5"}
+    with pytest.raises(sepi.SepiError, match=r"mine: views must be an array of shape \(T, S, H, W, C\), got a list"):
+        sepi.LightField([[1, 2]], "mine")  # type: ignore[arg-type]
+
+
+def test_package_gives_its_names_and_no_others() -> None:
+    for name in sepi.__all__:
+        assert getattr(sepi, name) is not None
+    assert set(sepi.__all__) == set(dir(sepi))
+    with pytest.raises(AttributeError, match="nonsense"):
+        _ = sepi.nonsense
+
+
+# --- ingest
+
+
+def ingested(*words: object) -> Result:
+    return CliRunner().invoke(ingest.main, [str(word) for word in words])
+
+
+def test_ingest_writes_the_scene_with_a_range(scene: Path) -> None:
+    (scene / "parameters.cfg").unlink()
+    called = ingested(scene, "--threads", 2, "--output", "deep/lf.h5", "--timing", "time.json")
+    assert called.exit_code == 0
+    light_field = read_light_field("deep/lf.h5")
+    assert light_field.known_range().source == "estimated"
+    np.testing.assert_array_equal(light_field.views, read_light_field(scene).views)
+    timing = json.loads(Path("time.json").read_text())
+    assert timing["seconds"] > 0
+    assert timing["peak_memory_mb"] > 10
+
+
+def test_ingest_renders_a_built_in_scene(tmp_path: Path) -> None:
+    output = tmp_path / "lf.h5"
+    words = ("--builtin", "dots", "--size", 64, "--views", 3, "--disparity-range", -2, 2, "--output", output)
+    assert ingested(*words).exit_code == 0
+    light_field = read_light_field(output)
+    assert light_field.views.shape == (3, 3, 64, 64, 3)
+    assert (light_field.known_range().minimum, light_field.known_range().source) == (-2, "given")
+    assert light_field.truth is not None
+
+
+@pytest.mark.parametrize("words", [(), ("x", "--builtin", "dots")])
+def test_ingest_reads_either_a_path_or_a_built_in_scene(tmp_path: Path, words: tuple[str, ...]) -> None:
+    called = ingested(*words, "--output", tmp_path / "lf.h5")
+    assert called.exit_code == 2
+    assert "either PATH or --builtin" in called.stderr
+    assert os.listdir(tmp_path) == []
+
+
+@pytest.mark.parametrize("words", [("absent",), ("--builtin", "dotz"), ("--builtin", "dots", "--size", "3")])
+def test_ingest_writes_nothing_on_bad_input(tmp_path: Path, words: tuple[str, ...]) -> None:
+    error_of(ingested(*words, "--output", tmp_path / "lf.h5"))
+    assert os.listdir(tmp_path) == []
+
+
+# --- what the project's front page promises
+
+
+def test_python_example_of_the_readme_runs(scene: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    scene.rename("moved")
+    Path("scenes").mkdir()
+    Path("moved").rename("scenes/pyramids")
+    readme = (Path(__file__).parents[2] / "README.md").read_text()
+    (example,) = re.findall(r"```python\n(.*?)```", readme, flags=re.DOTALL)
+    exec(compile(example, "README.md", "exec"), {})
+    assert capsys.readouterr().out.startswith("(64, 64) ")
+
+
+def test_citation_names_this_version() -> None:
+    root = Path(__file__).parents[2]
+    project = tomllib.loads((root / "pyproject.toml").read_text())["project"]
+    citation = yaml.safe_load((root / "CITATION.cff").read_text())
+    assert citation["version"] == project["version"]
+    assert citation["license"] == project["license"]
+    assert f"## {project['version']}" in (root / "CHANGELOG.md").read_text()

@@ -1,0 +1,287 @@
+"""`sepi compare`: two maps beside each other on a page, in a real browser; what is wrong with a map, in a line."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from browser import canvas_pixels, choose, map_pixels, opened, part, place_of, point_at, read_out, settled
+from click.testing import CliRunner, Result
+
+from sepi.cli.main import main
+from sepi.evaluate import score
+from sepi.io.hdf5 import write_stage
+from sepi.io.pfm import write_pfm
+from sepi.lightfield import FloatMap
+from sepi.report.web.comparison_page import Comparison, comparison_page, printed_scores
+from sepi.scenes import render, write_hci
+from sepi.stage import StageMaps
+
+SHAPE = (40, 60)
+CLOUD = '[data-part="cloud"]'
+
+
+def maps() -> tuple[FloatMap, FloatMap, FloatMap]:
+    """Two maps that are easily told apart, with unknown pixels, and the truth."""
+    random = np.random.default_rng(2)
+    y, x = np.indices(SHAPE)
+    truth = np.sin(x / 9) + y / 30
+    a = truth + random.normal(0, 0.05, SHAPE)
+    b = truth[:, ::-1] + 0.02
+    a[5:9, 7:20] = np.nan
+    found = [np.asarray(values, np.float32) for values in (a, b, truth)]
+    return found[0], found[1], found[2]
+
+
+@pytest.fixture
+def files(tmp_path: Path) -> list[Path]:
+    """The maps as PFM: ours, other, truth."""
+    paths = [tmp_path / f"{name}.pfm" for name in ("ours", "other", "truth")]
+    for path, values in zip(paths, maps(), strict=True):
+        write_pfm(path, values)
+    return paths
+
+
+def compare(*words: object) -> Result:
+    return CliRunner().invoke(main, ["compare", *map(str, words)], catch_exceptions=False)
+
+
+def told(result: Result) -> str:
+    """The one line of an error."""
+    assert result.exit_code == 1, result.output
+    (line,) = result.stderr.strip().splitlines()
+    assert line.startswith("sepi: ")
+    return str(line)
+
+
+@pytest.fixture(params=["truth", "no truth"])
+def page(request: pytest.FixtureRequest, browser: Any, files: list[Path], tmp_path: Path) -> Iterator[Any]:
+    """The page of two maps, with and without their truth."""
+    output = tmp_path / "page.html"
+    words = files if request.param == "truth" else files[:2]
+    assert compare(*words, "-o", output).exit_code == 0
+    with opened(browser, output, color_scheme="light") as found:
+        yield found
+
+
+def test_the_page_shows_both_maps(page: Any) -> None:
+    """A left of the slider, B right of it, and the slider moves by the keyboard."""
+    assert (page.input_value('[data-part="a"]'), page.input_value('[data-part="b"]')) == ("a", "b")
+    a, b = map_pixels(page, "a"), map_pixels(page, "b")
+    for press, border in ((None, 30), ("End", 60), ("Home", 0)):
+        if press:
+            page.press('[data-part="slider"]', press)
+        shown = canvas_pixels(page, '[data-part="wipe"]')
+        assert (shown == np.concatenate([a[:, :border], b[:, border:]], axis=1)).all()
+    assert (a != b).any(axis=2).mean() > 0.5
+
+
+def test_the_read_out_shows_the_values_of_the_files(page: Any) -> None:
+    """To three decimals; differences and errors are those of what is shown."""
+    ours, other, truth = maps()
+    with_truth = page.locator('[data-part="a"] option[value="truth"]').count() == 1
+    for x, y in ((0, 0), (59, 39), (31, 20), (10, 6)):
+        choose(page, a="a", b="b")
+        point_at(page, x, y)
+        shown = read_out(page)
+        for side, values in (("a", ours), ("b", other)):
+            if np.isnan(values[y, x]):
+                assert shown[f"value {side}"] == "unknown"
+                continue
+            value = float(shown[f"value {side}"])
+            assert value == float(f"{values[y, x]:.3f}")
+            if with_truth:
+                assert float(shown["truth"]) == float(f"{truth[y, x]:.3f}")
+                assert float(shown[f"error {side}"]) == pytest.approx(value - float(shown["truth"]), abs=1e-6)
+            else:
+                assert (shown["truth"], shown[f"error {side}"]) == ("–", "–")
+        choose(page, b="difference")
+        difference = read_out(page)["value b"]
+        if np.isnan(ours[y, x]):
+            assert difference == "unknown"
+        else:
+            expected = float(f"{ours[y, x]:.3f}") - float(f"{other[y, x]:.3f}")
+            assert float(difference) == pytest.approx(expected, abs=1e-6)
+
+
+@pytest.mark.parametrize("page", ["truth"], indirect=True)
+def test_which_map_is_nearer_to_the_truth(page: Any) -> None:
+    """Red where A is, blue where B is."""
+    ours, other, truth = maps()
+    nearer = np.abs(other - truth) - np.abs(ours - truth)
+    shown = map_pixels(page, "change").astype(int)
+    assert (shown[nearer > 0.1][:, 0] > shown[nearer > 0.1][:, 2]).all()
+    assert (shown[nearer < -0.04][:, 0] < shown[nearer < -0.04][:, 2]).all()
+    assert (shown[np.isnan(nearer)][:, :3] == (255, 0, 255)).all()
+
+
+def test_a_point_cloud_without_a_picture(page: Any) -> None:
+    """Coloured by disparity, since there is no view; it turns."""
+    page.locator(CLOUD).scroll_into_view_if_needed()
+    page.wait_for_selector(f"{CLOUD}[data-points]")
+    settled(page)
+    assert page.input_value('[data-part="cloud-colours"]') == "disparity"
+    assert page.locator('[data-part="cloud-colours"] option[value="view"]').is_disabled()
+    before = canvas_pixels(page, CLOUD)
+    assert len(np.unique(before.reshape(-1, 4), axis=0)) > 20
+    page.press(CLOUD, "ArrowLeft")
+    settled(page)
+    assert (canvas_pixels(page, CLOUD) != before).any()
+
+
+def test_a_click_and_the_grid(page: Any) -> None:
+    """There are no prepared pixels here: a click must do no harm."""
+    page.mouse.click(*place_of(page, '[data-part="wipe"]', 20, 20))
+    settled(page)
+    assert read_out(page)["pixel"] == "x 20, y 20"
+    page.locator('figure[data-key="difference"]').get_by_role("button", name="as A").click()
+    page.wait_for_selector('#viewer[data-shown="difference b"]')
+
+
+def test_the_page_on_a_phone(browser: Any, files: list[Path], tmp_path: Path) -> None:
+    output = tmp_path / ("a_rather_long_name_of_a_page_" * 5 + ".html")
+    assert compare(*files, "-o", output).exit_code == 0
+    with opened(browser, output, 390, 844, is_mobile=True, has_touch=True, color_scheme="dark") as page:
+        assert page.evaluate("[document.documentElement.scrollWidth, innerWidth]") == [390, 390]
+        assert page.evaluate("jumped") < 0.1
+
+
+def test_a_scene_brings_its_view_its_truth_and_its_regions(browser: Any, tmp_path: Path) -> None:
+    light_field = render("dots", size=64, views=3)
+    assert light_field.truth is not None
+    write_hci(light_field, tmp_path / "scene")
+    for number, name in enumerate(("one", "two")):
+        write_pfm(tmp_path / f"{name}.pfm", light_field.truth + np.float32(0.04 * number))
+    output = tmp_path / "page.html"
+    result = compare(tmp_path / "one.pfm", tmp_path / "two.pfm", tmp_path / "scene", "-o", output)
+    assert result.exit_code == 0, result.output
+    assert "occluded" in result.stdout
+    with opened(browser, output) as page:
+        choose(page, a="centre", b="b/error")
+        # compressed: colours are coarser than brightness
+        off = map_pixels(page, "centre")[:, :, :3].astype(int) - light_field.views[1, 1]
+        assert np.abs(off.mean(axis=2)).mean() < 5
+        assert np.abs(off.mean(axis=(0, 1))).max() < 4
+        point_at(page, 30, 12)
+        assert float(read_out(page)["value b"]) == pytest.approx(0.04, abs=0.0011)
+        rows = page.locator("table.sortable tbody tr").all_text_contents()
+        assert len(rows) == 6
+        assert any("occluded" in row for row in rows)
+        page.locator(CLOUD).scroll_into_view_if_needed()
+        page.wait_for_selector(f"{CLOUD}[data-points]")
+        assert "metric" in part(page, "cloud-note")
+
+
+def test_scores_are_printed_and_on_the_page(files: list[Path], tmp_path: Path) -> None:
+    """Those of sepi.evaluate, by both protocols; the better one is marked."""
+    ours, other, truth = maps()
+    output = tmp_path / "page.html"
+    result = compare(*files, "-o", output)
+    assert result.stdout.rstrip().endswith(f"written: {output}")
+    page = output.read_text()
+    for values, name in ((ours, "ours.pfm"), (other, "other.pfm")):
+        expected = score(values, truth, 0, None)
+        assert f"{expected['mse100']:.3f}" in page
+        assert name in result.stdout
+    found = printed_scores(Comparison(("x", "y"), (ours, other), truth))
+    assert found["x"]["paper"]["all"] == pytest.approx(score(ours, truth, 0, None), nan_ok=True)
+    assert page.count('class="best"') >= 2
+    assert printed_scores(Comparison(("x", "y"), (ours, other))) == {}
+    # without truth there is nothing to score
+    assert "<td" not in comparison_page(Comparison(("x", "y"), (ours, other))).split('class="viewer"')[0]
+
+
+def test_equal_input_gives_equal_bytes(files: list[Path], tmp_path: Path) -> None:
+    for name in ("one.html", "two.html"):
+        compare(*files, "-o", tmp_path / name)
+    assert (tmp_path / "one.html").read_bytes() == (tmp_path / "two.html").read_bytes()
+
+
+def test_equal_names_are_told_apart(browser: Any, tmp_path: Path) -> None:
+    """Two programs' maps often have one name; a map may be held against itself."""
+    ours, other, _ = maps()
+    for folder, values in (("old", ours), ("new", other)):
+        (tmp_path / folder).mkdir()
+        write_pfm(tmp_path / folder / "disparity.pfm", values)
+    output = tmp_path / "page.html"
+    compare(tmp_path / "old" / "disparity.pfm", tmp_path / "new" / "disparity.pfm", "-o", output)
+    assert "<h1>old/disparity.pfm beside new/disparity.pfm</h1>" in output.read_text()
+    same = tmp_path / "old" / "disparity.pfm"
+    compare(same, same, "-o", output)
+    with opened(browser, output) as page:
+        assert page.text_content("h1") == "disparity.pfm (A) beside disparity.pfm (B)"
+        point_at(page, 30, 30)
+        assert read_out(page)["value a"] == read_out(page)["value b"]
+
+
+def test_names_are_no_markup(browser: Any, tmp_path: Path) -> None:
+    ours, other, truth = maps()
+    attack = "<img src=x onerror=hacked()><script>hacked()<!-- & \"q\" 'r' </script>"
+    page_file = tmp_path / "page.html"
+    page_file.write_text(comparison_page(Comparison((attack, "b"), (ours, other), truth)), encoding="utf-8")
+    with opened(browser, page_file) as page:
+        assert page.text_content("h1") == f"{attack} beside b"
+        assert page.title() == f"{attack} beside b"
+        assert page.locator("img[src=x]").count() == 0
+        assert attack in part(page, "legends")
+
+
+def test_maps_without_a_single_known_pixel(browser: Any, tmp_path: Path) -> None:
+    """Nothing to see, but a page, and no error."""
+    nothing = np.full(SHAPE, np.nan, np.float32)
+    page_file = tmp_path / "page.html"
+    page_file.write_text(comparison_page(Comparison(("a", "b"), (nothing, nothing))), encoding="utf-8")
+    with opened(browser, page_file) as page:
+        point_at(page, 3, 4)
+        assert read_out(page)["value a"] == "unknown"
+        page.locator(CLOUD).scroll_into_view_if_needed()
+        page.wait_for_selector(f'{CLOUD}[data-points="0"]')
+
+
+def test_maps_of_different_sizes_are_refused(files: list[Path], tmp_path: Path) -> None:
+    write_pfm(tmp_path / "small.pfm", np.zeros((4, 5), np.float32))
+    output = tmp_path / "page.html"
+    line = told(compare(files[0], tmp_path / "small.pfm", "-o", output))
+    assert line == f"sepi: {tmp_path / 'small.pfm'}: is (4, 5), but {files[0]} is (40, 60) (height, width)"
+    line = told(compare(files[0], files[1], tmp_path / "small.pfm", "-o", output))
+    assert line.startswith(f"sepi: {tmp_path / 'small.pfm'}: is (4, 5)")
+    write_hci(render("dots", size=64, views=2), tmp_path / "scene")
+    line = told(compare(files[0], files[1], tmp_path / "scene", "-o", output))
+    assert "(64, 64)" in line
+    assert not output.exists()
+
+
+def test_a_missing_map_is_named(files: list[Path], tmp_path: Path) -> None:
+    output = tmp_path / "page.html"
+    for words in (("none.pfm", files[1]), (files[0], "none.pfm"), (*files[:2], "none.pfm")):
+        assert "none.pfm: no such file" in told(compare(*words, "-o", output)), words
+    assert not output.exists()
+
+
+def test_maps_of_different_views_are_refused(tmp_path: Path) -> None:
+    """Results say which view they belong to; wiping between two views would mislead."""
+    ours, other, _ = maps()
+    for name, values, view in (("one", ours, (1, 1)), ("two", other, (0, 1))):
+        attributes = {"view_position": view, "grid": (3, 3)}
+        write_stage(tmp_path / f"{name}.h5", StageMaps(values, np.ones(SHAPE, np.float32)), attributes)
+    line = told(compare(tmp_path / "one.h5", tmp_path / "two.h5", "-o", tmp_path / "page.html"))
+    assert "depth of another view" in line
+    assert not (tmp_path / "page.html").exists()
+
+
+def test_the_page_is_written_whole_or_not_at_all(
+    files: list[Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A page that cannot be written leaves the earlier one as it was, and nothing half-done beside it."""
+    output = tmp_path / "page.html"
+    assert compare(*files[:2], "-o", output).exit_code == 0
+    before = output.read_bytes()
+
+    def full(*_: object, **__: object) -> int:
+        raise OSError(28, "No space left on device", str(output))
+
+    monkeypatch.setattr(Path, "write_text", full)
+    assert "No space left on device" in told(compare(*files, "-o", output))
+    assert output.read_bytes() == before
+    assert {path.name for path in tmp_path.iterdir()} == {"page.html", "ours.pfm", "other.pfm", "truth.pfm"}

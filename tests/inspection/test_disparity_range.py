@@ -1,0 +1,259 @@
+"""The disparity range found from the views must hold every surface, and not be so wide that candidates are wasted."""
+
+import itertools
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from sepi.errors import SepiError
+from sepi.ingest import settle_range
+from sepi.inspection.coarse_sweep import coarse_sweep
+from sepi.inspection.disparity_range import estimate_range
+from sepi.lightfield import DisparityRange, LightField
+from sepi.reading import read_light_field
+from sepi.scenes import SCENES, render
+
+
+def texture(seed: int, height: int = 96, width: int = 96) -> np.ndarray:
+    """Noise that survives the filters, (height, width) float32 in 0..1."""
+    rng = np.random.default_rng(seed)
+    return cv2.GaussianBlur(rng.random((height, width), np.float32), (0, 0), 1.0) * 3 - 1
+
+
+def planes(back: float, front: float, square: int, size: int = 96, grid: tuple[int, int] = (5, 5)) -> LightField:
+    """A textured square of disparity ``front`` before a plane of disparity ``back``, both whole or half pixels."""
+    T, S = grid
+    margin = 160
+    ground = texture(1, 2 * (size + 2 * margin), 2 * (size + 2 * margin))
+    paint = texture(2, square, square)
+    views = np.empty((T, S, size, size, 1), np.float32)
+    for t, s in itertools.product(range(T), range(S)):
+        dt, ds = t - T // 2, s - S // 2
+        # twice the resolution, so that half pixels are exact
+        y, x = round(2 * (margin + back * dt)), round(2 * (margin + back * ds))
+        views[t, s, :, :, 0] = cv2.blur(ground, (2, 2))[y : y + 2 * size : 2, x : x + 2 * size : 2]
+        top, left = round((size - square) / 2 - front * dt), round((size - square) / 2 - front * ds)
+        views[t, s, top : top + square, left : left + square, 0] = paint
+    return LightField(np.clip(views, 0, 1), "planes")
+
+
+def holds(known: DisparityRange, low: float, high: float, slack: float = 0.0) -> bool:
+    return known.minimum <= low + slack and known.maximum >= high - slack
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_built_in_scenes(name: str) -> None:
+    light_field = render(name, size=128, views=7)
+    truth = light_field.truth
+    assert truth is not None
+    known = estimate_range(light_field)
+    assert known.source == "estimated"
+    assert holds(known, truth.min(), truth.max(), slack=0.05)
+    assert known.maximum - known.minimum < 1.5 * np.ptp(truth) + 0.8
+
+
+@pytest.mark.parametrize("name", ["cotton", "antinous"])
+@pytest.mark.parametrize("every", [1, 2])
+def test_real_scenes(hci: Path, name: str, every: int) -> None:
+    """Each second view is the same scene with disparities twice as large."""
+    whole = read_light_field(hci / name)
+    truth = whole.truth
+    assert truth is not None
+    known = estimate_range(LightField(whole.views[::every, ::every], name))
+    assert holds(known, every * truth.min(), every * truth.max())
+    assert known.maximum - known.minimum < 1.35 * every * np.ptp(truth)
+
+
+@pytest.mark.parametrize(("back", "front"), [(-2, 3), (0.5, 1.5), (4, 7), (-9, -6), (-14, -12)])
+def test_two_planes(back: float, front: float) -> None:
+    known = estimate_range(planes(back, front, square=30))
+    assert holds(known, back, front)
+    assert known.maximum - known.minimum < 1.3 * (front - back) + 1
+
+
+def test_small_object_far_in_front_is_found() -> None:
+    """A range without it would smear it over the background."""
+    assert holds(estimate_range(planes(-1, 6, square=10, size=128)), -1, 6)
+
+
+def test_search_goes_on_beyond_its_first_extent() -> None:
+    """A gantry with wide steps; a search that stops at 16 would report noise."""
+    known = estimate_range(planes(20, 23, square=40, size=160, grid=(3, 3)))
+    assert holds(known, 20, 23)
+    assert known.minimum > 18
+    assert known.maximum < 26
+
+
+def test_noise_and_light_loss_towards_the_outer_views() -> None:
+    light_field = planes(-2, 3, square=40, size=128)
+    rng = np.random.default_rng(3)
+    loss = 1 - 0.04 * np.hypot(*(np.indices((5, 5)) - 2))[:, :, None, None, None]
+    views = light_field.views * loss + rng.normal(0, 0.03, light_field.views.shape)
+    known = estimate_range(LightField(np.clip(views, 0, 1).astype(np.float32), "noisy"))
+    assert holds(known, -2, 3)
+    assert known.maximum - known.minimum < 8
+
+
+def test_range_reaches_a_little_beyond_the_surfaces() -> None:
+    """The extremes of a scene are seldom where its texture is; a range of what was matched would cut them off."""
+    known = estimate_range(planes(-6, 6, square=60, size=128))
+    assert known.minimum < -6.4
+    assert known.maximum > 6.4
+
+
+def test_noise_on_a_wall_is_not_texture() -> None:
+    """Anything matches anything there; one lucky match among thousands would stretch the range to the search's ends."""
+    square = planes(1, 1, square=40, size=128).views
+    t, s, y, x, _ = np.indices(square.shape)
+    outside = np.maximum(abs(y + t - 2 - 64), abs(x + s - 2 - 64)) > 20
+    views = np.where(outside, 0.5, square) + np.random.default_rng(5).normal(0, 0.02, square.shape)
+    known = estimate_range(LightField(views.astype(np.float32), "wall"))
+    assert holds(known, 1, 1)
+    assert known.maximum - known.minimum < 2
+
+
+def test_the_truth_and_own_range_are_not_looked_at() -> None:
+    light_field = planes(-2, 3, square=30)
+    told = LightField(
+        light_field.views,
+        "told",
+        disparity_range=DisparityRange(50, 60, "parameters"),
+        truth=np.full((96, 96), 55, np.float32),
+    )
+    assert estimate_range(told) == estimate_range(light_field)
+
+
+def test_missing_views_are_not_looked_at() -> None:
+    light_field = planes(-2, 3, square=30)
+    present = np.ones((5, 5), bool)
+    present[2, 0] = present[0, 2] = present[1, 1] = False
+    views = light_field.views.copy()
+    views[~present] = np.nan
+    assert holds(estimate_range(LightField(views, "sparse", present=present)), -2, 3)
+
+
+@pytest.mark.parametrize("grid", [(1, 5), (5, 1), (2, 2), (4, 3)])
+def test_other_grids(grid: tuple[int, int]) -> None:
+    assert holds(estimate_range(planes(-2, 3, square=40, grid=grid)), -2, 3)
+
+
+def test_only_diagonal_views() -> None:
+    present = np.eye(5, dtype=bool)
+    assert holds(estimate_range(LightField(planes(-2, 3, square=40).views, "diagonal", present=present)), -2, 3)
+
+
+def test_large_pictures_are_reduced_and_disparities_are_not() -> None:
+    light_field = planes(-2, 3, square=30)
+    large = np.repeat(np.repeat(light_field.views, 10, axis=2), 10, axis=3)
+    known = estimate_range(LightField(large[1:4, 1:4], "large"))
+    assert holds(known, -20, 30)
+    assert known.maximum - known.minimum < 75
+
+
+@pytest.mark.parametrize("level", [0.0, 0.5])
+def test_views_without_texture_say_so(level: float) -> None:
+    with pytest.raises(SepiError, match=r"blank: the disparity range cannot be estimated.*give one"):
+        estimate_range(LightField(np.full((3, 3, 40, 40, 3), level, np.float32), "blank"))
+
+
+def test_tiny_views_say_so() -> None:
+    with pytest.raises(SepiError, match="cannot be estimated"):
+        estimate_range(LightField(np.zeros((2, 2, 2, 2, 1), np.uint8), "tiny"))
+
+
+def test_no_view_near_the_centre_is_present() -> None:
+    present = np.zeros((13, 13), bool)
+    present[6, 6] = present[0, 0] = True
+    with pytest.raises(SepiError, match="no view within"):
+        estimate_range(LightField(np.zeros((13, 13, 8, 8, 1), np.uint8), "apart", present=present))
+
+
+def test_given_range_wins_over_the_scenes_own() -> None:
+    light_field = planes(-2, 3, square=30)
+    own = light_field.with_range(DisparityRange(-2.5, 3.5, "parameters"))
+    assert settle_range(own, (-1, 1)).disparity_range == DisparityRange(-1, 1, "given")
+    assert settle_range(own) is own
+    assert settle_range(light_field).known_range().source == "estimated"
+    with pytest.raises(SepiError, match="MIN < MAX"):
+        settle_range(own, (1, 1))
+
+
+def test_dark_corners_are_no_surfaces() -> None:
+    """A lens leaves the corners of Lytro pictures black; their edges move from view to view as nothing in the scene."""
+    light_field = render("wall", size=128, views=7)
+    clean = estimate_range(light_field)
+    y, x = np.mgrid[:128, :128] - 63.5
+    views = light_field.views.copy()
+    for t, s in np.ndindex(7, 7):
+        views[t, s][np.hypot(y - 4 * (t - 3), x - 4 * (s - 3)) > 76] = 1
+    vignetted = LightField(views, "vignetted")
+    known = estimate_range(vignetted)
+    assert known.minimum == pytest.approx(clean.minimum, abs=0.3)
+    assert known.maximum == pytest.approx(clean.maximum, abs=0.3)
+
+
+@pytest.mark.parametrize("limits", [(-1e9, 1e9), (0, 48), (-48, 1)])
+def test_a_range_beyond_the_views_is_refused(limits: tuple[float, float]) -> None:
+    """A typing error in the range would otherwise be hours of work on candidates that no view can show."""
+    light_field = LightField(np.zeros((3, 3, 32, 48, 1), np.uint8), "toy", source="toy.npy")
+    with pytest.raises(SepiError, match=r"toy\.npy: disparity range \(given\) .* less than the 48 pixels of a view"):
+        settle_range(light_field, limits)
+    assert settle_range(light_field, (-47, 47)).known_range().maximum == 47
+
+
+def sweep_in_numpy(
+    reference: np.ndarray, views: np.ndarray, offsets: np.ndarray, candidates: np.ndarray, limit: float, radius: int
+) -> np.ndarray:
+    """Costs (N, H, W) of the coarse sweep, written the plain way; infinite where too few views see the window."""
+    H, W = reference.shape
+    costs = np.full((len(candidates), H, W), np.inf)
+    rows, columns = np.mgrid[:H, :W]
+    for n, d in enumerate(candidates):
+        total, seen = np.zeros((H, W)), np.zeros((H, W))
+        for view, (dt, ds) in zip(views, offsets, strict=True):
+            y, x = rows - d * dt, columns - d * ds
+            y0, x0 = np.floor(y).astype(int), np.floor(x).astype(int)
+            inside = (y0 >= 0) & (y0 < H - 1) & (x0 >= 0) & (x0 < W - 1)
+            y0, x0 = np.where(inside, y0, 0), np.where(inside, x0, 0)
+            fy, fx = y - y0, x - x0
+            upper = (1 - fx) * view[y0, x0] + fx * view[y0, x0 + 1]
+            lower = (1 - fx) * view[y0 + 1, x0] + fx * view[y0 + 1, x0 + 1]
+            difference = np.minimum(np.abs(reference - (1 - fy) * upper - fy * lower), limit)
+            total += np.where(inside, difference, 0)
+            seen += inside
+        pixel = np.where(2 * seen >= len(views), total / np.maximum(seen, 1), np.inf)
+        for y, x in np.ndindex(H, W):
+            window = pixel[max(0, y - radius) : y + radius + 1, max(0, x - radius) : x + radius + 1]
+            costs[n, y, x] = window.mean()
+    return costs
+
+
+def test_kernel_equals_its_plain_twin() -> None:
+    """The compiled sweep works on blocks of rows and slices; an index off by one shifts every disparity."""
+    rng = np.random.default_rng(4)
+    reference = rng.random((37, 23), np.float32)
+    views = rng.random((4, 37, 23), np.float32)
+    offsets = np.array([[0, -2], [0, 1], [1, 0], [-1, 2]])
+    candidates = np.linspace(-3, 3, 13, dtype=np.float32)
+    lowest, second, mean, disparity = coarse_sweep(reference, views, offsets, candidates, np.float32(0.4), 2)
+    costs = sweep_in_numpy(reference, views, offsets, candidates, 0.4, 2)
+    finite = np.isfinite(costs)
+    np.testing.assert_allclose(mean, np.where(finite, costs, 0).sum(0) / np.maximum(finite.sum(0), 1), rtol=1e-4)
+    best = costs.argmin(0)
+    for y, x in np.ndindex(reference.shape):
+        n, column = best[y, x], costs[:, y, x]
+        if n in (0, len(candidates) - 1) or not np.isfinite(column[[n - 1, n + 1]]).all():
+            assert np.isinf(lowest[y, x])
+            continue
+        assert lowest[y, x] == pytest.approx(column[n], rel=1e-4)
+        assert abs(disparity[y, x] - candidates[n]) <= 0.25 + 1e-4
+        left = n
+        while left > 0 and column[left - 1] >= column[left]:
+            left -= 1
+        right = n
+        while right < len(column) - 1 and column[right + 1] >= column[right]:
+            right += 1
+        others = np.concatenate([column[:left], column[right + 1 :]])
+        assert second[y, x] == pytest.approx(others.min() if others.size else np.inf, rel=1e-4)

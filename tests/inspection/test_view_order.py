@@ -1,0 +1,250 @@
+"""The check of the views' order: what it names must set the views right, and it must not cry wolf."""
+
+from functools import cache
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from sepi.inspection.view_order import check_order, order_warning
+from sepi.io.readers.options import ORDERS
+from sepi.lightfield import LightField
+from sepi.scenes import SCENES, render
+
+TURNED = {
+    "as-given": "flip-both",
+    "flip-rows": "flip-columns",
+    "transpose": "transpose-flip-both",
+    "transpose-flip-rows": "transpose-flip-columns",
+}
+TURNED |= {second: first for first, second in TURNED.items()}
+
+
+@cache
+def scene(name: str, size: int = 96, views: int = 5) -> LightField:
+    return render(name, size=size, views=views)
+
+
+def misread(light_field: LightField, word: str, name: str = "misread") -> LightField:
+    """The light field as files of another order hold it: reading it in order ``word`` sets it right."""
+    T, S = light_field.grid
+    grid = (S, T) if word.startswith("transpose") else (T, S)
+    right = ORDERS[word](np.arange(T * S).reshape(grid))
+    views = np.empty((T * S, *light_field.views.shape[2:]), light_field.views.dtype)
+    present = np.zeros(T * S, bool)
+    for t, s in np.ndindex(T, S):
+        views[right[t, s]] = light_field.views[t, s]
+        present[right[t, s]] = light_field.present[t, s]
+    return LightField(views.reshape(*grid, *views.shape[1:]), name, present=present.reshape(grid))
+
+
+def grey_field(pictures: np.ndarray) -> LightField:
+    return LightField(np.ascontiguousarray(pictures), "field")
+
+
+@pytest.mark.parametrize("word", ORDERS)
+@pytest.mark.parametrize("name", ["curved_occluders", "dots", "stripes"])
+def test_the_order_that_sets_a_scene_right_is_named(name: str, word: str) -> None:
+    field = misread(scene(name), word)
+    found = check_order(field)
+    assert found.decided
+    assert found.sign_decided
+    assert found.best == word
+    assert list(found.fits) == list(ORDERS)
+    assert found.fits[word] < min(fit for other, fit in found.fits.items() if other != word)
+    warning = order_warning(field)
+    if word == "as-given":
+        assert warning is None
+        assert found.verdict() == "the views are in the right order"
+    else:
+        assert warning == found.verdict()
+        assert warning.endswith(f"read it with --order {word}")
+
+
+@pytest.mark.parametrize("word", ORDERS)
+def test_a_scene_without_occlusion_leaves_near_and_far_open(word: str) -> None:
+    found = check_order(misread(scene("slanted_plane"), word))
+    assert found.decided
+    assert not found.sign_decided
+    assert found.best in (word, TURNED[word])
+    assert found.fits[word] == found.fits[TURNED[word]]
+    # in such a scene the order as it is may be right
+    warned = order_warning(misread(scene("slanted_plane"), word))
+    assert (warned is None) == (word in ("as-given", "flip-both"))
+    assert warned is None or (f"--order {found.best}" in warned and TURNED[found.best] in warned)
+
+
+def test_the_verdict_says_what_cannot_be_told() -> None:
+    verdict = check_order(scene("slanted_plane")).verdict()
+    assert "right order" in verdict
+    assert "near and far cannot be told apart here" in verdict
+    assert "--order flip-both" in verdict
+
+
+@pytest.mark.parametrize("given", ORDERS)
+def test_an_order_that_was_asked_for_is_replaced_not_added_to(given: str) -> None:
+    """Read in a wrong order by the user's own flag, the flag that is named is the one to give instead."""
+    right = scene("curved_occluders")
+    files = misread(right, "transpose-flip-rows")
+    read = misread_by_flag(files, given)
+    found = check_order(read, given)
+    assert found.best == "transpose-flip-rows"
+    assert (order_warning(read, given) is None) == (given == "transpose-flip-rows")
+
+
+def misread_by_flag(files: LightField, word: str) -> LightField:
+    """What a reader makes of the files in order ``word``."""
+    T, S = files.grid
+    numbers = ORDERS[word](np.arange(T * S).reshape(T, S))
+    return LightField(files.views.reshape(T * S, *files.views.shape[2:])[numbers], "read")
+
+
+@pytest.mark.parametrize(("size", "views"), [(64, 9), (96, 3), (96, 5), (128, 2), (64, 4)])
+@pytest.mark.parametrize("name", SCENES)
+def test_no_built_in_scene_is_warned_of(name: str, size: int, views: int) -> None:
+    assert order_warning(scene(name, size, views)) is None
+
+
+@pytest.mark.parametrize("shape", ["cross", "star", "holes", "rows"])
+@pytest.mark.parametrize("word", ["as-given", "flip-columns", "transpose"])
+def test_missing_views_neither_hide_the_order_nor_invent_one(shape: str, word: str) -> None:
+    light_field = scene("curved_occluders")
+    t, s = np.mgrid[-2:3, -2:3]
+    present = {
+        "cross": (t == 0) | (s == 0),
+        "star": (t == 0) | (s == 0) | (abs(t) == abs(s)),
+        "holes": ~(((t == 1) & (s == 0)) | ((t == -2) & (s == -2))),
+        "rows": abs(t) <= 1,
+    }[shape]
+    views = np.where(present[:, :, None, None, None], light_field.views, 0).astype(np.uint8)
+    found = check_order(misread(LightField(views, "missing", present=present), word))
+    assert found.decided
+    assert found.best == word
+
+
+def test_the_reference_view_does_not_matter() -> None:
+    """A corner view as reference must not bring warnings that its light field otherwise has not."""
+    light_field = scene("curved_occluders")
+    corner = LightField(light_field.views, "corner", view=(0, 4))
+    assert check_order(corner) == check_order(light_field)
+
+
+@pytest.mark.parametrize("place", [np.s_[2:3], np.s_[:, 2:3], np.s_[2:3, 1:4], np.s_[:, 2:4], np.s_[2:4, 2:4]])
+@pytest.mark.parametrize("name", ["curved_occluders", "dots", "slanted_plane", "wall"])
+def test_thin_and_small_grids_bring_no_warning(name: str, place: tuple[slice, ...]) -> None:
+    light_field = grey_field(scene(name).views[place])
+    assert order_warning(light_field) is None
+
+
+def test_a_row_of_views_that_runs_the_other_way_is_found() -> None:
+    """Of a single row only the direction matters, and one word for it is enough."""
+    row = grey_field(scene("curved_occluders").views[2:3])
+    found = check_order(misread(row, "flip-columns"))
+    assert found.sign_decided
+    assert found.best == "flip-columns"
+
+
+def test_a_column_of_views_read_as_a_row_is_found() -> None:
+    column = grey_field(scene("curved_occluders").views[:, 2:3])
+    warning = order_warning(misread(column, "transpose"))
+    assert warning is not None
+    assert warning.endswith("--order transpose")
+
+
+def test_pictures_of_noise_are_left_undecided() -> None:
+    rng = np.random.default_rng(5)
+    noise = grey_field(rng.integers(0, 256, (5, 5, 80, 80, 3), dtype=np.uint8))
+    found = check_order(noise)
+    assert not found.decided
+    assert "cannot tell" in found.verdict()
+    assert order_warning(noise) is None
+
+
+@pytest.mark.parametrize("level", [0, 1, 128, 255])
+def test_empty_pictures_are_left_undecided(level: int) -> None:
+    flat = grey_field(np.full((5, 5, 40, 50, 3), level, np.uint8))
+    found = check_order(flat)
+    assert not found.decided
+    assert found.best == "as-given"
+    assert order_warning(flat) is None
+
+
+def test_equal_views_are_left_undecided() -> None:
+    """Views between which nothing moves fit in any order."""
+    picture = scene("dots").views[2, 2]
+    assert not check_order(grey_field(np.broadcast_to(picture, (3, 3, *picture.shape)))).decided
+
+
+@pytest.mark.parametrize("shape", [(2, 2), (2, 300), (300, 2), (3, 17), (16, 16), (20, 1000)])
+def test_pictures_too_small_to_tell_are_left_undecided(shape: tuple[int, int]) -> None:
+    rng = np.random.default_rng(6)
+    assert order_warning(grey_field(rng.integers(0, 256, (3, 3, *shape, 1), dtype=np.uint8))) is None
+
+
+def test_dark_and_noisy_views_are_not_warned_of() -> None:
+    light_field = scene("curved_occluders")
+    rng = np.random.default_rng(7)
+    noisy = light_field.views + rng.normal(0, 40, light_field.views.shape)
+    assert order_warning(grey_field(np.clip(noisy, 0, 255).astype(np.uint8))) is None
+    for divisor in (12, 30, 60):
+        for name in ("curved_occluders", "wall", "stripes"):
+            assert order_warning(grey_field(scene(name).views // divisor)) is None
+
+
+@pytest.mark.parametrize("word", ["as-given", "flip-rows", "flip-both"])
+def test_the_kind_of_pixels_does_not_matter(word: str) -> None:
+    field = misread(scene("curved_occluders"), word)
+    deep = field.views.astype(np.uint16) * 257
+    real = field.views.astype(np.float32) / 255
+    grey = field.views[..., 1:2]
+    for views in (deep, real, grey):
+        assert check_order(grey_field(views)).best == word
+
+
+def test_views_that_darken_outwards_are_still_in_order() -> None:
+    light_field = scene("curved_occluders")
+    t, s = np.mgrid[-2:3, -2:3]
+    gain = np.exp(-0.08 * (t**2 + s**2))[:, :, None, None, None]
+    views = (light_field.views * gain).astype(np.uint8)
+    for word in ORDERS:
+        assert check_order(misread(grey_field(views), word)).best in (word, TURNED[word])
+    assert order_warning(grey_field(views)) is None
+
+
+def test_a_large_parallax_is_found() -> None:
+    """Sparse camera arrays move things by tens of pixels from view to view."""
+    rng = np.random.default_rng(8)
+    texture = cv2.GaussianBlur(rng.random((500, 500)).astype(np.float32), (0, 0), 2)
+    texture = (255 * (texture - texture.min()) / np.ptp(texture)).astype(np.uint8)
+    views = np.empty((3, 3, 240, 260, 1), np.uint8)
+    for t, s in np.ndindex(3, 3):
+        # a pixel y of the middle view is seen at y - 23 (t - 1)
+        top, left = 100 + 23 * (t - 1), 100 + 23 * (s - 1)
+        views[t, s, :, :, 0] = texture[top : top + 240, left : left + 260]
+    for word in ORDERS:
+        found = check_order(misread(grey_field(views), word))
+        assert found.decided
+        assert found.best in (word, TURNED[word])
+
+
+@pytest.mark.parametrize("name", ["cotton", "antinous"])
+def test_real_scenes_in_every_order(hci: Path, name: str) -> None:
+    files = sorted((hci / name).glob("input_Cam*.png"))
+    pictures = np.stack([cv2.imread(str(path))[:, :, ::-1] for path in files])
+    every_order_is_named(grey_field(pictures.reshape(9, 9, *pictures.shape[1:])))
+
+
+def test_a_lytro_picture_in_every_order(real_data: Path) -> None:
+    folder = real_data / "lytro" / "2067"
+    rows = [[cv2.imread(str(folder / f"2067_{t:02}_{s:02}.png")) for s in range(1, 10)] for t in range(1, 10)]
+    every_order_is_named(grey_field(np.array(rows)[..., ::-1]))
+
+
+def every_order_is_named(light_field: LightField) -> None:
+    assert order_warning(light_field) is None
+    for word in ORDERS:
+        found = check_order(misread(light_field, word))
+        assert found.decided
+        assert found.sign_decided
+        assert found.best == word

@@ -1,0 +1,415 @@
+"""Light fields that arrive as arrays: every pixel at its place, and a clear word where that cannot be known."""
+
+import re
+import struct
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+import scipy.io
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from sepi.errors import SepiError
+from sepi.io.hdf5 import write_light_field
+from sepi.io.readers.arrays import light_field_from_array
+from sepi.io.readers.formats import FORMATS, read
+from sepi.io.readers.options import ReadOptions
+from sepi.lightfield import LightField
+
+T, S, H, W = 2, 3, 8, 10
+RNG = np.random.default_rng(7)
+# no zeros: a view of zeros counts as missing
+RGB = RNG.integers(1, 256, (T, S, H, W, 3), np.uint8)
+GREY = RGB[..., 0]
+
+
+def taken(array: np.ndarray, **options: object) -> LightField:
+    return light_field_from_array(array, name="toy", source="toy.npy", options=ReadOptions(**options))
+
+
+def refused(array: np.ndarray, **options: object) -> str:
+    with pytest.raises(SepiError) as caught:
+        taken(array, **options)
+    message = str(caught.value)
+    assert message.startswith("toy.npy: ")
+    assert "\n" not in message
+    return message
+
+
+def laid_out(array: np.ndarray, axes: str) -> np.ndarray:
+    """The array (T, S, H, W[, C]) with its axes in another order."""
+    return np.moveaxis(array, range(array.ndim), [axes.index(letter) for letter in "TSHWC"[: array.ndim]])
+
+
+# --- axes
+
+
+@pytest.mark.parametrize("axes", ["TSHWC", "HWTSC", "CTSHW", "TSCHW", "WSHTC", "CWHST"])
+def test_named_axes_put_every_pixel_in_its_place(axes: str) -> None:
+    """A wrong axis swaps views or transposes pictures, and depth is nonsense."""
+    light_field = taken(laid_out(RGB, axes), axes=axes)
+    np.testing.assert_array_equal(light_field.views, RGB)
+    assert not any("axes" in note for note in light_field.notes)
+
+
+@pytest.mark.parametrize("axes", ["TSHWC", "HWTSC", "CTSHW", "CHWTS"])
+def test_axes_of_colour_arrays_are_found_and_said(axes: str) -> None:
+    """Users of the common layouts need no flag, and see what was assumed."""
+    views = RNG.integers(1, 256, (5, 4, 12, 10, 3), np.uint8)[:, :2] if axes[0] == "C" else RGB
+    light_field = taken(laid_out(views, axes))
+    np.testing.assert_array_equal(light_field.views, views)
+    assert f"axes taken as {' '.join(axes)}; --axes sets them otherwise" in light_field.notes
+
+
+@pytest.mark.parametrize("axes", ["TSHW", "HWTS"])
+def test_axes_of_grey_arrays_are_found(axes: str) -> None:
+    light_field = taken(laid_out(GREY, axes))
+    np.testing.assert_array_equal(light_field.views, GREY[..., None])
+
+
+def test_a_small_grid_of_grey_views_is_no_row_of_colour_pictures() -> None:
+    """The shape (16, 16, 3, 3) looks like 16 pictures in colour, 3 pixels wide."""
+    views = RNG.integers(1, 256, (3, 3, 16, 16), np.uint8)
+    np.testing.assert_array_equal(taken(laid_out(views, "HWTS")).views, views[..., None])
+
+
+def test_axes_may_be_lower_case() -> None:
+    np.testing.assert_array_equal(taken(laid_out(RGB, "HWTSC"), axes="hwtsc").views, RGB)
+
+
+@pytest.mark.parametrize(
+    "shape",
+    [(9, 9, 9, 9, 3), (5, 5, 9, 9), (3, 3, 3, 20, 20), (3, 3, 20, 20, 4), (20, 5, 5, 20, 3), (8, 9, 10, 11, 12)],
+)
+def test_shapes_that_do_not_tell_ask_for_axes(shape: tuple[int, ...]) -> None:
+    """A guess here would be wrong half the time."""
+    message = refused(np.ones(shape, np.uint8))
+    assert "--axes" in message
+    assert str(shape) in message
+
+
+@pytest.mark.parametrize("axes", ["TSHWU", "TTHWC", "UVHWC", "HWC", "TSHWCC", "", "T S H W"])
+def test_axes_that_are_none_are_refused(axes: str) -> None:
+    assert f"--axes {axes}: expected T, S, H and W once each" in refused(RGB, axes=axes)
+
+
+def test_axes_must_be_as_many_as_the_array_has() -> None:
+    assert "--axes TSHW names 4 axes, the array has 5" in refused(RGB, axes="TSHW")
+    assert "--axes TSHWC names 5 axes, the array has 4" in refused(GREY, axes="TSHWC")
+
+
+@pytest.mark.parametrize("shape", [(8, 10, 3), (8,), (), (1, 2, 3, 8, 10, 3)])
+def test_other_numbers_of_axes_are_refused(shape: tuple[int, ...]) -> None:
+    assert "expected an array of 4 or 5 axes" in refused(np.ones(shape, np.uint8))
+
+
+def test_two_channels_are_no_colours() -> None:
+    assert "axis of colours" in refused(RGB[..., :2], axes="TSHWC")
+
+
+def test_empty_arrays_are_refused() -> None:
+    assert "empty" in refused(RGB[:, :0], axes="TSHWC")
+
+
+# --- views in one row
+
+
+def test_views_in_a_row_make_a_square_grid() -> None:
+    views = RNG.integers(1, 256, (9, 20, 24, 3), np.uint8)
+    light_field = taken(views)
+    np.testing.assert_array_equal(light_field.views, views.reshape(3, 3, 20, 24, 3))
+    assert "views taken as a grid of 3x3, row by row; --grid sets it otherwise" in light_field.notes
+
+
+def test_views_in_a_row_make_the_grid_that_is_given() -> None:
+    """Of 12 views nobody knows whether they are 3x4 or 4x3."""
+    views = RNG.integers(1, 256, (12, 20, 24, 3), np.uint8)
+    np.testing.assert_array_equal(taken(views, grid=(3, 4)).views, views.reshape(3, 4, 20, 24, 3))
+    assert "--grid ROWSxCOLUMNS" in refused(views)
+    assert "no grid of 5x5" in refused(views, grid=(5, 5))
+
+
+def test_axis_n_is_the_number_of_the_view() -> None:
+    views = RNG.integers(1, 256, (6, 5, 7, 3), np.uint8)
+    light_field = taken(views.transpose(1, 2, 3, 0), axes="HWCN", grid=(3, 2))
+    np.testing.assert_array_equal(light_field.views, views.reshape(3, 2, 5, 7, 3))
+
+
+def test_a_grid_that_contradicts_the_array_is_refused() -> None:
+    assert "--grid 3x2, but the array has 2x3 views" in refused(RGB, grid=(3, 2))
+    np.testing.assert_array_equal(taken(RGB, grid=(T, S)).views, RGB)
+
+
+# --- types and channels
+
+
+@pytest.mark.parametrize("kind", ["u1", "<u2", ">u2"])
+def test_integers_stay_as_they_are(kind: str) -> None:
+    """16 bit must not lose its lower half, nor a foreign byte order turn into noise."""
+    views = (RGB.astype(kind) * (1 if kind == "u1" else 257)).astype(kind)
+    light_field = taken(views)
+    assert light_field.views.dtype == (np.uint8 if kind == "u1" else np.uint16)
+    np.testing.assert_array_equal(light_field.views, views)
+
+
+@pytest.mark.parametrize("kind", ["<f4", ">f4", "<f8", ">f8"])
+def test_floats_become_float32(kind: str) -> None:
+    views = (RGB / 255).astype(kind)
+    light_field = taken(views)
+    assert light_field.views.dtype == np.float32
+    np.testing.assert_array_equal(light_field.views, views.astype(np.float32))
+
+
+@pytest.mark.parametrize("kind", [np.bool_, np.int8, np.int16, np.int32, np.int64, np.uint32, np.float16, np.complex64])
+def test_other_types_are_refused(kind: type) -> None:
+    assert f"values of type {np.dtype(kind)}; expected uint8, uint16" in refused(np.ones(RGB.shape, kind))
+
+
+def test_floats_of_0_to_255_are_refused() -> None:
+    """Taken as 0..1 they would be white all over."""
+    message = refused(RGB.astype(np.float32))
+    assert "view 0,0" in message
+    assert "within 0..1" in message
+    assert "255" in message
+
+
+def test_values_beyond_float32_are_refused() -> None:
+    assert "1e+300" in refused(np.full(RGB.shape, 1e300))
+
+
+def test_fourth_channel_is_left_out_and_said() -> None:
+    """The Light Field Toolbox's weight, or transparency, is no colour."""
+    four = np.concatenate([RGB, RNG.integers(0, 256, (T, S, H, W, 1), np.uint8)], axis=4)
+    light_field = taken(four, axes="TSHWC")
+    np.testing.assert_array_equal(light_field.views, RGB)
+    assert any("4th channel" in note for note in light_field.notes)
+    assert not any("4th channel" in note for note in taken(RGB).notes)
+
+
+# --- missing views
+
+
+def grid_of(kind: type = np.uint8) -> np.ndarray:
+    views = RNG.integers(1, 256, (3, 3, 8, 10, 3), np.uint8)
+    return views if kind is np.uint8 else (views / 255).astype(kind)
+
+
+@pytest.mark.parametrize("padding", [0, np.nan])
+def test_views_of_zeros_or_nan_are_missing(padding: float) -> None:
+    """Padding in the corners, taken as black pictures, would outvote the real views."""
+    views = grid_of(np.float32)
+    views[0, 0] = views[2, 2] = padding
+    light_field = taken(views)
+    assert np.argwhere(~light_field.present).tolist() == [[0, 0], [2, 2]]
+    assert any("taken as missing: 0,0 2,2" in note for note in light_field.notes)
+    np.testing.assert_array_equal(light_field.views[0, 0], 0)
+    np.testing.assert_array_equal(light_field.views[1, 2], views[1, 2])
+
+
+def test_all_views_black_are_not_all_missing() -> None:
+    assert taken(np.zeros(RGB.shape, np.uint8)).present.all()
+
+
+def test_a_black_centre_view_is_named_with_the_way_out() -> None:
+    views = grid_of()
+    views[1, 1] = 0
+    message = refused(views)
+    assert "view 1,1" in message
+    assert "--view" in message
+    assert taken(views, view=(1, 2)).reference == (1, 2)
+
+
+def test_nan_in_a_view_names_it_and_excluding_it_mends_it() -> None:
+    """One NaN spreads over the whole map; views left out must not bring theirs along."""
+    views = grid_of(np.float64)
+    views[0, 2, 3, 3, 1] = np.nan
+    views[2, 0, 0, 0, 0] = np.inf
+    assert "view 0,2 holds values that are not finite" in refused(views)
+    assert "--exclude 0,2" in refused(views)
+    assert "--exclude 2,0" in refused(views, exclude=("0,2",))
+    light_field = taken(views, exclude=("0,2", "2,0"))
+    assert np.argwhere(~light_field.present).tolist() == [[0, 2], [2, 0]]
+    assert np.isfinite(light_field.views).all()
+
+
+# --- arrangement
+
+
+def test_order_puts_views_in_their_places() -> None:
+    light_field = taken(RGB, order="transpose-flip-rows")
+    np.testing.assert_array_equal(light_field.views, RGB.transpose(1, 0, 2, 3, 4)[::-1])
+
+
+def test_the_reference_view_is_the_centre_of_the_grid_as_it_is_ordered() -> None:
+    """An even grid has no exact middle; all formats must take the same one of the views about it."""
+    views = RNG.integers(1, 256, (4, 4, 8, 10, 3), np.uint8)
+    light_field = taken(views, order="flip-both")
+    assert light_field.reference == (2, 2)
+    np.testing.assert_array_equal(light_field.views[light_field.reference], views[1, 1])
+
+
+def test_central_views_and_exclusions_count_in_the_new_grid() -> None:
+    views = RNG.integers(1, 256, (5, 7, 16, 20, 3), np.uint8)
+    light_field = taken(views, central=3, exclude=("0,1",), view=(2, 2))
+    kept = np.delete(views[1:4, 2:5].reshape(9, 16, 20, 3), 1, axis=0)
+    np.testing.assert_array_equal(light_field.views[light_field.present], kept)
+    assert not light_field.present[0, 1]
+    assert light_field.reference == (2, 2)
+
+
+def test_views_outside_the_central_ones_may_be_damaged() -> None:
+    views = np.ones((5, 5, 12, 12, 3), np.float32) / 2
+    views[0, 0, 0, 0, 0] = np.nan
+    assert taken(views, central=3).present.all()
+
+
+def test_the_array_is_copied() -> None:
+    views = RGB.copy()
+    light_field = taken(views)
+    views[:] = 0
+    np.testing.assert_array_equal(light_field.views, RGB)
+
+
+# --- this package's own files
+
+
+@pytest.fixture
+def own(tmp_path: Path) -> Path:
+    views = grid_of(np.float32)
+    truth = np.arange(80, dtype=np.float32).reshape(8, 10)
+    write_light_field(tmp_path / "own.h5", LightField(views, "own", truth=truth))
+    return tmp_path / "own.h5"
+
+
+def test_excluded_views_of_own_files_are_gone(own: Path) -> None:
+    """What is left out must not reach a later stage by another way."""
+    light_field = read(own, ReadOptions(exclude=("0,1",), order="flip-rows"))
+    assert np.argwhere(~light_field.present).tolist() == [[0, 1]]
+    assert not light_field.views[0, 1].any()
+    with h5py.File(own) as file:
+        np.testing.assert_array_equal(light_field.views[2], file["views"][0])
+        np.testing.assert_array_equal(light_field.truth, file["truth"])
+
+
+@pytest.mark.parametrize("name", ["views", "present", "truth"])
+def test_own_files_that_claim_more_than_they_hold(own: Path, name: str) -> None:
+    """A file of 2 KB may claim terabytes of fill values."""
+    with h5py.File(own, "a") as file:
+        del file[name]
+        file.create_dataset(name, (9, 9, 100_000, 100_000, 3), np.uint8)
+    with pytest.raises(SepiError, match=f"own.h5: damaged HDF5 file: '{name}' .* cannot lie in 0 bytes"):
+        read(own, ReadOptions())
+
+
+def test_shape_and_length_that_agree_on_a_lie(tmp_path: Path) -> None:
+    """Both stand in the header; what counts is the file."""
+    with h5py.File(tmp_path / "lie.h5", "w") as file:
+        file["LF"] = RGB
+    content = (tmp_path / "lie.h5").read_bytes()
+    shape, claimed = RGB.shape, (T, S, 100_000, 100_000, 3)
+    for old, new in ((struct.pack("<5Q", *shape), claimed), (struct.pack("<Q", RGB.size), [np.prod(claimed)])):
+        assert old in content
+        content = content.replace(old, struct.pack(f"<{len(new)}Q", *new))
+    (tmp_path / "lie.h5").write_bytes(content)
+    with pytest.raises(SepiError, match=r"lie\.h5: damaged HDF5 file"):
+        read(tmp_path / "lie.h5", ReadOptions(), "hci-old")
+
+
+# --- damaged files of every format
+
+
+def _mat_7_3(path: Path) -> None:
+    with h5py.File(path, "w", userblock_size=512) as file:
+        file.create_dataset("LF", data=RGB.T, chunks=(3, 5, 4, 3, 2), compression="gzip")
+        file["LF"].attrs["MATLAB_class"] = np.bytes_("uint8")
+    with path.open("r+b") as file:
+        file.write(b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM")
+
+
+def _hci_old(path: Path) -> None:
+    with h5py.File(path, "w") as file:
+        file["LF"] = RGB
+        file["GT_DEPTH"] = np.ones(RGB.shape[:4], np.float32)
+        file.attrs.update(dH=0.1, focalLength=100.0, shift=1.0)
+
+
+WRITERS = {
+    "a.npy": lambda path: np.save(path, RGB),
+    "a.npz": lambda path: np.savez(path, LF=RGB, other=np.ones(3)),
+    "compressed.npz": lambda path: np.savez_compressed(path, LF=RGB),
+    "a.mat": lambda path: scipy.io.savemat(path, {"LF": RGB, "other": {"field": 1}}),
+    "compressed.mat": lambda path: scipy.io.savemat(path, {"LF": RGB, "other": 2.0}, do_compression=True),
+    "v73.mat": _mat_7_3,
+    "old.h5": _hci_old,
+}
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
+    """Small undamaged files."""
+    folder = tmp_path_factory.mktemp("whole")
+    for name, write in WRITERS.items():
+        write(folder / name)
+    return {name: (folder / name).read_bytes() for name in WRITERS}
+
+
+@pytest.mark.parametrize("name", WRITERS)
+# the same damage each time: what HDF5's own library does to a random one is not this package's to promise
+@settings(max_examples=60, deadline=None, derandomize=True)
+@given(data=st.data())
+def test_damage_is_one_clear_error(
+    name: str, whole: dict[str, bytes], tmp_path_factory: pytest.TempPathFactory, data: st.DataObject
+) -> None:
+    """Broken downloads are common; they must end in a line that names the file, never in a traceback."""
+    content = bytearray(whole[name])
+    where = st.one_of(st.integers(0, 400), st.integers(0, len(content) - 1))
+    for at, value in data.draw(st.lists(st.tuples(where, st.integers(0, 255)), max_size=8)):
+        content[min(at, len(content) - 1)] = value
+    cut = data.draw(st.one_of(st.none(), where))
+    content = content[:cut] + data.draw(st.binary(max_size=20))
+    path = tmp_path_factory.getbasetemp() / f"damaged-{name}"
+    path.write_bytes(content)
+    wanted = {".npy": "numpy", ".npz": "numpy", ".mat": "matlab", ".h5": "hci-old"}[path.suffix]
+    for known in FORMATS.values():
+        assert known.matches(path) in (True, False)
+    message = f"{path}:"
+    try:
+        read(path, ReadOptions(), wanted)
+    except SepiError as error:
+        message = str(error)
+    assert message.startswith(f"{path}:")
+    assert message.isprintable()
+
+
+@pytest.mark.parametrize("name", WRITERS)
+def test_cut_off_files_are_errors_and_whole_ones_are_not(name: str, whole: dict[str, bytes], tmp_path: Path) -> None:
+    """A file cut anywhere lacks values: no part of it may pass for a light field."""
+    path = tmp_path / name
+    path.write_bytes(whole[name])
+    light_field = read(path, ReadOptions())
+    np.testing.assert_array_equal(light_field.views, RGB)
+    assert light_field.name == path.stem
+    assert light_field.source == str(path)
+    for part in (0, 0.1, 0.5, 0.9, 0.99):
+        path.write_bytes(whole[name][: int(part * len(whole[name]))])
+        with pytest.raises(SepiError, match=re.escape(str(path))):
+            read(path, ReadOptions())
+
+
+@pytest.mark.parametrize("name", WRITERS)
+def test_flags_for_other_formats_are_refused(name: str, whole: dict[str, bytes], tmp_path: Path) -> None:
+    """A flag that does nothing would make the user think it did."""
+    path = tmp_path / name
+    path.write_bytes(whole[name])
+    with pytest.raises(SepiError, match="--pattern does not apply"):
+        read(path, ReadOptions(pattern="view{number}.png"))
+
+
+@pytest.mark.parametrize("name", WRITERS)
+def test_formats_are_told_by_content(name: str, whole: dict[str, bytes], tmp_path: Path) -> None:
+    """The files that users have are not always named as their format wants it."""
+    path = tmp_path / "unnamed"
+    path.write_bytes(whole[name])
+    np.testing.assert_array_equal(read(path, ReadOptions()).views, RGB)

@@ -1,0 +1,168 @@
+"""Lytro lenslet pictures: the view (t, s) is the pixel (t, s) under every lenslet; any other reading mixes views."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import cv2
+import imageio.v3 as imageio
+import numpy as np
+import pytest
+
+from sepi.errors import SepiError
+from sepi.io.readers import eslf
+from sepi.io.readers.formats import format_of, read
+from sepi.io.readers.options import ReadOptions
+
+
+def stack(
+    grid: tuple[int, int], size: tuple[int, int] = (5, 7), channels: int = 3, kind: type = np.uint8
+) -> np.ndarray:
+    """Views (T, S, H, W, C) of random pixels."""
+    shape = (*grid, *size, channels)
+    return np.random.default_rng(0).integers(0, np.iinfo(kind).max, shape, kind, endpoint=True)
+
+
+def lenslets(views: np.ndarray, beyond: tuple[int, int] = (0, 0)) -> np.ndarray:
+    """Picture with the views' pixels under its lenslets, and further rows and columns beyond them."""
+    T, S, H, W, C = views.shape
+    picture = np.full((T * H + beyond[0], S * W + beyond[1], C), 99, views.dtype)
+    for t in range(T):
+        for s in range(S):
+            for y in range(H):
+                picture[y * T + t, s : S * W : S] = views[t, s, y]
+    return picture
+
+
+def put(path: Path, picture: np.ndarray) -> Path:
+    assert cv2.imwrite(str(path), picture[:, :, ::-1] if picture.shape[2] > 1 else picture)
+    return path
+
+
+@pytest.mark.parametrize("name", ["IMG_1_eslf.png", "flower.ESLF.PNG", "eslf.tif"])
+def test_the_middle_views_are_read_pixel_for_pixel(tmp_path: Path, name: str) -> None:
+    views = stack((14, 14))
+    path = put(tmp_path / name, lenslets(views))
+    assert format_of(path).name == "Lytro lenslet picture"
+    light_field = read(path, ReadOptions())
+    np.testing.assert_array_equal(light_field.views, views[3:12, 3:12])
+    assert light_field.present.all()
+    assert light_field.reference == (4, 4)
+    np.testing.assert_array_equal(light_field.views[light_field.reference], views[7, 7])
+    assert light_field.name == Path(name).stem
+    assert light_field.source == str(path)
+    assert light_field.notes == ("the 9x9 views in the middle of 14x14; --central N takes another odd number",)
+
+
+READ: dict[str, tuple[tuple[int, int], ReadOptions, Callable[[np.ndarray], np.ndarray]]] = {
+    "13x13": ((14, 14), ReadOptions(central=13), lambda views: views[1:14, 1:14]),
+    "3x3": ((14, 14), ReadOptions(central=3), lambda views: views[6:9, 6:9]),
+    "15 pixels under a lenslet": ((15, 15), ReadOptions(grid=(15, 15)), lambda views: views[3:12, 3:12]),
+    "15x15 all": ((15, 15), ReadOptions(grid=(15, 15), central=15), lambda views: views),
+    "a small grid": ((4, 5), ReadOptions(grid=(4, 5)), lambda views: views[1:4, 1:4]),
+    "a small odd grid": ((3, 3), ReadOptions(grid=(3, 3)), lambda views: views),
+    "a row": ((1, 5), ReadOptions(grid=(1, 5)), lambda views: views),
+    "flipped": ((14, 14), ReadOptions(order="flip-rows", central=3), lambda views: views[6:9, 6:9][::-1]),
+    "transposed": (
+        (14, 14),
+        ReadOptions(order="transpose", central=3),
+        lambda views: views[6:9, 6:9].swapaxes(0, 1),
+    ),
+}
+
+
+@pytest.mark.parametrize("case", READ)
+def test_other_views_are_read_when_asked_for(tmp_path: Path, case: str) -> None:
+    grid, options, expected = READ[case]
+    views = stack(grid)
+    light_field = read(put(tmp_path / "a_eslf.png", lenslets(views)), options)
+    np.testing.assert_array_equal(light_field.views, expected(views))
+
+
+@pytest.mark.parametrize(("kind", "channels"), [(np.uint8, 1), (np.uint16, 1), (np.uint16, 3)])
+def test_depth_of_pixels_is_kept(tmp_path: Path, kind: type, channels: int) -> None:
+    views = stack((14, 14), (3, 2), channels, kind)
+    light_field = read(put(tmp_path / "a_eslf.png", lenslets(views)), ReadOptions())
+    assert light_field.views.dtype == kind
+    np.testing.assert_array_equal(light_field.views, views[3:12, 3:12])
+
+
+def test_pixels_beyond_the_last_whole_lenslet_are_left_out_with_a_note(tmp_path: Path) -> None:
+    """The archive's pictures do not end with a whole lenslet."""
+    views = stack((14, 14))
+    light_field = read(put(tmp_path / "a_eslf.png", lenslets(views, (3, 13))), ReadOptions())
+    np.testing.assert_array_equal(light_field.views, views[3:12, 3:12])
+    assert "3 pixel rows and 13 columns beyond the last whole lenslet were left out" in light_field.notes
+
+
+def test_dark_views_are_named_with_the_flag_that_leaves_them_out(tmp_path: Path) -> None:
+    """They spoil the matching, but which views are used is the user's to say."""
+    views = stack((14, 14))
+    views[3, 3] //= 10
+    views[3, 11] = 0
+    views[7, 7] = np.maximum(views[7, 7], 60)
+    path = put(tmp_path / "a_eslf.png", lenslets(views))
+    light_field = read(path, ReadOptions())
+    assert light_field.present.all()
+    assert light_field.notes[-1].startswith("2 views are darker")
+    assert light_field.notes[-1].endswith("to leave out: --exclude 0,0 --exclude 0,8")
+    lighter = read(path, ReadOptions(exclude=("0,0", "0,8")))
+    assert not lighter.present[0, 0]
+    assert not lighter.present[0, 8]
+    assert lighter.present.sum() == 79
+    assert len(lighter.notes) == 1
+
+
+def test_any_picture_is_read_when_said_to_be_one(tmp_path: Path) -> None:
+    views = stack((14, 14))
+    path = put(tmp_path / "plain.bmp", lenslets(views))
+    with pytest.raises(SepiError, match="a single picture; give the folder of all views"):
+        format_of(path)
+    np.testing.assert_array_equal(read(path, ReadOptions(), "eslf").views, views[3:12, 3:12])
+
+
+def test_what_is_no_picture_does_not_look_like_one(tmp_path: Path) -> None:
+    (tmp_path / "eslf.txt").write_text("eslf")
+    (tmp_path / "eslf.png").mkdir()
+    assert not eslf.matches(tmp_path / "eslf.txt")
+    assert not eslf.matches(tmp_path / "eslf.png")
+    assert not eslf.matches(tmp_path / "nothing_eslf.png")
+
+
+BAD: dict[str, tuple[tuple[int, int], ReadOptions, str]] = {
+    "too low": ((27, 100), ReadOptions(), "views of 7x1 pixels"),
+    "too narrow": ((100, 27), ReadOptions(), "views of 1x7 pixels"),
+    "smaller than a lenslet": ((5, 5), ReadOptions(), "views of 0x0 pixels"),
+    "grid too large": ((100, 100), ReadOptions(grid=(60, 60)), "views of 1x1 pixels"),
+    "huge grid": ((100, 100), ReadOptions(grid=(999_999, 999_999)), "a grid of 2 to 10000 views"),
+    "no grid": ((100, 100), ReadOptions(grid=(0, 14)), "a grid of 2 to 10000 views"),
+    "one view": ((100, 100), ReadOptions(grid=(1, 1)), "a grid of 2 to 10000 views"),
+    "even middle": ((100, 100), ReadOptions(central=14), "odd number"),
+    "middle too large": ((100, 100), ReadOptions(central=15), "fits the grid of 14x14"),
+    "view outside": ((100, 100), ReadOptions(view=(9, 0)), "outside the grid"),
+    "reference view left out": ((100, 100), ReadOptions(exclude=("4,4",)), "centre view"),
+    "view left out": ((100, 100), ReadOptions(exclude=("1,2",), view=(1, 2)), "missing"),
+    "pattern": ((100, 100), ReadOptions(pattern="{number}"), "--pattern does not apply"),
+    "axes": ((100, 100), ReadOptions(axes="HWC"), "--axes does not apply"),
+    "variable": ((100, 100), ReadOptions(variable="LF"), "--variable does not apply"),
+    "links": ((100, 100), ReadOptions(follow_links=True), "--follow-links does not apply"),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_what_does_not_fit_is_one_line_that_names_the_file(tmp_path: Path, case: str) -> None:
+    size, options, word = BAD[case]
+    path = put(tmp_path / "a_eslf.png", np.full((*size, 3), 100, np.uint8))
+    with pytest.raises(SepiError) as caught:
+        read(path, options)
+    assert str(path) in str(caught.value)
+    assert word in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_damaged_picture_is_one_line_that_names_it(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "a_eslf.png"
+    imageio.imwrite(path, lenslets(stack((14, 14))))
+    path.write_bytes(path.read_bytes()[:-20])
+    with pytest.raises(SepiError, match=r"a_eslf\.png: damaged PNG"):
+        read(path, ReadOptions())
+    assert capfd.readouterr() == ("", "")

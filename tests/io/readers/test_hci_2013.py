@@ -1,0 +1,160 @@
+"""HDF5 files of the first HCI benchmark: views, the truth of the view whose depth is wanted, and the camera."""
+
+import re
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from sepi.camera import Camera
+from sepi.errors import SepiError
+from sepi.io.readers.formats import format_of, read
+from sepi.io.readers.options import ORDERS, ReadOptions
+from sepi.lightfield import LightField
+
+T, S, H, W = 3, 5, 8, 10
+RNG = np.random.default_rng(11)
+LF = RNG.integers(1, 256, (T, S, H, W, 3), np.uint8)
+DEPTH = RNG.uniform(5, 20, (T, S, H, W)).astype(np.float32)
+GEOMETRY = {"dH": 0.05, "focalLength": 300.0, "shift": 1.25}
+TRUTH = 0.05 * 300 / DEPTH.astype(np.float64) - 1.25
+
+
+def write(path: Path, *, depth: np.ndarray | None = DEPTH, views: np.ndarray = LF, **attributes: object) -> Path:
+    with h5py.File(path, "w") as file:
+        file["LF"] = views
+        if depth is not None:
+            file["GT_DEPTH"] = depth
+        file.attrs.update({**GEOMETRY, **attributes})
+    return path
+
+
+def taken(path: Path, **options: object) -> LightField:
+    assert format_of(path).name == "HCI-old HDF5"
+    return read(path, ReadOptions(**options))
+
+
+def refused(path: Path, **options: object) -> str:
+    with pytest.raises(SepiError, match=re.escape(str(path))) as caught:
+        read(path, ReadOptions(**options), "hci-old")
+    assert "\n" not in str(caught.value)
+    return str(caught.value)
+
+
+def test_views_truth_and_camera(tmp_path: Path) -> None:
+    light_field = taken(write(tmp_path / "buddha.h5"))
+    np.testing.assert_array_equal(light_field.views, LF)
+    np.testing.assert_allclose(light_field.truth, TRUTH[1, 2], rtol=1e-5, atol=1e-6)
+    assert light_field.truth.dtype == np.float32
+    assert light_field.camera == Camera(scale=15.0, offset=1.25, focal_px=300.0)
+    np.testing.assert_allclose(light_field.camera.depth(light_field.truth), DEPTH[1, 2], rtol=1e-4)
+    assert light_field.name == "buddha"
+    assert light_field.notes == ()
+
+
+def test_the_range_of_the_truth_is_not_taken(tmp_path: Path) -> None:
+    """Truth that told the method where to look would make its scores worthless."""
+    assert taken(write(tmp_path / "a.h5")).disparity_range is None
+
+
+def test_attributes_may_be_arrays_of_one(tmp_path: Path) -> None:
+    arrays = {key: np.array([value]) for key, value in GEOMETRY.items()}
+    light_field = taken(write(tmp_path / "a.h5", **arrays))
+    assert light_field.camera == Camera(15.0, 1.25, 300.0)
+
+
+@pytest.mark.parametrize("order", ORDERS)
+@pytest.mark.parametrize("view", [None, (0, 1), (2, 2)])
+def test_truth_is_that_of_the_view_whose_depth_is_wanted(
+    tmp_path: Path, order: str, view: tuple[int, int] | None
+) -> None:
+    """Truth of another view is shifted by its parallax: every score would be wrong."""
+    light_field = taken(write(tmp_path / "a.h5"), order=order, view=view, exclude=("0,0",))
+    own = light_field.views[light_field.reference]
+    t, s = next((t, s) for t in range(T) for s in range(S) if np.array_equal(LF[t, s], own))
+    assert view is not None or (t, s) == (1, 2)
+    np.testing.assert_allclose(light_field.truth, TRUTH[t, s], rtol=1e-5, atol=1e-6)
+
+
+def test_truth_of_the_centre_view_alone(tmp_path: Path) -> None:
+    path = write(tmp_path / "a.h5", depth=DEPTH[1, 2])
+    for options in ({}, {"central": 3}, {"order": "flip-both"}, {"view": (1, 2)}):
+        np.testing.assert_allclose(taken(path, **options).truth, TRUTH[1, 2], rtol=1e-5, atol=1e-6)
+    assert taken(path, view=(1, 1)).truth is None
+
+
+def test_truth_is_unknown_where_the_depth_is_none(tmp_path: Path) -> None:
+    """Holes in the depth are no surfaces; scoring leaves out what is not finite."""
+    depth = DEPTH.copy()
+    depth[1, 2, 0, :5] = [0, -1, np.nan, np.inf, 1e-45]
+    truth = taken(write(tmp_path / "a.h5", depth=depth)).truth
+    assert np.isnan(truth[0, :5]).all()
+    np.testing.assert_allclose(truth[1:], TRUTH[1, 2, 1:], rtol=1e-5, atol=1e-6)
+
+
+def test_a_file_without_depth(tmp_path: Path) -> None:
+    light_field = taken(write(tmp_path / "a.h5", depth=None))
+    assert light_field.truth is None
+    assert light_field.camera is not None
+
+
+@pytest.mark.parametrize("attributes", [{"dH": 0.0}, {"focalLength": -1.0}, {"shift": np.nan}, {"dH": np.inf}])
+def test_geometry_of_no_camera_gives_no_truth(tmp_path: Path, attributes: dict[str, float]) -> None:
+    light_field = taken(write(tmp_path / "a.h5", **attributes))
+    assert light_field.camera is None
+    assert light_field.truth is None
+    assert any("no metric depth and no ground truth" in note for note in light_field.notes)
+
+
+def test_missing_attributes_are_named(tmp_path: Path) -> None:
+    path = write(tmp_path / "a.h5")
+    with h5py.File(path, "a") as file:
+        del file.attrs["dH"], file.attrs["shift"]
+    light_field = taken(path)
+    assert light_field.truth is None
+    assert light_field.notes == ("no metric depth and no ground truth: the file has no attribute dH, shift",)
+
+
+def test_sizes_that_the_views_do_not_have_are_said(tmp_path: Path) -> None:
+    path = write(tmp_path / "a.h5", xRes=W, yRes=H, vRes=T, hRes=7, channels=3)
+    assert taken(path).notes == ("attribute hRes is 7, but the views have 5",)
+
+
+@pytest.mark.parametrize("value", ["near", [1.0, 2.0], []])
+def test_attributes_that_are_no_numbers_are_named(tmp_path: Path, value: object) -> None:
+    assert "attribute 'focalLength'" in refused(write(tmp_path / "a.h5", focalLength=value))
+
+
+@pytest.mark.parametrize("views", [LF[..., 0], LF[0, 0], np.concatenate([LF, LF], axis=4), LF.astype(np.int32)])
+def test_views_of_another_layout_are_refused(tmp_path: Path, views: np.ndarray) -> None:
+    message = refused(write(tmp_path / "a.h5", views=views))
+    assert "expected" in message
+
+
+def test_depth_of_another_shape_is_refused(tmp_path: Path) -> None:
+    assert "'GT_DEPTH' has shape (3, 5, 8, 9)" in refused(write(tmp_path / "a.h5", depth=DEPTH[..., 1:]))
+
+
+@pytest.mark.parametrize("name", ["LF", "GT_DEPTH"])
+def test_no_memory_on_the_word_of_a_shape(tmp_path: Path, name: str) -> None:
+    """A file of 2 KB may claim terabytes of fill values."""
+    path = write(tmp_path / "a.h5")
+    with h5py.File(path, "a") as file:
+        del file[name]
+        file.create_dataset(name, (9, 9, 100_000, 100_000, 3)[: 5 if name == "LF" else 4], np.uint8)
+    assert "cannot lie in 0 bytes" in refused(path)
+
+
+def test_a_group_or_nothing_in_place_of_the_views(tmp_path: Path) -> None:
+    with h5py.File(tmp_path / "group.h5", "w") as file:
+        file["LF/inner"] = LF
+    assert "'LF' is no array" in refused(tmp_path / "group.h5")
+    with h5py.File(tmp_path / "none.h5", "w") as file:
+        file["other"] = LF
+    assert "dataset 'LF' is missing" in refused(tmp_path / "none.h5")
+
+
+def test_axes_are_fixed(tmp_path: Path) -> None:
+    for options in ({"axes": "TSHWC"}, {"variable": "LF"}, {"grid": (3, 5)}, {"follow_links": True}):
+        assert "does not apply" in refused(write(tmp_path / "a.h5"), **options)

@@ -1,0 +1,261 @@
+"""MATLAB files of both kinds: what MATLAB shows is what is read, pixel for pixel."""
+
+import re
+import struct
+import zlib
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+import scipy.io
+
+from sepi.errors import SepiError
+from sepi.io.readers.formats import format_of, read
+from sepi.io.readers.options import ReadOptions
+from sepi.lightfield import LightField
+
+RNG = np.random.default_rng(3)
+LF = RNG.integers(1, 256, (2, 3, 8, 10, 3), np.uint8)
+
+
+def taken(path: Path, **options: object) -> LightField:
+    assert format_of(path).name == "MATLAB file"
+    return read(path, ReadOptions(**options))
+
+
+def refused(path: Path, **options: object) -> str:
+    with pytest.raises(SepiError, match=re.escape(str(path))) as caught:
+        read(path, ReadOptions(**options))
+    assert "\n" not in str(caught.value)
+    return str(caught.value)
+
+
+def save_7_3(path: Path, arrays: dict[str, np.ndarray], *, header: bool = True, classes: bool = True) -> None:
+    """Write by h5py what MATLAB writes: axes in reverse, a class for each array, a header in the first 512 bytes."""
+    names = {"float64": "double", "float32": "single"}
+    with h5py.File(path, "w", userblock_size=512 if header else 0) as file:
+        for name, array in arrays.items():
+            file.create_dataset(name, data=array.T, chunks=True, compression="gzip", compression_opts=3)
+            if classes:
+                file[name].attrs["MATLAB_class"] = np.bytes_(names.get(array.dtype.name, array.dtype.name))
+    if header:
+        with path.open("r+b") as file:
+            text = b"MATLAB 7.3 MAT-file, Platform: GLNXA64, Created on: Thu Jan  1 00:00:00 2015 HDF5 schema 1.00 ."
+            file.write(text.ljust(124) + b"\x00\x02IM")
+
+
+SAVERS = {
+    "5": lambda path, arrays: scipy.io.savemat(path, arrays),
+    "5 compressed": lambda path, arrays: scipy.io.savemat(path, arrays, do_compression=True),
+    "7.3": save_7_3,
+    "7.3 without header": lambda path, arrays: save_7_3(path, arrays, header=False),
+    "7.3 without classes": lambda path, arrays: save_7_3(path, arrays, classes=False),
+}
+saver = pytest.mark.parametrize("save", SAVERS.values(), ids=SAVERS)
+
+CASES = {
+    "TSHWC": (LF, None),
+    "HWTSC": (LF.transpose(2, 3, 0, 1, 4), None),
+    "SCWHT": (LF.transpose(1, 4, 3, 2, 0), "SCWHT"),
+    "16 bit": (LF.astype(np.uint16) * 257, None),
+    "double": (LF / 255, None),
+    "single": ((LF / 255).astype(np.float32), None),
+    "even grid": (RNG.integers(1, 256, (4, 4, 8, 10, 3), np.uint8), None),
+}
+
+
+@saver
+@pytest.mark.parametrize("case", CASES)
+def test_what_matlab_shows_is_read(tmp_path: Path, save, case: str) -> None:
+    """Axes in reverse, or values of another type, make depth nonsense."""
+    array, axes = CASES[case]
+    save(tmp_path / "scene.mat", {"LF": array})
+    light_field = taken(tmp_path / "scene.mat", axes=axes)
+    order = {"HWTSC": (2, 3, 0, 1, 4), "SCWHT": (4, 0, 3, 2, 1)}.get(case, (0, 1, 2, 3, 4))
+    expected = array.transpose(order)
+    np.testing.assert_array_equal(light_field.views, expected.astype(light_field.views.dtype))
+    assert light_field.views.dtype == (np.float32 if array.dtype.kind == "f" else array.dtype)
+    assert light_field.name == "scene"
+
+
+@saver
+def test_light_field_toolbox(tmp_path: Path, save) -> None:
+    """The toolbox saves 16 bit with a weight as fourth channel, and zeros in the corners of the grid."""
+    views = RNG.integers(1, 2**16, (5, 5, 12, 14, 4), np.uint16)
+    views[0, 0] = views[4, 0] = 0
+    save(tmp_path / "IMG__Decoded.mat", {"LF": views, "RectOptions": np.ones((3, 3))})
+    light_field = taken(tmp_path / "IMG__Decoded.mat")
+    np.testing.assert_array_equal(light_field.views, views[..., :3])
+    assert np.argwhere(~light_field.present).tolist() == [[0, 0], [4, 0]]
+    assert [note.split(" (")[0] for note in light_field.notes] == [
+        "axes taken as T S H W C; --axes sets them otherwise",
+        "4th channel",
+        "views that are all zeros taken as missing: 0,0 4,0",
+    ]
+
+
+@saver
+def test_grey_views_have_no_axis_of_colours(tmp_path: Path, save) -> None:
+    """MATLAB drops axes of size 1 at the end, whatever the user calls them."""
+    save(tmp_path / "grey.mat", {"LF": LF[..., 0]})
+    for axes in (None, "TSHW", "TSHWC"):
+        np.testing.assert_array_equal(taken(tmp_path / "grey.mat", axes=axes).views, LF[..., :1])
+
+
+@saver
+def test_one_of_several_arrays(tmp_path: Path, save) -> None:
+    """Which array is read must not be a matter of chance."""
+    other = 255 - LF // 2
+    save(tmp_path / "one.mat", {"views": LF, "matrix": np.ones((3, 3))})
+    np.testing.assert_array_equal(taken(tmp_path / "one.mat").views, LF)
+    save(tmp_path / "two.mat", {"before": other, "LF": LF})
+    np.testing.assert_array_equal(taken(tmp_path / "two.mat").views, LF)
+    np.testing.assert_array_equal(taken(tmp_path / "two.mat", variable="before").views, other)
+    assert "did you mean 'before'?" in refused(tmp_path / "two.mat", variable="befor")
+    save(tmp_path / "unclear.mat", {"left": LF, "right": other})
+    assert "--variable: left 2x3x8x10x3, right 2x3x8x10x3" in refused(tmp_path / "unclear.mat")
+    save(tmp_path / "none.mat", {"matrix": np.ones((3, 3))})
+    assert "no array of numbers of 4 or 5 axes (found: matrix 3x3)" in refused(tmp_path / "none.mat")
+
+
+def test_other_classes_are_passed_over(tmp_path: Path) -> None:
+    """Text, structures, cells and logical arrays stand beside the views in real files."""
+    others = {
+        "text": "words",
+        "cell": np.array([1, "a"], object),
+        "struct": {"LF": LF},
+        "mask": np.ones((2, 3, 8, 10), bool),
+        "complex": LF[..., 0] * 1j,
+    }
+    for compressed in (False, True):
+        scipy.io.savemat(tmp_path / "mixed.mat", {**others, "views": LF}, do_compression=compressed)
+        np.testing.assert_array_equal(taken(tmp_path / "mixed.mat").views, LF)
+    save_7_3(tmp_path / "mixed73.mat", {"views": LF})
+    with h5py.File(tmp_path / "mixed73.mat", "a") as file:
+        file["structure/LF"] = LF.T
+        file["mask"] = np.ones((10, 8, 3, 2), np.uint8)
+        file["mask"].attrs["MATLAB_class"] = np.bytes_("logical")
+        file["gone"] = h5py.SoftLink("/nowhere")
+    np.testing.assert_array_equal(taken(tmp_path / "mixed73.mat").views, LF)
+
+
+def test_other_programs_hdf5_is_as_they_show_it(tmp_path: Path) -> None:
+    """An HDF5 file that is only called .mat was not written in reverse."""
+    with h5py.File(tmp_path / "python.mat", "w") as file:
+        file["LF"] = LF
+    np.testing.assert_array_equal(taken(tmp_path / "python.mat").views, LF)
+
+
+def element(order: str, kind: int, data: bytes) -> bytes:
+    return struct.pack(order + "II", kind, len(data)) + data + bytes(-len(data) % 8)
+
+
+def version_5(order: str, *, dims: tuple[int, ...], kind: int, stored: int, data: bytes, packed: bool) -> bytes:
+    """A file with one variable LF, made by hand from the format's description."""
+    matrix = element(order, 6, struct.pack(order + "II", kind, 0))
+    matrix += element(order, 5, struct.pack(f"{order}{len(dims)}i", *dims))
+    # a name of up to four letters stands in the tag itself
+    matrix += struct.pack(order + "I", 2 << 16 | 1) + b"LF\0\0"
+    matrix += element(order, stored, data)
+    content = element(order, 14, matrix)
+    if packed:
+        content = struct.pack(order + "II", 15, len(zlib.compress(content))) + zlib.compress(content)
+    mark = b"\x00\x01IM" if order == "<" else b"\x01\x00MI"
+    return b"MATLAB 5.0 MAT-file, by hand".ljust(124) + mark + content
+
+
+@pytest.mark.parametrize("packed", [False, True])
+@pytest.mark.parametrize("order", ["<", ">"])
+def test_small_16_bit_values_stored_as_bytes_stay_16_bit(tmp_path: Path, order: str, packed: bool) -> None:
+    """MATLAB stores dark 16 bit pictures in 8 bits each; read as 8 bit they would be 256 times too bright."""
+    content = version_5(order, dims=LF.shape, kind=11, stored=2, data=LF.tobytes("F"), packed=packed)
+    (tmp_path / "dark.mat").write_bytes(content)
+    light_field = taken(tmp_path / "dark.mat")
+    assert light_field.views.dtype == np.uint16
+    np.testing.assert_array_equal(light_field.views, LF)
+
+
+@pytest.mark.parametrize("packed", [False, True])
+def test_big_endian_values(tmp_path: Path, packed: bool) -> None:
+    views = (LF.astype(np.uint16) * 255).astype(">u2")
+    content = version_5(">", dims=LF.shape, kind=11, stored=4, data=views.tobytes("F"), packed=packed)
+    (tmp_path / "big.mat").write_bytes(content)
+    np.testing.assert_array_equal(taken(tmp_path / "big.mat").views, views)
+
+
+@pytest.mark.parametrize("packed", [False, True])
+@pytest.mark.parametrize("dims", [(9, 9, 30000, 30000, 3), (2, 3, 8, 10, 4), (2, 3, -8, -10, 3), (2,) * 5])
+def test_shapes_that_the_values_do_not_have(tmp_path: Path, dims: tuple[int, ...], packed: bool) -> None:
+    """No memory may be taken on the word of a shape."""
+    content = version_5("<", dims=dims, kind=9, stored=2, data=LF.tobytes("F"), packed=packed)
+    (tmp_path / "lie.mat").write_bytes(content)
+    assert "damaged MATLAB file" in refused(tmp_path / "lie.mat")
+
+
+@pytest.mark.parametrize("packed", [False, True])
+def test_shape_and_length_that_agree_on_a_lie(tmp_path: Path, packed: bool) -> None:
+    """Both stand in the header; what counts is the file."""
+    honest = version_5("<", dims=LF.shape, kind=9, stored=2, data=LF.tobytes("F"), packed=False)[128:]
+    claimed = (2, 3, 8000, 10000, 3)
+    lie = honest.replace(struct.pack("<5i", *LF.shape), struct.pack("<5i", *claimed))
+    lie = lie.replace(struct.pack("<I", LF.size), struct.pack("<I", np.prod(claimed)))
+    if packed:
+        lie = struct.pack("<II", 14, 2_000_000_000) + lie[8:]
+        lie = struct.pack("<II", 15, len(zlib.compress(lie))) + zlib.compress(lie)
+    (tmp_path / "lie.mat").write_bytes(b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM" + lie)
+    assert "'LF' of shape (2, 3, 8000, 10000, 3) cannot lie in" in refused(tmp_path / "lie.mat")
+
+
+def test_type_codes_that_do_not_exist(tmp_path: Path) -> None:
+    content = version_5("<", dims=LF.shape, kind=9, stored=60000, data=LF.tobytes("F"), packed=False)
+    (tmp_path / "code.mat").write_bytes(content)
+    assert "damaged MATLAB file" in refused(tmp_path / "code.mat")
+
+
+def test_compressed_values_with_a_flipped_bit(tmp_path: Path) -> None:
+    """The checksum is the only thing that tells."""
+    stored = zlib.compressobj(0)
+    matrix = version_5("<", dims=LF.shape, kind=9, stored=2, data=LF.tobytes("F"), packed=False)[128:]
+    packed = bytearray(stored.compress(matrix) + stored.flush())
+    packed[1000] ^= 1
+    content = b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM" + struct.pack("<II", 15, len(packed)) + bytes(packed)
+    (tmp_path / "flipped.mat").write_bytes(content)
+    assert "damaged MATLAB file" in refused(tmp_path / "flipped.mat")
+
+
+def test_compressed_values_without_their_checksum(tmp_path: Path) -> None:
+    matrix = version_5("<", dims=LF.shape, kind=9, stored=2, data=LF.tobytes("F"), packed=False)[128:]
+    packed = zlib.compress(matrix)[:-4]
+    content = b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM" + struct.pack("<II", 15, len(packed)) + packed
+    (tmp_path / "short.mat").write_bytes(content)
+    assert "damaged MATLAB file: a compressed variable" in refused(tmp_path / "short.mat")
+
+
+def test_hdf5_that_claims_more_than_it_holds(tmp_path: Path) -> None:
+    """A file of 2 KB may claim terabytes of fill values."""
+    for chunks in (None, (1, 1, 1000, 1000, 3)):
+        with h5py.File(tmp_path / "huge.mat", "w") as file:
+            file.create_dataset("LF", (9, 9, 100_000, 100_000, 3), np.uint8, chunks=chunks)
+        assert "cannot lie in 0 bytes" in refused(tmp_path / "huge.mat")
+
+
+def test_values_in_another_file_are_refused(tmp_path: Path) -> None:
+    """A file from elsewhere must not make this program read others."""
+    np.tile(LF, 1).tofile(tmp_path / "secret")
+    with h5py.File(tmp_path / "external.mat", "w") as file:
+        file.create_dataset("LF", LF.shape, np.uint8, external=[(str(tmp_path / "secret"), 0, LF.size)])
+    assert "lie in another file" in refused(tmp_path / "external.mat")
+    with h5py.File(tmp_path / "other.h5", "w") as file:
+        file["LF"] = LF
+    with h5py.File(tmp_path / "linked.mat", "w") as file:
+        file["LF"] = h5py.ExternalLink("other.h5", "/LF")
+    assert "lie in another file" in refused(tmp_path / "linked.mat")
+
+
+def test_other_versions_say_what_to_do(tmp_path: Path) -> None:
+    scipy.io.savemat(tmp_path / "four.mat", {"LF": np.ones((8, 10))}, format="4")
+    (tmp_path / "text.mat").write_text("views\n")
+    (tmp_path / "empty.mat").touch()
+    for name in ("four.mat", "text.mat", "empty.mat"):
+        assert "not a MATLAB file of version 5 or 7.3; save it in MATLAB with -v7 or -v7.3" in refused(tmp_path / name)

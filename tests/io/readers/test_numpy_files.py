@@ -1,0 +1,167 @@
+"""NumPy files: the arrays in them, pixel for pixel, and nothing taken on the word of a header."""
+
+import io
+import re
+import struct
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sepi.errors import SepiError
+from sepi.io.readers.formats import format_of, read
+from sepi.io.readers.options import ReadOptions
+from sepi.lightfield import LightField
+
+RNG = np.random.default_rng(5)
+LF = RNG.integers(1, 256, (2, 3, 8, 10, 3), np.uint8)
+
+SAVERS = {
+    "npy": lambda path, array: np.save(path, array),
+    "npz": lambda path, array: np.savez(path, views=array, angles=np.ones(5)),
+    "compressed npz": lambda path, array: np.savez_compressed(path, views=array),
+}
+saver = pytest.mark.parametrize("kind", SAVERS)
+
+CASES = {
+    "TSHWC": LF,
+    "Fortran order": np.asfortranarray(LF),
+    "HWTSC": LF.transpose(2, 3, 0, 1, 4),
+    "grey": LF[..., 0],
+    "16 bit": LF.astype(np.uint16) * 257,
+    "big-endian": LF.astype(">u2") * 257,
+    "float32": (LF / 255).astype(np.float32),
+    "float64": LF / 255,
+    "even grid": RNG.integers(1, 256, (4, 4, 8, 10, 3), np.uint8),
+}
+
+
+def taken(path: Path, **options: object) -> LightField:
+    assert format_of(path).name == "NumPy file"
+    return read(path, ReadOptions(**options))
+
+
+def refused(path: Path, **options: object) -> str:
+    with pytest.raises(SepiError, match=re.escape(str(path))) as caught:
+        read(path, ReadOptions(**options), "numpy")
+    assert "\n" not in str(caught.value)
+    return str(caught.value)
+
+
+@saver
+@pytest.mark.parametrize("case", CASES)
+def test_every_pixel_is_read(tmp_path: Path, kind: str, case: str) -> None:
+    path = tmp_path / f"scene.{kind[-3:]}"
+    array = CASES[case]
+    SAVERS[kind](path, array)
+    light_field = taken(path)
+    expected = array.transpose(2, 3, 0, 1, 4) if case == "HWTSC" else array
+    np.testing.assert_array_equal(light_field.views.squeeze(), expected.astype(light_field.views.dtype))
+    assert light_field.views.dtype == (np.float32 if array.dtype.kind == "f" else array.dtype.newbyteorder("="))
+    assert light_field.views.flags.c_contiguous
+    assert light_field.name == "scene"
+
+
+def test_views_in_a_row_and_missing_ones(tmp_path: Path) -> None:
+    views = RNG.integers(1, 256, (9, 20, 24, 3), np.uint8)
+    views[8] = 0
+    np.save(tmp_path / "row.npy", views)
+    light_field = taken(tmp_path / "row.npy", order="flip-columns")
+    np.testing.assert_array_equal(light_field.views, views.reshape(3, 3, 20, 24, 3)[:, ::-1])
+    assert np.argwhere(~light_field.present).tolist() == [[2, 0]]
+
+
+def test_one_of_several_arrays(tmp_path: Path) -> None:
+    other = 255 - LF // 2
+    np.savez(tmp_path / "two.npz", left=LF, right=other, meta=np.array({"a": 1}, object))
+    assert "--variable: left 2x3x8x10x3, right 2x3x8x10x3" in refused(tmp_path / "two.npz")
+    np.testing.assert_array_equal(taken(tmp_path / "two.npz", variable="right").views, other)
+    assert "known: left, right" in refused(tmp_path / "two.npz", variable="middle")
+    assert "Python objects" in refused(tmp_path / "two.npz", variable="meta")
+    np.savez(tmp_path / "lf.npz", LF=LF, right=other)
+    np.testing.assert_array_equal(taken(tmp_path / "lf.npz").views, LF)
+    np.savez(tmp_path / "none.npz", angles=np.ones((3, 4)))
+    assert "found: angles 3x4" in refused(tmp_path / "none.npz")
+    np.save(tmp_path / "one.npy", LF)
+    assert "--variable does not apply" in refused(tmp_path / "one.npy", variable="LF")
+
+
+class _Trap:
+    """What runs when it is unpickled."""
+
+    def __reduce__(self) -> tuple[object, tuple[str]]:
+        return Path.touch, (Path("trapped"),)
+
+
+def test_pickles_are_never_opened(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A file of Python objects can run any program."""
+    monkeypatch.chdir(tmp_path)
+    trap = np.array([_Trap()], object).reshape(1, 1, 1, 1)
+    np.save(tmp_path / "trap.npy", trap)
+    np.savez(tmp_path / "trap.npz", LF=trap)
+    assert "Python objects" in refused(tmp_path / "trap.npy")
+    assert "Python objects" in refused(tmp_path / "trap.npz", variable="LF")
+    refused(tmp_path / "trap.npz")
+    assert not (tmp_path / "trapped").exists()
+
+
+def header(shape: tuple[int, ...], descr: str = "|u1", version: int = 1) -> bytes:
+    text = f"{{'descr': '{descr}', 'fortran_order': False, 'shape': {shape}, }}\n".encode()
+    return b"\x93NUMPY" + bytes([version, 0]) + struct.pack("<H" if version == 1 else "<I", len(text)) + text
+
+
+def test_header_of_version_2(tmp_path: Path) -> None:
+    (tmp_path / "two.npy").write_bytes(header(LF.shape, version=2) + LF.tobytes())
+    np.testing.assert_array_equal(taken(tmp_path / "two.npy").views, LF)
+
+
+@pytest.mark.parametrize(
+    ("shape", "word"),
+    [
+        ((9, 9, 100_000, 100_000, 3), "expected 2430000000000 bytes of values for uint8"),
+        ((2, 3, 8, 10, 4), "expected 1920 bytes of values for uint8 (2, 3, 8, 10, 4), got 1440"),
+        ((2, 3, -8, -10, 3), "shape (2, 3, -8, -10, 3)"),
+        ((2**62, 2**62, 4, 4, 3), f"expected {2**124 * 48} bytes of values"),
+    ],
+)
+def test_shapes_that_the_file_does_not_hold(tmp_path: Path, shape: tuple[int, ...], word: str) -> None:
+    """No memory may be taken on the word of a header."""
+    content = header(shape) + LF.tobytes()
+    (tmp_path / "lie.npy").write_bytes(content)
+    assert f"damaged NumPy file: {word}" in refused(tmp_path / "lie.npy")
+    for method in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+        with zipfile.ZipFile(tmp_path / "lie.npz", "w", method) as archive:
+            archive.writestr("LF.npy", content)
+        assert f"damaged NumPy file: {word}" in refused(tmp_path / "lie.npz")
+
+
+def test_an_archive_that_claims_more_than_it_holds(tmp_path: Path) -> None:
+    """The sizes in an archive's directory are claims too."""
+    file = io.BytesIO()
+    np.savez_compressed(file, LF=LF)
+    content = file.getvalue()
+    with zipfile.ZipFile(file) as archive:
+        size = archive.infolist()[0].file_size
+    # in the directory at the end, where the size in bytes stands once
+    at = content.rindex(struct.pack("<I", size))
+    (tmp_path / "lie.npz").write_bytes(content[:at] + struct.pack("<I", 2**32 - 2) + content[at + 4 :])
+    assert "cannot lie in" in refused(tmp_path / "lie.npz")
+
+
+def test_long_headers_are_not_parsed(tmp_path: Path) -> None:
+    (tmp_path / "long.npy").write_bytes(b"\x93NUMPY\x02\x00" + struct.pack("<I", 2**31) + b"(" * 100)
+    assert "header of 2147483648 bytes" in refused(tmp_path / "long.npy")
+    (tmp_path / "deep.npy").write_bytes(b"\x93NUMPY\x01\x00" + struct.pack("<H", 9000) + b"(" * 9000)
+    assert "damaged NumPy file" in refused(tmp_path / "deep.npy")
+
+
+def test_records_and_other_content_are_refused(tmp_path: Path) -> None:
+    np.save(tmp_path / "records.npy", np.zeros((2, 3, 8, 10), [("r", "u1"), ("g", "u1")]))
+    assert "expected uint8, uint16" in refused(tmp_path / "records.npy")
+    for name, content in {"text.npy": b"views\n", "empty.npy": b"", "text.npz": b"views\n", "empty.npz": b""}.items():
+        (tmp_path / name).write_bytes(content)
+        assert "not a NumPy file" in refused(tmp_path / name)
+    with zipfile.ZipFile(tmp_path / "pictures.npz", "w") as archive:
+        archive.writestr("readme.txt", "views")
+    assert "found: nothing" in refused(tmp_path / "pictures.npz")

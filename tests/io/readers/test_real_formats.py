@@ -1,0 +1,112 @@
+"""Real light fields in every form in which they arrive: the map depends on the views, not on the file they lie in."""
+
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.io
+from click.testing import CliRunner
+from real_scenes import final_scores, scene
+
+from sepi.cli.main import main
+from sepi.evaluate import score
+from sepi.io.hdf5 import write_light_field
+from sepi.io.pfm import read_pfm
+from sepi.lightfield import LightField
+from sepi.pipeline import estimate_depth
+from sepi.reading import read_light_field
+
+SCENES = ["cotton", "antinous"]
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_every_format_gives_the_same_light_field(hci: Path, name: str, tmp_path: Path) -> None:
+    """A map must not change because the views were stored otherwise, and no reader may doubt the order of the views."""
+    folder = scene(hci / name)
+    np.save(tmp_path / "array.npy", folder.views)
+    scipy.io.savemat(tmp_path / "matlab.mat", {"LF": folder.views})
+    write_light_field(tmp_path / "own.h5", folder)
+    crop = (slice(None), slice(None), slice(200, 248), slice(200, 264))
+    expected = small_map(folder, folder.views[crop])
+    for source in ("array.npy", "matlab.mat", "own.h5"):
+        # a warning is an error in the tests
+        found = read_light_field(tmp_path / source)
+        assert found.views.dtype == folder.views.dtype
+        np.testing.assert_array_equal(found.views, folder.views, err_msg=source)
+        assert (found.reference, found.present.all()) == (folder.reference, True)
+        # where values lie in memory differs from format to format
+        np.testing.assert_array_equal(small_map(folder, found.views[crop]), expected, err_msg=source)
+    own = read_light_field(tmp_path / "own.h5")
+    assert own.disparity_range == folder.disparity_range
+    np.testing.assert_array_equal(own.truth, folder.truth)
+
+
+def test_one_map_from_a_folder_and_from_an_array(hci: Path, tmp_path: Path) -> None:
+    """By the command, byte for byte, what does not name the source or need a camera."""
+    np.save(tmp_path / "array.npy", scene(hci / "cotton").views)
+    found = []
+    for source in (hci / "cotton", tmp_path / "array.npy"):
+        out = tmp_path / f"{source.stem}-maps"
+        words = ["depth", source, "-o", out, "--disparity-range", "-1.6", "1.5"]
+        words += ["--variant", "no_occlusion_no_textureless", "--set", "initial.sepi.candidates=31"]
+        called = CliRunner().invoke(main, [str(word) for word in words])
+        assert (called.exit_code, called.stderr) == (0, "")
+        names = ("confidence.png", "disparity.npy", "disparity.pfm", "disparity.png", "disparity_16bit.png")
+        found.append({name: (out / name).read_bytes() for name in names})
+    assert found[0] == found[1]
+
+
+def small_map(whole: LightField, views: np.ndarray) -> np.ndarray:
+    """What variant best makes of a part of the views."""
+    part = LightField(views, "part", disparity_range=whole.disparity_range)
+    return estimate_depth(part, "best", {"initial": {"candidates": 31}, "occlusion": {"passes": 1}}).disparity
+
+
+def mse(light_field: LightField, truth: np.ndarray) -> float:
+    return score(estimate_depth(light_field, "paper").disparity, truth)["mse100"]
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_a_star_of_views_is_nearly_as_good_as_the_grid(hci: Path, name: str) -> None:
+    """Row 4, column 4 and both diagonals, 33 of 81 views: what some camera arrays have."""
+    light_field = scene(hci / name)
+    t, s = np.mgrid[:9, :9]
+    star = (t == 4) | (s == 4) | (t == s) | (t + s == 8)
+    assert star.sum() == 33
+    # what is missing must not be looked at, whatever it is
+    views = np.where(star[:, :, None, None, None], light_field.views, 77).astype(np.uint8)
+    found = mse(replace(light_field, views=views, present=star), light_field.truth)
+    assert found <= 1.5 * final_scores(hci / name, "paper")["mse100"]
+
+
+def test_a_view_off_the_centre(hci: Path) -> None:
+    """The known truth belongs to row 4; with the first three rows cut off that is row 1 of 6, the centre row 3."""
+    light_field = scene(hci / "cotton")
+    cut = LightField(light_field.views[3:], "cut", disparity_range=light_field.disparity_range)
+    assert cut.reference == (3, 4)
+    off_centre = mse(cut.seen_from((1, 4)), light_field.truth)
+    assert off_centre <= 1.5 * final_scores(hci / "cotton", "paper")["mse100"]
+    # the map of the centre view belongs to another place: the check can tell
+    assert mse(cut, light_field.truth) > 1.4 * off_centre
+
+
+def test_lytro_picture_with_one_command(real_data: Path, tmp_path: Path) -> None:
+    """No parameters, no range, no flags: from a folder of pictures to disparity, point cloud and colours."""
+    started = time.monotonic()
+    words = ["depth", str(real_data / "lytro" / "2067"), "-o", str(tmp_path / "out")]
+    called = CliRunner().invoke(main, words)
+    assert called.exit_code == 0, called.output
+    # the order of real views is right, and no reader may doubt it
+    assert called.stderr == ""
+    assert time.monotonic() - started <= 60
+    disparity = read_pfm(tmp_path / "out/disparity.pfm")
+    assert disparity.shape == (383, 552)
+    head, back, wall = disparity[190:220, 60:120], disparity[150:250, 300:380], disparity[60:120, 60:200]
+    assert np.median(head) > np.median(back) + 0.2
+    assert np.median(back) > np.median(wall) + 0.3
+    # the wall is one surface: what is far from its median is speckle
+    assert np.mean(np.abs(wall - np.median(wall)) > 0.2) < 0.05
+    for file in ("points.ply", "disparity.png", "disparity_16bit.png"):
+        assert (tmp_path / "out" / file).stat().st_size > 100_000

@@ -1,0 +1,156 @@
+"""Disparity maps of other programs: every format gives the same numbers, and no meaning is guessed."""
+
+from pathlib import Path
+
+import cv2
+import h5py
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from PIL import Image, PngImagePlugin
+
+from sepi.cli.main import main
+from sepi.errors import SepiError
+from sepi.io.disparity_maps import SUFFIXES, is_disparity, read_disparity
+from sepi.io.pfm import write_pfm
+from sepi.io.result_folder import write_result
+from sepi.lightfield import LightField
+from sepi.stage import StageMaps
+
+SHAPE = (12, 17)
+
+
+@pytest.fixture
+def disparity() -> np.ndarray:
+    values = np.random.default_rng(0).normal(size=SHAPE).astype(np.float32)
+    values[3, 4] = np.nan
+    return values
+
+
+@pytest.fixture
+def result(tmp_path: Path, disparity: np.ndarray) -> Path:
+    """A folder as ``sepi depth`` writes it."""
+    views = np.random.default_rng(1).integers(0, 256, (3, 3, *SHAPE, 3), np.uint8)
+    write_result(tmp_path / "depth", LightField(views, "noise"), StageMaps(disparity, np.ones(SHAPE, np.float32)))
+    return tmp_path / "depth"
+
+
+def write_levels(path: Path, levels: np.ndarray, **texts: str) -> Path:
+    info = PngImagePlugin.PngInfo()
+    for key, text in texts.items():
+        info.add_text(key, text)
+    Image.fromarray(levels).save(path, pnginfo=info)
+    return path
+
+
+@pytest.mark.parametrize("name", ["", "disparity.pfm", "disparity.npy", "result.h5"])
+def test_what_depth_wrote_is_read_back(result: Path, disparity: np.ndarray, name: str) -> None:
+    assert is_disparity(result / name)
+    back = read_disparity(result / name)
+    assert back.dtype == np.float32
+    np.testing.assert_array_equal(back, disparity)
+
+
+def test_own_png_says_what_its_levels_mean(result: Path, disparity: np.ndarray) -> None:
+    """Read as plain levels, every score of such a map would be nonsense."""
+    path = result / "disparity_16bit.png"
+    assert is_disparity(path)
+    back = read_disparity(path)
+    assert back.dtype == np.float32
+    step = np.ptp(disparity[np.isfinite(disparity)]) / 65534
+    np.testing.assert_allclose(back, disparity, atol=0.51 * step)
+    assert np.isnan(back[3, 4])
+
+
+def test_names_may_end_in_capitals(tmp_path: Path, disparity: np.ndarray) -> None:
+    write_pfm(tmp_path / "MAP.PFM", disparity)
+    np.testing.assert_array_equal(read_disparity(tmp_path / "MAP.PFM"), disparity)
+
+
+@pytest.mark.parametrize("name", ["disparity.pfm", "disparity.npy", "disparity_16bit.png", "result.h5"])
+def test_scale_and_offset_turn_another_convention(result: Path, name: str) -> None:
+    plain = read_disparity(result / name)
+    np.testing.assert_array_equal(read_disparity(result / name, scale=-1), -plain)
+    np.testing.assert_allclose(read_disparity(result / name, offset=0.5), plain + 0.5, rtol=1e-6)
+    np.testing.assert_allclose(read_disparity(result / name, scale=2, offset=-1), 2 * plain - 1, rtol=1e-5)
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
+def test_levels_of_a_foreign_png_need_a_scale(tmp_path: Path, dtype: type) -> None:
+    levels = np.arange(204).reshape(SHAPE).astype(dtype)
+    path = write_levels(tmp_path / "map.png", levels, Comment="made elsewhere", scale="0.1")
+    # a light field may be a PNG, too: one that does not say that it is a map is not taken for one
+    assert not is_disparity(path)
+    with pytest.raises(SepiError, match=r"map.png: .* text chunks 'scale' and 'offset' .* give a scale") as caught:
+        read_disparity(path)
+    assert "\n" not in str(caught.value)
+    np.testing.assert_allclose(read_disparity(path, scale=0.02, offset=-2), levels * 0.02 - 2, atol=1e-6)
+
+
+def test_numbers_too_large_are_unknown(tmp_path: Path) -> None:
+    np.save(tmp_path / "map.npy", np.array([[1e300, 2.0]]))
+    assert read_disparity(tmp_path / "map.npy").tolist() == [[np.inf, 2.0]]
+
+
+def test_whole_numbers_are_numbers(tmp_path: Path) -> None:
+    np.save(tmp_path / "map.npy", np.array([[1, -2]], np.int16))
+    with h5py.File(tmp_path / "map.hdf5", "w") as file:
+        file["disparity"] = np.array([[1, -2]], np.int64)
+    for name in ("map.npy", "map.hdf5"):
+        assert read_disparity(tmp_path / name).tolist() == [[1.0, -2.0]]
+
+
+class TestWhatIsNoMap:
+    def error(self, path: Path) -> str:
+        with pytest.raises(SepiError) as caught:
+            read_disparity(path, scale=1)
+        assert str(caught.value).startswith(str(path))
+        assert "\n" not in str(caught.value)
+        return str(caught.value)
+
+    @pytest.mark.parametrize("suffix", SUFFIXES)
+    def test_absent_or_full_of_rubbish(self, tmp_path: Path, suffix: str) -> None:
+        path = tmp_path / f"map{suffix}"
+        assert "no such file" in self.error(path)
+        path.write_bytes(b"hello")
+        self.error(path)
+
+    def test_folder_without_a_result(self, tmp_path: Path) -> None:
+        assert not is_disparity(tmp_path)
+        with pytest.raises(SepiError, match=r"disparity\.pfm: no such file"):
+            read_disparity(tmp_path)
+
+    def test_another_kind_of_file(self, tmp_path: Path) -> None:
+        (tmp_path / "map.txt").write_text("1 2 3")
+        assert not is_disparity(tmp_path / "map.txt")
+        assert "expected a disparity map as .pfm, .h5 or .npy, or as grey .png" in self.error(tmp_path / "map.txt")
+
+    @pytest.mark.parametrize("mode", ["RGB", "P", "1", "LA", "RGBA"])
+    def test_png_without_grey_levels(self, tmp_path: Path, mode: str) -> None:
+        """Colours, or black and white stretched to 0 and 255, are no levels."""
+        Image.new(mode, SHAPE).save(tmp_path / "map.png")
+        assert "grey .png of 8 or 16 bit" in self.error(tmp_path / "map.png")
+
+    @pytest.mark.parametrize("text", ["wide", "nan", "inf", ""])
+    def test_png_with_texts_that_are_no_numbers(self, tmp_path: Path, text: str) -> None:
+        path = write_levels(tmp_path / "map.png", np.ones(SHAPE, np.uint16), scale=text, offset="0")
+        assert "text chunk 'scale' must be a number" in self.error(path)
+
+    def test_png_that_is_cut_off(self, result: Path) -> None:
+        path = result / "disparity_16bit.png"
+        whole = path.read_bytes()
+        for length in (8, 12, 20, 26, 40, 100, len(whole) - 1):
+            path.write_bytes(whole[:length])
+            is_disparity(path)
+            assert "damaged PNG" in self.error(path)
+
+
+def test_evaluate_takes_png_maps(result: Path, disparity: np.ndarray, tmp_path: Path) -> None:
+    called = CliRunner().invoke(main, ["evaluate", str(result / "disparity_16bit.png"), str(result)])
+    assert called.exit_code == 0, called.output
+    # the unknown pixel is unknown in both: left out, and nothing is wrong
+    assert called.stdout.splitlines()[1].split()[:3] == ["paper", "all", "0.000"]
+    cv2.imwrite(str(tmp_path / "levels.png"), np.ones(SHAPE, np.uint16))
+    called = CliRunner().invoke(main, ["evaluate", str(tmp_path / "levels.png"), str(result)])
+    assert called.exit_code == 1
+    assert "give a scale" in called.stderr

@@ -1,0 +1,234 @@
+"""Files appear whole or not at all, whatever stops the program: an error, a full disk, Ctrl-C at any moment."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from types import FrameType
+from typing import Any
+
+import numpy as np
+import pytest
+
+from sepi.errors import SepiError
+from sepi.io import files
+from sepi.io.files import atomic_folder, atomic_path
+from sepi.io.hdf5 import created
+from sepi.io.result_folder import RESULT_FILES
+from sepi.scenes import render, write_hci
+
+SOURCE = Path(__file__).parents[2]
+
+
+def names_in(folder: Path) -> list[str]:
+    return sorted(str(path.relative_to(folder)) for path in folder.rglob("*"))
+
+
+def write_file(target: Path) -> None:
+    with atomic_path(target) as temporary:
+        temporary.write_text("new")
+
+
+def write_folder(target: Path) -> None:
+    with atomic_folder(target) as temporary:
+        (temporary / "a").write_text("new")
+        (temporary / "b").write_text("new")
+
+
+class Interrupt:
+    """Raises KeyboardInterrupt before the n-th line that runs in ``sepi/io/files.py``."""
+
+    def __init__(self, moment: int) -> None:
+        self.left = moment
+
+    def __call__(self, frame: FrameType, event: str, _: Any) -> Any:
+        if frame.f_code.co_filename != files.__file__:
+            return None
+        if event == "line":
+            self.left -= 1
+            if self.left == 0:
+                sys.settrace(None)
+                raise KeyboardInterrupt
+        return self
+
+
+@pytest.mark.parametrize("write", [write_file, write_folder])
+def test_interrupted_at_any_line_nothing_is_half_written(tmp_path: Path, write: Any) -> None:
+    """A half-written map that looks finished is worse than none."""
+    interrupted = 0
+    for moment in range(1, 200):
+        folder = tmp_path / str(moment)
+        target = folder / "out.txt"
+        before = sys.gettrace()
+        sys.settrace(Interrupt(moment))
+        try:
+            write(target)
+            finished = True
+        except KeyboardInterrupt:
+            interrupted += 1
+            finished = False
+        finally:
+            sys.settrace(before)
+        # what the interpreter does when it ends
+        files._remove_unfinished()
+        found = names_in(folder) if folder.exists() else []
+        assert found in ([], ["out.txt"], ["out.txt", "out.txt/a", "out.txt/b"]), moment
+        if finished:
+            assert found != []
+            break
+    assert interrupted >= 10
+    assert finished
+
+
+def test_a_failure_leaves_what_was_there(tmp_path: Path) -> None:
+    (tmp_path / "map.txt").write_text("old")
+
+    def fail() -> None:
+        with atomic_path(tmp_path / "map.txt") as temporary:
+            temporary.write_text("half")
+            raise ValueError("oops")
+
+    with pytest.raises(ValueError, match="oops"):
+        fail()
+    assert names_in(tmp_path) == ["map.txt"]
+    assert (tmp_path / "map.txt").read_text() == "old"
+
+
+def test_a_link_is_replaced_and_not_followed(tmp_path: Path) -> None:
+    """A result folder with links must not let a rerun overwrite files elsewhere."""
+    (tmp_path / "precious.txt").write_text("mine")
+    (tmp_path / "out.txt").symlink_to(tmp_path / "precious.txt")
+    write_file(tmp_path / "out.txt")
+    assert (tmp_path / "precious.txt").read_text() == "mine"
+    assert (tmp_path / "out.txt").read_text() == "new"
+    assert not (tmp_path / "out.txt").is_symlink()
+
+
+def test_files_have_the_users_permissions(tmp_path: Path) -> None:
+    """Maps that nobody else in the group may read would be of no use on a shared machine."""
+    mask = os.umask(0o027)
+    try:
+        write_file(tmp_path / "map.txt")
+        write_folder(tmp_path / "maps")
+    finally:
+        os.umask(mask)
+    assert (tmp_path / "map.txt").stat().st_mode & 0o777 == 0o640
+    assert (tmp_path / "maps").stat().st_mode & 0o777 == 0o750
+
+
+@pytest.mark.parametrize("name", ["with space.txt", "Lichtfeld-Größe-光.txt", "x" * 250 + ".txt", "-flag.txt"])
+def test_any_name_will_do(tmp_path: Path, name: str) -> None:
+    write_file(tmp_path / name)
+    assert names_in(tmp_path) == [name]
+
+
+def test_a_device_is_not_replaced_by_a_file(tmp_path: Path) -> None:
+    """``-o /dev/stdout`` as root would take standard output away from every program."""
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "link").symlink_to(tmp_path / "pipe")
+    for name in ("pipe", "link"):
+        with pytest.raises(SepiError, match=rf"{name}: cannot be written \(not a file\)"):
+            write_file(tmp_path / name)
+    assert names_in(tmp_path) == ["link", "pipe"]
+    assert (tmp_path / "link").is_symlink()
+
+
+def test_a_folder_is_not_overwritten_by_a_file(tmp_path: Path) -> None:
+    (tmp_path / "map.txt").mkdir()
+    with pytest.raises(SepiError, match=r"map\.txt: cannot be written"):
+        write_file(tmp_path / "map.txt")
+    assert names_in(tmp_path) == ["map.txt"]
+
+
+# what a full disk does to each kind of file; the limit on a file's size stands for the disk
+FULL = """
+import resource, signal, sys
+from pathlib import Path
+import numpy as np
+from sepi.errors import SepiError
+from sepi.io.hdf5 import created
+from sepi.io.pfm import write_pfm
+from sepi.io.images import write_png
+
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+resource.setrlimit(resource.RLIMIT_FSIZE, (5000, 5000))
+noise = np.random.default_rng(0).random((99, 99), np.float32)
+
+def hdf5(path):
+    with created(path) as file:
+        file["x"] = noise
+
+kinds = {
+    "map.pfm": lambda path: write_pfm(path, noise),
+    "map.png": lambda path: write_png(path, (255 * noise).astype(np.uint8)),
+    "map.h5": hdf5,
+}
+for name, write in kinds.items():
+    try:
+        write(Path(name))
+    except SepiError as error:
+        print(" ".join(str(error).split()))
+"""
+
+
+def test_a_full_disk_is_one_line_for_each_kind_of_file(tmp_path: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", FULL],
+        cwd=tmp_path,
+        env=os.environ | {"PYTHONPATH": str(SOURCE)},
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    names = ["map.pfm", "map.png", "map.h5"]
+    assert done.stdout.splitlines() == [f"{name}: cannot be written (File too large)" for name in names]
+    assert names_in(tmp_path) == []
+
+
+def test_created_file_is_whole(tmp_path: Path) -> None:
+    with created(tmp_path / "x.h5") as file:
+        file["x"] = np.arange(4)
+    assert names_in(tmp_path) == ["x.h5"]
+
+
+@pytest.fixture(scope="session")
+def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("scenes") / "dots"
+    write_hci(render("dots", size=64, views=3), folder)
+    return folder
+
+
+def started(scene: Path, folder: Path) -> "subprocess.Popen[str]":
+    return subprocess.Popen(
+        [sys.executable, "-m", "sepi", "depth", str(scene), "-o", "out", "--set", "initial.semi_global.candidates=21"],
+        cwd=folder,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        # a background process of a shell ignores SIGINT; a user's does not
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+        env=os.environ | {"PYTHONPATH": str(SOURCE)},
+    )
+
+
+@pytest.mark.slow
+def test_depth_stopped_at_any_time_leaves_all_of_the_maps_or_none(scene: Path, tmp_path: Path) -> None:
+    (tmp_path / "whole").mkdir()
+    begun = time.monotonic()
+    process = started(scene, tmp_path / "whole")
+    assert process.communicate(timeout=120)[1] == ""
+    whole = time.monotonic() - begun
+    assert set(RESULT_FILES) <= set(os.listdir(tmp_path / "whole/out"))
+    for index, part in enumerate((0.3, 0.6, 0.8, 0.9, 0.95, 1.0)):
+        folder = tmp_path / str(index)
+        folder.mkdir()
+        process = started(scene, folder)
+        time.sleep(whole * part)
+        process.send_signal((signal.SIGINT, signal.SIGTERM)[index % 2])
+        process.communicate(timeout=60)
+        left = names_in(folder)
+        assert left in ([], names_in(tmp_path / "whole")), (part, left)

@@ -1,0 +1,261 @@
+"""Point clouds: where the points lie, what colour they have, and that other programs read the file."""
+
+import os
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+from plyfile import PlyData
+
+from sepi.camera import Camera
+from sepi.cli.results import points
+from sepi.errors import SepiError
+from sepi.io.ply import write_ply
+from sepi.io.point_cloud import point_cloud, view_points
+from sepi.io.result_folder import write_result
+from sepi.lightfield import LightField
+from sepi.stage import StageMaps
+
+H, W = 20, 31
+CAMERA = Camera(scale=12.0, offset=3.0, focal_px=400.0)
+
+
+def light_field(kind: type = np.uint8, channels: int = 3, **known: object) -> LightField:
+    rng = np.random.default_rng(0)
+    top = 1 if kind is np.float32 else np.iinfo(kind).max
+    views = (rng.random((5, 7, H, W, channels)) * top).astype(kind)
+    return LightField(views=views, name="toy", **known)
+
+
+def read_back(path: Path) -> tuple[np.ndarray, np.ndarray, PlyData]:
+    """Positions and colours of a PLY by a reader that is not this package's."""
+    data = PlyData.read(str(path))
+    vertex = data["vertex"].data
+    positions = np.stack([vertex[name] for name in "xyz"], axis=1)
+    colours = np.stack([vertex[name] for name in ("red", "green", "blue")], axis=1)
+    return positions, colours, data
+
+
+# --- positions
+
+
+def test_metric_point_lies_where_the_pinhole_camera_sees_it() -> None:
+    """By hand: 12 / (1 + 3) = 3 m away; 10 pixels right of the middle and 5.5 above it."""
+    disparity = np.full((H, W), np.nan, np.float32)
+    disparity[4, 25] = 1
+    cloud = point_cloud(light_field(camera=CAMERA), disparity)
+    assert cloud.metric
+    np.testing.assert_allclose(cloud.positions, [[10 * 3 / 400, 5.5 * 3 / 400, -3]], rtol=1e-6)
+
+
+@pytest.mark.parametrize("view", [(2, 5), (0, 3), (4, 0)])
+def test_clouds_of_two_views_coincide_a_baseline_apart(view: tuple[int, int]) -> None:
+    """Whoever merges the clouds of several views must get one scene: the sheared views' principal points differ.
+
+    The views are made by the definition of disparity alone; whole pixels keep that exact.
+    """
+    centre = (2, 3)
+    down, right = view[0] - centre[0], view[1] - centre[1]
+    first = np.random.default_rng(3).choice([-1.0, 0.0, 2.0], (H, W)).astype(np.float32)
+    second = np.full((H, W), np.nan, np.float32)
+    pairs = {}
+    for y, x in np.ndindex(H, W):
+        there = int(y - first[y, x] * down), int(x - first[y, x] * right)
+        # one scene point for each pixel is enough here: hidden ones need no order
+        if 0 <= there[0] < H and 0 <= there[1] < W and there not in pairs:
+            pairs[there] = (y, x)
+            second[there] = first[y, x]
+    kept = np.full((H, W), np.nan, np.float32)
+    for y, x in pairs.values():
+        kept[y, x] = first[y, x]
+    scene = light_field(camera=CAMERA)
+    from_first = point_cloud(scene, kept).positions
+    from_second = point_cloud(scene.seen_from(view), second).positions
+    assert len(from_first) == len(from_second) > 100
+    baseline = CAMERA.scale / CAMERA.focal_px
+    moved = from_second + np.array([right * baseline, -down * baseline, 0], np.float32)
+    by_pixel = dict(zip(sorted(pairs), moved, strict=True))
+    expected = dict(zip(sorted(pairs.values()), from_first, strict=True))
+    for there, here in pairs.items():
+        np.testing.assert_allclose(by_pixel[there], expected[here], rtol=0, atol=2e-6)
+
+
+def test_relief_is_upright_and_a_third_as_deep_as_wide() -> None:
+    disparity = np.tile(np.linspace(-1, 1, W, dtype=np.float32), (H, 1))
+    disparity[7, 7] = 1000  # one wrong pixel does not flatten it
+    cloud = point_cloud(light_field(), disparity)
+    assert not cloud.metric
+    assert len(cloud.positions) == H * W
+    grid = cloud.positions.reshape(H, W, 3)
+    np.testing.assert_allclose(grid[0, :, 0], np.arange(W) - (W - 1) / 2)
+    np.testing.assert_allclose(grid[:, 0, 1], (H - 1) / 2 - np.arange(H))
+    assert (np.diff(grid[0, :, 2]) > 0).all()  # nearer is nearer to the viewer
+    assert grid[0, -1, 2] - grid[0, 0, 2] == pytest.approx(W / 3, rel=0.05)
+    np.testing.assert_allclose(grid[3, :, 2], cloud.stretch * disparity[3], rtol=1e-6)
+
+
+def test_plane_and_empty_map_are_clouds_too() -> None:
+    flat = point_cloud(light_field(), np.full((H, W), 0.5, np.float32))
+    assert (flat.positions[:, 2] == 0.5).all()
+    nothing = point_cloud(light_field(), np.full((H, W), np.nan, np.float32))
+    assert nothing.positions.shape == nothing.colours.shape == (0, 3)
+
+
+# --- which points
+
+
+def test_pixels_without_a_place_have_no_point() -> None:
+    disparity = np.zeros((H, W), np.float32)
+    disparity[0, :5] = np.nan, np.inf, -np.inf, -3, -4  # -3: infinity of this camera
+    assert len(point_cloud(light_field(camera=CAMERA), disparity).positions) == H * W - 5
+    assert len(point_cloud(light_field(), disparity).positions) == H * W - 3
+
+
+def test_unsure_far_and_skipped_pixels_are_left_out() -> None:
+    disparity = np.zeros((H, W), np.float32)  # 4 m
+    disparity[0] = -2  # 12 m
+    confidence = np.full((H, W), 0.5, np.float32)
+    confidence[1], confidence[2, 0] = 0.4, np.nan
+    view = light_field().views[2, 3]
+    sure = view_points(view, disparity, confidence, camera=CAMERA, min_confidence=0.5)
+    assert len(sure.positions) == (H - 1) * W - 1
+    near = view_points(view, disparity, camera=CAMERA, max_depth=4.0)
+    assert len(near.positions) == (H - 1) * W
+    assert (near.positions[:, 2] == -4).all()
+    thin = view_points(view, disparity, camera=CAMERA, step=10)
+    assert len(thin.positions) == 2 * 4
+    np.testing.assert_array_equal(thin.colours, view[::10, ::10].reshape(-1, 3))
+
+
+BAD_CALLS = {
+    "map of another size": ({"disparity": np.zeros((3, 3), np.float32)}, "(3, 3)"),
+    "confidence of another size": ({"confidence": np.zeros((3, 3), np.float32)}, "(3, 3)"),
+    "no step": ({"step": 0}, "step"),
+    "metres without a camera": ({"max_depth": 3.0}, "camera's geometry"),
+    "negative depth": ({"max_depth": -3.0, "camera": CAMERA}, "positive"),
+    "NaN depth": ({"max_depth": np.nan, "camera": CAMERA}, "positive"),
+    "confidence above 1": ({"min_confidence": 1.5}, "0..1"),
+    "NaN confidence": ({"min_confidence": np.nan}, "0..1"),
+    "least confidence of none": ({"min_confidence": 0.5}, "confidence map"),
+}
+
+
+@pytest.mark.parametrize("case", BAD_CALLS)
+def test_what_cannot_be_meant_is_refused(case: str) -> None:
+    values, word = BAD_CALLS[case]
+    with pytest.raises(SepiError, match="point cloud") as raised:
+        view_points(np.zeros((H, W, 3), np.uint8), **{"disparity": np.zeros((H, W), np.float32), **values})
+    assert word in str(raised.value)
+
+
+# --- colours
+
+
+@pytest.mark.parametrize("kind", [np.uint8, np.uint16, np.float32])
+@pytest.mark.parametrize("channels", [1, 3])
+def test_colours_are_those_of_the_view_in_8_bit(kind: type, channels: int) -> None:
+    scene = light_field(kind, channels)
+    colours = point_cloud(scene, np.zeros((H, W), np.float32)).colours
+    top = 1 if kind is np.float32 else np.iinfo(kind).max
+    expected = np.broadcast_to(scene.views[2, 3].astype(float) / top * 255, (H, W, 3)).reshape(-1, 3)
+    assert colours.dtype == np.uint8
+    np.testing.assert_allclose(colours, expected, rtol=0, atol=0.501)
+
+
+# --- files
+
+
+def test_ply_is_read_by_others(tmp_path: Path) -> None:
+    rng = np.random.default_rng(5)
+    positions = rng.normal(size=(50, 3)).astype(np.float32)
+    colours = rng.integers(0, 256, (50, 3), np.uint8)
+    write_ply(tmp_path / "a.ply", positions, colours, ("metres", "x right"))
+    back, shades, data = read_back(tmp_path / "a.ply")
+    assert (data.text, data.byte_order) == (False, "<")
+    assert list(data.comments) == ["metres", "x right"]
+    np.testing.assert_array_equal(back, positions)
+    np.testing.assert_array_equal(shades, colours)
+    write_ply(tmp_path / "b.ply", positions, colours, ("metres", "x right"))
+    assert (tmp_path / "a.ply").read_bytes() == (tmp_path / "b.ply").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("positions", "colours", "comments"),
+    [((4, 2), (4, 2), ()), ((4, 3), (3, 3), ()), ((2, 3), (2, 3), ("two\nlines",)), ((2, 3), (2, 3), ("größe",))],
+)
+def test_ply_that_others_could_not_read_is_not_written(
+    tmp_path: Path, positions: tuple[int, int], colours: tuple[int, int], comments: tuple[str, ...]
+) -> None:
+    with pytest.raises(SepiError, match=r"a\.ply"):
+        write_ply(tmp_path / "a.ply", np.zeros(positions, np.float32), np.zeros(colours, np.uint8), comments)
+    assert list(tmp_path.iterdir()) == []
+
+
+# --- the command
+
+
+def call(*words: object) -> Result:
+    return CliRunner().invoke(points, [str(word) for word in words])
+
+
+@pytest.fixture
+def result(tmp_path: Path) -> Path:
+    """Folder of a result for the view (0, 6), without a camera."""
+    rng = np.random.default_rng(6)
+    maps = StageMaps(rng.random((H, W), np.float32), rng.random((H, W), np.float32))
+    write_result(tmp_path / "toy-depth", light_field(view=(0, 6)), maps, {"scene": "toy"})
+    return tmp_path / "toy-depth"
+
+
+def test_result_folder_holds_its_cloud(result: Path) -> None:
+    written = (result / "points.ply").read_bytes()
+    (result / "points.ply").unlink()
+    called = call(result)
+    assert called.exit_code == 0, called.output
+    assert f"{result / 'points.ply'} ({H * W} points, relief" in called.stdout
+    assert (result / "points.ply").read_bytes() == written
+    positions, colours, data = read_back(result / "points.ply")
+    assert "pixels" in " ".join(data.comments)
+    assert len(positions) == H * W
+    np.testing.assert_array_equal(colours, light_field().views[0, 6].reshape(-1, 3))
+
+
+def test_camera_flags_give_metres(result: Path, tmp_path: Path) -> None:
+    camera = ("--focal-length", 50, "--baseline", 10, "--focus-distance", 2, "--sensor-size", 31)
+    called = call(result / "result.h5", "-o", tmp_path / "a.ply", *camera, "--min-confidence", 0.5, "--max-depth", 1)
+    assert called.exit_code == 0, called.output
+    positions, _, data = read_back(tmp_path / "a.ply")
+    assert "metres" in " ".join(data.comments)
+    # focal length 50 px, baseline 0.01 m: b f = 0.5, b f / F = 0.25; the view is 2 rows above, 3 columns right
+    whole = replace(light_field(view=(0, 6)), camera=Camera(0.5, 0.25, 50.0))
+    rng = np.random.default_rng(6)
+    disparity, confidence = rng.random((H, W), np.float32), rng.random((H, W), np.float32)
+    kept = np.where((confidence >= 0.5) & (0.5 / (disparity + 0.25) <= 1), disparity, np.nan).astype(np.float32)
+    np.testing.assert_array_equal(positions, point_cloud(whole, kept).positions)
+    assert 0 < len(positions) < (confidence >= 0.5).sum()
+
+
+def test_clear_line_where_no_cloud_can_be_made(result: Path, tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "link").symlink_to(tmp_path / "pipe")
+    cases = {
+        (tmp_path / "gone",): "no such file",
+        (tmp_path,): "result.h5",
+        (result, "--max-depth", 3): "camera's geometry",
+        (result, "--min-confidence", 2): "0..1",
+        (result, "--min-confidence", 1): "no point is left",
+        (result, "-o", result): "toy-depth: not a file",
+        (result, "-o", tmp_path / "pipe"): "pipe: not a file",
+        (result, "-o", tmp_path / "link"): "link: not a file",
+    }
+    for words, expected in cases.items():
+        called = call(*words)
+        assert called.exit_code == 1, words
+        (line,) = called.stderr.splitlines()
+        assert line.startswith("sepi: ")
+        assert expected in line
+    assert (tmp_path / "pipe").is_fifo()
+    assert (tmp_path / "link").is_symlink()
+    assert call(result, "--focal-length", 50).exit_code == 2

@@ -1,0 +1,283 @@
+"""The folder of final maps as other programs read it, and what happens to what lies there already."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import h5py
+import numpy as np
+import pytest
+from PIL import Image
+
+from sepi.camera import Camera
+from sepi.errors import SepiError
+from sepi.io.result_folder import RESULT_FILES, read_result, write_result
+from sepi.lightfield import LightField
+from sepi.stage import StageMaps
+
+SHAPE = (12, 16)
+CAMERA = Camera(scale=36.0, offset=8.0, focal_px=1500.0)
+
+
+@pytest.fixture
+def light_field() -> LightField:
+    views = np.random.default_rng(1).integers(0, 65536, (3, 5, *SHAPE, 3), np.uint16)
+    return LightField(views=views, name="toy", camera=CAMERA)
+
+
+@pytest.fixture
+def maps() -> StageMaps:
+    rng = np.random.default_rng(2)
+    disparity = rng.uniform(-2, 3, SHAPE).astype(np.float32)
+    disparity[0, :3] = np.nan, np.inf, -np.inf
+    confidence = rng.random(SHAPE, np.float32)
+    occluded = rng.random(SHAPE) > 0.7
+    return StageMaps(disparity, confidence, {"occluded": occluded, "superpixels": np.arange(192).reshape(SHAPE)})
+
+
+def names_in(folder: Path) -> list[str]:
+    return sorted(path.name for path in folder.iterdir())
+
+
+def pixels_of(path: Path) -> np.ndarray:
+    image = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+    assert image is not None
+    return image
+
+
+def test_written_are_the_files_it_says(tmp_path: Path, light_field: LightField, maps: StageMaps) -> None:
+    named = write_result(tmp_path / "out", light_field, maps, {})
+    assert sorted(named) == sorted([*RESULT_FILES, "depth.pfm", "mask_occluded.png"])
+    assert sorted(named) == names_in(tmp_path / "out")
+
+
+def test_other_programs_read_the_same_disparity_from_every_format(
+    tmp_path: Path, light_field: LightField, maps: StageMaps
+) -> None:
+    write_result(tmp_path, light_field, maps, {})
+    array = np.load(tmp_path / "disparity.npy", allow_pickle=False)
+    assert array.dtype == np.dtype("<f4")
+    np.testing.assert_array_equal(array, maps.disparity)
+    np.testing.assert_array_equal(pixels_of(tmp_path / "disparity.pfm"), maps.disparity)
+    with h5py.File(tmp_path / "result.h5") as file:
+        np.testing.assert_array_equal(file["disparity"], maps.disparity)
+
+
+def test_16_bit_picture_says_how_to_get_disparity_back(
+    tmp_path: Path, light_field: LightField, maps: StageMaps
+) -> None:
+    write_result(tmp_path, light_field, maps, {})
+    values = pixels_of(tmp_path / "disparity_16bit.png")
+    with Image.open(tmp_path / "disparity_16bit.png") as image:
+        text = image.text
+    assert values.dtype == np.uint16
+    assert text["units"] == "pixels per view step"
+    assert text["Description"] == "disparity = (value - 1) * scale + offset; value 0: unknown"
+    finite = np.isfinite(maps.disparity)
+    assert (values[~finite] == 0).all()
+    scale, offset = float(text["scale"]), float(text["offset"])
+    back = (values[finite] - 1.0) * scale + offset
+    np.testing.assert_allclose(back, maps.disparity[finite], rtol=0, atol=scale / 2 * 1.0001)
+    assert scale < 5 / 65000  # the whole of 16 bits is used
+    assert values[finite].min() == 1
+    assert values.max() == 65535
+
+
+@pytest.mark.parametrize(("value", "level", "offset"), [(1.25, 1, 1.25), (np.nan, 0, 0.0)])
+def test_16_bit_picture_of_one_value(
+    tmp_path: Path, light_field: LightField, value: float, level: int, offset: float
+) -> None:
+    """A plane, or nothing found at all, must not divide by a range of zero."""
+    flat = np.full(SHAPE, value, np.float32)
+    write_result(tmp_path, light_field, StageMaps(flat, np.zeros(SHAPE, np.float32)), {})
+    assert (pixels_of(tmp_path / "disparity_16bit.png") == level).all()
+    with Image.open(tmp_path / "disparity_16bit.png") as image:
+        assert (float(image.text["scale"]), float(image.text["offset"])) == (1, offset)
+
+
+def test_pictures_of_masks_and_confidence(tmp_path: Path, light_field: LightField, maps: StageMaps) -> None:
+    write_result(tmp_path, light_field, maps, {})
+    np.testing.assert_array_equal(pixels_of(tmp_path / "mask_occluded.png"), 255 * maps.extra["occluded"])
+    grey = pixels_of(tmp_path / "confidence.png")
+    np.testing.assert_allclose(grey / 255, maps.confidence, rtol=0, atol=0.5 / 255 + 1e-6)
+
+
+def test_depth_in_metres(tmp_path: Path, light_field: LightField, maps: StageMaps) -> None:
+    """Metres by the formula of docs/outputs.md; nothing in the folder claims metres where the camera is unknown."""
+    disparity = maps.disparity.copy()
+    disparity[1, :2] = -8, -9  # at and beyond infinity
+    write_result(tmp_path / "known", light_field, replace(maps, disparity=disparity), {})
+    depth = pixels_of(tmp_path / "known/depth.pfm")
+    near = np.isfinite(disparity) & (disparity > -8)
+    np.testing.assert_allclose(depth[near], 36 / (disparity[near].astype(float) + 8), rtol=1e-6)
+    assert not np.isfinite(depth[1, :2]).any()
+    with h5py.File(tmp_path / "known/result.h5") as file:
+        np.testing.assert_array_equal(file["depth"], depth)
+        assert file.attrs["camera"].tolist() == [36, 8, 1500]
+    write_result(tmp_path / "unknown", replace(light_field, camera=None), maps, {})
+    assert "depth.pfm" not in names_in(tmp_path / "unknown")
+    with h5py.File(tmp_path / "unknown/result.h5") as file:
+        assert "depth" not in file
+        assert "camera" not in file.attrs
+
+
+@pytest.mark.parametrize("view", [None, (0, 4)])
+def test_result_holds_the_view_that_the_maps_belong_to(
+    tmp_path: Path, light_field: LightField, maps: StageMaps, view: tuple[int, int] | None
+) -> None:
+    shown = replace(light_field, view=view)
+    write_result(tmp_path, shown, maps, {"scene": "toy"})
+    place = view or (1, 2)
+    with h5py.File(tmp_path / "result.h5") as file:
+        assert file["view"].dtype == np.uint16
+        np.testing.assert_array_equal(file["view"], light_field.views[place])
+        assert tuple(file.attrs["view_position"]) == place
+        assert tuple(file.attrs["grid"]) == (3, 5)
+        np.testing.assert_array_equal(file["superpixels"], maps.extra["superpixels"])
+    for path in (tmp_path, tmp_path / "result.h5"):
+        back = read_result(path)
+        assert back.scene == "toy"
+        assert back.camera == CAMERA
+        assert back.from_centre == (place[0] - 1, place[1] - 2)
+        np.testing.assert_array_equal(back.picture, light_field.views[place])
+        np.testing.assert_array_equal(back.confidence, maps.confidence)
+
+
+def test_equal_results_give_equal_bytes(tmp_path: Path, light_field: LightField, maps: StageMaps) -> None:
+    for name in ("a", "b"):
+        names = write_result(tmp_path / name, light_field, maps, {"variant": "paper"})
+    for name in names:
+        assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes(), name
+
+
+def test_files_of_an_earlier_run_do_not_outlive_it(tmp_path: Path, light_field: LightField, maps: StageMaps) -> None:
+    """A mask of a stage that is now switched off, or depth of a camera no longer given, would be taken for this run's;
+    a user's own files stay, masks among them.
+    """
+    write_result(tmp_path, light_field, maps, {})
+    (tmp_path / "runtime.txt").write_text("1.5\n")
+    own = {"notes.txt": b"mine", "mask_broken.png": b"\x89PNG"}
+    for name, data in own.items():
+        (tmp_path / name).write_bytes(data)
+    assert cv2.imwrite(str(tmp_path / "mask_mine.png"), np.zeros(SHAPE, np.uint8))
+    again = write_result(tmp_path, replace(light_field, camera=None), replace(maps, extra={}), {})
+    assert sorted(again) == sorted(RESULT_FILES)
+    assert names_in(tmp_path) == sorted([*RESULT_FILES, *own, "mask_mine.png"])
+    for name, data in own.items():
+        assert (tmp_path / name).read_bytes() == data
+
+
+def test_links_in_the_folder_are_replaced_and_not_followed(
+    tmp_path: Path, light_field: LightField, maps: StageMaps
+) -> None:
+    names = write_result(tmp_path / "first", light_field, maps, {})
+    (tmp_path / "out").mkdir()
+    (tmp_path / "precious").write_text("mine")
+    for name in names:
+        (tmp_path / "out" / name).symlink_to(tmp_path / "precious")
+    write_result(tmp_path / "out", light_field, maps, {})
+    assert (tmp_path / "precious").read_text() == "mine"
+    for name in names:
+        assert not (tmp_path / "out" / name).is_symlink()
+        assert (tmp_path / "out" / name).read_bytes() == (tmp_path / "first" / name).read_bytes()
+
+
+@pytest.mark.parametrize("filled", [False, True])
+def test_the_folder_may_be_a_link_to_where_there_is_room(
+    tmp_path: Path, light_field: LightField, maps: StageMaps, filled: bool
+) -> None:
+    (tmp_path / "disk").mkdir()
+    if filled:
+        (tmp_path / "disk/notes.txt").write_text("mine")
+    (tmp_path / "out").symlink_to(tmp_path / "disk")
+    write_result(tmp_path / "out", light_field, maps, {})
+    assert (tmp_path / "out").is_symlink()
+    assert set(RESULT_FILES) < set(names_in(tmp_path / "disk"))
+
+
+def test_a_scene_is_not_written_into(tmp_path: Path, light_field: LightField, maps: StageMaps) -> None:
+    """Its masks have the names of a result's: they would be replaced."""
+    assert cv2.imwrite(str(tmp_path / "input_Cam000.png"), np.zeros((4, 4), np.uint8))
+    (tmp_path / "mask_occluded.png").write_bytes(b"truth")
+    with pytest.raises(SepiError, match="holds the views of a light field"):
+        write_result(tmp_path, light_field, maps, {})
+    assert names_in(tmp_path) == ["input_Cam000.png", "mask_occluded.png"]
+    assert (tmp_path / "mask_occluded.png").read_bytes() == b"truth"
+
+
+BAD_MAPS = {
+    "confidence of 0..255": (lambda maps: replace(maps, confidence=200 * maps.confidence), "within 0..1"),
+    "negative confidence": (lambda maps: replace(maps, confidence=-maps.confidence), "within 0..1"),
+    "confidence of another shape": (lambda maps: replace(maps, confidence=maps.confidence[:5]), "confidence of"),
+    "mask of another shape": (lambda maps: replace(maps, extra={"odd": np.ones((3, 3), bool)}), "odd of"),
+    "mask that leaves the folder": (
+        lambda maps: replace(maps, extra={"/../up": np.ones(SHAPE, bool)}),
+        "expected a name",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", BAD_MAPS)
+def test_bad_maps_are_refused_before_anything_is_written(
+    tmp_path: Path, light_field: LightField, maps: StageMaps, case: str
+) -> None:
+    spoil, word = BAD_MAPS[case]
+    with pytest.raises(SepiError, match="toy: ") as raised:
+        write_result(tmp_path / "out", light_field, spoil(maps), {})
+    assert word in str(raised.value)
+    assert names_in(tmp_path) == []
+
+
+def test_unknown_confidence_is_black(tmp_path: Path, light_field: LightField, maps: StageMaps) -> None:
+    confidence = maps.confidence.copy()
+    confidence[3, 4] = np.nan
+    write_result(tmp_path, light_field, replace(maps, confidence=confidence), {})
+    assert pixels_of(tmp_path / "confidence.png")[3, 4] == 0
+
+
+def _replaced(name: str, values: np.ndarray | None) -> object:
+    def spoil(file: h5py.File) -> None:
+        del file[name]
+        if values is not None:
+            file[name] = values
+
+    return spoil
+
+
+def _huge(file: h5py.File) -> None:
+    """A view of 4 TB that was never written."""
+    del file["view"]
+    file.create_dataset("view", (2**20, 2**20, 3), np.uint8, chunks=(256, 256, 3), compression="gzip")
+
+
+BAD_RESULTS = {
+    "no view": (_replaced("view", None), "view missing"),
+    "stage file": (lambda file: file.attrs.pop("view_position"), "view_position missing"),
+    "grid of one number": (lambda file: file.attrs.__setitem__("grid", 3), "damaged"),
+    "camera of nonsense": (lambda file: file.attrs.__setitem__("camera", (0.0, 1.0, -2.0)), "damaged"),
+    "camera of two numbers": (lambda file: file.attrs.__setitem__("camera", (1.0, 1.0)), "damaged"),
+    "view of another size": (_replaced("view", np.zeros((4, 4, 3), np.uint8)), "do not fit"),
+    "view of two channels": (_replaced("view", np.zeros((*SHAPE, 2), np.uint8)), "do not fit"),
+    "view of text": (_replaced("view", np.array(b"text")), "damaged"),
+    "more than the file holds": (_huge, "cannot lie in"),
+}
+
+
+@pytest.mark.parametrize("case", BAD_RESULTS)
+def test_bad_result_is_one_line_that_names_it(
+    tmp_path: Path, light_field: LightField, maps: StageMaps, case: str
+) -> None:
+    spoil, word = BAD_RESULTS[case]
+    write_result(tmp_path, light_field, maps, {})
+    with h5py.File(tmp_path / "result.h5", "a") as file:
+        spoil(file)
+    with pytest.raises(SepiError, match=r"result\.h5") as raised:
+        read_result(tmp_path)
+    assert word in str(raised.value)
+
+
+def test_no_result_at_all(tmp_path: Path) -> None:
+    (tmp_path / "text.h5").write_text("no")
+    for path, name in [(tmp_path, "result.h5"), (tmp_path / "gone", "gone"), (tmp_path / "text.h5", "text.h5")]:
+        with pytest.raises(SepiError, match=name):
+            read_result(path)

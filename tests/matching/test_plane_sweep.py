@@ -1,0 +1,279 @@
+"""The plane sweep equals a plain NumPy twin, the paper's SEPI construction, and itself on any number of threads."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numba
+import numpy as np
+import pytest
+from scipy.ndimage import map_coordinates
+from several_threads import several_threads
+
+from sepi.errors import SepiError
+from sepi.image.noise import noise_level, residual_variance
+from sepi.lightfield import DisparityRange, LightField
+from sepi.matching.photo_consistency import cost_row, sample_offsets
+from sepi.matching.plane_sweep import SweepParameters, planar, sweep
+from sepi.matching.plane_sweep_kernels import SHORTEST_GAP, TILE_WIDTH
+from sepi.matching.stitched_epi import line_cost, stitched_epi
+from sepi.matching.view_subsets import halves_and_quarters
+from sepi.scenes import render
+
+
+def random_light_field(grid=(5, 4), shape=(14, 17), channels=3, dtype=np.uint8, seed=0):
+    generator = np.random.default_rng(seed)
+    views = generator.random((*grid, *shape, channels), np.float32)
+    if dtype != np.float32:
+        views = np.round(views * np.iinfo(dtype).max).astype(dtype)
+    return LightField(views, "random", disparity_range=DisparityRange(-1.3, 1.1, "given"))
+
+
+def twin(light_field, parameters, groups, subset):
+    """The sweep in plain NumPy and SciPy: one interpolation per view and candidate, one loop per window pixel."""
+    T, S = light_field.grid
+    t0, s0 = light_field.reference
+    H, W = light_field.shape
+    candidates = light_field.known_range().candidates(parameters.candidates)
+    centre = light_field.centre
+    noise = residual_variance(centre)
+    views = light_field.views / (np.iinfo(light_field.views.dtype).max if light_field.views.dtype != np.float32 else 1)
+    rows, columns = np.mgrid[:H, :W].astype(float)
+    sums, counts = np.zeros((2, len(candidates), H, W))
+    for t in range(T):
+        for s in range(S):
+            if (t, s) == (t0, s0) or not light_field.present[t, s] or not subset[groups[t, s]]:
+                continue
+            for k, d in enumerate(candidates.astype(float)):
+                y, x = rows - d * (t - t0), columns - d * (s - s0)
+                inside = (y >= 0) & (y <= H - 1) & (x >= 0) & (np.floor(x) + 1 <= W - 1)
+                sample = np.stack([map_coordinates(c, [y, x], order=1) for c in np.moveaxis(views[t, s], 2, 0)], axis=2)
+                squared = ((sample - centre) ** 2).sum(axis=2)
+                sums[k] += np.where(inside, squared / (squared + parameters.scale**2 + noise), 0)
+                counts[k] += inside
+    r = parameters.window_radius
+    cost, total = np.zeros_like(sums), np.zeros_like(counts)
+    for y in range(H):
+        for x in range(W):
+            for v in range(max(0, y - r), min(H, y + r + 1)):
+                for u in range(max(0, x - r), min(W, x + r + 1)):
+                    distance = ((centre[y, x].astype(float) - centre[v, u]) ** 2).sum()
+                    weight = np.exp(-0.5 * distance / (parameters.window_sigma**2 + noise))
+                    cost[:, y, x] += weight * sums[:, v, u]
+                    total[:, y, x] += weight * counts[:, v, u]
+    cost = np.where(total > 0, cost / np.maximum(total, 1e-300), 1)
+    best = cost.argmin(axis=0)
+    lowest = cost.min(axis=0)
+    near = np.clip(best, 1, len(candidates) - 2)
+    before, after = (np.take_along_axis(cost, near[None] + step, axis=0)[0] for step in (-1, 1))
+    with np.errstate(all="ignore"):
+        offset = np.where((best == near) & (lowest > 0), 0.5 * (before - after) / (before - 2 * lowest + after), 0)
+    step = (candidates[-1] - candidates[0]) / (len(candidates) - 1)
+    return candidates[best] + offset * step, lowest, cost.mean(axis=0)
+
+
+@pytest.mark.parametrize("radius", [0, 2])
+@pytest.mark.parametrize("channels", [1, 3])
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.float32])
+def test_sweep_equals_its_numpy_twin(radius, channels, dtype):
+    """Wrong sampling, borders, counts or weights would show as a wrong depth map."""
+    light_field = random_light_field(channels=channels, dtype=dtype)
+    parameters = SweepParameters(candidates=11, scale=0.3, window_radius=radius, window_sigma=0.5)
+    views = halves_and_quarters(light_field.grid)
+    result = sweep(light_field, parameters, groups=views.groups, subsets=views.subsets)
+    for n in (0, 1, 4, 6):
+        disparity, cost, mean = twin(light_field, parameters, views.groups, views.subsets[n])
+        np.testing.assert_allclose(result.cost[n], cost, atol=2e-5)
+        np.testing.assert_allclose(result.mean[n], mean, atol=2e-5)
+        # two candidates may tie within rounding
+        assert np.mean(np.abs(result.disparity[n] - disparity) > 2e-3) < 0.01
+
+
+@pytest.mark.parametrize("view", [(0, 3), (4, 0), (1, 1)])
+def test_depth_of_another_view_than_the_centre(view):
+    """Steps counted from the wrong view would shift every sample of the depth map that was asked for."""
+    light_field = random_light_field().seen_from(view)
+    parameters = SweepParameters(candidates=11, scale=0.3, window_radius=1, window_sigma=0.5)
+    views = halves_and_quarters(light_field.grid, view)
+    result = sweep(light_field, parameters, groups=views.groups, subsets=views.subsets)
+    for n in range(len(views.names)):
+        _, cost, mean = twin(light_field, parameters, views.groups, views.subsets[n])
+        np.testing.assert_allclose(result.cost[n], cost, atol=2e-5)
+        np.testing.assert_allclose(result.mean[n], mean, atol=2e-5)
+
+
+def test_tiles_of_a_wide_picture_fit_together():
+    """Pictures wider than a tile: a seam, or a border counted in the middle, would run through the depth map."""
+    light_field = random_light_field(grid=(3, 3), shape=(9, 2 * TILE_WIDTH + 9))
+    parameters = SweepParameters(candidates=5, scale=0.3, window_radius=2, window_sigma=0.5)
+    groups = np.zeros(light_field.grid, int)
+    result = sweep(light_field, parameters)
+    _, cost, mean = twin(light_field, parameters, groups, np.ones(1, bool))
+    np.testing.assert_allclose(result.cost[0], cost, atol=2e-5)
+    np.testing.assert_allclose(result.mean[0], mean, atol=2e-5)
+
+
+def test_missing_views_are_left_out():
+    """A dark or absent view must not pull the depth of the others."""
+    whole = random_light_field()
+    present = np.ones(whole.grid, bool)
+    present[0, 1] = present[3, 3] = False
+    broken = whole.views.copy()
+    broken[~present] = 0
+    parameters = SweepParameters(candidates=7, scale=0.3, window_radius=1, window_sigma=0.5)
+    results = []
+    for views in (whole.views, broken):
+        light_field = LightField(views, "partial", present=present, disparity_range=whole.disparity_range)
+        results.append(sweep(light_field, parameters))
+    np.testing.assert_array_equal(results[0].disparity, results[1].disparity)
+
+
+@pytest.mark.parametrize("disparity", [-0.75, 0.0, 0.4])
+def test_sweep_visits_the_samples_of_the_stitched_epi(disparity):
+    """The fast sweep and the paper's construction (shift, concatenate, follow the line) are the same cost (Eq. 1-3)."""
+    light_field = random_light_field(shape=(12, 15))
+    light_field = light_field.with_range(DisparityRange(disparity - 0.5, disparity + 0.5, "given"))
+    parameters = SweepParameters(candidates=3, scale=0.3, window_radius=0)
+    scale = float(np.sqrt(parameters.scale**2 + residual_variance(light_field.centre)))
+    result = sweep(light_field, parameters)
+    for y, x in [(6, 7), (0, 3), (11, 14), (5, 1)]:
+        costs = [line_cost(light_field, y, x, disparity + offset, scale) for offset in (-0.5, 0, 0.5)]
+        assert result.cost[0, y, x] == pytest.approx(np.nanmin(costs), abs=1e-5)
+
+
+def test_true_slope_is_a_straight_line_in_the_stitched_epi():
+    """A drawn SEPI at the true disparity shows the pixel's colour all along one straight line."""
+    light_field = render("fronto_parallel", size=64, views=5)
+    y, x = 32, 30
+    at_truth = stitched_epi(light_field, y, float(light_field.truth[y, x]))
+    samples, valid = at_truth.along_line(x)
+    assert valid.sum() == 25
+    assert np.abs(samples - light_field.centre[y, x]).max() < 0.02
+    picture = at_truth.image()
+    assert picture.shape == (25, 64, 3)
+    columns = np.round(x - at_truth.disparity * at_truth.steps).astype(int)
+    drawn = (columns >= 0) & (columns < 64)
+    np.testing.assert_allclose(picture[drawn, columns[drawn]], samples[drawn], atol=0.02)
+    wrong, _ = stitched_epi(light_field, y, 0.0).along_line(x)
+    assert np.abs(wrong - light_field.centre[y, x]).max() > 0.05
+
+
+def test_stitched_epi_refuses_a_row_outside():
+    with pytest.raises(SepiError, match="row 99 lies outside"):
+        stitched_epi(random_light_field(), 99, 0.0)
+
+
+def test_equal_bytes_for_any_number_of_threads():
+    """A rerun on another machine must give the same file."""
+    light_field = render("curved_occluders", size=96, views=5)
+    parameters = SweepParameters(candidates=31)
+    views = halves_and_quarters(light_field.grid)
+    scattered = np.random.default_rng(0).random(light_field.shape) < 0.01
+    before = numba.get_num_threads()
+    for subsets, wanted in ((None, None), (views.subsets, scattered)):
+        results = []
+        try:
+            # the number of threads decides how the rows are shared out
+            for number in (1, several_threads()):
+                numba.set_num_threads(number)
+                groups = None if subsets is None else views.groups
+                results.append(sweep(light_field, parameters, groups=groups, subsets=subsets, wanted=wanted))
+        finally:
+            numba.set_num_threads(before)
+        for name in ("disparity", "cost", "mean"):
+            np.testing.assert_array_equal(getattr(results[0], name), getattr(results[1], name))
+
+
+def test_candidates_done_together_equal_candidates_done_alone():
+    """Dense candidates share the pixels that they read: a weight of one used for the other would blur the minimum."""
+    light_field = random_light_field(shape=(20, 40))
+    views = planar(light_field)
+    disparities = np.linspace(-1.3, 1.3, 61).astype(np.float32)
+    groups = halves_and_quarters(light_field.grid).groups
+    down = sample_offsets(disparities, np.arange(5) - 2)
+    across = sample_offsets(disparities, np.arange(4) - 2)
+    shared = (np.diff(down[0]) == 0).mean() * (np.diff(across[0]) == 0).mean()
+    assert 0.5 < shared < 1, "some candidates read the same pixels, some do not"
+    together, alone = np.empty((2, 9, 61, 40), np.float32)
+    for y in (0, 9, 19):
+        cost_row(views, 2, 2, groups, y, 0, 40, *down, *across, np.float32(900), together)
+        for k in range(61):
+            one = np.s_[:, k : k + 1]
+            single = np.empty((9, 1, 40), np.float32)
+            cost_row(
+                views, 2, 2, groups, y, 0, 40, *(np.ascontiguousarray(a[one]) for a in (*down, *across)),
+                np.float32(900), single,
+            )  # fmt: skip
+            alone[:, k] = single[:, 0]
+        np.testing.assert_allclose(together, alone, rtol=1e-5, atol=1e-6)
+
+
+def test_unwanted_pixels_stay_unknown_and_wanted_ones_unchanged():
+    light_field = random_light_field()
+    parameters = SweepParameters(candidates=5, scale=0.3, window_radius=2, window_sigma=0.5)
+    wanted = np.zeros(light_field.shape, bool)
+    wanted[[1, 7, 8], [3, 0, 16]] = True
+    some, whole = sweep(light_field, parameters, wanted=wanted), sweep(light_field, parameters)
+    assert np.isnan(some.disparity[0][~wanted]).all()
+    np.testing.assert_array_equal(some.disparity[0][wanted], whole.disparity[0][wanted])
+
+
+def test_wanted_pixels_far_apart_equal_the_whole_picture():
+    """Columns between are passed over: a window cut short there would change the depth of the pixels beside."""
+    light_field = random_light_field(grid=(3, 3), shape=(9, 4 * SHORTEST_GAP))
+    parameters = SweepParameters(candidates=5, scale=0.3, window_radius=2, window_sigma=0.5)
+    wanted = np.zeros(light_field.shape, bool)
+    wanted[[0, 3, 3, 8], [5, 4, 2 * SHORTEST_GAP, 4 * SHORTEST_GAP - 1]] = True
+    some, whole = sweep(light_field, parameters, wanted=wanted), sweep(light_field, parameters)
+    for name in ("disparity", "cost", "mean"):
+        np.testing.assert_allclose(getattr(some, name)[0][wanted], getattr(whole, name)[0][wanted], rtol=1e-5)
+
+
+def test_subset_without_views_matches_nothing():
+    """Seen from a corner of the grid, some parts hold no view: their cost is the worst there is, and is a number."""
+    light_field = random_light_field(grid=(3, 3), shape=(40, 44)).seen_from((0, 0))
+    views = halves_and_quarters(light_field.grid, (0, 0))
+    parameters = SweepParameters(candidates=5, scale=0.3, window_radius=1, window_sigma=0.5)
+    result = sweep(light_field, parameters, groups=views.groups, subsets=views.subsets)
+    empty = views.names.index("left-up")
+    assert (result.cost[empty] == 1).all()
+    assert (result.mean[empty] == 1).all()
+    assert np.isfinite(result.disparity).all()
+
+
+def test_unknown_range_is_an_error_that_says_what_to_give():
+    with pytest.raises(SepiError, match="disparity range unknown"):
+        sweep(LightField(random_light_field().views, "scene"), SweepParameters())
+
+
+def test_noise_level_is_the_noise_put_in():
+    """Scale and window follow the noise: an estimate off by far would blur clean scenes or trust noisy ones."""
+    generator = np.random.default_rng(1)
+    ramp = np.linspace(0.2, 0.8, 100, dtype=np.float32)
+    image = np.repeat((ramp[None] + 0 * ramp[:, None])[..., None], 3, axis=2)
+    assert noise_level(image) < 1e-4
+    for sigma in (0.01, 0.08):
+        noisy = (image + generator.normal(0, sigma, image.shape)).astype(np.float32)
+        assert noise_level(noisy) == pytest.approx(sigma, rel=0.1)
+
+
+def test_kernels_are_compiled_once():
+    """A job that compiles takes half a minute instead of a second."""
+    program = (
+        "import numpy as np\n"
+        "from sepi.lightfield import DisparityRange, LightField\n"
+        "from sepi.matching.plane_sweep import SweepParameters, sweep\n"
+        "from sepi.matching.plane_sweep_kernels import sweep_rows\n"
+        "views = np.random.default_rng(0).integers(0, 255, (3, 3, 8, 9, 1), np.uint8)\n"
+        "sweep(LightField(views, 'x', disparity_range=DisparityRange(-1, 1, 'given')), SweepParameters(candidates=3))\n"
+        "print(sum(sweep_rows.stats.cache_hits.values()), sum(sweep_rows.stats.cache_misses.values()))\n"
+    )
+    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
+    # the first may find the kernel compiled by others, or not; the second must
+    said = [
+        subprocess.run([sys.executable, "-c", program], env=environment, check=True, capture_output=True, text=True)
+        for _ in range(2)
+    ]
+    assert said[0].stdout.split() in (["0", "1"], ["1", "0"])
+    assert said[1].stdout.split() == ["1", "0"]

@@ -1,0 +1,214 @@
+"""The layered sweep, its z-buffers and the semi-global smoothing equal plain NumPy twins."""
+
+import numba
+import numpy as np
+import pytest
+from scipy.ndimage import map_coordinates
+from several_threads import several_threads
+
+from sepi.lightfield import DisparityRange, LightField
+from sepi.matching.base_detail import DETAIL_UNIT, LayerParameters, split_layers
+from sepi.matching.semi_global_kernels import aggregate, choose, semi_global
+from sepi.matching.visibility_kernels import EMPTY, covered_somewhere, sweep_rows, z_buffers
+from sepi.matching.visibility_sweep import (
+    AllViewsParameters,
+    VisibilityParameters,
+    depth_from_all_views,
+    depth_from_visible_views,
+)
+from sepi.scenes import render
+
+
+def random_light_field(grid=(3, 4), shape=(11, 13), channels=3, dtype=np.uint8, present=None):
+    views = np.random.default_rng(0).random((*grid, *shape, channels), np.float32)
+    if dtype != np.float32:
+        views = np.round(views * np.iinfo(dtype).max).astype(dtype)
+    return LightField(views, "random", present=present, disparity_range=DisparityRange(-1.3, 1.1, "given"))
+
+
+def z_buffer_twin(disparity, dt, ds):
+    H, W = disparity.shape
+    nearest = np.full((H, W), EMPTY)
+    for y, x in np.ndindex(H, W):
+        top, left = int(np.floor(y - disparity[y, x] * dt)), int(np.floor(x - disparity[y, x] * ds))
+        for row in (top, top + 1):
+            for column in (left, left + 1):
+                if 0 <= row < H and 0 <= column < W:
+                    nearest[row, column] = max(nearest[row, column], disparity[y, x])
+    return nearest
+
+
+def sweep_twin(light_field, layers, nearest, disparities, cover, hidden, scales, shares):
+    t0, s0 = light_field.reference
+    H, W = light_field.shape
+    rows, columns = np.mgrid[:H, :W].astype(float)
+    planes = [layers.colours * layers.colour_unit, layers.detail * DETAIL_UNIT][: 1 + bool(layers.detail.shape[2])]
+    out = np.ones((len(disparities), H, W))
+    for k, d in enumerate(disparities.astype(float)):
+        total, weight = np.zeros((2, H, W))
+        for t, s in np.argwhere(light_field.present):
+            if (t, s) == (t0, s0):
+                continue
+            y, x = rows - d * (t - t0), columns - d * (s - s0)
+            inside = (y >= 0) & (y <= H - 1) & (x >= 0) & (x <= W - 1)
+            seen = np.ones((H, W))
+            if nearest is not None:
+                # halves go down, as the kernel's comparison of fractions does
+                near = np.ceil(np.stack([y, x]) - 0.5).astype(int).clip(0, [[[H - 1]], [[W - 1]]])
+                seen = np.where(nearest[t, s][near[0], near[1]] <= np.float32(d + cover), 1, hidden)
+            for values, scale, share in zip(planes, scales, shares, strict=False):
+                sample = np.stack([map_coordinates(c, [y, x], order=1) for c in values[t, s].astype(float)])
+                squared = ((sample - values[t0, s0]) ** 2).sum(axis=0)
+                total += inside * seen * share * squared / (squared + scale)
+            weight += inside * seen
+        out[k] = np.where(weight > 0, total / np.maximum(weight, 1e-12), 1)
+    return out
+
+
+@pytest.mark.parametrize("channels", [1, 3])
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.float32])
+@pytest.mark.parametrize("visible", [False, True])
+def test_costs_equal_a_plain_twin(channels: int, dtype: type, visible: bool) -> None:
+    """A wrong sample, weight or view here is a wrong depth everywhere."""
+    present = np.ones((3, 4), bool)
+    present[0, 1] = False
+    light_field = random_light_field(channels=channels, dtype=dtype, present=present)
+    layers = split_layers(light_field, LayerParameters())
+    disparities = light_field.known_range().candidates(7)
+    disparity = np.random.default_rng(1).choice(disparities, light_field.shape).astype(np.float32)
+    nearest = z_buffers(disparity, present, *light_field.reference) if visible else np.empty((3, 4, 11, 0), np.float32)
+    scales, shares = np.array([0.02, 0.01], np.float32), np.array([0.4, 0.6], np.float32)
+    cost = np.empty((7, 11, 13), np.float32)
+    sweep_rows(
+        layers.colours,
+        np.float32(layers.colour_unit),
+        layers.detail,
+        np.float32(DETAIL_UNIT),
+        present,
+        *light_field.reference,
+        nearest,
+        disparities,
+        np.float32(0.1),
+        np.float32(0.05),
+        scales,
+        shares,
+        0,
+        11,
+        cost,
+    )
+    expected = sweep_twin(
+        light_field, layers, nearest if visible else None, disparities, np.float32(0.1), 0.05, scales, shares
+    )
+    np.testing.assert_allclose(cost, expected, atol=2e-5)
+
+
+def test_z_buffers_hold_the_nearest_pixel_that_touches_a_place() -> None:
+    light_field = random_light_field()
+    disparity = np.random.default_rng(2).uniform(-1.5, 1.5, light_field.shape).astype(np.float32)
+    present = np.ones((3, 4), bool)
+    present[2, 3] = False
+    found = z_buffers(disparity, present, 1, 2)
+    for t, s in np.argwhere(present):
+        np.testing.assert_array_equal(found[t, s], z_buffer_twin(disparity, t - 1, s - 2).astype(np.float32))
+    assert (found[2, 3] == EMPTY).all()
+
+
+def test_an_occluder_covers_what_lies_beside_it() -> None:
+    """A square before a wall hides the wall on each side from the views on that side, and nothing else."""
+    disparity = np.zeros((40, 40), np.float32)
+    disparity[15:25, 15:25] = 2
+    covered = covered_somewhere(disparity, np.ones((3, 3), bool), 1, 1, np.float32(0.15))
+    assert covered[18:22, 13:15].all()
+    assert covered[18:22, 25:27].all()
+    assert covered[13:15, 18:22].all()
+    assert not covered[15:25, 15:25].any()
+    assert not covered[:, :12].any()
+    assert not covered[28:].any()
+
+
+def aggregate_twin(cost, guide, radius, variance):
+    K, H, W = cost.shape
+    out = np.empty((H, W, K))
+    for y, x in np.ndindex(H, W):
+        rows, columns = np.s_[max(0, y - radius) : y + radius + 1], np.s_[max(0, x - radius) : x + radius + 1]
+        weight = np.exp(-((guide[rows, columns] - guide[y, x]) ** 2).sum(axis=2) / (2 * variance))
+        out[y, x] = (cost[:, rows, columns] * weight).sum(axis=(1, 2)) / weight.sum()
+    return out
+
+
+def path_twin(cost, guide, dy, dx, small, large, weakening):
+    H, W, K = cost.shape
+    path = np.zeros_like(cost)
+    jumps = np.abs(np.subtract.outer(np.arange(K), np.arange(K)))
+    for y in range(H)[:: 1 if dy >= 0 else -1]:
+        for x in range(W)[:: 1 if dx >= 0 else -1]:
+            v, u = y - dy, x - dx
+            if not (0 <= v < H and 0 <= u < W):
+                path[y, x] = cost[y, x]
+                continue
+            change = np.abs(guide[y, x] - guide[v, u]).sum()
+            penalty = np.choose(np.minimum(jumps, 2), [0, small, max(1.5 * small, large / (1 + weakening * change))])
+            path[y, x] = cost[y, x] + (path[v, u] + penalty).min(axis=1) - path[v, u].min()
+    return path
+
+
+def test_smoothing_equals_a_plain_twin() -> None:
+    random = np.random.default_rng(3)
+    cost, guide = random.random((6, 8, 9)).astype(np.float32), random.random((8, 9, 3)).astype(np.float32) * 0.1
+    averaged = aggregate(cost, guide, 2, np.float32(0.01))
+    np.testing.assert_allclose(averaged, aggregate_twin(cost, guide, 2, 0.01), atol=1e-5)
+    smoothed = semi_global(averaged, guide, np.float32(0.1), np.float32(0.5), np.float32(5))
+    directions = [(0, 1), (0, -1), (1, 0), (-1, 0), (1, 1), (1, -1), (-1, 1), (-1, -1)]
+    expected = sum(path_twin(averaged.astype(float), guide, *d, 0.1, 0.5, 5) for d in directions)
+    np.testing.assert_allclose(smoothed, expected, atol=1e-4)
+
+
+def test_margin_tells_one_minimum_from_two() -> None:
+    """Confidence is high for one deep minimum, zero for two equal ones and where nothing differs."""
+    disparities = np.linspace(-1, 1, 21).astype(np.float32)
+    one = np.minimum(1, np.abs(disparities - 0.5))
+    two = np.minimum(one, np.abs(disparities + 0.5))
+    volume = np.stack([one, two, np.full(21, 0.3)]).astype(np.float32)[None]
+    disparity, margin = choose(volume, volume, disparities, np.float32(0.25))
+    assert disparity[0, 0] == pytest.approx(0.5, abs=1e-6)
+    assert margin[0, 0] == pytest.approx(0.3, abs=1e-6)
+    np.testing.assert_allclose(margin[0, 1:], 0, atol=1e-6)
+
+
+def test_grey_views_give_the_depth_of_equal_colours() -> None:
+    """A grey light field is not worse off than the same one stored as RGB."""
+    scene = render("pyramids", size=64)
+    grey = scene.views[..., 1:2]
+    fields = [
+        LightField(views, "s", disparity_range=scene.disparity_range) for views in (grey, np.repeat(grey, 3, axis=4))
+    ]
+    one, three = (depth_from_all_views(f, AllViewsParameters(candidates=21), lambda _: None) for f in fields)
+    np.testing.assert_allclose(one.disparity, three.disparity, atol=1e-3)
+
+
+def test_depth_is_the_same_on_any_number_of_threads() -> None:
+    scene = render("fine_structures", size=64)
+    before = numba.get_num_threads()
+    found = []
+    try:
+        for threads in (1, several_threads()):
+            numba.set_num_threads(threads)
+            first = depth_from_all_views(scene, AllViewsParameters(candidates=21), lambda _: None)
+            result = depth_from_visible_views(
+                scene, first.disparity, VisibilityParameters(candidates=21, passes=1), lambda _: None
+            )
+            found.append((result.disparity.tobytes(), result.confidence.tobytes()))
+    finally:
+        numba.set_num_threads(before)
+    assert found[0] == found[1]
+
+
+def test_progress_ends_at_one() -> None:
+    seen: list[float] = []
+    scene = render("fronto_parallel", size=64)
+    first = depth_from_all_views(scene, AllViewsParameters(candidates=5), seen.append)
+    assert seen[-1] == 1
+    seen.clear()
+    depth_from_visible_views(scene, first.disparity, VisibilityParameters(candidates=5), seen.append)
+    assert seen[-1] == 1
+    assert np.all(np.diff(seen) >= 0)

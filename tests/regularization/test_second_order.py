@@ -1,0 +1,198 @@
+"""Gauss-Newton refinement and second-order smoothing against plain NumPy and SciPy, and on exact truth."""
+
+import numpy as np
+import pytest
+from scipy.ndimage import map_coordinates, spline_filter
+from scipy.sparse import diags
+from scipy.sparse.linalg import spsolve
+
+from sepi.lightfield import DisparityRange, LightField
+from sepi.matching.base_detail import DETAIL_UNIT, LayerParameters, split_layers
+from sepi.matching.gauss_newton import information, prepared, spline_derivatives, view_mean, windowed_step
+from sepi.matching.gauss_newton_kernels import MARGIN, SPLINE_UNIT, spline_coefficients
+from sepi.matching.visibility_kernels import z_buffers
+from sepi.optimize import SecondOrderParameters, second_order
+from sepi.regularization.second_order import bend_matrix, bend_weights, solve_smooth
+from sepi.scenes import render
+from sepi.stage import StageMaps, no_progress
+
+
+@pytest.mark.parametrize("shape", [(9, 14), (2, 2), (2, 30), (40, 3)])
+def test_spline_coefficients_equal_scipys(shape: tuple[int, int]) -> None:
+    image = np.random.default_rng(0).random(shape).astype(np.float32)
+    expected = spline_filter(image.astype(float), order=3, mode="mirror")
+    np.testing.assert_allclose(spline_coefficients(image), expected, atol=2e-5)
+
+
+def test_derivatives_are_those_of_the_spline() -> None:
+    image = np.random.default_rng(1).random((12, 15, 3)).astype(np.float32)
+    down, across = spline_derivatives(image)
+    y, x = np.mgrid[:12, :15].astype(float)
+    for c in range(3):
+        plane = image[..., c].astype(float)
+        for found, step in ((down, (1e-4, 0)), (across, (0, 1e-4))):
+            ends = [map_coordinates(plane, [y + s * step[0], x + s * step[1]], order=3, mode="mirror") for s in (1, -1)]
+            np.testing.assert_allclose(found[..., c], (ends[0] - ends[1]) / 2e-4, atol=1e-3)
+
+
+def sums_twin(light_field, layers, parameters, disparity, cover):
+    """Mean of the views, gradient and curvature, with SciPy's splines."""
+    t0, s0 = light_field.reference
+    H, W = light_field.shape
+    rows, columns = np.mgrid[:H, :W].astype(float)
+    nearest = z_buffers(disparity, light_field.present, t0, s0)
+    means, gradient, curvature = [], np.zeros((H, W)), np.zeros((H, W))
+    for values, unit, scale, share in (
+        (layers.colours, layers.colour_unit, parameters.colour_scale, 1 - parameters.detail_share),
+        (layers.detail, DETAIL_UNIT, parameters.detail_scale, parameters.detail_share),
+    ):
+        planes = values * unit
+        scale2 = layers.squared_scale(scale)
+        own = planes[t0, s0].astype(float)
+        samples = []
+        for t, s in np.argwhere(light_field.present):
+            if (t, s) == (t0, s0):
+                continue
+            y, x = rows - disparity * (t - t0), columns - disparity * (s - s0)
+            inside = (y >= 0) & (y <= H - 1) & (x >= 0) & (x <= W - 1)
+            place = [np.floor(v + 0.5).astype(int).clip(0, n - 1) for v, n in ((y, H), (x, W))]
+            seen = inside & (nearest[t, s][tuple(place)] <= disparity + np.float32(cover))
+            sample = np.stack([map_coordinates(c.astype(float), [y, x], order=3, mode="mirror") for c in planes[t, s]])
+            samples.append((t - t0, s - s0, seen, sample))
+        total, weight = own.copy(), np.ones((H, W))
+        for _, _, seen, sample in samples:
+            w = seen / (1 + ((sample - own) ** 2).sum(axis=0) / scale2) ** 2
+            total += w * sample
+            weight += w
+        mean = total / weight
+        means.append(np.moveaxis(mean, 0, 2))
+        down, across = spline_derivatives(means[-1].astype(np.float32))
+        for dt, ds, seen, sample in samples:
+            r, g = np.moveaxis(sample - mean, 0, 2), down * dt + across * ds
+            w = share * seen / scale2 / (1 + (r**2).sum(axis=2) / scale2) ** 2
+            gradient += w * (r * g).sum(axis=2)
+            curvature += w * (g * g).sum(axis=2)
+    return np.concatenate(means, axis=2), gradient, curvature
+
+
+def test_sums_over_the_views_equal_a_plain_twin() -> None:
+    """Wrong visibility, weights or interpolation would bias the depth below the candidate step."""
+    present = np.ones((3, 4), bool)
+    present[1, 0] = False
+    views = np.round(255 * np.random.default_rng(2).random((3, 4, 10, 12, 3))).astype(np.uint8)
+    light_field = LightField(views, "random", present=present, disparity_range=DisparityRange(-1, 1, "given"))
+    parameters = LayerParameters(colour_scale=0.3, detail_scale=0.2)
+    layers = split_layers(light_field, parameters)
+    matching = prepared(light_field, layers, parameters)
+    disparity = np.random.default_rng(3).uniform(-0.9, 0.9, (10, 12)).astype(np.float32)
+    nearest = z_buffers(disparity, present, *light_field.reference)
+    mean = view_mean(matching, disparity, nearest, 0.2)
+    gradient, curvature = information(matching, mean, disparity, nearest, 0.2)
+    expected = sums_twin(light_field, layers, parameters, disparity, 0.2)
+    np.testing.assert_allclose(mean, expected[0], atol=1e-3)
+    for found, twin in ((gradient, expected[1]), (curvature, expected[2])):
+        np.testing.assert_allclose(found, twin, atol=2e-3 * np.abs(twin).max())
+
+
+def test_margin_of_the_splines_is_mirrored() -> None:
+    scene = render("dots", size=64)
+    parameters = LayerParameters()
+    splines = prepared(scene, split_layers(scene, parameters), parameters).splines[0, 0, ..., 0]
+    inner = splines[MARGIN:-MARGIN, MARGIN:-MARGIN]
+    np.testing.assert_array_equal(splines, np.pad(inner, MARGIN, mode="reflect"))
+
+
+def test_coefficients_of_the_strongest_pattern_do_not_wrap_round() -> None:
+    """Single black and white pixels side by side have coefficients far outside 0..1."""
+    y, x = np.mgrid[:16, :16]
+    views = np.where((y + x) % 2, 1.5, -0.5).astype(np.float32)[None, None, ..., None] * np.ones((1, 2, 1, 1, 3))
+    field = LightField(views.astype(np.float32), "board", disparity_range=DisparityRange(-1, 1, "given"))
+    parameters = LayerParameters()
+    splines = prepared(field, split_layers(field, parameters), parameters).splines[0, 0, ..., 0]
+    inner = splines[MARGIN:-MARGIN, MARGIN:-MARGIN]
+    expected = spline_filter(views[0, 0, ..., 0], order=3, mode="mirror")
+    np.testing.assert_allclose(inner * SPLINE_UNIT, expected, atol=2 * SPLINE_UNIT)
+
+
+def test_steps_end_at_the_true_disparity() -> None:
+    """From a fifth of a candidate step away, three steps come within a thousandth of a pixel."""
+    scene = render("slanted_plane", size=96)
+    parameters = LayerParameters()
+    matching = prepared(scene, split_layers(scene, parameters), parameters)
+    disparity = (scene.truth + 0.02).astype(np.float32)
+    for _ in range(3):
+        nearest = z_buffers(disparity, scene.present, *scene.reference)
+        mean = view_mean(matching, disparity, nearest, 0.15)
+        gradient, curvature = information(matching, mean, disparity, nearest, 0.15)
+        disparity = disparity + windowed_step(gradient, curvature, 3, 0.05)[0]
+    assert np.abs(disparity - scene.truth)[8:-8, 8:-8].mean() < 1.5e-3
+
+
+def test_steps_are_those_of_newton_and_no_longer_than_allowed() -> None:
+    """Far from the minimum the linearisation does not hold: an uncut step would throw a pixel off its surface."""
+    gradient, curvature = np.full((9, 9), 0.3, np.float32), np.full((9, 9), 10.0, np.float32)
+    gradient[:, 5:] *= -100
+    step, information_there = windowed_step(gradient, curvature, 0, 0.05)
+    np.testing.assert_allclose(step[:, :5], 0.03, rtol=1e-5)
+    np.testing.assert_allclose(step[:, 5:], -0.05, rtol=1e-5)
+    np.testing.assert_allclose(information_there, 10)
+    # a window takes the mean of both before they are divided
+    wide, _ = windowed_step(gradient, curvature, 1, 9.0)
+    np.testing.assert_allclose(wide[4, 4], (2 * 0.3 - 30) / 3 / 10, rtol=1e-4)
+
+
+def plane(shape=(20, 24)):
+    y, x = np.mgrid[: shape[0], : shape[1]]
+    return (0.3 + 0.02 * x - 0.01 * y).astype(np.float32)
+
+
+def weights_of(disparity, reliability=1.0):
+    guide = np.zeros((*disparity.shape, 3), np.float32)
+    return bend_weights(disparity, guide, np.full(disparity.shape, reliability, np.float32), 0.1, 0.01)
+
+
+def test_planes_cost_nothing() -> None:
+    """The smoothing may not flatten slanted surfaces: with hardly any data a plane stays what it is."""
+    data = plane()
+    matrix = 10 * bend_matrix(weights_of(data), data.shape)
+    solution = solve_smooth(matrix, np.full(data.shape, 1e-6, np.float32), data, 1e-10, 500)
+    np.testing.assert_allclose(solution, data, atol=1e-5)
+
+
+def test_a_hole_is_filled_by_the_plane_round_it() -> None:
+    data, weight = plane(), np.ones((20, 24), np.float32)
+    data[6:14, 8:16] += 0.05
+    weight[6:14, 8:16] = 0
+    matrix = bend_matrix(weights_of(plane()), data.shape)
+    solution = solve_smooth(matrix, weight, data, 1e-10, 1000)
+    np.testing.assert_allclose(solution, plane(), atol=2e-4)
+
+
+def test_solver_agrees_with_a_direct_one() -> None:
+    random = np.random.default_rng(4)
+    data = (plane() + random.normal(0, 0.02, (20, 24))).astype(np.float32)
+    weight = random.uniform(0, 1, (20, 24)).astype(np.float32) ** 4
+    matrix = 10 * bend_matrix([random.uniform(0, 1, w.shape) for w in weights_of(data)], data.shape)
+    system = (matrix + diags(weight.ravel() + 1e-9)).tocsc()
+    expected = spsolve(system, weight.ravel().astype(float) * data.ravel())
+    found = solve_smooth(matrix, weight, data, 1e-10, 2000)
+    np.testing.assert_allclose(found.ravel(), expected, atol=1e-5)
+
+
+def test_steps_stay_where_the_data_is_reliable_and_go_where_it_is_not() -> None:
+    data = np.zeros((16, 16), np.float32)
+    data[:, 8:] = 1
+    sure, unsure = (solve_smooth(5 * bend_matrix(weights_of(data, r), data.shape), np.full(data.shape, 0.5, np.float32),
+                                 data, 1e-8, 500) for r in (1.0, 0.0))  # fmt: skip
+    np.testing.assert_allclose(sure, data, atol=1e-3)
+    assert np.abs(np.diff(unsure, axis=1)).max() < 0.5
+
+
+def test_refinement_of_zero_motion_is_exactly_zero() -> None:
+    """Views that are all the same have no parallax; any other answer would be an artefact."""
+    picture = np.round(255 * np.random.default_rng(5).random((48, 48, 3))).astype(np.uint8)
+    views = np.broadcast_to(picture, (5, 5, 48, 48, 3)).copy()
+    light_field = LightField(views, "still", disparity_range=DisparityRange(-1, 1, "given"))
+    before = StageMaps(np.zeros((48, 48), np.float32), np.ones((48, 48), np.float32))
+    result = second_order(light_field, before, SecondOrderParameters(), no_progress)
+    assert np.abs(result.disparity).max() < 1e-6

@@ -1,0 +1,343 @@
+"""Single pixels under the glass: the curves are the sweep's, SEPIs show straight lines where the depth is right."""
+
+import base64
+import json
+
+import cv2
+import numpy as np
+import pytest
+
+from sepi.errors import SepiError
+from sepi.image.noise import residual_variance
+from sepi.lightfield import DisparityRange, LightField
+from sepi.matching.plane_sweep import SweepParameters, sweep
+from sepi.matching.stitched_epi import stitched_epi
+from sepi.matching.view_subsets import halves_and_quarters
+from sepi.pipeline import estimate_depth
+from sepi.report.plots.contrast import stretched
+from sepi.report.probes.curves import cost_curves
+from sepi.report.probes.figure import write_probes
+from sepi.report.probes.pixels import APART, BORDER, interesting_pixels
+from sepi.report.probes.probe import GREY, probe, sepi_picture, to_json
+from sepi.scenes import render
+from sepi.stage import StageMaps
+
+
+def random_light_field(grid=(5, 4), shape=(14, 17), channels=3, dtype=np.uint8, **known):
+    generator = np.random.default_rng(0)
+    views = generator.random((*grid, *shape, channels), np.float32)
+    if dtype != np.float32:
+        views = np.round(views * np.iinfo(dtype).max).astype(dtype)
+    # whole disparities among the candidates: their samples on the last row and column are special cases
+    return LightField(views, "random", disparity_range=DisparityRange(-1, 1.25, "given"), **known)
+
+
+def missing_views(grid=(5, 4)):
+    present = np.ones(grid, bool)
+    # all of the upper left quarter but the dividing lines, and a single view
+    present[:2, :2] = present[4, 3] = False
+    return present
+
+
+@pytest.fixture(scope="module")
+def occluder():
+    """A small scene with occlusions, and its final maps."""
+    light_field = render("curved_occluders", size=96)
+    return light_field, estimate_depth(light_field, "paper")
+
+
+@pytest.mark.parametrize(
+    ("settings", "radius"),
+    [
+        ({}, 2),
+        ({"dtype": np.uint16}, 2),
+        ({"dtype": np.float32, "channels": 1}, 2),
+        ({"channels": 1}, 0),
+        ({"present": missing_views()}, 1),
+        ({"view": (0, 3)}, 1),
+        ({"view": (3, 1), "present": missing_views()}, 2),
+        ({"grid": (1, 5)}, 2),
+        ({"shape": (2, 3)}, 3),
+    ],
+)
+def test_curves_are_what_the_sweep_minimises(settings, radius):
+    """A curve drawn from other samples, weights or counts would explain a depth that was found another way."""
+    light_field = random_light_field(**settings)
+    parameters = SweepParameters(candidates=10, scale=0.3, window_radius=radius, window_sigma=0.5)
+    views = halves_and_quarters(light_field.grid, light_field.reference)
+    result = sweep(light_field, parameters, groups=views.groups, subsets=views.subsets)
+    H, W = light_field.shape
+    corners_and_inside = [(0, 0), (H - 1, W - 1), (0, W - 1), (H - 1, 0), (H // 2, W // 2), (H // 2, 1), (1, W // 2)]
+    for y, x in corners_and_inside:
+        curves = cost_curves(light_field, y, x, parameters)
+        assert curves.names == views.names
+        np.testing.assert_allclose(curves.costs.min(axis=1), result.cost[:, y, x], atol=2e-5)
+        np.testing.assert_allclose(curves.costs.mean(axis=1), result.mean[:, y, x], atol=2e-5)
+        lowest = np.sort(curves.costs, axis=1)[:, :2]
+        for n in np.flatnonzero((np.diff(lowest) > 1e-3)[:, 0]):
+            disparity, cost = curves.minimum(curves.names[n])
+            assert disparity == pytest.approx(result.disparity[n, y, x], abs=5e-3)
+            assert cost == pytest.approx(result.cost[n, y, x], abs=2e-5)
+
+
+def test_curves_of_a_scene_are_those_of_the_default_sweep():
+    """Noise and colour scales of real use: a curve off by the noise would have its minimum elsewhere."""
+    light_field = render("dots", size=64, views=5)
+    parameters = SweepParameters(candidates=61)
+    result = sweep(light_field, parameters)
+    noise = residual_variance(light_field.centre)
+    for y, x in [(0, 0), (20, 31), (63, 40), (33, 33)]:
+        disparity, cost = cost_curves(light_field, y, x, parameters, noise=noise).minimum()
+        assert cost == pytest.approx(result.cost[0, y, x], abs=2e-5)
+        assert disparity == pytest.approx(result.disparity[0, y, x], abs=5e-3)
+
+
+def test_a_pixel_outside_the_view_is_refused():
+    """A negative row from a config would silently count from the bottom."""
+    for y, x in [(-1, 0), (0, 17), (14, 0)]:
+        with pytest.raises(SepiError, match=r"lies outside the reference view; rows go from 0 to 13"):
+            cost_curves(random_light_field(), y, x, SweepParameters())
+        with pytest.raises(SepiError, match="lies outside the reference view"):
+            sepi_picture(random_light_field(), y, x, 0.5)
+
+
+def plane(disparity, grid=(5, 5), size=60, **known):
+    """A textured plane of one disparity, each view exact at every pixel: a sum of waves."""
+    generator = np.random.default_rng(1)
+    waves = generator.normal(scale=0.5, size=(12, 2))
+    phases = generator.uniform(0, 2 * np.pi, 12)
+    t, s, y, x = np.ogrid[: grid[0], : grid[1], :size, :size]
+    t0, s0 = known.get("view") or (grid[0] // 2, grid[1] // 2)
+    v, u = y + disparity * (t - t0), x + disparity * (s - s0)
+    values = sum(np.cos(a * v + b * u + p) for (a, b), p in zip(waves, phases, strict=True))
+    values = (0.5 + values / 24).astype(np.float32)
+    return LightField(values[..., None], "plane", disparity_range=DisparityRange(-2, 2, "given"), **known)
+
+
+def raggedness(picture):
+    """Mean deviation down the columns, grey levels."""
+    return picture.pixels[..., 0].astype(float).std(axis=0).mean()
+
+
+@pytest.mark.parametrize("view", [None, (1, 3)])
+def test_the_right_candidate_gives_upright_stripes(view):
+    """The point of the picture: the reader sees at a glance which candidate is right."""
+    light_field = plane(1.25, view=view)
+    right, near, wrong = (sepi_picture(light_field, 30, 30, d, half_width=8) for d in (1.25, 1.0, -0.75))
+    assert raggedness(right) < 1.5
+    assert raggedness(near) > 4 * raggedness(right)
+    assert raggedness(wrong) > raggedness(near)
+    assert right.pixels.shape == (25, 17, 3)
+    assert np.all(right.line == 8)
+
+
+def test_sheared_and_stitched_pictures_show_the_same_line():
+    """The unsheared picture is that of Eq. 1-2; a line drawn beside its samples would mislead."""
+    light_field = plane(0.25)
+    sheared = sepi_picture(light_field, 30, 28, 0.5, half_width=20)
+    stitched = sepi_picture(light_field, 30, 28, 0.5, half_width=20, sheared=False)
+    samples, valid = stitched_epi(light_field, 30, 0.5).along_line(28)
+    expected = np.rint(255 * samples[:, 0]).astype(int)
+    assert valid.all()
+    np.testing.assert_array_equal(sheared.pixels[:, 20, 0], expected)
+    np.testing.assert_allclose(stitched.line, 20 - 0.5 * np.arange(-12, 13))
+    whole = stitched.line == np.rint(stitched.line)
+    columns = np.rint(stitched.line[whole]).astype(int)
+    np.testing.assert_array_equal(stitched.pixels[np.flatnonzero(whole), columns, 0], expected[whole])
+    image = np.rint(255 * stitched_epi(light_field, 30, 0.5).image()[:, 8:49, 0])
+    seen = stitched.inside & (image > 0)
+    np.testing.assert_array_equal(stitched.pixels[..., 0][seen], image[seen])
+
+
+def test_grey_where_nothing_is_seen():
+    """Black or repeated pixels beyond the edge would look like a part of the scene."""
+    present = np.ones((5, 5), bool)
+    present[4, 0] = False
+    light_field = plane(0.0, present=present)
+    picture = sepi_picture(light_field, 1, 2, 1.0, half_width=6)
+    rows = picture.pixels.reshape(5, 5, 13, 3)
+    inside = picture.inside.reshape(5, 5, 13)
+    # row 1 of view row 4 would be at -1
+    assert not inside[4].any()
+    assert not inside[2, 2, :4].any()
+    assert inside[2, 2, 4:].all()
+    assert np.all(rows[~inside] == GREY)
+    assert not sepi_picture(light_field, 30, 30, 0.0).inside[20].any()
+    with pytest.raises(SepiError, match="finite"):
+        sepi_picture(light_field, 1, 2, float("nan"))
+
+
+def made_maps(light_field, **extra):
+    shape = light_field.shape
+    return StageMaps(np.full(shape, 0.5, np.float32), np.full(shape, 0.75, np.float32), extra)
+
+
+def test_probe_tells_what_the_maps_say():
+    """Values of another pixel or map, or the views of another side, would explain the wrong thing."""
+    truth = np.full((60, 60), np.nan, np.float32)
+    truth[20, 30] = 0.5
+    light_field = plane(0.5, truth=truth)
+    side = np.zeros((60, 60), np.uint8)
+    side[20, 30] = 2
+    flag = side > 0
+    maps = made_maps(light_field, occlusion_side=side, occluded=flag, textureless=~flag)
+    best = StageMaps(np.full((60, 60), 0.625, np.float32), maps.confidence)
+    parameters = SweepParameters(candidates=41)
+    found = probe(light_field, 20, 30, maps=maps, best=best, parameters=parameters, label="here")
+    assert (found.y, found.x, found.label) == (20, 30, "here")
+    assert (found.chosen, found.best, found.truth, found.confidence) == (0.5, 0.625, 0.5, 0.75)
+    assert found.minimum == pytest.approx(0.5, abs=0.02)
+    assert found.occluded
+    assert not found.textureless
+    assert found.side == "right"
+    np.testing.assert_array_equal(found.kept, np.tile([False, False, True, True, True], (5, 1)))
+    assert list(found.pictures) == ["minimum", "chosen", "wrong", "truth"]
+    # every view sees the plane's point, so the patch has the pixel's colour
+    colour = 255 * float(light_field.centre[20, 30, 0])
+    np.testing.assert_allclose(found.patch, colour, atol=2)
+    y, x = 20 - found.crop_origin[0], 30 - found.crop_origin[1]
+    assert found.crop[y, x, 0] == pytest.approx(colour, abs=1)
+    other = probe(light_field, 21, 30, maps=maps, parameters=parameters)
+    assert (other.truth, other.best, other.side, other.occluded) == (None, None, "full", False)
+    assert other.kept.all()
+    assert "truth" not in other.pictures
+
+
+def test_sides_of_another_occlusion_stage_are_refused():
+    """Wang's half planes are numbered otherwise; their names would be wrong, or an index out of range."""
+    light_field = plane(0.5)
+    maps = made_maps(light_field, occlusion_side=np.full((60, 60), 12, np.uint8))
+    with pytest.raises(SepiError, match="half_sepi has 0 to 8"):
+        probe(light_field, 20, 30, maps=maps, parameters=SweepParameters(candidates=5))
+
+
+def test_json_holds_the_curves_and_pictures(occluder):
+    """The page shows nothing but this; 14 kB a pixel, of such fine texture, keep ten scenes in one page."""
+    light_field, maps = occluder
+    found = probe(light_field, 40, 50, maps=maps, best=maps, parameters=SweepParameters())
+    text = json.dumps(to_json(found), allow_nan=False)
+    assert len(text) <= 14_000
+    data = json.loads(text)
+    assert list(data["costs"]) == list(found.curves.names)
+    for name, cost in zip(found.curves.names, found.curves.costs, strict=True):
+        decoded = np.frombuffer(base64.b64decode(data["costs"][name]), "<u2") / 65535
+        np.testing.assert_allclose(decoded, cost, atol=1e-5)
+    np.testing.assert_allclose(data["range"], found.curves.disparities[[0, -1]], atol=1e-4)
+    assert data["kept"] == "".join("01"[int(view)] for view in found.kept.ravel())
+    assert set(data["sepi"]) == {"minimum", "chosen", "wrong", "truth"}
+    for name, picture in found.pictures.items():
+        assert data["sepi"][name]["disparity"] == pytest.approx(picture.disparity, abs=1e-4)
+        shown = decoded_picture(data["sepi"][name]["src"], "image/webp")
+        other = found.pictures["chosen" if name == "wrong" else "wrong"]
+        stretched_pair = [stretched(p.pixels, p.inside, found.contrast) for p in (picture, other)]
+        own, others = (np.abs(shown.astype(int) - p).mean() for p in stretched_pair)
+        assert own < min(12, others / 3)
+    patch = stretched(found.patch, found.patch_inside, found.contrast)
+    np.testing.assert_array_equal(decoded_picture(data["patch"], "image/png"), patch)
+    assert text == json.dumps(to_json(probe(light_field, 40, 50, maps=maps, best=maps, parameters=SweepParameters())))
+
+
+def decoded_picture(uri, kind):
+    head, _, body = uri.partition(",")
+    assert head == f"data:{kind};base64"
+    return cv2.imdecode(np.frombuffer(base64.b64decode(body), np.uint8), cv2.IMREAD_COLOR)[:, :, ::-1]
+
+
+def test_interesting_pixels_show_each_kind(occluder):
+    """Pixels on top of each other, or none of a kind that the scene has, would leave the reader without an example."""
+    light_field, maps = occluder
+    pixels = interesting_pixels(light_field, maps, light_field.truth)
+    assert pixels == interesting_pixels(light_field, maps, light_field.truth)
+    labels = [pixel.label for pixel in pixels]
+    assert labels[0] == "textured and sure"
+    assert "largest error" in labels
+    assert any(label.startswith("occluded") for label in labels)
+    check_places(pixels, light_field.shape)
+    side_names = ("full", "left", "right", "up", "down")
+    for y, x, label in pixels:
+        if label.startswith("occluded"):
+            assert side_names[maps.extra["occlusion_side"][y, x]] in label
+    assert interesting_pixels(light_field, maps, light_field.truth, count=2) == pixels[:2]
+    without = [pixel.label for pixel in interesting_pixels(light_field, maps, None)]
+    assert "largest error" not in without
+
+
+def check_places(pixels, shape):
+    places = np.array([(pixel.y, pixel.x) for pixel in pixels])
+    distance = np.hypot(*(places[:, None] - places[None]).T)
+    assert np.all(distance[~np.eye(len(places), dtype=bool)] >= APART)
+    assert np.all(places >= BORDER)
+    assert np.all(places < np.array(shape) - BORDER)
+
+
+def test_the_largest_error_is_found():
+    """Truth is of use for this only: the pixel must lie in the wrong patch, whatever else is unknown."""
+    light_field = plane(0.5)
+    truth = np.full((60, 60), 0.5, np.float32)
+    truth[30:40, 42:50] = -1
+    truth[10:20] = np.nan
+    pixels = interesting_pixels(light_field, made_maps(light_field), truth)
+    (wrong,) = [pixel for pixel in pixels if pixel.label == "largest error"]
+    assert 30 <= wrong.y < 40
+    assert 42 <= wrong.x < 50
+
+
+def test_an_occluded_pixel_is_one_beside_its_occluder():
+    """A pixel marked by mistake, with the nearer surface on the side of the views that are kept, explains nothing."""
+    light_field = plane(0.5)
+    disparity = np.full((60, 60), -0.5, np.float32)
+    disparity[:, 28:34] = 0.5
+    side = np.zeros((60, 60), np.uint8)
+    # the left half is kept on both sides of the bar; only those left of it are hidden from the right
+    side[:, 22:28] = side[:, 34:40] = 1
+    maps = StageMaps(disparity, np.ones((60, 60), np.float32), {"occlusion_side": side, "occluded": side > 0})
+    (found,) = [pixel for pixel in interesting_pixels(light_field, maps, None) if "occluded" in pixel.label]
+    assert found.label == "occluded, left half kept"
+    assert 22 <= found.x < 28
+
+
+@pytest.mark.parametrize("shape", [(64, 64), (20, 300), (9, 9), (2, 2)])
+def test_interesting_pixels_of_plain_and_small_pictures(shape):
+    """Nothing to choose by, or no room: the report must still come."""
+    light_field = LightField(np.full((3, 3, *shape, 3), 90, np.uint8), "plain")
+    flat = made_maps(light_field, textureless=np.ones(shape, bool))
+    for maps in (made_maps(light_field), flat):
+        pixels = interesting_pixels(light_field, maps, None)
+        assert 1 <= len(pixels) <= 8
+        if min(shape) > 2 * BORDER:
+            check_places(pixels, shape)
+
+
+def test_figure_is_the_same_each_time_and_whole(occluder, tmp_path):
+    """Files that differ without cause would be made again, and checked in again, each time."""
+    light_field, maps = occluder
+    parameters = SweepParameters(candidates=31)
+    pixels = interesting_pixels(light_field, maps, light_field.truth, count=2)
+    probes = [probe(light_field, y, x, maps=maps, parameters=parameters, label=label) for y, x, label in pixels]
+    for folder in ("first", "second"):
+        write_probes(tmp_path / folder / "probes.v1", probes)
+    assert sorted(path.name for path in (tmp_path / "first").iterdir()) == ["probes.v1.pdf", "probes.v1.png"]
+    for name in ("probes.v1.pdf", "probes.v1.png"):
+        assert (tmp_path / "first" / name).read_bytes() == (tmp_path / "second" / name).read_bytes()
+        assert b"Matplotlib" not in (tmp_path / "first" / name).read_bytes()
+    assert b"CreationDate" not in (tmp_path / "first" / "probes.v1.pdf").read_bytes()
+    picture = cv2.imread(str(tmp_path / "first" / "probes.v1.png"))
+    taller = tmp_path / "more"
+    write_probes(taller, [*probes, probes[0]])
+    assert cv2.imread(f"{taller}.png").shape[0] > picture.shape[0]
+    with pytest.raises(SepiError, match="at least one"):
+        write_probes(tmp_path / "none", [])
+
+
+def test_figure_of_a_grey_picture_without_views_around(tmp_path):
+    """One row of views, missing views, a flat picture: nothing to stretch, and a side that holds a part of the rows."""
+    present = np.array([[False, True, True]])
+    light_field = LightField(
+        np.full((1, 3, 9, 9, 1), 7, np.uint8), "flat", present=present, disparity_range=DisparityRange(-20, 20, "given")
+    )
+    maps = made_maps(light_field, occlusion_side=np.full((9, 9), 5, np.uint8))
+    found = probe(light_field, 0, 8, maps=maps, parameters=SweepParameters(candidates=5))
+    assert found.side == "left-up"
+    np.testing.assert_array_equal(found.kept, [[False, True, False]])
+    write_probes(tmp_path / "flat", [found])
+    assert (tmp_path / "flat.png").stat().st_size > 0

@@ -1,0 +1,431 @@
+"""The page of the report: what it holds, how large it is, and the figures beside its tables."""
+
+import base64
+import copy
+import json
+import re
+from dataclasses import replace
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from page_example import COTTON, DOTS, EDGES, PICTURE, SIZE, Example
+
+from sepi.errors import SepiError
+from sepi.evaluate import REGIONS
+from sepi.io.scores import Evaluation
+from sepi.lightfield import FloatMap
+from sepi.report import charts, figures, page, published
+from sepi.report.graph import drawn
+from sepi.report.page import embedded, page_of, prose, read_scene
+from sepi.report.runs import Runs
+from sepi.report.web import page_data
+from sepi.report.web.scene_panels import SceneResults, note_of, viewer_of
+from sepi.report.web.viewer import PRECISIONS, ROLES, Viewer
+
+LARGEST_PAGE = 15_000_000
+"""Bytes that a page of ten scenes of 512x512 may have."""
+
+
+def viewer(shape: tuple[int, int] = (20, 30), **more: Any) -> Viewer:
+    return Viewer(shape, (-1.0, 1.0), **more)
+
+
+def some_map(seed: int, shape: tuple[int, int] = (20, 30)) -> FloatMap:
+    return np.random.default_rng(seed).uniform(-1, 1, shape).astype(np.float32)
+
+
+def steps_of(made: Viewer) -> list[float | None]:
+    """The step of each array; None for masks."""
+    return [array.get("step") for array in made.to_json()["arrays"]]
+
+
+def test_equal_maps_are_kept_once() -> None:
+    """Panels that show one map share its array."""
+    made = viewer()
+    numbers = [made.map(some_map(seed)) for seed in (0, 1, 0)]
+    assert numbers == [0, 1, 0]
+    assert len(made.to_json()["arrays"]) == 2
+
+
+def test_a_map_and_a_mask_of_equal_values_are_two() -> None:
+    """They are read in different ways."""
+    made = viewer()
+    ones = np.ones((20, 30), np.float32)
+    assert (made.map(ones), made.mask(ones > 0), made.map(ones)) == (0, 1, 0)
+    assert [step is None for step in steps_of(made)] == [False, True]
+
+
+@pytest.mark.parametrize("roles", [("other", "final"), ("final", "other"), ("confidence", "final", "other")])
+def test_an_equal_map_is_kept_as_finely_as_the_finest_role_wants(roles: tuple[str, ...]) -> None:
+    """A variant that switches nothing off has the final map of another: its read-out must stay exact."""
+    made = viewer()
+    for role in roles:
+        made.map(some_map(0), role)
+    assert steps_of(made) == [PRECISIONS[0][ROLES.index("final")]]
+
+
+def test_final_maps_are_the_finest() -> None:
+    for precision in PRECISIONS:
+        assert precision[ROLES.index("final")] == min(precision)
+    for role in range(len(ROLES)):
+        assert sorted(precision[role] for precision in PRECISIONS) == [precision[role] for precision in PRECISIONS]
+    made = viewer()
+    for role in ROLES:
+        made.map(some_map(ROLES.index(role)), role)
+    assert steps_of(made) == list(PRECISIONS[0])
+
+
+def test_a_small_scene_is_never_made_coarse() -> None:
+    """It has as many characters as one of 512x512."""
+    made = viewer((64, 64), picture=np.zeros((64, 64, 3), np.uint8))
+    for seed in range(30):
+        made.map(some_map(seed, (64, 64)), "final" if seed < 4 else "other")
+    assert set(steps_of(made)) == {0.001, 0.002}
+
+
+def test_large_pictures_are_thinned_out() -> None:
+    """Every other row and column of a picture of 1500x1500, which a phone could not hold in thirty maps."""
+    shape = (1501, 1500)
+    y, x = np.indices(shape)
+    made = viewer(shape, picture=np.full((*shape, 3), 90, np.uint8))
+    made.map((x / 500).astype(np.float32), "final")
+    made.mask(y < 700)
+    found = made.to_json()
+    assert (found["stride"], found["height"], found["width"]) == (2, 751, 750)
+    picture = cv2.imdecode(np.frombuffer(base64.b64decode(found["picture"].split(",")[1]), np.uint8), cv2.IMREAD_COLOR)
+    assert picture.shape == (751, 750, 3)
+    assert viewer((1024, 1024)).stride == 1
+
+
+def test_the_picture_keeps_its_colours() -> None:
+    picture = np.full((16, 16, 3), (200, 100, 20), np.uint8)
+    text = viewer((16, 16), picture=picture).to_json()["picture"]
+    assert text.startswith("data:image/webp;base64,")
+    found = cv2.imdecode(np.frombuffer(base64.b64decode(text.split(",")[1]), np.uint8), cv2.IMREAD_COLOR)[:, :, ::-1]
+    assert np.abs(found.astype(int) - picture).max() <= 6
+
+
+def noisy_scene(noise: float, outliers: float) -> Viewer:
+    """A scene of 512x512 with twenty maps, noisy and with wrong pixels everywhere, which hardly pack."""
+    random = np.random.default_rng(0)
+    shape = (512, 512)
+    y, x = np.indices(shape)
+    truth = np.sin(x / 60) + y / 300 + (x > 250)
+    picture = np.clip(random.normal(128, 30, (*shape, 3)), 0, 255).astype(np.uint8)
+
+    def blobs() -> FloatMap:
+        found: FloatMap = cv2.GaussianBlur(random.normal(0, 1, shape).astype(np.float32), (0, 0), 6) * 18
+        return found
+
+    def estimate() -> FloatMap:
+        found = truth + random.normal(0, noise, shape)
+        wrong = random.random(shape) < outliers
+        found[wrong] = random.uniform(-1, 3, wrong.sum())
+        return found.astype(np.float32)
+
+    made = viewer(shape, picture=picture)
+    made.map(truth.astype(np.float32), "final")
+    for _ in range(2):
+        made.map(estimate(), "final")
+        made.map((blobs() + random.normal(0, 0.05, shape)).clip(0, 1).astype(np.float32), "confidence")
+    for _ in range(14):
+        made.map(estimate())
+    for _ in range(6):
+        made.mask(blobs() > 1)
+    return made
+
+
+@pytest.mark.parametrize(("noise", "outliers"), [(0.001, 0.002), (0.02, 0.01)])
+def test_ten_noisy_scenes_stay_below_15_megabytes(noise: float, outliers: float, example: Example) -> None:
+    """Steps grow until a scene keeps its share, whatever its maps are like; ten of them and the page fit."""
+    reserved = 90_000
+    scene = len(json.dumps(noisy_scene(noise, outliers).to_json(reserved)))
+    rest = example.page.stat().st_size - sum(len(json.dumps(found)) for found in example.scenes)
+    assert rest < 600_000
+    assert 10 * (scene + reserved) + rest < LARGEST_PAGE
+
+
+def test_what_stands_beside_it_takes_of_a_scenes_share() -> None:
+    made = noisy_scene(0.001, 0.002)
+    free, crowded = (made.to_json(reserved) for reserved in (0, 700_000))
+    sizes = [len(json.dumps(found)) for found in (free, crowded)]
+    assert sizes[0] - sizes[1] > 300_000
+
+
+def test_panels_name_arrays_that_are_there(example: Example) -> None:
+    """A dangling number would be an error when the reader chooses the panel."""
+    for scene in example.scenes:
+        keys = [panel["key"] for panel in scene["panels"]]
+        assert len(set(keys)) == len(keys)
+        kinds = {panel["kind"] for panel in scene["panels"]}
+        assert kinds <= {"picture", "disparity", "error", "change", "confidence", "grey", "mask", "outline"}
+        for panel in scene["panels"]:
+            for role in ("map", "minus", "truth", "confidence"):
+                if role in panel:
+                    array = scene["arrays"][panel[role]]
+                    is_mask = role == "map" and panel["kind"] in ("mask", "outline")
+                    assert ("step" not in array) == is_mask, (panel, role)
+        assert {scene["first"]["a"], scene["first"]["b"]} <= set(keys)
+
+
+def test_a_scene_has_every_panel(example: Example) -> None:
+    """Reference view, truth, every stage, errors, changes, masks, confidence, other methods."""
+    panels = {scene["scene"]: {panel["key"]: panel for panel in scene["panels"]} for scene in example.scenes}
+    stages = {f"{variant}/{stage}" for variant in ("paper", "best") for stage in example.plan.stages}
+    cotton = set(panels["cotton"])
+    assert {"centre", "truth", "occluded-truth", "textureless-truth", *stages} <= cotton
+    assert {"paper/error", "best/error", "best/change", "imported/SPO", "imported/SPO/error"} <= cotton
+    assert {"paper/confidence", "best/confidence", "paper/superpixels", "paper/lti"} <= cotton
+    for kind, count in (("mask", 6), ("outline", 1), ("grey", 1)):
+        assert sum(panel["kind"] == kind for panel in panels["cotton"].values()) == count, kind
+    assert not any("imported" in key for key in panels["dots"])
+    without = set(panels["picture"])
+    assert stages <= without
+    assert not any("truth" in key or "error" in key or "change" in key for key in without)
+    assert re.fullmatch(r"MSE \d+\.\d\d, Q25 \d+\.\d\d, BadPix 0\.07 \d+\.\d %", panels["cotton"]["best/error"]["note"])
+    assert note_of(Evaluation()) is None
+
+
+def test_the_view_of_the_camera_is_handed_on(example: Example) -> None:
+    """A cloud of a view beside the centre must not be sheared."""
+    light_field = example.light_field(COTTON)
+    assert light_field.camera is not None
+    moved = replace(light_field, view=(0, 3))
+    maps = {name: {"optimize": example.final(COTTON, name)} for name in ("best", "paper")}
+    results = SceneResults(moved, maps, {name: Evaluation() for name in maps}, ["best", "paper"])
+    truthless = replace(results, light_field=replace(moved, truth=None))
+    camera = viewer_of(truthless).to_json()["camera"]
+    assert camera == {
+        "scale": light_field.camera.scale,
+        "offset": light_field.camera.offset,
+        "focal": light_field.camera.focal_px,
+        "from_centre": [-2, 1],
+    }
+
+
+class Page(HTMLParser):
+    """What a page refers to, and its identifiers."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.addresses: list[str] = []
+        self.ids: list[str] = []
+        self.links: list[str] = []
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        for name, value in attrs:
+            if name == "id" and value:
+                self.ids.append(value)
+            if name in ("src", "href", "action", "data", "poster", "srcset", "xlink:href") and value:
+                (self.links if tag == "a" else self.addresses).append(value)
+
+
+def test_the_page_is_one_file(example: Example) -> None:
+    """Nothing is loaded from anywhere; links go to places in the page that are there."""
+    text = example.page.read_text(encoding="utf-8")
+    found = Page(text)
+    assert all(address.startswith("data:") for address in found.addresses), found.addresses
+    assert {link.removeprefix("#") for link in found.links} <= set(found.ids)
+    assert len(set(found.ids)) == len(found.ids)
+    style = text[text.index("<style>") : text.index("</style>")]
+    assert "@import" not in style
+    assert "url(" not in style
+
+
+def test_equal_input_gives_equal_bytes(example: Example) -> None:
+    again = page_of(copy.deepcopy(example.numbers), copy.deepcopy(example.scenes), drawn(EDGES))
+    assert again == example.page.read_text(encoding="utf-8")
+
+
+def test_the_page_says_what_it_is_about(example: Example) -> None:
+    """Data sets, variants, protocols, versions, machine, date, and total time; inputs with checksums, parameters."""
+    text = re.sub(r"<wbr>", "", example.page.read_text(encoding="utf-8"))
+    made = example.numbers["made"]
+    for expected in (made["version"], made["date"], made["machine"]["processor"], made["libraries"]["numpy"]):
+        assert str(expected) in text
+    for scene in example.numbers["scenes"]:
+        assert scene["light_field"]["sha256"] in text
+        assert f"{scene['dataset']}/{scene['scene']}" in text
+    # two variants of four stages of 1.5 to 4.5 s on three scenes
+    assert f"<b>{3 * 2 * (1.5 + 2.5 + 3.5 + 4.5):.0f} s</b>" in text
+    assert "leaves out 15 pixels on each side" in text
+    for name in ("window_radius", "candidates"):
+        assert f"<dt>{name}</dt>" in text
+    assert "7x5 instead of 64x64" in text
+
+
+def test_json_in_the_page_cannot_end_its_script() -> None:
+    value = {"</script><!--": "<b>&\"'\u2028", "x": [1, None]}
+    text = str(embedded(value))
+    assert "<" not in text
+    assert json.loads(text) == value
+    assert str(prose("a `b` <c> `d<e`")) == "a <code>b</code> &lt;c&gt; <code>d&lt;e</code>"
+
+
+def numbers_file(folder: Path, content: Any) -> Path:
+    path = folder / "numbers.json"
+    path.write_text(content if isinstance(content, str) else json.dumps(content))
+    return path
+
+
+def run_page(folder: Path, example: Example, *scenes: Path, numbers: Path | None = None) -> Any:
+    graph = folder / "rules.svg"
+    graph.write_text(drawn(EDGES))
+    numbers = numbers or numbers_file(folder, example.numbers)
+    words = ["--numbers", numbers, "--graph", graph, "--output", folder / "index.html", *scenes]
+    return CliRunner().invoke(page.command, list(map(str, words)), catch_exceptions=False)
+
+
+def test_the_command_writes_the_same_page(example: Example, tmp_path: Path) -> None:
+    paths = []
+    for scene in example.scenes:
+        paths.append(tmp_path / f"{scene['scene']}.json")
+        paths[-1].write_text(json.dumps(scene))
+    result = run_page(tmp_path, example, *paths)
+    assert (result.exit_code, result.output) == (0, "")
+    assert (tmp_path / "index.html").read_bytes() == example.page.read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [(None, "cannot be read"), ("{", "not JSON"), ("[]", "not a scene of a report"), ('{"dataset": 1}', "not a scene")],
+)
+def test_what_is_no_scene_is_named(content: str | None, message: str, example: Example, tmp_path: Path) -> None:
+    """And an earlier page stays as it was."""
+    (tmp_path / "index.html").write_text("earlier")
+    scene = tmp_path / "scene.json"
+    if content is not None:
+        scene.write_text(content)
+    result = run_page(tmp_path, example, scene)
+    assert result.exit_code == 1
+    assert message in result.stderr
+    assert result.stderr.startswith(f"sepi: {scene}: ")
+    assert (tmp_path / "index.html").read_text() == "earlier"
+    with pytest.raises(SepiError):
+        read_scene(scene)
+
+
+def test_pictures_and_the_scene_for_the_page_come_from_one_command(example: Example, tmp_path: Path) -> None:
+    """With the pixels that the configuration asks for; twice the same bytes."""
+    for name in ("one", "two"):
+        words = ["--results", example.plan.results, "--plan", example.plan.to_json(), "--dataset", COTTON[0]]
+        words += ["--scene", COTTON[1], "--pixels", "[[20, 41]]", "--output", tmp_path / name]
+        words += ["--page", tmp_path / f"{name}.json"]
+        result = CliRunner().invoke(figures.command, list(map(str, words)), catch_exceptions=False)
+        assert result.exit_code == 0, result.output
+    one, two = (tmp_path / f"{name}.json" for name in ("one", "two"))
+    assert one.read_bytes() == two.read_bytes()
+    (scene,) = [found for found in example.scenes if found["scene"] == "cotton"]
+    assert json.loads(one.read_text()) == scene
+    assert (scene["probes"][0]["y"], scene["probes"][0]["x"]) == (20, 41)
+    written = {path.relative_to(tmp_path / "one") for path in (tmp_path / "one").rglob("*.*")}
+    assert written == {path.relative_to(tmp_path / "two") for path in (tmp_path / "two").rglob("*.*")}
+    for path in written:
+        assert (tmp_path / "one" / path).read_bytes() == (tmp_path / "two" / path).read_bytes(), path
+
+
+@pytest.fixture
+def runs(example: Example) -> Runs:
+    return Runs(example.numbers)
+
+
+def score_of(
+    example: Example, scene: tuple[str, str], variant: str, region: str = "all", name: str = "mse100"
+) -> float:
+    """A score of a final map, looked up in the numbers by hand."""
+    (found,) = [one for one in example.numbers["scenes"] if (one["dataset"], one["scene"]) == scene]
+    value = found["stages"]["/".join(example.plan.variants[variant].values())]["scores"]["paper"][region][name]
+    return float(value)
+
+
+def test_headline_figures(runs: Runs, example: Example) -> None:
+    """Ours beside the paper's, for the scenes that the paper has; then the others."""
+    row, other = page_data.headline(runs)
+    assert other["scene"] == "builtin/dots"
+    assert other["published"] == [None, None]
+    assert other["ours"]["paper"] == [score_of(example, DOTS, "paper", "all", name) for name in ("mse100", "q25")]
+    assert row["scene"] == "hci/cotton"
+    assert row["published"] == [1.20, 0.34]
+    expected = {v: [score_of(example, COTTON, v, "all", name) for name in ("mse100", "q25")] for v in ("best", "paper")}
+    assert row["ours"] == expected
+
+
+def test_scenes_of_the_paper_that_are_not_at_hand(runs: Runs) -> None:
+    found = page_data.missing_scenes(runs)
+    assert "Cotton" not in found["hci"]
+    assert "Antinous" in found["hci"]
+    assert len(found["hci"]) == 23
+    assert len(found["hci_old"]) == 7
+
+
+def test_ablation_bars(runs: Runs, example: Example) -> None:
+    """Averages over the scenes at hand, beside the published averages of the same variant and region."""
+    groups = {(group.dataset, group.region): group for group in page_data.ablation_bars(runs)}
+    assert {region for _, region in groups} == {"whole map", *REGIONS[1:]}
+    whole = groups["hci", "whole map"]
+    bars = {bar.variant: bar for bar in whole.rows}
+    assert whole.scenes == 1
+    assert bars["paper"].published == published.table4()["hci"]["paper"].overall == 4.34
+    assert bars["best"].published is None
+    assert bars["paper"].ours == score_of(example, COTTON, "paper")
+    assert whole.largest == max(score_of(example, COTTON, "paper"), score_of(example, COTTON, "best"), 4.34)
+    builtin = {bar.variant: bar for bar in groups["builtin", "occluded"].rows}
+    assert builtin["paper"].ours == score_of(example, DOTS, "paper", "occluded")
+    assert groups["hci_old", "whole map"].scenes == 0
+    assert all(bar.ours is None for bar in groups["hci_old", "whole map"].rows)
+    assert not [key for key in groups if key[0] == PICTURE[0]], "a data set without truth has no bars"
+
+
+def test_times(runs: Runs, example: Example) -> None:
+    rows = page_data.stage_times(runs)
+    assert [(row.scene, row.variant) for row in rows[:2]] == [("builtin/dots", "best"), ("builtin/dots", "paper")]
+    assert len(rows) == 6
+    assert rows[0].seconds == {"initial": 1.5, "occlusion": 2.5, "textureless": 3.5, "optimize": 4.5}
+    assert (rows[0].total, rows[0].peak) == (12.0, 230.0)
+    assert page_data.total_seconds(example.numbers) == 72.0
+
+
+def test_the_first_scene(example: Example) -> None:
+    """One that the paper has; else the last, the built-in ones being ordered from easy to hard."""
+    assert page_data.first_scene(Runs(example.numbers)) == "hci/cotton"
+    plan = example.numbers["plan"] | {"scenes": {"builtin": ["dots", "wall"]}}
+    assert page_data.first_scene(Runs(example.numbers | {"plan": plan})) == "builtin/wall"
+
+
+def test_charts_are_written_twice_the_same(example: Example, tmp_path: Path) -> None:
+    """Each as a picture to look at and as one for a paper."""
+    numbers = numbers_file(tmp_path, example.numbers)
+    for name in ("one", "two"):
+        words = ["--numbers", numbers, "--chart", "ablation", "--chart", "time_and_memory", "--output", tmp_path / name]
+        result = CliRunner().invoke(charts.command, list(map(str, words)), catch_exceptions=False)
+        assert result.exit_code == 0, result.output
+    one = tmp_path / "one"
+    names = {f"{name}.{ending}" for name in ("ablation", "time_and_memory") for ending in ("png", "pdf")}
+    assert {path.name for path in one.iterdir()} == names
+    for path in one.iterdir():
+        assert path.read_bytes() == (tmp_path / "two" / path.name).read_bytes(), path.name
+        if path.suffix == ".pdf":
+            assert path.read_bytes().startswith(b"%PDF")
+            assert b"CreationDate" not in path.read_bytes()
+        else:
+            picture = cv2.imread(str(path))
+            assert picture.std() > 5, "an empty picture"
+
+
+def test_a_chart_without_a_scene_with_truth(example: Example, tmp_path: Path) -> None:
+    """The rule promises the files: they come, and say why they are empty."""
+    charts.write_bars(tmp_path, "ablation", [])
+    picture = cv2.imread(str(tmp_path / "ablation.png"))
+    assert (picture < 128).any()
+
+
+def test_the_size_of_what_is_shown(example: Example) -> None:
+    for scene in example.scenes:
+        assert (scene["height"], scene["width"], scene["stride"]) == (SIZE, SIZE, 1)
+        assert scene["grid"] == [5, 5]

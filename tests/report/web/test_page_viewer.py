@@ -1,0 +1,356 @@
+"""The maps of the report's page in a real browser: slider, numbers under the cursor, close-ups, other scenes."""
+
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+from browser import (
+    CLOUD,
+    WIPE,
+    as_shown,
+    border_is,
+    canvas_pixels,
+    changed_pixels,
+    choose,
+    map_pixels,
+    opened,
+    part,
+    place_of,
+    point_at,
+    read_out,
+    settled,
+    show_scene,
+    touch,
+)
+from page_example import COTTON, DOTS_TITLE, PICTURE, PICTURE_TITLE, SIZE, UNKNOWN, Example
+
+from sepi.report.plots.pictures import disparity_limits, error_picture, map_picture
+
+# pixels (x, y): corners, edges, inside
+PLACES = [(0, 0), (63, 63), (40, 0), (5, 50), (31, 32)]
+
+
+def tile(key: str) -> str:
+    return f'figure[data-key="{key}"] canvas'
+
+
+def visible_tile(page: Any, key: str) -> str:
+    """Selector of a small panel, once it is in sight and drawn."""
+    page.locator(tile(key)).scroll_into_view_if_needed()
+    page.wait_for_function("(selector) => document.querySelector(selector).width > 10", arg=tile(key))
+    settled(page)
+    return tile(key)
+
+
+def test_the_slider_wipes_between_two_maps(page: Any) -> None:
+    """By the keyboard: one end shows B alone, the other A alone, between them the border lies where the slider is."""
+    assert border_is(page, SIZE // 2)
+    slider = page.locator('[data-part="slider"]')
+    slider.focus()
+    for key, border in (("Home", 0), ("PageUp", round(0.1 * SIZE)), ("End", SIZE)):
+        page.keyboard.press(key)
+        assert border_is(page, border), key
+    page.keyboard.press("ArrowLeft")
+    assert slider.input_value() == "999"
+    assert page.get_attribute('[data-part="slider"]', "aria-valuetext") == "100 % of A"
+
+
+def test_the_slider_moves_by_dragging(page: Any) -> None:
+    slider = page.locator('[data-part="slider"]')
+    slider.scroll_into_view_if_needed()
+    box = slider.bounding_box()
+    middle = box["y"] + box["height"] / 2
+    page.mouse.move(box["x"] + box["width"] / 2, middle)
+    page.mouse.down()
+    page.mouse.move(box["x"] + 0.25 * box["width"], middle, steps=5)
+    page.mouse.up()
+    value = int(slider.input_value())
+    assert 220 < value < 280
+    assert border_is(page, round(value / 1000 * SIZE))
+
+
+def test_the_picture_itself_can_be_dragged(page: Any) -> None:
+    """And a drag is no click: it chooses no pixel."""
+    before = page.get_attribute("#pixel", "data-pixel")
+    page.mouse.move(*place_of(page, WIPE, 30, 5))
+    page.mouse.down()
+    x, y = place_of(page, WIPE, 50, 5)
+    page.mouse.move(x, y, steps=5)
+    page.mouse.up()
+    value = int(page.input_value('[data-part="slider"]'))
+    assert abs(value / 1000 - 50.5 / SIZE) < 0.01
+    assert border_is(page, round(value / 1000 * SIZE))
+    line = page.locator('[data-part="line"]').bounding_box()
+    assert abs(line["x"] + line["width"] / 2 - x) < 3
+    page.mouse.move(*place_of(page, WIPE, 20, 10))
+    assert page.input_value('[data-part="slider"]') == str(value), "the slider follows a released button"
+    assert page.get_attribute("#pixel", "data-pixel") == before
+
+
+def test_swapping_and_choosing(page: Any) -> None:
+    page.click('[data-part="swap"]')
+    page.wait_for_selector('#viewer[data-shown="best/optimize centre"]')
+    assert border_is(page, SIZE // 2)
+    figure = page.locator('figure[data-key="paper/initial"]')
+    figure.get_by_role("button", name="as B").click()
+    page.wait_for_selector('#viewer[data-shown="best/optimize paper/initial"]')
+    assert border_is(page, SIZE // 2)
+    assert "paper" in part(page, "legends")
+
+
+def test_the_read_out_shows_the_values_of_the_files(page: Any, example: Example) -> None:
+    """Three decimals of what the HDF5 files hold, at corners, edges and inside."""
+    truth = example.light_field(COTTON).truth
+    assert truth is not None
+    finals = {side: example.final(COTTON, variant) for side, variant in (("a", "paper"), ("b", "best"))}
+    choose(page, a="paper/optimize", b="best/optimize")
+    for x, y in PLACES:
+        point_at(page, x, y)
+        shown = read_out(page)
+        for side, maps in finals.items():
+            value = float(shown[f"value {side}"])
+            assert value == as_shown(maps.disparity[y, x]), (x, y, side)
+            assert abs(float(shown[f"confidence {side}"]) - maps.confidence[y, x]) <= 0.0051
+            if np.isfinite(truth[y, x]):
+                assert float(shown["truth"]) == as_shown(truth[y, x])
+                error = float(shown[f"error {side}"])
+                assert error == pytest.approx(value - as_shown(truth[y, x]), abs=1e-6)
+            else:
+                assert (shown["truth"], shown[f"error {side}"]) == ("unknown", "unknown")
+    assert not np.isfinite(truth[0, 0])
+
+
+def test_the_read_out_of_truth_and_errors(page: Any, example: Example) -> None:
+    light_field = example.light_field(COTTON)
+    assert light_field.truth is not None
+    choose(page, a="truth", b="best/error")
+    for x, y in PLACES[1:]:
+        point_at(page, x, y)
+        truth = as_shown(light_field.truth[y, x])
+        estimate = as_shown(example.final(COTTON, "best").disparity[y, x])
+        shown = read_out(page)
+        assert float(shown["value a"]) == truth
+        assert float(shown["value b"]) == pytest.approx(estimate - truth, abs=1e-6)
+        assert shown["error a"] == "–"
+
+
+def test_the_read_out_of_other_maps_is_right_within_their_step(page: Any, example: Example) -> None:
+    """Stages on the way, confidence as a map, another method's map; what it does not know is called unknown."""
+    step = next(scene for scene in example.scenes if scene["scene"] == "cotton")["arrays"]
+    panels = {panel["key"]: panel for panel in page.evaluate("Sepi.viewer.scene.panels")}
+    maps = {
+        "paper/initial": example.stage(COTTON, "paper", "initial").disparity,
+        "best/occlusion": example.stage(COTTON, "best", "occlusion").disparity,
+        "best/confidence": example.final(COTTON, "best").confidence,
+        "imported/SPO": example.imported,
+    }
+    for key, values in maps.items():
+        choose(page, a=key)
+        half = step[panels[key]["map"]]["step"] / 2
+        # as many decimals as the step has
+        slack = half + (0.0005 if half < 0.005 else 0.005) + 1e-6
+        for x, y in PLACES:
+            point_at(page, x, y)
+            assert abs(float(read_out(page)["value a"]) - values[y, x]) <= slack, (key, x, y)
+    point_at(page, UNKNOWN[1].start, UNKNOWN[0].start)
+    assert (read_out(page)["value a"], read_out(page)["error a"]) == ("unknown", "unknown")
+
+
+def test_pictures_have_no_numbers(page: Any) -> None:
+    choose(page, a="centre", b="occluded-truth")
+    point_at(page, 10, 10)
+    shown = read_out(page)
+    assert {shown[f"{name} {side}"] for name in ("value", "error", "confidence") for side in "ab"} == {"–"}
+
+
+def test_every_panel_of_the_grid_reads_out(page: Any, example: Example) -> None:
+    """The cursor over a small panel is the cursor everywhere."""
+    choose(page, b="best/optimize")
+    for key in ("truth", "paper/initial"):
+        selector = visible_tile(page, key)
+        for x, y in ((12, 40), (55, 20)):
+            point_at(page, x, y, selector)
+            value = example.final(COTTON, "best").disparity[y, x]
+            assert float(read_out(page)["value b"]) == as_shown(value)
+
+
+def test_the_cursor_moves_by_the_keyboard(page: Any, example: Example) -> None:
+    page.locator(WIPE).focus()
+    for key, expected in (("ArrowRight", (33, 32)), ("ArrowUp", (33, 31)), ("Shift+ArrowLeft", (23, 31))):
+        page.keyboard.press(key)
+        settled(page)
+        assert read_out(page)["pixel"] == "x {}, y {}".format(*expected)
+    for _ in range(5):
+        page.keyboard.press("Shift+ArrowLeft")
+    settled(page)
+    assert read_out(page)["pixel"] == "x 0, y 31", "the cursor must stay in the picture"
+    assert float(read_out(page)["value b"]) == as_shown(example.final(COTTON, "best").disparity[31, 0])
+
+
+def test_legends_have_the_scale_of_the_scene(page: Any, example: Example) -> None:
+    truth = example.light_field(COTTON).truth
+    assert truth is not None
+    legends = part(page, "legends")
+    assert f"{np.nanmin(truth):.2f}" in legends
+    assert f"{np.nanmax(truth):.2f}" in legends
+    choose(page, a="paper/error")
+    assert "-0.20" in part(page, "legends")
+    assert "MSE" in part(page, "legends")
+
+
+def test_maps_have_the_colours_of_the_figures(page: Any, example: Example) -> None:
+    """A page and a paper must not disagree: viridis, the scene's limits, magenta for unknown."""
+    light_field = example.light_field(COTTON)
+    limits = disparity_limits(light_field)
+    expected = map_picture(example.imported, limits).astype(int)
+    shown = map_pixels(page, "imported/SPO")[:, :, :3].astype(int)
+    assert (shown[UNKNOWN] == (255, 0, 255)).all()
+    assert np.abs(shown - expected).max() <= 6
+    best = example.final(COTTON, "best").disparity
+    error = error_picture(best - light_field.truth).astype(int)
+    assert np.abs(map_pixels(page, "best/error")[:, :, :3] - error).max() <= 6
+
+
+def test_the_reference_view_is_the_picture(page: Any, example: Example) -> None:
+    """Compressed, but upright, not mirrored, its colours in order."""
+    light_field = example.light_field(COTTON)
+    shown = map_pixels(page, "centre")[:, :, :3].astype(int)
+    off = shown - light_field.views[light_field.reference]
+    assert np.abs(off.mean(axis=2)).mean() < 5
+    assert np.abs(off.mean(axis=(0, 1))).max() < 4
+    mask = light_field.masks["occluded"]
+    over = map_pixels(page, "occluded-truth")[:, :, :3].astype(int)
+    assert (over[mask][:, 0] > over[mask][:, 2] + 60).all()
+    assert (np.abs(over[~mask] - shown[~mask] / 2) <= 1).all()
+
+
+def magnified(picture: Any, x: int, y: int, side: int, reach: int = 20) -> Any:
+    """The surroundings of a pixel in a square of canvas pixels; grey outside the picture."""
+    places = np.floor((np.arange(side) + 0.5) * (2 * reach + 1) / side).astype(int) - reach
+    rows, columns = places[:, None] + y, places[None, :] + x
+    inside = (rows >= 0) & (rows < picture.shape[0]) & (columns >= 0) & (columns < picture.shape[1])
+    found = picture[rows.clip(0, picture.shape[0] - 1), columns.clip(0, picture.shape[1] - 1), :3]
+    return np.where(inside[:, :, None], found, 128)
+
+
+@pytest.mark.parametrize(("x", "y"), [(12, 30), (50, 8)])
+def test_close_ups_in_all_panels_follow_the_cursor(page: Any, x: int, y: int) -> None:
+    """In a lower corner of each panel, the one that is farther away from the cursor."""
+    keys = ("truth", "best/textureless")
+    page.locator(tile(keys[1])).scroll_into_view_if_needed()
+    for key in keys:
+        visible_tile(page, key)
+    point_at(page, 32, 20, tile(keys[1]))
+    before = {key: canvas_pixels(page, tile(key)) for key in keys}
+    point_at(page, x, y, tile(keys[1]))
+    settled(page)
+    for key in keys:
+        now = canvas_pixels(page, tile(key))
+        assert (now != before[key]).any(), key
+        height, width = now.shape[:2]
+        side = round(0.46 * min(width, height))
+        left = width - side if x < SIZE // 2 else 0
+        seen = now[height - side :, left : left + side, :3].astype(int)
+        wanted = magnified(map_pixels(page, key), x, y, side).astype(int)
+        # pixels at the borders of cells, the frame and the mark of the cursor may differ
+        assert (np.abs(seen - wanted).max(axis=2) < 12).mean() > 0.8, key
+    # without close-ups the corner shows what the panel shows there
+    page.uncheck('[data-part="close-ups"]')
+    plain = canvas_pixels(page, visible_tile(page, key))[height - side :, left : left + side, :3].astype(int)
+    whole = cv2.resize(map_pixels(page, key), (width, height), interpolation=cv2.INTER_NEAREST)
+    corner = whole[height - side :, left : left + side, :3].astype(int)
+    assert (np.abs(plain - corner).max(axis=2) < 12).mean() > 0.8
+    assert (np.abs(plain - seen).max(axis=2) < 12).mean() < 0.8
+
+
+def test_the_large_close_ups_follow_the_cursor(page: Any) -> None:
+    choose(page, a="truth", b="paper/optimize")
+    for x, y in ((10, 12), (60, 40)):
+        point_at(page, x, y)
+        for side, key in (("a", "truth"), ("b", "paper/optimize")):
+            seen = canvas_pixels(page, f'[data-part="close-{side}"]')[:, :, :3].astype(int)
+            wanted = magnified(map_pixels(page, key), x, y, len(seen)).astype(int)
+            assert (np.abs(seen - wanted).max(axis=2) < 12).mean() > 0.95
+
+
+def test_the_slider_works_by_touch(browser: Any, example: Example) -> None:
+    with opened(browser, example.page, 390, 844, has_touch=True, is_mobile=True, device_scale_factor=2) as page:
+        places = [place_of(page, WIPE, x, 20) for x in (30, 36, 42, 48)]
+        touch(page, {0: places})
+        settled(page)
+        assert abs(int(page.input_value('[data-part="slider"]')) / 1000 - 48.5 / SIZE) < 0.02
+        assert read_out(page)["pixel"] == "x 48, y 20"
+
+
+def test_another_scene_changes_everything(page: Any, example: Example) -> None:
+    page.locator(CLOUD).scroll_into_view_if_needed()
+    page.wait_for_selector(f"{CLOUD}[data-points]")
+    cloud, picture = canvas_pixels(page, CLOUD), canvas_pixels(page, WIPE)
+    choose(page, b="paper/optimize")
+    show_scene(page, DOTS_TITLE)
+    changed_pixels(page, CLOUD, cloud)
+    assert (canvas_pixels(page, WIPE) != picture).any()
+    assert page.input_value('[data-part="b"]') == "paper/optimize", "the map that was looked at stays chosen"
+    assert part(page, "pixels").startswith("1 textured and sure")
+    assert page.locator('[data-part="b"] option[value="imported/SPO"]').count() == 0
+    point_at(page, 20, 44)
+    assert float(read_out(page)["value b"]) == as_shown(example.final(("builtin", "dots"), "paper").disparity[44, 20])
+    page.click("#next")
+    page.click("#next")
+    page.wait_for_function("() => Sepi.viewer.shown && Sepi.viewer.scene.scene === 'picture'")
+    page.click("#next")
+    page.wait_for_function("() => Sepi.viewer.shown && Sepi.viewer.scene.scene === 'dots'")
+
+
+def test_a_scene_without_truth(page: Any, example: Example) -> None:
+    """Maps and numbers, but neither truth nor errors."""
+    show_scene(page, PICTURE_TITLE)
+    keys = page.locator('[data-part="a"] option').evaluate_all("(all) => all.map((o) => o.value)")
+    assert "best/optimize" in keys
+    assert not [key for key in keys if "error" in key or "truth" in key or "change" in key]
+    choose(page, a="best/optimize")
+    point_at(page, 33, 12)
+    shown = read_out(page)
+    assert float(shown["value a"]) == as_shown(example.final(PICTURE, "best").disparity[12, 33])
+    assert (shown["truth"], shown["error a"]) == ("–", "–")
+    assert "truthunknown" in part(page, "facts")
+    assert page.locator("#changes canvas").count() == 0
+
+
+def test_what_an_earlier_scene_began_is_not_shown(page: Any) -> None:
+    """A slow scene, left before it is there, must not appear over the one that was chosen after it."""
+    page.evaluate(
+        """() => {
+          const quick = Sepi.unpackMap;
+          Sepi.unpackMap = async (...given) => {
+            const late = window.slow;
+            if (late) await new Promise((done) => setTimeout(done, 400));
+            const found = await quick(...given);
+            if (late) window.late = true;
+            return found;
+          };
+        }"""
+    )
+    page.locator(WIPE).scroll_into_view_if_needed()
+    page.evaluate("window.slow = true")
+    page.select_option("#scene", label=DOTS_TITLE)
+    # a pointer that moves meanwhile finds nothing to read
+    page.mouse.move(*place_of(page, WIPE, 10, 10))
+    page.mouse.move(*place_of(page, WIPE, 30, 30))
+    settled(page)
+    assert read_out(page)["pixel"] != "x 30, y 30", "numbers of the scene before"
+    page.evaluate("window.slow = false")
+    page.select_option("#scene", label=PICTURE_TITLE)
+    page.wait_for_function("() => Sepi.viewer.shown")
+    page.wait_for_function("() => window.late")
+    settled(page)
+    assert page.evaluate("Sepi.viewer.scene.scene") == "picture"
+    assert border_is(page, SIZE // 2)
+    selector = visible_tile(page, "best/initial")
+    seen = cv2.resize(canvas_pixels(page, selector), (SIZE, SIZE), interpolation=cv2.INTER_AREA)
+    wanted = map_pixels(page, "best/initial")
+    top = slice(0, SIZE // 3)
+    assert (np.abs(seen[top].astype(int) - wanted[top].astype(int)).max(axis=2) < 40).mean() > 0.8
+    point_at(page, 12, 40)
+    assert read_out(page)["truth"] == "–"

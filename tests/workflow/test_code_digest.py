@@ -1,0 +1,95 @@
+"""The digest of a stage's code: too coarse, and a changed comment costs hours; too fine, and results are stale."""
+
+from pathlib import Path
+
+import pytest
+
+from sepi.pipeline import STAGES
+from sepi.workflow.code_digest import code_digest, imported_modules
+
+FILES = {
+    "pkg/__init__.py": "from pkg import extra\n",
+    "pkg/one.py": '"""One."""\n\nimport numpy\n\nfrom pkg import shared\nfrom pkg.io import reader\n\n\n'
+    'def f(x):\n    """Twice."""\n    return 2 * x  # doubled\n',
+    "pkg/two.py": "from pkg.shared import value\nfrom .io.files import path\n",
+    "pkg/shared.py": "value = 1\n",
+    "pkg/extra.py": "extra = 1\n",
+    "pkg/lazy.py": "def g():\n    import pkg.extra\n    return pkg.extra\n",
+    "pkg/deep.py": "try:\n    x = 1\nexcept ValueError:\n    import pkg.extra\nfinally:\n    from pkg import shared\n"
+    "with open('x'):\n    match x:\n        case 1:\n            from pkg.io import reader\n"
+    "if x:\n    pass\nelse:\n    from pkg.io.files import path\n",
+    "pkg/names.py": "from pkg.io import read\n",
+    "pkg/io/__init__.py": "from pkg.io.reader import read\n",
+    "pkg/io/reader.py": "from pkg.io.files import path\n\ndef read():\n    return path\n",
+    "pkg/io/files.py": "path = 1\n",
+}
+
+
+@pytest.fixture
+def tree(tmp_path: Path) -> Path:
+    for name, text in FILES.items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(text)
+    return tmp_path
+
+
+def changed_by(tree: Path, file: str, old: str, new: str) -> set[str]:
+    """Which of the modules one, two, lazy and names have another digest after the replacement."""
+    modules = ["pkg.one", "pkg.two", "pkg.lazy", "pkg.names"]
+    before = {module: code_digest(module, tree) for module in modules}
+    text = (tree / file).read_text()
+    assert old in text
+    # digests are remembered by path: compare with a second tree
+    other = tree.parent / f"{tree.name}-changed"
+    for name in FILES:
+        (other / name).parent.mkdir(parents=True, exist_ok=True)
+        (other / name).write_text(text.replace(old, new) if name == file else (tree / name).read_text())
+    return {module.removeprefix("pkg.") for module in modules if code_digest(module, other) != before[module]}
+
+
+def test_imports_are_followed(tree: Path) -> None:
+    assert imported_modules("pkg.one", tree) == {"pkg.one", "pkg.shared", "pkg.io.reader", "pkg.io.files"}
+    assert imported_modules("pkg.two", tree) == {"pkg.two", "pkg.shared", "pkg.io.files"}
+    assert imported_modules("pkg.lazy", tree) == {"pkg.lazy", "pkg.extra"}
+    deep = {"pkg.deep", "pkg.extra", "pkg.shared", "pkg.io.reader", "pkg.io.files"}
+    assert imported_modules("pkg.deep", tree) == deep
+    assert imported_modules("pkg.names", tree) == {"pkg.names", "pkg.io", "pkg.io.reader", "pkg.io.files"}
+
+
+@pytest.mark.parametrize(
+    ("file", "old", "new", "changed"),
+    [
+        ("pkg/one.py", "2 * x", "3 * x", {"one"}),
+        ("pkg/one.py", "# doubled", "# two times", set()),
+        ("pkg/one.py", "Twice.", "Two times.", set()),
+        ("pkg/one.py", '"""One."""', '"""The first."""', set()),
+        ("pkg/one.py", "2 * x", "(\n        2 * x\n    )", set()),
+        ("pkg/shared.py", "value = 1", "value = 2", {"one", "two"}),
+        ("pkg/shared.py", "value = 1", "value = 1  # one", set()),
+        ("pkg/io/files.py", "path = 1", "path = 2", {"one", "two", "names"}),
+        ("pkg/io/__init__.py", "\n", "\nx = 1\n", {"names"}),
+        ("pkg/extra.py", "extra = 1", "extra = 2", {"lazy"}),
+        ("pkg/__init__.py", "extra", "shared", set()),
+    ],
+)
+def test_what_changes_a_digest(tree: Path, file: str, old: str, new: str, changed: set[str]) -> None:
+    assert changed_by(tree, file, old, new) == changed
+
+
+def test_a_module_that_does_not_exist_is_an_error(tree: Path) -> None:
+    with pytest.raises(ModuleNotFoundError, match=r"pkg\.three"):
+        code_digest("pkg.three", tree)
+
+
+@pytest.mark.parametrize("stage", STAGES)
+def test_no_stage_depends_on_another_stage(stage: str) -> None:
+    """Else a change in one stage would rerun the stages before it."""
+    others = {f"sepi.{other}" for other in STAGES if other != stage}
+    assert not imported_modules(f"sepi.{stage}") & others
+
+
+@pytest.mark.parametrize("stage", STAGES)
+def test_no_stage_depends_on_workflow_or_report(stage: str) -> None:
+    """Else adding a key to the configuration would rerun everything."""
+    outside = {"sepi.workflow.config", "sepi.workflow.datasets", "sepi.pipeline", "sepi.cli.main", "sepi.evaluate", "sepi.scenes", "sepi"}
+    assert not imported_modules(f"sepi.{stage}") & outside

@@ -1,0 +1,376 @@
+"""The workflow's configuration: a typing error must be named, not ignored, and config.yaml must tell the truth."""
+
+import json
+import struct
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+import yaml
+
+from sepi.errors import SepiError
+from sepi.pipeline import STAGES, VARIANTS, key_of
+from sepi.scenes import SCENES
+from sepi.workflow.config import Settings, load_settings
+from sepi.workflow.config_file import default_yaml
+
+CONFIG = Path(__file__).parents[2] / "config.yaml"
+
+
+def message_of(values: dict[str, Any]) -> str:
+    with pytest.raises(SepiError) as caught:
+        load_settings(values)
+    assert "\n" not in str(caught.value)
+    return str(caught.value)
+
+
+def make_scene(folder: Path, views: int = 9, width: int = 40, height: int = 30) -> Path:
+    """A folder that looks like a scene: a PNG header is all that the configuration reads."""
+    folder.mkdir(parents=True)
+    header = b"\x89PNG\r\n\x1a\n" + struct.pack(">I4sII", 13, b"IHDR", width, height)
+    for number in range(views):
+        (folder / f"input_Cam{number:03}.png").write_bytes(header)
+    return folder
+
+
+def test_config_yaml_is_what_the_code_has() -> None:
+    """A default changed in the code but not in config.yaml would be overridden by the stale one."""
+    assert CONFIG.read_text() == default_yaml(), "run: python -m sepi.workflow.config_file > config.yaml"
+
+
+def test_config_yaml_sets_the_defaults() -> None:
+    assert load_settings(yaml.safe_load(CONFIG.read_text())) == load_settings({})
+
+
+def test_config_yaml_names_every_parameter_with_its_meaning() -> None:
+    lines = [line.strip() for line in CONFIG.read_text().splitlines()]
+    for choices in STAGES.values():
+        for choice in choices.values():
+            for name, field in choice.parameters.model_fields.items():
+                assert field.description, f"{name} has no description"
+                found = [number for number, line in enumerate(lines) if line.startswith(f"{name}: ")]
+                assert any(lines[number - 1].startswith("# ") for number in found), f"{name} has no comment"
+
+
+def test_defaults_run_every_builtin_scene_and_variant() -> None:
+    settings = load_settings({})
+    assert settings.scenes_of("builtin") == list(SCENES)
+    assert list(settings.variants) == list(VARIANTS)
+    assert settings.datasets == ["builtin"]
+    assert settings.own_variants == []
+
+
+@pytest.mark.parametrize(
+    ("values", "expected"),
+    [
+        ({"hci_rot": "x"}, "config: unknown 'hci_rot'; did you mean 'hci_root'?"),
+        ({"builtin": {"sizes": 96}}, "config.builtin: unknown 'sizes'; did you mean 'size'?"),
+        ({"builtin": {"size": "big"}}, "config.builtin.size: input should be a valid integer, got 'big'"),
+        ({"builtin": {"size": 3}}, "config.builtin.size: input should be greater than or equal to 64, got 3"),
+        ({"builtin": {"scenes": ["dotz"]}}, "config.builtin.scenes: unknown 'dotz'; did you mean 'dots'?"),
+        ({"builtin": {"scenes": []}}, "config: no scene to run on; name some in builtin.scenes or light_fields"),
+        ({"builtin": None}, "config.builtin: input should be an object, got None"),
+        ({"hci_root": "/nowhere"}, "config.hci_root: no folder '/nowhere'"),
+        ({"stages": {"initail": {}}}, "config.stages: unknown 'initail'; did you mean 'initial'?"),
+        ({"stages": {"initial": {"sapi": {}}}}, "config.stages.initial: unknown 'sapi'; did you mean 'sepi'?"),
+        (
+            {"stages": {"initial": {"sepi": {"candidats": 3}}}},
+            "config.stages.initial.sepi: unknown 'candidats'; did you mean 'candidates'?",
+        ),
+        (
+            {"stages": {"initial": {"sepi": {"candidates": 20.5}}}},
+            "config.stages.initial.sepi.candidates: input should be a valid integer, got 20.5",
+        ),
+        (
+            {"variants": {"mine": {"initial": "sepi"}}},
+            "config.variants.mine: no choice for stage 'occlusion' (one of half_sepi, wang, visibility, "
+            "visibility_unmixed, visibility_colours, none)",
+        ),
+        (
+            {"variants": {"mine": VARIANTS["paper"].choices | {"occlusion": "halfsepi"}}},
+            "config.variants.mine.occlusion: unknown 'halfsepi'; did you mean 'half_sepi'?",
+        ),
+        (
+            {"variants": {"paper": VARIANTS["wang"].choices}},
+            "config.variants.paper: a built-in variant has a fixed meaning",
+        ),
+        ({"variants": {"a/b": VARIANTS["wang"].choices}}, "config.variants.a/b: a variant's name must be letters"),
+        (
+            {"disparity_range": {"builtin/dotz": [0, 1]}},
+            "config.disparity_range: unknown 'builtin/dotz'; did you mean 'builtin/dots'?",
+        ),
+        ({"disparity_range": {"builtin/dots": [2, 1]}}, "config.disparity_range of builtin/dots"),
+        ({"disparity_range": {"builtin/dots": [2]}}, "config.disparity_range.builtin/dots.1: field required"),
+    ],
+)
+def test_a_wrong_key_or_value_is_named(values: dict[str, Any], expected: str) -> None:
+    assert expected in message_of(values)
+
+
+def test_numbers_left_as_text_are_numbers() -> None:
+    """Snakemake hands over ``--config 'builtin={size: 96}'`` as text, and YAML reads 1e-1 as text."""
+    settings = load_settings({"builtin": {"size": "96"}, "disparity_range": {"builtin/dots": ["-2", "1e-1"]}})
+    assert settings.scene("builtin", "dots").height == 96
+    assert settings.scene("builtin", "dots").disparity_range == (-2, 0.1)
+
+
+def test_an_empty_choice_keeps_its_defaults() -> None:
+    """``half_sepi:`` with nothing below it is null in YAML."""
+    assert load_settings({"stages": {"occlusion": {"half_sepi": None}}}) == load_settings({})
+
+
+def test_own_variants_come_beside_the_builtin_ones() -> None:
+    mine = VARIANTS["paper"].choices | {"optimize": "none"}
+    settings = load_settings({"variants": {"mine": mine}})
+    assert settings.own_variants == ["mine"]
+    mine, paper = (settings.variants[name].choices for name in ("mine", "paper"))
+    assert key_of(mine, "textureless") == key_of(paper, "textureless")
+    assert key_of(mine, "optimize") != key_of(paper, "optimize")
+
+
+class TestFolderOfScenes:
+    def settings(self, root: Path) -> Settings:
+        return load_settings({"hci_root": str(root)})
+
+    def test_scenes_are_found_below_categories(self, tmp_path: Path) -> None:
+        make_scene(tmp_path / "training" / "sideboard")
+        make_scene(tmp_path / "additional" / "antinous")
+        make_scene(tmp_path / "cotton")
+        (tmp_path / "notes").mkdir()
+        assert self.settings(tmp_path).scenes_of("hci") == ["antinous", "cotton", "sideboard"]
+
+    def test_the_folder_may_be_a_scene_itself(self, tmp_path: Path) -> None:
+        assert self.settings(make_scene(tmp_path / "cotton")).scenes_of("hci") == ["cotton"]
+
+    def test_size_and_number_of_views_are_read(self, tmp_path: Path) -> None:
+        """Threads and memory of every job follow from them."""
+        make_scene(tmp_path / "cotton", views=25, width=64, height=48)
+        scene = self.settings(tmp_path).scene("hci", "cotton")
+        assert (scene.views, scene.height, scene.width) == (25, 48, 64)
+
+    def test_everything_that_ingest_reads_is_an_input(self, tmp_path: Path) -> None:
+        folder = make_scene(tmp_path / "cotton", views=3)
+        for name in ("parameters.cfg", "gt_disp_lowres.pfm", "mask_planes_lowres.png", "license.txt"):
+            (folder / name).touch()
+        names = {path.name for path in self.settings(tmp_path).scene("hci", "cotton").files}
+        assert {"input_Cam000.png", "input_Cam002.png", "parameters.cfg", "gt_disp_lowres.pfm"} <= names
+        assert "license.txt" not in names
+
+    def test_two_scenes_of_one_name_are_refused(self, tmp_path: Path) -> None:
+        make_scene(tmp_path / "a" / "cotton")
+        make_scene(tmp_path / "b" / "cotton")
+        assert "two scenes are called 'cotton'" in message_of({"hci_root": str(tmp_path)})
+
+    def test_a_name_that_is_no_plain_word_is_refused(self, tmp_path: Path) -> None:
+        make_scene(tmp_path / "my {scene}")
+        assert "'my {scene}'" in message_of({"hci_root": str(tmp_path)})
+
+    def test_a_folder_without_scenes_is_refused(self, tmp_path: Path) -> None:
+        assert f"no scene in '{tmp_path}'" in message_of({"hci_root": str(tmp_path)})
+
+    def test_a_damaged_picture_is_left_to_ingest(self, tmp_path: Path) -> None:
+        """One bad scene must not keep the others from running."""
+        folder = make_scene(tmp_path / "cotton")
+        (folder / "input_Cam000.png").write_bytes(b"")
+        assert self.settings(tmp_path).scene("hci", "cotton").samples > 0
+
+    def test_an_unknown_scene_is_named(self, tmp_path: Path) -> None:
+        make_scene(tmp_path / "cotton")
+        with pytest.raises(SepiError, match="scene of dataset 'hci': unknown 'coton'; did you mean 'cotton'"):
+            self.settings(tmp_path).scene("hci", "coton")
+
+    def test_the_benchmark_folder_as_it_is_handed_out(self, hci: Path) -> None:
+        settings = self.settings(hci)
+        assert settings.scenes_of("hci") == ["antinous", "cotton"]
+        assert settings.scene("hci", "antinous").samples == 81 * 512 * 512
+
+
+class TestOwnLightFields:
+    """Light fields of any format go through the workflow, too."""
+
+    def test_flags_reach_ingest(self, tmp_path: Path) -> None:
+        (tmp_path / "lego.mat").write_bytes(bytes(3 * 81 * 100))
+        entry = {
+            "path": str(tmp_path / "lego.mat"),
+            "format": "matlab",
+            "grid": [9, 9],
+            "central": 5,
+            "order": "flip-rows",
+            "exclude": ["0,0", "4,4"],
+            "view": [2, 3],
+            "follow_links": True,
+        }
+        settings = load_settings({"light_fields": {"lego": entry}, "disparity_range": {"own/lego": [-1, 2]}})
+        scene = settings.scene("own", "lego")
+        words = "--format matlab --grid 9x9 --central 5 --order flip-rows --view 2,3 --exclude 0,0 --exclude 4,4"
+        assert scene.flags == (*words.split(), "--follow-links")
+        assert scene.files == (tmp_path / "lego.mat",)
+        assert scene.disparity_range == (-1, 2)
+        assert (scene.views, scene.height, scene.width) == (81, 10, 10)
+
+    def test_every_picture_of_a_folder_is_an_input(self, tmp_path: Path) -> None:
+        folder = make_scene(tmp_path / "flowers", views=4)
+        (folder / ".hidden").touch()
+        (folder / "below").mkdir()
+        scene = load_settings({"light_fields": {"a": {"path": str(folder)}}}).scene("own", "a")
+        assert [path.name for path in scene.files] == [f"input_Cam00{number}.png" for number in range(4)]
+        assert (scene.views, scene.height, scene.width) == (4, 30, 40)
+
+    @pytest.mark.parametrize(
+        ("entry", "expected"),
+        [
+            ({"path": "/nowhere"}, "config.light_fields.a: no file or folder '/nowhere'"),
+            ({}, "config.light_fields.a.path: field required"),
+            ({"path": "/", "gird": [3, 3]}, "config.light_fields.a: unknown 'gird'; did you mean 'grid'?"),
+            ({"path": "/", "grid": "3x3"}, "config.light_fields.a.grid: input should be a valid array, got '3x3'"),
+            ({"path": ""}, "config.light_fields.a.path: string should have at least 1 character"),
+            (
+                {"path": "/", "order": "flip-row"},
+                "a.order: unknown 'flip-row'; did you mean 'flip-rows'",
+            ),
+            ({"path": "/", "format": "nmupy"}, "config.light_fields.a.format: unknown 'nmupy'; did you mean 'numpy'"),
+            ({"path": "/", "central": 0}, "config.light_fields.a.central: input should be greater than or equal to 1"),
+            (
+                {"path": "/", "view": [-1, 2]},
+                "light_fields.a.view.0: input should be greater than or equal to 0",
+            ),
+            ({"path": "/", "central": "big"}, "config.light_fields.a.central: input should be a valid integer"),
+            ("/data/lego", "config.light_fields.a: input should be an object, got '/data/lego'"),
+        ],
+    )
+    def test_a_wrong_entry_is_named(self, entry: Any, expected: str) -> None:
+        assert expected in message_of({"light_fields": {"a": entry}})
+
+    def test_texts_that_look_like_numbers_stay_texts(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.chdir(tmp_path)
+        np.save("2024", np.zeros(1))
+        Path("2024.npy").rename("2024")
+        entry = {"path": "2024", "variable": "5", "grid": ["3", "3"]}
+        assert load_settings({"light_fields": {"a": entry}}).scene("own", "a").flags[-1] == "5"
+
+    def test_a_name_that_is_no_plain_word_is_refused(self, tmp_path: Path) -> None:
+        assert "'my lego'" in message_of({"light_fields": {"my lego": {"path": str(tmp_path)}}})
+
+
+def test_archive_files_are_scenes_by_their_own_or_their_folders_name(tmp_path: Path) -> None:
+    for name in ("buddha.h5", "mona/lf.h5"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        with h5py.File(tmp_path / name, "w") as file:
+            file["LF"] = np.zeros((3, 3, 8, 8, 3), np.uint8)
+    with h5py.File(tmp_path / "other.h5", "w") as file:
+        file["x"] = 1
+    (tmp_path / "readme.txt").touch()
+    settings = load_settings({"hci_old_root": str(tmp_path)})
+    assert settings.scenes_of("hci_old") == ["buddha", "mona"]
+    assert settings.scene("hci_old", "mona").files == (tmp_path / "mona/lf.h5",)
+    (tmp_path / "empty").mkdir()
+    assert "expected HDF5 files" in message_of({"hci_old_root": str(tmp_path / "empty")})
+    assert "no folder" in message_of({"hci_old_root": str(tmp_path / "absent")})
+
+
+class TestExternal:
+    """Maps of other methods are found where the user says, and a wrong entry is named before anything runs."""
+
+    def file(self, path: str, dataset: str = "hci", scene: str = "cotton") -> Path:
+        return load_settings({"external": {"SPO": path}}).external["SPO"].file(dataset, scene)
+
+    def test_none_by_default(self) -> None:
+        assert load_settings({}).external == {}
+
+    def test_a_folder_means_the_file_of_the_scenes_name(self, tmp_path: Path) -> None:
+        assert self.file(str(tmp_path)) == tmp_path / "cotton.pfm"
+        for name in ("other.pfm", "cotton.txt", "Cotton.PFM", "cotton.h5", "cotton.png", "cotton.npy", "cotton.pfm"):
+            (tmp_path / name).touch()
+            if name.lower().startswith("cotton") and not name.endswith("txt"):
+                # each in turn is preferred to those before it
+                assert self.file(str(tmp_path)) == tmp_path / name
+        (tmp_path / "below.pfm").mkdir()
+        assert self.file(str(tmp_path), scene="below") == tmp_path / "below.pfm"
+
+    def test_a_folder_that_is_not_there_stops_nothing(self) -> None:
+        """Its cells of the report say that there is no file."""
+        assert self.file("/nowhere") == Path("/nowhere/cotton.pfm")
+        assert self.file("/nowhere/{scene}.png") == Path("/nowhere/cotton.png")
+
+    def test_a_pattern_names_dataset_and_scene(self, tmp_path: Path) -> None:
+        assert self.file("/maps/{dataset}/{scene}/{scene}_spo.npy") == Path("/maps/hci/cotton/cotton_spo.npy")
+        (tmp_path / "hci").mkdir()
+        (tmp_path / "hci" / "Cotton.npy").touch()
+        assert self.file(f"{tmp_path}/{{dataset}}") == tmp_path / "hci/Cotton.npy"
+
+    def test_a_pattern_may_name_folders_that_depth_wrote(self, tmp_path: Path) -> None:
+        (tmp_path / "cotton-depth").mkdir()
+        assert self.file(f"{tmp_path}/{{scene}}-depth") == tmp_path / "cotton-depth/disparity.pfm"
+
+    def test_home_and_working_folder(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setenv("HOME", str(tmp_path))
+        monkeypatch.chdir(tmp_path)
+        (tmp_path / "maps").mkdir()
+        (tmp_path / "maps" / "cotton.npy").touch()
+        assert self.file("~/maps") == tmp_path / "maps/cotton.npy"
+        assert self.file("maps") == Path("maps/cotton.npy")
+
+    def test_what_the_command_is_told(self, tmp_path: Path) -> None:
+        (tmp_path / "dots.npy").touch()
+        entries = {"SPO": "/nowhere", "AMNorm": {"path": str(tmp_path), "scale": -1, "offset": 0.5}}
+        settings = load_settings({"external": entries})
+        assert settings.external_files("builtin", "dots") == {
+            "SPO": Path("/nowhere/dots.pfm"),
+            "AMNorm": tmp_path / "dots.npy",
+        }
+        told = json.loads(settings.external_json("builtin", "dots"))
+        assert list(told) == ["SPO", "AMNorm"]
+        assert told["SPO"] == {"path": "/nowhere/dots.pfm", "scale": None, "offset": 0.0}
+        assert told["AMNorm"] == {"path": f"{tmp_path}/dots.npy", "scale": -1.0, "offset": 0.5}
+        with pytest.raises(SepiError, match="unknown 'dotz'; did you mean 'dots'"):
+            settings.external_files("builtin", "dotz")
+
+    def test_texts_that_look_like_numbers(self) -> None:
+        """A folder may be called 2024; a scale is a number also where Snakemake hands over text."""
+        settings = load_settings({"external": {"a": "2024", "b": {"path": "1e-1", "scale": "-1", "offset": "1e-1"}}})
+        assert settings.external["a"].file("hci", "cotton") == Path("2024/cotton.pfm")
+        assert settings.external["b"].file("hci", "cotton") == Path("1e-1/cotton.pfm")
+        assert (settings.external["b"].scale, settings.external["b"].offset) == (-1, 0.1)
+
+    @pytest.mark.parametrize(
+        ("entry", "expected"),
+        [
+            (5, "config.external.SPO: input should be an object, got 5"),
+            (None, "config.external.SPO: input should be an object, got None"),
+            ("", "config.external.SPO.path: string should have at least 1 character"),
+            ({}, "config.external.SPO.path: field required"),
+            ({"path": 2024}, "config.external.SPO.path: input should be a valid string, got 2024"),
+            ({"path": "/", "scal": 1}, "config.external.SPO: unknown 'scal'; did you mean 'scale'?"),
+            ({"path": "/", "scale": "big"}, "config.external.SPO.scale: input should be a valid number, got 'big'"),
+            ({"path": "/", "scale": 0}, "config.external.SPO.scale: must not be 0"),
+            ({"path": "/", "offset": None}, "config.external.SPO.offset: input should be a valid number, got None"),
+            ("/maps/{scen}", "config.external.SPO.path: unknown '{scen}'; did you mean '{scene}'?"),
+            ("/maps/cotton.pfm", "config.external.SPO.path: '/maps/cotton.pfm' is one file; write {scene}"),
+        ],
+    )
+    def test_a_wrong_entry_is_named(self, entry: Any, expected: str) -> None:
+        assert expected in message_of({"external": {"SPO": entry}})
+
+    def test_one_file_for_all_scenes_is_refused(self, tmp_path: Path) -> None:
+        """It would be scored against every other scene's ground truth."""
+        (tmp_path / "spo").touch()
+        assert "is one file; write {scene}" in message_of({"external": {"SPO": str(tmp_path / "spo")}})
+        (tmp_path / "maps.pfm").mkdir()
+        assert self.file(str(tmp_path / "maps.pfm")) == tmp_path / "maps.pfm/cotton.pfm"
+
+    @pytest.mark.parametrize("name", ["", " ", "a/b", "..", ".a", " a", "a\nb"])
+    def test_a_name_that_cannot_be_shown_or_stored(self, name: str) -> None:
+        with pytest.raises(SepiError, match="a method's name must be printable text without '/'"):
+            load_settings({"external": {name: "/maps"}})
+
+    def test_names_of_other_methods_are_free(self) -> None:
+        names = ["SPO", "EPINET-Lite", "Ours (v2)", "Müller et al. 2019", "2024"]
+        assert list(load_settings({"external": dict.fromkeys(names, "/maps")}).external) == names
+
+    @pytest.mark.parametrize("name", ["best", "mine"])
+    def test_a_variants_name_is_refused(self, name: str) -> None:
+        """Two columns of one name could not be told apart."""
+        values = {"variants": {"mine": VARIANTS["wang"].choices}, "external": {name: "/maps"}}
+        assert message_of(values) == f"config.external.{name}: a variant has this name; give the method another"

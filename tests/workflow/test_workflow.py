@@ -1,0 +1,560 @@
+"""The workflow, run for real on two tiny scenes: what it makes, and above all what it makes again and what not.
+
+One complete run is shared by the tests; most of them then only ask Snakemake what it would do (a dry run).
+"""
+
+import copy
+import csv
+import json
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+from pydantic import ValidationError
+
+from sepi.io.hdf5 import read_attributes, read_stage
+from sepi.io.scores import read_scores
+from sepi.pipeline import STAGES, VARIANTS
+from sepi.reading import read_light_field
+from sepi.scenes import render, write_hci
+
+pytestmark = pytest.mark.workflow
+
+REPOSITORY = Path(__file__).parents[2]
+SIZE = 64
+# few candidates: the result does not matter here
+TINY = {
+    "builtin": {"scenes": ["dots"], "size": SIZE},
+    "stages": {
+        "initial": {name: {"candidates": 21} for name in ("sepi", "semi_global", "semi_global_colours")},
+        "occlusion": {"visibility": {"candidates": 21, "passes": 1}},
+    },
+}
+# two scenes, the paper's six variants and best; stage files that variants share are made once, choice none is no job
+COMPLETE = {"ingest": 2, "initial": 6, "occlusion": 8, "textureless": 10, "optimize": 14}
+# the variant of the fewest stages
+QUICK = "no_occlusion_no_textureless"
+# what the ablation of best asks for beyond that
+PARTS = {"initial": 2, "occlusion": 8, "textureless": 8, "optimize": 14}
+
+
+@dataclass(frozen=True)
+class Workflow:
+    """A copy of the workflow and the package, and a folder to run it in."""
+
+    tree: Path
+    folder: Path
+    config: dict[str, Any]
+
+    def command(self, *targets: str, flags: tuple[str, ...] = ()) -> list[str]:
+        """Snakemake with this configuration."""
+        self.folder.mkdir(exist_ok=True)
+        config = self.folder / "config.yaml"
+        config.write_text(yaml.safe_dump(self.config))
+        snakefile = str(self.tree / "Snakefile")
+        words = ["-m", "snakemake", "--snakefile", snakefile, "--configfile", str(config)]
+        return [sys.executable, *words, *flags, "--", *targets]
+
+    @property
+    def environment(self) -> dict[str, str]:
+        """Environment in which the copy of the package is the one imported."""
+        return os.environ | {"PYTHONPATH": str(self.tree)}
+
+    def run(self, *targets: str, flags: tuple[str, ...] = (), **environment: str) -> subprocess.CompletedProcess[str]:
+        """Run Snakemake to its end; stdout holds its messages too."""
+        return subprocess.run(
+            self.command(*targets, flags=flags),
+            cwd=self.folder,
+            env=self.environment | environment,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            check=False,
+            timeout=300,
+        )
+
+    def plan(self, *targets: str) -> dict[str, int]:
+        """Rule to number of jobs that a run would have, but for those that only collect."""
+        result = self.run(*targets, flags=("--dry-run",))
+        assert result.returncode == 0, result.stdout
+        if "Nothing to be done" in result.stdout:
+            return {}
+        table = result.stdout.split("Job stats:")[1].split("total")[0]
+        return {rule: int(count) for rule, count in re.findall(r"^(\w+) +(\d+)$", table, re.MULTILINE)}
+
+    def stage_plan(self, *targets: str) -> dict[str, int]:
+        """The plan without what comes after the stages (scores, tables, maps)."""
+        return {rule: count for rule, count in self.plan(*targets).items() if rule in COMPLETE}
+
+    def with_config(self, **values: Any) -> "Workflow":
+        """The same workflow with other values of some keys."""
+        return replace(self, config=self.config | values)
+
+
+def copy_of_the_project(folder: Path) -> Path:
+    """Snakefile, rules and package; numba's compiled code comes with the package's __pycache__."""
+    for name in ("sepi", "rules", "profiles"):
+        shutil.copytree(REPOSITORY / name, folder / name)
+    for name in ("Snakefile", "config.yaml"):
+        shutil.copy2(REPOSITORY / name, folder / name)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def workflow(tmp_path_factory: pytest.TempPathFactory) -> Workflow:
+    """The workflow on a built-in scene and on a folder of pictures without parameters and ground truth, not yet run."""
+    root = tmp_path_factory.mktemp("workflow")
+    scene = root / "my scenes" / "training" / "box"
+    write_hci(render("curved_occluders", size=SIZE, views=5), scene)
+    for name in ("parameters.cfg", "gt_disp_lowres.pfm", *(path.name for path in scene.glob("mask_*"))):
+        (scene / name).unlink()
+    return Workflow(copy_of_the_project(root / "tree"), root / "fresh", TINY | {"hci_root": str(root / "my scenes")})
+
+
+@pytest.fixture(scope="module")
+def finished(workflow: Workflow) -> Workflow:
+    """The workflow after ``snakemake all``; its output is in the file stdout."""
+    done = replace(workflow, folder=workflow.folder.with_name("finished"))
+    result = done.run("all")
+    assert result.returncode == 0, result.stdout
+    (done.folder / "stdout").write_text(result.stdout)
+    return done
+
+
+@contextmanager
+def edited(path: Path, old: str, new: str) -> Iterator[None]:
+    """A file with a replacement, for a while."""
+    text, times = path.read_text(), path.stat()
+    assert old in text
+    path.write_text(text.replace(old, new, 1))
+    try:
+        yield
+    finally:
+        path.write_text(text)
+        os.utime(path, ns=(times.st_atime_ns, times.st_mtime_ns))
+
+
+class TestAll:
+    def test_tables_and_maps_are_made_and_named(self, finished: Workflow) -> None:
+        """The run's last words tell a newcomer where to look."""
+        stdout = (finished.folder / "stdout").read_text()
+        for scene in ("builtin/dots", "hci/box"):
+            for name in ("disparity.pfm", "result.h5", "disparity.png", "confidence.png"):
+                assert (finished.folder / "results" / scene / "paper" / name).stat().st_size > 0
+            assert f"\n  results/{scene}/paper/\n" in stdout
+        tables = sorted((finished.folder / "reports").glob("table*.md"))
+        assert len(tables) == 4
+        for table in tables:
+            assert f"\n  reports/{table.name}\n" in stdout
+
+    def test_stage_files_say_what_made_them(self, finished: Workflow) -> None:
+        last = finished.folder / "results/hci/box/stages/sepi/none/lti/wls/optimize.h5"
+        attributes = read_attributes(last)
+        assert attributes["disparity_range_source"] == "estimated"
+        assert (attributes["stage"], attributes["choice"], attributes["scene"]) == ("optimize", "wls", "box")
+        before = json.loads(attributes["made_from"])
+        # what hands its maps on did nothing
+        assert [(step["stage"], step["choice"]) for step in before] == [("initial", "sepi"), ("textureless", "lti")]
+        assert before[0]["parameters"]["candidates"] == 21
+        assert read_stage(last).disparity.shape == (SIZE, SIZE)
+
+    def test_every_job_has_a_log_and_a_benchmark(self, finished: Workflow) -> None:
+        for kind, ending in (("logs", "log"), ("benchmarks", "tsv")):
+            path = finished.folder / kind / "builtin/dots/sepi/half_sepi/lti" / f"textureless.{ending}"
+            assert path.is_file()
+
+    def test_again_does_nothing(self, finished: Workflow) -> None:
+        assert finished.plan("all") == {}
+        assert finished.stage_plan("ablation") == PARTS
+
+    def test_no_temporary_file_is_left(self, finished: Workflow) -> None:
+        hidden = [path for path in (finished.folder / "results").rglob(".*") if path.name != ".snakemake_timestamp"]
+        assert hidden == []
+
+
+def other_parameters(stage: str, choice: str) -> dict[str, Any]:
+    """One parameter of a choice with a value that is not its default."""
+    model = STAGES[stage][choice].parameters
+    defaults = model()
+    for name in model.model_fields:
+        value = getattr(defaults, name)
+        candidates = [not value] if isinstance(value, bool) else []
+        if isinstance(value, int | float) and not isinstance(value, bool):
+            candidates = [value + 1, value - 1, value * 0.9, value * 1.1, value + 2]
+        for other in candidates:
+            try:
+                if model(**{name: other}) != defaults:
+                    return {name: other}
+            except ValidationError:
+                continue
+    pytest.fail(f"{stage}.{choice} has no number to change")
+
+
+# the jobs that a change in each stage's choice asks for, over both scenes and all seven variants
+RERUNS = [
+    ("initial", "sepi", {"initial": 2, "occlusion": 4, "textureless": 6, "optimize": 10}),
+    ("initial", "structure_tensor", {"initial": 2, "occlusion": 2, "textureless": 2, "optimize": 2}),
+    ("occlusion", "half_sepi", {"occlusion": 4, "textureless": 4, "optimize": 6}),
+    ("occlusion", "wang", {"occlusion": 2, "textureless": 2, "optimize": 2}),
+    ("textureless", "lti", {"textureless": 8, "optimize": 8}),
+    ("optimize", "wls", {"optimize": 12}),
+    ("initial", "semi_global", {"initial": 2, "occlusion": 2, "textureless": 2, "optimize": 2}),
+    ("occlusion", "visibility", {"occlusion": 2, "textureless": 2, "optimize": 2}),
+    ("textureless", "uniform_planes", {"textureless": 2, "optimize": 2}),
+    ("optimize", "second_order", {"optimize": 2}),
+]
+
+
+class TestRerun:
+    @pytest.mark.parametrize(("stage", "choice", "expected"), RERUNS)
+    def test_a_changed_parameter_reruns_its_stage_and_what_follows(
+        self, finished: Workflow, stage: str, choice: str, expected: dict[str, int]
+    ) -> None:
+        stages = copy.deepcopy(TINY["stages"])
+        changed = other_parameters(stage, choice)
+        stages.setdefault(stage, {}).setdefault(choice, {}).update(changed)
+        assert finished.with_config(stages=stages).stage_plan("all") == expected
+
+    def test_a_parameter_that_no_variant_uses_reruns_nothing(self, finished: Workflow) -> None:
+        """Only the variants that use the choice are made again: here the target uses another one."""
+        stages = TINY["stages"] | {
+            "occlusion": TINY["stages"]["occlusion"] | {"wang": other_parameters("occlusion", "wang")}
+        }
+        assert finished.with_config(stages=stages).plan("results/builtin/dots/paper/result.h5") == {}
+
+    @pytest.mark.parametrize("stage", ["initial", "textureless"])
+    def test_a_changed_module_reruns_its_stage_and_what_follows(self, finished: Workflow, stage: str) -> None:
+        expected = {
+            "initial": {"initial": 6, "occlusion": 8, "textureless": 10, "optimize": 14},
+            "textureless": {"textureless": 10, "optimize": 10},
+        }
+        with edited(finished.tree / "sepi" / f"{stage}.py", "\nCHOICES", "\n_MORE = 1\n\nCHOICES"):
+            assert finished.stage_plan("all") == expected[stage]
+
+    def test_a_changed_evaluation_reruns_no_stage(self, finished: Workflow) -> None:
+        with edited(finished.tree / "sepi" / "evaluate.py", "\nif __name__", "\n_MORE = 1\n\nif __name__"):
+            plan = finished.plan("all")
+        assert "evaluate" in plan
+        assert not plan.keys() & COMPLETE.keys()
+
+    def test_a_changed_comment_reruns_nothing(self, finished: Workflow) -> None:
+        with (
+            edited(finished.tree / "sepi" / "initial.py", "\nCHOICES", "\n# a comment\nCHOICES"),
+            edited(finished.tree / "sepi" / "lightfield.py", '"""The light field', '"""A light field'),
+        ):
+            assert finished.plan("all") == {}
+
+    def test_a_changed_picture_reruns_its_scene(self, finished: Workflow) -> None:
+        picture = Path(finished.config["hci_root"]) / "training" / "box" / "input_Cam003.png"
+        other = picture.with_name("input_Cam004.png")
+        before, times = picture.read_bytes(), picture.stat()
+        try:
+            picture.write_bytes(other.read_bytes())
+            plan = finished.stage_plan("all")
+        finally:
+            picture.write_bytes(before)
+            os.utime(picture, ns=(times.st_atime_ns, times.st_mtime_ns))
+        assert plan == {"ingest": 1, "initial": 3, "occlusion": 4, "textureless": 5, "optimize": 7}
+
+    def test_a_given_range_reruns_its_scene(self, finished: Workflow) -> None:
+        given = finished.with_config(disparity_range={"hci/box": [-3, 3]})
+        assert given.stage_plan("results/hci/box/paper/result.h5") == {
+            "ingest": 1,
+            "initial": 1,
+            "occlusion": 1,
+            "textureless": 1,
+            "optimize": 1,
+        }
+        assert given.plan("results/builtin/dots/paper/result.h5") == {}
+
+    def test_an_own_variant_shares_what_it_can(self, finished: Workflow) -> None:
+        """What hands its maps on is no job, wherever it stands."""
+        mine = {"initial": "structure_tensor", "occlusion": "none", "textureless": "lti", "optimize": "none"}
+        plan = finished.with_config(variants={"mine": mine}).plan("all")
+        assert {rule: plan.get(rule) for rule in [*COMPLETE, "evaluate", "export"]} == {
+            **dict.fromkeys(COMPLETE),
+            "textureless": 2,
+            "evaluate": 2,
+            "export": 2,
+        }
+
+    def test_only_a_changed_map_is_scored_anew(self, finished: Workflow, tmp_path: Path) -> None:
+        """The scores of a scene are one job, whatever changed of it."""
+        shutil.copytree(finished.folder, tmp_path / "run", symlinks=True)
+        stages = copy.deepcopy(TINY["stages"])
+        stages["optimize"] = {"second_order": other_parameters("optimize", "second_order")}
+        changed = replace(finished, folder=tmp_path / "run").with_config(stages=stages)
+        target = "results/builtin/dots/scores.h5"
+        assert changed.plan(target) == {"optimize": 1, "evaluate": 1}
+        # a job that fails leaves no old scores that count as new
+        kept = changed.folder / "results/builtin/dots/scores.kept.h5"
+        kept.rename(tmp_path / "kept.h5")
+        kept.mkdir()
+        assert changed.run(target).returncode != 0
+        assert not (changed.folder / target).exists()
+        assert changed.plan(target) == {"evaluate": 1}
+        kept.rmdir()
+        (tmp_path / "kept.h5").rename(kept)
+        result = changed.run(target)
+        assert result.returncode == 0, result.stdout
+        told = (changed.folder / "logs/builtin/dots/scores.log").read_text()
+        assert "1 of 19 maps scored anew: semi_global/visibility/uniform_planes/second_order" in told
+        before, after = (read_scores(flow.folder / target) for flow in (finished, changed))
+        # a score over no pixels is NaN, which equals nothing
+        assert [name for name in after if str(after[name]) != str(before[name])] == [
+            "semi_global/visibility/uniform_planes/second_order"
+        ]
+
+
+class TestReport:
+    def test_the_page_and_its_files_are_made(self, finished: Workflow) -> None:
+        """What a researcher opens, and what goes into a paper."""
+        reports = finished.folder / "reports"
+        page = (reports / "index.html").read_text()
+        for scene in ("builtin/dots", "hci/box"):
+            assert f">{scene}</option>" in page
+        for rule in ("initial", "occlusion", "textureless", "optimize", "numbers", "page"):
+            assert f">{rule}</text>" in page
+        assert "0.0165" in page  # a parameter of the paper's sweep
+        for table in (
+            "table1_mse",
+            "table2_q25",
+            "table3_regions",
+            "table4_ablation",
+            "stages",
+            "runtime",
+            "confidence",
+        ):
+            for ending in ("csv", "md", "tex"):
+                assert (reports / f"{table}.{ending}").stat().st_size > 0
+        figures = [reports / "figures" / name for name in ("ablation", "time_and_memory")]
+        figures += [reports / "maps/builtin/dots" / name for name in ("overview", "pixels", "best/sparsification")]
+        for figure in figures:
+            assert figure.with_suffix(".png").read_bytes().startswith(b"\x89PNG")
+            assert figure.with_suffix(".pdf").read_bytes().startswith(b"%PDF")
+        assert {scene["scene"] for scene in json.loads((reports / "report.json").read_text())["scenes"]} == {
+            "dots",
+            "box",
+        }
+
+    def test_a_pixel_asked_for_redraws_its_scene_alone(self, finished: Workflow) -> None:
+        asked = finished.with_config(report={"pixels": {"builtin/dots": [[20, 30]]}})
+        assert asked.plan("all") == {"all": 1, "maps": 1, "page": 1}
+
+    def test_the_parts_of_best_can_be_shown(self, finished: Workflow) -> None:
+        plan = finished.with_config(report={"parts_of_best": True}).plan("all")
+        assert plan["optimize"] == PARTS["optimize"]
+        assert plan["page"] == 1
+
+    def test_wrong_and_missing_maps_of_other_methods_stop_nothing(self, finished: Workflow, tmp_path: Path) -> None:
+        """The report still comes; the cell and a line at the end say what is wrong."""
+        truth = read_light_field(finished.folder / "results/builtin/dots/lightfield.h5", check_order=False).truth
+        assert truth is not None
+        holed = truth + np.float32(0.1)
+        holed[:10] = np.nan
+        for method, values in {"good": truth + np.float32(0.1), "holed": holed, "small": truth[:40]}.items():
+            (tmp_path / method).mkdir()
+            np.save(tmp_path / method / "dots.npy", values)
+        methods = {name: str(tmp_path / name) for name in ("good", "holed", "small", "absent")}
+        folder = tmp_path / "run"
+        shutil.copytree(finished.folder, folder, symlinks=True)
+        compared = replace(finished, folder=folder).with_config(external=methods)
+        result = compared.run("all")
+        assert result.returncode == 0, result.stdout
+        with (folder / "reports/table1_mse.csv").open(newline="") as file:
+            row = next(row for row in csv.DictReader(file) if (row["scene"], row["row"]) == ("dots", "scene"))
+        wrong = f"{SIZE}x40 instead of {SIZE}x{SIZE}"
+        cells = {"good": "1.0000", "holed": "1.0000", "small": wrong, "absent": "no file"}
+        assert {name: row[name] for name in cells} == cells
+        lines = [line for line in result.stdout.splitlines() if line.startswith("sepi: warning: external")]
+        assert any("external small, scene builtin/dots" in line and f"{SIZE}x40" in line for line in lines)
+        assert any("external holed, scene builtin/dots" in line and str(10 * SIZE) in line for line in lines)
+        assert "sepi: warning: external absent: no map of builtin/dots, hci/box" in lines
+        assert "| 1.00 (16 % unknown) |" in (folder / "reports/table1_mse.md").read_text()
+        page = (folder / "reports/index.html").read_text()
+        assert "good (imported)" in page
+        assert '"imported/good"' in page
+        assert '"imported/small"' not in page
+        assert compared.plan("all") == {}
+
+    def test_snakemakes_own_report_works(self, finished: Workflow) -> None:
+        """For provenance: each file with its category and caption."""
+        result = finished.run("all", flags=("--report", "provenance.html"))
+        assert result.returncode == 0, result.stdout
+        text = (finished.folder / "provenance.html").read_text()
+        for word in ("Tables", "Charts", "Scenes", "table1_mse.csv", "MSE x100 with single parts of the method"):
+            assert word in text
+
+
+class TestTargets:
+    def test_ablation_makes_all_variants(self, workflow: Workflow) -> None:
+        result = workflow.run("ablation", flags=("--dry-run",))
+        variants = re.findall(r"builtin/dots: maps of variant (\w+)", result.stdout)
+        assert sorted(variants) == sorted(VARIANTS)
+        assert workflow.stage_plan("ablation") == {rule: n + PARTS.get(rule, 0) for rule, n in COMPLETE.items()}
+
+    def test_a_single_file_makes_what_it_needs(self, workflow: Workflow) -> None:
+        assert workflow.plan("results/hci/box/no_occlusion/disparity.pfm") == {
+            "ingest": 1,
+            "initial": 1,
+            "textureless": 1,
+            "optimize": 1,
+            "export": 1,
+        }
+
+    @pytest.mark.parametrize(
+        ("target", "expected"),
+        [
+            ("results/builtin/dotz/paper/result.h5", "unknown 'dotz'; did you mean 'dots'?"),
+            ("results/bultin/dots/paper/result.h5", "unknown 'bultin'; did you mean 'builtin'?"),
+            ("results/builtin/dots/papr/result.h5", "unknown 'papr'; did you mean 'paper'?"),
+        ],
+    )
+    def test_an_unknown_name_in_a_target_is_named(self, workflow: Workflow, target: str, expected: str) -> None:
+        result = workflow.run(target, flags=("--dry-run",))
+        assert result.returncode != 0
+        assert expected in result.stdout
+
+
+class TestConfiguration:
+    def test_an_unknown_key_is_one_line_and_nothing_runs(self, workflow: Workflow) -> None:
+        result = workflow.with_config(builtn={"size": 64}).run("all")
+        assert result.returncode == 1
+        lines = [line for line in result.stdout.splitlines() if line.startswith("sepi: ")]
+        assert len(lines) == 1
+        assert "unknown 'builtn'; did you mean 'builtin'?" in lines[0]
+        assert "Traceback" not in result.stdout
+        assert not (workflow.folder / "results").exists()
+
+    def test_values_on_the_command_line(self, workflow: Workflow) -> None:
+        """``--config`` reaches nested keys, and a folder of scenes is one word."""
+        values = ("--config", "builtin={scenes: [wall, dots], size: 72}", f"hci_root={workflow.config['hci_root']}")
+        bare = replace(workflow, config={})
+        result = bare.run("all", flags=("--dry-run", *values))
+        assert result.returncode == 0, result.stdout
+        scenes = set(re.findall(r"(\w+/\w+): reading the light field", result.stdout))
+        assert scenes == {"builtin/wall", "builtin/dots", "hci/box"}
+
+    @pytest.mark.parametrize(
+        ("text", "message"),
+        [
+            ('hci_root: !!python/object/apply:os.system ["touch made-by-yaml"]', "not valid JSON or YAML"),
+            ("hci_root: !!python/name:os.system", "sepi: config.hci_root: expected numbers, text"),
+            ("hci_root: [1", "not valid JSON or YAML"),
+        ],
+    )
+    def test_yaml_builds_no_objects(self, workflow: Workflow, tmp_path: Path, text: str, message: str) -> None:
+        """A configuration from someone else must not run programs."""
+        (tmp_path / "other.yaml").write_text(text)
+        there = replace(workflow, folder=tmp_path / "run")
+        result = there.run("all", flags=("--configfile", str(tmp_path / "other.yaml")))
+        assert result.returncode != 0
+        assert "Traceback" not in result.stdout
+        assert message in result.stdout
+        assert not (there.folder / "made-by-yaml").exists()
+        assert not (there.folder / "results").exists()
+
+
+def test_own_light_fields_of_any_format_get_maps(workflow: Workflow, tmp_path: Path) -> None:
+    """Also those with views left out and in another order, and a wrong order is told at the end."""
+    views = render("curved_occluders", size=SIZE, views=5).views
+    np.save(tmp_path / "right.npy", views)
+    np.save(tmp_path / "turned.npy", views.transpose(1, 0, 2, 3, 4))
+    entries = {
+        "right": {"path": str(tmp_path / "right.npy"), "exclude": ["0,0"], "view": [2, 1]},
+        "turned": {"path": str(tmp_path / "turned.npy"), "order": "transpose"},
+        "wrong": {"path": str(tmp_path / "turned.npy")},
+    }
+    own = replace(workflow, folder=tmp_path / "run").with_config(hci_root=None, light_fields=entries)
+    maps = [f"results/own/{name}/{QUICK}/result.h5" for name in ("right", "turned")]
+    targets = [f"results/own/{name}/lightfield.h5" for name in entries]
+    result = own.run(*targets, *maps)
+    assert result.returncode == 0, result.stdout
+    assert [read_attributes(own.folder / file)["variant"] for file in maps] == [QUICK, QUICK]
+    kept = read_light_field(own.folder / "results/own/right/lightfield.h5", check_order=False)
+    assert kept.reference == (2, 1)
+    assert np.argwhere(~kept.present).tolist() == [[0, 0]]
+    turned = read_light_field(own.folder / "results/own/turned/lightfield.h5", check_order=False)
+    np.testing.assert_array_equal(turned.views, views)
+    warnings = [line for line in result.stdout.splitlines() if line.startswith("sepi: warning:")]
+    assert len(warnings) == 1
+    assert "turned.npy" in warnings[0]
+    assert "--order transpose" in warnings[0]
+    again = own.with_config(light_fields=entries | {"turned": entries["turned"] | {"order": "as-given"}})
+    assert again.stage_plan(*targets)["ingest"] == 1
+
+
+def test_a_failed_job_shows_the_one_clear_line(workflow: Workflow, tmp_path: Path) -> None:
+    """A user must not have to look for the log."""
+    scene = tmp_path / "scenes" / "broken"
+    write_hci(render("dots", size=SIZE, views=3), scene)
+    picture = scene / "input_Cam002.png"
+    picture.write_bytes(picture.read_bytes()[:100])
+    broken = replace(workflow, folder=tmp_path / "run").with_config(hci_root=str(tmp_path / "scenes"))
+    result = broken.run("results/hci/broken/paper/result.h5")
+    assert result.returncode != 0
+    assert re.search(rf"^ *sepi: .*{picture.name}.*$", result.stdout, re.MULTILINE)
+    assert "Traceback" not in result.stdout
+    assert files_below(broken.folder / "results") == []
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
+def test_an_interrupted_run_leaves_no_half_file_and_resumes(
+    workflow: Workflow, tmp_path: Path, number: signal.Signals
+) -> None:
+    """Ctrl-C at the terminal, or a machine that goes down, in the middle of writing a stage file."""
+    slow = Workflow(copy_of_the_project(tmp_path / "tree"), tmp_path / "run", TINY)
+    files = slow.tree / "sepi" / "io" / "files.py"
+    sleep = 'import os, time\n        time.sleep(float(os.environ.get("SLEEP", "0")))'
+    waiting = f"{sleep}\n        temporary.replace(path)"
+    target = f"results/builtin/dots/{QUICK}/result.h5"
+    light_field = slow.folder / "results/builtin/dots/lightfield.h5"
+    with edited(files, "temporary.replace(path)", waiting):
+        process = subprocess.Popen(
+            slow.command(target),
+            cwd=slow.folder,
+            env=slow.environment | {"SLEEP": "60"},
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            start_new_session=True,
+            # a background process of a shell ignores SIGINT; a user's does not
+            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+        )
+        wait_for(lambda: list(light_field.parent.glob(".lightfield-*.h5")))
+        # as a terminal does: to Snakemake and its jobs alike
+        os.killpg(process.pid, number)
+        assert process.wait(timeout=60) != 0
+        assert not light_field.exists()
+        if number == signal.SIGINT:
+            assert files_below(slow.folder / "results") == []
+        else:
+            assert slow.run(target).returncode != 0  # locked: Snakemake cannot know that the other run is dead
+            assert slow.run(target, flags=("--unlock",)).returncode == 0
+        result = slow.run(target)
+    assert result.returncode == 0, result.stdout
+    assert (slow.folder / target).is_file()
+
+
+def files_below(folder: Path) -> list[Path]:
+    """Every file, hidden ones too."""
+    return [path for path in folder.rglob("*") if path.is_file()]
+
+
+def wait_for(condition: Any, seconds: float = 60) -> None:
+    """Wait until a condition holds."""
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end, "timed out"
+        time.sleep(0.05)
