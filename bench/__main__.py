@@ -48,7 +48,7 @@ def run(scene: str, repeats: int, threads: int | None, groups: tuple[str, ...], 
         raise SepiError(f"--threads {threads}: this machine runs at most {most} at once")
     settings: dict[str, Any] = {
         "scene": scene if scene in SCENES else Path(scene).name,
-        "candidates": 21 if small else 181,
+        "num_disparities": 21 if small else 181,
         "threads": threads or most,
         "repeats": 1 if small else repeats,
     }

@@ -39,7 +39,7 @@ ALTERNATIVES = (
     Alternative("box window (colour ignored)", "initial", {"window_sigma": 10.0}),
     Alternative("squared differences (scale 1)", "initial", {"scale": 1.0}),
     Alternative("scale doubled", "initial", {"scale": 0.033}),
-    Alternative("91 candidates", "initial", {"candidates": 91}),
+    Alternative("91 candidates", "initial", {"num_disparities": 91}),
     Alternative("gains doubled", "occlusion", {"gain_half": 0.03, "gain_quarter": 0.06}),
     Alternative("halves only, no quarters", "occlusion", {"gain_quarter": 1.0}),
     Alternative("side not confirmed", "occlusion", {"gain_unconfirmed": 0.0}),
@@ -48,8 +48,8 @@ ALTERNATIVES = (
     Alternative("planes overrule any depth", "textureless", {"min_support": 1.0, "keep_confidence": 1.0}),
     Alternative("planes smooth only", "textureless", {"min_support": 0.0}),
     Alternative("no continuity between superpixels", "textureless", {"continuity": 0.0}),
-    Alternative("data weight at steps as printed", "optimize", {"step_weight": 1e-6}),
-    Alternative("no cut of the data weight at steps", "optimize", {"step_weight": 1.0}),
+    Alternative("data weight at steps as printed", "optimize", {"discontinuity_weight": 1e-6}),
+    Alternative("no cut of the data weight at steps", "optimize", {"discontinuity_weight": 1.0}),
     Alternative("confidence itself as weight", "optimize", {"confidence_power": 1.0}),
     Alternative("alpha a third", "optimize", {"alpha": 1e-6}),
     Alternative("alpha threefold", "optimize", {"alpha": 1e-5}),
@@ -83,12 +83,12 @@ def table(scenes: list[str]) -> str:
     names = []
     for scene in scenes:
         light_field = opened(scene)
-        if light_field.truth is None:
+        if light_field.ground_truth is None:
             raise SepiError(f"{scene}: has no ground truth to score against")
         names.append(light_field.name)
         known: dict[tuple[Any, ...], StageMaps] = {}
         for alternative in ALTERNATIVES:
-            result = score(final_maps(light_field, alternative, known).disparity, light_field.truth)
+            result = score(final_maps(light_field, alternative, known).disparity, light_field.ground_truth)
             cells[alternative.label].append(f"{result['mse100']:.2f} / {result['q25']:.2f} / {result['badpix007']:.1f}")
     head = ["| changed | " + " | ".join(names) + " |", "|---|" + "---|" * len(names)]
     return "\n".join([*head, *(f"| {label} | " + " | ".join(row) + " |" for label, row in cells.items())])

@@ -20,8 +20,8 @@ LARGE = (1024, 17)
 
 Growth = dict[str, list[int]]
 
-FULL: Growth = {"size": [128, 256, 512, 1024], "views": [3, 5, 7, 9, 13, 17], "candidates": [46, 91, 181, 362]}
-SMALL: Growth = {"size": [64, 128], "views": [3], "candidates": [11, 21]}
+FULL: Growth = {"size": [128, 256, 512, 1024], "views": [3, 5, 7, 9, 13, 17], "num_disparities": [46, 91, 181, 362]}
+SMALL: Growth = {"size": [64, 128], "views": [3], "num_disparities": [11, 21]}
 
 
 def sizes(growth: Growth, large: bool) -> dict[str, tuple[int, int]]:
@@ -39,7 +39,7 @@ def cases(folder: Path, growth: Growth, candidates: int, threads: int, variant: 
     with_threads = {**growth, "threads": _powers(threads)} if growth["size"] else {}
     for axis, values in with_threads.items():
         for value in values:
-            at = {"size": _size(growth), "views": _views(growth), "candidates": candidates, "threads": threads}
+            at = {"size": _size(growth), "views": _views(growth), "num_disparities": candidates, "threads": threads}
             if axis == "threads":
                 at["size"] = min(SIZE_FOR_THREADS, max(growth["size"]))
             at[axis] = value
@@ -47,7 +47,7 @@ def cases(folder: Path, growth: Growth, candidates: int, threads: int, variant: 
             found += _both(f"{axis} {value}", path, at, variant)
     if large:
         size, views = LARGE
-        at = {"size": size, "views": views, "candidates": candidates, "threads": threads}
+        at = {"size": size, "views": views, "num_disparities": candidates, "threads": threads}
         found.append(_all_stages("large", f"{views}x{views} views of {size}x{size}", folder, at, variant, once=True))
     return found
 
@@ -69,7 +69,7 @@ def _all_stages(group: str, name: str, folder: Path, at: dict[str, int], variant
 
 def _candidates(at: dict[str, int]) -> dict[str, dict[str, Any]]:
     """Parameters of the stages that sweep."""
-    return {stage: {"candidates": at["candidates"]} for stage in ("initial", "occlusion")}
+    return {stage: {"num_disparities": at["num_disparities"]} for stage in ("initial", "occlusion")}
 
 
 def _size(growth: Growth) -> int:

@@ -27,7 +27,7 @@ def _nothing(_: Any) -> Figures:
 
 @dataclass(frozen=True)
 class Prepared:
-    """A case whose inputs are at hand.
+    """A case whose inputs are available.
 
     Attributes
     ----------
@@ -105,7 +105,9 @@ def measured(case: Case, repeats: int) -> Measurement:
     """
     # forked from a process that has imported what all cases need and done nothing: none inherits another's memory
     context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload(["bench.plan", "sepi.matching.plane_sweep_kernels", "sepi.image.mean_shift", "skimage.segmentation"])
+    context.set_forkserver_preload(
+        ["bench.plan", "sepi.matching.plane_sweep_kernels", "sepi.image.mean_shift", "skimage.segmentation"]
+    )
     receiver, sender = context.Pipe(duplex=False)
     process = context.Process(target=_measure, args=(case, repeats, sender), daemon=True)
     process.start()

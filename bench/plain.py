@@ -72,13 +72,15 @@ def plain_sweep(light_field: LightField, parameters: SweepParameters, warp: Warp
     warp : callable
     """
     views = as_unit_float(light_field.views)
-    centre = light_field.centre
-    noise = residual_variance(centre)
-    weights = _window_weights(centre, parameters.window_radius, parameters.window_sigma**2 + noise)
+    reference_view = light_field.reference_view
+    noise = residual_variance(reference_view)
+    weights = _window_weights(reference_view, parameters.window_radius, parameters.window_sigma**2 + noise)
     lowest = np.full(light_field.shape, np.inf, np.float32)
     best = np.zeros(light_field.shape, np.float32)
-    for disparity in light_field.known_range().candidates(parameters.candidates):
-        total, number = _candidate_cost(light_field, views, centre, float(disparity), parameters.scale**2 + noise, warp)
+    for disparity in light_field.require_disparity_range().candidates(parameters.num_disparities):
+        total, number = _candidate_cost(
+            light_field, views, reference_view, float(disparity), parameters.scale**2 + noise, warp
+        )
         seen = _aggregated(number, weights)
         cost = np.divide(_aggregated(total, weights), seen, out=np.ones_like(total), where=seen > 0)
         better = cost < lowest
@@ -88,11 +90,11 @@ def plain_sweep(light_field: LightField, parameters: SweepParameters, warp: Warp
 
 
 def _candidate_cost(
-    light_field: LightField, views: FloatMap, centre: FloatMap, disparity: float, scale2: float, warp: Warp
+    light_field: LightField, views: FloatMap, reference_view: FloatMap, disparity: float, scale2: float, warp: Warp
 ) -> tuple[FloatMap, FloatMap]:
     """Sum of the robust residuals over the views at one disparity, and how many views see each pixel."""
     H, W = light_field.shape
-    t0, s0 = light_field.reference
+    t0, s0 = light_field.reference_position
     y, x = np.arange(H)[:, None], np.arange(W)[None]
     total, number = np.zeros((2, H, W), np.float32)
     for t, s in np.argwhere(light_field.present):
@@ -100,7 +102,7 @@ def _candidate_cost(
             continue
         down, across = -disparity * (t - t0), -disparity * (s - s0)
         residual = warp(views[t, s], down, across)
-        residual -= centre
+        residual -= reference_view
         squared = np.einsum("yxc,yxc->yx", residual, residual)
         inside = (y + down >= 0) & (y + down <= H - 1) & (x + across >= 0) & (np.floor(x + across) < W - 1)
         total += np.where(inside, squared / (squared + np.float32(scale2)), 0)
@@ -108,12 +110,12 @@ def _candidate_cost(
     return total, number
 
 
-def _window_weights(centre: FloatMap, radius: int, variance: float) -> FloatMap:
+def _window_weights(reference_view: FloatMap, radius: int, variance: float) -> FloatMap:
     """Weights of each pixel's window, (2 r + 1, 2 r + 1, H, W), zero outside the picture."""
     size = 2 * radius + 1
-    weights = np.zeros((size, size, *centre.shape[:2]), np.float32)
-    for i, j, here, there in _window(centre.shape[:2], radius):
-        squared = ((centre[here] - centre[there]) ** 2).sum(axis=2)
+    weights = np.zeros((size, size, *reference_view.shape[:2]), np.float32)
+    for i, j, here, there in _window(reference_view.shape[:2], radius):
+        squared = ((reference_view[here] - reference_view[there]) ** 2).sum(axis=2)
         weights[(i, j, *here)] = np.exp(-0.5 * squared / np.float32(variance))
     return np.asarray(weights / weights.sum(axis=(0, 1)), np.float32)
 
@@ -139,7 +141,7 @@ def _window(shape: tuple[int, ...], radius: int) -> Iterator[tuple[int, int, tup
 def prepare(scene: Path, candidates: int, warp: Warp) -> Prepared:
     """The plain sweep of a scene; says how far its lowest costs are from those of the compiled one."""
     light_field = read_light_field(scene)
-    parameters = SweepParameters(candidates=candidates)
+    parameters = SweepParameters(num_disparities=candidates)
 
     def figures(result: tuple[FloatMap, FloatMap]) -> Figures:
         difference = np.abs(result[1] - sweep(light_field, parameters).cost[0])
@@ -150,7 +152,7 @@ def prepare(scene: Path, candidates: int, warp: Warp) -> Prepared:
 
 def cases(scene: Path, candidates: int, threads: int) -> list[Case]:
     """The plain sweeps, each once: long enough to measure, and nothing in them is compiled at the first call."""
-    known = {"candidates": float(candidates)}
+    known = {"num_disparities": float(candidates)}
     rivals = {"NumPy slices": by_numpy, "SciPy ndimage.shift": by_scipy, "OpenCV warpAffine": by_opencv}
     return [
         Case("beside", name, prepare, (scene, candidates, warp), known, threads=threads, once=True)

@@ -44,16 +44,20 @@ def measure(scene: Scene, settings: dict[str, Any], groups: set[str], small: boo
     SepiError
         If the scene cannot be prepared.
     """
-    threads, candidates, repeats = settings["threads"], settings["candidates"], settings["repeats"]
+    threads, candidates, repeats = settings["threads"], settings["num_disparities"], settings["repeats"]
     variant = variant_named(VARIANT)
-    parameters = stage_parameters(variant, {stage: {"candidates": candidates} for stage in ("initial", "occlusion")})
+    parameters = stage_parameters(
+        variant, {stage: {"num_disparities": candidates} for stage in ("initial", "occlusion")}
+    )
     measured(Case("preparation", "scene", prepare_files, (scene, variant, parameters), threads=threads, once=True), 1)
     light_field = read_light_field(scene.light_field)
     (T, S), (H, W) = light_field.grid, light_field.shape
     settings.update(
         size=f"{W}x{H}", views=f"{T}x{S}", pixels=f"{light_field.views.dtype} x {light_field.views.shape[4]}"
     )
-    steps = stages.cases(scene, variant, parameters, threads, light_field.known_range().source == "estimated")
+    steps = stages.cases(
+        scene, variant, parameters, threads, light_field.require_disparity_range().source == "estimated"
+    )
     cases = []
     if "stages" in groups:
         tiny = (GROWING_SCENE, 64, 3, scene.folder / "tiny.h5")

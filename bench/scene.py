@@ -85,7 +85,7 @@ def prepare_grown(source: Path, growth: dict[str, tuple[int, int]], folder: Path
     def call() -> None:
         whole = read_light_field(source)
         for name, (size, views) in growth.items():
-            t, s = whole.reference[0] - views // 2, whole.reference[1] - views // 2
+            t, s = whole.reference_position[0] - views // 2, whole.reference_position[1] - views // 2
             some = whole.views[t : t + views, s : s + views]
             copies = [-(-size // length) for length in whole.shape]
             some = np.tile(some, (1, 1, *copies, 1))[:, :, :size, :size]

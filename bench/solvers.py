@@ -89,7 +89,7 @@ def prepare(scene: Scene, solver: Solver, exact: Path) -> Prepared:
     parameters = WlsParameters()
     confidence = rectified_confidence(before, parameters)
     weight = data_weight(before.disparity, confidence, parameters)
-    smoothness = smoothness_coefficient(light_field.centre, confidence, parameters)
+    smoothness = smoothness_coefficient(light_field.reference_view, confidence, parameters)
     matrix, right = energy_system(before.disparity, weight, smoothness, parameters.alpha)
     start = before.disparity.astype(np.float64).ravel()
 
@@ -104,7 +104,7 @@ def prepare(scene: Scene, solver: Solver, exact: Path) -> Prepared:
             "mean_difference": float(difference.mean()),
         }
 
-    return Prepared(lambda: solver(matrix, right, start, parameters.accuracy), figures)
+    return Prepared(lambda: solver(matrix, right, start, parameters.rtol), figures)
 
 
 def cases(scene: Scene, threads: int) -> list[Case]:

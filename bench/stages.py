@@ -94,7 +94,7 @@ def command(scene: Scene, threads: int, repeats: int, candidates: int) -> Measur
     output = scene.folder / "depth"
     words = ["-m", "sepi", "depth", str(scene.source), "--output", str(output), "--threads", str(threads)]
     words += ["--variant", VARIANT]
-    words += [f"--set={name}.candidates={candidates}" for name in ("initial.sepi", "occlusion.half_sepi")]
+    words += [f"--set={name}.num_disparities={candidates}" for name in ("initial.sepi", "occlusion.half_sepi")]
     return measured_command("whole", "sepi depth, files to maps", words, repeats)
 
 
@@ -106,9 +106,9 @@ def job(tiny: Path, output: Path, repeats: int) -> Measurement:
 
 def _scores(light_field: LightField, maps: StageMaps) -> Figures:
     """Scores of the whole map where there is ground truth: a stage made faster must not be made worse."""
-    if light_field.truth is None:
+    if light_field.ground_truth is None:
         return {}
-    scores = score(maps.disparity, light_field.truth)
+    scores = score(maps.disparity, light_field.ground_truth)
     return {key: float(scores[key]) for key in ("mse100", "q25", "badpix007")}
 
 
@@ -119,15 +119,15 @@ def _operations(light_field: LightField, name: str, choice: str, settings: Any, 
         pixels, groups = float(H * W), 1
     elif (name, choice) == ("occlusion", "half_sepi"):
         pixels = float(maps.extra["occlusion_candidates"].sum())
-        numbers = halves_and_quarters(light_field.grid, light_field.reference).groups
+        numbers = halves_and_quarters(light_field.grid, light_field.reference_position).groups
         # the reference view's own group is empty
-        groups = len(set(numbers.ravel().tolist()) - {int(numbers[light_field.reference])})
+        groups = len(set(numbers.ravel().tolist()) - {int(numbers[light_field.reference_position])})
     else:
         return {}
-    samples = pixels * (light_field.present.sum() - 1) * settings.candidates
+    samples = pixels * (light_field.present.sum() - 1) * settings.num_disparities
     window = (2 * settings.window_radius + 1) ** 2
     return {
         "samples": float(samples),
         "channels": float(light_field.views.shape[-1]),
-        WINDOW_OPERATIONS: pixels * settings.candidates * groups * window,
+        WINDOW_OPERATIONS: pixels * settings.num_disparities * groups * window,
     }

@@ -11,7 +11,7 @@ from sepi.report.tabular.layout import Cell, Section, Table
 
 Measurements = Mapping[str, Measurement]
 
-AXES = {"size": 2, "views": 2, "candidates": 1, "threads": -1}
+AXES = {"size": 2, "views": 2, "num_disparities": 1, "threads": -1}
 """What grows, and the power of it that time grows with if it is linear in pixels, views, candidates and work."""
 
 
@@ -97,10 +97,10 @@ def beside(result: Result) -> Table:
     rivals, own = result.group("beside"), result.group("stages").get("initial")
     if own is None or not rivals:
         return Table((), [])
-    per_candidate = own.median / result.settings["candidates"]
+    per_candidate = own.median / result.settings["num_disparities"]
     rows: list[list[Cell]] = [["sepi", _figure(per_candidate), "1", _whole(own.peak_memory_mb), None, None]]
     for name, m in rivals.items():
-        seconds = m.median / m.figures["candidates"]
+        seconds = m.median / m.figures["num_disparities"]
         differences = [f"{m.figures[key]:.0e}" for key in ("mean_difference", "largest_difference")]
         rows.append([name, _figure(seconds), _figure(seconds / per_candidate), _whole(m.peak_memory_mb), *differences])
     columns = ("", "s per candidate", "times sepi's", "peak memory MB", "mean difference of the cost", "largest")
@@ -155,7 +155,7 @@ def differences(before: Result, after: Result) -> list[str]:
 
 def _samples(measurement: Measurement) -> float:
     at = measurement.figures
-    return at["size"] ** 2 * at["views"] ** 2 * at["candidates"]
+    return at["size"] ** 2 * at["views"] ** 2 * at["num_disparities"]
 
 
 def _figure(value: float) -> str:

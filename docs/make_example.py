@@ -18,14 +18,14 @@ SIZE = 256
 def panels() -> list[Panel]:
     """Centre view, ground truth, estimate and signed error of the example scene."""
     light_field = render(SCENE, size=SIZE)
-    assert light_field.truth is not None
+    assert light_field.ground_truth is not None
     disparity = estimate_depth(light_field).disparity
     limits = disparity_limits(light_field)
     return [
         Panel("centre", "centre view", centre_picture(light_field)),
-        Panel("truth", "true disparity", map_picture(light_field.truth, limits)),
+        Panel("ground_truth", "true disparity", map_picture(light_field.ground_truth, limits)),
         Panel("disparity", "estimated disparity", map_picture(disparity, limits)),
-        Panel("error", "error, ±0.2 px", error_picture(disparity - light_field.truth)),
+        Panel("error", "error, ±0.2 px", error_picture(disparity - light_field.ground_truth)),
     ]
 
 

@@ -1,4 +1,4 @@
-# Texture-less regions (paper, section IV-C, Eq. 6-7): superpixels filled from their reliable edges, or none, which is no job.
+# Textureless regions (paper, section IV-C, Eq. 6-7): superpixels filled from their reliable edges, or none, which is no job.
 rule textureless:
     input:
         light_field="results/{dataset}/{scene}/lightfield.h5",
@@ -19,7 +19,7 @@ rule textureless:
         parameters=parameters_of("textureless"),
         code=code_digest("sepi.textureless"),
     message:
-        "{wildcards.dataset}/{wildcards.scene}: texture-less regions ({wildcards.initial}, {wildcards.occlusion}, {wildcards.textureless})"
+        "{wildcards.dataset}/{wildcards.scene}: textureless regions ({wildcards.initial}, {wildcards.occlusion}, {wildcards.textureless})"
     shell:
         "python -m sepi.textureless --light-field {input.light_field:q} --previous {input.previous:q} "
         "--choice {wildcards.textureless} --parameters {params.parameters:q} --threads {threads} "

@@ -39,12 +39,12 @@ REGIONS: tuple[str, ...] = (WHOLE_MAP, "occluded", "textureless")
 """Regions that are scored."""
 
 
-def score(estimate: FloatMap, truth: FloatMap, border: int = 0, region: BoolMap | None = None) -> Scores:
+def score(estimate: FloatMap, ground_truth: FloatMap, border: int = 0, region: BoolMap | None = None) -> Scores:
     """Scores of a disparity map.
 
     Parameters
     ----------
-    estimate, truth : ndarray, shape (H, W), float32
+    estimate, ground_truth : ndarray, shape (H, W), float32
         Disparity in pixels per view step.
     border : int
         Pixels left out on each side: 0 for the paper's protocol, 15 for the benchmark's.
@@ -64,14 +64,14 @@ def score(estimate: FloatMap, truth: FloatMap, border: int = 0, region: BoolMap 
     SepiError
         If shapes differ.
     """
-    _require_shape("truth", truth, estimate)
-    chosen = np.isfinite(truth)
+    _require_shape("ground_truth", ground_truth, estimate)
+    chosen = np.isfinite(ground_truth)
     if region is not None:
         _require_shape("region", region, estimate)
         chosen = chosen & region
     inside = np.s_[border : -border or None, border : -border or None]
     chosen = chosen[inside]
-    error = np.abs(estimate[inside][chosen].astype(np.float64) - truth[inside][chosen])
+    error = np.abs(estimate[inside][chosen].astype(np.float64) - ground_truth[inside][chosen])
     finite = np.isfinite(error)
     scores: Scores = {"mse100": 100 * _mean(error[finite] ** 2), "q25": _quarter(100 * error)}
     # written so that NaN is bad
@@ -86,7 +86,8 @@ def evaluate(light_field: LightField, disparity: FloatMap) -> dict[str, dict[str
     Parameters
     ----------
     light_field : LightField
-        Its own masks ``occluded`` and ``textureless`` are used where it has them, else those of ``sepi.scoring.regions``.
+        Its own masks ``occluded`` and ``textureless`` are used where it has them, else those of
+        ``sepi.scoring.regions``.
     disparity : ndarray, shape (H, W), float32
         Pixels per view step.
 
@@ -123,17 +124,19 @@ def evaluations_of(light_field: LightField, maps: Mapping[str, FloatMap]) -> dic
                 f"{light_field.name}: a disparity map must have the views' shape {light_field.shape}, "
                 f"got {disparity.shape}"
             )
-    if light_field.truth is None or not maps:
+    if light_field.ground_truth is None or not maps:
         return {name: Evaluation() for name in maps}
     masks = region_masks(light_field)
     sources = {name: "scene" if name in light_field.masks else "computed" for name in masks}
     return {
         name: Evaluation(
             scores={
-                protocol: {region: score(disparity, light_field.truth, border, masks.get(region)) for region in REGIONS}
+                protocol: {
+                    region: score(disparity, light_field.ground_truth, border, masks.get(region)) for region in REGIONS
+                }
                 for protocol, border in PROTOCOLS.items()
             },
-            error=_error(disparity, light_field.truth),
+            error=_error(disparity, light_field.ground_truth),
             regions=masks,
             region_sources=sources,
         )
@@ -178,7 +181,7 @@ def score_maps(
 
 def region_masks(light_field: LightField) -> dict[str, BoolMap]:
     """The masks ``occluded`` and ``textureless``, (H, W) bool: the scene's own, else computed from its ground truth."""
-    if light_field.truth is None:
+    if light_field.ground_truth is None:
         raise SepiError(f"{light_field.name}: regions for evaluation need ground truth, and this scene has none")
     names = ("occluded", "textureless")
     masks = dict(light_field.masks)
@@ -187,25 +190,25 @@ def region_masks(light_field: LightField) -> dict[str, BoolMap]:
 
         if "occluded" not in masks:
             masks["occluded"] = regions.occluded(
-                light_field.truth, light_field.grid, light_field.reference, light_field.present
+                light_field.ground_truth, light_field.grid, light_field.reference_position, light_field.present
             )
         if "textureless" not in masks:
-            masks["textureless"] = regions.textureless(light_field.centre)
+            masks["textureless"] = regions.textureless(light_field.reference_view)
     return {name: masks[name] for name in names}
 
 
-def _error(disparity: FloatMap, truth: FloatMap) -> FloatMap:
-    """Estimate minus truth; NaN where either is unknown."""
-    known = np.isfinite(truth) & np.isfinite(disparity)
-    return np.subtract(disparity, truth, out=np.full(truth.shape, np.nan, np.float32), where=known)
+def _error(disparity: FloatMap, ground_truth: FloatMap) -> FloatMap:
+    """Estimate minus ground truth; NaN where either is unknown."""
+    known = np.isfinite(ground_truth) & np.isfinite(disparity)
+    return np.subtract(disparity, ground_truth, out=np.full(ground_truth.shape, np.nan, np.float32), where=known)
 
 
 def _digest_of_scene(light_field: LightField, code: str) -> str:
     """Digest of what decides the scores beside the map: code, ground truth, masks, and what masks are computed from."""
-    grid = (light_field.grid, light_field.reference)
+    grid = (light_field.grid, light_field.reference_position)
     facts = [code, _versions(), grid, list(light_field.masks), list(REGIONS), PROTOCOLS, BAD_PIXEL]
     arrays: list[npt.NDArray[Any]] = [light_field.present, *light_field.masks.values()]
-    arrays += [] if light_field.truth is None else [light_field.truth, light_field.centre]
+    arrays += [] if light_field.ground_truth is None else [light_field.ground_truth, light_field.reference_view]
     return _digest(repr(facts), *arrays)
 
 
@@ -261,7 +264,7 @@ def command(
     if kept is not None:
         with atomic_path(kept) as temporary:
             shutil.copyfile(output, temporary)
-    if light_field.truth is None:
+    if light_field.ground_truth is None:
         click.echo(f"{light_field.name}: no ground truth, no scores", err=True)
     else:
         click.echo(f"{light_field.name}: {len(anew)} of {len(maps)} maps scored anew: {', '.join(anew)}", err=True)

@@ -19,7 +19,7 @@ from sepi.command import SepiCommand
 from sepi.errors import SepiError, SepiWarning
 from sepi.evaluate import evaluations_of
 from sepi.io.disparity_maps import map_file, read_disparity
-from sepi.io.external_maps import Imported, write_imported
+from sepi.io.external_maps import ExternalMap, write_imported
 from sepi.io.hdf5 import read_light_field
 from sepi.lightfield import LightField
 
@@ -29,7 +29,9 @@ NO_VALUE = "no finite value"
 
 
 class MapFile(BaseModel):
-    """A file with a disparity map, and what its values mean: the arguments of :func:`sepi.io.disparity_maps.read_disparity`."""
+    """A file with a disparity map, and what its values mean: the arguments of
+    :func:`sepi.io.disparity_maps.read_disparity`.
+    """
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
@@ -41,7 +43,7 @@ class MapFile(BaseModel):
 _MAP_FILES = TypeAdapter(dict[str, MapFile])
 
 
-def import_maps(light_field: LightField, files: Mapping[str, MapFile], scene: str = "") -> dict[str, Imported]:
+def import_maps(light_field: LightField, files: Mapping[str, MapFile], scene: str = "") -> dict[str, ExternalMap]:
     """Read and score the maps that other methods made of a light field.
 
     What is wrong with a map is told by a :class:`SepiWarning` that names method, scene, file and reason. Values that
@@ -70,7 +72,7 @@ def import_maps(light_field: LightField, files: Mapping[str, MapFile], scene: st
     return found
 
 
-def _read(light_field: LightField, scene: str, method: str, file: MapFile) -> Imported:
+def _read(light_field: LightField, scene: str, method: str, file: MapFile) -> ExternalMap:
     """The map of a method or its problem, without scores."""
     path = Path(file.path)
     digest = ""
@@ -78,9 +80,9 @@ def _read(light_field: LightField, scene: str, method: str, file: MapFile) -> Im
     def tell(reason: str) -> None:
         warnings.warn(f"external {method}, scene {scene}: {reason}", SepiWarning, stacklevel=3)
 
-    def without_map(problem: str, reason: str) -> Imported:
+    def without_map(problem: str, reason: str) -> ExternalMap:
         tell(reason)
-        return Imported(str(path), problem, digest)
+        return ExternalMap(str(path), problem, digest)
 
     try:
         path = map_file(path)
@@ -101,7 +103,7 @@ def _read(light_field: LightField, scene: str, method: str, file: MapFile) -> Im
         return without_map(NO_VALUE, f"{path}: none of its values is finite")
     if unknown:
         tell(f"{path}: {unknown} of {disparity.size} values are not finite; they count as bad pixels")
-    return Imported(str(path), "", digest, disparity)
+    return ExternalMap(str(path), "", digest, disparity)
 
 
 def _map_files(text: str) -> dict[str, MapFile]:

@@ -4,10 +4,11 @@
 variance (Eq. 3-4), and its distinctness as confidence (Eq. 5). The line meets one sample of each view, so this is a
 plane sweep (:mod:`sepi.matching.plane_sweep`); the construction itself is in :mod:`sepi.matching.stitched_epi`.
 
-``semi_global`` compares colours and fine detail (:mod:`sepi.matching.base_detail`) over all views, and smooths the costs
-semi-globally (:mod:`sepi.matching.semi_global`); ``semi_global_colours`` does so without the detail.
+``semi_global`` compares colours and fine detail (:mod:`sepi.matching.base_detail`) over all views, and smooths the
+costs semi-globally (:mod:`sepi.matching.semi_global`); ``semi_global_colours`` does so without the detail.
 
-``structure_tensor`` is the initial depth that the paper's ablation puts in its place (:mod:`sepi.matching.structure_tensor`).
+``structure_tensor`` is the initial depth that the paper's ablation puts in its place
+(:mod:`sepi.matching.structure_tensor`).
 
 References
 ----------
@@ -23,7 +24,7 @@ from sepi.matching.structure_tensor import StructureTensorParameters, structure_
 from sepi.matching.visibility_sweep import (
     AllViewsColoursParameters,
     AllViewsParameters,
-    LayeredSweepParameters,
+    VisibilitySweepParameters,
     depth_from_all_views,
 )
 from sepi.stage import Choice, Progress, StageMaps
@@ -58,7 +59,7 @@ def sepi(
 
 
 def semi_global(
-    light_field: LightField, previous: StageMaps | None, parameters: LayeredSweepParameters, progress: Progress
+    light_field: LightField, previous: StageMaps | None, parameters: VisibilitySweepParameters, progress: Progress
 ) -> StageMaps:
     """Depth from the two layers of all views, smoothed semi-globally; arguments and result as for ``sepi``."""
     result = depth_from_all_views(light_field, parameters, progress)

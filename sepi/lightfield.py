@@ -78,7 +78,7 @@ class LightField:
         Which views exist; the reference view must. All, unless given.
     disparity_range : DisparityRange or None
         None where nothing is known (it can be estimated from the views).
-    truth : ndarray, shape (H, W), float32, or None
+    ground_truth : ndarray, shape (H, W), float32, or None
         Ground-truth disparity of the reference view, for evaluation only.
     masks : mapping of str to ndarray, shape (H, W), bool
         Named regions for evaluation (``"occluded"``, ``"textureless"``, ...).
@@ -101,7 +101,7 @@ class LightField:
     source: str = ""
     present: BoolMap = field(default=None)  # type: ignore[arg-type]
     disparity_range: DisparityRange | None = None
-    truth: FloatMap | None = None
+    ground_truth: FloatMap | None = None
     masks: Mapping[str, BoolMap] = field(default_factory=dict)
     view: tuple[int, int] | None = None
     camera: Camera | None = None
@@ -128,34 +128,36 @@ class LightField:
             object.__setattr__(self, "present", np.ones(v.shape[:2], bool))
         if self.present.shape != v.shape[:2] or self.present.dtype != bool:
             raise SepiError(f"{self.name}: present must be bool of shape {v.shape[:2]}, got {self.present.shape}")
-        t, s = self.reference
+        t, s = self.reference_position
         if not (0 <= t < v.shape[0] and 0 <= s < v.shape[1]):
             raise SepiError(
                 f"{self.name}: view {t},{s} lies outside the grid; rows go from 0 to {v.shape[0] - 1}, "
                 f"columns from 0 to {v.shape[1] - 1}"
             )
-        which = "centre view" if self.reference == (v.shape[0] // 2, v.shape[1] // 2) else "view"
-        if not self.present[self.reference]:
-            raise SepiError(f"{self.name}: the {which} (t, s) = {self.reference} is missing; depth is made for it")
+        which = "centre view" if self.reference_position == (v.shape[0] // 2, v.shape[1] // 2) else "view"
+        if not self.present[self.reference_position]:
+            raise SepiError(
+                f"{self.name}: the {which} (t, s) = {self.reference_position} is missing; depth is made for it"
+            )
         if self.present.sum() < 2:
             raise SepiError(f"{self.name}: depth needs at least two views, only the {which} {t},{s} is present")
         if v.dtype == np.float32:
             _require_unit(self.name, v[self.present])
-        for what, array in {"truth": self.truth, **self.masks}.items():
+        for what, array in {"ground_truth": self.ground_truth, **self.masks}.items():
             if array is not None and array.shape != self.shape:
                 raise SepiError(
                     f"{self.name}: {what} must have the views' shape (H, W) = {self.shape}, got {array.shape}"
                 )
 
     @property
-    def reference(self) -> tuple[int, int]:
+    def reference_position(self) -> tuple[int, int]:
         """Grid position ``(t0, s0)`` of the reference view."""
         return self.view or (self.views.shape[0] // 2, self.views.shape[1] // 2)
 
     @property
     def from_centre(self) -> tuple[int, int]:
         """Rows below and columns to the right of the grid's centre view at which the reference view stands."""
-        (t, s), (rows, columns) = self.reference, self.grid
+        (t, s), (rows, columns) = self.reference_position, self.grid
         return t - rows // 2, s - columns // 2
 
     @property
@@ -169,11 +171,11 @@ class LightField:
         return self.views.shape[0], self.views.shape[1]
 
     @property
-    def centre(self) -> FloatMap:
+    def reference_view(self) -> FloatMap:
         """The reference view as ``(H, W, C)`` float32 in 0..1."""
-        return as_unit_float(self.views[self.reference])
+        return as_unit_float(self.views[self.reference_position])
 
-    def known_range(self) -> DisparityRange:
+    def require_disparity_range(self) -> DisparityRange:
         """The disparity range.
 
         Raises
@@ -197,9 +199,9 @@ class LightField:
         SepiError
             If there is no such view.
         """
-        if view == self.reference:
+        if view == self.reference_position:
             return self
-        return replace(self, view=view, truth=None, masks={})
+        return replace(self, view=view, ground_truth=None, masks={})
 
 
 def _require_unit(name: str, values: npt.NDArray[np.generic]) -> None:

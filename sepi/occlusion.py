@@ -14,8 +14,9 @@ crosses the occluder. ``half_sepi`` repeats the slope computation with the views
 orientation, and the half with the smaller cost is kept. ``none`` hands the initial depth on.
 
 ``visibility`` chooses the views one by one: those in which nothing of the map so far covers the pixel
-(:mod:`sepi.matching.visibility_sweep`); pixels that a depth step runs through then go to the surface that fills most of them
-(:mod:`sepi.image.mixed_pixels`). ``visibility_unmixed`` leaves the last step out, ``visibility_colours`` the detail layer.
+(:mod:`sepi.matching.visibility_sweep`); pixels that a depth discontinuity runs through then go to the surface that
+fills most of them (:mod:`sepi.image.mixed_pixels`). ``visibility_unmixed`` leaves the last step out,
+``visibility_colours`` the detail.
 
 References
 ----------
@@ -42,13 +43,13 @@ from sepi.matching.visibility_sweep import (
     VisibilityParameters,
     depth_from_visible_views,
 )
-from sepi.stage import Choice, NoParameters, Progress, StageMaps, given
+from sepi.stage import Choice, NoParameters, Progress, StageMaps, require_previous
 
 
 class OcclusionParameters(SweepParameters, CannyParameters):
     """What both occlusion models need: candidates, and when a half replaces the full SEPI."""
 
-    depth_step: float = Field(
+    discontinuity_threshold: float = Field(
         0.3, gt=0, description="step of the initial depth that makes a candidate, pixels per view step"
     )
     candidate_reach: int = Field(
@@ -102,14 +103,14 @@ def half_sepi(
     """
     from sepi.image.mean_shift import patch_modes
 
-    before = given(previous)
-    candidates = occlusion_candidates(light_field.centre, before.disparity, parameters)
-    views = halves_and_quarters(light_field.grid, light_field.reference)
+    before = require_previous(previous)
+    candidates = occlusion_candidates(light_field.reference_view, before.disparity, parameters)
+    views = halves_and_quarters(light_field.grid, light_field.reference_position)
     result = sweep(
-        light_field, parameters, groups=views.groups, subsets=views.subsets, wanted=candidates, progress=progress
+        light_field, parameters, groups=views.groups, subsets=views.subsets, mask=candidates, progress=progress
     )
     surface = patch_modes(
-        light_field.centre,
+        light_field.reference_view,
         before.disparity,
         cv2.dilate(candidates.astype(np.uint8), _box(parameters.side_reach)) > 0,
         radius=parameters.patch_radius,
@@ -122,7 +123,7 @@ def half_sepi(
         nearer = nearer_on_hidden_side(surface, result.disparity[n], sides, parameters.side_reach, parameters.side_step)
         cost[n] += parameters.gain_half if len(sides) == 1 else parameters.gain_quarter
         cost[n] += np.where(nearer, 0, parameters.gain_unconfirmed).astype(np.float32)
-    return refined(before, result, cost, candidates, parameters.min_change)
+    return replace_where_better(before, result, cost, candidates, parameters.min_change)
 
 
 def wang(
@@ -132,20 +133,20 @@ def wang(
 
     Arguments and result as for ``half_sepi``; ``occlusion_side`` is the half plane's number, 0 where all views count.
     """
-    before = given(previous)
-    candidates = occlusion_candidates(light_field.centre, before.disparity, parameters)
-    views = half_planes(light_field.grid, parameters.directions, light_field.reference)
+    before = require_previous(previous)
+    candidates = occlusion_candidates(light_field.reference_view, before.disparity, parameters)
+    views = half_planes(light_field.grid, parameters.directions, light_field.reference_position)
     result = sweep(
-        light_field, parameters, groups=views.groups, subsets=views.subsets, wanted=candidates, progress=progress
+        light_field, parameters, groups=views.groups, subsets=views.subsets, mask=candidates, progress=progress
     )
     # the two halves beside the edge have the edge's normal, and its reverse, as their middle
-    normal = edge_angle(light_field.centre, parameters)
+    normal = edge_angle(light_field.reference_view, parameters)
     first = np.floor(normal / np.pi * parameters.directions).astype(np.int64) % (2 * parameters.directions)
     number = np.arange(2 * parameters.directions)[:, None, None]
     beside = (number - first[None]) % parameters.directions == 0
     cost = result.cost.copy()
     cost[1:] = np.where(beside, cost[1:] + parameters.gain_half, np.inf)
-    return refined(before, result, cost, candidates, parameters.min_change)
+    return replace_where_better(before, result, cost, candidates, parameters.min_change)
 
 
 def visibility(
@@ -160,15 +161,18 @@ def visibility(
     StageMaps
         Adds ``occluded``, bool: pixels that something nearer covers in some view.
     """
-    from sepi.matching.visibility_kernels import covered_somewhere
+    from sepi.matching.visibility_kernels import occluded_in_any_view
 
-    before = given(previous)
+    before = require_previous(previous)
     result = depth_from_visible_views(light_field, before.disparity, parameters, progress)
     return before.updated(
         result.disparity,
         result.confidence,
-        occluded=covered_somewhere(
-            result.disparity, light_field.present, *light_field.reference, np.float32(parameters.cover)
+        occluded=occluded_in_any_view(
+            result.disparity,
+            light_field.present,
+            *light_field.reference_position,
+            np.float32(parameters.occlusion_margin),
         ),
     )
 
@@ -177,12 +181,12 @@ def none(
     light_field: LightField, previous: StageMaps | None, parameters: NoParameters, progress: Progress
 ) -> StageMaps:
     """Initial depth as it is."""
-    return given(previous)
+    return require_previous(previous)
 
 
-def occlusion_candidates(centre: FloatMap, disparity: FloatMap, parameters: OcclusionParameters) -> BoolMap:
+def occlusion_candidates(reference_view: FloatMap, disparity: FloatMap, parameters: OcclusionParameters) -> BoolMap:
     """Pixels within reach of an edge of the reference view or of a step of the depth map; shape (H, W), bool."""
-    edges = canny_edges(centre, parameters) | depth_steps(disparity, parameters.depth_step)
+    edges = canny_edges(reference_view, parameters) | depth_steps(disparity, parameters.discontinuity_threshold)
     return np.asarray(cv2.dilate(edges.astype(np.uint8), _box(parameters.candidate_reach)) > 0)
 
 
@@ -221,7 +225,7 @@ def nearer_on_hidden_side(surface: FloatMap, disparity: FloatMap, sides: list[st
     return nearest > disparity + step
 
 
-def refined(
+def replace_where_better(
     before: StageMaps, result: SweepResult, cost: npt.NDArray[np.float32], candidates: BoolMap, min_change: float
 ) -> StageMaps:
     """Initial maps with the depth and confidence of the subset of least cost where that is not all views.

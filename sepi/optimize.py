@@ -1,13 +1,13 @@
 """Global optimisation (section IV-D, Eq. 8-12 of [1]_).
 
 ``wls`` minimises the weighted least squares energy of Eq. 8: fidelity to the refined depth where it deserves it (Eq.
-9-10: the confidences of occluded, texture-less and other pixels, little where the depth changes abruptly), and
+9-10: the confidences of occluded, textureless and other pixels, little where the depth changes abruptly), and
 smoothness on the 4-connected grid where the image is smooth (Eq. 11) and the depth uncertain (Eq. 12).
 
-``second_order`` goes back to the views instead: Gauss-Newton steps on their residuals (:mod:`sepi.matching.gauss_newton`) bring
-the depth below the candidate step, and second-order smoothing (:mod:`sepi.regularization.second_order`), which leaves planes free,
-weighs each pixel by how much the views know about it. ``gauss_newton`` leaves out the smoothing,
-``second_order_colours`` the detail layer. ``none`` hands the depth on.
+``second_order`` goes back to the views instead: Gauss-Newton steps on their residuals
+(:mod:`sepi.matching.gauss_newton`) bring the depth below the candidate step, and second-order smoothing
+(:mod:`sepi.regularization.second_order`), which leaves planes free, weighs each pixel by how much the views know about
+it. ``gauss_newton`` leaves out the smoothing, ``second_order_colours`` the detail layer. ``none`` hands the depth on.
 
 References
 ----------
@@ -26,8 +26,17 @@ from pydantic import Field, model_validator
 
 from sepi.command import stage_command
 from sepi.lightfield import FloatMap, LightField
-from sepi.matching.base_detail import COLOURS_ALONE_SCALE, LayerParameters, Layers, split_layers
-from sepi.stage import Choice, NoParameters, Parameters, Progress, StageMaps, given, relative_confidence, with_defaults
+from sepi.matching.base_detail import COLOURS_ALONE_SCALE, BaseDetail, BaseDetailParameters, base_detail_decomposition
+from sepi.stage import (
+    Choice,
+    NoParameters,
+    Parameters,
+    Progress,
+    StageMaps,
+    relative_confidence,
+    require_previous,
+    with_defaults,
+)
 
 if TYPE_CHECKING:
     import scipy.sparse as sparse
@@ -67,28 +76,28 @@ class WlsParameters(Parameters):
     tau_1: float = Field(
         0.2, ge=0, description="standard deviation of the depth in 3x3 pixels that marks a step, px per step"
     )
-    step_weight: float = Field(
+    discontinuity_weight: float = Field(
         0.1, gt=0, le=1, description="share of its weight that the data keeps at a step, where Eq. 9 would leave none"
     )
     tau_2: float = Field(1.5, ge=0, description="how strongly confidence weakens smoothness")
-    textureless_confidence: float = Field(0.8, ge=0, le=1, description="c_tl, confidence of texture-less regions")
+    textureless_confidence: float = Field(0.8, ge=0, le=1, description="c_tl, confidence of textureless regions")
     confidence_power: float = Field(4.0, gt=0, le=10, description="exponent on the confidence as data weight")
-    accuracy: float = Field(
+    rtol: float = Field(
         1e-12, gt=0, lt=1, description="relative residual at which the solver stops; pixels of low weight need it small"
     )
 
 
-class SecondOrderParameters(LayerParameters):
+class SecondOrderParameters(BaseDetailParameters):
     """Parameters of Gauss-Newton refinement and second-order smoothing."""
 
     refinements: int = Field(0, ge=0, le=20, description="Gauss-Newton steps before the first smoothing")
     refinement_radius: int = Field(3, ge=0, le=20, description="window of these steps, 2 r + 1 pixels")
     solves: int = Field(2, ge=0, le=10, description="rounds of one Gauss-Newton step and one smoothing")
     solve_radius: int = Field(2, ge=0, le=20, description="window of the steps of these rounds, 2 r + 1 pixels")
-    longest_step: float = Field(0.05, gt=0, description="longest Gauss-Newton step, pixels per view step")
-    cover: float = Field(0.15, ge=0, description="by how much a cover must be nearer, pixels per view step")
+    max_update: float = Field(0.05, gt=0, description="longest Gauss-Newton step, pixels per view step")
+    occlusion_margin: float = Field(0.15, ge=0, description="by how much a cover must be nearer, pixels per view step")
     strength: float = Field(5.0, ge=0, description="weight of the smoothness; the best-known tenth of pixels weighs 1")
-    bend: float = Field(
+    second_difference_threshold: float = Field(
         0.05, gt=0, description="second difference of the depth that marks a step, pixels per view step"
     )
     smooth_colour: float = Field(
@@ -97,8 +106,8 @@ class SecondOrderParameters(LayerParameters):
     reliable_confidence: float = Field(
         0.5, gt=0, le=1, description="confidence within two pixels from which bends in the data are believed"
     )
-    solve_accuracy: float = Field(3e-4, gt=0, lt=1, description="relative residual at which the solver stops")
-    most_steps: int = Field(200, ge=1, description="steps after which the solver stops anyway")
+    rtol: float = Field(3e-4, gt=0, lt=1, description="relative residual at which the solver stops")
+    max_iterations: int = Field(200, ge=1, description="steps after which the solver stops anyway")
 
     @model_validator(mode="after")
     def _does_something(self) -> Self:
@@ -128,7 +137,7 @@ def wls(
     ----------
     light_field : LightField
     previous : StageMaps
-        Depth after the texture-less stage, with the map ``textureless`` where that stage ran.
+        Depth after the textureless stage, with the map ``textureless`` where that stage ran.
     parameters : WlsParameters
     progress : callable
 
@@ -137,13 +146,13 @@ def wls(
     StageMaps
         ``confidence`` is the rectified confidence c' of Eq. 10.
     """
-    before = given(previous)
+    before = require_previous(previous)
     confidence = rectified_confidence(before, parameters)
     weight = data_weight(before.disparity, confidence, parameters)
-    smoothness = smoothness_coefficient(light_field.centre, confidence, parameters)
+    smoothness = smoothness_coefficient(light_field.reference_view, confidence, parameters)
     progress(0.1)
     matrix, right = energy_system(before.disparity, weight, smoothness, parameters.alpha)
-    disparity = solve(matrix, right, before.disparity, parameters.accuracy)
+    disparity = solve(matrix, right, before.disparity, parameters.rtol)
     return before.updated(disparity.astype(np.float32), confidence)
 
 
@@ -159,12 +168,12 @@ def second_order(
     StageMaps
         ``confidence`` is that of :func:`smooth_confidence`.
     """
-    from sepi.matching.gauss_newton import information, prepared, view_mean, windowed_step
+    from sepi.matching.gauss_newton import gradient_and_hessian, spline_views, view_mean, windowed_step
     from sepi.matching.visibility_kernels import z_buffers
 
-    before = given(previous)
-    layers = split_layers(light_field, parameters)
-    matching = prepared(light_field, layers, parameters)
+    before = require_previous(previous)
+    layers = base_detail_decomposition(light_field, parameters)
+    matching = spline_views(light_field, layers, parameters)
     disparity = before.disparity
     uniform = before.mask("textureless")
     reliability = np.where(uniform, 1, reliable(before.confidence, parameters)).astype(np.float32)
@@ -175,16 +184,16 @@ def second_order(
         nearest = z_buffers(disparity, matching.present, *matching.place)
         if i <= parameters.refinements:
             # later steps are too small to change it
-            mean = view_mean(matching, disparity, nearest, parameters.cover)
-        gradient, curvature = information(matching, mean, disparity, nearest, parameters.cover)
+            mean = view_mean(matching, disparity, nearest, parameters.occlusion_margin)
+        gradient, curvature = gradient_and_hessian(matching, mean, disparity, nearest, parameters.occlusion_margin)
         radius = parameters.solve_radius if smooth else parameters.refinement_radius
-        step, curvature = windowed_step(gradient, curvature, radius, parameters.longest_step)
+        step, curvature = windowed_step(gradient, curvature, radius, parameters.max_update)
         # where no view knows anything, a step would follow the noise
         target = disparity + np.where(uniform, np.float32(0), step)
         if smooth:
             weight = np.minimum(curvature / max(float(np.percentile(curvature, 90)), 1e-9), 1) * reliability
             weight = np.where(uniform, np.float32(UNIFORM_WEIGHT), weight)
-            target = smoothed(target, disparity, weight, reliability, layers, parameters)
+            target = smooth_second_order(target, disparity, weight, reliability, layers, parameters)
         disparity = target
     return before.updated(disparity, smooth_confidence(disparity, curvature))
 
@@ -215,33 +224,33 @@ def reliable(confidence: FloatMap, parameters: SecondOrderParameters) -> FloatMa
     return np.asarray(np.clip((best / parameters.reliable_confidence) ** 2, LEAST_RELIABILITY, 1), np.float32)
 
 
-def smoothed(
+def smooth_second_order(
     target: FloatMap,
     shape: FloatMap,
     weight: FloatMap,
     reliability: FloatMap,
-    layers: Layers,
+    layers: BaseDetail,
     parameters: SecondOrderParameters,
 ) -> FloatMap:
     """Second-order smoothing of ``target``, whose bends are looked for in ``shape``; all shapes (H, W)."""
-    from sepi.regularization.second_order import bend_matrix, bend_weights, solve_smooth
+    from sepi.regularization.second_order import second_difference_matrix, smoothness_weights, solve_smooth
 
     variance = parameters.smooth_colour**2 + 4 * layers.noise
-    weights = bend_weights(shape, layers.guide, reliability, parameters.bend, variance)
+    weights = smoothness_weights(shape, layers.guide, reliability, parameters.second_difference_threshold, variance)
     weights = [parameters.strength * w + LEAST_SMOOTHNESS for w in weights]
-    matrix = bend_matrix(weights, target.shape)
-    return solve_smooth(matrix, weight, target, parameters.solve_accuracy, parameters.most_steps)
+    matrix = second_difference_matrix(weights, target.shape)
+    return solve_smooth(matrix, weight, target, parameters.rtol, parameters.max_iterations)
 
 
 def none(
     light_field: LightField, previous: StageMaps | None, parameters: NoParameters, progress: Progress
 ) -> StageMaps:
-    """Depth after the texture-less stage as it is."""
-    return given(previous)
+    """Depth after the textureless stage as it is."""
+    return require_previous(previous)
 
 
 def rectified_confidence(before: StageMaps, parameters: WlsParameters) -> FloatMap:
-    """C' of Eq. 10: of texture-less pixels a constant, else the stage's own (half-SEPI confidence where occluded)."""
+    """C' of Eq. 10: of textureless pixels a constant, else the stage's own (half-SEPI confidence where occluded)."""
     own = relative_confidence(before.confidence)
     return np.where(before.mask("textureless"), parameters.textureless_confidence, own).astype(np.float32)
 
@@ -252,12 +261,12 @@ def data_weight(disparity: FloatMap, confidence: FloatMap, parameters: WlsParame
     deviation = np.sqrt(np.maximum(cv2.blur((disparity - mean) ** 2, (3, 3)), 0))
     cut = np.exp(-np.minimum(parameters.tau_0 * np.maximum(deviation - parameters.tau_1, 0), 80))
     trust = np.maximum(confidence, LEAST_CONFIDENCE) ** parameters.confidence_power
-    return (trust * np.maximum(cut, parameters.step_weight)).astype(np.float32)
+    return (trust * np.maximum(cut, parameters.discontinuity_weight)).astype(np.float32)
 
 
-def smoothness_coefficient(centre: FloatMap, confidence: FloatMap, parameters: WlsParameters) -> FloatMap:
+def smoothness_coefficient(reference_view: FloatMap, confidence: FloatMap, parameters: WlsParameters) -> FloatMap:
     """S = s_c s_t of Eq. 11-12; shape (H, W), float32."""
-    dx, dy = (cv2.Sobel(centre, cv2.CV_32F, *order, ksize=3, scale=1 / 8) for order in ((1, 0), (0, 1)))
+    dx, dy = (cv2.Sobel(reference_view, cv2.CV_32F, *order, ksize=3, scale=1 / 8) for order in ((1, 0), (0, 1)))
     squared = (np.atleast_3d(dx) ** 2 + np.atleast_3d(dy) ** 2).sum(axis=2)
     return np.asarray(np.exp(-parameters.tau_2 * confidence) / (squared + parameters.gradient_floor**2), np.float32)
 
@@ -290,7 +299,7 @@ def energy_system(
     return (off + sparse.diags(diagonal)).tocsr(), w * disparity.ravel()
 
 
-def solve(matrix: sparse.csr_matrix, right: FloatArray, start: FloatMap, accuracy: float) -> FloatArray:
+def solve(matrix: sparse.csr_matrix, right: FloatArray, start: FloatMap, rtol: float) -> FloatArray:
     """Solve by conjugate gradients, to a residual relative to the right side; shape of ``start``, float64.
 
     With little smoothness the diagonal is preconditioner enough, and an algebraic multigrid takes several times as long
@@ -302,12 +311,12 @@ def solve(matrix: sparse.csr_matrix, right: FloatArray, start: FloatMap, accurac
 
     vector = start.astype(np.float64).ravel()
     inverse = sparse.diags_array(1 / matrix.diagonal())
-    solution, missed = cg(matrix, right, x0=vector, rtol=accuracy, maxiter=STEPS_BEFORE_MULTIGRID, M=inverse)
+    solution, missed = cg(matrix, right, x0=vector, rtol=rtol, maxiter=STEPS_BEFORE_MULTIGRID, M=inverse)
     if missed:
         import pyamg  # slow to import, seldom needed
 
         hierarchy = pyamg.ruge_stuben_solver(matrix)
-        solution = hierarchy.solve(right, x0=solution, tol=accuracy, accel="cg", maxiter=100)
+        solution = hierarchy.solve(right, x0=solution, tol=rtol, accel="cg", maxiter=100)
     return np.asarray(solution).reshape(start.shape)
 
 

@@ -156,7 +156,7 @@ def estimate_depth(
     variant : str or Variant
         Name of a built-in variant, or a choice for each stage.
     parameters : mapping, optional
-        Stage to field to value, where the defaults do not suit: ``{"initial": {"candidates": 91}}``.
+        Stage to field to value, where the defaults do not suit: ``{"initial": {"num_disparities": 91}}``.
     progress : callable
         Called with the fraction done, 0..1.
 

@@ -70,7 +70,7 @@ def read_light_field(
 
 def _depth_warning(light_field: LightField) -> str | None:
     """Tell of 16-bit files that hold fewer bits: to the stages, such views are nearly black."""
-    view = light_field.views[light_field.reference]
+    view = light_field.views[light_field.reference_position]
     brightest = int(view.max()) if view.dtype == np.uint16 else _NARROW
     if brightest >= _NARROW:
         return None
@@ -80,10 +80,10 @@ def _depth_warning(light_field: LightField) -> str | None:
 
 
 def _require_contrast(path: Path, light_field: LightField) -> None:
-    centre = light_field.centre
-    if (centre == centre[0, 0]).all():
-        colour = "black" if not centre.any() else "of one colour"
+    reference_view = light_field.reference_view
+    if (reference_view == reference_view[0, 0]).all():
+        colour = "black" if not reference_view.any() else "of one colour"
         raise SepiError(
-            f"{path}: view {light_field.reference[0]},{light_field.reference[1]} is all {colour}; depth needs views "
+            f"{path}: view {','.join(map(str, light_field.reference_position))} is all {colour}; depth needs views "
             "that show something"
         )

@@ -116,7 +116,7 @@ class Choice:
     run: StageFunction
 
 
-def given(previous: StageMaps | None) -> StageMaps:
+def require_previous(previous: StageMaps | None) -> StageMaps:
     """The maps of the stage before, for a stage that cannot be the first.
 
     Raises

@@ -1,4 +1,4 @@
-"""Depth of texture-less regions (section IV-C, Eq. 6-7 of [1]_).
+"""Depth of textureless regions (section IV-C, Eq. 6-7 of [1]_).
 
 ``lti`` finds the superpixels that hold too little texture for a slope and gives them the depth that propagates,
 linearly, from the reliable edges of their neighbourhood:
@@ -11,7 +11,7 @@ linearly, from the reliable edges of their neighbourhood:
 5. a plane smooths the depth it fits, but overrules only depth without support: neither distinct nor in agreement with
    its neighbourhood (noise lowers the confidence of good depth too, but does not make it disagree).
 
-``uniform_planes`` tells texture-less regions by the noise and gives each the plane that its border supports
+``uniform_planes`` tells textureless regions by the noise and gives each the plane that its border supports
 (:mod:`sepi.regularization.uniform_regions`). ``none`` hands the depth on.
 
 References
@@ -26,10 +26,10 @@ from pydantic import Field
 
 from sepi.command import stage_command
 from sepi.image.edges import CannyParameters, canny_edges
-from sepi.image.superpixels import FloatArray, Superpixels, borders, colour_modes, superpixels
+from sepi.image.superpixels import FloatArray, Superpixels, adjacency, colour_modes, superpixels
 from sepi.lightfield import BoolMap, FloatMap, LightField
-from sepi.regularization.uniform_regions import UniformPlanesParameters, filled
-from sepi.stage import Choice, NoParameters, Progress, StageMaps, given, relative_confidence
+from sepi.regularization.uniform_regions import UniformPlanesParameters, fill_uniform_regions
+from sepi.stage import Choice, NoParameters, Progress, StageMaps, relative_confidence, require_previous
 
 
 class LtiParameters(CannyParameters):
@@ -76,7 +76,7 @@ class LtiParameters(CannyParameters):
 def lti(
     light_field: LightField, previous: StageMaps | None, parameters: LtiParameters, progress: Progress
 ) -> StageMaps:
-    """Depth propagated into texture-less superpixels.
+    """Depth propagated into textureless superpixels.
 
     Parameters
     ----------
@@ -92,24 +92,26 @@ def lti(
         Adds ``superpixels``, int32 labels; ``lti``, float32, of each pixel's superpixel; ``textureless``, bool, the
         pixels whose depth was replaced.
     """
-    before = given(previous)
+    before = require_previous(previous)
     confidence = relative_confidence(before.confidence)
-    segments = superpixels(light_field.centre, superpixel_size(light_field.shape, parameters), parameters.compactness)
+    segments = superpixels(
+        light_field.reference_view, superpixel_size(light_field.shape, parameters), parameters.compactness
+    )
     progress(0.3)
     agreement = slope_agreement(before.disparity, parameters.agreement_radius, parameters.agreement_difference)
     # where no candidate inside the range was best, neighbours agree about its end only
-    lowest, highest = light_field.known_range().candidates(2)
+    lowest, highest = light_field.require_disparity_range().candidates(2)
     at_end = (before.disparity <= lowest) | (before.disparity >= highest)
     agreement = np.where(at_end, np.float32(0), agreement)
     agrees = agreement > parameters.texture_agreement
-    texture = canny_edges(light_field.centre, parameters) | (confidence > parameters.texture_confidence)
+    texture = canny_edges(light_field.reference_view, parameters) | (confidence > parameters.texture_confidence)
     information = local_texture_information(segments, texture)
     free = information < lti_threshold(information, parameters.lti_floor, parameters.lti_ceiling)
     # doubtful depth is common here, so trust rises steeply with confidence
     weight = confidence**4 * agreement**2
     # a plane continued far from its data may leave the range that was searched
     plane = np.clip(
-        propagated(light_field.centre, segments, free, before.disparity, weight, parameters), lowest, highest
+        propagated(light_field.reference_view, segments, free, before.disparity, weight, parameters), lowest, highest
     )
     progress(0.9)
     unsupported = local_texture_information(segments, texture | agrees) < parameters.min_support
@@ -144,8 +146,8 @@ def uniform_planes(
     StageMaps
         Adds ``textureless``, bool: the regions that were given a plane.
     """
-    before = given(previous)
-    disparity, uniform = filled(light_field, before, parameters)
+    before = require_previous(previous)
+    disparity, uniform = fill_uniform_regions(light_field, before, parameters)
     progress(1.0)
     return before.updated(disparity, before.confidence, textureless=uniform)
 
@@ -154,7 +156,7 @@ def none(
     light_field: LightField, previous: StageMaps | None, parameters: NoParameters, progress: Progress
 ) -> StageMaps:
     """Depth after the occlusion stage as it is."""
-    return given(previous)
+    return require_previous(previous)
 
 
 def superpixel_size(shape: tuple[int, int], parameters: LtiParameters) -> int:
@@ -224,7 +226,7 @@ def lti_threshold(information: FloatArray, floor: float, ceiling: float) -> floa
 
 
 def propagated(
-    centre: FloatMap,
+    reference_view: FloatMap,
     segments: Superpixels,
     free: BoolMap,
     disparity: FloatMap,
@@ -236,13 +238,13 @@ def propagated(
 
     design = basis(segments)
     planes = fit_planes(segments, disparity, weight, design, parameters.tolerance)
-    touching = borders(segments)
-    modes = colour_modes(centre, segments, parameters.colour_bandwidth)
-    apart = ((modes[touching.first] - modes[touching.second]) ** 2).sum(axis=1)
-    likeness = np.exp(-0.5 * apart / parameters.colour_bandwidth**2)
+    adjacent = adjacency(segments)
+    modes = colour_modes(reference_view, segments, parameters.colour_bandwidth)
+    apart = ((modes[adjacent.first] - modes[adjacent.second]) ** 2).sum(axis=1)
+    affinity = np.exp(-0.5 * apart / parameters.colour_bandwidth**2)
     coupling = Coupling(parameters.continuity, parameters.slope_continuity, parameters.tolerance)
     if free.any():
-        planes = propagate(segments, touching, likeness, planes, free, disparity, weight, design, coupling)
+        planes = propagate(segments, adjacent, affinity, planes, free, disparity, weight, design, coupling)
     return evaluate_planes(segments, planes, design)
 
 

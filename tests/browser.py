@@ -154,7 +154,7 @@ def read_out(page: Any) -> dict[str, str]:
     sides = {
         f"{name} {side}": part(page, f"{name}-{side}") for name in ("value", "error", "confidence") for side in "ab"
     }
-    return sides | {"truth": part(page, "truth"), "pixel": part(page, "pixel")}
+    return sides | {"ground_truth": part(page, "ground_truth"), "pixel": part(page, "pixel")}
 
 
 def choose(page: Any, **panels: str) -> None:

@@ -14,7 +14,7 @@ from sepi.camera import Camera
 from sepi.errors import SepiWarning
 from sepi.evaluate import score_maps
 from sepi.external import MapFile, import_maps
-from sepi.io.external_maps import Imported, write_imported
+from sepi.io.external_maps import ExternalMap, write_imported
 from sepi.io.hdf5 import read_light_field, read_stage, write_light_field, write_stage
 from sepi.io.pfm import write_pfm
 from sepi.io.provenance import scene_attributes, stage_attributes, step
@@ -78,9 +78,9 @@ class Example:
     @cached_property
     def imported(self) -> FloatMap:
         """The map of the other method for the scene cotton."""
-        truth = self.light_field(COTTON).truth
-        assert truth is not None
-        return imported_map(truth)
+        ground_truth = self.light_field(COTTON).ground_truth
+        assert ground_truth is not None
+        return imported_map(ground_truth)
 
 
 def small_light_field(scene: tuple[str, str]) -> LightField:
@@ -88,17 +88,17 @@ def small_light_field(scene: tuple[str, str]) -> LightField:
     name = "curved_occluders" if scene == COTTON else "dots"
     found = replace(render(name, size=SIZE, views=VIEWS), name=scene[1])
     if scene == COTTON:
-        assert found.truth is not None
-        truth = found.truth.copy()
-        truth[:3, :3] = np.nan
-        return replace(found, camera=_CAMERA, truth=truth)
-    return replace(found, truth=None, masks={}) if scene == PICTURE else found
+        assert found.ground_truth is not None
+        ground_truth = found.ground_truth.copy()
+        ground_truth[:3, :3] = np.nan
+        return replace(found, camera=_CAMERA, ground_truth=ground_truth)
+    return replace(found, ground_truth=None, masks={}) if scene == PICTURE else found
 
 
-def imported_map(truth: FloatMap) -> FloatMap:
+def imported_map(ground_truth: FloatMap) -> FloatMap:
     """The truth with an error, unknown in places."""
-    noise = np.random.default_rng(3).normal(0, 0.05, truth.shape).astype(np.float32)
-    found = np.nan_to_num(truth) + noise
+    noise = np.random.default_rng(3).normal(0, 0.05, ground_truth.shape).astype(np.float32)
+    found = np.nan_to_num(ground_truth) + noise
     found[UNKNOWN] = np.nan
     return found
 
@@ -129,7 +129,7 @@ def write_results(plan: Plan, scene: tuple[str, str]) -> None:
         run_stages(plan, scene, light_field, variant)
     write_plan_scores(plan, scene, light_field)
     maps = imported_maps(plan, light_field) if scene == COTTON else {}
-    absent = {method: Imported(f"/maps/{method}/{light_field.name}.pfm", "no file") for method in plan.external}
+    absent = {method: ExternalMap(f"/maps/{method}/{light_field.name}.pfm", "no file") for method in plan.external}
     write_imported(plan.external_file(*scene), absent | maps)
 
 
@@ -154,10 +154,10 @@ def write_plan_scores(plan: Plan, scene: tuple[str, str], light_field: LightFiel
     write_scores(plan.scores_file(*scene), score_maps(light_field, maps, {})[0], scene_attributes(light_field))
 
 
-def imported_maps(plan: Plan, light_field: LightField) -> Mapping[str, Imported]:
+def imported_maps(plan: Plan, light_field: LightField) -> Mapping[str, ExternalMap]:
     """One method's map with unknown pixels, and one of the wrong size."""
-    assert light_field.truth is not None
-    files = {"SPO": imported_map(light_field.truth), "wrong_size": np.zeros((5, 7), np.float32)}
+    assert light_field.ground_truth is not None
+    files = {"SPO": imported_map(light_field.ground_truth), "wrong_size": np.zeros((5, 7), np.float32)}
     for method, values in files.items():
         write_pfm(plan.results / f"{method}.pfm", values)
     with warnings.catch_warnings():

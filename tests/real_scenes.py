@@ -36,4 +36,4 @@ def final_maps(folder: Path, variant: str) -> StageMaps:
 
 def final_scores(folder: Path, variant: str) -> dict[str, float]:
     """Scores of a variant on the whole map."""
-    return score(final_maps(folder, variant).disparity, scene(folder).truth)
+    return score(final_maps(folder, variant).disparity, scene(folder).ground_truth)

@@ -11,11 +11,11 @@ import pytest
 from pydantic import ValidationError
 
 from sepi.evaluate import score
-from sepi.image.mixed_pixels import MixtureParameters, farther_where_little_covered
+from sepi.image.mixed_pixels import MixtureParameters, reassign_mixed_pixels
 from sepi.lightfield import DisparityRange, LightField
-from sepi.matching.base_detail import DETAIL_UNIT, LayerParameters, split_layers
+from sepi.matching.base_detail import DETAIL_UNIT, BaseDetailParameters, base_detail_decomposition
 from sepi.pipeline import PARTS_OF_BEST, STAGES, VARIANTS, estimate_depth
-from sepi.regularization.uniform_regions import UniformPlanesParameters, supporting_plane, uniform_regions
+from sepi.regularization.uniform_regions import UniformPlanesParameters, ransac_plane, uniform_regions
 from sepi.report.tabular.confidence import decile_errors, oracle, sparsification
 from sepi.scenes import render
 
@@ -25,15 +25,15 @@ from sepi.scenes import render
 )
 def test_mean_error_on_exact_truth(name: str, mean_error: float) -> None:
     scene = render(name, size=128)
-    found = estimate_depth(replace(scene, truth=None), "best").disparity
-    assert np.abs(found - scene.truth)[4:-4, 4:-4].mean() <= mean_error
+    found = estimate_depth(replace(scene, ground_truth=None), "best").disparity
+    assert np.abs(found - scene.ground_truth)[4:-4, 4:-4].mean() <= mean_error
 
 
 @pytest.mark.parametrize("name", ["fine_structures", "dots", "stripes", "wall"])
 def test_best_is_better_than_the_paper_below_a_pixel(name: str) -> None:
     """The most accurate variant has to be that on thin things, under noise, and without texture."""
     scene = render(name, size=128)
-    best, paper = (score(estimate_depth(scene, v).disparity, scene.truth) for v in ("best", "paper"))
+    best, paper = (score(estimate_depth(scene, v).disparity, scene.ground_truth) for v in ("best", "paper"))
     assert best["q25"] < paper["q25"]
     assert best["badpix007"] < paper["badpix007"]
 
@@ -53,7 +53,7 @@ def test_gloss_does_not_move_faint_texture() -> None:
     scene = render("slanted_plane", size=128)
     faint = replace(scene, views=np.round(110 + (scene.views.astype(np.float32) - 110) * 0.12).astype(np.uint8))
     errors = {
-        variant: np.abs(estimate_depth(glossy(faint), variant).disparity - scene.truth)[8:-8, 8:-8].mean()
+        variant: np.abs(estimate_depth(glossy(faint), variant).disparity - scene.ground_truth)[8:-8, 8:-8].mean()
         for variant in ("best", "best_no_detail")
     }
     assert errors["best"] < 0.02
@@ -68,7 +68,7 @@ def test_detail_leaves_out_shading_and_edges() -> None:
     step = np.where(x >= 20, 0.4, 0)
     view = np.repeat((shading + texture + step)[..., None], 3, axis=2).astype(np.float32)
     field = LightField(np.broadcast_to(view, (1, 2, 40, 40, 3)).copy(), "s")
-    detail = split_layers(field, LayerParameters()).detail[0, 0, 0] * DETAIL_UNIT
+    detail = base_detail_decomposition(field, BaseDetailParameters()).detail[0, 0, 0] * DETAIL_UNIT
     inner = detail[6:-6, 6:-6]
     assert np.corrcoef(inner.ravel(), texture[6:-6, 6:-6].ravel())[0, 1] > 0.95
     assert np.abs(inner).max() < 0.03
@@ -76,11 +76,11 @@ def test_detail_leaves_out_shading_and_edges() -> None:
 
 def test_layers_are_made_once_for_the_stages_of_a_run() -> None:
     scene = render("dots", size=64)
-    one, two = (split_layers(scene, LayerParameters()).detail for _ in range(2))
+    one, two = (base_detail_decomposition(scene, BaseDetailParameters()).detail for _ in range(2))
     assert one is two
     scene.views[0, 0] = 255 - scene.views[0, 0]
-    assert not np.array_equal(one, split_layers(scene, LayerParameters()).detail)
-    other = split_layers(scene, LayerParameters(base_radius=2)).detail
+    assert not np.array_equal(one, base_detail_decomposition(scene, BaseDetailParameters()).detail)
+    other = base_detail_decomposition(scene, BaseDetailParameters(base_radius=2)).detail
     assert not np.array_equal(one, other)
 
 
@@ -91,15 +91,15 @@ def test_mixed_pixels_go_to_the_surface_that_fills_them() -> None:
     guide[:, 9] = 0.2 + 0.2 * 0.6
     wide = np.zeros((20, 20), np.float32)
     wide[:, 9:] = 1
-    found = farther_where_little_covered(wide, guide, 0.0, MixtureParameters())
+    found = reassign_mixed_pixels(wide, guide, 0.0, MixtureParameters())
     expected = np.zeros((20, 20), np.float32)
     expected[:, 10:] = 1
     np.testing.assert_allclose(found, expected, atol=1e-6)
     # mostly foreground, or no contrast to tell by: left as it is
     guide[:, 9] = 0.2 + 0.8 * 0.6
-    np.testing.assert_array_equal(farther_where_little_covered(wide, guide, 0.0, MixtureParameters()), wide)
+    np.testing.assert_array_equal(reassign_mixed_pixels(wide, guide, 0.0, MixtureParameters()), wide)
     flat = np.full_like(guide, 0.5)
-    np.testing.assert_array_equal(farther_where_little_covered(wide, flat, 0.0, MixtureParameters()), wide)
+    np.testing.assert_array_equal(reassign_mixed_pixels(wide, flat, 0.0, MixtureParameters()), wide)
 
 
 def test_uniform_is_what_the_noise_explains() -> None:
@@ -116,15 +116,15 @@ def test_uniform_is_what_the_noise_explains() -> None:
 def test_plane_is_nowhere_nearer_than_most_of_the_border() -> None:
     """Half of the border belongs to things that stand before the region; what lies behind it cannot be."""
     y, x = np.mgrid[:30, :40]
-    truth = -0.5 + 0.01 * x
-    disparity = truth.copy()
+    ground_truth = -0.5 + 0.01 * x
+    disparity = ground_truth.copy()
     disparity[:, 30:] = 1.5
     border = np.zeros((30, 40), bool)
     border[[0, -1]] = border[:, [0, -1]] = True
-    plane = supporting_plane(border, disparity.astype(np.float32), UniformPlanesParameters(), np.random.default_rng(0))
+    plane = ransac_plane(border, disparity.astype(np.float32), UniformPlanesParameters(), np.random.default_rng(0))
     assert plane is not None
-    np.testing.assert_allclose(plane[0] + plane[1] * x + plane[2] * y, truth, atol=1e-3)
-    assert supporting_plane(np.zeros((30, 40), bool), disparity, UniformPlanesParameters(), None) is None
+    np.testing.assert_allclose(plane[0] + plane[1] * x + plane[2] * y, ground_truth, atol=1e-3)
+    assert ransac_plane(np.zeros((30, 40), bool), disparity, UniformPlanesParameters(), None) is None
 
 
 def test_parts_of_best_differ_from_it_in_one_thing() -> None:
@@ -163,7 +163,7 @@ def test_first_run_gives_the_bytes_of_later_ones(tmp_path: Path) -> None:
     """Freshly compiled kernels round as those loaded from disk do; else two machines would never agree."""
     program = (
         "import sys; from sepi.scenes import render; from sepi.pipeline import estimate_depth;"
-        "maps = estimate_depth(render('pyramids', size=64), 'best', {'initial': {'candidates': 21}});"
+        "maps = estimate_depth(render('pyramids', size=64), 'best', {'initial': {'num_disparities': 21}});"
         "sys.stdout.buffer.write(maps.disparity.tobytes() + maps.confidence.tobytes())"
     )
     environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path), "PYTHONPATH": str(Path(__file__).parents[1])}

@@ -19,21 +19,21 @@ from sepi.stage import StageMaps
 STAGE_ATTRIBUTES = {"stage": "initial", "choice": "sepi", "parameters": "{}", "made_from": "[]", "version": "0"}
 
 
-def scene(truth: np.ndarray | None, masks: dict[str, np.ndarray] | None = None, size: int = 40) -> LightField:
+def scene(ground_truth: np.ndarray | None, masks: dict[str, np.ndarray] | None = None, size: int = 40) -> LightField:
     """A light field of noise; only its shape, truth and masks matter here."""
     views = np.random.default_rng(1).integers(0, 256, (3, 3, size, size, 3), np.uint8)
     known = DisparityRange(-1, 1, "given")
-    return LightField(views, "noise", "built-in", disparity_range=known, truth=truth, masks=masks or {})
+    return LightField(views, "noise", "built-in", disparity_range=known, ground_truth=ground_truth, masks=masks or {})
 
 
-def twin(estimate: np.ndarray, truth: np.ndarray, border: int) -> dict[str, float]:
+def twin(estimate: np.ndarray, ground_truth: np.ndarray, border: int) -> dict[str, float]:
     """The rules of the two protocols, written without masks and in one place."""
-    height, width = truth.shape
+    height, width = ground_truth.shape
     errors = [
-        abs(float(estimate[y, x]) - float(truth[y, x]))
+        abs(float(estimate[y, x]) - float(ground_truth[y, x]))
         for y in range(border, height - border)
         for x in range(border, width - border)
-        if np.isfinite(truth[y, x])
+        if np.isfinite(ground_truth[y, x])
     ]
     good = [e for e in errors if np.isfinite(e)]
     ranked = sorted(100 * e if np.isfinite(e) else float("inf") for e in errors)
@@ -49,9 +49,9 @@ def twin(estimate: np.ndarray, truth: np.ndarray, border: int) -> dict[str, floa
 
 
 def test_scores_by_hand() -> None:
-    truth = np.zeros((2, 4), np.float32)
+    ground_truth = np.zeros((2, 4), np.float32)
     estimate = np.array([[0, 0.005, 0.02, -0.05], [0.1, -1, 2, 0]], np.float32)
-    scores = score(estimate, truth)
+    scores = score(estimate, ground_truth)
     squares = 0.005**2 + 0.02**2 + 0.05**2 + 0.1**2 + 1 + 4
     assert scores["mse100"] == pytest.approx(100 * squares / 8)
     # sorted: 0, 0, 0.5, ...; the third of eight, not interpolated
@@ -64,23 +64,23 @@ def test_scores_by_hand() -> None:
 def test_scores_equal_a_plain_twin(border: int) -> None:
     """Both protocols, with holes in truth and estimate: an error here would make every table wrong."""
     random = np.random.default_rng(3)
-    truth = random.normal(size=(41, 37)).astype(np.float32)
-    estimate = (truth + random.normal(scale=0.05, size=truth.shape)).astype(np.float32)
-    truth[random.random(truth.shape) < 0.1] = np.nan
-    truth[20, 20] = np.inf
-    estimate[random.random(truth.shape) < 0.1] = np.nan
+    ground_truth = random.normal(size=(41, 37)).astype(np.float32)
+    estimate = (ground_truth + random.normal(scale=0.05, size=ground_truth.shape)).astype(np.float32)
+    ground_truth[random.random(ground_truth.shape) < 0.1] = np.nan
+    ground_truth[20, 20] = np.inf
+    estimate[random.random(ground_truth.shape) < 0.1] = np.nan
     estimate[18, 18] = -np.inf
-    assert score(estimate, truth, border) == pytest.approx(twin(estimate, truth, border))
+    assert score(estimate, ground_truth, border) == pytest.approx(twin(estimate, ground_truth, border))
 
 
 def test_unknown_estimates_are_bad_and_reported() -> None:
     """The benchmark's toolkit counts NaN as good; a method must not gain by giving none."""
-    truth = np.zeros((2, 2), np.float32)
-    scores = score(np.array([[np.nan, np.inf], [0, 1]], np.float32), truth)
+    ground_truth = np.zeros((2, 2), np.float32)
+    scores = score(np.array([[np.nan, np.inf], [0, 1]], np.float32), ground_truth)
     assert scores["badpix007"] == 75
     assert scores["non_finite"] == 2
     assert scores["mse100"] == 50
-    nothing = score(np.full((2, 2), np.nan, np.float32), truth)
+    nothing = score(np.full((2, 2), np.nan, np.float32), ground_truth)
     assert np.isnan(nothing["mse100"])
     assert nothing["badpix007"] == 100
 
@@ -94,19 +94,19 @@ def test_no_pixels_give_nan_not_a_crash() -> None:
 
 
 def test_region_limits_the_pixels() -> None:
-    truth = np.zeros((4, 4), np.float32)
+    ground_truth = np.zeros((4, 4), np.float32)
     estimate = np.tile(np.array([0, 0, 1, 1], np.float32), (4, 1))
     region = np.zeros((4, 4), bool)
     region[:, 3] = True
-    assert score(estimate, truth, region=region)["mse100"] == 100
-    assert score(estimate, truth, region=~region)["mse100"] == pytest.approx(100 / 3)
+    assert score(estimate, ground_truth, region=region)["mse100"] == 100
+    assert score(estimate, ground_truth, region=~region)["mse100"] == pytest.approx(100 / 3)
 
 
 def test_evaluate_names_protocols_and_regions() -> None:
-    truth = np.zeros((40, 40), np.float32)
+    ground_truth = np.zeros((40, 40), np.float32)
     mask = np.zeros((40, 40), bool)
     mask[:10] = True
-    result = evaluate(scene(truth, {"occluded": mask}), truth + np.float32(0.05))
+    result = evaluate(scene(ground_truth, {"occluded": mask}), ground_truth + np.float32(0.05))
     assert list(result) == ["paper", "benchmark"]
     assert list(result["paper"]) == ["all", "occluded", "textureless"]
     assert result["paper"]["all"]["pixels"] == 1600
@@ -116,21 +116,21 @@ def test_evaluate_names_protocols_and_regions() -> None:
 
 
 def test_masks_come_from_the_scene_or_are_computed() -> None:
-    truth = np.zeros((40, 40), np.float32)
-    truth[10:30, 10:30] = 1
+    ground_truth = np.zeros((40, 40), np.float32)
+    ground_truth[10:30, 10:30] = 1
     mask = np.ones((40, 40), bool)
-    found = evaluation_of(scene(truth, {"textureless": mask}), truth)
+    found = evaluation_of(scene(ground_truth, {"textureless": mask}), ground_truth)
     assert found.region_sources == {"occluded": "computed", "textureless": "scene"}
-    np.testing.assert_array_equal(found.regions["occluded"], regions.occluded(truth, (3, 3)))
+    np.testing.assert_array_equal(found.regions["occluded"], regions.occluded(ground_truth, (3, 3)))
     np.testing.assert_array_equal(found.regions["textureless"], mask)
 
 
 def test_error_map_is_signed_and_nan_where_unknown() -> None:
-    truth = np.zeros((40, 40), np.float32)
-    truth[0, 0] = np.nan
+    ground_truth = np.zeros((40, 40), np.float32)
+    ground_truth[0, 0] = np.nan
     estimate = np.full((40, 40), -0.5, np.float32)
     estimate[1, 1] = np.inf
-    error = evaluation_of(scene(truth), estimate).error
+    error = evaluation_of(scene(ground_truth), estimate).error
     assert error is not None
     assert error[5, 5] == np.float32(-0.5)
     assert np.isnan(error[0, 0])
@@ -144,7 +144,7 @@ def test_no_ground_truth_no_scores() -> None:
 def test_wrong_shape_is_a_clear_error() -> None:
     with pytest.raises(SepiError, match=r"noise: .*shape \(40, 40\), got \(40, 39\)"):
         evaluate(scene(None), np.zeros((40, 39), np.float32))
-    with pytest.raises(SepiError, match=r"truth .*\(2, 2\), got \(2, 3\)"):
+    with pytest.raises(SepiError, match=r"ground_truth .*\(2, 2\), got \(2, 3\)"):
         score(np.zeros((2, 2), np.float32), np.zeros((2, 3), np.float32))
 
 
@@ -166,15 +166,15 @@ def run_command(
     return folder / output, result.stderr
 
 
-def noisy(truth: np.ndarray, seed: int) -> np.ndarray:
-    noise = np.random.default_rng(seed).normal(scale=0.05, size=truth.shape)
-    return truth + noise.astype(np.float32)
+def noisy(ground_truth: np.ndarray, seed: int) -> np.ndarray:
+    noise = np.random.default_rng(seed).normal(scale=0.05, size=ground_truth.shape)
+    return ground_truth + noise.astype(np.float32)
 
 
 def test_command_writes_what_evaluate_finds(tmp_path: Path) -> None:
-    truth = np.random.default_rng(5).normal(size=(40, 40)).astype(np.float32)
-    maps = {"sepi": noisy(truth, 6), "sepi/half_sepi": noisy(truth, 7)}
-    light_field = scene(truth)
+    ground_truth = np.random.default_rng(5).normal(size=(40, 40)).astype(np.float32)
+    maps = {"sepi": noisy(ground_truth, 6), "sepi/half_sepi": noisy(ground_truth, 7)}
+    light_field = scene(ground_truth)
     path, _ = run_command(tmp_path, light_field, maps)
     written, back = read_scores(path), read_evaluations(path)
     assert list(written) == list(back) == list(maps)
@@ -185,7 +185,7 @@ def test_command_writes_what_evaluate_finds(tmp_path: Path) -> None:
                 assert written[name][protocol][region] == pytest.approx(scores, nan_ok=True)
         found = back[name].evaluation
         assert found.error is not None
-        np.testing.assert_array_equal(found.error, estimate - truth)
+        np.testing.assert_array_equal(found.error, estimate - ground_truth)
         assert set(found.regions) == {"occluded", "textureless"}
         assert found.region_sources == {"occluded": "computed", "textureless": "computed"}
     assert path.read_bytes() == run_command(tmp_path, light_field, maps, "again.h5")[0].read_bytes()
@@ -216,11 +216,11 @@ class TestOnlyWhatChangedIsScoredAnew:
         run_command(tmp_path, scene(TRUTH), MAPS)
         assert "0 of 3 maps scored anew" in run_command(tmp_path, scene(TRUTH), MAPS)[1]
 
-    @pytest.mark.parametrize("what", ["truth", "mask", "picture", "code"])
+    @pytest.mark.parametrize("what", ["ground_truth", "mask", "picture", "code"])
     def test_what_changes_all_scores(self, tmp_path: Path, what: str) -> None:
         run_command(tmp_path, scene(TRUTH), MAPS)
         light_field = scene(TRUTH)
-        if what == "truth":
+        if what == "ground_truth":
             light_field = scene(TRUTH + np.float32(0.1))
         elif what == "mask":
             light_field = scene(TRUTH, {"occluded": np.eye(40, dtype=bool)})

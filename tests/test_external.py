@@ -14,7 +14,7 @@ from click.testing import CliRunner, Result
 from sepi.errors import SepiError, SepiWarning
 from sepi.evaluate import evaluation_of
 from sepi.external import MapFile, command, import_maps
-from sepi.io.external_maps import Imported, read_imported, read_imported_scores, write_imported
+from sepi.io.external_maps import ExternalMap, read_imported, read_imported_scores, write_imported
 from sepi.io.hdf5 import write_light_field
 from sepi.io.pfm import write_pfm
 from sepi.lightfield import LightField
@@ -27,14 +27,14 @@ SHAPE = (40, 44)
 def light_field() -> LightField:
     random = np.random.default_rng(1)
     views = random.integers(0, 256, (3, 3, *SHAPE, 3), np.uint8)
-    truth = random.normal(size=SHAPE).astype(np.float32)
-    return LightField(views, "noise", truth=truth, masks={"textureless": truth > 1})
+    ground_truth = random.normal(size=SHAPE).astype(np.float32)
+    return LightField(views, "noise", ground_truth=ground_truth, masks={"textureless": ground_truth > 1})
 
 
 @pytest.fixture
 def estimate(light_field: LightField) -> np.ndarray:
-    assert light_field.truth is not None
-    return light_field.truth + np.random.default_rng(2).normal(scale=0.05, size=SHAPE).astype(np.float32)
+    assert light_field.ground_truth is not None
+    return light_field.ground_truth + np.random.default_rng(2).normal(scale=0.05, size=SHAPE).astype(np.float32)
 
 
 def saved(path: Path, values: np.ndarray) -> MapFile:
@@ -80,7 +80,7 @@ class TestImport:
         np.testing.assert_allclose(imported.disparity, estimate, atol=1e-5)
 
     def test_without_truth_there_are_maps_but_no_scores(self, tmp_path: Path, light_field: LightField) -> None:
-        bare = replace(light_field, truth=None, masks={})
+        bare = replace(light_field, ground_truth=None, masks={})
         imported = import_maps(bare, {"SPO": saved(tmp_path / "noise.pfm", np.ones(SHAPE, np.float32))})["SPO"]
         assert imported.problem == ""
         assert imported.disparity is not None
@@ -144,12 +144,12 @@ class TestImport:
 
 
 class TestFile:
-    def imported(self, light_field: LightField, estimate: np.ndarray) -> Imported:
-        return Imported("maps/noise.pfm", "", "ab" * 32, estimate, evaluation_of(light_field, estimate))
+    def imported(self, light_field: LightField, estimate: np.ndarray) -> ExternalMap:
+        return ExternalMap("maps/noise.pfm", "", "ab" * 32, estimate, evaluation_of(light_field, estimate))
 
     def test_comes_back_unchanged(self, tmp_path: Path, light_field: LightField, estimate: np.ndarray) -> None:
         imported = self.imported(light_field, estimate)
-        maps = {"SPO": imported, "lost": Imported("maps/ü.pfm", "no file")}
+        maps = {"SPO": imported, "lost": ExternalMap("maps/ü.pfm", "no file")}
         write_imported(tmp_path / "a.h5", maps)
         back = read_imported(tmp_path / "a.h5")
         assert list(back) == ["SPO", "lost"]
@@ -165,7 +165,7 @@ class TestFile:
     def test_scores_alone(self, tmp_path: Path, light_field: LightField, estimate: np.ndarray) -> None:
         """Tables need no maps."""
         imported = self.imported(light_field, estimate)
-        write_imported(tmp_path / "a.h5", {"SPO": imported, "lost": Imported("x", "no file")})
+        write_imported(tmp_path / "a.h5", {"SPO": imported, "lost": ExternalMap("x", "no file")})
         back = read_imported_scores(tmp_path / "a.h5")
         assert list(back) == ["SPO", "lost"]
         assert back["SPO"].evaluation.scores == imported.evaluation.scores

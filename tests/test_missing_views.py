@@ -34,13 +34,13 @@ def without(light_field: LightField, present: np.ndarray, filling: int = 0) -> L
 
 
 def disparity_of(light_field: LightField, variant: str) -> np.ndarray:
-    few = {} if variant == "no_sepi" else {"initial": {"candidates": 61}}
+    few = {} if variant == "no_sepi" else {"initial": {"num_disparities": 61}}
     return estimate_depth(light_field, variant, few).disparity
 
 
 @cache
 def whole_mse(variant: str) -> float:
-    return score(disparity_of(scene(), variant), scene().truth)["mse100"]
+    return score(disparity_of(scene(), variant), scene().ground_truth)["mse100"]
 
 
 @pytest.mark.parametrize("variant", VARIANTS)
@@ -49,7 +49,7 @@ def test_every_variant_does_without_some_views(variant: str, shape: str) -> None
     """A stage that counts on the full grid would fail here, or give a map that is far worse."""
     disparity = disparity_of(without(scene(), SHAPES[shape]), variant)
     assert np.isfinite(disparity).all()
-    assert score(disparity, scene().truth)["mse100"] <= 2.5 * whole_mse(variant) + 1
+    assert score(disparity, scene().ground_truth)["mse100"] <= 2.5 * whole_mse(variant) + 1
 
 
 @pytest.mark.parametrize("variant", VARIANTS)
@@ -63,9 +63,9 @@ def test_what_missing_views_hold_is_never_used(variant: str) -> None:
 def test_range_is_estimated_without_some_views(shape: str) -> None:
     whole = scene(96)
     known = estimate_range(without(whole, SHAPES[shape]))
-    assert known.minimum <= whole.truth.min() + 0.05
-    assert known.maximum >= whole.truth.max() - 0.05
-    assert known.maximum - known.minimum < 3 * (whole.truth.max() - whole.truth.min())
+    assert known.minimum <= whole.ground_truth.min() + 0.05
+    assert known.maximum >= whole.ground_truth.max() - 0.05
+    assert known.maximum - known.minimum < 3 * (whole.ground_truth.max() - whole.ground_truth.min())
 
 
 def test_structure_tensor_says_what_it_needs() -> None:

@@ -43,13 +43,17 @@ def two_planes(near_side: str) -> LightField:
             views[t, s] = np.where(covered[..., None], foreground, background)
     place = columns if axis else rows
     nearer = place >= EDGE if near_side in ("right", "down") else place < EDGE
-    truth = np.where(nearer, 2, -1).astype(np.float32)
-    return LightField(views, "two planes", disparity_range=DisparityRange(-1.5, 2.5, "given"), truth=truth)
+    ground_truth = np.where(nearer, 2, -1).astype(np.float32)
+    return LightField(
+        views, "two planes", disparity_range=DisparityRange(-1.5, 2.5, "given"), ground_truth=ground_truth
+    )
 
 
-def run(light_field, choice="half_sepi", candidates=41):
-    initial = INITIAL["sepi"].run(light_field, None, INITIAL["sepi"].parameters(candidates=candidates), no_progress)
-    parameters = CHOICES[choice].parameters(**({} if choice == "none" else {"candidates": candidates}))
+def run(light_field, choice="half_sepi", num_disparities=41):
+    initial = INITIAL["sepi"].run(
+        light_field, None, INITIAL["sepi"].parameters(num_disparities=num_disparities), no_progress
+    )
+    parameters = CHOICES[choice].parameters(**({} if choice == "none" else {"num_disparities": num_disparities}))
     return initial, CHOICES[choice].run(light_field, initial, parameters, no_progress)
 
 
@@ -77,7 +81,7 @@ def test_depth_next_to_an_occluder_is_mended(choice):
     light_field = two_planes("right")
     initial, maps = run(light_field, choice)
     beside = np.s_[6:-6, EDGE - 5 : EDGE]
-    before, after = (np.abs(m.disparity - light_field.truth)[beside] for m in (initial, maps))
+    before, after = (np.abs(m.disparity - light_field.ground_truth)[beside] for m in (initial, maps))
     assert after.mean() < 0.05
     assert after.mean() <= before.mean()
     # the confidence of a mended pixel is that of the views it kept, not of the occluder's
@@ -88,9 +92,9 @@ def test_depth_next_to_an_occluder_is_mended(choice):
 @pytest.mark.parametrize("scene", ["curved_occluders", "fine_structures"])
 def test_half_sepi_lowers_the_error_at_occlusions(scene):
     light_field = render(scene, size=128)
-    initial, maps = run(light_field, candidates=91)
+    initial, maps = run(light_field, num_disparities=91)
     occluded = light_field.masks["occluded"]
-    before, after = (np.mean((m.disparity - light_field.truth)[occluded] ** 2) for m in (initial, maps))
+    before, after = (np.mean((m.disparity - light_field.ground_truth)[occluded] ** 2) for m in (initial, maps))
     assert after < 0.97 * before
 
 

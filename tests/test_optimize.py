@@ -43,7 +43,7 @@ def test_solver_agrees_with_a_direct_solve(alpha, multigrid, monkeypatch):
     ruge_stuben = pyamg.ruge_stuben_solver
     monkeypatch.setattr(pyamg, "ruge_stuben_solver", lambda matrix: hierarchies.append(1) or ruge_stuben(matrix))
     direct = splu(matrix.tocsc()).solve(right).reshape(shape)
-    solved = solve(matrix, right, disparity, WlsParameters().accuracy)
+    solved = solve(matrix, right, disparity, WlsParameters().rtol)
     assert np.abs(solved - direct).max() < 1e-4
     assert bool(hierarchies) == multigrid, "both ways are tested"
 
@@ -110,7 +110,7 @@ def test_data_counts_less_at_steps_and_by_its_confidence():
     disparity[:, 10:] = 2
     weight = data_weight(disparity, np.full_like(disparity, 0.5), parameters)
     np.testing.assert_allclose(weight[:, [2, 17]], 0.5)
-    np.testing.assert_allclose(weight[:, [9, 10]], 0.5 * parameters.step_weight)
+    np.testing.assert_allclose(weight[:, [9, 10]], 0.5 * parameters.discontinuity_weight)
 
 
 def test_texture_less_pixels_have_the_papers_confidence():

@@ -14,7 +14,7 @@ from sepi.lightfield import DisparityRange, LightField
 from sepi.pipeline import VARIANTS
 from sepi.scenes import render, write_hci
 
-CANDIDATES = {"initial": {"candidates": 21}, "occlusion": {"candidates": 21}}
+CANDIDATES = {"initial": {"num_disparities": 21}, "occlusion": {"num_disparities": 21}}
 
 
 def light_field(shape, dtype=np.uint8, low=0.0, disparities=(-1.0, 1.0), **values) -> LightField:
@@ -50,7 +50,7 @@ def test_odd_light_fields_get_finite_maps(name: str, variant: str) -> None:
     odd = ODD[name]
     parameters = CANDIDATES if VARIANTS[variant].initial == "sepi" else {"occlusion": CANDIDATES["occlusion"]}
     maps = sepi.estimate_depth(odd, variant=variant, parameters=parameters)
-    known = odd.known_range()
+    known = odd.require_disparity_range()
     assert maps.disparity.shape == odd.shape
     assert np.isfinite(maps.disparity).all()
     assert maps.disparity.min() > known.minimum - 1
@@ -66,7 +66,7 @@ def test_an_unknown_range_is_estimated() -> None:
     maps = sepi.estimate_depth(alone, variant="no_occlusion_no_textureless")
     known = sepi.estimate_depth(alone.with_range(estimate_range(alone)), variant="no_occlusion_no_textureless")
     np.testing.assert_array_equal(maps.disparity, known.disparity)
-    assert np.median(np.abs(maps.disparity - whole.truth)) < 0.1
+    assert np.median(np.abs(maps.disparity - whole.ground_truth)) < 0.1
 
 
 @pytest.mark.parametrize(

@@ -34,7 +34,9 @@ def test_every_part_is_worth_its_place(hci: Path, name: str, variant: str) -> No
 def test_each_stage_lowers_the_error(hci: Path, name: str) -> None:
     light_field = scene(hci / name)
     choices = tuple(VARIANTS["paper"].choices.values())
-    errors = [score(maps_after(hci / name, choices[:n]).disparity, light_field.truth)["mse100"] for n in (1, 2, 3, 4)]
+    errors = [
+        score(maps_after(hci / name, choices[:n]).disparity, light_field.ground_truth)["mse100"] for n in (1, 2, 3, 4)
+    ]
     assert np.all(np.diff(errors) < 0), errors
 
 
@@ -47,10 +49,10 @@ def test_half_sepi_beats_the_split_angular_patch(hci: Path) -> None:
 def test_range_is_found_without_truth_or_parameters(hci: Path) -> None:
     """Without parameters.cfg (antinous has none) a range that cut off the head or the wall would spoil the map."""
     light_field = scene(hci / "antinous")
-    known = light_field.known_range()
+    known = light_field.require_disparity_range()
     assert known.source == "estimated"
-    assert known.minimum < light_field.truth.min()
-    assert known.maximum > light_field.truth.max()
+    assert known.minimum < light_field.ground_truth.min()
+    assert known.maximum > light_field.ground_truth.max()
 
 
 # MSE x100, Q25 x100 and BadPix 0.07 % on the whole map
@@ -71,5 +73,5 @@ def test_best_variant_reaches_its_figures(hci: Path, name: str) -> None:
 def test_error_falls_with_confidence(hci: Path, name: str) -> None:
     """Who keeps the confident pixels must get the better ones, all the way down."""
     final = final_maps(hci / name, "best")
-    for errors in decile_errors(final.confidence, final.disparity - scene(hci / name).truth):
+    for errors in decile_errors(final.confidence, final.disparity - scene(hci / name).ground_truth):
         assert np.all(np.diff(errors) > 0), errors

@@ -1,11 +1,11 @@
-"""Texture-less regions: LTI, its threshold, propagation of planes, and the promise never to make good depth worse."""
+"""Textureless regions: LTI, its threshold, propagation of planes, and the promise never to make good depth worse."""
 
 import numpy as np
 import pytest
 from scipy.ndimage import binary_erosion, gaussian_filter
 
 from sepi.image.mean_shift import sample_modes
-from sepi.image.superpixels import Superpixels, borders, colour_modes, superpixels
+from sepi.image.superpixels import Superpixels, adjacency, colour_modes, superpixels
 from sepi.lightfield import DisparityRange, LightField
 from sepi.regularization.planes import Coupling, basis, evaluate_planes, fit_planes, propagate
 from sepi.scenes import render
@@ -33,18 +33,18 @@ def bare_plane(seed=0, noise=True):
     """A slanted plane whose inner part has no texture: noise instead of depth, and no confidence, there."""
     generator = np.random.default_rng(seed)
     rows, columns = np.mgrid[:120, :120]
-    truth = (0.01 * columns - 0.006 * rows).astype(np.float32)
+    ground_truth = (0.01 * columns - 0.006 * rows).astype(np.float32)
     bare = (np.abs(rows - 60) < 35) & (np.abs(columns - 60) < 35)
     texture = gaussian_filter(generator.normal(0, 40, (120, 120, 1)), (1, 1, 0))
     centre = np.repeat(np.where(bare[..., None], 128, 128 + texture), 3, axis=2).astype(np.uint8)
     light_field = LightField(
         np.broadcast_to(centre, (3, 3, *centre.shape)).copy(), "bare", disparity_range=DisparityRange(-2, 2, "given")
     )
-    disparity = truth.copy()
+    disparity = ground_truth.copy()
     if noise:
         disparity[bare] = generator.uniform(-2, 2, bare.sum())
     confidence = np.where(bare, 0.1, 0.9).astype(np.float32)
-    return light_field, truth, bare, StageMaps(disparity, confidence)
+    return light_field, ground_truth, bare, StageMaps(disparity, confidence)
 
 
 def run(light_field, maps, **values):
@@ -52,33 +52,33 @@ def run(light_field, maps, **values):
 
 
 def test_depth_propagates_linearly_into_a_bare_surface():
-    light_field, truth, bare, maps = bare_plane()
+    light_field, ground_truth, bare, maps = bare_plane()
     refined = run(light_field, maps)
     inner = binary_erosion(bare, iterations=15)  # a superpixel from the rim
-    assert np.abs(maps.disparity - truth)[inner].mean() > 0.5
-    assert np.abs(refined.disparity - truth)[inner].mean() < 0.01
-    assert np.abs(refined.disparity - truth).mean() < 0.3 * np.abs(maps.disparity - truth).mean()
+    assert np.abs(maps.disparity - ground_truth)[inner].mean() > 0.5
+    assert np.abs(refined.disparity - ground_truth)[inner].mean() < 0.01
+    assert np.abs(refined.disparity - ground_truth).mean() < 0.3 * np.abs(maps.disparity - ground_truth).mean()
     assert refined.extra["textureless"][inner].mean() > 0.95
     assert set(refined.extra) == {"superpixels", "lti", "textureless"}
 
 
 def test_good_depth_is_not_made_worse():
     """Noise lowers confidence everywhere; a plane laid over sound depth would erase the scene."""
-    light_field, truth, _, _ = bare_plane()
-    rows, columns = np.indices(truth.shape)
-    truth = truth + ((rows // 12 + columns // 12) % 2).astype(np.float32)
-    maps = StageMaps(truth, np.full_like(truth, 0.2))
+    light_field, ground_truth, _, _ = bare_plane()
+    rows, columns = np.indices(ground_truth.shape)
+    ground_truth = ground_truth + ((rows // 12 + columns // 12) % 2).astype(np.float32)
+    maps = StageMaps(ground_truth, np.full_like(ground_truth, 0.2))
     refined = run(light_field, maps)
-    assert np.abs(refined.disparity - truth).max() < 0.15
+    assert np.abs(refined.disparity - ground_truth).max() < 0.15
 
 
 @pytest.mark.parametrize("scene", ["dots", "curved_occluders", "pyramids", "stripes"])
 def test_never_worse_on_scenes_without_bare_surfaces(scene):
     light_field = render(scene, size=128)
     generator = np.random.default_rng(3)
-    noisy = light_field.truth + generator.normal(0, 0.03, light_field.shape).astype(np.float32)
+    noisy = light_field.ground_truth + generator.normal(0, 0.03, light_field.shape).astype(np.float32)
     maps = StageMaps(noisy, generator.uniform(0.2, 0.5, light_field.shape).astype(np.float32))
-    before, after = (np.mean((m.disparity - light_field.truth) ** 2) for m in (maps, run(light_field, maps)))
+    before, after = (np.mean((m.disparity - light_field.ground_truth) ** 2) for m in (maps, run(light_field, maps)))
     assert after <= 1.02 * before
 
 
@@ -118,45 +118,45 @@ def test_agreement_tells_noise_from_depth():
 def test_robust_fit_ignores_outliers():
     segments = tiles((30, 30), 15)
     rows, columns = np.indices((30, 30))
-    truth = (0.5 + 0.02 * columns - 0.01 * rows).astype(np.float32)
-    spoiled = truth.copy()
+    ground_truth = (0.5 + 0.02 * columns - 0.01 * rows).astype(np.float32)
+    spoiled = ground_truth.copy()
     spoiled[::3] += 1
     design = basis(segments)
-    planes = fit_planes(segments, spoiled, np.ones_like(truth), design, 0.05)
-    assert np.abs(evaluate_planes(segments, planes, design) - truth).max() < 0.02
+    planes = fit_planes(segments, spoiled, np.ones_like(ground_truth), design, 0.05)
+    assert np.abs(evaluate_planes(segments, planes, design) - ground_truth).max() < 0.02
 
 
 def test_propagation_equals_the_plane_that_its_neighbours_lie_on():
     """One unknown superpixel among planes of one surface, no data: the continuation is exact."""
     segments = tiles((45, 45), 15)
     rows, columns = np.indices((45, 45))
-    truth = (0.02 * columns - 0.01 * rows).astype(np.float32)
+    ground_truth = (0.02 * columns - 0.01 * rows).astype(np.float32)
     design = basis(segments)
-    planes = fit_planes(segments, truth, np.ones_like(truth), design, 0.05)
+    planes = fit_planes(segments, ground_truth, np.ones_like(ground_truth), design, 0.05)
     free = np.zeros(9, bool)
     free[4] = True
     planes[4] = [5, 5, 5]
-    touching = borders(segments)
+    adjacent = adjacency(segments)
     solved = propagate(
-        segments, touching, np.ones(len(touching.first)), planes, free, truth, np.zeros_like(truth), design,
-        Coupling(continuity=1.0, slope=1.0, tolerance=0.05),
+        segments, adjacent, np.ones(len(adjacent.first)), planes, free, ground_truth, np.zeros_like(ground_truth),
+        design, Coupling(continuity=1.0, slope=1.0, tolerance=0.05),
     )  # fmt: skip
-    np.testing.assert_allclose(evaluate_planes(segments, solved, design), truth, atol=1e-3)
+    np.testing.assert_allclose(evaluate_planes(segments, solved, design), ground_truth, atol=1e-3)
     np.testing.assert_array_equal(solved[~free], planes[~free])
 
 
 def test_borders_of_tiles():
-    touching = borders(tiles((20, 20), 10))
-    pairs = list(zip(touching.first.tolist(), touching.second.tolist(), strict=True))
+    adjacent = adjacency(tiles((20, 20), 10))
+    pairs = list(zip(adjacent.first.tolist(), adjacent.second.tolist(), strict=True))
     assert pairs == [(0, 1), (0, 2), (1, 3), (2, 3)]
-    assert touching.lengths.tolist() == [10, 10, 10, 10]
-    np.testing.assert_allclose(touching.midpoints[0], [9.5, 4.5])
+    assert adjacent.lengths.tolist() == [10, 10, 10, 10]
+    np.testing.assert_allclose(adjacent.midpoints[0], [9.5, 4.5])
 
 
 def test_superpixels_have_the_papers_sizes():
     assert superpixel_size((512, 512), LtiParameters()) == 15
     assert superpixel_size((768, 768), LtiParameters()) == 17
-    centre = render("wall", size=128, views=3).centre
+    centre = render("wall", size=128, views=3).reference_view
     segments = superpixels(centre, 15, 10.0)
     assert 0.6 < len(segments) / (128**2 / 15**2) < 1.4
     assert len(superpixels(centre[..., :1], 15, 10.0)) > 30

@@ -17,10 +17,10 @@ _PATH = click.Path(path_type=Path)
 @click.command(cls=SepiCommand, short_help="Show two disparity maps side by side on a page.")
 @click.argument("a", metavar="A", type=_PATH)
 @click.argument("b", metavar="B", type=_PATH)
-@click.argument("truth", metavar="[TRUTH|SCENE]", type=_PATH, required=False)
+@click.argument("ground_truth", metavar="[TRUTH|SCENE]", type=_PATH, required=False)
 @click.option("-o", "--output", type=_PATH, default=Path("compare.html"), show_default=True, help="Page to write.")
 @reading_flags
-def compare(a: Path, b: Path, truth: Path | None, output: Path, reading: Reading) -> None:
+def compare(a: Path, b: Path, ground_truth: Path | None, output: Path, reading: Reading) -> None:
     """Show the disparity maps A and B side by side on a page.
 
     A and B are maps of any program: PFM, HDF5 with a dataset 'disparity', NumPy (.npy), 'disparity_16bit.png', or a
@@ -41,16 +41,16 @@ def compare(a: Path, b: Path, truth: Path | None, output: Path, reading: Reading
     maps = read_disparity(a), read_disparity(b)
     require_one_view(a, b)
     light_field, values = None, None
-    if truth is not None and is_disparity(truth):
-        values = read_disparity(truth)
-        require_one_view(a, truth)
-    elif truth is not None:
-        light_field = scene_of(truth, a, reading)
-        values = light_field.truth
+    if ground_truth is not None and is_disparity(ground_truth):
+        values = read_disparity(ground_truth)
+        require_one_view(a, ground_truth)
+    elif ground_truth is not None:
+        light_field = scene_of(ground_truth, a, reading)
+        values = light_field.ground_truth
     _require_shape(b, maps[1].shape, a, maps[0].shape)
-    if truth is not None:
+    if ground_truth is not None:
         shape = values.shape if values is not None else light_field.shape if light_field is not None else ()
-        _require_shape(truth, shape, a, maps[0].shape)
+        _require_shape(ground_truth, shape, a, maps[0].shape)
     found = Comparison(_names(a, b), maps, values, light_field)
     with atomic_path(output) as temporary:
         temporary.write_text(comparison_page(found), encoding="utf-8")

@@ -22,16 +22,16 @@ _PATH = click.Path(path_type=Path)
 
 @click.command(cls=SepiCommand, short_help="Score a disparity map against ground truth.")
 @click.argument("estimate", type=_PATH)
-@click.argument("truth", metavar="TRUTH|SCENE", type=_PATH)
+@click.argument("ground_truth", metavar="TRUTH|SCENE", type=_PATH)
 @click.option("--border", type=click.IntRange(min=0), help="Score with this many pixels left out on each side only.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 @reading_flags
-def evaluate(estimate: Path, truth: Path, border: int | None, as_json: bool, reading: Reading) -> None:
+def evaluate(estimate: Path, ground_truth: Path, border: int | None, as_json: bool, reading: Reading) -> None:
     """Score the disparity map ESTIMATE against ground truth.
 
     ESTIMATE is a PFM, an HDF5 file with a dataset 'disparity', a NumPy file (.npy), a 'disparity_16bit.png', or a
     folder that 'sepi depth' wrote. TRUTH is such a file; give the SCENE itself, a light field with ground truth, to
-    have its occluded and texture-less regions scored too. Give the flags of 'sepi depth' that say how to read the SCENE
+    have its occluded and textureless regions scored too. Give the flags of 'sepi depth' that say how to read the SCENE
     here, too. A folder that 'sepi depth' wrote knows which view it belongs to.
 
     Both protocols are used: 'paper' scores the whole map, 'benchmark' leaves out 15 pixels on each side.
@@ -41,32 +41,34 @@ def evaluate(estimate: Path, truth: Path, border: int | None, as_json: bool, rea
       sepi evaluate cotton-depth cotton
       sepi evaluate estimate.pfm gt_disp_lowres.pfm --border 15 --json
     """
-    scores = _scores(estimate, truth, border, reading)
+    scores = _scores(estimate, ground_truth, border, reading)
     if as_json:
         click.echo(json.dumps(_without_nan(scores), indent=2, sort_keys=True))
     else:
         click.echo(score_table(scores))
 
 
-def _scores(estimate: Path, truth: Path, border: int | None, reading: Reading) -> dict[str, dict[str, Scores]]:
-    """Protocol to region to scores; the regions only where ``truth`` is a light field."""
+def _scores(estimate: Path, ground_truth: Path, border: int | None, reading: Reading) -> dict[str, dict[str, Scores]]:
+    """Protocol to region to scores; the regions only where ``ground_truth`` is a light field."""
     from sepi.evaluate import PROTOCOLS, REGIONS, WHOLE_MAP, region_masks, score
     from sepi.io.disparity_maps import is_disparity, read_disparity
 
     disparity = read_disparity(estimate)
     masks = {}
-    if is_disparity(truth):
-        values = read_disparity(truth)
-        require_one_view(estimate, truth)
+    if is_disparity(ground_truth):
+        values = read_disparity(ground_truth)
+        require_one_view(estimate, ground_truth)
     else:
-        light_field = scene_of(truth, estimate, reading)
-        if light_field.truth is None:
-            t, s = light_field.reference
-            raise SepiError(f"{truth}: no ground truth for view {t},{s}")
-        values = light_field.truth
+        light_field = scene_of(ground_truth, estimate, reading)
+        if light_field.ground_truth is None:
+            t, s = light_field.reference_position
+            raise SepiError(f"{ground_truth}: no ground truth for view {t},{s}")
+        values = light_field.ground_truth
         masks = region_masks(light_field)
     if values.shape != disparity.shape:
-        raise SepiError(f"{truth}: ground truth is {values.shape}, the estimate {disparity.shape} (height, width)")
+        raise SepiError(
+            f"{ground_truth}: ground truth is {values.shape}, the estimate {disparity.shape} (height, width)"
+        )
     protocols = PROTOCOLS if border is None else {f"border {border}": border}
     regions = REGIONS if masks else (WHOLE_MAP,)
     return {

@@ -91,7 +91,7 @@ _FLAGS = (
         "--format",
         "file_format",
         metavar="FORMAT",
-        help="hci, hci-old, images, eslf, matlab, numpy or sepi; found by looking unless given.",
+        help="hci, hci-2013, images, eslf, matlab, numpy or sepi; found by looking unless given.",
     ),
     click.option("--grid", type=GRID, metavar="ROWSxCOLUMNS", help="Grid of views in the files."),
     click.option(

@@ -98,7 +98,7 @@ def depth(
       sepi depth cotton -o maps --disparity-range -2 2
       sepi depth flowers_eslf.png --central 7
       sepi depth views --grid 5x5 --exclude 0,0 --exclude 0,4
-      sepi depth cotton --variant paper --set initial.sepi.candidates=91
+      sepi depth cotton --variant paper --set initial.sepi.num_disparities=91
     """
     from sepi.ingest import settle_range
     from sepi.io.files import atomic_path
@@ -131,7 +131,7 @@ def depth(
         with atomic_path(folder / RUNTIME) as temporary:
             temporary.write_text(f"{seconds:.3f}\n", encoding="ascii")
     click.echo(f"{light_field.name}: {_size(light_field)}")
-    click.echo(f"disparity range: {_range(light_field.known_range())}")
+    click.echo(f"disparity range: {_range(light_field.require_disparity_range())}")
     click.echo(f"written to {folder}/: {' '.join(files)}")
 
 
@@ -149,7 +149,7 @@ def info(light_field_path: Path, geometry: Geometry | None, reading: Reading) ->
 
     known_format = format_of(light_field_path, reading.file_format)
     light_field = reading.read(light_field_path)
-    t0, s0 = light_field.reference
+    t0, s0 = light_field.reference_position
     missing = [f"{t},{s}" for t, s in zip(*(~light_field.present).nonzero(), strict=True)]
     own = light_field.disparity_range
     try:
@@ -167,7 +167,7 @@ def info(light_field_path: Path, geometry: Geometry | None, reading: Reading) ->
         "disparity range": "none given; the estimate is used" if own is None else _range(own),
         "estimated range": estimated,
         "metric depth": "unknown camera" if camera is None else f"{camera.scale:g} m / (disparity + {camera.offset:g})",
-        "ground truth": "none" if light_field.truth is None else "yes",
+        "ground truth": "none" if light_field.ground_truth is None else "yes",
         "masks": ", ".join(light_field.masks) or "none",
     }
     for key, value in lines.items():
@@ -262,7 +262,7 @@ def _parameters(settings: tuple[str, ...], name: str, variant: Variant) -> dict[
         match = re.fullmatch(r"(\w+)\.(\w+)\.(\w+)=(.*)", setting)
         if match is None:
             raise SepiError(
-                f"--set {setting}: expected STAGE.CHOICE.NAME=VALUE, such as initial.semi_global.candidates=91"
+                f"--set {setting}: expected STAGE.CHOICE.NAME=VALUE, such as initial.semi_global.num_disparities=91"
             )
         stage, choice, field, text = match.groups()
         if variant.choices.get(stage) != choice:

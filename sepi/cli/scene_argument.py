@@ -54,11 +54,11 @@ def scene_of(scene: Path, estimate: Path, reading: Reading) -> LightField:
     if belongs is not None and reading.options.view is None:
         reading = replace(reading, options=replace(reading.options, view=belongs[0]))
     light_field = reading.read(scene, check_order=False)
-    if belongs is not None and belongs != (light_field.reference, light_field.grid):
+    if belongs is not None and belongs != (light_field.reference_position, light_field.grid):
         (t, s), (rows, columns) = belongs
         raise SepiError(
             f"{estimate}: depth of view {t},{s} of {rows}x{columns} views, but {scene} is read as view "
-            f"{light_field.reference[0]},{light_field.reference[1]} of {light_field.grid[0]}x{light_field.grid[1]}; "
+            f"{','.join(map(str, light_field.reference_position))} of {light_field.grid[0]}x{light_field.grid[1]}; "
             "give the flags here that 'sepi depth' had"
         )
     return light_field

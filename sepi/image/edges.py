@@ -27,12 +27,12 @@ class CannyParameters(Parameters):
 _SOBEL_GAIN = 8
 
 
-def canny_edges(centre: FloatMap, parameters: CannyParameters) -> BoolMap:
+def canny_edges(reference_view: FloatMap, parameters: CannyParameters) -> BoolMap:
     """Canny edges of the reference view; thresholds rise with its noise.
 
     Parameters
     ----------
-    centre : ndarray, shape (H, W, C), float32
+    reference_view : ndarray, shape (H, W, C), float32
         Values in 0..1.
     parameters : CannyParameters
 
@@ -40,7 +40,7 @@ def canny_edges(centre: FloatMap, parameters: CannyParameters) -> BoolMap:
     -------
     ndarray, shape (H, W), bool
     """
-    smooth = _smooth_grey(centre, parameters.canny_sigma)
+    smooth = _smooth_grey(reference_view, parameters.canny_sigma)
     noise = noise_level(smooth[..., None])
     dx, dy = (cv2.Sobel(smooth, cv2.CV_32F, *order, ksize=3) for order in ((1, 0), (0, 1)))
     # Canny takes 16-bit derivatives
@@ -50,12 +50,12 @@ def canny_edges(centre: FloatMap, parameters: CannyParameters) -> BoolMap:
     return np.asarray(edges > 0)
 
 
-def edge_angle(centre: FloatMap, parameters: CannyParameters) -> FloatMap:
+def edge_angle(reference_view: FloatMap, parameters: CannyParameters) -> FloatMap:
     """Angle of the normal of the strongest edge near each pixel, from ``+x`` towards ``+y``.
 
     Parameters
     ----------
-    centre : ndarray, shape (H, W, C), float32
+    reference_view : ndarray, shape (H, W, C), float32
     parameters : CannyParameters
 
     Returns
@@ -63,7 +63,7 @@ def edge_angle(centre: FloatMap, parameters: CannyParameters) -> FloatMap:
     ndarray, shape (H, W), float32
         Radians, -pi..pi.
     """
-    smooth = _smooth_grey(centre, parameters.canny_sigma)
+    smooth = _smooth_grey(reference_view, parameters.canny_sigma)
     dx, dy = (cv2.Sobel(smooth, cv2.CV_32F, *order, ksize=3) for order in ((1, 0), (0, 1)))
     # double angles let opposite normals add up
     wide = 4 * parameters.canny_sigma
@@ -78,5 +78,5 @@ def depth_steps(disparity: FloatMap, step: float) -> BoolMap:
     return np.asarray(cv2.dilate(disparity, box) - cv2.erode(disparity, box) > step)
 
 
-def _smooth_grey(centre: FloatMap, sigma: float) -> FloatMap:
-    return np.asarray(cv2.GaussianBlur(centre.mean(axis=2), (0, 0), sigma), np.float32)
+def _smooth_grey(reference_view: FloatMap, sigma: float) -> FloatMap:
+    return np.asarray(cv2.GaussianBlur(reference_view.mean(axis=2), (0, 0), sigma), np.float32)

@@ -28,7 +28,7 @@ MOST_ITERATIONS, ACCURACY = 50, 1e-3
 
 
 def patch_modes(
-    image: FloatMap, disparity: FloatMap, wanted: BoolMap, *, radius: int, sigma_colour: float, sigma_disparity: float
+    image: FloatMap, disparity: FloatMap, mask: BoolMap, *, radius: int, sigma_colour: float, sigma_disparity: float
 ) -> FloatMap:
     """Disparity of the colour-and-disparity mode that each wanted pixel belongs to.
 
@@ -38,7 +38,7 @@ def patch_modes(
         Centre view, 0..1.
     disparity : ndarray, shape (H, W), float32
         Pixels per view step.
-    wanted : ndarray, shape (H, W), bool
+    mask : ndarray, shape (H, W), bool
         The others keep their disparity.
     radius : int
         The patch is ``2 radius + 1`` pixels wide and high.
@@ -52,18 +52,18 @@ def patch_modes(
     scaled = (np.sqrt(0.5) / sigma_colour * image).astype(np.float32)
     factor = np.float32(0.5 / sigma_disparity**2)
     modes = disparity.astype(np.float32)
-    _patch_modes(scaled, disparity.astype(np.float32), wanted, radius, factor, modes)
+    _patch_modes(scaled, disparity.astype(np.float32), mask, radius, factor, modes)
     return modes
 
 
 @njit(cache=True, parallel=True)
-def _patch_modes(image: Any, disparity: Any, wanted: Any, radius: int, factor: Any, modes: Any) -> None:
+def _patch_modes(image: Any, disparity: Any, mask: Any, radius: int, factor: Any, modes: Any) -> None:
     H, W, C = image.shape
     for y in prange(H):
         colour = np.empty(C, np.float32)
         moved = np.empty(C, np.float32)
         for x in range(W):
-            if not wanted[y, x]:
+            if not mask[y, x]:
                 continue
             colour[:] = image[y, x]
             depth = disparity[y, x]

@@ -17,17 +17,19 @@ from sepi.stage import Parameters
 class MixtureParameters(Parameters):
     """Parameters of the decision by colour mixture."""
 
-    mixture: float = Field(
+    alpha_threshold: float = Field(
         0.3, ge=0, le=1, description="covered share up to which a pixel goes to the farther surface; 0 moves none"
     )
-    mixture_step: float = Field(0.3, gt=0, description="depth step beside which pixels mix, pixels per view step")
-    mixture_reach: int = Field(4, ge=1, le=20, description="how far away clean colours are looked for, in pixels")
-    mixture_contrast: float = Field(
+    alpha_discontinuity: float = Field(
+        0.3, gt=0, description="depth step beside which pixels mix, pixels per view step"
+    )
+    alpha_radius: int = Field(4, ge=1, le=20, description="how far away clean colours are looked for, in pixels")
+    alpha_contrast: float = Field(
         9.0, ge=0, description="least squared colour difference of the two sides, in units of their variance"
     )
 
 
-def farther_where_little_covered(
+def reassign_mixed_pixels(
     disparity: FloatMap, guide: FloatMap, noise: float, parameters: MixtureParameters
 ) -> FloatMap:
     """Disparity map whose mixed pixels at steps belong to the surface that covers most of them.
@@ -46,17 +48,17 @@ def farther_where_little_covered(
     -------
     ndarray, shape (H, W), float32
     """
-    if parameters.mixture == 0:
+    if parameters.alpha_threshold == 0:
         return disparity
     from sepi.image.mixed_pixels_kernels import decided_pixels
 
     decided: FloatMap = decided_pixels(
         disparity,
         guide,
-        parameters.mixture_step,
-        parameters.mixture_reach,
-        parameters.mixture_contrast,
-        parameters.mixture,
+        parameters.alpha_discontinuity,
+        parameters.alpha_radius,
+        parameters.alpha_contrast,
+        parameters.alpha_threshold,
         # a hundredth of full scale counts as equal even without noise
         1e-4 + noise,
     )

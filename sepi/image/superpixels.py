@@ -63,7 +63,7 @@ class Superpixels:
 
 
 @dataclass(frozen=True)
-class Borders:
+class Adjacency:
     """Pairs of superpixels that touch.
 
     Attributes
@@ -81,17 +81,17 @@ class Borders:
     lengths: IntArray
     midpoints: FloatArray
 
-    def subset(self, keep: BoolMap) -> Borders:
+    def subset(self, keep: BoolMap) -> Adjacency:
         """Some of the pairs."""
-        return Borders(self.first[keep], self.second[keep], self.lengths[keep], self.midpoints[keep])
+        return Adjacency(self.first[keep], self.second[keep], self.lengths[keep], self.midpoints[keep])
 
 
-def superpixels(centre: FloatMap, size: int, compactness: float) -> Superpixels:
+def superpixels(reference_view: FloatMap, size: int, compactness: float) -> Superpixels:
     """SLIC superpixels of about ``size x size`` pixels.
 
     Parameters
     ----------
-    centre : ndarray, shape (H, W, C), float32
+    reference_view : ndarray, shape (H, W, C), float32
         Values in 0..1.
     size : int
         Pixels.
@@ -100,13 +100,13 @@ def superpixels(centre: FloatMap, size: int, compactness: float) -> Superpixels:
     """
     from skimage.segmentation import slic
 
-    H, W = centre.shape[:2]
+    H, W = reference_view.shape[:2]
     labels = slic(
-        centre if centre.shape[2] == 3 else centre[..., 0],
+        reference_view if reference_view.shape[2] == 3 else reference_view[..., 0],
         n_segments=max(1, H * W // size**2),
         compactness=compactness,
         start_label=0,
-        channel_axis=2 if centre.shape[2] == 3 else None,
+        channel_axis=2 if reference_view.shape[2] == 3 else None,
     )
     labels = np.unique(labels, return_inverse=True)[1].reshape(H, W).astype(np.int64)
     sizes = np.bincount(labels.ravel())
@@ -115,7 +115,7 @@ def superpixels(centre: FloatMap, size: int, compactness: float) -> Superpixels:
     return Superpixels(labels, sizes, np.stack(sums, axis=1) / sizes[:, None])
 
 
-def borders(segments: Superpixels) -> Borders:
+def adjacency(segments: Superpixels) -> Adjacency:
     """Which superpixels touch, along how many pixel sides, and where."""
     labels = segments.labels
     pieces = []
@@ -132,15 +132,15 @@ def borders(segments: Superpixels) -> Borders:
     )
     lengths = np.bincount(index, minlength=len(pairs))
     sums = np.stack([np.bincount(index, sides[:, k], len(pairs)) for k in (2, 3)], axis=1)
-    return Borders(pairs // len(segments), pairs % len(segments), lengths, sums / np.maximum(lengths, 1)[:, None])
+    return Adjacency(pairs // len(segments), pairs % len(segments), lengths, sums / np.maximum(lengths, 1)[:, None])
 
 
-def colour_modes(centre: FloatMap, segments: Superpixels, bandwidth: float) -> FloatArray:
+def colour_modes(reference_view: FloatMap, segments: Superpixels, bandwidth: float) -> FloatArray:
     """Mean-shift mode of each superpixel's mean colour in HSV space: the propagation cue of section IV-C.
 
     Parameters
     ----------
-    centre : ndarray, shape (H, W, C), float32
+    reference_view : ndarray, shape (H, W, C), float32
         Values in 0..1.
     segments : Superpixels
     bandwidth : float
@@ -153,7 +153,7 @@ def colour_modes(centre: FloatMap, segments: Superpixels, bandwidth: float) -> F
     """
     from sepi.image.mean_shift import sample_modes
 
-    rgb = centre if centre.shape[2] == 3 else np.repeat(centre, 3, axis=2)
+    rgb = reference_view if reference_view.shape[2] == 3 else np.repeat(reference_view, 3, axis=2)
     hue, saturation, value = np.moveaxis(cv2.cvtColor(np.ascontiguousarray(rgb), cv2.COLOR_RGB2HSV), 2, 0)
     # hue is an angle that means little where colour is weak, so it goes into a cone
     chroma = saturation * value

@@ -62,7 +62,7 @@ def estimate_range(light_field: LightField) -> DisparityRange:
     Parameters
     ----------
     light_field : LightField
-        Its own range, truth and masks are not looked at.
+        Its own range, ground truth and masks are not looked at.
 
     Returns
     -------
@@ -76,12 +76,12 @@ def estimate_range(light_field: LightField) -> DisparityRange:
     """
     positions = _positions(light_field)
     factor = math.ceil(math.sqrt(math.prod(light_field.shape) / _MOST_PIXELS))
-    reference = _prepared(light_field.views[light_field.reference], factor)
+    reference = _prepared(light_field.views[light_field.reference_position], factor)
     views = np.stack([_prepared(light_field.views[position], factor) for position in positions])
-    offsets = np.array(positions, np.int64) - light_field.reference
+    offsets = np.array(positions, np.int64) - light_field.reference_position
     # the farthest view moves by one pixel from candidate to candidate
     step = 1 / int(abs(offsets).max())
-    seen = ~_dark_corners(light_field.centre, reference.shape)
+    seen = ~_dark_corners(light_field.reference_view, reference.shape)
     found: FloatMap = np.empty(0, np.float32)
     for extent in _extents(max(reference.shape) * step / 2):
         number = max(1, math.ceil(extent / step))
@@ -107,7 +107,7 @@ def estimate_range(light_field: LightField) -> DisparityRange:
 
 def _positions(light_field: LightField) -> list[tuple[int, int]]:
     """Grid positions to match with the centre: its row and column; any others where those are not there."""
-    t0, s0 = light_field.reference
+    t0, s0 = light_field.reference_position
     present = [
         (int(t), int(s))
         for t, s in np.argwhere(light_field.present)

@@ -97,7 +97,7 @@ def check_order(light_field: LightField, given: str = AS_GIVEN) -> OrderCheck:
     Parameters
     ----------
     light_field : LightField
-        Its disparity range, truth and reference view are not looked at.
+        Its disparity range, ground truth and reference view are not looked at.
     given : str
         Order in which it was read; the words of the result are to take its place.
 
@@ -119,7 +119,7 @@ def check_order(light_field: LightField, given: str = AS_GIVEN) -> OrderCheck:
             # at most half way to the next layout: the wrong sign is still the better layout
             for word, sign in trial.best.items():
                 misfits[word] += trial.gap / 2 * (lesser if sign > 0 else greater) / votes
-    # from changes of the light field at hand to orders that take the place of the given one
+    # from changes of the light field available to orders that take the place of the given one
     fits = {word: misfits[_change(given, word)] for word in ORDERS}
     best = min(ORDERS, key=lambda word: (fits[word], word != given))
     return OrderCheck(fits, best, trial.clear, sign_decided, given)

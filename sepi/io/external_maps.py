@@ -23,7 +23,7 @@ _METHODS = "methods"
 
 
 @dataclass(frozen=True)
-class Imported:
+class ExternalMap:
     """The map of a scene that another method's program made.
 
     Attributes
@@ -47,7 +47,7 @@ class Imported:
     evaluation: Evaluation = field(default_factory=Evaluation)
 
 
-def write_imported(path: Path, maps: Mapping[str, Imported]) -> None:
+def write_imported(path: Path, maps: Mapping[str, ExternalMap]) -> None:
     """Write the maps of all methods, by name; equal content gives equal bytes."""
     with created(path) as file:
         methods = file.create_group(_METHODS, track_order=True)
@@ -61,7 +61,7 @@ def write_imported(path: Path, maps: Mapping[str, Imported]) -> None:
             put_evaluation(group, imported.evaluation)
 
 
-def read_imported(path: Path) -> dict[str, Imported]:
+def read_imported(path: Path) -> dict[str, ExternalMap]:
     """Method to what :func:`write_imported` wrote of it, in the same order.
 
     Raises
@@ -72,7 +72,7 @@ def read_imported(path: Path) -> dict[str, Imported]:
     return _read(path, with_maps=True)
 
 
-def read_imported_scores(path: Path) -> dict[str, Imported]:
+def read_imported_scores(path: Path) -> dict[str, ExternalMap]:
     """Like :func:`read_imported`, but without any map: no disparity, no errors, no regions.
 
     Raises
@@ -83,15 +83,15 @@ def read_imported_scores(path: Path) -> dict[str, Imported]:
     return _read(path, with_maps=False)
 
 
-def _read(path: Path, with_maps: bool) -> dict[str, Imported]:
+def _read(path: Path, with_maps: bool) -> dict[str, ExternalMap]:
     with opened(path) as file:
         if _METHODS not in file:
             raise SepiError(f"{path}: not a file of other methods' maps (written by python -m sepi.external)")
         return {name: _imported(group, with_maps) for name, group in file[_METHODS].items()}
 
 
-def _imported(group: h5py.Group, with_maps: bool) -> Imported:
-    return Imported(
+def _imported(group: h5py.Group, with_maps: bool) -> ExternalMap:
+    return ExternalMap(
         source=str(group.attrs["source"]),
         problem=str(group.attrs["problem"]),
         sha256=str(group.attrs["sha256"]),

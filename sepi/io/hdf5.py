@@ -99,9 +99,9 @@ def write_light_field(path: Path, light_field: LightField) -> None:
             file.attrs["camera"] = astuple(light_field.camera)
         if light_field.notes:
             file.attrs["notes"] = [_fixed(note) for note in light_field.notes]
-        if light_field.truth is not None:
-            file.create_dataset("truth", data=light_field.truth)
-            file["truth"].attrs["units"] = UNITS["disparity"]
+        if light_field.ground_truth is not None:
+            file.create_dataset("ground_truth", data=light_field.ground_truth)
+            file["ground_truth"].attrs["units"] = UNITS["disparity"]
         for name, mask in sorted(light_field.masks.items()):
             file.create_dataset(f"masks/{name}", data=mask, compression="gzip", compression_opts=1)
 
@@ -155,7 +155,7 @@ def read_light_field(path: Path) -> LightField:
             camera=Camera(*map(float, file.attrs["camera"])) if "camera" in file.attrs else None,
             notes=tuple(_text(path, file, "notes").split("\0")) if "notes" in file.attrs else (),
             disparity_range=known,
-            truth=stored(path, file["truth"]).astype(np.float32) if "truth" in file else None,
+            ground_truth=stored(path, file["ground_truth"]).astype(np.float32) if "ground_truth" in file else None,
             masks={name: stored(path, file["masks"][name]).astype(bool) for name in file.get("masks", {})},
         )
 

@@ -77,7 +77,7 @@ def point_cloud(light_field: LightField, disparity: FloatMap) -> PointCloud:
         If ``disparity`` is not of the view's shape (H, W).
     """
     return view_points(
-        light_field.views[light_field.reference],
+        light_field.views[light_field.reference_position],
         disparity,
         camera=light_field.camera,
         from_centre=light_field.from_centre,

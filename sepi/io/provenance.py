@@ -82,7 +82,7 @@ def history_of(path: Path | None) -> list[Step]:
 
 def scene_attributes(light_field: LightField) -> dict[str, Attribute]:
     """Attributes that tell which light field a file is about, and its disparity range, which must be known."""
-    known = light_field.known_range()
+    known = light_field.require_disparity_range()
     return {
         "scene": light_field.name,
         "source": light_field.source,

@@ -237,8 +237,8 @@ def _write_files(
 def _write_all(path: Path, light_field: LightField, maps: StageMaps, attributes: Mapping[str, Attribute]) -> None:
     """Write every map, the view and where it stands, the camera and what made the maps as one HDF5 file."""
     camera = light_field.camera
-    more: dict[str, npt.NDArray[Any]] = {"view": light_field.views[light_field.reference]}
-    known: dict[str, Any] = {"view_position": light_field.reference, "grid": light_field.grid}
+    more: dict[str, npt.NDArray[Any]] = {"view": light_field.views[light_field.reference_position]}
+    known: dict[str, Any] = {"view_position": light_field.reference_position, "grid": light_field.grid}
     if camera is not None:
         more["depth"] = camera.depth(maps.disparity)
         known["camera"] = (camera.scale, camera.offset, camera.focal_px)

@@ -35,7 +35,7 @@ class Evaluation:
     scores : mapping
         Protocol to region to scores; empty where there is no ground truth.
     error : ndarray, shape (H, W), float32, or None
-        Estimate minus truth in pixels per view step; NaN where either is unknown.
+        Estimate minus ground truth in pixels per view step; NaN where either is unknown.
     regions : mapping of str to ndarray, shape (H, W), bool
         The masks that the scores of a region were taken over.
     region_sources : mapping of str to str

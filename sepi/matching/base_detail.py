@@ -35,7 +35,7 @@ COLOURS_ALONE_SCALE = 0.0164
 _KEPT: dict[tuple[object, ...], npt.NDArray[np.int16]] = {}
 
 
-class LayerParameters(Parameters):
+class BaseDetailParameters(Parameters):
     """Parameters of the two layers and of how well they must fit."""
 
     colour_scale: float = Field(
@@ -59,7 +59,7 @@ class LayerParameters(Parameters):
 
 
 @dataclass(frozen=True)
-class Layers:
+class BaseDetail:
     """The layers of all views, as the kernels want them.
 
     Attributes
@@ -87,13 +87,13 @@ class Layers:
         return scale**2 + self.noise
 
 
-def split_layers(light_field: LightField, parameters: LayerParameters) -> Layers:
+def base_detail_decomposition(light_field: LightField, parameters: BaseDetailParameters) -> BaseDetail:
     """The layers of a light field; missing views stay empty.
 
     Parameters
     ----------
     light_field : LightField
-    parameters : LayerParameters
+    parameters : BaseDetailParameters
 
     Returns
     -------
@@ -102,16 +102,16 @@ def split_layers(light_field: LightField, parameters: LayerParameters) -> Layers
     views = light_field.views
     channels = 3 // views.shape[4]
     # grey counts as three equal channels, so that scales mean the same for grey and colour
-    noise = channels * residual_variance(light_field.centre)
-    edge = float(np.hypot(parameters.base_sigma_colour, 3 * noise_level(light_field.centre))) / channels
+    noise = channels * residual_variance(light_field.reference_view)
+    edge = float(np.hypot(parameters.base_sigma_colour, 3 * noise_level(light_field.reference_view))) / channels
     if parameters.detail_share > 0:
         detail = _detail_of_views(light_field, parameters.base_radius, edge, parameters.base_sigma_space)
     else:
         detail = np.empty((*light_field.grid, 0, *light_field.shape), np.int16)
     colours = np.ascontiguousarray(np.repeat(views.transpose(0, 1, 4, 2, 3), channels, axis=2))
     unit = 1 / float(np.iinfo(views.dtype).max) if np.issubdtype(views.dtype, np.integer) else 1.0  # type: ignore[type-var]
-    guide = np.ascontiguousarray(np.repeat(light_field.centre, channels, axis=2))
-    return Layers(colours, unit, detail, noise, guide)
+    guide = np.ascontiguousarray(np.repeat(light_field.reference_view, channels, axis=2))
+    return BaseDetail(colours, unit, detail, noise, guide)
 
 
 def _detail_of_views(light_field: LightField, radius: int, edge: float, width: float) -> npt.NDArray[np.int16]:

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sepi.lightfield import BoolMap, FloatMap, LightField
-from sepi.matching.base_detail import DETAIL_UNIT, LayerParameters, Layers
+from sepi.matching.base_detail import DETAIL_UNIT, BaseDetail, BaseDetailParameters
 from sepi.matching.gauss_newton_kernels import (
     MARGIN,
     mean_of_views,
@@ -30,7 +30,7 @@ _DIFFERENCE = np.array([-1, 0, 1], np.float32) / 2
 
 
 @dataclass(frozen=True)
-class Matching:
+class SplineViews:
     """What a Gauss-Newton step needs of the views.
 
     Attributes
@@ -54,20 +54,20 @@ class Matching:
     shares: FloatMap
 
 
-def prepared(light_field: LightField, layers: Layers, parameters: LayerParameters) -> Matching:
+def spline_views(light_field: LightField, layers: BaseDetail, parameters: BaseDetailParameters) -> SplineViews:
     """Splines of all views and the reference view's layers.
 
     Parameters
     ----------
     light_field : LightField
     layers : Layers
-    parameters : LayerParameters
+    parameters : BaseDetailParameters
 
     Returns
     -------
-    Matching
+    SplineViews
     """
-    t0, s0 = light_field.reference
+    t0, s0 = light_field.reference_position
     planes = [(layers.colours, layers.colour_unit, parameters.colour_scale, 1 - parameters.detail_share)]
     if parameters.detail_share > 0:
         planes.append((layers.detail, DETAIL_UNIT, parameters.detail_scale, parameters.detail_share))
@@ -76,28 +76,28 @@ def prepared(light_field: LightField, layers: Layers, parameters: LayerParameter
     for i, (values, unit, _, _) in enumerate(planes):
         view_splines(values, np.float32(unit), light_field.present, 3 * i, splines)
     own = [values[t0, s0].astype(np.float32) * np.float32(unit) for values, unit, _, _ in planes]
-    return Matching(
+    return SplineViews(
         splines,
         np.ascontiguousarray(np.concatenate(own).transpose(1, 2, 0)),
         light_field.present,
-        light_field.reference,
+        light_field.reference_position,
         np.array([layers.squared_scale(scale) for _, _, scale, _ in planes], np.float32),
         np.array([share for _, _, _, share in planes], np.float32),
     )
 
 
-def view_mean(matching: Matching, disparity: FloatMap, nearest: FloatMap, cover: float) -> FloatMap:
+def view_mean(matching: SplineViews, disparity: FloatMap, nearest: FloatMap, occlusion_margin: float) -> FloatMap:
     """Mean of the views that see each pixel.
 
     Parameters
     ----------
-    matching : Matching
+    matching : SplineViews
     disparity : ndarray, shape (H, W), float32
         Pixels per view step.
     nearest : ndarray, shape (T, S, H, W), float32
         z-buffers of the map in the views.
-    cover : float
-        By how much a cover must be nearer, pixels per view step.
+    occlusion_margin : float
+        By how much a occlusion_margin must be nearer, pixels per view step.
 
     Returns
     -------
@@ -109,29 +109,29 @@ def view_mean(matching: Matching, disparity: FloatMap, nearest: FloatMap, cover:
         *matching.place,
         disparity,
         nearest,
-        np.float32(cover),
+        np.float32(occlusion_margin),
         matching.scales,
         matching.reference,
     )
     return mean
 
 
-def information(
-    matching: Matching, mean: FloatMap, disparity: FloatMap, nearest: FloatMap, cover: float
+def gradient_and_hessian(
+    matching: SplineViews, mean: FloatMap, disparity: FloatMap, nearest: FloatMap, occlusion_margin: float
 ) -> tuple[FloatMap, FloatMap]:
     """Gradient and curvature of the cost of each pixel, before any window.
 
     Parameters
     ----------
-    matching : Matching
+    matching : SplineViews
     mean : ndarray, shape (H, W, C), float32
         From :func:`view_mean`; of a slightly different map is good enough.
     disparity : ndarray, shape (H, W), float32
         Pixels per view step.
     nearest : ndarray, shape (T, S, H, W), float32
         z-buffers of the map in the views.
-    cover : float
-        By how much a cover must be nearer, pixels per view step.
+    occlusion_margin : float
+        By how much a occlusion_margin must be nearer, pixels per view step.
 
     Returns
     -------
@@ -145,7 +145,7 @@ def information(
         *matching.place,
         disparity,
         nearest,
-        np.float32(cover),
+        np.float32(occlusion_margin),
         matching.scales,
         matching.shares,
         mean,

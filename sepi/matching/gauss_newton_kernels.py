@@ -162,8 +162,10 @@ def _seen(y: Any, x: Any, nearest: Any, limit: Any) -> Any:
 
 
 @njit(parallel=True, cache=True, fastmath=EXACT, error_model="numpy")
-def mean_of_views(splines: Any, present: Any, t0: int, s0: int, disparity: Any, nearest: Any, cover: Any, scales: Any,
-                  reference: Any) -> Any:  # fmt: skip
+def mean_of_views(
+    splines: Any, present: Any, t0: int, s0: int, disparity: Any, nearest: Any, occlusion_margin: Any, scales: Any,
+    reference: Any,
+) -> Any:  # fmt: skip
     """Mean of the views that see each pixel, those unlike the reference view counting less; shape (H, W, C), float32.
 
     Parameters
@@ -176,7 +178,7 @@ def mean_of_views(splines: Any, present: Any, t0: int, s0: int, disparity: Any, 
     disparity : ndarray, shape (H, W), float32
     nearest : ndarray, shape (T, S, H, W), float32
         z-buffers.
-    cover : float32
+    occlusion_margin : float32
         By how much a cover must be nearer.
     scales : ndarray, shape (C / 3,), float32
         Square of the robust scale of each layer.
@@ -188,6 +190,7 @@ def mean_of_views(splines: Any, present: Any, t0: int, s0: int, disparity: Any, 
     for y in prange(H):
         for x in range(W):
             d = disparity[y, x]
+            limit = d + occlusion_margin
             for layer in range(C // 3):
                 c, scale = 3 * layer, scales[layer]
                 m0, m1, m2 = reference[y, x, c], reference[y, x, c + 1], reference[y, x, c + 2]
@@ -196,7 +199,7 @@ def mean_of_views(splines: Any, present: Any, t0: int, s0: int, disparity: Any, 
                     for s in range(S):
                         fy = np.float32(y) - d * np.float32(t - t0)
                         fx = np.float32(x) - d * np.float32(s - s0)
-                        if not present[t, s] or (t == t0 and s == s0) or not _seen(fy, fx, nearest[t, s], d + cover):
+                        if not present[t, s] or (t == t0 and s == s0) or not _seen(fy, fx, nearest[t, s], limit):
                             continue
                         v0, v1, v2 = _sample(splines[t, s], c, fy, fx)
                         z = (v0 - m0) ** 2 + (v1 - m1) ** 2 + (v2 - m2) ** 2
@@ -211,13 +214,13 @@ def mean_of_views(splines: Any, present: Any, t0: int, s0: int, disparity: Any, 
 
 
 @njit(parallel=True, cache=True, fastmath=EXACT, error_model="numpy")
-def normal_equations(splines: Any, present: Any, t0: int, s0: int, disparity: Any, nearest: Any, cover: Any,
+def normal_equations(splines: Any, present: Any, t0: int, s0: int, disparity: Any, nearest: Any, occlusion_margin: Any,
                      scales: Any, shares: Any, mean: Any, down: Any, across: Any) -> Any:  # fmt: skip
     """Gauss-Newton sums of each pixel over the views that see it.
 
     Parameters
     ----------
-    splines, present, t0, s0, disparity, nearest, cover, scales
+    splines, present, t0, s0, disparity, nearest, occlusion_margin, scales
         As in :func:`mean_of_views`.
     shares : ndarray, shape (C / 3,), float32
         Share of each layer.
@@ -235,6 +238,7 @@ def normal_equations(splines: Any, present: Any, t0: int, s0: int, disparity: An
     for y in prange(H):
         for x in range(W):
             d = disparity[y, x]
+            limit = d + occlusion_margin
             for layer in range(C // 3):
                 c, scale = 3 * layer, scales[layer]
                 m0, m1, m2 = mean[y, x, c], mean[y, x, c + 1], mean[y, x, c + 2]
@@ -245,7 +249,7 @@ def normal_equations(splines: Any, present: Any, t0: int, s0: int, disparity: An
                     for s in range(S):
                         dt, ds = np.float32(t - t0), np.float32(s - s0)
                         fy, fx = np.float32(y) - d * dt, np.float32(x) - d * ds
-                        if not present[t, s] or (t == t0 and s == s0) or not _seen(fy, fx, nearest[t, s], d + cover):
+                        if not present[t, s] or (t == t0 and s == s0) or not _seen(fy, fx, nearest[t, s], limit):
                             continue
                         v0, v1, v2 = _sample(splines[t, s], c, fy, fx)
                         r0, r1, r2 = v0 - m0, v1 - m1, v2 - m2

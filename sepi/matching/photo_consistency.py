@@ -84,8 +84,8 @@ def _add_two_rgb(
 
 @njit(cache=True, fastmath=True, error_model="numpy")
 def _add_view(
-    band: Any, low: int, centre: Any, y: int, begin: int, end: int, down: Any, fy: Any, across: Any, fx: Any, H: int,
-    scale2: Any, cost: Any,
+    band: Any, low: int, reference_view: Any, y: int, begin: int, end: int, down: Any, fy: Any, across: Any, fx: Any, H:
+    int, scale2: Any, cost: Any,
 ) -> None:  # fmt: skip
     """Add the residuals of one view, whose rows from ``low`` on are in ``band (C, rows, W)``, to ``cost (K, n)``."""
     C, _, W = band.shape
@@ -107,9 +107,9 @@ def _add_view(
         w = _weights(below, fx[here])
         out = cost[here, first - begin : last - begin]
         if C == 1:
-            _add_gray(out, band[0, n, i : j + 1], band[0, n + 1, i : j + 1], centre[0, first:last], w, scale2)
+            _add_gray(out, band[0, n, i : j + 1], band[0, n + 1, i : j + 1], reference_view[0, first:last], w, scale2)
             continue
-        g = (centre[0, first:last], centre[1, first:last], centre[2, first:last])
+        g = (reference_view[0, first:last], reference_view[1, first:last], reference_view[2, first:last])
         if k < K and across[k] == left and y + down[k] == top:
             v = _weights(fy[k], fx[k])
             _add_two_rgb(
@@ -151,7 +151,7 @@ def cost_row(
     """
     T, S, C, H, W = views.shape
     cost[:, :, : end - begin] = 0
-    centre = views[t0, s0, :, y].astype(np.float32)
+    reference_view = views[t0, s0, :, y].astype(np.float32)
     # rows and columns that any candidate touches, converted once for all candidates
     rows = 2
     for t in range(T):
@@ -168,7 +168,7 @@ def cost_row(
             for c in range(C):
                 for row in range(low, high + 1):
                     band[c, row - low, leftmost:rightmost] = views[t, s, c, row, leftmost:rightmost]
-            _add_view(band, low, centre, y, begin, end, down[t], fy[t], across[s], fx[s], H, scale2, cost[g])
+            _add_view(band, low, reference_view, y, begin, end, down[t], fy[t], across[s], fx[s], H, scale2, cost[g])
 
 
 @njit(cache=True, error_model="numpy")

@@ -28,7 +28,9 @@ from sepi.stage import Parameters, Progress, no_progress
 class SweepParameters(Parameters):
     """Parameters of a plane sweep."""
 
-    candidates: int = Field(181, ge=3, le=4001, description="number of candidate disparities, uniform over the range")
+    num_disparities: int = Field(
+        181, ge=3, le=4001, description="number of candidate disparities, uniform over the range"
+    )
     scale: float = Field(
         0.0165,
         ge=1e-6,
@@ -84,7 +86,7 @@ def sweep(
     *,
     groups: npt.NDArray[np.int64] | None = None,
     subsets: BoolMap | None = None,
-    wanted: BoolMap | None = None,
+    mask: BoolMap | None = None,
     progress: Progress = no_progress,
 ) -> SweepResult:
     """Sweep the candidate disparities and keep the best one of each pixel and subset of views.
@@ -101,7 +103,7 @@ def sweep(
         Group of each view, 0..G-1; -1 leaves a view out. Default: one group of all.
     subsets : ndarray, shape (N, G), bool, optional
         Which groups make up each subset. Default: each group by itself.
-    wanted : ndarray, shape (H, W), bool, optional
+    mask : ndarray, shape (H, W), bool, optional
         Pixels to be done. Default: all.
     progress : callable, optional
 
@@ -122,25 +124,25 @@ def sweep(
     H, W = light_field.shape
     groups = np.zeros(light_field.grid, np.int64) if groups is None else groups
     groups = np.where(light_field.present, groups, -1)
-    groups[light_field.reference] = -1  # the reference view agrees with itself at every candidate
+    groups[light_field.reference_position] = -1  # the reference view agrees with itself at every candidate
     subsets = np.eye(groups.max() + 1, dtype=bool) if subsets is None else subsets
     groups, subsets = _without_empty(groups, subsets)
-    wanted = np.ones((H, W), bool) if wanted is None else wanted
+    mask = np.ones((H, W), bool) if mask is None else mask
     views = planar(light_field)
-    noise = residual_variance(light_field.centre)
+    noise = residual_variance(light_field.reference_view)
     result = SweepResult(*(np.full((len(subsets), H, W), np.nan, np.float32) for _ in range(3)))
-    disparities = light_field.known_range().candidates(parameters.candidates)
-    (T, S), (t0, s0) = light_field.grid, light_field.reference
+    disparities = light_field.require_disparity_range().candidates(parameters.num_disparities)
+    (T, S), (t0, s0) = light_field.grid, light_field.reference_position
     rows = _rows_at_a_stretch(H, get_num_threads())
     strip = rows * get_num_threads()
     for first in range(0, H, strip):
         sweep_rows(
             views,
-            *light_field.reference,
-            np.ascontiguousarray(light_field.centre.transpose(2, 0, 1)),
+            *light_field.reference_position,
+            np.ascontiguousarray(light_field.reference_view.transpose(2, 0, 1)),
             groups,
             subsets,
-            wanted,
+            mask,
             first,
             min(H, first + strip),
             rows,

@@ -168,18 +168,18 @@ def _best_candidate(costs: Any, disparities: Any) -> Any:
 
 
 @njit(cache=True)
-def _needed_runs(wanted: Any, y: int, begin: int, end: int, radius: int, runs: Any) -> int:
+def _needed_runs(mask: Any, y: int, begin: int, end: int, radius: int, runs: Any) -> int:
     """Runs of columns of row ``y`` that windows of wanted pixels touch, into ``runs (N, 2)``, and how many.
 
     A short gap does not end a run. Rows of all tasks count, lest a run, and with it the way a compiler sums it up,
     depend on how the rows are shared out.
     """
-    H, W = wanted.shape
+    H, W = mask.shape
     number = 0
     for x in range(begin, end):
         needed = False
         for row in range(max(0, y - radius), min(H, y + radius + 1)):
-            needed |= wanted[row, x]
+            needed |= mask[row, x]
         if not needed:
             continue
         first, last = max(0, x - radius), min(W, x + radius + 1)
@@ -207,13 +207,13 @@ def _transpose(costs: Any, columns: int, target: Any) -> None:
 
 @njit(cache=True, error_model="numpy")
 def _fill_row(
-    views: Any, t0: int, s0: int, groups: Any, wanted: Any, row: int, begin: int, end: int, margin: int, radius: int,
+    views: Any, t0: int, s0: int, groups: Any, mask: Any, row: int, begin: int, end: int, margin: int, radius: int,
     down: Any, fy: Any, across: Any, fx: Any, scale2: Any, costs: Any, runs: Any, ring_row: Any, counts_row: Any,
 ) -> None:  # fmt: skip
     """Costs of one row into ``ring_row (n, G K)`` where they are needed, and near the border the views that see it."""
-    H, W = wanted.shape
+    H, W = mask.shape
     origin = begin - radius
-    for r in range(_needed_runs(wanted, row, begin, end, radius, runs)):
+    for r in range(_needed_runs(mask, row, begin, end, radius, runs)):
         first, last = runs[r]
         cost_row(views, t0, s0, groups, row, first, last, down, fy, across, fx, scale2, costs)
         _transpose(costs, last - first, ring_row[first - origin :])
@@ -233,13 +233,13 @@ def _fill_row(
 
 @njit(cache=True, error_model="numpy")
 def _sweep_tile(
-    views: Any, t0: int, s0: int, guide: Any, groups: Any, subsets: Any, wanted: Any,
+    views: Any, t0: int, s0: int, guide: Any, groups: Any, subsets: Any, mask: Any,
     top: int, bottom: int, begin: int, end: int, disparities: Any, down: Any, fy: Any, across: Any, fx: Any,
     scale2: Any, radius: int, window_variance: Any, margin: int,
     disparity: Any, cost: Any, mean: Any,
 ) -> None:  # fmt: skip
     """Sweep rows ``top..bottom``, columns ``begin..end``; nearer than ``margin`` to the border, views are counted."""
-    H, W = wanted.shape
+    H, W = mask.shape
     N, G = subsets.shape
     K = disparities.size
     size = 2 * radius + 1
@@ -258,17 +258,17 @@ def _sweep_tile(
     total = np.empty(K, np.float32)
     done = -1  # last row whose costs are in the ring
     for y in range(top, bottom):
-        if not wanted[y, begin:end].any():
+        if not mask[y, begin:end].any():
             continue
         for row in range(max(0, y - radius, done + 1), min(H, y + radius + 1)):
             _fill_row(
-                views, t0, s0, groups, wanted, row, begin, end, margin, radius, down, fy, across, fx, scale2, costs,
+                views, t0, s0, groups, mask, row, begin, end, margin, radius, down, fy, across, fx, scale2, costs,
                 runs, ring[row % size], counts[row % size],
             )  # fmt: skip
             done = row
         window_weights(guide, y, begin, end, radius, window_variance, weights)
         for x in range(begin, end):
-            if not wanted[y, x]:
+            if not mask[y, x]:
                 continue
             _aggregate(ring, y, x - begin, H, weights, sums)
             # away from the border every view sees every pixel of the window: nothing to count
@@ -283,7 +283,7 @@ def _sweep_tile(
 
 @njit(cache=True, parallel=True)
 def sweep_rows(
-    views: Any, t0: int, s0: int, guide: Any, groups: Any, subsets: Any, wanted: Any,
+    views: Any, t0: int, s0: int, guide: Any, groups: Any, subsets: Any, mask: Any,
     first: int, last: int, rows: int, disparities: Any, down: Any, fy: Any, across: Any, fx: Any,
     scale2: Any, radius: int, window_variance: Any, disparity: Any, cost: Any, mean: Any,
 ) -> None:  # fmt: skip
@@ -295,7 +295,7 @@ def sweep_rows(
     for task in prange((last - first + rows - 1) // rows):
         for begin in range(0, W, TILE_WIDTH):
             _sweep_tile(
-                views, t0, s0, guide, groups, subsets, wanted,
+                views, t0, s0, guide, groups, subsets, mask,
                 first + task * rows, min(last, first + (task + 1) * rows), begin, min(W, begin + TILE_WIDTH),
                 disparities, down, fy, across, fx, scale2, radius, window_variance, margin,
                 disparity, cost, mean,

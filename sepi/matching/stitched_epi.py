@@ -106,7 +106,7 @@ def stitched_epi(light_field: LightField, y: int, disparity: float) -> StitchedE
     (T, S), (H, W) = light_field.grid, light_field.shape
     if not 0 <= y < H:
         raise SepiError(f"{light_field.name}: row {y} lies outside the reference view (0..{H - 1})")
-    t0, s0 = light_field.reference
+    t0, s0 = light_field.reference_position
     channels = light_field.views.shape[4]
     rows = np.zeros((T, S, W, channels), np.float32)
     inside = np.zeros((T, S), bool)
@@ -147,8 +147,8 @@ def line_cost(light_field: LightField, y: int, x: int, disparity: float, scale: 
         0..1; NaN if no view sees the pixel.
     """
     samples, valid = stitched_epi(light_field, y, disparity).along_line(x)
-    t0, s0 = light_field.reference
+    t0, s0 = light_field.reference_position
     valid = valid.copy()
     valid[t0 * light_field.grid[1] + s0] = False
-    squared = ((samples - light_field.centre[y, x]) ** 2).sum(axis=1)[valid]
+    squared = ((samples - light_field.reference_view[y, x]) ** 2).sum(axis=1)[valid]
     return float(np.mean(squared / (squared + scale**2))) if squared.size else float("nan")

@@ -57,8 +57,8 @@ def structure_tensor_depth(light_field: LightField, parameters: StructureTensorP
     SepiError
         If the reference view is alone in its row and in its column.
     """
-    t0, s0 = light_field.reference
-    known = light_field.known_range()
+    t0, s0 = light_field.reference_position
+    known = light_field.require_disparity_range()
     best = np.full(light_field.shape, (known.minimum + known.maximum) / 2, np.float32)
     confidence = np.zeros(light_field.shape, np.float32)
     row = [(s - s0, light_field.views[t0, s]) for s in range(light_field.grid[1]) if light_field.present[t0, s]]

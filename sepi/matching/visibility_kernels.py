@@ -52,14 +52,14 @@ def z_buffers(disparity: Any, present: Any, t0: int, s0: int) -> Any:
 
 
 @njit(parallel=True, cache=True)
-def covered_somewhere(disparity: Any, present: Any, t0: int, s0: int, cover: Any) -> Any:
+def occluded_in_any_view(disparity: Any, present: Any, t0: int, s0: int, occlusion_margin: Any) -> Any:
     """Pixels that something nearer covers in one of the views that could see them; shape (H, W), bool.
 
     Parameters
     ----------
     disparity, present, t0, s0
         As in :func:`z_buffers`.
-    cover : float32
+    occlusion_margin : float32
         By how much a cover must be nearer, pixels per view step.
     """
     nearest = z_buffers(disparity, present, t0, s0)
@@ -72,7 +72,7 @@ def covered_somewhere(disparity: Any, present: Any, t0: int, s0: int, cover: Any
                 for s in range(S):
                     row, column = y - d * (t - t0) + 0.5, x - d * (s - s0) + 0.5
                     if row >= 0 and column >= 0 and row < H and column < W:
-                        covered[y, x] |= nearest[t, s, int(row), int(column)] > d + cover
+                        covered[y, x] |= nearest[t, s, int(row), int(column)] > d + occlusion_margin
     return covered
 
 
@@ -92,7 +92,7 @@ def _add_layer(
 
 @njit(cache=True, fastmath=EXACT, error_model="numpy")
 def _add_view(
-    band: Any, low: int, centre: Any, y: int, dt: int, ds: int, disparities: Any, nearest: Any, tolerance: Any,
+    band: Any, low: int, reference_view: Any, y: int, dt: int, ds: int, disparities: Any, nearest: Any, tolerance: Any,
     hidden: Any, scales: Any, shares: Any, seen: Any, total: Any, weight: Any,
 ) -> None:  # fmt: skip
     """Add one view, whose rows from ``low`` on are in ``band (layers, 3, rows, W + 1)``, at every candidate."""
@@ -125,7 +125,7 @@ def _add_view(
             count[x] += run[x]
         w = ((one - fy) * (one - fx), (one - fy) * fx, fy * (one - fx), fy * fx)
         for layer in range(layers):
-            b, g = band[layer], centre[layer]
+            b, g = band[layer], reference_view[layer]
             _add_layer(
                 total[k, first:last], b[0, n, i:j], b[0, n + 1, i:j], b[1, n, i:j], b[1, n + 1, i:j], b[2, n, i:j],
                 b[2, n + 1, i:j], g[0, first:last], g[1, first:last], g[2, first:last], run, w, scales[layer],
@@ -177,13 +177,13 @@ def sweep_rows(
     for y in prange(begin, end):
         total, weight = np.zeros((K, W), np.float32), np.zeros((K, W), np.float32)
         seen = np.empty(W, np.float32)
-        centre = np.empty((layers, 3, W), np.float32)
+        reference_view = np.empty((layers, 3, W), np.float32)
         # one column more, which is read but weighs nothing
         band = np.zeros((layers, 3, rows, W + 1), np.float32)
         for c in range(3):
-            _load(colours[t0, s0, c, y], colour_unit, centre[0, c])
+            _load(colours[t0, s0, c, y], colour_unit, reference_view[0, c])
             if layers == 2:
-                _load(detail[t0, s0, c, y], detail_unit, centre[1, c])
+                _load(detail[t0, s0, c, y], detail_unit, reference_view[1, c])
         for t in range(T):
             ends = (y - disparities[0] * (t - t0), y - disparities[K - 1] * (t - t0))
             low = max(0, min(H - 2, math.floor(min(ends))))
@@ -197,7 +197,7 @@ def sweep_rows(
                         if layers == 2:
                             _load(detail[t, s, c, row], detail_unit, band[1, c, row - low, :W])
                 _add_view(
-                    band, low, centre, y, t - t0, s - s0, disparities, nearest[t, s], tolerance, hidden, scales,
+                    band, low, reference_view, y, t - t0, s - s0, disparities, nearest[t, s], tolerance, hidden, scales,
                     shares, seen, total, weight,
                 )  # fmt: skip
         for k in range(K):

@@ -2,7 +2,8 @@
 
 A view sees pixel ``p`` at candidate ``d`` unless something nearer than ``d`` covers the place where ``p`` would be
 seen. What covers it is known from a first depth map: each view gets a z-buffer of that map. This is the idea of the
-half-SEPI, with the part of the views chosen view by view. The compiled loops are in :mod:`sepi.matching.visibility_kernels`.
+half-SEPI, with the part of the views chosen view by view. The compiled loops are in
+:mod:`sepi.matching.visibility_kernels`.
 """
 
 from __future__ import annotations
@@ -12,9 +13,15 @@ from dataclasses import replace
 import numpy as np
 from pydantic import Field
 
-from sepi.image.mixed_pixels import MixtureParameters, farther_where_little_covered
+from sepi.image.mixed_pixels import MixtureParameters, reassign_mixed_pixels
 from sepi.lightfield import FloatMap, LightField
-from sepi.matching.base_detail import COLOURS_ALONE_SCALE, DETAIL_UNIT, LayerParameters, Layers, split_layers
+from sepi.matching.base_detail import (
+    COLOURS_ALONE_SCALE,
+    DETAIL_UNIT,
+    BaseDetail,
+    BaseDetailParameters,
+    base_detail_decomposition,
+)
 from sepi.matching.semi_global import SmoothedResult, SmoothingParameters, smooth_and_choose
 from sepi.stage import Progress, with_defaults
 
@@ -22,22 +29,24 @@ ROWS_PER_REPORT = 128
 """Rows of the picture between two calls of the progress function."""
 
 
-class LayeredSweepParameters(LayerParameters, SmoothingParameters):
+class VisibilitySweepParameters(BaseDetailParameters, SmoothingParameters):
     """Parameters of a layered sweep and of the choice among its candidates."""
 
-    candidates: int = Field(91, ge=3, le=4001, description="number of candidate disparities, uniform over the range")
+    num_disparities: int = Field(
+        91, ge=3, le=4001, description="number of candidate disparities, uniform over the range"
+    )
 
 
-class VisibilityParameters(LayeredSweepParameters, MixtureParameters):
+class VisibilityParameters(VisibilitySweepParameters, MixtureParameters):
     """Parameters of the sweep over the views that see a pixel."""
 
     passes: int = Field(3, ge=1, le=10, description="how often visibility and depth are computed anew")
-    cover: float = Field(0.15, ge=0, description="by how much a cover must be nearer, pixels per view step")
-    hidden_weight: float = Field(0.01, ge=0, le=1, description="weight of a view in which the pixel is covered")
+    occlusion_margin: float = Field(0.15, ge=0, description="by how much a cover must be nearer, pixels per view step")
+    occluded_view_weight: float = Field(0.01, ge=0, le=1, description="weight of a view in which the pixel is covered")
 
 
 AllViewsParameters = with_defaults(
-    LayeredSweepParameters,
+    VisibilitySweepParameters,
     "AllViewsParameters",
     "Parameters of the first depth map: a narrow scale of the colours bears with views that do not see the pixel.",
     colour_scale=0.0077,
@@ -46,7 +55,10 @@ AllViewsColoursParameters = with_defaults(
     AllViewsParameters, "AllViewsColoursParameters", "The same from colours alone.", detail_share=0.0
 )
 UnmixedParameters = with_defaults(
-    VisibilityParameters, "UnmixedParameters", "Visible views without the decision by colour mixture.", mixture=0.0
+    VisibilityParameters,
+    "UnmixedParameters",
+    "Visible views without the decision by colour mixture.",
+    alpha_threshold=0.0,
 )
 VisibilityColoursParameters = with_defaults(
     VisibilityParameters,
@@ -58,7 +70,7 @@ VisibilityColoursParameters = with_defaults(
 
 
 def depth_from_all_views(
-    light_field: LightField, parameters: LayeredSweepParameters, progress: Progress
+    light_field: LightField, parameters: VisibilitySweepParameters, progress: Progress
 ) -> SmoothedResult:
     """Depth as if every view saw every pixel.
 
@@ -66,7 +78,7 @@ def depth_from_all_views(
     ----------
     light_field : LightField
         With a known disparity range.
-    parameters : LayeredSweepParameters
+    parameters : VisibilitySweepParameters
     progress : callable
 
     Returns
@@ -78,7 +90,7 @@ def depth_from_all_views(
     SepiError
         If the disparity range is unknown.
     """
-    layers = split_layers(light_field, parameters)
+    layers = base_detail_decomposition(light_field, parameters)
     none = np.empty((*light_field.grid, light_field.shape[0], 0), np.float32)
     return _swept(light_field, layers, none, 0.0, 1.0, parameters, progress)
 
@@ -108,38 +120,38 @@ def depth_from_visible_views(
     """
     from sepi.matching.visibility_kernels import z_buffers
 
-    layers = split_layers(light_field, parameters)
+    layers = base_detail_decomposition(light_field, parameters)
     n = parameters.passes
     for i in range(n):
-        nearest = z_buffers(disparity, light_field.present, *light_field.reference)
+        nearest = z_buffers(disparity, light_field.present, *light_field.reference_position)
         result = _swept(
             light_field,
             layers,
             nearest,
-            parameters.cover,
-            parameters.hidden_weight,
+            parameters.occlusion_margin,
+            parameters.occluded_view_weight,
             parameters,
             lambda fraction, i=i: progress((i + fraction) / n),  # type: ignore[misc]
         )
         disparity = result.disparity
-    decided = farther_where_little_covered(disparity, layers.guide, layers.noise, parameters)
+    decided = reassign_mixed_pixels(disparity, layers.guide, layers.noise, parameters)
     return replace(result, disparity=decided)
 
 
 def _swept(
     light_field: LightField,
-    layers: Layers,
+    layers: BaseDetail,
     nearest: FloatMap,
-    cover: float,
+    occlusion_margin: float,
     hidden: float,
-    parameters: LayeredSweepParameters,
+    parameters: VisibilitySweepParameters,
     progress: Progress,
 ) -> SmoothedResult:
     from sepi.matching.visibility_kernels import sweep_rows
 
     H, W = light_field.shape
-    disparities = light_field.known_range().candidates(parameters.candidates)
-    cost = np.empty((parameters.candidates, H, W), np.float32)
+    disparities = light_field.require_disparity_range().candidates(parameters.num_disparities)
+    cost = np.empty((parameters.num_disparities, H, W), np.float32)
     share = parameters.detail_share
     scales = [layers.squared_scale(s) for s in (parameters.colour_scale, parameters.detail_scale)]
     for begin in range(0, H, ROWS_PER_REPORT):
@@ -150,10 +162,10 @@ def _swept(
             layers.detail,
             np.float32(DETAIL_UNIT),
             light_field.present,
-            *light_field.reference,
+            *light_field.reference_position,
             nearest,
             disparities,
-            np.float32(cover),
+            np.float32(occlusion_margin),
             np.float32(hidden),
             np.array(scales, np.float32),
             np.array([1 - share, share], np.float32),

@@ -16,7 +16,7 @@ import numpy as np
 import scipy.sparse as sparse
 from scipy.sparse.linalg import spsolve
 
-from sepi.image.superpixels import Borders, FloatArray, Superpixels
+from sepi.image.superpixels import Adjacency, FloatArray, Superpixels
 from sepi.lightfield import BoolMap, FloatMap
 
 UNIT = 15.0
@@ -90,8 +90,8 @@ def fit_planes(
 
 def propagate(
     segments: Superpixels,
-    touching: Borders,
-    likeness: FloatArray,
+    adjacent: Adjacency,
+    affinity: FloatArray,
     planes: FloatArray,
     free: BoolMap,
     disparity: FloatMap,
@@ -103,14 +103,14 @@ def propagate(
 
     The absolute values of Eq. 7 are minimised by re-weighting: of the data, ``|d_hat - d|``, and of the continuity,
     ``|d_hat - d_l|``, where ``d_l`` is the neighbour's plane continued linearly to the common border. The equation's
-    denominator, which weakens the coupling across a change of depth, is that re-weighting; its factor of likeness is
+    denominator, which weakens the coupling across a change of depth, is that re-weighting; its factor of affinity is
     the colour cue. All free superpixels are solved for together, so depth travels from reliable edges inwards.
 
     Parameters
     ----------
     segments : Superpixels
-    touching : Borders
-    likeness : ndarray, shape (E,), float
+    adjacent : Borders
+    affinity : ndarray, shape (E,), float
         0..1 for each border: whether the two sides belong together.
     planes : ndarray, shape (N, 3), float
         Of the held superpixels, and a start for the others.
@@ -124,21 +124,21 @@ def propagate(
     -------
     ndarray, shape (N, 3), float
     """
-    touched = free[touching.first] | free[touching.second]
-    touching, likeness = touching.subset(touched), likeness[touched]
+    touched = free[adjacent.first] | free[adjacent.second]
+    adjacent, affinity = adjacent.subset(touched), affinity[touched]
     at_first, at_second = (
-        np.column_stack([np.ones(len(likeness)), (touching.midpoints - segments.centroids[side]) / UNIT])
-        for side in (touching.first, touching.second)
+        np.column_stack([np.ones(len(affinity)), (adjacent.midpoints - segments.centroids[side]) / UNIT])
+        for side in (adjacent.first, adjacent.second)
     )
-    strength = coupling.continuity * likeness * touching.lengths / UNIT
+    strength = coupling.continuity * affinity * adjacent.lengths / UNIT
     weight = np.where(free[segments.labels], weight, 0)
     unknown = np.repeat(free, 3)
     solution = planes.copy()
-    trust = np.ones(len(likeness))
+    trust = np.ones(len(affinity))
     data_weight = weight
     for spread in _shrinking(coupling.tolerance):
         left, right = _normal_equations(segments, disparity, data_weight, design)
-        continuity = _continuity(touching, at_first, at_second, strength * trust, coupling.slope, len(segments))
+        continuity = _continuity(adjacent, at_first, at_second, strength * trust, coupling.slope, len(segments))
         system = sparse.block_diag(left / UNIT**2, format="csr") + continuity + 1e-9 * sparse.eye_array(unknown.size)
         system = system.tocsr()[unknown]
         known = system[:, ~unknown] @ solution.ravel()[~unknown]
@@ -146,7 +146,7 @@ def propagate(
         solution[free] = solved.reshape(-1, 3)
         residual = evaluate_planes(segments, solution, design) - disparity
         data_weight = weight / (1 + (residual / spread) ** 2)
-        step = (at_first * solution[touching.first]).sum(axis=1) - (at_second * solution[touching.second]).sum(axis=1)
+        step = (at_first * solution[adjacent.first]).sum(axis=1) - (at_second * solution[adjacent.second]).sum(axis=1)
         trust = 1 / (1 + (step / spread) ** 2)
     return solution
 
@@ -176,19 +176,19 @@ def _normal_equations(
 
 
 def _continuity(
-    touching: Borders, at_first: FloatArray, at_second: FloatArray, strength: FloatArray, slope: float, count: int
+    adjacent: Adjacency, at_first: FloatArray, at_second: FloatArray, strength: FloatArray, slope: float, count: int
 ) -> sparse.csr_array:
     """Quadratic form of the disagreement of neighbours: of values at the border's middle, and of slopes."""
     number = len(strength)
     rows = np.arange(number)
     triples = []
     for p in range(3):
-        triples.append((rows, 3 * touching.first + p, at_first[:, p]))
-        triples.append((rows, 3 * touching.second + p, -at_second[:, p]))
+        triples.append((rows, 3 * adjacent.first + p, at_first[:, p]))
+        triples.append((rows, 3 * adjacent.second + p, -at_second[:, p]))
     root = np.full(number, np.sqrt(slope))
     for p in (1, 2):
-        triples.append((rows + p * number, 3 * touching.first + p, root))
-        triples.append((rows + p * number, 3 * touching.second + p, -root))
+        triples.append((rows + p * number, 3 * adjacent.first + p, root))
+        triples.append((rows + p * number, 3 * adjacent.second + p, -root))
     row, column, value = (np.concatenate(parts) for parts in zip(*triples, strict=True))
     difference = sparse.csr_array((value, (row, column)), shape=(3 * number, 3 * count))
     return difference.T @ sparse.diags_array(np.tile(strength, 3)) @ difference

@@ -35,7 +35,7 @@ _ACROSS = ((_BACK, _BACK), (_BACK, _ON), (_ON, _BACK), (_ON, _ON))
 _SECOND, _MIXED = (1.0, -2.0, 1.0), (1.0, -1.0, -1.0, 1.0)
 
 
-def bend_weights(
+def smoothness_weights(
     disparity: FloatMap, guide: FloatMap, reliability: FloatMap, bend: float, colour_variance: float
 ) -> list[FloatArray]:
     """Weights of the second differences along x, along y and across, 0..1.
@@ -75,7 +75,7 @@ def bend_weights(
     ]
 
 
-def bend_matrix(weights: list[FloatArray], shape: tuple[int, int]) -> sparse.csr_matrix:
+def second_difference_matrix(weights: list[FloatArray], shape: tuple[int, int]) -> sparse.csr_matrix:
     """Matrix of the smoothness term: ``d^T A d`` is the weighted sum of squared second differences."""
     numbers = np.arange(shape[0] * shape[1], dtype=np.int32).reshape(shape)
     total = sparse.csr_matrix((numbers.size, numbers.size))
@@ -90,19 +90,19 @@ def bend_matrix(weights: list[FloatArray], shape: tuple[int, int]) -> sparse.csr
 
 
 def solve_smooth(
-    smoothness: sparse.csr_matrix, weight: FloatMap, data: FloatMap, accuracy: float, most_steps: int
+    smoothness: sparse.csr_matrix, weight: FloatMap, data: FloatMap, rtol: float, max_iterations: int
 ) -> FloatMap:
     """Disparities of least energy.
 
     Parameters
     ----------
     smoothness : sparse matrix, shape (H W, H W)
-        From :func:`bend_matrix`, times the strength.
+        From :func:`second_difference_matrix`, times the strength.
     weight, data : ndarray, shape (H, W), float32
         ``w`` and ``z``; the data is also where the solver starts.
-    accuracy : float
+    rtol : float
         Residual, relative to the data's deviations from their mean, at which the solver stops.
-    most_steps : int
+    max_iterations : int
         Steps after which it stops anyway.
 
     Returns
@@ -112,11 +112,11 @@ def solve_smooth(
     w = weight.ravel().astype(np.float64) + 1e-9
     matrix = (smoothness + sparse.diags(w)).tocsr()
     start = data.ravel().astype(np.float64)
-    # smoothness does not know constants: without the mean, the accuracy does not depend on where zero lies
+    # smoothness does not know constants: without the mean, the rtol does not depend on where zero lies
     mean = np.average(start, weights=w)
     start = start - mean
     solution, _ = cg(
-        matrix, w * start, x0=start, rtol=accuracy, atol=0, maxiter=most_steps, M=_two_levels(matrix, data.shape)
+        matrix, w * start, x0=start, rtol=rtol, atol=0, maxiter=max_iterations, M=_two_levels(matrix, data.shape)
     )
     return np.asarray(solution + mean, np.float32).reshape(data.shape)
 

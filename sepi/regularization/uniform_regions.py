@@ -22,7 +22,7 @@ from pydantic import Field
 
 from sepi.image.noise import noise_level
 from sepi.lightfield import BoolMap, FloatMap, LightField
-from sepi.matching.base_detail import LayerParameters, split_layers
+from sepi.matching.base_detail import BaseDetailParameters, base_detail_decomposition
 from sepi.matching.plane_sweep import full_scale
 from sepi.stage import Parameters, StageMaps
 
@@ -49,18 +49,20 @@ class UniformPlanesParameters(Parameters):
         0.0102, ge=0, le=1, description="RGB distance that counts as the region's colour, colours in 0..1"
     )
     grow_confidence: float = Field(0.75, ge=0, le=1, description="confidence beyond which a pixel keeps its own depth")
-    least_area: int = Field(50, ge=1, description="smaller regions are left alone, in pixels")
+    min_area: int = Field(50, ge=1, description="smaller regions are left alone, in pixels")
     border_confidence: float = Field(0.3, ge=0, le=1, description="confidence from which a border pixel counts")
     tolerance: float = Field(0.05, gt=0, description="distance from the plane of what agrees, pixels per view step")
-    contradiction: float = Field(
+    behind_penalty: float = Field(
         2.0, ge=0, description="weight of border behind the plane against border that agrees with it"
     )
-    least_agreement: float = Field(0.25, ge=0, le=1, description="share of the border without which there is no plane")
-    trials: int = Field(500, ge=1, description="planes tried for each region")
-    cover: float = Field(0.15, ge=0, description="by how much a cover must be nearer, pixels per view step")
+    min_inlier_ratio: float = Field(0.25, ge=0, le=1, description="share of the border without which there is no plane")
+    ransac_iterations: int = Field(500, ge=1, description="planes tried for each region")
+    occlusion_margin: float = Field(0.15, ge=0, description="by how much a cover must be nearer, pixels per view step")
 
 
-def filled(light_field: LightField, before: StageMaps, parameters: UniformPlanesParameters) -> tuple[FloatMap, BoolMap]:
+def fill_uniform_regions(
+    light_field: LightField, before: StageMaps, parameters: UniformPlanesParameters
+) -> tuple[FloatMap, BoolMap]:
     """Disparity with planes in uniform regions, and these regions.
 
     Parameters
@@ -82,17 +84,17 @@ def filled(light_field: LightField, before: StageMaps, parameters: UniformPlanes
     """
     from scipy import ndimage
 
-    from sepi.matching.gauss_newton import prepared, view_mean
+    from sepi.matching.gauss_newton import spline_views, view_mean
     from sepi.matching.visibility_kernels import z_buffers
 
-    colours = LayerParameters(colour_scale=parameters.colour_scale, detail_share=0.0)
-    matching = prepared(light_field, split_layers(light_field, colours), colours)
-    nearest = z_buffers(before.disparity, light_field.present, *light_field.reference)
-    mean = view_mean(matching, before.disparity, nearest, parameters.cover)
+    colours = BaseDetailParameters(colour_scale=parameters.colour_scale, detail_share=0.0)
+    matching = spline_views(light_field, base_detail_decomposition(light_field, colours), colours)
+    nearest = z_buffers(before.disparity, light_field.present, *light_field.reference_position)
+    mean = view_mean(matching, before.disparity, nearest, parameters.occlusion_margin)
     views = int(light_field.present.sum())
     rounding = 0.3 / full_scale(light_field.views.dtype) if light_field.views.dtype != np.float32 else 0.0
-    variance = max(noise_level(light_field.centre), rounding, LEAST_NOISE) ** 2 / views
-    known = light_field.known_range()
+    variance = max(noise_level(light_field.reference_view), rounding, LEAST_NOISE) ** 2 / views
+    known = light_field.require_disparity_range()
     uniform = uniform_regions(mean, variance, before.confidence, parameters)
     disparity = before.disparity.copy()
     labels, _ = ndimage.label(uniform)
@@ -100,12 +102,12 @@ def filled(light_field: LightField, before: StageMaps, parameters: UniformPlanes
     for number, place in enumerate(ndimage.find_objects(labels), start=1):
         around = tuple(slice(max(side.start - 2, 0), side.stop + 2) for side in place)
         own = labels[around] == number
-        if own.sum() < parameters.least_area:
+        if own.sum() < parameters.min_area:
             uniform[around][own] = False
             continue
         border = cv2.dilate(own.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
         border &= ~uniform[around] & (before.confidence[around] > parameters.border_confidence)
-        plane = supporting_plane(border, before.disparity[around], parameters, random)
+        plane = ransac_plane(border, before.disparity[around], parameters, random)
         if plane is None:
             uniform[around][own] = False
         else:
@@ -149,7 +151,7 @@ def uniform_regions(
     return np.asarray(core | ((near > 0.5 / size**2) & alike & (confidence < parameters.grow_confidence)))
 
 
-def supporting_plane(
+def ransac_plane(
     border: BoolMap, disparity: FloatMap, parameters: UniformPlanesParameters, random: np.random.Generator
 ) -> npt.NDArray[np.float64] | None:
     """Plane that most of a border agrees with and little of it lies behind.
@@ -172,15 +174,15 @@ def supporting_plane(
         return None
     places = np.stack([np.ones(values.size), x, y], axis=1)
     best, chosen = -np.inf, None
-    for _ in range(parameters.trials):
+    for _ in range(parameters.ransac_iterations):
         three = random.choice(values.size, 3, replace=False)
         if abs(np.linalg.det(places[three])) < 1e-9:
             continue
         residual = values - places @ np.linalg.solve(places[three], values[three])
         agreement = np.abs(residual) < parameters.tolerance
-        score = agreement.sum() - parameters.contradiction * (residual < -parameters.tolerance).sum()
+        score = agreement.sum() - parameters.behind_penalty * (residual < -parameters.tolerance).sum()
         if score > best:
             best, chosen = score, agreement
-    if chosen is None or chosen.sum() < max(3, parameters.least_agreement * values.size):
+    if chosen is None or chosen.sum() < max(3, parameters.min_inlier_ratio * values.size):
         return None
     return np.asarray(np.linalg.lstsq(places[chosen], values[chosen], rcond=None)[0])

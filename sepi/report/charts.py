@@ -19,7 +19,7 @@ _STAGES = ("#3b5b92", "#2a8c8c", "#7ab648", "#d9b430", "#b25d2c", "#7d4f9e")
 
 
 def write_bars(folder: Path, name: str, groups: Sequence[BarGroup]) -> None:
-    """A panel of bars for each group of :func:`sepi.report.web.page_data.ablation_bars`; a sentence where there is none."""
+    """A panel of bars for each group of :func:`sepi.report.web.page_data.ablation_bars`; a sentence without any."""
     if not groups:
         figure = new_figure(4.2, 1)
         figure.text(0.5, 0.5, "no scene with ground truth", ha="center", va="center", fontsize=8)
@@ -46,7 +46,7 @@ def write_bars(folder: Path, name: str, groups: Sequence[BarGroup]) -> None:
         axis.set_title(f"{group.dataset}, {group.region}{count}", fontsize=8, parse_math=False)
         axis.tick_params(axis="x", labelsize=7)
         axis.set_xlabel("MSE x100", fontsize=7)
-    labels = {"this code, scenes at hand": _OURS, "the paper, all its scenes": _PUBLISHED}
+    labels = {"this code, scenes available": _OURS, "the paper, all its scenes": _PUBLISHED}
     handles = [Patch(color=colour, label=label) for label, colour in labels.items()]
     figure.legend(handles=handles, fontsize=7, loc="outside upper center", ncols=2)
     save(figure, folder, name)

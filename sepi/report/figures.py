@@ -1,7 +1,7 @@
 """Pictures of a scene, and what the page needs of it.
 
-Reference view, truth, disparity after each stage, errors, masks and other methods' maps as PNG; a sheet of them all,
-the confidence's curves and single pixels as figures (PNG and PDF).
+Reference view, ground truth, disparity after each stage, errors, masks and other methods' maps as PNG; a sheet of them
+all, the confidence's curves and single pixels as figures (PNG and PDF).
 """
 
 from __future__ import annotations
@@ -65,11 +65,11 @@ def scene_panels(light_field: LightField, evaluation: Evaluation) -> list[Panel]
     """What does not depend on the variant: reference view, and ground truth with its regions where there is any."""
     centre = centre_picture(light_field)
     panels = [Panel("centre", "reference view", centre)]
-    if light_field.truth is not None:
-        truth = map_picture(light_field.truth, disparity_limits(light_field))
-        panels.append(Panel("truth", "ground truth", truth))
+    if light_field.ground_truth is not None:
+        ground_truth = map_picture(light_field.ground_truth, disparity_limits(light_field))
+        panels.append(Panel("ground_truth", "ground truth", ground_truth))
     for region, mask in evaluation.regions.items():
-        panels.append(Panel(f"{region}_truth", f"{region}, for scoring", mask_picture(centre, mask)))
+        panels.append(Panel(f"{region}_ground_truth", f"{region}, for scoring", mask_picture(centre, mask)))
     return panels
 
 
@@ -83,7 +83,7 @@ def stage_panels(light_field: LightField, variant: str, maps: Mapping[str, Stage
 
 
 def detail_panels(light_field: LightField, variant: str, final: StageMaps) -> list[Panel]:
-    """Confidence, and what a variant took for occluded and texture-less, with the superpixels it used."""
+    """Confidence, and what a variant took for occluded and textureless, with the superpixels it used."""
     centre = centre_picture(light_field)
     panels = [Panel(f"{variant}/confidence", f"{variant}: confidence", map_picture(final.confidence, (0, 1), "gray"))]
     for region in ("occluded", "textureless"):
@@ -99,7 +99,7 @@ def detail_panels(light_field: LightField, variant: str, final: StageMaps) -> li
 
 
 def change_panels(evaluations: Mapping[str, Evaluation]) -> list[Panel]:
-    """How much farther from the truth a variant is than the one it is compared with; nothing without ground truth."""
+    """How much larger a variant's error is than that of the one it is compared with; nothing without ground truth."""
     errors = {name: evaluation.error for name, evaluation in evaluations.items() if evaluation.error is not None}
     panels = []
     for variant in errors:
@@ -247,8 +247,8 @@ def page_json(results: SceneResults, dataset: str, scene: str, probes: Sequence[
 
 @click.command(name="python -m sepi.report.figures", cls=SepiCommand)
 @click.option("--results", type=click.Path(path_type=Path), required=True, help="Folder of the results.")
-@click.option("--plan", "plan_text", required=True, help="JSON: scenes per data set, choices per variant and stage.")
-@click.option("--dataset", required=True, help="Data set of the scene.")
+@click.option("--plan", "plan_text", required=True, help="JSON: scenes per dataset, choices per variant and stage.")
+@click.option("--dataset", required=True, help="Dataset of the scene.")
 @click.option("--scene", required=True, help="Scene to draw.")
 @click.option("--pixels", default="[]", show_default=True, help="JSON: pixels to look into, [[row, column], ...].")
 @click.option("--output", type=click.Path(path_type=Path), required=True, help="Folder to write to.")

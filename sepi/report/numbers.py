@@ -74,8 +74,8 @@ def collect(plan: Plan, parameters: Parameters | None = None, parts: bool = Fals
         result, versions, machine; ``protocols``: name to border; ``plan``; ``parameters``; ``scenes``: a list, each
         with ``dataset``, ``scene``, ``light_field``, ``stages`` (path of choices to ``stage``, ``scores``,
         ``seconds``, ``peak_memory_mb``), ``confidence`` (variant to errors) and ``external`` (method to ``problem``,
-        ``source``, ``sha256``, ``scores``); ``tables``: name to :func:`sepi.report.tabular.layout.as_json`. With ``parts``,
-        scenes have ``stages`` only, and ``scores`` is None but after the last stage.
+        ``source``, ``sha256``, ``scores``); ``tables``: name to :func:`sepi.report.tabular.layout.as_json`. With
+        ``parts``, scenes have ``stages`` only, and ``scores`` is None but after the last stage.
 
     Raises
     ------
@@ -147,12 +147,12 @@ def _light_field(path: Path) -> dict[str, Any]:
         "source": found.source,
         "range": None if known is None else [known.minimum, known.maximum],
         "range_source": None if known is None else known.source,
-        "truth": found.truth is not None,
+        "ground_truth": found.ground_truth is not None,
         "masks": sorted(found.masks),
         "notes": list(found.notes),
         "camera": None if found.camera is None else asdict(found.camera),
         "sha256": _digest(found.views),
-        "truth_sha256": None if found.truth is None else _digest(found.truth),
+        "truth_sha256": None if found.ground_truth is None else _digest(found.ground_truth),
     }
 
 
@@ -289,13 +289,13 @@ def _parameters(text: str) -> Parameters:
         return {stage: {word: dict(found) for word, found in choices.items()} for stage, choices in value.items()}
     except (ValueError, TypeError, AttributeError) as error:
         raise SepiError(
-            f'--parameters: expected JSON such as {{"initial": {{"sepi": {{"candidates": 91}}}}}} ({error})'
+            f'--parameters: expected JSON such as {{"initial": {{"sepi": {{"num_disparities": 91}}}}}} ({error})'
         ) from error
 
 
 @click.command(name="python -m sepi.report.numbers", cls=SepiCommand)
 @click.option("--results", type=click.Path(path_type=Path), required=True, help="Folder of the results.")
-@click.option("--plan", "plan_text", required=True, help="JSON: scenes per data set, choices per variant and stage.")
+@click.option("--plan", "plan_text", required=True, help="JSON: scenes per dataset, choices per variant and stage.")
 @click.option("--parameters", default="{}", show_default=True, help="JSON: parameters per stage and choice.")
 @click.option("--parts", is_flag=True, help="What the ablation of the best variant needs, and nothing else.")
 @click.option("--output", type=click.Path(path_type=Path), required=True, help="JSON file to write.")

@@ -50,7 +50,7 @@ class Plan:
     results : Path
         Folder of the results.
     scenes : mapping of str to sequence of str
-        Data set to its scenes, in the order of the tables.
+        Dataset to its scenes, in the order of the tables.
     variants : mapping of str to mapping
         Variant to stage to choice, in order; the stages are the same for all.
     external : sequence of str

@@ -23,8 +23,8 @@ AVERAGE = "Average"
 PAPERS_METHOD = "zhou"
 """Key of the paper's own method."""
 
-DATASETS: dict[str, str] = {"hci": "HCI 4D light field benchmark", "hci_old": "HCI Blender (2013)"}
-"""Data sets of the paper, under the names that this project gives them."""
+DATASETS: dict[str, str] = {"hci": "HCI 4D light field benchmark", "hci_2013": "HCI Blender (2013)"}
+"""Datasets of the paper, under the names that this project gives them."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ class Method:
 
 @dataclass(frozen=True)
 class SceneTable:
-    """Table 1 or 2: a figure per data set, scene and method.
+    """Table 1 or 2: a figure per dataset, scene and method.
 
     Attributes
     ----------
@@ -65,20 +65,20 @@ class SceneTable:
         ``(dataset, scene)`` to ``{method key: figure}``, in the paper's order; a method that was trained on the scene
         has no figure.
     averages : mapping
-        Data set to ``{method key: figure}``: the average rows as printed.
+        Dataset to ``{method key: figure}``: the average rows as printed.
     """
 
     cells: Mapping[tuple[str, str], Mapping[str, float]]
     averages: Mapping[str, Mapping[str, float]]
 
     def scenes(self, dataset: str) -> list[str]:
-        """Scenes of a data set, in the paper's order."""
+        """Scenes of a dataset, in the paper's order."""
         return [scene for name, scene in self.cells if name == dataset]
 
 
 @dataclass(frozen=True)
 class Regions:
-    """100 x MSE over the whole map, the occluded and the texture-less region; None where the paper prints nothing."""
+    """100 x MSE over the whole map, the occluded and the textureless region; None where the paper prints nothing."""
 
     overall: float | None
     occluded: float | None
@@ -88,7 +88,7 @@ class Regions:
 def paper_scene(dataset: str, scene: str) -> str | None:
     """The paper's name of a scene, or None where the paper does not have it.
 
-    Only data sets named as in :data:`DATASETS` are looked up, so that a built-in scene called ``dots`` is not taken
+    Only datasets named as in :data:`DATASETS` are looked up, so that a built-in scene called ``dots`` is not taken
     for the benchmark's; within them, capitals do not matter.
     """
     return {name.lower(): name for name in table1().scenes(dataset)}.get(scene.lower())
@@ -114,7 +114,7 @@ def table2() -> SceneTable:
 
 @cache
 def table3() -> dict[str, dict[str, Regions]]:
-    """Table 3: data set to method key to average 100 x MSE in the two regions."""
+    """Table 3: dataset to method key to average 100 x MSE in the two regions."""
     rows = _rows("table3_regions.csv")
     return {
         dataset: {
@@ -127,7 +127,7 @@ def table3() -> dict[str, dict[str, Regions]]:
 
 @cache
 def table4() -> dict[str, dict[str, Regions]]:
-    """Table 4 and the text's figures for Wang's occlusion stage: data set to variant to average 100 x MSE."""
+    """Table 4 and the text's figures for Wang's occlusion stage: dataset to variant to average 100 x MSE."""
     table: dict[str, dict[str, Regions]] = {dataset: {} for dataset in DATASETS}
     for row in _rows("table4_ablation.csv"):
         table[row["dataset"]][row["variant"]] = Regions(

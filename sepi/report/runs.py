@@ -35,7 +35,7 @@ class Runs:
 
     @cached_property
     def plan(self) -> Plan:
-        """Scenes, variants and imported methods; its files are not at hand."""
+        """Scenes, variants and imported methods; its files are not available."""
         return Plan.from_json(Path(), json.dumps(self.numbers["plan"]))
 
     def light_field(self, dataset: str, scene: str) -> dict[str, Any]:
@@ -52,7 +52,7 @@ class Runs:
         return _with_nan(found)
 
     def scored(self, dataset: str, variant: str = MAIN_VARIANT) -> list[str]:
-        """Scenes of a data set that have ground truth, and so scores; looked for with one of the variants."""
+        """Scenes of a dataset that have ground truth, and so scores; looked for with one of the variants."""
         scenes = self.plan.scenes.get(dataset, ())
         return [scene for scene in scenes if self.scores(dataset, scene, variant)]
 
@@ -92,7 +92,7 @@ class Runs:
         return scores[protocol][region][score] if scores else None
 
     def external_problem(self, dataset: str, scene: str, method: str) -> str:
-        """Why an imported map has no scores, in a few words; empty where it has some, or the scene has no truth."""
+        """Why an external map has no scores, in a few words; empty where it has some or there is no ground truth."""
         return str(self._scene(dataset, scene)["external"][method]["problem"])
 
     def _scene(self, dataset: str, scene: str) -> dict[str, Any]:

@@ -4,7 +4,7 @@ Examples
 --------
 >>> from sepi.scenes import SCENES, render
 >>> light_field = render("fronto_parallel", size=64, views=3)
->>> float(light_field.truth[10, 20])
+>>> float(light_field.ground_truth[10, 20])
 1.0
 """
 

@@ -49,8 +49,8 @@ def write_hci(light_field: LightField, folder: Path) -> None:
         for number, view in enumerate(views.reshape(-1, *light_field.shape, 3)):
             write_png(temporary / f"input_Cam{number:03d}.png", view)
         (temporary / "parameters.cfg").write_text(settings, encoding="utf-8")
-        if light_field.truth is not None:
-            write_pfm(temporary / "gt_disp_lowres.pfm", light_field.truth)
+        if light_field.ground_truth is not None:
+            write_pfm(temporary / "gt_disp_lowres.pfm", light_field.ground_truth)
         for name, mask in light_field.masks.items():
             write_png(temporary / f"mask_{name}.png", mask)
 
@@ -59,7 +59,7 @@ def _settings(light_field: LightField) -> str:
     """Content of ``parameters.cfg``."""
     height, width = light_field.shape
     rows, columns = light_field.grid
-    known = light_field.known_range()
+    known = light_field.require_disparity_range()
     sections: dict[str, Mapping[str, object]] = {
         "intrinsics": {
             "focal_length_mm": FOCAL_LENGTH_MM,

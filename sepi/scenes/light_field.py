@@ -37,8 +37,9 @@ def render(name: str, *, size: int = 192, views: int = 9) -> LightField:
     Returns
     -------
     LightField
-        Views uint8 RGB; exact disparity of the surface at each pixel centre as ``truth``; the masks ``occluded`` (the
-        point is hidden by a nearer surface in at least one view) and ``textureless`` (the surface carries no depth).
+        Views uint8 RGB; exact disparity of the surface at each pixel centre as ``ground_truth``; the masks ``occluded``
+        (the point is hidden by a nearer surface in at least one view) and ``textureless`` (the surface carries no
+        depth).
         Equal arguments give equal bytes.
 
     Raises
@@ -63,7 +64,7 @@ def render(name: str, *, size: int = 192, views: int = 9) -> LightField:
         name=name,
         source="built-in",
         disparity_range=_range_around(disparity),
-        truth=disparity.astype(np.float32),
+        ground_truth=disparity.astype(np.float32),
         masks={
             "occluded": occluded(scene, disparity, (views, views)),
             "textureless": np.array([surface.textureless for surface in surfaces])[owner],

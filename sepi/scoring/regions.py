@@ -1,6 +1,6 @@
 """Regions for evaluation: where the ground truth says a view is blocked, and where the reference view has no texture.
 
-The paper names another work for its occluded region and defines no texture-less one. These definitions are the same for
+The paper names another work for its occluded region and defines no textureless one. These definitions are the same for
 every scene and method, so that rows of a table compare. Estimators never see them.
 """
 
@@ -30,7 +30,10 @@ _STRETCH = 2.0
 
 
 def occluded(
-    truth: FloatMap, grid: tuple[int, int], reference: tuple[int, int] | None = None, present: BoolMap | None = None
+    ground_truth: FloatMap,
+    grid: tuple[int, int],
+    reference: tuple[int, int] | None = None,
+    present: BoolMap | None = None,
 ) -> BoolMap:
     """Pixels of the reference view that at least one other view does not see.
 
@@ -43,7 +46,7 @@ def occluded(
 
     Parameters
     ----------
-    truth : ndarray, shape (H, W), float32
+    ground_truth : ndarray, shape (H, W), float32
         Disparity in pixels per view step; pixels that are not finite neither hide nor are hidden.
     grid : tuple of int
         Number of view rows and columns ``(T, S)``.
@@ -67,15 +70,15 @@ def occluded(
     ]
     # far views hide most: looking at them first ends the search early
     offsets.sort(key=lambda offset: -max(abs(offset[0]), abs(offset[1])))
-    finite = np.isfinite(truth)
+    finite = np.isfinite(ground_truth)
     if not finite.any() or not offsets:
-        return np.zeros(truth.shape, bool)
-    filled = np.where(finite, truth, -np.inf).astype(np.float64)
-    hidden: BoolMap = _hidden(filled, np.array(offsets, np.int64), float(truth[finite].max()))
+        return np.zeros(ground_truth.shape, bool)
+    filled = np.where(finite, ground_truth, -np.inf).astype(np.float64)
+    hidden: BoolMap = _hidden(filled, np.array(offsets, np.int64), float(ground_truth[finite].max()))
     return hidden
 
 
-def textureless(centre: FloatMap) -> BoolMap:
+def textureless(reference_view: FloatMap) -> BoolMap:
     """Pixels of the reference view round which the image hardly changes.
 
     The energy is the squared gradient, averaged over the channels and over a window of ``WINDOW`` pixels; its root is
@@ -83,20 +86,20 @@ def textureless(centre: FloatMap) -> BoolMap:
 
     Parameters
     ----------
-    centre : ndarray, shape (H, W, C), float32
+    reference_view : ndarray, shape (H, W, C), float32
         Centre view in 0..1.
 
     Returns
     -------
     ndarray, shape (H, W), bool
     """
-    energy = np.zeros(centre.shape[:2], np.float32)
-    for channel in range(centre.shape[2]):
-        plane = np.ascontiguousarray(centre[:, :, channel], np.float32)
+    energy = np.zeros(reference_view.shape[:2], np.float32)
+    for channel in range(reference_view.shape[2]):
+        plane = np.ascontiguousarray(reference_view[:, :, channel], np.float32)
         # Scharr's weights sum to 32 per pixel of distance
         for dx, dy in ((1, 0), (0, 1)):
             energy += np.square(cv2.Scharr(plane, cv2.CV_32F, dx, dy) / 32)
-    energy = cv2.blur(energy / centre.shape[2], (WINDOW, WINDOW))
+    energy = cv2.blur(energy / reference_view.shape[2], (WINDOW, WINDOW))
     flat = _without_small(energy < ENERGY_THRESHOLD**2)
     return ~_without_small(~flat)
 
@@ -110,24 +113,24 @@ def _without_small(mask: BoolMap) -> BoolMap:
 
 
 @numba.njit(cache=True)
-def _hidden(truth: npt.NDArray[np.float64], offsets: npt.NDArray[np.int64], nearest: float) -> BoolMap:
+def _hidden(ground_truth: npt.NDArray[np.float64], offsets: npt.NDArray[np.int64], nearest: float) -> BoolMap:
     """``occluded`` with -inf for unknown disparities, the view offsets ``(N, 2)`` and the largest disparity."""
-    height, width = truth.shape
+    height, width = ground_truth.shape
     result = np.zeros((height, width), np.bool_)
     for y in range(height):
         for x in range(width):
             for n in range(len(offsets)):
-                if _hidden_in(truth, y, x, offsets[n, 0], offsets[n, 1], nearest):
+                if _hidden_in(ground_truth, y, x, offsets[n, 0], offsets[n, 1], nearest):
                     result[y, x] = True
                     break
     return result
 
 
 @numba.njit(cache=True)
-def _hidden_in(truth: npt.NDArray[np.float64], y: int, x: int, dt: int, ds: int, nearest: float) -> bool:
+def _hidden_in(ground_truth: npt.NDArray[np.float64], y: int, x: int, dt: int, ds: int, nearest: float) -> bool:
     """Whether the view at offset ``(dt, ds)`` does not see the pixel ``(y, x)``."""
-    height, width = truth.shape
-    own = truth[y, x]
+    height, width = ground_truth.shape
+    own = ground_truth[y, x]
     landing_y, landing_x = y - own * dt, x - own * ds
     # also false for unknown disparities
     if not (0 <= landing_y <= height - 1 and 0 <= landing_x <= width - 1):
@@ -141,7 +144,7 @@ def _hidden_in(truth: npt.NDArray[np.float64], y: int, x: int, dt: int, ds: int,
         if not (0 <= row < height and 0 <= column < width):
             return False
         # pixels by which the surface here lands beyond the pixel looked at
-        beyond = (truth[row, column] - own) * steps_per_disparity - step
+        beyond = (ground_truth[row, column] - own) * steps_per_disparity - step
         crossed = step > 1 and before * beyond < 0 and abs(before - beyond) <= _STRETCH
         if abs(beyond) <= _HALF_PIXEL or crossed:
             return True

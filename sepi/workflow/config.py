@@ -26,7 +26,7 @@ GRAPH_CONFIG = "SEPI_GRAPH_CONFIG"
 """Environment variable with a configuration (JSON) in place of the workflow's own; the rule graph is asked for so."""
 
 # names of folders and panels that stand beside those of variants
-_RESERVED = ("stages", "imported", "truth", "centre")
+_RESERVED = ("stages", "imported", "ground_truth", "centre")
 # the built-in scenes have 9x9 views
 _BUILTIN_VIEWS = 81
 # keys whose values are text even where they look like numbers
@@ -110,9 +110,9 @@ class Config(_Keys):
         description="Dataset 'hci': a folder of HCI 4D benchmark scenes; every folder in it with input_Cam*.png is a "
         "scene, also below category folders such as training/. null for none.",
     )
-    hci_old_root: str | None = Field(
+    hci_2013_root: str | None = Field(
         None,
-        description="Dataset 'hci_old': a folder with HDF5 files of the HCI archive of 2013 (Wanner et al.). "
+        description="Dataset 'hci_2013': a folder with HDF5 files of the HCI archive of 2013 (Wanner et al.). "
         "null for none.",
     )
     light_fields: dict[str, dict[str, Any]] = Field(
@@ -293,8 +293,8 @@ def _scenes(config: Config) -> dict[tuple[str, str], Scene]:
     scenes = [Scene("builtin", name, None, (), _BUILTIN_VIEWS, size, size) for name in config.builtin.scenes]
     if config.hci_root:
         scenes += scenes_in(Path(config.hci_root).expanduser(), "hci", "config.hci_root")
-    if config.hci_old_root:
-        scenes += scenes_in(Path(config.hci_old_root).expanduser(), "hci_old", "config.hci_old_root")
+    if config.hci_2013_root:
+        scenes += scenes_in(Path(config.hci_2013_root).expanduser(), "hci_2013", "config.hci_2013_root")
     for name, values in config.light_fields.items():
         where = f"config.light_fields.{name}"
         own = validated(OwnLightField, values, where)

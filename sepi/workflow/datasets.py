@@ -67,7 +67,7 @@ def scenes_in(root: Path, dataset: str, where: str) -> list[Scene]:
     """Every light field of a dataset below a folder, by name.
 
     A scene of ``hci`` is a folder with ``input_Cam*.png``; ``root`` may be one itself, or hold scenes or categories of
-    scenes. A scene of ``hci_old`` is an HDF5 file with a dataset ``LF``; it has the file's name, or its folder's where
+    scenes. A scene of ``hci_2013`` is an HDF5 file with a dataset ``LF``; it has the file's name, or its folder's where
     the file is ``lf.h5``.
 
     Parameters
@@ -75,7 +75,7 @@ def scenes_in(root: Path, dataset: str, where: str) -> list[Scene]:
     root : Path
         Folder to look in, or one such file.
     dataset : str
-        ``"hci"`` or ``"hci_old"``.
+        ``"hci"`` or ``"hci_2013"``.
     where : str
         The key that named ``root``, for messages.
 
@@ -85,7 +85,7 @@ def scenes_in(root: Path, dataset: str, where: str) -> list[Scene]:
         If there is no such folder, no scene in it, two scenes of one name, or a name that is no plain word.
     """
     find, expected = _FINDERS[dataset]
-    if not (root.is_dir() or (root.is_file() and dataset == "hci_old")):
+    if not (root.is_dir() or (root.is_file() and dataset == "hci_2013")):
         raise SepiError(f"{where}: no folder '{root}'")
     scenes = list(find(root.resolve()))
     if not scenes:
@@ -138,13 +138,13 @@ def _archive_scenes(path: Path, depth: int = _DEPTH + 1) -> Iterator[Scene]:
                 yield from _archive_scenes(inner, depth - 1)
     elif hci_2013.matches(path):
         name = path.parent.name if path.stem.lower() == "lf" else path.stem
-        yield Scene("hci_old", name, path, (path,), *_rough_size((path,)))
+        yield Scene("hci_2013", name, path, (path,), *_rough_size((path,)))
 
 
 # dataset to what yields its scenes below a folder, and what is looked for
 _FINDERS: dict[str, tuple[Callable[[Path], Iterator[Scene]], str]] = {
     "hci": (_benchmark_scenes, f"folders with {VIEW_PATTERN}"),
-    "hci_old": (_archive_scenes, f"HDF5 files with a dataset {hci_2013.VIEWS}"),
+    "hci_2013": (_archive_scenes, f"HDF5 files with a dataset {hci_2013.VIEWS}"),
 }
 
 

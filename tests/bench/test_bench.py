@@ -43,7 +43,7 @@ def measurement(group: str, name: str, seconds: float, **figures: float) -> Meas
 
 
 def result(*measurements: Measurement) -> Result:
-    return Result({"processor": "abacus"}, {"scene": "dots", "candidates": 10, "threads": 1}, measurements)
+    return Result({"processor": "abacus"}, {"scene": "dots", "num_disparities": 10, "threads": 1}, measurements)
 
 
 class TestMeasuring:
@@ -78,12 +78,12 @@ class TestMeasuring:
 def test_plain_implementations_give_the_compiled_costs(name: str, warp: Warp) -> None:
     """A yardstick that computes something else measures nothing. Bounds the compiled sweep's rounding, too."""
     light_field = render(name, size=64, views=5)
-    parameters = SweepParameters(candidates=13)
+    parameters = SweepParameters(num_disparities=13)
     disparity, lowest = plain_sweep(light_field, parameters, warp)
     own = sweep(light_field, parameters)
     # costs of 0..1, summed over 24 views in single precision
     assert np.abs(lowest - own.cost[0]).max() < 1e-5
-    step = 2 * np.diff(light_field.known_range().candidates(13))[0]
+    step = 2 * np.diff(light_field.require_disparity_range().candidates(13))[0]
     # the compiled sweep refines by a parabola; two candidates may tie
     assert np.mean(np.abs(disparity - own.disparity[0]) > step) < 0.002
 
@@ -119,19 +119,19 @@ class TestTables:
     def test_time_per_sample_and_speed_up(self) -> None:
         found = result(
             *(
-                measurement(group, f"{axis} {value}", seconds, size=10, views=2, candidates=5, threads=value)
+                measurement(group, f"{axis} {value}", seconds, size=10, views=2, num_disparities=5, threads=value)
                 for group in ("growth, initial", "growth, all stages")
-                for axis, value, seconds in (("candidates", 5, 2e-6), ("threads", 1, 8.0), ("threads", 2, 4.0))
+                for axis, value, seconds in (("num_disparities", 5, 2e-6), ("threads", 1, 8.0), ("threads", 2, 4.0))
             )
         )
         assert tables.growth(found, "threads").rows[1][:3] == [2, "4.00", "2.00"]
         # 2 microseconds for 100 pixels, 4 views, 5 candidates
-        assert tables.growth(found, "candidates").rows[0][2] == "1.00"
+        assert tables.growth(found, "num_disparities").rows[0][2] == "1.00"
 
     def test_times_the_plain_ones(self) -> None:
         found = result(
             measurement("stages", "initial", 20.0),
-            measurement("beside", "slow", 40.0, candidates=2, mean_difference=0, largest_difference=0),
+            measurement("beside", "slow", 40.0, num_disparities=2, mean_difference=0, largest_difference=0),
         )
         assert tables.beside(found).rows[1][:3] == ["slow", "20.0", "10.0"]
 

@@ -247,7 +247,7 @@ CASES: dict[str, tuple[Spoil, str, tuple[str, ...]]] = {
         "in.h5",
         ("in.h5",),
     ),
-    "HCI-old with depth of another size": (
+    "HCI 2013 with depth of another size": (
         lambda: hdf5(
             lambda f: (
                 f.create_dataset("LF", data=VIEWS),
@@ -386,6 +386,6 @@ def test_names_with_spaces_and_letters_of_any_script(
     for path in pictures("{t} é {s}.png"):
         path.rename(path.with_name(path.name.replace("é", name.replace("/", "").replace("-", ""))))
     Path("in").rename(name)
-    called = CliRunner().invoke(main, ["depth", "--set", "initial.semi_global.candidates=11", "--", name])
+    called = CliRunner().invoke(main, ["depth", "--set", "initial.semi_global.num_disparities=11", "--", name])
     assert called.exit_code == 0, called.output
     assert Path(f"{name}-depth/disparity.pfm").is_file()

@@ -28,7 +28,7 @@ from sepi.reading import read_light_field
 from sepi.scenes import SCENES, render, write_hci
 
 # few candidates: these tests are about the commands, not about depth
-FAST = ("--threads", "2", "--set", "initial.semi_global.candidates=21")
+FAST = ("--threads", "2", "--set", "initial.semi_global.num_disparities=21")
 
 
 @pytest.fixture(scope="session")
@@ -78,7 +78,7 @@ def test_depth_writes_the_maps_and_says_so(scene: Path) -> None:
     assert called.exit_code == 0
     assert called.stderr == ""  # no progress bar where nobody watches
     assert "pyramids: 3x3 views (rows x columns) of 64x64 pixels" in called.stdout
-    known = read_light_field(scene).known_range()
+    known = read_light_field(scene).require_disparity_range()
     assert f"disparity range: {known.minimum} to {known.maximum} pixels per view step (from the" in called.stdout
     masks = {"mask_occluded.png", "mask_textureless.png"}
     assert set(os.listdir("pyramids-depth")) == {*RESULT_FILES, *masks, "depth.pfm"}
@@ -98,7 +98,7 @@ def test_result_says_what_made_it(scene: Path) -> None:
     assert attributes["disparity_range_source"] == "given"
     steps = json.loads(attributes["made_from"])
     assert [step["choice"] for step in steps] == ["semi_global", "visibility", "uniform_planes", "wls"]
-    assert steps[0]["parameters"]["candidates"] == 21
+    assert steps[0]["parameters"]["num_disparities"] == 21
     with h5py.File("out/result.h5") as file:
         assert file["disparity"].attrs["units"] == "pixels per view step"
 
@@ -134,7 +134,7 @@ def test_depth_from_the_file_that_ingest_wrote(scene: Path) -> None:
 
 
 def test_python_gives_the_same_map_as_the_command(scene: Path, result: Path) -> None:
-    maps = sepi.estimate_depth(sepi.read_light_field(scene), "best", {"initial": {"candidates": 21}})
+    maps = sepi.estimate_depth(sepi.read_light_field(scene), "best", {"initial": {"num_disparities": 21}})
     np.testing.assert_array_equal(maps.disparity, read_pfm(result / "disparity.pfm"))
 
 
@@ -302,15 +302,15 @@ BAD: dict[str, tuple[Callable[[Path], object], tuple[str, ...], str]] = {
     ),
     "parameter out of bounds": (
         lambda s: None,
-        ("pyramids", "--set", "initial.semi_global.candidates=0"),
-        "candidates",
+        ("pyramids", "--set", "initial.semi_global.num_disparities=0"),
+        "num_disparities",
     ),
     "parameter of the wrong type": (
         lambda s: None,
-        ("pyramids", "--set", "initial.semi_global.candidates=few"),
+        ("pyramids", "--set", "initial.semi_global.num_disparities=few"),
         "'few'",
     ),
-    "parameter without value": (lambda s: None, ("pyramids", "--set", "candidates"), "STAGE.CHOICE.NAME=VALUE"),
+    "parameter without value": (lambda s: None, ("pyramids", "--set", "num_disparities"), "STAGE.CHOICE.NAME=VALUE"),
     "output is a file": (
         lambda s: (s.parent / "out").write_text("mine"),
         ("pyramids", "-o", "out"),
@@ -370,8 +370,8 @@ def test_evaluate_knows_which_view_a_result_belongs_to(scene: Path, pyramids: Pa
     assert "no ground truth for view 0,1" in error_of(call("evaluate", "side", scene))
     assert call("depth", scene, "-o", "centre", *FAST).exit_code == 0
     assert "side: depth of another view than centre" in error_of(call("evaluate", "centre", "side"))
-    views, truth = read_light_field(pyramids).views, read_light_field(pyramids).truth
-    write_light_field(Path("cut.h5"), LightField(views[1:], "cut", truth=truth, view=(0, 1)))
+    views, ground_truth = read_light_field(pyramids).views, read_light_field(pyramids).ground_truth
+    write_light_field(Path("cut.h5"), LightField(views[1:], "cut", ground_truth=ground_truth, view=(0, 1)))
     assert call("depth", "cut.h5", "-o", "own", *FAST).exit_code == 0
     assert call("evaluate", "own", "cut.h5").exit_code == 0
     assert call("depth", "cut.h5", "-o", "turned", "--order", "flip-columns", *FAST).exit_code == 0
@@ -379,11 +379,11 @@ def test_evaluate_knows_which_view_a_result_belongs_to(scene: Path, pyramids: Pa
 
 
 def test_evaluate_gives_numbers_to_programs(tmp_path: Path) -> None:
-    truth = np.zeros((40, 50), np.float32)
-    estimate = truth.copy()
+    ground_truth = np.zeros((40, 50), np.float32)
+    estimate = ground_truth.copy()
     estimate[:, :10] = 1
     estimate[20, 30] = np.nan
-    write_pfm(tmp_path / "truth.pfm", truth)
+    write_pfm(tmp_path / "truth.pfm", ground_truth)
     np.save(tmp_path / "estimate.npy", estimate)
     scores = json.loads(call("evaluate", tmp_path / "estimate.npy", tmp_path / "truth.pfm", "--json").stdout)
     assert scores["paper"]["all"]["pixels"] == 2000
@@ -415,7 +415,7 @@ def test_evaluate_reads_every_kind_of_map(pyramids: Path, result: Path, tmp_path
 
 
 @pytest.mark.parametrize(
-    ("estimate", "truth", "message"),
+    ("estimate", "ground_truth", "message"),
     [
         ("absent.pfm", "map.pfm", "absent.pfm: no such file"),
         ("map.pfm", "absent", "absent: no such file"),
@@ -435,7 +435,7 @@ def test_evaluate_reads_every_kind_of_map(pyramids: Path, result: Path, tmp_path
     ],
 )
 def test_bad_maps_are_one_line(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, estimate: str, truth: str, message: str
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, estimate: str, ground_truth: str, message: str
 ) -> None:
     monkeypatch.chdir(tmp_path)
     write_pfm(Path("map.pfm"), np.zeros((6, 8), np.float32))
@@ -457,7 +457,7 @@ def test_bad_maps_are_one_line(
         file["depth"] = 1
     views = np.random.default_rng(0).integers(0, 255, (2, 2, 6, 8, 1), np.uint8)
     write_light_field(Path("plain.h5"), LightField(views, "plain"))
-    assert message in error_of(call("evaluate", estimate, truth))
+    assert message in error_of(call("evaluate", estimate, ground_truth))
 
 
 # --- info and scenes
@@ -575,7 +575,7 @@ def test_each_command_has_help(command: str) -> None:
 
 def test_python_writes_what_the_command_writes(scene: Path, result: Path) -> None:
     light_field = sepi.read_light_field(scene, options=sepi.ReadOptions(view=(1, 1)))
-    maps = sepi.estimate_depth(light_field, "best", {"initial": {"candidates": 21}})
+    maps = sepi.estimate_depth(light_field, "best", {"initial": {"num_disparities": 21}})
     sepi.write_result("out", light_field, maps)
     written, by_command = everything_in(Path("out")), everything_in(result)
     assert set(written) == set(by_command)
@@ -604,7 +604,7 @@ def test_ingest_writes_the_scene_with_a_range(scene: Path) -> None:
     called = ingested(scene, "--threads", 2, "--output", "deep/lf.h5", "--timing", "time.json")
     assert called.exit_code == 0
     light_field = read_light_field("deep/lf.h5")
-    assert light_field.known_range().source == "estimated"
+    assert light_field.require_disparity_range().source == "estimated"
     np.testing.assert_array_equal(light_field.views, read_light_field(scene).views)
     timing = json.loads(Path("time.json").read_text())
     assert timing["seconds"] > 0
@@ -617,8 +617,11 @@ def test_ingest_renders_a_built_in_scene(tmp_path: Path) -> None:
     assert ingested(*words).exit_code == 0
     light_field = read_light_field(output)
     assert light_field.views.shape == (3, 3, 64, 64, 3)
-    assert (light_field.known_range().minimum, light_field.known_range().source) == (-2, "given")
-    assert light_field.truth is not None
+    assert (light_field.require_disparity_range().minimum, light_field.require_disparity_range().source) == (
+        -2,
+        "given",
+    )
+    assert light_field.ground_truth is not None
 
 
 @pytest.mark.parametrize("words", [(), ("x", "--builtin", "dots")])

@@ -23,21 +23,21 @@ CLOUD = '[data-part="cloud"]'
 
 
 def maps() -> tuple[FloatMap, FloatMap, FloatMap]:
-    """Two maps that are easily told apart, with unknown pixels, and the truth."""
+    """Two maps that are easily told apart, with unknown pixels, and the ground truth."""
     random = np.random.default_rng(2)
     y, x = np.indices(SHAPE)
-    truth = np.sin(x / 9) + y / 30
-    a = truth + random.normal(0, 0.05, SHAPE)
-    b = truth[:, ::-1] + 0.02
+    ground_truth = np.sin(x / 9) + y / 30
+    a = ground_truth + random.normal(0, 0.05, SHAPE)
+    b = ground_truth[:, ::-1] + 0.02
     a[5:9, 7:20] = np.nan
-    found = [np.asarray(values, np.float32) for values in (a, b, truth)]
+    found = [np.asarray(values, np.float32) for values in (a, b, ground_truth)]
     return found[0], found[1], found[2]
 
 
 @pytest.fixture
 def files(tmp_path: Path) -> list[Path]:
     """The maps as PFM: ours, other, truth."""
-    paths = [tmp_path / f"{name}.pfm" for name in ("ours", "other", "truth")]
+    paths = [tmp_path / f"{name}.pfm" for name in ("ours", "other", "ground_truth")]
     for path, values in zip(paths, maps(), strict=True):
         write_pfm(path, values)
     return paths
@@ -55,11 +55,11 @@ def told(result: Result) -> str:
     return str(line)
 
 
-@pytest.fixture(params=["truth", "no truth"])
+@pytest.fixture(params=["ground_truth", "no truth"])
 def page(request: pytest.FixtureRequest, browser: Any, files: list[Path], tmp_path: Path) -> Iterator[Any]:
     """The page of two maps, with and without their truth."""
     output = tmp_path / "page.html"
-    words = files if request.param == "truth" else files[:2]
+    words = files if request.param == "ground_truth" else files[:2]
     assert compare(*words, "-o", output).exit_code == 0
     with opened(browser, output, color_scheme="light") as found:
         yield found
@@ -79,8 +79,8 @@ def test_the_page_shows_both_maps(page: Any) -> None:
 
 def test_the_read_out_shows_the_values_of_the_files(page: Any) -> None:
     """To three decimals; differences and errors are those of what is shown."""
-    ours, other, truth = maps()
-    with_truth = page.locator('[data-part="a"] option[value="truth"]').count() == 1
+    ours, other, ground_truth = maps()
+    with_truth = page.locator('[data-part="a"] option[value="ground_truth"]').count() == 1
     for x, y in ((0, 0), (59, 39), (31, 20), (10, 6)):
         choose(page, a="a", b="b")
         point_at(page, x, y)
@@ -92,10 +92,10 @@ def test_the_read_out_shows_the_values_of_the_files(page: Any) -> None:
             value = float(shown[f"value {side}"])
             assert value == float(f"{values[y, x]:.3f}")
             if with_truth:
-                assert float(shown["truth"]) == float(f"{truth[y, x]:.3f}")
-                assert float(shown[f"error {side}"]) == pytest.approx(value - float(shown["truth"]), abs=1e-6)
+                assert float(shown["ground_truth"]) == float(f"{ground_truth[y, x]:.3f}")
+                assert float(shown[f"error {side}"]) == pytest.approx(value - float(shown["ground_truth"]), abs=1e-6)
             else:
-                assert (shown["truth"], shown[f"error {side}"]) == ("–", "–")
+                assert (shown["ground_truth"], shown[f"error {side}"]) == ("–", "–")
         choose(page, b="difference")
         difference = read_out(page)["value b"]
         if np.isnan(ours[y, x]):
@@ -105,11 +105,11 @@ def test_the_read_out_shows_the_values_of_the_files(page: Any) -> None:
             assert float(difference) == pytest.approx(expected, abs=1e-6)
 
 
-@pytest.mark.parametrize("page", ["truth"], indirect=True)
+@pytest.mark.parametrize("page", ["ground_truth"], indirect=True)
 def test_which_map_is_nearer_to_the_truth(page: Any) -> None:
     """Red where A is, blue where B is."""
-    ours, other, truth = maps()
-    nearer = np.abs(other - truth) - np.abs(ours - truth)
+    ours, other, ground_truth = maps()
+    nearer = np.abs(other - ground_truth) - np.abs(ours - ground_truth)
     shown = map_pixels(page, "change").astype(int)
     assert (shown[nearer > 0.1][:, 0] > shown[nearer > 0.1][:, 2]).all()
     assert (shown[nearer < -0.04][:, 0] < shown[nearer < -0.04][:, 2]).all()
@@ -149,10 +149,10 @@ def test_the_page_on_a_phone(browser: Any, files: list[Path], tmp_path: Path) ->
 
 def test_a_scene_brings_its_view_its_truth_and_its_regions(browser: Any, tmp_path: Path) -> None:
     light_field = render("dots", size=64, views=3)
-    assert light_field.truth is not None
+    assert light_field.ground_truth is not None
     write_hci(light_field, tmp_path / "scene")
     for number, name in enumerate(("one", "two")):
-        write_pfm(tmp_path / f"{name}.pfm", light_field.truth + np.float32(0.04 * number))
+        write_pfm(tmp_path / f"{name}.pfm", light_field.ground_truth + np.float32(0.04 * number))
     output = tmp_path / "page.html"
     result = compare(tmp_path / "one.pfm", tmp_path / "two.pfm", tmp_path / "scene", "-o", output)
     assert result.exit_code == 0, result.output
@@ -175,20 +175,20 @@ def test_a_scene_brings_its_view_its_truth_and_its_regions(browser: Any, tmp_pat
 
 def test_scores_are_printed_and_on_the_page(files: list[Path], tmp_path: Path) -> None:
     """Those of sepi.evaluate, by both protocols; the better one is marked."""
-    ours, other, truth = maps()
+    ours, other, ground_truth = maps()
     output = tmp_path / "page.html"
     result = compare(*files, "-o", output)
     assert result.stdout.rstrip().endswith(f"written: {output}")
     page = output.read_text()
     for values, name in ((ours, "ours.pfm"), (other, "other.pfm")):
-        expected = score(values, truth, 0, None)
+        expected = score(values, ground_truth, 0, None)
         assert f"{expected['mse100']:.3f}" in page
         assert name in result.stdout
-    found = printed_scores(Comparison(("x", "y"), (ours, other), truth))
-    assert found["x"]["paper"]["all"] == pytest.approx(score(ours, truth, 0, None), nan_ok=True)
+    found = printed_scores(Comparison(("x", "y"), (ours, other), ground_truth))
+    assert found["x"]["paper"]["all"] == pytest.approx(score(ours, ground_truth, 0, None), nan_ok=True)
     assert page.count('class="best"') >= 2
     assert printed_scores(Comparison(("x", "y"), (ours, other))) == {}
-    # without truth there is nothing to score
+    # without ground truth there is nothing to score
     assert "<td" not in comparison_page(Comparison(("x", "y"), (ours, other))).split('class="viewer"')[0]
 
 
@@ -216,10 +216,10 @@ def test_equal_names_are_told_apart(browser: Any, tmp_path: Path) -> None:
 
 
 def test_names_are_no_markup(browser: Any, tmp_path: Path) -> None:
-    ours, other, truth = maps()
+    ours, other, ground_truth = maps()
     attack = "<img src=x onerror=hacked()><script>hacked()<!-- & \"q\" 'r' </script>"
     page_file = tmp_path / "page.html"
-    page_file.write_text(comparison_page(Comparison((attack, "b"), (ours, other), truth)), encoding="utf-8")
+    page_file.write_text(comparison_page(Comparison((attack, "b"), (ours, other), ground_truth)), encoding="utf-8")
     with opened(browser, page_file) as page:
         assert page.text_content("h1") == f"{attack} beside b"
         assert page.title() == f"{attack} beside b"
@@ -284,4 +284,4 @@ def test_the_page_is_written_whole_or_not_at_all(
     monkeypatch.setattr(Path, "write_text", full)
     assert "No space left on device" in told(compare(*files, "-o", output))
     assert output.read_bytes() == before
-    assert {path.name for path in tmp_path.iterdir()} == {"page.html", "ours.pfm", "other.pfm", "truth.pfm"}
+    assert {path.name for path in tmp_path.iterdir()} == {"page.html", "ours.pfm", "other.pfm", "ground_truth.pfm"}

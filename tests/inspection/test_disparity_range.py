@@ -46,12 +46,12 @@ def holds(known: DisparityRange, low: float, high: float, slack: float = 0.0) ->
 @pytest.mark.parametrize("name", SCENES)
 def test_built_in_scenes(name: str) -> None:
     light_field = render(name, size=128, views=7)
-    truth = light_field.truth
-    assert truth is not None
+    ground_truth = light_field.ground_truth
+    assert ground_truth is not None
     known = estimate_range(light_field)
     assert known.source == "estimated"
-    assert holds(known, truth.min(), truth.max(), slack=0.05)
-    assert known.maximum - known.minimum < 1.5 * np.ptp(truth) + 0.8
+    assert holds(known, ground_truth.min(), ground_truth.max(), slack=0.05)
+    assert known.maximum - known.minimum < 1.5 * np.ptp(ground_truth) + 0.8
 
 
 @pytest.mark.parametrize("name", ["cotton", "antinous"])
@@ -59,11 +59,11 @@ def test_built_in_scenes(name: str) -> None:
 def test_real_scenes(hci: Path, name: str, every: int) -> None:
     """Each second view is the same scene with disparities twice as large."""
     whole = read_light_field(hci / name)
-    truth = whole.truth
-    assert truth is not None
+    ground_truth = whole.ground_truth
+    assert ground_truth is not None
     known = estimate_range(LightField(whole.views[::every, ::every], name))
-    assert holds(known, every * truth.min(), every * truth.max())
-    assert known.maximum - known.minimum < 1.35 * every * np.ptp(truth)
+    assert holds(known, every * ground_truth.min(), every * ground_truth.max())
+    assert known.maximum - known.minimum < 1.35 * every * np.ptp(ground_truth)
 
 
 @pytest.mark.parametrize(("back", "front"), [(-2, 3), (0.5, 1.5), (4, 7), (-9, -6), (-14, -12)])
@@ -120,7 +120,7 @@ def test_the_truth_and_own_range_are_not_looked_at() -> None:
         light_field.views,
         "told",
         disparity_range=DisparityRange(50, 60, "parameters"),
-        truth=np.full((96, 96), 55, np.float32),
+        ground_truth=np.full((96, 96), 55, np.float32),
     )
     assert estimate_range(told) == estimate_range(light_field)
 
@@ -175,7 +175,7 @@ def test_given_range_wins_over_the_scenes_own() -> None:
     own = light_field.with_range(DisparityRange(-2.5, 3.5, "parameters"))
     assert settle_range(own, (-1, 1)).disparity_range == DisparityRange(-1, 1, "given")
     assert settle_range(own) is own
-    assert settle_range(light_field).known_range().source == "estimated"
+    assert settle_range(light_field).require_disparity_range().source == "estimated"
     with pytest.raises(SepiError, match="MIN < MAX"):
         settle_range(own, (1, 1))
 
@@ -200,7 +200,7 @@ def test_a_range_beyond_the_views_is_refused(limits: tuple[float, float]) -> Non
     light_field = LightField(np.zeros((3, 3, 32, 48, 1), np.uint8), "toy", source="toy.npy")
     with pytest.raises(SepiError, match=r"toy\.npy: disparity range \(given\) .* less than the 48 pixels of a view"):
         settle_range(light_field, limits)
-    assert settle_range(light_field, (-47, 47)).known_range().maximum == 47
+    assert settle_range(light_field, (-47, 47)).require_disparity_range().maximum == 47
 
 
 def sweep_in_numpy(

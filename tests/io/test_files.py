@@ -204,7 +204,17 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def started(scene: Path, folder: Path) -> "subprocess.Popen[str]":
     return subprocess.Popen(
-        [sys.executable, "-m", "sepi", "depth", str(scene), "-o", "out", "--set", "initial.semi_global.candidates=21"],
+        [
+            sys.executable,
+            "-m",
+            "sepi",
+            "depth",
+            str(scene),
+            "-o",
+            "out",
+            "--set",
+            "initial.semi_global.num_disparities=21",
+        ],
         cwd=folder,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,

@@ -95,7 +95,7 @@ def test_view_number_is_columns_times_row_plus_column(square: Path) -> None:
 def test_without_parameters_the_range_is_unknown(square: Path) -> None:
     light_field = read_light_field(square)
     assert light_field.disparity_range is None
-    assert light_field.truth is None
+    assert light_field.ground_truth is None
     assert light_field.masks == {}
     assert light_field.name == "square"
     assert light_field.source == str(square)
@@ -107,7 +107,7 @@ def test_parameters_truth_and_masks_are_read(full: Path) -> None:
     np.testing.assert_array_equal(light_field.views[1, 0], pixels(3))
     assert light_field.name == "toy"
     assert light_field.disparity_range == DisparityRange(-1.5, 2.0, "parameters")
-    np.testing.assert_array_equal(light_field.truth, np.arange(192, dtype=np.float32).reshape(12, 16))
+    np.testing.assert_array_equal(light_field.ground_truth, np.arange(192, dtype=np.float32).reshape(12, 16))
     assert set(light_field.masks) == {"occluded", "planes_lowres"}
     assert light_field.masks["occluded"].sum() == 18
     assert light_field.masks["occluded"][2, 3]
@@ -130,7 +130,7 @@ def test_sixteen_bit_views_keep_their_depth(square: Path) -> None:
     light_field = read_light_field(square)
     assert light_field.views.dtype == np.uint16
     np.testing.assert_array_equal(light_field.views[2, 2], pixels(8, np.uint16))
-    assert light_field.centre.max() <= 1
+    assert light_field.reference_view.max() <= 1
 
 
 def test_a_string_is_a_path(square: Path) -> None:
@@ -417,7 +417,7 @@ def test_light_field_file_gives_back_all_that_is_known(tmp_path: Path, light_fie
     back = read_light_field(tmp_path / "lf.h5")
     np.testing.assert_array_equal(back.views, light_field.views)
     np.testing.assert_array_equal(back.present, light_field.present)
-    np.testing.assert_array_equal(back.truth, light_field.truth)
+    np.testing.assert_array_equal(back.ground_truth, light_field.ground_truth)
     np.testing.assert_array_equal(back.masks["occluded"], light_field.masks["occluded"])
     assert (back.name, back.source) == ("toy", "somewhere")
     assert back.disparity_range == light_field.disparity_range
@@ -527,7 +527,7 @@ def test_failed_result_leaves_no_folder(
     def fail(path: Path, values: np.ndarray) -> None:
         raise SepiError(f"{path}: no space")
 
-    monkeypatch.setattr(result_folder, "write_png", fail)
+    monkeypatch.setattr("sepi.io.result_folder.write_png", fail)
     with pytest.raises(SepiError, match="no space"):
         write_result(tmp_path / "out", light_field, maps_of(light_field), {})
     assert list(tmp_path.iterdir()) == []
@@ -574,9 +574,9 @@ def test_real_scene(hci: Path, name: str, low: float, high: float) -> None:
     light_field = read_light_field(hci / name)
     assert light_field.views.shape == (9, 9, 512, 512, 3)
     assert light_field.name == name
-    assert light_field.truth is not None
-    assert light_field.truth.min() == pytest.approx(low, abs=1e-3)
-    assert light_field.truth.max() == pytest.approx(high, abs=1e-3)
+    assert light_field.ground_truth is not None
+    assert light_field.ground_truth.min() == pytest.approx(low, abs=1e-3)
+    assert light_field.ground_truth.max() == pytest.approx(high, abs=1e-3)
     own = DisparityRange(-1.6, 1.5, "parameters") if name == "cotton" else None
     assert light_field.disparity_range == own
 
@@ -587,6 +587,6 @@ def test_real_scene_with_a_view_missing(hci: Path, tmp_path: Path) -> None:
     (tmp_path / "cotton/input_Cam003.png").unlink()
     light_field = read_light_field(tmp_path / "cotton")
     assert np.argwhere(~light_field.present).tolist() == [[0, 3]]
-    assert light_field.truth is not None
+    assert light_field.ground_truth is not None
     (tmp_path / "cotton/input_Cam040.png").unlink()
     assert "the centre view (t, s) = (4, 4) is missing" in error_of(tmp_path / "cotton")

@@ -198,11 +198,11 @@ def test_the_folder_may_be_a_link_to_where_there_is_room(
 def test_a_scene_is_not_written_into(tmp_path: Path, light_field: LightField, maps: StageMaps) -> None:
     """Its masks have the names of a result's: they would be replaced."""
     assert cv2.imwrite(str(tmp_path / "input_Cam000.png"), np.zeros((4, 4), np.uint8))
-    (tmp_path / "mask_occluded.png").write_bytes(b"truth")
+    (tmp_path / "mask_occluded.png").write_bytes(b"ground_truth")
     with pytest.raises(SepiError, match="holds the views of a light field"):
         write_result(tmp_path, light_field, maps, {})
     assert names_in(tmp_path) == ["input_Cam000.png", "mask_occluded.png"]
-    assert (tmp_path / "mask_occluded.png").read_bytes() == b"truth"
+    assert (tmp_path / "mask_occluded.png").read_bytes() == b"ground_truth"
 
 
 BAD_MAPS = {

@@ -33,10 +33,10 @@ def random_light_field(grid=(5, 4), shape=(14, 17), channels=3, dtype=np.uint8, 
 def twin(light_field, parameters, groups, subset):
     """The sweep in plain NumPy and SciPy: one interpolation per view and candidate, one loop per window pixel."""
     T, S = light_field.grid
-    t0, s0 = light_field.reference
+    t0, s0 = light_field.reference_position
     H, W = light_field.shape
-    candidates = light_field.known_range().candidates(parameters.candidates)
-    centre = light_field.centre
+    candidates = light_field.require_disparity_range().candidates(parameters.num_disparities)
+    centre = light_field.reference_view
     noise = residual_variance(centre)
     views = light_field.views / (np.iinfo(light_field.views.dtype).max if light_field.views.dtype != np.float32 else 1)
     rows, columns = np.mgrid[:H, :W].astype(float)
@@ -79,7 +79,7 @@ def twin(light_field, parameters, groups, subset):
 def test_sweep_equals_its_numpy_twin(radius, channels, dtype):
     """Wrong sampling, borders, counts or weights would show as a wrong depth map."""
     light_field = random_light_field(channels=channels, dtype=dtype)
-    parameters = SweepParameters(candidates=11, scale=0.3, window_radius=radius, window_sigma=0.5)
+    parameters = SweepParameters(num_disparities=11, scale=0.3, window_radius=radius, window_sigma=0.5)
     views = halves_and_quarters(light_field.grid)
     result = sweep(light_field, parameters, groups=views.groups, subsets=views.subsets)
     for n in (0, 1, 4, 6):
@@ -94,7 +94,7 @@ def test_sweep_equals_its_numpy_twin(radius, channels, dtype):
 def test_depth_of_another_view_than_the_centre(view):
     """Steps counted from the wrong view would shift every sample of the depth map that was asked for."""
     light_field = random_light_field().seen_from(view)
-    parameters = SweepParameters(candidates=11, scale=0.3, window_radius=1, window_sigma=0.5)
+    parameters = SweepParameters(num_disparities=11, scale=0.3, window_radius=1, window_sigma=0.5)
     views = halves_and_quarters(light_field.grid, view)
     result = sweep(light_field, parameters, groups=views.groups, subsets=views.subsets)
     for n in range(len(views.names)):
@@ -106,7 +106,7 @@ def test_depth_of_another_view_than_the_centre(view):
 def test_tiles_of_a_wide_picture_fit_together():
     """Pictures wider than a tile: a seam, or a border counted in the middle, would run through the depth map."""
     light_field = random_light_field(grid=(3, 3), shape=(9, 2 * TILE_WIDTH + 9))
-    parameters = SweepParameters(candidates=5, scale=0.3, window_radius=2, window_sigma=0.5)
+    parameters = SweepParameters(num_disparities=5, scale=0.3, window_radius=2, window_sigma=0.5)
     groups = np.zeros(light_field.grid, int)
     result = sweep(light_field, parameters)
     _, cost, mean = twin(light_field, parameters, groups, np.ones(1, bool))
@@ -121,7 +121,7 @@ def test_missing_views_are_left_out():
     present[0, 1] = present[3, 3] = False
     broken = whole.views.copy()
     broken[~present] = 0
-    parameters = SweepParameters(candidates=7, scale=0.3, window_radius=1, window_sigma=0.5)
+    parameters = SweepParameters(num_disparities=7, scale=0.3, window_radius=1, window_sigma=0.5)
     results = []
     for views in (whole.views, broken):
         light_field = LightField(views, "partial", present=present, disparity_range=whole.disparity_range)
@@ -134,8 +134,8 @@ def test_sweep_visits_the_samples_of_the_stitched_epi(disparity):
     """The fast sweep and the paper's construction (shift, concatenate, follow the line) are the same cost (Eq. 1-3)."""
     light_field = random_light_field(shape=(12, 15))
     light_field = light_field.with_range(DisparityRange(disparity - 0.5, disparity + 0.5, "given"))
-    parameters = SweepParameters(candidates=3, scale=0.3, window_radius=0)
-    scale = float(np.sqrt(parameters.scale**2 + residual_variance(light_field.centre)))
+    parameters = SweepParameters(num_disparities=3, scale=0.3, window_radius=0)
+    scale = float(np.sqrt(parameters.scale**2 + residual_variance(light_field.reference_view)))
     result = sweep(light_field, parameters)
     for y, x in [(6, 7), (0, 3), (11, 14), (5, 1)]:
         costs = [line_cost(light_field, y, x, disparity + offset, scale) for offset in (-0.5, 0, 0.5)]
@@ -146,17 +146,17 @@ def test_true_slope_is_a_straight_line_in_the_stitched_epi():
     """A drawn SEPI at the true disparity shows the pixel's colour all along one straight line."""
     light_field = render("fronto_parallel", size=64, views=5)
     y, x = 32, 30
-    at_truth = stitched_epi(light_field, y, float(light_field.truth[y, x]))
+    at_truth = stitched_epi(light_field, y, float(light_field.ground_truth[y, x]))
     samples, valid = at_truth.along_line(x)
     assert valid.sum() == 25
-    assert np.abs(samples - light_field.centre[y, x]).max() < 0.02
+    assert np.abs(samples - light_field.reference_view[y, x]).max() < 0.02
     picture = at_truth.image()
     assert picture.shape == (25, 64, 3)
     columns = np.round(x - at_truth.disparity * at_truth.steps).astype(int)
     drawn = (columns >= 0) & (columns < 64)
     np.testing.assert_allclose(picture[drawn, columns[drawn]], samples[drawn], atol=0.02)
     wrong, _ = stitched_epi(light_field, y, 0.0).along_line(x)
-    assert np.abs(wrong - light_field.centre[y, x]).max() > 0.05
+    assert np.abs(wrong - light_field.reference_view[y, x]).max() > 0.05
 
 
 def test_stitched_epi_refuses_a_row_outside():
@@ -167,18 +167,18 @@ def test_stitched_epi_refuses_a_row_outside():
 def test_equal_bytes_for_any_number_of_threads():
     """A rerun on another machine must give the same file."""
     light_field = render("curved_occluders", size=96, views=5)
-    parameters = SweepParameters(candidates=31)
+    parameters = SweepParameters(num_disparities=31)
     views = halves_and_quarters(light_field.grid)
     scattered = np.random.default_rng(0).random(light_field.shape) < 0.01
     before = numba.get_num_threads()
-    for subsets, wanted in ((None, None), (views.subsets, scattered)):
+    for subsets, mask in ((None, None), (views.subsets, scattered)):
         results = []
         try:
             # the number of threads decides how the rows are shared out
             for number in (1, several_threads()):
                 numba.set_num_threads(number)
                 groups = None if subsets is None else views.groups
-                results.append(sweep(light_field, parameters, groups=groups, subsets=subsets, wanted=wanted))
+                results.append(sweep(light_field, parameters, groups=groups, subsets=subsets, mask=mask))
         finally:
             numba.set_num_threads(before)
         for name in ("disparity", "cost", "mean"):
@@ -211,30 +211,30 @@ def test_candidates_done_together_equal_candidates_done_alone():
 
 def test_unwanted_pixels_stay_unknown_and_wanted_ones_unchanged():
     light_field = random_light_field()
-    parameters = SweepParameters(candidates=5, scale=0.3, window_radius=2, window_sigma=0.5)
-    wanted = np.zeros(light_field.shape, bool)
-    wanted[[1, 7, 8], [3, 0, 16]] = True
-    some, whole = sweep(light_field, parameters, wanted=wanted), sweep(light_field, parameters)
-    assert np.isnan(some.disparity[0][~wanted]).all()
-    np.testing.assert_array_equal(some.disparity[0][wanted], whole.disparity[0][wanted])
+    parameters = SweepParameters(num_disparities=5, scale=0.3, window_radius=2, window_sigma=0.5)
+    mask = np.zeros(light_field.shape, bool)
+    mask[[1, 7, 8], [3, 0, 16]] = True
+    some, whole = sweep(light_field, parameters, mask=mask), sweep(light_field, parameters)
+    assert np.isnan(some.disparity[0][~mask]).all()
+    np.testing.assert_array_equal(some.disparity[0][mask], whole.disparity[0][mask])
 
 
 def test_wanted_pixels_far_apart_equal_the_whole_picture():
     """Columns between are passed over: a window cut short there would change the depth of the pixels beside."""
     light_field = random_light_field(grid=(3, 3), shape=(9, 4 * SHORTEST_GAP))
-    parameters = SweepParameters(candidates=5, scale=0.3, window_radius=2, window_sigma=0.5)
-    wanted = np.zeros(light_field.shape, bool)
-    wanted[[0, 3, 3, 8], [5, 4, 2 * SHORTEST_GAP, 4 * SHORTEST_GAP - 1]] = True
-    some, whole = sweep(light_field, parameters, wanted=wanted), sweep(light_field, parameters)
+    parameters = SweepParameters(num_disparities=5, scale=0.3, window_radius=2, window_sigma=0.5)
+    mask = np.zeros(light_field.shape, bool)
+    mask[[0, 3, 3, 8], [5, 4, 2 * SHORTEST_GAP, 4 * SHORTEST_GAP - 1]] = True
+    some, whole = sweep(light_field, parameters, mask=mask), sweep(light_field, parameters)
     for name in ("disparity", "cost", "mean"):
-        np.testing.assert_allclose(getattr(some, name)[0][wanted], getattr(whole, name)[0][wanted], rtol=1e-5)
+        np.testing.assert_allclose(getattr(some, name)[0][mask], getattr(whole, name)[0][mask], rtol=1e-5)
 
 
 def test_subset_without_views_matches_nothing():
     """Seen from a corner of the grid, some parts hold no view: their cost is the worst there is, and is a number."""
     light_field = random_light_field(grid=(3, 3), shape=(40, 44)).seen_from((0, 0))
     views = halves_and_quarters(light_field.grid, (0, 0))
-    parameters = SweepParameters(candidates=5, scale=0.3, window_radius=1, window_sigma=0.5)
+    parameters = SweepParameters(num_disparities=5, scale=0.3, window_radius=1, window_sigma=0.5)
     result = sweep(light_field, parameters, groups=views.groups, subsets=views.subsets)
     empty = views.names.index("left-up")
     assert (result.cost[empty] == 1).all()
@@ -266,7 +266,8 @@ def test_kernels_are_compiled_once():
         "from sepi.matching.plane_sweep import SweepParameters, sweep\n"
         "from sepi.matching.plane_sweep_kernels import sweep_rows\n"
         "views = np.random.default_rng(0).integers(0, 255, (3, 3, 8, 9, 1), np.uint8)\n"
-        "sweep(LightField(views, 'x', disparity_range=DisparityRange(-1, 1, 'given')), SweepParameters(candidates=3))\n"
+        "light_field = LightField(views, 'x', disparity_range=DisparityRange(-1, 1, 'given'))\n"
+        "sweep(light_field, SweepParameters(num_disparities=3))\n"
         "print(sum(sweep_rows.stats.cache_hits.values()), sum(sweep_rows.stats.cache_misses.values()))\n"
     )
     environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}

@@ -7,9 +7,9 @@ from scipy.ndimage import map_coordinates
 from several_threads import several_threads
 
 from sepi.lightfield import DisparityRange, LightField
-from sepi.matching.base_detail import DETAIL_UNIT, LayerParameters, split_layers
+from sepi.matching.base_detail import DETAIL_UNIT, BaseDetailParameters, base_detail_decomposition
 from sepi.matching.semi_global_kernels import aggregate, choose, semi_global
-from sepi.matching.visibility_kernels import EMPTY, covered_somewhere, sweep_rows, z_buffers
+from sepi.matching.visibility_kernels import EMPTY, occluded_in_any_view, sweep_rows, z_buffers
 from sepi.matching.visibility_sweep import (
     AllViewsParameters,
     VisibilityParameters,
@@ -39,7 +39,7 @@ def z_buffer_twin(disparity, dt, ds):
 
 
 def sweep_twin(light_field, layers, nearest, disparities, cover, hidden, scales, shares):
-    t0, s0 = light_field.reference
+    t0, s0 = light_field.reference_position
     H, W = light_field.shape
     rows, columns = np.mgrid[:H, :W].astype(float)
     planes = [layers.colours * layers.colour_unit, layers.detail * DETAIL_UNIT][: 1 + bool(layers.detail.shape[2])]
@@ -73,10 +73,14 @@ def test_costs_equal_a_plain_twin(channels: int, dtype: type, visible: bool) -> 
     present = np.ones((3, 4), bool)
     present[0, 1] = False
     light_field = random_light_field(channels=channels, dtype=dtype, present=present)
-    layers = split_layers(light_field, LayerParameters())
-    disparities = light_field.known_range().candidates(7)
+    layers = base_detail_decomposition(light_field, BaseDetailParameters())
+    disparities = light_field.require_disparity_range().candidates(7)
     disparity = np.random.default_rng(1).choice(disparities, light_field.shape).astype(np.float32)
-    nearest = z_buffers(disparity, present, *light_field.reference) if visible else np.empty((3, 4, 11, 0), np.float32)
+    nearest = (
+        z_buffers(disparity, present, *light_field.reference_position)
+        if visible
+        else np.empty((3, 4, 11, 0), np.float32)
+    )
     scales, shares = np.array([0.02, 0.01], np.float32), np.array([0.4, 0.6], np.float32)
     cost = np.empty((7, 11, 13), np.float32)
     sweep_rows(
@@ -85,7 +89,7 @@ def test_costs_equal_a_plain_twin(channels: int, dtype: type, visible: bool) -> 
         layers.detail,
         np.float32(DETAIL_UNIT),
         present,
-        *light_field.reference,
+        *light_field.reference_position,
         nearest,
         disparities,
         np.float32(0.1),
@@ -117,7 +121,7 @@ def test_an_occluder_covers_what_lies_beside_it() -> None:
     """A square before a wall hides the wall on each side from the views on that side, and nothing else."""
     disparity = np.zeros((40, 40), np.float32)
     disparity[15:25, 15:25] = 2
-    covered = covered_somewhere(disparity, np.ones((3, 3), bool), 1, 1, np.float32(0.15))
+    covered = occluded_in_any_view(disparity, np.ones((3, 3), bool), 1, 1, np.float32(0.15))
     assert covered[18:22, 13:15].all()
     assert covered[18:22, 25:27].all()
     assert covered[13:15, 18:22].all()
@@ -182,7 +186,7 @@ def test_grey_views_give_the_depth_of_equal_colours() -> None:
     fields = [
         LightField(views, "s", disparity_range=scene.disparity_range) for views in (grey, np.repeat(grey, 3, axis=4))
     ]
-    one, three = (depth_from_all_views(f, AllViewsParameters(candidates=21), lambda _: None) for f in fields)
+    one, three = (depth_from_all_views(f, AllViewsParameters(num_disparities=21), lambda _: None) for f in fields)
     np.testing.assert_allclose(one.disparity, three.disparity, atol=1e-3)
 
 
@@ -193,9 +197,9 @@ def test_depth_is_the_same_on_any_number_of_threads() -> None:
     try:
         for threads in (1, several_threads()):
             numba.set_num_threads(threads)
-            first = depth_from_all_views(scene, AllViewsParameters(candidates=21), lambda _: None)
+            first = depth_from_all_views(scene, AllViewsParameters(num_disparities=21), lambda _: None)
             result = depth_from_visible_views(
-                scene, first.disparity, VisibilityParameters(candidates=21, passes=1), lambda _: None
+                scene, first.disparity, VisibilityParameters(num_disparities=21, passes=1), lambda _: None
             )
             found.append((result.disparity.tobytes(), result.confidence.tobytes()))
     finally:
@@ -206,9 +210,9 @@ def test_depth_is_the_same_on_any_number_of_threads() -> None:
 def test_progress_ends_at_one() -> None:
     seen: list[float] = []
     scene = render("fronto_parallel", size=64)
-    first = depth_from_all_views(scene, AllViewsParameters(candidates=5), seen.append)
+    first = depth_from_all_views(scene, AllViewsParameters(num_disparities=5), seen.append)
     assert seen[-1] == 1
     seen.clear()
-    depth_from_visible_views(scene, first.disparity, VisibilityParameters(candidates=5), seen.append)
+    depth_from_visible_views(scene, first.disparity, VisibilityParameters(num_disparities=5), seen.append)
     assert seen[-1] == 1
     assert np.all(np.diff(seen) >= 0)

@@ -7,12 +7,12 @@ from scipy.sparse import diags
 from scipy.sparse.linalg import spsolve
 
 from sepi.lightfield import DisparityRange, LightField
-from sepi.matching.base_detail import DETAIL_UNIT, LayerParameters, split_layers
-from sepi.matching.gauss_newton import information, prepared, spline_derivatives, view_mean, windowed_step
+from sepi.matching.base_detail import DETAIL_UNIT, BaseDetailParameters, base_detail_decomposition
+from sepi.matching.gauss_newton import gradient_and_hessian, spline_derivatives, spline_views, view_mean, windowed_step
 from sepi.matching.gauss_newton_kernels import MARGIN, SPLINE_UNIT, spline_coefficients
 from sepi.matching.visibility_kernels import z_buffers
 from sepi.optimize import SecondOrderParameters, second_order
-from sepi.regularization.second_order import bend_matrix, bend_weights, solve_smooth
+from sepi.regularization.second_order import second_difference_matrix, smoothness_weights, solve_smooth
 from sepi.scenes import render
 from sepi.stage import StageMaps, no_progress
 
@@ -37,7 +37,7 @@ def test_derivatives_are_those_of_the_spline() -> None:
 
 def sums_twin(light_field, layers, parameters, disparity, cover):
     """Mean of the views, gradient and curvature, with SciPy's splines."""
-    t0, s0 = light_field.reference
+    t0, s0 = light_field.reference_position
     H, W = light_field.shape
     rows, columns = np.mgrid[:H, :W].astype(float)
     nearest = z_buffers(disparity, light_field.present, t0, s0)
@@ -81,13 +81,13 @@ def test_sums_over_the_views_equal_a_plain_twin() -> None:
     present[1, 0] = False
     views = np.round(255 * np.random.default_rng(2).random((3, 4, 10, 12, 3))).astype(np.uint8)
     light_field = LightField(views, "random", present=present, disparity_range=DisparityRange(-1, 1, "given"))
-    parameters = LayerParameters(colour_scale=0.3, detail_scale=0.2)
-    layers = split_layers(light_field, parameters)
-    matching = prepared(light_field, layers, parameters)
+    parameters = BaseDetailParameters(colour_scale=0.3, detail_scale=0.2)
+    layers = base_detail_decomposition(light_field, parameters)
+    matching = spline_views(light_field, layers, parameters)
     disparity = np.random.default_rng(3).uniform(-0.9, 0.9, (10, 12)).astype(np.float32)
-    nearest = z_buffers(disparity, present, *light_field.reference)
+    nearest = z_buffers(disparity, present, *light_field.reference_position)
     mean = view_mean(matching, disparity, nearest, 0.2)
-    gradient, curvature = information(matching, mean, disparity, nearest, 0.2)
+    gradient, curvature = gradient_and_hessian(matching, mean, disparity, nearest, 0.2)
     expected = sums_twin(light_field, layers, parameters, disparity, 0.2)
     np.testing.assert_allclose(mean, expected[0], atol=1e-3)
     for found, twin in ((gradient, expected[1]), (curvature, expected[2])):
@@ -96,8 +96,8 @@ def test_sums_over_the_views_equal_a_plain_twin() -> None:
 
 def test_margin_of_the_splines_is_mirrored() -> None:
     scene = render("dots", size=64)
-    parameters = LayerParameters()
-    splines = prepared(scene, split_layers(scene, parameters), parameters).splines[0, 0, ..., 0]
+    parameters = BaseDetailParameters()
+    splines = spline_views(scene, base_detail_decomposition(scene, parameters), parameters).splines[0, 0, ..., 0]
     inner = splines[MARGIN:-MARGIN, MARGIN:-MARGIN]
     np.testing.assert_array_equal(splines, np.pad(inner, MARGIN, mode="reflect"))
 
@@ -107,8 +107,8 @@ def test_coefficients_of_the_strongest_pattern_do_not_wrap_round() -> None:
     y, x = np.mgrid[:16, :16]
     views = np.where((y + x) % 2, 1.5, -0.5).astype(np.float32)[None, None, ..., None] * np.ones((1, 2, 1, 1, 3))
     field = LightField(views.astype(np.float32), "board", disparity_range=DisparityRange(-1, 1, "given"))
-    parameters = LayerParameters()
-    splines = prepared(field, split_layers(field, parameters), parameters).splines[0, 0, ..., 0]
+    parameters = BaseDetailParameters()
+    splines = spline_views(field, base_detail_decomposition(field, parameters), parameters).splines[0, 0, ..., 0]
     inner = splines[MARGIN:-MARGIN, MARGIN:-MARGIN]
     expected = spline_filter(views[0, 0, ..., 0], order=3, mode="mirror")
     np.testing.assert_allclose(inner * SPLINE_UNIT, expected, atol=2 * SPLINE_UNIT)
@@ -117,15 +117,15 @@ def test_coefficients_of_the_strongest_pattern_do_not_wrap_round() -> None:
 def test_steps_end_at_the_true_disparity() -> None:
     """From a fifth of a candidate step away, three steps come within a thousandth of a pixel."""
     scene = render("slanted_plane", size=96)
-    parameters = LayerParameters()
-    matching = prepared(scene, split_layers(scene, parameters), parameters)
-    disparity = (scene.truth + 0.02).astype(np.float32)
+    parameters = BaseDetailParameters()
+    matching = spline_views(scene, base_detail_decomposition(scene, parameters), parameters)
+    disparity = (scene.ground_truth + 0.02).astype(np.float32)
     for _ in range(3):
-        nearest = z_buffers(disparity, scene.present, *scene.reference)
+        nearest = z_buffers(disparity, scene.present, *scene.reference_position)
         mean = view_mean(matching, disparity, nearest, 0.15)
-        gradient, curvature = information(matching, mean, disparity, nearest, 0.15)
+        gradient, curvature = gradient_and_hessian(matching, mean, disparity, nearest, 0.15)
         disparity = disparity + windowed_step(gradient, curvature, 3, 0.05)[0]
-    assert np.abs(disparity - scene.truth)[8:-8, 8:-8].mean() < 1.5e-3
+    assert np.abs(disparity - scene.ground_truth)[8:-8, 8:-8].mean() < 1.5e-3
 
 
 def test_steps_are_those_of_newton_and_no_longer_than_allowed() -> None:
@@ -148,13 +148,13 @@ def plane(shape=(20, 24)):
 
 def weights_of(disparity, reliability=1.0):
     guide = np.zeros((*disparity.shape, 3), np.float32)
-    return bend_weights(disparity, guide, np.full(disparity.shape, reliability, np.float32), 0.1, 0.01)
+    return smoothness_weights(disparity, guide, np.full(disparity.shape, reliability, np.float32), 0.1, 0.01)
 
 
 def test_planes_cost_nothing() -> None:
     """The smoothing may not flatten slanted surfaces: with hardly any data a plane stays what it is."""
     data = plane()
-    matrix = 10 * bend_matrix(weights_of(data), data.shape)
+    matrix = 10 * second_difference_matrix(weights_of(data), data.shape)
     solution = solve_smooth(matrix, np.full(data.shape, 1e-6, np.float32), data, 1e-10, 500)
     np.testing.assert_allclose(solution, data, atol=1e-5)
 
@@ -163,7 +163,7 @@ def test_a_hole_is_filled_by_the_plane_round_it() -> None:
     data, weight = plane(), np.ones((20, 24), np.float32)
     data[6:14, 8:16] += 0.05
     weight[6:14, 8:16] = 0
-    matrix = bend_matrix(weights_of(plane()), data.shape)
+    matrix = second_difference_matrix(weights_of(plane()), data.shape)
     solution = solve_smooth(matrix, weight, data, 1e-10, 1000)
     np.testing.assert_allclose(solution, plane(), atol=2e-4)
 
@@ -172,7 +172,7 @@ def test_solver_agrees_with_a_direct_one() -> None:
     random = np.random.default_rng(4)
     data = (plane() + random.normal(0, 0.02, (20, 24))).astype(np.float32)
     weight = random.uniform(0, 1, (20, 24)).astype(np.float32) ** 4
-    matrix = 10 * bend_matrix([random.uniform(0, 1, w.shape) for w in weights_of(data)], data.shape)
+    matrix = 10 * second_difference_matrix([random.uniform(0, 1, w.shape) for w in weights_of(data)], data.shape)
     system = (matrix + diags(weight.ravel() + 1e-9)).tocsc()
     expected = spsolve(system, weight.ravel().astype(float) * data.ravel())
     found = solve_smooth(matrix, weight, data, 1e-10, 2000)
@@ -182,7 +182,8 @@ def test_solver_agrees_with_a_direct_one() -> None:
 def test_steps_stay_where_the_data_is_reliable_and_go_where_it_is_not() -> None:
     data = np.zeros((16, 16), np.float32)
     data[:, 8:] = 1
-    sure, unsure = (solve_smooth(5 * bend_matrix(weights_of(data, r), data.shape), np.full(data.shape, 0.5, np.float32),
+    sure, unsure = (solve_smooth(5 * second_difference_matrix(weights_of(data, r), data.shape), np.full(data.shape, 0.5,
+    np.float32),
                                  data, 1e-8, 500) for r in (1.0, 0.0))  # fmt: skip
     np.testing.assert_allclose(sure, data, atol=1e-3)
     assert np.abs(np.diff(unsure, axis=1)).max() < 0.5

@@ -9,7 +9,7 @@ from sepi.report.published import SceneTable
 
 TABLES = {"table 1": published.table1(), "table 2": published.table2()}
 
-# averages that do not follow from the paper's own rows: (table, data set, method); see docs/published.md
+# averages that do not follow from the paper's own rows: (table, dataset, method); see docs/published.md
 STRATIFIED_ONLY = {
     ("table 2", "hci", "wang_distgdisp"),
     ("table 2", "hci", "tsai"),
@@ -26,7 +26,7 @@ def column(table: SceneTable, dataset: str, method: str) -> list[float]:
 def test_every_scene_and_method_is_there(name: str) -> None:
     """A row lost in typing would silently drop a scene from the report."""
     table = TABLES[name]
-    assert [len(table.scenes(dataset)) for dataset in ("hci", "hci_old")] == [24, 7]
+    assert [len(table.scenes(dataset)) for dataset in ("hci", "hci_2013")] == [24, 7]
     learned = {key for key, method in published.methods().items() if method.column and method.learning != "none"}
     everyone = {key for key, method in published.methods().items() if method.column}
     assert len(everyone) == 11
@@ -94,14 +94,14 @@ def test_a_few_cells_by_eye() -> None:
     assert table2.cells["hci", "Cotton"]["zhou"] == 0.34
     assert table1.cells["hci", "Antinous"]["mishiba"] == 5.25
     assert table1.cells["hci", "Stripes"]["jeon"] == 1043.84
-    assert table2.cells["hci_old", "Stilllife"]["jin"] == 1.33
+    assert table2.cells["hci_2013", "Stilllife"]["jin"] == 1.33
     assert published.table3()["hci"]["wang_occ"].occluded == 37.26
 
 
 def test_scene_names_are_matched_within_their_dataset_only() -> None:
     """A built-in scene called dots is not the benchmark's Dots."""
     assert published.paper_scene("hci", "cotton") == "Cotton"
-    assert published.paper_scene("hci_old", "buddha") == "Buddha"
+    assert published.paper_scene("hci_2013", "buddha") == "Buddha"
     assert published.paper_scene("hci", "buddha") is None
     assert published.paper_scene("builtin", "dots") is None
 

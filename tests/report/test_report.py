@@ -18,7 +18,7 @@ from sepi import pipeline
 from sepi.errors import SepiError
 from sepi.evaluate import evaluation_of, score_maps
 from sepi.external import NO_FILE
-from sepi.io.external_maps import Imported, write_imported
+from sepi.io.external_maps import ExternalMap, write_imported
 from sepi.io.hdf5 import read_stage, write_light_field, write_stage
 from sepi.io.scores import Evaluation, map_name, read_evaluations, write_scores
 from sepi.lightfield import DisparityRange, LightField
@@ -38,12 +38,12 @@ VARIANTS = {
     "no_occlusion": {"initial": "sepi", "occlusion": "none", "textureless": "lti", "optimize": "wls"},
     "wang": {"initial": "sepi", "occlusion": "wang", "textureless": "lti", "optimize": "wls"},
 }
-# error added to the truth after each stage; the scenes' own is added too
+# error added to the ground truth after each stage; the scenes' own is added too
 STAGE_ERROR = {"initial": 0.4, "occlusion": 0.3, "textureless": 0.2, "optimize": 0.1}
 VARIANT_ERROR = {"paper": 0.0, "no_occlusion": 0.1, "wang": 0.2, "best": -0.05, "best_wls": 0.3}
 SCENE_ERROR = {"dots": 0.0, "flat": 0.1, "cotton": 0.0, "mine": 0.1, "picture": 0.0}
-# what is added to the truth of a scene in an imported map, or what is wrong with the map; one method has the name of a
-# column that is there anyway, and is the most accurate of all
+# what is added to the ground truth of a scene in an imported map, or what is wrong with the map; one method has the
+# name of a column that is there anyway, and is the most accurate of all
 EXTERNAL: dict[str, dict[str, float | str]] = {
     "SPO": {"cotton": 0.2, "mine": NO_FILE, "picture": 0.2, "dots": NO_FILE},
     "zhou": {"cotton": 0.02, "mine": 0.04, "picture": NO_FILE, "dots": NO_FILE},
@@ -54,23 +54,25 @@ EXTERNAL: dict[str, dict[str, float | str]] = {
 def light_field(name: str) -> LightField:
     random = np.random.default_rng(len(name))
     views = random.integers(0, 256, (3, 3, SIZE, SIZE, 3), np.uint8)
-    truth = None if name == "picture" else np.linspace(-1, 1, SIZE, dtype=np.float32) * np.ones((SIZE, 1), np.float32)
+    ground_truth = (
+        None if name == "picture" else np.linspace(-1, 1, SIZE, dtype=np.float32) * np.ones((SIZE, 1), np.float32)
+    )
     masks = {"occluded": np.zeros((SIZE, SIZE), bool), "textureless": np.ones((SIZE, SIZE), bool)}
     if name != "flat":
         masks["occluded"][5:10] = True
     known = DisparityRange(-1.5, 1.5, "given")
-    return LightField(views, name, "test", disparity_range=known, truth=truth, masks=masks)
+    return LightField(views, name, "test", disparity_range=known, ground_truth=ground_truth, masks=masks)
 
 
 def stage_maps(scene: LightField, variant: str, stage: str) -> StageMaps:
-    truth = scene.truth if scene.truth is not None else np.zeros(scene.shape, np.float32)
+    ground_truth = scene.ground_truth if scene.ground_truth is not None else np.zeros(scene.shape, np.float32)
     step = np.float32(STAGE_ERROR[stage] + VARIANT_ERROR[variant] + SCENE_ERROR[scene.name])
     extra = {
         "occluded": scene.masks["occluded"],
         "textureless": scene.masks["textureless"],
         "superpixels": (np.indices(scene.shape) // 10).sum(0).astype(np.int32),
     }
-    return StageMaps(truth + step, np.full(scene.shape, 0.5, np.float32), extra)
+    return StageMaps(ground_truth + step, np.full(scene.shape, 0.5, np.float32), extra)
 
 
 @pytest.fixture(scope="module")
@@ -103,14 +105,14 @@ def with_results(made: Plan) -> Plan:
     return made
 
 
-def imported_map(scene: LightField, what: float | str) -> Imported:
-    """A map with this error added to the truth, or one with this problem."""
+def imported_map(scene: LightField, what: float | str) -> ExternalMap:
+    """A map with this error added to the ground truth, or one with this problem."""
     if isinstance(what, str):
-        return Imported("/maps/none.pfm", what)
-    truth = np.zeros(scene.shape, np.float32) if scene.truth is None else scene.truth
-    disparity = truth + np.float32(what)
-    scores = Evaluation() if scene.truth is None else evaluation_of(scene, disparity)
-    return Imported("/maps/some.pfm", "", 64 * "a", disparity, scores)
+        return ExternalMap("/maps/none.pfm", what)
+    ground_truth = np.zeros(scene.shape, np.float32) if scene.ground_truth is None else scene.ground_truth
+    disparity = ground_truth + np.float32(what)
+    scores = Evaluation() if scene.ground_truth is None else evaluation_of(scene, disparity)
+    return ExternalMap("/maps/some.pfm", "", 64 * "a", disparity, scores)
 
 
 @pytest.fixture(scope="module")
@@ -226,18 +228,18 @@ def test_averages_say_over_what(report: Path) -> None:
     """Averages compare only over the same scenes: a method without a figure for one of them gets none."""
     rows = rows_of(report, "table1_mse")
     ours = only(rows, dataset="builtin", row="average")
-    assert (ours["scene"], ours["ours"]) == ("Average of 2 scenes at hand", "2.5000")
+    assert (ours["scene"], ours["ours"]) == ("Average of 2 scenes available", "2.5000")
     assert only(rows, dataset="hci", row="average")["zhou"] == ""
     printed = only(rows, dataset="hci", row="average printed")
     assert (printed["ours"], printed["zhou"]) == ("", "4.34")
-    assert not [row for row in rows if row["dataset"] == "hci_old" and row["row"] == "average"]
+    assert not [row for row in rows if row["dataset"] == "hci_2013" and row["row"] == "average"]
 
 
 def test_average_of_scenes_at_hand_covers_the_published_ones(plan: Plan, tmp_path: Path) -> None:
     alone = Plan(plan.results, {"hci": ["cotton"]}, VARIANTS)
     write_tables(alone, tmp_path / "reports", "table1_mse")
     row = only(rows_of(tmp_path / "reports", "table1_mse"), dataset="hci", row="average")
-    assert (row["scene"], row["ours"], row["zhou"]) == ("Average of 1 scene at hand", "1.0000", "1.20")
+    assert (row["scene"], row["ours"], row["zhou"]) == ("Average of 1 scene available", "1.0000", "1.20")
     assert row["ratio"] == "0.8333"
 
 
@@ -246,9 +248,9 @@ def test_regions_table(report: Path) -> None:
     rows = rows_of(report, "table3_regions")
     ours = only(rows, method="ours")
     assert (ours["builtin_occluded"], ours["builtin_textureless"]) == ("1.0000", "2.5000")
-    assert (ours["hci_occluded"], ours["hci_old_occluded"]) == ("2.5000", "")
+    assert (ours["hci_occluded"], ours["hci_2013_occluded"]) == ("2.5000", "")
     assert only(rows, method="zhou")["hci_occluded"] == "20.62"
-    assert only(rows, method="wang_occ")["hci_old_textureless"] == "3.95"
+    assert only(rows, method="wang_occ")["hci_2013_textureless"] == "3.95"
     assert not [row for row in rows if row["method"] == "mishiba"]
     assert "hci: cotton, mine" in (report / "table3_regions.md").read_text()
 
@@ -487,16 +489,16 @@ def test_wrong_numbers_are_one_line(content: str | None, arguments: list[str], m
 
 
 def test_numbers_say_what_they_are_of(complete: Plan) -> None:
-    found = collect(complete, {"initial": {"sepi": {"candidates": 9}, "structure_tensor": {"radius": 1}}})
+    found = collect(complete, {"initial": {"sepi": {"num_disparities": 9}, "structure_tensor": {"radius": 1}}})
     assert re.fullmatch(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d[+-]\d\d:\d\d", found["made"]["date"])
     assert found["made"]["libraries"]["numpy"] == np.__version__
     assert found["made"]["machine"]["cores"] > 0
     assert found["protocols"] == {"paper": 0, "benchmark": 15}
     assert found["plan"]["external"] == ["SPO", "zhou"]
-    assert found["parameters"]["initial"] == {"sepi": {"candidates": 9}}
+    assert found["parameters"]["initial"] == {"sepi": {"num_disparities": 9}}
     (scene,) = found["scenes"]
     known = light_field("cotton")
-    assert known.truth is not None
+    assert known.ground_truth is not None
     expected = {
         "grid": [3, 3],
         "shape": [SIZE, SIZE],
@@ -505,12 +507,12 @@ def test_numbers_say_what_they_are_of(complete: Plan) -> None:
         "source": "test",
         "range": [-1.5, 1.5],
         "range_source": "given",
-        "truth": True,
+        "ground_truth": True,
         "masks": ["occluded", "textureless"],
         "notes": [],
         "camera": None,
         "sha256": hashlib.sha256(known.views.tobytes()).hexdigest(),
-        "truth_sha256": hashlib.sha256(known.truth.tobytes()).hexdigest(),
+        "truth_sha256": hashlib.sha256(known.ground_truth.tobytes()).hexdigest(),
     }
     assert scene["light_field"] == expected
     assert list(scene["stages"])[:2] == ["sepi", "sepi/half_sepi"]
@@ -593,7 +595,7 @@ def test_cells_say_their_kind(imported: dict[str, Any]) -> None:
     assert cells["odd|_name_ (imported)"]["value"] is None
     rows = [row for section in imported["tables"]["table1_mse"]["sections"] for row in section["rows"]]
     at_hand = {row["cells"][0]["text"] for row in rows if row["at_hand"]}
-    assert at_hand == {"Cotton", "mine", "dots", "Average of 1 scene at hand", "Average of 2 scenes at hand"}
+    assert at_hand == {"Cotton", "mine", "dots", "Average of 1 scene available", "Average of 2 scenes available"}
     assert {row["kind"] for row in rows} == {"scene", "average", "average printed"}
 
 
@@ -650,7 +652,7 @@ def test_best_and_second_best_are_marked_as_in_the_paper(imported: dict[str, Any
     assert marked("hci", "Average as printed (24 scenes)") == {"Zhou et al. (SEPI)": BEST, "Zhang et al. (SPO)": SECOND}
     assert marked("builtin", "dots") == {"this code, best": BEST, "this code, paper": SECOND}
     # Buddha: 0.45, then twice 0.48
-    assert list(marked("hci_old", "Buddha").values()) == [SECOND, SECOND, BEST]
+    assert list(marked("hci_2013", "Buddha").values()) == [SECOND, SECOND, BEST]
 
 
 def test_regions_are_ranked_over_the_same_scenes_only(imported: dict[str, Any]) -> None:
@@ -718,7 +720,13 @@ def test_no_name_of_the_users_breaks_a_table(imported: dict[str, Any]) -> None:
 def test_pictures_of_a_scene(plan: Plan, tmp_path: Path) -> None:
     run(figures.command, plan, tmp_path, "--dataset", "hci", "--scene", "cotton")
     written = {str(path.relative_to(tmp_path)) for path in tmp_path.rglob("*.png")}
-    common = {"overview.png", "centre.png", "truth.png", "occluded_truth.png", "textureless_truth.png"}
+    common = {
+        "overview.png",
+        "centre.png",
+        "ground_truth.png",
+        "occluded_ground_truth.png",
+        "textureless_ground_truth.png",
+    }
     stages = {"1_initial", "2_occlusion", "3_textureless", "4_optimize"}
     each = stages | {"error", "confidence", "occluded", "textureless", "superpixels"}
     common |= {"paper/sparsification.png", "pixels.png"}
@@ -733,7 +741,7 @@ def test_pictures_without_ground_truth(plan: Plan, tmp_path: Path) -> None:
     run(figures.command, plan, tmp_path, "--dataset", "hci", "--scene", "picture")
     written = {path.stem for path in tmp_path.rglob("*.png")}
     assert {"overview", "centre", "4_optimize"} <= written
-    assert not written & {"truth", "error", "occluded_truth", "textureless_truth"}
+    assert not written & {"ground_truth", "error", "occluded_truth", "textureless_truth"}
 
 
 def test_pictures_are_the_same_bytes_each_time(plan: Plan, tmp_path: Path) -> None:

@@ -28,19 +28,19 @@ def scene(name: str) -> LightField:
 
 def steps(light_field: LightField) -> list[tuple[int, int, int, int]]:
     """Grid position of every view but the centre, and its steps down and right from there."""
-    (T, S), (t0, s0) = light_field.grid, light_field.reference
+    (T, S), (t0, s0) = light_field.grid, light_field.reference_position
     return [(t, s, t - t0, s - s0) for t in range(T) for s in range(S) if (t, s) != (t0, s0)]
 
 
 def warp_error(light_field: LightField, offset: float) -> float:
     """Mean difference in grey levels between the centre view and the views where truth + offset says a point is."""
-    d = light_field.truth.astype(float) + offset
+    d = light_field.ground_truth.astype(float) + offset
     y, x = np.mgrid[: d.shape[0], : d.shape[1]]
     # pixels that mix two surfaces have no one disparity
-    step = ndimage.maximum_filter(light_field.truth, 5) - ndimage.minimum_filter(light_field.truth, 5)
+    step = ndimage.maximum_filter(light_field.ground_truth, 5) - ndimage.minimum_filter(light_field.ground_truth, 5)
     usable = ~ndimage.binary_dilation(light_field.masks["occluded"], iterations=2)
     usable &= ~light_field.masks["textureless"] & (step < 0.6)
-    centre = light_field.views[light_field.reference].astype(float)
+    centre = light_field.views[light_field.reference_position].astype(float)
     errors = []
     for t, s, dt, ds in steps(light_field):
         at_y, at_x = y - d * dt, x - d * ds
@@ -63,8 +63,8 @@ def test_every_view_shows_the_centre_view_where_the_truth_says(name: str) -> Non
 
 def test_a_plane_of_disparity_one_moves_by_whole_pixels() -> None:
     light_field = scene("fronto_parallel")
-    assert (light_field.truth == 1).all()
-    centre = light_field.views[light_field.reference]
+    assert (light_field.ground_truth == 1).all()
+    centre = light_field.views[light_field.reference_position]
     inner = slice(3, SIZE - 3)
     for t, s, dt, ds in steps(light_field):
         shifted = np.roll(light_field.views[t, s], (dt, ds), axis=(0, 1))
@@ -73,14 +73,14 @@ def test_a_plane_of_disparity_one_moves_by_whole_pixels() -> None:
 
 def test_slanted_plane_is_linear_at_pixel_centres() -> None:
     y, x = (np.mgrid[:SIZE, :SIZE] + 0.5) / SIZE - 0.5
-    np.testing.assert_allclose(scene("slanted_plane").truth, 1.6 * x - 0.8 * y, atol=1e-6)
+    np.testing.assert_allclose(scene("slanted_plane").ground_truth, 1.6 * x - 0.8 * y, atol=1e-6)
 
 
 @pytest.mark.parametrize("name", list(SCENES))
 def test_the_same_scene_is_the_same_bytes_each_time(name: str) -> None:
     first, second = scene(name), render(name, size=SIZE, views=VIEWS)
     assert first.views.tobytes() == second.views.tobytes()
-    assert first.truth.tobytes() == second.truth.tobytes()
+    assert first.ground_truth.tobytes() == second.ground_truth.tobytes()
     assert all(first.masks[key].tobytes() == second.masks[key].tobytes() for key in first.masks)
 
 
@@ -88,7 +88,7 @@ FINE = 5
 
 
 def z_buffered(name: str) -> np.ndarray:
-    """Occluded pixels by brute force: the truth at five times the resolution, splatted into every view."""
+    """Occluded pixels by brute force: the ground truth at five times the resolution, splatted into every view."""
     drawn = rendering.drawing(DEFINITIONS[name].surfaces(), FINE * SIZE)
     drawn = drawn._replace(planes=drawn.planes * FINE)
     d, _ = rendering.visible(drawn, FINE * SIZE)
@@ -157,15 +157,15 @@ def test_textureless_mask_is_the_bare_wall() -> None:
     light_field = scene("wall")
     bare = light_field.masks["textureless"]
     assert 0.2 < bare.mean() < 0.6
-    values = light_field.centre[ndimage.binary_erosion(bare, iterations=2)]
+    values = light_field.reference_view[ndimage.binary_erosion(bare, iterations=2)]
     assert values.std(axis=0).max() < 0.015
     assert not any(scene(name).masks["textureless"].any() for name in SCENES if name != "wall")
 
 
 def test_stripes_fall_in_contrast() -> None:
     light_field = scene("stripes")
-    stripes, count = ndimage.label(light_field.truth > 0)
-    contrast = ndimage.standard_deviation(light_field.centre.mean(axis=2), stripes, range(1, count + 1))
+    stripes, count = ndimage.label(light_field.ground_truth > 0)
+    contrast = ndimage.standard_deviation(light_field.reference_view.mean(axis=2), stripes, range(1, count + 1))
     assert count == 8
     assert (np.diff(contrast) < 0).all()
 
@@ -180,11 +180,11 @@ def test_dots_are_noisy_to_the_right_and_differently_in_each_view() -> None:
 @pytest.mark.parametrize("name", list(SCENES))
 def test_range_encloses_the_truth_with_a_margin_in_tenths(name: str) -> None:
     light_field = scene(name)
-    known = light_field.known_range()
+    known = light_field.require_disparity_range()
     assert known.source == "parameters"
-    assert known.minimum <= light_field.truth.min() - 0.199
-    assert known.maximum >= light_field.truth.max() + 0.199
-    assert known.maximum - known.minimum < max(2.3, np.ptp(light_field.truth) + 0.6)
+    assert known.minimum <= light_field.ground_truth.min() - 0.199
+    assert known.maximum >= light_field.ground_truth.max() + 0.199
+    assert known.maximum - known.minimum < max(2.3, np.ptp(light_field.ground_truth) + 0.6)
     assert (known.minimum, known.maximum) == (round(known.minimum, 1), round(known.maximum, 1))
 
 
@@ -192,14 +192,14 @@ def test_range_encloses_the_truth_with_a_margin_in_tenths(name: str) -> None:
 def test_even_grids_have_their_centre_at_the_lower_right_of_the_middle(views: int) -> None:
     even, odd = render("pyramids", size=64, views=views), render("pyramids", size=64, views=3)
     assert even.grid == (views, views)
-    np.testing.assert_array_equal(even.views[even.reference], odd.views[odd.reference])
+    np.testing.assert_array_equal(even.views[even.reference_position], odd.views[odd.reference_position])
 
 
 def test_shapes_grow_with_the_picture_and_disparities_stay() -> None:
     small, large = render("curved_occluders", size=64, views=2), render("curved_occluders", size=129, views=2)
     assert large.shape == (129, 129)
     at = np.rint((np.arange(64) + 0.5) / 64 * 129 - 0.5).astype(int)
-    assert (np.abs(large.truth[np.ix_(at, at)] - small.truth) < 0.05).mean() > 0.95
+    assert (np.abs(large.ground_truth[np.ix_(at, at)] - small.ground_truth) < 0.05).mean() > 0.95
 
 
 def test_default_is_nine_by_nine_views_of_192_pixels() -> None:
@@ -257,10 +257,10 @@ def test_folder_has_the_layout_of_the_benchmark(tmp_path: Path) -> None:
     settings.read(folder / "parameters.cfg")
     assert dict(settings["meta"]) | {"scene": "wall", "category": "built-in"} == dict(settings["meta"])
     assert settings.getint("extrinsics", "num_cams_x") == settings.getint("extrinsics", "num_cams_y") == 3
-    known = light_field.known_range()
+    known = light_field.require_disparity_range()
     assert settings.getfloat("meta", "disp_min") == known.minimum
     assert settings.getfloat("meta", "disp_max") == known.maximum
-    np.testing.assert_array_equal(read_pfm(folder / "gt_disp_lowres.pfm"), light_field.truth)
+    np.testing.assert_array_equal(read_pfm(folder / "gt_disp_lowres.pfm"), light_field.ground_truth)
     view = cv2.imread(str(folder / "input_Cam005.png"))[..., ::-1]
     np.testing.assert_array_equal(view, light_field.views[1, 2])
     mask = cv2.imread(str(folder / "mask_occluded.png"), cv2.IMREAD_UNCHANGED)
@@ -274,7 +274,7 @@ def test_folder_is_read_back_exactly(name: str, tmp_path: Path) -> None:
     write_hci(light_field, tmp_path / name)
     back = read_light_field(tmp_path / name)
     np.testing.assert_array_equal(back.views, light_field.views)
-    np.testing.assert_array_equal(back.truth, light_field.truth)
+    np.testing.assert_array_equal(back.ground_truth, light_field.ground_truth)
     assert (back.name, back.disparity_range) == (light_field.name, light_field.disparity_range)
     assert set(back.masks) == set(light_field.masks)
     for key, mask in light_field.masks.items():

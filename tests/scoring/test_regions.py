@@ -10,37 +10,37 @@ from sepi.io.pfm import read_pfm
 from sepi.scoring.regions import SMALLEST_AREA, occluded, textureless
 
 
-def buffered(truth: np.ndarray, grid: tuple[int, int]) -> np.ndarray:
+def buffered(ground_truth: np.ndarray, grid: tuple[int, int]) -> np.ndarray:
     """Plain twin: every pair of pixels; hidden where a nearer pixel lands within half a pixel."""
-    height, width = truth.shape
+    height, width = ground_truth.shape
     y, x = np.mgrid[:height, :width]
-    hidden = np.zeros(truth.shape, bool)
+    hidden = np.zeros(ground_truth.shape, bool)
     for dt in range(-(grid[0] // 2), grid[0] // 2 + 1):
         for ds in range(-(grid[1] // 2), grid[1] // 2 + 1):
-            row, column = (y - truth * dt).ravel(), (x - truth * ds).ravel()
+            row, column = (y - ground_truth * dt).ravel(), (x - ground_truth * ds).ravel()
             near = (abs(row[:, None] - row) <= 0.501) & (abs(column[:, None] - column) <= 0.501)
-            covered = (near & (truth.ravel() > truth.ravel()[:, None])).any(1)
+            covered = (near & (ground_truth.ravel() > ground_truth.ravel()[:, None])).any(1)
             inside = (row >= 0) & (row <= height - 1) & (column >= 0) & (column <= width - 1)
-            hidden |= (covered & inside).reshape(truth.shape)
+            hidden |= (covered & inside).reshape(ground_truth.shape)
     return hidden
 
 
 def two_planes(near: float = 1.0, far: float = 0.0) -> np.ndarray:
-    truth = np.full((24, 30), far, np.float32)
-    truth[8:16, 10:20] = near
-    return truth
+    ground_truth = np.full((24, 30), far, np.float32)
+    ground_truth[8:16, 10:20] = near
+    return ground_truth
 
 
 def test_views_that_are_missing_hide_nothing() -> None:
     """A pixel that only a missing view does not see is no harder than others."""
-    truth = np.zeros((24, 24), np.float32)
-    truth[8:16, 8:16] = 3
+    ground_truth = np.zeros((24, 24), np.float32)
+    ground_truth[8:16, 8:16] = 3
     present = np.zeros((5, 5), bool)
     present[2, :] = True
-    row_only = occluded(truth, (5, 5), None, present)
+    row_only = occluded(ground_truth, (5, 5), None, present)
     assert row_only.any()
     assert not row_only[:8].any()
-    assert occluded(truth, (5, 5))[:8].any()
+    assert occluded(ground_truth, (5, 5))[:8].any()
 
 
 def test_two_planes_hide_a_band_round_the_nearer_one() -> None:
@@ -54,8 +54,8 @@ def test_two_planes_hide_a_band_round_the_nearer_one() -> None:
 
 @pytest.mark.parametrize(("near", "far"), [(1, 0), (2, 0), (0, -1), (1.5, -0.5), (0.5, 0.25)])
 def test_equals_comparing_every_pair_of_pixels(near: float, far: float) -> None:
-    truth = two_planes(near, far)
-    np.testing.assert_array_equal(occluded(truth, (5, 5)), buffered(truth, (5, 5)))
+    ground_truth = two_planes(near, far)
+    np.testing.assert_array_equal(occluded(ground_truth, (5, 5)), buffered(ground_truth, (5, 5)))
 
 
 def test_views_in_one_row_hide_only_sideways() -> None:
@@ -68,9 +68,9 @@ def test_views_in_one_row_hide_only_sideways() -> None:
 
 def test_a_thin_bar_hides_stripes_and_not_all_that_lies_between() -> None:
     """Far behind a bar of one pixel each view misses one column; the pixels between two views' columns are seen."""
-    truth = np.zeros((9, 41), np.float32)
-    truth[:, 20] = 4
-    hidden = np.flatnonzero(occluded(truth, (1, 5))[4])
+    ground_truth = np.zeros((9, 41), np.float32)
+    ground_truth[:, 20] = 4
+    hidden = np.flatnonzero(occluded(ground_truth, (1, 5))[4])
     np.testing.assert_array_equal(hidden, [12, 16, 24, 28])
 
 
@@ -84,19 +84,19 @@ def test_a_slanted_plane_does_not_hide_itself(slope: float) -> None:
 
 def test_pixels_that_leave_the_view_are_not_counted() -> None:
     """At the image's edge the nearer plane pushes nothing out of sight: those pixels are outside that view."""
-    truth = np.zeros((10, 12), np.float32)
-    truth[:, 2:] = 2
-    hidden = occluded(truth, (1, 3))
+    ground_truth = np.zeros((10, 12), np.float32)
+    ground_truth[:, 2:] = 2
+    hidden = occluded(ground_truth, (1, 3))
     # columns 0 and 1 are hidden in the view to the right only, and inside it
     np.testing.assert_array_equal(hidden[5], np.arange(12) < 2)
-    shifted = occluded(truth + np.float32(3), (1, 3))
+    shifted = occluded(ground_truth + np.float32(3), (1, 3))
     assert not shifted.any()
 
 
 def test_unknown_truth_neither_hides_nor_is_hidden() -> None:
-    truth = two_planes()
-    truth[8:16, 10:20] = np.nan
-    assert not occluded(truth, (5, 5)).any()
+    ground_truth = two_planes()
+    ground_truth[8:16, 10:20] = np.nan
+    assert not occluded(ground_truth, (5, 5)).any()
     assert not occluded(np.full((4, 4), np.nan, np.float32), (3, 3)).any()
 
 
@@ -130,7 +130,7 @@ def test_small_patches_and_holes_are_cleaned_up() -> None:
 @pytest.mark.parametrize(("name", "hidden", "flat"), [("cotton", 0.038, 0.36), ("antinous", 0.092, 0.56)])
 def test_real_scenes_have_plausible_regions(hci: Path, name: str, hidden: float, flat: float) -> None:
     """Parts of the map, checked by eye once: bands beside the busts' outlines; walls, shade and smooth stone."""
-    truth = read_pfm(hci / name / "gt_disp_lowres.pfm")
+    ground_truth = read_pfm(hci / name / "gt_disp_lowres.pfm")
     centre = cv2.imread(str(hci / name / "input_Cam040.png")).astype(np.float32) / 255
-    assert occluded(truth, (9, 9)).mean() == pytest.approx(hidden, abs=0.002)
+    assert occluded(ground_truth, (9, 9)).mean() == pytest.approx(hidden, abs=0.002)
     assert textureless(centre).mean() == pytest.approx(flat, abs=0.01)

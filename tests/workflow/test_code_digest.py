@@ -91,5 +91,13 @@ def test_no_stage_depends_on_another_stage(stage: str) -> None:
 @pytest.mark.parametrize("stage", STAGES)
 def test_no_stage_depends_on_workflow_or_report(stage: str) -> None:
     """Else adding a key to the configuration would rerun everything."""
-    outside = {"sepi.workflow.config", "sepi.workflow.datasets", "sepi.pipeline", "sepi.cli.main", "sepi.evaluate", "sepi.scenes", "sepi"}
+    outside = {
+        "sepi.workflow.config",
+        "sepi.workflow.datasets",
+        "sepi.pipeline",
+        "sepi.cli.main",
+        "sepi.evaluate",
+        "sepi.scenes",
+        "sepi",
+    }
     assert not imported_modules(f"sepi.{stage}") & outside

@@ -76,12 +76,12 @@ def test_defaults_run_every_builtin_scene_and_variant() -> None:
         ({"stages": {"initail": {}}}, "config.stages: unknown 'initail'; did you mean 'initial'?"),
         ({"stages": {"initial": {"sapi": {}}}}, "config.stages.initial: unknown 'sapi'; did you mean 'sepi'?"),
         (
-            {"stages": {"initial": {"sepi": {"candidats": 3}}}},
-            "config.stages.initial.sepi: unknown 'candidats'; did you mean 'candidates'?",
+            {"stages": {"initial": {"sepi": {"num_disparity": 3}}}},
+            "config.stages.initial.sepi: unknown 'num_disparity'; did you mean 'num_disparities'?",
         ),
         (
-            {"stages": {"initial": {"sepi": {"candidates": 20.5}}}},
-            "config.stages.initial.sepi.candidates: input should be a valid integer, got 20.5",
+            {"stages": {"initial": {"sepi": {"num_disparities": 20.5}}}},
+            "config.stages.initial.sepi.num_disparities: input should be a valid integer, got 20.5",
         ),
         (
             {"variants": {"mine": {"initial": "sepi"}}},
@@ -262,12 +262,12 @@ def test_archive_files_are_scenes_by_their_own_or_their_folders_name(tmp_path: P
     with h5py.File(tmp_path / "other.h5", "w") as file:
         file["x"] = 1
     (tmp_path / "readme.txt").touch()
-    settings = load_settings({"hci_old_root": str(tmp_path)})
-    assert settings.scenes_of("hci_old") == ["buddha", "mona"]
-    assert settings.scene("hci_old", "mona").files == (tmp_path / "mona/lf.h5",)
+    settings = load_settings({"hci_2013_root": str(tmp_path)})
+    assert settings.scenes_of("hci_2013") == ["buddha", "mona"]
+    assert settings.scene("hci_2013", "mona").files == (tmp_path / "mona/lf.h5",)
     (tmp_path / "empty").mkdir()
-    assert "expected HDF5 files" in message_of({"hci_old_root": str(tmp_path / "empty")})
-    assert "no folder" in message_of({"hci_old_root": str(tmp_path / "absent")})
+    assert "expected HDF5 files" in message_of({"hci_2013_root": str(tmp_path / "empty")})
+    assert "no folder" in message_of({"hci_2013_root": str(tmp_path / "absent")})
 
 
 class TestExternal:

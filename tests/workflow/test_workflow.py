@@ -38,8 +38,8 @@ SIZE = 64
 TINY = {
     "builtin": {"scenes": ["dots"], "size": SIZE},
     "stages": {
-        "initial": {name: {"candidates": 21} for name in ("sepi", "semi_global", "semi_global_colours")},
-        "occlusion": {"visibility": {"candidates": 21, "passes": 1}},
+        "initial": {name: {"num_disparities": 21} for name in ("sepi", "semi_global", "semi_global_colours")},
+        "occlusion": {"visibility": {"num_disparities": 21, "passes": 1}},
     },
 }
 # two scenes, the paper's six variants and best; stage files that variants share are made once, choice none is no job
@@ -360,11 +360,17 @@ class TestReport:
 
     def test_wrong_and_missing_maps_of_other_methods_stop_nothing(self, finished: Workflow, tmp_path: Path) -> None:
         """The report still comes; the cell and a line at the end say what is wrong."""
-        truth = read_light_field(finished.folder / "results/builtin/dots/lightfield.h5", check_order=False).truth
-        assert truth is not None
-        holed = truth + np.float32(0.1)
+        ground_truth = read_light_field(
+            finished.folder / "results/builtin/dots/lightfield.h5", check_order=False
+        ).ground_truth
+        assert ground_truth is not None
+        holed = ground_truth + np.float32(0.1)
         holed[:10] = np.nan
-        for method, values in {"good": truth + np.float32(0.1), "holed": holed, "small": truth[:40]}.items():
+        for method, values in {
+            "good": ground_truth + np.float32(0.1),
+            "holed": holed,
+            "small": ground_truth[:40],
+        }.items():
             (tmp_path / method).mkdir()
             np.save(tmp_path / method / "dots.npy", values)
         methods = {name: str(tmp_path / name) for name in ("good", "holed", "small", "absent")}
@@ -484,7 +490,7 @@ def test_own_light_fields_of_any_format_get_maps(workflow: Workflow, tmp_path: P
     assert result.returncode == 0, result.stdout
     assert [read_attributes(own.folder / file)["variant"] for file in maps] == [QUICK, QUICK]
     kept = read_light_field(own.folder / "results/own/right/lightfield.h5", check_order=False)
-    assert kept.reference == (2, 1)
+    assert kept.reference_position == (2, 1)
     assert np.argwhere(~kept.present).tolist() == [[0, 0]]
     turned = read_light_field(own.folder / "results/own/turned/lightfield.h5", check_order=False)
     np.testing.assert_array_equal(turned.views, views)

@@ -105,10 +105,10 @@ def rearranged(light_field: LightField, options: ReadOptions) -> LightField:
     views = light_field.views.reshape(T * S, *light_field.views.shape[2:])[numbers]
     present = light_field.present.ravel()[numbers] & (numbers >= 0)
     views[~present] = 0
-    place = place_of(numbers, light_field.reference[0] * S + light_field.reference[1])
-    if place is not None and (light_field.view is not None or light_field.truth is not None):
+    place = place_of(numbers, light_field.reference_position[0] * S + light_field.reference_position[1])
+    if place is not None and (light_field.view is not None or light_field.ground_truth is not None):
         return replace(light_field, views=views, present=present, view=place)
-    return replace(light_field, views=views, present=present, view=options.view, truth=None, masks={})
+    return replace(light_field, views=views, present=present, view=options.view, ground_truth=None, masks={})
 
 
 def variable_of(source: str, shapes: Mapping[str, tuple[int, ...]], wanted: str | None) -> str:

@@ -77,7 +77,7 @@ def read(path: Path, options: ReadOptions) -> LightField:
     light_field = LightField(
         views=views, name=path.resolve().stem, source=str(path), present=present, view=options.view, notes=tuple(notes)
     )
-    dark = _dark_views(views, present, light_field.reference)
+    dark = _dark_views(views, present, light_field.reference_position)
     return replace(light_field, notes=(*notes, *_dark_notes(dark)))
 
 

@@ -42,7 +42,7 @@ FORMATS = {
     # before the other kinds of HDF5: MATLAB's is told by its header or ending
     "matlab": Format("MATLAB file", ".mat with an array such as LF", matlab.matches, matlab.read),
     "numpy": Format("NumPy file", ".npy or .npz", numpy_files.matches, numpy_files.read),
-    "hci-old": Format("HCI-old HDF5", "with LF (T, S, H, W, 3)", hci_2013.matches, hci_2013.read),
+    "hci-2013": Format("HCI 2013 HDF5", "with LF (T, S, H, W, 3)", hci_2013.matches, hci_2013.read),
     "sepi": Format("sepi HDF5", "written by this package", hdf5.matches, hdf5.read),
 }
 """Word for ``--format`` to format; the first that matches reads."""

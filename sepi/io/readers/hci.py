@@ -92,7 +92,7 @@ def read(path: Path, options: ReadOptions) -> LightField:
         present=arranged.present,
         view=with_truth if read_truth else options.view,
         disparity_range=parameters.disparity_range,
-        truth=_read_truth(path / TRUTH, shape) if read_truth else None,
+        ground_truth=_read_truth(path / TRUTH, shape) if read_truth else None,
         masks=_read_masks(path, shape) if read_truth else {},
         camera=_read_camera(path / PARAMETERS, values, shape),
     )
@@ -214,10 +214,10 @@ def _has_truth(folder: Path) -> bool:
 def _read_truth(path: Path, shape: tuple[int, int]) -> FloatMap | None:
     if not path.is_file():
         return None
-    truth = read_pfm(path)
-    if truth.shape != shape:
-        raise SepiError(f"{path}: ground truth is {truth.shape}, the views are {shape} (height, width)")
-    return truth
+    ground_truth = read_pfm(path)
+    if ground_truth.shape != shape:
+        raise SepiError(f"{path}: ground truth is {ground_truth.shape}, the views are {shape} (height, width)")
+    return ground_truth
 
 
 def _read_masks(folder: Path, shape: tuple[int, int]) -> dict[str, BoolMap]:

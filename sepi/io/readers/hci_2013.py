@@ -77,13 +77,13 @@ def read(path: Path, options: ReadOptions) -> LightField:
             notes=_contradictions(path, file, shape),
         )
         numbers = arranged(str(path), shape[:2], options)
-        number = int(numbers[light_field.reference])
+        number = int(numbers[light_field.reference_position])
         depth = _read_depth(path, file, shape, (number // shape[1], number % shape[1]))
     if geometry.camera is None:
         note = f"no metric depth{'' if depth is None else ' and no ground truth'}: {geometry.reason}"
         return replace(light_field, notes=(*light_field.notes, note))
-    truth = None if depth is None else _disparity(depth, geometry.camera)
-    return replace(light_field, camera=geometry.camera, truth=truth)
+    ground_truth = None if depth is None else _disparity(depth, geometry.camera)
+    return replace(light_field, camera=geometry.camera, ground_truth=ground_truth)
 
 
 @dataclass(frozen=True)

@@ -51,17 +51,17 @@ def scale_colours(scale: str | Colormap) -> npt.NDArray[np.uint8]:
 
 def disparity_limits(light_field: LightField) -> tuple[float, float]:
     """Ends of the colour scale of a scene: those of its ground truth, else, or where it is flat, of its range."""
-    if light_field.truth is not None and np.isfinite(light_field.truth).any():
-        known = light_field.truth[np.isfinite(light_field.truth)]
+    if light_field.ground_truth is not None and np.isfinite(light_field.ground_truth).any():
+        known = light_field.ground_truth[np.isfinite(light_field.ground_truth)]
         if known.min() < known.max():
             return float(known.min()), float(known.max())
-    known_range = light_field.known_range()
-    return known_range.minimum, known_range.maximum
+    require_disparity_range = light_field.require_disparity_range()
+    return require_disparity_range.minimum, require_disparity_range.maximum
 
 
 def centre_picture(light_field: LightField) -> Picture:
     """The reference view."""
-    return as_rgb(light_field.centre)
+    return as_rgb(light_field.reference_view)
 
 
 def as_rgb(colours: FloatMap) -> Picture:

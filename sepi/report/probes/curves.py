@@ -1,7 +1,7 @@
 """The cost curves of a single pixel: what the sweep minimises there (Eq. 3-5 of [1]_).
 
-:func:`sepi.matching.plane_sweep.sweep` never holds a cost curve; here those of one pixel are computed again, in plain NumPy on the few
-samples that its aggregation window meets.
+:func:`sepi.matching.plane_sweep.sweep` never holds a cost curve; here those of one pixel are computed again, in plain
+NumPy on the few samples that its aggregation window meets.
 
 References
 ----------
@@ -74,7 +74,7 @@ def cost_curves(
         Pixel of the reference view.
     parameters : SweepParameters
     noise : float, optional
-        ``residual_variance(light_field.centre)``, the same for all pixels; computed unless given.
+        ``residual_variance(light_field.reference_view)``, the same for all pixels; computed unless given.
 
     Returns
     -------
@@ -86,18 +86,18 @@ def cost_curves(
         If the pixel lies outside the reference view or the disparity range is unknown.
     """
     require_inside(light_field, y, x)
-    (T, S), (t0, s0), (H, W) = light_field.grid, light_field.reference, light_field.shape
-    disparities = light_field.known_range().candidates(parameters.candidates)
-    noise = residual_variance(light_field.centre) if noise is None else noise
+    (T, S), (t0, s0), (H, W) = light_field.grid, light_field.reference_position, light_field.shape
+    disparities = light_field.require_disparity_range().candidates(parameters.num_disparities)
+    noise = residual_variance(light_field.reference_view) if noise is None else noise
     r = parameters.window_radius
     rows = np.arange(max(0, y - r), min(H, y + r + 1))
     columns = np.arange(max(0, x - r), min(W, x + r + 1))
-    centre = as_unit_float(light_field.views[t0, s0][np.ix_(rows, columns)]).transpose(2, 0, 1)
-    difference = centre - centre[:, y - rows[0], x - columns[0], None, None]
+    reference_view = as_unit_float(light_field.views[t0, s0][np.ix_(rows, columns)]).transpose(2, 0, 1)
+    difference = reference_view - reference_view[:, y - rows[0], x - columns[0], None, None]
     weights = np.exp(-0.5 * (difference**2).sum(axis=0) / np.float32(parameters.window_sigma**2 + noise))
     weights = (weights / weights.sum()).astype(np.float32)
     scale2 = np.float32(parameters.scale**2 + noise)
-    views = halves_and_quarters(light_field.grid, light_field.reference)
+    views = halves_and_quarters(light_field.grid, light_field.reference_position)
     sums, counts = np.zeros((2, views.subsets.shape[1], len(disparities)), np.float32)
     down, fy = sample_offsets(disparities, np.arange(T) - t0)
     across, fx = sample_offsets(disparities, np.arange(S) - s0)
@@ -108,7 +108,7 @@ def cost_curves(
         # as the sweep counts: a sample on the last row needs none below, one on the last column does not count
         inside_y = (top >= 0) & ((top < H - 1) | ((top == H - 1) & (fy[t] == 0)[:, None]))
         inside_x = (left >= 0) & (left < W - 1)
-        squared = _squared_residuals(light_field.views[t, s], centre, top, left, fy[t], fx[s])
+        squared = _squared_residuals(light_field.views[t, s], reference_view, top, left, fy[t], fx[s])
         residual = squared / (squared + scale2)
         if not (inside_y.all() and inside_x.all()):
             residual *= inside_y[:, :, None] & inside_x[:, None]
@@ -132,7 +132,7 @@ def require_inside(light_field: LightField, y: int, x: int) -> None:
 
 def _squared_residuals(
     view: npt.NDArray[np.generic],
-    centre: FloatMap,
+    reference_view: FloatMap,
     top: npt.NDArray[np.int64],
     left: npt.NDArray[np.int64],
     fy: FloatMap,
@@ -147,12 +147,12 @@ def _squared_residuals(
     rows = np.clip(np.arange(top.min(), top.max() + 2), 0, H - 1)
     columns = np.clip(np.arange(left.min(), left.max() + 2), 0, W - 1)
     crop = as_unit_float(view[rows[:, None], columns]).transpose(2, 0, 1)
-    size = (centre.shape[1] + 1, centre.shape[2] + 1)
+    size = (reference_view.shape[1] + 1, reference_view.shape[2] + 1)
     windows = np.lib.stride_tricks.sliding_window_view(crop, size, axis=(1, 2))
     block = windows[:, top[:, 0] - top.min(), left[:, 0] - left.min()]
     fy, fx = fy[:, None, None], fx[:, None, None]
     above, below = block[:, :, :-1], block[:, :, 1:]
     level = above + fy * (below - above)
     sample = level[..., :-1] + fx * (level[..., 1:] - level[..., :-1])
-    sample -= centre[:, None]
+    sample -= reference_view[:, None]
     return np.asarray(np.einsum("ckyx,ckyx->kyx", sample, sample), np.float32)

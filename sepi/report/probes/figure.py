@@ -25,7 +25,7 @@ _QUARTER = "#999999"
 _MARKS: dict[str, tuple[str, Literal["-", "--", ":"], float, str]] = {
     "chosen": ("#0072B2", "-", 3.0, "chosen (final map)"),
     "best": ("#CC79A7", "--", 1.6, "variant best"),
-    "truth": ("#000000", ":", 1.2, "truth"),
+    "ground_truth": ("#000000", ":", 1.2, "ground_truth"),
 }
 _PIXEL = "#F0E442"
 
@@ -164,7 +164,7 @@ def _draw_curves(axes: Axes, found: Probe, last: bool) -> None:
 
 
 def _values(found: Probe) -> str:
-    values = {"chosen": found.chosen, "best": found.best, "truth": found.truth}
+    values = {"chosen": found.chosen, "best": found.best, "ground_truth": found.ground_truth}
     known = [f"{name} {value:+.3f}" for name, value in values.items() if value is not None]
     kept = "all views" if found.side == "full" else f"{found.side} views"
     return ", ".join([*known, f"kept: {kept}", f"confidence {found.confidence:.2f}"])

@@ -1,4 +1,4 @@
-"""Pixels worth a look, chosen from the maps of a variant: sure, occluded on each side, texture-less, wrong, unsure.
+"""Pixels worth a look, chosen from the maps of a variant: sure, occluded on each side, textureless, wrong, unsure.
 
 Truth only helps to find the largest error; this is for display, no estimator calls it.
 """
@@ -45,19 +45,19 @@ class InterestingPixel(NamedTuple):
 
 
 def interesting_pixels(
-    light_field: LightField, maps: StageMaps, truth: FloatMap | None, count: int = COUNT
+    light_field: LightField, maps: StageMaps, ground_truth: FloatMap | None, count: int = COUNT
 ) -> list[InterestingPixel]:
     """Choose pixels that show how the method works and where it fails.
 
     In order, as far as the scene has them: textured and sure; occluded, by the half of the views that is kept, the
-    clearest first; texture-less; of the largest error; unsure. Equal input gives equal pixels.
+    clearest first; textureless; of the largest error; unsure. Equal input gives equal pixels.
 
     Parameters
     ----------
     light_field : LightField
     maps : StageMaps
         Final maps of a variant; its masks and ``occlusion_side`` are used where it has them.
-    truth : ndarray, shape (H, W), float32, or None
+    ground_truth : ndarray, shape (H, W), float32, or None
         True disparity; may hold values that are not finite.
     count : int
         At most so many.
@@ -67,12 +67,12 @@ def interesting_pixels(
     list of InterestingPixel
         Distinct, at least ``APART`` from each other, and ``BORDER`` from the picture's border where it is large enough.
     """
-    texture = _texture(light_field.centre)
+    texture = _texture(light_field.reference_view)
     scores = [
         ("textured and sure", _sure(texture, maps)),
         *_occluded(texture, maps),
         _textureless(texture, maps),
-        ("largest error", _wrong(maps.disparity, truth)),
+        ("largest error", _wrong(maps.disparity, ground_truth)),
         ("textured but unsure", _unsure(texture, maps)),
     ]
     free = _inner(light_field.shape)
@@ -90,15 +90,15 @@ def interesting_pixels(
     return found
 
 
-def _texture(centre: FloatMap) -> FloatMap:
+def _texture(reference_view: FloatMap) -> FloatMap:
     """Strength of the gradient around each pixel, full range per pixel; shape (H, W)."""
-    energy = np.zeros(centre.shape[:2], np.float32)
-    for channel in range(centre.shape[2]):
-        plane = np.ascontiguousarray(centre[:, :, channel])
+    energy = np.zeros(reference_view.shape[:2], np.float32)
+    for channel in range(reference_view.shape[2]):
+        plane = np.ascontiguousarray(reference_view[:, :, channel])
         for dx, dy in ((1, 0), (0, 1)):
             # Scharr's weights sum to 32 per pixel of distance
             energy += np.square(cv2.Scharr(plane, cv2.CV_32F, dx, dy) / 32)
-    return np.sqrt(_blurred(energy / centre.shape[2]))
+    return np.sqrt(_blurred(energy / reference_view.shape[2]))
 
 
 def _sure(texture: FloatMap, maps: StageMaps) -> FloatMap:
@@ -142,20 +142,20 @@ def _spread(disparity: FloatMap, radius: int) -> FloatMap:
 
 
 def _textureless(texture: FloatMap, maps: StageMaps) -> tuple[str, FloatMap]:
-    """A label, and how far inside the texture-less regions; without any, how little texture there is."""
+    """A label, and how far inside the textureless regions; without any, how little texture there is."""
     mask = maps.mask("textureless")
     if not mask.any():
         return "least texture", np.asarray(1 / (1 + texture / _CLEAR_TEXTURE), np.float32)
     # a frame, so that a picture without any texture has a middle too
     framed = np.pad(mask.astype(np.uint8), 1)
     inside = cv2.distanceTransform(framed, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)[1:-1, 1:-1]
-    return "texture-less", np.asarray(inside, np.float32)
+    return "textureless", np.asarray(inside, np.float32)
 
 
-def _wrong(disparity: FloatMap, truth: FloatMap | None) -> FloatMap:
-    if truth is None:
+def _wrong(disparity: FloatMap, ground_truth: FloatMap | None) -> FloatMap:
+    if ground_truth is None:
         return np.zeros_like(disparity)
-    return _blurred(np.nan_to_num(np.abs(disparity - truth), nan=0.0, posinf=0.0))
+    return _blurred(np.nan_to_num(np.abs(disparity - ground_truth), nan=0.0, posinf=0.0))
 
 
 def _unsure(texture: FloatMap, maps: StageMaps) -> FloatMap:

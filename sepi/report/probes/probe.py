@@ -85,7 +85,7 @@ class Probe:
         Views of ``side`` that are present.
     best : float or None
         Disparity in the final map of the most accurate variant, if it was given.
-    truth : float or None
+    ground_truth : float or None
         None where it is unknown.
     confidence : float
         Of the final map, 0..1.
@@ -93,7 +93,7 @@ class Probe:
         What the stages took the pixel for.
     pictures : mapping of str to SepiPicture
         SEPIs at ``minimum``, ``chosen``, ``wrong`` (the candidate of the highest cost over all views) and, where it is
-        known, ``truth``.
+        known, ``ground_truth``.
     patch : ndarray, shape (T, S, 3), uint8
         The sample of each view at the chosen disparity (angular patch); grey where there is none.
     crop : ndarray, shape (h, w, 3), uint8
@@ -112,7 +112,7 @@ class Probe:
     side: str
     kept: BoolMap
     best: float | None
-    truth: float | None
+    ground_truth: float | None
     confidence: float
     occluded: bool
     textureless: bool
@@ -210,7 +210,7 @@ def probe(
     label : str
         Why the pixel was chosen.
     noise : float, optional
-        ``residual_variance(light_field.centre)``; computed unless given.
+        ``residual_variance(light_field.reference_view)``; computed unless given.
     half_width : int
         Of the SEPI pictures, pixels.
 
@@ -225,20 +225,20 @@ def probe(
         finite there, or the side is none of the half-SEPI's.
     """
     curves = cost_curves(light_field, y, x, parameters, noise=noise)
-    views = halves_and_quarters(light_field.grid, light_field.reference)
+    views = halves_and_quarters(light_field.grid, light_field.reference_position)
     kept_subset = int(maps.extra["occlusion_side"][y, x]) if "occlusion_side" in maps.extra else 0
     if kept_subset >= len(views.names):
         raise SepiError(
             f"{light_field.name}: occlusion_side at (y, x) = ({y}, {x}) is {kept_subset}; "
             f"half_sepi has 0 to {len(views.names) - 1}"
         )
-    truth = None if light_field.truth is None else _finite(light_field.truth[y, x])
+    ground_truth = None if light_field.ground_truth is None else _finite(light_field.ground_truth[y, x])
     minimum, _ = curves.minimum()
     shown = {
         "minimum": minimum,
         "chosen": float(maps.disparity[y, x]),
         "wrong": float(curves.disparities[curves.costs[0].argmax()]),
-        "truth": truth,
+        "ground_truth": ground_truth,
     }
     pictures = {
         name: sepi_picture(light_field, y, x, disparity, half_width=half_width)
@@ -246,7 +246,7 @@ def probe(
         if disparity is not None
     }
     top, left = max(0, y - CROP_RADIUS), max(0, x - CROP_RADIUS)
-    around = light_field.views[light_field.reference][top : y + CROP_RADIUS + 1, left : x + CROP_RADIUS + 1]
+    around = light_field.views[light_field.reference_position][top : y + CROP_RADIUS + 1, left : x + CROP_RADIUS + 1]
     return Probe(
         y=y,
         x=x,
@@ -258,7 +258,7 @@ def probe(
         side=views.names[kept_subset],
         kept=views.subsets[kept_subset][views.groups] & light_field.present,
         best=None if best is None else _finite(best.disparity[y, x]),
-        truth=truth,
+        ground_truth=ground_truth,
         confidence=float(maps.confidence[y, x]),
         occluded=bool(maps.mask("occluded")[y, x]),
         textureless=bool(maps.mask("textureless")[y, x]),
@@ -294,7 +294,7 @@ def to_json(found: Probe) -> dict[str, Any]:
         "side": found.side,
         "kept": "".join("01"[int(view)] for view in found.kept.ravel()),
         "best": _short(found.best),
-        "truth": _short(found.truth),
+        "ground_truth": _short(found.ground_truth),
         "confidence": _short(found.confidence),
         "occluded": found.occluded,
         "textureless": found.textureless,

@@ -34,8 +34,8 @@ def scene_probes(results: SceneResults, final_file: Path, asked: Sequence[Intere
     """
     maps = results.final(MAIN_VARIANT)
     light_field = results.light_field
-    places = [*asked, *interesting_pixels(light_field, maps, light_field.truth)]
-    noise = residual_variance(light_field.centre)
+    places = [*asked, *interesting_pixels(light_field, maps, light_field.ground_truth)]
+    noise = residual_variance(light_field.reference_view)
     parameters = sweep_parameters(final_file)
     return [
         probe(

@@ -56,7 +56,7 @@ def ablation_table(runs: Runs) -> Report:
             grid = Grid(columns, [_line(group, variants) for group in groups])
             sections.append(Section(dataset_title(dataset), grid))
     return Report(
-        "Table 4: ablation, MSE x100 (whole map / occluded / texture-less)",
+        "Table 4: ablation, MSE x100 (whole map / occluded / textureless)",
         f"{PROTOCOL_NOTE} The first five variants are the columns of the paper's table 4 in its order; `wang` is the "
         f"comparison in its text (published for the whole map only), `{BEST_VARIANT}` this project's own. "
         f"{REGIONS_NOTE}",
@@ -66,7 +66,7 @@ def ablation_table(runs: Runs) -> Report:
 
 
 def _groups(runs: Runs, dataset: str, variants: Sequence[str]) -> list[_Group]:
-    """The rows of a data set: its scenes, their average, and the paper's."""
+    """The rows of a dataset: its scenes, their average, and the paper's."""
     cells = [(variant, region) for variant in variants for region in REGIONS]
     scenes = runs.scored(dataset)
     ours = {

@@ -41,7 +41,8 @@ IMPORTED_NOTE = (
     "their method is learned."
 )
 REGIONS_NOTE = (
-    "Regions are those of `sepi.scoring.regions`, or the exact ones that a built-in scene brings; the paper's are not known."
+    "Regions are those of `sepi.scoring.regions`, or the exact ones that a built-in scene brings; the paper's are "
+    "not known."
 )
 
 
@@ -122,8 +123,8 @@ def scene_table(runs: Runs, score: str, paper: SceneTable, title: str) -> Report
         f"{PROTOCOL_NOTE} This code: variants {own_names(plan)}; then each figure of these divided by the published "
         f"one of the paper's method, {published.methods()[published.PAPERS_METHOD].label}. Other columns: as the paper "
         f"prints them; empty where the scene was in the method's training set. {LEARNED_NOTE} A scene without a figure "
-        "of this code is not at hand, or has no ground truth here; one without published figures is not in the paper. "
-        "The average of the scenes at hand is empty where a method has no figure for one of them."
+        "of this code is not available or has no ground truth here; one without published figures is not in the paper. "
+        "The average of the scenes available is empty where a method has no figure for one of them."
         + (f" {IMPORTED_NOTE}" if plan.external else ""),
         Table([*keys, *imported_keys(plan, keys)], rows),
         sections,
@@ -168,9 +169,9 @@ def _average_rows(runs: Runs, dataset: str, score: str, paper: SceneTable) -> li
 
 
 def has_column(runs: Runs, dataset: str, method: str) -> bool:
-    """Whether an imported method belongs on a data set's page.
+    """Whether an imported method belongs on a dataset's page.
 
-    One that has files, but none for this data set, does not; one without any file does, or nobody would see that.
+    One that has files, but none for this dataset, does not; one without any file does, or nobody would see that.
     """
     with_file = {name for name, scene in runs.plan.pairs if runs.external_problem(name, scene, method) != NO_FILE}
     return dataset in with_file or (not with_file and dataset in runs.plan.scenes)
@@ -221,18 +222,18 @@ def method_head(method: Method) -> str:
 
 
 def datasets_of(plan: Plan) -> list[str]:
-    """Data sets at hand, then the paper's others."""
+    """Datasets available, then the paper's others."""
     return list(dict.fromkeys([*plan.scenes, *published.DATASETS]))
 
 
 def dataset_title(dataset: str) -> str:
-    """Name of a data set, with the paper's where it has one."""
+    """Name of a dataset, with the paper's where it has one."""
     return f"{dataset}: {published.DATASETS[dataset]}" if dataset in published.DATASETS else dataset
 
 
 def average_label(count: int) -> str:
     """Name of the row with averages of our figures."""
-    return f"Average of {count} scene{'s' * (count != 1)} at hand"
+    return f"Average of {count} scene{'s' * (count != 1)} available"
 
 
 def printed_label(count: int) -> str:

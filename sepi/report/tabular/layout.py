@@ -14,7 +14,7 @@ from typing import Any
 from sepi.io.files import atomic_path
 
 Cell = str | float | int | None
-"""Text (published figures too, as printed), a figure of ours, a count, or nothing (not at hand)."""
+"""Text (published figures too, as printed), a figure of ours, a count, or nothing (not available)."""
 
 Row = Sequence[Cell]
 
@@ -186,7 +186,7 @@ def write(path: Path, text: str) -> Path:
 
 
 def as_csv(table: Table) -> str:
-    """CSV with four decimals; an empty cell is not at hand, ``nan`` is a score over no pixels."""
+    """CSV with four decimals; an empty cell is not available, ``nan`` is a score over no pixels."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(table.columns)
@@ -195,7 +195,7 @@ def as_csv(table: Table) -> str:
 
 
 def as_markdown(report: Report) -> str:
-    """A page with two decimals; an empty cell is not at hand, ``n/a`` is a score over no pixels."""
+    """A page with two decimals; an empty cell is not available, ``n/a`` is a score over no pixels."""
     marked = f" {report.marked} (**bold**, *italic*)." if report.marked else ""
     lines = [f"# {_plain(report.title)}", "", _with_code(report.caption) + marked, ""]
     for section in report.page:

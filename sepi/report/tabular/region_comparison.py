@@ -1,4 +1,4 @@
-"""Table 3: averages over occluded and texture-less regions, ours, published and of imported maps."""
+"""Table 3: averages over occluded and textureless regions, ours, published and of imported maps."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ from sepi.report.tabular.layout import (
     ranks,
 )
 
-# data set and region
+# dataset and region
 _Place = tuple[str, str]
 
 
@@ -67,7 +67,7 @@ class _MethodRow:
 
 
 def region_table(runs: Runs) -> Report:
-    """Table 3: average MSE x100 over occluded and texture-less regions."""
+    """Table 3: average MSE x100 over occluded and textureless regions."""
     plan = runs.plan
     datasets = [dataset for dataset in datasets_of(plan) if dataset in published.DATASETS or runs.scored(dataset)]
     places = [(dataset, region) for dataset in datasets for region in REGIONS if region != WHOLE_MAP]
@@ -79,9 +79,9 @@ def region_table(runs: Runs) -> Report:
     at_hand = "; ".join(f"{dataset}: {', '.join(runs.scored(dataset)) or 'none'}" for dataset in datasets)
     data: list[Row] = [[row.key, row.learning, *row.cells] for row in found]
     return Report(
-        "Table 3: MSE x100 in occluded and texture-less regions",
-        f"{PROTOCOL_NOTE} This code: variants {own_names(plan)}, average of the scenes at hand that have such a "
-        f"region ({at_hand}). Other rows: as the paper prints them, over all scenes of the data set. "
+        "Table 3: MSE x100 in occluded and textureless regions",
+        f"{PROTOCOL_NOTE} This code: variants {own_names(plan)}, average of the scenes available that have such a "
+        f"region ({at_hand}). Other rows: as the paper prints them, over all scenes of the dataset. "
         f"{REGIONS_NOTE} {LEARNED_NOTE}" + (f" {IMPORTED_NOTE}" if plan.external else ""),
         Table(["method", "learning", *(f"{dataset}_{region}" for dataset, region in places)], data),
         [Section("", Grid(columns, lines))],
@@ -125,7 +125,7 @@ def _own_average(runs: Runs, dataset: str, region: str, variant: str) -> float |
 
 
 def _imported_average(runs: Runs, dataset: str, region: str, method: str) -> Cell:
-    """Average over the scenes at hand; where a map is missing, its problem or how many scenes have one."""
+    """Average over the scenes available; where a map is missing, its problem or how many scenes have one."""
     scenes = runs.scored(dataset)
     figures = [runs.external_score(dataset, scene, method, "mse100", region) for scene in scenes]
     known = [figure for figure in figures if figure is not None]
@@ -147,6 +147,6 @@ def _column_marks(runs: Runs, rows: Sequence[_MethodRow], column: int, place: _P
 
 
 def _is_complete(dataset: str, scenes: Sequence[str]) -> bool:
-    """Whether the scenes at hand are those of the paper."""
+    """Whether the scenes available are those of the paper."""
     of_paper = published.table1().scenes(dataset)
     return sorted(of_paper) == sorted(published.paper_scene(dataset, scene) or scene for scene in scenes)

@@ -33,14 +33,14 @@ class Comparison:
     names : (str, str)
     maps : (ndarray, ndarray), shape (H, W), float32
         Pixels per view step.
-    truth : ndarray, shape (H, W), float32, or None
+    ground_truth : ndarray, shape (H, W), float32, or None
     light_field : LightField or None
         Gives the reference view and the regions.
     """
 
     names: tuple[str, str]
     maps: tuple[FloatMap, FloatMap]
-    truth: FloatMap | None = None
+    ground_truth: FloatMap | None = None
     light_field: LightField | None = None
     scores: tuple[AllScores, ...] = field(init=False)
 
@@ -49,15 +49,15 @@ class Comparison:
 
     @property
     def _known(self) -> bool:
-        return self.truth is not None
+        return self.ground_truth is not None
 
     def _scores(self, values: FloatMap) -> AllScores:
-        assert self.truth is not None
+        assert self.ground_truth is not None
         scene = self.light_field
-        masks = region_masks(scene) if scene is not None and scene.truth is not None else {}
+        masks = region_masks(scene) if scene is not None and scene.ground_truth is not None else {}
         regions = REGIONS if masks else (WHOLE_MAP,)
         return {
-            protocol: {region: score(values, self.truth, border, masks.get(region)) for region in regions}
+            protocol: {region: score(values, self.ground_truth, border, masks.get(region)) for region in regions}
             for protocol, border in PROTOCOLS.items()
         }
 
@@ -98,17 +98,17 @@ def _viewer(found: Comparison) -> Viewer:
     if picture is not None:
         viewer.panel("Scene", "centre", "reference view", "picture")
     numbers = [viewer.map(values, "final") for values in (a, b)]
-    truth = None if found.truth is None else viewer.map(found.truth, "final")
-    if truth is not None:
-        viewer.panel("Scene", "truth", "ground truth", "disparity", map=truth)
+    ground_truth = None if found.ground_truth is None else viewer.map(found.ground_truth, "final")
+    if ground_truth is not None:
+        viewer.panel("Scene", "ground_truth", "ground truth", "disparity", map=ground_truth)
     for key, name, number in zip("ab", found.names, numbers, strict=True):
         viewer.panel("Maps", key, name, "disparity", map=number)
     title = f"{found.names[0]} less {found.names[1]}"
     viewer.panel("Maps", "difference", title, "error", map=numbers[0], minus=numbers[1])
-    if truth is not None:
+    if ground_truth is not None:
         for key, name, number in zip("ab", found.names, numbers, strict=True):
-            viewer.panel("Errors", f"{key}/error", f"{name}: error", "error", map=number, minus=truth)
-        title = f"{found.names[0]} beside {found.names[1]}: which is nearer to the truth"
+            viewer.panel("Errors", f"{key}/error", f"{name}: error", "error", map=number, minus=ground_truth)
+        title = f"{found.names[0]} beside {found.names[1]}: which is nearer to the ground truth"
         viewer.panel(
             "Errors",
             "change",
@@ -116,15 +116,15 @@ def _viewer(found: Comparison) -> Viewer:
             "change",
             map=numbers[1],
             minus=numbers[0],
-            truth=truth,
+            ground_truth=ground_truth,
             ends=["farther", "nearer"],
         )
     return viewer
 
 
 def _limits(found: Comparison) -> tuple[float, float]:
-    """Ends of the scale of disparity: those of the truth, else what nearly all pixels of both maps lie between."""
-    shown = found.maps if found.truth is None else (found.truth,)
+    """Ends of the scale of disparity: those of the ground truth, else what nearly all pixels of both maps span."""
+    shown = found.maps if found.ground_truth is None else (found.ground_truth,)
     known = np.concatenate([values[np.isfinite(values)] for values in shown])
     if known.size == 0:
         return 0.0, 1.0

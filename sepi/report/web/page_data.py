@@ -52,7 +52,7 @@ def headline(runs: Runs) -> list[dict[str, Any]]:
 
 
 def missing_scenes(runs: Runs) -> dict[str, list[str]]:
-    """Scenes of the paper that are not at hand, by data set."""
+    """Scenes of the paper that are not available, by dataset."""
     found = {}
     for dataset in published.DATASETS:
         here = {published.paper_scene(dataset, scene) for scene in runs.plan.scenes.get(dataset, ())}
@@ -99,7 +99,7 @@ class BarGroup:
 
 
 def ablation_bars(runs: Runs) -> list[BarGroup]:
-    """Average MSE x100 of every listed variant beside the published one, a group per data set and region."""
+    """Average MSE x100 of every listed variant beside the published one, a group per dataset and region."""
     groups = []
     for dataset in datasets_of(runs.plan):
         scenes = runs.scored(dataset)

@@ -1,4 +1,6 @@
-"""The panels of a scene in the report: reference view, truth, stages, variants, errors, masks, other methods' maps."""
+"""The panels of a scene in the report: reference view, ground truth, stages, variants, errors, masks, other methods'
+maps.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +16,7 @@ from sepi.report.web.viewer import Viewer
 from sepi.stage import StageMaps
 
 # titles of what a variant took for a region, which need not be the region that is scored
-_DETECTED = {"occluded": "occluded, detected", "textureless": "texture-less, detected"}
+_DETECTED = {"occluded": "occluded, detected", "textureless": "textureless, detected"}
 
 
 @dataclass(frozen=True)
@@ -58,11 +60,11 @@ def viewer_of(results: SceneResults) -> Viewer:
         light_field.camera,
         light_field.from_centre,
     )
-    truth = _add_scene(viewer, results)
+    ground_truth = _add_scene(viewer, results)
     confidence = _add_stages(viewer, results)
-    finals = _add_finals(viewer, results, confidence, truth)
-    _add_imported(viewer, results, truth)
-    _add_changes(viewer, finals, truth)
+    finals = _add_finals(viewer, results, confidence, ground_truth)
+    _add_imported(viewer, results, ground_truth)
+    _add_changes(viewer, finals, ground_truth)
     _add_details(viewer, results, confidence)
     return viewer
 
@@ -76,16 +78,16 @@ def note_of(evaluation: Evaluation) -> str | None:
 
 
 def _add_scene(viewer: Viewer, results: SceneResults) -> int | None:
-    """Reference view, truth and its regions; the truth's number."""
+    """Reference view, ground truth and its regions; the ground truth's number."""
     group = "Scene"
     viewer.panel(group, "centre", "reference view", "picture")
-    if results.light_field.truth is None:
+    if results.light_field.ground_truth is None:
         return None
-    truth = viewer.map(results.light_field.truth, "final")
-    viewer.panel(group, "truth", "ground truth", "disparity", map=truth)
+    ground_truth = viewer.map(results.light_field.ground_truth, "final")
+    viewer.panel(group, "ground_truth", "ground truth", "disparity", map=ground_truth)
     for region, mask in results.evaluations[MAIN_VARIANT].regions.items():
-        viewer.panel(group, f"{region}-truth", f"{region}, for scoring", "mask", map=viewer.mask(mask))
-    return truth
+        viewer.panel(group, f"{region}-ground-truth", f"{region}, for scoring", "mask", map=viewer.mask(mask))
+    return ground_truth
 
 
 def _add_stages(viewer: Viewer, results: SceneResults) -> dict[str, int]:
@@ -108,7 +110,7 @@ def _add_stages(viewer: Viewer, results: SceneResults) -> dict[str, int]:
 
 
 def _add_finals(
-    viewer: Viewer, results: SceneResults, confidence: Mapping[str, int], truth: int | None
+    viewer: Viewer, results: SceneResults, confidence: Mapping[str, int], ground_truth: int | None
 ) -> dict[str, int]:
     """Final maps of all variants, and their errors; the number of each map."""
     finals = {
@@ -119,25 +121,25 @@ def _add_finals(
         more = {"map": number, "confidence": confidence.get(variant), "note": note_of(results.evaluations[variant])}
         if variant not in results.compared:
             viewer.panel("Other variants", variant, variant, "disparity", **more)
-        if truth is not None:
-            viewer.panel("Signed errors", f"{variant}/error", f"{variant}: error", "error", minus=truth, **more)
+        if ground_truth is not None:
+            viewer.panel("Signed errors", f"{variant}/error", f"{variant}: error", "error", minus=ground_truth, **more)
     return finals
 
 
-def _add_imported(viewer: Viewer, results: SceneResults, truth: int | None) -> None:
+def _add_imported(viewer: Viewer, results: SceneResults, ground_truth: int | None) -> None:
     for method, (disparity, evaluation) in results.imported.items():
         number = viewer.imported(disparity)
         note = note_of(evaluation)
         group = "Other methods, imported"
         viewer.panel(group, f"imported/{method}", f"{method} (imported)", "disparity", map=number, note=note)
-        if truth is not None:
+        if ground_truth is not None:
             key, title = f"imported/{method}/error", f"{method} (imported): error"
-            viewer.panel("Errors of other methods", key, title, "error", map=number, minus=truth, note=note)
+            viewer.panel("Errors of other methods", key, title, "error", map=number, minus=ground_truth, note=note)
 
 
-def _add_changes(viewer: Viewer, finals: Mapping[str, int], truth: int | None) -> None:
-    """Where a variant is farther from the truth, and where nearer, than the one it is compared with."""
-    if truth is None:
+def _add_changes(viewer: Viewer, finals: Mapping[str, int], ground_truth: int | None) -> None:
+    """Where a variant is farther from the ground truth, and where nearer, than the one it is compared with."""
+    if ground_truth is None:
         return
     for variant in finals:
         if variant != MAIN_VARIANT:
@@ -149,7 +151,7 @@ def _add_changes(viewer: Viewer, finals: Mapping[str, int], truth: int | None) -
                 "change",
                 map=finals[worse],
                 minus=finals[better],
-                truth=truth,
+                ground_truth=ground_truth,
             )
 
 
@@ -159,7 +161,7 @@ def compared_pair(variant: str) -> tuple[str, str]:
 
 
 def _add_details(viewer: Viewer, results: SceneResults, confidence: Mapping[str, int]) -> None:
-    """Confidence, and what the compared variants took for occluded and texture-less."""
+    """Confidence, and what the compared variants took for occluded and textureless."""
     for variant in results.compared:
         group = f"Masks and confidence of {variant}"
         key = f"{variant}/confidence"

@@ -1,7 +1,7 @@
 """What the viewer in a page needs: panels that name arrays, and the arrays, packed and each there once.
 
-A panel is a way to look at one array, or at two: an error is a map less the truth, and a page takes that difference
-itself. ``templates/viewer.js`` draws them.
+A panel is a way to look at one array, or at two: an error is a map less the ground truth, and a page takes that
+difference itself. ``templates/viewer.js`` draws them.
 """
 
 from __future__ import annotations
@@ -125,9 +125,9 @@ class Viewer:
         kind : str
             ``picture``, ``disparity``, ``error``, ``change``, ``confidence``, ``grey``, ``mask`` or ``outline``.
         **more
-            ``map``: number of its array; ``minus``: of the array taken from it; ``truth``: of the truth that both are
-            compared with; ``confidence``: of the confidence that is read out beside it; ``note``: what is to be said
-            of it; ``ends``: words for the low and the high end of its scale.
+            ``map``: number of its array; ``minus``: of the array taken from it; ``ground_truth``: of the ground truth
+            that both are compared with; ``confidence``: of the confidence that is read out beside it; ``note``: what is
+            to be said of it; ``ends``: words for the low and the high end of its scale.
         """
         if any(panel["key"] == key for panel in self.panels):
             raise ValueError(f"two panels are called {key!r}")

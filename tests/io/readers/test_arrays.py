@@ -218,7 +218,7 @@ def test_a_black_centre_view_is_named_with_the_way_out() -> None:
     message = refused(views)
     assert "view 1,1" in message
     assert "--view" in message
-    assert taken(views, view=(1, 2)).reference == (1, 2)
+    assert taken(views, view=(1, 2)).reference_position == (1, 2)
 
 
 def test_nan_in_a_view_names_it_and_excluding_it_mends_it() -> None:
@@ -246,8 +246,8 @@ def test_the_reference_view_is_the_centre_of_the_grid_as_it_is_ordered() -> None
     """An even grid has no exact middle; all formats must take the same one of the views about it."""
     views = RNG.integers(1, 256, (4, 4, 8, 10, 3), np.uint8)
     light_field = taken(views, order="flip-both")
-    assert light_field.reference == (2, 2)
-    np.testing.assert_array_equal(light_field.views[light_field.reference], views[1, 1])
+    assert light_field.reference_position == (2, 2)
+    np.testing.assert_array_equal(light_field.views[light_field.reference_position], views[1, 1])
 
 
 def test_central_views_and_exclusions_count_in_the_new_grid() -> None:
@@ -256,7 +256,7 @@ def test_central_views_and_exclusions_count_in_the_new_grid() -> None:
     kept = np.delete(views[1:4, 2:5].reshape(9, 16, 20, 3), 1, axis=0)
     np.testing.assert_array_equal(light_field.views[light_field.present], kept)
     assert not light_field.present[0, 1]
-    assert light_field.reference == (2, 2)
+    assert light_field.reference_position == (2, 2)
 
 
 def test_views_outside_the_central_ones_may_be_damaged() -> None:
@@ -278,8 +278,8 @@ def test_the_array_is_copied() -> None:
 @pytest.fixture
 def own(tmp_path: Path) -> Path:
     views = grid_of(np.float32)
-    truth = np.arange(80, dtype=np.float32).reshape(8, 10)
-    write_light_field(tmp_path / "own.h5", LightField(views, "own", truth=truth))
+    ground_truth = np.arange(80, dtype=np.float32).reshape(8, 10)
+    write_light_field(tmp_path / "own.h5", LightField(views, "own", ground_truth=ground_truth))
     return tmp_path / "own.h5"
 
 
@@ -290,10 +290,10 @@ def test_excluded_views_of_own_files_are_gone(own: Path) -> None:
     assert not light_field.views[0, 1].any()
     with h5py.File(own) as file:
         np.testing.assert_array_equal(light_field.views[2], file["views"][0])
-        np.testing.assert_array_equal(light_field.truth, file["truth"])
+        np.testing.assert_array_equal(light_field.ground_truth, file["ground_truth"])
 
 
-@pytest.mark.parametrize("name", ["views", "present", "truth"])
+@pytest.mark.parametrize("name", ["views", "present", "ground_truth"])
 def test_own_files_that_claim_more_than_they_hold(own: Path, name: str) -> None:
     """A file of 2 KB may claim terabytes of fill values."""
     with h5py.File(own, "a") as file:
@@ -314,7 +314,7 @@ def test_shape_and_length_that_agree_on_a_lie(tmp_path: Path) -> None:
         content = content.replace(old, struct.pack(f"<{len(new)}Q", *new))
     (tmp_path / "lie.h5").write_bytes(content)
     with pytest.raises(SepiError, match=r"lie\.h5: damaged HDF5 file"):
-        read(tmp_path / "lie.h5", ReadOptions(), "hci-old")
+        read(tmp_path / "lie.h5", ReadOptions(), "hci-2013")
 
 
 # --- damaged files of every format
@@ -328,7 +328,7 @@ def _mat_7_3(path: Path) -> None:
         file.write(b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM")
 
 
-def _hci_old(path: Path) -> None:
+def _hci_2013(path: Path) -> None:
     with h5py.File(path, "w") as file:
         file["LF"] = RGB
         file["GT_DEPTH"] = np.ones(RGB.shape[:4], np.float32)
@@ -342,7 +342,7 @@ WRITERS = {
     "a.mat": lambda path: scipy.io.savemat(path, {"LF": RGB, "other": {"field": 1}}),
     "compressed.mat": lambda path: scipy.io.savemat(path, {"LF": RGB, "other": 2.0}, do_compression=True),
     "v73.mat": _mat_7_3,
-    "old.h5": _hci_old,
+    "old.h5": _hci_2013,
 }
 
 
@@ -371,7 +371,7 @@ def test_damage_is_one_clear_error(
     content = content[:cut] + data.draw(st.binary(max_size=20))
     path = tmp_path_factory.getbasetemp() / f"damaged-{name}"
     path.write_bytes(content)
-    wanted = {".npy": "numpy", ".npz": "numpy", ".mat": "matlab", ".h5": "hci-old"}[path.suffix]
+    wanted = {".npy": "numpy", ".npz": "numpy", ".mat": "matlab", ".h5": "hci-2013"}[path.suffix]
     for known in FORMATS.values():
         assert known.matches(path) in (True, False)
     message = f"{path}:"

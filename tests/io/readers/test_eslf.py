@@ -46,8 +46,8 @@ def test_the_middle_views_are_read_pixel_for_pixel(tmp_path: Path, name: str) ->
     light_field = read(path, ReadOptions())
     np.testing.assert_array_equal(light_field.views, views[3:12, 3:12])
     assert light_field.present.all()
-    assert light_field.reference == (4, 4)
-    np.testing.assert_array_equal(light_field.views[light_field.reference], views[7, 7])
+    assert light_field.reference_position == (4, 4)
+    np.testing.assert_array_equal(light_field.views[light_field.reference_position], views[7, 7])
     assert light_field.name == Path(name).stem
     assert light_field.source == str(path)
     assert light_field.notes == ("the 9x9 views in the middle of 14x14; --central N takes another odd number",)

@@ -1,4 +1,4 @@
-"""HDF5 files of the first HCI benchmark: views, the truth of the view whose depth is wanted, and the camera."""
+"""HDF5 files of the first HCI benchmark: views, the ground truth of the view whose depth is wanted, and the camera."""
 
 import re
 from pathlib import Path
@@ -31,13 +31,13 @@ def write(path: Path, *, depth: np.ndarray | None = DEPTH, views: np.ndarray = L
 
 
 def taken(path: Path, **options: object) -> LightField:
-    assert format_of(path).name == "HCI-old HDF5"
+    assert format_of(path).name == "HCI 2013 HDF5"
     return read(path, ReadOptions(**options))
 
 
 def refused(path: Path, **options: object) -> str:
     with pytest.raises(SepiError, match=re.escape(str(path))) as caught:
-        read(path, ReadOptions(**options), "hci-old")
+        read(path, ReadOptions(**options), "hci-2013")
     assert "\n" not in str(caught.value)
     return str(caught.value)
 
@@ -45,10 +45,10 @@ def refused(path: Path, **options: object) -> str:
 def test_views_truth_and_camera(tmp_path: Path) -> None:
     light_field = taken(write(tmp_path / "buddha.h5"))
     np.testing.assert_array_equal(light_field.views, LF)
-    np.testing.assert_allclose(light_field.truth, TRUTH[1, 2], rtol=1e-5, atol=1e-6)
-    assert light_field.truth.dtype == np.float32
+    np.testing.assert_allclose(light_field.ground_truth, TRUTH[1, 2], rtol=1e-5, atol=1e-6)
+    assert light_field.ground_truth.dtype == np.float32
     assert light_field.camera == Camera(scale=15.0, offset=1.25, focal_px=300.0)
-    np.testing.assert_allclose(light_field.camera.depth(light_field.truth), DEPTH[1, 2], rtol=1e-4)
+    np.testing.assert_allclose(light_field.camera.depth(light_field.ground_truth), DEPTH[1, 2], rtol=1e-4)
     assert light_field.name == "buddha"
     assert light_field.notes == ()
 
@@ -71,31 +71,31 @@ def test_truth_is_that_of_the_view_whose_depth_is_wanted(
 ) -> None:
     """Truth of another view is shifted by its parallax: every score would be wrong."""
     light_field = taken(write(tmp_path / "a.h5"), order=order, view=view, exclude=("0,0",))
-    own = light_field.views[light_field.reference]
+    own = light_field.views[light_field.reference_position]
     t, s = next((t, s) for t in range(T) for s in range(S) if np.array_equal(LF[t, s], own))
     assert view is not None or (t, s) == (1, 2)
-    np.testing.assert_allclose(light_field.truth, TRUTH[t, s], rtol=1e-5, atol=1e-6)
+    np.testing.assert_allclose(light_field.ground_truth, TRUTH[t, s], rtol=1e-5, atol=1e-6)
 
 
 def test_truth_of_the_centre_view_alone(tmp_path: Path) -> None:
     path = write(tmp_path / "a.h5", depth=DEPTH[1, 2])
     for options in ({}, {"central": 3}, {"order": "flip-both"}, {"view": (1, 2)}):
-        np.testing.assert_allclose(taken(path, **options).truth, TRUTH[1, 2], rtol=1e-5, atol=1e-6)
-    assert taken(path, view=(1, 1)).truth is None
+        np.testing.assert_allclose(taken(path, **options).ground_truth, TRUTH[1, 2], rtol=1e-5, atol=1e-6)
+    assert taken(path, view=(1, 1)).ground_truth is None
 
 
 def test_truth_is_unknown_where_the_depth_is_none(tmp_path: Path) -> None:
     """Holes in the depth are no surfaces; scoring leaves out what is not finite."""
     depth = DEPTH.copy()
     depth[1, 2, 0, :5] = [0, -1, np.nan, np.inf, 1e-45]
-    truth = taken(write(tmp_path / "a.h5", depth=depth)).truth
-    assert np.isnan(truth[0, :5]).all()
-    np.testing.assert_allclose(truth[1:], TRUTH[1, 2, 1:], rtol=1e-5, atol=1e-6)
+    ground_truth = taken(write(tmp_path / "a.h5", depth=depth)).ground_truth
+    assert np.isnan(ground_truth[0, :5]).all()
+    np.testing.assert_allclose(ground_truth[1:], TRUTH[1, 2, 1:], rtol=1e-5, atol=1e-6)
 
 
 def test_a_file_without_depth(tmp_path: Path) -> None:
     light_field = taken(write(tmp_path / "a.h5", depth=None))
-    assert light_field.truth is None
+    assert light_field.ground_truth is None
     assert light_field.camera is not None
 
 
@@ -103,7 +103,7 @@ def test_a_file_without_depth(tmp_path: Path) -> None:
 def test_geometry_of_no_camera_gives_no_truth(tmp_path: Path, attributes: dict[str, float]) -> None:
     light_field = taken(write(tmp_path / "a.h5", **attributes))
     assert light_field.camera is None
-    assert light_field.truth is None
+    assert light_field.ground_truth is None
     assert any("no metric depth and no ground truth" in note for note in light_field.notes)
 
 
@@ -112,7 +112,7 @@ def test_missing_attributes_are_named(tmp_path: Path) -> None:
     with h5py.File(path, "a") as file:
         del file.attrs["dH"], file.attrs["shift"]
     light_field = taken(path)
-    assert light_field.truth is None
+    assert light_field.ground_truth is None
     assert light_field.notes == ("no metric depth and no ground truth: the file has no attribute dH, shift",)
 
 

@@ -225,7 +225,7 @@ def test_views_stand_where_their_names_say(tmp_path: Path, case: str) -> None:
     assert light_field.name == "my scene"
     assert light_field.source == str(folder)
     if options.view:
-        assert light_field.reference == options.view
+        assert light_field.reference_position == options.view
 
 
 @pytest.mark.parametrize("ending", ["png", "PNG", "bmp", "tif", "tiff", "ppm", "pnm", "webp"])

@@ -35,12 +35,12 @@ def test_every_format_gives_the_same_light_field(hci: Path, name: str, tmp_path:
         found = read_light_field(tmp_path / source)
         assert found.views.dtype == folder.views.dtype
         np.testing.assert_array_equal(found.views, folder.views, err_msg=source)
-        assert (found.reference, found.present.all()) == (folder.reference, True)
+        assert (found.reference_position, found.present.all()) == (folder.reference_position, True)
         # where values lie in memory differs from format to format
         np.testing.assert_array_equal(small_map(folder, found.views[crop]), expected, err_msg=source)
     own = read_light_field(tmp_path / "own.h5")
     assert own.disparity_range == folder.disparity_range
-    np.testing.assert_array_equal(own.truth, folder.truth)
+    np.testing.assert_array_equal(own.ground_truth, folder.ground_truth)
 
 
 def test_one_map_from_a_folder_and_from_an_array(hci: Path, tmp_path: Path) -> None:
@@ -50,7 +50,7 @@ def test_one_map_from_a_folder_and_from_an_array(hci: Path, tmp_path: Path) -> N
     for source in (hci / "cotton", tmp_path / "array.npy"):
         out = tmp_path / f"{source.stem}-maps"
         words = ["depth", source, "-o", out, "--disparity-range", "-1.6", "1.5"]
-        words += ["--variant", "no_occlusion_no_textureless", "--set", "initial.sepi.candidates=31"]
+        words += ["--variant", "no_occlusion_no_textureless", "--set", "initial.sepi.num_disparities=31"]
         called = CliRunner().invoke(main, [str(word) for word in words])
         assert (called.exit_code, called.stderr) == (0, "")
         names = ("confidence.png", "disparity.npy", "disparity.pfm", "disparity.png", "disparity_16bit.png")
@@ -61,11 +61,11 @@ def test_one_map_from_a_folder_and_from_an_array(hci: Path, tmp_path: Path) -> N
 def small_map(whole: LightField, views: np.ndarray) -> np.ndarray:
     """What variant best makes of a part of the views."""
     part = LightField(views, "part", disparity_range=whole.disparity_range)
-    return estimate_depth(part, "best", {"initial": {"candidates": 31}, "occlusion": {"passes": 1}}).disparity
+    return estimate_depth(part, "best", {"initial": {"num_disparities": 31}, "occlusion": {"passes": 1}}).disparity
 
 
-def mse(light_field: LightField, truth: np.ndarray) -> float:
-    return score(estimate_depth(light_field, "paper").disparity, truth)["mse100"]
+def mse(light_field: LightField, ground_truth: np.ndarray) -> float:
+    return score(estimate_depth(light_field, "paper").disparity, ground_truth)["mse100"]
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -77,19 +77,19 @@ def test_a_star_of_views_is_nearly_as_good_as_the_grid(hci: Path, name: str) -> 
     assert star.sum() == 33
     # what is missing must not be looked at, whatever it is
     views = np.where(star[:, :, None, None, None], light_field.views, 77).astype(np.uint8)
-    found = mse(replace(light_field, views=views, present=star), light_field.truth)
+    found = mse(replace(light_field, views=views, present=star), light_field.ground_truth)
     assert found <= 1.5 * final_scores(hci / name, "paper")["mse100"]
 
 
 def test_a_view_off_the_centre(hci: Path) -> None:
-    """The known truth belongs to row 4; with the first three rows cut off that is row 1 of 6, the centre row 3."""
+    """The ground truth belongs to row 4; with the first three rows cut off that is row 1 of 6, the centre row 3."""
     light_field = scene(hci / "cotton")
     cut = LightField(light_field.views[3:], "cut", disparity_range=light_field.disparity_range)
-    assert cut.reference == (3, 4)
-    off_centre = mse(cut.seen_from((1, 4)), light_field.truth)
+    assert cut.reference_position == (3, 4)
+    off_centre = mse(cut.seen_from((1, 4)), light_field.ground_truth)
     assert off_centre <= 1.5 * final_scores(hci / "cotton", "paper")["mse100"]
     # the map of the centre view belongs to another place: the check can tell
-    assert mse(cut, light_field.truth) > 1.4 * off_centre
+    assert mse(cut, light_field.ground_truth) > 1.4 * off_centre
 
 
 def test_lytro_picture_with_one_command(real_data: Path, tmp_path: Path) -> None:

@@ -63,8 +63,8 @@ def occluder():
 def test_curves_are_what_the_sweep_minimises(settings, radius):
     """A curve drawn from other samples, weights or counts would explain a depth that was found another way."""
     light_field = random_light_field(**settings)
-    parameters = SweepParameters(candidates=10, scale=0.3, window_radius=radius, window_sigma=0.5)
-    views = halves_and_quarters(light_field.grid, light_field.reference)
+    parameters = SweepParameters(num_disparities=10, scale=0.3, window_radius=radius, window_sigma=0.5)
+    views = halves_and_quarters(light_field.grid, light_field.reference_position)
     result = sweep(light_field, parameters, groups=views.groups, subsets=views.subsets)
     H, W = light_field.shape
     corners_and_inside = [(0, 0), (H - 1, W - 1), (0, W - 1), (H - 1, 0), (H // 2, W // 2), (H // 2, 1), (1, W // 2)]
@@ -83,9 +83,9 @@ def test_curves_are_what_the_sweep_minimises(settings, radius):
 def test_curves_of_a_scene_are_those_of_the_default_sweep():
     """Noise and colour scales of real use: a curve off by the noise would have its minimum elsewhere."""
     light_field = render("dots", size=64, views=5)
-    parameters = SweepParameters(candidates=61)
+    parameters = SweepParameters(num_disparities=61)
     result = sweep(light_field, parameters)
-    noise = residual_variance(light_field.centre)
+    noise = residual_variance(light_field.reference_view)
     for y, x in [(0, 0), (20, 31), (63, 40), (33, 33)]:
         disparity, cost = cost_curves(light_field, y, x, parameters, noise=noise).minimum()
         assert cost == pytest.approx(result.cost[0, y, x], abs=2e-5)
@@ -174,33 +174,33 @@ def made_maps(light_field, **extra):
 
 def test_probe_tells_what_the_maps_say():
     """Values of another pixel or map, or the views of another side, would explain the wrong thing."""
-    truth = np.full((60, 60), np.nan, np.float32)
-    truth[20, 30] = 0.5
-    light_field = plane(0.5, truth=truth)
+    ground_truth = np.full((60, 60), np.nan, np.float32)
+    ground_truth[20, 30] = 0.5
+    light_field = plane(0.5, ground_truth=ground_truth)
     side = np.zeros((60, 60), np.uint8)
     side[20, 30] = 2
     flag = side > 0
     maps = made_maps(light_field, occlusion_side=side, occluded=flag, textureless=~flag)
     best = StageMaps(np.full((60, 60), 0.625, np.float32), maps.confidence)
-    parameters = SweepParameters(candidates=41)
+    parameters = SweepParameters(num_disparities=41)
     found = probe(light_field, 20, 30, maps=maps, best=best, parameters=parameters, label="here")
     assert (found.y, found.x, found.label) == (20, 30, "here")
-    assert (found.chosen, found.best, found.truth, found.confidence) == (0.5, 0.625, 0.5, 0.75)
+    assert (found.chosen, found.best, found.ground_truth, found.confidence) == (0.5, 0.625, 0.5, 0.75)
     assert found.minimum == pytest.approx(0.5, abs=0.02)
     assert found.occluded
     assert not found.textureless
     assert found.side == "right"
     np.testing.assert_array_equal(found.kept, np.tile([False, False, True, True, True], (5, 1)))
-    assert list(found.pictures) == ["minimum", "chosen", "wrong", "truth"]
+    assert list(found.pictures) == ["minimum", "chosen", "wrong", "ground_truth"]
     # every view sees the plane's point, so the patch has the pixel's colour
-    colour = 255 * float(light_field.centre[20, 30, 0])
+    colour = 255 * float(light_field.reference_view[20, 30, 0])
     np.testing.assert_allclose(found.patch, colour, atol=2)
     y, x = 20 - found.crop_origin[0], 30 - found.crop_origin[1]
     assert found.crop[y, x, 0] == pytest.approx(colour, abs=1)
     other = probe(light_field, 21, 30, maps=maps, parameters=parameters)
-    assert (other.truth, other.best, other.side, other.occluded) == (None, None, "full", False)
+    assert (other.ground_truth, other.best, other.side, other.occluded) == (None, None, "full", False)
     assert other.kept.all()
-    assert "truth" not in other.pictures
+    assert "ground_truth" not in other.pictures
 
 
 def test_sides_of_another_occlusion_stage_are_refused():
@@ -208,7 +208,7 @@ def test_sides_of_another_occlusion_stage_are_refused():
     light_field = plane(0.5)
     maps = made_maps(light_field, occlusion_side=np.full((60, 60), 12, np.uint8))
     with pytest.raises(SepiError, match="half_sepi has 0 to 8"):
-        probe(light_field, 20, 30, maps=maps, parameters=SweepParameters(candidates=5))
+        probe(light_field, 20, 30, maps=maps, parameters=SweepParameters(num_disparities=5))
 
 
 def test_json_holds_the_curves_and_pictures(occluder):
@@ -224,7 +224,7 @@ def test_json_holds_the_curves_and_pictures(occluder):
         np.testing.assert_allclose(decoded, cost, atol=1e-5)
     np.testing.assert_allclose(data["range"], found.curves.disparities[[0, -1]], atol=1e-4)
     assert data["kept"] == "".join("01"[int(view)] for view in found.kept.ravel())
-    assert set(data["sepi"]) == {"minimum", "chosen", "wrong", "truth"}
+    assert set(data["sepi"]) == {"minimum", "chosen", "wrong", "ground_truth"}
     for name, picture in found.pictures.items():
         assert data["sepi"][name]["disparity"] == pytest.approx(picture.disparity, abs=1e-4)
         shown = decoded_picture(data["sepi"][name]["src"], "image/webp")
@@ -246,8 +246,8 @@ def decoded_picture(uri, kind):
 def test_interesting_pixels_show_each_kind(occluder):
     """Pixels on top of each other, or none of a kind that the scene has, would leave the reader without an example."""
     light_field, maps = occluder
-    pixels = interesting_pixels(light_field, maps, light_field.truth)
-    assert pixels == interesting_pixels(light_field, maps, light_field.truth)
+    pixels = interesting_pixels(light_field, maps, light_field.ground_truth)
+    assert pixels == interesting_pixels(light_field, maps, light_field.ground_truth)
     labels = [pixel.label for pixel in pixels]
     assert labels[0] == "textured and sure"
     assert "largest error" in labels
@@ -257,7 +257,7 @@ def test_interesting_pixels_show_each_kind(occluder):
     for y, x, label in pixels:
         if label.startswith("occluded"):
             assert side_names[maps.extra["occlusion_side"][y, x]] in label
-    assert interesting_pixels(light_field, maps, light_field.truth, count=2) == pixels[:2]
+    assert interesting_pixels(light_field, maps, light_field.ground_truth, count=2) == pixels[:2]
     without = [pixel.label for pixel in interesting_pixels(light_field, maps, None)]
     assert "largest error" not in without
 
@@ -273,10 +273,10 @@ def check_places(pixels, shape):
 def test_the_largest_error_is_found():
     """Truth is of use for this only: the pixel must lie in the wrong patch, whatever else is unknown."""
     light_field = plane(0.5)
-    truth = np.full((60, 60), 0.5, np.float32)
-    truth[30:40, 42:50] = -1
-    truth[10:20] = np.nan
-    pixels = interesting_pixels(light_field, made_maps(light_field), truth)
+    ground_truth = np.full((60, 60), 0.5, np.float32)
+    ground_truth[30:40, 42:50] = -1
+    ground_truth[10:20] = np.nan
+    pixels = interesting_pixels(light_field, made_maps(light_field), ground_truth)
     (wrong,) = [pixel for pixel in pixels if pixel.label == "largest error"]
     assert 30 <= wrong.y < 40
     assert 42 <= wrong.x < 50
@@ -311,8 +311,8 @@ def test_interesting_pixels_of_plain_and_small_pictures(shape):
 def test_figure_is_the_same_each_time_and_whole(occluder, tmp_path):
     """Files that differ without cause would be made again, and checked in again, each time."""
     light_field, maps = occluder
-    parameters = SweepParameters(candidates=31)
-    pixels = interesting_pixels(light_field, maps, light_field.truth, count=2)
+    parameters = SweepParameters(num_disparities=31)
+    pixels = interesting_pixels(light_field, maps, light_field.ground_truth, count=2)
     probes = [probe(light_field, y, x, maps=maps, parameters=parameters, label=label) for y, x, label in pixels]
     for folder in ("first", "second"):
         write_probes(tmp_path / folder / "probes.v1", probes)
@@ -336,7 +336,7 @@ def test_figure_of_a_grey_picture_without_views_around(tmp_path):
         np.full((1, 3, 9, 9, 1), 7, np.uint8), "flat", present=present, disparity_range=DisparityRange(-20, 20, "given")
     )
     maps = made_maps(light_field, occlusion_side=np.full((9, 9), 5, np.uint8))
-    found = probe(light_field, 0, 8, maps=maps, parameters=SweepParameters(candidates=5))
+    found = probe(light_field, 0, 8, maps=maps, parameters=SweepParameters(num_disparities=5))
     assert found.side == "left-up"
     np.testing.assert_array_equal(found.kept, [[False, True, False]])
     write_probes(tmp_path / "flat", [found])

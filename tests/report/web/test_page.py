@@ -115,7 +115,7 @@ def noisy_scene(noise: float, outliers: float) -> Viewer:
     random = np.random.default_rng(0)
     shape = (512, 512)
     y, x = np.indices(shape)
-    truth = np.sin(x / 60) + y / 300 + (x > 250)
+    ground_truth = np.sin(x / 60) + y / 300 + (x > 250)
     picture = np.clip(random.normal(128, 30, (*shape, 3)), 0, 255).astype(np.uint8)
 
     def blobs() -> FloatMap:
@@ -123,13 +123,13 @@ def noisy_scene(noise: float, outliers: float) -> Viewer:
         return found
 
     def estimate() -> FloatMap:
-        found = truth + random.normal(0, noise, shape)
+        found = ground_truth + random.normal(0, noise, shape)
         wrong = random.random(shape) < outliers
         found[wrong] = random.uniform(-1, 3, wrong.sum())
         return found.astype(np.float32)
 
     made = viewer(shape, picture=picture)
-    made.map(truth.astype(np.float32), "final")
+    made.map(ground_truth.astype(np.float32), "final")
     for _ in range(2):
         made.map(estimate(), "final")
         made.map((blobs() + random.normal(0, 0.05, shape)).clip(0, 1).astype(np.float32), "confidence")
@@ -165,7 +165,7 @@ def test_panels_name_arrays_that_are_there(example: Example) -> None:
         kinds = {panel["kind"] for panel in scene["panels"]}
         assert kinds <= {"picture", "disparity", "error", "change", "confidence", "grey", "mask", "outline"}
         for panel in scene["panels"]:
-            for role in ("map", "minus", "truth", "confidence"):
+            for role in ("map", "minus", "ground_truth", "confidence"):
                 if role in panel:
                     array = scene["arrays"][panel[role]]
                     is_mask = role == "map" and panel["kind"] in ("mask", "outline")
@@ -178,7 +178,7 @@ def test_a_scene_has_every_panel(example: Example) -> None:
     panels = {scene["scene"]: {panel["key"]: panel for panel in scene["panels"]} for scene in example.scenes}
     stages = {f"{variant}/{stage}" for variant in ("paper", "best") for stage in example.plan.stages}
     cotton = set(panels["cotton"])
-    assert {"centre", "truth", "occluded-truth", "textureless-truth", *stages} <= cotton
+    assert {"centre", "ground_truth", "occluded-ground-truth", "textureless-ground-truth", *stages} <= cotton
     assert {"paper/error", "best/error", "best/change", "imported/SPO", "imported/SPO/error"} <= cotton
     assert {"paper/confidence", "best/confidence", "paper/superpixels", "paper/lti"} <= cotton
     for kind, count in (("mask", 6), ("outline", 1), ("grey", 1)):
@@ -186,7 +186,7 @@ def test_a_scene_has_every_panel(example: Example) -> None:
     assert not any("imported" in key for key in panels["dots"])
     without = set(panels["picture"])
     assert stages <= without
-    assert not any("truth" in key or "error" in key or "change" in key for key in without)
+    assert not any("ground_truth" in key or "error" in key or "change" in key for key in without)
     assert re.fullmatch(r"MSE \d+\.\d\d, Q25 \d+\.\d\d, BadPix 0\.07 \d+\.\d %", panels["cotton"]["best/error"]["note"])
     assert note_of(Evaluation()) is None
 
@@ -198,7 +198,7 @@ def test_the_view_of_the_camera_is_handed_on(example: Example) -> None:
     moved = replace(light_field, view=(0, 3))
     maps = {name: {"optimize": example.final(COTTON, name)} for name in ("best", "paper")}
     results = SceneResults(moved, maps, {name: Evaluation() for name in maps}, ["best", "paper"])
-    truthless = replace(results, light_field=replace(moved, truth=None))
+    truthless = replace(results, light_field=replace(moved, ground_truth=None))
     camera = viewer_of(truthless).to_json()["camera"]
     assert camera == {
         "scale": light_field.camera.scale,
@@ -244,7 +244,7 @@ def test_equal_input_gives_equal_bytes(example: Example) -> None:
 
 
 def test_the_page_says_what_it_is_about(example: Example) -> None:
-    """Data sets, variants, protocols, versions, machine, date, and total time; inputs with checksums, parameters."""
+    """Datasets, variants, protocols, versions, machine, date, and total time; inputs with checksums, parameters."""
     text = re.sub(r"<wbr>", "", example.page.read_text(encoding="utf-8"))
     made = example.numbers["made"]
     for expected in (made["version"], made["date"], made["machine"]["processor"], made["libraries"]["numpy"]):
@@ -255,7 +255,7 @@ def test_the_page_says_what_it_is_about(example: Example) -> None:
     # two variants of four stages of 1.5 to 4.5 s on three scenes
     assert f"<b>{3 * 2 * (1.5 + 2.5 + 3.5 + 4.5):.0f} s</b>" in text
     assert "leaves out 15 pixels on each side" in text
-    for name in ("window_radius", "candidates"):
+    for name in ("window_radius", "num_disparities"):
         assert f"<dt>{name}</dt>" in text
     assert "7x5 instead of 64x64" in text
 
@@ -361,11 +361,11 @@ def test_scenes_of_the_paper_that_are_not_at_hand(runs: Runs) -> None:
     assert "Cotton" not in found["hci"]
     assert "Antinous" in found["hci"]
     assert len(found["hci"]) == 23
-    assert len(found["hci_old"]) == 7
+    assert len(found["hci_2013"]) == 7
 
 
 def test_ablation_bars(runs: Runs, example: Example) -> None:
-    """Averages over the scenes at hand, beside the published averages of the same variant and region."""
+    """Averages over the scenes available, beside the published averages of the same variant and region."""
     groups = {(group.dataset, group.region): group for group in page_data.ablation_bars(runs)}
     assert {region for _, region in groups} == {"whole map", *REGIONS[1:]}
     whole = groups["hci", "whole map"]
@@ -377,9 +377,9 @@ def test_ablation_bars(runs: Runs, example: Example) -> None:
     assert whole.largest == max(score_of(example, COTTON, "paper"), score_of(example, COTTON, "best"), 4.34)
     builtin = {bar.variant: bar for bar in groups["builtin", "occluded"].rows}
     assert builtin["paper"].ours == score_of(example, DOTS, "paper", "occluded")
-    assert groups["hci_old", "whole map"].scenes == 0
-    assert all(bar.ours is None for bar in groups["hci_old", "whole map"].rows)
-    assert not [key for key in groups if key[0] == PICTURE[0]], "a data set without truth has no bars"
+    assert groups["hci_2013", "whole map"].scenes == 0
+    assert all(bar.ours is None for bar in groups["hci_2013", "whole map"].rows)
+    assert not [key for key in groups if key[0] == PICTURE[0]], "a dataset without truth has no bars"
 
 
 def test_times(runs: Runs, example: Example) -> None:

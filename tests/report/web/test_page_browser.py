@@ -90,7 +90,7 @@ def test_tables_sort(page: Any) -> None:
 
 @pytest.mark.parametrize("clicks", [1, 2])
 def test_rows_without_a_figure_stay_behind_those_with_one(page: Any, clicks: int) -> None:
-    """Only the scene at hand has a figure of ours: it comes first, up and down."""
+    """Only the scene available has a figure of ours: it comes first, up and down."""
     table = page.locator("#table1_mse table").nth(1)
     button = table.locator("thead th").nth(1).locator("button")
     for _ in range(clicks):

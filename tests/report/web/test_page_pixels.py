@@ -37,9 +37,9 @@ def test_a_pixel_that_the_configuration_asks_for_comes_first(page: Any, example:
     facts = part(page, "facts")
     for variant in ("paper", "best"):
         assert f"chosen by {variant}{example.final(COTTON, variant).disparity[y, x]:.3f}" in facts
-    truth = example.light_field(COTTON).truth
-    assert truth is not None
-    assert f"truth{truth[y, x]:.3f}" in facts
+    ground_truth = example.light_field(COTTON).ground_truth
+    assert ground_truth is not None
+    assert f"ground truth{ground_truth[y, x]:.3f}" in facts
 
 
 def test_buttons_choose_prepared_pixels(page: Any, example: Example) -> None:

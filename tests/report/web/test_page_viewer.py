@@ -101,8 +101,8 @@ def test_swapping_and_choosing(page: Any) -> None:
 
 def test_the_read_out_shows_the_values_of_the_files(page: Any, example: Example) -> None:
     """Three decimals of what the HDF5 files hold, at corners, edges and inside."""
-    truth = example.light_field(COTTON).truth
-    assert truth is not None
+    ground_truth = example.light_field(COTTON).ground_truth
+    assert ground_truth is not None
     finals = {side: example.final(COTTON, variant) for side, variant in (("a", "paper"), ("b", "best"))}
     choose(page, a="paper/optimize", b="best/optimize")
     for x, y in PLACES:
@@ -112,26 +112,26 @@ def test_the_read_out_shows_the_values_of_the_files(page: Any, example: Example)
             value = float(shown[f"value {side}"])
             assert value == as_shown(maps.disparity[y, x]), (x, y, side)
             assert abs(float(shown[f"confidence {side}"]) - maps.confidence[y, x]) <= 0.0051
-            if np.isfinite(truth[y, x]):
-                assert float(shown["truth"]) == as_shown(truth[y, x])
+            if np.isfinite(ground_truth[y, x]):
+                assert float(shown["ground_truth"]) == as_shown(ground_truth[y, x])
                 error = float(shown[f"error {side}"])
-                assert error == pytest.approx(value - as_shown(truth[y, x]), abs=1e-6)
+                assert error == pytest.approx(value - as_shown(ground_truth[y, x]), abs=1e-6)
             else:
-                assert (shown["truth"], shown[f"error {side}"]) == ("unknown", "unknown")
-    assert not np.isfinite(truth[0, 0])
+                assert (shown["ground_truth"], shown[f"error {side}"]) == ("unknown", "unknown")
+    assert not np.isfinite(ground_truth[0, 0])
 
 
 def test_the_read_out_of_truth_and_errors(page: Any, example: Example) -> None:
     light_field = example.light_field(COTTON)
-    assert light_field.truth is not None
-    choose(page, a="truth", b="best/error")
+    assert light_field.ground_truth is not None
+    choose(page, a="ground_truth", b="best/error")
     for x, y in PLACES[1:]:
         point_at(page, x, y)
-        truth = as_shown(light_field.truth[y, x])
+        ground_truth = as_shown(light_field.ground_truth[y, x])
         estimate = as_shown(example.final(COTTON, "best").disparity[y, x])
         shown = read_out(page)
-        assert float(shown["value a"]) == truth
-        assert float(shown["value b"]) == pytest.approx(estimate - truth, abs=1e-6)
+        assert float(shown["value a"]) == ground_truth
+        assert float(shown["value b"]) == pytest.approx(estimate - ground_truth, abs=1e-6)
         assert shown["error a"] == "–"
 
 
@@ -158,7 +158,7 @@ def test_the_read_out_of_other_maps_is_right_within_their_step(page: Any, exampl
 
 
 def test_pictures_have_no_numbers(page: Any) -> None:
-    choose(page, a="centre", b="occluded-truth")
+    choose(page, a="centre", b="occluded-ground-truth")
     point_at(page, 10, 10)
     shown = read_out(page)
     assert {shown[f"{name} {side}"] for name in ("value", "error", "confidence") for side in "ab"} == {"–"}
@@ -167,7 +167,7 @@ def test_pictures_have_no_numbers(page: Any) -> None:
 def test_every_panel_of_the_grid_reads_out(page: Any, example: Example) -> None:
     """The cursor over a small panel is the cursor everywhere."""
     choose(page, b="best/optimize")
-    for key in ("truth", "paper/initial"):
+    for key in ("ground_truth", "paper/initial"):
         selector = visible_tile(page, key)
         for x, y in ((12, 40), (55, 20)):
             point_at(page, x, y, selector)
@@ -189,11 +189,11 @@ def test_the_cursor_moves_by_the_keyboard(page: Any, example: Example) -> None:
 
 
 def test_legends_have_the_scale_of_the_scene(page: Any, example: Example) -> None:
-    truth = example.light_field(COTTON).truth
-    assert truth is not None
+    ground_truth = example.light_field(COTTON).ground_truth
+    assert ground_truth is not None
     legends = part(page, "legends")
-    assert f"{np.nanmin(truth):.2f}" in legends
-    assert f"{np.nanmax(truth):.2f}" in legends
+    assert f"{np.nanmin(ground_truth):.2f}" in legends
+    assert f"{np.nanmax(ground_truth):.2f}" in legends
     choose(page, a="paper/error")
     assert "-0.20" in part(page, "legends")
     assert "MSE" in part(page, "legends")
@@ -208,7 +208,7 @@ def test_maps_have_the_colours_of_the_figures(page: Any, example: Example) -> No
     assert (shown[UNKNOWN] == (255, 0, 255)).all()
     assert np.abs(shown - expected).max() <= 6
     best = example.final(COTTON, "best").disparity
-    error = error_picture(best - light_field.truth).astype(int)
+    error = error_picture(best - light_field.ground_truth).astype(int)
     assert np.abs(map_pixels(page, "best/error")[:, :, :3] - error).max() <= 6
 
 
@@ -216,11 +216,11 @@ def test_the_reference_view_is_the_picture(page: Any, example: Example) -> None:
     """Compressed, but upright, not mirrored, its colours in order."""
     light_field = example.light_field(COTTON)
     shown = map_pixels(page, "centre")[:, :, :3].astype(int)
-    off = shown - light_field.views[light_field.reference]
+    off = shown - light_field.views[light_field.reference_position]
     assert np.abs(off.mean(axis=2)).mean() < 5
     assert np.abs(off.mean(axis=(0, 1))).max() < 4
     mask = light_field.masks["occluded"]
-    over = map_pixels(page, "occluded-truth")[:, :, :3].astype(int)
+    over = map_pixels(page, "occluded-ground-truth")[:, :, :3].astype(int)
     assert (over[mask][:, 0] > over[mask][:, 2] + 60).all()
     assert (np.abs(over[~mask] - shown[~mask] / 2) <= 1).all()
 
@@ -237,7 +237,7 @@ def magnified(picture: Any, x: int, y: int, side: int, reach: int = 20) -> Any:
 @pytest.mark.parametrize(("x", "y"), [(12, 30), (50, 8)])
 def test_close_ups_in_all_panels_follow_the_cursor(page: Any, x: int, y: int) -> None:
     """In a lower corner of each panel, the one that is farther away from the cursor."""
-    keys = ("truth", "best/textureless")
+    keys = ("ground_truth", "best/textureless")
     page.locator(tile(keys[1])).scroll_into_view_if_needed()
     for key in keys:
         visible_tile(page, key)
@@ -265,10 +265,10 @@ def test_close_ups_in_all_panels_follow_the_cursor(page: Any, x: int, y: int) ->
 
 
 def test_the_large_close_ups_follow_the_cursor(page: Any) -> None:
-    choose(page, a="truth", b="paper/optimize")
+    choose(page, a="ground_truth", b="paper/optimize")
     for x, y in ((10, 12), (60, 40)):
         point_at(page, x, y)
-        for side, key in (("a", "truth"), ("b", "paper/optimize")):
+        for side, key in (("a", "ground_truth"), ("b", "paper/optimize")):
             seen = canvas_pixels(page, f'[data-part="close-{side}"]')[:, :, :3].astype(int)
             wanted = magnified(map_pixels(page, key), x, y, len(seen)).astype(int)
             assert (np.abs(seen - wanted).max(axis=2) < 12).mean() > 0.95
@@ -308,12 +308,12 @@ def test_a_scene_without_truth(page: Any, example: Example) -> None:
     show_scene(page, PICTURE_TITLE)
     keys = page.locator('[data-part="a"] option').evaluate_all("(all) => all.map((o) => o.value)")
     assert "best/optimize" in keys
-    assert not [key for key in keys if "error" in key or "truth" in key or "change" in key]
+    assert not [key for key in keys if "error" in key or "ground_truth" in key or "change" in key]
     choose(page, a="best/optimize")
     point_at(page, 33, 12)
     shown = read_out(page)
     assert float(shown["value a"]) == as_shown(example.final(PICTURE, "best").disparity[12, 33])
-    assert (shown["truth"], shown["error a"]) == ("–", "–")
+    assert (shown["ground_truth"], shown["error a"]) == ("–", "–")
     assert "truthunknown" in part(page, "facts")
     assert page.locator("#changes canvas").count() == 0
 
@@ -353,4 +353,4 @@ def test_what_an_earlier_scene_began_is_not_shown(page: Any) -> None:
     top = slice(0, SIZE // 3)
     assert (np.abs(seen[top].astype(int) - wanted[top].astype(int)).max(axis=2) < 40).mean() > 0.8
     point_at(page, 12, 40)
-    assert read_out(page)["truth"] == "–"
+    assert read_out(page)["ground_truth"] == "–"

@@ -20,7 +20,7 @@ Sepi.Panels = class {
     this.arrays = new Sepi.Arrays(scene);
     this.drawn = new Map();
     this.byKey = new Map(this.list.map((panel) => [panel.key, panel]));
-    this.truth = this.byKey.get("truth");
+    this.groundTruth = this.byKey.get("ground_truth");
   }
 
   get(key) {
@@ -42,8 +42,8 @@ Sepi.Panels = class {
     if (panel.minus === undefined) return map;
     const other = await this.arrays.get(panel.minus);
     if (panel.kind !== "change") return map.map((value, i) => value - other[i]);
-    const truth = await this.arrays.get(panel.truth);
-    return map.map((value, i) => Math.abs(value - truth[i]) - Math.abs(other[i] - truth[i]));
+    const groundTruth = await this.arrays.get(panel.ground_truth);
+    return map.map((value, i) => Math.abs(value - groundTruth[i]) - Math.abs(other[i] - groundTruth[i]));
   }
 
   /** Decimals to print a panel's numbers with. */

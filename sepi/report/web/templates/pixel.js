@@ -62,9 +62,9 @@ Sepi.Pixels = class {
       "chosen by paper": value(probe.chosen),
       "chosen by best": value(probe.best),
       "least cost": `${value(probe.minimum)} (all views); lowest of all with: ${Sepi.subset(probe.best_subset)}`,
-      truth: value(probe.truth),
+      ground_truth: value(probe.ground_truth),
       confidence: value(probe.confidence),
-      occlusion: `${occlusion}${probe.textureless ? "; texture-less" : ""}`,
+      occlusion: `${occlusion}${probe.textureless ? "; textureless" : ""}`,
     };
     this.part("facts").replaceChildren(
       ...Object.entries(facts).flatMap(([name, text]) => [
@@ -86,7 +86,7 @@ Sepi.Pixels = class {
     const names = {
       minimum: "SEPI at the least cost",
       chosen: "SEPI at the chosen candidate",
-      truth: "SEPI at the truth",
+      ground_truth: "SEPI at the ground truth",
       wrong: "SEPI at the worst candidate",
     };
     const shown = Object.keys(names).filter((name) => name in probe.sepi);
@@ -198,7 +198,7 @@ Sepi.chartAxes = (width, height, left, bottom, top, [low, high], highest) => {
 };
 
 Sepi.chartMarks = (probe, across, up, top, base) => {
-  const marks = { truth: probe.truth, paper: probe.chosen, best: probe.best };
+  const marks = { ground_truth: probe.ground_truth, paper: probe.chosen, best: probe.best };
   return Object.entries(marks)
     .filter(([, d]) => d !== null && d !== undefined)
     .flatMap(([name, d], i) => [

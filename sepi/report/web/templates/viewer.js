@@ -107,10 +107,10 @@ Sepi.Viewer = class {
       shown[side] = { panel, picture: await this.panels.picture(panel.key), values: await this.panels.values(panel) };
       if (panel.confidence !== undefined) shown[side].confidence = await this.panels.arrays.get(panel.confidence);
     }
-    const truth = this.panels.truth && (await this.panels.arrays.get(this.panels.truth.map));
+    const groundTruth = this.panels.groundTruth && (await this.panels.arrays.get(this.panels.groundTruth.map));
     if (turn !== this.turn || keys.a !== this.key("a") || keys.b !== this.key("b")) return;
     this.shown = shown;
-    this.truth = truth;
+    this.groundTruth = groundTruth;
     this.part("legends").replaceChildren(
       ...["a", "b"].map((side) =>
         Sepi.element(
@@ -217,13 +217,13 @@ Sepi.Viewer = class {
       if (i < 0 || !values) return "–";
       return Number.isNaN(values[i]) ? "unknown" : values[i].toFixed(decimals);
     };
-    const truth = this.panels.truth;
-    set("truth", number(this.truth, truth ? this.panels.decimals(truth) : 0));
+    const groundTruth = this.panels.groundTruth;
+    set("ground_truth", number(this.groundTruth, groundTruth ? this.panels.decimals(groundTruth) : 0));
     for (const side of ["a", "b"]) {
       const { panel, values, confidence } = this.shown[side];
       const decimals = values ? this.panels.decimals(panel) : 0;
       set(`value-${side}`, number(values, decimals));
-      const compares = panel.kind === "disparity" && this.truth && panel !== truth;
+      const compares = panel.kind === "disparity" && this.groundTruth && panel !== groundTruth;
       set(`error-${side}`, compares ? number(this.errors(side), decimals) : "–");
       set(`confidence-${side}`, confidence ? number(confidence, this.panels.arrays.decimals(panel.confidence)) : "–");
     }
@@ -237,7 +237,7 @@ Sepi.Viewer = class {
   /** Errors of what a side shows, made when they are first read out. */
   errors(side) {
     const shown = this.shown[side];
-    shown.errors ??= shown.values.map((value, i) => value - this.truth[i]);
+    shown.errors ??= shown.values.map((value, i) => value - this.groundTruth[i]);
     return shown.errors;
   }
 
