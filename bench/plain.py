@@ -71,7 +71,7 @@ def plain_sweep(light_field: LightField, parameters: SweepParameters, warp: Warp
     parameters : SweepParameters
     warp : callable
     """
-    views = as_unit_float(light_field.views)
+    views = as_unit_float(light_field.rgb_views)
     reference_view = light_field.reference_view
     noise = residual_variance(reference_view)
     weights = _window_weights(reference_view, parameters.window_radius, parameters.window_sigma**2 + noise)

@@ -171,9 +171,18 @@ class LightField:
         return self.views.shape[0], self.views.shape[1]
 
     @property
+    def rgb_views(self) -> npt.NDArray[np.generic]:
+        """The views with three channels, ``(T, S, H, W, 3)``: what all computation sees.
+
+        Grey counts as three equal channels, so that a light field gives the same maps as grey and as RGB. They take no
+        memory of their own and cannot be written to.
+        """
+        return np.broadcast_to(self.views, (*self.views.shape[:4], 3))
+
+    @property
     def reference_view(self) -> FloatMap:
-        """The reference view as ``(H, W, C)`` float32 in 0..1."""
-        return as_unit_float(self.views[self.reference_position])
+        """The reference view as ``(H, W, 3)`` float32 in 0..1, grey as three equal channels."""
+        return as_unit_float(self.rgb_views[self.reference_position])
 
     def require_disparity_range(self) -> DisparityRange:
         """The disparity range.
@@ -212,8 +221,14 @@ def _require_unit(name: str, values: npt.NDArray[np.generic]) -> None:
 
 
 def as_unit_float(values: npt.NDArray[np.generic]) -> FloatMap:
-    """Pixel values as float32 in 0..1; integers are divided by the largest value of their type."""
+    """Pixel values as float32 in 0..1, rows contiguous; integers are divided by the largest value of their type."""
+    values = np.ascontiguousarray(values)
     if np.issubdtype(values.dtype, np.integer):
         largest = np.iinfo(values.dtype).max  # type: ignore[type-var]
         return np.asarray(values.astype(np.float32) / np.float32(largest), np.float32)
     return values.astype(np.float32)
+
+
+def full_scale(dtype: npt.DTypeLike) -> float:
+    """Pixel value that stands for 1.0."""
+    return float(np.iinfo(dtype).max) if np.issubdtype(dtype, np.integer) else 1.0

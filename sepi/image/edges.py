@@ -32,7 +32,7 @@ def canny_edges(reference_view: FloatMap, parameters: CannyParameters) -> BoolMa
 
     Parameters
     ----------
-    reference_view : ndarray, shape (H, W, C), float32
+    reference_view : ndarray, shape (H, W, 3), float32
         Values in 0..1.
     parameters : CannyParameters
 
@@ -55,7 +55,7 @@ def edge_angle(reference_view: FloatMap, parameters: CannyParameters) -> FloatMa
 
     Parameters
     ----------
-    reference_view : ndarray, shape (H, W, C), float32
+    reference_view : ndarray, shape (H, W, 3), float32
     parameters : CannyParameters
 
     Returns

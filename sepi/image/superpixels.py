@@ -91,7 +91,7 @@ def superpixels(reference_view: FloatMap, size: int, compactness: float) -> Supe
 
     Parameters
     ----------
-    reference_view : ndarray, shape (H, W, C), float32
+    reference_view : ndarray, shape (H, W, 3), float32
         Values in 0..1.
     size : int
         Pixels.
@@ -102,11 +102,11 @@ def superpixels(reference_view: FloatMap, size: int, compactness: float) -> Supe
 
     H, W = reference_view.shape[:2]
     labels = slic(
-        reference_view if reference_view.shape[2] == 3 else reference_view[..., 0],
+        reference_view,
         n_segments=max(1, H * W // size**2),
         compactness=compactness,
         start_label=0,
-        channel_axis=2 if reference_view.shape[2] == 3 else None,
+        channel_axis=2,
     )
     labels = np.unique(labels, return_inverse=True)[1].reshape(H, W).astype(np.int64)
     sizes = np.bincount(labels.ravel())
@@ -140,7 +140,7 @@ def colour_modes(reference_view: FloatMap, segments: Superpixels, bandwidth: flo
 
     Parameters
     ----------
-    reference_view : ndarray, shape (H, W, C), float32
+    reference_view : ndarray, shape (H, W, 3), float32
         Values in 0..1.
     segments : Superpixels
     bandwidth : float
@@ -153,8 +153,7 @@ def colour_modes(reference_view: FloatMap, segments: Superpixels, bandwidth: flo
     """
     from sepi.image.mean_shift import sample_modes
 
-    rgb = reference_view if reference_view.shape[2] == 3 else np.repeat(reference_view, 3, axis=2)
-    hue, saturation, value = np.moveaxis(cv2.cvtColor(np.ascontiguousarray(rgb), cv2.COLOR_RGB2HSV), 2, 0)
+    hue, saturation, value = np.moveaxis(cv2.cvtColor(reference_view, cv2.COLOR_RGB2HSV), 2, 0)
     # hue is an angle that means little where colour is weak, so it goes into a cone
     chroma = saturation * value
     cone = (chroma * np.cos(np.radians(hue)), chroma * np.sin(np.radians(hue)), value)

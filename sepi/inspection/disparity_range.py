@@ -76,8 +76,8 @@ def estimate_range(light_field: LightField) -> DisparityRange:
     """
     positions = _positions(light_field)
     factor = math.ceil(math.sqrt(math.prod(light_field.shape) / _MOST_PIXELS))
-    reference = _prepared(light_field.views[light_field.reference_position], factor)
-    views = np.stack([_prepared(light_field.views[position], factor) for position in positions])
+    reference = _prepared(light_field.rgb_views[light_field.reference_position], factor)
+    views = np.stack([_prepared(light_field.rgb_views[position], factor) for position in positions])
     offsets = np.array(positions, np.int64) - light_field.reference_position
     # the farthest view moves by one pixel from candidate to candidate
     step = 1 / int(abs(offsets).max())

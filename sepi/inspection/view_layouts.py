@@ -60,7 +60,7 @@ class Views:
     """
 
     def __init__(self, light_field: LightField) -> None:
-        self._views = light_field.views
+        self._views = light_field.rgb_views
         self._factor = max(1, math.ceil(math.sqrt(math.prod(light_field.shape) / _MOST_PIXELS)))
         self._grey: dict[tuple[int, int, int], FloatMap] = {}
         places = np.argwhere(light_field.present)

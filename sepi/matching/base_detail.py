@@ -23,7 +23,7 @@ import numpy.typing as npt
 from pydantic import Field
 
 from sepi.image.noise import noise_level, residual_variance
-from sepi.lightfield import FloatMap, LightField, as_unit_float
+from sepi.lightfield import FloatMap, LightField, as_unit_float, full_scale
 from sepi.stage import Parameters
 
 DETAIL_UNIT = 1 / 32000
@@ -99,19 +99,14 @@ def base_detail_decomposition(light_field: LightField, parameters: BaseDetailPar
     -------
     Layers
     """
-    views = light_field.views
-    channels = 3 // views.shape[4]
-    # grey counts as three equal channels, so that scales mean the same for grey and colour
-    noise = channels * residual_variance(light_field.reference_view)
-    edge = float(np.hypot(parameters.base_sigma_colour, 3 * noise_level(light_field.reference_view))) / channels
+    views, guide = light_field.rgb_views, light_field.reference_view
+    edge = float(np.hypot(parameters.base_sigma_colour, 3 * noise_level(guide)))
     if parameters.detail_share > 0:
         detail = _detail_of_views(light_field, parameters.base_radius, edge, parameters.base_sigma_space)
     else:
         detail = np.empty((*light_field.grid, 0, *light_field.shape), np.int16)
-    colours = np.ascontiguousarray(np.repeat(views.transpose(0, 1, 4, 2, 3), channels, axis=2))
-    unit = 1 / float(np.iinfo(views.dtype).max) if np.issubdtype(views.dtype, np.integer) else 1.0  # type: ignore[type-var]
-    guide = np.ascontiguousarray(np.repeat(light_field.reference_view, channels, axis=2))
-    return BaseDetail(colours, unit, detail, noise, guide)
+    colours = np.ascontiguousarray(views.transpose(0, 1, 4, 2, 3))
+    return BaseDetail(colours, 1 / full_scale(views.dtype), detail, residual_variance(guide), guide)
 
 
 def _detail_of_views(light_field: LightField, radius: int, edge: float, width: float) -> npt.NDArray[np.int16]:
@@ -119,7 +114,7 @@ def _detail_of_views(light_field: LightField, radius: int, edge: float, width: f
 
     The detail of the last light field is kept, since the stages of one run ask for it again.
     """
-    views = light_field.views
+    views = light_field.rgb_views
     content = zlib.crc32(np.ascontiguousarray(views).data)
     key = (content, views.shape, views.dtype, light_field.present.tobytes(), radius, edge, width)
     if key in _KEPT:
@@ -127,8 +122,7 @@ def _detail_of_views(light_field: LightField, radius: int, edge: float, width: f
     detail = np.zeros((*light_field.grid, 3, *light_field.shape), np.int16)
     for t, s in np.argwhere(light_field.present):
         view = as_unit_float(views[t, s])
-        base = cv2.bilateralFilter(np.ascontiguousarray(view), 2 * radius + 1, edge, width).reshape(view.shape)
-        # of grey views the one channel goes to all three
+        base = cv2.bilateralFilter(view, 2 * radius + 1, edge, width)
         detail[t, s] = np.rint(np.clip(view - base, -1, 1) / DETAIL_UNIT).astype(np.int16).transpose(2, 0, 1)
     forget_layers()
     _KEPT[key] = detail

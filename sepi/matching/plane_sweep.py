@@ -21,7 +21,7 @@ import numpy.typing as npt
 from pydantic import Field
 
 from sepi.image.noise import residual_variance
-from sepi.lightfield import BoolMap, FloatMap, LightField
+from sepi.lightfield import BoolMap, FloatMap, LightField, full_scale
 from sepi.stage import Parameters, Progress, no_progress
 
 
@@ -71,13 +71,8 @@ class SweepResult:
 
 
 def planar(light_field: LightField) -> npt.NDArray[np.generic]:
-    """Views as ``(T, S, C, H, W)``, each channel's rows contiguous, in their own number type."""
-    return np.ascontiguousarray(light_field.views.transpose(0, 1, 4, 2, 3))
-
-
-def full_scale(dtype: npt.DTypeLike) -> float:
-    """Pixel value that stands for 1.0."""
-    return float(np.iinfo(dtype).max) if np.issubdtype(dtype, np.integer) else 1.0
+    """Views as ``(T, S, 3, H, W)``, each channel's rows contiguous, in their own number type."""
+    return np.ascontiguousarray(light_field.rgb_views.transpose(0, 1, 4, 2, 3))
 
 
 def sweep(

@@ -107,8 +107,7 @@ def stitched_epi(light_field: LightField, y: int, disparity: float) -> StitchedE
     if not 0 <= y < H:
         raise SepiError(f"{light_field.name}: row {y} lies outside the reference view (0..{H - 1})")
     t0, s0 = light_field.reference_position
-    channels = light_field.views.shape[4]
-    rows = np.zeros((T, S, W, channels), np.float32)
+    rows = np.zeros((T, S, W, 3), np.float32)
     inside = np.zeros((T, S), bool)
     offsets = np.zeros((T, S))
     steps = np.zeros((T, S), int)
@@ -120,12 +119,13 @@ def stitched_epi(light_field: LightField, y: int, disparity: float) -> StitchedE
         if not 0 <= row <= H - 1:
             continue
         top = min(int(np.floor(row)), H - 2)
-        above, below = as_unit_float(light_field.views[t, :, top]), as_unit_float(light_field.views[t, :, top + 1])
+        above, below = (
+            as_unit_float(light_field.rgb_views[t, :, top]),
+            as_unit_float(light_field.rgb_views[t, :, top + 1]),
+        )
         rows[t] = (1 - (row - top)) * above + (row - top) * below
         inside[t] = light_field.present[t]
-    return StitchedEpi(
-        rows.reshape(T * S, W, channels), offsets.ravel(), steps.ravel(), inside.ravel(), float(disparity)
-    )
+    return StitchedEpi(rows.reshape(T * S, W, 3), offsets.ravel(), steps.ravel(), inside.ravel(), float(disparity))
 
 
 def line_cost(light_field: LightField, y: int, x: int, disparity: float, scale: float) -> float:

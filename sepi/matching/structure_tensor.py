@@ -61,8 +61,8 @@ def structure_tensor_depth(light_field: LightField, parameters: StructureTensorP
     known = light_field.require_disparity_range()
     best = np.full(light_field.shape, (known.minimum + known.maximum) / 2, np.float32)
     confidence = np.zeros(light_field.shape, np.float32)
-    row = [(s - s0, light_field.views[t0, s]) for s in range(light_field.grid[1]) if light_field.present[t0, s]]
-    column = [(t - t0, light_field.views[t, s0]) for t in range(light_field.grid[0]) if light_field.present[t, s0]]
+    row = [(s - s0, light_field.rgb_views[t0, s]) for s in range(light_field.grid[1]) if light_field.present[t0, s]]
+    column = [(t - t0, light_field.rgb_views[t, s0]) for t in range(light_field.grid[0]) if light_field.present[t, s0]]
     if max(len(row), len(column)) < 2:
         raise SepiError(
             f"{light_field.name}: the structure tensor needs a second view in the row or the column of view {t0},{s0}"

@@ -21,9 +21,8 @@ import numpy.typing as npt
 from pydantic import Field
 
 from sepi.image.noise import noise_level
-from sepi.lightfield import BoolMap, FloatMap, LightField
+from sepi.lightfield import BoolMap, FloatMap, LightField, full_scale
 from sepi.matching.base_detail import BaseDetailParameters, base_detail_decomposition
-from sepi.matching.plane_sweep import full_scale
 from sepi.stage import Parameters, StageMaps
 
 LEAST_NOISE = 1e-5

@@ -86,7 +86,7 @@ def textureless(reference_view: FloatMap) -> BoolMap:
 
     Parameters
     ----------
-    reference_view : ndarray, shape (H, W, C), float32
+    reference_view : ndarray, shape (H, W, 3), float32
         Centre view in 0..1.
 
     Returns

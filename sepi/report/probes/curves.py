@@ -92,7 +92,7 @@ def cost_curves(
     r = parameters.window_radius
     rows = np.arange(max(0, y - r), min(H, y + r + 1))
     columns = np.arange(max(0, x - r), min(W, x + r + 1))
-    reference_view = as_unit_float(light_field.views[t0, s0][np.ix_(rows, columns)]).transpose(2, 0, 1)
+    reference_view = as_unit_float(light_field.rgb_views[t0, s0][np.ix_(rows, columns)]).transpose(2, 0, 1)
     difference = reference_view - reference_view[:, y - rows[0], x - columns[0], None, None]
     weights = np.exp(-0.5 * (difference**2).sum(axis=0) / np.float32(parameters.window_sigma**2 + noise))
     weights = (weights / weights.sum()).astype(np.float32)
@@ -108,7 +108,7 @@ def cost_curves(
         # as the sweep counts: a sample on the last row needs none below, one on the last column does not count
         inside_y = (top >= 0) & ((top < H - 1) | ((top == H - 1) & (fy[t] == 0)[:, None]))
         inside_x = (left >= 0) & (left < W - 1)
-        squared = _squared_residuals(light_field.views[t, s], reference_view, top, left, fy[t], fx[s])
+        squared = _squared_residuals(light_field.rgb_views[t, s], reference_view, top, left, fy[t], fx[s])
         residual = squared / (squared + scale2)
         if not (inside_y.all() and inside_x.all()):
             residual *= inside_y[:, :, None] & inside_x[:, None]

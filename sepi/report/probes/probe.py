@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sepi.errors import SepiError
-from sepi.lightfield import BoolMap, FloatMap, LightField, as_unit_float
+from sepi.lightfield import BoolMap, FloatMap, LightField
 from sepi.matching.plane_sweep import SweepParameters
 from sepi.matching.stitched_epi import stitched_epi
 from sepi.matching.view_subsets import halves_and_quarters
@@ -246,7 +246,7 @@ def probe(
         if disparity is not None
     }
     top, left = max(0, y - CROP_RADIUS), max(0, x - CROP_RADIUS)
-    around = light_field.views[light_field.reference_position][top : y + CROP_RADIUS + 1, left : x + CROP_RADIUS + 1]
+    around = light_field.reference_view[top : y + CROP_RADIUS + 1, left : x + CROP_RADIUS + 1]
     return Probe(
         y=y,
         x=x,
@@ -264,7 +264,7 @@ def probe(
         textureless=bool(maps.mask("textureless")[y, x]),
         pictures=pictures,
         patch=pictures["chosen"].pixels[:, half_width].reshape(*light_field.grid, 3),
-        crop=as_rgb(as_unit_float(around)),
+        crop=as_rgb(around),
         crop_origin=(top, left),
     )
 
