@@ -15,7 +15,7 @@ import click
 
 from sepi.errors import SepiError
 from sepi.evaluate import score
-from sepi.ingest import settle_range
+from sepi.inspection.disparity_range import settle_range
 from sepi.lightfield import LightField
 from sepi.pipeline import STAGES, variant_named
 from sepi.reading import read_light_field

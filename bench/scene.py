@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from bench.measure import Prepared
-from sepi.ingest import settle_range
+from sepi.inspection.disparity_range import settle_range
 from sepi.io.hdf5 import read_light_field, read_stage, write_light_field, write_stage
 from sepi.io.provenance import stage_attributes, step
 from sepi.lightfield import LightField

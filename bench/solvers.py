@@ -16,7 +16,14 @@ from bench.measure import Case, Figures, Prepared
 from bench.scene import Scene, maps_before
 from sepi.errors import SepiError
 from sepi.io.hdf5 import read_light_field
-from sepi.optimize import WlsParameters, data_weight, energy_system, rectified_confidence, smoothness_coefficient, solve
+from sepi.regularization.wls import (
+    WlsParameters,
+    data_weight,
+    energy_system,
+    rectified_confidence,
+    smoothness_coefficient,
+    solve,
+)
 
 Vector = npt.NDArray[np.float64]
 Solver = Callable[[Any, Vector, Vector, float], Vector]
@@ -87,7 +94,7 @@ def prepare(scene: Scene, solver: Solver, exact: Path) -> Prepared:
     before = maps_before(scene, "optimize")
     assert before is not None  # it is not the first stage
     parameters = WlsParameters()
-    confidence = rectified_confidence(before, parameters)
+    confidence = rectified_confidence(before.confidence, before.mask("textureless"), parameters)
     weight = data_weight(before.disparity, confidence, parameters)
     smoothness = smoothness_coefficient(light_field.reference_view, confidence, parameters)
     matrix, right = energy_system(before.disparity, weight, smoothness, parameters.alpha)

@@ -8,7 +8,7 @@ import time
 from pathlib import Path
 
 from sepi.workflow.config import GRAPH_CONFIG, load_settings
-from sepi.workflow.code_digest import ROOT, code_digest
+from sepi.workflow.code_digest import ROOT, code_digest, stage_modules
 from sepi.errors import SepiError
 from sepi.io.result_folder import RESULT_FILES
 from sepi.pipeline import HANDED_ON, STAGES, VARIANTS, key_of, stage_of

@@ -14,7 +14,7 @@ rule initial:
         mem_mb=memory_for(bytes_per_sample=13, bytes_per_pixel=1300),
     params:
         parameters=parameters_of("initial"),
-        code=code_digest("sepi.initial"),
+        code=code_digest(*stage_modules("initial")),
     message:
         "{wildcards.dataset}/{wildcards.scene}: initial depth ({wildcards.initial})"
     shell:

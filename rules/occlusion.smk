@@ -17,7 +17,7 @@ rule occlusion:
         mem_mb=memory_for(bytes_per_sample=18, bytes_per_pixel=1400),
     params:
         parameters=parameters_of("occlusion"),
-        code=code_digest("sepi.occlusion"),
+        code=code_digest(*stage_modules("occlusion")),
     message:
         "{wildcards.dataset}/{wildcards.scene}: occlusion ({wildcards.initial}, {wildcards.occlusion})"
     shell:

@@ -17,7 +17,7 @@ rule optimize:
         mem_mb=memory_for(bytes_per_sample=30, bytes_per_pixel=1500),
     params:
         parameters=parameters_of("optimize"),
-        code=code_digest("sepi.optimize"),
+        code=code_digest(*stage_modules("optimize")),
     message:
         "{wildcards.dataset}/{wildcards.scene}: global optimisation ({wildcards.initial}, {wildcards.occlusion}, {wildcards.textureless}, {wildcards.optimize})"
     shell:

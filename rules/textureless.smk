@@ -17,7 +17,7 @@ rule textureless:
         mem_mb=memory_for(bytes_per_sample=17, bytes_per_pixel=500),
     params:
         parameters=parameters_of("textureless"),
-        code=code_digest("sepi.textureless"),
+        code=code_digest(*stage_modules("textureless")),
     message:
         "{wildcards.dataset}/{wildcards.scene}: textureless regions ({wildcards.initial}, {wildcards.occlusion}, {wildcards.textureless})"
     shell:

@@ -11,7 +11,6 @@ import functools
 import gc
 import json
 import os
-import resource
 import signal
 import sys
 import threading
@@ -32,8 +31,8 @@ from sepi.io.provenance import history_of, stage_attributes, step
 from sepi.stage import Choice, Progress, no_progress
 from sepi.validation import validated
 
-# a workflow that stops its jobs; a terminal that is closed
-_ENDING = (signal.SIGTERM, signal.SIGHUP)
+# a workflow that stops its jobs; a terminal that is closed, which not all systems tell of
+_ENDING = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
 
 
 class _Shown(click.ClickException):
@@ -162,7 +161,17 @@ def peak_memory_mb() -> float:
         # ru_maxrss below would start at what the parent held
         return next(int(line.split()[1]) for line in status.splitlines() if line.startswith("VmHWM")) / 2**10
     except (OSError, StopIteration):
+        pass
+    try:
+        import resource
+
         return megabytes(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+    except ImportError:
+        # Windows
+        import psutil
+
+        memory = psutil.Process().memory_info()
+        return float(getattr(memory, "peak_wset", memory.rss)) / 2**20
 
 
 def megabytes(maxrss: int) -> float:

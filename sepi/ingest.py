@@ -9,35 +9,10 @@ import click
 
 from sepi.cli.input_options import Reading, reading_flags
 from sepi.command import SepiCommand, use_threads, write_timing
-from sepi.errors import SepiError
+from sepi.inspection.disparity_range import settle_range
 from sepi.io.hdf5 import write_light_field
-from sepi.lightfield import DisparityRange, LightField
 
 _PATH = click.Path(path_type=Path)
-
-
-def settle_range(light_field: LightField, given: tuple[float, float] | None = None) -> LightField:
-    """The light field with a disparity range: the given one, else its own, else one estimated from the views.
-
-    Raises
-    ------
-    SepiError
-        If the given range is none, or nothing is known and the views do not tell, or a disparity of the range would
-        move every pixel out of the neighbouring view.
-    """
-    if given is not None:
-        light_field = light_field.with_range(DisparityRange(*given, "given"))
-    if light_field.disparity_range is None:
-        from sepi.inspection.disparity_range import estimate_range
-
-        return light_field.with_range(estimate_range(light_field))
-    known, side = light_field.disparity_range, max(light_field.shape)
-    if max(-known.minimum, known.maximum) >= side:
-        raise SepiError(
-            f"{light_field.source or light_field.name}: disparity range ({known.source}) of {known.minimum:g} to "
-            f"{known.maximum:g} pixels per view step; expected less than the {side} pixels of a view"
-        )
-    return light_field
 
 
 @click.command(name="python -m sepi.ingest", cls=SepiCommand)

@@ -17,7 +17,6 @@ References
 
 from __future__ import annotations
 
-from sepi.command import stage_command
 from sepi.lightfield import LightField
 from sepi.matching.plane_sweep import SweepParameters, sweep
 from sepi.matching.structure_tensor import StructureTensorParameters, structure_tensor_depth
@@ -83,4 +82,6 @@ CHOICES = {
 }
 
 if __name__ == "__main__":
+    from sepi.command import stage_command
+
     stage_command("initial", CHOICES)()

@@ -32,7 +32,6 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import Field
 
-from sepi.command import stage_command
 from sepi.image.edges import CannyParameters, canny_edges, depth_steps, edge_angle
 from sepi.lightfield import BoolMap, FloatMap, LightField
 from sepi.matching.plane_sweep import SweepParameters, SweepResult, sweep
@@ -43,7 +42,7 @@ from sepi.matching.visibility_sweep import (
     VisibilityParameters,
     depth_from_visible_views,
 )
-from sepi.stage import Choice, NoParameters, Progress, StageMaps, require_previous
+from sepi.stage import Choice, NoParameters, Progress, StageMaps, none, require_previous
 
 
 class OcclusionParameters(SweepParameters, CannyParameters):
@@ -177,13 +176,6 @@ def visibility(
     )
 
 
-def none(
-    light_field: LightField, previous: StageMaps | None, parameters: NoParameters, progress: Progress
-) -> StageMaps:
-    """Initial depth as it is."""
-    return require_previous(previous)
-
-
 def occlusion_candidates(reference_view: FloatMap, disparity: FloatMap, parameters: OcclusionParameters) -> BoolMap:
     """Pixels within reach of an edge of the reference view or of a step of the depth map; shape (H, W), bool."""
     edges = canny_edges(reference_view, parameters) | depth_steps(disparity, parameters.discontinuity_threshold)
@@ -273,4 +265,6 @@ CHOICES = {
 }
 
 if __name__ == "__main__":
+    from sepi.command import stage_command
+
     stage_command("occlusion", CHOICES)()

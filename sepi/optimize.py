@@ -17,38 +17,31 @@ References
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Self
+from typing import Self
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 from pydantic import Field, model_validator
 
-from sepi.command import stage_command
 from sepi.lightfield import FloatMap, LightField
 from sepi.matching.base_detail import COLOURS_ALONE_SCALE, BaseDetail, BaseDetailParameters, base_detail_decomposition
+from sepi.regularization.wls import (
+    WlsParameters,
+    data_weight,
+    energy_system,
+    rectified_confidence,
+    smoothness_coefficient,
+    solve,
+)
 from sepi.stage import (
     Choice,
     NoParameters,
-    Parameters,
     Progress,
     StageMaps,
-    relative_confidence,
+    none,
     require_previous,
     with_defaults,
 )
-
-if TYPE_CHECKING:
-    import scipy.sparse as sparse
-
-FloatArray = npt.NDArray[np.float64]
-
-LEAST_CONFIDENCE = 0.01
-"""Keeps the system solvable where no pixel is trusted."""
-
-STEPS_BEFORE_MULTIGRID = 200
-"""As long as setting up the multigrid takes."""
-
 
 UNIFORM_WEIGHT = 0.05
 """Weight of a plane that was put into a region without texture; planes cost nothing, so little holds it."""
@@ -61,30 +54,6 @@ HALF_CONFIDENT_BEND = 0.01
 
 LEAST_RELIABILITY = 1e-6
 LEAST_SMOOTHNESS = 1e-8
-
-
-class WlsParameters(Parameters):
-    """Parameters of the weighted least squares."""
-
-    alpha: float = Field(
-        3e-6, ge=0, description="weight of smoothness against data; for gradients of values 0..1 per px"
-    )
-    gradient_floor: float = Field(
-        0.002, gt=0, description="image gradient below which all is equally smooth, 0..1 per px"
-    )
-    tau_0: float = Field(1000.0, ge=0, description="how sharply the data weight falls beyond tau_1")
-    tau_1: float = Field(
-        0.2, ge=0, description="standard deviation of the depth in 3x3 pixels that marks a step, px per step"
-    )
-    discontinuity_weight: float = Field(
-        0.1, gt=0, le=1, description="share of its weight that the data keeps at a step, where Eq. 9 would leave none"
-    )
-    tau_2: float = Field(1.5, ge=0, description="how strongly confidence weakens smoothness")
-    textureless_confidence: float = Field(0.8, ge=0, le=1, description="c_tl, confidence of textureless regions")
-    confidence_power: float = Field(4.0, gt=0, le=10, description="exponent on the confidence as data weight")
-    rtol: float = Field(
-        1e-12, gt=0, lt=1, description="relative residual at which the solver stops; pixels of low weight need it small"
-    )
 
 
 class SecondOrderParameters(BaseDetailParameters):
@@ -147,7 +116,7 @@ def wls(
         ``confidence`` is the rectified confidence c' of Eq. 10.
     """
     before = require_previous(previous)
-    confidence = rectified_confidence(before, parameters)
+    confidence = rectified_confidence(before.confidence, before.mask("textureless"), parameters)
     weight = data_weight(before.disparity, confidence, parameters)
     smoothness = smoothness_coefficient(light_field.reference_view, confidence, parameters)
     progress(0.1)
@@ -242,84 +211,6 @@ def smooth_second_order(
     return solve_smooth(matrix, weight, target, parameters.rtol, parameters.max_iterations)
 
 
-def none(
-    light_field: LightField, previous: StageMaps | None, parameters: NoParameters, progress: Progress
-) -> StageMaps:
-    """Depth after the textureless stage as it is."""
-    return require_previous(previous)
-
-
-def rectified_confidence(before: StageMaps, parameters: WlsParameters) -> FloatMap:
-    """C' of Eq. 10: of textureless pixels a constant, else the stage's own (half-SEPI confidence where occluded)."""
-    own = relative_confidence(before.confidence)
-    return np.where(before.mask("textureless"), parameters.textureless_confidence, own).astype(np.float32)
-
-
-def data_weight(disparity: FloatMap, confidence: FloatMap, parameters: WlsParameters) -> FloatMap:
-    """Weight w of Eq. 9: the confidence, or little of it where the depth's deviation in 3x3 pixels marks a step."""
-    mean = cv2.blur(disparity, (3, 3))
-    deviation = np.sqrt(np.maximum(cv2.blur((disparity - mean) ** 2, (3, 3)), 0))
-    cut = np.exp(-np.minimum(parameters.tau_0 * np.maximum(deviation - parameters.tau_1, 0), 80))
-    trust = np.maximum(confidence, LEAST_CONFIDENCE) ** parameters.confidence_power
-    return (trust * np.maximum(cut, parameters.discontinuity_weight)).astype(np.float32)
-
-
-def smoothness_coefficient(reference_view: FloatMap, confidence: FloatMap, parameters: WlsParameters) -> FloatMap:
-    """S = s_c s_t of Eq. 11-12; shape (H, W), float32."""
-    dx, dy = (cv2.Sobel(reference_view, cv2.CV_32F, *order, ksize=3, scale=1 / 8) for order in ((1, 0), (0, 1)))
-    squared = (np.atleast_3d(dx) ** 2 + np.atleast_3d(dy) ** 2).sum(axis=2)
-    return np.asarray(np.exp(-parameters.tau_2 * confidence) / (squared + parameters.gradient_floor**2), np.float32)
-
-
-def energy_system(
-    disparity: FloatMap, weight: FloatMap, smoothness: FloatMap, alpha: float
-) -> tuple[sparse.csr_matrix, FloatArray]:
-    """Normal equations of Eq. 8 on the 4-connected grid.
-
-    Each pair of neighbours stands twice in the sum, once with the coefficient of either pixel.
-
-    Returns
-    -------
-    matrix : sparse matrix, shape (H * W, H * W), float64
-        Symmetric, positive definite.
-    right : ndarray, shape (H * W,), float64
-    """
-    import scipy.sparse as sparse
-
-    H, W = disparity.shape
-    index = np.arange(H * W).reshape(H, W)
-    s = alpha * smoothness.astype(np.float64)
-    first = np.concatenate([index[:, :-1].ravel(), index[:-1].ravel()])
-    second = np.concatenate([index[:, 1:].ravel(), index[1:].ravel()])
-    pair = np.concatenate([(s[:, :-1] + s[:, 1:]).ravel(), (s[:-1] + s[1:]).ravel()])
-    w = weight.astype(np.float64).ravel()
-    off = sparse.coo_matrix((-pair, (first, second)), shape=(H * W, H * W))
-    off = (off + off.T).tocsr()
-    diagonal = w - np.asarray(off.sum(axis=1)).ravel()
-    return (off + sparse.diags(diagonal)).tocsr(), w * disparity.ravel()
-
-
-def solve(matrix: sparse.csr_matrix, right: FloatArray, start: FloatMap, rtol: float) -> FloatArray:
-    """Solve by conjugate gradients, to a residual relative to the right side; shape of ``start``, float64.
-
-    With little smoothness the diagonal is preconditioner enough, and an algebraic multigrid takes several times as long
-    to set up as that takes to arrive. What has not arrived after a few steps is left to multigrid, whose steps do not
-    grow in number with smoothness or with regions that have hardly any data.
-    """
-    import scipy.sparse as sparse
-    from scipy.sparse.linalg import cg
-
-    vector = start.astype(np.float64).ravel()
-    inverse = sparse.diags_array(1 / matrix.diagonal())
-    solution, missed = cg(matrix, right, x0=vector, rtol=rtol, maxiter=STEPS_BEFORE_MULTIGRID, M=inverse)
-    if missed:
-        import pyamg  # slow to import, seldom needed
-
-        hierarchy = pyamg.ruge_stuben_solver(matrix)
-        solution = hierarchy.solve(right, x0=solution, tol=rtol, accel="cg", maxiter=100)
-    return np.asarray(solution).reshape(start.shape)
-
-
 CHOICES = {
     "wls": Choice(WlsParameters, wls),
     "second_order": Choice(SecondOrderParameters, second_order),
@@ -329,4 +220,6 @@ CHOICES = {
 }
 
 if __name__ == "__main__":
+    from sepi.command import stage_command
+
     stage_command("optimize", CHOICES)()

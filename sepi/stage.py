@@ -116,6 +116,13 @@ class Choice:
     run: StageFunction
 
 
+def none(
+    light_field: LightField, previous: StageMaps | None, parameters: NoParameters, progress: Progress
+) -> StageMaps:
+    """The choice of a stage that is switched off: the maps of the stage before as they are."""
+    return require_previous(previous)
+
+
 def require_previous(previous: StageMaps | None) -> StageMaps:
     """The maps of the stage before, for a stage that cannot be the first.
 

@@ -24,12 +24,11 @@ from __future__ import annotations
 import numpy as np
 from pydantic import Field
 
-from sepi.command import stage_command
 from sepi.image.edges import CannyParameters, canny_edges
 from sepi.image.superpixels import FloatArray, Superpixels, adjacency, colour_modes, superpixels
 from sepi.lightfield import BoolMap, FloatMap, LightField
 from sepi.regularization.uniform_regions import UniformPlanesParameters, fill_uniform_regions
-from sepi.stage import Choice, NoParameters, Progress, StageMaps, relative_confidence, require_previous
+from sepi.stage import Choice, NoParameters, Progress, StageMaps, none, relative_confidence, require_previous
 
 
 class LtiParameters(CannyParameters):
@@ -152,13 +151,6 @@ def uniform_planes(
     return before.updated(disparity, before.confidence, textureless=uniform)
 
 
-def none(
-    light_field: LightField, previous: StageMaps | None, parameters: NoParameters, progress: Progress
-) -> StageMaps:
-    """Depth after the occlusion stage as it is."""
-    return require_previous(previous)
-
-
 def superpixel_size(shape: tuple[int, int], parameters: LtiParameters) -> int:
     """Width of a superpixel for images of this height and width, pixels."""
     return parameters.superpixel_size if shape[0] * shape[1] <= 512 * 512 else parameters.superpixel_size_large
@@ -261,4 +253,6 @@ CHOICES = {
 }
 
 if __name__ == "__main__":
+    from sepi.command import stage_command
+
     stage_command("textureless", CHOICES)()

@@ -8,7 +8,7 @@ from functools import cache
 from pathlib import Path
 
 from sepi.evaluate import score
-from sepi.ingest import settle_range
+from sepi.inspection.disparity_range import settle_range
 from sepi.lightfield import LightField
 from sepi.pipeline import STAGES, VARIANTS
 from sepi.reading import read_light_field

@@ -6,8 +6,8 @@ import pytest
 from scipy.sparse.linalg import splu
 
 from sepi.lightfield import DisparityRange, LightField
-from sepi.optimize import (
-    CHOICES,
+from sepi.optimize import CHOICES
+from sepi.regularization.wls import (
     WlsParameters,
     data_weight,
     energy_system,
@@ -119,7 +119,7 @@ def test_texture_less_pixels_have_the_papers_confidence():
     textureless = np.zeros((10, 10), bool)
     textureless[:3] = True
     maps = StageMaps(confidence, confidence, {"textureless": textureless})
-    rectified = rectified_confidence(maps, WlsParameters())
+    rectified = rectified_confidence(maps.confidence, maps.mask("textureless"), WlsParameters())
     np.testing.assert_allclose(rectified[:3], 0.8)
     assert (np.diff(rectified[3:].ravel()) >= 0).all()
 

@@ -58,7 +58,8 @@ def test_a_stage_without_kernels_does_not_wait_for_numba(tmp_path: Path) -> None
     write_stage(tmp_path / "initial.h5", maps, attributes)
     files = {"--light-field": "lightfield.h5", "--previous": "initial.h5", "--output": "optimize.h5"}
     words = ["--choice", "wls", *(str(part) for name, file in files.items() for part in (name, tmp_path / file))]
-    program = f"from sepi.optimize import *\nstage_command('optimize', CHOICES)({words!r}, standalone_mode=False)"
+    imports = "from sepi.command import stage_command\nfrom sepi.optimize import CHOICES"
+    program = f"{imports}\nstage_command('optimize', CHOICES)({words!r}, standalone_mode=False)"
     assert loaded(program) == {"scipy"}
     assert (tmp_path / "optimize.h5").is_file()
 

@@ -100,7 +100,7 @@ def depth(
       sepi depth views --grid 5x5 --exclude 0,0 --exclude 0,4
       sepi depth cotton --variant paper --set initial.sepi.num_disparities=91
     """
-    from sepi.ingest import settle_range
+    from sepi.inspection.disparity_range import settle_range
     from sepi.io.files import atomic_path
     from sepi.io.result_folder import RUNTIME, require_target, write_result
     from sepi.pipeline import HANDED_ON, estimate_depth, stage_parameters, variant_named

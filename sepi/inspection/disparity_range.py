@@ -16,7 +16,6 @@ import numpy as np
 import numpy.typing as npt
 
 from sepi.errors import SepiError
-from sepi.inspection.coarse_sweep import coarse_sweep
 from sepi.lightfield import BoolMap, DisparityRange, FloatMap, LightField, as_unit_float
 
 # Search: pixels per view step to each side at first, and at most
@@ -74,6 +73,9 @@ def estimate_range(light_field: LightField) -> DisparityRange:
     SepiError
         If too few pixels can be matched (no texture, or no disparity within 64 pixels per view step).
     """
+    # here, since it brings the compiler with it, and most scenes name their range
+    from sepi.inspection.coarse_sweep import coarse_sweep
+
     positions = _positions(light_field)
     factor = math.ceil(math.sqrt(math.prod(light_field.shape) / _MOST_PIXELS))
     reference = _prepared(light_field.rgb_views[light_field.reference_position], factor)
@@ -103,6 +105,28 @@ def estimate_range(light_field: LightField) -> DisparityRange:
     return DisparityRange(
         math.floor(100 * factor * (low - margin)) / 100, math.ceil(100 * factor * (high + margin)) / 100, "estimated"
     )
+
+
+def settle_range(light_field: LightField, given: tuple[float, float] | None = None) -> LightField:
+    """The light field with a disparity range: the given one, else its own, else one estimated from the views.
+
+    Raises
+    ------
+    SepiError
+        If the given range is none, or nothing is known and the views do not tell, or a disparity of the range would
+        move every pixel out of the neighbouring view.
+    """
+    if given is not None:
+        light_field = light_field.with_range(DisparityRange(*given, "given"))
+    if light_field.disparity_range is None:
+        return light_field.with_range(estimate_range(light_field))
+    known, side = light_field.disparity_range, max(light_field.shape)
+    if max(-known.minimum, known.maximum) >= side:
+        raise SepiError(
+            f"{light_field.source or light_field.name}: disparity range ({known.source}) of {known.minimum:g} to "
+            f"{known.maximum:g} pixels per view step; expected less than the {side} pixels of a view"
+        )
+    return light_field
 
 
 def _positions(light_field: LightField) -> list[tuple[int, int]]:

@@ -4,7 +4,10 @@ Snakemake sees the shell command of a rule, not the modules that the command imp
 ``params: code=code_digest("sepi.MODULE")``. What counts:
 
 - the module itself and every module of this package that it imports, directly or through others, wherever the import
-  stands. This includes the shared ones (light field, files, command line): they shape what is written;
+  stands;
+- not what stands below ``if __name__ == "__main__":``. For a stage that is the command, which parses flags and shows
+  progress: it cannot change the maps. What writes them to a file can: :func:`stage_modules` adds it;
+- not what stands below ``if TYPE_CHECKING:``, which never runs;
 - not the ``__init__`` of a package on the way to a module: it is run, but nothing of it is used. It counts where a name
   is imported from the package itself;
 - the syntax tree without docstrings: neither comments nor layout count;
@@ -23,15 +26,23 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 
+# blocks of a module that are not run when it is imported
+_NOT_RUN = ("TYPE_CHECKING", "__name__ == '__main__'")
+
+
+def stage_modules(stage: str) -> tuple[str, ...]:
+    """Modules that decide, with what they import, what is in a stage's file: the stage, and the format of the file."""
+    return (f"sepi.{stage}", "sepi.io.hdf5", "sepi.io.provenance")
+
 
 @cache
-def code_digest(module: str, root: Path = ROOT) -> str:
-    """Digest of a module and of all that it imports from its own package.
+def code_digest(*modules: str, root: Path = ROOT) -> str:
+    """Digest of modules and of all that they import from their own package.
 
     Parameters
     ----------
-    module : str
-        Dotted name, ``"sepi.initial"``.
+    *modules : str
+        Dotted names, ``"sepi.initial"``.
     root : Path
         Folder that holds the package.
 
@@ -46,15 +57,15 @@ def code_digest(module: str, root: Path = ROOT) -> str:
         If there is no such module below ``root``.
     """
     total = hashlib.sha256()
-    for name in sorted(imported_modules(module, root)):
+    for name in sorted(imported_modules(*modules, root=root)):
         total.update(f"{name}\n{_code(_file_of(name, root))}\n".encode())
     return total.hexdigest()[:16]
 
 
-def imported_modules(module: str, root: Path = ROOT) -> set[str]:
-    """``module`` and the modules of its package that it imports, directly or through others; dotted names."""
+def imported_modules(*modules: str, root: Path = ROOT) -> set[str]:
+    """The modules and those of their package that they import, directly or through others; dotted names."""
     found: set[str] = set()
-    waiting = [module]
+    waiting = list(modules)
     while waiting:
         name = waiting.pop()
         if name not in found:
@@ -80,7 +91,9 @@ def _is_module(module: str, root: Path) -> bool:
 
 @cache
 def _tree(file: Path) -> ast.Module:
-    return ast.parse(file.read_bytes(), str(file))
+    tree = ast.parse(file.read_bytes(), str(file))
+    tree.body = [node for node in tree.body if not (isinstance(node, ast.If) and ast.unparse(node.test) in _NOT_RUN)]
+    return tree
 
 
 @cache

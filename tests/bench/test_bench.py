@@ -22,7 +22,7 @@ from bench.solvers import SOLVERS
 from bench.stages import WINDOW_OPERATIONS
 from sepi.errors import SepiError
 from sepi.matching.plane_sweep import SweepParameters, sweep
-from sepi.optimize import energy_system
+from sepi.regularization.wls import energy_system
 from sepi.scenes import render
 from sepi.workflow.machine import this_machine
 

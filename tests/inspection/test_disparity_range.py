@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from sepi.errors import SepiError
-from sepi.ingest import settle_range
 from sepi.inspection.coarse_sweep import coarse_sweep
-from sepi.inspection.disparity_range import estimate_range
+from sepi.inspection.disparity_range import estimate_range, settle_range
 from sepi.lightfield import DisparityRange, LightField
 from sepi.reading import read_light_field
 from sepi.scenes import SCENES, render
