@@ -27,6 +27,8 @@ References
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import numpy.typing as npt
@@ -97,8 +99,8 @@ def half_sepi(
     Returns
     -------
     StageMaps
-        Adds ``occlusion_candidates`` and ``occluded``, bool, and ``occlusion_side``, uint8, the subset kept:
-        0 all views, 1-4 left, right, up, down half, 5-8 left-up, left-down, right-up, right-down quarter.
+        Adds ``occlusion_candidates`` and ``occluded``, bool, and ``view_subset``, uint8, the subset kept, a number
+        of ``subset_names``: all views, a half, or a quarter.
     """
     from sepi.image.mean_shift import patch_modes
 
@@ -122,7 +124,7 @@ def half_sepi(
         nearer = nearer_on_hidden_side(surface, result.disparity[n], sides, parameters.side_reach, parameters.side_step)
         cost[n] += parameters.gain_half if len(sides) == 1 else parameters.gain_quarter
         cost[n] += np.where(nearer, 0, parameters.gain_unconfirmed).astype(np.float32)
-    return replace_where_better(before, result, cost, candidates, parameters.min_change)
+    return replace_where_better(before, result, cost, candidates, views.names, parameters.min_change)
 
 
 def wang(
@@ -130,7 +132,7 @@ def wang(
 ) -> StageMaps:
     """Depth from the half of the angular patch, split along the edge, with the smaller cost.
 
-    Arguments and result as for ``half_sepi``; ``occlusion_side`` is the half plane's number, 0 where all views count.
+    Arguments and result as for ``half_sepi``; ``subset_names`` are those of half planes.
     """
     before = require_previous(previous)
     candidates = occlusion_candidates(light_field.reference_view, before.disparity, parameters)
@@ -145,7 +147,7 @@ def wang(
     beside = (number - first[None]) % parameters.directions == 0
     cost = result.cost.copy()
     cost[1:] = np.where(beside, cost[1:] + parameters.gain_half, np.inf)
-    return replace_where_better(before, result, cost, candidates, parameters.min_change)
+    return replace_where_better(before, result, cost, candidates, views.names, parameters.min_change)
 
 
 def visibility(
@@ -218,7 +220,12 @@ def nearer_on_hidden_side(surface: FloatMap, disparity: FloatMap, sides: list[st
 
 
 def replace_where_better(
-    before: StageMaps, result: SweepResult, cost: npt.NDArray[np.float32], candidates: BoolMap, min_change: float
+    before: StageMaps,
+    result: SweepResult,
+    cost: npt.NDArray[np.float32],
+    candidates: BoolMap,
+    names: tuple[str, ...],
+    min_change: float,
 ) -> StageMaps:
     """Initial maps with the depth and confidence of the subset of least cost where that is not all views.
 
@@ -230,6 +237,8 @@ def replace_where_better(
     cost : ndarray, shape (N, H, W), float32
         Costs to choose by.
     candidates : ndarray, shape (H, W), bool
+    names : tuple of str, length N
+        Of the subsets.
     min_change : float
         Smaller changes of disparity keep the depth from all views.
 
@@ -237,18 +246,19 @@ def replace_where_better(
     -------
     StageMaps
     """
-    side = np.where(candidates, np.argmin(np.nan_to_num(cost, nan=np.inf), axis=0), 0)
-    chosen = np.take_along_axis(result.disparity, side[None], axis=0)[0]
-    confidence = np.take_along_axis(result.confidence(), side[None], axis=0)[0]
-    occluded = side > 0
+    subset = np.where(candidates, np.argmin(np.nan_to_num(cost, nan=np.inf), axis=0), 0)
+    chosen = np.take_along_axis(result.disparity, subset[None], axis=0)[0]
+    confidence = np.take_along_axis(result.confidence(), subset[None], axis=0)[0]
+    occluded = subset > 0
     changed = occluded & (np.abs(chosen - before.disparity) > min_change)
-    return before.updated(
+    maps = before.updated(
         np.where(changed, chosen, before.disparity),
         np.where(occluded, confidence, before.confidence),
         occlusion_candidates=candidates,
         occluded=occluded,
-        occlusion_side=side.astype(np.uint8),
+        view_subset=subset.astype(np.uint8),
     )
+    return replace(maps, subset_names=names)
 
 
 def _box(radius: int) -> npt.NDArray[np.uint8]:

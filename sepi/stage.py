@@ -75,12 +75,15 @@ class StageMaps:
     confidence : ndarray, shape (H, W), float32
         0..1.
     extra : mapping of str to ndarray, shape (H, W)
-        Maps of this stage and of those before it (``occluded``, ``occlusion_side``, ``superpixels``, ...).
+        Maps of this stage and of those before it (``occluded``, ``view_subset``, ``superpixels``, ...).
+    subset_names : tuple of str
+        What the values of the map ``view_subset`` stand for, from 0 on; empty without such a map.
     """
 
     disparity: FloatMap
     confidence: FloatMap
     extra: Mapping[str, npt.NDArray[Any]] = field(default_factory=dict)
+    subset_names: tuple[str, ...] = ()
 
     def all(self) -> dict[str, npt.NDArray[Any]]:
         """Every map by name."""

@@ -8,6 +8,7 @@ from sepi.errors import SepiError
 from sepi.image.edges import CannyParameters, canny_edges, depth_steps, edge_angle
 from sepi.image.mean_shift import patch_modes
 from sepi.initial import CHOICES as INITIAL
+from sepi.io.hdf5 import read_stage, write_stage
 from sepi.lightfield import DisparityRange, LightField
 from sepi.matching.view_subsets import half_planes, halves_and_quarters
 from sepi.occlusion import CHOICES, nearer_on_hidden_side
@@ -62,7 +63,8 @@ def test_half_away_from_the_nearer_surface_is_kept(near_side, kept):
     """With the side rule the wrong way round (as in the paper's text) the occluder's views would be trusted."""
     light_field = two_planes(near_side)
     _, maps = run(light_field)
-    names = halves_and_quarters(light_field.grid).names
+    names = maps.subset_names
+    assert names == halves_and_quarters(light_field.grid).names
     across = np.s_[15:-15, EDGE - 2 : EDGE] if near_side == "right" else None
     if near_side == "left":
         across = np.s_[15:-15, EDGE : EDGE + 2]
@@ -70,7 +72,7 @@ def test_half_away_from_the_nearer_surface_is_kept(near_side, kept):
         across = np.s_[EDGE - 2 : EDGE, 15:-15]
     if near_side == "up":
         across = np.s_[EDGE : EDGE + 2, 15:-15]
-    sides = maps.extra["occlusion_side"][across]
+    sides = maps.extra["view_subset"][across]
     assert np.mean([kept in names[side] for side in sides.ravel()]) > 0.9
     opposite = {"left": "right", "right": "left", "up": "down", "down": "up"}[kept]
     assert not any(opposite in names[side] for side in sides.ravel())
@@ -174,3 +176,19 @@ def test_edges_follow_gradients_and_their_direction():
     assert np.abs(np.abs(edge_angle(image.transpose(1, 0, 2), CannyParameters())[20, 20]) - np.pi / 2) < 0.1
     assert depth_steps(image[..., 0], 0.3)[:, 19:21].all()
     assert not depth_steps(image[..., 0], 0.6).any()
+
+
+@pytest.mark.parametrize("choice", ["half_sepi", "wang"])
+def test_the_file_says_which_views_were_kept(tmp_path, choice):
+    """Both occlusion models number their subsets from 0: the same number stands for other views."""
+    light_field = two_planes("right")
+    initial, maps = run(light_field, choice)
+    write_stage(tmp_path / "occlusion.h5", maps, {})
+    back = read_stage(tmp_path / "occlusion.h5")
+    assert back.subset_names == maps.subset_names
+    kept = {back.subset_names[number] for number in np.unique(back.extra["view_subset"])}
+    assert "full" in kept
+    assert ("left" in kept) == (choice == "half_sepi")
+    assert any(name.startswith("half-plane") for name in kept) == (choice == "wang")
+    # stages that follow hand it on
+    assert back.updated(initial.disparity, initial.confidence).subset_names == maps.subset_names

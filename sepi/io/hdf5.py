@@ -39,6 +39,8 @@ def write_stage(path: Path, maps: StageMaps, attributes: Mapping[str, Attribute]
             dataset = file.create_dataset(name, data=values, **compression)
             if name in UNITS:
                 dataset.attrs["units"] = UNITS[name]
+            if name == "view_subset":
+                dataset.attrs["names"] = [_fixed(subset) for subset in maps.subset_names]
         for key, value in attributes.items():
             file.attrs[key] = value
 
@@ -53,8 +55,9 @@ def read_stage(path: Path) -> StageMaps:
     """
     with opened(path) as file:
         maps = {name: file[name][...] for name in file}
+        names = file["view_subset"].attrs["names"] if "view_subset" in file else []
     try:
-        return StageMaps(maps.pop("disparity"), maps.pop("confidence"), maps)
+        return StageMaps(maps.pop("disparity"), maps.pop("confidence"), maps, tuple(name.decode() for name in names))
     except KeyError as error:
         raise SepiError(f"{path}: not a stage file: dataset {error} is missing") from error
 

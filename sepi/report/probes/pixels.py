@@ -56,7 +56,7 @@ def interesting_pixels(
     ----------
     light_field : LightField
     maps : StageMaps
-        Final maps of a variant; its masks and ``occlusion_side`` are used where it has them.
+        Final maps of a variant; its masks and ``view_subset`` are used where it has them.
     ground_truth : ndarray, shape (H, W), float32, or None
         True disparity; may hold values that are not finite.
     count : int
@@ -111,7 +111,7 @@ def _sure(texture: FloatMap, maps: StageMaps) -> FloatMap:
 def _occluded(texture: FloatMap, maps: StageMaps) -> list[tuple[str, FloatMap]]:
     """A label and score for each half of the views that is kept somewhere, the highest score first."""
     names = halves_and_quarters((3, 3)).names
-    side = maps.extra.get("occlusion_side", np.zeros(maps.disparity.shape, np.uint8))
+    side = maps.extra.get("view_subset", np.zeros(maps.disparity.shape, np.uint8))
     # a map that changes from pixel to pixel has been smoothed over the edge, or is not sure which side is which
     even = 1 / (1 + _spread(maps.disparity, 1) / _DEPTH_STEP)
     clear = even * np.minimum(texture / _CLEAR_TEXTURE, 1) * np.nan_to_num(maps.confidence)

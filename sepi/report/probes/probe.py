@@ -222,15 +222,15 @@ def probe(
     ------
     SepiError
         If the pixel lies outside the reference view, the disparity range is unknown, the final disparity is not
-        finite there, or the side is none of the half-SEPI's.
+        finite there, or the subsets of the views are not those of the half-SEPI.
     """
     curves = cost_curves(light_field, y, x, parameters, noise=noise)
     views = halves_and_quarters(light_field.grid, light_field.reference_position)
-    kept_subset = int(maps.extra["occlusion_side"][y, x]) if "occlusion_side" in maps.extra else 0
-    if kept_subset >= len(views.names):
+    kept_subset = int(maps.extra["view_subset"][y, x]) if "view_subset" in maps.extra else 0
+    if maps.subset_names and maps.subset_names != views.names:
         raise SepiError(
-            f"{light_field.name}: occlusion_side at (y, x) = ({y}, {x}) is {kept_subset}; "
-            f"half_sepi has 0 to {len(views.names) - 1}"
+            f"{light_field.name}: the subsets of the views are {', '.join(maps.subset_names[:3])}, ...; "
+            f"expected those of half_sepi, {', '.join(views.names[:3])}, ..."
         )
     ground_truth = None if light_field.ground_truth is None else _finite(light_field.ground_truth[y, x])
     minimum, _ = curves.minimum()

@@ -2,6 +2,7 @@
 
 import base64
 import json
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -12,7 +13,7 @@ from sepi.image.noise import residual_variance
 from sepi.lightfield import DisparityRange, LightField
 from sepi.matching.plane_sweep import SweepParameters, sweep
 from sepi.matching.stitched_epi import stitched_epi
-from sepi.matching.view_subsets import halves_and_quarters
+from sepi.matching.view_subsets import half_planes, halves_and_quarters
 from sepi.pipeline import estimate_depth
 from sepi.report.plots.contrast import stretched
 from sepi.report.probes.curves import cost_curves
@@ -180,7 +181,7 @@ def test_probe_tells_what_the_maps_say():
     side = np.zeros((60, 60), np.uint8)
     side[20, 30] = 2
     flag = side > 0
-    maps = made_maps(light_field, occlusion_side=side, occluded=flag, textureless=~flag)
+    maps = made_maps(light_field, view_subset=side, occluded=flag, textureless=~flag)
     best = StageMaps(np.full((60, 60), 0.625, np.float32), maps.confidence)
     parameters = SweepParameters(num_disparities=41)
     found = probe(light_field, 20, 30, maps=maps, best=best, parameters=parameters, label="here")
@@ -206,8 +207,9 @@ def test_probe_tells_what_the_maps_say():
 def test_sides_of_another_occlusion_stage_are_refused():
     """Wang's half planes are numbered otherwise; their names would be wrong, or an index out of range."""
     light_field = plane(0.5)
-    maps = made_maps(light_field, occlusion_side=np.full((60, 60), 12, np.uint8))
-    with pytest.raises(SepiError, match="half_sepi has 0 to 8"):
+    maps = made_maps(light_field, view_subset=np.full((60, 60), 3, np.uint8))
+    maps = replace(maps, subset_names=half_planes(light_field.grid, 8).names)
+    with pytest.raises(SepiError, match=r"half-plane 0.*expected those of half_sepi, full, left"):
         probe(light_field, 20, 30, maps=maps, parameters=SweepParameters(num_disparities=5))
 
 
@@ -256,7 +258,7 @@ def test_interesting_pixels_show_each_kind(occluder):
     side_names = ("full", "left", "right", "up", "down")
     for y, x, label in pixels:
         if label.startswith("occluded"):
-            assert side_names[maps.extra["occlusion_side"][y, x]] in label
+            assert side_names[maps.extra["view_subset"][y, x]] in label
     assert interesting_pixels(light_field, maps, light_field.ground_truth, count=2) == pixels[:2]
     without = [pixel.label for pixel in interesting_pixels(light_field, maps, None)]
     assert "largest error" not in without
@@ -290,7 +292,7 @@ def test_an_occluded_pixel_is_one_beside_its_occluder():
     side = np.zeros((60, 60), np.uint8)
     # the left half is kept on both sides of the bar; only those left of it are hidden from the right
     side[:, 22:28] = side[:, 34:40] = 1
-    maps = StageMaps(disparity, np.ones((60, 60), np.float32), {"occlusion_side": side, "occluded": side > 0})
+    maps = StageMaps(disparity, np.ones((60, 60), np.float32), {"view_subset": side, "occluded": side > 0})
     (found,) = [pixel for pixel in interesting_pixels(light_field, maps, None) if "occluded" in pixel.label]
     assert found.label == "occluded, left half kept"
     assert 22 <= found.x < 28
@@ -335,7 +337,7 @@ def test_figure_of_a_grey_picture_without_views_around(tmp_path):
     light_field = LightField(
         np.full((1, 3, 9, 9, 1), 7, np.uint8), "flat", present=present, disparity_range=DisparityRange(-20, 20, "given")
     )
-    maps = made_maps(light_field, occlusion_side=np.full((9, 9), 5, np.uint8))
+    maps = made_maps(light_field, view_subset=np.full((9, 9), 5, np.uint8))
     found = probe(light_field, 0, 8, maps=maps, parameters=SweepParameters(num_disparities=5))
     assert found.side == "left-up"
     np.testing.assert_array_equal(found.kept, [[False, True, False]])
