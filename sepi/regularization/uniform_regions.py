@@ -93,28 +93,24 @@ def fill_uniform_regions(
     views = int(light_field.present.sum())
     rounding = 0.3 / full_scale(light_field.views.dtype) if light_field.views.dtype != np.float32 else 0.0
     variance = max(noise_level(light_field.reference_view), rounding, LEAST_NOISE) ** 2 / views
-    known = light_field.require_disparity_range()
     uniform = uniform_regions(mean, variance, before.confidence, parameters)
-    disparity = before.disparity.copy()
     labels, _ = ndimage.label(uniform)
-    random = np.random.default_rng(0)
+    uniform &= np.bincount(labels.ravel())[labels] >= parameters.min_area
+    known = light_field.require_disparity_range()
+    disparity, filled = before.disparity.copy(), np.zeros_like(uniform)
     for number, place in enumerate(ndimage.find_objects(labels), start=1):
         around = tuple(slice(max(side.start - 2, 0), side.stop + 2) for side in place)
-        own = labels[around] == number
-        if own.sum() < parameters.min_area:
-            uniform[around][own] = False
-            continue
+        own = uniform[around] & (labels[around] == number)
         border = cv2.dilate(own.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
+        # what lies in another region is no border, whether or not that one gets a plane: their order must not matter
         border &= ~uniform[around] & (before.confidence[around] > parameters.border_confidence)
-        plane = ransac_plane(border, before.disparity[around], parameters, random)
-        if plane is None:
-            uniform[around][own] = False
-        else:
+        plane = ransac_plane(border, before.disparity[around], parameters)
+        if plane is not None:
             y, x = np.nonzero(own)
-            values = plane[0] + plane[1] * x + plane[2] * y
             # a plane that its border holds at one side only may lead anywhere
-            disparity[around][own] = np.clip(values, known.minimum, known.maximum)
-    return disparity, uniform
+            disparity[around][own] = np.clip(_basis(y, x, own.shape) @ plane, known.minimum, known.maximum)
+            filled[around] |= own
+    return disparity, filled
 
 
 def uniform_regions(
@@ -151,37 +147,47 @@ def uniform_regions(
 
 
 def ransac_plane(
-    border: BoolMap, disparity: FloatMap, parameters: UniformPlanesParameters, random: np.random.Generator
+    border: BoolMap, disparity: FloatMap, parameters: UniformPlanesParameters
 ) -> npt.NDArray[np.float64] | None:
     """Plane that most of a border agrees with and little of it lies behind.
+
+    The triples of pixels that planes are tried through do not depend on other regions, nor on which way the picture is
+    mirrored.
 
     Parameters
     ----------
     border : ndarray, shape (h, w), bool
     disparity : ndarray, shape (h, w), float32
     parameters : UniformPlanesParameters
-    random : numpy.random.Generator
 
     Returns
     -------
     ndarray, shape (3,), or None
-        ``a, b, c`` of ``a + b x + c y``; None where too little of the border agrees.
+        ``a, b, c`` of ``a + b x + c y`` with ``x`` and ``y`` from the middle of the array; None where too little of
+        the border agrees.
     """
     y, x = np.nonzero(border)
     values = disparity[border].astype(np.float64)
     if values.size < _PIXELS_OF_A_PLANE:
         return None
-    places = np.stack([np.ones(values.size), x, y], axis=1)
+    positions = _basis(y, x, border.shape)
+    order = np.lexsort(((positions[:, 1:] ** 2).sum(axis=1), values))
+    positions, values = positions[order], values[order]
+    triples = np.random.default_rng(0).integers(values.size, size=(parameters.ransac_iterations, 3))
+    triples = triples[np.abs(np.linalg.det(positions[triples])) > 1e-9]
     best, chosen = -np.inf, None
-    for _ in range(parameters.ransac_iterations):
-        three = random.choice(values.size, 3, replace=False)
-        if abs(np.linalg.det(places[three])) < 1e-9:
-            continue
-        residual = values - places @ np.linalg.solve(places[three], values[three])
-        agreement = np.abs(residual) < parameters.tolerance
-        score = agreement.sum() - parameters.behind_penalty * (residual < -parameters.tolerance).sum()
+    for plane in np.linalg.solve(positions[triples], values[triples, None])[..., 0]:
+        residual = values - positions @ plane
+        inliers = np.abs(residual) < parameters.tolerance
+        score = inliers.sum() - parameters.behind_penalty * (residual < -parameters.tolerance).sum()
         if score > best:
-            best, chosen = score, agreement
+            best, chosen = score, inliers
     if chosen is None or chosen.sum() < max(3, parameters.min_inlier_ratio * values.size):
         return None
-    return np.asarray(np.linalg.lstsq(places[chosen], values[chosen], rcond=None)[0])
+    return np.asarray(np.linalg.lstsq(positions[chosen], values[chosen], rcond=None)[0])
+
+
+def _basis(y: npt.NDArray[np.int64], x: npt.NDArray[np.int64], shape: tuple[int, ...]) -> npt.NDArray[np.float64]:
+    """1, x and y of pixels, (N, 3), from the middle of an array of this shape."""
+    height, width = shape
+    return np.stack([np.ones(x.size), x - (width - 1) / 2, y - (height - 1) / 2], axis=1)

@@ -1,0 +1,83 @@
+"""Planes in regions without texture: a region's plane is its own, whatever else there is and however it lies."""
+
+import numpy as np
+import pytest
+from scipy.ndimage import gaussian_filter
+
+from sepi.lightfield import DisparityRange, LightField
+from sepi.regularization.uniform_regions import UniformPlanesParameters, fill_uniform_regions
+from sepi.stage import StageMaps
+
+SHAPE = (60, 90)
+PARAMETERS = UniformPlanesParameters(window_radius=1, growth=0, ransac_iterations=40)
+
+
+def scene(*regions: tuple[slice, slice]) -> tuple[LightField, StageMaps]:
+    """Three equal views of a texture with these bare regions, and a doubtful depth map of a slanted plane."""
+    random = np.random.default_rng(5)
+    # detail wider than a pixel, so that it is not taken for noise of the camera
+    texture = gaussian_filter(random.normal(0, 400, (*SHAPE, 3)), (1.5, 1.5, 0))
+    view = np.clip(128 + texture, 0, 255).astype(np.uint8)
+    noise = random.normal(0, 0.04, SHAPE)
+    for region in regions:
+        view[region] = 120
+    y, x = np.mgrid[: SHAPE[0], : SHAPE[1]]
+    disparity = (0.004 * x - 0.003 * y + noise).astype(np.float32)
+    # what stands before the background, and must not pull a plane nearer
+    disparity[:, 40:46] += 0.5
+    views = np.broadcast_to(view, (1, 3, *view.shape)).copy()
+    light_field = LightField(views, "bare", disparity_range=DisparityRange(-2, 2, "given"))
+    return light_field, StageMaps(disparity, np.full(SHAPE, 0.7, np.float32))
+
+
+def mirrored(light_field: LightField, maps: StageMaps, axis: int) -> tuple[LightField, StageMaps]:
+    views = np.flip(light_field.views, (axis, axis + 2)).copy()
+    field = LightField(views, "mirrored", disparity_range=light_field.disparity_range)
+    return field, StageMaps(np.flip(maps.disparity, axis).copy(), np.flip(maps.confidence, axis).copy())
+
+
+NEAR, FAR, SMALL = np.s_[10:34, 8:38], np.s_[36:56, 60:86], np.s_[8:12, 44:48]
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_a_mirrored_scene_has_mirrored_planes(axis: int) -> None:
+    """A picture taken through a mirror must not have another depth."""
+    light_field, maps = scene(NEAR, FAR)
+    disparity, filled = fill_uniform_regions(light_field, maps, PARAMETERS)
+    other, other_filled = fill_uniform_regions(*mirrored(light_field, maps, axis), PARAMETERS)
+    assert filled[NEAR].mean() > 0.8
+    assert filled[FAR].mean() > 0.8
+    np.testing.assert_array_equal(np.flip(other_filled, axis), filled)
+    np.testing.assert_allclose(np.flip(other, axis), disparity, atol=1e-5)
+
+
+@pytest.mark.parametrize(("near", "far"), [(NEAR, FAR), (FAR, NEAR)])
+def test_a_far_region_does_not_change_a_near_ones_plane(near: tuple[slice, slice], far: tuple[slice, slice]) -> None:
+    alone, _ = fill_uniform_regions(*scene(near), PARAMETERS)
+    beside, _ = fill_uniform_regions(*scene(near, far), PARAMETERS)
+    np.testing.assert_array_equal(beside[near], alone[near])
+
+
+@pytest.mark.parametrize("refused", [np.s_[35:41, 8:38], np.s_[3:9, 8:38]], ids=["later", "earlier"])
+def test_a_refused_region_counts_the_same_before_and_after(refused: tuple[slice, slice]) -> None:
+    """Regions are numbered from the top: one that is refused must be no border of others, wherever it lies."""
+    light_field, maps = scene(NEAR, refused)
+    # nothing agrees round the second region, and its own depth would spoil the plane of the first
+    maps.disparity[refused] = np.random.default_rng(1).uniform(-2, 2, maps.disparity[refused].shape)
+    around = tuple(slice(max(side.start - 4, 0), side.stop + 4) for side in refused)
+    rim = np.zeros(SHAPE, bool)
+    rim[around] = True
+    rim[refused] = rim[NEAR] = False
+    maps.disparity[rim] = np.random.default_rng(2).uniform(-2, 2, rim.sum())
+    disparity, filled = fill_uniform_regions(light_field, maps, PARAMETERS)
+    assert not filled[refused].any()
+    flipped, other = fill_uniform_regions(*mirrored(light_field, maps, 0), PARAMETERS)
+    np.testing.assert_array_equal(np.flip(other, 0), filled)
+    np.testing.assert_allclose(np.flip(flipped, 0), disparity, atol=1e-5)
+
+
+def test_small_regions_are_left_alone() -> None:
+    light_field, maps = scene(SMALL)
+    disparity, filled = fill_uniform_regions(light_field, maps, PARAMETERS)
+    assert not filled.any()
+    np.testing.assert_array_equal(disparity, maps.disparity)
