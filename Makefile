@@ -2,7 +2,7 @@
 # make check  environment, then the fast part of the tests: for every save
 # make test   environment, then the whole test suite, on all cores
 # make coverage  the whole test suite, and the share of lines and branches that it runs
-# make lint   style, format and types
+# make lint   style, format, types and imports
 # make bench  environment, then times, memory and growth of the pipeline, to reports/
 # make clean  remove results and everything else that was made, but for the environment
 
@@ -41,6 +41,7 @@ lint: $(READY)
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
+	$(BIN)/lint-imports --no-logo --no-cache
 	$(BIN)/snakefmt --line-length 120 --check Snakefile rules
 
 bench: $(READY)

@@ -94,3 +94,24 @@ def test_threads_are_kept_to_whether_or_not_libraries_are_there(before: str) -> 
     environment["PYTHONPATH"] = str(Path(__file__).parents[1])
     done = subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
+
+
+def test_the_api_can_be_imported_where_a_system_lacks_signals_and_limits() -> None:
+    """Windows has no module ``resource``, no SIGHUP, no affinity and no /proc."""
+    program = (
+        "import os, signal, sys, psutil\n"
+        "from pathlib import Path\n"
+        "sys.modules['resource'] = None\n"
+        "del signal.SIGHUP, os.sched_getaffinity\n"
+        "import numpy, sepi, sepi.cli.main\n"
+        "from sepi.command import available_cores, peak_memory_mb, shown_errors\n"
+        "field = sepi.LightField(numpy.zeros((3, 3, 8, 8, 3), numpy.uint8), 'a', "
+        "disparity_range=sepi.DisparityRange(-1, 1, 'given'))\n"
+        "with shown_errors():\n"
+        "    assert sepi.estimate_depth(field, 'no_occlusion_no_textureless').disparity.shape == (8, 8)\n"
+        "Path.read_text = lambda *_, **__: (_ for _ in ()).throw(OSError())\n"
+        "assert peak_memory_mb() > 20\n"
+        "assert available_cores() >= 1\n"
+    )
+    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[1])}
+    subprocess.run([sys.executable, "-c", program], env=environment, check=True)
