@@ -192,9 +192,9 @@ def check(context: click.Context, light_field_path: Path, reading: Reading) -> N
     light_field = reading.read(light_field_path, check_order=False)
     found = check_order(light_field, reading.options.order)
     click.echo(f"{light_field.name}: {_size(light_field)}")
-    click.echo("order, and by how much the views misfit in it (0 to 1; less is better):")
-    for word, misfit in found.fits.items():
-        click.echo(f"  {word:24}{misfit:8.4f}{'  best' if word == found.best and found.decided else ''}")
+    click.echo("order, and how well the views match in it (matching cost, 0 to 1; less is better):")
+    for order, cost in found.fits.items():
+        click.echo(f"  {order:24}{cost:8.4f}{'  best' if order == found.best and found.clear else ''}")
     click.echo(found.verdict())
     if found.warning() is not None:
         context.exit(1)

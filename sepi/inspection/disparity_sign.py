@@ -48,7 +48,7 @@ def occlusion_votes(views: Views, trial: Trial) -> tuple[int, int]:
     ----------
     views : Views
     trial : Trial
-        Its best layout is taken for right; the signs are those of that layout's first word.
+        Its best layout is taken for right; the signs are those of that layout's first order.
 
     Returns
     -------
@@ -68,17 +68,17 @@ def occlusion_votes(views: Views, trial: Trial) -> tuple[int, int]:
     pictures = {
         step: _as_bright(_middle(views.plain(step)) * scale, reference) for both in steps.values() for step in both
     }
-    word = next(iter(trial.best))
-    places = {step: (int(t), int(s)) for step in pictures for t, s in steps_under(word, [step])}
+    order = next(iter(trial.best))
+    positions = {step: (int(t), int(s)) for step in pictures for t, s in steps_under(order, [step])}
     movement = min(_MOST_MOVEMENT, math.ceil(1.15 * trial.largest_disparity * reach) + 1)
     candidates = (np.arange(-movement, movement + 1) / reach).astype(np.float32)
     sides = [
-        (np.stack([pictures[step] for step in both]), np.array([places[step] for step in both], np.int64))
+        (np.stack([pictures[step] for step in both]), np.array([positions[step] for step in both], np.int64))
         for both in steps.values()
     ]
     disparity, trusted = _disparity(reference, sides, candidates)
     residual = {
-        step: residuals(reference, picture, places[step][0], places[step][1], disparity, _WINDOW_RADIUS)
+        step: residuals(reference, picture, positions[step][0], positions[step][1], disparity, _WINDOW_RADIUS)
         for step, picture in pictures.items()
     }
     noise = max(_LEAST_NOISE, rounding, _typical([values[trusted] for values in residual.values()]))
@@ -89,8 +89,8 @@ def occlusion_votes(views: Views, trial: Trial) -> tuple[int, int]:
             here[-1],
             np.maximum(there[0], there[-1]),
             np.maximum.reduce([*here, *there]),
-            places[steps[t, s][-1]][0],
-            places[steps[t, s][-1]][1],
+            positions[steps[t, s][-1]][0],
+            positions[steps[t, s][-1]][1],
             disparity,
             trusted,
             _SEEN * noise,
@@ -105,7 +105,7 @@ def occlusion_votes(views: Views, trial: Trial) -> tuple[int, int]:
 def _directions(views: Views, largest: float) -> tuple[int, list[Step]]:
     """Distance, and directions in which there are views at it and at half of it, on both sides.
 
-    The farthest at which nothing moves by more than is searched: the strips that are hidden are widest there.
+    The most distant at which nothing moves by more than is searched: the strips that are hidden are widest there.
     """
     present = set(views.steps)
     for reach in range(REACH, 0, -1):
@@ -147,8 +147,8 @@ def _disparity(
     A pixel that is hidden on one side still shows its disparity on the other.
     """
     sweeps = [
-        coarse_sweep(reference, pictures, places, candidates, np.float32(_TRUNCATION), _SWEEP_RADIUS)
-        for pictures, places in sides
+        coarse_sweep(reference, pictures, positions, candidates, np.float32(_TRUNCATION), _SWEEP_RADIUS)
+        for pictures, positions in sides
     ]
     chosen = np.stack([sweep[0] for sweep in sweeps]).argmin(axis=0)
     lowest, second, mean, disparity = (np.choose(chosen, [sweep[n] for sweep in sweeps]) for n in range(4))

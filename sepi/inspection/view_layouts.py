@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from sepi.inspection.view_order_kernels import layout_misfits
 from sepi.io.readers.options import ORDERS
-from sepi.lightfield import FloatMap, LightField
+from sepi.lightfield import FloatMap, LightField, as_unit_float
 
 REACH = 8
 """Views up to this many steps away are looked at."""
@@ -29,7 +29,7 @@ _LEAST_SIDE = 16
 _BLUR_SIGMA = 0.8
 _HIGH_PASS = 9
 
-# Steps to the views that are tried first, and how many views; movement in the farthest of them, pixels, that is
+# Steps to the views that are tried first, and how many views; movement in the most distant of them, pixels, that is
 # searched, and its step; reductions that reach disparities beyond that
 _FIRST_REACH = 4
 _MOST_VIEWS = 16
@@ -39,11 +39,11 @@ _REDUCTIONS = (2, 4)
 # Half width of a patch, pixels; points along a side of the picture
 _PATCH_RADIUS = 2
 _CELLS = 24
-# Clear: fewest points, next layout's misfit over the best's, and how many standard errors their difference is
+# Clear: fewest points, next layout's matching cost over the best's, and how many standard errors their difference is
 _FEWEST_POINTS = 30
 _CLEAR_RATIO = 1.1
 _CLEAR_ERRORS = 8.0
-# Misfit of a point that is matched, and part of those that may lie at an end of the search
+# Matching cost of a point that is matched, and part of those that may lie at an end of the search
 _MATCHED = 0.5
 _AT_END = 0.02
 
@@ -63,10 +63,10 @@ class Views:
         self._views = light_field.rgb_views
         self._factor = max(1, math.ceil(math.sqrt(math.prod(light_field.shape) / _MOST_PIXELS)))
         self._grey: dict[tuple[int, int, int], FloatMap] = {}
-        places = np.argwhere(light_field.present)
-        distance = abs(places - np.array(light_field.grid) // 2).sum(axis=1)
-        self._middle = places[distance.argmin()]
-        self.steps: list[Step] = [(int(t), int(s)) for t, s in places - self._middle if (t, s) != (0, 0)]
+        positions = np.argwhere(light_field.present)
+        distance = abs(positions - np.array(light_field.grid) // 2).sum(axis=1)
+        self._middle = positions[distance.argmin()]
+        self.steps: list[Step] = [(int(t), int(s)) for t, s in positions - self._middle if (t, s) != (0, 0)]
         height, width = light_field.shape
         self.shape = (height // self._factor, width // self._factor)
 
@@ -83,13 +83,11 @@ class Views:
         return np.asarray(grey - cv2.blur(grey, (_HIGH_PASS, _HIGH_PASS)), np.float32)
 
     def _read(self, step: Step, factor: int) -> FloatMap:
-        view = self._views[self._middle[0] + step[0], self._middle[1] + step[1]]
+        view = np.ascontiguousarray(self._views[self._middle[0] + step[0], self._middle[1] + step[1]])
         size = (max(1, view.shape[1] // factor), max(1, view.shape[0] // factor))
         reduced = cv2.resize(view, size, interpolation=cv2.INTER_AREA) if factor > 1 else view
-        reduced = reduced.reshape(size[1], size[0], -1)
-        grey = cv2.cvtColor(reduced, cv2.COLOR_RGB2GRAY) if reduced.shape[2] == 3 else reduced[:, :, 0]
-        largest = np.iinfo(grey.dtype).max if np.issubdtype(grey.dtype, np.integer) else 1
-        return np.asarray(cv2.GaussianBlur(grey.astype(np.float32) / largest, (0, 0), _BLUR_SIGMA), np.float32)
+        grey = as_unit_float(cv2.cvtColor(reduced, cv2.COLOR_RGB2GRAY))
+        return np.asarray(cv2.GaussianBlur(grey, (0, 0), _BLUR_SIGMA), np.float32)
 
 
 @dataclass(frozen=True)
@@ -99,49 +97,49 @@ class Trial:
     Attributes
     ----------
     layouts : list of dict
-        Words of each layout, with the sign that they give to its disparities.
-    misfit, disparity : ndarrays, shape (P, L), float32
+        Orders of each layout, with the sign that they give to its disparities.
+    cost, disparity : ndarrays, shape (P, L), float32
         Of each point under each layout: 0..1, and pixels per view step.
     extent : float
         Largest disparity searched, pixels per view step.
     """
 
     layouts: list[dict[str, int]]
-    misfit: FloatMap
+    cost: FloatMap
     disparity: FloatMap
     extent: float
 
-    def misfits(self) -> dict[str, float]:
-        """Mean misfit of each word."""
-        mean = self.misfit.mean(axis=0)
-        return {word: float(mean[n]) for n, layout in enumerate(self.layouts) for word in layout}
+    def matching_costs(self) -> dict[str, float]:
+        """Mean matching cost of each order."""
+        mean = self.cost.mean(axis=0)
+        return {order: float(mean[n]) for n, layout in enumerate(self.layouts) for order in layout}
 
     @property
     def best(self) -> dict[str, int]:
-        """Words of the layout that fits best, with their signs."""
+        """Orders of the layout that fits best, with their signs."""
         return self.layouts[self._ranking[0]]
 
     @property
     def gap(self) -> float:
-        """By how much the next layout's misfit is above the best's."""
+        """By how much the next layout's matching cost is above the best's."""
         return float(self._difference.mean())
 
     @property
     def errors(self) -> float:
         """The gap in standard errors."""
-        return self.gap * math.sqrt(len(self.misfit)) / max(float(self._difference.std()), 1e-6)
+        return self.gap * math.sqrt(len(self.cost)) / max(float(self._difference.std()), 1e-6)
 
     @property
     def clear(self) -> bool:
         """Whether the best layout is clearly better than any other."""
-        best, following = self.misfit.mean(axis=0)[self._ranking[:2]]
+        best, following = self.cost.mean(axis=0)[self._ranking[:2]]
         return bool(following >= _CLEAR_RATIO * best and self.errors >= _CLEAR_ERRORS)
 
     @property
     def largest_disparity(self) -> float:
         """Largest absolute disparity under the best layout, but for a few outliers."""
         best = self._ranking[0]
-        matched = abs(self.disparity[self.misfit[:, best] < _MATCHED, best])
+        matched = abs(self.disparity[self.cost[:, best] < _MATCHED, best])
         return float(np.quantile(matched, 1 - _AT_END)) if matched.size else self.extent
 
     @property
@@ -151,12 +149,12 @@ class Trial:
 
     @property
     def _ranking(self) -> list[int]:
-        return [int(n) for n in self.misfit.mean(axis=0).argsort(kind="stable")]
+        return [int(n) for n in self.cost.mean(axis=0).argsort(kind="stable")]
 
     @property
     def _difference(self) -> FloatMap:
         best, following = self._ranking[:2]
-        return np.asarray(self.misfit[:, following] - self.misfit[:, best], np.float32)
+        return np.asarray(self.cost[:, following] - self.cost[:, best], np.float32)
 
 
 def best_trial(views: Views) -> Trial | None:
@@ -173,25 +171,25 @@ def best_trial(views: Views) -> Trial | None:
     return best
 
 
-def steps_under(word: str, steps: list[Step]) -> npt.NDArray[np.int64]:
+def steps_under(order: str, steps: list[Step]) -> npt.NDArray[np.int64]:
     """Steps of views after their grid is laid out anew by an order, shape (V, 2)."""
-    grid = ORDERS[word](np.arange(9).reshape(3, 3))
+    grid = ORDERS[order](np.arange(9).reshape(3, 3))
     # where the views one row and one column after the centre go
     matrix = np.stack([np.argwhere(grid == view)[0] - 1 for view in (7, 5)])
     return np.asarray(np.array(steps, np.int64).reshape(-1, 2) @ matrix, np.int64)
 
 
 def _distances(views: Views) -> Iterator[tuple[int, int]]:
-    """Steps to the farthest view used, and further reduction: a middle distance, nearer ones, a farther one."""
-    farthest = min(REACH, max(max(map(abs, step)) for step in views.steps))
-    reach = min(farthest, _FIRST_REACH)
+    """Steps to the most distant view used, and further reduction: first a middle distance, then less, then more."""
+    most_distant = min(REACH, max(max(map(abs, step)) for step in views.steps))
+    reach = min(most_distant, _FIRST_REACH)
     while reach >= 1:
         yield reach, 1
         reach //= 2
     for factor in _REDUCTIONS:
         yield 1, factor
-    if farthest > _FIRST_REACH:
-        yield farthest, 1
+    if most_distant > _FIRST_REACH:
+        yield most_distant, 1
 
 
 def _tried(views: Views, reach: int, factor: int) -> Trial | None:
@@ -207,12 +205,12 @@ def _tried(views: Views, reach: int, factor: int) -> Trial | None:
     count = round(_MOVEMENT / _MOVEMENT_STEP)
     candidates = (np.arange(-count, count + 1) * (_MOVEMENT_STEP / abs(offsets).max())).astype(np.float32)
     others = np.stack([views.detail(step, factor) for step in steps])
-    misfit, disparity = layout_misfits(reference, others, offsets, candidates, points, _PATCH_RADIUS)
-    return Trial(layouts, misfit, disparity * factor, float(candidates[-1]) * factor)
+    cost, disparity = layout_misfits(reference, others, offsets, candidates, points, _PATCH_RADIUS)
+    return Trial(layouts, cost, disparity * factor, float(candidates[-1]) * factor)
 
 
 def _ring(steps: list[Step], reach: int) -> list[Step]:
-    """Views beyond half of ``reach``; first those along the axes and diagonals, and farther ones."""
+    """Views beyond half of ``reach``; first those along the axes and diagonals, and more distant ones."""
 
     def rank(step: Step) -> tuple[int, int, Step]:
         t, s = abs(step[0]), abs(step[1])
@@ -222,19 +220,19 @@ def _ring(steps: list[Step], reach: int) -> list[Step]:
 
 
 def _layouts(steps: list[Step]) -> tuple[list[dict[str, int]], FloatMap]:
-    """Words that put these views at the same places but for the sign, and those places, shape (L, V, 2)."""
+    """Orders that put these views at the same positions but for the sign, and those positions, shape (L, V, 2)."""
     layouts: list[dict[str, int]] = []
-    places: list[npt.NDArray[np.int64]] = []
-    for word in ORDERS:
-        place = steps_under(word, steps)
-        for layout, known in zip(layouts, places, strict=True):
-            if np.array_equal(place, known) or np.array_equal(place, -known):
-                layout[word] = 1 if np.array_equal(place, known) else -1
+    positions: list[npt.NDArray[np.int64]] = []
+    for order in ORDERS:
+        position = steps_under(order, steps)
+        for layout, known in zip(layouts, positions, strict=True):
+            if np.array_equal(position, known) or np.array_equal(position, -known):
+                layout[order] = 1 if np.array_equal(position, known) else -1
                 break
         else:
-            layouts.append({word: 1})
-            places.append(place)
-    return layouts, np.stack(places).astype(np.float32)
+            layouts.append({order: 1})
+            positions.append(position)
+    return layouts, np.stack(positions).astype(np.float32)
 
 
 def _points(detail: FloatMap) -> npt.NDArray[np.int64]:
@@ -249,7 +247,7 @@ def _points(detail: FloatMap) -> npt.NDArray[np.int64]:
         return np.empty((0, 2), np.int64)
     cells = strength[: rows * side, : columns * side].reshape(rows, side, columns, side).swapaxes(1, 2)
     flat = cells.reshape(rows, columns, side * side)
-    place = flat.argmax(axis=2)
-    y = np.arange(rows)[:, None] * side + place // side + edge
-    x = np.arange(columns)[None] * side + place % side + edge
+    position = flat.argmax(axis=2)
+    y = np.arange(rows)[:, None] * side + position // side + edge
+    x = np.arange(columns)[None] * side + position % side + edge
     return np.asarray(np.stack([y, x], axis=2)[flat.max(axis=2) > 0], np.int64)

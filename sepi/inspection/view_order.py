@@ -42,33 +42,33 @@ class OrderCheck:
     Attributes
     ----------
     fits : mapping of str to float
-        Word of ``sepi.io.readers.options.ORDERS`` to misfit, 0..1, lower is better; in the order of ``ORDERS``.
+        Order of ``sepi.io.readers.options.ORDERS`` to matching cost, 0..1, lower is better; in the order of ``ORDERS``.
     best : str
-        Word of the lowest misfit; of equal ones the given order, then the first.
-    decided : bool
+        Order of the lowest matching cost; of equal ones the given order, then the first.
+    clear : bool
         Whether the views fit clearly better in this order than in others, but for exchanging near and far.
-    sign_decided : bool
+    sign_clear : bool
         Whether occlusion tells near from far.
-    given : str
+    read_in : str
         Order in which the light field was read.
     """
 
     fits: Mapping[str, float]
     best: str
-    decided: bool
-    sign_decided: bool
-    given: str = AS_GIVEN
+    clear: bool
+    sign_clear: bool
+    read_in: str = AS_GIVEN
 
     def verdict(self) -> str:
         """One line for the user."""
-        if not self.decided:
+        if not self.clear:
             return (
                 "cannot tell: no order fits clearly better than the others (too little texture, or too little movement "
                 "between the views)"
             )
-        if self.best != self.given:
+        if self.best != self.read_in:
             return self._advice()
-        if self.sign_decided:
+        if self.sign_clear:
             return "the views are in the right order"
         return (
             f"the views are in the right order, but near and far cannot be told apart here; if depth comes out inside "
@@ -77,29 +77,29 @@ class OrderCheck:
 
     def warning(self) -> str | None:
         """What to read the light field with instead; None unless another order is clearly better."""
-        return self._advice() if self.decided and self.best != self.given else None
+        return self._advice() if self.clear and self.best != self.read_in else None
 
     def _advice(self) -> str:
-        fault = _FAULTS[self.best] if self.given == AS_GIVEN else f"--order {self.given} does not fit"
+        fault = _FAULTS[self.best] if self.read_in == AS_GIVEN else f"--order {self.read_in} does not fit"
         advice = f"{fault}: read it with --order {self.best}"
-        if self.sign_decided:
+        if self.sign_clear:
             return advice
         return f"{advice}, or {self._turned()} if depth comes out inside out"
 
     def _turned(self) -> str:
         """The best order with near and far exchanged."""
-        return _word(ORDERS["flip-both"](ORDERS[self.best](_GRID)))
+        return _name(ORDERS["flip-both"](ORDERS[self.best](_GRID)))
 
 
-def check_order(light_field: LightField, given: str = AS_GIVEN) -> OrderCheck:
+def check_order(light_field: LightField, read_in: str = AS_GIVEN) -> OrderCheck:
     """Find out in which order the views fit together.
 
     Parameters
     ----------
     light_field : LightField
         Its disparity range, ground truth and reference view are not looked at.
-    given : str
-        Order in which it was read; the words of the result are to take its place.
+    read_in : str
+        Order in which it was read; the orders of the result are to take its place.
 
     Returns
     -------
@@ -108,44 +108,44 @@ def check_order(light_field: LightField, given: str = AS_GIVEN) -> OrderCheck:
     views = Views(light_field)
     trial = best_trial(views)
     if trial is None:
-        return OrderCheck(dict.fromkeys(ORDERS, 1.0), given, decided=False, sign_decided=False, given=given)
-    misfits = trial.misfits()
-    sign_decided = False
+        return OrderCheck(dict.fromkeys(ORDERS, 1.0), read_in, clear=False, sign_clear=False, read_in=read_in)
+    costs = trial.matching_costs()
+    sign_clear = False
     if trial.clear:
         greater, lesser = occlusion_votes(views, trial)
         votes = greater + lesser
-        sign_decided = votes >= _FEWEST_VOTES and max(greater, lesser) >= _MAJORITY * votes
-        if sign_decided:
+        sign_clear = votes >= _FEWEST_VOTES and max(greater, lesser) >= _MAJORITY * votes
+        if sign_clear:
             # at most half way to the next layout: the wrong sign is still the better layout
-            for word, sign in trial.best.items():
-                misfits[word] += trial.gap / 2 * (lesser if sign > 0 else greater) / votes
+            for order, sign in trial.best.items():
+                costs[order] += trial.gap / 2 * (lesser if sign > 0 else greater) / votes
     # from changes of the light field available to orders that take the place of the given one
-    fits = {word: misfits[_change(given, word)] for word in ORDERS}
-    best = min(ORDERS, key=lambda word: (fits[word], word != given))
-    return OrderCheck(fits, best, trial.clear, sign_decided, given)
+    fits = {order: costs[_change(read_in, order)] for order in ORDERS}
+    best = min(ORDERS, key=lambda order: (fits[order], order != read_in))
+    return OrderCheck(fits, best, trial.clear, sign_clear, read_in)
 
 
-def order_warning(light_field: LightField, given: str = AS_GIVEN) -> str | None:
+def order_warning(light_field: LightField, read_in: str = AS_GIVEN) -> str | None:
     """A sentence that names the order to read a light field in, where that is clearly not the given one.
 
     Parameters
     ----------
     light_field : LightField
-    given : str
+    read_in : str
         Order in which it was read.
 
     Returns
     -------
     str or None
     """
-    return check_order(light_field, given).warning()
+    return check_order(light_field, read_in).warning()
 
 
-def _change(given: str, wanted: str) -> str:
-    """The order that takes a grid read in order ``given`` to what reading it in order ``wanted`` gives."""
-    target = ORDERS[wanted](_GRID)
-    return next(word for word in ORDERS if np.array_equal(ORDERS[word](ORDERS[given](_GRID)), target))
+def _change(read_in: str, target: str) -> str:
+    """The order that takes a grid read in order ``read_in`` to what reading it in order ``target`` gives."""
+    turned = ORDERS[target](_GRID)
+    return next(order for order in ORDERS if np.array_equal(ORDERS[order](ORDERS[read_in](_GRID)), turned))
 
 
-def _word(grid: Numbers) -> str:
-    return next(word for word in ORDERS if np.array_equal(ORDERS[word](_GRID), grid))
+def _name(grid: Numbers) -> str:
+    return next(order for order in ORDERS if np.array_equal(ORDERS[order](_GRID), grid))

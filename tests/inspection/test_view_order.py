@@ -48,8 +48,8 @@ def grey_field(pictures: np.ndarray) -> LightField:
 def test_the_order_that_sets_a_scene_right_is_named(name: str, word: str) -> None:
     field = misread(scene(name), word)
     found = check_order(field)
-    assert found.decided
-    assert found.sign_decided
+    assert found.clear
+    assert found.sign_clear
     assert found.best == word
     assert list(found.fits) == list(ORDERS)
     assert found.fits[word] < min(fit for other, fit in found.fits.items() if other != word)
@@ -65,8 +65,8 @@ def test_the_order_that_sets_a_scene_right_is_named(name: str, word: str) -> Non
 @pytest.mark.parametrize("word", ORDERS)
 def test_a_scene_without_occlusion_leaves_near_and_far_open(word: str) -> None:
     found = check_order(misread(scene("slanted_plane"), word))
-    assert found.decided
-    assert not found.sign_decided
+    assert found.clear
+    assert not found.sign_clear
     assert found.best in (word, TURNED[word])
     assert found.fits[word] == found.fits[TURNED[word]]
     # in such a scene the order as it is may be right
@@ -119,7 +119,7 @@ def test_missing_views_neither_hide_the_order_nor_invent_one(shape: str, word: s
     }[shape]
     views = np.where(present[:, :, None, None, None], light_field.views, 0).astype(np.uint8)
     found = check_order(misread(LightField(views, "missing", present=present), word))
-    assert found.decided
+    assert found.clear
     assert found.best == word
 
 
@@ -141,7 +141,7 @@ def test_a_row_of_views_that_runs_the_other_way_is_found() -> None:
     """Of a single row only the direction matters, and one word for it is enough."""
     row = grey_field(scene("curved_occluders").views[2:3])
     found = check_order(misread(row, "flip-columns"))
-    assert found.sign_decided
+    assert found.sign_clear
     assert found.best == "flip-columns"
 
 
@@ -156,7 +156,7 @@ def test_pictures_of_noise_are_left_undecided() -> None:
     rng = np.random.default_rng(5)
     noise = grey_field(rng.integers(0, 256, (5, 5, 80, 80, 3), dtype=np.uint8))
     found = check_order(noise)
-    assert not found.decided
+    assert not found.clear
     assert "cannot tell" in found.verdict()
     assert order_warning(noise) is None
 
@@ -165,7 +165,7 @@ def test_pictures_of_noise_are_left_undecided() -> None:
 def test_empty_pictures_are_left_undecided(level: int) -> None:
     flat = grey_field(np.full((5, 5, 40, 50, 3), level, np.uint8))
     found = check_order(flat)
-    assert not found.decided
+    assert not found.clear
     assert found.best == "as-given"
     assert order_warning(flat) is None
 
@@ -173,7 +173,7 @@ def test_empty_pictures_are_left_undecided(level: int) -> None:
 def test_equal_views_are_left_undecided() -> None:
     """Views between which nothing moves fit in any order."""
     picture = scene("dots").views[2, 2]
-    assert not check_order(grey_field(np.broadcast_to(picture, (3, 3, *picture.shape)))).decided
+    assert not check_order(grey_field(np.broadcast_to(picture, (3, 3, *picture.shape)))).clear
 
 
 @pytest.mark.parametrize("shape", [(2, 2), (2, 300), (300, 2), (3, 17), (16, 16), (20, 1000)])
@@ -224,7 +224,7 @@ def test_a_large_parallax_is_found() -> None:
         views[t, s, :, :, 0] = texture[top : top + 240, left : left + 260]
     for word in ORDERS:
         found = check_order(misread(grey_field(views), word))
-        assert found.decided
+        assert found.clear
         assert found.best in (word, TURNED[word])
 
 
@@ -245,6 +245,6 @@ def every_order_is_named(light_field: LightField) -> None:
     assert order_warning(light_field) is None
     for word in ORDERS:
         found = check_order(misread(light_field, word))
-        assert found.decided
-        assert found.sign_decided
+        assert found.clear
+        assert found.sign_clear
         assert found.best == word
