@@ -3,7 +3,7 @@
 A pixel next to a nearer surface is hidden from the views on that surface's side, and the line through its full SEPI
 crosses the occluder. ``half_sepi`` repeats the slope computation with the views of one half, or of two halves at once:
 
-1. candidates: pixels near Canny edges of the reference view and near steps of the initial depth;
+1. candidates: pixels near Canny edges of the reference view and near discontinuities of the initial depth;
 2. mean shift on the patch of image and depth gives the surface that each pixel belongs to;
 3. side: by geometry the half away from the nearer surface is kept. (With positive disparity nearer, a nearer surface on
    the right hides the pixel from the views on the right, so the left half is kept. The paper's sentence says the
@@ -13,7 +13,7 @@ crosses the occluder. ``half_sepi`` repeats the slope computation with the views
 ``wang`` is the occlusion model of [2]_, which the paper's text compares with: the angular patch is split along the edge
 orientation, and the half with the smaller cost is kept. ``none`` hands the initial depth on.
 
-``visibility`` chooses the views one by one: those in which nothing of the map so far covers the pixel
+``visibility`` chooses the views one by one: those in which nothing of the map so far occludes the pixel
 (:mod:`sepi.matching.visibility_sweep`); pixels that a depth discontinuity runs through then go to the surface that
 fills most of them (:mod:`sepi.image.mixed_pixels`). ``visibility_unmixed`` leaves the last step out,
 ``visibility_colours`` the detail.
@@ -34,7 +34,7 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import Field
 
-from sepi.image.edges import CannyParameters, canny_edges, depth_steps, edge_angle
+from sepi.image.edges import CannyParameters, canny_edges, depth_discontinuities, edge_angle
 from sepi.lightfield import BoolMap, FloatMap, LightField
 from sepi.matching.plane_sweep import SweepParameters, SweepResult, sweep
 from sepi.matching.view_subsets import SIDES, half_planes, halves_and_quarters
@@ -51,7 +51,7 @@ class OcclusionParameters(SweepParameters, CannyParameters):
     """What both occlusion models need: candidates, and when a half replaces the full SEPI."""
 
     discontinuity_threshold: float = Field(
-        0.3, gt=0, description="step of the initial depth that makes a candidate, pixels per view step"
+        0.3, gt=0, description="change of the initial depth that makes a candidate, pixels per view step"
     )
     candidate_reach: int = Field(
         12, ge=0, le=50, description="distance from an edge within which pixels are candidates, px"
@@ -70,7 +70,7 @@ class HalfSepiParameters(OcclusionParameters):
     patch_sigma_colour: float = Field(0.05, gt=0, description="mean-shift bandwidth, RGB distance, colours in 0..1")
     patch_sigma_disparity: float = Field(0.3, gt=0, description="mean-shift bandwidth, pixels per view step")
     side_reach: int = Field(16, ge=1, le=50, description="how far away the nearer surface is looked for, pixels")
-    side_step: float = Field(0.1, ge=0, description="by how much the occluder must be nearer, pixels per view step")
+    side_margin: float = Field(0.1, ge=0, description="by how much the occluder must be nearer, pixels per view step")
     gain_unconfirmed: float = Field(
         0.03, ge=0, le=2, description="further gain asked for where no nearer surface is found on the hidden side"
     )
@@ -121,7 +121,9 @@ def half_sepi(
     cost = result.cost.copy()
     for n, name in enumerate(views.names[1:], start=1):
         sides = name.split("-")
-        nearer = nearer_on_hidden_side(surface, result.disparity[n], sides, parameters.side_reach, parameters.side_step)
+        nearer = nearer_on_hidden_side(
+            surface, result.disparity[n], sides, parameters.side_reach, parameters.side_margin
+        )
         cost[n] += parameters.gain_half if len(sides) == 1 else parameters.gain_quarter
         cost[n] += np.where(nearer, 0, parameters.gain_unconfirmed).astype(np.float32)
     return replace_where_better(before, result, cost, candidates, views.names, parameters.min_change)
@@ -160,7 +162,7 @@ def visibility(
     Returns
     -------
     StageMaps
-        Adds ``occluded``, bool: pixels that something nearer covers in some view.
+        Adds ``occluded``, bool: pixels that something nearer occludes in some view.
     """
     from sepi.matching.visibility_kernels import occluded_in_any_view
 
@@ -179,12 +181,15 @@ def visibility(
 
 
 def occlusion_candidates(reference_view: FloatMap, disparity: FloatMap, parameters: OcclusionParameters) -> BoolMap:
-    """Pixels within reach of an edge of the reference view or of a step of the depth map; shape (H, W), bool."""
-    edges = canny_edges(reference_view, parameters) | depth_steps(disparity, parameters.discontinuity_threshold)
+    """Pixels within reach of an edge of the reference view or of a depth discontinuity; shape (H, W), bool."""
+    edges = canny_edges(reference_view, parameters)
+    edges |= depth_discontinuities(disparity, parameters.discontinuity_threshold)
     return np.asarray(cv2.dilate(edges.astype(np.uint8), _box(parameters.candidate_reach)) > 0)
 
 
-def nearer_on_hidden_side(surface: FloatMap, disparity: FloatMap, sides: list[str], reach: int, step: float) -> BoolMap:
+def nearer_on_hidden_side(
+    surface: FloatMap, disparity: FloatMap, sides: list[str], reach: int, margin: float
+) -> BoolMap:
     """Whether a nearer surface lies where it would hide the pixel from the views that are left out.
 
     Parameters
@@ -197,7 +202,7 @@ def nearer_on_hidden_side(surface: FloatMap, disparity: FloatMap, sides: list[st
         The half that is kept, or the two whose overlap is; one hidden side is enough.
     reach : int
         Pixels.
-    step : float
+    margin : float
         By how much nearer, pixels per view step.
 
     Returns
@@ -216,7 +221,7 @@ def nearer_on_hidden_side(surface: FloatMap, disparity: FloatMap, sides: list[st
             here = np.s_[max(0, -dy) : H - max(0, dy), max(0, -dx) : W - max(0, dx)]
             there = np.s_[max(0, dy) : H - max(0, -dy), max(0, dx) : W - max(0, -dx)]
             np.maximum(nearest[here], surface[there], out=nearest[here])
-    return nearest > disparity + step
+    return nearest > disparity + margin
 
 
 def replace_where_better(

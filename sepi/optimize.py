@@ -5,7 +5,7 @@
 smoothness on the 4-connected grid where the image is smooth (Eq. 11) and the depth uncertain (Eq. 12).
 
 ``second_order`` goes back to the views instead: Gauss-Newton steps on their residuals
-(:mod:`sepi.matching.gauss_newton`) bring the depth below the candidate step, and second-order smoothing
+(:mod:`sepi.matching.gauss_newton`) refine the depth below the disparity sampling, and second-order smoothing
 (:mod:`sepi.regularization.second_order`), which leaves planes free, weighs each pixel by how much the views know about
 it. ``gauss_newton`` leaves out the smoothing, ``second_order_colours`` the detail layer. ``none`` hands the depth on.
 
@@ -47,10 +47,10 @@ UNIFORM_WEIGHT = 0.05
 """Weight of a plane that was put into a region without texture; planes cost nothing, so little holds it."""
 
 IGNORANCE = 0.01
-"""What a view's information of 1 / px^2 adds to the bend, in the confidence; pixels per view step."""
+"""What a view's information of 1 / px^2 adds to the second difference, in the confidence; pixels per view step."""
 
-HALF_CONFIDENT_BEND = 0.01
-"""Bend at which the confidence is one half, pixels per view step."""
+HALF_CONFIDENT_DIFFERENCE = 0.01
+"""Second difference at which the confidence is one half, pixels per view step."""
 
 LEAST_RELIABILITY = 1e-6
 LEAST_SMOOTHNESS = 1e-8
@@ -63,20 +63,22 @@ class SecondOrderParameters(BaseDetailParameters):
     refinement_radius: int = Field(3, ge=0, le=20, description="window of these steps, 2 r + 1 pixels")
     solves: int = Field(2, ge=0, le=10, description="rounds of one Gauss-Newton step and one smoothing")
     solve_radius: int = Field(2, ge=0, le=20, description="window of the steps of these rounds, 2 r + 1 pixels")
-    max_update: float = Field(0.05, gt=0, description="longest Gauss-Newton step, pixels per view step")
-    occlusion_margin: float = Field(0.15, ge=0, description="by how much a cover must be nearer, pixels per view step")
+    max_update: float = Field(0.05, gt=0, description="largest change by one Gauss-Newton step, pixels per view step")
+    occlusion_margin: float = Field(
+        0.15, ge=0, description="by how much an occluder must be nearer, pixels per view step"
+    )
     strength: float = Field(5.0, ge=0, description="weight of the smoothness; the best-known tenth of pixels weighs 1")
     second_difference_threshold: float = Field(
-        0.05, gt=0, description="second difference of the depth that marks a step, pixels per view step"
+        0.05, gt=0, description="second difference of the depth that marks a discontinuity, pixels per view step"
     )
     smooth_colour: float = Field(
         0.1, gt=0, description="RGB distance at which smoothness falls, colours in 0..1; noise adds to it"
     )
     reliable_confidence: float = Field(
-        0.5, gt=0, le=1, description="confidence within two pixels from which bends in the data are believed"
+        0.5, gt=0, le=1, description="confidence within two pixels from which discontinuities in the data are believed"
     )
     rtol: float = Field(3e-4, gt=0, lt=1, description="relative residual at which the solver stops")
-    max_iterations: int = Field(200, ge=1, description="steps after which the solver stops anyway")
+    max_iterations: int = Field(200, ge=1, description="iterations after which the solver stops anyway")
 
     @model_validator(mode="after")
     def _does_something(self) -> Self:
@@ -168,7 +170,7 @@ def second_order(
 
 
 def smooth_confidence(disparity: FloatMap, curvature: FloatMap) -> FloatMap:
-    """Confidence by how much the surface bends round a pixel and how little the views know about it.
+    """Confidence by the second difference of the surface round a pixel and how little the views know about it.
 
     Parameters
     ----------
@@ -180,11 +182,12 @@ def smooth_confidence(disparity: FloatMap, curvature: FloatMap) -> FloatMap:
     -------
     ndarray, shape (H, W), float32
         ``h / (h + b + i / sqrt(curvature))`` with the mean second difference ``b`` over 5x5 pixels,
-        ``h = HALF_CONFIDENT_BEND`` and ``i = IGNORANCE``. Near depth steps, where errors are large, it is close to 0.
+        ``h = HALF_CONFIDENT_DIFFERENCE`` and ``i = IGNORANCE``. Near depth discontinuities, where errors are large, it
+        is close to 0.
     """
-    bend = cv2.blur(np.abs(cv2.Laplacian(disparity, cv2.CV_32F)), (5, 5))
-    unknown = np.maximum(bend, 0) + IGNORANCE / np.sqrt(curvature + np.float32(1e-3))
-    return np.asarray(HALF_CONFIDENT_BEND / (HALF_CONFIDENT_BEND + unknown), np.float32)
+    difference = cv2.blur(np.abs(cv2.Laplacian(disparity, cv2.CV_32F)), (5, 5))
+    unknown = np.maximum(difference, 0) + IGNORANCE / np.sqrt(curvature + np.float32(1e-3))
+    return np.asarray(HALF_CONFIDENT_DIFFERENCE / (HALF_CONFIDENT_DIFFERENCE + unknown), np.float32)
 
 
 def reliable(confidence: FloatMap, parameters: SecondOrderParameters) -> FloatMap:
@@ -201,7 +204,7 @@ def smooth_second_order(
     layers: BaseDetail,
     parameters: SecondOrderParameters,
 ) -> FloatMap:
-    """Second-order smoothing of ``target``, whose bends are looked for in ``shape``; all shapes (H, W)."""
+    """Second-order smoothing of ``target``, whose discontinuities are looked for in ``shape``; all shapes (H, W)."""
     from sepi.regularization.second_order import second_difference_matrix, smoothness_weights, solve_smooth
 
     variance = parameters.smooth_colour**2 + 4 * layers.noise

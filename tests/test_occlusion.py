@@ -5,7 +5,7 @@ import pytest
 from scipy.ndimage import gaussian_filter
 
 from sepi.errors import SepiError
-from sepi.image.edges import CannyParameters, canny_edges, depth_steps, edge_angle
+from sepi.image.edges import CannyParameters, canny_edges, depth_discontinuities, edge_angle
 from sepi.image.mean_shift import patch_modes
 from sepi.initial import CHOICES as INITIAL
 from sepi.io.hdf5 import read_stage, write_stage
@@ -174,8 +174,8 @@ def test_edges_follow_gradients_and_their_direction():
     assert not edges[:, :15].any()
     assert np.abs(edge_angle(image, CannyParameters())[20, 20]) < 0.1
     assert np.abs(np.abs(edge_angle(image.transpose(1, 0, 2), CannyParameters())[20, 20]) - np.pi / 2) < 0.1
-    assert depth_steps(image[..., 0], 0.3)[:, 19:21].all()
-    assert not depth_steps(image[..., 0], 0.6).any()
+    assert depth_discontinuities(image[..., 0], 0.3)[:, 19:21].all()
+    assert not depth_discontinuities(image[..., 0], 0.6).any()
 
 
 @pytest.mark.parametrize("choice", ["half_sepi", "wang"])

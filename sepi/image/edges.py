@@ -1,4 +1,4 @@
-"""Edges of the reference view and steps of a depth map."""
+"""Edges of the reference view and discontinuities of a depth map."""
 
 from __future__ import annotations
 
@@ -72,10 +72,10 @@ def edge_angle(reference_view: FloatMap, parameters: CannyParameters) -> FloatMa
     return np.asarray(0.5 * np.arctan2(across, along), np.float32)
 
 
-def depth_steps(disparity: FloatMap, step: float) -> BoolMap:
-    """Pixels whose 3x3 neighbourhood spans more than ``step`` pixels of disparity per view step; (H, W), bool."""
+def depth_discontinuities(disparity: FloatMap, threshold: float) -> BoolMap:
+    """Pixels whose 3x3 neighbourhood spans more than ``threshold`` pixels of disparity per view step; (H, W), bool."""
     box = np.ones((3, 3), np.uint8)
-    return np.asarray(cv2.dilate(disparity, box) - cv2.erode(disparity, box) > step)
+    return np.asarray(cv2.dilate(disparity, box) - cv2.erode(disparity, box) > threshold)
 
 
 def _smooth_grey(reference_view: FloatMap, sigma: float) -> FloatMap:

@@ -103,13 +103,13 @@ def propagate(
 
     The absolute values of Eq. 7 are minimised by re-weighting: of the data, ``|d_hat - d|``, and of the continuity,
     ``|d_hat - d_l|``, where ``d_l`` is the neighbour's plane continued linearly to the common border. The equation's
-    denominator, which weakens the coupling across a change of depth, is that re-weighting; its factor of affinity is
+    denominator, which weakens the coupling across a change of depth, is that re-weighting; its factor of likeness is
     the colour cue. All free superpixels are solved for together, so depth travels from reliable edges inwards.
 
     Parameters
     ----------
     segments : Superpixels
-    adjacent : Borders
+    adjacent : Adjacency
     affinity : ndarray, shape (E,), float
         0..1 for each border: whether the two sides belong together.
     planes : ndarray, shape (N, 3), float

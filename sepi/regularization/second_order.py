@@ -1,10 +1,11 @@
-"""Second-order smoothing of a disparity map: planes are free, bends cost, and the data counts by what it knows.
+"""Second-order smoothing of a disparity map: planes are free, second differences cost, and the data counts by what it
+knows.
 
 Minimises ``sum_p w_p (d_p - z_p)^2 + sum_q c_q (D_q d)^2`` over disparities ``d``, where ``z`` is the data, ``w`` its
-weight, and ``D_q`` the second differences along x, along y and across; ``c_q`` is small where the data bends sharply,
-unless the data there is worth little, and where the colours change. The system has 13 entries a row and is solved by
-conjugate gradients; what those are slow at, bends over long distances, is taken by a direct solve for one plane for
-each block of pixels, added to the diagonal as preconditioner (two-level Schwarz, [1]_).
+weight, and ``D_q`` the second differences along x, along y and across; ``c_q`` is small where that of the data is
+large, unless the data there is worth little, and where the colours change. The system has 13 entries a row and is
+solved by conjugate gradients; what those are slow at, curvature over long distances, is taken by a direct solve for one
+plane for each block of pixels, added to the diagonal as preconditioner (two-level Schwarz, [1]_).
 
 References
 ----------
@@ -36,7 +37,7 @@ _SECOND, _MIXED = (1.0, -2.0, 1.0), (1.0, -1.0, -1.0, 1.0)
 
 
 def smoothness_weights(
-    disparity: FloatMap, guide: FloatMap, reliability: FloatMap, bend: float, colour_variance: float
+    disparity: FloatMap, guide: FloatMap, reliability: FloatMap, threshold: float, colour_variance: float
 ) -> list[FloatArray]:
     """Weights of the second differences along x, along y and across, 0..1.
 
@@ -47,9 +48,9 @@ def smoothness_weights(
     guide : ndarray, shape (H, W, 3), float32
         Colours, 0..1.
     reliability : ndarray, shape (H, W), float32
-        0..1: how far a bend in the data is believed.
-    bend : float
-        Second difference that counts as a step, pixels per view step.
+        0..1: how far a second difference of the data is believed.
+    threshold : float
+        Second difference that counts as a discontinuity, pixels per view step.
     colour_variance : float
         Squared RGB distance at which smoothness falls.
 
@@ -60,12 +61,12 @@ def smoothness_weights(
     """
 
     def weight(
-        places: tuple[Corner, ...], factors: tuple[float, ...], pairs: tuple[tuple[int, int], ...]
+        corners: tuple[Corner, ...], factors: tuple[float, ...], pairs: tuple[tuple[int, int], ...]
     ) -> FloatArray:
-        difference = np.asarray(sum(f * disparity[p].astype(np.float64) for f, p in zip(factors, places, strict=True)))
-        trust = np.minimum.reduce([reliability[p] for p in places])
-        colour = sum(((guide[places[a]] - guide[places[b]]) ** 2).sum(axis=2) for a, b in pairs)
-        exponent = (difference / bend) ** 2 * trust + 2 * np.asarray(colour, np.float64) / colour_variance
+        difference = np.asarray(sum(f * disparity[p].astype(np.float64) for f, p in zip(factors, corners, strict=True)))
+        trust = np.minimum.reduce([reliability[p] for p in corners])
+        colour = sum(((guide[corners[a]] - guide[corners[b]]) ** 2).sum(axis=2) for a, b in pairs)
+        exponent = (difference / threshold) ** 2 * trust + 2 * np.asarray(colour, np.float64) / colour_variance
         return np.asarray(np.exp(-np.minimum(exponent, 30)))
 
     return [
@@ -79,10 +80,12 @@ def second_difference_matrix(weights: list[FloatArray], shape: tuple[int, int]) 
     """Matrix of the smoothness term: ``d^T A d`` is the weighted sum of squared second differences."""
     numbers = np.arange(shape[0] * shape[1], dtype=np.int32).reshape(shape)
     total = sparse.csr_matrix((numbers.size, numbers.size))
-    for places, factors, weight in zip((_ALONG_X, _ALONG_Y, _ACROSS), (_SECOND, _SECOND, _MIXED), weights, strict=True):
+    for corners, factors, weight in zip(
+        (_ALONG_X, _ALONG_Y, _ACROSS), (_SECOND, _SECOND, _MIXED), weights, strict=True
+    ):
         root = np.sqrt(weight).ravel()
-        rows = np.tile(np.arange(root.size, dtype=np.int32), len(places))
-        columns = np.concatenate([numbers[p].ravel() for p in places])
+        rows = np.tile(np.arange(root.size, dtype=np.int32), len(corners))
+        columns = np.concatenate([numbers[p].ravel() for p in corners])
         values = np.concatenate([f * root for f in factors])
         difference = sparse.csr_matrix((values, (rows, columns)), shape=(root.size, numbers.size))
         total = total + difference.T @ difference

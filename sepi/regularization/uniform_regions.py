@@ -56,7 +56,9 @@ class UniformPlanesParameters(Parameters):
     )
     min_inlier_ratio: float = Field(0.25, ge=0, le=1, description="share of the border without which there is no plane")
     ransac_iterations: int = Field(500, ge=1, description="planes tried for each region")
-    occlusion_margin: float = Field(0.15, ge=0, description="by how much a cover must be nearer, pixels per view step")
+    occlusion_margin: float = Field(
+        0.15, ge=0, description="by how much an occluder must be nearer, pixels per view step"
+    )
 
 
 def fill_uniform_regions(

@@ -41,10 +41,13 @@ class WlsParameters(Parameters):
     )
     tau_0: float = Field(1000.0, ge=0, description="how sharply the data weight falls beyond tau_1")
     tau_1: float = Field(
-        0.2, ge=0, description="standard deviation of the depth in 3x3 pixels that marks a step, px per step"
+        0.2, ge=0, description="standard deviation of the depth in 3x3 pixels that marks a discontinuity"
     )
     discontinuity_weight: float = Field(
-        0.1, gt=0, le=1, description="share of its weight that the data keeps at a step, where Eq. 9 would leave none"
+        0.1,
+        gt=0,
+        le=1,
+        description="share of its weight that data keeps at a discontinuity, where Eq. 9 would leave none",
     )
     tau_2: float = Field(1.5, ge=0, description="how strongly confidence weakens smoothness")
     textureless_confidence: float = Field(0.8, ge=0, le=1, description="c_tl, confidence of textureless regions")
@@ -61,7 +64,9 @@ def rectified_confidence(confidence: FloatMap, textureless: BoolMap, parameters:
 
 
 def data_weight(disparity: FloatMap, confidence: FloatMap, parameters: WlsParameters) -> FloatMap:
-    """Weight w of Eq. 9: the confidence, or little of it where the depth's deviation in 3x3 pixels marks a step."""
+    """Weight w of Eq. 9: the confidence, or little of it at depth discontinuities, where the deviation in 3x3 pixels
+    marks one.
+    """
     mean = cv2.blur(disparity, (3, 3))
     deviation = np.sqrt(np.maximum(cv2.blur((disparity - mean) ** 2, (3, 3)), 0))
     cut = np.exp(-np.minimum(parameters.tau_0 * np.maximum(deviation - parameters.tau_1, 0), 80))
@@ -108,8 +113,8 @@ def solve(matrix: sparse.csr_matrix, right: FloatArray, start: FloatMap, rtol: f
     """Solve by conjugate gradients, to a residual relative to the right side; shape of ``start``, float64.
 
     With little smoothness the diagonal is preconditioner enough, and an algebraic multigrid takes several times as long
-    to set up as that takes to arrive. What has not arrived after a few steps is left to multigrid, whose steps do not
-    grow in number with smoothness or with regions that have hardly any data.
+    to set up as that takes to arrive. What has not arrived after a few iterations is left to multigrid, whose
+    iterations do not grow in number with smoothness or with regions that have hardly any data.
     """
     import scipy.sparse as sparse
     from scipy.sparse.linalg import cg
