@@ -9,10 +9,13 @@ import numpy as np
 import pytest
 
 from sepi.io.hdf5 import write_light_field, write_stage
-from sepi.scenes import render
+from sepi.scenes import render, write_hci
 from sepi.stage import StageMaps
 
-SLOW = ("numba", "scipy", "skimage", "matplotlib", "pyamg", "jinja2", "snakemake", "tqdm")
+SLOW = (
+    *("numba", "scipy", "skimage", "matplotlib", "pyamg", "jinja2", "snakemake", "tqdm"),
+    *("PIL", "tifffile", "tabulate", "networkx", "pandas"),
+)
 """Libraries that take longer to import than many a job takes."""
 
 MODULES = (
@@ -41,12 +44,24 @@ def loaded(program: str) -> set[str]:
     told = f"{program}\nimport sys\nprint(*(name for name in {SLOW!r} if name in sys.modules))"
     environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[1])}
     done = subprocess.run([sys.executable, "-c", told], env=environment, capture_output=True, text=True, check=True)
-    return set(done.stdout.split())
+    return set(done.stdout.splitlines()[-1].split())
 
 
 @pytest.mark.parametrize("module", MODULES)
 def test_nothing_slow_is_imported_before_it_is_needed(module: str) -> None:
     assert loaded(f"import {module}") == set()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("variant", "more"), [("best", set()), ("paper", {"skimage"}), ("no_occlusion_no_textureless", set())]
+)
+def test_depth_loads_what_it_uses(tmp_path: Path, variant: str, more: set[str]) -> None:
+    """From files to maps: no library of the workflow, the report, other formats, or other variants."""
+    write_hci(render("dots", size=64, views=3), tmp_path / "dots")
+    words = ["depth", str(tmp_path / "dots"), "-o", str(tmp_path / "maps"), "--variant", variant]
+    found = loaded(f"from sepi.cli.main import main\nmain({words!r}, standalone_mode=False)")
+    assert found == {"numba", "scipy"} | more
 
 
 def test_a_stage_without_kernels_does_not_wait_for_numba(tmp_path: Path) -> None:
