@@ -51,8 +51,8 @@ def external_maps(
     Returns
     -------
     dict of str to ExternalMap
-        In the order of ``sources``. A file that is missing, cannot be read, has another size than the views or no finite
-        value has its problem (``no file``, ``not readable``, ``800x600 instead of 512x512`` as width x height,
+        In the order of ``sources``. A file that is missing, cannot be read, has another size than the views or no
+        finite value has its problem (``no file``, ``not readable``, ``800x600 instead of 512x512`` as width x height,
         ``no finite value``) and no map.
     """
     scene = scene or light_field.name

@@ -182,9 +182,9 @@ VARIANT_ENTRIES: dict[str, dict[str, Any]] = {
     "best_no_smoothing": {"base": "best", "optimize": {"refinements": 3, "solves": 0}},
     "best_wls": {"base": "best", "optimize": "wls"},
 }
-"""The built-in variants as :func:`variant_from` reads them: the paper's method, the other four columns of its table 4 in
-their order, and the text's other occlusion stage; then the most accurate variant, and the same with one part switched
-off or put back to the paper's."""
+"""The built-in variants as :func:`variant_from` reads them: the paper's method, the other four columns of its table 4
+in their order, and the text's other occlusion stage; then the most accurate variant, and the same with one part
+switched off or put back to the paper's."""
 
 DEFAULT_VARIANT = "best"
 """Variant of ``sepi depth``."""

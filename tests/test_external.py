@@ -52,17 +52,17 @@ class TestImport:
     def test_scores_are_those_of_our_own_maps(
         self, tmp_path: Path, light_field: LightField, estimate: np.ndarray
     ) -> None:
-        imported = external_maps(light_field, {"SPO": saved(tmp_path / "noise.pfm", estimate)})["SPO"]
+        external = external_maps(light_field, {"SPO": saved(tmp_path / "noise.pfm", estimate)})["SPO"]
         expected = evaluation_of(light_field, estimate)
-        assert imported.problem == ""
-        assert imported.source == str(tmp_path / "noise.pfm")
-        np.testing.assert_array_equal(imported.disparity, estimate)
-        assert imported.evaluation.scores == expected.scores
-        assert imported.evaluation.region_sources == expected.region_sources
+        assert external.problem == ""
+        assert external.source == str(tmp_path / "noise.pfm")
+        np.testing.assert_array_equal(external.disparity, estimate)
+        assert external.evaluation.scores == expected.scores
+        assert external.evaluation.region_sources == expected.region_sources
         assert expected.region_sources == {"occluded": "computed", "textureless": "scene"}
-        np.testing.assert_array_equal(imported.evaluation.error, expected.error)
+        np.testing.assert_array_equal(external.evaluation.error, expected.error)
         for name, mask in expected.regions.items():
-            np.testing.assert_array_equal(imported.evaluation.regions[name], mask)
+            np.testing.assert_array_equal(external.evaluation.regions[name], mask)
 
     def test_methods_keep_their_order(self, tmp_path: Path, light_field: LightField, estimate: np.ndarray) -> None:
         """The report's columns come as the user wrote them."""
@@ -76,15 +76,15 @@ class TestImport:
         self, tmp_path: Path, light_field: LightField, estimate: np.ndarray
     ) -> None:
         file = saved(tmp_path / "noise.pfm", -2 * estimate + 3)
-        imported = external_maps(light_field, {"SPO": file.model_copy(update={"scale": -0.5, "offset": 1.5})})["SPO"]
-        np.testing.assert_allclose(imported.disparity, estimate, atol=1e-5)
+        external = external_maps(light_field, {"SPO": file.model_copy(update={"scale": -0.5, "offset": 1.5})})["SPO"]
+        np.testing.assert_allclose(external.disparity, estimate, atol=1e-5)
 
     def test_without_truth_there_are_maps_but_no_scores(self, tmp_path: Path, light_field: LightField) -> None:
         bare = replace(light_field, ground_truth=None, masks={})
-        imported = external_maps(bare, {"SPO": saved(tmp_path / "noise.pfm", np.ones(SHAPE, np.float32))})["SPO"]
-        assert imported.problem == ""
-        assert imported.disparity is not None
-        assert imported.evaluation.scores == {}
+        external = external_maps(bare, {"SPO": saved(tmp_path / "noise.pfm", np.ones(SHAPE, np.float32))})["SPO"]
+        assert external.problem == ""
+        assert external.disparity is not None
+        assert external.evaluation.scores == {}
 
     def test_unknown_pixels_are_counted_and_bad(
         self, tmp_path: Path, light_field: LightField, estimate: np.ndarray
@@ -92,10 +92,10 @@ class TestImport:
         estimate[20, 20:23] = [np.nan, np.inf, -np.inf]
         file = saved(tmp_path / "noise.pfm", estimate)
         with pytest.warns(SepiWarning, match=r"external SPO, scene noise: .*noise\.pfm: 3 of 1760 values"):
-            imported = external_maps(light_field, {"SPO": file})["SPO"]
-        assert imported.problem == ""
-        np.testing.assert_array_equal(imported.disparity, estimate)
-        whole = imported.evaluation.scores["paper"]["all"]
+            external = external_maps(light_field, {"SPO": file})["SPO"]
+        assert external.problem == ""
+        np.testing.assert_array_equal(external.disparity, estimate)
+        whole = external.evaluation.scores["paper"]["all"]
         assert whole["non_finite"] == 3
         assert whole["badpix007"] >= 100 * 3 / 1760
 
@@ -147,38 +147,38 @@ class TestImport:
 
 
 class TestFile:
-    def imported(self, light_field: LightField, estimate: np.ndarray) -> ExternalMap:
+    def external(self, light_field: LightField, estimate: np.ndarray) -> ExternalMap:
         return ExternalMap("maps/noise.pfm", "", "ab" * 32, estimate, evaluation_of(light_field, estimate))
 
     def test_comes_back_unchanged(self, tmp_path: Path, light_field: LightField, estimate: np.ndarray) -> None:
-        imported = self.imported(light_field, estimate)
-        maps = {"SPO": imported, "lost": ExternalMap("maps/ü.pfm", "no file")}
+        external = self.external(light_field, estimate)
+        maps = {"SPO": external, "lost": ExternalMap("maps/ü.pfm", "no file")}
         write_external(tmp_path / "a.h5", maps)
         back = read_external(tmp_path / "a.h5")
         assert list(back) == ["SPO", "lost"]
         assert back["lost"] == maps["lost"]
-        assert (back["SPO"].source, back["SPO"].sha256) == (imported.source, imported.sha256)
-        assert back["SPO"].evaluation.scores == imported.evaluation.scores
+        assert (back["SPO"].source, back["SPO"].sha256) == (external.source, external.sha256)
+        assert back["SPO"].evaluation.scores == external.evaluation.scores
         np.testing.assert_array_equal(back["SPO"].disparity, estimate)
-        np.testing.assert_array_equal(back["SPO"].evaluation.error, imported.evaluation.error)
+        np.testing.assert_array_equal(back["SPO"].evaluation.error, external.evaluation.error)
         assert set(back["SPO"].evaluation.regions) == {"occluded", "textureless"}
         write_external(tmp_path / "b.h5", maps)
         assert (tmp_path / "a.h5").read_bytes() == (tmp_path / "b.h5").read_bytes()
 
     def test_scores_alone(self, tmp_path: Path, light_field: LightField, estimate: np.ndarray) -> None:
         """Tables need no maps."""
-        imported = self.imported(light_field, estimate)
-        write_external(tmp_path / "a.h5", {"SPO": imported, "lost": ExternalMap("x", "no file")})
+        external = self.external(light_field, estimate)
+        write_external(tmp_path / "a.h5", {"SPO": external, "lost": ExternalMap("x", "no file")})
         back = read_external_scores(tmp_path / "a.h5")
         assert list(back) == ["SPO", "lost"]
-        assert back["SPO"].evaluation.scores == imported.evaluation.scores
+        assert back["SPO"].evaluation.scores == external.evaluation.scores
         assert (back["SPO"].disparity, back["SPO"].evaluation.error, back["SPO"].evaluation.regions) == (None, None, {})
         assert back["lost"].problem == "no file"
 
     def test_maps_say_their_unit_and_masks_take_no_room(
         self, tmp_path: Path, light_field: LightField, estimate: np.ndarray
     ) -> None:
-        write_external(tmp_path / "a.h5", {"SPO": self.imported(light_field, estimate)})
+        write_external(tmp_path / "a.h5", {"SPO": self.external(light_field, estimate)})
         with h5py.File(tmp_path / "a.h5") as file:
             assert file["methods/SPO/disparity"].attrs["units"] == "pixels per view step"
             assert file["methods/SPO/regions/occluded"].compression == "gzip"
@@ -189,7 +189,7 @@ class TestFile:
 
     def test_another_file_is_a_clear_error(self, tmp_path: Path, light_field: LightField) -> None:
         write_light_field(tmp_path / "lightfield.h5", light_field)
-        with pytest.raises(SepiError, match=r"lightfield\.h5: not a file of other methods' maps"):
+        with pytest.raises(SepiError, match=r"lightfield\.h5: not a file of external maps"):
             read_external(tmp_path / "lightfield.h5")
 
 
@@ -209,7 +209,7 @@ class TestCommand:
             f"sepi: warning: external AMNorm, scene noise: {tmp_path / 'absent.pfm'}: no such file"
         ]
         back = read_external(tmp_path / "external.h5")
-        assert [imported.problem for imported in back.values()] == ["", "no file"]
+        assert [external.problem for external in back.values()] == ["", "no file"]
         assert back["SPO"].evaluation.scores == evaluation_of(light_field, estimate).scores
         written = (tmp_path / "external.h5").read_bytes()
         assert call(tmp_path, light_field, json.dumps(maps)).exit_code == 0
@@ -235,15 +235,15 @@ class TestCommand:
 
 
 def test_published_maps_score_as_an_independent_program_scores_them(hci: Path, real_data: Path) -> None:
-    """SPO on cotton: a slip in orientation, sign or border would put every imported method in a wrong light."""
+    """SPO on cotton: a slip in orientation, sign or border would put every external method in a wrong light."""
     folder = real_data / "published_maps"
     if not folder.is_dir():
         pytest.skip(f"no published maps at {folder}")
     scene = read_light_field(hci / "cotton")
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        imported = external_maps(scene, {"SPO": ExternalSource(path=str(folder / "SPO" / "cotton.pfm"))})["SPO"]
-    scores = imported.evaluation.scores
+        external = external_maps(scene, {"SPO": ExternalSource(path=str(folder / "SPO" / "cotton.pfm"))})["SPO"]
+    scores = external.evaluation.scores
     assert scores["paper"]["all"]["mse100"] == pytest.approx(1.7786, abs=5e-5)
     assert scores["benchmark"]["all"]["mse100"] == pytest.approx(1.3130, abs=5e-5)
     assert scores["paper"]["all"]["non_finite"] == 0

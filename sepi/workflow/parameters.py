@@ -66,7 +66,7 @@ def shared_by(model: type[Parameters]) -> dict[str, str]:
     }
 
 
-def default_values() -> dict[str, dict[str, dict[str, Any]]]:
+def default_values() -> dict[str, Any]:
     """Every default, stated once."""
     defaults = {group: model().model_dump() for group, model in GROUPS.items()}
     found = {SHARED: {group: {name: defaults[group][name] for name in fields_of(group)} for group in GROUPS}}
