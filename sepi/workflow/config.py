@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable, Mapping
+import os
+import re
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
@@ -12,6 +14,7 @@ from typing import Annotated, Any
 from pydantic import BaseModel, ConfigDict, Field
 
 from sepi.errors import SepiError
+from sepi.io.disparity_maps import SUFFIXES
 from sepi.io.external_maps import ExternalSource
 from sepi.io.readers.formats import FORMATS
 from sepi.io.readers.options import ORDERS
@@ -21,7 +24,6 @@ from sepi.scenes import SCENES
 from sepi.stage import Parameters
 from sepi.validation import require_known, validated
 from sepi.workflow.datasets import Scene, own_scene, scenes_in
-from sepi.workflow.external_config import external_source
 from sepi.workflow.parameters import default_values, stage_settings
 
 GRAPH_CONFIG = "SEPI_GRAPH_CONFIG"
@@ -29,6 +31,8 @@ GRAPH_CONFIG = "SEPI_GRAPH_CONFIG"
 
 # names of folders and panels that stand beside those of variants
 _RESERVED = ("stages", "imported", "external", "ground_truth", "centre")
+# a file name holds 255 bytes, and pictures of a method are folders of its name
+_LONGEST_METHOD = 80
 # the built-in scenes have 9x9 views
 _BUILTIN_VIEWS = 81
 # keys whose values are text even where they look like numbers
@@ -249,7 +253,7 @@ def load_settings(values: Mapping[str, Any]) -> Settings:
         {key: replace(scene, disparity_range=ranges.get("/".join(key))) for key, scene in scenes.items()},
         variants,
         stage_settings(config.stages, variants),
-        {name: external_source(name, entry, variants) for name, entry in config.external.items()},
+        {name: _external(name, entry, variants) for name, entry in config.external.items()},
         _report(config.report, scenes),
     )
 
@@ -314,6 +318,27 @@ def _variant(name: str, entries: Mapping[str, Any]) -> Variant:
     if not name.isidentifier() or name in _RESERVED:
         raise SepiError(f"{where}: a variant's name must be letters, digits and _, and none of {', '.join(_RESERVED)}")
     return variant
+
+
+def _external(name: str, entry: Mapping[str, Any], variants: Collection[str]) -> ExternalSource:
+    where = f"config.external.{name}"
+    source = validated(ExternalSource, entry, where)
+    if name in variants:
+        raise SepiError(f"{where}: a variant has this name; give the method another")
+    if not name.strip() or name != name.strip() or "/" in name or name.startswith(".") or not name.isprintable():
+        raise SepiError(f"{where}: a method's name must be printable text without '/', not beginning with '.'")
+    if len(name.encode()) > _LONGEST_METHOD:
+        raise SepiError(f"config.external.{name[:20]}...: a method's name must have at most {_LONGEST_METHOD} bytes")
+    require_known(f"{where}.path", re.findall(r"\{[^{}]*\}", source.path), ("{dataset}", "{scene}"))
+    path = Path(os.path.expanduser(source.path))
+    if "{scene}" not in source.path and (path.is_file() or (path.suffix.lower() in SUFFIXES and not path.is_dir())):
+        # one file would be taken for the map of every scene
+        raise SepiError(
+            f"{where}.path: '{source.path}' is one file; write {{scene}} for the scene's name, or give the folder"
+        )
+    if source.scale == 0:
+        raise SepiError(f"{where}.scale: must not be 0, or every disparity would be the offset")
+    return source
 
 
 def _report(report: Report, scenes: Mapping[tuple[str, str], Scene]) -> Report:
