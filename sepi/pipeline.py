@@ -48,7 +48,7 @@ class Variant:
     Raises
     ------
     SepiError
-        If a word is not one of the stage's choices, or a field or value is not one of the choice's.
+        If one is not a choice of its stage, or a field or value is not one of the choice's.
     """
 
     initial: str
@@ -113,7 +113,7 @@ def variant_from(name: str, entries: Mapping[str, Any], where: str, users: tuple
     entries : mapping of str to mapping
         Its entry and those that may be its base.
     where : str
-        The place of the entries, for messages.
+        Where the entries stand, for messages.
     users : tuple of str
         The variants that are built on this one.
 
@@ -192,9 +192,9 @@ DEFAULT_VARIANT = "best"
 PARTS_OF_BEST: dict[str, str] = {
     "best": "all parts",
     "best_paper_initial": "the paper's initial depth",
-    "best_no_detail": "colours alone, no detail layer",
+    "best_no_detail": "colours alone, no detail",
     "best_half_sepi": "half-SEPIs, no visibility",
-    "best_no_mixture": "no colour mixture at steps",
+    "best_no_mixture": "no reassignment of mixed pixels",
     "best_no_planes": "no planes in uniform regions",
     "best_no_smoothing": "Gauss-Newton, no smoothing",
     "best_wls": "the paper's global optimisation",

@@ -1,6 +1,6 @@
 """What every stage has in common: the maps that travel from stage to stage, and the command that a rule calls.
 
-A stage module defines ``CHOICES``: for each word that a variant may use, a parameter model and a pure function
+A stage module defines ``CHOICES``: for each choice that a variant may name, a parameter model and a pure function
 ``(light_field, previous, parameters, progress) -> StageMaps``. The Python API, the command line and the workflow's
 rules all call that function.
 """

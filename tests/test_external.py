@@ -1,4 +1,4 @@
-"""Maps of other methods: scored like ours, and whatever is wrong with one is told and stops nothing."""
+"""Maps of external methods: scored like ours, and whatever is wrong with one is told and stops nothing."""
 
 import json
 import os

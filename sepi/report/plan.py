@@ -79,7 +79,7 @@ class Plan:
             plan = cls(
                 results,
                 {dataset: _names(names) for dataset, names in values["scenes"].items()},
-                {name: {stage: str(word) for stage, word in c.items()} for name, c in values["variants"].items()},
+                {name: {stage: str(label) for stage, label in c.items()} for name, c in values["variants"].items()},
                 _names(values.get("external", ())),
             )
         except (ValueError, KeyError, TypeError, AttributeError) as error:

@@ -54,7 +54,7 @@ class Builtin(_Keys):
 
 
 _Count = Annotated[int, Field(ge=1)]
-_Place = Annotated[int, Field(ge=0)]
+_Index = Annotated[int, Field(ge=0)]
 
 
 class OwnLightField(_Keys):
@@ -69,24 +69,24 @@ class OwnLightField(_Keys):
     central: _Count | None = None
     order: str | None = None
     exclude: list[str] = []
-    view: tuple[_Place, _Place] | None = None
+    view: tuple[_Index, _Index] | None = None
     follow_links: bool = False
 
     @property
     def flags(self) -> tuple[str, ...]:
         """All but the path, as flags of the command line."""
         pairs = {"grid": "x", "view": ","}
-        words: list[str] = []
+        flags: list[str] = []
         for key, value in self.model_dump(exclude={"path", "exclude", "follow_links"}, exclude_none=True).items():
-            words += [f"--{key}", pairs[key].join(map(str, value)) if key in pairs else str(value)]
-        words += [word for view in self.exclude for word in ("--exclude", view)]
-        return (*words, "--follow-links") if self.follow_links else tuple(words)
+            flags += [f"--{key}", pairs[key].join(map(str, value)) if key in pairs else str(value)]
+        flags += [flag for view in self.exclude for flag in ("--exclude", view)]
+        return (*flags, "--follow-links") if self.follow_links else tuple(flags)
 
 
 class Report(_Keys):
     """Keys of ``report``."""
 
-    pixels: dict[str, list[tuple[_Place, _Place]]] = Field(
+    pixels: dict[str, list[tuple[_Index, _Index]]] = Field(
         {},
         description="pixels to look into beside those chosen automatically, such as {hci/cotton: [[200, 310]]}: row "
         "and column",
@@ -122,7 +122,7 @@ class Config(_Keys):
     )
     external: dict[str, dict[str, Any]] = Field(
         {},
-        description="Disparity maps that other methods made, by the method's name, to be scored and shown beside ours: "
+        description="Disparity maps of external methods, by the method's name, to be scored and shown beside ours: "
         "a folder with SCENE.pfm, .npy, .png or .h5, a file pattern such as {SPO: '/maps/{dataset}/{scene}/spo.pfm'}, "
         "or {path: ..., scale: ..., offset: ...} where disparity = value * scale + offset.",
     )

@@ -47,14 +47,14 @@ def _stage_lines() -> list[str]:
     lines = []
     for stage, entries in default_values().items():
         lines.append(f"  {stage}:")
-        for word, values in entries.items():
+        for name, values in entries.items():
             if stage == SHARED:
-                model, where = GROUPS[word], f"of {', '.join(choices_with(word))}"
+                model, where = GROUPS[name], f"of {', '.join(choices_with(name))}"
             else:
-                model = STAGES[stage][word].parameters
+                model = STAGES[stage][name].parameters
                 where = ", ".join(f"{SHARED}.{group}" for group in dict.fromkeys(shared_by(model).values()))
             lines += [f"    # {where}"] if where else []
-            lines.append(f"    {word}:" if values else f"    {word}: {{}}")
+            lines.append(f"    {name}:" if values else f"    {name}: {{}}")
             lines += _fields(model, "      ", values)
     return lines
 

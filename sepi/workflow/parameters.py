@@ -48,9 +48,9 @@ def fields_of(group: str) -> list[str]:
 def choices_with(group: str) -> list[str]:
     """The choices that have a group, as ``STAGE.CHOICE``."""
     return [
-        f"{stage}.{word}"
+        f"{stage}.{name}"
         for stage, choices in STAGES.items()
-        for word, choice in choices.items()
+        for name, choice in choices.items()
         if issubclass(choice.parameters, GROUPS[group])
     ]
 
@@ -72,8 +72,8 @@ def default_values() -> dict[str, Any]:
     found = {SHARED: {group: {name: defaults[group][name] for name in fields_of(group)} for group in GROUPS}}
     for stage, choices in STAGES.items():
         found[stage] = {
-            word: choice.parameters().model_dump(exclude=set(shared_by(choice.parameters)))
-            for word, choice in choices.items()
+            name: choice.parameters().model_dump(exclude=set(shared_by(choice.parameters)))
+            for name, choice in choices.items()
         }
     return found
 
@@ -97,24 +97,24 @@ def stage_settings(values: Values, variants: Mapping[str, Variant]) -> dict[str,
     require_known(where, values, [SHARED, *STAGES])
     shared = values.get(SHARED, {})
     require_known(f"{where}.{SHARED}", shared, GROUPS)
-    for group, given in shared.items():
-        require_known(f"{where}.{SHARED}.{group}", given or {}, fields_of(group))
-        validated(GROUPS[group], given or {}, f"{where}.{SHARED}.{group}")
+    for group, settings in shared.items():
+        require_known(f"{where}.{SHARED}.{group}", settings or {}, fields_of(group))
+        validated(GROUPS[group], settings or {}, f"{where}.{SHARED}.{group}")
     found: dict[str, dict[str, Parameters]] = {}
     for stage, choices in STAGES.items():
         own = values.get(stage, {})
         require_known(f"{where}.{stage}", own, choices)
-        given = {word: _with_shared(choice.parameters, own.get(word), shared) for word, choice in choices.items()}
+        defaults = {name: _with_shared(choice.parameters, own.get(name), shared) for name, choice in choices.items()}
         found[stage] = {
-            word: validated(choice.parameters, given[word], f"{where}.{stage}.{word}")
-            for word, choice in choices.items()
+            name: validated(choice.parameters, defaults[name], f"{where}.{stage}.{name}")
+            for name, choice in choices.items()
         }
-        for name, variant in variants.items():
+        for variant_name, variant in variants.items():
             choice = variant.choices[stage]
             found[stage][variant.labels[stage]] = validated(
                 choices[choice].parameters,
-                {**given[choice], **variant.overrides.get(stage, {})},
-                f"config.variants.{name}.{stage}",
+                {**defaults[choice], **variant.overrides.get(stage, {})},
+                f"config.variants.{variant_name}.{stage}",
             )
     return found
 
@@ -124,4 +124,4 @@ def _with_shared(
 ) -> dict[str, Any]:
     """The values of a choice: its groups', then its own."""
     groups = {name: shared.get(group) or {} for name, group in shared_by(model).items()}
-    return {**{name: given[name] for name, given in groups.items() if name in given}, **(own or {})}
+    return {name: values[name] for name, values in groups.items() if name in values} | dict(own or {})

@@ -90,10 +90,10 @@ def key_of(labels: Mapping[str, str], stage: str) -> str:
         Stage to the label of its choice, in the order of the stages.
     stage : str
     """
-    words = list(labels.values())[: list(labels).index(stage) + 1]
-    while words[-1] == HANDED_ON:
-        words.pop()
-    return "/".join(words)
+    names = list(labels.values())[: list(labels).index(stage) + 1]
+    while names[-1] == HANDED_ON:
+        names.pop()
+    return "/".join(names)
 
 
 def stage_of(key: str) -> str:

@@ -383,7 +383,7 @@ def test_archive_files_are_scenes_by_their_own_or_their_folders_name(tmp_path: P
 
 
 class TestExternal:
-    """Maps of other methods are found where the user says, and a wrong entry is named before anything runs."""
+    """Maps of external methods are found where the user says, and a wrong entry is named before anything runs."""
 
     def file(self, path: str, dataset: str = "hci", scene: str = "cotton") -> Path:
         return load_settings({"external": {"SPO": path}}).external["SPO"].file(dataset, scene)
