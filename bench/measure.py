@@ -15,8 +15,9 @@ from dataclasses import dataclass, field
 from multiprocessing.connection import Connection
 from typing import Any
 
-from sepi.command import megabytes, peak_memory_mb, use_threads
+from sepi.command import megabytes, peak_memory_mb
 from sepi.errors import SepiError
+from sepi.threads import use_threads
 
 Figures = dict[str, float]
 

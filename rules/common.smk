@@ -7,14 +7,15 @@ import sys
 import time
 from pathlib import Path
 
-from sepi.workflow.config import GRAPH_CONFIG, load_settings
-from sepi.workflow.code_digest import ROOT, code_digest, stage_modules
 from sepi.errors import SepiError
 from sepi.io.result_folder import RESULT_FILES
-from sepi.pipeline import HANDED_ON, STAGES, VARIANTS, key_of, stage_of
+from sepi.pipeline import HANDED_ON, STAGES, VARIANTS, choice_of
 from sepi.report.plan import Plan
-from sepi.workflow.run_log import show_progress
 from sepi.validation import require_known
+from sepi.workflow.code_digest import ROOT, code_digest, stage_modules
+from sepi.workflow.config import GRAPH_CONFIG, load_settings
+from sepi.workflow.result_paths import PARTS, RESULTS, key_of, scene_files
+from sepi.workflow.run_log import show_progress
 
 STARTED = time.time()
 
@@ -34,57 +35,59 @@ except OSError as error:
     sys.exit(f"sepi: config: {error.filename}: {error.strerror}")
 
 
-VARIANT_CHOICES = {name: variant.choices for name, variant in SETTINGS.variants.items()}
+VARIANT_LABELS = {name: variant.labels for name, variant in SETTINGS.variants.items()}
 SCENES_BY_DATASET = {name: SETTINGS.scenes_of(name) for name in SETTINGS.datasets}
-PLAN = Plan(Path("results"), SCENES_BY_DATASET, VARIANT_CHOICES, list(SETTINGS.external))
+PLAN = Plan(RESULTS, SCENES_BY_DATASET, VARIANT_LABELS, list(SETTINGS.external))
+
+# the rules' patterns
+SCENE = scene_files("{dataset}", "{scene}")
+LABELS = {stage: f"{{{stage}}}" for stage in STAGES}
 
 
 wildcard_constraints:
     dataset="[^/]+",
     scene="[^/]+",
     variant="[^/]+",
-    initial="|".join(STAGES["initial"]),
-    occlusion="|".join(STAGES["occlusion"]),
-    textureless="|".join(STAGES["textureless"]),
-    optimize="|".join(STAGES["optimize"]),
+    which=f"|{PARTS}",
 
 
-def light_field_file(dataset, scene):
-    """The light field of a scene, as ingest writes it."""
-    return f"results/{dataset}/{scene}/lightfield.h5"
-
-
-def choices_that_run(stage):
-    """Pattern of a stage's choices, without the one that hands maps on: that is no job."""
-    return "|".join(choice for choice in STAGES[stage] if choice != HANDED_ON)
+def stage_output(stage, ending):
+    """Pattern of what a stage writes: for every choice but the one that hands maps on, which is no job."""
+    known = {name: "|".join(map(re.escape, found)) for name, found in SETTINGS.parameters.items()}
+    known[stage] = "|".join(re.escape(label) for label in SETTINGS.parameters[stage] if label != HANDED_ON)
+    return SCENE.stage({name: f"{{{name},{labels}}}" for name, labels in known.items()}, stage, ending)
 
 
 def file_before(stage):
-    """Function of wildcards: the file with the maps that a stage is given, of the last stage before it that ran."""
+    """Function of wildcards: the file with the maps that a stage is given, if any: of the last stage that ran."""
     before = list(STAGES)[: list(STAGES).index(stage)]
 
     def file(wildcards):
-        choices = {name: wildcards[name] for name in before}
-        key = key_of(choices, before[-1])
-        return f"results/{wildcards.dataset}/{wildcards.scene}/stages/{key}/{stage_of(choices, key)}.h5"
+        labels = {name: wildcards[name] for name in before}
+        return scene_files(wildcards.dataset, wildcards.scene).stage(labels, before[-1]) if before else []
 
     return file
 
 
-def final_file(dataset, scene, variant):
+def final_file(wildcards):
     """The file with the final maps of a variant."""
-    require_known("variant", [variant], SETTINGS.variants)
-    return PLAN.stage_file(dataset, scene, variant, PLAN.stages[-1])
+    require_known("variant", [wildcards.variant], SETTINGS.variants)
+    return PLAN.stage_file(wildcards.dataset, wildcards.scene, wildcards.variant, PLAN.stages[-1])
 
 
 def result_files(variants):
     """The final maps of every configured scene for these variants."""
     return [
-        f"results/{dataset}/{scene}/{variant}/{name}"
+        str(PLAN.files(dataset, scene).variant(variant) / name)
         for dataset, scene in SETTINGS.scenes
         for variant in variants
         for name in RESULT_FILES
     ]
+
+
+def choice_for(stage):
+    """Function of wildcards: the choice of a stage."""
+    return lambda wildcards: choice_of(wildcards[stage])
 
 
 def parameters_of(stage):
@@ -134,7 +137,7 @@ def is_new(file):
 
 
 def print_warnings():
-    """Show what the readers of light fields and of other methods' maps warned of in this run, from their logs."""
+    """Show what the readers of light fields and of external maps warned of in this run, from their logs."""
     missing = {}
     for dataset, scene in SETTINGS.scenes:
         for rule in ("ingest", "external"):

@@ -4,22 +4,20 @@
 # without ground truth gets a score file that says so. The parts of variant best have a file of their own, as in the report.
 rule evaluate:
     input:
-        light_field="results/{dataset}/{scene}/lightfield.h5",
-        maps=lambda wildcards: PLAN.scored_files(wildcards.dataset, wildcards.scene, parts=wildcards.which == "_parts"),
+        light_field=SCENE.light_field,
+        maps=lambda wildcards: PLAN.scored_files(wildcards.dataset, wildcards.scene, parts=bool(wildcards.which)),
     output:
-        scores="results/{dataset}/{scene}/scores{which}.h5",
+        scores=SCENE.scores("{which}"),
     log:
         "logs/{dataset}/{scene}/scores{which}.log",
     benchmark:
         "benchmarks/{dataset}/{scene}/scores{which}.tsv"
-    wildcard_constraints:
-        which="|_parts",
     threads: 1
     resources:
         mem_mb=lambda wildcards, input: memory_for(4, bytes_per_pixel=200 + 50 * len(input.maps))(wildcards),
     params:
-        stages="results/{dataset}/{scene}/stages",
-        kept="results/{dataset}/{scene}/scores{which}.kept.h5",
+        stages=str(SCENE.stages),
+        kept=str(SCENE.kept_scores("{which}")),
         code=lambda wildcards: code_digest("sepi.evaluate"),
     message:
         "{wildcards.dataset}/{wildcards.scene}: scores"

@@ -4,10 +4,10 @@
 
 rule export:
     input:
-        light_field="results/{dataset}/{scene}/lightfield.h5",
-        maps=lambda wildcards: final_file(wildcards.dataset, wildcards.scene, wildcards.variant),
+        light_field=SCENE.light_field,
+        maps=final_file,
     output:
-        expand("results/{{dataset}}/{{scene}}/{{variant}}/{name}", name=RESULT_FILES),
+        [SCENE.variant("{variant}") / name for name in RESULT_FILES],
     log:
         "logs/{dataset}/{scene}/{variant}/export.log",
     benchmark:
@@ -16,7 +16,7 @@ rule export:
     resources:
         mem_mb=memory_for(bytes_per_sample=4),
     params:
-        folder="results/{dataset}/{scene}/{variant}",
+        folder=str(SCENE.variant("{variant}")),
         code=code_digest("sepi.export"),
     message:
         "{wildcards.dataset}/{wildcards.scene}: maps of variant {wildcards.variant}"

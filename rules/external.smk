@@ -1,4 +1,4 @@
-# Disparity maps that other methods made of a scene (config key `external`), scored like ours. A file that is missing or
+# Disparity maps that external methods made of a scene (config key `external`), scored like ours. A file that is missing or
 # wrong stops nothing: its problem is in the output and in the log.
 
 
@@ -10,10 +10,10 @@ def external_inputs(wildcards):
 
 rule external:
     input:
-        light_field="results/{dataset}/{scene}/lightfield.h5",
+        light_field=SCENE.light_field,
         maps=external_inputs,
     output:
-        maps="results/{dataset}/{scene}/external.h5",
+        maps=SCENE.external,
     log:
         "logs/{dataset}/{scene}/external.log",
     benchmark:
@@ -26,7 +26,7 @@ rule external:
         scene="{dataset}/{scene}",
         code=code_digest("sepi.external"),
     message:
-        "{wildcards.dataset}/{wildcards.scene}: maps of other methods"
+        "{wildcards.dataset}/{wildcards.scene}: maps of external methods"
     shell:
-        "python -m sepi.external --light-field {input.light_field:q} --maps {params.maps:q} --scene {params.scene:q} --output {output.maps:q} "
-        "2> {log:q}"
+        "python -m sepi.external --light-field {input.light_field:q} --maps {params.maps:q} "
+        "--scene {params.scene:q} --output {output.maps:q} 2> {log:q}"

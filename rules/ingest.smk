@@ -4,7 +4,7 @@ rule ingest:
     input:
         files=lambda wildcards: scene_of(wildcards).files,
     output:
-        light_field="results/{dataset}/{scene}/lightfield.h5",
+        light_field=SCENE.light_field,
     log:
         "logs/{dataset}/{scene}/ingest.log",
     benchmark:

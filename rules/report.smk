@@ -33,7 +33,7 @@ def ablation_files():
 
 def plan_of_scene(wildcards):
     """The plan for one scene alone, so that another scene in the configuration does not redraw it."""
-    return Plan(PLAN.results, {wildcards.dataset: [wildcards.scene]}, VARIANT_CHOICES, PLAN.external).to_json()
+    return Plan(PLAN.results, {wildcards.dataset: [wildcards.scene]}, VARIANT_LABELS, PLAN.external).to_json()
 
 
 def pixels_of(wildcards):
@@ -45,7 +45,7 @@ def pixels_of(wildcards):
 # of best's parts have a file of their own (report_parts), since `all` does not run those variants.
 rule numbers:
     input:
-        measured=lambda wildcards: PLAN.number_inputs(parts=wildcards.which == "_parts"),
+        measured=lambda wildcards: PLAN.number_inputs(parts=bool(wildcards.which)),
         published=sorted(PUBLISHED.glob("*.csv")),
     output:
         "reports/report{which}.json",
@@ -53,8 +53,6 @@ rule numbers:
         "logs/report{which}.log",
     benchmark:
         "benchmarks/report{which}.tsv"
-    wildcard_constraints:
-        which="|_parts",
     threads: 1
     resources:
         # light fields are read one after the other
@@ -68,7 +66,7 @@ rule numbers:
     message:
         "numbers of the report"
     shell:
-        "python -m sepi.report.numbers --results results --plan {params.plan:q} --parameters {params.parameters:q} "
+        "python -m sepi.report.numbers --results {RESULTS} --plan {params.plan:q} --parameters {params.parameters:q} "
         "{params.flags} --output {output:q} 2> {log:q}"
 
 
@@ -194,7 +192,7 @@ rule maps:
     message:
         "{wildcards.dataset}/{wildcards.scene}: pictures"
     shell:
-        "python -m sepi.report.figures --results results --plan {params.plan:q} "
+        "python -m sepi.report.figures --results {RESULTS} --plan {params.plan:q} "
         "--dataset {wildcards.dataset:q} --scene {wildcards.scene:q} --pixels {params.pixels:q} "
         "--output {output.folder:q} --page {output.page:q} 2> {log:q}"
 

@@ -10,7 +10,6 @@ import atexit
 import functools
 import gc
 import json
-import os
 import signal
 import sys
 import threading
@@ -29,6 +28,7 @@ from sepi.io.files import atomic_path
 from sepi.io.hdf5 import read_light_field, read_stage, write_stage
 from sepi.io.provenance import history_of, stage_attributes, step
 from sepi.stage import Choice, Progress, no_progress
+from sepi.threads import use_threads
 from sepi.validation import validated
 
 # a workflow that stops its jobs; a terminal that is closed, which not all systems tell of
@@ -127,31 +127,6 @@ def progress_bar(label: str) -> Iterator[Progress]:
             bar.update(round(100 * min(max(fraction, 0.0), 1.0)) - bar.n)
 
         yield progress
-
-
-def available_cores() -> int:
-    """Cores that this process may use: a container or a scheduler may give it fewer than the machine has."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
-def use_threads(count: int) -> None:
-    """Let numba and OpenCV use at most ``count`` threads (fewer where the machine has fewer cores).
-
-    Neither is imported for that, since not every job needs them: what is not there yet is told when it starts.
-    """
-    if "numba" in sys.modules:
-        import numba
-
-        # numba refuses more threads than it started with
-        numba.set_num_threads(min(count, numba.config.NUMBA_NUM_THREADS))  # type: ignore[attr-defined]
-    else:
-        os.environ["NUMBA_NUM_THREADS"] = str(min(count, int(os.environ.get("NUMBA_NUM_THREADS", available_cores()))))
-    if "cv2" in sys.modules:
-        import cv2
-
-        cv2.setNumThreads(count)
-    else:
-        os.environ["OPENCV_FOR_THREADS_NUM"] = str(count)
 
 
 def peak_memory_mb() -> float:

@@ -1,4 +1,4 @@
-"""Other methods' disparity maps of a scene: read, checked and scored like this package's own.
+"""External methods' disparity maps of a scene: read, checked and scored like this package's own.
 
 A map that is missing or wrong is told, not an error: the report shows it as a cell with its problem.
 """
@@ -13,13 +13,13 @@ from pathlib import Path
 
 import click
 import numpy as np
-from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
+from pydantic import TypeAdapter, ValidationError
 
 from sepi.command import SepiCommand
 from sepi.errors import SepiError, SepiWarning
 from sepi.evaluate import evaluations_of
 from sepi.io.disparity_maps import map_file, read_disparity
-from sepi.io.external_maps import ExternalMap, write_imported
+from sepi.io.external_maps import ExternalMap, ExternalSource, write_external
 from sepi.io.hdf5 import read_light_field
 from sepi.lightfield import LightField
 
@@ -28,23 +28,13 @@ NOT_READABLE = "not readable"
 NO_VALUE = "no finite value"
 
 
-class MapFile(BaseModel):
-    """A file with a disparity map, and what its values mean: the arguments of
-    :func:`sepi.io.disparity_maps.read_disparity`.
-    """
-
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
-
-    path: str
-    scale: float | None = None
-    offset: float = 0.0
+_SOURCES = TypeAdapter(dict[str, ExternalSource])
 
 
-_MAP_FILES = TypeAdapter(dict[str, MapFile])
-
-
-def import_maps(light_field: LightField, files: Mapping[str, MapFile], scene: str = "") -> dict[str, ExternalMap]:
-    """Read and score the maps that other methods made of a light field.
+def external_maps(
+    light_field: LightField, sources: Mapping[str, ExternalSource], scene: str = ""
+) -> dict[str, ExternalMap]:
+    """Read and score external methods' maps of a light field.
 
     What is wrong with a map is told by a :class:`SepiWarning` that names method, scene, file and reason. Values that
     are not finite are kept, counted in such a warning, and scored as bad pixels.
@@ -53,28 +43,29 @@ def import_maps(light_field: LightField, files: Mapping[str, MapFile], scene: st
     ----------
     light_field : LightField
         The scene; without ground truth there are no scores.
-    files : mapping of str to MapFile
-        Method to the file of its map.
+    sources : mapping of str to ExternalSource
+        Method to its map, whose ``path`` is a file.
     scene : str
         What messages call the scene; the light field's own name unless given.
 
     Returns
     -------
-    dict of str to Imported
-        In the order of ``files``. A file that is missing, cannot be read, has another size than the views or no finite
-        value has its problem (``no file``, ``not readable``, ``800x600 instead of 512x512`` as width x height,
+    dict of str to ExternalMap
+        In the order of ``sources``. A file that is missing, cannot be read, has another size than the views or no
+        finite value has its problem (``no file``, ``not readable``, ``800x600 instead of 512x512`` as width x height,
         ``no finite value``) and no map.
     """
-    found = {method: _read(light_field, scene or light_field.name, method, file) for method, file in files.items()}
-    maps = {method: imported.disparity for method, imported in found.items() if imported.disparity is not None}
+    scene = scene or light_field.name
+    found = {method: _read(light_field, scene, method, source) for method, source in sources.items()}
+    maps = {method: external.disparity for method, external in found.items() if external.disparity is not None}
     for method, evaluation in evaluations_of(light_field, maps).items():
         found[method] = replace(found[method], evaluation=evaluation)
     return found
 
 
-def _read(light_field: LightField, scene: str, method: str, file: MapFile) -> ExternalMap:
+def _read(light_field: LightField, scene: str, method: str, source: ExternalSource) -> ExternalMap:
     """The map of a method or its problem, without scores."""
-    path = Path(file.path)
+    path = Path(source.path)
     digest = ""
 
     def tell(reason: str) -> None:
@@ -90,7 +81,7 @@ def _read(light_field: LightField, scene: str, method: str, file: MapFile) -> Ex
             return without_map(NO_FILE, f"{path}: no such file")
         with path.open("rb") as opened:
             digest = hashlib.file_digest(opened, "sha256").hexdigest()
-        disparity = read_disparity(path, scale=file.scale, offset=file.offset)
+        disparity = read_disparity(path, scale=source.scale, offset=source.offset)
     except SepiError as error:
         return without_map(NOT_READABLE, str(error))
     except OSError as error:
@@ -106,9 +97,9 @@ def _read(light_field: LightField, scene: str, method: str, file: MapFile) -> Ex
     return ExternalMap(str(path), "", digest, disparity)
 
 
-def _map_files(text: str) -> dict[str, MapFile]:
+def _sources(text: str) -> dict[str, ExternalSource]:
     try:
-        return _MAP_FILES.validate_json(text)
+        return _SOURCES.validate_json(text)
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         where = ".".join(["--maps", *map(str, first["loc"])])
@@ -123,9 +114,9 @@ def _map_files(text: str) -> dict[str, MapFile]:
 @click.option("--scene", default="", help="What messages call the scene; the light field's own name unless given.")
 @click.option("--output", type=click.Path(path_type=Path), required=True, help="File to write (HDF5).")
 def command(light_field_path: Path, maps: str, scene: str, output: Path) -> None:
-    """Read and score the disparity maps that other methods made of a light field."""
-    files = _map_files(maps)
-    write_imported(output, import_maps(read_light_field(light_field_path), files, scene))
+    """Read and score the disparity maps that external methods made of a light field."""
+    sources = _sources(maps)
+    write_external(output, external_maps(read_light_field(light_field_path), sources, scene))
 
 
 if __name__ == "__main__":

@@ -8,9 +8,10 @@ from pathlib import Path
 import click
 
 from sepi.cli.input_options import Reading, reading_flags
-from sepi.command import SepiCommand, use_threads, write_timing
+from sepi.command import SepiCommand, write_timing
 from sepi.inspection.disparity_range import settle_range
 from sepi.io.hdf5 import write_light_field
+from sepi.threads import use_threads
 
 _PATH = click.Path(path_type=Path)
 

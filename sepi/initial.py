@@ -5,7 +5,7 @@ variance (Eq. 3-4), and its distinctness as confidence (Eq. 5). The line meets o
 plane sweep (:mod:`sepi.matching.plane_sweep`); the construction itself is in :mod:`sepi.matching.stitched_epi`.
 
 ``semi_global`` compares colours and fine detail (:mod:`sepi.matching.base_detail`) over all views, and smooths the
-costs semi-globally (:mod:`sepi.matching.semi_global`); ``semi_global_colours`` does so without the detail.
+costs semi-globally (:mod:`sepi.matching.semi_global`).
 
 ``structure_tensor`` is the initial depth that the paper's ablation puts in its place
 (:mod:`sepi.matching.structure_tensor`).
@@ -21,7 +21,6 @@ from sepi.lightfield import LightField
 from sepi.matching.plane_sweep import SweepParameters, sweep
 from sepi.matching.structure_tensor import StructureTensorParameters, structure_tensor_depth
 from sepi.matching.visibility_sweep import (
-    AllViewsColoursParameters,
     AllViewsParameters,
     VisibilitySweepParameters,
     depth_from_all_views,
@@ -77,7 +76,6 @@ def structure_tensor(
 CHOICES = {
     "sepi": Choice(SweepParameters, sepi),
     "semi_global": Choice(AllViewsParameters, semi_global),
-    "semi_global_colours": Choice(AllViewsColoursParameters, semi_global),
     "structure_tensor": Choice(StructureTensorParameters, structure_tensor),
 }
 

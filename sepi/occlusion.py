@@ -15,8 +15,7 @@ orientation, and the half with the smaller cost is kept. ``none`` hands the init
 
 ``visibility`` chooses the views one by one: those in which nothing of the map so far occludes the pixel
 (:mod:`sepi.matching.visibility_sweep`); pixels that a depth discontinuity runs through then go to the surface that
-fills most of them (:mod:`sepi.image.mixed_pixels`). ``visibility_unmixed`` leaves the last step out,
-``visibility_colours`` the detail.
+fills most of them (:mod:`sepi.image.mixed_pixels`).
 
 References
 ----------
@@ -38,12 +37,7 @@ from sepi.image.edges import CannyParameters, canny_edges, depth_discontinuities
 from sepi.lightfield import BoolMap, FloatMap, LightField
 from sepi.matching.plane_sweep import SweepParameters, SweepResult, sweep
 from sepi.matching.view_subsets import SIDES, half_planes, halves_and_quarters
-from sepi.matching.visibility_sweep import (
-    UnmixedParameters,
-    VisibilityColoursParameters,
-    VisibilityParameters,
-    depth_from_visible_views,
-)
+from sepi.matching.visibility_sweep import VisibilityParameters, depth_from_visible_views
 from sepi.stage import Choice, NoParameters, Progress, StageMaps, none, require_previous
 
 
@@ -274,8 +268,6 @@ CHOICES = {
     "half_sepi": Choice(HalfSepiParameters, half_sepi),
     "wang": Choice(WangParameters, wang),
     "visibility": Choice(VisibilityParameters, visibility),
-    "visibility_unmixed": Choice(UnmixedParameters, visibility),
-    "visibility_colours": Choice(VisibilityColoursParameters, visibility),
     "none": Choice(NoParameters, none),
 }
 

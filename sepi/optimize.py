@@ -7,7 +7,7 @@ smoothness on the 4-connected grid where the image is smooth (Eq. 11) and the de
 ``second_order`` goes back to the views instead: Gauss-Newton steps on their residuals
 (:mod:`sepi.matching.gauss_newton`) refine the depth below the disparity sampling, and second-order smoothing
 (:mod:`sepi.regularization.second_order`), which leaves planes free, weighs each pixel by how much the views know about
-it. ``gauss_newton`` leaves out the smoothing, ``second_order_colours`` the detail layer. ``none`` hands the depth on.
+it. ``none`` hands the depth on.
 
 References
 ----------
@@ -24,7 +24,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from sepi.lightfield import FloatMap, LightField
-from sepi.matching.base_detail import COLOURS_ALONE_SCALE, BaseDetail, BaseDetailParameters, base_detail_decomposition
+from sepi.matching.base_detail import BaseDetail, BaseDetailParameters, base_detail_decomposition
 from sepi.regularization.wls import (
     WlsParameters,
     data_weight,
@@ -36,11 +36,11 @@ from sepi.regularization.wls import (
 from sepi.stage import (
     Choice,
     NoParameters,
+    OcclusionMarginParameters,
     Progress,
     StageMaps,
     none,
     require_previous,
-    with_defaults,
 )
 
 UNIFORM_WEIGHT = 0.05
@@ -56,7 +56,7 @@ LEAST_RELIABILITY = 1e-6
 LEAST_SMOOTHNESS = 1e-8
 
 
-class SecondOrderParameters(BaseDetailParameters):
+class SecondOrderParameters(BaseDetailParameters, OcclusionMarginParameters):
     """Parameters of Gauss-Newton refinement and second-order smoothing."""
 
     refinements: int = Field(0, ge=0, le=20, description="Gauss-Newton steps before the first smoothing")
@@ -64,9 +64,6 @@ class SecondOrderParameters(BaseDetailParameters):
     solves: int = Field(2, ge=0, le=10, description="rounds of one Gauss-Newton step and one smoothing")
     solve_radius: int = Field(2, ge=0, le=20, description="window of the steps of these rounds, 2 r + 1 pixels")
     max_update: float = Field(0.05, gt=0, description="largest change by one Gauss-Newton step, pixels per view step")
-    occlusion_margin: float = Field(
-        0.15, ge=0, description="by how much an occluder must be nearer, pixels per view step"
-    )
     strength: float = Field(5.0, ge=0, description="weight of the smoothness; the best-known tenth of pixels weighs 1")
     second_difference_threshold: float = Field(
         0.05, gt=0, description="second difference of the depth that marks a discontinuity, pixels per view step"
@@ -85,18 +82,6 @@ class SecondOrderParameters(BaseDetailParameters):
         if self.refinements + self.solves == 0:
             raise ValueError("refinements and solves cannot both be 0; the choice 'none' hands the depth on")
         return self
-
-
-GaussNewtonParameters = with_defaults(
-    SecondOrderParameters, "GaussNewtonParameters", "Refinement without smoothing.", refinements=3, solves=0
-)
-SecondOrderColoursParameters = with_defaults(
-    SecondOrderParameters,
-    "SecondOrderColoursParameters",
-    "Refinement and smoothing by colours alone.",
-    colour_scale=COLOURS_ALONE_SCALE,
-    detail_share=0.0,
-)
 
 
 def wls(
@@ -217,8 +202,6 @@ def smooth_second_order(
 CHOICES = {
     "wls": Choice(WlsParameters, wls),
     "second_order": Choice(SecondOrderParameters, second_order),
-    "gauss_newton": Choice(GaussNewtonParameters, second_order),
-    "second_order_colours": Choice(SecondOrderColoursParameters, second_order),
     "none": Choice(NoParameters, none),
 }
 

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import hashlib
+import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from sepi import initial, occlusion, optimize, textureless
+from sepi.errors import SepiError
 from sepi.lightfield import LightField
 from sepi.matching.base_detail import forget_layers
 from sepi.stage import Choice, Parameters, Progress, StageMaps, no_progress
@@ -23,76 +26,165 @@ STAGES: dict[str, dict[str, Choice]] = {
 HANDED_ON = "none"
 """The choice of a stage that hands on the maps of the stage before: it is no job and has no file."""
 
+_BASE, _CHOICE = "base", "choice"
+# a folder's name holds 255 bytes
+_LONGEST_LABEL = 120
+
 # rough part of the running time, for the progress bar only
 _SHARE = {"initial": 0.25, "occlusion": 0.35, "textureless": 0.1, "optimize": 0.3}
 
 
 @dataclass(frozen=True)
 class Variant:
-    """One choice for each stage.
+    """One choice for each stage, and what it overrides of the choices' parameters.
+
+    Attributes
+    ----------
+    initial, occlusion, textureless, optimize : str
+        The stages' choices.
+    overrides : mapping of str to mapping
+        Stage to field to value.
 
     Raises
     ------
     SepiError
-        If a word is not one of the stage's choices.
+        If one is not a choice of its stage, or a field or value is not one of the choice's.
     """
 
     initial: str
     occlusion: str
     textureless: str
     optimize: str
+    overrides: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for stage, choice in self.choices.items():
             require_known(f"variant, stage {stage}", [choice], STAGES[stage])
+        require_known("variant, overrides", self.overrides, STAGES)
+        stage_parameters(self)
 
     @property
     def choices(self) -> dict[str, str]:
         """Stage to choice, in the order of the stages."""
         return {stage: getattr(self, stage) for stage in STAGES}
 
+    @property
+    def labels(self) -> dict[str, str]:
+        """Stage to what names its choice together with its overrides: ``"visibility+alpha_threshold=0"``."""
+        return {stage: choice_label(choice, self.overrides.get(stage, {})) for stage, choice in self.choices.items()}
 
-def key_of(choices: Mapping[str, str], stage: str) -> str:
-    """What names the maps after a stage: the choices up to the stage that made them, ``"sepi/half_sepi/lti"``.
 
-    Variants that begin alike share it, and a stage that hands maps on has that of the stage before. It is the folder of
-    the stage file.
+def choice_label(choice: str, overrides: Mapping[str, Any]) -> str:
+    """What names a choice and its overrides, in tables and as a folder: ``"visibility+alpha_threshold=0"``.
+
+    Equal overrides give equal labels, in whatever order and however the numbers are written. A label that would be too
+    long for a folder, or holds anything but letters, digits and ``_ . - + =``, ends with a digest instead.
+    """
+    parts = [choice, *(f"{name}={_written(overrides[name])}" for name in sorted(overrides))]
+    label = "+".join(parts)
+    if len(label) <= _LONGEST_LABEL and re.fullmatch(r"[\w.+=-]+", label, re.ASCII):
+        return label
+    return f"{choice}+{hashlib.sha256(label.encode()).hexdigest()[:12]}"
+
+
+def _written(value: Any) -> str:
+    """A value as briefly as it can be read back; 0.0 and 0 are the same."""
+    if isinstance(value, float):
+        return repr(value).removesuffix(".0").replace("e+", "e")
+    return str(value)
+
+
+def choice_of(label: str) -> str:
+    """The choice that :func:`choice_label` names."""
+    return label.partition("+")[0]
+
+
+def variant_from(name: str, entries: Mapping[str, Any], where: str, users: tuple[str, ...] = ()) -> Variant:
+    """The variant that an entry such as ``{"base": "best", "occlusion": {"alpha_threshold": 0}}`` describes.
+
+    For each stage an entry has a choice, ``"visibility"``, or a choice and what to override,
+    ``{"choice": "visibility", "alpha_threshold": 0}``. With ``base`` it starts from another variant: stages that it
+    leaves out are that variant's, and overrides without a choice are made on top of that variant's.
 
     Parameters
     ----------
-    choices : mapping of str to str
-        Stage to choice, in the order of the stages.
-    stage : str
+    name : str
+        Of the variant.
+    entries : mapping of str to mapping
+        Its entry and those that may be its base.
+    where : str
+        Where the entries stand, for messages.
+    users : tuple of str
+        The variants that are built on this one.
+
+    Raises
+    ------
+    SepiError
+        If the entry is no such mapping, misses a stage, names what does not exist, or is built on itself.
     """
-    words = list(choices.values())[: list(choices).index(stage) + 1]
-    while words[-1] == HANDED_ON:
-        words.pop()
-    return "/".join(words)
+    entry, here = entries[name], f"{where}.{name}"
+    if not isinstance(entry, Mapping):
+        raise SepiError(f"{here}: expected a choice for each stage, or a base and what differs, got {entry!r}")
+    require_known(here, entry, (_BASE, *STAGES))
+    base = None
+    if _BASE in entry:
+        require_known(f"{here}.{_BASE}", [entry[_BASE]], entries)
+        if entry[_BASE] in (name, *users):
+            raise SepiError(f"{here}.{_BASE}: the variant would be built on itself")
+        base = variant_from(entry[_BASE], entries, where, (name, *users))
+    chosen = {stage: _chosen(stage, entry.get(stage, {}), base, here) for stage in STAGES}
+    overrides = {stage: values for stage, (_, values) in chosen.items() if values}
+    return Variant(**{stage: choice for stage, (choice, _) in chosen.items()}, overrides=overrides)
 
 
-def stage_of(choices: Mapping[str, str], key: str) -> str:
-    """The stage that made the maps which :func:`key_of` names."""
-    return list(choices)[key.count("/")]
+def _chosen(stage: str, given: Any, base: Variant | None, where: str) -> tuple[str, dict[str, Any]]:
+    """A stage's choice and what is overridden."""
+    values = {_CHOICE: given} if isinstance(given, str) else given
+    if not isinstance(values, Mapping):
+        raise SepiError(f"{where}.{stage}: expected a choice, or parameters of one, got {given!r}")
+    own = {key: value for key, value in values.items() if key != _CHOICE}
+    if _CHOICE in values:
+        choice = values[_CHOICE]
+        require_known(f"{where}.{stage}", [choice], STAGES[stage])
+    elif base is not None:
+        choice, own = base.choices[stage], {**base.overrides.get(stage, {}), **own}
+    else:
+        raise SepiError(f"{where}: no choice for stage '{stage}' (one of {', '.join(STAGES[stage])})")
+    checked = validated(STAGES[stage][choice].parameters, own, f"{where}.{stage}")
+    # as the model holds them: where a number is a float, 0 is 0.0
+    return choice, {key: getattr(checked, key) for key in own}
 
 
-VARIANTS: dict[str, Variant] = {
-    "paper": Variant("sepi", "half_sepi", "lti", "wls"),
-    "no_sepi": Variant("structure_tensor", "half_sepi", "lti", "wls"),
-    "no_occlusion": Variant("sepi", "none", "lti", "wls"),
-    "no_textureless": Variant("sepi", "half_sepi", "none", "wls"),
-    "no_occlusion_no_textureless": Variant("sepi", "none", "none", "wls"),
-    "wang": Variant("sepi", "wang", "lti", "wls"),
-    "best": Variant("semi_global", "visibility", "uniform_planes", "second_order"),
-    "best_paper_initial": Variant("sepi", "visibility", "uniform_planes", "second_order"),
-    "best_no_detail": Variant("semi_global_colours", "visibility_colours", "uniform_planes", "second_order_colours"),
-    "best_half_sepi": Variant("semi_global", "half_sepi", "uniform_planes", "second_order"),
-    "best_no_mixture": Variant("semi_global", "visibility_unmixed", "uniform_planes", "second_order"),
-    "best_no_planes": Variant("semi_global", "visibility", "none", "second_order"),
-    "best_no_smoothing": Variant("semi_global", "visibility", "uniform_planes", "gauss_newton"),
-    "best_wls": Variant("semi_global", "visibility", "uniform_planes", "wls"),
+VARIANT_ENTRIES: dict[str, dict[str, Any]] = {
+    "paper": {"initial": "sepi", "occlusion": "half_sepi", "textureless": "lti", "optimize": "wls"},
+    "no_sepi": {"base": "paper", "initial": "structure_tensor"},
+    "no_occlusion": {"base": "paper", "occlusion": "none"},
+    "no_textureless": {"base": "paper", "textureless": "none"},
+    "no_occlusion_no_textureless": {"base": "paper", "occlusion": "none", "textureless": "none"},
+    "wang": {"base": "paper", "occlusion": "wang"},
+    "best": {
+        "initial": "semi_global",
+        "occlusion": "visibility",
+        "textureless": "uniform_planes",
+        "optimize": "second_order",
+    },
+    "best_paper_initial": {"base": "best", "initial": "sepi"},
+    # colours alone must tell surfaces apart: their scale is narrower than beside the detail
+    "best_no_detail": {
+        "base": "best",
+        "initial": {"detail_share": 0},
+        "occlusion": {"detail_share": 0, "colour_scale": 0.0164},
+        "optimize": {"detail_share": 0, "colour_scale": 0.0164},
+    },
+    "best_half_sepi": {"base": "best", "occlusion": "half_sepi"},
+    "best_no_mixture": {"base": "best", "occlusion": {"alpha_threshold": 0}},
+    "best_no_planes": {"base": "best", "textureless": "none"},
+    "best_no_smoothing": {"base": "best", "optimize": {"refinements": 3, "solves": 0}},
+    "best_wls": {"base": "best", "optimize": "wls"},
 }
-"""The paper's method, the other four columns of its table 4 in their order, and the text's other occlusion stage; then
-the most accurate variant, and the same with one part switched off or put back to the paper's."""
+"""The built-in variants as :func:`variant_from` reads them: the paper's method, the other four columns of its table 4
+in their order, and the text's other occlusion stage; then the most accurate variant, and the same with one part
+switched off or put back to the paper's."""
 
 DEFAULT_VARIANT = "best"
 """Variant of ``sepi depth``."""
@@ -100,9 +192,9 @@ DEFAULT_VARIANT = "best"
 PARTS_OF_BEST: dict[str, str] = {
     "best": "all parts",
     "best_paper_initial": "the paper's initial depth",
-    "best_no_detail": "colours alone, no detail layer",
+    "best_no_detail": "colours alone, no detail",
     "best_half_sepi": "half-SEPIs, no visibility",
-    "best_no_mixture": "no colour mixture at steps",
+    "best_no_mixture": "no reassignment of mixed pixels",
     "best_no_planes": "no planes in uniform regions",
     "best_no_smoothing": "Gauss-Newton, no smoothing",
     "best_wls": "the paper's global optimisation",
@@ -126,7 +218,7 @@ def variant_named(name: str) -> Variant:
 def stage_parameters(
     variant: Variant, parameters: Mapping[str, Mapping[str, Any]] | None = None
 ) -> dict[str, Parameters]:
-    """Parameters of each stage of ``variant``: the defaults, but for what ``parameters`` sets.
+    """Parameters of each stage of ``variant``: the defaults, but for what the variant and then ``parameters`` override.
 
     Raises
     ------
@@ -136,9 +228,17 @@ def stage_parameters(
     given = parameters or {}
     require_known("parameters", given, STAGES)
     return {
-        stage: validated(STAGES[stage][choice].parameters, given.get(stage, {}), f"{stage}.{choice}")
+        stage: validated(
+            STAGES[stage][choice].parameters,
+            {**variant.overrides.get(stage, {}), **given.get(stage, {})},
+            f"{stage}.{choice}",
+        )
         for stage, choice in variant.choices.items()
     }
+
+
+VARIANTS = {name: variant_from(name, VARIANT_ENTRIES, "variants") for name in VARIANT_ENTRIES}
+"""Name to built-in variant."""
 
 
 def estimate_depth(
@@ -154,7 +254,7 @@ def estimate_depth(
     light_field : LightField
         Where its disparity range is unknown, it is estimated from the views.
     variant : str or Variant
-        Name of a built-in variant, or a choice for each stage.
+        Name of a built-in variant, or a choice for each stage and what it overrides.
     parameters : mapping, optional
         Stage to field to value, where the defaults do not suit: ``{"initial": {"num_disparities": 91}}``.
     progress : callable

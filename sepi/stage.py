@@ -1,6 +1,6 @@
 """What every stage has in common: the maps that travel from stage to stage, and the command that a rule calls.
 
-A stage module defines ``CHOICES``: for each word that a variant may use, a parameter model and a pure function
+A stage module defines ``CHOICES``: for each choice that a variant may name, a parameter model and a pure function
 ``(light_field, previous, parameters, progress) -> StageMaps``. The Python API, the command line and the workflow's
 rules all call that function.
 """
@@ -9,11 +9,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Annotated, Any, TypeVar
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from pydantic import BaseModel, ConfigDict, Field, create_model
+from pydantic import BaseModel, ConfigDict, Field
 
 from sepi.errors import SepiError
 from sepi.lightfield import BoolMap, FloatMap, LightField
@@ -26,42 +26,22 @@ def no_progress(_: float) -> None:
     """For callers who do not watch."""
 
 
-P = TypeVar("P", bound="Parameters")
-
-
 class Parameters(BaseModel):
     """Parameters of one choice of a stage: frozen, unknown keys refused, each with a default and a description."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
 
-def with_defaults(model: type[P], name: str, doc: str, **defaults: Any) -> type[P]:
-    """The same parameters, bounds and descriptions with other defaults: for a choice that switches a part off.
-
-    Parameters
-    ----------
-    model : type
-        Parameters to start from.
-    name, doc : str
-        Of the new class.
-    **defaults
-        Field to its new default.
-
-    Returns
-    -------
-    type
-        Subclass of ``model``.
-    """
-    fields: dict[str, Any] = {}
-    for key, value in defaults.items():
-        field_of_model = model.model_fields[key]
-        constrained = Annotated[(field_of_model.annotation, *field_of_model.metadata)]  # type: ignore[name-defined]
-        fields[key] = (constrained, Field(value, description=field_of_model.description))
-    return create_model(name, __base__=model, __doc__=doc, __module__=model.__module__, **fields)
-
-
 class NoParameters(Parameters):
     """A choice that has nothing to set."""
+
+
+class OcclusionMarginParameters(Parameters):
+    """Which surfaces hide a pixel from a view."""
+
+    occlusion_margin: float = Field(
+        0.15, ge=0, description="by how much an occluder must be nearer, pixels per view step"
+    )
 
 
 @dataclass(frozen=True)

@@ -10,13 +10,17 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ValidationError
 
 from sepi.errors import SepiError
+from sepi.renamed import new_name
 
 Model = TypeVar("Model", bound=BaseModel)
 
 
 def unknown(where: str, word: str, known: Iterable[str]) -> SepiError:
-    """The error for a word that is not one of ``known``: names it, the nearest known word, and all of them."""
+    """The error for a word that is not one of ``known``: names it, its new name or the nearest, and all of them."""
     words = list(known)
+    new = new_name(word, words)
+    if new is not None:
+        return SepiError(f"{where}: unknown '{word}'; it is now {new}")
     near = difflib.get_close_matches(word, words, n=1, cutoff=0.5)
     hint = f"did you mean '{near[0]}'? " if near else ""
     return SepiError(f"{where}: unknown '{word}'; {hint}known: {', '.join(words) or 'nothing can be set here'}")

@@ -13,8 +13,8 @@ import numpy as np
 from sepi.camera import Camera
 from sepi.errors import SepiWarning
 from sepi.evaluate import score_maps
-from sepi.external import MapFile, import_maps
-from sepi.io.external_maps import ExternalMap, write_imported
+from sepi.external import ExternalSource, external_maps
+from sepi.io.external_maps import ExternalMap, write_external
 from sepi.io.hdf5 import read_light_field, read_stage, write_light_field, write_stage
 from sepi.io.pfm import write_pfm
 from sepi.io.provenance import scene_attributes, stage_attributes, step
@@ -130,7 +130,7 @@ def write_results(plan: Plan, scene: tuple[str, str]) -> None:
     write_plan_scores(plan, scene, light_field)
     maps = imported_maps(plan, light_field) if scene == COTTON else {}
     absent = {method: ExternalMap(f"/maps/{method}/{light_field.name}.pfm", "no file") for method in plan.external}
-    write_imported(plan.external_file(*scene), absent | maps)
+    write_external(plan.external_file(*scene), absent | maps)
 
 
 def run_stages(plan: Plan, scene: tuple[str, str], light_field: LightField, variant: str) -> None:
@@ -149,7 +149,7 @@ def run_stages(plan: Plan, scene: tuple[str, str], light_field: LightField, vari
 
 def write_plan_scores(plan: Plan, scene: tuple[str, str], light_field: LightField) -> None:
     """The score file of a scene, from its stage files."""
-    folder = plan.stages_folder(*scene)
+    folder = plan.files(*scene).stages
     maps = {map_name(folder, file): read_stage(file).disparity for file in plan.scored_files(*scene)}
     write_scores(plan.scores_file(*scene), score_maps(light_field, maps, {})[0], scene_attributes(light_field))
 
@@ -162,7 +162,9 @@ def imported_maps(plan: Plan, light_field: LightField) -> Mapping[str, ExternalM
         write_pfm(plan.results / f"{method}.pfm", values)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SepiWarning)
-        return import_maps(light_field, {name: MapFile(path=str(plan.results / f"{name}.pfm")) for name in files})
+        return external_maps(
+            light_field, {name: ExternalSource(path=str(plan.results / f"{name}.pfm")) for name in files}
+        )
 
 
 def scene_json(plan: Plan, scene: tuple[str, str]) -> dict[str, Any]:

@@ -1,6 +1,6 @@
 """Real benchmark scenes, read and computed once for every test that looks at them.
 
-Maps are kept by their stages' choices, so variants share what they have in common. Tests of real scenes run in one
+Maps are kept by their stages' labels, so variants share what they have in common. Tests of real scenes run in one
 process (``conftest.py`` sees to it), so nothing is computed twice where tests run side by side.
 """
 
@@ -10,9 +10,12 @@ from pathlib import Path
 from sepi.evaluate import score
 from sepi.inspection.disparity_range import settle_range
 from sepi.lightfield import LightField
-from sepi.pipeline import STAGES, VARIANTS
+from sepi.pipeline import STAGES, VARIANTS, choice_of
 from sepi.reading import read_light_field
 from sepi.stage import StageMaps, no_progress
+from sepi.workflow.parameters import stage_settings
+
+SETTINGS = stage_settings({}, VARIANTS)
 
 
 @cache
@@ -22,16 +25,16 @@ def scene(folder: Path) -> LightField:
 
 
 @cache
-def maps_after(folder: Path, choices: tuple[str, ...]) -> StageMaps:
-    """Maps after the stages named; variants share what they have in common."""
-    before = maps_after(folder, choices[:-1]) if len(choices) > 1 else None
-    choice = STAGES[list(STAGES)[len(choices) - 1]][choices[-1]]
-    return choice.run(scene(folder), before, choice.parameters(), no_progress)
+def maps_after(folder: Path, labels: tuple[str, ...]) -> StageMaps:
+    """Maps after the stages whose choices are labelled so; variants share what they have in common."""
+    before = maps_after(folder, labels[:-1]) if len(labels) > 1 else None
+    stage, label = list(STAGES)[len(labels) - 1], labels[-1]
+    return STAGES[stage][choice_of(label)].run(scene(folder), before, SETTINGS[stage][label], no_progress)
 
 
 def final_maps(folder: Path, variant: str) -> StageMaps:
     """Maps after the last stage of a variant."""
-    return maps_after(folder, tuple(VARIANTS[variant].choices.values()))
+    return maps_after(folder, tuple(VARIANTS[variant].labels.values()))
 
 
 def final_scores(folder: Path, variant: str) -> dict[str, float]:

@@ -8,13 +8,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from pydantic import ValidationError
 
 from sepi.evaluate import score
 from sepi.image.mixed_pixels import MixtureParameters, reassign_mixed_pixels
 from sepi.lightfield import DisparityRange, LightField
 from sepi.matching.base_detail import DETAIL_UNIT, BaseDetailParameters, base_detail_decomposition
-from sepi.pipeline import PARTS_OF_BEST, STAGES, VARIANTS, estimate_depth
+from sepi.pipeline import PARTS_OF_BEST, VARIANTS, estimate_depth
 from sepi.regularization.uniform_regions import UniformPlanesParameters, ransac_plane, uniform_regions
 from sepi.report.tabular.confidence import decile_errors, oracle, sparsification
 from sepi.scenes import render
@@ -133,7 +132,7 @@ def test_parts_of_best_differ_from_it_in_one_thing() -> None:
     assert next(iter(PARTS_OF_BEST)) == "best"
     assert set(PARTS_OF_BEST) == {name for name in VARIANTS if name.startswith("best")}
     for name in PARTS_OF_BEST:
-        different = [s for s, c in VARIANTS[name].choices.items() if VARIANTS["best"].choices[s] != c]
+        different = [s for s, c in VARIANTS[name].labels.items() if VARIANTS["best"].labels[s] != c]
         assert len(different) == {"best": 0, "best_no_detail": 3}.get(name, 1)
 
 
@@ -173,21 +172,3 @@ def test_first_run_gives_the_bytes_of_later_ones(tmp_path: Path) -> None:
         for _ in range(2)
     )
     assert first == second
-
-
-def test_a_part_switched_off_keeps_all_but_its_default() -> None:
-    """A reduced choice with other bounds or descriptions would be documented and checked differently."""
-    full, reduced = (STAGES["occlusion"][name].parameters for name in ("visibility", "visibility_colours"))
-    assert {
-        key for key in full.model_fields if full.model_fields[key].default != reduced.model_fields[key].default
-    } == {
-        "colour_scale",
-        "detail_share",
-    }
-    for key, field in full.model_fields.items():
-        assert reduced.model_fields[key].metadata == field.metadata
-        assert reduced.model_fields[key].description == field.description
-    with pytest.raises(ValidationError):
-        reduced(detail_share=2.0)
-    with pytest.raises(ValidationError, match="cannot both be 0"):
-        STAGES["optimize"]["gauss_newton"].parameters(refinements=0)

@@ -1,4 +1,4 @@
-"""Maps of other methods: scored like ours, and whatever is wrong with one is told and stops nothing."""
+"""Maps of external methods: scored like ours, and whatever is wrong with one is told and stops nothing."""
 
 import json
 import os
@@ -13,8 +13,8 @@ from click.testing import CliRunner, Result
 
 from sepi.errors import SepiError, SepiWarning
 from sepi.evaluate import evaluation_of
-from sepi.external import MapFile, command, import_maps
-from sepi.io.external_maps import ExternalMap, read_imported, read_imported_scores, write_imported
+from sepi.external import ExternalSource, command, external_maps
+from sepi.io.external_maps import ExternalMap, read_external, read_external_scores, write_external
 from sepi.io.hdf5 import write_light_field
 from sepi.io.pfm import write_pfm
 from sepi.lightfield import LightField
@@ -37,9 +37,9 @@ def estimate(light_field: LightField) -> np.ndarray:
     return light_field.ground_truth + np.random.default_rng(2).normal(scale=0.05, size=SHAPE).astype(np.float32)
 
 
-def saved(path: Path, values: np.ndarray) -> MapFile:
+def saved(path: Path, values: np.ndarray) -> ExternalSource:
     write_pfm(path, values)
-    return MapFile(path=str(path))
+    return ExternalSource(path=str(path))
 
 
 def call(folder: Path, light_field: LightField, maps: str) -> Result:
@@ -52,39 +52,39 @@ class TestImport:
     def test_scores_are_those_of_our_own_maps(
         self, tmp_path: Path, light_field: LightField, estimate: np.ndarray
     ) -> None:
-        imported = import_maps(light_field, {"SPO": saved(tmp_path / "noise.pfm", estimate)})["SPO"]
+        external = external_maps(light_field, {"SPO": saved(tmp_path / "noise.pfm", estimate)})["SPO"]
         expected = evaluation_of(light_field, estimate)
-        assert imported.problem == ""
-        assert imported.source == str(tmp_path / "noise.pfm")
-        np.testing.assert_array_equal(imported.disparity, estimate)
-        assert imported.evaluation.scores == expected.scores
-        assert imported.evaluation.region_sources == expected.region_sources
+        assert external.problem == ""
+        assert external.source == str(tmp_path / "noise.pfm")
+        np.testing.assert_array_equal(external.disparity, estimate)
+        assert external.evaluation.scores == expected.scores
+        assert external.evaluation.region_sources == expected.region_sources
         assert expected.region_sources == {"occluded": "computed", "textureless": "scene"}
-        np.testing.assert_array_equal(imported.evaluation.error, expected.error)
+        np.testing.assert_array_equal(external.evaluation.error, expected.error)
         for name, mask in expected.regions.items():
-            np.testing.assert_array_equal(imported.evaluation.regions[name], mask)
+            np.testing.assert_array_equal(external.evaluation.regions[name], mask)
 
     def test_methods_keep_their_order(self, tmp_path: Path, light_field: LightField, estimate: np.ndarray) -> None:
         """The report's columns come as the user wrote them."""
         names = ["SPO", "AMNorm", "z", "CAE 2017", "m10", "m2"]
         files = {name: saved(tmp_path / f"{name}.pfm", estimate) for name in names}
-        found = import_maps(light_field, files)
-        write_imported(tmp_path / "external.h5", found)
-        assert list(read_imported(tmp_path / "external.h5")) == names
+        found = external_maps(light_field, files)
+        write_external(tmp_path / "external.h5", found)
+        assert list(read_external(tmp_path / "external.h5")) == names
 
     def test_scale_and_offset_reach_the_map(
         self, tmp_path: Path, light_field: LightField, estimate: np.ndarray
     ) -> None:
         file = saved(tmp_path / "noise.pfm", -2 * estimate + 3)
-        imported = import_maps(light_field, {"SPO": file.model_copy(update={"scale": -0.5, "offset": 1.5})})["SPO"]
-        np.testing.assert_allclose(imported.disparity, estimate, atol=1e-5)
+        external = external_maps(light_field, {"SPO": file.model_copy(update={"scale": -0.5, "offset": 1.5})})["SPO"]
+        np.testing.assert_allclose(external.disparity, estimate, atol=1e-5)
 
     def test_without_truth_there_are_maps_but_no_scores(self, tmp_path: Path, light_field: LightField) -> None:
         bare = replace(light_field, ground_truth=None, masks={})
-        imported = import_maps(bare, {"SPO": saved(tmp_path / "noise.pfm", np.ones(SHAPE, np.float32))})["SPO"]
-        assert imported.problem == ""
-        assert imported.disparity is not None
-        assert imported.evaluation.scores == {}
+        external = external_maps(bare, {"SPO": saved(tmp_path / "noise.pfm", np.ones(SHAPE, np.float32))})["SPO"]
+        assert external.problem == ""
+        assert external.disparity is not None
+        assert external.evaluation.scores == {}
 
     def test_unknown_pixels_are_counted_and_bad(
         self, tmp_path: Path, light_field: LightField, estimate: np.ndarray
@@ -92,10 +92,10 @@ class TestImport:
         estimate[20, 20:23] = [np.nan, np.inf, -np.inf]
         file = saved(tmp_path / "noise.pfm", estimate)
         with pytest.warns(SepiWarning, match=r"external SPO, scene noise: .*noise\.pfm: 3 of 1760 values"):
-            imported = import_maps(light_field, {"SPO": file})["SPO"]
-        assert imported.problem == ""
-        np.testing.assert_array_equal(imported.disparity, estimate)
-        whole = imported.evaluation.scores["paper"]["all"]
+            external = external_maps(light_field, {"SPO": file})["SPO"]
+        assert external.problem == ""
+        np.testing.assert_array_equal(external.disparity, estimate)
+        whole = external.evaluation.scores["paper"]["all"]
         assert whole["non_finite"] == 3
         assert whole["badpix007"] >= 100 * 3 / 1760
 
@@ -118,9 +118,9 @@ class TestImport:
             path.write_bytes(values)
         elif isinstance(values, np.ndarray):
             write_pfm(path, values.astype(np.float32))
-        files = {"bad": MapFile(path=str(path)), "good": saved(tmp_path / "good.pfm", estimate)}
+        files = {"bad": ExternalSource(path=str(path)), "good": saved(tmp_path / "good.pfm", estimate)}
         with pytest.warns(SepiWarning) as caught:
-            found = import_maps(light_field, files)
+            found = external_maps(light_field, files)
         (line,) = (str(warning.message) for warning in caught)
         assert line.startswith(f"external bad, scene noise: {path}: ")
         assert reason in line
@@ -136,58 +136,61 @@ class TestImport:
         file = saved(tmp_path / "noise.pfm", np.ones(SHAPE, np.float32))
         (tmp_path / "noise.pfm").chmod(0)
         with pytest.warns(SepiWarning, match="Permission denied"):
-            assert import_maps(light_field, {"SPO": file})["SPO"].problem == "not readable"
+            assert external_maps(light_field, {"SPO": file})["SPO"].problem == "not readable"
 
     def test_a_name_that_no_file_can_have(self, light_field: LightField) -> None:
         with pytest.warns(SepiWarning, match="too long"):
-            assert import_maps(light_field, {"SPO": MapFile(path="a" * 300 + ".pfm")})["SPO"].problem == "not readable"
+            assert (
+                external_maps(light_field, {"SPO": ExternalSource(path="a" * 300 + ".pfm")})["SPO"].problem
+                == "not readable"
+            )
 
 
 class TestFile:
-    def imported(self, light_field: LightField, estimate: np.ndarray) -> ExternalMap:
+    def external(self, light_field: LightField, estimate: np.ndarray) -> ExternalMap:
         return ExternalMap("maps/noise.pfm", "", "ab" * 32, estimate, evaluation_of(light_field, estimate))
 
     def test_comes_back_unchanged(self, tmp_path: Path, light_field: LightField, estimate: np.ndarray) -> None:
-        imported = self.imported(light_field, estimate)
-        maps = {"SPO": imported, "lost": ExternalMap("maps/ü.pfm", "no file")}
-        write_imported(tmp_path / "a.h5", maps)
-        back = read_imported(tmp_path / "a.h5")
+        external = self.external(light_field, estimate)
+        maps = {"SPO": external, "lost": ExternalMap("maps/ü.pfm", "no file")}
+        write_external(tmp_path / "a.h5", maps)
+        back = read_external(tmp_path / "a.h5")
         assert list(back) == ["SPO", "lost"]
         assert back["lost"] == maps["lost"]
-        assert (back["SPO"].source, back["SPO"].sha256) == (imported.source, imported.sha256)
-        assert back["SPO"].evaluation.scores == imported.evaluation.scores
+        assert (back["SPO"].source, back["SPO"].sha256) == (external.source, external.sha256)
+        assert back["SPO"].evaluation.scores == external.evaluation.scores
         np.testing.assert_array_equal(back["SPO"].disparity, estimate)
-        np.testing.assert_array_equal(back["SPO"].evaluation.error, imported.evaluation.error)
+        np.testing.assert_array_equal(back["SPO"].evaluation.error, external.evaluation.error)
         assert set(back["SPO"].evaluation.regions) == {"occluded", "textureless"}
-        write_imported(tmp_path / "b.h5", maps)
+        write_external(tmp_path / "b.h5", maps)
         assert (tmp_path / "a.h5").read_bytes() == (tmp_path / "b.h5").read_bytes()
 
     def test_scores_alone(self, tmp_path: Path, light_field: LightField, estimate: np.ndarray) -> None:
         """Tables need no maps."""
-        imported = self.imported(light_field, estimate)
-        write_imported(tmp_path / "a.h5", {"SPO": imported, "lost": ExternalMap("x", "no file")})
-        back = read_imported_scores(tmp_path / "a.h5")
+        external = self.external(light_field, estimate)
+        write_external(tmp_path / "a.h5", {"SPO": external, "lost": ExternalMap("x", "no file")})
+        back = read_external_scores(tmp_path / "a.h5")
         assert list(back) == ["SPO", "lost"]
-        assert back["SPO"].evaluation.scores == imported.evaluation.scores
+        assert back["SPO"].evaluation.scores == external.evaluation.scores
         assert (back["SPO"].disparity, back["SPO"].evaluation.error, back["SPO"].evaluation.regions) == (None, None, {})
         assert back["lost"].problem == "no file"
 
     def test_maps_say_their_unit_and_masks_take_no_room(
         self, tmp_path: Path, light_field: LightField, estimate: np.ndarray
     ) -> None:
-        write_imported(tmp_path / "a.h5", {"SPO": self.imported(light_field, estimate)})
+        write_external(tmp_path / "a.h5", {"SPO": self.external(light_field, estimate)})
         with h5py.File(tmp_path / "a.h5") as file:
             assert file["methods/SPO/disparity"].attrs["units"] == "pixels per view step"
             assert file["methods/SPO/regions/occluded"].compression == "gzip"
 
     def test_no_method_at_all(self, tmp_path: Path) -> None:
-        write_imported(tmp_path / "a.h5", {})
-        assert read_imported(tmp_path / "a.h5") == {}
+        write_external(tmp_path / "a.h5", {})
+        assert read_external(tmp_path / "a.h5") == {}
 
     def test_another_file_is_a_clear_error(self, tmp_path: Path, light_field: LightField) -> None:
         write_light_field(tmp_path / "lightfield.h5", light_field)
-        with pytest.raises(SepiError, match=r"lightfield\.h5: not a file of other methods' maps"):
-            read_imported(tmp_path / "lightfield.h5")
+        with pytest.raises(SepiError, match=r"lightfield\.h5: not a file of external maps"):
+            read_external(tmp_path / "lightfield.h5")
 
 
 class TestCommand:
@@ -205,8 +208,8 @@ class TestCommand:
         assert result.stderr.splitlines() == [
             f"sepi: warning: external AMNorm, scene noise: {tmp_path / 'absent.pfm'}: no such file"
         ]
-        back = read_imported(tmp_path / "external.h5")
-        assert [imported.problem for imported in back.values()] == ["", "no file"]
+        back = read_external(tmp_path / "external.h5")
+        assert [external.problem for external in back.values()] == ["", "no file"]
         assert back["SPO"].evaluation.scores == evaluation_of(light_field, estimate).scores
         written = (tmp_path / "external.h5").read_bytes()
         assert call(tmp_path, light_field, json.dumps(maps)).exit_code == 0
@@ -232,15 +235,15 @@ class TestCommand:
 
 
 def test_published_maps_score_as_an_independent_program_scores_them(hci: Path, real_data: Path) -> None:
-    """SPO on cotton: a slip in orientation, sign or border would put every imported method in a wrong light."""
+    """SPO on cotton: a slip in orientation, sign or border would put every external method in a wrong light."""
     folder = real_data / "published_maps"
     if not folder.is_dir():
         pytest.skip(f"no published maps at {folder}")
     scene = read_light_field(hci / "cotton")
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        imported = import_maps(scene, {"SPO": MapFile(path=str(folder / "SPO" / "cotton.pfm"))})["SPO"]
-    scores = imported.evaluation.scores
+        external = external_maps(scene, {"SPO": ExternalSource(path=str(folder / "SPO" / "cotton.pfm"))})["SPO"]
+    scores = external.evaluation.scores
     assert scores["paper"]["all"]["mse100"] == pytest.approx(1.7786, abs=5e-5)
     assert scores["benchmark"]["all"]["mse100"] == pytest.approx(1.3130, abs=5e-5)
     assert scores["paper"]["all"]["non_finite"] == 0

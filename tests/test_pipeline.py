@@ -1,8 +1,10 @@
 """All stages on odd but legal light fields, and the refusal of those that hold no depth."""
 
 import os
+import re
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +13,7 @@ import pytest
 import sepi
 from sepi.inspection.disparity_range import estimate_range
 from sepi.lightfield import DisparityRange, LightField
-from sepi.pipeline import VARIANTS
+from sepi.pipeline import VARIANTS, Variant, choice_label, choice_of, stage_parameters
 from sepi.scenes import render, write_hci
 
 CANDIDATES = {"initial": {"num_disparities": 21}, "occlusion": {"num_disparities": 21}}
@@ -67,6 +69,49 @@ def test_an_unknown_range_is_estimated() -> None:
     known = sepi.estimate_depth(alone.with_range(estimate_range(alone)), variant="no_occlusion_no_textureless")
     np.testing.assert_array_equal(maps.disparity, known.disparity)
     assert np.median(np.abs(maps.disparity - whole.ground_truth)) < 0.1
+
+
+def test_a_variant_overrides_and_the_caller_overrides_it() -> None:
+    scene = render("pyramids", size=64, views=3)
+    mine = Variant("structure_tensor", "none", "none", "wls", {"optimize": {"alpha": 0, "tau_2": 1}})
+    found = stage_parameters(mine, {"optimize": {"alpha": 1e-5}})["optimize"]
+    assert found.model_dump() == stage_parameters(VARIANTS["paper"])["optimize"].model_dump() | {
+        "alpha": 1e-5,
+        "tau_2": 1,
+    }
+    set_by_caller = sepi.estimate_depth(scene, replace(mine, overrides={}), {"optimize": {"alpha": 0, "tau_2": 1}})
+    np.testing.assert_array_equal(sepi.estimate_depth(scene, mine).disparity, set_by_caller.disparity)
+
+
+@pytest.mark.parametrize(
+    ("overrides", "complaint"),
+    [
+        ({"optimise": {}}, "variant, overrides: unknown 'optimise'; did you mean 'optimize'"),
+        ({"initial": {"candidates": 5}}, "initial.sepi: unknown 'candidates'; it is now num_disparities"),
+        ({"initial": {"scale": 5}}, "initial.sepi.scale: input should be less than or equal to 2, got 5"),
+    ],
+)
+def test_a_wrong_override_is_named(overrides: dict[str, dict[str, float]], complaint: str) -> None:
+    with pytest.raises(sepi.SepiError, match=complaint):
+        Variant("sepi", "none", "none", "wls", overrides)
+
+
+@pytest.mark.parametrize(
+    ("overrides", "label"),
+    [
+        ({}, "wls"),
+        ({"b": 0.0, "a": 12}, "wls+a=12+b=0"),
+        ({"a": 1e-12, "b": 1e20}, "wls+a=1e-12+b=1e20"),
+        ({"a": 0.1 + 0.2}, "wls+a=0.30000000000000004"),
+        ({"a": "x/y"}, r"wls\+[0-9a-f]{12}"),
+        ({"a" * 100: 1, "b" * 100: 1}, r"wls\+[0-9a-f]{12}"),
+    ],
+)
+def test_a_label_is_a_short_folder_name(overrides: dict[str, object], label: str) -> None:
+    found = choice_label("wls", overrides)
+    assert found == label or re.fullmatch(label, found)
+    assert choice_of(found) == "wls"
+    assert found == choice_label("wls", dict(reversed(overrides.items())))
 
 
 @pytest.mark.parametrize(

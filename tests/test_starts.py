@@ -79,36 +79,38 @@ def test_a_stage_without_kernels_does_not_wait_for_numba(tmp_path: Path) -> None
     assert (tmp_path / "optimize.h5").is_file()
 
 
-@pytest.mark.parametrize("limit", ["environment", "affinity"])
+# what a scheduler does, or a container
+NARROW = "import os\nos.sched_setaffinity(0, {min(os.sched_getaffinity(0))})\n"
+needs_affinity = pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="this system knows no affinity")
+
+
+def run_without_limits(program: str, **environment: str) -> None:
+    """Run a program that asserts something, with none of the limits on threads that these tests run under."""
+    free = {name: value for name, value in os.environ.items() if not name.endswith("_NUM_THREADS")}
+    free |= {"PYTHONPATH": str(Path(__file__).parents[1]), **environment}
+    done = subprocess.run([sys.executable, "-c", program], env=free, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize("limit", ["environment", pytest.param("affinity", marks=needs_affinity)])
 def test_no_more_threads_than_were_given(limit: str) -> None:
     """A scheduler gives a job one core of many: with more threads than that, its neighbours wait."""
-    narrow = "import os\nos.sched_setaffinity(0, {min(os.sched_getaffinity(0))})\n" if limit == "affinity" else ""
     program = (
-        f"{narrow}from sepi.command import use_threads\nuse_threads(64)\nimport numba\n"
+        f"{NARROW if limit == 'affinity' else ''}from sepi.threads import use_threads\nuse_threads(64)\nimport numba\n"
         "assert numba.get_num_threads() == 1, numba.get_num_threads()"
     )
-    environment = {name: value for name, value in os.environ.items() if not name.endswith("_NUM_THREADS")}
-    environment["PYTHONPATH"] = str(Path(__file__).parents[1])
-    if limit == "environment":
-        environment["NUMBA_NUM_THREADS"] = "1"
-    elif not hasattr(os, "sched_setaffinity"):
-        pytest.skip("this system knows no affinity")
-    done = subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
+    run_without_limits(program, **({"NUMBA_NUM_THREADS": "1"} if limit == "environment" else {}))
 
 
 @pytest.mark.parametrize("before", ["", "import numba, cv2\n"])
 def test_threads_are_kept_to_whether_or_not_libraries_are_there(before: str) -> None:
     """Asked for one thread, a job must not take the cores of the jobs beside it."""
     program = (
-        f"{before}from sepi.command import use_threads\nuse_threads(1)\nimport numba, cv2\n"
+        f"{before}from sepi.threads import use_threads\nuse_threads(1)\nimport numba, cv2\n"
         "assert numba.get_num_threads() == 1, numba.get_num_threads()\n"
         "assert cv2.getNumThreads() == 1, cv2.getNumThreads()"
     )
-    environment = {name: value for name, value in os.environ.items() if not name.endswith("_NUM_THREADS")}
-    environment["PYTHONPATH"] = str(Path(__file__).parents[1])
-    done = subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
+    run_without_limits(program)
 
 
 def test_the_api_can_be_imported_where_a_system_lacks_signals_and_limits() -> None:
@@ -119,7 +121,8 @@ def test_the_api_can_be_imported_where_a_system_lacks_signals_and_limits() -> No
         "sys.modules['resource'] = None\n"
         "del signal.SIGHUP, os.sched_getaffinity\n"
         "import numpy, sepi, sepi.cli.main\n"
-        "from sepi.command import available_cores, peak_memory_mb, shown_errors\n"
+        "from sepi.command import peak_memory_mb, shown_errors\n"
+        "from sepi.threads import available_cores\n"
         "field = sepi.LightField(numpy.zeros((3, 3, 8, 8, 3), numpy.uint8), 'a', "
         "disparity_range=sepi.DisparityRange(-1, 1, 'given'))\n"
         "with shown_errors():\n"
@@ -130,3 +133,16 @@ def test_the_api_can_be_imported_where_a_system_lacks_signals_and_limits() -> No
     )
     environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[1])}
     subprocess.run([sys.executable, "-c", program], env=environment, check=True)
+
+
+@needs_affinity
+@pytest.mark.parametrize("command", ["depth", "check", "info"])
+def test_a_command_takes_the_cores_that_it_was_given(tmp_path: Path, command: str) -> None:
+    """Without --threads, too; each library would take what it thinks that the machine has."""
+    write_hci(render("dots", size=64, views=3), tmp_path / "dots")
+    words = [command, str(tmp_path / "dots"), *(["-o", str(tmp_path / "out")] if command == "depth" else [])]
+    program = (
+        f"{NARROW}from sepi.cli.main import main\nmain({words!r}, standalone_mode=False)\n"
+        "import numba, cv2\nassert (numba.config.NUMBA_NUM_THREADS, cv2.getNumThreads()) == (1, 1)"
+    )
+    run_without_limits(program)

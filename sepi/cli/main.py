@@ -15,9 +15,11 @@ from sepi.cli.compare import compare
 from sepi.cli.evaluate import evaluate
 from sepi.cli.input_options import Geometry, Reading, camera_flags, reading_flags
 from sepi.cli.results import check_submission, points, submission
-from sepi.command import SepiGroup, available_cores, progress_bar, use_threads
+from sepi.command import SepiGroup, progress_bar
 from sepi.errors import SepiError
 from sepi.io.provenance import package_version, result_attributes, step
+from sepi.threads import available_cores, use_threads
+from sepi.validation import require_known
 
 # Modules that are slow to import, such as the stages, are imported in the commands that need them.
 if TYPE_CHECKING:
@@ -217,7 +219,6 @@ def scenes(names: tuple[str, ...], output: Path, size: int, views: int, only_lis
       sepi scenes pyramids stripes -o scenes --size 256
     """
     from sepi.scenes import SCENES, render, write_hci
-    from sepi.validation import require_known
 
     if only_list:
         width = max(map(len, SCENES))
@@ -257,6 +258,8 @@ def _range(known: DisparityRange) -> str:
 
 def _parameters(settings: tuple[str, ...], name: str, variant: Variant) -> dict[str, dict[str, Any]]:
     """Stage to field to value from ``STAGE.CHOICE.NAME=VALUE`` of the command line."""
+    from sepi.pipeline import STAGES
+
     parameters: dict[str, dict[str, Any]] = {}
     for setting in settings:
         match = re.fullmatch(r"(\w+)\.(\w+)\.(\w+)=(.*)", setting)
@@ -265,6 +268,8 @@ def _parameters(settings: tuple[str, ...], name: str, variant: Variant) -> dict[
                 f"--set {setting}: expected STAGE.CHOICE.NAME=VALUE, such as initial.semi_global.num_disparities=91"
             )
         stage, choice, field, text = match.groups()
+        require_known(f"--set {setting}", [stage], STAGES)
+        require_known(f"--set {setting}", [choice], STAGES[stage])
         if variant.choices.get(stage) != choice:
             used = ", ".join(f"{stage}.{choice}" for stage, choice in variant.choices.items())
             raise SepiError(f"--set {setting}: variant {name} does not use {stage}.{choice}; it uses {used}")

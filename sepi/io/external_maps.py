@@ -1,20 +1,23 @@
-"""Files of other methods' disparity maps of one scene, with their scores.
+"""External methods' disparity maps: where they lie, and the file of one scene's maps with their scores.
 
-Layout: a group ``methods/NAME`` per method, in the order of the configuration, with the attributes ``source``,
-``problem`` and ``sha256``. Where there is no problem it holds ``disparity (H, W)``, and what a score file holds
-(:mod:`sepi.io.scores`) if the scene has ground truth.
+Layout of that file: a group ``methods/NAME`` per method, in the order of the configuration, with the attributes
+``source``, ``problem`` and ``sha256``. Where there is no problem it holds ``disparity (H, W)``, and what a score file
+holds (:mod:`sepi.io.scores`) if the scene has ground truth.
 """
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import h5py
 import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
 
 from sepi.errors import SepiError
+from sepi.io.disparity_maps import SUFFIXES, map_file
 from sepi.io.hdf5 import UNITS, created, opened
 from sepi.io.scores import Evaluation, evaluation_in, put_evaluation, scores_in
 from sepi.lightfield import FloatMap
@@ -22,9 +25,43 @@ from sepi.lightfield import FloatMap
 _METHODS = "methods"
 
 
+class ExternalSource(BaseModel):
+    """Where the disparity maps of an external method lie, and what their values mean.
+
+    Attributes
+    ----------
+    path : str
+        A file, a folder with a file for each scene, or a pattern with ``{scene}`` and ``{dataset}``.
+    scale, offset : float
+        As :func:`sepi.io.disparity_maps.read_disparity` takes them.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+    path: str = Field(min_length=1)
+    scale: float | None = None
+    offset: float = 0.0
+
+    def file(self, dataset: str, scene: str) -> Path:
+        """The map of a scene: the file that is there, or else the one that was expected."""
+        path = Path(os.path.expanduser(self.path.replace("{dataset}", dataset).replace("{scene}", scene)))
+        if "{scene}" in self.path:
+            # os.path: a folder that may not be entered has no maps, and is no error here
+            return map_file(path) if os.path.isdir(path) else path
+        try:
+            names = sorted(os.listdir(path))
+        except OSError:
+            names = []
+        expected = [f"{scene}{suffix}" for suffix in SUFFIXES]
+        exact = [name for name in expected if name in names]
+        alike = [other for name in expected for other in names if other.casefold() == name.casefold()]
+        files = (path / name for name in (*exact, *alike))
+        return next(filter(os.path.isfile, files), path / expected[0])
+
+
 @dataclass(frozen=True)
 class ExternalMap:
-    """The map of a scene that another method's program made.
+    """An external method's map of a scene.
 
     Attributes
     ----------
@@ -47,22 +84,22 @@ class ExternalMap:
     evaluation: Evaluation = field(default_factory=Evaluation)
 
 
-def write_imported(path: Path, maps: Mapping[str, ExternalMap]) -> None:
+def write_external(path: Path, maps: Mapping[str, ExternalMap]) -> None:
     """Write the maps of all methods, by name; equal content gives equal bytes."""
     with created(path) as file:
         methods = file.create_group(_METHODS, track_order=True)
-        for name, imported in maps.items():
+        for name, external in maps.items():
             group = methods.create_group(name)
             for key in ("source", "problem", "sha256"):
-                group.attrs[key] = getattr(imported, key)
-            if imported.disparity is not None:
-                group.create_dataset("disparity", data=imported.disparity)
+                group.attrs[key] = getattr(external, key)
+            if external.disparity is not None:
+                group.create_dataset("disparity", data=external.disparity)
                 group["disparity"].attrs["units"] = UNITS["disparity"]
-            put_evaluation(group, imported.evaluation)
+            put_evaluation(group, external.evaluation)
 
 
-def read_imported(path: Path) -> dict[str, ExternalMap]:
-    """Method to what :func:`write_imported` wrote of it, in the same order.
+def read_external(path: Path) -> dict[str, ExternalMap]:
+    """Method to what :func:`write_external` wrote of it, in the same order.
 
     Raises
     ------
@@ -72,13 +109,13 @@ def read_imported(path: Path) -> dict[str, ExternalMap]:
     return _read(path, with_maps=True)
 
 
-def read_imported_scores(path: Path) -> dict[str, ExternalMap]:
-    """Like :func:`read_imported`, but without any map: no disparity, no errors, no regions.
+def read_external_scores(path: Path) -> dict[str, ExternalMap]:
+    """Like :func:`read_external`, but without any map: no disparity, no errors, no regions.
 
     Raises
     ------
     SepiError
-        As :func:`read_imported`.
+        As :func:`read_external`.
     """
     return _read(path, with_maps=False)
 
@@ -86,11 +123,11 @@ def read_imported_scores(path: Path) -> dict[str, ExternalMap]:
 def _read(path: Path, with_maps: bool) -> dict[str, ExternalMap]:
     with opened(path) as file:
         if _METHODS not in file:
-            raise SepiError(f"{path}: not a file of other methods' maps (written by python -m sepi.external)")
-        return {name: _imported(group, with_maps) for name, group in file[_METHODS].items()}
+            raise SepiError(f"{path}: not a file of external maps (written by python -m sepi.external)")
+        return {name: _external(group, with_maps) for name, group in file[_METHODS].items()}
 
 
-def _imported(group: h5py.Group, with_maps: bool) -> ExternalMap:
+def _external(group: h5py.Group, with_maps: bool) -> ExternalMap:
     return ExternalMap(
         source=str(group.attrs["source"]),
         problem=str(group.attrs["problem"]),

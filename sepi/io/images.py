@@ -19,6 +19,7 @@ from sepi.errors import SepiError
 from sepi.io.files import atomic_path
 from sepi.io.picture_headers import PNG_SIGNATURE, Header, header_of
 from sepi.lightfield import HIGHEST, LOWEST, BoolMap
+from sepi.threads import available_cores
 
 Pixels = npt.NDArray[np.integer[Any] | np.floating[Any]]
 
@@ -91,7 +92,7 @@ def read_views(paths: Sequence[Path], places: Sequence[int] | None = None, count
         views[places[index]] = image
 
     # decoding runs outside Python's lock, so threads share the work
-    with ThreadPoolExecutor(min(8, os.cpu_count() or 1)) as pool:
+    with ThreadPoolExecutor(min(8, available_cores())) as pool:
         for _ in pool.map(fill, range(len(paths))):
             pass
     return views

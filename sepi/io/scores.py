@@ -168,9 +168,9 @@ def _maps(path: Path, file: h5py.File) -> h5py.Group:
 
 
 def _stored_name(name: str) -> str:
-    # HDF5 would take a slash for a group of groups
-    return name.replace("/", ".")
+    # HDF5 would take a slash for a group of groups; no label of a choice has a colon
+    return name.replace("/", ":")
 
 
 def _name(stored: str) -> str:
-    return stored.replace(".", "/")
+    return stored.replace(":", "/")

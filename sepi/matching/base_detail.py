@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import zlib
 from dataclasses import dataclass
+from typing import Annotated
 
 import cv2
 import numpy as np
@@ -29,21 +30,24 @@ from sepi.stage import Parameters
 DETAIL_UNIT = 1 / 32000
 """Value of one step of the detail, which is stored as int16: colours differ by at most 1."""
 
-COLOURS_ALONE_SCALE = 0.0164
-"""Scale of the colours without detail: then they must tell surfaces apart."""
-
 _KEPT: dict[tuple[object, ...], npt.NDArray[np.int16]] = {}
+
+
+ColourScale = Annotated[
+    float,
+    Field(
+        ge=1e-6,
+        le=2,
+        description="residual of the colours at which their cost is one half; RGB distance, colours in 0..1",
+    ),
+]
+"""A parameter whose default is not the same for every sweep."""
 
 
 class BaseDetailParameters(Parameters):
     """Parameters of the two layers and of how well they must fit."""
 
-    colour_scale: float = Field(
-        0.0316,
-        ge=1e-6,
-        le=2,
-        description="residual of the colours at which their cost is one half; RGB distance, colours in 0..1",
-    )
+    colour_scale: ColourScale = 0.0316
     detail_scale: float = Field(
         0.0045,
         ge=1e-6,

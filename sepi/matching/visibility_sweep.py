@@ -16,14 +16,14 @@ from pydantic import Field
 from sepi.image.mixed_pixels import MixtureParameters, reassign_mixed_pixels
 from sepi.lightfield import FloatMap, LightField
 from sepi.matching.base_detail import (
-    COLOURS_ALONE_SCALE,
     DETAIL_UNIT,
     BaseDetail,
     BaseDetailParameters,
+    ColourScale,
     base_detail_decomposition,
 )
 from sepi.matching.semi_global import SmoothedResult, SmoothingParameters, smooth_and_choose
-from sepi.stage import Progress, with_defaults
+from sepi.stage import OcclusionMarginParameters, Progress
 
 ROWS_PER_REPORT = 128
 """Rows of the picture between two calls of the progress function."""
@@ -37,36 +37,17 @@ class VisibilitySweepParameters(BaseDetailParameters, SmoothingParameters):
     )
 
 
-class VisibilityParameters(VisibilitySweepParameters, MixtureParameters):
+class VisibilityParameters(VisibilitySweepParameters, MixtureParameters, OcclusionMarginParameters):
     """Parameters of the sweep over the views that see a pixel."""
 
     passes: int = Field(3, ge=1, le=10, description="how often visibility and depth are computed anew")
-    occlusion_margin: float = Field(0.15, ge=0, description="by how much a cover must be nearer, pixels per view step")
     occluded_view_weight: float = Field(0.01, ge=0, le=1, description="weight of a view in which the pixel is covered")
 
 
-AllViewsParameters = with_defaults(
-    VisibilitySweepParameters,
-    "AllViewsParameters",
-    "Parameters of the first depth map: a narrow scale of the colours bears with views that do not see the pixel.",
-    colour_scale=0.0077,
-)
-AllViewsColoursParameters = with_defaults(
-    AllViewsParameters, "AllViewsColoursParameters", "The same from colours alone.", detail_share=0.0
-)
-UnmixedParameters = with_defaults(
-    VisibilityParameters,
-    "UnmixedParameters",
-    "Visible views without the decision by colour mixture.",
-    alpha_threshold=0.0,
-)
-VisibilityColoursParameters = with_defaults(
-    VisibilityParameters,
-    "VisibilityColoursParameters",
-    "Visible views by colours alone.",
-    colour_scale=COLOURS_ALONE_SCALE,
-    detail_share=0.0,
-)
+class AllViewsParameters(VisibilitySweepParameters):
+    """Parameters of the first depth map: a narrow scale of the colours bears with views that do not see the pixel."""
+
+    colour_scale: ColourScale = 0.0077
 
 
 def depth_from_all_views(

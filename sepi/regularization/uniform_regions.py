@@ -23,7 +23,7 @@ from pydantic import Field
 from sepi.image.noise import noise_level
 from sepi.lightfield import BoolMap, FloatMap, LightField, full_scale
 from sepi.matching.base_detail import BaseDetailParameters, base_detail_decomposition
-from sepi.stage import Parameters, StageMaps
+from sepi.stage import OcclusionMarginParameters, StageMaps
 
 LEAST_NOISE = 1e-5
 """Noise below which rounding of float32 is noise too; integers have at least 0.3 levels by rounding."""
@@ -31,7 +31,7 @@ LEAST_NOISE = 1e-5
 _PIXELS_OF_A_PLANE = 12  # least border to fit one to
 
 
-class UniformPlanesParameters(Parameters):
+class UniformPlanesParameters(OcclusionMarginParameters):
     """Parameters of uniform regions and their planes."""
 
     colour_scale: float = Field(
@@ -56,9 +56,6 @@ class UniformPlanesParameters(Parameters):
     )
     min_inlier_ratio: float = Field(0.25, ge=0, le=1, description="share of the border without which there is no plane")
     ransac_iterations: int = Field(500, ge=1, description="planes tried for each region")
-    occlusion_margin: float = Field(
-        0.15, ge=0, description="by how much an occluder must be nearer, pixels per view step"
-    )
 
 
 def fill_uniform_regions(

@@ -19,7 +19,7 @@ import numpy as np
 
 from sepi.command import SepiCommand
 from sepi.evaluate import WHOLE_MAP
-from sepi.io.external_maps import read_imported
+from sepi.io.external_maps import read_external
 from sepi.io.files import atomic_path
 from sepi.io.hdf5 import read_light_field, read_stage
 from sepi.io.images import write_png
@@ -182,7 +182,7 @@ def read_results(plan: Plan, dataset: str, scene: str) -> SceneResults:
     }
     keys = {variant: plan.stage_key(variant, plan.stages[-1]) for variant in maps}
     scored = read_evaluations(plan.scores_file(dataset, scene), list(keys.values()))
-    imported = read_imported(plan.external_file(dataset, scene)) if plan.external else {}
+    imported = read_external(plan.external_file(dataset, scene)) if plan.external else {}
     return SceneResults(
         light_field=read_light_field(plan.light_field_file(dataset, scene)),
         maps=maps,

@@ -24,7 +24,7 @@ import numpy.typing as npt
 from sepi.command import SepiCommand
 from sepi.errors import SepiError
 from sepi.evaluate import BAD_PIXEL, PROTOCOLS, REGIONS
-from sepi.io.external_maps import read_imported_scores
+from sepi.io.external_maps import read_external_scores
 from sepi.io.hdf5 import read_light_field, read_stage
 from sepi.io.scores import Scores, read_evaluations, read_scores
 from sepi.report.plan import PARTS_TABLES, TABLES, Plan
@@ -208,7 +208,7 @@ def _external(plan: Plan, dataset: str, scene: str) -> dict[str, Any]:
     if not plan.external:
         return {}
     path = plan.external_file(dataset, scene)
-    imported = read_imported_scores(path)
+    imported = read_external_scores(path)
     missing = [method for method in plan.external if method not in imported]
     if missing:
         raise SepiError(f"{path}: no method '{missing[0]}'; it holds: {', '.join(imported) or 'none'}")

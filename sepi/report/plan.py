@@ -1,4 +1,4 @@
-"""Which scenes, variants and imported methods a report is about, and where their files lie.
+"""Which scenes, variants and external methods a report is about, and where their files lie.
 
 The workflow declares the inputs of the report's numbers from here, and they are collected from nothing else.
 """
@@ -12,7 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from sepi.errors import SepiError
-from sepi.pipeline import HANDED_ON, PARTS_OF_BEST, key_of, stage_of
+from sepi.pipeline import HANDED_ON, PARTS_OF_BEST
+from sepi.workflow.result_paths import PARTS, SceneFiles, key_of, scene_files, stage_of
 
 MAIN_VARIANT = "paper"
 """The variant that does what the paper describes; its figures stand beside the published ones."""
@@ -43,7 +44,7 @@ PARTS_TABLES = ("ablation_best",)
 
 @dataclass(frozen=True)
 class Plan:
-    """Scenes, variants and imported methods of a report.
+    """Scenes, variants and external methods of a report.
 
     Attributes
     ----------
@@ -52,9 +53,9 @@ class Plan:
     scenes : mapping of str to sequence of str
         Dataset to its scenes, in the order of the tables.
     variants : mapping of str to mapping
-        Variant to stage to choice, in order; the stages are the same for all.
+        Variant to stage to the label of its choice (:func:`sepi.pipeline.choice_label`), in order.
     external : sequence of str
-        Methods whose maps are imported, in the order of the tables.
+        External methods, in the order of the tables.
     """
 
     results: Path
@@ -66,7 +67,7 @@ class Plan:
     def from_json(cls, results: Path, text: str) -> Plan:
         """Plan from JSON ``{"scenes": {DATASET: [SCENE]}, "variants": {VARIANT: {STAGE: CHOICE}}}``.
 
-        Imported methods, ``"external": [NAME]``, may be added.
+        External methods, ``"external": [NAME]``, may be added.
 
         Raises
         ------
@@ -78,7 +79,7 @@ class Plan:
             plan = cls(
                 results,
                 {dataset: _names(names) for dataset, names in values["scenes"].items()},
-                {name: {stage: str(word) for stage, word in c.items()} for name, c in values["variants"].items()},
+                {name: {stage: str(label) for stage, label in c.items()} for name, c in values["variants"].items()},
                 _names(values.get("external", ())),
             )
         except (ValueError, KeyError, TypeError, AttributeError) as error:
@@ -95,7 +96,7 @@ class Plan:
         return json.dumps(self.content())
 
     def content(self) -> dict[str, Any]:
-        """Scenes, variants and imported methods as JSON has them."""
+        """Scenes, variants and external methods as JSON has them."""
         return {
             "scenes": {dataset: list(names) for dataset, names in self.scenes.items()},
             "variants": {variant: dict(choices) for variant, choices in self.variants.items()},
@@ -112,37 +113,33 @@ class Plan:
         """Every ``(dataset, scene)``."""
         return [(dataset, scene) for dataset, scenes in self.scenes.items() for scene in scenes]
 
+    def files(self, dataset: str, scene: str) -> SceneFiles:
+        """Where the files of a scene lie."""
+        return scene_files(dataset, scene, self.results)
+
     def light_field_file(self, dataset: str, scene: str) -> Path:
         """The light field of a scene."""
-        return self.results / dataset / scene / "lightfield.h5"
-
-    def stages_folder(self, dataset: str, scene: str) -> Path:
-        """The folder of a scene's stage files."""
-        return self.results / dataset / scene / "stages"
+        return self.files(dataset, scene).light_field
 
     def stage_file(self, dataset: str, scene: str, variant: str, stage: str, ending: str = "h5") -> Path:
-        """The file with a variant's maps after a stage, or one beside it: ``ending`` is ``"time.json"``.
-
-        It is that of an earlier stage where this one hands its maps on.
-        """
-        folder = self.stages_folder(dataset, scene) / self.stage_key(variant, stage)
-        return folder / f"{self.made_by(variant, stage)}.{ending}"
+        """The file with a variant's maps after a stage, or one beside it: ``ending`` is ``"time.json"``."""
+        return self.files(dataset, scene).stage(self.variants[variant], stage, ending)
 
     def scores_file(self, dataset: str, scene: str, parts: bool = False) -> Path:
         """The scores of a scene's maps; with ``parts``, of those that the ablation of the best variant needs."""
-        return self.results / dataset / scene / f"scores{'_parts' if parts else ''}.h5"
+        return self.files(dataset, scene).scores(PARTS if parts else "")
 
     def external_file(self, dataset: str, scene: str) -> Path:
-        """The maps and scores of all imported methods for a scene."""
-        return self.results / dataset / scene / "external.h5"
+        """The maps and scores of all external methods for a scene."""
+        return self.files(dataset, scene).external
 
     def stage_key(self, variant: str, stage: str) -> str:
-        """What names a variant's maps after a stage, in numbers and scores: :func:`sepi.pipeline.key_of`."""
+        """What names a variant's maps after a stage, in numbers and scores."""
         return key_of(self.variants[variant], stage)
 
     def made_by(self, variant: str, stage: str) -> str:
         """The stage that made a variant's maps after ``stage``: itself, or an earlier one whose maps it hands on."""
-        return stage_of(self.variants[variant], self.stage_key(variant, stage))
+        return stage_of(self.stage_key(variant, stage))
 
     def runs_stage(self, variant: str, stage: str) -> bool:
         """Whether a stage of a variant does anything; else it hands on what it is given."""

@@ -22,10 +22,12 @@ import ast
 import hashlib
 from collections.abc import Iterator
 from functools import cache
+from importlib.util import resolve_name
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 
+_DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
 # blocks of a module that are not run when it is imported
 _NOT_RUN = ("TYPE_CHECKING", "__name__ == '__main__'")
 
@@ -58,7 +60,7 @@ def code_digest(*modules: str, root: Path = ROOT) -> str:
     """
     total = hashlib.sha256()
     for name in sorted(imported_modules(*modules, root=root)):
-        total.update(f"{name}\n{_code(_file_of(name, root))}\n".encode())
+        total.update(f"{name}\n{_code_and_imports(name, root)[0]}\n".encode())
     return total.hexdigest()[:16]
 
 
@@ -70,90 +72,40 @@ def imported_modules(*modules: str, root: Path = ROOT) -> set[str]:
         name = waiting.pop()
         if name not in found:
             found.add(name)
-            waiting.extend(_imports(name, root))
+            waiting.extend(_code_and_imports(name, root)[1])
     return found
 
 
-def _file_of(module: str, root: Path) -> Path:
+@cache
+def _file_of(module: str, root: Path) -> Path | None:
     path = root.joinpath(*module.split("."))
-    for candidate in (path.with_name(f"{path.name}.py"), path / "__init__.py"):
-        if candidate.is_file():
-            return candidate
-    raise ModuleNotFoundError(f"no module {module} in {root}")
-
-
-def _is_module(module: str, root: Path) -> bool:
-    try:
-        return bool(_file_of(module, root))
-    except ModuleNotFoundError:
-        return False
+    return next(filter(Path.is_file, (path.with_name(f"{path.name}.py"), path / "__init__.py")), None)
 
 
 @cache
-def _tree(file: Path) -> ast.Module:
+def _code_and_imports(module: str, root: Path) -> tuple[str, frozenset[str]]:
+    """The syntax tree of a module without docstrings, and the modules of its package that it imports."""
+    file = _file_of(module, root)
+    if file is None:
+        raise ModuleNotFoundError(f"no module {module} in {root}")
     tree = ast.parse(file.read_bytes(), str(file))
     tree.body = [node for node in tree.body if not (isinstance(node, ast.If) and ast.unparse(node.test) in _NOT_RUN)]
-    return tree
-
-
-@cache
-def _imports(module: str, root: Path) -> frozenset[str]:
-    return frozenset(_imported_by(module, root))
-
-
-def _imported_by(module: str, root: Path) -> Iterator[str]:
-    file = _file_of(module, root)
-    package = module.split(".")[0]
-    for node in _statements(_tree(file).body):
-        if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names if alias.name.split(".")[0] == package)
-        elif isinstance(node, ast.ImportFrom):
-            base = _absolute(node, module, file.name == "__init__.py")
-            if base.split(".")[0] == package:
-                yield from _imported_from(base, [alias.name for alias in node.names], root)
-
-
-def _imported_from(base: str, names: list[str], root: Path) -> Iterator[str]:
-    for name in names:
-        inner = f"{base}.{name}"
-        if _is_module(inner, root):
-            yield inner
-        elif _is_module(base, root):
-            yield base
-
-
-def _absolute(node: ast.ImportFrom, module: str, is_package: bool) -> str:
-    if node.level == 0:
-        return node.module or ""
-    parts = module.split(".")
-    up = node.level - 1 if is_package else node.level
-    return ".".join([*parts[: len(parts) - up], *([node.module] if node.module else [])])
-
-
-@cache
-def _code(file: Path) -> str:
-    """The syntax tree of a file without docstrings; remembered, since most files belong to several commands."""
-    tree = _tree(file)
-    for node in [tree, *_statements(tree.body)]:
-        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef) and _is_text(
-            node.body[:1]
-        ):
+    package = module if file.name == "__init__.py" else module.rpartition(".")[0]
+    imports: set[str] = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import | ast.ImportFrom):
+            imports.update(_imported(node, package, root))
+        elif isinstance(node, _DOCUMENTED) and ast.get_docstring(node, clean=False) is not None:
             node.body = node.body[1:]
-    return ast.dump(tree)
+    return ast.dump(tree), frozenset(name for name in imports if name.split(".")[0] == module.split(".")[0])
 
 
-def _statements(body: list[ast.stmt]) -> Iterator[ast.stmt]:
-    """All statements of a body and of those in it; expressions, of which there are far more, are not looked into."""
-    for node in body:
-        yield node
-        for inner in (node, *getattr(node, "handlers", ()), *getattr(node, "cases", ())):
-            for field in ("body", "orelse", "finalbody") if inner is node else ("body",):
-                yield from _statements(getattr(inner, field, []))
-
-
-def _is_text(first: list[ast.stmt]) -> bool:
-    """Whether a body's first statement, if any, is its docstring."""
-    return any(
-        isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant) and isinstance(node.value.value, str)
-        for node in first
-    )
+def _imported(node: ast.Import | ast.ImportFrom, package: str, root: Path) -> Iterator[str]:
+    """The modules that a statement imports: of ``from pkg import name``, ``pkg.name`` if that is one, else ``pkg``."""
+    if isinstance(node, ast.Import):
+        yield from (alias.name for alias in node.names)
+        return
+    base = resolve_name("." * node.level + (node.module or ""), package)
+    for alias in node.names:
+        inner = f"{base}.{alias.name}"
+        yield inner if _file_of(inner, root) else base

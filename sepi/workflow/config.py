@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable, Mapping
+import os
+import re
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
@@ -12,21 +14,25 @@ from typing import Annotated, Any
 from pydantic import BaseModel, ConfigDict, Field
 
 from sepi.errors import SepiError
+from sepi.io.disparity_maps import SUFFIXES
+from sepi.io.external_maps import ExternalSource
 from sepi.io.readers.formats import FORMATS
 from sepi.io.readers.options import ORDERS
 from sepi.lightfield import DisparityRange
-from sepi.pipeline import STAGES, VARIANTS, Variant
+from sepi.pipeline import VARIANT_ENTRIES, VARIANTS, Variant, variant_from
 from sepi.scenes import SCENES
 from sepi.stage import Parameters
 from sepi.validation import require_known, validated
 from sepi.workflow.datasets import Scene, own_scene, scenes_in
-from sepi.workflow.external_config import ExternalMaps, external_maps
+from sepi.workflow.parameters import default_values, stage_settings
 
 GRAPH_CONFIG = "SEPI_GRAPH_CONFIG"
 """Environment variable with a configuration (JSON) in place of the workflow's own; the rule graph is asked for so."""
 
 # names of folders and panels that stand beside those of variants
-_RESERVED = ("stages", "imported", "ground_truth", "centre")
+_RESERVED = ("stages", "imported", "external", "ground_truth", "centre")
+# a file name holds 255 bytes, and pictures of a method are folders of its name
+_LONGEST_METHOD = 80
 # the built-in scenes have 9x9 views
 _BUILTIN_VIEWS = 81
 # keys whose values are text even where they look like numbers
@@ -47,15 +53,8 @@ class Builtin(_Keys):
     size: int = Field(192, ge=64, le=1024, description="height and width of a view in pixels")
 
 
-def _default_stages() -> dict[str, dict[str, dict[str, Any] | None]]:
-    return {
-        stage: {word: choice.parameters().model_dump() for word, choice in choices.items()}
-        for stage, choices in STAGES.items()
-    }
-
-
 _Count = Annotated[int, Field(ge=1)]
-_Place = Annotated[int, Field(ge=0)]
+_Index = Annotated[int, Field(ge=0)]
 
 
 class OwnLightField(_Keys):
@@ -70,24 +69,24 @@ class OwnLightField(_Keys):
     central: _Count | None = None
     order: str | None = None
     exclude: list[str] = []
-    view: tuple[_Place, _Place] | None = None
+    view: tuple[_Index, _Index] | None = None
     follow_links: bool = False
 
     @property
     def flags(self) -> tuple[str, ...]:
         """All but the path, as flags of the command line."""
         pairs = {"grid": "x", "view": ","}
-        words: list[str] = []
+        flags: list[str] = []
         for key, value in self.model_dump(exclude={"path", "exclude", "follow_links"}, exclude_none=True).items():
-            words += [f"--{key}", pairs[key].join(map(str, value)) if key in pairs else str(value)]
-        words += [word for view in self.exclude for word in ("--exclude", view)]
-        return (*words, "--follow-links") if self.follow_links else tuple(words)
+            flags += [f"--{key}", pairs[key].join(map(str, value)) if key in pairs else str(value)]
+        flags += [flag for view in self.exclude for flag in ("--exclude", view)]
+        return (*flags, "--follow-links") if self.follow_links else tuple(flags)
 
 
 class Report(_Keys):
     """Keys of ``report``."""
 
-    pixels: dict[str, list[tuple[_Place, _Place]]] = Field(
+    pixels: dict[str, list[tuple[_Index, _Index]]] = Field(
         {},
         description="pixels to look into beside those chosen automatically, such as {hci/cotton: [[200, 310]]}: row "
         "and column",
@@ -123,7 +122,7 @@ class Config(_Keys):
     )
     external: dict[str, dict[str, Any]] = Field(
         {},
-        description="Disparity maps that other methods made, by the method's name, to be scored and shown beside ours: "
+        description="Disparity maps of external methods, by the method's name, to be scored and shown beside ours: "
         "a folder with SCENE.pfm, .npy, .png or .h5, a file pattern such as {SPO: '/maps/{dataset}/{scene}/spo.pfm'}, "
         "or {path: ..., scale: ..., offset: ...} where disparity = value * scale + offset.",
     )
@@ -133,14 +132,17 @@ class Config(_Keys):
         description="Disparity range of single scenes in pixels per view step, such as {hci/cotton: [-1.6, 1.5]}. "
         "Other scenes have the range of their own parameters.cfg, or one estimated from the views.",
     )
-    variants: dict[str, dict[str, str]] = Field(
-        {name: variant.choices for name, variant in VARIANTS.items()},
-        description="A choice for each stage. 'paper' is the method; 'paper' to 'no_occlusion_no_textureless' are the "
+    variants: dict[str, dict[str, Any]] = Field(
+        VARIANT_ENTRIES,
+        description="A choice for each stage, or {choice: CHOICE, PARAMETER: VALUE} with what it overrides; with base, "
+        "only what differs from that variant. 'paper' is the method; 'paper' to 'no_occlusion_no_textureless' are the "
         "columns of its table 4. 'best' is the most accurate variant, 'best_...' are the same with one part switched "
         "off. These have fixed meanings; add variants of your own beside them.",
     )
     stages: dict[str, dict[str, dict[str, Any] | None]] = Field(
-        default_factory=_default_stages, description="Parameters of each stage, by choice."
+        default_factory=default_values,
+        description="Parameters of each stage, by choice. Those below shared hold for every choice that has them, but "
+        "for one that has its own value below its stage.",
     )
 
 
@@ -154,10 +156,10 @@ class Settings:
         Every scene to run on, in the tables' order.
     variants : mapping of str to Variant
         The built-in variants, then the user's own.
-    parameters : mapping of stage to choice to Parameters
-        What each stage runs with.
-    external : mapping of str to ExternalMaps
-        Other methods, and where their maps are.
+    parameters : mapping of stage to label to Parameters
+        What each stage runs with, by choice and what is overridden of it.
+    external : mapping of str to ExternalSource
+        External methods, and where their maps are.
     report : Report
         What the report's page shows beside the rest.
     """
@@ -165,7 +167,7 @@ class Settings:
     scenes: Mapping[tuple[str, str], Scene]
     variants: Mapping[str, Variant]
     parameters: Mapping[str, Mapping[str, Parameters]]
-    external: Mapping[str, ExternalMaps]
+    external: Mapping[str, ExternalSource]
     report: Report
 
     @property
@@ -194,19 +196,19 @@ class Settings:
         require_known(f"scene of dataset '{dataset}'", [name], self.scenes_of(dataset))
         return self.scenes[dataset, name]
 
-    def parameters_json(self, stage: str, choice: str) -> str:
+    def parameters_json(self, stage: str, label: str) -> str:
         """Parameters of a stage's choice as JSON with sorted keys."""
-        return json.dumps(self.parameters[stage][choice].model_dump(mode="json"), sort_keys=True)
+        return json.dumps(self.parameters[stage][label].model_dump(mode="json"), sort_keys=True)
 
     def variants_json(self, variants: Iterable[str]) -> str:
-        """Stage to choice to parameters as JSON, of the choices that some of these variants use."""
-        used = {pair for name in variants for pair in self.variants[name].choices.items()}
+        """Stage to label to parameters as JSON, of the choices that some of these variants use."""
+        used = {pair for name in variants for pair in self.variants[name].labels.items()}
         return json.dumps(
             {
                 stage: {
-                    word: values.model_dump(mode="json") for word, values in choices.items() if (stage, word) in used
+                    label: values.model_dump(mode="json") for label, values in found.items() if (stage, label) in used
                 }
-                for stage, choices in self.parameters.items()
+                for stage, found in self.parameters.items()
             }
         )
 
@@ -219,13 +221,13 @@ class Settings:
             If there is no such scene.
         """
         scene = self.scene(dataset, name)
-        return {method: maps.file(scene.dataset, scene.name) for method, maps in self.external.items()}
+        return {method: source.file(scene.dataset, scene.name) for method, source in self.external.items()}
 
     def external_json(self, dataset: str, name: str) -> str:
         """What ``python -m sepi.external`` is to read for a scene, in the order of the configuration."""
         files = self.external_files(dataset, name)
         return json.dumps(
-            {method: maps.model_dump() | {"path": str(files[method])} for method, maps in self.external.items()}
+            {method: source.model_dump() | {"path": str(files[method])} for method, source in self.external.items()}
         )
 
 
@@ -245,11 +247,13 @@ def load_settings(values: Mapping[str, Any]) -> Settings:
         require_known("config.disparity_range", [name], [f"{dataset}/{scene}" for dataset, scene in scenes])
         DisparityRange(minimum, maximum, f"config.disparity_range of {name}")
         ranges[name] = (minimum, maximum)
+    entries = {**VARIANT_ENTRIES, **config.variants}
+    variants = {name: _variant(name, entries) for name in entries}
     return Settings(
         {key: replace(scene, disparity_range=ranges.get("/".join(key))) for key, scene in scenes.items()},
-        dict(VARIANTS) | {name: _variant(name, choices) for name, choices in config.variants.items()},
-        _parameters(config.stages),
-        {name: external_maps(name, entry, config.variants) for name, entry in config.external.items()},
+        variants,
+        stage_settings(config.stages, variants),
+        {name: _external(name, entry, variants) for name, entry in config.external.items()},
         _report(config.report, scenes),
     )
 
@@ -306,32 +310,35 @@ def _scenes(config: Config) -> dict[tuple[str, str], Scene]:
     return {(scene.dataset, scene.name): scene for scene in scenes}
 
 
-def _variant(name: str, choices: Mapping[str, str]) -> Variant:
+def _variant(name: str, entries: Mapping[str, Any]) -> Variant:
+    variant = variant_from(name, entries, "config.variants")
     where = f"config.variants.{name}"
-    require_known(where, choices, STAGES)
-    missing = [stage for stage in STAGES if stage not in choices]
-    if missing:
-        raise SepiError(f"{where}: no choice for stage '{missing[0]}' (one of {', '.join(STAGES[missing[0]])})")
-    for stage, choice in choices.items():
-        require_known(f"{where}.{stage}", [choice], STAGES[stage])
-    if name in VARIANTS and dict(choices) != VARIANTS[name].choices:
+    if name in VARIANTS and variant != VARIANTS[name]:
         raise SepiError(f"{where}: a built-in variant has a fixed meaning; give yours another name")
     if not name.isidentifier() or name in _RESERVED:
         raise SepiError(f"{where}: a variant's name must be letters, digits and _, and none of {', '.join(_RESERVED)}")
-    return Variant(**choices)
+    return variant
 
 
-def _parameters(stages: Mapping[str, Mapping[str, Mapping[str, Any] | None]]) -> dict[str, dict[str, Parameters]]:
-    require_known("config.stages", stages, STAGES)
-    for stage, choices in stages.items():
-        require_known(f"config.stages.{stage}", choices, STAGES[stage])
-    return {
-        stage: {
-            word: validated(choice.parameters, stages.get(stage, {}).get(word) or {}, f"config.stages.{stage}.{word}")
-            for word, choice in choices.items()
-        }
-        for stage, choices in STAGES.items()
-    }
+def _external(name: str, entry: Mapping[str, Any], variants: Collection[str]) -> ExternalSource:
+    where = f"config.external.{name}"
+    source = validated(ExternalSource, entry, where)
+    if name in variants:
+        raise SepiError(f"{where}: a variant has this name; give the method another")
+    if not name.strip() or name != name.strip() or "/" in name or name.startswith(".") or not name.isprintable():
+        raise SepiError(f"{where}: a method's name must be printable text without '/', not beginning with '.'")
+    if len(name.encode()) > _LONGEST_METHOD:
+        raise SepiError(f"config.external.{name[:20]}...: a method's name must have at most {_LONGEST_METHOD} bytes")
+    require_known(f"{where}.path", re.findall(r"\{[^{}]*\}", source.path), ("{dataset}", "{scene}"))
+    path = Path(os.path.expanduser(source.path))
+    if "{scene}" not in source.path and (path.is_file() or (path.suffix.lower() in SUFFIXES and not path.is_dir())):
+        # one file would be taken for the map of every scene
+        raise SepiError(
+            f"{where}.path: '{source.path}' is one file; write {{scene}} for the scene's name, or give the folder"
+        )
+    if source.scale == 0:
+        raise SepiError(f"{where}.scale: must not be 0, or every disparity would be the offset")
+    return source
 
 
 def _report(report: Report, scenes: Mapping[tuple[str, str], Scene]) -> Report:

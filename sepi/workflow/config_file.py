@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import textwrap
+from collections.abc import Mapping
 from typing import Any
 
 import click
@@ -15,7 +16,8 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from sepi.pipeline import STAGES
-from sepi.workflow.config import Builtin, Config, Report
+from sepi.workflow.config import Config
+from sepi.workflow.parameters import GROUPS, SHARED, choices_with, default_values, shared_by
 
 
 def default_yaml() -> str:
@@ -30,9 +32,9 @@ def default_yaml() -> str:
         lines += _comment(field, "")
         default = field.get_default(call_default_factory=True)
         if key in ("builtin", "report"):
-            lines += [f"{key}:", *_fields(Builtin if key == "builtin" else Report, "  ")]
+            lines += [f"{key}:", *_fields(type(default), "  ", default.model_dump())]
         elif key == "variants":
-            lines += ["variants:", *(f"  {name}: {_flow(choices)}" for name, choices in default.items())]
+            lines += ["variants:", *(f"  {name}: {_flow(entry)}" for name, entry in default.items())]
         elif key == "stages":
             lines += ["stages:", *_stage_lines()]
         else:
@@ -43,19 +45,24 @@ def default_yaml() -> str:
 
 def _stage_lines() -> list[str]:
     lines = []
-    for stage, choices in STAGES.items():
+    for stage, entries in default_values().items():
         lines.append(f"  {stage}:")
-        for word, choice in choices.items():
-            fields = _fields(choice.parameters, "      ")
-            lines += [f"    {word}:", *fields] if fields else [f"    {word}: {{}}"]
+        for name, values in entries.items():
+            if stage == SHARED:
+                model, where = GROUPS[name], f"of {', '.join(choices_with(name))}"
+            else:
+                model = STAGES[stage][name].parameters
+                where = ", ".join(f"{SHARED}.{group}" for group in dict.fromkeys(shared_by(model).values()))
+            lines += [f"    # {where}"] if where else []
+            lines.append(f"    {name}:" if values else f"    {name}: {{}}")
+            lines += _fields(model, "      ", values)
     return lines
 
 
-def _fields(model: type[BaseModel], indent: str) -> list[str]:
+def _fields(model: type[BaseModel], indent: str, values: Mapping[str, Any]) -> list[str]:
     lines = []
-    for name, field in model.model_fields.items():
-        lines += _comment(field, indent)
-        lines.append(f"{indent}{name}: {_flow(field.get_default(call_default_factory=True))}")
+    for name, value in values.items():
+        lines += [*_comment(model.model_fields[name], indent), f"{indent}{name}: {_flow(value)}"]
     return lines
 
 

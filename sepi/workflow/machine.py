@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import os
 import platform
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 from sepi.io.provenance import package_version
+from sepi.threads import available_cores
 
 LIBRARIES = ("numpy", "scipy", "numba", "opencv-python-headless", "h5py", "pyamg")
 """Distributions that the stages compute with."""
@@ -18,7 +18,7 @@ def this_machine() -> dict[str, Any]:
     """Processor, cores that may be used, and versions."""
     return {
         "processor": _processor(),
-        "cores": len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count(),
+        "cores": available_cores(),
         "system": platform.system(),
         "python": platform.python_version(),
         "sepi": package_version(),

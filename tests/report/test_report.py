@@ -18,7 +18,7 @@ from sepi import pipeline
 from sepi.errors import SepiError
 from sepi.evaluate import evaluation_of, score_maps
 from sepi.external import NO_FILE
-from sepi.io.external_maps import ExternalMap, write_imported
+from sepi.io.external_maps import ExternalMap, write_external
 from sepi.io.hdf5 import read_stage, write_light_field, write_stage
 from sepi.io.scores import Evaluation, map_name, read_evaluations, write_scores
 from sepi.lightfield import DisparityRange, LightField
@@ -93,7 +93,7 @@ def with_results(made: Plan) -> Plan:
                 write_stage(made.stage_file(dataset, name, variant, stage), maps, step)
                 timing = made.stage_file(dataset, name, variant, stage, "time.json")
                 timing.write_text(json.dumps({"seconds": 1.5, "peak_memory_mb": 200 + 10 * len(stage)}))
-        folder = made.stages_folder(dataset, name)
+        folder = made.files(dataset, name).stages
         for parts in (False, True):
             files = made.scored_files(dataset, name, parts)
             disparity = {map_name(folder, file): read_stage(file).disparity for file in files}
@@ -101,7 +101,7 @@ def with_results(made: Plan) -> Plan:
             write_scores(made.scores_file(dataset, name, parts), scored, {"scene": name})
         if made.external:
             maps = {method: imported_map(scene, EXTERNAL[method][name]) for method in made.external}
-            write_imported(made.external_file(dataset, name), maps)
+            write_external(made.external_file(dataset, name), maps)
     return made
 
 

@@ -1,7 +1,9 @@
 """The workflow's configuration: a typing error must be named, not ignored, and config.yaml must tell the truth."""
 
+import inspect
 import json
 import struct
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -11,10 +13,15 @@ import pytest
 import yaml
 
 from sepi.errors import SepiError
-from sepi.pipeline import STAGES, VARIANTS, key_of
+from sepi.io.readers.formats import FORMATS
+from sepi.pipeline import STAGES, VARIANTS
+from sepi.renamed import RENAMED
 from sepi.scenes import SCENES
-from sepi.workflow.config import Settings, load_settings
+from sepi.stage import Parameters
+from sepi.workflow.config import Config, Settings, load_settings
 from sepi.workflow.config_file import default_yaml
+from sepi.workflow.parameters import GROUPS
+from sepi.workflow.result_paths import key_of
 
 CONFIG = Path(__file__).parents[2] / "config.yaml"
 
@@ -85,18 +92,48 @@ def test_defaults_run_every_builtin_scene_and_variant() -> None:
         ),
         (
             {"variants": {"mine": {"initial": "sepi"}}},
-            "config.variants.mine: no choice for stage 'occlusion' (one of half_sepi, wang, visibility, "
-            "visibility_unmixed, visibility_colours, none)",
+            "config.variants.mine: no choice for stage 'occlusion' (one of half_sepi, wang, visibility, none)",
         ),
+        ({"variants": {"mine": {"base": "pap"}}}, "config.variants.mine.base: unknown 'pap'; did you mean 'paper'?"),
         (
-            {"variants": {"mine": VARIANTS["paper"].choices | {"occlusion": "halfsepi"}}},
+            {"variants": {"mine": {"base": "best", "occlusion": "halfsepi"}}},
             "config.variants.mine.occlusion: unknown 'halfsepi'; did you mean 'half_sepi'?",
         ),
         (
-            {"variants": {"paper": VARIANTS["wang"].choices}},
-            "config.variants.paper: a built-in variant has a fixed meaning",
+            {"variants": {"mine": {"base": "best", "occlusion": {"alpha_treshold": 0}}}},
+            "config.variants.mine.occlusion: unknown 'alpha_treshold'; did you mean 'alpha_threshold'?",
         ),
-        ({"variants": {"a/b": VARIANTS["wang"].choices}}, "config.variants.a/b: a variant's name must be letters"),
+        (
+            {"variants": {"mine": {"base": "best", "occlusion": {"alpha_threshold": 2}}}},
+            "config.variants.mine.occlusion.alpha_threshold: input should be less than or equal to 1, got 2",
+        ),
+        (
+            {"variants": {"mine": {"base": "best", "occlusion": {"choice": "none", "passes": 1}}}},
+            "config.variants.mine.occlusion: unknown 'passes'; known: nothing can be set here",
+        ),
+        (
+            {"variants": {"mine": {"base": "best", "optimize": {"solves": 0}}}},
+            "config.variants.mine.optimize: value error, refinements and solves cannot both be 0",
+        ),
+        ({"variants": {"mine": {"base": "best", "optimize": 3}}}, "config.variants.mine.optimize: expected a choice"),
+        (
+            {"variants": {"mine": {"base": "other"}, "other": {"base": "mine"}}},
+            "config.variants.other.base: the variant would be built on itself",
+        ),
+        ({"variants": {"paper": {"base": "best"}}}, "config.variants.paper: a built-in variant has a fixed meaning"),
+        ({"variants": {"a/b": {"base": "wang"}}}, "config.variants.a/b: a variant's name must be letters"),
+        (
+            {"stages": {"shared": {"plane_sweeps": {}}}},
+            "config.stages.shared: unknown 'plane_sweeps'; did you mean 'plane_sweep'?",
+        ),
+        (
+            {"stages": {"shared": {"plane_sweep": {"canny_low": 0.1}}}},
+            "config.stages.shared.plane_sweep: unknown 'canny_low'; known: num_disparities, scale",
+        ),
+        (
+            {"stages": {"shared": {"plane_sweep": {"num_disparities": 2}}}},
+            "config.stages.shared.plane_sweep.num_disparities: input should be greater than or equal to 3, got 2",
+        ),
         (
             {"disparity_range": {"builtin/dotz": [0, 1]}},
             "config.disparity_range: unknown 'builtin/dotz'; did you mean 'builtin/dots'?",
@@ -122,12 +159,87 @@ def test_an_empty_choice_keeps_its_defaults() -> None:
 
 
 def test_own_variants_come_beside_the_builtin_ones() -> None:
-    mine = VARIANTS["paper"].choices | {"optimize": "none"}
-    settings = load_settings({"variants": {"mine": mine}})
-    assert settings.own_variants == ["mine"]
-    mine, paper = (settings.variants[name].choices for name in ("mine", "paper"))
-    assert key_of(mine, "textureless") == key_of(paper, "textureless")
-    assert key_of(mine, "optimize") != key_of(paper, "optimize")
+    """Variants that begin alike share files; an override is part of the path, however its number is written."""
+    entries = {
+        "mine": {"base": "paper", "optimize": "none"},
+        "other": {"base": "best_no_mixture", "occlusion": {"passes": "2"}, "optimize": {"choice": "wls", "alpha": 0.0}},
+    }
+    settings = load_settings({"variants": entries})
+    assert settings.own_variants == ["mine", "other"]
+    mine, paper, other = (settings.variants[name].labels for name in ("mine", "paper", "other"))
+    assert key_of(mine, "textureless") == key_of(mine, "optimize") == key_of(paper, "textureless")
+    assert key_of(other, "optimize") == "semi_global/visibility+alpha_threshold=0+passes=2/uniform_planes/wls+alpha=0"
+    assert settings.parameters["occlusion"]["visibility+alpha_threshold=0+passes=2"].model_dump() == {
+        **settings.parameters["occlusion"]["visibility"].model_dump(),
+        "alpha_threshold": 0,
+        "passes": 2,
+    }
+
+
+class TestParameters:
+    def test_a_shared_one_is_set_once_for_all_that_have_it(self) -> None:
+        shared = {"plane_sweep": {"num_disparities": 21}, "base_detail": {"colour_scale": 0.1, "detail_scale": 0.2}}
+        values = {"shared": shared, "occlusion": {"wang": {"num_disparities": 31}}}
+        found = load_settings({"stages": values}).parameters
+        sweeps = [("initial", "sepi"), ("occlusion", "half_sepi"), ("occlusion", "wang")]
+        assert [found[stage][word].num_disparities for stage, word in sweeps] == [21, 21, 31]
+        # a choice with another default, and a variant that overrides it, keep their own
+        unlike = [("initial", "semi_global"), ("optimize", "second_order+colour_scale=0.0164+detail_share=0")]
+        alike = [("occlusion", "visibility"), ("optimize", "second_order")]
+        assert [found[stage][word].colour_scale for stage, word in unlike + alike] == [0.0077, 0.0164, 0.1, 0.1]
+        assert {found[stage][word].detail_scale for stage, word in unlike + alike} == {0.2}
+
+    def test_every_one_that_choices_share_is_in_a_group(self) -> None:
+        """Else it would be stated twice."""
+        models = [choice.parameters for choices in STAGES.values() for choice in choices.values()]
+        counts = Counter(base for model in models for base in model.__mro__ if issubclass(base, Parameters))
+        declared = {model for model, count in counts.items() if count > 1 and inspect.get_annotations(model)}
+        assert declared - {Parameters} == set(GROUPS.values())
+
+
+@pytest.mark.parametrize(
+    ("values", "expected"),
+    [
+        ({"hci_old_root": "/data"}, "config: unknown 'hci_old_root'; it is now hci_2013_root"),
+        (
+            {"stages": {"initial": {"sepi": {"candidates": 21}}}},
+            "sepi: unknown 'candidates'; it is now num_disparities",
+        ),
+        ({"stages": {"shared": {"occluders": {"cover": 1}}}}, "occluders: unknown 'cover'; it is now occlusion_margin"),
+        ({"stages": {"optimize": {"second_order": {"bend": 1}}}}, "'bend'; it is now second_difference_threshold"),
+        (
+            {"stages": {"optimize": {"wls": {"accuracy": 1}}}},
+            "wls: unknown 'accuracy'; it is now rtol",
+        ),
+        (
+            {"stages": {"occlusion": {"visibility_unmixed": {}}}},
+            "config.stages.occlusion: unknown 'visibility_unmixed'; it is now visibility with alpha_threshold: 0",
+        ),
+        (
+            {"variants": {"mine": {"base": "best", "optimize": "gauss_newton"}}},
+            "mine.optimize: unknown 'gauss_newton'; it is now second_order with refinements: 3, solves: 0",
+        ),
+        (
+            {"variants": {"mine": {"base": "best", "textureless": {"trials": 5}}}},
+            "config.variants.mine.textureless: unknown 'trials'; it is now ransac_iterations",
+        ),
+        (
+            {"light_fields": {"a": {"path": "/", "format": "hci-old"}}},
+            "config.light_fields.a.format: unknown 'hci-old'; it is now hci-2013",
+        ),
+    ],
+)
+def test_an_old_name_says_the_new_one(values: dict[str, Any], expected: str) -> None:
+    assert expected in message_of(values)
+
+
+def test_every_new_name_exists() -> None:
+    """A table of names that led to others which were renamed again would help no one."""
+    fields = {name for choices in STAGES.values() for c in choices.values() for name in c.parameters.model_fields}
+    words = {word for choices in STAGES.values() for word in choices}
+    known = fields | words | set(Config.model_fields) | {"hci_2013"} | set(FORMATS)
+    assert not RENAMED.keys() & known
+    assert {new.split()[0] for new in RENAMED.values()} <= known
 
 
 class TestFolderOfScenes:
@@ -271,7 +383,7 @@ def test_archive_files_are_scenes_by_their_own_or_their_folders_name(tmp_path: P
 
 
 class TestExternal:
-    """Maps of other methods are found where the user says, and a wrong entry is named before anything runs."""
+    """Maps of external methods are found where the user says, and a wrong entry is named before anything runs."""
 
     def file(self, path: str, dataset: str = "hci", scene: str = "cotton") -> Path:
         return load_settings({"external": {"SPO": path}}).external["SPO"].file(dataset, scene)
@@ -372,5 +484,5 @@ class TestExternal:
     @pytest.mark.parametrize("name", ["best", "mine"])
     def test_a_variants_name_is_refused(self, name: str) -> None:
         """Two columns of one name could not be told apart."""
-        values = {"variants": {"mine": VARIANTS["wang"].choices}, "external": {name: "/maps"}}
+        values = {"variants": {"mine": {"base": "wang"}}, "external": {name: "/maps"}}
         assert message_of(values) == f"config.external.{name}: a variant has this name; give the method another"

@@ -29,6 +29,7 @@ from sepi.io.scores import read_scores
 from sepi.pipeline import STAGES, VARIANTS
 from sepi.reading import read_light_field
 from sepi.scenes import render, write_hci
+from sepi.workflow.parameters import GROUPS, SHARED
 
 pytestmark = pytest.mark.workflow
 
@@ -38,8 +39,8 @@ SIZE = 64
 TINY = {
     "builtin": {"scenes": ["dots"], "size": SIZE},
     "stages": {
-        "initial": {name: {"num_disparities": 21} for name in ("sepi", "semi_global", "semi_global_colours")},
-        "occlusion": {"visibility": {"num_disparities": 21, "passes": 1}},
+        "shared": {"plane_sweep": {"num_disparities": 21}, "base_detail_sweep": {"num_disparities": 21}},
+        "occlusion": {"visibility": {"passes": 1}},
     },
 }
 # two scenes, the paper's six variants and best; stage files that variants share are made once, choice none is no job
@@ -167,7 +168,7 @@ class TestAll:
         before = json.loads(attributes["made_from"])
         # what hands its maps on did nothing
         assert [(step["stage"], step["choice"]) for step in before] == [("initial", "sepi"), ("textureless", "lti")]
-        assert before[0]["parameters"]["candidates"] == 21
+        assert before[0]["parameters"]["num_disparities"] == 21
         assert read_stage(last).disparity.shape == (SIZE, SIZE)
 
     def test_every_job_has_a_log_and_a_benchmark(self, finished: Workflow) -> None:
@@ -185,8 +186,8 @@ class TestAll:
 
 
 def other_parameters(stage: str, choice: str) -> dict[str, Any]:
-    """One parameter of a choice with a value that is not its default."""
-    model = STAGES[stage][choice].parameters
+    """One parameter of a choice, or of a group, with a value that is not its default."""
+    model = GROUPS[choice] if stage == SHARED else STAGES[stage][choice].parameters
     defaults = model()
     for name in model.model_fields:
         value = getattr(defaults, name)
@@ -214,6 +215,7 @@ RERUNS = [
     ("occlusion", "visibility", {"occlusion": 2, "textureless": 2, "optimize": 2}),
     ("textureless", "uniform_planes", {"textureless": 2, "optimize": 2}),
     ("optimize", "second_order", {"optimize": 2}),
+    ("shared", "plane_sweep", {"initial": 2, "occlusion": 6, "textureless": 8, "optimize": 12}),
 ]
 
 
@@ -279,16 +281,32 @@ class TestRerun:
         }
         assert given.plan("results/builtin/dots/paper/result.h5") == {}
 
-    def test_an_own_variant_shares_what_it_can(self, finished: Workflow) -> None:
-        """What hands its maps on is no job, wherever it stands."""
-        mine = {"initial": "structure_tensor", "occlusion": "none", "textureless": "lti", "optimize": "none"}
+    @pytest.mark.parametrize(
+        ("mine", "expected"),
+        [
+            # what hands its maps on is no job, wherever it stands
+            ({"base": "no_sepi", "occlusion": "none", "optimize": "none"}, {"textureless": 2}),
+            ({"base": "paper", "textureless": {"tolerance": 0.1}}, {"textureless": 2, "optimize": 2}),
+        ],
+    )
+    def test_an_own_variant_shares_what_it_can(
+        self, finished: Workflow, mine: dict[str, Any], expected: dict[str, int]
+    ) -> None:
         plan = finished.with_config(variants={"mine": mine}).plan("all")
-        assert {rule: plan.get(rule) for rule in [*COMPLETE, "evaluate", "export"]} == {
-            **dict.fromkeys(COMPLETE),
-            "textureless": 2,
-            "evaluate": 2,
-            "export": 2,
-        }
+        others = {"evaluate": 2, "export": 2}
+        assert {rule: plan.get(rule) for rule in [*COMPLETE, *others]} == dict.fromkeys(COMPLETE) | expected | others
+
+    def test_an_override_reaches_the_stage(self, finished: Workflow, tmp_path: Path) -> None:
+        """Its file lies beside that of the choice as it is."""
+        shutil.copytree(finished.folder, tmp_path / "run", symlinks=True)
+        mine = {"base": QUICK, "optimize": {"tau_2": 1, "alpha": 1e-5}}
+        run = replace(finished, folder=tmp_path / "run").with_config(variants={"mine": mine})
+        result = run.run("results/builtin/dots/mine/result.h5")
+        assert result.returncode == 0, result.stdout
+        file = run.folder / "results/builtin/dots/stages/sepi/none/none/wls+alpha=1e-05+tau_2=1/optimize.h5"
+        attributes = read_attributes(file)
+        assert attributes["choice"] == "wls"
+        assert json.loads(attributes["parameters"])["alpha"] == 1e-5
 
     def test_only_a_changed_map_is_scored_anew(self, finished: Workflow, tmp_path: Path) -> None:
         """The scores of a scene are one job, whatever changed of it."""

@@ -1,0 +1,32 @@
+"""How many threads this process may use, and the libraries that keep to it."""
+
+from __future__ import annotations
+
+import os
+import sys
+
+
+def available_cores() -> int:
+    """Cores that this process may use: a container or a scheduler may give it fewer than the machine has."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def use_threads(count: int) -> None:
+    """Let numba and OpenCV use at most ``count`` threads, and never more than :func:`available_cores`.
+
+    Neither is imported for that, since not every job needs them: what is not there yet is told when it starts.
+    """
+    count = min(count, available_cores())
+    if "numba" in sys.modules:
+        import numba
+
+        # numba refuses more threads than it started with
+        numba.set_num_threads(min(count, numba.config.NUMBA_NUM_THREADS))  # type: ignore[attr-defined]
+    else:
+        os.environ["NUMBA_NUM_THREADS"] = str(min(count, int(os.environ.get("NUMBA_NUM_THREADS", count))))
+    if "cv2" in sys.modules:
+        import cv2
+
+        cv2.setNumThreads(count)
+    else:
+        os.environ["OPENCV_FOR_THREADS_NUM"] = str(count)
