@@ -58,13 +58,31 @@ def stage_output(stage, ending):
     return SCENE.stage({name: f"{{{name},{labels}}}" for name, labels in known.items()}, stage, ending)
 
 
+def stage_log(folder, stage, ending):
+    """Pattern of a stage's log or benchmark."""
+    return f"{folder}/{{dataset}}/{{scene}}/{key_of(LABELS, stage)}/{stage}.{ending}"
+
+
+def stage_message(stage, title):
+    """What is shown when a stage starts: the scene, and the choices that led to it."""
+    choices = key_of(LABELS, stage).replace("{", "{wildcards.")
+    return f"{{wildcards.dataset}}/{{wildcards.scene}}: {title} ({choices})"
+
+
+# the command of every stage, after its inputs
+STAGE_FLAGS = (
+    "--choice {params.choice} --parameters {params.parameters:q} --threads {threads} "
+    "--output {output.maps:q} --timing {output.timing:q} 2> {log:q}"
+)
+
+
 def file_before(stage):
-    """Function of wildcards: the file with the maps that a stage is given, if any: of the last stage that ran."""
+    """Function of wildcards: the file with the maps that a stage is given, of the last stage before it that ran."""
     before = list(STAGES)[: list(STAGES).index(stage)]
 
     def file(wildcards):
         labels = {name: wildcards[name] for name in before}
-        return scene_files(wildcards.dataset, wildcards.scene).stage(labels, before[-1]) if before else []
+        return scene_files(wildcards.dataset, wildcards.scene).stage(labels, before[-1])
 
     return file
 

@@ -1,0 +1,22 @@
+# Initial depth (paper, section IV-A, Eq. 1-5): for each pixel the candidate at which the views agree best.
+rule initial:
+    input:
+        light_field=SCENE.light_field,
+    output:
+        maps=stage_output("initial", "h5"),
+        timing=stage_output("initial", "time.json"),
+    log:
+        stage_log("logs", "initial", "log"),
+    benchmark:
+        stage_log("benchmarks", "initial", "tsv")
+    threads: threads_for
+    resources:
+        mem_mb=memory_for(bytes_per_sample=13, bytes_per_pixel=1300),
+    params:
+        choice=choice_for("initial"),
+        parameters=parameters_of("initial"),
+        code=code_digest(*stage_modules("initial")),
+    message:
+        stage_message("initial", "initial depth")
+    shell:
+        "python -m sepi.initial --light-field {input.light_field:q} " + STAGE_FLAGS

@@ -1,0 +1,23 @@
+# Occluded regions (paper, section IV-B): depth from the views that see a pixel; none is no job.
+rule occlusion:
+    input:
+        light_field=SCENE.light_field,
+        previous=file_before("occlusion"),
+    output:
+        maps=stage_output("occlusion", "h5"),
+        timing=stage_output("occlusion", "time.json"),
+    log:
+        stage_log("logs", "occlusion", "log"),
+    benchmark:
+        stage_log("benchmarks", "occlusion", "tsv")
+    threads: threads_for
+    resources:
+        mem_mb=memory_for(bytes_per_sample=18, bytes_per_pixel=1400),
+    params:
+        choice=choice_for("occlusion"),
+        parameters=parameters_of("occlusion"),
+        code=code_digest(*stage_modules("occlusion")),
+    message:
+        stage_message("occlusion", "occlusion")
+    shell:
+        "python -m sepi.occlusion --light-field {input.light_field:q} --previous {input.previous:q} " + STAGE_FLAGS

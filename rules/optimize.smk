@@ -1,0 +1,23 @@
+# Global optimisation (paper, section IV-D, Eq. 8-12) over the whole map; none is no job.
+rule optimize:
+    input:
+        light_field=SCENE.light_field,
+        previous=file_before("optimize"),
+    output:
+        maps=stage_output("optimize", "h5"),
+        timing=stage_output("optimize", "time.json"),
+    log:
+        stage_log("logs", "optimize", "log"),
+    benchmark:
+        stage_log("benchmarks", "optimize", "tsv")
+    threads: threads_for
+    resources:
+        mem_mb=memory_for(bytes_per_sample=30, bytes_per_pixel=1500),
+    params:
+        choice=choice_for("optimize"),
+        parameters=parameters_of("optimize"),
+        code=code_digest(*stage_modules("optimize")),
+    message:
+        stage_message("optimize", "global optimisation")
+    shell:
+        "python -m sepi.optimize --light-field {input.light_field:q} --previous {input.previous:q} " + STAGE_FLAGS

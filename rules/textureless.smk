@@ -1,0 +1,23 @@
+# Textureless regions (paper, section IV-C, Eq. 6-7): filled from their reliable edges; none is no job.
+rule textureless:
+    input:
+        light_field=SCENE.light_field,
+        previous=file_before("textureless"),
+    output:
+        maps=stage_output("textureless", "h5"),
+        timing=stage_output("textureless", "time.json"),
+    log:
+        stage_log("logs", "textureless", "log"),
+    benchmark:
+        stage_log("benchmarks", "textureless", "tsv")
+    threads: threads_for
+    resources:
+        mem_mb=memory_for(bytes_per_sample=17, bytes_per_pixel=500),
+    params:
+        choice=choice_for("textureless"),
+        parameters=parameters_of("textureless"),
+        code=code_digest(*stage_modules("textureless")),
+    message:
+        stage_message("textureless", "textureless regions")
+    shell:
+        "python -m sepi.textureless --light-field {input.light_field:q} --previous {input.previous:q} " + STAGE_FLAGS
