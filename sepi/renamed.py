@@ -21,6 +21,7 @@ RENAMED = {
     "mixture_reach": "alpha_radius",
     "mixture_step": "alpha_discontinuity",
     "most_steps": "max_iterations",
+    "side_step": "side_margin",
     "solve_accuracy": "rtol",
     "step_weight": "discontinuity_weight",
     "trials": "ransac_iterations",
