@@ -14,7 +14,7 @@ from sepi.report.plan import Plan
 from sepi.validation import require_known
 from sepi.workflow.code_digest import ROOT, code_digest, stage_modules
 from sepi.workflow.config import GRAPH_CONFIG, load_settings
-from sepi.workflow.result_paths import PARTS, RESULTS, key_of, scene_files
+from sepi.workflow.result_paths import PARTS_ENDING, RESULTS, key_of, scene_files
 from sepi.workflow.run_log import show_progress
 
 STARTED = time.time()
@@ -48,7 +48,7 @@ wildcard_constraints:
     dataset="[^/]+",
     scene="[^/]+",
     variant="[^/]+",
-    which=f"|{PARTS}",
+    which=f"|{PARTS_ENDING}",
 
 
 def stage_output(stage, ending):

@@ -13,7 +13,7 @@ from typing import Any
 
 from sepi.errors import SepiError
 from sepi.pipeline import HANDED_ON, PARTS_OF_BEST
-from sepi.workflow.result_paths import PARTS, SceneFiles, key_of, scene_files, stage_of
+from sepi.workflow.result_paths import PARTS_ENDING, SceneFiles, key_of, scene_files, stage_of
 
 MAIN_VARIANT = "paper"
 """The variant that does what the paper describes; its figures stand beside the published ones."""
@@ -127,7 +127,7 @@ class Plan:
 
     def scores_file(self, dataset: str, scene: str, parts: bool = False) -> Path:
         """The scores of a scene's maps; with ``parts``, of those that the ablation of the best variant needs."""
-        return self.files(dataset, scene).scores(PARTS if parts else "")
+        return self.files(dataset, scene).scores(PARTS_ENDING if parts else "")
 
     def external_file(self, dataset: str, scene: str) -> Path:
         """The maps and scores of all external methods for a scene."""

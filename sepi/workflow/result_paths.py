@@ -14,7 +14,7 @@ from sepi.pipeline import HANDED_ON, STAGES
 RESULTS = Path("results")
 """Folder of the results, in the folder that the workflow runs in."""
 
-PARTS = "_parts"
+PARTS_ENDING = "_parts"
 """Ending of the files that belong to the ablation of the best variant alone."""
 
 
@@ -61,7 +61,7 @@ class SceneFiles:
         return self.stages / key / f"{stage_of(key)}.{ending}"
 
     def scores(self, which: str = "") -> Path:
-        """The scores of the maps; ``which`` is :data:`PARTS` for those that only the ablation of ``best`` needs."""
+        """The scores of the maps; ``which`` is :data:`PARTS_ENDING` for those of the ablation of ``best`` alone."""
         return self.folder / f"scores{which}.h5"
 
     def kept_scores(self, which: str = "") -> Path:
