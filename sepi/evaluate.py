@@ -23,7 +23,7 @@ from sepi.errors import SepiError
 from sepi.io.files import atomic_path
 from sepi.io.hdf5 import read_light_field, read_stage
 from sepi.io.provenance import scene_attributes
-from sepi.io.scores import Evaluation, Scored, Scores, map_name, read_evaluations, write_scores
+from sepi.io.scores import AllScores, Evaluation, Scored, Scores, map_name, read_evaluations, write_scores
 from sepi.lightfield import BoolMap, FloatMap, LightField
 
 PROTOCOLS: dict[str, int] = {"paper": 0, "benchmark": 15}
@@ -31,6 +31,16 @@ PROTOCOLS: dict[str, int] = {"paper": 0, "benchmark": 15}
 
 BAD_PIXEL: dict[str, float] = {"badpix007": 0.07, "badpix003": 0.03, "badpix001": 0.01}
 """Score to the error in pixels per view step above which a pixel is bad."""
+
+SCORES: dict[str, str] = {
+    "mse100": "MSE x100",
+    "q25": "Q25 x100",
+    **{name: f"BadPix {threshold} %" for name, threshold in BAD_PIXEL.items()},
+}
+"""Score to its name in tables."""
+
+COUNTS: dict[str, str] = {"non_finite": "non-finite", "pixels": "pixels"}
+"""Count that stands beside the scores to its name in tables."""
 
 WHOLE_MAP = "all"
 """Name of the region that is the whole map."""
@@ -80,38 +90,56 @@ def score(estimate: FloatMap, ground_truth: FloatMap, border: int = 0, region: B
     return scores
 
 
-def evaluate(light_field: LightField, disparity: FloatMap) -> dict[str, dict[str, Scores]]:
-    """Scores of a disparity map of this light field, by every protocol and over every region.
+def score_regions(
+    estimate: FloatMap,
+    ground_truth: FloatMap,
+    masks: Mapping[str, BoolMap] | None = None,
+    protocols: Mapping[str, int] = PROTOCOLS,
+) -> AllScores:
+    """Scores of a disparity map by every protocol and over every region.
 
     Parameters
     ----------
-    light_field : LightField
-        Its own masks ``occluded`` and ``textureless`` are used where it has them, else those of
-        ``sepi.scoring.regions``.
-    disparity : ndarray, shape (H, W), float32
-        Pixels per view step.
+    estimate, ground_truth : ndarray, shape (H, W), float32
+        Disparity in pixels per view step.
+    masks : mapping of str to ndarray, shape (H, W), bool, optional
+        Those of :func:`region_masks`; without them the whole map is the only region.
+    protocols : mapping of str to int
+        Protocol to the pixels left out on each side.
 
     Returns
     -------
     dict
         Protocol (``paper``, ``benchmark``) to region (``all``, ``occluded``, ``textureless``) to the scores of
-        :func:`score`; empty where the light field has no ground truth.
+        :func:`score`.
 
     Raises
     ------
     SepiError
-        If the map does not have the light field's shape.
+        If shapes differ.
     """
-    return {protocol: dict(scores) for protocol, scores in evaluation_of(light_field, disparity).scores.items()}
+    regions: dict[str, BoolMap | None] = {WHOLE_MAP: None, **(masks or {})}
+    return {
+        protocol: {name: score(estimate, ground_truth, border, mask) for name, mask in regions.items()}
+        for protocol, border in protocols.items()
+    }
 
 
 def evaluation_of(light_field: LightField, disparity: FloatMap) -> Evaluation:
-    """Like :func:`evaluate`, with the error map and the masks that were used."""
+    """:func:`evaluations_of` for one map."""
     return evaluations_of(light_field, {"": disparity})[""]
 
 
 def evaluations_of(light_field: LightField, maps: Mapping[str, FloatMap]) -> dict[str, Evaluation]:
-    """:func:`evaluation_of` for several maps of one light field, by name; the masks are found once for all.
+    """Scores, error maps and masks of disparity maps of one light field, by name; the masks are found once for all.
+
+    Parameters
+    ----------
+    light_field : LightField
+        Its own masks ``occluded`` and ``textureless`` are used where it has them, else those of
+        ``sepi.scoring.regions``. Without ground truth the evaluations are empty.
+    maps : mapping of str to ndarray, shape (H, W), float32
+        Name to disparity in pixels per view step.
 
     Raises
     ------
@@ -130,12 +158,7 @@ def evaluations_of(light_field: LightField, maps: Mapping[str, FloatMap]) -> dic
     sources = {name: "scene" if name in light_field.masks else "computed" for name in masks}
     return {
         name: Evaluation(
-            scores={
-                protocol: {
-                    region: score(disparity, light_field.ground_truth, border, masks.get(region)) for region in REGIONS
-                }
-                for protocol, border in PROTOCOLS.items()
-            },
+            scores=score_regions(disparity, light_field.ground_truth, masks),
             error=_error(disparity, light_field.ground_truth),
             regions=masks,
             region_sources=sources,

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from sepi.cli.input_options import Reading, reading_flags
-from sepi.cli.scene_argument import require_one_view, scene_of
+from sepi.cli.scene_argument import read_ground_truth, require_one_view
 from sepi.command import SepiCommand
 from sepi.errors import SepiError
 
@@ -34,41 +34,35 @@ def compare(a: Path, b: Path, ground_truth: Path | None, output: Path, reading: 
       sepi compare before.pfm after.pfm gt_disp_lowres.pfm -o page.html
     """
     from sepi.cli.evaluate import score_table
-    from sepi.io.disparity_maps import is_disparity, read_disparity
+    from sepi.io.disparity_maps import read_disparity
     from sepi.io.files import atomic_path
-    from sepi.report.web.comparison_page import Comparison, comparison_page, printed_scores
+    from sepi.report.web.comparison_page import Comparison, comparison_page
 
     maps = read_disparity(a), read_disparity(b)
     require_one_view(a, b)
-    light_field, values = None, None
-    if ground_truth is not None and is_disparity(ground_truth):
-        values = read_disparity(ground_truth)
-        require_one_view(a, ground_truth)
-    elif ground_truth is not None:
-        light_field = scene_of(ground_truth, a, reading)
-        values = light_field.ground_truth
+    values, light_field = (None, None) if ground_truth is None else read_ground_truth(ground_truth, a, reading)
     _require_shape(b, maps[1].shape, a, maps[0].shape)
-    if ground_truth is not None:
-        shape = values.shape if values is not None else light_field.shape if light_field is not None else ()
-        _require_shape(ground_truth, shape, a, maps[0].shape)
+    for known in (values, light_field):
+        if ground_truth is not None and known is not None:
+            _require_shape(ground_truth, known.shape, a, maps[0].shape)
     found = Comparison(_names(a, b), maps, values, light_field)
     with atomic_path(output) as temporary:
         temporary.write_text(comparison_page(found), encoding="utf-8")
-    for name, scores in printed_scores(found).items():
+    for name, scores in found.scores.items():
         click.echo(f"{name}\n{score_table(scores)}\n")
     click.echo(f"written: {output}")
 
 
-def _require_shape(path: Path, shape: tuple[int, ...], first: Path, wanted: tuple[int, ...]) -> None:
-    if shape != wanted:
-        raise SepiError(f"{path}: is {shape}, but {first} is {wanted} (height, width)")
+def _require_shape(path: Path, shape: tuple[int, ...], first: Path, expected: tuple[int, ...]) -> None:
+    if shape != expected:
+        raise SepiError(f"{path}: is {shape}, but {first} is {expected} (height, width)")
 
 
 def _names(a: Path, b: Path) -> tuple[str, str]:
     """The last parts of two paths, as many as it takes to tell them apart."""
     parts = [path.resolve().parts for path in (a, b)]
     for count in range(1, max(map(len, parts)) + 1):
-        one, other = ("/".join(words[-count:]) for words in parts)
+        one, other = ("/".join(names[-count:]) for names in parts)
         if one != other:
             return one, other
     return f"{parts[0][-1]} (A)", f"{parts[1][-1]} (B)"

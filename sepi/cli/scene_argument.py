@@ -10,10 +10,10 @@ from sepi.cli.input_options import Reading
 from sepi.errors import SepiError
 
 if TYPE_CHECKING:
-    from sepi.lightfield import LightField
+    from sepi.lightfield import FloatMap, LightField
 
 View = tuple[tuple[int, int], tuple[int, int]]
-"""Place of a view, and rows and columns of the grid it is in."""
+"""Position of a view, and rows and columns of the grid it is in."""
 
 
 def view_of(path: Path) -> View | None:
@@ -42,14 +42,26 @@ def require_one_view(estimate: Path, other: Path) -> None:
         raise SepiError(f"{other}: depth of another view than {estimate}; compare maps of one view")
 
 
-def scene_of(scene: Path, estimate: Path, reading: Reading) -> LightField:
-    """The light field, seen from the view that the estimate belongs to.
+def read_ground_truth(path: Path, estimate: Path, reading: Reading) -> tuple[FloatMap | None, LightField | None]:
+    """The ground truth for an estimate, and the light field if ``path`` is one.
 
     Raises
     ------
     SepiError
-        If it cannot be read, or not from that view.
+        If it cannot be read, or belongs to another view.
     """
+    from sepi.io.disparity_maps import is_disparity, read_disparity
+
+    if is_disparity(path):
+        values = read_disparity(path)
+        require_one_view(estimate, path)
+        return values, None
+    light_field = _scene_of(path, estimate, reading)
+    return light_field.ground_truth, light_field
+
+
+def _scene_of(scene: Path, estimate: Path, reading: Reading) -> LightField:
+    """The light field, seen from the view that the estimate belongs to."""
     belongs = view_of(estimate)
     if belongs is not None and reading.options.view is None:
         reading = replace(reading, options=replace(reading.options, view=belongs[0]))

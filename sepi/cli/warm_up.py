@@ -28,7 +28,7 @@ def compile_kernels(variants: tuple[str, ...]) -> None:
     """Call every kernel that these variants use, and those that reading and evaluating use, as their jobs do."""
     from dataclasses import replace
 
-    from sepi.evaluate import evaluate
+    from sepi.evaluate import evaluation_of
     from sepi.inspection.disparity_range import estimate_range
     from sepi.inspection.view_order import order_warning
     from sepi.pipeline import estimate_depth
@@ -38,7 +38,7 @@ def compile_kernels(variants: tuple[str, ...]) -> None:
     for variant in variants:
         maps = estimate_depth(light_field, variant, {})
     bare = replace(light_field, disparity_range=None, masks={})
-    evaluate(bare, maps.disparity)
+    evaluation_of(bare, maps.disparity)
     order_warning(bare, "as-given")
     estimate_range(bare)
 

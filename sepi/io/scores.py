@@ -8,6 +8,7 @@ stored once. Where the scene has no ground truth the groups of the maps are empt
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -24,6 +25,9 @@ _MAPS = "maps"
 
 Scores = dict[str, float]
 """Score to value, for one protocol and region."""
+
+AllScores = dict[str, dict[str, Scores]]
+"""Protocol to region to scores."""
 
 
 @dataclass(frozen=True)
@@ -99,7 +103,7 @@ def write_scores(path: Path, maps: Mapping[str, Scored], attributes: Mapping[str
                     group[f"regions/{region}"] = first[f"regions/{region}"]
 
 
-def read_scores(path: Path) -> dict[str, dict[str, dict[str, Scores]]]:
+def read_scores(path: Path) -> dict[str, AllScores]:
     """Map to protocol to region to scores; without protocols where the scene has no ground truth.
 
     Raises
@@ -142,7 +146,7 @@ def put_evaluation(group: h5py.Group, evaluation: Evaluation) -> None:
         dataset.attrs["source"] = evaluation.region_sources[name]
 
 
-def scores_in(group: h5py.Group) -> dict[str, dict[str, Scores]]:
+def scores_in(group: h5py.Group) -> AllScores:
     """The scores alone of what :func:`put_evaluation` wrote: protocol to region to scores."""
     return {
         protocol: {region: {key: value.item() for key, value in cell.attrs.items()} for region, cell in regions.items()}
@@ -159,6 +163,15 @@ def evaluation_in(group: h5py.Group) -> Evaluation:
         regions={name: mask[...].astype(bool) for name, mask in regions.items()},
         region_sources={name: str(mask.attrs["source"]) for name, mask in regions.items()},
     )
+
+
+def without_nan(value: Any) -> Any:
+    """A value as JSON has it: None for a number that is none, such as a score over no pixels."""
+    if isinstance(value, dict):
+        return {key: without_nan(inner) for key, inner in value.items()}
+    if isinstance(value, list):
+        return [without_nan(inner) for inner in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def _maps(path: Path, file: h5py.File) -> h5py.Group:

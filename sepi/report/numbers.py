@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import math
 import os
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
@@ -23,10 +22,10 @@ import numpy.typing as npt
 
 from sepi.command import SepiCommand
 from sepi.errors import SepiError
-from sepi.evaluate import BAD_PIXEL, PROTOCOLS, REGIONS
+from sepi.evaluate import COUNTS, PROTOCOLS, REGIONS, SCORES
 from sepi.io.external_maps import read_external_scores
 from sepi.io.hdf5 import read_light_field, read_stage
-from sepi.io.scores import Scores, read_evaluations, read_scores
+from sepi.io.scores import Scores, read_evaluations, read_scores, without_nan
 from sepi.report.plan import PARTS_TABLES, TABLES, Plan
 from sepi.report.runs import Runs
 from sepi.report.tables import BUILDERS
@@ -48,9 +47,6 @@ LIBRARIES = (
 )
 """Distributions whose versions are told."""
 
-_SCORES = ("mse100", "q25", *BAD_PIXEL)
-_COUNTS = ("non_finite", "pixels")
-
 Parameters = Mapping[str, Mapping[str, Mapping[str, Any]]]
 """Stage to choice to parameter to value."""
 
@@ -61,7 +57,7 @@ def collect(plan: Plan, parameters: Parameters | None = None, parts: bool = Fals
     Parameters
     ----------
     plan : Plan
-        Scenes, variants and imported methods.
+        Scenes, variants and external methods.
     parameters : mapping, optional
         Stage to choice to what the workflow ran it with; choices that no variant uses are left out.
     parts : bool
@@ -89,7 +85,7 @@ def collect(plan: Plan, parameters: Parameters | None = None, parts: bool = Fals
         "parameters": _used(plan, parameters or {}, parts),
         "scenes": [_scene(plan, dataset, scene, parts) for dataset, scene in plan.pairs],
     }
-    numbers = _without_nan(numbers)
+    numbers = without_nan(numbers)
     runs = Runs(numbers)
     tables = {name: as_json(BUILDERS[name](runs)) for name in TABLES if (name in PARTS_TABLES) == parts}
     return numbers | {"tables": tables}
@@ -152,7 +148,7 @@ def _light_field(path: Path) -> dict[str, Any]:
         "notes": list(found.notes),
         "camera": None if found.camera is None else asdict(found.camera),
         "sha256": _digest(found.views),
-        "truth_sha256": None if found.ground_truth is None else _digest(found.ground_truth),
+        "ground_truth_sha256": None if found.ground_truth is None else _digest(found.ground_truth),
     }
 
 
@@ -204,21 +200,17 @@ def _confidence(plan: Plan, dataset: str, scene: str) -> dict[str, dict[str, lis
 
 
 def _external(plan: Plan, dataset: str, scene: str) -> dict[str, Any]:
-    """Scores of the imported methods, or what is wrong with their maps."""
+    """Scores of the external methods, or what is wrong with their maps."""
     if not plan.external:
         return {}
     path = plan.external_file(dataset, scene)
-    imported = read_external_scores(path)
-    missing = [method for method in plan.external if method not in imported]
+    maps = read_external_scores(path)
+    missing = [method for method in plan.external if method not in maps]
     if missing:
-        raise SepiError(f"{path}: no method '{missing[0]}'; it holds: {', '.join(imported) or 'none'}")
+        raise SepiError(f"{path}: no method '{missing[0]}'; it holds: {', '.join(maps) or 'none'}")
     return {
-        method: {
-            "problem": imported[method].problem,
-            "source": imported[method].source,
-            "sha256": imported[method].sha256,
-            "scores": _ordered(path, imported[method].evaluation.scores),
-        }
+        method: {key: getattr(maps[method], key) for key in ("problem", "source", "sha256")}
+        | {"scores": _ordered(path, maps[method].evaluation.scores)}
         for method in plan.external
     }
 
@@ -228,8 +220,8 @@ def _ordered(path: Path, scores: Mapping[str, Mapping[str, Scores]]) -> dict[str
     try:
         return {
             protocol: {
-                region: {name: scores[protocol][region][name] for name in _SCORES}
-                | {name: int(scores[protocol][region][name]) for name in _COUNTS}
+                region: {name: scores[protocol][region][name] for name in SCORES}
+                | {name: int(scores[protocol][region][name]) for name in COUNTS}
                 for region in REGIONS
             }
             for protocol in PROTOCOLS
@@ -258,15 +250,6 @@ def _memory_gb() -> float | None:
         return round(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 2**30, 1)
     except (AttributeError, OSError, ValueError):
         return None
-
-
-def _without_nan(value: Any) -> Any:
-    """JSON has no NaN and no infinity: None stands for a number that is none."""
-    if isinstance(value, dict):
-        return {key: _without_nan(inner) for key, inner in value.items()}
-    if isinstance(value, list):
-        return [_without_nan(inner) for inner in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def _json(value: Any, indent: str) -> str:

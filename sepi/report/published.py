@@ -14,6 +14,8 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
+from sepi.evaluate import WHOLE_MAP
+
 FOLDER = Path(__file__).parent / "published"
 """Where the data files are."""
 
@@ -83,6 +85,10 @@ class Regions:
     overall: float | None
     occluded: float | None
     textureless: float | None
+
+    def of(self, region: str) -> float | None:
+        """The figure of a region of :data:`sepi.evaluate.REGIONS`."""
+        return {WHOLE_MAP: self.overall, "occluded": self.occluded, "textureless": self.textureless}[region]
 
 
 def paper_scene(dataset: str, scene: str) -> str | None:

@@ -16,7 +16,8 @@ from sepi.report.tabular.ablation import ablation_table
 from sepi.report.tabular.comparison import scene_table
 from sepi.report.tabular.confidence import confidence_table
 from sepi.report.tabular.latex import as_latex
-from sepi.report.tabular.layout import Report, as_csv, as_markdown, write
+from sepi.report.tabular.layout import Report, as_csv, write
+from sepi.report.tabular.markdown import as_markdown
 from sepi.report.tabular.parts import parts_table
 from sepi.report.tabular.region_comparison import region_table
 from sepi.report.tabular.stages import runtime_table, stage_table
@@ -47,9 +48,8 @@ def command(path: Path, names: tuple[str, ...], output: Path) -> None:
     runs = Runs(numbers)
     for name in names or numbers["tables"]:
         report = BUILDERS[name](runs)
-        write(output / f"{name}.csv", as_csv(report.data))
-        write(output / f"{name}.md", as_markdown(report))
-        write(output / f"{name}.tex", as_latex(report, name))
+        for ending, text in (("csv", as_csv(report)), ("md", as_markdown(report)), ("tex", as_latex(report, name))):
+            write(output / f"{name}.{ending}", text)
 
 
 if __name__ == "__main__":

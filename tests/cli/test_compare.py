@@ -14,7 +14,7 @@ from sepi.evaluate import score
 from sepi.io.hdf5 import write_stage
 from sepi.io.pfm import write_pfm
 from sepi.lightfield import FloatMap
-from sepi.report.web.comparison_page import Comparison, comparison_page, printed_scores
+from sepi.report.web.comparison_page import Comparison, comparison_page
 from sepi.scenes import render, write_hci
 from sepi.stage import StageMaps
 
@@ -184,10 +184,10 @@ def test_scores_are_printed_and_on_the_page(files: list[Path], tmp_path: Path) -
         expected = score(values, ground_truth, 0, None)
         assert f"{expected['mse100']:.3f}" in page
         assert name in result.stdout
-    found = printed_scores(Comparison(("x", "y"), (ours, other), ground_truth))
+    found = Comparison(("x", "y"), (ours, other), ground_truth).scores
     assert found["x"]["paper"]["all"] == pytest.approx(score(ours, ground_truth, 0, None), nan_ok=True)
     assert page.count('class="best"') >= 2
-    assert printed_scores(Comparison(("x", "y"), (ours, other))) == {}
+    assert Comparison(("x", "y"), (ours, other)).scores == {}
     # without ground truth there is nothing to score
     assert "<td" not in comparison_page(Comparison(("x", "y"), (ours, other))).split('class="viewer"')[0]
 

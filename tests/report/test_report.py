@@ -28,7 +28,8 @@ from sepi.report.plan import PARTS_TABLES, TABLES, Plan
 from sepi.report.plots import pictures
 from sepi.report.runs import Runs
 from sepi.report.tabular.latex import as_latex
-from sepi.report.tabular.layout import BEST, SECOND, as_csv, as_json, as_markdown, ranks
+from sepi.report.tabular.layout import BEST, SECOND, as_csv, as_json, ranks
+from sepi.report.tabular.markdown import as_markdown
 from sepi.stage import StageMaps
 
 SIZE = 40
@@ -163,7 +164,7 @@ def table_rows(page: str) -> list[list[str]]:
 
 def csv_rows(found: dict[str, Any], table: str) -> list[dict[str, str]]:
     """Rows of a table's CSV file, in which cells may hold line breaks."""
-    return list(csv.DictReader(as_csv(report_of(found, table).data).splitlines(keepends=True)))
+    return list(csv.DictReader(as_csv(report_of(found, table)).splitlines(keepends=True)))
 
 
 def run(command: object, plan: Plan, output: Path, *more: str) -> None:

@@ -1,4 +1,4 @@
-"""What the confidence is worth: errors by decile of confidence, and sparsification curves [1]_.
+"""Confidence evaluation: errors by decile of confidence, and sparsification curves [1]_.
 
 References
 ----------
@@ -8,16 +8,15 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
-from sepi.evaluate import PROTOCOLS
 from sepi.lightfield import FloatMap
 from sepi.report.runs import Runs
-from sepi.report.tabular.layout import OURS, TEXT, Cell, Column, Entry, Grid, Line, Report, Row, Section, Table
+from sepi.report.tabular.layout import Column, Kind, Line, Report, Row, Section, entries
+from sepi.report.tabular.methods import PROTOCOL_NOTE
 
 DECILES = 10
 
@@ -73,31 +72,32 @@ def oracle(error: FloatMap) -> FloatArray:
 
 def confidence_table(runs: Runs) -> Report:
     """Mean errors by decile of confidence and the area under the sparsification curve, beside the oracle's."""
-    rows: list[Row] = []
-    lines: list[Line] = []
+    tenths = [f"decile {i}" for i in range(1, DECILES + 1)]
+    heads = [*tenths, "area", "oracle", "random"]
+    columns = [Column("scene", Kind.TEXT), Column("variant", Kind.TEXT), *(Column(head, Kind.OURS) for head in heads)]
+    data: list[Row] = []
+    lines = []
     for dataset in runs.plan.scenes:
         for scene in runs.scored(dataset):
             for variant in runs.plan.compared:
                 found = runs.confidence(dataset, scene, variant)
                 if found is None:
                     continue
-                areas: list[Cell] = [_mean(found["curve"]), _mean(found["oracle"]), found["curve"][0]]
-                for name, figures in (("mse100", found["squared"]), ("mae100", found["absolute"])):
-                    rows.append([dataset, scene, variant, name, *figures, *areas])
-                figures_shown = [*found["absolute"], *areas]
-                lines.append(Line([Entry(f"{dataset}/{scene}", TEXT), Entry(variant, TEXT), *_own(figures_shown)]))
-    tenths = [f"decile {i}" for i in range(1, DECILES + 1)]
-    heads = [Column(head, OURS) for head in (*tenths, "area", "oracle", "random")]
+                areas = [float(np.mean(found["curve"])), float(np.mean(found["oracle"])), found["curve"][0]]
+                data.append([dataset, scene, variant, "mse100", *found["squared"], *areas])
+                data.append([dataset, scene, variant, "mae100", *found["absolute"], *areas])
+                lines.append(Line(entries(columns, [f"{dataset}/{scene}", variant, *found["absolute"], *areas])))
     return Report(
-        "Confidence",
-        f"Protocol: paper (border {PROTOCOLS['paper']}, the whole map). Mean absolute error x100 of each tenth of the "
-        "pixels, from the most confident (1) to the least (10); mean squared errors are in the CSV file. Area: mean of "
-        "the sparsification curve, which is the mean absolute error x100 of the pixels left when the least confident "
-        "are taken away, from none to 99 %; oracle: the same when the pixels with the largest errors go first, which "
-        "nothing can beat; random: the error of all pixels, which is what a confidence that says nothing reaches. "
-        "Curves: `maps/DATASET/SCENE/VARIANT/sparsification.png`.",
-        Table(["dataset", "scene", "variant", "error", *tenths, "area", "oracle", "random"], rows),
-        [Section("", Grid([Column("scene", TEXT), Column("variant", TEXT), *heads], lines))],
+        "Confidence evaluation",
+        f"{PROTOCOL_NOTE} Mean absolute error x100 of each tenth of the pixels, from the most confident (1) to the "
+        "least (10); mean squared errors are in the CSV file. Area: mean of the sparsification curve, which is the "
+        "mean absolute error x100 of the pixels left when the least confident are taken away, from none to 99 %; "
+        "oracle: the same when the pixels with the largest errors go first, which nothing can beat; random: the error "
+        "of all pixels, which is what a confidence that says nothing reaches. Curves: "
+        "`maps/DATASET/SCENE/VARIANT/sparsification.png`.",
+        ["dataset", "scene", "variant", "error", *heads],
+        data,
+        [Section("", columns, lines)],
     )
 
 
@@ -120,14 +120,6 @@ def write_curves(folder: Path, confidence: FloatMap, error: FloatMap) -> None:
     axis.set_ylim(bottom=0)
     axis.legend()
     save(figure, folder, "sparsification")
-
-
-def _own(figures: Sequence[Cell]) -> list[Entry]:
-    return [Entry(figure, OURS) for figure in figures]
-
-
-def _mean(values: Sequence[float]) -> float:
-    return float(np.mean(values))
 
 
 def _by_confidence(confidence: FloatMap, error: FloatMap) -> FloatArray:

@@ -5,35 +5,28 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-from sepi.report.tabular.layout import BEST, SECOND, TEXT, Entry, Grid, Line, Report, Section
+from sepi.report.tabular.layout import BEST, SECOND, Column, Entry, Kind, Line, Report, Section
 
 # more columns than fit upright on a page
 _MOST_UPRIGHT = 8
 
-_ESCAPES = {
-    "\\": r"\textbackslash{}",
-    "{": r"\{",
-    "}": r"\}",
-    "$": r"\$",
-    "&": r"\&",
-    "#": r"\#",
-    "%": r"\%",
-    "_": r"\_",
-    "~": r"\textasciitilde{}",
-    "^": r"\textasciicircum{}",
-    "<": r"\textless{}",
-    ">": r"\textgreater{}",
-    "|": r"\textbar{}",
-    '"': "{''}",
-    "`": r"\textasciigrave{}",
-    "×": r"$\times$",
-    "±": r"$\pm$",
-    # after the end of a row, these would belong to the command that ends it
-    "[": "{[}",
-    "]": "{]}",
-    "*": "{*}",
-}
-_SPECIAL = re.compile("[" + re.escape("".join(_ESCAPES)) + "]")
+_ESCAPES = str.maketrans(
+    {
+        **{character: f"\\{character}" for character in "{}$&#%_"},
+        # after the end of a row, these would belong to the command that ends it
+        **{character: f"{{{character}}}" for character in "[]*"},
+        "\\": r"\textbackslash{}",
+        "~": r"\textasciitilde{}",
+        "^": r"\textasciicircum{}",
+        "<": r"\textless{}",
+        ">": r"\textgreater{}",
+        "|": r"\textbar{}",
+        '"': "{''}",
+        "`": r"\textasciigrave{}",
+        "×": r"$\times$",
+        "±": r"$\pm$",
+    }
+)
 
 
 def as_latex(report: Report, name: str) -> str:
@@ -51,68 +44,62 @@ def as_latex(report: Report, name: str) -> str:
     str
         LaTeX in UTF-8. Its first lines name the packages it needs.
     """
-    sections = report.page
-    packages = "booktabs"
-    if any(_is_wide(section.grid) for section in sections):
-        packages += ",graphicx"
-    lines = [f"% {escaped(report.title)}", rf"% needs \usepackage{{{packages}}}"]
-    labels = _labels(name, sections)
-    for section, label in zip(sections, labels, strict=True):
-        lines += ["", *_environment(report, section, label)]
-    return "\n".join([*lines, ""])
+    packages = "booktabs,graphicx" if any(map(_is_wide, report.sections)) else "booktabs"
+    parts = [f"% {escaped(report.title)}\n% needs \\usepackage{{{packages}}}"]
+    labels = _labels(name, report.sections)
+    parts += [_environment(report, section, label) for section, label in zip(report.sections, labels, strict=True)]
+    return "\n\n".join(parts) + "\n"
 
 
 def escaped(text: str) -> str:
     """Text that LaTeX sets as it is, in one line."""
-    safe = _SPECIAL.sub(lambda found: _ESCAPES[found[0]], " ".join(text.splitlines()))
+    safe = " ".join(text.splitlines()).translate(_ESCAPES)
     # two hyphens would become a dash
     return re.sub(r"-(?=-)", "-{}", safe)
 
 
-def _environment(report: Report, section: Section, label: str) -> list[str]:
-    grid = section.grid
-    wide = _is_wide(grid)
+def _environment(report: Report, section: Section, label: str) -> str:
+    wide = _is_wide(section)
     environment = "table*" if wide else "table"
+    size = "\\scriptsize\n\\setlength{\\tabcolsep}{3pt}" if wide else r"\small"
     # LaTeX numbers tables itself
     title = re.sub(r"^Table \d+: ", "", report.title)
     title = f"{title}; {section.heading}" if section.heading else title
     marked = rf" {escaped(report.marked)} (\textbf{{bold}}, \underline{{underlined}})." if report.marked else ""
-    alignment = "".join("l" if column.kind == TEXT else "r" for column in grid.columns)
-    heads = [escaped(column.head) for column in grid.columns]
-    if wide:
-        heads = [
-            head if column.kind == TEXT else rf"\rotatebox{{90}}{{{head}}}"
-            for head, column in zip(heads, grid.columns, strict=True)
-        ]
-    return [
-        rf"\begin{{{environment}}}",
-        r"\centering",
-        *([r"\scriptsize", r"\setlength{\tabcolsep}{3pt}"] if wide else [r"\small"]),
-        rf"\caption{{{escaped(title)}. {_with_code(report.caption)}{marked}}}",
-        rf"\label{{{label}}}",
-        rf"\begin{{tabular}}{{@{{}}{alignment}@{{}}}}",
-        r"\toprule",
-        _row(heads),
-        r"\midrule",
-        *_body(grid.lines),
-        r"\bottomrule",
-        r"\end{tabular}",
-        rf"\end{{{environment}}}",
-    ]
+    alignment = "".join("l" if column.kind == Kind.TEXT else "r" for column in section.columns)
+    return rf"""\begin{{{environment}}}
+\centering
+{size}
+\caption{{{escaped(title)}. {_with_code(report.caption)}{marked}}}
+\label{{{label}}}
+\begin{{tabular}}{{@{{}}{alignment}@{{}}}}
+\toprule
+{_row([_head(column, wide) for column in section.columns])}
+\midrule
+{_body(section.rows)}\bottomrule
+\end{{tabular}}
+\end{{{environment}}}"""
 
 
-def _body(lines: Sequence[Line]) -> list[str]:
+def _body(lines: Sequence[Line]) -> str:
     """The rows; a rule stands before the first average."""
-    rows = []
-    for index, line in enumerate(lines):
-        if index and line.kind.startswith("average") and not lines[index - 1].kind.startswith("average"):
-            rows.append(r"\midrule")
-        rows.append(_row([_cell(entry) for entry in line.entries]))
-    return rows
+    text, before = "", "average"
+    for line in lines:
+        kind = line.kind.split()[0] if line.kind else ""
+        if kind == "average" != before:
+            text += "\\midrule\n"
+        text += _row([_cell(entry) for entry in line.cells]) + "\n"
+        before = kind
+    return text
 
 
 def _row(cells: Sequence[str]) -> str:
     return " & ".join(cells) + r" \\"
+
+
+def _head(column: Column, wide: bool) -> str:
+    head = escaped(column.head)
+    return rf"\rotatebox{{90}}{{{head}}}" if wide and column.kind != Kind.TEXT else head
 
 
 def _cell(entry: Entry) -> str:
@@ -133,13 +120,12 @@ def _labels(name: str, sections: Sequence[Section]) -> list[str]:
         return [f"tab:{name}"]
     labels: list[str] = []
     for section in sections:
-        words = re.findall(r"[a-z0-9_]+", section.heading.lower())
-        label = "-".join([f"tab:{name}", *words])
+        label = "-".join([f"tab:{name}", *re.findall(r"[a-z0-9_]+", section.heading.lower())])
         while label in labels:
             label += "-again"
         labels.append(label)
     return labels
 
 
-def _is_wide(grid: Grid) -> bool:
-    return len(grid.columns) > _MOST_UPRIGHT
+def _is_wide(section: Section) -> bool:
+    return len(section.columns) > _MOST_UPRIGHT

@@ -1,4 +1,4 @@
-"""Tables as CSV, Markdown and JSON, always in the same order and format."""
+"""What a table of the report is, as CSV and JSON; :mod:`.markdown` and :mod:`.latex` write the others."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ import io
 import math
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from enum import StrEnum
 from pathlib import Path
 from typing import Any
 
@@ -18,23 +19,23 @@ Cell = str | float | int | None
 
 Row = Sequence[Cell]
 
-TEXT, FIGURE, OURS, PUBLISHED, IMPORTED, RATIO = "text", "figure", "ours", "published", "imported", "ratio"
-"""Kinds of cells: words; a figure that nothing is compared with; of this code; as printed by the paper; of an imported
-map, scored here; ours divided by a published one, or the reverse."""
-
 BEST, SECOND = "best", "second"
 """Marks of cells."""
 
-# characters that Markdown reads as markup in the midst of a line; an underscore within a word is none
-_MARKUP = re.compile(r"[\\`*\[\]<>&|~]|(?<![^\W_])_|_(?![^\W_])")
 
+class Kind(StrEnum):
+    """What a cell or column holds."""
 
-@dataclass(frozen=True)
-class Table:
-    """Rows under a header."""
-
-    columns: Sequence[str]
-    rows: Sequence[Row]
+    TEXT = "text"
+    FIGURE = "figure"
+    """A figure that nothing is compared with."""
+    OURS = "ours"
+    PUBLISHED = "published"
+    """As printed by the paper."""
+    EXTERNAL = "external"
+    """Of another method's map, scored here."""
+    RATIO = "ratio"
+    """Ours divided by a published one, or the reverse."""
 
 
 @dataclass(frozen=True)
@@ -42,43 +43,17 @@ class Column:
     """Head and kind of a page's column."""
 
     head: str
-    kind: str = FIGURE
+    kind: Kind = Kind.FIGURE
 
 
 @dataclass(frozen=True)
 class Entry:
-    """A cell of a page.
+    """A cell of a page: its text, the figure to sort it by if it has one, its kind, and its mark if it has one."""
 
-    Attributes
-    ----------
-    cell : Cell
-        What it shows.
-    kind : str
-        Of the kinds above.
-    mark : str or None
-        :data:`BEST` or :data:`SECOND`.
-    note : str
-        What must be known of the figure, after it.
-    """
-
-    cell: Cell
-    kind: str = FIGURE
+    text: str
+    value: float | None
+    kind: Kind
     mark: str | None = None
-    note: str = ""
-
-    @property
-    def text(self) -> str:
-        """As a page shows it, without the mark's sign."""
-        return f"{short(self.cell)} ({self.note})" if self.note else short(self.cell)
-
-    @property
-    def value(self) -> float | None:
-        """The figure; of several figures in a cell the first. None for words, nothing, and a score over no pixels."""
-        cell = self.cell
-        if isinstance(cell, str) and self.kind in (OURS, PUBLISHED):
-            first = cell.split("/")[0]
-            return float(first) if re.fullmatch(r"-?\d+(\.\d+)?", first) else None
-        return float(cell) if isinstance(cell, int | float) and math.isfinite(cell) else None
 
 
 @dataclass(frozen=True)
@@ -87,48 +62,36 @@ class Line:
 
     Attributes
     ----------
-    entries : sequence of Entry
+    cells : sequence of Entry
         One per column.
     kind : str
         ``"scene"``, ``"average"``, ``"average printed"``, or empty.
-    at_hand : bool
+    available : bool
         False where all figures are published ones.
     """
 
-    entries: Sequence[Entry]
+    cells: Sequence[Entry]
     kind: str = ""
-    at_hand: bool = True
-
-
-@dataclass(frozen=True)
-class Grid:
-    """Lines under a header, each cell with its kind."""
-
-    columns: Sequence[Column]
-    lines: Sequence[Line]
-
-    def without_empty(self) -> Grid:
-        """The same without columns of published or imported figures or ratios in which nothing stands."""
-        kept = [
-            index
-            for index, column in enumerate(self.columns)
-            if column.kind in (TEXT, FIGURE, OURS) or any(line.entries[index].text for line in self.lines)
-        ]
-        lines = [Line([line.entries[i] for i in kept], line.kind, line.at_hand) for line in self.lines]
-        return Grid([self.columns[i] for i in kept], lines)
+    available: bool = True
 
 
 @dataclass(frozen=True)
 class Section:
-    """A table of a page, under a heading of its own where it has one."""
+    """A part of a page: lines under a header, and under a heading where it is not empty."""
 
     heading: str
-    table: Table | Grid
+    columns: Sequence[Column]
+    rows: Sequence[Line]
 
-    @property
-    def grid(self) -> Grid:
-        """The table, its cells with their kinds."""
-        return self.table if isinstance(self.table, Grid) else _grid_of(self.table)
+    def without_empty(self) -> Section:
+        """The same without columns of published or external figures or ratios in which nothing stands."""
+        kept = [
+            index
+            for index, column in enumerate(self.columns)
+            if column.kind in (Kind.TEXT, Kind.FIGURE, Kind.OURS) or any(row.cells[index].text for row in self.rows)
+        ]
+        rows = [Line([row.cells[index] for index in kept], row.kind, row.available) for row in self.rows]
+        return Section(self.heading, [self.columns[index] for index in kept], rows)
 
 
 @dataclass(frozen=True)
@@ -139,9 +102,9 @@ class Report:
     ----------
     title, caption : str
         For the page; the caption names the protocol. Words between backticks are names from the program.
-    data : Table
-        For the CSV file: one figure per cell.
-    page : sequence of Section
+    heads, data : sequence
+        Header and rows of the CSV file: one figure per cell.
+    sections : sequence of Section
         For the Markdown and LaTeX files and the web page.
     marked : str
         Sentence that says what is marked as best and second best; empty where nothing is.
@@ -149,14 +112,32 @@ class Report:
 
     title: str
     caption: str
-    data: Table
-    page: Sequence[Section]
+    heads: Sequence[str]
+    data: Sequence[Row]
+    sections: Sequence[Section]
     marked: str = ""
+
+
+def entry(cell: Cell, kind: Kind = Kind.FIGURE, mark: str | None = None, note: str = "") -> Entry:
+    """A cell of a page; what must be known of its figure, the note, stands after it."""
+    text = f"{short(cell)} ({note})" if note else short(cell)
+    return Entry(text, _value(cell, kind), kind, mark)
+
+
+def entries(columns: Sequence[Column], cells: Row, figures: Kind | None = None) -> list[Entry]:
+    """Cells of the kinds of their columns; where ``figures`` is given, all that are no words are of that kind."""
+    kinds = [figures if figures and column.kind != Kind.TEXT else column.kind for column in columns]
+    return [entry(cell, kind) for cell, kind in zip(cells, kinds, strict=True)]
 
 
 def printed(value: float | None) -> str | None:
     """A published figure with the two decimals that the paper prints."""
     return None if value is None else f"{value:.2f}"
+
+
+def short(cell: Cell) -> str:
+    """A cell as a page shows it: two decimals, empty where not available, ``n/a`` for a score over no pixels."""
+    return _text(cell, decimals=2, no_pixels="n/a")
 
 
 def ranks(values: Sequence[float | None]) -> list[str | None]:
@@ -178,35 +159,19 @@ def ranks(values: Sequence[float | None]) -> list[str | None]:
     return [None if value is None else marks.get(value) for value in shown]
 
 
-def write(path: Path, text: str) -> Path:
-    """Write a text file whole or not at all; returns its path."""
+def write(path: Path, text: str) -> None:
+    """Write a text file whole or not at all."""
     with atomic_path(path) as temporary:
         temporary.write_text(text, encoding="utf-8", newline="\n")
-    return path
 
 
-def as_csv(table: Table) -> str:
+def as_csv(report: Report) -> str:
     """CSV with four decimals; an empty cell is not available, ``nan`` is a score over no pixels."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(table.columns)
-    writer.writerows([_text(cell, decimals=4, nothing="", no_pixels="nan") for cell in row] for row in table.rows)
+    writer.writerow(report.heads)
+    writer.writerows([_text(cell, decimals=4, no_pixels="nan") for cell in row] for row in report.data)
     return text.getvalue()
-
-
-def as_markdown(report: Report) -> str:
-    """A page with two decimals; an empty cell is not available, ``n/a`` is a score over no pixels."""
-    marked = f" {report.marked} (**bold**, *italic*)." if report.marked else ""
-    lines = [f"# {_plain(report.title)}", "", _with_code(report.caption) + marked, ""]
-    for section in report.page:
-        grid = section.grid
-        if section.heading:
-            lines += [f"## {_plain(section.heading)}", ""]
-        lines.append(_markdown_row([_plain(column.head) for column in grid.columns]))
-        lines.append(_markdown_row(["---" if column.kind == TEXT else "---:" for column in grid.columns]))
-        lines += [_markdown_row([_markdown(entry) for entry in line.entries]) for line in grid.lines]
-        lines.append("")
-    return "\n".join(lines)
 
 
 def as_json(report: Report) -> dict[str, Any]:
@@ -214,69 +179,19 @@ def as_json(report: Report) -> dict[str, Any]:
     return {
         "title": report.title,
         "caption": report.caption + (f" {report.marked}." if report.marked else ""),
-        "sections": [
-            {
-                "heading": section.heading,
-                "columns": [{"head": column.head, "kind": column.kind} for column in section.grid.columns],
-                "rows": [
-                    {
-                        "kind": line.kind,
-                        "at_hand": line.at_hand,
-                        "cells": [
-                            {"text": entry.text, "value": entry.value, "kind": entry.kind, "mark": entry.mark}
-                            for entry in line.entries
-                        ],
-                    }
-                    for line in section.grid.lines
-                ],
-            }
-            for section in report.page
-        ],
+        "sections": [asdict(section) for section in report.sections],
     }
 
 
-def short(cell: Cell) -> str:
-    """A cell as a page shows it."""
-    return _text(cell, decimals=2, nothing="", no_pixels="n/a")
-
-
-def _text(cell: Cell, *, decimals: int, nothing: str, no_pixels: str) -> str:
-    if cell is None:
-        return nothing
+def _text(cell: Cell, *, decimals: int, no_pixels: str) -> str:
     if isinstance(cell, float):
         return no_pixels if math.isnan(cell) else f"{cell:.{decimals}f}"
-    return str(cell)
+    return "" if cell is None else str(cell)
 
 
-def _grid_of(table: Table) -> Grid:
-    """Kinds guessed; a column of words is one whose first filled cell is words."""
-    columns = []
-    for index, head in enumerate(table.columns):
-        filled = [short(row[index]) for row in table.rows if row[index] is not None]
-        columns.append(Column(head, FIGURE if filled and filled[0][:1].isdigit() else TEXT))
-    lines = [Line([Entry(cell, column.kind) for cell, column in zip(row, columns, strict=True)]) for row in table.rows]
-    return Grid(columns, lines)
-
-
-def _markdown(entry: Entry) -> str:
-    sign = {BEST: "**", SECOND: "*"}.get(entry.mark or "", "")
-    return f"{sign}{_plain(entry.text)}{sign}"
-
-
-def _plain(text: str) -> str:
-    """Text that Markdown shows as it is, in one line."""
-    return _escaped(" ".join(text.splitlines()))
-
-
-def _with_code(text: str) -> str:
-    """Text that Markdown shows as it is, but for names between backticks."""
-    parts = re.split(r"(`[^`]*`)", text)
-    return "".join(part if index % 2 else _escaped(part) for index, part in enumerate(parts))
-
-
-def _escaped(text: str) -> str:
-    return _MARKUP.sub(r"\\\g<0>", text)
-
-
-def _markdown_row(cells: Sequence[str]) -> str:
-    return f"| {' | '.join(cells)} |"
+def _value(cell: Cell, kind: Kind) -> float | None:
+    """The figure; of several in a cell the first. None for words, nothing, and a score over no pixels."""
+    if isinstance(cell, str):
+        first = re.match(r"-?\d+(\.\d+)?(?=/|$)", cell) if kind in (Kind.OURS, Kind.PUBLISHED) else None
+        return float(first[0]) if first else None
+    return float(cell) if cell is not None and math.isfinite(cell) else None

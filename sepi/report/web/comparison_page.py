@@ -2,26 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from sepi.evaluate import PROTOCOLS, REGIONS, WHOLE_MAP, region_masks, score
-from sepi.io.scores import Scores
+from sepi.evaluate import COUNTS, SCORES, region_masks, score_regions
+from sepi.io.scores import AllScores
 from sepi.lightfield import FloatMap, LightField
 from sepi.report.page import SCRIPTS, colour_scales, embedded_scenes, environment
 from sepi.report.plots.pictures import centre_picture
+from sepi.report.tabular.layout import BEST, Column, Entry, Kind, Line, Section, entry
 from sepi.report.web.viewer import Viewer
 
 # part of the pixels beyond each end of the colour scale, so that a few wrong ones do not use it up
 _BEYOND = 0.005
 
-_SHOWN = {"mse100": "MSE x100", "q25": "Q25 x100", "badpix007": "BadPix 0.07 %", "non_finite": "not finite"}
-
-AllScores = dict[str, dict[str, Scores]]
-"""Protocol to region to scores."""
+_SHOWN = ("mse100", "q25", "badpix007", "non_finite")
 
 
 @dataclass(frozen=True)
@@ -42,24 +40,15 @@ class Comparison:
     maps: tuple[FloatMap, FloatMap]
     ground_truth: FloatMap | None = None
     light_field: LightField | None = None
-    scores: tuple[AllScores, ...] = field(init=False)
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "scores", tuple(self._scores(values) for values in self.maps) if self._known else ())
-
-    @property
-    def _known(self) -> bool:
-        return self.ground_truth is not None
-
-    def _scores(self, values: FloatMap) -> AllScores:
-        assert self.ground_truth is not None
-        scene = self.light_field
-        masks = region_masks(scene) if scene is not None and scene.ground_truth is not None else {}
-        regions = REGIONS if masks else (WHOLE_MAP,)
-        return {
-            protocol: {region: score(values, self.ground_truth, border, masks.get(region)) for region in regions}
-            for protocol, border in PROTOCOLS.items()
-        }
+    @cached_property
+    def scores(self) -> dict[str, AllScores]:
+        """Of each map, by its name; empty without ground truth."""
+        if self.ground_truth is None:
+            return {}
+        masks = None if self.light_field is None else region_masks(self.light_field)
+        scores = [score_regions(values, self.ground_truth, masks) for values in self.maps]
+        return dict(zip(self.names, scores, strict=True))
 
 
 def comparison_page(found: Comparison) -> str:
@@ -103,7 +92,7 @@ def _viewer(found: Comparison) -> Viewer:
         viewer.panel("Scene", "ground_truth", "ground truth", "disparity", map=ground_truth)
     for key, name, number in zip("ab", found.names, numbers, strict=True):
         viewer.panel("Maps", key, name, "disparity", map=number)
-    title = f"{found.names[0]} less {found.names[1]}"
+    title = f"{found.names[0]} minus {found.names[1]}"
     viewer.panel("Maps", "difference", title, "error", map=numbers[0], minus=numbers[1])
     if ground_truth is not None:
         for key, name, number in zip("ab", found.names, numbers, strict=True):
@@ -136,26 +125,23 @@ def _score_section(found: Comparison) -> dict[str, Any] | None:
     """A table for the page: a row per protocol and region, each score of both maps, the better one marked."""
     if not found.scores:
         return None
-    columns = [{"head": head, "kind": "text"} for head in ("protocol", "region")]
-    columns += [{"head": f"{head}, {name}", "kind": "ours"} for head in _SHOWN.values() for name in found.names]
+    heads = SCORES | COUNTS
+    columns = [Column("protocol", Kind.TEXT), Column("region", Kind.TEXT)]
+    columns += [Column(f"{heads[name]}, {title}", Kind.OURS) for name in _SHOWN for title in found.names]
     rows = []
-    for protocol, regions in found.scores[0].items():
+    one, other = found.scores.values()
+    for protocol, regions in one.items():
         for region in regions:
-            cells = [{"text": text, "value": None, "kind": "text", "mark": None} for text in (protocol, region)]
+            cells = [entry(protocol, Kind.TEXT), entry(region, Kind.TEXT)]
             for name in _SHOWN:
-                pair = [scores[protocol][region][name] for scores in found.scores]
+                pair = [one[protocol][region][name], other[protocol][region][name]]
                 cells += [_cell(value, pair) for value in pair]
-            rows.append({"kind": "", "at_hand": True, "cells": cells})
-    return {"heading": "", "columns": columns, "rows": rows}
+            rows.append(Line(cells))
+    return asdict(Section("", columns, rows))
 
 
-def _cell(value: float, pair: list[float]) -> dict[str, Any]:
+def _cell(value: float, pair: list[float]) -> Entry:
     known = not np.isnan(value)
     text = "n/a" if not known else str(value) if isinstance(value, int) else f"{value:.3f}"
     better = known and value == min(pair) and pair[0] != pair[1]
-    return {"text": text, "value": value if known else None, "kind": "ours", "mark": "best" if better else None}
-
-
-def printed_scores(found: Comparison) -> Mapping[str, AllScores]:
-    """Name of each map to its scores; empty without ground truth."""
-    return dict(zip(found.names, found.scores, strict=False))
+    return Entry(text, value if known else None, Kind.OURS, BEST if better else None)

@@ -10,7 +10,7 @@ from typing import Any
 from sepi.evaluate import REGIONS, WHOLE_MAP
 from sepi.report import published
 from sepi.report.runs import Numbers, Runs
-from sepi.report.tabular.comparison import datasets_of, mean
+from sepi.report.tabular.methods import datasets_of, mean
 
 
 def headline(runs: Runs) -> list[dict[str, Any]]:
@@ -109,7 +109,7 @@ def ablation_bars(runs: Runs) -> list[BarGroup]:
                 Bar(
                     variant,
                     _mean(runs.final(dataset, scene, "mse100", region, variant) for scene in scenes),
-                    _published(theirs.get(variant), region),
+                    theirs[variant].of(region) if variant in theirs else None,
                 )
                 for variant in runs.plan.listed
             ]
@@ -199,14 +199,6 @@ def first_scene(runs: Runs) -> str:
     """The scene that is shown first: one that the paper has, else the last, the built-in ones being ordered so."""
     known = [pair for pair in runs.plan.pairs if published.paper_scene(*pair) is not None]
     return "/".join(known[0] if known else runs.plan.pairs[-1])
-
-
-def _published(figures: published.Regions | None, region: str) -> float | None:
-    if figures is None:
-        return None
-    name = "overall" if region == WHOLE_MAP else region
-    found: float | None = getattr(figures, name)
-    return found
 
 
 def _mean(values: Iterable[float]) -> float | None:

@@ -1,0 +1,127 @@
+"""What tables 1 to 4 compare: this project's variants, the published methods, and other methods' maps."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from sepi.evaluate import PROTOCOLS, WHOLE_MAP
+from sepi.external import NO_FILE
+from sepi.report import published
+from sepi.report.plan import MAIN_VARIANT, Plan
+from sepi.report.runs import Runs
+from sepi.report.tabular.layout import Cell, Kind, printed
+
+SCENE, AVERAGE, PRINTED_AVERAGE = "scene", "average", "average printed"
+"""What a row is, as the CSV files say it."""
+
+PROTOCOL_NOTE = f"Protocol: paper (border {PROTOCOLS['paper']}, the whole map)."
+LEARNED_NOTE = "* learned, supervised; ** learned, unsupervised."
+EXTERNAL_NOTE = (
+    "External: maps that other methods made, scored here as ours are; they are not ranked, since nothing says whether "
+    "their method is learned."
+)
+REGIONS_NOTE = (
+    "Regions are those of `sepi.scoring.regions`, or the exact ones that a built-in scene brings; the paper's are "
+    "not known."
+)
+
+
+@dataclass(frozen=True)
+class Method:
+    """A method, or how it compares with the paper's.
+
+    Attributes
+    ----------
+    name : str
+        Of the variant or method.
+    key, head : str
+        What the CSV files and the pages call it.
+    kind : Kind
+        ``OURS``, ``RATIO`` (of ours to the paper's), ``PUBLISHED`` or ``EXTERNAL``.
+    learning : str
+        As :class:`sepi.report.published.Method` has it; empty where it is not known or not the question.
+    """
+
+    name: str
+    key: str
+    head: str
+    kind: Kind
+    learning: str = ""
+
+    def shown(self, figure: Cell) -> Cell:
+        """A figure of this method as the tables have it."""
+        return printed(figure) if self.kind == Kind.PUBLISHED and isinstance(figure, float) else figure
+
+
+def compared_methods(plan: Plan) -> list[Method]:
+    """Every method, in the order of the tables: ours, their ratios to the paper's, published, external."""
+    suffixes = {variant: "" if variant == MAIN_VARIANT else f"_{variant}" for variant in plan.compared}
+    signs = {"none": "", "supervised": "*", "unsupervised": "**"}
+    methods = [
+        *(Method(v, f"ours{suffix}", f"this code, {v}", Kind.OURS, "none") for v, suffix in suffixes.items()),
+        *(Method(v, f"ratio{suffix}", f"{v} / published", Kind.RATIO) for v, suffix in suffixes.items()),
+        *(
+            Method(m.key, m.key, m.label + signs[m.learning], Kind.PUBLISHED, m.learning)
+            for m in published.methods().values()
+        ),
+    ]
+    # an external method with the name of a column that is there anyway is told apart
+    taken = {"dataset", "scene", "row", "method", "learning", *(method.key for method in methods)}
+    heads = {name: f"{name} (external)" for name in plan.external}
+    keys = {name: head if name in taken else name for name, head in heads.items()}
+    return [*methods, *(Method(name, keys[name], head, Kind.EXTERNAL) for name, head in heads.items())]
+
+
+def external_cell(runs: Runs, dataset: str, scene: str, method: str, score: str) -> Cell:
+    """The score of another method's map by the paper's protocol, or what is wrong with it."""
+    figure = runs.external_score(dataset, scene, method, score)
+    return (runs.external_problem(dataset, scene, method) or None) if figure is None else figure
+
+
+def unknown_note(runs: Runs, dataset: str, scene: str, method: str) -> str:
+    """How much of an external map is not finite, which its mean squared error does not show; empty where all is."""
+    scores = runs.external_scores(dataset, scene, method)
+    whole = scores["paper"][WHOLE_MAP] if scores else {"pixels": 0}
+    return f"{100 * whole['non_finite'] / whole['pixels']:.0f} % unknown" if whole.get("non_finite") else ""
+
+
+def has_column(runs: Runs, dataset: str, method: str) -> bool:
+    """Whether an external method belongs on a dataset's page.
+
+    One that has files, but none for this dataset, does not; one without any file does, or nobody would see that.
+    """
+    with_file = {name for name, scene in runs.plan.pairs if runs.external_problem(name, scene, method) != NO_FILE}
+    return dataset in with_file or (not with_file and dataset in runs.plan.scenes)
+
+
+def own_names(plan: Plan) -> str:
+    """The variants whose figures are compared, for a caption."""
+    return " and ".join(f"`{variant}`" for variant in plan.compared)
+
+
+def datasets_of(plan: Plan) -> list[str]:
+    """Datasets available, then the paper's others."""
+    return list(dict.fromkeys([*plan.scenes, *published.DATASETS]))
+
+
+def dataset_title(dataset: str) -> str:
+    """Name of a dataset, with the paper's where it has one."""
+    return f"{dataset}: {published.DATASETS[dataset]}" if dataset in published.DATASETS else dataset
+
+
+def average_label(count: int) -> str:
+    """Name of the row with averages of our figures."""
+    return f"Average of {count} scene{'s' * (count != 1)} available"
+
+
+def printed_label(dataset: str) -> str:
+    """Name of the row with the paper's averages."""
+    return f"Average as printed ({len(published.table1().scenes(dataset))} scenes)"
+
+
+def mean(values: Iterable[float]) -> float:
+    """Mean of the scores that exist; NaN where none does (a scene may have no such region)."""
+    known = [value for value in values if not math.isnan(value)]
+    return sum(known) / len(known) if known else math.nan
