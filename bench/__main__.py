@@ -16,7 +16,6 @@ from bench.scene import Scene
 from sepi.command import SepiGroup
 from sepi.errors import SepiError
 from sepi.io.files import atomic_path
-from sepi.report.tabular.layout import Report, Section, Table, as_markdown
 from sepi.scenes import SCENES
 from sepi.workflow.machine import this_machine
 
@@ -79,15 +78,16 @@ def compare(before: Path, after: Path) -> None:
         raise SepiError(f"{before} and {after}: nothing was measured in both")
     for difference in tables.differences(old, new):
         click.echo(f"sepi: warning: not the same {difference}", err=True)
-    click.echo(as_markdown(Report("Before and after", "Median seconds of each case.", table, [Section("", table)])))
+    click.echo(f"# Before and after\n\nMedian seconds of each case.\n\n{table.markdown()}")
 
 
 def _page(result: Result) -> str:
     """The result as Markdown."""
-    machine = ", ".join(f"{key} {value}" for key, value in result.machine.items())
-    settings = ", ".join(f"{key} {value}" for key, value in result.settings.items())
-    caption = f"Medians. {settings}.\n\nMachine: {machine}."
-    return as_markdown(Report("Benchmark", caption, Table((), ()), tables.sections(result)))
+    facts = [", ".join(f"{key} {value}" for key, value in one.items()) for one in (result.settings, result.machine)]
+    parts = ["# Benchmark", f"Medians. {facts[0]}.", f"Machine: {facts[1]}."]
+    for heading, table in tables.sections(result).items():
+        parts += [f"## {heading}", table.markdown()]
+    return "\n\n".join(parts) + "\n"
 
 
 if __name__ == "__main__":

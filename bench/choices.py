@@ -12,7 +12,9 @@ from pathlib import Path
 from typing import Any
 
 import click
+from tabulate import tabulate
 
+from sepi.command import SepiCommand
 from sepi.errors import SepiError
 from sepi.evaluate import score
 from sepi.inspection.disparity_range import settle_range
@@ -48,8 +50,8 @@ ALTERNATIVES = (
     Alternative("planes overrule any depth", "textureless", {"min_support": 1.0, "keep_confidence": 1.0}),
     Alternative("planes smooth only", "textureless", {"min_support": 0.0}),
     Alternative("no continuity between superpixels", "textureless", {"continuity": 0.0}),
-    Alternative("data weight at steps as printed", "optimize", {"discontinuity_weight": 1e-6}),
-    Alternative("no cut of the data weight at steps", "optimize", {"discontinuity_weight": 1.0}),
+    Alternative("data weight at discontinuities as printed", "optimize", {"discontinuity_weight": 1e-6}),
+    Alternative("no cut of the data weight at discontinuities", "optimize", {"discontinuity_weight": 1.0}),
     Alternative("confidence itself as weight", "optimize", {"confidence_power": 1.0}),
     Alternative("alpha a third", "optimize", {"alpha": 1e-6}),
     Alternative("alpha threefold", "optimize", {"alpha": 1e-5}),
@@ -79,29 +81,27 @@ def opened(name: str) -> LightField:
 
 def table(scenes: list[str]) -> str:
     """Markdown: a row per alternative, a column per scene, MSE x100 / Q25 x100 / BadPix 0.07 % on the whole map."""
-    cells: dict[str, list[str]] = {alternative.label: [] for alternative in ALTERNATIVES}
     names = []
+    columns = [[alternative.label for alternative in ALTERNATIVES]]
     for scene in scenes:
         light_field = opened(scene)
         if light_field.ground_truth is None:
             raise SepiError(f"{scene}: has no ground truth to score against")
-        names.append(light_field.name)
         known: dict[tuple[Any, ...], StageMaps] = {}
-        for alternative in ALTERNATIVES:
-            result = score(final_maps(light_field, alternative, known).disparity, light_field.ground_truth)
-            cells[alternative.label].append(f"{result['mse100']:.2f} / {result['q25']:.2f} / {result['badpix007']:.1f}")
-    head = ["| changed | " + " | ".join(names) + " |", "|---|" + "---|" * len(names)]
-    return "\n".join([*head, *(f"| {label} | " + " | ".join(row) + " |" for label, row in cells.items())])
+        found = [
+            score(final_maps(light_field, alternative, known).disparity, light_field.ground_truth)
+            for alternative in ALTERNATIVES
+        ]
+        names.append(light_field.name)
+        columns.append([f"{s['mse100']:.2f} / {s['q25']:.2f} / {s['badpix007']:.1f}" for s in found])
+    return str(tabulate(zip(*columns, strict=True), ["changed", *names], tablefmt="pipe"))
 
 
-@click.command()
+@click.command(name="python -m bench.choices", cls=SepiCommand)
 @click.argument("scenes", nargs=-1, required=True)
 def main(scenes: tuple[str, ...]) -> None:
     """Print the final score of SCENES with one choice of the method changed at a time."""
-    try:
-        click.echo(table(list(scenes)))
-    except SepiError as error:
-        raise click.ClickException(str(error)) from error
+    click.echo(table(list(scenes)))
 
 
 if __name__ == "__main__":

@@ -13,7 +13,9 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection
-from typing import Any
+from typing import Annotated, Any
+
+from pydantic import Field
 
 from sepi.command import megabytes, peak_memory_mb
 from sepi.errors import SepiError
@@ -86,7 +88,7 @@ class Measurement:
 
     group: str
     name: str
-    seconds: tuple[float, ...]
+    seconds: Annotated[tuple[float, ...], Field(min_length=1)]
     peak_memory_mb: float
     figures: Figures = field(default_factory=dict)
 

@@ -138,10 +138,10 @@ def _window(shape: tuple[int, ...], radius: int) -> Iterator[tuple[int, int, tup
             yield i + radius, j + radius, here, there
 
 
-def prepare(scene: Path, candidates: int, warp: Warp) -> Prepared:
+def prepare(scene: Path, num_disparities: int, warp: Warp) -> Prepared:
     """The plain sweep of a scene; says how far its lowest costs are from those of the compiled one."""
     light_field = read_light_field(scene)
-    parameters = SweepParameters(num_disparities=candidates)
+    parameters = SweepParameters(num_disparities=num_disparities)
 
     def figures(result: tuple[FloatMap, FloatMap]) -> Figures:
         difference = np.abs(result[1] - sweep(light_field, parameters).cost[0])
@@ -150,11 +150,11 @@ def prepare(scene: Path, candidates: int, warp: Warp) -> Prepared:
     return Prepared(lambda: plain_sweep(light_field, parameters, warp), figures)
 
 
-def cases(scene: Path, candidates: int, threads: int) -> list[Case]:
+def cases(scene: Path, num_disparities: int, threads: int) -> list[Case]:
     """The plain sweeps, each once: long enough to measure, and nothing in them is compiled at the first call."""
-    known = {"num_disparities": float(candidates)}
+    known = {"num_disparities": float(num_disparities)}
     rivals = {"NumPy slices": by_numpy, "SciPy ndimage.shift": by_scipy, "OpenCV warpAffine": by_opencv}
     return [
-        Case("beside", name, prepare, (scene, candidates, warp), known, threads=threads, once=True)
+        Case("beside", name, prepare, (scene, num_disparities, warp), known, threads=threads, once=True)
         for name, warp in rivals.items()
     ]

@@ -28,7 +28,7 @@ def measure(scene: Scene, settings: dict[str, Any], groups: set[str], small: boo
     ----------
     scene : Scene
     settings : dict
-        ``candidates``, ``threads`` and ``repeats``; what is known of the scene once it is read is added.
+        ``num_disparities``, ``threads`` and ``repeats``; what is known of the scene once it is read is added.
     groups : set of str
         Of ``GROUPS``.
     small : bool
@@ -44,10 +44,10 @@ def measure(scene: Scene, settings: dict[str, Any], groups: set[str], small: boo
     SepiError
         If the scene cannot be prepared.
     """
-    threads, candidates, repeats = settings["threads"], settings["num_disparities"], settings["repeats"]
+    threads, num_disparities, repeats = settings["threads"], settings["num_disparities"], settings["repeats"]
     variant = variant_named(VARIANT)
     parameters = stage_parameters(
-        variant, {stage: {"num_disparities": candidates} for stage in ("initial", "occlusion")}
+        variant, {stage: {"num_disparities": num_disparities} for stage in ("initial", "occlusion")}
     )
     measured(Case("preparation", "scene", prepare_files, (scene, variant, parameters), threads=threads, once=True), 1)
     light_field = read_light_field(scene.light_field)
@@ -71,11 +71,11 @@ def measure(scene: Scene, settings: dict[str, Any], groups: set[str], small: boo
     if "storage" in groups:
         cases += storage.cases(scene, threads, list(storage.OPTIONS)[: 2 if small else None])
     if groups & {"growth", "large"}:
-        cases += _growth_cases(scene, candidates, threads, groups, small)
+        cases += _growth_cases(scene, num_disparities, threads, groups, small)
     found, failed = _all_measured(cases, repeats)
     if "stages" in groups:
         tiny_files = scene.folder / "tiny.h5", scene.folder / "tiny-initial.h5"
-        found[:0] = [stages.command(scene, threads, repeats, candidates), stages.job(*tiny_files, repeats)]
+        found[:0] = [stages.command(scene, threads, repeats, num_disparities), stages.job(*tiny_files, repeats)]
     return found, failed
 
 
@@ -97,7 +97,7 @@ def _all_measured(cases: list[Case], repeats: int) -> tuple[list[Measurement], i
     return found, failed
 
 
-def _growth_cases(scene: Scene, candidates: int, threads: int, groups: set[str], small: bool) -> list[Case]:
+def _growth_cases(scene: Scene, num_disparities: int, threads: int, groups: set[str], small: bool) -> list[Case]:
     """Light fields of every size, and kernels compiled for them; then the cases."""
     axes = growth.SMALL if small else growth.FULL
     if "growth" not in groups:
@@ -110,5 +110,5 @@ def _growth_cases(scene: Scene, candidates: int, threads: int, groups: set[str],
         Case("preparation", "scene to grow", prepare_render, render, once=True),
         Case("preparation", "growth", prepare_grown, (whole, needed, scene.folder), once=True),
         Case("preparation", "kernels", stages.whole, (whole, variant, {}), threads=threads, once=True),
-        *growth.cases(scene.folder, axes, candidates, threads, variant, large),
+        *growth.cases(scene.folder, axes, num_disparities, threads, variant, large),
     ]

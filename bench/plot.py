@@ -50,5 +50,5 @@ def _growth(panel: Any, result: Result, axis: str) -> None:
 
 def _beside(panel: Any, result: Result) -> None:
     rows = list(beside(result).rows)[::-1]
-    panel.barh([str(row[0]) for row in rows], [float(str(row[1])) for row in rows], color="tab:green", log=True)
+    panel.barh([row[0] for row in rows], [float(row[1]) for row in rows], color="tab:green", log=True)
     panel.set(title="initial stage beside plain ones", xlabel="seconds per candidate")

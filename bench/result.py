@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import json
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
+
+from pydantic import TypeAdapter, ValidationError
 
 from bench.measure import Measurement
 from sepi.errors import SepiError
 from sepi.io.files import atomic_path
-
-FORMAT = 1
 
 
 @dataclass(frozen=True)
@@ -23,24 +22,29 @@ class Result:
     machine : mapping
         Processor, cores and versions; no names of hosts or users.
     settings : mapping
-        Scene, size, views, candidates, threads, repeats.
+        Scene, size, views, num_disparities, threads, repeats.
     measurements : tuple of Measurement
+    format : int
+        Of the file.
     """
 
     machine: dict[str, Any]
     settings: dict[str, Any]
     measurements: tuple[Measurement, ...]
+    format: Literal[1] = 1
 
     def group(self, name: str) -> dict[str, Measurement]:
         """Measurements of one group by name."""
         return {m.name: m for m in self.measurements if m.group == name}
 
 
+_RESULT = TypeAdapter(Result)
+
+
 def write(result: Result, path: Path) -> None:
     """Write a result as JSON."""
-    content = {"format": FORMAT, **asdict(result)}
     with atomic_path(path) as temporary:
-        temporary.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
+        temporary.write_bytes(_RESULT.dump_json(result, indent=1) + b"\n")
 
 
 def read(path: Path) -> Result:
@@ -52,16 +56,9 @@ def read(path: Path) -> Result:
         If the file is missing or no result of a benchmark.
     """
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-        if content["format"] != FORMAT:
-            raise SepiError(f"{path}: a benchmark's result of format {content['format']}, expected {FORMAT}")
-        measurements = tuple(
-            Measurement(**{**m, "seconds": tuple(map(float, m["seconds"]))}) for m in content["measurements"]
-        )
-        if not all(m.seconds for m in measurements):
-            raise ValueError
-        return Result(content["machine"], content["settings"], measurements)
+        return _RESULT.validate_json(path.read_bytes())
     except OSError as error:
         raise SepiError(f"{path}: {error.strerror}") from error
-    except (ValueError, KeyError, TypeError) as error:
-        raise SepiError(f"{path}: not a benchmark's result (expected the JSON that `run` wrote)") from error
+    except ValidationError as error:
+        reason = error.errors()[0]["msg"]
+        raise SepiError(f"{path}: not a benchmark's result (expected the JSON that `run` wrote): {reason}") from error

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -29,40 +30,34 @@ Vector = npt.NDArray[np.float64]
 Solver = Callable[[Any, Vector, Vector, float], Vector]
 """Takes matrix, right side, start and the relative residual to reach."""
 
-MOST_STEPS = 20_000
+MAX_ITERATIONS = 20_000
 
 
-def own(matrix: Any, right: Vector, start: Vector, accuracy: float) -> Vector:
+def own(matrix: Any, right: Vector, start: Vector, rtol: float) -> Vector:
     """The project's: Jacobi, and multigrid where that does not arrive soon."""
-    return solve(matrix, right, start.astype(np.float32), accuracy)
+    return solve(matrix, right, start.astype(np.float32), rtol)
 
 
-def ruge_stuben(matrix: Any, right: Vector, start: Vector, accuracy: float) -> Vector:
-    """Conjugate gradients with classical algebraic multigrid."""
-    hierarchy = pyamg.ruge_stuben_solver(matrix)
-    return np.asarray(hierarchy.solve(right, x0=start, tol=accuracy, accel="cg", maxiter=500))
+def multigrid(kind: str, matrix: Any, right: Vector, start: Vector, rtol: float) -> Vector:
+    """Conjugate gradients with algebraic multigrid: ``ruge_stuben`` is classical, or ``smoothed_aggregation``."""
+    hierarchy = getattr(pyamg, f"{kind}_solver")(matrix)
+    return np.asarray(hierarchy.solve(right, x0=start, tol=rtol, accel="cg", maxiter=500))
 
 
-def smoothed_aggregation(matrix: Any, right: Vector, start: Vector, accuracy: float) -> Vector:
-    """Conjugate gradients with multigrid by smoothed aggregation."""
-    hierarchy = pyamg.smoothed_aggregation_solver(matrix)
-    return np.asarray(hierarchy.solve(right, x0=start, tol=accuracy, accel="cg", maxiter=500))
-
-
-def jacobi(matrix: Any, right: Vector, start: Vector, accuracy: float) -> Vector:
+def jacobi(matrix: Any, right: Vector, start: Vector, rtol: float) -> Vector:
     """Conjugate gradients with the diagonal."""
-    return _conjugate_gradients(matrix, right, start, accuracy, sparse.diags_array(1 / matrix.diagonal()))
+    return _conjugate_gradients(matrix, right, start, rtol, sparse.diags_array(1 / matrix.diagonal()))
 
 
-def incomplete(matrix: Any, right: Vector, start: Vector, accuracy: float) -> Vector:
+def incomplete(matrix: Any, right: Vector, start: Vector, rtol: float) -> Vector:
     """Conjugate gradients with an incomplete factorisation."""
     factors = linalg.spilu(
         matrix.tocsc(), drop_tol=1e-4, fill_factor=10, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0
     )
-    return _conjugate_gradients(matrix, right, start, accuracy, linalg.LinearOperator(matrix.shape, factors.solve))
+    return _conjugate_gradients(matrix, right, start, rtol, linalg.LinearOperator(matrix.shape, factors.solve))
 
 
-def direct(matrix: Any, right: Vector, start: Vector, accuracy: float) -> Vector:
+def direct(matrix: Any, right: Vector, start: Vector, rtol: float) -> Vector:
     """Sparse factorisation, ordered for a symmetric matrix."""
     factors = linalg.splu(
         matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0, options={"SymmetricMode": True}
@@ -73,18 +68,18 @@ def direct(matrix: Any, right: Vector, start: Vector, accuracy: float) -> Vector
 SOLVERS: dict[str, Solver] = {
     "direct (SuperLU)": direct,
     "sepi's": own,
-    "multigrid, Ruge-Stuben + CG": ruge_stuben,
-    "multigrid, smoothed aggregation + CG": smoothed_aggregation,
+    "multigrid, Ruge-Stuben + CG": partial(multigrid, "ruge_stuben"),
+    "multigrid, smoothed aggregation + CG": partial(multigrid, "smoothed_aggregation"),
     "Jacobi + CG": jacobi,
     "incomplete LU + CG": incomplete,
 }
 """Name to solver, the exact one first."""
 
 
-def _conjugate_gradients(matrix: Any, right: Vector, start: Vector, accuracy: float, inverse: Any) -> Vector:
-    solution, missed = linalg.cg(matrix, right, x0=start, rtol=accuracy, maxiter=MOST_STEPS, M=inverse)
+def _conjugate_gradients(matrix: Any, right: Vector, start: Vector, rtol: float, inverse: Any) -> Vector:
+    solution, missed = linalg.cg(matrix, right, x0=start, rtol=rtol, maxiter=MAX_ITERATIONS, M=inverse)
     if missed:
-        raise SepiError(f"no convergence in {MOST_STEPS} steps")
+        raise SepiError(f"no convergence in {MAX_ITERATIONS} iterations")
     return np.asarray(solution)
 
 

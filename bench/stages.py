@@ -89,12 +89,12 @@ def cases(
     return [Case("stages", name, prepare, arguments, threads=threads) for name, prepare, arguments in steps]
 
 
-def command(scene: Scene, threads: int, repeats: int, candidates: int) -> Measurement:
+def command(scene: Scene, threads: int, repeats: int, num_disparities: int) -> Measurement:
     """The command ``sepi depth``, from its start to its end: files to maps."""
     output = scene.folder / "depth"
     words = ["-m", "sepi", "depth", str(scene.source), "--output", str(output), "--threads", str(threads)]
     words += ["--variant", VARIANT]
-    words += [f"--set={name}.num_disparities={candidates}" for name in ("initial.sepi", "occlusion.half_sepi")]
+    words += [f"--set={name}.num_disparities={num_disparities}" for name in ("initial.sepi", "occlusion.half_sepi")]
     return measured_command("whole", "sepi depth, files to maps", words, repeats)
 
 

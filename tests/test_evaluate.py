@@ -9,7 +9,7 @@ import pytest
 from click.testing import CliRunner
 
 from sepi.errors import SepiError
-from sepi.evaluate import command, evaluate, evaluation_of, score
+from sepi.evaluate import command, evaluation_of, score
 from sepi.io.hdf5 import write_light_field, write_stage
 from sepi.io.scores import read_evaluations, read_scores
 from sepi.lightfield import DisparityRange, LightField
@@ -102,11 +102,11 @@ def test_region_limits_the_pixels() -> None:
     assert score(estimate, ground_truth, region=~region)["mse100"] == pytest.approx(100 / 3)
 
 
-def test_evaluate_names_protocols_and_regions() -> None:
+def test_scores_are_by_protocol_and_regions() -> None:
     ground_truth = np.zeros((40, 40), np.float32)
     mask = np.zeros((40, 40), bool)
     mask[:10] = True
-    result = evaluate(scene(ground_truth, {"occluded": mask}), ground_truth + np.float32(0.05))
+    result = evaluation_of(scene(ground_truth, {"occluded": mask}), ground_truth + np.float32(0.05)).scores
     assert list(result) == ["paper", "benchmark"]
     assert list(result["paper"]) == ["all", "occluded", "textureless"]
     assert result["paper"]["all"]["pixels"] == 1600
@@ -138,12 +138,12 @@ def test_error_map_is_signed_and_nan_where_unknown() -> None:
 
 
 def test_no_ground_truth_no_scores() -> None:
-    assert evaluate(scene(None), np.zeros((40, 40), np.float32)) == {}
+    assert evaluation_of(scene(None), np.zeros((40, 40), np.float32)).scores == {}
 
 
 def test_wrong_shape_is_a_clear_error() -> None:
     with pytest.raises(SepiError, match=r"noise: .*shape \(40, 40\), got \(40, 39\)"):
-        evaluate(scene(None), np.zeros((40, 39), np.float32))
+        evaluation_of(scene(None), np.zeros((40, 39), np.float32))
     with pytest.raises(SepiError, match=r"ground_truth .*\(2, 2\), got \(2, 3\)"):
         score(np.zeros((2, 2), np.float32), np.zeros((2, 3), np.float32))
 
@@ -180,7 +180,7 @@ def test_command_writes_what_evaluate_finds(tmp_path: Path) -> None:
     assert list(written) == list(back) == list(maps)
     for name, estimate in maps.items():
         assert set(written[name]) == {"paper", "benchmark"}
-        for protocol, cells in evaluate(light_field, estimate).items():
+        for protocol, cells in evaluation_of(light_field, estimate).scores.items():
             for region, scores in cells.items():
                 assert written[name][protocol][region] == pytest.approx(scores, nan_ok=True)
         found = back[name].evaluation

@@ -33,13 +33,13 @@ def write_bars(folder: Path, name: str, groups: Sequence[BarGroup]) -> None:
     for axis in axes[len(groups) :]:
         axis.set_axis_off()
     for axis, group in zip(axes, groups, strict=False):
-        place = np.arange(len(group.rows))
+        positions = np.arange(len(group.rows))
         for shift, key, colour in ((-0.2, "ours", _OURS), (0.2, "published", _PUBLISHED)):
             values = np.array([getattr(row, key) for row in group.rows], np.float64)
             if not np.isnan(values).all():
-                bars = axis.barh(place + shift, values, 0.38, color=colour)
+                bars = axis.barh(positions + shift, values, 0.38, color=colour)
                 axis.bar_label(bars, ["" if np.isnan(value) else f"{value:.2f}" for value in values], fontsize=6)
-        axis.set_yticks(place, [row.variant for row in group.rows], fontsize=7)
+        axis.set_yticks(positions, [row.variant for row in group.rows], fontsize=7)
         axis.invert_yaxis()
         axis.margins(x=0.15)
         count = f", {group.scenes} scenes" if group.scenes > 1 else ""
@@ -56,18 +56,18 @@ def write_times(folder: Path, name: str, rows: Sequence[StageTimes]) -> None:
     """Seconds of the stages, stacked, beside the peak memory of each; a bar per scene and variant."""
     figure = new_figure(9, 1.2 + 0.3 * len(rows))
     time, memory = figure.subplots(1, 2, sharey=True)
-    place = np.arange(len(rows))
+    positions = np.arange(len(rows))
     left = np.zeros(len(rows))
     stages = list(rows[0].seconds)
     for number, stage in enumerate(stages):
         seconds = np.array([row.seconds[stage] for row in rows])
         peaks = [row.memory[stage] for row in rows]
         colour = _STAGES[number % len(_STAGES)]
-        time.barh(place, seconds, 0.7, left=left, color=colour, label=stage)
+        time.barh(positions, seconds, 0.7, left=left, color=colour, label=stage)
         shift = (number + 0.5) / len(stages) - 0.5
-        memory.barh(place + 0.7 * shift, peaks, 0.6 / len(stages), color=colour)
+        memory.barh(positions + 0.7 * shift, peaks, 0.6 / len(stages), color=colour)
         left += seconds
-    time.set_yticks(place, [f"{row.scene}, {row.variant}" for row in rows], fontsize=7, parse_math=False)
+    time.set_yticks(positions, [f"{row.scene}, {row.variant}" for row in rows], fontsize=7, parse_math=False)
     time.invert_yaxis()
     time.set_xlabel("seconds", fontsize=8)
     memory.set_xlabel("peak memory / MB", fontsize=8)

@@ -115,8 +115,8 @@ def made_here(files: Sequence[Path]) -> dict[str, Any]:
 
 
 def as_text(value: Any) -> str:
-    """JSON in which what holds no lists or dictionaries stands on one line, so that a difference is easy to read."""
-    return _json(value, "") + "\n"
+    """JSON with a number per line, so that a difference is easy to read."""
+    return json.dumps(value, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
 
 
 def _scene(plan: Plan, dataset: str, scene: str, parts: bool) -> dict[str, Any]:
@@ -235,9 +235,9 @@ def _used(plan: Plan, parameters: Parameters, parts: bool) -> dict[str, dict[str
     """Parameters of the choices of these numbers' variants."""
     used: dict[str, dict[str, Any]] = {}
     for stage in plan.stages:
-        words = dict.fromkeys(plan.variants[variant][stage] for variant in (plan.parts if parts else plan.listed))
+        choices = dict.fromkeys(plan.variants[variant][stage] for variant in (plan.parts if parts else plan.listed))
         known = parameters.get(stage, {})
-        used[stage] = {word: dict(known[word]) for word in words if word in known}
+        used[stage] = {choice: dict(known[choice]) for choice in choices if choice in known}
     return used
 
 
@@ -252,24 +252,10 @@ def _memory_gb() -> float | None:
         return None
 
 
-def _json(value: Any, indent: str) -> str:
-    inner = list(value.values()) if isinstance(value, dict) else value if isinstance(value, list) else []
-    if not any(isinstance(one, dict | list) for one in inner):
-        return json.dumps(value, allow_nan=False, ensure_ascii=False)
-    deeper = indent + " "
-    if isinstance(value, dict):
-        texts = [f"{json.dumps(key, ensure_ascii=False)}: {_json(one, deeper)}" for key, one in value.items()]
-    else:
-        texts = [_json(one, deeper) for one in inner]
-    lines = f",\n{deeper}".join(texts)
-    opening, closing = "{}" if isinstance(value, dict) else "[]"
-    return f"{opening}\n{deeper}{lines}\n{indent}{closing}"
-
-
 def _parameters(text: str) -> Parameters:
     try:
         value = json.loads(text)
-        return {stage: {word: dict(found) for word, found in choices.items()} for stage, choices in value.items()}
+        return {stage: {choice: dict(found) for choice, found in choices.items()} for stage, choices in value.items()}
     except (ValueError, TypeError, AttributeError) as error:
         raise SepiError(
             f'--parameters: expected JSON such as {{"initial": {{"sepi": {{"num_disparities": 91}}}}}} ({error})'

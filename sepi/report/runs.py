@@ -12,7 +12,7 @@ from typing import Any
 
 from sepi.errors import SepiError
 from sepi.evaluate import WHOLE_MAP
-from sepi.io.scores import Scores
+from sepi.io.scores import AllScores
 from sepi.report.plan import MAIN_VARIANT, Plan
 
 Numbers = Mapping[str, Any]
@@ -35,7 +35,7 @@ class Runs:
 
     @cached_property
     def plan(self) -> Plan:
-        """Scenes, variants and imported methods; its files are not available."""
+        """Scenes, variants and external methods; its files are not available."""
         return Plan.from_json(Path(), json.dumps(self.numbers["plan"]))
 
     def light_field(self, dataset: str, scene: str) -> dict[str, Any]:
@@ -43,7 +43,7 @@ class Runs:
         found: dict[str, Any] = self._scene(dataset, scene)["light_field"]
         return found
 
-    def scores(self, dataset: str, scene: str, variant: str, stage: str | None = None) -> dict[str, dict[str, Scores]]:
+    def scores(self, dataset: str, scene: str, variant: str, stage: str | None = None) -> AllScores:
         """Protocol to region to scores after a stage, the last unless given; empty without ground truth."""
         stage = stage or self.plan.stages[-1]
         found = self._stage(dataset, scene, variant, stage)["scores"]
@@ -74,8 +74,8 @@ class Runs:
         found = self._scene(dataset, scene)["confidence"].get(variant)
         return None if found is None else {name: [_number(v) for v in values] for name, values in found.items()}
 
-    def external_scores(self, dataset: str, scene: str, method: str) -> dict[str, dict[str, Scores]]:
-        """Protocol to region to scores of an imported map; empty without a map that can be scored."""
+    def external_scores(self, dataset: str, scene: str, method: str) -> AllScores:
+        """Protocol to region to scores of another method's map; empty without a map that can be scored."""
         return _with_nan(self._scene(dataset, scene)["external"][method]["scores"])
 
     def external_score(
@@ -87,7 +87,7 @@ class Runs:
         region: str = WHOLE_MAP,
         protocol: str = "paper",
     ) -> float | None:
-        """A score of an imported map; None without a map that can be scored."""
+        """A score of another method's map; None without a map that can be scored."""
         scores = self.external_scores(dataset, scene, method)
         return scores[protocol][region][score] if scores else None
 
@@ -147,7 +147,7 @@ def read_json(path: Path, keys: set[str], what: str, module: str) -> dict[str, A
     return found
 
 
-def _with_nan(scores: Mapping[str, Mapping[str, Mapping[str, float | None]]]) -> dict[str, dict[str, Scores]]:
+def _with_nan(scores: Mapping[str, Mapping[str, Mapping[str, float | None]]]) -> AllScores:
     return {
         protocol: {region: {name: _number(value) for name, value in found.items()} for region, found in regions.items()}
         for protocol, regions in scores.items()

@@ -113,7 +113,7 @@ class TestTables:
         assert tables.floor_seconds(found, found.group("stages")["initial"]) == pytest.approx(2.5)
         rows = {row[0]: row for row in tables.steps(found).rows}
         assert "50 %" in rows["initial"]
-        assert rows["optimize"][5] is None
+        assert rows["optimize"][5] == ""
         assert rows["sum"][1] == "10.0"
 
     def test_time_per_sample_and_speed_up(self) -> None:
@@ -124,7 +124,7 @@ class TestTables:
                 for axis, value, seconds in (("num_disparities", 5, 2e-6), ("threads", 1, 8.0), ("threads", 2, 4.0))
             )
         )
-        assert tables.growth(found, "threads").rows[1][:3] == [2, "4.00", "2.00"]
+        assert tables.growth(found, "threads").rows[1][:3] == ["2", "4.00", "2.00"]
         # 2 microseconds for 100 pixels, 4 views, 5 candidates
         assert tables.growth(found, "num_disparities").rows[0][2] == "1.00"
 
@@ -147,7 +147,7 @@ class TestCompare:
     def test_ratio_of_what_both_measured(self, files: tuple[Path, Path]) -> None:
         called = CliRunner().invoke(main, ["compare", *map(str, files)])
         assert called.exit_code == 0
-        assert "| stages: initial | 2.00 | 1.00 | 0.50 | 100 | 100 | 1.50 | 1.50 |" in called.stdout
+        assert "| stages: initial | 2.00 | 1.00 | 0.50 | 100 | 100 | 1.50 | 1.50 |" in " ".join(called.stdout.split())
         assert "gone" not in called.stdout
         assert called.stderr == ""
 
@@ -210,7 +210,7 @@ def test_small_run_measures_everything(tmp_path: Path) -> None:
     assert cv2.imread(str(tmp_path / "bench.png")) is not None
     again = CliRunner().invoke(main, ["compare", *[str(tmp_path / "bench.json")] * 2])
     assert again.exit_code == 0
-    assert again.stdout.count("| 1.00 |") >= len(content["measurements"])
+    assert " ".join(again.stdout.split()).count("| 1.00 |") >= len(content["measurements"])
 
 
 def test_more_threads_than_cores(tmp_path: Path) -> None:

@@ -8,21 +8,7 @@ from sepi.report.plan import PARTS_TABLES, TABLES
 from sepi.report.runs import Runs
 from sepi.report.tables import BUILDERS
 from sepi.report.tabular.latex import as_latex, escaped
-from sepi.report.tabular.layout import (
-    BEST,
-    FIGURE,
-    OURS,
-    PUBLISHED,
-    SECOND,
-    TEXT,
-    Column,
-    Entry,
-    Grid,
-    Line,
-    Report,
-    Section,
-    Table,
-)
+from sepi.report.tabular.layout import BEST, SECOND, Column, Kind, Line, Report, Section, entry
 
 SPECIALS = "\\ { } $ & # % _ ~ ^ < > | \" ' ` [ ] * -- ---"
 
@@ -31,16 +17,16 @@ _COMMAND = re.compile(r"\\(begin|end)\{[a-z]+\*?\}|\\[a-zA-Z]+|\\[{}$&#%_]|\\\\$
 
 
 def report(sections: list[Section], caption: str = "All of it.", marked: str = "") -> Report:
-    return Report("Errors", caption, Table([], []), sections, marked)
+    return Report("Errors", caption, [], [], sections, marked)
 
 
 def section(*lines: Line, heading: str = "", columns: int = 3) -> Section:
-    heads = [Column("scene", TEXT), *(Column(f"figure {i}", FIGURE) for i in range(1, columns))]
-    return Section(heading, Grid(heads, lines))
+    heads = [Column("scene", Kind.TEXT), *(Column(f"figure {i}") for i in range(1, columns))]
+    return Section(heading, heads, lines)
 
 
 def line(*cells: str | float | None, kind: str = "") -> Line:
-    return Line([Entry(cell, TEXT if index == 0 else OURS) for index, cell in enumerate(cells)], kind)
+    return Line([entry(cell, Kind.OURS if index else Kind.TEXT) for index, cell in enumerate(cells)], kind)
 
 
 def require_sound(text: str) -> None:
@@ -80,7 +66,7 @@ def body_of(text: str) -> list[str]:
 
 def test_a_table_with_its_rules_and_marks() -> None:
     lines = [
-        Line([Entry("cotton", TEXT), Entry(0.5, OURS, BEST), Entry("0.70", PUBLISHED, SECOND)], "scene"),
+        Line([entry("cotton", Kind.TEXT), entry(0.5, Kind.OURS, BEST), entry("0.70", Kind.PUBLISHED, SECOND)], "scene"),
         line("wall", float("nan"), None, kind="scene"),
         line("Average of 2 scenes", 0.5, None, kind="average"),
         line("Average as printed", None, 4.34, kind="average printed"),

@@ -1,0 +1,159 @@
+"""Results for the report's tests: stage files with known errors, the numbers of them, and ways to look into tables."""
+
+import csv
+import json
+import re
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+
+from sepi.evaluate import evaluation_of, score_maps
+from sepi.external import NO_FILE
+from sepi.io.external_maps import ExternalMap, write_external
+from sepi.io.hdf5 import read_stage, write_light_field, write_stage
+from sepi.io.scores import Evaluation, map_name, write_scores
+from sepi.lightfield import DisparityRange, LightField
+from sepi.report import numbers, tables
+from sepi.report.plan import Plan
+from sepi.report.runs import Runs
+from sepi.report.tabular.layout import Report, as_csv
+from sepi.report.tabular.markdown import as_markdown
+from sepi.stage import StageMaps
+
+SIZE = 40
+SCENES = {"builtin": ["dots", "flat"], "hci": ["cotton", "mine", "picture"]}
+VARIANTS = {
+    "paper": {"initial": "sepi", "occlusion": "half_sepi", "textureless": "lti", "optimize": "wls"},
+    "no_occlusion": {"initial": "sepi", "occlusion": "none", "textureless": "lti", "optimize": "wls"},
+    "wang": {"initial": "sepi", "occlusion": "wang", "textureless": "lti", "optimize": "wls"},
+}
+# error added to the ground truth after each stage; the scenes' own is added too
+STAGE_ERROR = {"initial": 0.4, "occlusion": 0.3, "textureless": 0.2, "optimize": 0.1}
+VARIANT_ERROR = {"paper": 0.0, "no_occlusion": 0.1, "wang": 0.2, "best": -0.05, "best_wls": 0.3}
+SCENE_ERROR = {"dots": 0.0, "flat": 0.1, "cotton": 0.0, "mine": 0.1, "picture": 0.0}
+# what is added to the ground truth of a scene in another method's map, or what is wrong with it; one method has the
+# name of a column that is there anyway, and is the most accurate of all
+EXTERNAL: dict[str, dict[str, float | str]] = {
+    "SPO": {"cotton": 0.2, "mine": NO_FILE, "picture": 0.2, "dots": NO_FILE},
+    "zhou": {"cotton": 0.02, "mine": 0.04, "picture": NO_FILE, "dots": NO_FILE},
+    "odd|_name_": {"cotton": "80x40 instead of 40x40", "mine": "not readable", "picture": NO_FILE, "dots": NO_FILE},
+}
+
+
+def light_field(name: str) -> LightField:
+    random = np.random.default_rng(len(name))
+    views = random.integers(0, 256, (3, 3, SIZE, SIZE, 3), np.uint8)
+    ground_truth = (
+        None if name == "picture" else np.linspace(-1, 1, SIZE, dtype=np.float32) * np.ones((SIZE, 1), np.float32)
+    )
+    masks = {"occluded": np.zeros((SIZE, SIZE), bool), "textureless": np.ones((SIZE, SIZE), bool)}
+    if name != "flat":
+        masks["occluded"][5:10] = True
+    known = DisparityRange(-1.5, 1.5, "given")
+    return LightField(views, name, "test", disparity_range=known, ground_truth=ground_truth, masks=masks)
+
+
+def stage_maps(scene: LightField, variant: str, stage: str) -> StageMaps:
+    ground_truth = scene.ground_truth if scene.ground_truth is not None else np.zeros(scene.shape, np.float32)
+    step = np.float32(STAGE_ERROR[stage] + VARIANT_ERROR[variant] + SCENE_ERROR[scene.name])
+    extra = {
+        "occluded": scene.masks["occluded"],
+        "textureless": scene.masks["textureless"],
+        "superpixels": (np.indices(scene.shape) // 10).sum(0).astype(np.int32),
+    }
+    return StageMaps(ground_truth + step, np.full(scene.shape, 0.5, np.float32), extra)
+
+
+def with_results(made: Plan) -> Plan:
+    """The plan, its result files written."""
+    for dataset, name in made.pairs:
+        scene = light_field(name)
+        write_light_field(made.light_field_file(dataset, name), scene)
+        for variant in made.variants:
+            for stage in (stage for stage in made.stages if made.runs_stage(variant, stage)):
+                maps = stage_maps(scene, variant, stage)
+                step = {"stage": stage, "choice": made.variants[variant][stage], "parameters": "{}", "made_from": "[]"}
+                write_stage(made.stage_file(dataset, name, variant, stage), maps, step)
+                timing = made.stage_file(dataset, name, variant, stage, "time.json")
+                timing.write_text(json.dumps({"seconds": 1.5, "peak_memory_mb": 200 + 10 * len(stage)}))
+        folder = made.files(dataset, name).stages
+        for parts in (False, True):
+            files = made.scored_files(dataset, name, parts)
+            disparity = {map_name(folder, file): read_stage(file).disparity for file in files}
+            scored = score_maps(scene, disparity, {})[0]
+            write_scores(made.scores_file(dataset, name, parts), scored, {"scene": name})
+        if made.external:
+            maps = {method: external_map(scene, EXTERNAL[method][name]) for method in made.external}
+            write_external(made.external_file(dataset, name), maps)
+    return made
+
+
+def external_map(scene: LightField, what: float | str) -> ExternalMap:
+    """A map with this error added to the ground truth, or one with this problem."""
+    if isinstance(what, str):
+        return ExternalMap("/maps/none.pfm", what)
+    ground_truth = np.zeros(scene.shape, np.float32) if scene.ground_truth is None else scene.ground_truth
+    disparity = ground_truth + np.float32(what)
+    scores = Evaluation() if scene.ground_truth is None else evaluation_of(scene, disparity)
+    return ExternalMap("/maps/some.pfm", "", 64 * "a", disparity, scores)
+
+
+def numbers_of(plan: Plan, parts: bool = False) -> dict[str, Any]:
+    """The numbers of a plan as their file brings them."""
+    found: dict[str, Any] = json.loads(numbers.as_text(numbers.collect(plan, parts=parts)), parse_constant=pytest.fail)
+    return found
+
+
+def linked(plan: Plan, folder: Path, parts: bool = False) -> Plan:
+    """The plan in a folder that has the inputs of its numbers and nothing else."""
+    for path in plan.number_inputs(parts):
+        copied = folder / path.relative_to(plan.results)
+        copied.parent.mkdir(parents=True, exist_ok=True)
+        copied.hardlink_to(path)
+    return replace(plan, results=folder)
+
+
+def run(command: Any, plan: Plan, output: Path, *more: str) -> Result:
+    """Call a command of the report."""
+    arguments = ["--results", str(plan.results), "--plan", plan.to_json(), "--output", str(output), *more]
+    return CliRunner().invoke(command, arguments, catch_exceptions=False)
+
+
+def report_of(found: dict[str, Any], table: str) -> Report:
+    return tables.BUILDERS[table](Runs(found))
+
+
+def markdown(found: dict[str, Any], table: str) -> str:
+    """A table's Markdown, its columns not aligned."""
+    return re.sub(" +", " ", as_markdown(report_of(found, table)))
+
+
+def csv_rows(found: dict[str, Any], table: str) -> list[dict[str, str]]:
+    """Rows of a table's CSV file, in which cells may hold line breaks."""
+    return list(csv.DictReader(as_csv(report_of(found, table)).splitlines(keepends=True)))
+
+
+def only(rows: list[dict[str, str]], **cells: str) -> dict[str, str]:
+    found = [row for row in rows if all(row[key] == value for key, value in cells.items())]
+    assert len(found) == 1, (cells, found)
+    return found[0]
+
+
+def cells_of(found: dict[str, Any], table: str, heading: str, row: str) -> dict[str, Any]:
+    """Head of each column to the cell of the JSON in one row of one section of a table."""
+    (section,) = [one for one in found["tables"][table]["sections"] if one["heading"].split(":")[0] == heading]
+    (line,) = [line for line in section["rows"] if line["cells"][0]["text"] == row]
+    return {column["head"]: cell for column, cell in zip(section["columns"], line["cells"], strict=True)}
+
+
+def renamed(value: Any, names: dict[str, str]) -> Any:
+    """JSON in which keys and texts have other names."""
+    if isinstance(value, dict):
+        return {names.get(key, key): renamed(inner, names) for key, inner in value.items()}
+    if isinstance(value, list):
+        return [renamed(inner, names) for inner in value]
+    return names.get(value, value) if isinstance(value, str) else value

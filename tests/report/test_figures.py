@@ -1,0 +1,49 @@
+"""Pictures of a scene."""
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+from report_results import VARIANTS, light_field, run
+
+from sepi.report import figures
+from sepi.report.plan import Plan
+
+
+def draw(plan: Plan, folder: Path, dataset: str, scene: str) -> None:
+    result = run(figures.command, plan, folder, "--dataset", dataset, "--scene", scene)
+    assert result.exit_code == 0, result.output
+
+
+def test_pictures_of_a_scene(plan: Plan, tmp_path: Path) -> None:
+    draw(plan, tmp_path, "hci", "cotton")
+    written = {str(path.relative_to(tmp_path)) for path in tmp_path.rglob("*.png")}
+    common = {
+        "overview.png",
+        "centre.png",
+        "ground_truth.png",
+        "occluded_ground_truth.png",
+        "textureless_ground_truth.png",
+    }
+    stages = {"1_initial", "2_occlusion", "3_textureless", "4_optimize"}
+    each = stages | {"error", "confidence", "occluded", "textureless", "superpixels"}
+    common |= {"paper/sparsification.png", "pixels.png"}
+    common |= {f"{variant}/change.png" for variant in VARIANTS if variant != "paper"}
+    assert written == common | {f"{variant}/{name}.png" for variant in VARIANTS for name in each}
+    centre = cv2.imread(str(tmp_path / "centre.png"))[:, :, ::-1]
+    np.testing.assert_array_equal(centre, light_field("cotton").views[1, 1])
+
+
+def test_pictures_without_ground_truth(plan: Plan, tmp_path: Path) -> None:
+    """A real picture: maps, but neither truth nor errors."""
+    draw(plan, tmp_path, "hci", "picture")
+    written = {path.stem for path in tmp_path.rglob("*.png")}
+    assert {"overview", "centre", "4_optimize"} <= written
+    assert not written & {"ground_truth", "error", "occluded_truth", "textureless_truth"}
+
+
+def test_pictures_are_the_same_bytes_each_time(plan: Plan, tmp_path: Path) -> None:
+    for name in ("one", "two"):
+        draw(plan, tmp_path / name, "builtin", "dots")
+    for path in (tmp_path / "one").rglob("*.png"):
+        assert path.read_bytes() == (tmp_path / "two" / path.relative_to(tmp_path / "one")).read_bytes()
