@@ -1,4 +1,4 @@
-"""The picture in README.md: a built-in scene and its depth. ``python -m docs.make_example docs/example.png``."""
+"""The picture in README.md: a built-in scene and its depth. ``python docs/make_example.py docs/example.png``."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ SIZE = 256
 
 
 def panels() -> list[Panel]:
-    """Centre view, ground truth, estimate and signed error of the example scene."""
+    """Reference view, ground truth, estimate and signed error of the example scene."""
     light_field = render(SCENE, size=SIZE)
     assert light_field.ground_truth is not None
     disparity = estimate_depth(light_field).disparity
     limits = disparity_limits(light_field)
     return [
-        Panel("centre", "centre view", centre_picture(light_field)),
-        Panel("ground_truth", "true disparity", map_picture(light_field.ground_truth, limits)),
+        Panel("reference", "reference view", centre_picture(light_field)),
+        Panel("ground_truth", "ground truth", map_picture(light_field.ground_truth, limits)),
         Panel("disparity", "estimated disparity", map_picture(disparity, limits)),
         Panel("error", "error, ±0.2 px", error_picture(disparity - light_field.ground_truth)),
     ]
