@@ -37,7 +37,7 @@ class Prepared:
     call : callable
         What is timed.
     figures : callable
-        Takes what the last call returned; what is to be said of it (accuracy, residual, size). Not timed.
+        Takes what the last call returned; what is to be said of it (scores, residual, size). Not timed.
     """
 
     call: Callable[[], Any]
@@ -83,7 +83,7 @@ class Measurement:
     peak_memory_mb : float
         Of the whole process: interpreter, libraries and inputs included.
     figures : mapping of str to number
-        What was known beforehand, and what the case itself found (accuracy, residual, size).
+        What was known beforehand, and what the case itself found (scores, residual, size).
     """
 
     group: str
@@ -161,7 +161,7 @@ print(json.dumps([seconds, resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrs
 """
 
 
-def measured_command(group: str, name: str, words: Sequence[str], repeats: int) -> Measurement:
+def measured_command(group: str, name: str, arguments: Sequence[str], repeats: int) -> Measurement:
     """Measure a Python command as a user would: the whole process from start to end; once before, to warm the disk.
 
     Raises
@@ -171,7 +171,7 @@ def measured_command(group: str, name: str, words: Sequence[str], repeats: int) 
     """
     seconds, peaks = [], []
     for _ in range(repeats + 1):
-        command = [sys.executable, "-I", "-S", "-c", _STARTER, sys.executable, *words]
+        command = [sys.executable, "-I", "-S", "-c", _STARTER, sys.executable, *arguments]
         said, complained = _output(command)
         taken, peak, code = json.loads(said)
         if code:

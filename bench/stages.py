@@ -92,16 +92,16 @@ def cases(
 def command(scene: Scene, threads: int, repeats: int, num_disparities: int) -> Measurement:
     """The command ``sepi depth``, from its start to its end: files to maps."""
     output = scene.folder / "depth"
-    words = ["-m", "sepi", "depth", str(scene.source), "--output", str(output), "--threads", str(threads)]
-    words += ["--variant", VARIANT]
-    words += [f"--set={name}.num_disparities={num_disparities}" for name in ("initial.sepi", "occlusion.half_sepi")]
-    return measured_command("whole", "sepi depth, files to maps", words, repeats)
+    arguments = ["-m", "sepi", "depth", str(scene.source), "--output", str(output), "--threads", str(threads)]
+    arguments += ["--variant", VARIANT]
+    arguments += [f"--set={name}.num_disparities={num_disparities}" for name in ("initial.sepi", "occlusion.half_sepi")]
+    return measured_command("whole", "sepi depth, files to maps", arguments, repeats)
 
 
 def job(tiny: Path, output: Path, repeats: int) -> Measurement:
     """A job of the workflow on next to nothing: what start, imports and loading of the compiled kernels take."""
-    words = ["-m", "sepi.initial", "--choice", "sepi", "--light-field", str(tiny), "--output", str(output)]
-    return measured_command("whole", "start of a job", words, repeats)
+    arguments = ["-m", "sepi.initial", "--choice", "sepi", "--light-field", str(tiny), "--output", str(output)]
+    return measured_command("whole", "start of a job", arguments, repeats)
 
 
 def _scores(light_field: LightField, maps: StageMaps) -> Figures:

@@ -271,7 +271,7 @@ _PATH = click.Path(path_type=Path)
 
 @click.command(name="python -m sepi.evaluate", cls=SepiCommand)
 @click.option("--light-field", "light_field_path", type=_PATH, required=True, help="From ingest.")
-@click.option("--stages", type=_PATH, required=True, help="Folder of the stage files; their places name the maps.")
+@click.option("--stages", type=_PATH, required=True, help="Folder of the stage files; their paths in it name the maps.")
 @click.option("--code", default="", help="Digest of the code: maps that other code scored are scored anew.")
 @click.option("--kept", type=_PATH, help="Score file of an earlier call: what still holds in it is taken over.")
 @click.option("--output", type=_PATH, required=True, help="Score file (HDF5) to write, and then to keep.")

@@ -17,16 +17,17 @@ _PATH = click.Path(path_type=Path)
 @click.command(cls=SepiCommand, short_help="Show two disparity maps side by side on a page.")
 @click.argument("a", metavar="A", type=_PATH)
 @click.argument("b", metavar="B", type=_PATH)
-@click.argument("ground_truth", metavar="[TRUTH|SCENE]", type=_PATH, required=False)
+@click.argument("ground_truth", metavar="[GROUND_TRUTH|SCENE]", type=_PATH, required=False)
 @click.option("-o", "--output", type=_PATH, default=Path("compare.html"), show_default=True, help="Page to write.")
 @reading_flags
 def compare(a: Path, b: Path, ground_truth: Path | None, output: Path, reading: Reading) -> None:
     """Show the disparity maps A and B side by side on a page.
 
     A and B are maps of any program: PFM, HDF5 with a dataset 'disparity', NumPy (.npy), 'disparity_16bit.png', or a
-    folder that 'sepi depth' wrote. TRUTH is such a map, too; give the SCENE itself, a light field, to see its view
-    beside the maps, and to have regions scored. The page is one file and needs no network: a slider wipes between any
-    two of the maps, their differences and their errors; numbers and close-ups follow the cursor; a point cloud turns.
+    folder that 'sepi depth' wrote. GROUND_TRUTH is such a map, too; give the SCENE itself, a light field, to see its
+    view beside the maps, and to have regions scored. The page is one file and needs no network: a slider wipes between
+    any two of the maps, their differences and their errors; numbers and close-ups follow the cursor; a point cloud
+    turns.
 
     \b
     Examples:

@@ -22,7 +22,7 @@ _PATH = click.Path(path_type=Path)
 
 @click.command(cls=SepiCommand, short_help="Score a disparity map against ground truth.")
 @click.argument("estimate", type=_PATH)
-@click.argument("ground_truth", metavar="TRUTH|SCENE", type=_PATH)
+@click.argument("ground_truth", metavar="GROUND_TRUTH|SCENE", type=_PATH)
 @click.option("--border", type=click.IntRange(min=0), help="Score with this many pixels left out on each side only.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 @reading_flags
@@ -30,9 +30,9 @@ def evaluate(estimate: Path, ground_truth: Path, border: int | None, as_json: bo
     """Score the disparity map ESTIMATE against ground truth.
 
     ESTIMATE is a PFM, an HDF5 file with a dataset 'disparity', a NumPy file (.npy), a 'disparity_16bit.png', or a
-    folder that 'sepi depth' wrote. TRUTH is such a file; give the SCENE itself, a light field with ground truth, to
-    have its occluded and textureless regions scored too. Give the flags of 'sepi depth' that say how to read the SCENE
-    here, too. A folder that 'sepi depth' wrote knows which view it belongs to.
+    folder that 'sepi depth' wrote. GROUND_TRUTH is such a file; give the SCENE itself, a light field with ground truth,
+    to have its occluded and textureless regions scored too. Give the flags of 'sepi depth' that say how to read the
+    SCENE here, too. A folder that 'sepi depth' wrote knows which view it belongs to.
 
     Both protocols are used: 'paper' scores the whole map, 'benchmark' leaves out 15 pixels on each side.
 

@@ -19,7 +19,7 @@ _PARTIAL = click.option("--partial", is_flag=True, help="Take fewer than the ben
 @click.argument("result_path", metavar="RESULT", type=_PATH)
 @click.option("-o", "--output", type=_PATH, help="PLY file to write; points.ply beside the result unless given.")
 @click.option("--min-confidence", type=float, default=0.0, metavar="X", help="Leave out less sure pixels; 0 to 1.")
-@click.option("--max-depth", type=float, metavar="M", help="Leave out points farther than this many metres.")
+@click.option("--max-depth", type=float, metavar="M", help="Leave out points more distant than this many metres.")
 @click.option("--step", type=click.IntRange(min=1), default=1, metavar="N", help="Use every Nth row and column only.")
 @camera_flags
 def points(

@@ -1,4 +1,4 @@
-"""The argument TRUTH|SCENE of the commands that score maps: a map, or a light field read from the view of the maps."""
+"""The argument GROUND_TRUTH|SCENE of the commands that score maps: a map, or a light field from the maps' view."""
 
 from __future__ import annotations
 

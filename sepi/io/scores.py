@@ -68,7 +68,7 @@ class Scored:
 
 
 def map_name(stages: Path, file: Path) -> str:
-    """Name of the map in a stage file: the file's place in the folder of a scene's stage files.
+    """Name of the map in a stage file: its folder within the folder of a scene's stage files.
 
     Raises
     ------

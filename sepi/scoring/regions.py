@@ -20,7 +20,7 @@ WINDOW = 7
 ENERGY_THRESHOLD = 0.005
 """Root-mean-square gradient under which a pixel has no texture: part of the full range per pixel (1.3 of 255 steps)."""
 
-SMALLEST_AREA = 225
+MIN_AREA = 225
 """Pixels: smaller patches are dropped and smaller holes filled (one superpixel of the paper, 15 x 15)."""
 
 # half a pixel, and a little more so that rounding of float32 disparities decides no tie
@@ -32,7 +32,7 @@ _STRETCH = 2.0
 def occluded(
     ground_truth: FloatMap,
     grid: tuple[int, int],
-    reference: tuple[int, int] | None = None,
+    reference_position: tuple[int, int] | None = None,
     present: BoolMap | None = None,
 ) -> BoolMap:
     """Pixels of the reference view that at least one other view does not see.
@@ -50,8 +50,8 @@ def occluded(
         Disparity in pixels per view step; pixels that are not finite neither hide nor are hidden.
     grid : tuple of int
         Number of view rows and columns ``(T, S)``.
-    reference : tuple of int, optional
-        Place of the reference view; the centre unless given.
+    reference_position : tuple of int, optional
+        Position of the reference view; the centre unless given.
     present : ndarray, shape (T, S), bool, optional
         Which views there are; all unless given.
 
@@ -61,7 +61,7 @@ def occluded(
         A pixel that falls outside a view counts as seen by it.
     """
     rows, columns = grid
-    t0, s0 = reference or (rows // 2, columns // 2)
+    t0, s0 = reference_position or (rows // 2, columns // 2)
     offsets = [
         (t - t0, s - s0)
         for t in range(rows)
@@ -82,12 +82,12 @@ def textureless(reference_view: FloatMap) -> BoolMap:
     """Pixels of the reference view round which the image hardly changes.
 
     The energy is the squared gradient, averaged over the channels and over a window of ``WINDOW`` pixels; its root is
-    compared with ``ENERGY_THRESHOLD``. Patches and holes under ``SMALLEST_AREA`` are removed.
+    compared with ``ENERGY_THRESHOLD``. Patches and holes under ``MIN_AREA`` are removed.
 
     Parameters
     ----------
     reference_view : ndarray, shape (H, W, 3), float32
-        Centre view in 0..1.
+        In 0..1.
 
     Returns
     -------
@@ -106,7 +106,7 @@ def textureless(reference_view: FloatMap) -> BoolMap:
 
 def _without_small(mask: BoolMap) -> BoolMap:
     labels, _ = ndimage.label(mask)
-    large = np.bincount(labels.ravel()) >= SMALLEST_AREA
+    large = np.bincount(labels.ravel()) >= MIN_AREA
     large[0] = False
     kept: BoolMap = large[labels]
     return kept

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from sepi.io.pfm import read_pfm
-from sepi.scoring.regions import SMALLEST_AREA, occluded, textureless
+from sepi.scoring.regions import MIN_AREA, occluded, textureless
 
 
 def buffered(ground_truth: np.ndarray, grid: tuple[int, int]) -> np.ndarray:
@@ -118,7 +118,7 @@ def test_shading_without_texture_is_textureless() -> None:
 
 
 def test_small_patches_and_holes_are_cleaned_up() -> None:
-    side = int(SMALLEST_AREA**0.5)
+    side = int(MIN_AREA**0.5)
     centre = np.full((90, 90, 1), 0.5, np.float32)
     centre[40, 40] = 0.6
     assert textureless(centre).all()

@@ -11,25 +11,22 @@ from sepi.report.tabular import methods
 from sepi.report.tabular.layout import Cell, Column, Kind, Line, Report, Section, entry, ranks
 from sepi.report.tabular.methods import Method
 
-# dataset and region
-_Place = tuple[str, str]
-
 
 def region_table(runs: Runs) -> Report:
     """Table 3: average MSE x100 over occluded and textureless regions."""
     plan = runs.plan
     datasets = [one for one in methods.datasets_of(plan) if one in published.DATASETS or runs.scored(one)]
-    places = [(dataset, region) for dataset in datasets for region in REGIONS if region != WHOLE_MAP]
+    columns = [(dataset, region) for dataset in datasets for region in REGIONS if region != WHOLE_MAP]
     in_paper = {key for figures in published.table3().values() for key in figures}
     rows = [
         method
         for method in methods.compared_methods(plan)
         if method.kind in (Kind.OURS, Kind.EXTERNAL) or method.key in in_paper
     ]
-    figures = {method: [_average(runs, method, *place) for place in places] for method in rows}
+    figures = {method: [_average(runs, method, *column) for column in columns] for method in rows}
     cells = {method: [method.shown(figure) for figure in figures[method]] for method in rows}
     marks = list(
-        zip(*(_marks(runs, figures, index, dataset) for index, (dataset, _) in enumerate(places)), strict=True)
+        zip(*(_marks(runs, figures, index, dataset) for index, (dataset, _) in enumerate(columns)), strict=True)
     )
     lines = [
         Line(
@@ -44,9 +41,9 @@ def region_table(runs: Runs) -> Report:
         f"{methods.PROTOCOL_NOTE} This code: variants {methods.own_names(plan)}, average of the scenes available that "
         f"have such a region ({available}). Other rows: as the paper prints them, over all scenes of the dataset. "
         f"{methods.REGIONS_NOTE} {methods.LEARNED_NOTE}" + (f" {methods.EXTERNAL_NOTE}" if plan.external else ""),
-        ["method", "learning", *(f"{dataset}_{region}" for dataset, region in places)],
+        ["method", "learning", *(f"{dataset}_{region}" for dataset, region in columns)],
         [[method.key, method.learning, *cells[method]] for method in rows],
-        [Section("", [Column("method", Kind.TEXT), *(Column(", ".join(place)) for place in places)], lines)],
+        [Section("", [Column("method", Kind.TEXT), *(Column(", ".join(column)) for column in columns)], lines)],
         "Marked: best and second best in a column, of the published methods that are not learned, and of this code "
         "where it ran on every scene that the published averages are over",
     )
