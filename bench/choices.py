@@ -7,7 +7,6 @@ any scenes with ground truth, given as folders, files or names of built-in scene
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -24,46 +23,39 @@ from sepi.reading import read_light_field
 from sepi.scenes import SCENES, render
 from sepi.stage import StageMaps, no_progress
 
-
-@dataclass(frozen=True)
-class Alternative:
-    """A change to the parameters of one stage of variant ``paper``."""
-
-    label: str
-    stage: str = ""
-    values: dict[str, Any] = field(default_factory=dict)
-
-
-ALTERNATIVES = (
-    Alternative("as chosen"),
-    Alternative("no cost window", "initial", {"window_radius": 0}),
-    Alternative("3x3 window", "initial", {"window_radius": 1}),
-    Alternative("box window (colour ignored)", "initial", {"window_sigma": 10.0}),
-    Alternative("squared differences (scale 1)", "initial", {"scale": 1.0}),
-    Alternative("scale doubled", "initial", {"scale": 0.033}),
-    Alternative("91 candidates", "initial", {"num_disparities": 91}),
-    Alternative("gains doubled", "occlusion", {"gain_half": 0.03, "gain_quarter": 0.06}),
-    Alternative("halves only, no quarters", "occlusion", {"gain_quarter": 1.0}),
-    Alternative("side not confirmed", "occlusion", {"gain_unconfirmed": 0.0}),
-    Alternative("only confirmed sides", "occlusion", {"gain_unconfirmed": 2.0}),
-    Alternative("candidates within 4 px", "occlusion", {"candidate_reach": 4}),
-    Alternative("planes overrule any depth", "textureless", {"min_support": 1.0, "keep_confidence": 1.0}),
-    Alternative("planes smooth only", "textureless", {"min_support": 0.0}),
-    Alternative("no continuity between superpixels", "textureless", {"continuity": 0.0}),
-    Alternative("data weight at discontinuities as printed", "optimize", {"discontinuity_weight": 1e-6}),
-    Alternative("no cut of the data weight at discontinuities", "optimize", {"discontinuity_weight": 1.0}),
-    Alternative("confidence itself as weight", "optimize", {"confidence_power": 1.0}),
-    Alternative("alpha a third", "optimize", {"alpha": 1e-6}),
-    Alternative("alpha threefold", "optimize", {"alpha": 1e-5}),
-)
+ALTERNATIVES: dict[str, tuple[str, dict[str, Any]]] = {
+    "as chosen": ("", {}),
+    "no cost window": ("initial", {"window_radius": 0}),
+    "3x3 window": ("initial", {"window_radius": 1}),
+    "box window (colour ignored)": ("initial", {"window_sigma": 10.0}),
+    "squared differences (scale 1)": ("initial", {"scale": 1.0}),
+    "scale doubled": ("initial", {"scale": 0.033}),
+    "91 candidates": ("initial", {"num_disparities": 91}),
+    "gains doubled": ("occlusion", {"gain_half": 0.03, "gain_quarter": 0.06}),
+    "halves only, no quarters": ("occlusion", {"gain_quarter": 1.0}),
+    "side not confirmed": ("occlusion", {"gain_unconfirmed": 0.0}),
+    "only confirmed sides": ("occlusion", {"gain_unconfirmed": 2.0}),
+    "candidates within 4 px": ("occlusion", {"candidate_reach": 4}),
+    "planes overrule any depth": ("textureless", {"min_support": 1.0, "keep_confidence": 1.0}),
+    "planes smooth only": ("textureless", {"min_support": 0.0}),
+    "no continuity between superpixels": ("textureless", {"continuity": 0.0}),
+    "data weight at discontinuities as printed": ("optimize", {"discontinuity_weight": 1e-6}),
+    "no cut of the data weight at discontinuities": ("optimize", {"discontinuity_weight": 1.0}),
+    "confidence itself as weight": ("optimize", {"confidence_power": 1.0}),
+    "alpha a third": ("optimize", {"alpha": 1e-6}),
+    "alpha threefold": ("optimize", {"alpha": 1e-5}),
+}
+"""Label to a stage of variant ``paper`` and the parameters of it that differ."""
 
 
-def final_maps(light_field: LightField, alternative: Alternative, known: dict[tuple[Any, ...], StageMaps]) -> StageMaps:
-    """Maps of variant ``paper`` with one alternative; stages before the change are taken from ``known``."""
+def final_maps(
+    light_field: LightField, changed: str, parameters: dict[str, Any], known: dict[tuple[Any, ...], StageMaps]
+) -> StageMaps:
+    """Maps of variant ``paper`` with a changed stage; stages before the change are taken from ``known``."""
     maps: StageMaps | None = None
     key: tuple[Any, ...] = ()
     for stage, choice in variant_named("paper").choices.items():
-        values = alternative.values if stage == alternative.stage else {}
+        values = parameters if stage == changed else {}
         key = (*key, tuple(sorted(values.items())))
         if key not in known:
             selected = STAGES[stage][choice]
@@ -82,15 +74,15 @@ def opened(name: str) -> LightField:
 def table(scenes: list[str]) -> str:
     """Markdown: a row per alternative, a column per scene, MSE x100 / Q25 x100 / BadPix 0.07 % on the whole map."""
     names = []
-    columns = [[alternative.label for alternative in ALTERNATIVES]]
+    columns = [list(ALTERNATIVES)]
     for scene in scenes:
         light_field = opened(scene)
         if light_field.ground_truth is None:
             raise SepiError(f"{scene}: has no ground truth to score against")
         known: dict[tuple[Any, ...], StageMaps] = {}
         found = [
-            score(final_maps(light_field, alternative, known).disparity, light_field.ground_truth)
-            for alternative in ALTERNATIVES
+            score(final_maps(light_field, *alternative, known).disparity, light_field.ground_truth)
+            for alternative in ALTERNATIVES.values()
         ]
         names.append(light_field.name)
         columns.append([f"{s['mse100']:.2f} / {s['q25']:.2f} / {s['badpix007']:.1f}" for s in found])

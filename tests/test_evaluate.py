@@ -193,28 +193,26 @@ def test_command_writes_what_evaluate_finds(tmp_path: Path) -> None:
 
 TRUTH = np.random.default_rng(5).normal(size=(40, 40)).astype(np.float32)
 MAPS = {name: noisy(TRUTH, seed) for seed, name in enumerate(["sepi", "sepi/none/lti", "semi_global"])}
+OTHER = noisy(TRUTH, 9)
 
 
 class TestOnlyWhatChangedIsScoredAnew:
     """A scene has one score file: a change in one variant must not cost the scores of all, nor leave old ones."""
 
-    def test_a_changed_map(self, tmp_path: Path) -> None:
+    @pytest.mark.parametrize(
+        ("maps", "told"),
+        [
+            (MAPS, "0 of 3 maps scored anew"),
+            (MAPS | {"sepi/none/lti": OTHER}, "1 of 3 maps scored anew: sepi/none/lti"),
+            ({"wang": OTHER, "semi_global": MAPS["semi_global"]}, "1 of 2 maps scored anew: wang"),
+        ],
+        ids=["nothing", "a map", "another map and fewer"],
+    )
+    def test_changed_maps(self, tmp_path: Path, maps: dict[str, np.ndarray], told: str) -> None:
         run_command(tmp_path, scene(TRUTH), MAPS)
-        changed = MAPS | {"sepi/none/lti": noisy(TRUTH, 9)}
-        path, told = run_command(tmp_path, scene(TRUTH), changed)
-        assert "1 of 3 maps scored anew: sepi/none/lti" in told
-        assert path.read_bytes() == run_command(tmp_path, scene(TRUTH), changed, "fresh.h5")[0].read_bytes()
-
-    def test_a_further_map_and_one_less(self, tmp_path: Path) -> None:
-        run_command(tmp_path, scene(TRUTH), MAPS)
-        others = {"wang": noisy(TRUTH, 9), **{name: MAPS[name] for name in ("semi_global", "sepi")}}
-        path, told = run_command(tmp_path, scene(TRUTH), others)
-        assert "1 of 3 maps scored anew: wang" in told
-        assert path.read_bytes() == run_command(tmp_path, scene(TRUTH), others, "fresh.h5")[0].read_bytes()
-
-    def test_nothing_changed(self, tmp_path: Path) -> None:
-        run_command(tmp_path, scene(TRUTH), MAPS)
-        assert "0 of 3 maps scored anew" in run_command(tmp_path, scene(TRUTH), MAPS)[1]
+        path, found = run_command(tmp_path, scene(TRUTH), maps)
+        assert told in found
+        assert path.read_bytes() == run_command(tmp_path, scene(TRUTH), maps, "fresh.h5")[0].read_bytes()
 
     @pytest.mark.parametrize("what", ["ground_truth", "mask", "picture", "code"])
     def test_what_changes_all_scores(self, tmp_path: Path, what: str) -> None:

@@ -127,10 +127,25 @@ def write_submission(path: Path, entries: Mapping[str, Entry], *, partial: bool 
     SepiError
         If the submission has a problem, as :func:`problems_of` finds it, or cannot be written.
     """
-    try:
-        _write(path, entries, partial)
-    except OSError as error:
-        raise SepiError(f"{path}: cannot be written ({error.strerror or error})") from error
+    with tempfile.TemporaryDirectory(prefix="sepi-") as name:
+        files: dict[str, Path] = {}
+        for scene, entry in entries.items():
+            disparity, runtime = _names_of(scene)
+            files |= {disparity: entry.disparity, runtime: Path(name) / f"{scene}.txt"}
+            files[runtime].write_text(f"{entry.seconds:.10g}\n", encoding="ascii")
+        problems = _strangers(files) + _problems_in(files, {}, partial)
+        if problems:
+            more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
+            raise SepiError(f"{path}: not written: {problems[0]}{more}")
+        try:
+            with atomic_path(path) as temporary, zipfile.ZipFile(temporary, "w") as archive:
+                for inner, file in sorted(files.items()):
+                    # neither dates nor compression, which differ from run to run and from library to library
+                    info = zipfile.ZipInfo(inner)
+                    info.create_system, info.external_attr = 3, (stat.S_IFREG | 0o644) << 16
+                    archive.writestr(info, file.read_bytes())
+        except OSError as error:
+            raise SepiError(f"{path}: cannot be written ({error.strerror or error})") from error
 
 
 def problems_of(path: Path, *, partial: bool = False) -> list[str]:
@@ -164,25 +179,6 @@ def problems_of(path: Path, *, partial: bool = False) -> list[str]:
     raise SepiError(f"{path}: no such file or folder")
 
 
-def _write(path: Path, entries: Mapping[str, Entry], partial: bool) -> None:
-    with tempfile.TemporaryDirectory(prefix="sepi-") as name:
-        files = {}
-        for scene, entry in entries.items():
-            files[f"{MAPS}/{scene}.pfm"] = entry.disparity
-            files[f"{RUNTIMES}/{scene}.txt"] = Path(name) / f"{scene}.txt"
-            files[f"{RUNTIMES}/{scene}.txt"].write_text(f"{entry.seconds:.10g}\n", encoding="ascii")
-        problems = _strangers(files) + _problems_in(files, {}, partial)
-        if problems:
-            more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
-            raise SepiError(f"{path}: not written: {problems[0]}{more}")
-        with atomic_path(path) as temporary, zipfile.ZipFile(temporary, "w") as archive:
-            for inner, file in sorted(files.items()):
-                # neither dates nor compression, which differ from run to run and from library to library
-                info = zipfile.ZipInfo(inner)
-                info.create_system, info.external_attr = 3, (stat.S_IFREG | 0o644) << 16
-                archive.writestr(info, file.read_bytes())
-
-
 def _problems_of_archive(path: Path, partial: bool) -> list[str]:
     try:
         archive = zipfile.ZipFile(path)
@@ -202,18 +198,16 @@ def _unpacked(archive: zipfile.ZipFile, folder: Path) -> tuple[dict[str, Path], 
     for number, info in enumerate(archive.infolist()):
         if info.filename not in _EXPECTED:
             continue
-        problem = _unpacking_problem(info)
-        if problem is None:
-            try:
-                # under a name that the archive has no say in
-                target = folder / f"{number}"
-                target.write_bytes(archive.read(info))
-            except (zipfile.BadZipFile, zlib.error, EOFError, RuntimeError, ValueError, OSError) as error:
-                problem = f"cannot be unpacked ({error})"
-            else:
-                files[info.filename] = target
-        if problem is not None:
+        # under a name that the archive has no say in
+        target = folder / f"{number}"
+        if problem := _unpacking_problem(info):
             damaged[info.filename] = problem
+            continue
+        try:
+            target.write_bytes(archive.read(info))
+            files[info.filename] = target
+        except (zipfile.BadZipFile, zlib.error, EOFError, RuntimeError, ValueError, OSError) as error:
+            damaged[info.filename] = f"cannot be unpacked ({error})"
     return files, damaged
 
 
@@ -268,19 +262,20 @@ def _strangeness(name: str) -> str:
 
 def _problems_in(files: Mapping[str, Path], damaged: Mapping[str, str], partial: bool) -> list[str]:
     """Problems with what a submission must hold: ``files`` by name, ``damaged`` those that cannot be read, and why."""
-    there = {name for name in _EXPECTED if name in damaged or name in files}
-    absent = [part for part in (MAPS, RUNTIMES) if not any(name.startswith(f"{part}/") for name in there)]
+    known = {*damaged, *files}
+    absent = [part for part in (MAPS, RUNTIMES) if not any(_root(name) == part for name in known & _EXPECTED)]
     problems = [f"{part}/: no such folder with files of the benchmark's scenes" for part in absent]
-    for part, end in ((MAPS, "pfm"), (RUNTIMES, "txt")):
-        for scene in SCENES:
-            name = f"{part}/{scene}.{end}"
+    for names in zip(*map(_names_of, SCENES), strict=True):
+        for scene, name in zip(SCENES, names, strict=True):
+            part = _root(name)
+            problem = None
             if name in damaged:
-                problems.append(f"{name}: {damaged[name]}")
+                problem = damaged[name]
             elif name in files:
                 problem = _map_problem(files[name]) if part == MAPS else _seconds_in(files[name])[1]
-                problems += [f"{name}: {problem}"] if problem else []
-            elif part not in absent and not (partial and there.isdisjoint(_names_of(scene))):
-                problems.append(f"{name}: missing")
+            elif part not in absent and not (partial and known.isdisjoint(_names_of(scene))):
+                problem = "missing"
+            problems += [f"{name}: {problem}"] if problem else []
     return problems
 
 
