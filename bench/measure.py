@@ -24,10 +24,6 @@ from sepi.threads import use_threads
 Figures = dict[str, float]
 
 
-def _nothing(_: Any) -> Figures:
-    return {}
-
-
 @dataclass(frozen=True)
 class Prepared:
     """A case whose inputs are available.
@@ -41,7 +37,7 @@ class Prepared:
     """
 
     call: Callable[[], Any]
-    figures: Callable[[Any], Figures] = _nothing
+    figures: Callable[[Any], Figures] = lambda _: {}
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict
@@ -19,6 +18,7 @@ from typing import Any
 import click
 import numpy as np
 import numpy.typing as npt
+import psutil
 
 from sepi.command import SepiCommand
 from sepi.errors import SepiError
@@ -107,7 +107,7 @@ def made_here(files: Sequence[Path]) -> dict[str, Any]:
         "machine": {
             "processor": machine["processor"],
             "cores": machine["cores"],
-            "memory_gb": _memory_gb(),
+            "memory_gb": round(psutil.virtual_memory().total / 2**30, 1),
             "system": machine["system"],
         },
         "libraries": libraries,
@@ -243,13 +243,6 @@ def _used(plan: Plan, parameters: Parameters, parts: bool) -> dict[str, dict[str
 
 def _digest(values: npt.NDArray[Any]) -> str:
     return hashlib.sha256(np.ascontiguousarray(values).data.cast("B")).hexdigest()
-
-
-def _memory_gb() -> float | None:
-    try:
-        return round(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 2**30, 1)
-    except (AttributeError, OSError, ValueError):
-        return None
 
 
 def _parameters(text: str) -> Parameters:

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from bench import plan, tables
+from bench import choices, plan, tables
 from bench.__main__ import main
 from bench.measure import Case, Measurement, Prepared, measured, measured_command
 from bench.plain import Warp, by_numpy, by_opencv, by_scipy, plain_sweep
@@ -99,6 +99,17 @@ def test_every_solver_gives_the_exact_solution() -> None:
     for solver in SOLVERS.values():
         solution = solver(matrix, right, np.zeros(1200), 1e-10)
         np.testing.assert_allclose(solution.ravel(), exact, atol=1e-5)
+
+
+def test_choices_are_changed_one_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The table of docs/method.md: a row for each change, scored by itself."""
+    monkeypatch.setattr(choices, "opened", lambda name: render(name, size=64, views=3))
+    some = {"as chosen": ("", {}), "no window": ("initial", {"window_radius": 0}), "again": ("", {})}
+    monkeypatch.setattr(choices, "ALTERNATIVES", some)
+    head, _, *rows = ([cell.strip() for cell in row.split("|")[1:3]] for row in choices.table(["dots"]).splitlines())
+    assert head == ["changed", "dots"]
+    assert [name for name, _ in rows] == list(some)
+    assert rows[0][1] == rows[2][1] != rows[1][1]
 
 
 class TestTables:

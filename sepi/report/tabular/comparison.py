@@ -66,10 +66,10 @@ def scene_table(runs: Runs, score: str, paper: SceneTable, title: str) -> Report
     for dataset in methods.datasets_of(plan):
         found = _rows(runs, dataset, score, paper, columns)
         data += [[dataset, row.name, row.kind, *row.cells(columns)] for row in found]
-        shown = [m for m in columns if m.kind != Kind.EXTERNAL or methods.has_column(runs, dataset, m.name)]
+        shown = [method for method in columns if _is_shown(runs, dataset, method, found)]
         heads = [Column("scene", Kind.TEXT), *(Column(method.head, method.kind) for method in shown)]
-        section = Section(methods.dataset_title(dataset), heads, [row.line(shown) for row in found])
-        sections += [section.without_empty()] if found else []
+        if found:
+            sections.append(Section(methods.dataset_title(dataset), heads, [row.line(shown) for row in found]))
     return Report(
         title,
         f"{methods.PROTOCOL_NOTE} This code: variants {methods.own_names(plan)}; then each figure of these divided by "
@@ -83,6 +83,13 @@ def scene_table(runs: Runs, score: str, paper: SceneTable, title: str) -> Report
         sections,
         "Marked: best and second best in a row, of this code and the published methods that are not learned",
     )
+
+
+def _is_shown(runs: Runs, dataset: str, method: Method, rows: Sequence[_SceneRow]) -> bool:
+    """Whether a method has a column on a dataset's page: ours always, others where something stands in it."""
+    if method.kind == Kind.EXTERNAL and not methods.has_column(runs, dataset, method.name):
+        return False
+    return method.kind == Kind.OURS or any(row.figure(method) is not None for row in rows)
 
 
 def _rows(runs: Runs, dataset: str, score: str, paper: SceneTable, columns: Sequence[Method]) -> list[_SceneRow]:

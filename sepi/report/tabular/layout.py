@@ -83,16 +83,6 @@ class Section:
     columns: Sequence[Column]
     rows: Sequence[Line]
 
-    def without_empty(self) -> Section:
-        """The same without columns of published or external figures or ratios in which nothing stands."""
-        kept = [
-            index
-            for index, column in enumerate(self.columns)
-            if column.kind in (Kind.TEXT, Kind.FIGURE, Kind.OURS) or any(row.cells[index].text for row in self.rows)
-        ]
-        rows = [Line([row.cells[index] for index in kept], row.kind, row.available) for row in self.rows]
-        return Section(self.heading, [self.columns[index] for index in kept], rows)
-
 
 @dataclass(frozen=True)
 class Report:
