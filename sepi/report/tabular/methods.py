@@ -67,11 +67,15 @@ def compared_methods(plan: Plan) -> list[Method]:
             for m in published.methods().values()
         ),
     ]
-    # an external method with the name of a column that is there anyway is told apart
     taken = {"dataset", "scene", "row", "method", "learning", *(method.key for method in methods)}
-    heads = {name: f"{name} (external)" for name in plan.external}
-    keys = {name: head if name in taken else name for name, head in heads.items()}
-    return [*methods, *(Method(name, keys[name], head, Kind.EXTERNAL) for name, head in heads.items())]
+    for name in plan.external:
+        key = name
+        # one with the name of a column that is there anyway is told apart
+        while key in taken:
+            key += " (external)"
+        taken.add(key)
+        methods.append(Method(name, key, f"{name} (external)", Kind.EXTERNAL))
+    return methods
 
 
 def external_cell(runs: Runs, dataset: str, scene: str, method: str, score: str) -> Cell:
