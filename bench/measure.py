@@ -11,8 +11,8 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field
-from multiprocessing.connection import Connection
 from typing import Annotated, Any
 
 from pydantic import Field
@@ -107,44 +107,33 @@ def measured(case: Case, repeats: int) -> Measurement:
     context.set_forkserver_preload(
         ["bench.plan", "sepi.matching.plane_sweep_kernels", "sepi.image.mean_shift", "skimage.segmentation"]
     )
-    receiver, sender = context.Pipe(duplex=False)
-    process = context.Process(target=_measure, args=(case, repeats, sender), daemon=True)
-    process.start()
-    sender.close()
     try:
-        answer = receiver.recv()
-    except EOFError:
-        process.join()
-        answer = f"the process ended with code {process.exitcode}"
-    except BaseException:
-        # an interrupt: nothing is left running
-        process.terminate()
-        raise
-    finally:
-        receiver.close()
-        process.join()
-    if isinstance(answer, str):
-        raise SepiError(f"benchmark {case.group}, {case.name}: {answer}")
-    seconds, memory, figures = answer
+        with ProcessPoolExecutor(1, context) as pool:
+            future = pool.submit(_measure, case, repeats)
+            try:
+                seconds, memory, figures = future.result()
+            except KeyboardInterrupt:
+                for process in multiprocessing.active_children():
+                    process.terminate()
+                raise
+    except Exception as error:
+        reason = " ".join(f"{type(error).__name__}: {error}".split())
+        raise SepiError(f"benchmark {case.group}, {case.name}: {reason}") from error
     return Measurement(case.group, case.name, tuple(seconds), memory, {**case.figures, **figures})
 
 
-def _measure(case: Case, repeats: int, sender: Connection) -> None:
-    """In the new process: prepare, call, and send back seconds, memory and figures, or the text of an error."""
-    try:
-        use_threads(case.threads)
-        prepared = case.prepare(*case.arguments)
-        if not case.once:
-            prepared.call()
-        seconds, result = [], None
-        for _ in range(1 if case.once else repeats):
-            started = time.perf_counter()
-            result = prepared.call()
-            seconds.append(time.perf_counter() - started)
-        memory = peak_memory_mb()
-        sender.send((seconds, memory, prepared.figures(result)))
-    except Exception as error:
-        sender.send(" ".join(f"{type(error).__name__}: {error}".split()))
+def _measure(case: Case, repeats: int) -> tuple[list[float], float, Figures]:
+    """In the new process: prepare and call; seconds of each call, peak memory in MB and figures."""
+    use_threads(case.threads)
+    prepared = case.prepare(*case.arguments)
+    if not case.once:
+        prepared.call()
+    seconds, result = [], None
+    for _ in range(1 if case.once else repeats):
+        started = time.perf_counter()
+        result = prepared.call()
+        seconds.append(time.perf_counter() - started)
+    return seconds, peak_memory_mb(), prepared.figures(result)
 
 
 # a process of its own, since a new process inherits the peak memory of the one that starts it
