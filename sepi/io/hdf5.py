@@ -18,14 +18,15 @@ import numpy as np
 import numpy.typing as npt
 
 from sepi.camera import Camera
-from sepi.errors import SepiError
+from sepi.errors import SepiError, printable
 from sepi.io.files import atomic_path
-from sepi.io.readers.arrays import DEFLATE_RATIO, printable, rearranged
-from sepi.io.readers.options import ReadOptions, require_unused
 from sepi.lightfield import RANGE_SOURCES, DisparityRange, FloatMap, LightField
 from sepi.stage import StageMaps
 
 Attribute = str | float | int | tuple[float, float]
+
+DEFLATE_RATIO = 1100
+"""Bytes that a byte can unpack to; zlib's limit is 1032."""
 
 UNITS = {"disparity": "pixels per view step", "confidence": "0..1", "depth": "metres"}
 
@@ -109,26 +110,15 @@ def write_light_field(path: Path, light_field: LightField) -> None:
             file.create_dataset(f"masks/{name}", data=mask, compression="gzip", compression_opts=1)
 
 
-def matches(path: Path) -> bool:
-    """Whether ``path`` is an HDF5 file that may be a light field of this package: it holds views, or is damaged."""
-    if not path.is_file() or not h5py.is_hdf5(path):
-        return False
-    try:
-        with h5py.File(path, "r") as file:
-            return "views" in file
-    except (OSError, LookupError, ValueError, RuntimeError):
-        return True
-
-
-def holds(path: Path, name: str) -> bool:
-    """Whether ``path`` is a readable HDF5 file with a dataset of this name."""
+def holds(path: Path, name: str, *, if_damaged: bool = False) -> bool:
+    """Whether ``path`` is an HDF5 file with a dataset of this name; ``if_damaged`` where it cannot be told."""
     if not path.is_file() or not h5py.is_hdf5(path):
         return False
     try:
         with h5py.File(path, "r") as file:
             return name in file
     except (OSError, LookupError, ValueError, RuntimeError):
-        return False
+        return if_damaged
 
 
 def read_light_field(path: Path) -> LightField:
@@ -161,18 +151,6 @@ def read_light_field(path: Path) -> LightField:
             ground_truth=stored(path, file["ground_truth"]).astype(np.float32) if "ground_truth" in file else None,
             masks={name: stored(path, file["masks"][name]).astype(bool) for name in file.get("masks", {})},
         )
-
-
-def read(path: Path, options: ReadOptions) -> LightField:
-    """Read a light field written by ``write_light_field`` and arrange its views as asked for.
-
-    Raises
-    ------
-    SepiError
-        If the file is not such a file, or the options do not fit it.
-    """
-    require_unused(str(path), options, ("grid", "pattern", "axes", "variable", "follow_links"))
-    return rearranged(read_light_field(path), options)
 
 
 def require_stored(path: Path, dataset: h5py.Dataset) -> None:

@@ -7,8 +7,6 @@ from __future__ import annotations
 
 import os
 import re
-import struct
-import zlib
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,11 +20,11 @@ from sepi.camera import Camera
 from sepi.errors import SepiError
 from sepi.io.files import atomic_files, atomic_folder, atomic_path
 from sepi.io.hdf5 import Attribute, opened, stored, write_stage
-from sepi.io.images import write_png
+from sepi.io.images import png_texts, write_png
 from sepi.io.pfm import write_pfm
 from sepi.io.ply import write_ply
 from sepi.io.point_cloud import point_cloud
-from sepi.lightfield import BoolMap, FloatMap, LightField
+from sepi.lightfield import FloatMap, LightField
 from sepi.stage import StageMaps
 
 RESULT = "result.h5"
@@ -50,8 +48,6 @@ _DEPTH = "depth.pfm"
 # part of the pixels beyond each end of the colour scale, so that a few wrong pixels do not use it up
 _BEYOND = 0.005
 
-# PNG: signature and header chunk, which all files begin with; further chunks may follow
-_PNG_START = 8 + 25
 # says which masks are this module's, so that those of an earlier run can be told from a user's own
 _MASK_TEXT = {"Software": "sepi", "Description": "mask: 255 inside, 0 outside"}
 
@@ -229,7 +225,7 @@ def _write_files(
     for name, values in depth.items():
         write_pfm(folder / name, values)
     for name, mask in masks.items():
-        _write_with_text(folder / name, mask, _MASK_TEXT)
+        write_png(folder / name, mask, _MASK_TEXT)
     _write_all(folder / RESULT, light_field, maps, attributes)
     return (*RESULT_FILES[:-1], *depth, *masks, RESULT)
 
@@ -248,21 +244,12 @@ def _write_all(path: Path, light_field: LightField, maps: StageMaps, attributes:
 def _remove_others(folder: Path, made: Collection[str]) -> None:
     """Remove what an earlier run wrote and this one does not make."""
     known = [path for path in (folder / _DEPTH, folder / RUNTIME) if path.is_file()]
-    for path in known + [path for path in folder.glob("mask_*.png") if _is_own_mask(path)]:
+    for path in known + [path for path in folder.glob("mask_*.png") if png_texts(path) == _MASK_TEXT]:
         if path.name not in made:
             try:
                 path.unlink()
             except OSError as error:
                 raise SepiError(f"{path}: an earlier run's file cannot be removed ({error.strerror})") from error
-
-
-def _is_own_mask(path: Path) -> bool:
-    text = _text_chunks(_MASK_TEXT)
-    try:
-        with path.open("rb") as file:
-            return file.read(_PNG_START + len(text))[_PNG_START:] == text
-    except OSError:
-        return False
 
 
 def _write_16bit(path: Path, disparity: FloatMap) -> None:
@@ -273,7 +260,7 @@ def _write_16bit(path: Path, disparity: FloatMap) -> None:
     scale = (high - low) / 65534 if high > low else 1.0
     levels = np.zeros(disparity.shape, np.uint16)
     levels[finite] = np.rint((values - low) / scale) + 1
-    _write_with_text(
+    write_png(
         path,
         levels,
         {
@@ -283,22 +270,6 @@ def _write_16bit(path: Path, disparity: FloatMap) -> None:
             "units": "pixels per view step",
         },
     )
-
-
-def _write_with_text(path: Path, pixels: BoolMap | npt.NDArray[np.uint16], texts: Mapping[str, str]) -> None:
-    """Write a PNG with text chunks right after its header."""
-    with atomic_path(path) as temporary:
-        write_png(temporary, pixels)
-        data = temporary.read_bytes()
-        temporary.write_bytes(data[:_PNG_START] + _text_chunks(texts) + data[_PNG_START:])
-
-
-def _text_chunks(texts: Mapping[str, str]) -> bytes:
-    chunks = b""
-    for key, text in texts.items():
-        body = b"tEXt" + f"{key}\0{text}".encode("latin-1")
-        chunks += struct.pack(">I", len(body) - 4) + body + struct.pack(">I", zlib.crc32(body))
-    return chunks
 
 
 def _levels(unit: npt.NDArray[np.floating[Any]]) -> npt.NDArray[np.uint8]:

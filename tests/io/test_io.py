@@ -172,7 +172,7 @@ BAD_FOLDERS: dict[str, tuple[Callable[[Path], object], str, str]] = {
         "input_Cam001.png",
         "cannot be read",
     ),
-    "truncated PNG": (lambda f: cut(f / "input_Cam003.png"), "input_Cam003.png", "cut off"),
+    "truncated PNG": (lambda f: cut(f / "input_Cam003.png"), "input_Cam003.png", "damaged PNG"),
     "damaged PNG": (lambda f: flip(f / "input_Cam003.png"), "input_Cam003.png", "checksum"),
     "not a PNG": (lambda f: (f / "input_Cam003.png").write_text("hello"), "input_Cam003.png", "not a PNG"),
     "empty PNG": (lambda f: (f / "input_Cam000.png").write_bytes(b""), "input_Cam000.png", "not a PNG"),
@@ -524,7 +524,7 @@ def test_other_files_in_the_result_folder_stay(tmp_path: Path, light_field: Ligh
 def test_failed_result_leaves_no_folder(
     tmp_path: Path, light_field: LightField, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def fail(path: Path, values: np.ndarray) -> None:
+    def fail(path: Path, *_: object) -> None:
         raise SepiError(f"{path}: no space")
 
     monkeypatch.setattr("sepi.io.result_folder.write_png", fail)

@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+import warnings
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from sepi.errors import SepiError
+from sepi.errors import SepiError, printable
 from sepi.io.readers.options import Numbers, ReadOptions, arranged, place_of
 from sepi.lightfield import HIGHEST, LOWEST, BoolMap, LightField
 from sepi.validation import require_known
 
 Array = npt.NDArray[np.generic]
-
-DEFLATE_RATIO = 1100
-"""Bytes that a byte can unpack to; zlib's limit is 1032."""
 
 # "N" is the number t * S + s of a view
 _LAYOUTS = ("TSHWC", "TSHW", "NHWC")
@@ -144,9 +144,20 @@ def variable_of(source: str, shapes: Mapping[str, tuple[int, ...]], wanted: str 
     raise SepiError(f"{source}: holds no array of numbers of 4 or 5 axes (found: {listed or 'nothing'})")
 
 
-def printable(text: str) -> str:
-    """Text from a file as one line, whatever is in it."""
-    return " ".join("".join(letter if letter.isprintable() else " " for letter in text).split())
+@contextmanager
+def damage_named(path: Path, kind: str) -> Iterator[None]:
+    """Turn whatever the libraries stumble over in a damaged file into one error, and keep their warnings here."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            yield
+    except SepiError:
+        raise
+    except Exception as error:
+        if isinstance(error, OSError) and error.strerror:
+            raise SepiError(f"{path}: cannot be read ({error.strerror})") from error
+        reason = printable(str(error)) or type(error).__name__
+        raise SepiError(f"{path}: damaged {kind} ({reason[:200]})") from error
 
 
 @dataclass(frozen=True)

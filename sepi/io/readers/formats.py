@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from sepi.errors import SepiError
-from sepi.io import hdf5
+from sepi.io.hdf5 import holds
 from sepi.io.images import SUFFIXES
-from sepi.io.readers import eslf, hci, hci_2013, image_folder, matlab, numpy_files
+from sepi.io.readers import eslf, hci, hci_2013, image_folder, matlab, numpy_files, sepi_hdf5
 from sepi.io.readers.options import ReadOptions
 from sepi.lightfield import LightField
 from sepi.validation import require_known
@@ -43,7 +43,7 @@ FORMATS = {
     "matlab": Format("MATLAB file", ".mat with an array such as LF", matlab.matches, matlab.read),
     "numpy": Format("NumPy file", ".npy or .npz", numpy_files.matches, numpy_files.read),
     "hci-2013": Format("HCI 2013 HDF5", "with LF (T, S, H, W, 3)", hci_2013.matches, hci_2013.read),
-    "sepi": Format("sepi HDF5", "written by this package", hdf5.matches, hdf5.read),
+    "sepi": Format("sepi HDF5", "written by this package", sepi_hdf5.matches, sepi_hdf5.read),
 }
 """Word for ``--format`` to format; the first that matches reads."""
 
@@ -108,7 +108,7 @@ def read(path: Path, options: ReadOptions, wanted: str | None = None) -> LightFi
 def _what_else(path: Path) -> str:
     """What a path that is no light field seems to be, for who gave the wrong one of several."""
     result = path / "result.h5" if path.is_dir() else path
-    if hdf5.holds(result, "disparity"):
+    if holds(result, "disparity"):
         return "holds a disparity map, not a light field"
     if path.is_file():
         picture = path.suffix.lower() in SUFFIXES

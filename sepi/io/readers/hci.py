@@ -24,7 +24,7 @@ import numpy as np
 
 from sepi.camera import Camera, camera_from
 from sepi.errors import SepiError
-from sepi.io.images import png_size, read_picture
+from sepi.io.images import picture_header, read_picture
 from sepi.io.pfm import read_pfm
 from sepi.io.readers.options import ReadOptions, place_of, require_unused
 from sepi.io.readers.view_files import read_arranged
@@ -224,7 +224,8 @@ def _read_masks(folder: Path, shape: tuple[int, int]) -> dict[str, BoolMap]:
     masks = {}
     for path in sorted(folder.glob("mask_*.png")):
         name = path.stem.removeprefix("mask_")
-        if png_size(path) == shape:
+        header = picture_header(path)
+        if (header.height, header.width) == shape:
             values = read_picture(path)
             # white on black; anything else is not a region
             if np.array_equal(values.min(2), values.max(2)) and np.isin(values, (0, values.max())).all():

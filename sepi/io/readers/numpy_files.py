@@ -5,10 +5,7 @@ from __future__ import annotations
 import io
 import math
 import struct
-import warnings
 import zipfile
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any
@@ -16,8 +13,9 @@ from typing import IO, Any
 import numpy as np
 from numpy.lib import format as npy
 
-from sepi.errors import SepiError
-from sepi.io.readers.arrays import DEFLATE_RATIO, Array, light_field_from_array, printable, variable_of
+from sepi.errors import SepiError, printable
+from sepi.io.hdf5 import DEFLATE_RATIO
+from sepi.io.readers.arrays import Array, damage_named, light_field_from_array, variable_of
 from sepi.io.readers.options import ReadOptions, require_unused
 from sepi.lightfield import LightField
 
@@ -72,7 +70,7 @@ def read(path: Path, options: ReadOptions) -> LightField:
         :func:`sepi.io.readers.arrays.light_field_from_array`.
     """
     require_unused(str(path), options, ("pattern", "follow_links"))
-    with _damage_named(path), path.open("rb") as file:
+    with damage_named(path, "NumPy file"), path.open("rb") as file:
         zipped = file.read(len(_MAGIC)).startswith(_ZIP_MAGICS)
         file.seek(0)
         if not zipped:
@@ -89,7 +87,7 @@ def read_array(path: Path) -> Array:
     SepiError
         If the file cannot be read, is damaged or holds Python objects.
     """
-    with _damage_named(path), path.open("rb") as file:
+    with damage_named(path, "NumPy file"), path.open("rb") as file:
         return _read_npy(path, file)
 
 
@@ -161,19 +159,3 @@ def _require_values(where: str, header: _Header, held: int) -> None:
             f"{where}: damaged NumPy file: expected {header.nbytes} bytes of values for {header.dtype} {header.shape}, "
             f"got {held}"
         )
-
-
-@contextmanager
-def _damage_named(path: Path) -> Iterator[None]:
-    """Turn whatever the libraries stumble over into one error, and keep their warnings here."""
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            yield
-    except SepiError:
-        raise
-    except OSError as error:
-        raise SepiError(f"{path}: cannot be read ({error.strerror or error})") from error
-    except Exception as error:
-        reason = printable(str(error)) or type(error).__name__
-        raise SepiError(f"{path}: damaged NumPy file ({reason[:200]})") from error
