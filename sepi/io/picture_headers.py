@@ -109,13 +109,14 @@ def _by_pillow(file: IO[bytes], size: int, whole: bool) -> Header:
     with image:
         # how pixels are packed; only of a PNG is it a plain text
         packed = image.tile[0].args if image.tile else ""
-        deep = isinstance(packed, str) and "16" in packed
+        packed = packed if isinstance(packed, str) else ""
+        grey = packed.startswith(("1", "I", "L"))
         header = Header(
             {"WEBP": "WebP", "MPO": "JPEG"}.get(image.format or "", image.format or ""),
             image.height,
             image.width,
-            pixel_bytes=6 if deep else 3,
-            grey=isinstance(packed, str) and packed.startswith(("1", "I", "L")),
+            pixel_bytes=(1 if grey else 3) * (2 if "16" in packed else 1),
+            grey=grey,
         )
         if whole and header.kind == "JPEG":
             image.load()

@@ -70,18 +70,39 @@ def read(path: Path, options: ReadOptions) -> LightField:
         :func:`sepi.io.readers.arrays.light_field_from_array`.
     """
     require_unused(str(path), options, ("pattern", "follow_links"))
-    head = _head(path)
-    if head[-4:] in _BYTE_ORDERS:
-        array = _read_5(path, options.variable)
-    elif h5py.is_hdf5(path):
-        array = _read_7_3(path, options.variable, by_matlab=head.startswith(_TEXT_7_3))
-    else:
-        what = "is damaged" if head.startswith(_TEXT_7_3) else "is not a MATLAB file of version 5 or 7.3"
-        raise SepiError(f"{path}: {what}; save it in MATLAB with -v7 or -v7.3")
+    found = shapes(path)
+    name = variable_of(str(path), {name: shape for name, (shape, _) in found.items()}, options.variable)
+    array = _read_7_3(path, name) if h5py.is_hdf5(path) else _read_5(path, name, found[name][1])
     # the axes that MATLAB dropped
     while array.ndim < len(options.axes or "") <= 5:
         array = array[..., None]
     return light_field_from_array(array, name=path.stem, source=str(path), options=options)
+
+
+def shapes(path: Path) -> dict[str, tuple[tuple[int, ...], np.dtype[Any]]]:
+    """Shape and type, as MATLAB shows them, of each array of real numbers in a file; their values are not read.
+
+    Raises
+    ------
+    SepiError
+        If the file is damaged or of another version.
+    """
+    head = _head(path)
+    if head[-4:] in _BYTE_ORDERS:
+        from scipy.io import whosmat
+
+        with damage_named(path, "MATLAB file"):
+            names = _real_arrays(path)
+            return {name: (shape, np.dtype(kind)) for name, shape, kind in whosmat(path) if name in names}
+    if h5py.is_hdf5(path):
+        with opened(path) as file:
+            arrays = {name: file[name] for name in file if _is_numbers(file.get(name))}
+            return {
+                name: (array.shape[:: -1 if _is_turned(path, array) else 1], array.dtype)
+                for name, array in arrays.items()
+            }
+    what = "is damaged" if head.startswith(_TEXT_7_3) else "is not a MATLAB file of version 5 or 7.3"
+    raise SepiError(f"{path}: {what}; save it in MATLAB with -v7 or -v7.3")
 
 
 def _head(path: Path) -> bytes:
@@ -92,30 +113,13 @@ def _head(path: Path) -> bytes:
         raise SepiError(f"{path}: cannot be read ({error.strerror})") from error
 
 
-def shapes_5(path: Path) -> dict[str, tuple[tuple[int, ...], np.dtype[Any]]]:
-    """Shape and type, as MATLAB shows them, of each array of real numbers in a file of version 5; values are not read.
-
-    Raises
-    ------
-    SepiError
-        If the file is damaged.
-    """
-    from scipy.io import whosmat
-
-    with damage_named(path, "MATLAB file"):
-        names = _real_arrays(path)
-        return {name: (shape, np.dtype(kind)) for name, shape, kind in whosmat(path) if name in names}
-
-
-def _read_5(path: Path, variable: str | None) -> Array:
+def _read_5(path: Path, name: str, kind: np.dtype[Any]) -> Array:
     from scipy.io import loadmat
 
-    found = shapes_5(path)
-    name = variable_of(str(path), {name: shape for name, (shape, _) in found.items()}, variable)
     with damage_named(path, "MATLAB file"):
         values: Array = loadmat(path, variable_names=[name])[name]
         # MATLAB saves doubles that are small whole numbers as bytes
-        return values.astype(found[name][1], copy=False)
+        return values.astype(kind, copy=False)
 
 
 def _real_arrays(path: Path) -> set[str]:
@@ -157,15 +161,15 @@ def _parts(order: str, head: bytes) -> list[tuple[int, bytes]]:
     return parts
 
 
-def _read_7_3(path: Path, variable: str | None, *, by_matlab: bool) -> Array:
+def _read_7_3(path: Path, name: str) -> Array:
     with opened(path) as file:
-        arrays = {name: file[name] for name in file if _is_numbers(file.get(name))}
-        # other programs' files are as their own libraries show them
-        turned = [name for name, dataset in arrays.items() if by_matlab or "MATLAB_class" in dataset.attrs]
-        shapes = {name: dataset.shape[:: -1 if name in turned else 1] for name, dataset in arrays.items()}
-        name = variable_of(str(path), shapes, variable)
-        array = stored(path, arrays[name])
-        return array.T if name in turned else array
+        array = stored(path, file[name])
+        return array.T if _is_turned(path, file[name]) else array
+
+
+def _is_turned(path: Path, dataset: h5py.Dataset) -> bool:
+    """Whether the axes are in reverse, as MATLAB writes them; other programs do not."""
+    return "MATLAB_class" in dataset.attrs or _head(path).startswith(_TEXT_7_3)
 
 
 def _is_numbers(entry: Any) -> bool:

@@ -99,21 +99,47 @@ def _read_npy(path: Path, file: IO[bytes]) -> Array:
     return np.memmap(path, header.dtype, "r", header.size, header.shape, order)
 
 
-def _read_npz(path: Path, wanted: str | None) -> Array:
+def shapes(path: Path) -> dict[str, tuple[tuple[int, ...], np.dtype[Any]]]:
+    """Shape and type of each array in a file by its name, the empty one in ``.npy``; values are not read.
+
+    Raises
+    ------
+    SepiError
+        If the file cannot be read or is damaged.
+    """
+    with damage_named(path, "NumPy file"), path.open("rb") as file:
+        if not zipfile.is_zipfile(file):
+            file.seek(0)
+            header = _read_header(str(path), file)
+            return {"": (header.shape, header.dtype)}
+        with zipfile.ZipFile(file) as archive:
+            return {name: (header.shape, header.dtype) for name, (_, header) in _members(path, archive).items()}
+
+
+def _read_npz(path: Path, variable: str | None) -> Array:
     with zipfile.ZipFile(path) as archive:
-        headers = {}
-        members = {info.filename.removesuffix(".npy"): info for info in archive.infolist() if _is_array(info)}
-        for name, info in members.items():
-            _require_stored(path, info)
-            with archive.open(info) as file:
-                headers[name] = _read_header(f"{path}: {printable(info.filename)}", file)
-        shapes = {
-            name: header.shape for name, header in headers.items() if header.dtype.kind in "iuf" or name == wanted
+        members = _members(path, archive)
+        numbers = {
+            name: header.shape
+            for name, (_, header) in members.items()
+            if header.dtype.kind in "iuf" or name == variable
         }
-        name = variable_of(str(path), shapes, wanted)
-        _require_values(f"{path}: {printable(name)}.npy", headers[name], members[name].file_size - headers[name].size)
-        with archive.open(members[name]) as file:
+        name = variable_of(str(path), numbers, variable)
+        info, header = members[name]
+        _require_values(f"{path}: {printable(name)}.npy", header, info.file_size - header.size)
+        with archive.open(info) as file:
             return npy.read_array(file, allow_pickle=False)
+
+
+def _members(path: Path, archive: zipfile.ZipFile) -> dict[str, tuple[zipfile.ZipInfo, _Header]]:
+    """Arrays of an archive and their headers, by name."""
+    members = {}
+    for info in filter(_is_array, archive.infolist()):
+        _require_stored(path, info)
+        with archive.open(info) as file:
+            header = _read_header(f"{path}: {printable(info.filename)}", file)
+        members[info.filename.removesuffix(".npy")] = info, header
+    return members
 
 
 def _is_array(info: zipfile.ZipInfo) -> bool:
