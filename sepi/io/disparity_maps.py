@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from sepi.errors import SepiError
-from sepi.io.hdf5 import holds, read_map
+from sepi.io.hdf5 import has_dataset, read_map
 from sepi.io.images import png_texts, read_picture
 from sepi.io.pfm import read_pfm
 from sepi.io.readers.numpy_files import read_array
@@ -37,7 +37,7 @@ def is_disparity(path: Path) -> bool:
         return map_file(path).is_file()
     suffix = path.suffix.lower()
     if suffix in _HDF5:
-        return holds(path, _DATASET)
+        return has_dataset(path, _DATASET)
     if suffix == ".png":
         return {_SCALE, _OFFSET} <= set(png_texts(path))
     return suffix in SUFFIXES

@@ -55,13 +55,13 @@ def read_picture(path: Path) -> Pixels:
     return image
 
 
-def read_views(paths: Sequence[Path], places: Sequence[int] | None = None, count: int | None = None) -> Pixels:
+def read_views(paths: Sequence[Path], positions: Sequence[int] | None = None, count: int | None = None) -> Pixels:
     """Read pictures that must be alike, several at a time.
 
     Parameters
     ----------
     paths : sequence of Path
-    places : sequence of int, optional
+    positions : sequence of int, optional
         Index of each in the result; one after the other unless given.
     count : int, optional
         Length of the result; as many as ``paths`` unless given.
@@ -69,7 +69,7 @@ def read_views(paths: Sequence[Path], places: Sequence[int] | None = None, count
     Returns
     -------
     ndarray, shape (count, H, W, C), uint8, uint16 or float32
-        Zero at places that no picture has.
+        Zero at positions that no picture has.
 
     Raises
     ------
@@ -78,7 +78,7 @@ def read_views(paths: Sequence[Path], places: Sequence[int] | None = None, count
         more memory together than there is.
     """
     first = read_picture(paths[0])
-    places = range(len(paths)) if places is None else places
+    positions = range(len(paths)) if positions is None else positions
     count = len(paths) if count is None else count
     _require_memory(paths[0].parent, first, count)
     views = np.zeros((count, *first.shape), first.dtype)
@@ -90,7 +90,7 @@ def read_views(paths: Sequence[Path], places: Sequence[int] | None = None, count
                 f"{paths[index]}: {_described(image)}, but {paths[0].name} is {_described(first)}; "
                 "all views must be alike"
             )
-        views[places[index]] = image
+        views[positions[index]] = image
 
     # decoding runs outside Python's lock, so threads share the work
     with ThreadPoolExecutor(min(8, available_cores())) as pool:

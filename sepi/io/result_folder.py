@@ -19,7 +19,7 @@ import numpy.typing as npt
 from sepi.camera import Camera
 from sepi.errors import SepiError
 from sepi.io.files import atomic_files, atomic_folder, atomic_path
-from sepi.io.hdf5 import Attribute, opened, stored, write_stage
+from sepi.io.hdf5 import Attribute, open_hdf5, read_dataset, write_stage
 from sepi.io.images import png_texts, write_png
 from sepi.io.pfm import write_pfm
 from sepi.io.ply import write_ply
@@ -158,12 +158,14 @@ def read_result(path: Path) -> Result:
         If there is no such file, or it is damaged or not such a result.
     """
     path = path / RESULT if path.is_dir() else path
-    with opened(path) as file:
+    with open_hdf5(path) as file:
         attributes = dict(file.attrs)
         needed = {"view", "disparity", "confidence"} - set(file) | {"view_position", "grid"} - set(attributes)
         if needed:
             raise SepiError(f"{path}: not a result of 'sepi depth': {', '.join(sorted(needed))} missing")
-        picture, disparity, confidence = (stored(path, file[name]) for name in ("view", "disparity", "confidence"))
+        picture, disparity, confidence = (
+            read_dataset(path, file[name]) for name in ("view", "disparity", "confidence")
+        )
         (t, s), (rows, columns) = (map(int, attributes[name]) for name in ("view_position", "grid"))
         try:
             camera = Camera(*map(float, attributes["camera"])) if "camera" in attributes else None
@@ -182,7 +184,7 @@ def read_result(path: Path) -> Result:
     )
 
 
-def coloured(values: FloatMap) -> npt.NDArray[np.uint8]:
+def colour_code(values: FloatMap) -> npt.NDArray[np.uint8]:
     """A map (H, W) in perceptually uniform colours, (H, W, 3) RGB; black where it is not finite."""
     finite = np.isfinite(values)
     low, high = np.quantile(values[finite], (_BEYOND, 1 - _BEYOND)) if finite.any() else (0.0, 0.0)
@@ -218,7 +220,7 @@ def _write_files(
     with atomic_path(folder / "disparity.npy") as temporary, temporary.open("wb") as file:
         np.save(file, maps.disparity.astype("<f4"), allow_pickle=False)
     _write_16bit(folder / "disparity_16bit.png", maps.disparity)
-    write_png(folder / "disparity.png", coloured(maps.disparity))
+    write_png(folder / "disparity.png", colour_code(maps.disparity))
     write_png(folder / "confidence.png", _levels(maps.confidence))
     cloud = point_cloud(light_field, maps.disparity)
     write_ply(folder / "points.ply", cloud.positions, cloud.colours, cloud.comments())

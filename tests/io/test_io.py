@@ -17,7 +17,7 @@ from sepi.errors import SepiError
 from sepi.io.hdf5 import read_attributes, read_stage, write_light_field
 from sepi.io.images import read_picture, read_views, write_png
 from sepi.io.pfm import read_pfm, write_pfm
-from sepi.io.result_folder import RESULT_FILES, coloured, write_result
+from sepi.io.result_folder import RESULT_FILES, colour_code, write_result
 from sepi.lightfield import DisparityRange, LightField
 from sepi.reading import read_light_field
 from sepi.stage import StageMaps
@@ -550,9 +550,9 @@ def test_maps_of_another_scene_are_refused(tmp_path: Path, light_field: LightFie
 def test_colours_show_finite_values_whatever_else_is_there() -> None:
     """One infinite pixel must not flatten the picture; a missing one must be seen as missing."""
     values = np.linspace(-1, 1, 400, dtype=np.float32).reshape(20, 20)
-    clean = coloured(values)
+    clean = colour_code(values)
     values[0, 0], values[5, 5], values[9, 9] = np.nan, np.inf, -np.inf
-    spoilt = coloured(values)
+    spoilt = colour_code(values)
     assert (spoilt[[0, 5, 9], [0, 5, 9]] == 0).all()
     finite = np.isfinite(values)
     assert np.abs(spoilt[finite].astype(int) - clean[finite]).max() <= 6
@@ -561,7 +561,7 @@ def test_colours_show_finite_values_whatever_else_is_there() -> None:
 
 @pytest.mark.parametrize("value", [0.7, np.nan])
 def test_colours_of_a_map_without_contrast(value: float) -> None:
-    picture = coloured(np.full((4, 5), value, np.float32))
+    picture = colour_code(np.full((4, 5), value, np.float32))
     assert (picture == picture[0, 0]).all()
 
 

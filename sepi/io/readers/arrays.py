@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sepi.errors import SepiError, printable
-from sepi.io.readers.options import Numbers, ReadOptions, arranged, place_of
+from sepi.io.readers.options import Numbers, ReadOptions, arrange_numbers, position_of
 from sepi.lightfield import HIGHEST, LOWEST, BoolMap, LightField
 from sepi.validation import require_known
 
@@ -58,7 +58,7 @@ def light_field_from_array(
     Returns
     -------
     LightField
-        Views uint8, uint16 or float32 at their places, zero where missing.
+        Views uint8, uint16 or float32 at their positions, zero where missing.
 
     Raises
     ------
@@ -70,7 +70,7 @@ def light_field_from_array(
     given = axes or options.axes
     letters = _found_axes(source, array.shape, options.grid) if given is None else _checked_axes(source, array, given)
     stack = _as_stack(source, array, letters, options.grid)
-    numbers = arranged(source, stack.grid, options)
+    numbers = arrange_numbers(source, stack.grid, options)
     filled = _filled(source, stack, numbers, kind)
     reference = options.view or (numbers.shape[0] // 2, numbers.shape[1] // 2)
     if reference in filled.blank:
@@ -89,7 +89,7 @@ def light_field_from_array(
     )
 
 
-def rearranged(light_field: LightField, options: ReadOptions) -> LightField:
+def rearrange(light_field: LightField, options: ReadOptions) -> LightField:
     """A light field whose views are arranged as asked for; ground truth and masks stay with the view they belong to.
 
     Raises
@@ -97,7 +97,7 @@ def rearranged(light_field: LightField, options: ReadOptions) -> LightField:
     SepiError
         If the options do not fit its grid.
     """
-    numbers = arranged(light_field.source or light_field.name, light_field.grid, options)
+    numbers = arrange_numbers(light_field.source or light_field.name, light_field.grid, options)
     T, S = light_field.grid
     if np.array_equal(numbers, np.arange(T * S).reshape(T, S)):
         return light_field
@@ -105,13 +105,13 @@ def rearranged(light_field: LightField, options: ReadOptions) -> LightField:
     views = light_field.views.reshape(T * S, *light_field.views.shape[2:])[numbers]
     present = light_field.present.ravel()[numbers] & (numbers >= 0)
     views[~present] = 0
-    place = place_of(numbers, light_field.reference_position[0] * S + light_field.reference_position[1])
-    if place is not None and (light_field.view is not None or light_field.ground_truth is not None):
-        return replace(light_field, views=views, present=present, view=place)
+    position = position_of(numbers, light_field.reference_position[0] * S + light_field.reference_position[1])
+    if position is not None and (light_field.view is not None or light_field.ground_truth is not None):
+        return replace(light_field, views=views, present=present, view=position)
     return replace(light_field, views=views, present=present, view=options.view, ground_truth=None, masks={})
 
 
-def variable_of(source: str, shapes: Mapping[str, tuple[int, ...]], wanted: str | None) -> str:
+def variable_of(source: str, shapes: Mapping[str, tuple[int, ...]], requested: str | None) -> str:
     """Name of the array that is the light field, of those in a file.
 
     Parameters
@@ -120,7 +120,7 @@ def variable_of(source: str, shapes: Mapping[str, tuple[int, ...]], wanted: str 
         Path, for messages.
     shapes : mapping of str to tuple of int
         Name of each array of numbers to its shape.
-    wanted : str, optional
+    requested : str, optional
         The user's choice. Without: the only array of 4 or 5 axes, or ``LF`` among several.
 
     Raises
@@ -128,9 +128,9 @@ def variable_of(source: str, shapes: Mapping[str, tuple[int, ...]], wanted: str 
     SepiError
         If there is no such array, or several.
     """
-    if wanted is not None:
-        require_known(f"{source}: --variable", [wanted], shapes)
-        return wanted
+    if requested is not None:
+        require_known(f"{source}: --variable", [requested], shapes)
+        return requested
     fitting = [name for name, shape in shapes.items() if len(shape) in (4, 5)]
     if len(fitting) == 1:
         return fitting[0]
@@ -172,7 +172,7 @@ class _Stack:
 
 @dataclass(frozen=True)
 class _Filled:
-    """Views at their places; ``blank`` are those that are there but hold nothing."""
+    """Views at their positions; ``blank`` are those that are there but hold nothing."""
 
     views: Array
     present: BoolMap
@@ -280,16 +280,16 @@ def _as_stack(source: str, array: Array, letters: str, grid: tuple[int, int] | N
         views = views[..., None]
 
     def view(number: int) -> Array:
-        place = (number,) if "N" in letters else divmod(number, columns)
+        position = (number,) if "N" in letters else divmod(number, columns)
         # grey stays grey, the fourth channel goes
-        found: Array = views[place][..., :3]
+        found: Array = views[position][..., :3]
         return found
 
     return _Stack((rows, columns), (size["H"], size["W"], min(size["C"], 3)), view, tuple(notes))
 
 
 def _filled(source: str, stack: _Stack, numbers: Numbers, kind: np.dtype[Any]) -> _Filled:
-    """Put the views in their places; those left out are not even looked at."""
+    """Put the views in their positions; those left out are not even looked at."""
     views: Array = np.zeros((*numbers.shape, *stack.shape), kind)
     present = np.zeros(numbers.shape, bool)
     black: list[tuple[int, int]] = []
@@ -306,18 +306,18 @@ def _filled(source: str, stack: _Stack, numbers: Numbers, kind: np.dtype[Any]) -
     notes = []
     if not present.any():
         # a light field that is all black is none with all views missing
-        for place in black:
-            present[place] = True
+        for position in black:
+            present[position] = True
         black = []
-    for what, places in (("all zeros", black), ("NaN throughout", unknown)):
-        if places:
-            more = f" and {len(places) - _LISTED} more" if len(places) > _LISTED else ""
-            listed = " ".join(f"{t},{s}" for t, s in places[:_LISTED])
+    for what, positions in (("all zeros", black), ("NaN throughout", unknown)):
+        if positions:
+            more = f" and {len(positions) - _LISTED} more" if len(positions) > _LISTED else ""
+            listed = " ".join(f"{t},{s}" for t, s in positions[:_LISTED])
             notes.append(f"views that are {what} taken as missing: {listed}{more}")
     return _Filled(views, present, (*black, *unknown), tuple(notes))
 
 
-def _is_known(source: str, place: tuple[int, int], view: Array) -> bool:
+def _is_known(source: str, position: tuple[int, int], view: Array) -> bool:
     """Whether a view of floats holds values; False for NaN throughout.
 
     Raises
@@ -325,7 +325,7 @@ def _is_known(source: str, place: tuple[int, int], view: Array) -> bool:
     SepiError
         If some are not finite, or far outside 0..1.
     """
-    where = f"{source}: view {place[0]},{place[1]}"
+    where = f"{source}: view {position[0]},{position[1]}"
     with np.errstate(invalid="ignore"):
         low, high = float(view.min()), float(view.max())
     if not (math.isfinite(low) and math.isfinite(high)):
@@ -333,7 +333,7 @@ def _is_known(source: str, place: tuple[int, int], view: Array) -> bool:
             return False
         raise SepiError(
             f"{where} holds values that are not finite (NaN or infinite); mend it, or leave it out with "
-            f"--exclude {place[0]},{place[1]}"
+            f"--exclude {position[0]},{position[1]}"
         )
     if low < LOWEST or high > HIGHEST:
         raise SepiError(

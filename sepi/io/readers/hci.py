@@ -1,6 +1,6 @@
 """Folders in the layout of the HCI 4D light field benchmark.
 
-``input_CamNNN.png`` is view ``NNN = S * t + s``. Views may be missing, but for the one whose depth is wanted.
+``input_CamNNN.png`` is view ``NNN = S * t + s``. Views may be missing, but for the one whose depth is made.
 ``parameters.cfg``, ``gt_disp_lowres.pfm`` (disparity of the centre view) and ``mask_NAME.png`` (white regions) are read
 where present.
 
@@ -26,8 +26,8 @@ from sepi.camera import Camera, camera_from
 from sepi.errors import SepiError
 from sepi.io.images import picture_header, read_picture
 from sepi.io.pfm import read_pfm
-from sepi.io.readers.options import ReadOptions, place_of, require_unused
-from sepi.io.readers.view_files import read_arranged
+from sepi.io.readers.options import ReadOptions, position_of, require_unused
+from sepi.io.readers.view_files import read_grid
 from sepi.lightfield import BoolMap, DisparityRange, FloatMap, LightField
 
 PARAMETERS = "parameters.cfg"
@@ -75,7 +75,7 @@ def read(path: Path, options: ReadOptions) -> LightField:
     files = _numbered_views(path)
     grid = options.grid or parameters.grid or _square_grid(path, files)
     _require_inside(path, files, grid, "--grid" if options.grid else PARAMETERS)
-    arranged = read_arranged(path, files, grid, options)
+    arranged = read_grid(path, files, grid, options)
     shape = arranged.views.shape[2], arranged.views.shape[3]
     if parameters.shape not in (None, shape):
         raise SepiError(
@@ -83,7 +83,7 @@ def read(path: Path, options: ReadOptions) -> LightField:
             "disparities change with the size, so set image_resolution, disp_min and disp_max for these views"
         )
     # ground truth and masks belong to the centre view of the folder's own grid
-    with_truth = place_of(arranged.numbers, grid[0] // 2 * grid[1] + grid[1] // 2)
+    with_truth = position_of(arranged.numbers, grid[0] // 2 * grid[1] + grid[1] // 2)
     read_truth = with_truth is not None and options.view in (None, with_truth) and _has_truth(path)
     return LightField(
         views=arranged.views,

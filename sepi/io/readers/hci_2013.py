@@ -22,9 +22,9 @@ import numpy.typing as npt
 
 from sepi.camera import Camera
 from sepi.errors import SepiError
-from sepi.io.hdf5 import holds, opened, require_stored, stored
+from sepi.io.hdf5 import has_dataset, open_hdf5, read_dataset, require_values_inside
 from sepi.io.readers.arrays import light_field_from_array
-from sepi.io.readers.options import ReadOptions, arranged, require_unused
+from sepi.io.readers.options import ReadOptions, arrange_numbers, require_unused
 from sepi.lightfield import FloatMap, LightField
 
 VIEWS = "LF"
@@ -37,7 +37,7 @@ _SIZES = {"vRes": 0, "hRes": 1, "yRes": 2, "xRes": 3, "channels": 4}
 
 def matches(path: Path) -> bool:
     """Whether ``path`` is a readable HDF5 file with a dataset ``LF``."""
-    return holds(path, VIEWS)
+    return has_dataset(path, VIEWS)
 
 
 def read(path: Path, options: ReadOptions) -> LightField:
@@ -56,11 +56,11 @@ def read(path: Path, options: ReadOptions) -> LightField:
         :func:`sepi.io.readers.arrays.light_field_from_array`.
     """
     require_unused(str(path), options, ("grid", "pattern", "axes", "variable", "follow_links"))
-    with opened(path) as file:
+    with open_hdf5(path) as file:
         if VIEWS not in file:
             raise SepiError(f"{path}: not of the first HCI benchmark: dataset '{VIEWS}' is missing")
         views = file[VIEWS]
-        require_stored(path, views)
+        require_values_inside(path, views)
         if views.ndim != 5 or views.shape[4] not in (1, 3):
             raise SepiError(
                 f"{path}: expected '{VIEWS}' of shape (T, S, H, W, 3), got {views.shape}; if it is a light field of "
@@ -69,14 +69,14 @@ def read(path: Path, options: ReadOptions) -> LightField:
         shape = views.shape
         geometry = _read_geometry(path, file)
         light_field = light_field_from_array(
-            stored(path, views),
+            read_dataset(path, views),
             name=path.stem,
             source=str(path),
             options=options,
             axes="TSHWC",
             notes=_contradictions(path, file, shape),
         )
-        numbers = arranged(str(path), shape[:2], options)
+        numbers = arrange_numbers(str(path), shape[:2], options)
         number = int(numbers[light_field.reference_position])
         depth = _read_depth(path, file, shape, (number // shape[1], number % shape[1]))
     if geometry.camera is None:
@@ -132,7 +132,7 @@ def _read_depth(
     if DEPTH not in file:
         return None
     dataset = file[DEPTH]
-    require_stored(path, dataset)
+    require_values_inside(path, dataset)
     if dataset.shape == shape[:4]:
         return np.asarray(dataset[view], np.float64)
     if dataset.shape == shape[2:4]:

@@ -26,7 +26,7 @@ import h5py
 import numpy as np
 
 from sepi.errors import SepiError
-from sepi.io.hdf5 import opened, stored
+from sepi.io.hdf5 import open_hdf5, read_dataset
 from sepi.io.readers.arrays import Array, damage_named, light_field_from_array, variable_of
 from sepi.io.readers.options import ReadOptions, require_unused
 from sepi.lightfield import LightField
@@ -95,7 +95,7 @@ def shapes(path: Path) -> dict[str, tuple[tuple[int, ...], np.dtype[Any]]]:
             names = _real_arrays(path)
             return {name: (shape, np.dtype(kind)) for name, shape, kind in whosmat(path) if name in names}
     if h5py.is_hdf5(path):
-        with opened(path) as file:
+        with open_hdf5(path) as file:
             arrays = {name: file[name] for name in file if _is_numbers(file.get(name))}
             return {
                 name: (array.shape[:: -1 if _is_turned(path, array) else 1], array.dtype)
@@ -162,8 +162,8 @@ def _parts(order: str, head: bytes) -> list[tuple[int, bytes]]:
 
 
 def _read_7_3(path: Path, name: str) -> Array:
-    with opened(path) as file:
-        array = stored(path, file[name])
+    with open_hdf5(path) as file:
+        array = read_dataset(path, file[name])
         return array.T if _is_turned(path, file[name]) else array
 
 

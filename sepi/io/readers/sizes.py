@@ -10,7 +10,7 @@ from typing import NamedTuple
 import h5py
 
 from sepi.errors import SepiError
-from sepi.io.hdf5 import DEFLATE_RATIO, opened
+from sepi.io.hdf5 import DEFLATE_RATIO, open_hdf5
 from sepi.io.images import SUFFIXES, picture_header
 from sepi.io.readers import eslf, matlab, numpy_files
 
@@ -97,6 +97,6 @@ def _shapes(path: Path) -> list[tuple[tuple[int, ...], int]]:
     for reader in (matlab, numpy_files):
         if reader.matches(path):
             return [(shape, kind.itemsize) for shape, kind in reader.shapes(path).values()]
-    with opened(path) as file:
+    with open_hdf5(path) as file:
         arrays = [entry for entry in map(file.get, file) if isinstance(entry, h5py.Dataset)]
         return [(array.shape or (), array.dtype.itemsize) for array in arrays]
