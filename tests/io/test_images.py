@@ -16,7 +16,7 @@ import tifffile
 from PIL import Image
 
 from sepi.errors import SepiError
-from sepi.io.images import read_picture, read_views
+from sepi.io.images import read_picture, read_views, write_png
 
 RANDOM = np.random.default_rng(0)
 RGB8 = RANDOM.integers(0, 256, (40, 50, 3), np.uint8)
@@ -396,3 +396,23 @@ def test_png_with_fewer_rows_than_it_says_is_refused(tmp_path: Path) -> None:
     (tmp_path / "a.png").write_bytes(png(100, 100))
     with pytest.raises(SepiError, match=r"a\.png: .*cannot be decoded"):
         read_picture(tmp_path / "a.png")
+
+
+def test_views_come_in_the_order_asked_for(tmp_path: Path) -> None:
+    """Threads finish in any order."""
+    views = RANDOM.integers(0, 256, (9, 12, 16, 3), np.uint8)
+    for number, view in enumerate(views):
+        by_opencv(view)(tmp_path / f"{number}.png")
+    order = [5, 1, 8, 0]
+    np.testing.assert_array_equal(read_views([tmp_path / f"{number}.png" for number in order]), views[order])
+
+
+@pytest.mark.parametrize("pixels", [RGB8, RGB16])
+def test_written_picture_is_read_back(tmp_path: Path, pixels: np.ndarray) -> None:
+    write_png(tmp_path / "colour.png", pixels)
+    np.testing.assert_array_equal(cv2.imread(str(tmp_path / "colour.png"), -1)[:, :, ::-1], pixels)
+
+
+def test_mask_is_white_inside(tmp_path: Path) -> None:
+    write_png(tmp_path / "mask.png", np.array([[True, False]]))
+    assert read_picture(tmp_path / "mask.png")[:, :, 0].tolist() == [[255, 0]]
