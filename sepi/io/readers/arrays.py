@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -69,9 +69,9 @@ def light_field_from_array(
     kind = _pixel_type(source, array.dtype)
     given = axes or options.axes
     letters = _found_axes(source, array.shape, options.grid) if given is None else _checked_axes(source, array, given)
-    stack = _as_stack(source, array, letters, options.grid)
-    numbers = arrange_numbers(source, stack.grid, options)
-    filled = _filled(source, stack, numbers, kind)
+    stack, laid_out = _as_stack(source, array, letters, options.grid)
+    numbers = arrange_numbers(source, stack.shape[:2], options)
+    filled = _fill(source, stack, numbers, kind)
     reference = options.view or (numbers.shape[0] // 2, numbers.shape[1] // 2)
     if reference in filled.blank:
         raise SepiError(
@@ -85,7 +85,7 @@ def light_field_from_array(
         source=source,
         present=filled.present,
         view=options.view,
-        notes=(*notes, *assumed, *stack.notes, *filled.notes),
+        notes=(*notes, *assumed, *laid_out, *filled.notes),
     )
 
 
@@ -158,16 +158,6 @@ def damage_named(path: Path, kind: str) -> Iterator[None]:
             raise SepiError(f"{path}: cannot be read ({error.strerror})") from error
         reason = printable(str(error)) or type(error).__name__
         raise SepiError(f"{path}: damaged {kind} ({reason[:200]})") from error
-
-
-@dataclass(frozen=True)
-class _Stack:
-    """Views of the given grid by number."""
-
-    grid: tuple[int, int]
-    shape: tuple[int, int, int]
-    view: Callable[[int], Array]
-    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -251,8 +241,8 @@ def _pairs_in_order(shape: tuple[int, ...]) -> list[str]:
     return ["HWTS"] if 2 * max(last) <= min(first) else []
 
 
-def _as_stack(source: str, array: Array, letters: str, grid: tuple[int, int] | None) -> _Stack:
-    """The array as views ``(H, W, C)`` by number, without copying."""
+def _as_stack(source: str, array: Array, letters: str, grid: tuple[int, int] | None) -> tuple[Array, list[str]]:
+    """The array as views (T, S, H, W, C), without copying, and what was assumed."""
     size = dict(zip(letters, array.shape, strict=True))
     if 0 in array.shape:
         raise SepiError(f"{source}: the array is empty: {array.shape}")
@@ -261,12 +251,11 @@ def _as_stack(source: str, array: Array, letters: str, grid: tuple[int, int] | N
             f"{source}: the axis of colours (axes {' '.join(letters)}) has size {size['C']}; expected 1, 3 or 4"
         )
     notes = ["4th channel (transparency or weight) left out"] if size["C"] == 4 else []
-    if "N" in letters:
+    if "N" in letters and grid is None:
         side = math.isqrt(size["N"])
-        if grid is None:
-            notes.append(f"views taken as a grid of {side}x{side}, row by row; --grid sets it otherwise")
-            grid = side, side
-    elif grid not in (None, (size["T"], size["S"])):
+        notes.append(f"views taken as a grid of {side}x{side}, row by row; --grid sets it otherwise")
+        grid = side, side
+    elif "N" not in letters and grid not in (None, (size["T"], size["S"])):
         raise SepiError(
             f"{source}: --grid {grid[0]}x{grid[1]}, but the array has {size['T']}x{size['S']} views "
             f"(axes {' '.join(letters)})"
@@ -274,28 +263,20 @@ def _as_stack(source: str, array: Array, letters: str, grid: tuple[int, int] | N
     rows, columns = grid or (size["T"], size["S"])
     if rows * columns != size.get("N", rows * columns):
         raise SepiError(f"{source}: {size['N']} views make no grid of {rows}x{columns}; --grid ROWSxCOLUMNS sets it")
-    order = [letters.index(letter) for letter in ("NHWC" if "N" in letters else "TSHWC") if letter in letters]
-    views = array.transpose(order)
-    if "C" not in letters:
-        views = views[..., None]
-
-    def view(number: int) -> Array:
-        position = (number,) if "N" in letters else divmod(number, columns)
-        # grey stays grey, the fourth channel goes
-        found: Array = views[position][..., :3]
-        return found
-
-    return _Stack((rows, columns), (size["H"], size["W"], min(size["C"], 3)), view, tuple(notes))
+    views = array.transpose([letters.index(letter) for letter in "NTSHWC" if letter in letters])
+    views = views.reshape(rows, columns, size["H"], size["W"], size["C"])
+    # grey stays grey, the fourth channel goes
+    return views[..., :3], notes
 
 
-def _filled(source: str, stack: _Stack, numbers: Numbers, kind: np.dtype[Any]) -> _Filled:
+def _fill(source: str, stack: Array, numbers: Numbers, kind: np.dtype[Any]) -> _Filled:
     """Put the views in their positions; those left out are not even looked at."""
-    views: Array = np.zeros((*numbers.shape, *stack.shape), kind)
+    views: Array = np.zeros((*numbers.shape, *stack.shape[2:]), kind)
     present = np.zeros(numbers.shape, bool)
     black: list[tuple[int, int]] = []
     unknown: list[tuple[int, int]] = []
     for t, s in np.argwhere(numbers >= 0).tolist():
-        view = stack.view(int(numbers[t, s]))
+        view = stack[divmod(int(numbers[t, s]), stack.shape[1])]
         if kind.kind == "f" and not _is_known(source, (t, s), view):
             unknown.append((t, s))
             continue
@@ -304,10 +285,9 @@ def _filled(source: str, stack: _Stack, numbers: Numbers, kind: np.dtype[Any]) -
         if not present[t, s]:
             black.append((t, s))
     notes = []
-    if not present.any():
+    if black and not present.any():
         # a light field that is all black is none with all views missing
-        for position in black:
-            present[position] = True
+        present[tuple(np.transpose(black))] = True
         black = []
     for what, positions in (("all zeros", black), ("NaN throughout", unknown)):
         if positions:

@@ -33,6 +33,8 @@ from sepi.lightfield import BoolMap, DisparityRange, FloatMap, LightField
 PARAMETERS = "parameters.cfg"
 TRUTH = "gt_disp_lowres.pfm"
 
+_CAMERA = ("focal_length_mm", "baseline_mm", "focus_distance_m", "sensor_size_mm")
+
 Number = TypeVar("Number", int, float)
 
 _VIEW = re.compile(r"input_Cam(\d{1,6})\.png")
@@ -152,14 +154,20 @@ def _values(path: Path) -> dict[str, str]:
 
 
 def _read_parameters(path: Path, values: dict[str, str]) -> _Parameters:
-    limits = _pair(path, values, "disp_min", "disp_max", float)
+    limits = _pair(path, values, ("disp_min", "disp_max"), float)
     if limits is not None and not (math.isfinite(limits[0]) and limits[0] < limits[1] < math.inf):
         raise SepiError(
             f"{path}: expected finite disp_min < disp_max in pixels per view step, got {limits[0]:g} and {limits[1]:g}"
         )
+    sizes = []
+    for keys in (("num_cams_y", "num_cams_x"), ("image_resolution_y_px", "image_resolution_x_px")):
+        size = _pair(path, values, keys, int)
+        if size is not None and min(size) < 1:
+            raise SepiError(f"{path}: expected {' and '.join(keys)} of at least 1, got {size[0]} and {size[1]}")
+        sizes.append(size)
     return _Parameters(
-        grid=_positive(path, values, "num_cams_y", "num_cams_x"),
-        shape=_positive(path, values, "image_resolution_y_px", "image_resolution_x_px"),
+        grid=sizes[0],
+        shape=sizes[1],
         disparity_range=None if limits is None else DisparityRange(*limits, "parameters"),
         scene=values.get("scene") or None,
     )
@@ -167,44 +175,34 @@ def _read_parameters(path: Path, values: dict[str, str]) -> _Parameters:
 
 def _read_camera(path: Path, values: dict[str, str], shape: tuple[int, int]) -> Camera | None:
     """Geometry from the parameters; None where they do not give all of it."""
-    keys = ("focal_length_mm", "baseline_mm", "focus_distance_m", "sensor_size_mm")
-    if not all(key in values for key in keys):
+    if not all(key in values for key in _CAMERA):
         return None
-    numbers = {}
-    for key in keys:
-        try:
-            numbers[key] = float(values[key])
-        except ValueError as error:
-            raise SepiError(f"{path}: expected a number for {key}, got '{values[key]}'") from error
     try:
-        return camera_from(**numbers, shape=shape)
+        return camera_from(**dict(zip(_CAMERA, _numbers(path, values, _CAMERA, float), strict=True)), shape=shape)
     except SepiError as error:
-        raise SepiError(f"{path}: {error}") from error
-
-
-def _positive(path: Path, values: dict[str, str], first: str, second: str) -> tuple[int, int] | None:
-    pair = _pair(path, values, first, second, int)
-    if pair is not None and min(pair) < 1:
-        raise SepiError(f"{path}: expected {first} and {second} of at least 1, got {pair[0]} and {pair[1]}")
-    return pair
+        raise error if str(error).startswith(str(path)) else SepiError(f"{path}: {error}") from error
 
 
 def _pair(
-    path: Path, values: dict[str, str], first: str, second: str, kind: Callable[[str], Number]
+    path: Path, values: dict[str, str], keys: tuple[str, str], kind: Callable[[str], Number]
 ) -> tuple[Number, Number] | None:
     """Two numbers that come together or not at all."""
-    given = [key for key in (first, second) if key in values]
-    if not given:
+    missing = [key for key in keys if key not in values]
+    if len(missing) == 1:
+        raise SepiError(f"{path}: {missing[0]} is not given, but needed with the other of {' and '.join(keys)}")
+    if missing:
         return None
-    if len(given) == 1:
-        raise SepiError(f"{path}: {given[0]} is given, but {second if given == [first] else first} is not")
+    first, second = _numbers(path, values, keys, kind)
+    return first, second
+
+
+def _numbers(path: Path, values: dict[str, str], keys: tuple[str, ...], kind: Callable[[str], Number]) -> list[Number]:
     try:
-        return kind(values[first]), kind(values[second])
+        return [kind(values[key]) for key in keys]
     except ValueError as error:
-        raise SepiError(
-            f"{path}: expected {'whole ' if kind is int else ''}numbers for {first} and {second}, "
-            f"got '{values[first]}' and '{values[second]}'"
-        ) from error
+        given = ", ".join(f"'{values[key]}'" for key in keys)
+        whole = "whole " if kind is int else ""
+        raise SepiError(f"{path}: expected {whole}numbers for {', '.join(keys)}, got {given}") from error
 
 
 def _has_truth(folder: Path) -> bool:

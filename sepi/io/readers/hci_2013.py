@@ -13,7 +13,7 @@ References
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import h5py
@@ -67,7 +67,7 @@ def read(path: Path, options: ReadOptions) -> LightField:
                 "other axes, write it as .npy and name them with --axes"
             )
         shape = views.shape
-        geometry = _read_geometry(path, file)
+        camera, reason = _read_camera(path, file)
         light_field = light_field_from_array(
             read_dataset(path, views),
             name=path.stem,
@@ -79,29 +79,22 @@ def read(path: Path, options: ReadOptions) -> LightField:
         numbers = arrange_numbers(str(path), shape[:2], options)
         number = int(numbers[light_field.reference_position])
         depth = _read_depth(path, file, shape, (number // shape[1], number % shape[1]))
-    if geometry.camera is None:
-        note = f"no metric depth{'' if depth is None else ' and no ground truth'}: {geometry.reason}"
+    if camera is None:
+        note = f"no metric depth{'' if depth is None else ' and no ground truth'}: {reason}"
         return replace(light_field, notes=(*light_field.notes, note))
-    ground_truth = None if depth is None else _disparity(depth, geometry.camera)
-    return replace(light_field, camera=geometry.camera, ground_truth=ground_truth)
+    ground_truth = None if depth is None else _disparity(depth, camera)
+    return replace(light_field, camera=camera, ground_truth=ground_truth)
 
 
-@dataclass(frozen=True)
-class _Geometry:
+def _read_camera(path: Path, file: h5py.File) -> tuple[Camera | None, str]:
     """The camera, or the reason why there is none."""
-
-    camera: Camera | None
-    reason: str = ""
-
-
-def _read_geometry(path: Path, file: h5py.File) -> _Geometry:
     missing = [key for key in _GEOMETRY if key not in file.attrs]
     if missing:
-        return _Geometry(None, f"the file has no attribute {', '.join(missing)}")
+        return None, f"the file has no attribute {', '.join(missing)}"
     baseline, focal_length, shift = (_number(path, file, key) for key in _GEOMETRY)
     if not (0 < baseline < math.inf and 0 < focal_length < math.inf and math.isfinite(shift)):
-        return _Geometry(None, f"dH {baseline:g}, focalLength {focal_length:g}, shift {shift:g} are no camera's")
-    return _Geometry(Camera(baseline * focal_length, shift, focal_length))
+        return None, f"dH {baseline:g}, focalLength {focal_length:g}, shift {shift:g} are no camera's"
+    return Camera(baseline * focal_length, shift, focal_length), ""
 
 
 def _number(path: Path, file: h5py.File, key: str) -> float:

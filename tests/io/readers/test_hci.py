@@ -181,7 +181,7 @@ BAD_FOLDERS: dict[str, tuple[Callable[[Path], object], str, str]] = {
     "half a range": (
         lambda f: (f / "parameters.cfg").write_text("[meta]\ndisp_min = 1"),
         "parameters.cfg",
-        "disp_max is not",
+        "disp_max is not given",
     ),
     "no cameras": (config(num_cams_x="0"), "parameters.cfg", "at least 1"),
     "half a camera": (config(num_cams_x="2.5"), "parameters.cfg", "whole numbers"),

@@ -2,6 +2,7 @@
 
 import io
 import re
+import resource
 import struct
 import zipfile
 from pathlib import Path
@@ -117,23 +118,19 @@ def test_header_of_version_2(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("shape", "word"),
-    [
-        ((9, 9, 100_000, 100_000, 3), "expected 2430000000000 bytes of values for uint8"),
-        ((2, 3, 8, 10, 4), "expected 1920 bytes of values for uint8 (2, 3, 8, 10, 4), got 1440"),
-        ((2, 3, -8, -10, 3), "shape (2, 3, -8, -10, 3)"),
-        ((2**62, 2**62, 4, 4, 3), f"expected {2**124 * 48} bytes of values"),
-    ],
+    "shape", [(9, 9, 100_000, 100_000, 3), (2, 3, 8, 10, 4), (2, 3, -8, -10, 3), (2**62, 2**62, 4, 4, 3)]
 )
-def test_shapes_that_the_file_does_not_hold(tmp_path: Path, shape: tuple[int, ...], word: str) -> None:
+def test_shapes_that_the_file_does_not_hold(tmp_path: Path, shape: tuple[int, ...]) -> None:
     """No memory may be taken on the word of a header."""
     content = header(shape) + LF.tobytes()
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     (tmp_path / "lie.npy").write_bytes(content)
-    assert f"damaged NumPy file: {word}" in refused(tmp_path / "lie.npy")
+    assert "damaged NumPy file" in refused(tmp_path / "lie.npy")
     for method in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
         with zipfile.ZipFile(tmp_path / "lie.npz", "w", method) as archive:
             archive.writestr("LF.npy", content)
-        assert f"damaged NumPy file: {word}" in refused(tmp_path / "lie.npz")
+        assert "damaged NumPy file" in refused(tmp_path / "lie.npz")
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 500_000  # KB
 
 
 def test_an_archive_that_claims_more_than_it_holds(tmp_path: Path) -> None:
@@ -151,7 +148,7 @@ def test_an_archive_that_claims_more_than_it_holds(tmp_path: Path) -> None:
 
 def test_long_headers_are_not_parsed(tmp_path: Path) -> None:
     (tmp_path / "long.npy").write_bytes(b"\x93NUMPY\x02\x00" + struct.pack("<I", 2**31) + b"(" * 100)
-    assert "header of 2147483648 bytes" in refused(tmp_path / "long.npy")
+    assert "damaged NumPy file" in refused(tmp_path / "long.npy")
     (tmp_path / "deep.npy").write_bytes(b"\x93NUMPY\x01\x00" + struct.pack("<H", 9000) + b"(" * 9000)
     assert "damaged NumPy file" in refused(tmp_path / "deep.npy")
 
