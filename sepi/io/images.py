@@ -175,7 +175,7 @@ def _decoded(path: Path, data: bytes, header: Header) -> Pixels:
     except cv2.error:
         image = None
     if image is None or image.shape[:2] != (header.height, header.width):
-        raise SepiError(f"{path}: damaged {header.kind}: its pixels cannot be decoded")
+        raise SepiError(f"{path}: damaged {header.kind}, perhaps cut off: its pixels cannot be decoded")
     if image.dtype not in (np.uint8, np.uint16, np.float32):
         raise SepiError(f"{path}: pixels of type {image.dtype}; expected 8 or 16 bit without sign, or float32")
     if header.mixed_alpha and image.shape[2:] == (4,) and image[:, :, 3].min() < 255:

@@ -87,7 +87,7 @@ def read_header(path: Path, file: IO[bytes], *, whole: bool = False) -> Header:
         raise SepiError(f"{path}: {error}") from error
     except Exception as error:
         # the libraries stumble over damage in many ways
-        raise SepiError(f"{path}: damaged {kind} ({printable(str(error))[:200]})") from error
+        raise SepiError(f"{path}: damaged {kind}, perhaps cut off ({printable(str(error))[:200]})") from error
     pixels = header.height * header.width
     if not 1 <= pixels <= min(MAX_PIXELS, _PIXELS_PER_BYTE * size + _SMALL):
         raise SepiError(
@@ -124,7 +124,7 @@ def _by_pillow(file: IO[bytes], size: int, whole: bool) -> Header:
             image.verify()
     # Pillow leaves out the last checksum, of which libpng prints lines of its own
     if whole and header.kind == "PNG" and file.read(4) != zlib.crc32(b"IEND").to_bytes(4, "big"):
-        raise ValueError("bad checksum in its last chunk, or cut off")
+        raise ValueError("bad checksum in its last chunk")
     return header
 
 
