@@ -149,12 +149,6 @@ def position_of(numbers: Numbers, number: int) -> tuple[int, int] | None:
     return (int(positions[0][0]), int(positions[0][1])) if len(positions) else None
 
 
-def parse_position(text: str) -> tuple[int, int] | None:
-    """``(t, s)`` from ``"T,S"``; None for any other text."""
-    match = _POSITION.fullmatch(text)
-    return None if match is None else (int(match[1]), int(match[2]))
-
-
 def _central(source: str, numbers: Numbers, side: int) -> Numbers:
     T, S = numbers.shape
     # around the centre view, as the light field's convention has it; an even grid has one row more before it than after
@@ -168,8 +162,9 @@ def _central(source: str, numbers: Numbers, side: int) -> Numbers:
 
 
 def _excluded(source: str, view: str, numbers: Numbers, names: Mapping[str, int]) -> int:
-    position = parse_position(view)
-    if position is not None:
+    match = _POSITION.fullmatch(view)
+    if match is not None:
+        position = int(match[1]), int(match[2])
         _require_inside(source, numbers, position)
         return int(numbers[position])
     if view not in names:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -82,21 +82,19 @@ def _of_array(shape: tuple[int, ...], itemsize: int) -> Size:
     return Size(max(1, math.prod(others) // channels), shape[first], shape[second], itemsize * channels)
 
 
-def _arrays(path: Path) -> Iterator[tuple[tuple[int, ...], int]]:
-    """Shape and bytes of a value of each array in a file that may be a light field."""
-    most = path.stat().st_size * DEFLATE_RATIO
+def _arrays(path: Path) -> list[tuple[tuple[int, ...], int]]:
+    """Shape and bytes of a value of each array in a file that may be a light field, and that the file can hold."""
     try:
-        for shape, itemsize in _shapes(path):
-            if len(shape) in (4, 5) and 0 < math.prod(shape) * itemsize <= most:
-                yield shape, itemsize
+        if numpy_files.matches(path):
+            arrays = list(numpy_files.shapes(path).values())
+        elif matlab.matches(path):
+            arrays = list(matlab.shapes(path).values())
+        else:
+            with open_hdf5(path) as file:
+                entries = (entry for entry in map(file.get, file) if isinstance(entry, h5py.Dataset))
+                arrays = [(entry.shape or (), entry.dtype) for entry in entries]
     except SepiError:
-        return
-
-
-def _shapes(path: Path) -> list[tuple[tuple[int, ...], int]]:
-    for reader in (matlab, numpy_files):
-        if reader.matches(path):
-            return [(shape, kind.itemsize) for shape, kind in reader.shapes(path).values()]
-    with open_hdf5(path) as file:
-        arrays = [entry for entry in map(file.get, file) if isinstance(entry, h5py.Dataset)]
-        return [(array.shape or (), array.dtype.itemsize) for array in arrays]
+        return []
+    most = path.stat().st_size * DEFLATE_RATIO
+    sized = [(shape, kind.itemsize) for shape, kind in arrays if len(shape) in (4, 5)]
+    return [(shape, itemsize) for shape, itemsize in sized if 0 < math.prod(shape) * itemsize <= most]

@@ -64,15 +64,6 @@ def test_every_pixel_is_read(tmp_path: Path, kind: str, case: str) -> None:
     assert light_field.name == "scene"
 
 
-def test_views_in_a_row_and_missing_ones(tmp_path: Path) -> None:
-    views = RNG.integers(1, 256, (9, 20, 24, 3), np.uint8)
-    views[8] = 0
-    np.save(tmp_path / "row.npy", views)
-    light_field = taken(tmp_path / "row.npy", order="flip-columns")
-    np.testing.assert_array_equal(light_field.views, views.reshape(3, 3, 20, 24, 3)[:, ::-1])
-    assert np.argwhere(~light_field.present).tolist() == [[2, 0]]
-
-
 def test_one_of_several_arrays(tmp_path: Path) -> None:
     other = 255 - LF // 2
     np.savez(tmp_path / "two.npz", left=LF, right=other, meta=np.array({"a": 1}, object))
