@@ -137,16 +137,9 @@ def threads_for(wildcards):
     return min(1 + scene_of(wildcards).samples // 8_000_000, 8)
 
 
-def memory_for(bytes_per_sample, bytes_per_pixel=0):
-    """Function of wildcards: memory of a job in MB, from the samples (pixels of all views) and pixels of its scene."""
-
-    def memory(wildcards):
-        scene = scene_of(wildcards)
-        pixels = scene.height * scene.width
-        # what Python and its libraries take before any data
-        return 300 + round((bytes_per_sample * scene.samples + bytes_per_pixel * pixels) / 2**20)
-
-    return memory
+def memory_for(*needs, **more):
+    """Function of wildcards: memory of a job in MB (:meth:`sepi.workflow.datasets.Scene.memory_mb`)."""
+    return lambda wildcards: scene_of(wildcards).memory_mb(*needs, **more)
 
 
 def is_new(file):

@@ -11,7 +11,7 @@ rule ingest:
         "benchmarks/{dataset}/{scene}/ingest.tsv"
     threads: threads_for
     resources:
-        mem_mb=memory_for(bytes_per_sample=12),
+        mem_mb=memory_for(bytes_per_sample=12, copies=3),
     params:
         source=ingest_source,
         disparity_range=ingest_range,

@@ -7,3 +7,8 @@ class SepiError(Exception):
 
 class SepiWarning(UserWarning):
     """Something that is probably not as the user meant it; the message says what would be right."""
+
+
+def printable(text: str) -> str:
+    """Text from a file as one line for a message, whatever is in it."""
+    return " ".join("".join(letter if letter.isprintable() else " " for letter in text).split())

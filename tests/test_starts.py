@@ -61,7 +61,7 @@ def test_depth_loads_what_it_uses(tmp_path: Path, variant: str, more: set[str]) 
     write_hci(render("dots", size=64, views=3), tmp_path / "dots")
     words = ["depth", str(tmp_path / "dots"), "-o", str(tmp_path / "maps"), "--variant", variant]
     found = loaded(f"from sepi.cli.main import main\nmain({words!r}, standalone_mode=False)")
-    assert found == {"numba", "scipy"} | more
+    assert found == {"numba", "scipy", "PIL"} | more
 
 
 def test_a_stage_without_kernels_does_not_wait_for_numba(tmp_path: Path) -> None:

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import math
-import struct
 from pathlib import Path
 
 import numpy as np
 
 from sepi.errors import SepiError
-from sepi.io.hdf5 import holds, read_map
-from sepi.io.images import read_picture
+from sepi.io.hdf5 import has_dataset, read_map
+from sepi.io.images import png_texts, read_picture
 from sepi.io.pfm import read_pfm
-from sepi.io.picture_headers import PNG_SIGNATURE
 from sepi.io.readers.numpy_files import read_array
 from sepi.lightfield import FloatMap
 
@@ -22,6 +20,7 @@ SUFFIXES: tuple[str, ...] = (".pfm", ".npy", ".png", *_HDF5)
 """Ends of names of the files that are read, in small letters."""
 
 _DATASET = "disparity"
+# colour type of a PNG, the 26th byte of its header
 _GREY = 0
 # text chunks of `disparity_16bit.png`
 _SCALE, _OFFSET = "scale", "offset"
@@ -38,9 +37,9 @@ def is_disparity(path: Path) -> bool:
         return map_file(path).is_file()
     suffix = path.suffix.lower()
     if suffix in _HDF5:
-        return holds(path, _DATASET)
+        return has_dataset(path, _DATASET)
     if suffix == ".png":
-        return path.is_file() and {_SCALE, _OFFSET} <= set(_png_texts(_bytes_of(path)))
+        return {_SCALE, _OFFSET} <= set(png_texts(path))
     return suffix in SUFFIXES
 
 
@@ -99,15 +98,13 @@ def _read_npy(path: Path) -> FloatMap:
 
 
 def _read_png(path: Path, scaled: bool) -> FloatMap:
-    data = _bytes_of(path)
-    if not data.startswith(PNG_SIGNATURE):
-        raise _no_map(path)
     levels = read_picture(path)[:, :, 0].astype(np.float64)
-    # the header chunk comes first; levels of fewer bits would have been stretched to 8
-    bits, colour = data[24:26]
-    if colour != _GREY or bits not in (8, 16):
+    with path.open("rb") as file:
+        head = file.read(26)
+    # levels of fewer bits would have been stretched to 8
+    if not head.startswith(b"\x89PNG") or head[24] not in (8, 16) or head[25] != _GREY:
         raise _no_map(path)
-    texts = _png_texts(data)
+    texts = png_texts(path)
     if {_SCALE, _OFFSET} <= set(texts):
         own_scale, own_offset = (_number(path, key, texts[key]) for key in (_SCALE, _OFFSET))
         return np.where(levels > 0, (levels - 1) * own_scale + own_offset, np.nan).astype(np.float32)
@@ -119,19 +116,6 @@ def _read_png(path: Path, scaled: bool) -> FloatMap:
     return levels.astype(np.float32)
 
 
-def _png_texts(data: bytes) -> dict[str, str]:
-    """Key to text of a PNG's uncompressed text chunks; none of what is no PNG."""
-    texts = {}
-    at = len(PNG_SIGNATURE)
-    while data.startswith(PNG_SIGNATURE) and at + 12 <= len(data):
-        length, kind = struct.unpack_from(">I4s", data, at)
-        if kind == b"tEXt":
-            key, _, text = data[at + 8 : at + 8 + length].partition(b"\0")
-            texts[key.decode("latin-1")] = text.decode("latin-1")
-        at += 12 + length
-    return texts
-
-
 def _number(path: Path, key: str, text: str) -> float:
     try:
         value = float(text)
@@ -140,13 +124,6 @@ def _number(path: Path, key: str, text: str) -> float:
     if not math.isfinite(value):
         raise SepiError(f"{path}: text chunk '{key}' must be a number, got {text[:40]!r}")
     return value
-
-
-def _bytes_of(path: Path) -> bytes:
-    try:
-        return path.read_bytes()
-    except OSError as error:
-        raise SepiError(f"{path}: cannot be read ({error.strerror})") from error
 
 
 def _no_map(path: Path) -> SepiError:

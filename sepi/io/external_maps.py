@@ -18,7 +18,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from sepi.errors import SepiError
 from sepi.io.disparity_maps import SUFFIXES, map_file
-from sepi.io.hdf5 import UNITS, created, opened
+from sepi.io.hdf5 import UNITS, create_hdf5, open_hdf5
 from sepi.io.scores import Evaluation, evaluation_in, put_evaluation, scores_in
 from sepi.lightfield import FloatMap
 
@@ -86,7 +86,7 @@ class ExternalMap:
 
 def write_external(path: Path, maps: Mapping[str, ExternalMap]) -> None:
     """Write the maps of all methods, by name; equal content gives equal bytes."""
-    with created(path) as file:
+    with create_hdf5(path) as file:
         methods = file.create_group(_METHODS, track_order=True)
         for name, external in maps.items():
             group = methods.create_group(name)
@@ -121,7 +121,7 @@ def read_external_scores(path: Path) -> dict[str, ExternalMap]:
 
 
 def _read(path: Path, with_maps: bool) -> dict[str, ExternalMap]:
-    with opened(path) as file:
+    with open_hdf5(path) as file:
         if _METHODS not in file:
             raise SepiError(f"{path}: not a file of external maps (written by python -m sepi.external)")
         return {name: _external(group, with_maps) for name, group in file[_METHODS].items()}

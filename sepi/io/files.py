@@ -29,16 +29,11 @@ def atomic_path(path: Path) -> Iterator[Path]:
     """
     if path.exists() and not path.is_file():
         raise SepiError(f"{path}: cannot be written (not a file)")
-    temporary = _temporary_for(path, path.suffix)
-    try:
+    with _temporary_beside(path, path.suffix, path) as temporary:
         path.parent.mkdir(parents=True, exist_ok=True)
         temporary.touch(exist_ok=False)
         yield temporary
         temporary.replace(path)
-    except OSError as error:
-        raise SepiError(f"{path}: cannot be written ({error.strerror or error})") from error
-    finally:
-        _remove(temporary)
 
 
 @contextmanager
@@ -52,16 +47,11 @@ def atomic_folder(path: Path) -> Iterator[Path]:
     """
     if path.exists() and not (path.is_dir() and not any(path.iterdir())):
         raise SepiError(f"{path}: exists already; remove it or choose a folder that does not exist")
-    temporary = _temporary_for(path, "")
-    try:
+    with _temporary_beside(path, "", path) as temporary:
         path.parent.mkdir(parents=True, exist_ok=True)
         temporary.mkdir()
         yield temporary
         temporary.replace(path)
-    except OSError as error:
-        raise SepiError(f"{path}: cannot be written ({error.strerror or error})") from error
-    finally:
-        _remove(temporary)
 
 
 @contextmanager
@@ -73,23 +63,25 @@ def atomic_files(folder: Path) -> Iterator[Path]:
     SepiError
         If ``folder`` cannot be written to, or the disk is full.
     """
-    temporary = _temporary_for(folder / "files", "")
-    try:
+    with _temporary_beside(folder / "files", "", folder) as temporary:
         temporary.mkdir()
         yield temporary
         for path in sorted(temporary.iterdir(), key=lambda path: path.stat().st_mtime_ns):
             path.replace(folder / path.name)
-    except OSError as error:
-        raise SepiError(f"{folder}: cannot be written ({error.strerror or error})") from error
-    finally:
-        _remove(temporary)
 
 
-def _temporary_for(path: Path, suffix: str) -> Path:
+@contextmanager
+def _temporary_beside(path: Path, suffix: str, target: Path) -> Iterator[Path]:
+    """A name for a temporary file or folder, removed at the end; an error of the system is one about ``target``."""
     # the token keeps two programs that write the same file apart; a long name is cut so that the whole fits
     temporary = path.parent / f".{path.stem[:40]}-{secrets.token_hex(6)}{suffix}"
     _unfinished.add(temporary)
-    return temporary
+    try:
+        yield temporary
+    except OSError as error:
+        raise SepiError(f"{target}: cannot be written ({error.strerror or error})") from error
+    finally:
+        _remove(temporary)
 
 
 def _remove(temporary: Path) -> None:

@@ -18,21 +18,22 @@ import numpy as np
 import numpy.typing as npt
 
 from sepi.camera import Camera
-from sepi.errors import SepiError
+from sepi.errors import SepiError, printable
 from sepi.io.files import atomic_path
-from sepi.io.readers.arrays import DEFLATE_RATIO, printable, rearranged
-from sepi.io.readers.options import ReadOptions, require_unused
 from sepi.lightfield import RANGE_SOURCES, DisparityRange, FloatMap, LightField
 from sepi.stage import StageMaps
 
 Attribute = str | float | int | tuple[float, float]
+
+DEFLATE_RATIO = 1100
+"""Bytes that a byte can unpack to; zlib's limit is 1032."""
 
 UNITS = {"disparity": "pixels per view step", "confidence": "0..1", "depth": "metres"}
 
 
 def write_stage(path: Path, maps: StageMaps, attributes: Mapping[str, Attribute]) -> None:
     """Write a stage's maps and the attributes that say what made them."""
-    with created(path) as file:
+    with create_hdf5(path) as file:
         for name, values in maps.all().items():
             # small integers and masks shrink to almost nothing; float maps hardly compress
             compression = {"compression": "gzip", "compression_opts": 1} if values.dtype.itemsize < 4 else {}
@@ -53,7 +54,7 @@ def read_stage(path: Path) -> StageMaps:
     SepiError
         If the file is missing, not HDF5, or holds no disparity and confidence.
     """
-    with opened(path) as file:
+    with open_hdf5(path) as file:
         maps = {name: file[name][...] for name in file}
         names = file["view_subset"].attrs["names"] if "view_subset" in file else []
     try:
@@ -70,8 +71,8 @@ def read_map(path: Path, name: str) -> FloatMap:
     SepiError
         If the file is missing, not HDF5, or holds no such map.
     """
-    with opened(path) as file:
-        values = stored(path, file[name])
+    with open_hdf5(path) as file:
+        values = read_dataset(path, file[name])
     if values.ndim != 2 or values.dtype.kind not in "fiu":
         raise SepiError(f"{path}: expected '{name}' as numbers of shape (H, W), got {values.dtype} {values.shape}")
     return values.astype(np.float32)
@@ -79,14 +80,14 @@ def read_map(path: Path, name: str) -> FloatMap:
 
 def read_attributes(path: Path) -> dict[str, Any]:
     """Attributes of an HDF5 file."""
-    with opened(path) as file:
+    with open_hdf5(path) as file:
         return dict(file.attrs)
 
 
 def write_light_field(path: Path, light_field: LightField) -> None:
     """Write a light field with all that is known about it; ``read_light_field`` gives it back unchanged."""
     known = light_field.disparity_range
-    with created(path) as file:
+    with create_hdf5(path) as file:
         # gzip would cost 1.8 s and save half of 64 MB for a benchmark scene: not worth it for an intermediate file
         file.create_dataset("views", data=light_field.views)
         file["views"].attrs["axes"] = "t s y x channel"
@@ -109,26 +110,15 @@ def write_light_field(path: Path, light_field: LightField) -> None:
             file.create_dataset(f"masks/{name}", data=mask, compression="gzip", compression_opts=1)
 
 
-def matches(path: Path) -> bool:
-    """Whether ``path`` is an HDF5 file that may be a light field of this package: it holds views, or is damaged."""
-    if not path.is_file() or not h5py.is_hdf5(path):
-        return False
-    try:
-        with h5py.File(path, "r") as file:
-            return "views" in file
-    except (OSError, LookupError, ValueError, RuntimeError):
-        return True
-
-
-def holds(path: Path, name: str) -> bool:
-    """Whether ``path`` is a readable HDF5 file with a dataset of this name."""
+def has_dataset(path: Path, name: str, *, if_damaged: bool = False) -> bool:
+    """Whether ``path`` is an HDF5 file with a dataset of this name; ``if_damaged`` where it cannot be told."""
     if not path.is_file() or not h5py.is_hdf5(path):
         return False
     try:
         with h5py.File(path, "r") as file:
             return name in file
     except (OSError, LookupError, ValueError, RuntimeError):
-        return False
+        return if_damaged
 
 
 def read_light_field(path: Path) -> LightField:
@@ -139,7 +129,7 @@ def read_light_field(path: Path) -> LightField:
     SepiError
         If the file is missing, not HDF5, or not a light field.
     """
-    with opened(path) as file:
+    with open_hdf5(path) as file:
         if "views" not in file or "name" not in file.attrs:
             raise SepiError(
                 f"{path}: not a light field of this package: dataset 'views' or attribute 'name' is missing"
@@ -150,32 +140,22 @@ def read_light_field(path: Path) -> LightField:
             known = DisparityRange(minimum, maximum, _known_source(path, _text(path, file, "disparity_range_source")))
         view = file.attrs.get("view")
         return LightField(
-            views=stored(path, file["views"]),
+            views=read_dataset(path, file["views"]),
             name=_text(path, file, "name"),
             source=_text(path, file, "source"),
-            present=stored(path, file["present"]).astype(bool),
+            present=read_dataset(path, file["present"]).astype(bool),
             view=None if view is None else (int(view[0]), int(view[1])),
             camera=Camera(*map(float, file.attrs["camera"])) if "camera" in file.attrs else None,
             notes=tuple(_text(path, file, "notes").split("\0")) if "notes" in file.attrs else (),
             disparity_range=known,
-            ground_truth=stored(path, file["ground_truth"]).astype(np.float32) if "ground_truth" in file else None,
-            masks={name: stored(path, file["masks"][name]).astype(bool) for name in file.get("masks", {})},
+            ground_truth=read_dataset(path, file["ground_truth"]).astype(np.float32)
+            if "ground_truth" in file
+            else None,
+            masks={name: read_dataset(path, file["masks"][name]).astype(bool) for name in file.get("masks", {})},
         )
 
 
-def read(path: Path, options: ReadOptions) -> LightField:
-    """Read a light field written by ``write_light_field`` and arrange its views as asked for.
-
-    Raises
-    ------
-    SepiError
-        If the file is not such a file, or the options do not fit it.
-    """
-    require_unused(str(path), options, ("grid", "pattern", "axes", "variable", "follow_links"))
-    return rearranged(read_light_field(path), options)
-
-
-def require_stored(path: Path, dataset: h5py.Dataset) -> None:
+def require_values_inside(path: Path, dataset: h5py.Dataset) -> None:
     """Raise unless a dataset's values can lie in the file, so that no memory is taken on the word of its shape.
 
     Raises
@@ -194,20 +174,20 @@ def require_stored(path: Path, dataset: h5py.Dataset) -> None:
         raise SepiError(f"{path}: damaged HDF5 file: '{name}' of shape {dataset.shape} cannot lie in {held} bytes")
 
 
-def stored(path: Path, dataset: h5py.Dataset) -> npt.NDArray[Any]:
+def read_dataset(path: Path, dataset: h5py.Dataset) -> npt.NDArray[Any]:
     """All values of a dataset.
 
     Raises
     ------
     SepiError
-        As :func:`require_stored`.
+        As :func:`require_values_inside`.
     """
-    require_stored(path, dataset)
+    require_values_inside(path, dataset)
     return np.asarray(dataset[...])
 
 
 @contextmanager
-def opened(path: Path) -> Iterator[h5py.File]:
+def open_hdf5(path: Path) -> Iterator[h5py.File]:
     """Open an HDF5 file for reading.
 
     Raises
@@ -229,7 +209,7 @@ def opened(path: Path) -> Iterator[h5py.File]:
 
 
 @contextmanager
-def created(path: Path) -> Iterator[h5py.File]:
+def create_hdf5(path: Path) -> Iterator[h5py.File]:
     """Write an HDF5 file, whole or not at all.
 
     Raises

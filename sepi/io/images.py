@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
+import io
 import os
-import struct
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import cv2
 import numpy as np
@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from sepi.errors import SepiError
 from sepi.io.files import atomic_path
-from sepi.io.picture_headers import PNG_SIGNATURE, Header, header_of
+from sepi.io.picture_headers import Header, read_header
 from sepi.lightfield import HIGHEST, LOWEST, BoolMap
 from sepi.threads import available_cores
 
@@ -45,8 +45,9 @@ def read_picture(path: Path) -> Pixels:
         If the file is unreadable, no picture of these kinds, cut off or damaged, of other numbers than 8 or 16 bit or
         float32, or has float pixels that are not finite or far outside 0..1.
     """
-    data = _read_bytes(path)
-    header = header_of(path, data)
+    with _opened(path) as file:
+        data = file.read()
+    header = read_header(path, io.BytesIO(data), whole=True)
     image = _pnm_pixels(path, data, header) if header.kind == "PNM" else _decoded(path, data, header)
     if image.dtype == np.float32 and not (image.min() >= LOWEST and image.max() <= HIGHEST):
         what = f"{image.min():g} to {image.max():g}" if np.isfinite(image).all() else "NaN or infinite ones"
@@ -54,13 +55,13 @@ def read_picture(path: Path) -> Pixels:
     return image
 
 
-def read_views(paths: Sequence[Path], places: Sequence[int] | None = None, count: int | None = None) -> Pixels:
+def read_views(paths: Sequence[Path], positions: Sequence[int] | None = None, count: int | None = None) -> Pixels:
     """Read pictures that must be alike, several at a time.
 
     Parameters
     ----------
     paths : sequence of Path
-    places : sequence of int, optional
+    positions : sequence of int, optional
         Index of each in the result; one after the other unless given.
     count : int, optional
         Length of the result; as many as ``paths`` unless given.
@@ -68,7 +69,7 @@ def read_views(paths: Sequence[Path], places: Sequence[int] | None = None, count
     Returns
     -------
     ndarray, shape (count, H, W, C), uint8, uint16 or float32
-        Zero at places that no picture has.
+        Zero at positions that no picture has.
 
     Raises
     ------
@@ -77,7 +78,7 @@ def read_views(paths: Sequence[Path], places: Sequence[int] | None = None, count
         more memory together than there is.
     """
     first = read_picture(paths[0])
-    places = range(len(paths)) if places is None else places
+    positions = range(len(paths)) if positions is None else positions
     count = len(paths) if count is None else count
     _require_memory(paths[0].parent, first, count)
     views = np.zeros((count, *first.shape), first.dtype)
@@ -89,7 +90,7 @@ def read_views(paths: Sequence[Path], places: Sequence[int] | None = None, count
                 f"{paths[index]}: {_described(image)}, but {paths[0].name} is {_described(first)}; "
                 "all views must be alike"
             )
-        views[places[index]] = image
+        views[positions[index]] = image
 
     # decoding runs outside Python's lock, so threads share the work
     with ThreadPoolExecutor(min(8, available_cores())) as pool:
@@ -98,51 +99,61 @@ def read_views(paths: Sequence[Path], places: Sequence[int] | None = None, count
     return views
 
 
-def png_size(path: Path) -> tuple[int, int]:
-    """Height and width in pixels, from the header alone.
-
-    Raises
-    ------
-    SepiError
-        If the file is unreadable or has no PNG header.
-    """
-    try:
-        with path.open("rb") as file:
-            head = file.read(24)
-    except OSError as error:
-        raise SepiError(f"{path}: cannot be read ({error.strerror})") from error
-    if len(head) < 24 or not head.startswith(PNG_SIGNATURE):
-        raise SepiError(f"{path}: not a PNG")
-    width, height = struct.unpack(">II", head[16:24])
-    return height, width
-
-
-def picture_size(path: Path) -> tuple[int, int]:
-    """Height and width in pixels of a picture of any kind that is read; of a PNG from the header alone.
+def picture_header(path: Path) -> Header:
+    """What a picture of any kind that is read is, without decoding it.
 
     Raises
     ------
     SepiError
         If the file is unreadable, or no such picture.
     """
+    with _opened(path) as file:
+        return read_header(path, file)
+
+
+def png_texts(path: Path) -> dict[str, str]:
+    """Key to text of a PNG's text chunks; none of what is no undamaged PNG."""
+    from PIL import PngImagePlugin
+
+    if not path.is_file():
+        return {}
     try:
-        return png_size(path)
-    except SepiError:
-        header = header_of(path, _read_bytes(path))
-        return header.height, header.width
+        with PngImagePlugin.PngImageFile(path) as image:
+            return {key: str(text) for key, text in image.text.items()}
+    except Exception:
+        # Pillow stumbles over damage in many ways
+        return {}
 
 
-def write_png(path: Path, pixels: Pixels | BoolMap) -> None:
-    """Write grey (H, W) or RGB (H, W, 3) uint8, uint16 or bool as PNG, whole or not at all; bool becomes 0 and 255."""
+def write_png(path: Path, pixels: Pixels | BoolMap, texts: Mapping[str, str] | None = None) -> None:
+    """Write a PNG, whole or not at all.
+
+    Parameters
+    ----------
+    path : Path
+    pixels : ndarray, shape (H, W) or (H, W, 3), uint8, uint16 or bool
+        Grey or RGB; bool becomes 0 and 255.
+    texts : mapping of str to str, optional
+        Text chunks; for grey only.
+    """
     values: npt.NDArray[Any] = np.asarray(255 * pixels, np.uint8) if pixels.dtype == bool else pixels
-    done, data = cv2.imencode(".png", values[:, :, ::-1] if values.ndim == 3 else values)
-    if not done:
-        raise SepiError(f"{path}: a picture of shape {pixels.shape} and type {pixels.dtype} cannot be written as PNG")
     with atomic_path(path) as temporary:
+        if texts is not None:
+            from PIL import Image, PngImagePlugin
+
+            chunks = PngImagePlugin.PngInfo()
+            for key, text in texts.items():
+                chunks.add_text(key, text)
+            Image.fromarray(values).save(temporary, "PNG", pnginfo=chunks)
+            return
+        done, data = cv2.imencode(".png", values[:, :, ::-1] if values.ndim == 3 else values)
+        if not done:
+            raise SepiError(f"{path}: pixels {pixels.shape} of type {pixels.dtype} cannot be written as PNG")
         temporary.write_bytes(data.tobytes())
 
 
-def _read_bytes(path: Path) -> bytes:
+@contextmanager
+def _opened(path: Path) -> Iterator[IO[bytes]]:
     try:
         if path.is_symlink() and not path.exists():
             raise SepiError(f"{path}: a link to {path.readlink()}, which does not exist")
@@ -150,7 +161,8 @@ def _read_bytes(path: Path) -> bytes:
             raise SepiError(f"{path}: cannot be read (not a plain file)")
         if path.stat().st_size > _MAX_BYTES:
             raise SepiError(f"{path}: {path.stat().st_size} bytes are more than a picture has")
-        return path.read_bytes()
+        with path.open("rb") as file:
+            yield file
     except OSError as error:
         raise SepiError(f"{path}: cannot be read ({error.strerror})") from error
 
@@ -163,7 +175,7 @@ def _decoded(path: Path, data: bytes, header: Header) -> Pixels:
     except cv2.error:
         image = None
     if image is None or image.shape[:2] != (header.height, header.width):
-        raise SepiError(f"{path}: damaged {header.kind}: its pixels cannot be decoded")
+        raise SepiError(f"{path}: damaged {header.kind}, perhaps cut off: its pixels cannot be decoded")
     if image.dtype not in (np.uint8, np.uint16, np.float32):
         raise SepiError(f"{path}: pixels of type {image.dtype}; expected 8 or 16 bit without sign, or float32")
     if header.mixed_alpha and image.shape[2:] == (4,) and image[:, :, 3].min() < 255:
@@ -177,7 +189,7 @@ def _pnm_pixels(path: Path, data: bytes, header: Header) -> Pixels:
     """Pixels of a PGM or PPM, stretched to the whole range of their type."""
     channels = 1 if header.grey else 3
     count = header.height * header.width * channels
-    kind: np.dtype[Any] = np.dtype(np.uint8) if header.largest < 256 else np.dtype(">u2")
+    kind: np.dtype[Any] = np.dtype(np.uint8) if header.white < 256 else np.dtype(">u2")
     full = np.iinfo(kind).max
     values: npt.NDArray[Any]
     if header.digits:
@@ -187,10 +199,10 @@ def _pnm_pixels(path: Path, data: bytes, header: Header) -> Pixels:
         values = np.array([int(text) for text in texts], np.int64)
     else:
         values = np.frombuffer(data, kind, count, header.start)
-    if values.max() > header.largest:
-        raise SepiError(f"{path}: damaged PNM: a value of {values.max()}, but white is {header.largest}")
-    if header.largest != full:
-        values = np.rint(values * (full / header.largest))
+    if values.max() > header.white:
+        raise SepiError(f"{path}: damaged PNM: a value of {values.max()}, but white is {header.white}")
+    if header.white != full:
+        values = np.rint(values * (full / header.white))
     return values.astype(kind.newbyteorder("=")).reshape(header.height, header.width, channels)
 
 

@@ -112,7 +112,7 @@ def view_points(
     min_confidence : float
         Leave out pixels of lower confidence.
     max_depth : float, optional
-        Leave out points farther than this, metres.
+        Leave out points more distant than this, metres.
     step : int
         Use every so-many-th row and column of pixels.
 
@@ -129,7 +129,7 @@ def view_points(
         raise SepiError(f"point cloud: expected a step of at least 1 pixel, got {step}")
     used = np.zeros(disparity.shape, bool)
     used[::step, ::step] = True
-    used &= np.isfinite(disparity) & _sure(confidence, min_confidence)
+    used &= np.isfinite(disparity) & _confident(confidence, min_confidence)
     if camera is not None:
         used &= _near(camera.depth(disparity), max_depth)
         return _metric(picture, disparity, used, camera, from_centre)
@@ -138,22 +138,22 @@ def view_points(
     return _relief(picture, disparity, used)
 
 
-def _sure(confidence: FloatMap | None, least: float) -> BoolMap | bool:
-    if not 0 <= least <= 1:
-        raise SepiError(f"point cloud: expected a least confidence within 0..1, got {least:g}")
-    if least == 0:
+def _confident(confidence: FloatMap | None, min_confidence: float) -> BoolMap | bool:
+    if not 0 <= min_confidence <= 1:
+        raise SepiError(f"point cloud: expected a least confidence within 0..1, got {min_confidence:g}")
+    if min_confidence == 0:
         return True
     if confidence is None:
         raise SepiError("point cloud: a least confidence needs a confidence map")
     # comparison with NaN is false: unknown confidence is none
-    return np.asarray(confidence >= least)
+    return np.asarray(confidence >= min_confidence)
 
 
-def _near(depth: FloatMap, farthest: float | None) -> BoolMap:
-    if farthest is not None and not farthest > 0:
-        raise SepiError(f"point cloud: expected a positive largest depth in metres, got {farthest:g}")
+def _near(depth: FloatMap, max_depth: float | None) -> BoolMap:
+    if max_depth is not None and not max_depth > 0:
+        raise SepiError(f"point cloud: expected a positive largest depth in metres, got {max_depth:g}")
     near = np.isfinite(depth) & (depth > 0)
-    return near if farthest is None else near & (depth <= farthest)
+    return near if max_depth is None else near & (depth <= max_depth)
 
 
 def _metric(

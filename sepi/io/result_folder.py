@@ -7,8 +7,6 @@ from __future__ import annotations
 
 import os
 import re
-import struct
-import zlib
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,12 +19,12 @@ import numpy.typing as npt
 from sepi.camera import Camera
 from sepi.errors import SepiError
 from sepi.io.files import atomic_files, atomic_folder, atomic_path
-from sepi.io.hdf5 import Attribute, opened, stored, write_stage
-from sepi.io.images import write_png
+from sepi.io.hdf5 import Attribute, open_hdf5, read_dataset, write_stage
+from sepi.io.images import png_texts, write_png
 from sepi.io.pfm import write_pfm
 from sepi.io.ply import write_ply
 from sepi.io.point_cloud import point_cloud
-from sepi.lightfield import BoolMap, FloatMap, LightField
+from sepi.lightfield import FloatMap, LightField
 from sepi.stage import StageMaps
 
 RESULT = "result.h5"
@@ -50,8 +48,6 @@ _DEPTH = "depth.pfm"
 # part of the pixels beyond each end of the colour scale, so that a few wrong pixels do not use it up
 _BEYOND = 0.005
 
-# PNG: signature and header chunk, which all files begin with; further chunks may follow
-_PNG_START = 8 + 25
 # says which masks are this module's, so that those of an earlier run can be told from a user's own
 _MASK_TEXT = {"Software": "sepi", "Description": "mask: 255 inside, 0 outside"}
 
@@ -162,12 +158,14 @@ def read_result(path: Path) -> Result:
         If there is no such file, or it is damaged or not such a result.
     """
     path = path / RESULT if path.is_dir() else path
-    with opened(path) as file:
+    with open_hdf5(path) as file:
         attributes = dict(file.attrs)
         needed = {"view", "disparity", "confidence"} - set(file) | {"view_position", "grid"} - set(attributes)
         if needed:
             raise SepiError(f"{path}: not a result of 'sepi depth': {', '.join(sorted(needed))} missing")
-        picture, disparity, confidence = (stored(path, file[name]) for name in ("view", "disparity", "confidence"))
+        picture, disparity, confidence = (
+            read_dataset(path, file[name]) for name in ("view", "disparity", "confidence")
+        )
         (t, s), (rows, columns) = (map(int, attributes[name]) for name in ("view_position", "grid"))
         try:
             camera = Camera(*map(float, attributes["camera"])) if "camera" in attributes else None
@@ -186,7 +184,7 @@ def read_result(path: Path) -> Result:
     )
 
 
-def coloured(values: FloatMap) -> npt.NDArray[np.uint8]:
+def colour_code(values: FloatMap) -> npt.NDArray[np.uint8]:
     """A map (H, W) in perceptually uniform colours, (H, W, 3) RGB; black where it is not finite."""
     finite = np.isfinite(values)
     low, high = np.quantile(values[finite], (_BEYOND, 1 - _BEYOND)) if finite.any() else (0.0, 0.0)
@@ -222,14 +220,14 @@ def _write_files(
     with atomic_path(folder / "disparity.npy") as temporary, temporary.open("wb") as file:
         np.save(file, maps.disparity.astype("<f4"), allow_pickle=False)
     _write_16bit(folder / "disparity_16bit.png", maps.disparity)
-    write_png(folder / "disparity.png", coloured(maps.disparity))
+    write_png(folder / "disparity.png", colour_code(maps.disparity))
     write_png(folder / "confidence.png", _levels(maps.confidence))
     cloud = point_cloud(light_field, maps.disparity)
     write_ply(folder / "points.ply", cloud.positions, cloud.colours, cloud.comments())
     for name, values in depth.items():
         write_pfm(folder / name, values)
     for name, mask in masks.items():
-        _write_with_text(folder / name, mask, _MASK_TEXT)
+        write_png(folder / name, mask, _MASK_TEXT)
     _write_all(folder / RESULT, light_field, maps, attributes)
     return (*RESULT_FILES[:-1], *depth, *masks, RESULT)
 
@@ -248,21 +246,12 @@ def _write_all(path: Path, light_field: LightField, maps: StageMaps, attributes:
 def _remove_others(folder: Path, made: Collection[str]) -> None:
     """Remove what an earlier run wrote and this one does not make."""
     known = [path for path in (folder / _DEPTH, folder / RUNTIME) if path.is_file()]
-    for path in known + [path for path in folder.glob("mask_*.png") if _is_own_mask(path)]:
+    for path in known + [path for path in folder.glob("mask_*.png") if png_texts(path) == _MASK_TEXT]:
         if path.name not in made:
             try:
                 path.unlink()
             except OSError as error:
                 raise SepiError(f"{path}: an earlier run's file cannot be removed ({error.strerror})") from error
-
-
-def _is_own_mask(path: Path) -> bool:
-    text = _text_chunks(_MASK_TEXT)
-    try:
-        with path.open("rb") as file:
-            return file.read(_PNG_START + len(text))[_PNG_START:] == text
-    except OSError:
-        return False
 
 
 def _write_16bit(path: Path, disparity: FloatMap) -> None:
@@ -273,7 +262,7 @@ def _write_16bit(path: Path, disparity: FloatMap) -> None:
     scale = (high - low) / 65534 if high > low else 1.0
     levels = np.zeros(disparity.shape, np.uint16)
     levels[finite] = np.rint((values - low) / scale) + 1
-    _write_with_text(
+    write_png(
         path,
         levels,
         {
@@ -283,22 +272,6 @@ def _write_16bit(path: Path, disparity: FloatMap) -> None:
             "units": "pixels per view step",
         },
     )
-
-
-def _write_with_text(path: Path, pixels: BoolMap | npt.NDArray[np.uint16], texts: Mapping[str, str]) -> None:
-    """Write a PNG with text chunks right after its header."""
-    with atomic_path(path) as temporary:
-        write_png(temporary, pixels)
-        data = temporary.read_bytes()
-        temporary.write_bytes(data[:_PNG_START] + _text_chunks(texts) + data[_PNG_START:])
-
-
-def _text_chunks(texts: Mapping[str, str]) -> bytes:
-    chunks = b""
-    for key, text in texts.items():
-        body = b"tEXt" + f"{key}\0{text}".encode("latin-1")
-        chunks += struct.pack(">I", len(body) - 4) + body + struct.pack(">I", zlib.crc32(body))
-    return chunks
 
 
 def _levels(unit: npt.NDArray[np.floating[Any]]) -> npt.NDArray[np.uint8]:

@@ -18,7 +18,7 @@ import h5py
 import numpy as np
 
 from sepi.errors import SepiError
-from sepi.io.hdf5 import UNITS, Attribute, created, opened
+from sepi.io.hdf5 import UNITS, Attribute, create_hdf5, open_hdf5
 from sepi.lightfield import BoolMap, FloatMap
 
 _MAPS = "maps"
@@ -85,7 +85,7 @@ def write_scores(path: Path, maps: Mapping[str, Scored], attributes: Mapping[str
 
     Equal content gives equal bytes. A name is a path such as ``"sepi/half_sepi"``.
     """
-    with created(path) as file:
+    with create_hdf5(path) as file:
         file.attrs["ground_truth"] = any(scored.evaluation.error is not None for scored in maps.values())
         for key, value in attributes.items():
             file.attrs[key] = value
@@ -111,7 +111,7 @@ def read_scores(path: Path) -> dict[str, AllScores]:
     SepiError
         If the file is missing, not HDF5, or not a score file.
     """
-    with opened(path) as file:
+    with open_hdf5(path) as file:
         return {_name(key): scores_in(group) for key, group in _maps(path, file).items()}
 
 
@@ -123,7 +123,7 @@ def read_evaluations(path: Path, names: Collection[str] | None = None) -> dict[s
     SepiError
         If the file is missing, not HDF5, not a score file, or has nothing of one of the maps.
     """
-    with opened(path) as file:
+    with open_hdf5(path) as file:
         maps = _maps(path, file)
         known = [_name(key) for key in maps]
         for name in names or ():

@@ -2,25 +2,25 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 from sepi.errors import SepiError
-from sepi.io.images import SUFFIXES, picture_size
 from sepi.io.readers import hci_2013
+from sepi.io.readers.sizes import size_of
 
 VIEW_PATTERN = "input_Cam*.png"
 # what a scene's folder may hold besides views, and ingest reads
 _OTHER_PATTERNS = ("parameters.cfg", "gt_disp_lowres.pfm", "*mask*.png")
 # a scene's name is a folder name below results/ and a word on the command line
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.+-]*")
-# a side of the benchmark's views
-_USUAL_SIDE = 512
+# what Python and its libraries take before any data, in MB
+_LIBRARIES = 300
+# bytes of a pixel of 8-bit colours
+_RGB = 3
 # root/scene, root/category/scene, and a level more
 _DEPTH = 3
 
@@ -41,6 +41,8 @@ class Scene:
         Number of views.
     height, width : int
         Size of a view in pixels.
+    pixel_bytes : int
+        Bytes that a pixel of a view takes as the files hold it, unpacked.
     disparity_range : tuple of float or None
         Range the user set, pixels per view step; None: the scene's own or an estimate.
     flags : tuple of str
@@ -54,6 +56,7 @@ class Scene:
     views: int
     height: int
     width: int
+    pixel_bytes: int = _RGB
     disparity_range: tuple[float, float] | None = None
     flags: tuple[str, ...] = ()
 
@@ -61,6 +64,20 @@ class Scene:
     def samples(self) -> int:
         """Number of pixels of all views together."""
         return self.views * self.height * self.width
+
+    def memory_mb(self, bytes_per_sample: float, bytes_per_pixel: float = 0, copies: int = 2) -> int:
+        """Memory of a job on this scene in MB.
+
+        Parameters
+        ----------
+        bytes_per_sample, bytes_per_pixel : float
+            What the job holds of each pixel of all views and of each pixel of one, for views of 8-bit colours.
+        copies : int
+            How often views of wider values are held at a time.
+        """
+        wider = copies * max(0, self.pixel_bytes - _RGB)
+        held = (bytes_per_sample + wider) * self.samples + bytes_per_pixel * self.height * self.width
+        return _LIBRARIES + round(held / 2**20)
 
 
 def scenes_in(root: Path, dataset: str, where: str) -> list[Scene]:
@@ -112,7 +129,7 @@ def own_scene(name: str, source: Path, flags: tuple[str, ...], where: str) -> Sc
     source = source.resolve()
     inside = [path for path in sorted(source.iterdir()) if path.is_file()] if source.is_dir() else [source]
     files = tuple(path for path in inside if not path.name.startswith("."))
-    return Scene("own", name, source, files, *_rough_size(files), flags=flags)
+    return Scene("own", name, source, files, *size_of(files), flags=flags)
 
 
 def _require_plain(name: str, where: str) -> None:
@@ -124,7 +141,7 @@ def _benchmark_scenes(folder: Path, depth: int = _DEPTH) -> Iterator[Scene]:
     views = sorted(folder.glob(VIEW_PATTERN))
     if views:
         others = sorted({path for pattern in _OTHER_PATTERNS for path in folder.glob(pattern)})
-        yield Scene("hci", folder.name, folder, (*views, *others), *_rough_size(views))
+        yield Scene("hci", folder.name, folder, (*views, *others), *size_of(views))
     elif depth:
         for inner in sorted(folder.iterdir()):
             if inner.is_dir() and not inner.name.startswith("."):
@@ -138,7 +155,7 @@ def _archive_scenes(path: Path, depth: int = _DEPTH + 1) -> Iterator[Scene]:
                 yield from _archive_scenes(inner, depth - 1)
     elif hci_2013.matches(path):
         name = path.parent.name if path.stem.lower() == "lf" else path.stem
-        yield Scene("hci_2013", name, path, (path,), *_rough_size((path,)))
+        yield Scene("hci_2013", name, path, (path,), *size_of((path,)))
 
 
 # dataset to what yields its scenes below a folder, and what is looked for
@@ -146,23 +163,3 @@ _FINDERS: dict[str, tuple[Callable[[Path], Iterator[Scene]], str]] = {
     "hci": (_benchmark_scenes, f"folders with {VIEW_PATTERN}"),
     "hci_2013": (_archive_scenes, f"HDF5 files with a dataset {hci_2013.VIEWS}"),
 }
-
-
-def _rough_size(files: Sequence[Path]) -> tuple[int, int, int]:
-    """Number of views, their height and width: what threads and memory of a job are reckoned from.
-
-    Without pictures, or with a single one, the largest file is taken for an array of 9x9 views, or a picture of as
-    many; damaged ones are left to ingest, which will say so.
-    """
-    pictures = [path for path in files if path.suffix.lower() in SUFFIXES]
-    if len(pictures) > 1:
-        try:
-            return len(pictures), *picture_size(pictures[0])
-        except SepiError:
-            return len(pictures), _USUAL_SIDE, _USUAL_SIDE
-    views, values = 81, max((path.stat().st_size for path in files), default=0)
-    if pictures:
-        with suppress(SepiError):
-            values = 3 * math.prod(picture_size(pictures[0]))
-    side = max(1, math.isqrt(values // (3 * views)))
-    return views, side, side

@@ -15,7 +15,7 @@ import pytest
 from sepi.errors import SepiError
 from sepi.io import files
 from sepi.io.files import atomic_folder, atomic_path
-from sepi.io.hdf5 import created
+from sepi.io.hdf5 import create_hdf5
 from sepi.io.result_folder import RESULT_FILES
 from sepi.scenes import render, write_hci
 
@@ -148,7 +148,7 @@ import resource, signal, sys
 from pathlib import Path
 import numpy as np
 from sepi.errors import SepiError
-from sepi.io.hdf5 import created
+from sepi.io.hdf5 import create_hdf5
 from sepi.io.pfm import write_pfm
 from sepi.io.images import write_png
 
@@ -157,7 +157,7 @@ resource.setrlimit(resource.RLIMIT_FSIZE, (5000, 5000))
 noise = np.random.default_rng(0).random((99, 99), np.float32)
 
 def hdf5(path):
-    with created(path) as file:
+    with create_hdf5(path) as file:
         file["x"] = noise
 
 kinds = {
@@ -190,7 +190,7 @@ def test_a_full_disk_is_one_line_for_each_kind_of_file(tmp_path: Path) -> None:
 
 
 def test_created_file_is_whole(tmp_path: Path) -> None:
-    with created(tmp_path / "x.h5") as file:
+    with create_hdf5(tmp_path / "x.h5") as file:
         file["x"] = np.arange(4)
     assert names_in(tmp_path) == ["x.h5"]
 

@@ -16,7 +16,7 @@ import tifffile
 from PIL import Image
 
 from sepi.errors import SepiError
-from sepi.io.images import read_picture, read_views
+from sepi.io.images import read_picture, read_views, write_png
 
 RANDOM = np.random.default_rng(0)
 RGB8 = RANDOM.integers(0, 256, (40, 50, 3), np.uint8)
@@ -156,6 +156,7 @@ def test_camera_orientation_does_not_turn_a_view(tmp_path: Path) -> None:
 WHOLE: dict[str, Callable[[Path], object]] = {
     "png": by_pillow(RGB8),
     "jpg": by_pillow(smooth(), quality=95),
+    "progressive.jpg": by_pillow(smooth(), quality=95, progressive=True),
     "bmp": by_pillow(RGB8),
     "tif": by_tifffile(RGB16),
     "tiff": by_opencv(smooth()),
@@ -203,7 +204,7 @@ def test_damage_anywhere_is_an_error_or_a_picture(
         except SepiError:
             refused += 1
     assert refused > 5
-    if ending != "jpg":  # libjpeg has a word for damage that it goes on after
+    if not ending.endswith("jpg"):  # libjpeg has a word for damage that it goes on after
         assert capfd.readouterr() == ("", "")
 
 
@@ -258,12 +259,12 @@ BAD: dict[str, tuple[bytes, str]] = {
     "empty": (b"", "not a PNG, JPEG"),
     "text": (b"hello, world; this is no picture of any kind at all", "not a PNG, JPEG"),
     "GIF": (b"GIF89a" + bytes(100), "not a PNG, JPEG"),
-    "huge PNG": (png(60_000, 60_000), "60000x60000"),
-    "large PNG": (png(16_000, 16_000), "16000x16000"),
-    "PNG without pixels": (png(0, 5), "0x5"),
-    "huge JPEG": (jpeg(65_000, 65_000), "65000x65000"),
-    "large JPEG": (jpeg(16_000, 16_000), "16000x16000"),
-    "JPEG without height": (jpeg(50, 0), "50x0"),
+    "huge PNG": (png(60_000, 60_000), "3600000000 pixels"),
+    "large PNG": (png(9000, 9000), "9000x9000"),
+    "PNG without pixels": (png(0, 5), "damaged PNG"),
+    "huge JPEG": (jpeg(65_000, 65_000), "4225000000 pixels"),
+    "large JPEG": (jpeg(9000, 9000), "9000x9000"),
+    "JPEG without height": (jpeg(50, 0), "damaged JPEG"),
     "huge TIFF": (tiff(width=2**31, height=2**31), "2147483648"),
     "large TIFF": (tiff(width=16_000, height=16_000), "16000x16000"),
     "plain TIFF larger than its file": (tiff(compression=1, width=100, height=100), "bytes of pixels"),
@@ -275,12 +276,13 @@ BAD: dict[str, tuple[bytes, str]] = {
     "TIFF of two samples": (tiff(samples=2), "2 samples"),
     "TIFF of 16 bit with white as zero": (tiff(bits=16, photometric=0), "black as zero"),
     "TIFF in CMYK": (tiff(samples=4, photometric=5), "nor RGB"),
-    "huge BMP": (bmp(2**31 - 1, 2**31 - 1), "cut off"),
-    "huge BMP upside down": (bmp(2**30, -(2**31)), "cut off"),
-    "large compressed BMP": (bmp(16_000, 16_000, 1), "16000x16000"),
-    "BMP of no width": (bmp(0, 10), "0x10"),
-    "BMP of negative width": (bmp(-10, 10), "-10"),
-    "large WebP": (webp(16_383, 16_383), "16383x16383"),
+    "huge BMP": (bmp(2**31 - 1, 2**31 - 1), "more pixels"),
+    "huge BMP upside down": (bmp(2**30, -(2**31)), "more pixels"),
+    "large BMP": (bmp(9000, 9000), "9000x9000"),
+    "BMP of no width": (bmp(0, 10), "damaged BMP"),
+    "BMP of negative width": (bmp(-10, 10), "more pixels"),
+    "huge WebP": (webp(16_383, 16_383), "268402689 pixels"),
+    "large WebP": (webp(9000, 9000), "9000x9000"),
     "huge PGM": (b"P5 999999999 999999999 255\n" + bytes(100), "cut off"),
     "huge PGM in digits": (b"P2 99999 99999 255\n" + b"1 " * 100, "cut off"),
     "PGM with too few digits": (b"P2 3 2 255\n" + b"100 " * 5, "6 whole numbers"),
@@ -394,3 +396,23 @@ def test_png_with_fewer_rows_than_it_says_is_refused(tmp_path: Path) -> None:
     (tmp_path / "a.png").write_bytes(png(100, 100))
     with pytest.raises(SepiError, match=r"a\.png: .*cannot be decoded"):
         read_picture(tmp_path / "a.png")
+
+
+def test_views_come_in_the_order_asked_for(tmp_path: Path) -> None:
+    """Threads finish in any order."""
+    views = RANDOM.integers(0, 256, (9, 12, 16, 3), np.uint8)
+    for number, view in enumerate(views):
+        by_opencv(view)(tmp_path / f"{number}.png")
+    order = [5, 1, 8, 0]
+    np.testing.assert_array_equal(read_views([tmp_path / f"{number}.png" for number in order]), views[order])
+
+
+@pytest.mark.parametrize("pixels", [RGB8, RGB16])
+def test_written_picture_is_read_back(tmp_path: Path, pixels: np.ndarray) -> None:
+    write_png(tmp_path / "colour.png", pixels)
+    np.testing.assert_array_equal(cv2.imread(str(tmp_path / "colour.png"), -1)[:, :, ::-1], pixels)
+
+
+def test_mask_is_white_inside(tmp_path: Path) -> None:
+    write_png(tmp_path / "mask.png", np.array([[True, False]]))
+    assert read_picture(tmp_path / "mask.png")[:, :, 0].tolist() == [[255, 0]]

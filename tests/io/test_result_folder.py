@@ -11,7 +11,7 @@ from PIL import Image
 
 from sepi.camera import Camera
 from sepi.errors import SepiError
-from sepi.io.result_folder import RESULT_FILES, read_result, write_result
+from sepi.io.result_folder import RESULT_FILES, colour_code, read_result, write_result
 from sepi.lightfield import LightField
 from sepi.stage import StageMaps
 
@@ -126,13 +126,15 @@ def test_result_holds_the_view_that_the_maps_belong_to(
     tmp_path: Path, light_field: LightField, maps: StageMaps, view: tuple[int, int] | None
 ) -> None:
     shown = replace(light_field, view=view)
-    write_result(tmp_path, shown, maps, {"scene": "toy"})
+    write_result(tmp_path, shown, maps, {"scene": "toy", "variant": "paper"})
     place = view or (1, 2)
     with h5py.File(tmp_path / "result.h5") as file:
         assert file["view"].dtype == np.uint16
         np.testing.assert_array_equal(file["view"], light_field.views[place])
         assert tuple(file.attrs["view_position"]) == place
         assert tuple(file.attrs["grid"]) == (3, 5)
+        assert file.attrs["variant"] == "paper"
+        np.testing.assert_array_equal(file["occluded"], maps.extra["occluded"])
         np.testing.assert_array_equal(file["superpixels"], maps.extra["superpixels"])
     for path in (tmp_path, tmp_path / "result.h5"):
         back = read_result(path)
@@ -207,6 +209,10 @@ def test_a_scene_is_not_written_into(tmp_path: Path, light_field: LightField, ma
 
 BAD_MAPS = {
     "confidence of 0..255": (lambda maps: replace(maps, confidence=200 * maps.confidence), "within 0..1"),
+    "maps of another scene": (
+        lambda _: StageMaps(np.zeros((3, 4), np.float32), np.zeros((3, 4), np.float32)),
+        "(12, 16)",
+    ),
     "negative confidence": (lambda maps: replace(maps, confidence=-maps.confidence), "within 0..1"),
     "confidence of another shape": (lambda maps: replace(maps, confidence=maps.confidence[:5]), "confidence of"),
     "mask of another shape": (lambda maps: replace(maps, extra={"odd": np.ones((3, 3), bool)}), "odd of"),
@@ -281,3 +287,41 @@ def test_no_result_at_all(tmp_path: Path) -> None:
     for path, name in [(tmp_path, "result.h5"), (tmp_path / "gone", "gone"), (tmp_path / "text.h5", "text.h5")]:
         with pytest.raises(SepiError, match=name):
             read_result(path)
+
+
+def test_failed_result_leaves_no_folder(
+    tmp_path: Path, light_field: LightField, maps: StageMaps, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(path: Path, *_: object) -> None:
+        raise SepiError(f"{path}: no space")
+
+    monkeypatch.setattr("sepi.io.result_folder.write_png", fail)
+    with pytest.raises(SepiError, match="no space"):
+        write_result(tmp_path / "out", light_field, maps, {})
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_result_needs_a_folder(tmp_path: Path, light_field: LightField, maps: StageMaps) -> None:
+    (tmp_path / "out").write_text("mine")
+    for target in (tmp_path / "out", tmp_path / "out" / "below"):
+        with pytest.raises(SepiError, match="out"):
+            write_result(target, light_field, maps, {})
+    assert (tmp_path / "out").read_text() == "mine"
+
+
+def test_colours_show_finite_values_whatever_else_is_there() -> None:
+    """One infinite pixel must not flatten the picture; a missing one must be seen as missing."""
+    values = np.linspace(-1, 1, 400, dtype=np.float32).reshape(20, 20)
+    clean = colour_code(values)
+    values[0, 0], values[5, 5], values[9, 9] = np.nan, np.inf, -np.inf
+    spoilt = colour_code(values)
+    assert (spoilt[[0, 5, 9], [0, 5, 9]] == 0).all()
+    finite = np.isfinite(values)
+    assert np.abs(spoilt[finite].astype(int) - clean[finite]).max() <= 6
+    assert len(np.unique(clean.reshape(-1, 3), axis=0)) > 200
+
+
+@pytest.mark.parametrize("value", [0.7, np.nan])
+def test_colours_of_a_map_without_contrast(value: float) -> None:
+    picture = colour_code(np.full((4, 5), value, np.float32))
+    assert (picture == picture[0, 0]).all()

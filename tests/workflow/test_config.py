@@ -2,7 +2,6 @@
 
 import inspect
 import json
-import struct
 from collections import Counter
 from pathlib import Path
 from typing import Any
@@ -13,6 +12,7 @@ import pytest
 import yaml
 
 from sepi.errors import SepiError
+from sepi.io.images import write_png
 from sepi.io.readers.formats import FORMATS
 from sepi.pipeline import STAGES, VARIANTS
 from sepi.renamed import RENAMED
@@ -34,11 +34,10 @@ def message_of(values: dict[str, Any]) -> str:
 
 
 def make_scene(folder: Path, views: int = 9, width: int = 40, height: int = 30) -> Path:
-    """A folder that looks like a scene: a PNG header is all that the configuration reads."""
+    """A folder that looks like a scene."""
     folder.mkdir(parents=True)
-    header = b"\x89PNG\r\n\x1a\n" + struct.pack(">I4sII", 13, b"IHDR", width, height)
     for number in range(views):
-        (folder / f"input_Cam{number:03}.png").write_bytes(header)
+        write_png(folder / f"input_Cam{number:03}.png", np.zeros((height, width, 3), np.uint8))
     return folder
 
 

@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from sepi.errors import SepiError
-from sepi.io.readers.options import Numbers, ReadOptions, arranged, place_of
+from sepi.errors import SepiError, printable
+from sepi.io.readers.options import Numbers, ReadOptions, arrange_numbers, position_of
 from sepi.lightfield import HIGHEST, LOWEST, BoolMap, LightField
 from sepi.validation import require_known
 
 Array = npt.NDArray[np.generic]
-
-DEFLATE_RATIO = 1100
-"""Bytes that a byte can unpack to; zlib's limit is 1032."""
 
 # "N" is the number t * S + s of a view
 _LAYOUTS = ("TSHWC", "TSHW", "NHWC")
@@ -58,7 +58,7 @@ def light_field_from_array(
     Returns
     -------
     LightField
-        Views uint8, uint16 or float32 at their places, zero where missing.
+        Views uint8, uint16 or float32 at their positions, zero where missing.
 
     Raises
     ------
@@ -69,9 +69,9 @@ def light_field_from_array(
     kind = _pixel_type(source, array.dtype)
     given = axes or options.axes
     letters = _found_axes(source, array.shape, options.grid) if given is None else _checked_axes(source, array, given)
-    stack = _as_stack(source, array, letters, options.grid)
-    numbers = arranged(source, stack.grid, options)
-    filled = _filled(source, stack, numbers, kind)
+    stack, laid_out = _as_stack(source, array, letters, options.grid)
+    numbers = arrange_numbers(source, stack.shape[:2], options)
+    filled = _fill(source, stack, numbers, kind)
     reference = options.view or (numbers.shape[0] // 2, numbers.shape[1] // 2)
     if reference in filled.blank:
         raise SepiError(
@@ -85,11 +85,11 @@ def light_field_from_array(
         source=source,
         present=filled.present,
         view=options.view,
-        notes=(*notes, *assumed, *stack.notes, *filled.notes),
+        notes=(*notes, *assumed, *laid_out, *filled.notes),
     )
 
 
-def rearranged(light_field: LightField, options: ReadOptions) -> LightField:
+def rearrange(light_field: LightField, options: ReadOptions) -> LightField:
     """A light field whose views are arranged as asked for; ground truth and masks stay with the view they belong to.
 
     Raises
@@ -97,7 +97,7 @@ def rearranged(light_field: LightField, options: ReadOptions) -> LightField:
     SepiError
         If the options do not fit its grid.
     """
-    numbers = arranged(light_field.source or light_field.name, light_field.grid, options)
+    numbers = arrange_numbers(light_field.source or light_field.name, light_field.grid, options)
     T, S = light_field.grid
     if np.array_equal(numbers, np.arange(T * S).reshape(T, S)):
         return light_field
@@ -105,13 +105,13 @@ def rearranged(light_field: LightField, options: ReadOptions) -> LightField:
     views = light_field.views.reshape(T * S, *light_field.views.shape[2:])[numbers]
     present = light_field.present.ravel()[numbers] & (numbers >= 0)
     views[~present] = 0
-    place = place_of(numbers, light_field.reference_position[0] * S + light_field.reference_position[1])
-    if place is not None and (light_field.view is not None or light_field.ground_truth is not None):
-        return replace(light_field, views=views, present=present, view=place)
+    position = position_of(numbers, light_field.reference_position[0] * S + light_field.reference_position[1])
+    if position is not None and (light_field.view is not None or light_field.ground_truth is not None):
+        return replace(light_field, views=views, present=present, view=position)
     return replace(light_field, views=views, present=present, view=options.view, ground_truth=None, masks={})
 
 
-def variable_of(source: str, shapes: Mapping[str, tuple[int, ...]], wanted: str | None) -> str:
+def variable_of(source: str, shapes: Mapping[str, tuple[int, ...]], requested: str | None) -> str:
     """Name of the array that is the light field, of those in a file.
 
     Parameters
@@ -120,7 +120,7 @@ def variable_of(source: str, shapes: Mapping[str, tuple[int, ...]], wanted: str 
         Path, for messages.
     shapes : mapping of str to tuple of int
         Name of each array of numbers to its shape.
-    wanted : str, optional
+    requested : str, optional
         The user's choice. Without: the only array of 4 or 5 axes, or ``LF`` among several.
 
     Raises
@@ -128,9 +128,9 @@ def variable_of(source: str, shapes: Mapping[str, tuple[int, ...]], wanted: str 
     SepiError
         If there is no such array, or several.
     """
-    if wanted is not None:
-        require_known(f"{source}: --variable", [wanted], shapes)
-        return wanted
+    if requested is not None:
+        require_known(f"{source}: --variable", [requested], shapes)
+        return requested
     fitting = [name for name, shape in shapes.items() if len(shape) in (4, 5)]
     if len(fitting) == 1:
         return fitting[0]
@@ -144,24 +144,25 @@ def variable_of(source: str, shapes: Mapping[str, tuple[int, ...]], wanted: str 
     raise SepiError(f"{source}: holds no array of numbers of 4 or 5 axes (found: {listed or 'nothing'})")
 
 
-def printable(text: str) -> str:
-    """Text from a file as one line, whatever is in it."""
-    return " ".join("".join(letter if letter.isprintable() else " " for letter in text).split())
-
-
-@dataclass(frozen=True)
-class _Stack:
-    """Views of the given grid by number."""
-
-    grid: tuple[int, int]
-    shape: tuple[int, int, int]
-    view: Callable[[int], Array]
-    notes: tuple[str, ...] = ()
+@contextmanager
+def damage_named(path: Path, kind: str) -> Iterator[None]:
+    """Turn whatever the libraries stumble over in a damaged file into one error, and keep their warnings here."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            yield
+    except SepiError:
+        raise
+    except Exception as error:
+        if isinstance(error, OSError) and error.strerror:
+            raise SepiError(f"{path}: cannot be read ({error.strerror})") from error
+        reason = printable(str(error)) or type(error).__name__
+        raise SepiError(f"{path}: damaged {kind} ({reason[:200]})") from error
 
 
 @dataclass(frozen=True)
 class _Filled:
-    """Views at their places; ``blank`` are those that are there but hold nothing."""
+    """Views at their positions; ``blank`` are those that are there but hold nothing."""
 
     views: Array
     present: BoolMap
@@ -240,8 +241,8 @@ def _pairs_in_order(shape: tuple[int, ...]) -> list[str]:
     return ["HWTS"] if 2 * max(last) <= min(first) else []
 
 
-def _as_stack(source: str, array: Array, letters: str, grid: tuple[int, int] | None) -> _Stack:
-    """The array as views ``(H, W, C)`` by number, without copying."""
+def _as_stack(source: str, array: Array, letters: str, grid: tuple[int, int] | None) -> tuple[Array, list[str]]:
+    """The array as views (T, S, H, W, C), without copying, and what was assumed."""
     size = dict(zip(letters, array.shape, strict=True))
     if 0 in array.shape:
         raise SepiError(f"{source}: the array is empty: {array.shape}")
@@ -250,12 +251,11 @@ def _as_stack(source: str, array: Array, letters: str, grid: tuple[int, int] | N
             f"{source}: the axis of colours (axes {' '.join(letters)}) has size {size['C']}; expected 1, 3 or 4"
         )
     notes = ["4th channel (transparency or weight) left out"] if size["C"] == 4 else []
-    if "N" in letters:
+    if "N" in letters and grid is None:
         side = math.isqrt(size["N"])
-        if grid is None:
-            notes.append(f"views taken as a grid of {side}x{side}, row by row; --grid sets it otherwise")
-            grid = side, side
-    elif grid not in (None, (size["T"], size["S"])):
+        notes.append(f"views taken as a grid of {side}x{side}, row by row; --grid sets it otherwise")
+        grid = side, side
+    elif "N" not in letters and grid not in (None, (size["T"], size["S"])):
         raise SepiError(
             f"{source}: --grid {grid[0]}x{grid[1]}, but the array has {size['T']}x{size['S']} views "
             f"(axes {' '.join(letters)})"
@@ -263,28 +263,20 @@ def _as_stack(source: str, array: Array, letters: str, grid: tuple[int, int] | N
     rows, columns = grid or (size["T"], size["S"])
     if rows * columns != size.get("N", rows * columns):
         raise SepiError(f"{source}: {size['N']} views make no grid of {rows}x{columns}; --grid ROWSxCOLUMNS sets it")
-    order = [letters.index(letter) for letter in ("NHWC" if "N" in letters else "TSHWC") if letter in letters]
-    views = array.transpose(order)
-    if "C" not in letters:
-        views = views[..., None]
-
-    def view(number: int) -> Array:
-        place = (number,) if "N" in letters else divmod(number, columns)
-        # grey stays grey, the fourth channel goes
-        found: Array = views[place][..., :3]
-        return found
-
-    return _Stack((rows, columns), (size["H"], size["W"], min(size["C"], 3)), view, tuple(notes))
+    views = array.transpose([letters.index(letter) for letter in "NTSHWC" if letter in letters])
+    views = views.reshape(rows, columns, size["H"], size["W"], size["C"])
+    # grey stays grey, the fourth channel goes
+    return views[..., :3], notes
 
 
-def _filled(source: str, stack: _Stack, numbers: Numbers, kind: np.dtype[Any]) -> _Filled:
-    """Put the views in their places; those left out are not even looked at."""
-    views: Array = np.zeros((*numbers.shape, *stack.shape), kind)
+def _fill(source: str, stack: Array, numbers: Numbers, kind: np.dtype[Any]) -> _Filled:
+    """Put the views in their positions; those left out are not even looked at."""
+    views: Array = np.zeros((*numbers.shape, *stack.shape[2:]), kind)
     present = np.zeros(numbers.shape, bool)
     black: list[tuple[int, int]] = []
     unknown: list[tuple[int, int]] = []
     for t, s in np.argwhere(numbers >= 0).tolist():
-        view = stack.view(int(numbers[t, s]))
+        view = stack[divmod(int(numbers[t, s]), stack.shape[1])]
         if kind.kind == "f" and not _is_known(source, (t, s), view):
             unknown.append((t, s))
             continue
@@ -293,20 +285,19 @@ def _filled(source: str, stack: _Stack, numbers: Numbers, kind: np.dtype[Any]) -
         if not present[t, s]:
             black.append((t, s))
     notes = []
-    if not present.any():
+    if black and not present.any():
         # a light field that is all black is none with all views missing
-        for place in black:
-            present[place] = True
+        present[tuple(np.transpose(black))] = True
         black = []
-    for what, places in (("all zeros", black), ("NaN throughout", unknown)):
-        if places:
-            more = f" and {len(places) - _LISTED} more" if len(places) > _LISTED else ""
-            listed = " ".join(f"{t},{s}" for t, s in places[:_LISTED])
+    for what, positions in (("all zeros", black), ("NaN throughout", unknown)):
+        if positions:
+            more = f" and {len(positions) - _LISTED} more" if len(positions) > _LISTED else ""
+            listed = " ".join(f"{t},{s}" for t, s in positions[:_LISTED])
             notes.append(f"views that are {what} taken as missing: {listed}{more}")
     return _Filled(views, present, (*black, *unknown), tuple(notes))
 
 
-def _is_known(source: str, place: tuple[int, int], view: Array) -> bool:
+def _is_known(source: str, position: tuple[int, int], view: Array) -> bool:
     """Whether a view of floats holds values; False for NaN throughout.
 
     Raises
@@ -314,7 +305,7 @@ def _is_known(source: str, place: tuple[int, int], view: Array) -> bool:
     SepiError
         If some are not finite, or far outside 0..1.
     """
-    where = f"{source}: view {place[0]},{place[1]}"
+    where = f"{source}: view {position[0]},{position[1]}"
     with np.errstate(invalid="ignore"):
         low, high = float(view.min()), float(view.max())
     if not (math.isfinite(low) and math.isfinite(high)):
@@ -322,7 +313,7 @@ def _is_known(source: str, place: tuple[int, int], view: Array) -> bool:
             return False
         raise SepiError(
             f"{where} holds values that are not finite (NaN or infinite); mend it, or leave it out with "
-            f"--exclude {place[0]},{place[1]}"
+            f"--exclude {position[0]},{position[1]}"
         )
     if low < LOWEST or high > HIGHEST:
         raise SepiError(

@@ -18,8 +18,8 @@ import numpy as np
 
 from sepi.errors import SepiError
 from sepi.io.images import SUFFIXES, Pixels, read_picture
-from sepi.io.readers.options import ReadOptions, arranged, require_unused
-from sepi.io.readers.view_files import MAX_PLACES
+from sepi.io.readers.options import ReadOptions, arrange_numbers, require_unused
+from sepi.io.readers.view_files import MAX_VIEWS
 from sepi.lightfield import MIN_SIZE, BoolMap, LightField
 
 BLOCK = (14, 14)
@@ -51,8 +51,8 @@ def read(path: Path, options: ReadOptions) -> LightField:
     """
     require_unused(str(path), options, ("pattern", "axes", "variable", "follow_links"))
     T, S = grid = options.grid or BLOCK
-    if not 2 <= T * S <= MAX_PLACES:
-        raise SepiError(f"{path}: --grid {T}x{S}: expected a grid of 2 to {MAX_PLACES} views")
+    if not 2 <= T * S <= MAX_VIEWS:
+        raise SepiError(f"{path}: --grid {T}x{S}: expected a grid of 2 to {MAX_VIEWS} views")
     central = options.central or _usual_side(grid)
     picture = read_picture(path)
     height, width = picture.shape[0] // T, picture.shape[1] // S
@@ -61,13 +61,13 @@ def read(path: Path, options: ReadOptions) -> LightField:
             f"{path}: {picture.shape[1]}x{picture.shape[0]} pixels with {T}x{S} views under each lenslet make views of "
             f"{width}x{height} pixels; expected at least {MIN_SIZE}x{MIN_SIZE}"
         )
-    numbers = arranged(str(path), grid, replace(options, central=central))
+    numbers = arrange_numbers(str(path), grid, replace(options, central=central))
     present = numbers >= 0
     blocks = picture[: height * T, : width * S].reshape(height, T, width, S, -1)
     views = np.zeros((*numbers.shape, height, width, picture.shape[2]), picture.dtype)
-    for place in zip(*present.nonzero(), strict=True):
-        t, s = divmod(int(numbers[place]), S)
-        views[place] = blocks[:, t, :, s]
+    for position in zip(*present.nonzero(), strict=True):
+        t, s = divmod(int(numbers[position]), S)
+        views[position] = blocks[:, t, :, s]
     notes = []
     if options.central is None and central is not None and (central, central) != grid:
         notes.append(f"the {central}x{central} views in the middle of {T}x{S}; --central N takes another odd number")

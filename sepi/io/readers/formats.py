@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from sepi.errors import SepiError
-from sepi.io import hdf5
+from sepi.io.hdf5 import has_dataset
 from sepi.io.images import SUFFIXES
-from sepi.io.readers import eslf, hci, hci_2013, image_folder, matlab, numpy_files
+from sepi.io.readers import eslf, hci, hci_2013, image_folder, matlab, numpy_files, sepi_hdf5
 from sepi.io.readers.options import ReadOptions
 from sepi.lightfield import LightField
 from sepi.validation import require_known
@@ -43,31 +43,31 @@ FORMATS = {
     "matlab": Format("MATLAB file", ".mat with an array such as LF", matlab.matches, matlab.read),
     "numpy": Format("NumPy file", ".npy or .npz", numpy_files.matches, numpy_files.read),
     "hci-2013": Format("HCI 2013 HDF5", "with LF (T, S, H, W, 3)", hci_2013.matches, hci_2013.read),
-    "sepi": Format("sepi HDF5", "written by this package", hdf5.matches, hdf5.read),
+    "sepi": Format("sepi HDF5", "written by this package", sepi_hdf5.matches, sepi_hdf5.read),
 }
 """Word for ``--format`` to format; the first that matches reads."""
 
 
-def format_of(path: Path, wanted: str | None = None) -> Format:
+def format_of(path: Path, file_format: str | None = None) -> Format:
     """Find the format of a light field by looking at it.
 
     Parameters
     ----------
     path : Path
-    wanted : str, optional
+    file_format : str, optional
         Key of :data:`FORMATS`, in place of looking.
 
     Raises
     ------
     SepiError
-        If there is nothing at ``path``, or it is of no known format, or ``wanted`` is none.
+        If there is nothing at ``path``, or it is of no known format, or ``file_format`` is none.
     """
-    if wanted is not None:
-        require_known("format", [wanted], FORMATS)
+    if file_format is not None:
+        require_known("format", [file_format], FORMATS)
     if not path.exists():
         raise SepiError(f"{path}: no such file or folder")
-    if wanted is not None:
-        return FORMATS[wanted]
+    if file_format is not None:
+        return FORMATS[file_format]
     for known in FORMATS.values():
         if known.matches(path):
             return known
@@ -75,7 +75,7 @@ def format_of(path: Path, wanted: str | None = None) -> Format:
     raise SepiError(f"{path}: {_what_else(path)}; expected {expected}")
 
 
-def read(path: Path, options: ReadOptions, wanted: str | None = None) -> LightField:
+def read(path: Path, options: ReadOptions, file_format: str | None = None) -> LightField:
     """Read a light field of any known format as its files have it.
 
     Parameters
@@ -83,7 +83,7 @@ def read(path: Path, options: ReadOptions, wanted: str | None = None) -> LightFi
     path : Path
         File or folder.
     options : ReadOptions
-    wanted : str, optional
+    file_format : str, optional
         Key of :data:`FORMATS`, in place of looking.
 
     Returns
@@ -96,7 +96,7 @@ def read(path: Path, options: ReadOptions, wanted: str | None = None) -> LightFi
     SepiError
         If nothing is there, the format is unknown, or the files are damaged or contradict each other or the options.
     """
-    known = format_of(path, wanted)
+    known = format_of(path, file_format)
     try:
         light_field = known.read(path, options)
         return light_field if options.view is None else light_field.seen_from(options.view)
@@ -108,7 +108,7 @@ def read(path: Path, options: ReadOptions, wanted: str | None = None) -> LightFi
 def _what_else(path: Path) -> str:
     """What a path that is no light field seems to be, for who gave the wrong one of several."""
     result = path / "result.h5" if path.is_dir() else path
-    if hdf5.holds(result, "disparity"):
+    if has_dataset(result, "disparity"):
         return "holds a disparity map, not a light field"
     if path.is_file():
         picture = path.suffix.lower() in SUFFIXES

@@ -1,6 +1,6 @@
 """Folders in the layout of the HCI 4D light field benchmark.
 
-``input_CamNNN.png`` is view ``NNN = S * t + s``. Views may be missing, but for the one whose depth is wanted.
+``input_CamNNN.png`` is view ``NNN = S * t + s``. Views may be missing, but for the one whose depth is made.
 ``parameters.cfg``, ``gt_disp_lowres.pfm`` (disparity of the centre view) and ``mask_NAME.png`` (white regions) are read
 where present.
 
@@ -24,14 +24,16 @@ import numpy as np
 
 from sepi.camera import Camera, camera_from
 from sepi.errors import SepiError
-from sepi.io.images import png_size, read_picture
+from sepi.io.images import picture_header, read_picture
 from sepi.io.pfm import read_pfm
-from sepi.io.readers.options import ReadOptions, place_of, require_unused
-from sepi.io.readers.view_files import read_arranged
+from sepi.io.readers.options import ReadOptions, position_of, require_unused
+from sepi.io.readers.view_files import read_grid
 from sepi.lightfield import BoolMap, DisparityRange, FloatMap, LightField
 
 PARAMETERS = "parameters.cfg"
 TRUTH = "gt_disp_lowres.pfm"
+
+_CAMERA = ("focal_length_mm", "baseline_mm", "focus_distance_m", "sensor_size_mm")
 
 Number = TypeVar("Number", int, float)
 
@@ -75,7 +77,7 @@ def read(path: Path, options: ReadOptions) -> LightField:
     files = _numbered_views(path)
     grid = options.grid or parameters.grid or _square_grid(path, files)
     _require_inside(path, files, grid, "--grid" if options.grid else PARAMETERS)
-    arranged = read_arranged(path, files, grid, options)
+    arranged = read_grid(path, files, grid, options)
     shape = arranged.views.shape[2], arranged.views.shape[3]
     if parameters.shape not in (None, shape):
         raise SepiError(
@@ -83,7 +85,7 @@ def read(path: Path, options: ReadOptions) -> LightField:
             "disparities change with the size, so set image_resolution, disp_min and disp_max for these views"
         )
     # ground truth and masks belong to the centre view of the folder's own grid
-    with_truth = place_of(arranged.numbers, grid[0] // 2 * grid[1] + grid[1] // 2)
+    with_truth = position_of(arranged.numbers, grid[0] // 2 * grid[1] + grid[1] // 2)
     read_truth = with_truth is not None and options.view in (None, with_truth) and _has_truth(path)
     return LightField(
         views=arranged.views,
@@ -152,14 +154,20 @@ def _values(path: Path) -> dict[str, str]:
 
 
 def _read_parameters(path: Path, values: dict[str, str]) -> _Parameters:
-    limits = _pair(path, values, "disp_min", "disp_max", float)
+    limits = _pair(path, values, ("disp_min", "disp_max"), float)
     if limits is not None and not (math.isfinite(limits[0]) and limits[0] < limits[1] < math.inf):
         raise SepiError(
             f"{path}: expected finite disp_min < disp_max in pixels per view step, got {limits[0]:g} and {limits[1]:g}"
         )
+    sizes = []
+    for keys in (("num_cams_y", "num_cams_x"), ("image_resolution_y_px", "image_resolution_x_px")):
+        size = _pair(path, values, keys, int)
+        if size is not None and min(size) < 1:
+            raise SepiError(f"{path}: expected {' and '.join(keys)} of at least 1, got {size[0]} and {size[1]}")
+        sizes.append(size)
     return _Parameters(
-        grid=_positive(path, values, "num_cams_y", "num_cams_x"),
-        shape=_positive(path, values, "image_resolution_y_px", "image_resolution_x_px"),
+        grid=sizes[0],
+        shape=sizes[1],
         disparity_range=None if limits is None else DisparityRange(*limits, "parameters"),
         scene=values.get("scene") or None,
     )
@@ -167,44 +175,34 @@ def _read_parameters(path: Path, values: dict[str, str]) -> _Parameters:
 
 def _read_camera(path: Path, values: dict[str, str], shape: tuple[int, int]) -> Camera | None:
     """Geometry from the parameters; None where they do not give all of it."""
-    keys = ("focal_length_mm", "baseline_mm", "focus_distance_m", "sensor_size_mm")
-    if not all(key in values for key in keys):
+    if not all(key in values for key in _CAMERA):
         return None
-    numbers = {}
-    for key in keys:
-        try:
-            numbers[key] = float(values[key])
-        except ValueError as error:
-            raise SepiError(f"{path}: expected a number for {key}, got '{values[key]}'") from error
     try:
-        return camera_from(**numbers, shape=shape)
+        return camera_from(**dict(zip(_CAMERA, _numbers(path, values, _CAMERA, float), strict=True)), shape=shape)
     except SepiError as error:
-        raise SepiError(f"{path}: {error}") from error
-
-
-def _positive(path: Path, values: dict[str, str], first: str, second: str) -> tuple[int, int] | None:
-    pair = _pair(path, values, first, second, int)
-    if pair is not None and min(pair) < 1:
-        raise SepiError(f"{path}: expected {first} and {second} of at least 1, got {pair[0]} and {pair[1]}")
-    return pair
+        raise error if str(error).startswith(str(path)) else SepiError(f"{path}: {error}") from error
 
 
 def _pair(
-    path: Path, values: dict[str, str], first: str, second: str, kind: Callable[[str], Number]
+    path: Path, values: dict[str, str], keys: tuple[str, str], kind: Callable[[str], Number]
 ) -> tuple[Number, Number] | None:
     """Two numbers that come together or not at all."""
-    given = [key for key in (first, second) if key in values]
-    if not given:
+    missing = [key for key in keys if key not in values]
+    if len(missing) == 1:
+        raise SepiError(f"{path}: {missing[0]} is not given, but needed with the other of {' and '.join(keys)}")
+    if missing:
         return None
-    if len(given) == 1:
-        raise SepiError(f"{path}: {given[0]} is given, but {second if given == [first] else first} is not")
+    first, second = _numbers(path, values, keys, kind)
+    return first, second
+
+
+def _numbers(path: Path, values: dict[str, str], keys: tuple[str, ...], kind: Callable[[str], Number]) -> list[Number]:
     try:
-        return kind(values[first]), kind(values[second])
+        return [kind(values[key]) for key in keys]
     except ValueError as error:
-        raise SepiError(
-            f"{path}: expected {'whole ' if kind is int else ''}numbers for {first} and {second}, "
-            f"got '{values[first]}' and '{values[second]}'"
-        ) from error
+        given = ", ".join(f"'{values[key]}'" for key in keys)
+        whole = "whole " if kind is int else ""
+        raise SepiError(f"{path}: expected {whole}numbers for {', '.join(keys)}, got {given}") from error
 
 
 def _has_truth(folder: Path) -> bool:
@@ -224,7 +222,8 @@ def _read_masks(folder: Path, shape: tuple[int, int]) -> dict[str, BoolMap]:
     masks = {}
     for path in sorted(folder.glob("mask_*.png")):
         name = path.stem.removeprefix("mask_")
-        if png_size(path) == shape:
+        header = picture_header(path)
+        if (header.height, header.width) == shape:
             values = read_picture(path)
             # white on black; anything else is not a region
             if np.array_equal(values.min(2), values.max(2)) and np.isin(values, (0, values.max())).all():

@@ -13,7 +13,7 @@ References
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import h5py
@@ -22,9 +22,9 @@ import numpy.typing as npt
 
 from sepi.camera import Camera
 from sepi.errors import SepiError
-from sepi.io.hdf5 import holds, opened, require_stored, stored
+from sepi.io.hdf5 import has_dataset, open_hdf5, read_dataset, require_values_inside
 from sepi.io.readers.arrays import light_field_from_array
-from sepi.io.readers.options import ReadOptions, arranged, require_unused
+from sepi.io.readers.options import ReadOptions, arrange_numbers, require_unused
 from sepi.lightfield import FloatMap, LightField
 
 VIEWS = "LF"
@@ -37,7 +37,7 @@ _SIZES = {"vRes": 0, "hRes": 1, "yRes": 2, "xRes": 3, "channels": 4}
 
 def matches(path: Path) -> bool:
     """Whether ``path`` is a readable HDF5 file with a dataset ``LF``."""
-    return holds(path, VIEWS)
+    return has_dataset(path, VIEWS)
 
 
 def read(path: Path, options: ReadOptions) -> LightField:
@@ -56,52 +56,45 @@ def read(path: Path, options: ReadOptions) -> LightField:
         :func:`sepi.io.readers.arrays.light_field_from_array`.
     """
     require_unused(str(path), options, ("grid", "pattern", "axes", "variable", "follow_links"))
-    with opened(path) as file:
+    with open_hdf5(path) as file:
         if VIEWS not in file:
             raise SepiError(f"{path}: not of the first HCI benchmark: dataset '{VIEWS}' is missing")
         views = file[VIEWS]
-        require_stored(path, views)
+        require_values_inside(path, views)
         if views.ndim != 5 or views.shape[4] not in (1, 3):
             raise SepiError(
                 f"{path}: expected '{VIEWS}' of shape (T, S, H, W, 3), got {views.shape}; if it is a light field of "
                 "other axes, write it as .npy and name them with --axes"
             )
         shape = views.shape
-        geometry = _read_geometry(path, file)
+        camera, reason = _read_camera(path, file)
         light_field = light_field_from_array(
-            stored(path, views),
+            read_dataset(path, views),
             name=path.stem,
             source=str(path),
             options=options,
             axes="TSHWC",
             notes=_contradictions(path, file, shape),
         )
-        numbers = arranged(str(path), shape[:2], options)
+        numbers = arrange_numbers(str(path), shape[:2], options)
         number = int(numbers[light_field.reference_position])
         depth = _read_depth(path, file, shape, (number // shape[1], number % shape[1]))
-    if geometry.camera is None:
-        note = f"no metric depth{'' if depth is None else ' and no ground truth'}: {geometry.reason}"
+    if camera is None:
+        note = f"no metric depth{'' if depth is None else ' and no ground truth'}: {reason}"
         return replace(light_field, notes=(*light_field.notes, note))
-    ground_truth = None if depth is None else _disparity(depth, geometry.camera)
-    return replace(light_field, camera=geometry.camera, ground_truth=ground_truth)
+    ground_truth = None if depth is None else _disparity(depth, camera)
+    return replace(light_field, camera=camera, ground_truth=ground_truth)
 
 
-@dataclass(frozen=True)
-class _Geometry:
+def _read_camera(path: Path, file: h5py.File) -> tuple[Camera | None, str]:
     """The camera, or the reason why there is none."""
-
-    camera: Camera | None
-    reason: str = ""
-
-
-def _read_geometry(path: Path, file: h5py.File) -> _Geometry:
     missing = [key for key in _GEOMETRY if key not in file.attrs]
     if missing:
-        return _Geometry(None, f"the file has no attribute {', '.join(missing)}")
+        return None, f"the file has no attribute {', '.join(missing)}"
     baseline, focal_length, shift = (_number(path, file, key) for key in _GEOMETRY)
     if not (0 < baseline < math.inf and 0 < focal_length < math.inf and math.isfinite(shift)):
-        return _Geometry(None, f"dH {baseline:g}, focalLength {focal_length:g}, shift {shift:g} are no camera's")
-    return _Geometry(Camera(baseline * focal_length, shift, focal_length))
+        return None, f"dH {baseline:g}, focalLength {focal_length:g}, shift {shift:g} are no camera's"
+    return Camera(baseline * focal_length, shift, focal_length), ""
 
 
 def _number(path: Path, file: h5py.File, key: str) -> float:
@@ -132,7 +125,7 @@ def _read_depth(
     if DEPTH not in file:
         return None
     dataset = file[DEPTH]
-    require_stored(path, dataset)
+    require_values_inside(path, dataset)
     if dataset.shape == shape[:4]:
         return np.asarray(dataset[view], np.float64)
     if dataset.shape == shape[2:4]:

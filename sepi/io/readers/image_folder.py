@@ -13,11 +13,11 @@ from pathlib import Path
 from sepi.errors import SepiError
 from sepi.io.images import SUFFIXES
 from sepi.io.readers.options import ReadOptions, require_unused
-from sepi.io.readers.view_files import MAX_PLACES, read_arranged
-from sepi.io.readers.view_names import EXAMPLES, ViewNumbers, numbers_from_likeness, numbers_from_pattern
+from sepi.io.readers.view_files import MAX_VIEWS, read_grid
+from sepi.io.readers.view_names import EXAMPLES, ViewNumbers, infer_view_numbers, parse_view_numbers
 from sepi.lightfield import LightField
 
-_PLACES_PER_PICTURE = 100
+_POSITIONS_PER_PICTURE = 100
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,7 @@ class _Layout:
     """The given grid, the number ``t * S + s`` in it of each name, and what was assumed."""
 
     grid: tuple[int, int]
-    places: dict[str, int]
+    positions: dict[str, int]
     notes: tuple[str, ...]
 
 
@@ -50,8 +50,8 @@ def read(path: Path, options: ReadOptions) -> LightField:
     Raises
     ------
     SepiError
-        If the names do not tell the views' places, a view is given twice, damaged or unlike the others, or the options
-        do not fit.
+        If the names do not tell the views' positions, a view is given twice, damaged or unlike the others, or the
+        options do not fit.
     """
     require_unused(str(path), options, ("axes", "variable"))
     if not path.is_dir():
@@ -62,24 +62,24 @@ def read(path: Path, options: ReadOptions) -> LightField:
         raise SepiError(f"{path}: cannot be read ({error.strerror})") from error
     pictures = [file.name for file in files if file.suffix.lower() in SUFFIXES]
     if options.pattern is None:
-        named = numbers_from_likeness(str(path), pictures)
+        named = infer_view_numbers(str(path), pictures)
     else:
-        named = numbers_from_pattern(str(path), [file.name for file in files], options.pattern)
+        named = parse_view_numbers(str(path), [file.name for file in files], options.pattern)
     if len(named.numbers) < 2:
         raise SepiError(f"{path}: only one view, {next(iter(named.numbers))}; depth needs at least two")
     _require_different(path, named)
     two_numbers = len(next(iter(named.numbers.values()))) == 2
     layout = _by_row_and_column(path, named, options) if two_numbers else _by_number(path, named, options)
-    views = {number: path / name for name, number in layout.places.items()}
-    arranged = read_arranged(path, views, layout.grid, options)
-    unlike = [name for name in named.unlike if name in pictures]
+    views = {number: path / name for name, number in layout.positions.items()}
+    arranged = read_grid(path, views, layout.grid, options)
+    unmatched = [name for name in named.unmatched if name in pictures]
     return LightField(
         views=arranged.views,
         name=path.resolve().name,
         source=str(path),
         present=arranged.present,
         view=options.view,
-        notes=(*_left_out(unlike), *layout.notes),
+        notes=(*_left_out(unmatched), *layout.notes),
     )
 
 
@@ -117,7 +117,7 @@ def _by_row_and_column(path: Path, named: ViewNumbers, options: ReadOptions) -> 
     spread = max(rows) - base[0], max(columns) - base[1]
     if options.grid is not None:
         grid = options.grid
-        # views that are missing, if the grid has a place for them
+        # views that are missing, if the grid has a position for them
         step = 1 if spread[0] < grid[0] and spread[1] < grid[1] else step
     else:
         grid = spread[0] // step + 1, spread[1] // step + 1
@@ -134,11 +134,11 @@ def _by_row_and_column(path: Path, named: ViewNumbers, options: ReadOptions) -> 
     if base[0] not in (0, 1) or base[1] not in (0, 1):
         notes.append(f"the names count rows from {base[0]}, columns from {base[1]}")
     notes += _step_notes(step)
-    places = {
+    positions = {
         name: (row - base[0]) // step * grid[1] + (column - base[1]) // step
         for name, (row, column) in named.numbers.items()
     }
-    return _Layout(grid, places, tuple(notes))
+    return _Layout(grid, positions, tuple(notes))
 
 
 def _by_number(path: Path, named: ViewNumbers, options: ReadOptions) -> _Layout:
@@ -152,7 +152,7 @@ def _by_number(path: Path, named: ViewNumbers, options: ReadOptions) -> _Layout:
         grid, note = options.grid, ""
         count = grid[0] * grid[1]
         base = _base(lowest, highest, count)
-        # numbers that are missing, if the grid has a place for them
+        # numbers that are missing, if the grid has a position for them
         step = 1 if highest - base < count else step
         if (highest - base) // step >= count:
             name = max(numbers, key=lambda name: numbers[name])
@@ -168,18 +168,18 @@ def _by_number(path: Path, named: ViewNumbers, options: ReadOptions) -> _Layout:
 
 
 def _base(lowest: int, highest: int, count: int) -> int:
-    """The number of the first place: 0 or 1 where only that lets the numbers end with the grid."""
+    """The number of the first position: 0 or 1 where only that lets the numbers end with the grid."""
     if lowest > 1 and highest in (count - 1, count):
         return highest - count + 1
     return lowest
 
 
-def _inferred_grid(path: Path, named: ViewNumbers, places: Sequence[int]) -> tuple[tuple[int, int], str]:
+def _inferred_grid(path: Path, named: ViewNumbers, positions: Sequence[int]) -> tuple[tuple[int, int], str]:
     """The grid that the views fill, and what was assumed."""
-    count = len(places)
+    count = len(positions)
     numbers = [number for (number,) in named.numbers.values()]
     span = f"{min(numbers)} to {max(numbers)}"
-    if max(places) + 1 != count:
+    if max(positions) + 1 != count:
         raise SepiError(
             f"{path}: {count} pictures numbered {span}, so numbers are missing; give --grid ROWSxCOLUMNS of the whole "
             f"grid, or --pattern, such as {EXAMPLES}, if another number counts them"
@@ -187,7 +187,7 @@ def _inferred_grid(path: Path, named: ViewNumbers, places: Sequence[int]) -> tup
     side = math.isqrt(count)
     square = side**2 == count
     line = (1, count) if named.line == "row" else (count, 1)
-    if square and not (named.line and named.line_alike):
+    if square and not (named.line and named.line_likely):
         return (side, side), f"views are numbered {span}, taken for a {side}x{side} grid row by row"
     if square:
         raise SepiError(
@@ -200,11 +200,11 @@ def _inferred_grid(path: Path, named: ViewNumbers, places: Sequence[int]) -> tup
 
 
 def _require_plausible(path: Path, grid: tuple[int, int], named: ViewNumbers) -> None:
-    places, pictures = grid[0] * grid[1], len(named.numbers)
-    if places > min(MAX_PLACES, _PLACES_PER_PICTURE * pictures):
+    positions, pictures = grid[0] * grid[1], len(named.numbers)
+    if positions > min(MAX_VIEWS, _POSITIONS_PER_PICTURE * pictures):
         raise SepiError(
-            f"{path}: the names ({next(iter(named.numbers))}) give a grid of {grid[0]}x{grid[1]} places for {pictures} "
-            f"pictures; say which numbers are row and column with --pattern, such as {EXAMPLES}"
+            f"{path}: the names ({next(iter(named.numbers))}) give a grid of {grid[0]}x{grid[1]} positions for "
+            f"{pictures} pictures; say which numbers are row and column with --pattern, such as {EXAMPLES}"
         )
 
 

@@ -4,6 +4,11 @@ The axes are those that MATLAB shows. It drops trailing axes of size 1, so grey 
 7.3 stores the axes in reverse. The Light Field Toolbox [1]_ saves ``LF`` with the axes T S H W C and a weight as the
 fourth channel.
 
+SciPy reads version 5. It ends the program with a segmentation fault where the type of the values is none that there is
+(such as code 60000 in place of 2, of bytes), so the types are looked at first. After a header of 128 bytes come
+elements, each a tag of type and length and then data; a variable is a *matrix* element, or that compressed by zlib, and
+begins with the elements flags, dimensions, name and values.
+
 References
 ----------
 .. [1] D. G. Dansereau, O. Pizarro, S. B. Williams, "Decoding, calibration and rectification for lenselet-based
@@ -12,21 +17,34 @@ References
 
 from __future__ import annotations
 
+import struct
+import zlib
 from pathlib import Path
 from typing import Any
 
 import h5py
+import numpy as np
 
 from sepi.errors import SepiError
-from sepi.io.hdf5 import opened, stored
-from sepi.io.readers.arrays import Array, light_field_from_array, variable_of
-from sepi.io.readers.mat5 import BYTE_ORDERS, HEADER, read_variable, variables
+from sepi.io.hdf5 import open_hdf5, read_dataset
+from sepi.io.readers.arrays import Array, damage_named, light_field_from_array, variable_of
 from sepi.io.readers.options import ReadOptions, require_unused
 from sepi.lightfield import LightField
 
 # other classes are text, logical values, cells, ...
 _NUMBERS = ("uint8", "int8", "uint16", "int16", "uint32", "int32", "single", "uint64", "int64", "double")
 _TEXT_7_3 = b"MATLAB 7.3 MAT-file"
+
+# bytes before the first element of version 5; the last four, version and byte order, as NumPy's word for the order
+_HEADER = 128
+_BYTE_ORDERS = {b"\x00\x01IM": "<", b"\x01\x00MI": ">"}
+_MATRIX, _COMPRESSED = 14, 15
+_COMPLEX, _LOGICAL = 0x800, 0x200
+# classes of variables that are arrays of numbers, and the types in which their values may be stored
+_CLASSES = range(6, 16)
+_TYPES = (1, 2, 3, 4, 5, 6, 7, 9, 12, 13)
+# enough for all that comes before the values: names have at most 63 letters
+_PREFIX = 4096
 
 
 def matches(path: Path) -> bool:
@@ -39,7 +57,7 @@ def matches(path: Path) -> bool:
         head = _head(path)
     except SepiError:
         return False
-    return head[-4:] in BYTE_ORDERS or head.startswith(_TEXT_7_3)
+    return head[-4:] in _BYTE_ORDERS or head.startswith(_TEXT_7_3)
 
 
 def read(path: Path, options: ReadOptions) -> LightField:
@@ -52,43 +70,106 @@ def read(path: Path, options: ReadOptions) -> LightField:
         :func:`sepi.io.readers.arrays.light_field_from_array`.
     """
     require_unused(str(path), options, ("pattern", "follow_links"))
-    head = _head(path)
-    if head[-4:] in BYTE_ORDERS:
-        array = _read_5(path, options.variable)
-    elif h5py.is_hdf5(path):
-        array = _read_7_3(path, options.variable, by_matlab=head.startswith(_TEXT_7_3))
-    else:
-        what = "is damaged" if head.startswith(_TEXT_7_3) else "is not a MATLAB file of version 5 or 7.3"
-        raise SepiError(f"{path}: {what}; save it in MATLAB with -v7 or -v7.3")
+    found = shapes(path)
+    name = variable_of(str(path), {name: shape for name, (shape, _) in found.items()}, options.variable)
+    array = _read_7_3(path, name) if h5py.is_hdf5(path) else _read_5(path, name, found[name][1])
     # the axes that MATLAB dropped
     while array.ndim < len(options.axes or "") <= 5:
         array = array[..., None]
     return light_field_from_array(array, name=path.stem, source=str(path), options=options)
 
 
+def shapes(path: Path) -> dict[str, tuple[tuple[int, ...], np.dtype[Any]]]:
+    """Shape and type, as MATLAB shows them, of each array of real numbers in a file; their values are not read.
+
+    Raises
+    ------
+    SepiError
+        If the file is damaged or of another version.
+    """
+    head = _head(path)
+    if head[-4:] in _BYTE_ORDERS:
+        from scipy.io import whosmat
+
+        with damage_named(path, "MATLAB file"):
+            names = _real_arrays(path)
+            return {name: (shape, np.dtype(kind)) for name, shape, kind in whosmat(path) if name in names}
+    if h5py.is_hdf5(path):
+        with open_hdf5(path) as file:
+            arrays = {name: file[name] for name in file if _is_numbers(file.get(name))}
+            return {
+                name: (array.shape[:: -1 if _is_turned(path, array) else 1], array.dtype)
+                for name, array in arrays.items()
+            }
+    what = "is damaged" if head.startswith(_TEXT_7_3) else "is not a MATLAB file of version 5 or 7.3"
+    raise SepiError(f"{path}: {what}; save it in MATLAB with -v7 or -v7.3")
+
+
 def _head(path: Path) -> bytes:
     try:
         with path.open("rb") as file:
-            return file.read(HEADER)
+            return file.read(_HEADER)
     except OSError as error:
         raise SepiError(f"{path}: cannot be read ({error.strerror})") from error
 
 
-def _read_5(path: Path, wanted: str | None) -> Array:
-    found = variables(path)
-    name = variable_of(str(path), {name: variable.shape for name, variable in found.items()}, wanted)
-    return read_variable(path, found[name])
+def _read_5(path: Path, name: str, kind: np.dtype[Any]) -> Array:
+    from scipy.io import loadmat
+
+    with damage_named(path, "MATLAB file"):
+        values: Array = loadmat(path, variable_names=[name])[name]
+        # MATLAB saves doubles that are small whole numbers as bytes
+        return values.astype(kind, copy=False)
 
 
-def _read_7_3(path: Path, wanted: str | None, *, by_matlab: bool) -> Array:
-    with opened(path) as file:
-        arrays = {name: file[name] for name in file if _is_numbers(file.get(name))}
-        # other programs' files are as their own libraries show them
-        turned = [name for name, dataset in arrays.items() if by_matlab or "MATLAB_class" in dataset.attrs]
-        shapes = {name: dataset.shape[:: -1 if name in turned else 1] for name, dataset in arrays.items()}
-        name = variable_of(str(path), shapes, wanted)
-        array = stored(path, arrays[name])
-        return array.T if name in turned else array
+def _real_arrays(path: Path) -> set[str]:
+    """Names of a file's arrays of real numbers, whose values are of types that there are."""
+    names = set()
+    with path.open("rb") as file:
+        order = _BYTE_ORDERS[file.read(_HEADER)[-4:]]
+        while tag := file.read(8):
+            kind, length = struct.unpack(order + "II", tag)
+            end = file.tell() + length
+            if end > path.stat().st_size:
+                raise SepiError(f"{path}: damaged MATLAB file: it is cut off")
+            head = file.read(min(length, _PREFIX))
+            if kind == _COMPRESSED:
+                head = zlib.decompressobj().decompress(head, _PREFIX)
+                kind, head = struct.unpack_from(order + "I", head)[0], head[8:]
+            flags = struct.unpack_from(order + "I", head, 8)[0] if kind == _MATRIX else 0
+            if flags & 0xFF in _CLASSES and not flags & (_COMPLEX | _LOGICAL):
+                _, _, name, (stored_as, _) = _parts(order, head)
+                if stored_as not in _TYPES:
+                    raise SepiError(f"{path}: damaged MATLAB file: an array with values of type {stored_as}")
+                names.add(name[1].decode("latin-1"))
+            file.seek(end)
+    return names
+
+
+def _parts(order: str, head: bytes) -> list[tuple[int, bytes]]:
+    """Type and data of the first four elements of a matrix; of the values only as much as ``head`` holds."""
+    parts = []
+    at = 0
+    for _ in range(4):
+        kind, length = struct.unpack_from(order + "II", head, at)
+        start, after = at + 8, at + 8 + -(-length // 8) * 8
+        if kind >> 16:
+            # up to four bytes of data stand in the tag itself
+            kind, length, start, after = kind & 0xFFFF, kind >> 16, at + 4, at + 8
+        parts.append((kind, head[start : start + length]))
+        at = after
+    return parts
+
+
+def _read_7_3(path: Path, name: str) -> Array:
+    with open_hdf5(path) as file:
+        array = read_dataset(path, file[name])
+        return array.T if _is_turned(path, file[name]) else array
+
+
+def _is_turned(path: Path, dataset: h5py.Dataset) -> bool:
+    """Whether the axes are in reverse, as MATLAB writes them; other programs do not."""
+    return "MATLAB_class" in dataset.attrs or _head(path).startswith(_TEXT_7_3)
 
 
 def _is_numbers(entry: Any) -> bool:

@@ -2,46 +2,23 @@
 
 from __future__ import annotations
 
-import io
-import math
-import struct
-import warnings
 import zipfile
-from collections.abc import Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any
 
 import numpy as np
 from numpy.lib import format as npy
 
-from sepi.errors import SepiError
-from sepi.io.readers.arrays import DEFLATE_RATIO, Array, light_field_from_array, printable, variable_of
+from sepi.errors import SepiError, printable
+from sepi.io.hdf5 import DEFLATE_RATIO
+from sepi.io.readers.arrays import Array, damage_named, light_field_from_array, variable_of
 from sepi.io.readers.options import ReadOptions, require_unused
 from sepi.lightfield import LightField
 
-_MAGIC = b"\x93NUMPY"
+_KIND = "NumPy file"
 # of a ZIP archive with members, and of an empty one
 _ZIP_MAGICS = (b"PK\x03\x04", b"PK\x05\x06")
-# format version to the struct of the header's length and the function that reads both
-_VERSIONS = {(1, 0): ("<H", npy.read_array_header_1_0), (2, 0): ("<I", npy.read_array_header_2_0)}
-# NumPy's own limit for headers of unknown origin
-_LONGEST_HEADER = 10_000
-
-
-@dataclass(frozen=True)
-class _Header:
-    """What stands before the values of an array."""
-
-    shape: tuple[int, ...]
-    fortran_order: bool
-    dtype: np.dtype[Any]
-    size: int
-
-    @property
-    def nbytes(self) -> int:
-        return math.prod(self.shape) * self.dtype.itemsize
+_HEADERS = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
 
 
 def matches(path: Path) -> bool:
@@ -51,10 +28,9 @@ def matches(path: Path) -> bool:
     if path.suffix.lower() in (".npy", ".npz"):
         return True
     try:
-        with path.open("rb") as file:
-            head = file.read(len(_MAGIC))
-        if not head.startswith(_ZIP_MAGICS):
-            return head == _MAGIC
+        if not _is_zipped(path):
+            with path.open("rb") as file:
+                return npy.read_magic(file) is not None
         with zipfile.ZipFile(path) as archive:
             return any(map(_is_array, archive.infolist()))
     except Exception:
@@ -72,12 +48,11 @@ def read(path: Path, options: ReadOptions) -> LightField:
         :func:`sepi.io.readers.arrays.light_field_from_array`.
     """
     require_unused(str(path), options, ("pattern", "follow_links"))
-    with _damage_named(path), path.open("rb") as file:
-        zipped = file.read(len(_MAGIC)).startswith(_ZIP_MAGICS)
-        file.seek(0)
-        if not zipped:
-            require_unused(str(path), options, ("variable",))
-        array = _read_npz(path, options.variable) if zipped else _read_npy(path, file)
+    with damage_named(path, _KIND):
+        zipped = _is_zipped(path)
+    if not zipped:
+        require_unused(str(path), options, ("variable",))
+    array = _read_npz(path, options.variable) if zipped else read_array(path)
     return light_field_from_array(array, name=path.stem, source=str(path), options=options)
 
 
@@ -89,40 +64,54 @@ def read_array(path: Path) -> Array:
     SepiError
         If the file cannot be read, is damaged or holds Python objects.
     """
-    with _damage_named(path), path.open("rb") as file:
-        return _read_npy(path, file)
+    with damage_named(path, _KIND):
+        with path.open("rb") as file:
+            _require_plain(path, "", _read_header(path, file)[1])
+        array: Array = np.load(path, mmap_mode="r", allow_pickle=False)
+        return array
 
 
-def _read_npy(path: Path, file: IO[bytes]) -> Array:
-    header = _read_header(str(path), file)
-    _require_values(str(path), header, path.stat().st_size - header.size)
-    # mapped: only the views in use are read
-    order: Any = "F" if header.fortran_order else "C"
-    return np.memmap(path, header.dtype, "r", header.size, header.shape, order)
+def shapes(path: Path) -> dict[str, tuple[tuple[int, ...], np.dtype[Any]]]:
+    """Shape and type of each array in a file by its name, the empty one in ``.npy``; values are not read.
+
+    Raises
+    ------
+    SepiError
+        If the file cannot be read or is damaged.
+    """
+    with damage_named(path, _KIND):
+        if not _is_zipped(path):
+            with path.open("rb") as file:
+                return {"": _read_header(path, file)}
+        found = {}
+        with zipfile.ZipFile(path) as archive:
+            for info in filter(_is_array, archive.infolist()):
+                _require_room(path, info)
+                with archive.open(info) as file:
+                    found[info.filename.removesuffix(".npy")] = _read_header(path, file)
+        return found
 
 
-def _read_npz(path: Path, wanted: str | None) -> Array:
-    with zipfile.ZipFile(path) as archive:
-        headers = {}
-        members = {info.filename.removesuffix(".npy"): info for info in archive.infolist() if _is_array(info)}
-        for name, info in members.items():
-            _require_stored(path, info)
-            with archive.open(info) as file:
-                headers[name] = _read_header(f"{path}: {printable(info.filename)}", file)
-        shapes = {
-            name: header.shape for name, header in headers.items() if header.dtype.kind in "iuf" or name == wanted
-        }
-        name = variable_of(str(path), shapes, wanted)
-        _require_values(f"{path}: {printable(name)}.npy", headers[name], members[name].file_size - headers[name].size)
-        with archive.open(members[name]) as file:
-            return npy.read_array(file, allow_pickle=False)
+def _read_npz(path: Path, variable: str | None) -> Array:
+    found = shapes(path)
+    numbers = {name: shape for name, (shape, kind) in found.items() if kind.kind in "iuf" or name == variable}
+    name = variable_of(str(path), numbers, variable)
+    _require_plain(path, f": {printable(name)}.npy", found[name][1])
+    with damage_named(path, _KIND), np.load(path, allow_pickle=False) as archive:
+        array: Array = archive[name]
+        return array
+
+
+def _is_zipped(path: Path) -> bool:
+    with path.open("rb") as file:
+        return file.read(4) in _ZIP_MAGICS
 
 
 def _is_array(info: zipfile.ZipInfo) -> bool:
     return info.filename.endswith(".npy")
 
 
-def _require_stored(path: Path, info: zipfile.ZipInfo) -> None:
+def _require_room(path: Path, info: zipfile.ZipInfo) -> None:
     """Raise unless a member of an archive can be as large as the archive says."""
     if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED) or info.flag_bits & 1:
         raise SepiError(f"{path}: {printable(info.filename)} is encrypted or packed in a way that NumPy does not use")
@@ -133,47 +122,18 @@ def _require_stored(path: Path, info: zipfile.ZipInfo) -> None:
         )
 
 
-def _read_header(where: str, file: IO[bytes]) -> _Header:
-    """Read the header of an array, which may be a lie."""
-    start = file.read(len(_MAGIC) + 2)
-    if not start.startswith(_MAGIC) or len(start) < len(_MAGIC) + 2:
-        raise SepiError(f"{where}: not a NumPy file: no header of one")
-    version = (start[-2], start[-1])
-    if version not in _VERSIONS:
-        raise SepiError(f"{where}: NumPy file of version {version[0]}.{version[1]}; expected one array of numbers")
-    form, parse = _VERSIONS[version]
-    length_bytes = file.read(struct.calcsize(form))
-    length = struct.unpack(form, length_bytes)[0] if len(length_bytes) == struct.calcsize(form) else 0
-    if not 0 < length <= _LONGEST_HEADER:
-        raise SepiError(f"{where}: damaged NumPy file: header of {length} bytes")
-    shape, fortran_order, dtype = parse(io.BytesIO(length_bytes + file.read(length)))
-    if any(size < 0 for size in shape):
-        raise SepiError(f"{where}: damaged NumPy file: shape {shape}")
-    return _Header(shape, fortran_order, dtype, len(start) + len(length_bytes) + length)
-
-
-def _require_values(where: str, header: _Header, held: int) -> None:
-    """Raise unless the values are plain and fit into the ``held`` bytes after the header."""
-    if header.dtype.hasobject:
-        raise SepiError(f"{where}: holds Python objects, which are not read; save the views as one array of numbers")
-    if header.nbytes > held:
-        raise SepiError(
-            f"{where}: damaged NumPy file: expected {header.nbytes} bytes of values for {header.dtype} {header.shape}, "
-            f"got {held}"
-        )
-
-
-@contextmanager
-def _damage_named(path: Path) -> Iterator[None]:
-    """Turn whatever the libraries stumble over into one error, and keep their warnings here."""
+def _read_header(path: Path, file: IO[bytes]) -> tuple[tuple[int, ...], np.dtype[Any]]:
+    """Shape and type of the array that a file begins with."""
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            yield
-    except SepiError:
-        raise
-    except OSError as error:
-        raise SepiError(f"{path}: cannot be read ({error.strerror or error})") from error
-    except Exception as error:
-        reason = printable(str(error)) or type(error).__name__
-        raise SepiError(f"{path}: damaged NumPy file ({reason[:200]})") from error
+        version = npy.read_magic(file)
+    except ValueError as error:
+        raise SepiError(f"{path}: not a NumPy file: no header of one") from error
+    if version not in _HEADERS:
+        raise SepiError(f"{path}: NumPy file of version {version[0]}.{version[1]}; expected one array of numbers")
+    shape, _, kind = _HEADERS[version](file)
+    return shape, kind
+
+
+def _require_plain(path: Path, member: str, kind: np.dtype[Any]) -> None:
+    if kind.hasobject:
+        raise SepiError(f"{path}{member}: holds Python objects, which are not read; save the views as numbers")

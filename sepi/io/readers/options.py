@@ -1,4 +1,4 @@
-"""How to read a light field where its files do not say it all, and how its views are put in their places.
+"""How to read a light field where its files do not say it all, and how its views are put in their positions.
 
 Readers find a grid of views in the files, the *given* grid. What :class:`ReadOptions` asks for turns it into the
 light field's grid: ``central`` cuts out its middle, ``order`` flips and transposes it, ``exclude`` leaves views out.
@@ -67,7 +67,7 @@ class ReadOptions:
     exclude : tuple of str
         Views to leave out: positions ``"T,S"`` or file names.
     view : tuple of int, optional
-        Position ``(t, s)`` of the view whose depth is wanted; the centre view unless given.
+        Position ``(t, s)`` of the view whose depth is made; the centre view unless given.
     follow_links : bool
         Read views that are links to files outside their folder.
     """
@@ -83,10 +83,10 @@ class ReadOptions:
     follow_links: bool = False
 
 
-def arranged(
+def arrange_numbers(
     source: str, grid: tuple[int, int], options: ReadOptions, names: Mapping[str, int] | None = None
 ) -> Numbers:
-    """Which view of the given grid stands at each place of the light field's grid.
+    """Which view of the given grid stands at each position of the light field's grid.
 
     Parameters
     ----------
@@ -143,16 +143,10 @@ def require_unused(source: str, options: ReadOptions, names: Iterable[str]) -> N
             raise SepiError(f"{source}: {flag} does not apply to this format; it is for {_MEANT_FOR[name]}")
 
 
-def place_of(numbers: Numbers, number: int) -> tuple[int, int] | None:
+def position_of(numbers: Numbers, number: int) -> tuple[int, int] | None:
     """Where a view of the given grid stands, ``(t, s)``; None where it was left out."""
-    places = np.argwhere(numbers == number)
-    return (int(places[0][0]), int(places[0][1])) if len(places) else None
-
-
-def position(text: str) -> tuple[int, int] | None:
-    """``(t, s)`` from ``"T,S"``; None for any other text."""
-    match = _POSITION.fullmatch(text)
-    return None if match is None else (int(match[1]), int(match[2]))
+    positions = np.argwhere(numbers == number)
+    return (int(positions[0][0]), int(positions[0][1])) if len(positions) else None
 
 
 def _central(source: str, numbers: Numbers, side: int) -> Numbers:
@@ -168,22 +162,23 @@ def _central(source: str, numbers: Numbers, side: int) -> Numbers:
 
 
 def _excluded(source: str, view: str, numbers: Numbers, names: Mapping[str, int]) -> int:
-    place = position(view)
-    if place is not None:
-        _require_inside(source, numbers, place)
-        return int(numbers[place])
+    match = _POSITION.fullmatch(view)
+    if match is not None:
+        position = int(match[1]), int(match[2])
+        _require_inside(source, numbers, position)
+        return int(numbers[position])
     if view not in names:
         found = f" (found: {', '.join(sorted(names)[:3])}, ...)" if names else ""
         raise SepiError(
-            f"{source}: view '{view}' to exclude: expected a place ROW,COLUMN or the name of a view's file{found}"
+            f"{source}: view '{view}' to exclude: expected a position ROW,COLUMN or the name of a view's file{found}"
         )
     return names[view]
 
 
-def _require_inside(source: str, numbers: Numbers, place: tuple[int, int]) -> None:
+def _require_inside(source: str, numbers: Numbers, position: tuple[int, int]) -> None:
     T, S = numbers.shape
-    if not (0 <= place[0] < T and 0 <= place[1] < S):
+    if not (0 <= position[0] < T and 0 <= position[1] < S):
         raise SepiError(
-            f"{source}: view {place[0]},{place[1]} lies outside the grid; rows go from 0 to {T - 1}, columns from 0 to "
-            f"{S - 1}"
+            f"{source}: view {position[0]},{position[1]} lies outside the grid; rows go from 0 to {T - 1}, "
+            f"columns from 0 to {S - 1}"
         )

@@ -10,16 +10,16 @@ import numpy as np
 
 from sepi.errors import SepiError
 from sepi.io.images import Pixels, read_views
-from sepi.io.readers.options import Numbers, ReadOptions, arranged
+from sepi.io.readers.options import Numbers, ReadOptions, arrange_numbers
 from sepi.lightfield import BoolMap
 
-MAX_PLACES = 10_000
+MAX_VIEWS = 10_000
 """More views than any grid has."""
 
 
 @dataclass(frozen=True)
-class Arranged:
-    """Views at their places.
+class ViewGrid:
+    """Views at their positions.
 
     Attributes
     ----------
@@ -35,8 +35,8 @@ class Arranged:
     numbers: Numbers
 
 
-def read_arranged(folder: Path, files: Mapping[int, Path], grid: tuple[int, int], options: ReadOptions) -> Arranged:
-    """Read the views of a grid and put them in their places; those left out are not even opened.
+def read_grid(folder: Path, files: Mapping[int, Path], grid: tuple[int, int], options: ReadOptions) -> ViewGrid:
+    """Read the views of a grid and put them in their positions; those left out are not even opened.
 
     Parameters
     ----------
@@ -54,18 +54,18 @@ def read_arranged(folder: Path, files: Mapping[int, Path], grid: tuple[int, int]
         If the options do not fit the grid, no view is left, or a file cannot be read, is a link out of the folder, or
         is unlike the others.
     """
-    if grid[0] * grid[1] > MAX_PLACES:
-        raise SepiError(f"{folder}: a grid of {grid[0]}x{grid[1]} views; expected at most {MAX_PLACES} views")
-    numbers = arranged(str(folder), grid, options, {path.name: number for number, path in files.items()})
+    if grid[0] * grid[1] > MAX_VIEWS:
+        raise SepiError(f"{folder}: a grid of {grid[0]}x{grid[1]} views; expected at most {MAX_VIEWS} views")
+    numbers = arrange_numbers(str(folder), grid, options, {path.name: number for number, path in files.items()})
     present = np.isin(numbers, list(files))
-    places = np.flatnonzero(present)
-    paths = [files[int(number)] for number in numbers.ravel()[places]]
+    positions = np.flatnonzero(present)
+    paths = [files[int(number)] for number in numbers.ravel()[positions]]
     if not paths:
         raise SepiError(f"{folder}: no view is left")
     if not options.follow_links:
         require_within(folder, paths)
-    views = read_views(paths, [int(place) for place in places], numbers.size)
-    return Arranged(views.reshape(*numbers.shape, *views.shape[1:]), present, numbers)
+    views = read_views(paths, [int(position) for position in positions], numbers.size)
+    return ViewGrid(views.reshape(*numbers.shape, *views.shape[1:]), present, numbers)
 
 
 def require_within(folder: Path, paths: Iterable[Path]) -> None:

@@ -30,19 +30,19 @@ class ViewNumbers:
     ----------
     numbers : dict of str to tuple of int
         Name to ``(row, column)``, or to ``(number,)`` where views are numbered through.
-    unlike : tuple of str
+    unmatched : tuple of str
         Names that were left out.
     line : {"row", "column"} or None
         For views numbered through: whether the one number that all names share stands where the number of the row or
         of the column would, so that the views may be a single one.
-    line_alike : bool
+    line_likely : bool
         Whether that number is written in the same way as the views' numbers.
     """
 
     numbers: dict[str, tuple[int, ...]]
-    unlike: tuple[str, ...] = ()
+    unmatched: tuple[str, ...] = ()
     line: str | None = None
-    line_alike: bool = False
+    line_likely: bool = False
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class _Name:
     numbers: tuple[str, ...]
 
 
-def numbers_from_pattern(source: str, names: Iterable[str], pattern: str) -> ViewNumbers:
+def parse_view_numbers(source: str, names: Iterable[str], pattern: str) -> ViewNumbers:
     """Numbers where a pattern has them.
 
     Parameters
@@ -84,7 +84,7 @@ def numbers_from_pattern(source: str, names: Iterable[str], pattern: str) -> Vie
     )
 
 
-def numbers_from_likeness(source: str, names: Iterable[str]) -> ViewNumbers:
+def infer_view_numbers(source: str, names: Iterable[str]) -> ViewNumbers:
     """Numbers that differ from name to name, among names that are alike but for their numbers.
 
     Decimal numbers, such as a camera's position, do not count the views.
@@ -102,8 +102,8 @@ def numbers_from_likeness(source: str, names: Iterable[str]) -> ViewNumbers:
     """
     names = sorted(names)
     for form in (_DECIMAL + _INTEGER, _INTEGER):  # without decimals: names such as 03.07.png
-        alike = _most_alike(source, [_cut(name, re.compile(form)) for name in names])
-        varying = _varying(alike)
+        group = _largest_group(source, [_cut(name, re.compile(form)) for name in names])
+        varying = _varying(group)
         if varying:
             break
     else:
@@ -113,17 +113,17 @@ def numbers_from_likeness(source: str, names: Iterable[str]) -> ViewNumbers:
         )
     if len(varying) > 2:
         raise SepiError(
-            f"{source}: {len(varying)} numbers differ from name to name ({alike[0].name}); give --pattern, such as "
-            f"'{_suggested(alike[0], varying)}'"
+            f"{source}: {len(varying)} numbers differ from name to name ({group[0].name}); give --pattern, such as "
+            f"'{_suggested(group[0], varying)}'"
         )
-    kept = {view.name for view in alike}
-    columns = [_values([view.numbers[at] for view in alike]) for at in varying]
-    line, line_alike = _line(alike, varying[0]) if len(varying) == 1 else (None, False)
+    kept = {view.name for view in group}
+    columns = [_values([view.numbers[at] for view in group]) for at in varying]
+    line, line_likely = _line(group, varying[0]) if len(varying) == 1 else (None, False)
     return ViewNumbers(
-        dict(zip([view.name for view in alike], zip(*columns, strict=True), strict=True)),
+        dict(zip([view.name for view in group], zip(*columns, strict=True), strict=True)),
         tuple(name for name in names if name not in kept),
         line,
-        line_alike,
+        line_likely,
     )
 
 
@@ -145,8 +145,8 @@ def _cut(name: str, form: re.Pattern[str]) -> _Name:
     return _Name(name, (*texts, suffix.lower()), tuple(numbers))
 
 
-def _most_alike(source: str, names: Sequence[_Name]) -> list[_Name]:
-    """The largest group of names whose texts are the same."""
+def _largest_group(source: str, names: Sequence[_Name]) -> list[_Name]:
+    """The largest group of names of the same texts."""
     groups: dict[tuple[str, ...], list[_Name]] = defaultdict(list)
     for name in names:
         if name.numbers or "/" in "".join(name.texts):
@@ -162,11 +162,11 @@ def _most_alike(source: str, names: Sequence[_Name]) -> list[_Name]:
     return ranked[0]
 
 
-def _varying(alike: Sequence[_Name]) -> list[int]:
+def _varying(group: Sequence[_Name]) -> list[int]:
     """Which numbers differ from name to name, leaving out those that repeat another."""
     columns: dict[tuple[int, ...], int] = {}
-    for at in range(len(alike[0].numbers)):
-        values = tuple(int(view.numbers[at]) for view in alike)
+    for at in range(len(group[0].numbers)):
+        values = tuple(int(view.numbers[at]) for view in group)
         if len(set(values)) > 1:
             columns.setdefault(values, at)
     return sorted(columns.values())
@@ -178,15 +178,15 @@ def _values(texts: Sequence[str]) -> list[int]:
     return [abs(int(text)) if hyphens else int(text) for text in texts]
 
 
-def _line(alike: Sequence[_Name], at: int) -> tuple[str | None, bool]:
+def _line(group: Sequence[_Name], at: int) -> tuple[str | None, bool]:
     """Whether the number before or after the one that varies, the same in all names, may be a row or a column."""
-    written = [view.numbers[at] for view in alike]
-    count = len(alike[0].numbers)
-    beside = {line: place for line, place in (("row", at - 1), ("column", at + 1)) if 0 <= place < count}
+    written = [view.numbers[at] for view in group]
+    count = len(group[0].numbers)
+    beside = {line: index for line, index in (("row", at - 1), ("column", at + 1)) if 0 <= index < count}
     shared = {
-        line: alike[0].numbers[place]
-        for line, place in beside.items()
-        if len({int(view.numbers[place]) for view in alike}) == 1 and abs(int(alike[0].numbers[place])) < _SMALL
+        line: group[0].numbers[index]
+        for line, index in beside.items()
+        if len({int(view.numbers[index]) for view in group}) == 1 and abs(int(group[0].numbers[index])) < _SMALL
     }
     if len(shared) != 1:
         return None, False

@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 from sepi.errors import SepiError
 from sepi.io.readers.formats import format_of, read
 from sepi.io.readers.options import ReadOptions
-from sepi.io.readers.view_names import numbers_from_likeness, numbers_from_pattern
+from sepi.io.readers.view_names import infer_view_numbers, parse_view_numbers
 from sepi.lightfield import LightField
 
 
@@ -428,10 +428,10 @@ TEXT = st.text(st.sampled_from("01290_-. ax{}*()[]\\/?+^$|é\n٣²") | st.charac
 @given(st.lists(TEXT, max_size=8))
 def test_any_names_give_numbers_or_an_error(names: list[str]) -> None:
     try:
-        found = numbers_from_likeness("folder", names)
+        found = infer_view_numbers("folder", names)
     except SepiError:
         return
-    assert set(found.numbers) | set(found.unlike) == set(names)
+    assert set(found.numbers) | set(found.unmatched) == set(names)
     assert all(len(numbers) in (1, 2) for numbers in found.numbers.values())
     assert len({len(numbers) for numbers in found.numbers.values()}) == 1
 
@@ -441,17 +441,17 @@ def test_any_pattern_is_one_or_an_error(names: list[str], before: str, fields: s
     pattern = before + fields + after
     names = [*names, before + fields.format(number=7, row=3, column=-4) + after]
     try:
-        found = numbers_from_pattern("folder", names, pattern)
+        found = parse_view_numbers("folder", names, pattern)
     except SepiError:
         return
-    assert set(found.numbers) | set(found.unlike) == set(names)
+    assert set(found.numbers) | set(found.unmatched) == set(names)
 
 
 @given(st.integers(-(10**17), 10**17), st.integers(0, 10**17), TEXT.filter(lambda text: not set("{}*/\\-") & set(text)))
 def test_pattern_finds_the_numbers_that_made_the_name(row: int, column: int, text: str) -> None:
     between = text.strip("0123456789-") or "_"
     names = [f"{row}{between}{column}.png", f"5{between}5.png"]
-    found = numbers_from_pattern("folder", names, f"{{row}}{between}{{column}}.png")
+    found = parse_view_numbers("folder", names, f"{{row}}{between}{{column}}.png")
     assert found.numbers[names[0]] == (row, column)
 
 
@@ -461,7 +461,7 @@ def test_no_pattern_takes_long(pattern: str) -> None:
     started = time.perf_counter()
     names = ["a" * 255, "1" * 255, "a1" * 127, "-" * 255, "1a" * 127]
     with pytest.raises(SepiError, match="no file has a name like"):
-        numbers_from_pattern("folder", names, pattern)
+        parse_view_numbers("folder", names, pattern)
     assert time.perf_counter() - started < 1
 
 
@@ -469,7 +469,7 @@ def test_no_pattern_takes_long(pattern: str) -> None:
 def test_no_name_takes_long(name: str) -> None:
     started = time.perf_counter()
     with pytest.raises(SepiError):
-        numbers_from_likeness("folder", [name, name + "a"])
+        infer_view_numbers("folder", [name, name + "a"])
     assert time.perf_counter() - started < 1
 
 

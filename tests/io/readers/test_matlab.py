@@ -1,6 +1,7 @@
 """MATLAB files of both kinds: what MATLAB shows is what is read, pixel for pixel."""
 
 import re
+import resource
 import struct
 import zlib
 from pathlib import Path
@@ -204,10 +205,13 @@ def test_shape_and_length_that_agree_on_a_lie(tmp_path: Path, packed: bool) -> N
         lie = struct.pack("<II", 14, 2_000_000_000) + lie[8:]
         lie = struct.pack("<II", 15, len(zlib.compress(lie))) + zlib.compress(lie)
     (tmp_path / "lie.mat").write_bytes(b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM" + lie)
-    assert "'LF' of shape (2, 3, 8000, 10000, 3) cannot lie in" in refused(tmp_path / "lie.mat")
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    assert "damaged MATLAB file" in refused(tmp_path / "lie.mat")
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 500_000  # KB
 
 
 def test_type_codes_that_do_not_exist(tmp_path: Path) -> None:
+    """SciPy ends the program with a segmentation fault."""
     content = version_5("<", dims=LF.shape, kind=9, stored=60000, data=LF.tobytes("F"), packed=False)
     (tmp_path / "code.mat").write_bytes(content)
     assert "damaged MATLAB file" in refused(tmp_path / "code.mat")
@@ -222,14 +226,6 @@ def test_compressed_values_with_a_flipped_bit(tmp_path: Path) -> None:
     content = b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM" + struct.pack("<II", 15, len(packed)) + bytes(packed)
     (tmp_path / "flipped.mat").write_bytes(content)
     assert "damaged MATLAB file" in refused(tmp_path / "flipped.mat")
-
-
-def test_compressed_values_without_their_checksum(tmp_path: Path) -> None:
-    matrix = version_5("<", dims=LF.shape, kind=9, stored=2, data=LF.tobytes("F"), packed=False)[128:]
-    packed = zlib.compress(matrix)[:-4]
-    content = b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM" + struct.pack("<II", 15, len(packed)) + packed
-    (tmp_path / "short.mat").write_bytes(content)
-    assert "damaged MATLAB file: a compressed variable" in refused(tmp_path / "short.mat")
 
 
 def test_hdf5_that_claims_more_than_it_holds(tmp_path: Path) -> None:

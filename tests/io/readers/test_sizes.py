@@ -1,0 +1,122 @@
+"""Sizes from headers: what the workflow asks memory for must hold the views, however small they are packed."""
+
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+import scipy.io
+from PIL import Image
+
+from sepi.io.hdf5 import write_light_field
+from sepi.io.readers.sizes import Size, size_of
+from sepi.lightfield import LightField
+from sepi.workflow.datasets import own_scene
+
+
+def matlab_7_3(path: Path, views: np.ndarray) -> None:
+    with h5py.File(path, "w") as file:
+        file.create_dataset("LF", data=views.T, chunks=True, compression="gzip")
+        file["LF"].attrs["MATLAB_class"] = np.bytes_({"f": "double", "u": "uint8"}[views.dtype.kind])
+
+
+def hci_2013(path: Path, views: np.ndarray) -> None:
+    with h5py.File(path, "w") as file:
+        file.create_dataset("LF", data=views, compression="gzip")
+
+
+WRITERS: dict[str, Callable[[Path, np.ndarray], object]] = {
+    "a.npy": np.save,
+    "a.npz": lambda path, views: np.savez_compressed(path, small=np.ones((2, 2, 3, 3)), LF=views),
+    "v5.mat": lambda path, views: scipy.io.savemat(path, {"LF": views, "text": "a"}, do_compression=True),
+    "v73.mat": matlab_7_3,
+    "old.h5": hci_2013,
+    "own.h5": lambda path, views: write_light_field(path, LightField(views.astype(np.float32), "a")),
+}
+
+
+def compressible(*shape: int) -> np.ndarray:
+    """Views of float64 that shrink to a hundredth of their size."""
+    return np.broadcast_to(np.linspace(0, 1, shape[3])[:, None], shape).copy()
+
+
+@pytest.mark.parametrize("name", WRITERS)
+def test_arrays_are_as_large_as_they_are_unpacked(tmp_path: Path, name: str) -> None:
+    WRITERS[name](tmp_path / name, compressible(3, 5, 60, 64, 3))
+    assert size_of([tmp_path / name]) == Size(15, 60, 64, 12 if name == "own.h5" else 24)
+
+
+@pytest.mark.parametrize(
+    ("shape", "expected"),
+    [
+        ((60, 64, 5, 7, 3), Size(35, 60, 64, 3)),
+        ((3, 5, 7, 60, 64), Size(35, 60, 64, 3)),
+        ((9, 60, 64, 3), Size(9, 60, 64, 3)),
+        ((3, 3, 60, 64), Size(9, 60, 64, 1)),
+        ((60, 64, 9, 9), Size(81, 60, 64, 1)),
+        ((5, 7, 60, 64, 4), Size(35, 60, 64, 4)),
+    ],
+)
+def test_axes_of_any_order(tmp_path: Path, shape: tuple[int, ...], expected: Size) -> None:
+    np.save(tmp_path / "a.npy", np.zeros(shape, np.uint8))
+    assert size_of([tmp_path / "a.npy"]) == expected
+
+
+def test_pictures_of_views_and_of_lenslets(tmp_path: Path) -> None:
+    files = [tmp_path / f"view{number}.png" for number in range(4)]
+    for path in files:
+        Image.fromarray(np.zeros((30, 40), np.uint16)).save(path)
+    assert size_of(files) == Size(4, 30, 40, 2)
+    Image.new("RGB", (14 * 50, 14 * 40)).save(tmp_path / "a_eslf.png")
+    found = size_of([tmp_path / "a_eslf.png"])
+    assert found[:3] == (81, 40, 50)
+    # the whole picture is decoded
+    assert 81 * 40 * 50 * found.pixel_bytes >= 14 * 50 * 14 * 40 * 3
+
+
+@pytest.mark.parametrize("content", [b"", b"\x93NUMPY", b"PK\x03\x04", b"MATLAB 5.0 MAT-file", b"\x89HDF\r\n\x1a\n"])
+@pytest.mark.parametrize("ending", ["npy", "npz", "mat", "h5", "png"])
+def test_what_is_not_understood_is_left_to_the_reader(tmp_path: Path, content: bytes, ending: str) -> None:
+    (tmp_path / f"a.{ending}").write_bytes(content + bytes(3 * 81 * 100))
+    assert size_of([tmp_path / f"a.{ending}"]) == Size(81, 10, 10)
+    assert size_of([tmp_path / f"a.{ending}"] * 2).height >= 10
+
+
+def test_a_size_that_the_file_cannot_hold_is_not_believed(tmp_path: Path) -> None:
+    """A job that asks for terabytes never runs, and nobody learns what is wrong with the file."""
+    with h5py.File(tmp_path / "huge.h5", "w") as file:
+        file.create_dataset("LF", (9, 9, 100_000, 100_000, 3), np.uint8)
+    assert size_of([tmp_path / "huge.h5"]).height < 10_000
+
+
+PEAK = """
+import sys
+from sepi.command import peak_memory_mb
+from sepi.io.readers.formats import read
+from sepi.io.readers.options import ReadOptions
+from pathlib import Path
+import scipy.io
+for name in sys.argv[1:]:
+    read(Path(name), ReadOptions())
+    print(peak_memory_mb())
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", set(WRITERS) - {"own.h5"})
+def test_reading_takes_no_more_than_ingest_asks_for(tmp_path: Path, name: str) -> None:
+    """Killed for want of memory, a job says nothing about why; the numbers are those of ``rules/ingest.smk``."""
+    large = compressible(5, 5, 320, 320, 3)
+    for prefix, views in (("small-", large[:2, :2, :16, :16]), ("large-", large)):
+        WRITERS[name](tmp_path / (prefix + name), views)
+    files = [str(tmp_path / (prefix + name)) for prefix in ("small-", "large-")]
+    done = subprocess.run([sys.executable, "-c", PEAK, *files], capture_output=True, text=True, check=True)
+    before, after = map(float, done.stdout.split())
+    scene = own_scene("a", Path(files[1]), (), "config")
+    assert scene.samples * scene.pixel_bytes == large.nbytes
+    unpacked = large.nbytes / 2**20
+    # beside what Python and its libraries take; the least that there can be shows that the peak was seen
+    assert unpacked < after - before < scene.memory_mb(12, copies=3) - 300

@@ -1,0 +1,105 @@
+"""The package's own HDF5 files: all that is known comes back, and a damaged one is one clear error."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from sepi.errors import SepiError
+from sepi.io.hdf5 import write_light_field
+from sepi.lightfield import DisparityRange, LightField
+from sepi.reading import read_light_field
+
+
+def error_of(path: Path) -> str:
+    with pytest.raises(SepiError) as caught:
+        read_light_field(path)
+    message = str(caught.value)
+    assert "\n" not in message
+    return message
+
+
+def cut(path: Path) -> None:
+    data = path.read_bytes()
+    path.write_bytes(data[: len(data) // 2])
+
+
+@pytest.fixture
+def light_field() -> LightField:
+    present = np.ones((2, 3), bool)
+    present[0, 0] = False
+    return LightField(
+        np.random.default_rng(0).integers(0, 256, (2, 3, 12, 16, 3), np.uint8),
+        "toy",
+        "somewhere",
+        present,
+        DisparityRange(-1, 2, "given"),
+        np.linspace(-1, 2, 192, dtype=np.float32).reshape(12, 16),
+        {"occluded": np.eye(12, 16, dtype=bool)},
+    )
+
+
+def test_light_field_file_gives_back_all_that_is_known(tmp_path: Path, light_field: LightField) -> None:
+    write_light_field(tmp_path / "lf.h5", light_field)
+    back = read_light_field(tmp_path / "lf.h5")
+    np.testing.assert_array_equal(back.views, light_field.views)
+    np.testing.assert_array_equal(back.present, light_field.present)
+    np.testing.assert_array_equal(back.ground_truth, light_field.ground_truth)
+    np.testing.assert_array_equal(back.masks["occluded"], light_field.masks["occluded"])
+    assert (back.name, back.source) == ("toy", "somewhere")
+    assert back.disparity_range == light_field.disparity_range
+
+
+def test_equal_light_fields_give_equal_bytes(tmp_path: Path, light_field: LightField) -> None:
+    for name in ("a.h5", "b.h5"):
+        write_light_field(tmp_path / name, light_field)
+    assert (tmp_path / "a.h5").read_bytes() == (tmp_path / "b.h5").read_bytes()
+
+
+def spoiled(change: Callable[[h5py.File], object]) -> Callable[[Path], None]:
+    def spoil(path: Path) -> None:
+        with h5py.File(path, "r+") as file:
+            change(file)
+
+    return spoil
+
+
+def replace(file: h5py.File, name: str, values: np.ndarray) -> None:
+    del file[name]
+    file[name] = values
+
+
+BAD_FILES: dict[str, tuple[Callable[[Path], None], str]] = {
+    "cut off": (cut, "not a readable HDF5 file"),
+    "no name": (spoiled(lambda f: f.attrs.pop("name")), "name"),
+    "no source": (spoiled(lambda f: f.attrs.pop("source")), "damaged"),
+    "range of three numbers": (spoiled(lambda f: f.attrs.__setitem__("disparity_range", [1, 2, 3])), "damaged"),
+    "range the wrong way round": (spoiled(lambda f: f.attrs.__setitem__("disparity_range", [2, 1])), "MIN < MAX"),
+    "views of four axes": (
+        spoiled(lambda f: replace(f, "views", np.zeros((3, 4, 4, 3), np.uint8))),
+        "(T, S, H, W, C)",
+    ),
+    "views of text": (spoiled(lambda f: replace(f, "views", np.array(b"text"))), "(T, S, H, W, C)"),
+    "NaN pixels": (
+        spoiled(lambda f: replace(f, "views", np.full((2, 3, 12, 16, 3), np.nan, np.float32))),
+        "finite and within 0..1",
+    ),
+    "floats of 0..255": (
+        spoiled(lambda f: replace(f, "views", np.full((2, 3, 12, 16, 3), 200, np.float32))),
+        "within 0..1",
+    ),
+    "centre view missing": (spoiled(lambda f: replace(f, "present", np.zeros((2, 3), bool))), "centre view"),
+    "views are a group": (spoiled(lambda f: (f.pop("views"), f.create_group("views"))), "damaged"),
+}
+
+
+@pytest.mark.parametrize("case", BAD_FILES)
+def test_bad_file_is_one_line_that_names_it(tmp_path: Path, light_field: LightField, case: str) -> None:
+    spoil, word = BAD_FILES[case]
+    write_light_field(tmp_path / "lf.h5", light_field)
+    spoil(tmp_path / "lf.h5")
+    message = error_of(tmp_path / "lf.h5")
+    assert "lf.h5" in message
+    assert word in message
