@@ -25,7 +25,7 @@ _QUARTER = "#999999"
 _MARKS: dict[str, tuple[str, Literal["-", "--", ":"], float, str]] = {
     "chosen": ("#0072B2", "-", 3.0, "chosen (final map)"),
     "best": ("#CC79A7", "--", 1.6, "variant best"),
-    "ground_truth": ("#000000", ":", 1.2, "ground_truth"),
+    "ground_truth": ("#000000", ":", 1.2, "ground truth"),
 }
 _PIXEL = "#F0E442"
 

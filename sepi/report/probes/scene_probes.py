@@ -10,10 +10,10 @@ import numpy as np
 from sepi.image.noise import residual_variance
 from sepi.io.provenance import history_of
 from sepi.matching.plane_sweep import SweepParameters
+from sepi.report.panels import SceneResults
 from sepi.report.plan import BEST_VARIANT, MAIN_VARIANT
 from sepi.report.probes.pixels import InterestingPixel, interesting_pixels
 from sepi.report.probes.probe import Probe, probe
-from sepi.report.web.scene_panels import SceneResults
 
 
 def scene_probes(results: SceneResults, final_file: Path, asked: Sequence[InterestingPixel]) -> list[Probe]:

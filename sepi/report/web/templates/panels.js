@@ -4,6 +4,9 @@
 
 Sepi.UNKNOWN = [255, 0, 255]; // magenta is in none of the scales
 
+/** Whether a panel is drawn over the reference view, and has no numbers. */
+Sepi.overView = ({ kind }) => ["picture", "mask", "outline"].includes(kind);
+
 /** Scales of 256 colours, [r, g, b, r, ...], by name. */
 Sepi.scales = () => {
   Sepi.knownScales ??= Object.fromEntries(
@@ -19,12 +22,11 @@ Sepi.Panels = class {
     this.list = scene.panels;
     this.arrays = new Sepi.Arrays(scene);
     this.drawn = new Map();
-    this.byKey = new Map(this.list.map((panel) => [panel.key, panel]));
-    this.groundTruth = this.byKey.get("ground_truth");
+    this.groundTruth = this.get("ground_truth");
   }
 
   get(key) {
-    return this.byKey.get(key);
+    return this.list.find((panel) => panel.key === key);
   }
 
   /** Colour scale of a panel, and the values at its ends. */
@@ -37,18 +39,13 @@ Sepi.Panels = class {
 
   /** Numbers that a panel shows, as an array over the pixels; null for pictures and masks. */
   async values(panel) {
-    if (["picture", "mask", "outline"].includes(panel.kind)) return null;
+    if (Sepi.overView(panel)) return null;
     const map = await this.arrays.get(panel.map);
     if (panel.minus === undefined) return map;
     const other = await this.arrays.get(panel.minus);
     if (panel.kind !== "change") return map.map((value, i) => value - other[i]);
     const groundTruth = await this.arrays.get(panel.ground_truth);
     return map.map((value, i) => Math.abs(value - groundTruth[i]) - Math.abs(other[i] - groundTruth[i]));
-  }
-
-  /** Decimals to print a panel's numbers with. */
-  decimals(panel) {
-    return this.arrays.decimals(panel.map);
   }
 
   /** The panel as a canvas of the maps' size. */
@@ -61,7 +58,7 @@ Sepi.Panels = class {
     const { width, height } = this.scene;
     const canvas = Sepi.canvas(width, height);
     const context = canvas.getContext("2d", { willReadFrequently: true });
-    const overView = ["picture", "mask", "outline"].includes(panel.kind);
+    const overView = Sepi.overView(panel);
     if (overView && this.scene.picture) context.drawImage(await this.view(), 0, 0);
     if (panel.kind === "picture") return canvas;
     const image = context.getImageData(0, 0, width, height);
@@ -72,14 +69,10 @@ Sepi.Panels = class {
   }
 
   /** The reference view as a decoded image. */
-  view() {
-    this.decoded ??= (async () => {
-      const image = new Image();
-      image.src = this.scene.picture;
-      await image.decode();
-      return image;
-    })();
-    return this.decoded;
+  async view() {
+    this.image ??= Sepi.element("img", { src: this.scene.picture });
+    await this.image.decode();
+    return this.image;
   }
 
   colour(data, values, name, low, high) {
@@ -107,7 +100,7 @@ Sepi.Panels = class {
 
 /** A legend of a panel's colours, with the values at its ends. */
 Sepi.legend = (panels, panel) => {
-  if (["picture", "mask", "outline"].includes(panel.kind)) return Sepi.element("span", { className: "legend" });
+  if (Sepi.overView(panel)) return Sepi.element("span", { className: "legend" });
   const [name, low, high] = panels.scale(panel);
   const scale = Sepi.scales()[name];
   const stops = Array.from({ length: 17 }, (_, i) => {
@@ -119,7 +112,7 @@ Sepi.legend = (panels, panel) => {
   const words = panel.ends ?? {
     disparity: ["far", "near"],
     error: ["too far", "too near"],
-    change: ["harmed", "mended"],
+    change: ["degraded", "improved"],
     confidence: ["low", "high"],
     grey: ["low", "high"],
   }[panel.kind];

@@ -38,17 +38,14 @@ Sepi.Pixels = class {
     if (!this.probes.length) return;
     const { stride } = this.scene;
     const distance = (probe) => Math.hypot(probe.x - stride * x, probe.y - stride * y);
-    const number = this.probes.reduce(
-      (best, probe, i) => (distance(probe) < distance(this.probes[best]) ? i : best),
-      0,
-    );
+    const distances = this.probes.map(distance);
+    const number = distances.indexOf(Math.min(...distances));
     this.select(number);
+    if (distances[number] < stride) return;
     const asked = `${this.scene.dataset}/${this.scene.scene}: [[${stride * y}, ${stride * x}]]`;
     this.part("asked").textContent =
-      distance(this.probes[number]) < stride
-        ? ""
-        : `You clicked x ${stride * x}, y ${stride * y}; the nearest prepared pixel is shown. ` +
-          `To have that one: config.yaml, report, pixels: {${asked}}`;
+      `You clicked x ${stride * x}, y ${stride * y}; the nearest prepared pixel is shown. ` +
+      `To have that one: config.yaml, report, pixels: {${asked}}`;
   }
 
   select(number) {
@@ -56,13 +53,13 @@ Sepi.Pixels = class {
     this.part("asked").textContent = "";
     [...this.part("pixels").children].forEach((button, i) => button.setAttribute("aria-pressed", i === number));
     const value = (d) => (d === null || d === undefined ? "unknown" : d.toFixed(3));
-    const occlusion = `${probe.occluded ? "occluded" : "not occluded"}; kept: ${Sepi.subset(probe.side)}`;
+    const occlusion = `${probe.occluded ? "occluded" : "not occluded"}; kept: ${Sepi.subset(probe.kept_subset)}`;
     const facts = {
       pixel: `x ${probe.x}, y ${probe.y} ([${probe.y}, ${probe.x}] in the configuration)`,
       "chosen by paper": value(probe.chosen),
       "chosen by best": value(probe.best),
-      "least cost": `${value(probe.minimum)} (all views); lowest of all with: ${Sepi.subset(probe.best_subset)}`,
-      ground_truth: value(probe.ground_truth),
+      "lowest cost": `${value(probe.minimum)} (all views); lowest of all subsets: ${Sepi.subset(probe.best_subset)}`,
+      "ground truth": value(probe.ground_truth),
       confidence: value(probe.confidence),
       occlusion: `${occlusion}${probe.textureless ? "; textureless" : ""}`,
     };
@@ -84,7 +81,7 @@ Sepi.Pixels = class {
     // known before they are decoded, so that nothing below jumps
     const size = { width: Sepi.SEPI_WIDTH, height: rows * columns };
     const names = {
-      minimum: "SEPI at the least cost",
+      minimum: "SEPI at the lowest cost",
       chosen: "SEPI at the chosen candidate",
       ground_truth: "SEPI at the ground truth",
       wrong: "SEPI at the worst candidate",
@@ -93,20 +90,12 @@ Sepi.Pixels = class {
     const figures = shown.map((name) => {
       const { disparity, src } = probe.sepi[name];
       const title = `${names[name]}: ${disparity.toFixed(3)}`;
-      return Sepi.element(
-        "figure",
-        {},
-        Sepi.element("div", { className: "sepi" }, Sepi.element("img", { src, alt: title, ...size })),
-        Sepi.element("figcaption", {}, title),
-      );
+      const picture = Sepi.element("img", { src, alt: title, ...size });
+      return Sepi.figure(Sepi.element("div", { className: "sepi" }, picture), title);
     });
-    const patch = Sepi.element(
-      "figure",
-      {},
-      Sepi.element("img", { src: probe.patch, alt: "the pixel in every view at the chosen candidate", className: "patch" }),
-      Sepi.element("figcaption", {}, "the pixel in every view"),
-    );
-    return [...figures, patch, this.keptViews(probe)];
+    const alt = "the pixel in every view at the chosen candidate";
+    const patch = Sepi.element("img", { src: probe.patch, alt, className: "patch" });
+    return [...figures, Sepi.figure(patch, "the pixel in every view"), this.keptViews(probe)];
   }
 
   /** The view grid, with the views that the half-SEPI keeps. */
@@ -121,10 +110,9 @@ Sepi.Pixels = class {
         class: probe.kept[i] === "1" ? "kept" : "left-out",
       }),
     );
-    const svg = Sepi.shape("svg", { viewBox: `0 0 ${columns} ${rows}`, class: "views", role: "img" }, ...cells);
-    const words = `views kept: ${Sepi.subset(probe.side)}`;
-    svg.setAttribute("aria-label", words);
-    return Sepi.element("figure", {}, svg, Sepi.element("figcaption", {}, words));
+    const words = `views kept: ${Sepi.subset(probe.kept_subset)}`;
+    const box = { viewBox: `0 0 ${columns} ${rows}`, class: "views", role: "img", "aria-label": words };
+    return Sepi.figure(Sepi.shape("svg", box, ...cells), words);
   }
 };
 
@@ -203,7 +191,7 @@ Sepi.chartMarks = (probe, across, up, top, base) => {
     .filter(([, d]) => d !== null && d !== undefined)
     .flatMap(([name, d], i) => [
       Sepi.shape("path", { d: `M${across(d)},${top}V${base}`, class: `mark ${name}` }),
-      Sepi.shape("text", { x: across(d) + 3, y: top - 14 + 11 * i, class: `mark ${name}` }, name),
+      Sepi.shape("text", { x: across(d) + 3, y: top - 14 + 11 * i, class: `mark ${name}` }, name.replace("_", " ")),
     ]);
 };
 

@@ -21,7 +21,7 @@ Sepi.Viewer = class {
     this.watcher = new IntersectionObserver((entries) => this.seen(entries), { rootMargin: "200px" });
     this.slider.addEventListener("input", () => this.drawWipe());
     for (const side of ["a", "b"]) this.part(side).addEventListener("change", () => this.select());
-    this.part("swap").addEventListener("click", () => this.swap());
+    this.part("swap").addEventListener("click", () => this.choose({ a: this.key("b"), b: this.key("a") }));
     this.part("close-ups").addEventListener("change", () => this.drawGrid());
     this.follow(this.wipe, true);
     addEventListener("resize", () => this.drawGrid());
@@ -72,30 +72,17 @@ Sepi.Viewer = class {
     for (const side of ["a", "b"]) {
       const before = this.part(side).value;
       this.part(side).replaceChildren(...Sepi.options(list));
-      this.part(side).value = this.panels.get(before) ? before : this.first(side);
+      this.part(side).value = this.panels.get(before) ? before : this.scene.first[side];
     }
-  }
-
-  /** What is shown before anything is chosen: the reference view beside the first final map. */
-  first(side) {
-    const named = this.scene.first?.[side];
-    return named && this.panels.get(named) ? named : this.panels.list[side === "a" ? 0 : this.panels.list.length > 1 ? 1 : 0].key;
   }
 
   key(side) {
     return this.part(side).value;
   }
 
-  async swap() {
-    const [a, b] = [this.key("a"), this.key("b")];
-    this.part("a").value = b;
-    this.part("b").value = a;
-    await this.select();
-  }
-
-  async choose(side, key) {
-    this.part(side).value = key;
-    await this.select();
+  choose(keys) {
+    for (const [side, key] of Object.entries(keys)) this.part(side).value = key;
+    return this.select();
   }
 
   async select() {
@@ -217,15 +204,15 @@ Sepi.Viewer = class {
       if (i < 0 || !values) return "–";
       return Number.isNaN(values[i]) ? "unknown" : values[i].toFixed(decimals);
     };
-    const groundTruth = this.panels.groundTruth;
-    set("ground_truth", number(this.groundTruth, groundTruth ? this.panels.decimals(groundTruth) : 0));
+    const { groundTruth, arrays } = this.panels;
+    set("ground_truth", number(this.groundTruth, groundTruth ? arrays.decimals(groundTruth.map) : 0));
     for (const side of ["a", "b"]) {
       const { panel, values, confidence } = this.shown[side];
-      const decimals = values ? this.panels.decimals(panel) : 0;
+      const decimals = values ? arrays.decimals(panel.map) : 0;
       set(`value-${side}`, number(values, decimals));
       const compares = panel.kind === "disparity" && this.groundTruth && panel !== groundTruth;
       set(`error-${side}`, compares ? number(this.errors(side), decimals) : "–");
-      set(`confidence-${side}`, confidence ? number(confidence, this.panels.arrays.decimals(panel.confidence)) : "–");
+      set(`confidence-${side}`, confidence ? number(confidence, arrays.decimals(panel.confidence)) : "–");
     }
     if (!this.cursor) return set("pixel", "move over a map");
     const [x, y] = this.cursor.map((place) => place * this.scene.stride);
@@ -273,26 +260,15 @@ Sepi.Viewer = class {
     this.watcher.disconnect();
     this.visible.clear();
     this.tiles = new Map();
-    const groups = new Map();
+    const tiles = (panels) => Sepi.element("div", { className: "tiles" }, ...panels.map((panel) => this.tile(panel)));
     const changes = Sepi.byId("changes");
-    changes?.replaceChildren(Sepi.element("div", { className: "tiles" }));
-    for (const panel of this.panels.list) {
-      const tile = this.tile(panel);
-      if (changes && panel.kind === "change") changes.firstChild.append(tile);
-      else if (groups.has(panel.group)) groups.get(panel.group).push(tile);
-      else groups.set(panel.group, [tile]);
-    }
+    const elsewhere = changes ? this.panels.list.filter(({ kind }) => kind === "change") : [];
+    changes?.replaceChildren(tiles(elsewhere));
+    const groups = Sepi.grouped(this.panels.list.filter((panel) => !elsewhere.includes(panel)));
     const problems = Object.entries(this.scene.problems ?? {}).map(([method, why]) => `${method}: ${why}`);
     this.part("grid").replaceChildren(
-      ...[...groups].map(([title, tiles]) =>
-        Sepi.element(
-          "section",
-          {},
-          Sepi.element("h4", {}, title),
-          Sepi.element("div", { className: "tiles" }, ...tiles),
-        ),
-      ),
-      Sepi.element("p", { className: "soft" }, problems.length ? `Not imported: ${problems.join("; ")}.` : ""),
+      ...groups.map(([title, panels]) => Sepi.element("section", {}, Sepi.element("h4", {}, title), tiles(panels))),
+      Sepi.element("p", { className: "soft" }, problems.length ? `Not available: ${problems.join("; ")}.` : ""),
     );
   }
 
@@ -304,17 +280,15 @@ Sepi.Viewer = class {
     const buttons = ["a", "b"].map((side) => {
       const button = Sepi.element("button", { type: "button", title: `show as ${side.toUpperCase()}` }, side.toUpperCase());
       button.setAttribute("aria-label", `show ${panel.title} as ${side.toUpperCase()}`);
-      button.addEventListener("click", () => this.choose(side, panel.key));
+      button.addEventListener("click", () => this.choose({ [side]: panel.key }));
       return button;
     });
-    const caption = Sepi.element(
-      "figcaption",
-      {},
+    const figure = Sepi.figure(
+      canvas,
       Sepi.element("span", { className: "pair" }, ...buttons),
       ...Sepi.breakable(panel.title),
       Sepi.element("small", {}, panel.note ?? ""),
     );
-    const figure = Sepi.element("figure", {}, canvas, caption);
     figure.dataset.key = panel.key;
     this.follow(canvas);
     this.tiles.set(canvas, panel.key);
@@ -350,7 +324,7 @@ Sepi.Viewer = class {
     this.drawCursor(context, width, height, picture);
   }
 
-  /** The cursor in a small panel, and its close-up in the corner that is farther away. */
+  /** The cursor in a small panel, and its close-up in the more distant corner. */
   drawCursor(context, width, height, picture) {
     const [x, y] = [
       ((this.cursor[0] + 0.5) * width) / this.scene.width,
@@ -374,12 +348,15 @@ Sepi.Viewer = class {
   }
 };
 
-/** Options of a select, under the headings of their groups. */
-Sepi.options = (list) => {
-  const groups = new Map();
-  for (const { group, key, title } of list) {
-    if (!groups.has(group)) groups.set(group, Sepi.element("optgroup", { label: group }));
-    groups.get(group).append(Sepi.element("option", { value: key }, title));
-  }
-  return [...groups.values()];
+/** Panels under the headings of their groups, in order. */
+Sepi.grouped = (list) => {
+  const groups = new Map(list.map(({ group }) => [group, []]));
+  for (const panel of list) groups.get(panel.group).push(panel);
+  return [...groups];
 };
+
+/** Options of a select, under the headings of their groups. */
+Sepi.options = (list) =>
+  Sepi.grouped(list).map(([label, panels]) =>
+    Sepi.element("optgroup", { label }, ...panels.map(({ key, title }) => Sepi.element("option", { value: key }, title))),
+  );
