@@ -111,7 +111,7 @@ def command(
     probes = scene_probes(found, plan.stage_file(dataset, scene, MAIN_VARIANT, plan.stages[-1]), asked)
     write_scene(found, panels, f"{dataset}/{scene}", output)
     if probes:
-        write_probes(output / "pixels", probes)
+        write_probes(output / "pixels", probes, reference_picture(found.light_field))
     if page is not None:
         with atomic_path(page) as temporary:
             text = json.dumps(page_json(found, panels, dataset, scene, probes), separators=(",", ":"))

@@ -722,7 +722,7 @@ def test_pictures_of_a_scene(plan: Plan, tmp_path: Path) -> None:
     written = {str(path.relative_to(tmp_path)) for path in tmp_path.rglob("*.png")}
     common = {
         "overview.png",
-        "centre.png",
+        "reference_view.png",
         "ground_truth.png",
         "occluded_ground_truth.png",
         "textureless_ground_truth.png",
@@ -732,15 +732,15 @@ def test_pictures_of_a_scene(plan: Plan, tmp_path: Path) -> None:
     common |= {"paper/sparsification.png", "pixels.png"}
     common |= {f"{variant}/change.png" for variant in VARIANTS if variant != "paper"}
     assert written == common | {f"{variant}/{name}.png" for variant in VARIANTS for name in each}
-    centre = cv2.imread(str(tmp_path / "centre.png"))[:, :, ::-1]
-    np.testing.assert_array_equal(centre, light_field("cotton").views[1, 1])
+    view = cv2.imread(str(tmp_path / "reference_view.png"))[:, :, ::-1]
+    np.testing.assert_array_equal(view, light_field("cotton").views[1, 1])
 
 
 def test_pictures_without_ground_truth(plan: Plan, tmp_path: Path) -> None:
     """A real picture: maps, but neither truth nor errors."""
     run(figures.command, plan, tmp_path, "--dataset", "hci", "--scene", "picture")
     written = {path.stem for path in tmp_path.rglob("*.png")}
-    assert {"overview", "centre", "4_optimize"} <= written
+    assert {"overview", "reference_view", "4_optimize"} <= written
     assert not written & {"ground_truth", "error", "occluded_truth", "textureless_truth"}
 
 

@@ -15,7 +15,6 @@ from typing import Any
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
 from sepi.errors import SepiError
 from sepi.lightfield import BoolMap, LightField

@@ -34,22 +34,20 @@ def scene_probes(results: SceneResults, final_file: Path, asked: Sequence[Intere
     """
     maps = results.final(MAIN_VARIANT)
     light_field = results.light_field
-    places = [*asked, *interesting_pixels(light_field, maps, light_field.ground_truth)]
+    pixels = [*asked, *interesting_pixels(light_field, maps, light_field.ground_truth)]
     noise = residual_variance(light_field.reference_view)
     parameters = sweep_parameters(final_file)
     return [
         probe(
             light_field,
-            place.y,
-            place.x,
+            pixel,
             maps=maps,
             parameters=parameters,
             best=results.final(BEST_VARIANT) if BEST_VARIANT in results.maps else None,
-            label=place.label,
             noise=noise,
         )
-        for place in places
-        if np.isfinite(maps.disparity[place.y, place.x])
+        for pixel in pixels
+        if np.isfinite(maps.disparity[pixel.y, pixel.x])
     ]
 
 
