@@ -322,8 +322,8 @@ def test_what_an_earlier_scene_began_is_not_shown(page: Any) -> None:
     """A slow scene, left before it is there, must not appear over the one that was chosen after it."""
     page.evaluate(
         """() => {
-          const quick = Sepi.unpackMap;
-          Sepi.unpackMap = async (...given) => {
+          const quick = Sepi.unpack;
+          Sepi.unpack = async (...given) => {
             const late = window.slow;
             if (late) await new Promise((done) => setTimeout(done, 400));
             const found = await quick(...given);
