@@ -19,14 +19,22 @@ from sepi.report.panels import Panel
 from sepi.report.plots.pictures import ERROR_LIMIT, Picture, outlines, picture_uri, reference_picture
 from sepi.report.web.packing import packed
 
-STEPS = ((0.001, 0.01, 0.002), (0.001, 0.02, 0.01), (0.001, 0.05, 0.05), (0.01, 0.2, 0.2))
+STEPS = (
+    (0.001, 0.01, 0.002),
+    (0.001, 0.02, 0.01),
+    (0.001, 0.05, 0.01),
+    (0.001, 0.05, 0.02),
+    (0.001, 0.05, 0.05),
+    (0.01, 0.2, 0.2),
+)
 """Steps of precise maps, of confidences and of other maps, from the finest; a page has the first of them that
 keep a scene within its share."""
 
 PRECISE, CONFIDENCE, OTHER, MASK = range(4)
 """What an array is held for: its place in a row of :data:`STEPS`. A mask has steps of 1."""
 
-# characters for each pixel of an array, on average; a small scene may take as much as one of 512x512
+# characters for each pixel of an array, on average: ten scenes of 512x512 and the page round them stay below 20 MB; a
+# small scene may take as much as one of 512x512
 _SHARE = 0.275
 _LEAST_PIXELS = 2**18
 
