@@ -155,7 +155,6 @@ def probe(
     maps: StageMaps,
     parameters: SweepParameters,
     best: StageMaps | None = None,
-    noise: float | None = None,
 ) -> Probe:
     """Everything there is to show of one pixel.
 
@@ -171,8 +170,6 @@ def probe(
         Of its initial or occlusion stage.
     best : StageMaps, optional
         Final maps of the most accurate variant.
-    noise : float, optional
-        ``residual_variance(light_field.reference_view)``; computed unless given.
 
     Returns
     -------
@@ -185,7 +182,7 @@ def probe(
         finite there, or the subsets of the views are not those of the half-SEPI.
     """
     y, x, _ = pixel
-    curves = cost_curves(light_field, y, x, parameters, noise=noise)
+    curves = cost_curves(light_field, y, x, parameters)
     views = halves_and_quarters(light_field.grid, light_field.reference_position)
     number = int(kept_subsets(maps)[y, x])
     if maps.subset_names and maps.subset_names != views.names:

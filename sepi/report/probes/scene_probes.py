@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 
-from sepi.image.noise import residual_variance
 from sepi.io.provenance import history_of
 from sepi.matching.plane_sweep import SweepParameters
 from sepi.report.panels import SceneResults
@@ -35,7 +34,6 @@ def scene_probes(results: SceneResults, final_file: Path, asked: Sequence[Intere
     maps = results.final(MAIN_VARIANT)
     light_field = results.light_field
     pixels = [*asked, *interesting_pixels(light_field, maps, light_field.ground_truth)]
-    noise = residual_variance(light_field.reference_view)
     parameters = sweep_parameters(final_file)
     return [
         probe(
@@ -44,7 +42,6 @@ def scene_probes(results: SceneResults, final_file: Path, asked: Sequence[Intere
             maps=maps,
             parameters=parameters,
             best=results.final(BEST_VARIANT) if BEST_VARIANT in results.maps else None,
-            noise=noise,
         )
         for pixel in pixels
         if np.isfinite(maps.disparity[pixel.y, pixel.x])

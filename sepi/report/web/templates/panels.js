@@ -20,13 +20,24 @@ Sepi.Panels = class {
   constructor(scene) {
     this.scene = scene;
     this.list = scene.panels;
-    this.arrays = new Sepi.Arrays(scene);
-    this.drawn = new Map();
+    this.arrays = [];
+    this.drawn = {};
     this.groundTruth = this.get("ground_truth");
   }
 
   get(key) {
     return this.list.find((panel) => panel.key === key);
+  }
+
+  /** An array of the scene, unpacked once, when it is first asked for. */
+  array(number) {
+    this.arrays[number] ??= Sepi.unpack(this.scene.arrays[number], this.scene.width);
+    return this.arrays[number];
+  }
+
+  /** Decimals that tell the steps of an array apart. */
+  decimals(number) {
+    return this.scene.arrays[number].step < 0.01 ? 3 : 2;
   }
 
   /** Colour scale of a panel, and the values at its ends. */
@@ -40,18 +51,18 @@ Sepi.Panels = class {
   /** Numbers that a panel shows, as an array over the pixels; null for pictures and masks. */
   async values(panel) {
     if (Sepi.overView(panel)) return null;
-    const map = await this.arrays.get(panel.map);
+    const map = await this.array(panel.map);
     if (panel.minus === undefined) return map;
-    const other = await this.arrays.get(panel.minus);
+    const other = await this.array(panel.minus);
     if (panel.kind !== "change") return map.map((value, i) => value - other[i]);
-    const groundTruth = await this.arrays.get(panel.ground_truth);
+    const groundTruth = await this.array(panel.ground_truth);
     return map.map((value, i) => Math.abs(value - groundTruth[i]) - Math.abs(other[i] - groundTruth[i]));
   }
 
   /** The panel as a canvas of the maps' size. */
   picture(key) {
-    if (!this.drawn.has(key)) this.drawn.set(key, this.draw(this.get(key)));
-    return this.drawn.get(key);
+    this.drawn[key] ??= this.draw(this.get(key));
+    return this.drawn[key];
   }
 
   async draw(panel) {
@@ -62,7 +73,7 @@ Sepi.Panels = class {
     if (overView && this.scene.picture) context.drawImage(await this.view(), 0, 0);
     if (panel.kind === "picture") return canvas;
     const image = context.getImageData(0, 0, width, height);
-    if (overView) this.overlay(image.data, await this.arrays.get(panel.map), panel.kind);
+    if (overView) this.overlay(image.data, await this.array(panel.map), panel.kind);
     else this.colour(image.data, await this.values(panel), ...this.scale(panel));
     context.putImageData(image, 0, 0);
     return canvas;

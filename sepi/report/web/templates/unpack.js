@@ -46,22 +46,3 @@ Sepi.unpack = async ({ step, base, data }, width) => {
   }
   return values;
 };
-
-/** Arrays of a scene, each unpacked once, when it is first asked for. */
-Sepi.Arrays = class {
-  constructor(scene) {
-    this.scene = scene;
-    this.unpacked = new Map();
-  }
-
-  get(number) {
-    const { arrays, width } = this.scene;
-    if (!this.unpacked.has(number)) this.unpacked.set(number, Sepi.unpack(arrays[number], width));
-    return this.unpacked.get(number);
-  }
-
-  /** Decimals that tell the steps of an array apart. */
-  decimals(number) {
-    return this.scene.arrays[number].step < 0.01 ? 3 : 2;
-  }
-};

@@ -92,9 +92,9 @@ Sepi.Viewer = class {
     for (const side of ["a", "b"]) {
       const panel = this.panels.get(keys[side]);
       shown[side] = { panel, picture: await this.panels.picture(panel.key), values: await this.panels.values(panel) };
-      if (panel.confidence !== undefined) shown[side].confidence = await this.panels.arrays.get(panel.confidence);
+      if (panel.confidence !== undefined) shown[side].confidence = await this.panels.array(panel.confidence);
     }
-    const groundTruth = this.panels.groundTruth && (await this.panels.arrays.get(this.panels.groundTruth.map));
+    const groundTruth = this.panels.groundTruth && (await this.panels.array(this.panels.groundTruth.map));
     if (turn !== this.turn || keys.a !== this.key("a") || keys.b !== this.key("b")) return;
     this.shown = shown;
     this.groundTruth = groundTruth;
@@ -117,8 +117,8 @@ Sepi.Viewer = class {
 
   /** What is to be said of a panel: its scores, and how finely the page holds it. */
   small(panel) {
-    const step = this.scene.arrays[panel.map]?.step;
-    return [panel.note, step && `held in steps of ${step}`].filter(Boolean).join("; ");
+    const steps = Sepi.overView(panel) ? "" : `held in steps of ${this.scene.arrays[panel.map].step}`;
+    return [panel.note, steps].filter(Boolean).join("; ");
   }
 
   drawWipe() {
@@ -132,18 +132,23 @@ Sepi.Viewer = class {
     }
     this.part("line").style.left = `${this.slider.value / 10}%`;
     this.slider.setAttribute("aria-valuetext", `${Math.round(this.slider.value / 10)} % of A`);
-    for (const side of ["a", "b"]) this.closeUp(this.part(`close-${side}`), this.shown[side].picture);
+    this.drawCloseUps();
+  }
+
+  /** The pixel of the maps that is nearest to a position. */
+  inside(x, y) {
+    const { width, height } = this.scene;
+    return [Math.max(0, Math.min(width - 1, x)), Math.max(0, Math.min(height - 1, y))];
   }
 
   /** Pixels of the maps under a pointer over an element that shows all of them. */
   pixel(element, event) {
     const box = element.getBoundingClientRect();
-    const place = (at, start, length, count) =>
-      Math.max(0, Math.min(count - 1, Math.floor(((at - start) / length) * count)));
-    return [
-      place(event.clientX, box.left, box.width, this.scene.width),
-      place(event.clientY, box.top, box.height, this.scene.height),
-    ];
+    const { width, height } = this.scene;
+    return this.inside(
+      Math.floor(((event.clientX - box.left) / box.width) * width),
+      Math.floor(((event.clientY - box.top) / box.height) * height),
+    );
   }
 
   /** Let the cursor follow the pointer over an element; a drag over the large picture moves the slider. */
@@ -168,14 +173,11 @@ Sepi.Viewer = class {
     });
     if (!wipes) return;
     element.addEventListener("keydown", (event) => {
-      const step = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }[event.key];
+      const move = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }[event.key];
       const [x, y] = this.cursor ?? [this.scene.width >> 1, this.scene.height >> 1];
-      if (step) {
+      if (move) {
         const far = event.shiftKey ? 10 : 1;
-        this.moveTo(
-          Math.max(0, Math.min(this.scene.width - 1, x + far * step[0])),
-          Math.max(0, Math.min(this.scene.height - 1, y + far * step[1])),
-        );
+        this.moveTo(...this.inside(x + far * move[0], y + far * move[1]));
       } else if (event.key === "Enter") this.chosen(x, y);
       else return;
       event.preventDefault();
@@ -188,7 +190,7 @@ Sepi.Viewer = class {
       this.pending = undefined;
       if (!this.shown) return;
       this.readOut();
-      for (const side of ["a", "b"]) this.closeUp(this.part(`close-${side}`), this.shown[side].picture);
+      this.drawCloseUps();
       this.drawGrid();
     });
   }
@@ -204,15 +206,15 @@ Sepi.Viewer = class {
       if (i < 0 || !values) return "–";
       return Number.isNaN(values[i]) ? "unknown" : values[i].toFixed(decimals);
     };
-    const { groundTruth, arrays } = this.panels;
-    set("ground_truth", number(this.groundTruth, groundTruth ? arrays.decimals(groundTruth.map) : 0));
+    const { panels } = this;
+    set("ground_truth", number(this.groundTruth, panels.groundTruth ? panels.decimals(panels.groundTruth.map) : 0));
     for (const side of ["a", "b"]) {
       const { panel, values, confidence } = this.shown[side];
-      const decimals = values ? arrays.decimals(panel.map) : 0;
+      const decimals = values ? panels.decimals(panel.map) : 0;
       set(`value-${side}`, number(values, decimals));
-      const compares = panel.kind === "disparity" && this.groundTruth && panel !== groundTruth;
+      const compares = panel.kind === "disparity" && this.groundTruth && panel !== panels.groundTruth;
       set(`error-${side}`, compares ? number(this.errors(side), decimals) : "–");
-      set(`confidence-${side}`, confidence ? number(confidence, arrays.decimals(panel.confidence)) : "–");
+      set(`confidence-${side}`, confidence ? number(confidence, panels.decimals(panel.confidence)) : "–");
     }
     if (!this.cursor) return set("pixel", "move over a map");
     const [x, y] = this.cursor.map((place) => place * this.scene.stride);
@@ -228,12 +230,14 @@ Sepi.Viewer = class {
     return shown.errors;
   }
 
-  /** The surroundings of the cursor, magnified. */
-  closeUp(canvas, picture) {
-    const context = canvas.getContext("2d");
-    context.imageSmoothingEnabled = false;
-    context.clearRect(0, 0, canvas.width, canvas.height);
-    this.magnify(context, picture, 0, 0, canvas.width);
+  /** The surroundings of the cursor in A and B, magnified. */
+  drawCloseUps() {
+    for (const side of ["a", "b"]) {
+      const canvas = this.part(`close-${side}`);
+      const context = canvas.getContext("2d");
+      context.imageSmoothingEnabled = false;
+      this.magnify(context, this.shown[side].picture, 0, 0, canvas.width);
+    }
   }
 
   magnify(context, picture, left, top, side) {
