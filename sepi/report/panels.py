@@ -193,6 +193,7 @@ def _change_panels(results: SceneResults) -> Iterator[Panel]:
                 results.final(worse).disparity,
                 minus=results.final(better).disparity,
                 ground_truth=ground_truth,
+                note="red: improved, blue: degraded",
             )
 
 

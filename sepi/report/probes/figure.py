@@ -160,13 +160,13 @@ def _draw_curves(axes: Axes, found: Probe, last: bool) -> None:
     axes.yaxis.set_major_locator(MaxNLocator(5))
     axes.tick_params(labelsize=7)
     axes.set_ylabel("mean cost", fontsize=7)
-    axes.set_title(_values(found), fontsize=7, loc="left", pad=3)
+    axes.set_title(_values(found), fontsize=6, loc="left", pad=3)
     if last:
         axes.set_xlabel("disparity / pixels per view step", fontsize=7, labelpad=1)
 
 
 def _values(found: Probe) -> str:
-    values = {"chosen": found.chosen, "best": found.best, "ground_truth": found.ground_truth}
+    values = {"chosen": found.chosen, "best": found.best, "ground truth": found.ground_truth}
     known = [f"{name} {value:+.3f}" for name, value in values.items() if value is not None]
     kept = "all views" if found.kept_subset == "full" else f"{found.kept_subset} views"
     return ", ".join([*known, f"kept: {kept}", f"confidence {found.confidence:.2f}"])

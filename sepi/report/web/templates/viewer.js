@@ -198,27 +198,25 @@ Sepi.Viewer = class {
   /** Numbers under the cursor. */
   readOut() {
     if (!this.shown) return;
-    const set = (name, text) => (this.part(name).textContent = text);
-    const marker = this.part("marker");
-    marker.hidden = this.cursor === null;
-    const i = this.cursor ? this.cursor[1] * this.scene.width + this.cursor[0] : -1;
-    const number = (values, decimals) => {
-      if (i < 0 || !values) return "–";
-      return Number.isNaN(values[i]) ? "unknown" : values[i].toFixed(decimals);
+    const { cursor, panels, scene } = this;
+    const show = (name, values, array) => {
+      const value = cursor && values ? values[cursor[1] * scene.width + cursor[0]] : undefined;
+      const known = Number.isNaN(value) ? "unknown" : value?.toFixed(panels.decimals(array));
+      this.part(name).textContent = known ?? "–";
     };
-    const { panels } = this;
-    set("ground_truth", number(this.groundTruth, panels.groundTruth ? panels.decimals(panels.groundTruth.map) : 0));
+    show("ground_truth", this.groundTruth, panels.groundTruth?.map);
     for (const side of ["a", "b"]) {
       const { panel, values, confidence } = this.shown[side];
-      const decimals = values ? panels.decimals(panel.map) : 0;
-      set(`value-${side}`, number(values, decimals));
-      const compares = panel.kind === "disparity" && this.groundTruth && panel !== panels.groundTruth;
-      set(`error-${side}`, compares ? number(this.errors(side), decimals) : "–");
-      set(`confidence-${side}`, confidence ? number(confidence, panels.decimals(panel.confidence)) : "–");
+      show(`value-${side}`, values, panel.map);
+      const compares = cursor && panel.kind === "disparity" && this.groundTruth && panel !== panels.groundTruth;
+      show(`error-${side}`, compares && this.errors(side), panel.map);
+      show(`confidence-${side}`, confidence, panel.confidence);
     }
-    if (!this.cursor) return set("pixel", "move over a map");
-    const [x, y] = this.cursor.map((place) => place * this.scene.stride);
-    set("pixel", `x ${x}, y ${y}`);
+    const marker = this.part("marker");
+    marker.hidden = !cursor;
+    const position = cursor?.map((place) => place * scene.stride);
+    this.part("pixel").textContent = position ? `x ${position[0]}, y ${position[1]}` : "move over a map";
+    if (!cursor) return;
     marker.style.left = `${(100 * (this.cursor[0] + 0.5)) / this.scene.width}%`;
     marker.style.top = `${(100 * (this.cursor[1] + 0.5)) / this.scene.height}%`;
   }
