@@ -90,9 +90,10 @@ flowchart TB
 def test_what_a_longer_way_implies_is_left_out(edges: list[tuple[str, str]], kept: list[tuple[str, str]]) -> None:
     picture = svg_of(edges)
     assert drawn_edges(picture) == set(kept)
-    title = picture.find("title")
-    assert title is not None
-    assert (title.text or "").count(" needs ") == len(kept)
+    assert picture.get("role") == "img"
+    words = picture.findtext("title") or ""
+    assert all(f"{user} needs {maker}" in words for maker, user in kept)
+    assert words.count(" needs ") == len(kept)
 
 
 @settings(max_examples=60, deadline=None)
@@ -112,13 +113,6 @@ def test_every_rule_and_every_edge_is_drawn(edges: list[tuple[str, str]]) -> Non
             assert name == other or abs(x - x2) >= w or abs(y - y2) >= h, (name, other)
     for maker, user in edges:
         assert np.subtract(boxes[user], boxes[maker])[1] > boxes[maker][3]
-
-
-def test_the_picture_says_in_words_what_it_shows() -> None:
-    title = svg_of(DIAMOND).find("title")
-    assert title is not None
-    assert "b needs a" in (title.text or "")
-    assert svg_of(DIAMOND).get("role") == "img"
 
 
 def test_names_are_no_markup() -> None:

@@ -1,7 +1,6 @@
 """The page of the report: what it holds, how large it is, and the figures beside its tables."""
 
 import base64
-import copy
 import json
 import re
 from dataclasses import replace
@@ -23,7 +22,7 @@ from sepi.lightfield import FloatMap, LightField
 from sepi.report import charts, figures, page, published
 from sepi.report.figures import page_json
 from sepi.report.graph import drawn
-from sepi.report.page import embedded, page_of, prose, read_scene
+from sepi.report.page import embedded, prose, read_scene
 from sepi.report.panels import Kind, Panel, SceneResults, note_of, panels_of
 from sepi.report.runs import Runs
 from sepi.report.web import page_data
@@ -141,6 +140,7 @@ def test_ten_noisy_scenes_stay_below_20_megabytes(noise: float, outliers: float,
 def test_panels_name_arrays_that_are_there(example: Example) -> None:
     """A dangling number would be an error when the reader chooses the panel."""
     for scene in example.scenes:
+        assert (scene["height"], scene["width"], scene["stride"]) == (SIZE, SIZE, 1)
         keys = [shown["key"] for shown in scene["panels"]]
         assert len(set(keys)) == len(keys)
         kinds = {shown["kind"] for shown in scene["panels"]}
@@ -217,11 +217,6 @@ def test_the_page_is_one_file(example: Example) -> None:
     style = text[text.index("<style>") : text.index("</style>")]
     assert "@import" not in style
     assert "url(" not in style
-
-
-def test_equal_input_gives_equal_bytes(example: Example) -> None:
-    again = page_of(copy.deepcopy(example.numbers), copy.deepcopy(example.scenes), drawn(EDGES))
-    assert again == example.page.read_text(encoding="utf-8")
 
 
 def test_the_page_says_what_it_is_about(example: Example) -> None:
@@ -404,9 +399,3 @@ def test_a_chart_without_a_scene_with_truth(example: Example, tmp_path: Path) ->
     charts.write_bars(tmp_path, "ablation", [])
     picture = cv2.imread(str(tmp_path / "ablation.png"))
     assert (picture < 128).any()
-
-
-def test_the_size_of_what_is_shown(example: Example) -> None:
-    for scene in example.scenes:
-        assert (scene["height"], scene["width"], scene["stride"]) == (SIZE, SIZE, 1)
-        assert scene["grid"] == [5, 5]

@@ -56,20 +56,6 @@ def test_the_slider_wipes_between_two_maps(page: Any) -> None:
     assert page.get_attribute('[data-part="slider"]', "aria-valuetext") == "100 % of A"
 
 
-def test_the_slider_moves_by_dragging(page: Any) -> None:
-    slider = page.locator('[data-part="slider"]')
-    slider.scroll_into_view_if_needed()
-    box = slider.bounding_box()
-    middle = box["y"] + box["height"] / 2
-    page.mouse.move(box["x"] + box["width"] / 2, middle)
-    page.mouse.down()
-    page.mouse.move(box["x"] + 0.25 * box["width"], middle, steps=5)
-    page.mouse.up()
-    value = int(slider.input_value())
-    assert 220 < value < 280
-    assert border_is(page, round(value / 1000 * SIZE))
-
-
 def test_the_picture_itself_can_be_dragged(page: Any) -> None:
     """And a drag is no click: it chooses no pixel."""
     before = page.get_attribute("#pixel", "data-pixel")
