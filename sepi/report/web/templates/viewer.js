@@ -280,8 +280,9 @@ Sepi.Viewer = class {
     canvas.setAttribute("aria-label", `${panel.title}${panel.note ? `: ${panel.note}` : ""}`);
     canvas.style.aspectRatio = `${this.scene.width} / ${this.scene.height}`;
     const buttons = ["a", "b"].map((side) => {
-      const button = Sepi.element("button", { type: "button", title: `show as ${side.toUpperCase()}` }, side.toUpperCase());
-      button.setAttribute("aria-label", `show ${panel.title} as ${side.toUpperCase()}`);
+      const name = side.toUpperCase();
+      const button = Sepi.element("button", { type: "button", title: `show as ${name}` }, name);
+      button.setAttribute("aria-label", `show ${panel.title} as ${name}`);
       button.addEventListener("click", () => this.choose({ [side]: panel.key }));
       return button;
     });
