@@ -129,7 +129,7 @@ def write_results(plan: Plan, scene: tuple[str, str]) -> None:
     for variant in plan.variants:
         run_stages(plan, scene, light_field, variant)
     write_plan_scores(plan, scene, light_field)
-    maps = external_maps(plan, light_field) if scene == COTTON else {}
+    maps = methods_maps(plan, light_field) if scene == COTTON else {}
     absent = {method: ExternalMap(f"/maps/{method}/{light_field.name}.pfm", "no file") for method in plan.external}
     write_external(plan.external_file(*scene), absent | maps)
 
@@ -155,7 +155,7 @@ def write_plan_scores(plan: Plan, scene: tuple[str, str], light_field: LightFiel
     write_scores(plan.scores_file(*scene), score_maps(light_field, maps, {})[0], scene_attributes(light_field))
 
 
-def external_maps(plan: Plan, light_field: LightField) -> Mapping[str, ExternalMap]:
+def methods_maps(plan: Plan, light_field: LightField) -> Mapping[str, ExternalMap]:
     """One method's map with unknown pixels, and one of the wrong size."""
     assert light_field.ground_truth is not None
     files = {"SPO": external_map(light_field.ground_truth), "wrong_size": np.zeros((5, 7), np.float32)}
