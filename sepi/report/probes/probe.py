@@ -11,6 +11,7 @@ import base64
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import cv2
@@ -99,7 +100,7 @@ class Probe:
     textureless: bool
     pictures: Mapping[str, SepiPicture]
 
-    @property
+    @cached_property
     def stretched(self) -> dict[str, Picture]:
         """The SEPIs with more contrast, the same in all."""
         limits = contrast_of([(picture.pixels, picture.inside) for picture in self.pictures.values()])

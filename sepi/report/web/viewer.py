@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from sepi.lightfield import LightField
 from sepi.report.panels import Panel
-from sepi.report.plots.pictures import ERROR_LIMIT, Picture, outlines, picture_uri, reference_picture
+from sepi.report.plots.pictures import ERROR_LIMIT, outlines, picture_uri, reference_picture
 from sepi.report.web.packing import packed
 
 STEPS = (
@@ -41,9 +41,8 @@ _LEAST_PIXELS = 2**18
 # larger pictures are thinned out, so that a browser can hold all their maps
 _MOST_PIXELS = 2**20
 
-# of the reference view: the second where the first takes more than so many characters for each pixel
-_PICTURE_QUALITIES = (95, 80)
-_PICTURE_SHARE = 0.4
+# of the reference view
+_WEBP = [cv2.IMWRITE_WEBP_QUALITY, 90]
 
 
 class _Arrays:
@@ -93,7 +92,7 @@ def viewer_json(
     height, width = -(-full_height // stride), -(-full_width // stride)
     arrays = _Arrays(stride)
     entries = [_entry(panel, arrays) for panel in panels]
-    pixels = max(_LEAST_PIXELS, height * width)
+    picture = None if light_field is None else arrays.thinned(reference_picture(light_field))
     return {
         "height": height,
         "width": width,
@@ -101,9 +100,9 @@ def viewer_json(
         "limits": list(limits),
         "error_limit": ERROR_LIMIT,
         "camera": None if light_field is None else _camera(light_field),
-        "picture": "" if light_field is None else _webp(reference_picture(light_field)[::stride, ::stride], pixels),
+        "picture": "" if picture is None else picture_uri(picture, "webp", _WEBP),
         "panels": entries,
-        "arrays": arrays.packed(_SHARE * pixels * len(arrays.held)),
+        "arrays": arrays.packed(_SHARE * max(_LEAST_PIXELS, height * width) * len(arrays.held)),
     }
 
 
@@ -139,11 +138,3 @@ def _camera(light_field: LightField) -> dict[str, Any] | None:
         "focal": camera.focal_px,
         "from_centre": list(light_field.from_centre),
     }
-
-
-def _webp(picture: Picture, pixels: int) -> str:
-    for quality in _PICTURE_QUALITIES:
-        text = picture_uri(np.ascontiguousarray(picture), "webp", [cv2.IMWRITE_WEBP_QUALITY, quality])
-        if len(text) <= _PICTURE_SHARE * pixels:
-            break
-    return text
