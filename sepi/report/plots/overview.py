@@ -22,7 +22,7 @@ def write_overview(
     """All pictures of one size on one sheet, with their titles; equal pictures give equal bytes."""
     height, width = rows[0][0][1].shape[:2]
     size = (_PANEL - _GAP, (_PANEL - _GAP) * height / width)
-    row_height = size[1] + _TITLE
+    row_height = size[1] + _TITLE + _GAP / 2
     head = _TITLE if title else 0.0
     sheet_size = (_PANEL * max(map(len, rows)), row_height * len(rows) + head)
     figure = new_figure(*sheet_size, layout=None)
@@ -32,7 +32,7 @@ def write_overview(
     sheet.text(sheet_size[0] / 2, sheet_size[1] - 0.1, title, fontsize=12, ha="center", va="top", parse_math=False)
     dots = (round(size[0] * _DOTS), round(size[1] * _DOTS))
     for number, row in enumerate(rows):
-        bottom = sheet_size[1] - head - (number + 1) * row_height
+        bottom = sheet_size[1] - head - (number + 1) * row_height + _GAP / 2
         for column, (words, picture) in enumerate(row):
             left = column * _PANEL + _GAP / 2
             extent = (left, left + size[0], bottom, bottom + size[1])
