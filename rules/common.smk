@@ -13,7 +13,7 @@ from sepi.pipeline import HANDED_ON, STAGES, VARIANTS, choice_of
 from sepi.report.plan import Plan
 from sepi.validation import require_known
 from sepi.workflow.code_digest import ROOT, code_digest, stage_modules
-from sepi.workflow.config import GRAPH_CONFIG, load_settings
+from sepi.workflow.config import load_settings
 from sepi.workflow.result_paths import PARTS_ENDING, RESULTS, key_of, scene_files
 from sepi.workflow.run_log import show_progress
 
@@ -24,11 +24,8 @@ STARTED = time.time()
 for name, folder in {"PATH": Path(sys.executable).parent, "PYTHONPATH": ROOT}.items():
     os.environ[name] = os.pathsep.join([str(folder), *filter(None, [os.environ.get(name)])])
 
-# the rule graph is drawn of a configuration that stands for all others: sepi.report.graph
-GIVEN = json.loads(os.environ[GRAPH_CONFIG]) if GRAPH_CONFIG in os.environ else config
-
 try:
-    SETTINGS = load_settings(GIVEN)
+    SETTINGS = load_settings(config)
 except SepiError as error:
     sys.exit(f"sepi: {error}")
 except OSError as error:

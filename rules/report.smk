@@ -164,7 +164,7 @@ rule parts_chart:
         "python -m sepi.report.charts --numbers {input:q} --chart ablation_best --output reports/figures 2> {log:q}"
 
 
-# Pictures of a scene: reference view, ground truth, each stage and variant, errors, masks, other methods' maps, and all
+# Pictures of a scene: reference view, ground truth, each stage and variant, errors, masks, external methods' maps, and all
 # on a sheet (overview); single pixels that the method is shown at work on (pixels); and the scene for the page.
 rule maps:
     input:
@@ -209,13 +209,12 @@ rule graph:
         "benchmarks/graph.tsv"
     threads: 1
     params:
-        # other methods' maps add a rule
-        config=lambda wildcards: json.dumps({"external": {"other": "maps/{scene}.pfm"}} if SETTINGS.external else {}),
+        flags="--external" if SETTINGS.external else "",
         code=code_digest("sepi.report.graph"),
     message:
         "rule graph"
     shell:
-        "python -m sepi.report.graph --snakefile {input[0]:q} --config {params.config:q} --output {output:q} 2> {log:q}"
+        "python -m sepi.report.graph --snakefile {input[0]:q} {params.flags} --output {output:q} 2> {log:q}"
 
 
 # The page: all numbers, tables and scenes in one file

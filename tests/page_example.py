@@ -26,6 +26,7 @@ from sepi.report import numbers
 from sepi.report.figures import page_json, read_results
 from sepi.report.graph import drawn
 from sepi.report.page import page_of
+from sepi.report.panels import panels_of
 from sepi.report.plan import MAIN_VARIANT, Plan
 from sepi.report.probes.pixels import InterestingPixel
 from sepi.report.probes.scene_probes import scene_probes
@@ -39,7 +40,7 @@ ASKED = {COTTON: (20, 41)}
 """Pixels, row and column, that the configuration asks for."""
 
 UNKNOWN = (slice(30, 34), slice(6, 12))
-"""Rows and columns that the imported map does not know."""
+"""Rows and columns that the external map does not know."""
 
 EDGES = [("ingest", "initial"), ("initial", "numbers"), ("initial", "maps"), ("numbers", "page"), ("maps", "page")]
 # of a camera that sees the scene in front of it
@@ -76,11 +77,11 @@ class Example:
         return read_stage(self.plan.stage_file(*scene, variant, stage))
 
     @cached_property
-    def imported(self) -> FloatMap:
+    def external(self) -> FloatMap:
         """The map of the other method for the scene cotton."""
         ground_truth = self.light_field(COTTON).ground_truth
         assert ground_truth is not None
-        return imported_map(ground_truth)
+        return external_map(ground_truth)
 
 
 def small_light_field(scene: tuple[str, str]) -> LightField:
@@ -95,7 +96,7 @@ def small_light_field(scene: tuple[str, str]) -> LightField:
     return replace(found, ground_truth=None, masks={}) if scene == PICTURE else found
 
 
-def imported_map(ground_truth: FloatMap) -> FloatMap:
+def external_map(ground_truth: FloatMap) -> FloatMap:
     """The truth with an error, unknown in places."""
     noise = np.random.default_rng(3).normal(0, 0.05, ground_truth.shape).astype(np.float32)
     found = np.nan_to_num(ground_truth) + noise
@@ -128,7 +129,7 @@ def write_results(plan: Plan, scene: tuple[str, str]) -> None:
     for variant in plan.variants:
         run_stages(plan, scene, light_field, variant)
     write_plan_scores(plan, scene, light_field)
-    maps = imported_maps(plan, light_field) if scene == COTTON else {}
+    maps = methods_maps(plan, light_field) if scene == COTTON else {}
     absent = {method: ExternalMap(f"/maps/{method}/{light_field.name}.pfm", "no file") for method in plan.external}
     write_external(plan.external_file(*scene), absent | maps)
 
@@ -154,10 +155,10 @@ def write_plan_scores(plan: Plan, scene: tuple[str, str], light_field: LightFiel
     write_scores(plan.scores_file(*scene), score_maps(light_field, maps, {})[0], scene_attributes(light_field))
 
 
-def imported_maps(plan: Plan, light_field: LightField) -> Mapping[str, ExternalMap]:
+def methods_maps(plan: Plan, light_field: LightField) -> Mapping[str, ExternalMap]:
     """One method's map with unknown pixels, and one of the wrong size."""
     assert light_field.ground_truth is not None
-    files = {"SPO": imported_map(light_field.ground_truth), "wrong_size": np.zeros((5, 7), np.float32)}
+    files = {"SPO": external_map(light_field.ground_truth), "wrong_size": np.zeros((5, 7), np.float32)}
     for method, values in files.items():
         write_pfm(plan.results / f"{method}.pfm", values)
     with warnings.catch_warnings():
@@ -172,5 +173,5 @@ def scene_json(plan: Plan, scene: tuple[str, str]) -> dict[str, Any]:
     results = read_results(plan, *scene)
     asked = [InterestingPixel(*ASKED[scene], "asked for")] if scene in ASKED else []
     probes = scene_probes(results, plan.stage_file(*scene, MAIN_VARIANT, plan.stages[-1]), asked)
-    found: dict[str, Any] = json.loads(json.dumps(page_json(results, *scene, probes)))
+    found: dict[str, Any] = json.loads(json.dumps(page_json(results, panels_of(results), *scene, probes)))
     return found

@@ -7,52 +7,55 @@ from __future__ import annotations
 
 import html
 import json
-import os
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
 import warnings
-from collections.abc import Mapping, Sequence
-from itertools import pairwise
+from collections.abc import Iterable
 from pathlib import Path
 
 import click
+import networkx as nx
 
 from sepi.command import SepiCommand
 from sepi.errors import SepiError, SepiWarning
 from sepi.io.files import atomic_path
-from sepi.workflow.config import GRAPH_CONFIG
 
-Edges = Sequence[tuple[str, str]]
+Edges = Iterable[tuple[str, str]]
 """Pairs of rules: the one that makes something, and the one that needs it."""
 
+# of a rule's box, between boxes, and of the gap through which an edge passes a row
 _WIDTH, _HEIGHT, _ACROSS, _DOWN, _PASSING = 118, 32, 22, 30, 30
 
 
-def rule_edges(snakefile: Path, config: Mapping[str, object]) -> list[tuple[str, str]]:
-    """Edges between the rules that ``snakemake all`` runs.
+def rule_edges(snakefile: Path, external: bool = False) -> list[tuple[str, str]]:
+    """Edges between the rules that ``snakemake all`` runs, sorted.
 
     Parameters
     ----------
     snakefile : Path
-    config : mapping
-        Values of the configuration that change which rules run.
+        Its rules lie in the folder ``rules`` beside it.
+    external : bool
+        Whether maps of external methods are configured, which adds a rule.
 
     Raises
     ------
     SepiError
         If Snakemake does not say.
     """
-    small = {**config, "builtin": {"scenes": ["dots"]}}
-    # in a folder of its own: the one that is worked in is locked
+    # a copy, which is not locked by the run that asks, with a configuration of its own: the scenes and relative paths
+    # of the user's mean nothing here
     with tempfile.TemporaryDirectory() as folder:
-        words = ["--snakefile", str(snakefile.resolve()), "--rulegraph", "mermaid-js"]
+        copy = Path(folder)
+        shutil.copy(snakefile, copy / "Snakefile")
+        shutil.copytree(snakefile.parent / "rules", copy / "rules")
+        config = {"builtin": {"scenes": ["dots"]}, "external": {"other": "maps"} if external else {}}
+        (copy / "config.yaml").write_text(json.dumps(config))
         run = subprocess.run(
-            [sys.executable, "-m", "snakemake", *words, "--", "all"],
-            cwd=folder,
-            # in place of a configuration that is not known here, whose relative paths would mean nothing
-            env=os.environ | {GRAPH_CONFIG: json.dumps(small)},
+            [sys.executable, "-m", "snakemake", "--rulegraph", "mermaid-js", "--", "all"],
+            cwd=copy,
             capture_output=True,
             text=True,
             check=False,
@@ -70,128 +73,85 @@ def parsed(text: str) -> list[tuple[str, str]]:
     return sorted((names[maker], names[user]) for maker, user in pairs)
 
 
-def reduced(edges: Edges) -> list[tuple[str, str]]:
-    """The edges without those that a longer way implies."""
-    users: dict[str, set[str]] = {}
-    for maker, user in edges:
-        users.setdefault(maker, set()).add(user)
-
-    def reached(start: str) -> set[str]:
-        found: set[str] = set()
-        waiting = [start]
-        while waiting:
-            for user in users.get(waiting.pop(), ()):
-                if user not in found:
-                    found.add(user)
-                    waiting.append(user)
-        return found
-
-    return [
-        (maker, user)
-        for maker, user in edges
-        if not any(user in reached(other) for other in users[maker] if other != user)
-    ]
-
-
-def layers(edges: Edges) -> tuple[list[list[str]], list[list[str]]]:
-    """Places for the rules: each below all that it needs, near them.
-
-    Returns
-    -------
-    rows : list of list of str
-        Rules by the length of the longest way that leads to them. An edge that passes a row has a place in it, too,
-        named ``MAKER>USER>ROW``.
-    ways : list of list of str
-        For each edge the places that it goes through.
-    """
-    makers: dict[str, list[str]] = {name: [] for pair in edges for name in pair}
-    for maker, user in edges:
-        makers[user].append(maker)
-    level: dict[str, int] = {}
-
-    def level_of(name: str) -> int:
-        if name not in level:
-            level[name] = 1 + max((level_of(maker) for maker in makers[name]), default=-1)
-        return level[name]
-
-    rows: list[list[str]] = [[] for _ in range(max(map(level_of, makers)) + 1)]
-    for name in sorted(makers):
-        rows[level[name]].append(name)
-    above: dict[str, list[str]] = {name: [] for name in makers}
-    ways = []
-    for maker, user in edges:
-        between = range(level[maker] + 1, level[user])
-        passed = [f"{maker}>{user}>{number}" for number in between]
-        for name, number in zip(passed, between, strict=True):
-            rows[number].append(name)
-        way = [maker, *passed, user]
-        for upper, lower in pairwise(way):
-            above.setdefault(lower, []).append(upper)
-        ways.append(way)
-    place: dict[str, float] = {}
-    for row in rows:
-        known = {name: [place[upper] for upper in above[name]] for name in row}
-        row.sort(key=lambda name: (sum(known[name]) / len(known[name]) if known[name] else 0.0, name))
-        place |= {name: (number + 0.5) / len(row) for number, name in enumerate(row)}
-    return rows, ways
-
-
-def _placed(rows: list[list[str]]) -> tuple[dict[str, tuple[float, float]], float]:
-    """Middle of every place, and the width of them all; an edge that passes takes less room than a rule."""
-    room = {name: _PASSING if ">" in name else _WIDTH + _ACROSS for row in rows for name in row}
-    width = max(sum(room[name] for name in row) for row in rows)
-    middle = {}
-    for level, row in enumerate(rows):
-        x = (width - sum(room[name] for name in row)) / 2
-        for name in row:
-            middle[name] = (x + room[name] / 2, _DOWN + level * (_HEIGHT + _DOWN) + _HEIGHT / 2)
-            x += room[name]
-    return middle, width
-
-
-def _curve(way: list[str], middle: dict[str, tuple[float, float]]) -> str:
-    """Path of an edge from below its first place to above its last, straight down past the rows between."""
-    x, y = middle[way[0]]
-    path = f"M{x:.1f},{y + _HEIGHT / 2:.1f}"
-    y += _HEIGHT / 2
-    for name in way[1:]:
-        to_x, to_y = middle[name]
-        half = (y + to_y - _HEIGHT / 2) / 2
-        path += f" C{x:.1f},{half:.1f} {to_x:.1f},{half:.1f} {to_x:.1f},{to_y - _HEIGHT / 2:.1f}"
-        if name != way[-1]:
-            path += f" V{to_y + _HEIGHT / 2:.1f}"
-        x, y = to_x, to_y + _HEIGHT / 2
-    return f'<path d="{path}"/>'
-
-
 def drawn(edges: Edges) -> str:
-    """SVG of a rule graph, top to bottom, in the colours of the page."""
-    edges = reduced(edges)
-    rows, ways = layers(edges)
-    middle, width = _placed(rows)
+    """SVG of a rule graph, in the colours of the page: each rule below all that it needs.
+
+    Edges that a longer way implies are left out.
+    """
+    graph = nx.transitive_reduction(nx.DiGraph(edges))
+    words = "; ".join(f"{user} needs {maker}" for maker, user in sorted(graph.edges))
+    rows = _rows(graph)
+    middle = _middles(graph, rows)
+    width = max(sum(map(_room, row)) for row in rows)
     height = len(rows) * (_HEIGHT + _DOWN) + _DOWN
-    lines = [_curve(way, middle) for way in ways]
+    lines = [_line(middle[upper], middle[lower], isinstance(lower, tuple)) for upper, lower in graph.edges]
     boxes = [
         f'<g><rect x="{x - _WIDTH / 2:.1f}" y="{y - _HEIGHT / 2:.1f}" width="{_WIDTH}" height="{_HEIGHT}" rx="6"/>'
         f'<text x="{x:.1f}" y="{y + 4:.1f}">{html.escape(name)}</text></g>'
         for name, (x, y) in middle.items()
-        if ">" not in name
+        if isinstance(name, str)
     ]
-    words = "; ".join(f"{user} needs {maker}" for maker, user in edges)
+    size = f'viewBox="{-width / 2:.1f} 0 {width} {height}" width="{width}" height="{height}"'
     return (
-        f'<svg class="graph" role="img" viewBox="0 0 {width} {height}" width="{width}" height="{height}">'
-        f"<title>Rules of the workflow: {html.escape(words)}</title>{''.join(lines)}{''.join(boxes)}</svg>\n"
+        f'<svg class="graph" role="img" {size}>'
+        f"<title>Rules of the workflow: {html.escape(words)}</title>{''.join(sorted(lines))}{''.join(boxes)}</svg>\n"
     )
+
+
+# a rule's name; or the place at which an edge passes a row: maker, user, number of the row
+_Place = str | tuple[str, str, int]
+
+
+def _rows(graph: nx.DiGraph) -> list[list[_Place]]:
+    """Rules by the longest way that leads to them; edges of the graph that pass rows then go through places in them."""
+    rows: list[list[_Place]] = [sorted(names) for names in nx.topological_generations(graph)]
+    row_of = {name: number for number, row in enumerate(rows) for name in row}
+    for maker, user in list(graph.edges):
+        passed = [(maker, user, number) for number in range(row_of[maker] + 1, row_of[user])]
+        if passed:
+            graph.remove_edge(maker, user)
+            nx.add_path(graph, [maker, *passed, user])
+        for place in passed:
+            rows[place[2]].append(place)
+    return rows
+
+
+def _middles(graph: nx.DiGraph, rows: list[list[_Place]]) -> dict[_Place, tuple[float, float]]:
+    """Middle of every place: near what it needs, all rows centred at 0."""
+    middle: dict[_Place, tuple[float, float]] = {}
+
+    def pull(place: _Place) -> tuple[float, str]:
+        above = [middle[upper][0] for upper in graph.predecessors(place)]
+        return sum(above) / max(1, len(above)), str(place)
+
+    for number, row in enumerate(rows):
+        x = -sum(map(_room, row)) / 2
+        for place in sorted(row, key=pull):
+            middle[place] = (x + _room(place) / 2, _DOWN + number * (_HEIGHT + _DOWN) + _HEIGHT / 2)
+            x += _room(place)
+    return middle
+
+
+def _room(place: _Place) -> int:
+    return _WIDTH + _ACROSS if isinstance(place, str) else _PASSING
+
+
+def _line(upper: tuple[float, float], lower: tuple[float, float], passes: bool) -> str:
+    """An edge from below one place to above another, or, where it passes that row, straight on to below it."""
+    (x, y), (to_x, to_y) = upper, lower
+    begin, half, end = y + _HEIGHT / 2, (y + to_y) / 2, to_y - _HEIGHT / 2
+    on = f" v{_HEIGHT:.1f}" if passes else ""
+    return f'<path d="M{x:.1f},{begin:.1f} C{x:.1f},{half:.1f} {to_x:.1f},{half:.1f} {to_x:.1f},{end:.1f}{on}"/>'
 
 
 @click.command(name="python -m sepi.report.graph", cls=SepiCommand)
 @click.option("--snakefile", type=click.Path(path_type=Path), required=True, help="The workflow.")
-@click.option("--config", default="{}", show_default=True, help="JSON: values of the configuration.")
+@click.option("--external", is_flag=True, help="Maps of external methods are configured.")
 @click.option("--output", type=click.Path(path_type=Path), required=True, help="SVG file to write.")
-def command(snakefile: Path, config: str, output: Path) -> None:
+def command(snakefile: Path, external: bool, output: Path) -> None:
     """Draw the rules that 'snakemake all' runs."""
     try:
-        picture = drawn(rule_edges(snakefile, json.loads(config)))
+        picture = drawn(rule_edges(snakefile, external))
     except SepiError as error:
         # the page is worth more than its graph
         warnings.warn(str(error), SepiWarning, stacklevel=1)

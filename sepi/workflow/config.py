@@ -26,11 +26,8 @@ from sepi.validation import require_known, validated
 from sepi.workflow.datasets import Scene, own_scene, scenes_in
 from sepi.workflow.parameters import default_values, stage_settings
 
-GRAPH_CONFIG = "SEPI_GRAPH_CONFIG"
-"""Environment variable with a configuration (JSON) in place of the workflow's own; the rule graph is asked for so."""
-
 # names of folders and panels that stand beside those of variants
-_RESERVED = ("stages", "imported", "external", "ground_truth", "centre")
+_RESERVED = ("stages", "external", "ground_truth", "reference_view")
 # a file name holds 255 bytes, and pictures of a method are folders of its name
 _LONGEST_METHOD = 80
 # the built-in scenes have 9x9 views

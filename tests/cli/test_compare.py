@@ -158,9 +158,9 @@ def test_a_scene_brings_its_view_its_truth_and_its_regions(browser: Any, tmp_pat
     assert result.exit_code == 0, result.output
     assert "occluded" in result.stdout
     with opened(browser, output) as page:
-        choose(page, a="centre", b="b/error")
+        choose(page, a="reference_view", b="b/error")
         # compressed: colours are coarser than brightness
-        off = map_pixels(page, "centre")[:, :, :3].astype(int) - light_field.views[1, 1]
+        off = map_pixels(page, "reference_view")[:, :, :3].astype(int) - light_field.views[1, 1]
         assert np.abs(off.mean(axis=2)).mean() < 5
         assert np.abs(off.mean(axis=(0, 1))).max() < 4
         point_at(page, 30, 12)

@@ -20,7 +20,7 @@ def test_pictures_of_a_scene(plan: Plan, tmp_path: Path) -> None:
     written = {str(path.relative_to(tmp_path)) for path in tmp_path.rglob("*.png")}
     common = {
         "overview.png",
-        "centre.png",
+        "reference_view.png",
         "ground_truth.png",
         "occluded_ground_truth.png",
         "textureless_ground_truth.png",
@@ -30,7 +30,7 @@ def test_pictures_of_a_scene(plan: Plan, tmp_path: Path) -> None:
     common |= {"paper/sparsification.png", "pixels.png"}
     common |= {f"{variant}/change.png" for variant in VARIANTS if variant != "paper"}
     assert written == common | {f"{variant}/{name}.png" for variant in VARIANTS for name in each}
-    centre = cv2.imread(str(tmp_path / "centre.png"))[:, :, ::-1]
+    centre = cv2.imread(str(tmp_path / "reference_view.png"))[:, :, ::-1]
     np.testing.assert_array_equal(centre, light_field("cotton").views[1, 1])
 
 
@@ -38,7 +38,7 @@ def test_pictures_without_ground_truth(plan: Plan, tmp_path: Path) -> None:
     """A real picture: maps, but neither truth nor errors."""
     draw(plan, tmp_path, "hci", "picture")
     written = {path.stem for path in tmp_path.rglob("*.png")}
-    assert {"overview", "centre", "4_optimize"} <= written
+    assert {"overview", "reference_view", "4_optimize"} <= written
     assert not written & {"ground_truth", "error", "occluded_truth", "textureless_truth"}
 
 

@@ -408,9 +408,9 @@ class TestReport:
         assert "sepi: warning: external absent: no map of builtin/dots, hci/box" in lines
         assert "| 1.00 (16 % unknown) |" in (folder / "reports/table1_mse.md").read_text()
         page = (folder / "reports/index.html").read_text()
-        assert "good (imported)" in page
-        assert '"imported/good"' in page
-        assert '"imported/small"' not in page
+        assert "good (external)" in page
+        assert '"external/good/disparity"' in page
+        assert '"external/small/disparity"' not in page
         assert compared.plan("all") == {}
 
     def test_snakemakes_own_report_works(self, finished: Workflow) -> None:

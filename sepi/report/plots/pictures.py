@@ -15,6 +15,7 @@ from matplotlib.colors import Colormap, ListedColormap
 from skimage.color import lab2rgb, rgb2lab
 
 from sepi.lightfield import BoolMap, FloatMap, LightField
+from sepi.report.panels import Panel
 
 Picture = npt.NDArray[np.uint8]
 """RGB, (H, W, 3)."""
@@ -55,11 +56,11 @@ def disparity_limits(light_field: LightField) -> tuple[float, float]:
         known = light_field.ground_truth[np.isfinite(light_field.ground_truth)]
         if known.min() < known.max():
             return float(known.min()), float(known.max())
-    require_disparity_range = light_field.require_disparity_range()
-    return require_disparity_range.minimum, require_disparity_range.maximum
+    found = light_field.require_disparity_range()
+    return found.minimum, found.maximum
 
 
-def centre_picture(light_field: LightField) -> Picture:
+def reference_picture(light_field: LightField) -> Picture:
     """The reference view."""
     return as_rgb(light_field.reference_view)
 
@@ -74,6 +75,24 @@ def picture_uri(picture: Picture, kind: str, options: Sequence[int] = ()) -> str
     """A picture as an address that holds it; ``kind`` is ``"png"`` or ``"webp"``, ``options`` are OpenCV's."""
     _, data = cv2.imencode(f".{kind}", cv2.cvtColor(picture, cv2.COLOR_RGB2BGR), list(options))
     return f"data:image/{kind};base64,{base64.b64encode(data.tobytes()).decode('ascii')}"
+
+
+def panel_picture(panel: Panel, view: Picture, limits: tuple[float, float]) -> Picture:
+    """The picture of a panel; ``limits`` are the ends of the scale of disparity, ``view`` is the reference view."""
+    values, minus, ground_truth = panel.values, panel.minus, panel.ground_truth
+    if values is None:
+        return view
+    if panel.kind == "mask":
+        return mask_picture(view, values)
+    if panel.kind == "outline":
+        return outline_picture(view, values)
+    if panel.kind in ("confidence", "grey"):
+        return map_picture(values, (0, 1), "gray")
+    if minus is None:
+        return map_picture(values, limits)
+    if ground_truth is None:
+        return error_picture(values - minus)
+    return error_picture(np.abs(values - ground_truth) - np.abs(minus - ground_truth))
 
 
 def map_picture(values: FloatMap, limits: tuple[float, float], scale: str | Colormap = "viridis") -> Picture:
@@ -91,16 +110,16 @@ def error_picture(error: FloatMap) -> Picture:
     return map_picture(error, (-ERROR_LIMIT, ERROR_LIMIT), error_scale())
 
 
-def mask_picture(centre: Picture, mask: BoolMap) -> Picture:
+def mask_picture(view: Picture, mask: BoolMap) -> Picture:
     """A mask (H, W) in orange over the darkened reference view."""
-    dark = centre.astype(np.float32) / 2
+    dark = view.astype(np.float32) / 2
     dark[mask] = (dark[mask] + _MASK) / 2 + 32
     return np.clip(dark, 0, 255).astype(np.uint8)
 
 
-def outline_picture(centre: Picture, labels: npt.NDArray[np.integer[Any]]) -> Picture:
+def outline_picture(view: Picture, labels: npt.NDArray[np.integer[Any]]) -> Picture:
     """Borders between regions of equal label (H, W) in yellow over the reference view."""
-    picture = centre.copy()
+    picture = view.copy()
     picture[outlines(labels)] = _OUTLINE
     return picture
 

@@ -61,9 +61,7 @@ class Curves:
         return self.names[int(self.costs.min(axis=1).argmin())]
 
 
-def cost_curves(
-    light_field: LightField, y: int, x: int, parameters: SweepParameters, *, noise: float | None = None
-) -> Curves:
+def cost_curves(light_field: LightField, y: int, x: int, parameters: SweepParameters) -> Curves:
     """Cost of every candidate at one pixel, as :func:`sepi.matching.plane_sweep.sweep` minimises it.
 
     Parameters
@@ -73,8 +71,6 @@ def cost_curves(
     y, x : int
         Pixel of the reference view.
     parameters : SweepParameters
-    noise : float, optional
-        ``residual_variance(light_field.reference_view)``, the same for all pixels; computed unless given.
 
     Returns
     -------
@@ -88,7 +84,7 @@ def cost_curves(
     require_inside(light_field, y, x)
     (T, S), (t0, s0), (H, W) = light_field.grid, light_field.reference_position, light_field.shape
     disparities = light_field.require_disparity_range().candidates(parameters.num_disparities)
-    noise = residual_variance(light_field.reference_view) if noise is None else noise
+    noise = residual_variance(light_field.reference_view)
     r = parameters.window_radius
     rows = np.arange(max(0, y - r), min(H, y + r + 1))
     columns = np.arange(max(0, x - r), min(W, x + r + 1))

@@ -13,7 +13,6 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
 from sepi.errors import SepiError
-from sepi.report.plots.contrast import stretched
 from sepi.report.plots.pictures import Picture
 from sepi.report.plots.saving import new_figure, save
 from sepi.report.probes.probe import Probe
@@ -25,11 +24,14 @@ _QUARTER = "#999999"
 _MARKS: dict[str, tuple[str, Literal["-", "--", ":"], float, str]] = {
     "chosen": ("#0072B2", "-", 3.0, "chosen (final map)"),
     "best": ("#CC79A7", "--", 1.6, "variant best"),
-    "ground_truth": ("#000000", ":", 1.2, "ground_truth"),
+    "ground_truth": ("#000000", ":", 1.2, "ground truth"),
 }
 _PIXEL = "#F0E442"
 
 _SEPIS = {"wrong": "worst candidate", "minimum": "lowest cost", "chosen": "chosen"}
+
+# pixels of the reference view on each side of the pixel
+_CROP_RADIUS = 40
 
 _DPI = 100
 # inches: a SEPI of 81 rows and 49 columns has two dots to a pixel
@@ -40,7 +42,7 @@ _PICTURES = _HEIGHT + 3 * (_GAP + _SEPI_WIDTH) + _GAP + _PATCH
 _PLOT = _MARGIN + _PICTURES + 0.6
 
 
-def write_probes(path: Path, probes: Sequence[Probe]) -> None:
+def write_probes(path: Path, probes: Sequence[Probe], view: Picture) -> None:
     """Draw probes, a row each, into ``path`` with ``.png`` and with ``.pdf`` added; equal probes give equal bytes.
 
     A row shows the surroundings of the pixel; its SEPI at the worst candidate, at that of the lowest cost and at the
@@ -55,6 +57,8 @@ def write_probes(path: Path, probes: Sequence[Probe]) -> None:
         Without ending.
     probes : sequence of Probe
         At least one.
+    view : ndarray, shape (H, W, 3), uint8
+        The reference view.
 
     Raises
     ------
@@ -70,7 +74,7 @@ def write_probes(path: Path, probes: Sequence[Probe]) -> None:
     sheet.set_axis_off()
     for number, found in enumerate(probes):
         bottom = _FOOT + _ROW * (len(probes) - 1 - number) + 0.2
-        _draw_pictures(sheet, found, bottom)
+        _draw_pictures(sheet, found, view, bottom)
         area = (_PLOT / _WIDTH, bottom / height, 1 - (_PLOT + _MARGIN) / _WIDTH, _HEIGHT / height)
         _draw_curves(figure.add_axes(area), found, last=number == len(probes) - 1)
     # pictures set limits of their own
@@ -80,28 +84,25 @@ def write_probes(path: Path, probes: Sequence[Probe]) -> None:
     save(figure, path.parent, path.name)
 
 
-def _draw_pictures(sheet: Axes, found: Probe, bottom: float) -> None:
+def _draw_pictures(sheet: Axes, found: Probe, view: Picture, bottom: float) -> None:
     """Surroundings, SEPIs and angular patch of a probe, from ``bottom`` inches on."""
-    sheet.text(
-        _MARGIN, bottom + _HEIGHT + 0.11, f"(y, x) = ({found.y}, {found.x}): {found.label}", fontsize=8, weight="bold"
-    )
-    _draw_place(sheet, found, bottom)
-    limits = found.contrast
+    y, x, label = found.pixel
+    sheet.text(_MARGIN, bottom + _HEIGHT + 0.11, f"(y, x) = ({y}, {x}): {label}", fontsize=8, weight="bold")
+    _draw_surroundings(sheet, view, y, x, bottom)
+    pictures = found.stretched
     left = _MARGIN + _HEIGHT + _GAP
     for name, title in _SEPIS.items():
-        picture = found.pictures[name]
-        _place(sheet, stretched(picture.pixels, picture.inside, limits), left, bottom, _SEPI_WIDTH, _HEIGHT)
+        _place(sheet, pictures[name], left, bottom, _SEPI_WIDTH, _HEIGHT)
         middle = left + _SEPI_WIDTH / 2
         sheet.plot([middle], [bottom - 0.03], marker="^", markersize=4, color="black")
         sheet.plot([middle], [bottom + _HEIGHT + 0.03], marker="v", markersize=4, color="black")
-        _write_below(sheet, middle, bottom, f"{title}: {picture.disparity:+.2f}")
+        _write_below(sheet, middle, bottom, f"{title}: {found.pictures[name].disparity:+.2f}")
         if not found.kept.all():
             _draw_kept(sheet, found, left - 0.06, bottom)
         left += _SEPI_WIDTH + _GAP
     T, S = found.kept.shape
-    patch = stretched(found.patch, found.patch_inside, limits)
     scale = _PATCH / max(T, S)
-    _place(sheet, patch, left, bottom, S * scale, T * scale)
+    _place(sheet, found.patch, left, bottom, S * scale, T * scale)
     _write_below(sheet, left + S * scale / 2, bottom, "views, chosen")
 
 
@@ -120,21 +121,22 @@ def _write_below(sheet: Axes, x: float, bottom: float, text: str) -> None:
     sheet.text(x, bottom - 0.08, text, fontsize=7, ha="center", va="top")
 
 
-def _draw_place(sheet: Axes, found: Probe, bottom: float) -> None:
-    top, left = found.crop_origin
-    height, width = found.crop.shape[:2]
+def _draw_surroundings(sheet: Axes, view: Picture, y: int, x: int, bottom: float) -> None:
+    top, left = max(0, y - _CROP_RADIUS), max(0, x - _CROP_RADIUS)
+    crop = view[top : y + _CROP_RADIUS + 1, left : x + _CROP_RADIUS + 1]
+    height, width = crop.shape[:2]
     scale = _HEIGHT / max(height, width)
     ceiling = bottom + _HEIGHT
-    _place(sheet, found.crop, _MARGIN, ceiling - height * scale, width * scale, height * scale)
-    x, y = _MARGIN + (found.x - left + 0.5) * scale, ceiling - (found.y - top + 0.5) * scale
+    _place(sheet, crop, _MARGIN, ceiling - height * scale, width * scale, height * scale)
+    across, up = _MARGIN + (x - left + 0.5) * scale, ceiling - (y - top + 0.5) * scale
     for colour, size in (("black", 3.0), (_PIXEL, 1.5)):
-        sheet.plot([x], [y], marker="o", markersize=11, fillstyle="none", markeredgecolor=colour, markeredgewidth=size)
+        sheet.plot([across], [up], marker="o", markersize=11, fillstyle="none", color=colour, markeredgewidth=size)
 
 
 def _draw_kept(sheet: Axes, found: Probe, x: float, bottom: float) -> None:
     """Bars along the rows of the SEPI whose views are kept."""
     ends = np.diff(found.kept.ravel().astype(np.int64), prepend=0, append=0)
-    colour = _CURVES.get(found.side, _QUARTER)
+    colour = _CURVES.get(found.kept_subset, _QUARTER)
     for begin, end in zip(np.flatnonzero(ends == 1), np.flatnonzero(ends == -1), strict=True):
         y = [bottom + _HEIGHT * (1 - place / found.kept.size) for place in (begin + 0.1, end - 0.1)]
         sheet.plot([x, x], y, color=colour, linewidth=2.5, solid_capstyle="butt")
@@ -147,9 +149,9 @@ def _draw_curves(axes: Axes, found: Probe, last: bool) -> None:
             axes.axvline(value, color=colour, linestyle=dashes, linewidth=width, zorder=1)
     curves = found.curves
     for name, cost in zip(curves.names, curves.costs, strict=True):
-        if name not in _CURVES and name != found.side:
+        if name not in _CURVES and name != found.kept_subset:
             continue
-        colour, important = _CURVES.get(name, _QUARTER), name in ("full", found.side)
+        colour, important = _CURVES.get(name, _QUARTER), name in ("full", found.kept_subset)
         axes.plot(curves.disparities, cost, color=colour, linewidth=1.8 if important else 0.9, zorder=2)
         if important:
             axes.plot(*([value] for value in curves.minimum(name)), marker="o", markersize=5, color=colour, zorder=3)
@@ -158,22 +160,22 @@ def _draw_curves(axes: Axes, found: Probe, last: bool) -> None:
     axes.yaxis.set_major_locator(MaxNLocator(5))
     axes.tick_params(labelsize=7)
     axes.set_ylabel("mean cost", fontsize=7)
-    axes.set_title(_values(found), fontsize=7, loc="left", pad=3)
+    axes.set_title(_values(found), fontsize=6, loc="left", pad=3)
     if last:
         axes.set_xlabel("disparity / pixels per view step", fontsize=7, labelpad=1)
 
 
 def _values(found: Probe) -> str:
-    values = {"chosen": found.chosen, "best": found.best, "ground_truth": found.ground_truth}
+    values = {"chosen": found.chosen, "best": found.best, "ground truth": found.ground_truth}
     known = [f"{name} {value:+.3f}" for name, value in values.items() if value is not None]
-    kept = "all views" if found.side == "full" else f"{found.side} views"
+    kept = "all views" if found.kept_subset == "full" else f"{found.kept_subset} views"
     return ", ".join([*known, f"kept: {kept}", f"confidence {found.confidence:.2f}"])
 
 
 def _draw_legend(figure: Figure, probes: Sequence[Probe]) -> None:
     names = {"full": "all views", **{side: f"{side} half" for side in _CURVES if side != "full"}}
     handles = [Line2D([], [], color=_CURVES[name], label=label) for name, label in names.items()]
-    if any(found.side not in _CURVES for found in probes):
+    if any(found.kept_subset not in _CURVES for found in probes):
         handles.append(Line2D([], [], color=_QUARTER, label="quarter kept"))
     handles.append(Line2D([], [], color="black", linestyle="", marker="o", markersize=5, label="lowest cost"))
     for name, (colour, dashes, width, label) in _MARKS.items():

@@ -1,6 +1,6 @@
 """Pixels worth a look, chosen from the maps of a variant: sure, occluded on each side, textureless, wrong, unsure.
 
-Truth only helps to find the largest error; this is for display, no estimator calls it.
+Ground truth only helps to find the largest error; this is for display, no estimator calls it.
 """
 
 from __future__ import annotations
@@ -15,9 +15,6 @@ from sepi.lightfield import BoolMap, FloatMap, LightField
 from sepi.matching.view_subsets import SIDES, halves_and_quarters
 from sepi.stage import StageMaps
 
-COUNT = 8
-"""Pixels that are chosen unless fewer are asked for: one of each kind."""
-
 APART = 12
 """Least distance between two of them, pixels."""
 
@@ -26,12 +23,12 @@ BORDER = 8
 
 # side in pixels of the windows over which a property must hold, lest a single odd pixel is chosen
 _WINDOW = 5
-# distance within which the occluder of a pixel is looked for, and a sure pixel has no depth step, pixels
+# distance within which the occluder of a pixel is looked for, and a sure pixel has no depth discontinuity, pixels
 _REACH = 10
-# disparity from end to end of a neighbourhood beyond which it has a depth step, pixels per view step
-_DEPTH_STEP = 0.3
-# step to the occluder beyond which a larger one is no clearer, pixels per view step
-_CLEAR_STEP = 2.0
+# disparity from end to end of a neighbourhood beyond which it has a depth discontinuity, pixels per view step
+_DISCONTINUITY = 0.3
+# difference to the occluder beyond which a larger one is no clearer, pixels per view step
+_CLEAR_DIFFERENCE = 2.0
 # gradient (full range per pixel) beyond which more texture is no better to look at
 _CLEAR_TEXTURE = 0.03
 
@@ -44,8 +41,13 @@ class InterestingPixel(NamedTuple):
     label: str
 
 
+def kept_subsets(maps: StageMaps) -> npt.NDArray[np.uint8]:
+    """Number of the subset of the views that the occlusion stage kept at each pixel, (H, W); 0, all, without it."""
+    return maps.extra.get("view_subset", np.zeros(maps.disparity.shape, np.uint8))
+
+
 def interesting_pixels(
-    light_field: LightField, maps: StageMaps, ground_truth: FloatMap | None, count: int = COUNT
+    light_field: LightField, maps: StageMaps, ground_truth: FloatMap | None
 ) -> list[InterestingPixel]:
     """Choose pixels that show how the method works and where it fails.
 
@@ -59,8 +61,6 @@ def interesting_pixels(
         Final maps of a variant; its masks and ``view_subset`` are used where it has them.
     ground_truth : ndarray, shape (H, W), float32, or None
         True disparity; may hold values that are not finite.
-    count : int
-        At most so many.
 
     Returns
     -------
@@ -78,7 +78,7 @@ def interesting_pixels(
     free = _inner(light_field.shape)
     found: list[InterestingPixel] = []
     for label, score in scores:
-        if len(found) >= count or not free.any():
+        if not free.any():
             break
         # a score of zero is no case of its kind
         values = np.where(free, np.nan_to_num(score), 0)
@@ -104,24 +104,24 @@ def _texture(reference_view: FloatMap) -> FloatMap:
 def _sure(texture: FloatMap, maps: StageMaps) -> FloatMap:
     sure = _blurred(maps.confidence) * np.minimum(texture / _CLEAR_TEXTURE, 1)
     alone = ~(maps.mask("occluded") | maps.mask("textureless"))
-    smooth = alone & (_spread(maps.disparity, _REACH) < _DEPTH_STEP)
+    smooth = alone & (_spread(maps.disparity, _REACH) < _DISCONTINUITY)
     return np.where(smooth if smooth.any() else alone, sure, 0).astype(np.float32)
 
 
 def _occluded(texture: FloatMap, maps: StageMaps) -> list[tuple[str, FloatMap]]:
     """A label and score for each half of the views that is kept somewhere, the highest score first."""
     names = halves_and_quarters((3, 3)).names
-    side = maps.extra.get("view_subset", np.zeros(maps.disparity.shape, np.uint8))
+    subset = kept_subsets(maps)
     # a map that changes from pixel to pixel has been smoothed over the edge, or is not sure which side is which
-    even = 1 / (1 + _spread(maps.disparity, 1) / _DEPTH_STEP)
+    even = 1 / (1 + _spread(maps.disparity, 1) / _DISCONTINUITY)
     clear = even * np.minimum(texture / _CLEAR_TEXTURE, 1) * np.nan_to_num(maps.confidence)
     scores = []
     for name, (dt, ds) in SIDES.items():
-        kept = side == names.index(name)
+        kept = subset == names.index(name)
         # the views kept lie towards (dt, ds), so the occluder lies the other way
-        step = _nearest_towards(maps.disparity, -dt, -ds) - maps.disparity
-        step = np.clip(np.nan_to_num(step), 0, _CLEAR_STEP)
-        score = np.where(kept, _blurred(kept.astype(np.float32)) * step * clear, 0).astype(np.float32)
+        nearer = _nearest_towards(maps.disparity, -dt, -ds) - maps.disparity
+        nearer = np.clip(np.nan_to_num(nearer), 0, _CLEAR_DIFFERENCE)
+        score = np.where(kept, _blurred(kept.astype(np.float32)) * nearer * clear, 0).astype(np.float32)
         scores.append((f"occluded, {name} half kept", score))
     return sorted(scores, key=lambda labelled: -float(labelled[1].max()))
 
@@ -135,7 +135,7 @@ def _nearest_towards(disparity: FloatMap, dy: int, dx: int) -> FloatMap:
 
 
 def _spread(disparity: FloatMap, radius: int) -> FloatMap:
-    """Largest less smallest disparity of the square neighbourhood of each pixel."""
+    """Largest minus smallest disparity of the square neighbourhood of each pixel."""
     kernel = np.ones((2 * radius + 1, 2 * radius + 1), np.uint8)
     finite = np.nan_to_num(disparity)
     return np.asarray(cv2.dilate(finite, kernel) - cv2.erode(finite, kernel), np.float32)

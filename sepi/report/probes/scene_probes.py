@@ -7,13 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
-from sepi.image.noise import residual_variance
 from sepi.io.provenance import history_of
 from sepi.matching.plane_sweep import SweepParameters
+from sepi.report.panels import SceneResults
 from sepi.report.plan import BEST_VARIANT, MAIN_VARIANT
 from sepi.report.probes.pixels import InterestingPixel, interesting_pixels
 from sepi.report.probes.probe import Probe, probe
-from sepi.report.web.scene_panels import SceneResults
 
 
 def scene_probes(results: SceneResults, final_file: Path, asked: Sequence[InterestingPixel]) -> list[Probe]:
@@ -34,22 +33,18 @@ def scene_probes(results: SceneResults, final_file: Path, asked: Sequence[Intere
     """
     maps = results.final(MAIN_VARIANT)
     light_field = results.light_field
-    places = [*asked, *interesting_pixels(light_field, maps, light_field.ground_truth)]
-    noise = residual_variance(light_field.reference_view)
+    pixels = [*asked, *interesting_pixels(light_field, maps, light_field.ground_truth)]
     parameters = sweep_parameters(final_file)
     return [
         probe(
             light_field,
-            place.y,
-            place.x,
+            pixel,
             maps=maps,
             parameters=parameters,
             best=results.final(BEST_VARIANT) if BEST_VARIANT in results.maps else None,
-            label=place.label,
-            noise=noise,
         )
-        for place in places
-        if np.isfinite(maps.disparity[place.y, place.x])
+        for pixel in pixels
+        if np.isfinite(maps.disparity[pixel.y, pixel.x])
     ]
 
 

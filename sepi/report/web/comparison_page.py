@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from typing import Any
@@ -12,9 +13,9 @@ from sepi.evaluate import COUNTS, SCORES, region_masks, score_regions
 from sepi.io.scores import AllScores
 from sepi.lightfield import FloatMap, LightField
 from sepi.report.page import SCRIPTS, colour_scales, embedded_scenes, environment
-from sepi.report.plots.pictures import centre_picture
+from sepi.report.panels import Panel
 from sepi.report.tabular.layout import BEST, Column, Entry, Kind, Line, Section, entry
-from sepi.report.web.viewer import Viewer
+from sepi.report.web.viewer import viewer_json
 
 # part of the pixels beyond each end of the colour scale, so that a few wrong ones do not use it up
 _BEYOND = 0.005
@@ -53,13 +54,12 @@ class Comparison:
 
 def comparison_page(found: Comparison) -> str:
     """The page, HTML."""
-    viewer = _viewer(found)
     scene = {
         "dataset": found.names[0],
         "scene": found.names[1],
         "grid": [1, 1],
         "first": {"a": "a", "b": "b"},
-        **viewer.to_json(),
+        **viewer_json(list(_panels(found)), _limits(found), found.light_field),
         "probes": [],
     }
     return (
@@ -77,38 +77,29 @@ def comparison_page(found: Comparison) -> str:
     )
 
 
-def _viewer(found: Comparison) -> Viewer:
-    a, b = found.maps
-    light_field = found.light_field
-    picture = None if light_field is None else centre_picture(light_field)
-    camera = None if light_field is None else light_field.camera
-    from_centre = (0, 0) if light_field is None else light_field.from_centre
-    viewer = Viewer((a.shape[0], a.shape[1]), _limits(found), picture, camera, from_centre)
-    if picture is not None:
-        viewer.panel("Scene", "centre", "reference view", "picture")
-    numbers = [viewer.map(values, "final") for values in (a, b)]
-    ground_truth = None if found.ground_truth is None else viewer.map(found.ground_truth, "final")
+def _panels(found: Comparison) -> Iterator[Panel]:
+    (a, b), maps, ground_truth = found.names, found.maps, found.ground_truth
+    if found.light_field is not None:
+        yield Panel("reference_view", "reference view", "Scene", "picture")
     if ground_truth is not None:
-        viewer.panel("Scene", "ground_truth", "ground truth", "disparity", map=ground_truth)
-    for key, name, number in zip("ab", found.names, numbers, strict=True):
-        viewer.panel("Maps", key, name, "disparity", map=number)
-    title = f"{found.names[0]} minus {found.names[1]}"
-    viewer.panel("Maps", "difference", title, "error", map=numbers[0], minus=numbers[1])
+        yield Panel("ground_truth", "ground truth", "Scene", "disparity", ground_truth, precise=True)
+    for key, name, values in zip("ab", found.names, maps, strict=True):
+        yield Panel(key, name, "Maps", "disparity", values, precise=True)
+    yield Panel("difference", f"{a} minus {b}", "Maps", "error", maps[0], minus=maps[1])
     if ground_truth is not None:
-        for key, name, number in zip("ab", found.names, numbers, strict=True):
-            viewer.panel("Errors", f"{key}/error", f"{name}: error", "error", map=number, minus=ground_truth)
-        title = f"{found.names[0]} beside {found.names[1]}: which is nearer to the ground truth"
-        viewer.panel(
-            "Errors",
+        for key, name, values in zip("ab", found.names, maps, strict=True):
+            yield Panel(f"{key}/error", f"{name}: error", "Errors", "error", values, minus=ground_truth)
+        title = f"{a} beside {b}: which is more accurate"
+        yield Panel(
             "change",
             title,
+            "Errors",
             "change",
-            map=numbers[1],
-            minus=numbers[0],
+            maps[1],
+            minus=maps[0],
             ground_truth=ground_truth,
-            ends=["farther", "nearer"],
+            ends=("less accurate", "more accurate"),
         )
-    return viewer
 
 
 def _limits(found: Comparison) -> tuple[float, float]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,33 +21,29 @@ def headline(runs: Runs) -> list[dict[str, Any]]:
     list of dict
         ``scene``; ``published``: MSE x100 and Q25 x100; ``ours``: variant to the same two.
     """
+
+    def ours(dataset: str, scenes: Sequence[str]) -> dict[str, list[float | None]]:
+        return {
+            variant: [
+                _mean(runs.final(dataset, scene, score, variant=variant) for scene in scenes)
+                for score in ("mse100", "q25")
+            ]
+            for variant in runs.plan.compared
+        }
+
     rows: list[dict[str, Any]] = []
     for dataset in published.DATASETS:
         for scene in runs.scored(dataset):
             name = published.paper_scene(dataset, scene)
-            if name is None:
-                continue
-            theirs = [
-                table.cells[dataset, name].get(published.PAPERS_METHOD)
-                for table in (published.table1(), published.table2())
-            ]
-            ours = {
-                variant: [runs.final(dataset, scene, score, variant=variant) for score in ("mse100", "q25")]
-                for variant in runs.plan.compared
-            }
-            rows.append({"scene": f"{dataset}/{scene}", "published": theirs, "ours": ours})
+            if name is not None:
+                tables = (published.table1(), published.table2())
+                theirs = [table.cells[dataset, name].get(published.PAPERS_METHOD) for table in tables]
+                rows.append({"scene": f"{dataset}/{scene}", "published": theirs, "ours": ours(dataset, [scene])})
     for dataset in runs.plan.scenes:
-        scenes = [scene for scene in runs.scored(dataset) if published.paper_scene(dataset, scene) is None]
-        if scenes:
-            name = f"{dataset}, average of {len(scenes)}" if len(scenes) > 1 else f"{dataset}/{scenes[0]}"
-            means = {
-                variant: [
-                    _mean(runs.final(dataset, scene, score, variant=variant) for scene in scenes)
-                    for score in ("mse100", "q25")
-                ]
-                for variant in runs.plan.compared
-            }
-            rows.append({"scene": name, "published": [None, None], "ours": means})
+        others = [scene for scene in runs.scored(dataset) if published.paper_scene(dataset, scene) is None]
+        if others:
+            title = f"{dataset}, average of {len(others)}" if len(others) > 1 else f"{dataset}/{others[0]}"
+            rows.append({"scene": title, "published": [None, None], "ours": ours(dataset, others)})
     return rows
 
 

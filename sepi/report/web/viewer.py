@@ -1,211 +1,140 @@
 """What the viewer in a page needs: panels that name arrays, and the arrays, packed and each there once.
 
-A panel is a way to look at one array, or at two: an error is a map less the ground truth, and a page takes that
-difference itself. ``templates/viewer.js`` draws them.
+An error is a map minus the ground truth, and a page takes that difference itself. ``templates/viewer.js`` draws them.
 """
 
 from __future__ import annotations
 
 import hashlib
 import math
-from dataclasses import dataclass, field
-from functools import cache
+from collections.abc import Sequence
 from typing import Any
 
 import cv2
 import numpy as np
+import numpy.typing as npt
 
-from sepi.camera import Camera
-from sepi.lightfield import BoolMap, FloatMap
-from sepi.report.plots.pictures import ERROR_LIMIT, Picture, picture_uri
-from sepi.report.web.packing import packed_map, packed_mask, packed_size
+from sepi.lightfield import LightField
+from sepi.report.panels import Panel
+from sepi.report.plots.pictures import ERROR_LIMIT, outlines, picture_uri, reference_picture
+from sepi.report.web.packing import packed
 
-ROLES = ("final", "confidence", "other")
-"""What a map is kept for, which decides in how fine steps."""
-
-_MASK = "mask"
-
-PRECISIONS = (
+STEPS = (
     (0.001, 0.01, 0.002),
-    (0.001, 0.01, 0.005),
     (0.001, 0.02, 0.01),
-    (0.001, 0.02, 0.02),
+    (0.001, 0.05, 0.01),
     (0.001, 0.05, 0.02),
-    (0.001, 0.05, 0.03),
     (0.001, 0.05, 0.05),
-    (0.001, 0.05, 0.1),
-    (0.002, 0.1, 0.1),
-    (0.005, 0.1, 0.1),
     (0.01, 0.2, 0.2),
 )
-"""Steps of the maps of each role, from the finest; the first is taken that keeps the scene within its share."""
+"""Steps of precise maps, of confidences and of other maps, from the finest; a page has the first of them that
+keep a scene within its share."""
 
-# Characters for each pixel: ten scenes of 512x512 and the page round them stay below 15 MB. Imported maps come on top.
-_BUDGET = 5.4
-_BUDGET_IMPORTED = 0.2
-# a smaller scene may take as much as one of 512x512
+PRECISE, CONFIDENCE, OTHER, MASK = range(4)
+"""What an array is held for: its place in a row of :data:`STEPS`. A mask has steps of 1."""
+
+# characters for each pixel of an array, on average: ten scenes of 512x512 and the page round them stay below 20 MB; a
+# small scene may take as much as one of 512x512
+_SHARE = 0.275
 _LEAST_PIXELS = 2**18
 
 # larger pictures are thinned out, so that a browser can hold all their maps
 _MOST_PIXELS = 2**20
 
-# of the reference view: the second where the first takes more than so many characters for each pixel
-_PICTURE_QUALITIES = (95, 80)
-_PICTURE_SHARE = 0.4
+# of the reference view
+_WEBP = [cv2.IMWRITE_WEBP_QUALITY, 90]
 
 
-@dataclass(frozen=True)
-class _Array:
-    """A map and its role, or a mask."""
+class _Arrays:
+    """Arrays by their content, thinned out, with what each is held for."""
 
-    values: FloatMap
-    role: str
+    def __init__(self, stride: int) -> None:
+        self.stride = stride
+        self.held: dict[str, tuple[npt.NDArray[Any], int]] = {}
 
-    def packed(self, step: float) -> dict[str, Any]:
-        return packed_mask(self.values.astype(bool)) if self.role == _MASK else packed_map(self.values, step)
+    def thinned(self, values: npt.NDArray[Any]) -> npt.NDArray[Any]:
+        """The rows and columns of an array that are held."""
+        return np.ascontiguousarray(values[:: self.stride, :: self.stride])
 
-    def size(self, step: float) -> int:
-        return len(self.packed(step)["data"]) if self.role == _MASK else packed_size(self.values, step)
+    def number(self, thinned: npt.NDArray[Any], role: int) -> int:
+        """Hold an array; returns the number that panels call it by. Equal maps are one, as fine as any needs it."""
+        values = thinned if role == MASK else thinned.astype(np.float32)
+        key = values.dtype.name + hashlib.sha256(values.tobytes()).hexdigest()
+        _, before = self.held.get(key, (None, role))
+        self.held[key] = (values, min(role, before))
+        return list(self.held).index(key)
+
+    def packed(self, budget: float) -> list[dict[str, Any]]:
+        """All arrays, in the finest steps that keep them within a number of characters, or the coarsest."""
+        for steps in STEPS:
+            found = [packed(values, (*steps, 1.0)[role]) for values, role in self.held.values()]
+            if sum(len(array["data"]) for array in found) <= budget:
+                break
+        return found
 
 
-@dataclass
-class Viewer:
-    """Panels of one scene, and the arrays that they show.
+def viewer_json(
+    panels: Sequence[Panel], limits: tuple[float, float], light_field: LightField | None = None
+) -> dict[str, Any]:
+    """Panels and arrays, ready for ``json.dumps``.
 
-    Attributes
+    Parameters
     ----------
-    shape : (int, int)
-        Height and width of all maps.
+    panels : sequence of Panel
+        Of maps of one size; one of them at least has values.
     limits : (float, float)
         Ends of the scale of disparity, pixels per view step.
-    picture : ndarray, shape (H, W, 3), uint8, or None
-        The reference view.
-    camera : Camera or None
-        For a cloud in metres.
-    from_centre : (int, int)
-        Rows below and columns to the right of the grid's centre view at which the reference view stands.
+    light_field : LightField, optional
+        Gives the reference view, and the camera for a cloud in metres.
     """
-
-    shape: tuple[int, int]
-    limits: tuple[float, float]
-    picture: Picture | None = None
-    camera: Camera | None = None
-    from_centre: tuple[int, int] = (0, 0)
-    panels: list[dict[str, Any]] = field(default_factory=list)
-    _arrays: dict[str, _Array] = field(default_factory=dict)
-    _imported: int = 0
-
-    def map(self, values: FloatMap, role: str = "other") -> int:
-        """Keep a map (H, W) of one of :data:`ROLES`; returns the number that panels call it by."""
-        return self._number(self.thinned(values.astype(np.float32)), role)
-
-    def mask(self, values: BoolMap) -> int:
-        """Keep a mask (H, W); returns its number."""
-        return self.kept_mask(self.thinned(values))
-
-    def kept_mask(self, values: BoolMap) -> int:
-        """Keep a mask that is thinned out already; returns its number."""
-        return self._number(values.astype(np.float32), _MASK)
-
-    def imported(self, values: FloatMap) -> int:
-        """Keep a map of another method, which may take its own share of characters; returns its number."""
-        self._imported += 1
-        return self.map(values)
-
-    def panel(self, group: str, key: str, title: str, kind: str, **more: Any) -> None:
-        """Add a panel.
-
-        Parameters
-        ----------
-        group : str
-            Heading that it stands under.
-        key : str
-            Its name, which no other panel has.
-        title : str
-        kind : str
-            ``picture``, ``disparity``, ``error``, ``change``, ``confidence``, ``grey``, ``mask`` or ``outline``.
-        **more
-            ``map``: number of its array; ``minus``: of the array taken from it; ``ground_truth``: of the ground truth
-            that both are compared with; ``confidence``: of the confidence that is read out beside it; ``note``: what is
-            to be said of it; ``ends``: words for the low and the high end of its scale.
-        """
-        if any(panel["key"] == key for panel in self.panels):
-            raise ValueError(f"two panels are called {key!r}")
-        known = {name: value for name, value in more.items() if value is not None}
-        self.panels.append({"group": group, "key": key, "title": title, "kind": kind, **known})
-
-    @property
-    def stride(self) -> int:
-        """Every so-many-th row and column is kept."""
-        return max(1, math.ceil(math.sqrt(self.shape[0] * self.shape[1] / _MOST_PIXELS)))
-
-    def to_json(self, reserved: int = 0) -> dict[str, Any]:
-        """Everything, ready for ``json.dumps``.
-
-        Parameters
-        ----------
-        reserved : int
-            Characters that what stands beside it takes of the scene's share.
-        """
-        picture = "" if self.picture is None else _webp(self.thinned(self.picture))
-        height, width = (len(range(0, side, self.stride)) for side in self.shape)
-        share = (_BUDGET + _BUDGET_IMPORTED * self._imported) * max(_LEAST_PIXELS, height * width)
-        budget = share - reserved - len(picture)
-        steps = self._affordable_steps(budget)
-        return {
-            "height": height,
-            "width": width,
-            "stride": self.stride,
-            "limits": list(self.limits),
-            "error_limit": ERROR_LIMIT,
-            "camera": self._camera_json(),
-            "picture": picture,
-            "panels": self.panels,
-            "arrays": [array.packed(steps[array.role]) for array in self._arrays.values()],
-        }
-
-    def _affordable_steps(self, budget: float) -> dict[str, float]:
-        """Steps of each role: the finest that keep all arrays within a number of characters, or the coarsest."""
-        arrays = list(self._arrays.values())
-        size = cache(lambda number, step: arrays[number].size(step))
-        for precision in PRECISIONS:
-            steps = dict(zip((*ROLES, _MASK), (*precision, 1.0), strict=True))
-            total = 0
-            for number, array in enumerate(arrays):
-                total += size(number, steps[array.role])
-                if total > budget:
-                    break
-            else:
-                return steps
-        return steps
-
-    def _camera_json(self) -> dict[str, Any] | None:
-        if self.camera is None:
-            return None
-        return {
-            "scale": self.camera.scale,
-            "offset": self.camera.offset,
-            "focal": self.camera.focal_px,
-            "from_centre": list(self.from_centre),
-        }
-
-    def thinned(self, values: Any) -> Any:
-        """The rows and columns of an array (H, W, ...) that are kept."""
-        return values[:: self.stride, :: self.stride]
-
-    def _number(self, values: FloatMap, role: str) -> int:
-        kind = "mask" if role == _MASK else "map"
-        key = kind + hashlib.sha256(np.ascontiguousarray(values).tobytes()).hexdigest()
-        before = self._arrays.get(key)
-        # an equal map that is held more finely serves both
-        finer = role if before is None else min(before.role, role, key=[*ROLES, _MASK].index)
-        self._arrays[key] = _Array(values, finer)
-        return list(self._arrays).index(key)
+    full_height, full_width = next(panel.values.shape for panel in panels if panel.values is not None)
+    stride = max(1, math.ceil(math.sqrt(full_height * full_width / _MOST_PIXELS)))
+    height, width = -(-full_height // stride), -(-full_width // stride)
+    arrays = _Arrays(stride)
+    entries = [_entry(panel, arrays) for panel in panels]
+    picture = None if light_field is None else arrays.thinned(reference_picture(light_field))
+    return {
+        "height": height,
+        "width": width,
+        "stride": stride,
+        "limits": list(limits),
+        "error_limit": ERROR_LIMIT,
+        "camera": None if light_field is None else _camera(light_field),
+        "picture": "" if picture is None else picture_uri(picture, "webp", _WEBP),
+        "panels": entries,
+        "arrays": arrays.packed(_SHARE * max(_LEAST_PIXELS, height * width) * len(arrays.held)),
+    }
 
 
-def _webp(picture: Picture) -> str:
-    for quality in _PICTURE_QUALITIES:
-        text = picture_uri(np.ascontiguousarray(picture), "webp", [cv2.IMWRITE_WEBP_QUALITY, quality])
-        if len(text) <= _PICTURE_SHARE * max(_LEAST_PIXELS, picture.shape[0] * picture.shape[1]):
-            break
-    return text
+def _entry(panel: Panel, arrays: _Arrays) -> dict[str, Any]:
+    """A panel with the numbers of its arrays, without what it does not have."""
+    entry: dict[str, Any] = {"key": panel.key, "title": panel.title, "group": panel.group, "kind": panel.kind}
+    entry |= {name: text for name, text in (("note", panel.note), ("ends", panel.ends)) if text}
+    role = {"mask": MASK, "outline": MASK, "confidence": CONFIDENCE}.get(
+        panel.kind, PRECISE if panel.precise else OTHER
+    )
+    shown = {
+        "map": (panel.values, role),
+        "minus": (panel.minus, OTHER),
+        "ground_truth": (panel.ground_truth, OTHER),
+        "confidence": (panel.confidence, CONFIDENCE),
+    }
+    for name, (values, held_for) in shown.items():
+        if values is not None:
+            thinned = arrays.thinned(values)
+            # thinned out first: borders of one pixel would break
+            thinned = outlines(thinned) if panel.kind == "outline" else thinned
+            entry[name] = arrays.number(thinned, held_for)
+    return entry
+
+
+def _camera(light_field: LightField) -> dict[str, Any] | None:
+    camera = light_field.camera
+    if camera is None:
+        return None
+    return {
+        "scale": camera.scale,
+        "offset": camera.offset,
+        "focal": camera.focal_px,
+        "from_centre": list(light_field.from_centre),
+    }

@@ -9,17 +9,16 @@ import numpy as np
 import pytest
 
 from sepi.errors import SepiError
-from sepi.image.noise import residual_variance
 from sepi.lightfield import DisparityRange, LightField
 from sepi.matching.plane_sweep import SweepParameters, sweep
 from sepi.matching.stitched_epi import stitched_epi
 from sepi.matching.view_subsets import half_planes, halves_and_quarters
 from sepi.pipeline import estimate_depth
-from sepi.report.plots.contrast import stretched
+from sepi.report.plots.pictures import reference_picture
 from sepi.report.probes.curves import cost_curves
 from sepi.report.probes.figure import write_probes
-from sepi.report.probes.pixels import APART, BORDER, interesting_pixels
-from sepi.report.probes.probe import GREY, probe, sepi_picture, to_json
+from sepi.report.probes.pixels import APART, BORDER, InterestingPixel, interesting_pixels
+from sepi.report.probes.probe import GREY, HALF_WIDTH, probe, sepi_picture, to_json
 from sepi.scenes import render
 from sepi.stage import StageMaps
 
@@ -86,9 +85,8 @@ def test_curves_of_a_scene_are_those_of_the_default_sweep():
     light_field = render("dots", size=64, views=5)
     parameters = SweepParameters(num_disparities=61)
     result = sweep(light_field, parameters)
-    noise = residual_variance(light_field.reference_view)
     for y, x in [(0, 0), (20, 31), (63, 40), (33, 33)]:
-        disparity, cost = cost_curves(light_field, y, x, parameters, noise=noise).minimum()
+        disparity, cost = cost_curves(light_field, y, x, parameters).minimum()
         assert cost == pytest.approx(result.cost[0, y, x], abs=2e-5)
         assert disparity == pytest.approx(result.disparity[0, y, x], abs=5e-3)
 
@@ -116,38 +114,28 @@ def plane(disparity, grid=(5, 5), size=60, **known):
 
 
 def raggedness(picture):
-    """Mean deviation down the columns, grey levels."""
-    return picture.pixels[..., 0].astype(float).std(axis=0).mean()
+    """Mean deviation down the middle columns, which all views see, grey levels."""
+    return picture.pixels[:, HALF_WIDTH - 8 : HALF_WIDTH + 9, 0].astype(float).std(axis=0).mean()
 
 
 @pytest.mark.parametrize("view", [None, (1, 3)])
 def test_the_right_candidate_gives_upright_stripes(view):
     """The point of the picture: the reader sees at a glance which candidate is right."""
     light_field = plane(1.25, view=view)
-    right, near, wrong = (sepi_picture(light_field, 30, 30, d, half_width=8) for d in (1.25, 1.0, -0.75))
+    right, near, wrong = (sepi_picture(light_field, 30, 30, d) for d in (1.25, 1.0, -0.75))
     assert raggedness(right) < 1.5
     assert raggedness(near) > 4 * raggedness(right)
     assert raggedness(wrong) > raggedness(near)
-    assert right.pixels.shape == (25, 17, 3)
-    assert np.all(right.line == 8)
+    assert right.pixels.shape == (25, 2 * HALF_WIDTH + 1, 3)
 
 
-def test_sheared_and_stitched_pictures_show_the_same_line():
-    """The unsheared picture is that of Eq. 1-2; a line drawn beside its samples would mislead."""
+def test_the_middle_column_is_the_line_of_the_stitched_epi():
+    """A picture of other samples than those of Eq. 1-2 would mislead."""
     light_field = plane(0.25)
-    sheared = sepi_picture(light_field, 30, 28, 0.5, half_width=20)
-    stitched = sepi_picture(light_field, 30, 28, 0.5, half_width=20, sheared=False)
     samples, valid = stitched_epi(light_field, 30, 0.5).along_line(28)
-    expected = np.rint(255 * samples[:, 0]).astype(int)
     assert valid.all()
-    np.testing.assert_array_equal(sheared.pixels[:, 20, 0], expected)
-    np.testing.assert_allclose(stitched.line, 20 - 0.5 * np.arange(-12, 13))
-    whole = stitched.line == np.rint(stitched.line)
-    columns = np.rint(stitched.line[whole]).astype(int)
-    np.testing.assert_array_equal(stitched.pixels[np.flatnonzero(whole), columns, 0], expected[whole])
-    image = np.rint(255 * stitched_epi(light_field, 30, 0.5).image()[:, 8:49, 0])
-    seen = stitched.inside & (image > 0)
-    np.testing.assert_array_equal(stitched.pixels[..., 0][seen], image[seen])
+    expected = np.rint(255 * samples[:, 0]).astype(int)
+    np.testing.assert_array_equal(sepi_picture(light_field, 30, 28, 0.5).pixels[:, HALF_WIDTH, 0], expected)
 
 
 def test_grey_where_nothing_is_seen():
@@ -155,9 +143,10 @@ def test_grey_where_nothing_is_seen():
     present = np.ones((5, 5), bool)
     present[4, 0] = False
     light_field = plane(0.0, present=present)
-    picture = sepi_picture(light_field, 1, 2, 1.0, half_width=6)
-    rows = picture.pixels.reshape(5, 5, 13, 3)
-    inside = picture.inside.reshape(5, 5, 13)
+    picture = sepi_picture(light_field, 1, 2, 1.0)
+    near = slice(HALF_WIDTH - 6, HALF_WIDTH + 7)
+    rows = picture.pixels.reshape(5, 5, -1, 3)[:, :, near]
+    inside = picture.inside.reshape(5, 5, -1)[:, :, near]
     # row 1 of view row 4 would be at -1
     assert not inside[4].any()
     assert not inside[2, 2, :4].any()
@@ -184,22 +173,21 @@ def test_probe_tells_what_the_maps_say():
     maps = made_maps(light_field, view_subset=side, occluded=flag, textureless=~flag)
     best = StageMaps(np.full((60, 60), 0.625, np.float32), maps.confidence)
     parameters = SweepParameters(num_disparities=41)
-    found = probe(light_field, 20, 30, maps=maps, best=best, parameters=parameters, label="here")
-    assert (found.y, found.x, found.label) == (20, 30, "here")
+    pixel = InterestingPixel(20, 30, "here")
+    found = probe(light_field, pixel, maps=maps, best=best, parameters=parameters)
+    assert found.pixel == pixel
     assert (found.chosen, found.best, found.ground_truth, found.confidence) == (0.5, 0.625, 0.5, 0.75)
-    assert found.minimum == pytest.approx(0.5, abs=0.02)
+    assert found.curves.minimum()[0] == pytest.approx(0.5, abs=0.02)
     assert found.occluded
     assert not found.textureless
-    assert found.side == "right"
+    assert found.kept_subset == "right"
     np.testing.assert_array_equal(found.kept, np.tile([False, False, True, True, True], (5, 1)))
     assert list(found.pictures) == ["minimum", "chosen", "wrong", "ground_truth"]
     # every view sees the plane's point, so the patch has the pixel's colour
     colour = 255 * float(light_field.reference_view[20, 30, 0])
-    np.testing.assert_allclose(found.patch, colour, atol=2)
-    y, x = 20 - found.crop_origin[0], 30 - found.crop_origin[1]
-    assert found.crop[y, x, 0] == pytest.approx(colour, abs=1)
-    other = probe(light_field, 21, 30, maps=maps, parameters=parameters)
-    assert (other.ground_truth, other.best, other.side, other.occluded) == (None, None, "full", False)
+    np.testing.assert_allclose(found.pictures["chosen"].pixels[:, HALF_WIDTH], colour, atol=2)
+    other = probe(light_field, InterestingPixel(21, 30, ""), maps=maps, parameters=parameters)
+    assert (other.ground_truth, other.best, other.kept_subset, other.occluded) == (None, None, "full", False)
     assert other.kept.all()
     assert "ground_truth" not in other.pictures
 
@@ -210,13 +198,13 @@ def test_sides_of_another_occlusion_stage_are_refused():
     maps = made_maps(light_field, view_subset=np.full((60, 60), 3, np.uint8))
     maps = replace(maps, subset_names=half_planes(light_field.grid, 8).names)
     with pytest.raises(SepiError, match=r"half-plane 0.*expected those of half_sepi, full, left"):
-        probe(light_field, 20, 30, maps=maps, parameters=SweepParameters(num_disparities=5))
+        probe(light_field, InterestingPixel(20, 30, ""), maps=maps, parameters=SweepParameters(num_disparities=5))
 
 
 def test_json_holds_the_curves_and_pictures(occluder):
     """The page shows nothing but this; 14 kB a pixel, of such fine texture, keep ten scenes in one page."""
     light_field, maps = occluder
-    found = probe(light_field, 40, 50, maps=maps, best=maps, parameters=SweepParameters())
+    found = probe(light_field, InterestingPixel(40, 50, ""), maps=maps, best=maps, parameters=SweepParameters())
     text = json.dumps(to_json(found), allow_nan=False)
     assert len(text) <= 14_000
     data = json.loads(text)
@@ -230,13 +218,14 @@ def test_json_holds_the_curves_and_pictures(occluder):
     for name, picture in found.pictures.items():
         assert data["sepi"][name]["disparity"] == pytest.approx(picture.disparity, abs=1e-4)
         shown = decoded_picture(data["sepi"][name]["src"], "image/webp")
-        other = found.pictures["chosen" if name == "wrong" else "wrong"]
-        stretched_pair = [stretched(p.pixels, p.inside, found.contrast) for p in (picture, other)]
-        own, others = (np.abs(shown.astype(int) - p).mean() for p in stretched_pair)
+        other = "chosen" if name == "wrong" else "wrong"
+        own, others = (np.abs(shown.astype(int) - found.stretched[one]).mean() for one in (name, other))
         assert own < min(12, others / 3)
-    patch = stretched(found.patch, found.patch_inside, found.contrast)
-    np.testing.assert_array_equal(decoded_picture(data["patch"], "image/png"), patch)
-    assert text == json.dumps(to_json(probe(light_field, 40, 50, maps=maps, best=maps, parameters=SweepParameters())))
+    np.testing.assert_array_equal(decoded_picture(data["patch"], "image/png"), found.patch)
+    np.testing.assert_array_equal(found.patch.reshape(-1, 3), found.stretched["chosen"][:, HALF_WIDTH])
+    assert text == json.dumps(
+        to_json(probe(light_field, InterestingPixel(40, 50, ""), maps=maps, best=maps, parameters=SweepParameters()))
+    )
 
 
 def decoded_picture(uri, kind):
@@ -259,7 +248,6 @@ def test_interesting_pixels_show_each_kind(occluder):
     for y, x, label in pixels:
         if label.startswith("occluded"):
             assert side_names[maps.extra["view_subset"][y, x]] in label
-    assert interesting_pixels(light_field, maps, light_field.ground_truth, count=2) == pixels[:2]
     without = [pixel.label for pixel in interesting_pixels(light_field, maps, None)]
     assert "largest error" not in without
 
@@ -314,10 +302,11 @@ def test_figure_is_the_same_each_time_and_whole(occluder, tmp_path):
     """Files that differ without cause would be made again, and checked in again, each time."""
     light_field, maps = occluder
     parameters = SweepParameters(num_disparities=31)
-    pixels = interesting_pixels(light_field, maps, light_field.ground_truth, count=2)
-    probes = [probe(light_field, y, x, maps=maps, parameters=parameters, label=label) for y, x, label in pixels]
+    pixels = interesting_pixels(light_field, maps, light_field.ground_truth)[:2]
+    probes = [probe(light_field, pixel, maps=maps, parameters=parameters) for pixel in pixels]
+    view = reference_picture(light_field)
     for folder in ("first", "second"):
-        write_probes(tmp_path / folder / "probes.v1", probes)
+        write_probes(tmp_path / folder / "probes.v1", probes, view)
     assert sorted(path.name for path in (tmp_path / "first").iterdir()) == ["probes.v1.pdf", "probes.v1.png"]
     for name in ("probes.v1.pdf", "probes.v1.png"):
         assert (tmp_path / "first" / name).read_bytes() == (tmp_path / "second" / name).read_bytes()
@@ -325,10 +314,10 @@ def test_figure_is_the_same_each_time_and_whole(occluder, tmp_path):
     assert b"CreationDate" not in (tmp_path / "first" / "probes.v1.pdf").read_bytes()
     picture = cv2.imread(str(tmp_path / "first" / "probes.v1.png"))
     taller = tmp_path / "more"
-    write_probes(taller, [*probes, probes[0]])
+    write_probes(taller, [*probes, probes[0]], view)
     assert cv2.imread(f"{taller}.png").shape[0] > picture.shape[0]
     with pytest.raises(SepiError, match="at least one"):
-        write_probes(tmp_path / "none", [])
+        write_probes(tmp_path / "none", [], view)
 
 
 def test_figure_of_a_grey_picture_without_views_around(tmp_path):
@@ -338,8 +327,8 @@ def test_figure_of_a_grey_picture_without_views_around(tmp_path):
         np.full((1, 3, 9, 9, 1), 7, np.uint8), "flat", present=present, disparity_range=DisparityRange(-20, 20, "given")
     )
     maps = made_maps(light_field, view_subset=np.full((9, 9), 5, np.uint8))
-    found = probe(light_field, 0, 8, maps=maps, parameters=SweepParameters(num_disparities=5))
-    assert found.side == "left-up"
+    found = probe(light_field, InterestingPixel(0, 8, ""), maps=maps, parameters=SweepParameters(num_disparities=5))
+    assert found.kept_subset == "left-up"
     np.testing.assert_array_equal(found.kept, [[False, True, False]])
-    write_probes(tmp_path / "flat", [found])
+    write_probes(tmp_path / "flat", [found], reference_picture(light_field))
     assert (tmp_path / "flat.png").stat().st_size > 0

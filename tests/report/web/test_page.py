@@ -1,7 +1,6 @@
 """The page of the report: what it holds, how large it is, and the figures beside its tables."""
 
 import base64
-import copy
 import json
 import re
 from dataclasses import replace
@@ -11,6 +10,7 @@ from typing import Any
 
 import cv2
 import numpy as np
+import numpy.typing as npt
 import pytest
 from click.testing import CliRunner
 from page_example import COTTON, DOTS, EDGES, PICTURE, SIZE, Example
@@ -18,104 +18,99 @@ from page_example import COTTON, DOTS, EDGES, PICTURE, SIZE, Example
 from sepi.errors import SepiError
 from sepi.evaluate import REGIONS
 from sepi.io.scores import Evaluation
-from sepi.lightfield import FloatMap
+from sepi.lightfield import FloatMap, LightField
 from sepi.report import charts, figures, page, published
+from sepi.report.figures import page_json
 from sepi.report.graph import drawn
-from sepi.report.page import embedded, page_of, prose, read_scene
+from sepi.report.page import embedded, prose, read_scene
+from sepi.report.panels import Kind, Panel, SceneResults, note_of, panels_of
 from sepi.report.runs import Runs
 from sepi.report.web import page_data
-from sepi.report.web.scene_panels import SceneResults, note_of, viewer_of
-from sepi.report.web.viewer import PRECISIONS, ROLES, Viewer
+from sepi.report.web.viewer import CONFIDENCE, OTHER, PRECISE, STEPS, viewer_json
 
-LARGEST_PAGE = 15_000_000
+LARGEST_PAGE = 20_000_000
 """Bytes that a page of ten scenes of 512x512 may have."""
 
+SCALE = (-1.0, 1.0)
 
-def viewer(shape: tuple[int, int] = (20, 30), **more: Any) -> Viewer:
-    return Viewer(shape, (-1.0, 1.0), **more)
+
+def panel(number: int, values: Any, kind: Kind = "disparity", **more: Any) -> Panel:
+    return Panel(f"panel {number}", "title", "group", kind, values, **more)
 
 
 def some_map(seed: int, shape: tuple[int, int] = (20, 30)) -> FloatMap:
     return np.random.default_rng(seed).uniform(-1, 1, shape).astype(np.float32)
 
 
-def steps_of(made: Viewer) -> list[float | None]:
-    """The step of each array; None for masks."""
-    return [array.get("step") for array in made.to_json()["arrays"]]
+def a_light_field(picture: npt.NDArray[np.uint8]) -> LightField:
+    """One whose views are all this picture."""
+    return LightField(np.stack([[picture, picture]]), "views")
+
+
+def decoded(picture: str) -> npt.NDArray[np.uint8]:
+    """The RGB picture that an address holds."""
+    assert picture.startswith("data:image/webp;base64,")
+    data = np.frombuffer(base64.b64decode(picture.split(",")[1]), np.uint8)
+    return cv2.imdecode(data, cv2.IMREAD_COLOR)[:, :, ::-1]
 
 
 def test_equal_maps_are_kept_once() -> None:
-    """Panels that show one map share its array."""
-    made = viewer()
-    numbers = [made.map(some_map(seed)) for seed in (0, 1, 0)]
-    assert numbers == [0, 1, 0]
-    assert len(made.to_json()["arrays"]) == 2
-
-
-def test_a_map_and_a_mask_of_equal_values_are_two() -> None:
-    """They are read in different ways."""
-    made = viewer()
+    """Panels that show one map share its array; a map and a mask of equal values are two, read in different steps."""
     ones = np.ones((20, 30), np.float32)
-    assert (made.map(ones), made.mask(ones > 0), made.map(ones)) == (0, 1, 0)
-    assert [step is None for step in steps_of(made)] == [False, True]
+    maps = [panel(number, some_map(seed)) for number, seed in enumerate((0, 1, 0))]
+    found = viewer_json([*maps, panel(3, ones), panel(4, ones > 0, "mask"), panel(5, ones)], SCALE)
+    assert [entry["map"] for entry in found["panels"]] == [0, 1, 0, 2, 3, 2]
+    assert [array["step"] for array in found["arrays"]] == [STEPS[0][OTHER]] * 3 + [1]
 
 
-@pytest.mark.parametrize("roles", [("other", "final"), ("final", "other"), ("confidence", "final", "other")])
-def test_an_equal_map_is_kept_as_finely_as_the_finest_role_wants(roles: tuple[str, ...]) -> None:
+@pytest.mark.parametrize("order", [(0, 1, 2), (2, 1, 0), (1, 0, 2)])
+def test_an_equal_map_is_kept_as_finely_as_the_finest_panel_wants(order: tuple[int, ...]) -> None:
     """A variant that switches nothing off has the final map of another: its read-out must stay exact."""
-    made = viewer()
-    for role in roles:
-        made.map(some_map(0), role)
-    assert steps_of(made) == [PRECISIONS[0][ROLES.index("final")]]
+    values = some_map(0)
+    panels = [panel(0, values), panel(1, values, precise=True), panel(2, values, "confidence")]
+    (array,) = viewer_json([panels[number] for number in order], SCALE)["arrays"]
+    assert array["step"] == STEPS[0][PRECISE]
 
 
-def test_final_maps_are_the_finest() -> None:
-    for precision in PRECISIONS:
-        assert precision[ROLES.index("final")] == min(precision)
-    for role in range(len(ROLES)):
-        assert sorted(precision[role] for precision in PRECISIONS) == [precision[role] for precision in PRECISIONS]
-    made = viewer()
-    for role in ROLES:
-        made.map(some_map(ROLES.index(role)), role)
-    assert steps_of(made) == list(PRECISIONS[0])
+def test_precise_maps_are_the_finest() -> None:
+    for steps in STEPS:
+        assert steps[PRECISE] == min(steps)
+    for role in (PRECISE, CONFIDENCE, OTHER):
+        assert sorted(steps[role] for steps in STEPS) == [steps[role] for steps in STEPS]
+    panels = [panel(0, some_map(0), precise=True), panel(1, some_map(1), "confidence"), panel(2, some_map(2))]
+    assert [array["step"] for array in viewer_json(panels, SCALE)["arrays"]] == list(STEPS[0])
 
 
 def test_a_small_scene_is_never_made_coarse() -> None:
     """It has as many characters as one of 512x512."""
-    made = viewer((64, 64), picture=np.zeros((64, 64, 3), np.uint8))
-    for seed in range(30):
-        made.map(some_map(seed, (64, 64)), "final" if seed < 4 else "other")
-    assert set(steps_of(made)) == {0.001, 0.002}
+    panels = [panel(seed, some_map(seed, (64, 64)), precise=seed < 4) for seed in range(30)]
+    assert {array["step"] for array in viewer_json(panels, SCALE)["arrays"]} == {0.001, 0.002}
 
 
 def test_large_pictures_are_thinned_out() -> None:
     """Every other row and column of a picture of 1500x1500, which a phone could not hold in thirty maps."""
     shape = (1501, 1500)
     y, x = np.indices(shape)
-    made = viewer(shape, picture=np.full((*shape, 3), 90, np.uint8))
-    made.map((x / 500).astype(np.float32), "final")
-    made.mask(y < 700)
-    found = made.to_json()
+    panels = [panel(0, (x / 500).astype(np.float32), precise=True), panel(1, y < 700, "mask")]
+    found = viewer_json(panels, SCALE, a_light_field(np.full((*shape, 3), 90, np.uint8)))
     assert (found["stride"], found["height"], found["width"]) == (2, 751, 750)
-    picture = cv2.imdecode(np.frombuffer(base64.b64decode(found["picture"].split(",")[1]), np.uint8), cv2.IMREAD_COLOR)
-    assert picture.shape == (751, 750, 3)
-    assert viewer((1024, 1024)).stride == 1
+    assert decoded(found["picture"]).shape == (751, 750, 3)
+    assert viewer_json([panel(0, np.zeros((1024, 1024), bool), "mask")], SCALE)["stride"] == 1
 
 
 def test_the_picture_keeps_its_colours() -> None:
     picture = np.full((16, 16, 3), (200, 100, 20), np.uint8)
-    text = viewer((16, 16), picture=picture).to_json()["picture"]
-    assert text.startswith("data:image/webp;base64,")
-    found = cv2.imdecode(np.frombuffer(base64.b64decode(text.split(",")[1]), np.uint8), cv2.IMREAD_COLOR)[:, :, ::-1]
-    assert np.abs(found.astype(int) - picture).max() <= 6
+    found = viewer_json([panel(0, some_map(0, (16, 16)))], SCALE, a_light_field(picture))
+    assert np.abs(decoded(found["picture"]).astype(int) - picture).max() <= 6
 
 
-def noisy_scene(noise: float, outliers: float) -> Viewer:
-    """A scene of 512x512 with twenty maps, noisy and with wrong pixels everywhere, which hardly pack."""
+@pytest.mark.parametrize(("noise", "outliers"), [(0.001, 0.002), (0.02, 0.01)])
+def test_ten_noisy_scenes_stay_below_20_megabytes(noise: float, outliers: float, example: Example) -> None:
+    """Steps grow until a scene keeps its share, whatever its maps are like; ten of them and the page fit."""
     random = np.random.default_rng(0)
     shape = (512, 512)
     y, x = np.indices(shape)
-    ground_truth = np.sin(x / 60) + y / 300 + (x > 250)
+    ground_truth = (np.sin(x / 60) + y / 300 + (x > 250)).astype(np.float32)
     picture = np.clip(random.normal(128, 30, (*shape, 3)), 0, 255).astype(np.uint8)
 
     def blobs() -> FloatMap:
@@ -128,67 +123,53 @@ def noisy_scene(noise: float, outliers: float) -> Viewer:
         found[wrong] = random.uniform(-1, 3, wrong.sum())
         return found.astype(np.float32)
 
-    made = viewer(shape, picture=picture)
-    made.map(ground_truth.astype(np.float32), "final")
-    for _ in range(2):
-        made.map(estimate(), "final")
-        made.map((blobs() + random.normal(0, 0.05, shape)).clip(0, 1).astype(np.float32), "confidence")
-    for _ in range(14):
-        made.map(estimate())
-    for _ in range(6):
-        made.mask(blobs() > 1)
-    return made
+    def confidence() -> FloatMap:
+        return (blobs() + random.normal(0, 0.05, shape)).clip(0, 1).astype(np.float32)
 
-
-@pytest.mark.parametrize(("noise", "outliers"), [(0.001, 0.002), (0.02, 0.01)])
-def test_ten_noisy_scenes_stay_below_15_megabytes(noise: float, outliers: float, example: Example) -> None:
-    """Steps grow until a scene keeps its share, whatever its maps are like; ten of them and the page fit."""
-    reserved = 90_000
-    scene = len(json.dumps(noisy_scene(noise, outliers).to_json(reserved)))
+    panels = [panel(0, ground_truth, precise=True)]
+    panels += [panel(1 + number, estimate(), precise=number < 2) for number in range(16)]
+    panels += [panel(17 + number, confidence(), "confidence") for number in range(2)]
+    panels += [panel(19 + number, blobs() > 1, "mask") for number in range(6)]
+    scene = len(json.dumps(viewer_json(panels, SCALE, a_light_field(picture))))
+    probes = max(len(json.dumps(found["probes"])) for found in example.scenes)
     rest = example.page.stat().st_size - sum(len(json.dumps(found)) for found in example.scenes)
     assert rest < 600_000
-    assert 10 * (scene + reserved) + rest < LARGEST_PAGE
-
-
-def test_what_stands_beside_it_takes_of_a_scenes_share() -> None:
-    made = noisy_scene(0.001, 0.002)
-    free, crowded = (made.to_json(reserved) for reserved in (0, 700_000))
-    sizes = [len(json.dumps(found)) for found in (free, crowded)]
-    assert sizes[0] - sizes[1] > 300_000
+    assert 10 * (scene + probes) + rest < LARGEST_PAGE
 
 
 def test_panels_name_arrays_that_are_there(example: Example) -> None:
     """A dangling number would be an error when the reader chooses the panel."""
     for scene in example.scenes:
-        keys = [panel["key"] for panel in scene["panels"]]
+        assert (scene["height"], scene["width"], scene["stride"]) == (SIZE, SIZE, 1)
+        keys = [shown["key"] for shown in scene["panels"]]
         assert len(set(keys)) == len(keys)
-        kinds = {panel["kind"] for panel in scene["panels"]}
+        kinds = {shown["kind"] for shown in scene["panels"]}
         assert kinds <= {"picture", "disparity", "error", "change", "confidence", "grey", "mask", "outline"}
-        for panel in scene["panels"]:
+        for shown in scene["panels"]:
             for role in ("map", "minus", "ground_truth", "confidence"):
-                if role in panel:
-                    array = scene["arrays"][panel[role]]
-                    is_mask = role == "map" and panel["kind"] in ("mask", "outline")
-                    assert ("step" not in array) == is_mask, (panel, role)
+                if role in shown:
+                    is_mask = role == "map" and shown["kind"] in ("mask", "outline")
+                    assert (scene["arrays"][shown[role]]["step"] == 1) == is_mask, (shown, role)
         assert {scene["first"]["a"], scene["first"]["b"]} <= set(keys)
 
 
 def test_a_scene_has_every_panel(example: Example) -> None:
     """Reference view, truth, every stage, errors, changes, masks, confidence, other methods."""
-    panels = {scene["scene"]: {panel["key"]: panel for panel in scene["panels"]} for scene in example.scenes}
-    stages = {f"{variant}/{stage}" for variant in ("paper", "best") for stage in example.plan.stages}
+    panels = {scene["scene"]: {shown["key"]: shown for shown in scene["panels"]} for scene in example.scenes}
+    numbered = [f"{number}_{stage}" for number, stage in enumerate(example.plan.stages, start=1)]
+    stages = {f"{variant}/{stage}" for variant in ("paper", "best") for stage in numbered}
     cotton = set(panels["cotton"])
-    assert {"centre", "ground_truth", "occluded-ground-truth", "textureless-ground-truth", *stages} <= cotton
-    assert {"paper/error", "best/error", "best/change", "imported/SPO", "imported/SPO/error"} <= cotton
+    assert {"reference_view", "ground_truth", "occluded_ground_truth", "textureless_ground_truth", *stages} <= cotton
+    assert {"paper/error", "best/error", "best/change", "external/SPO/disparity", "external/SPO/error"} <= cotton
     assert {"paper/confidence", "best/confidence", "paper/superpixels", "paper/lti"} <= cotton
     for kind, count in (("mask", 6), ("outline", 1), ("grey", 1)):
-        assert sum(panel["kind"] == kind for panel in panels["cotton"].values()) == count, kind
-    assert not any("imported" in key for key in panels["dots"])
+        assert sum(shown["kind"] == kind for shown in panels["cotton"].values()) == count, kind
+    assert not any("external" in key for key in panels["dots"])
     without = set(panels["picture"])
     assert stages <= without
     assert not any("ground_truth" in key or "error" in key or "change" in key for key in without)
     assert re.fullmatch(r"MSE \d+\.\d\d, Q25 \d+\.\d\d, BadPix 0\.07 \d+\.\d %", panels["cotton"]["best/error"]["note"])
-    assert note_of(Evaluation()) is None
+    assert note_of(Evaluation()) == ""
 
 
 def test_the_view_of_the_camera_is_handed_on(example: Example) -> None:
@@ -199,7 +180,7 @@ def test_the_view_of_the_camera_is_handed_on(example: Example) -> None:
     maps = {name: {"optimize": example.final(COTTON, name)} for name in ("best", "paper")}
     results = SceneResults(moved, maps, {name: Evaluation() for name in maps}, ["best", "paper"])
     truthless = replace(results, light_field=replace(moved, ground_truth=None))
-    camera = viewer_of(truthless).to_json()["camera"]
+    camera = page_json(truthless, panels_of(truthless), *COTTON, [])["camera"]
     assert camera == {
         "scale": light_field.camera.scale,
         "offset": light_field.camera.offset,
@@ -236,11 +217,6 @@ def test_the_page_is_one_file(example: Example) -> None:
     style = text[text.index("<style>") : text.index("</style>")]
     assert "@import" not in style
     assert "url(" not in style
-
-
-def test_equal_input_gives_equal_bytes(example: Example) -> None:
-    again = page_of(copy.deepcopy(example.numbers), copy.deepcopy(example.scenes), drawn(EDGES))
-    assert again == example.page.read_text(encoding="utf-8")
 
 
 def test_the_page_says_what_it_is_about(example: Example) -> None:
@@ -423,9 +399,3 @@ def test_a_chart_without_a_scene_with_truth(example: Example, tmp_path: Path) ->
     charts.write_bars(tmp_path, "ablation", [])
     picture = cv2.imread(str(tmp_path / "ablation.png"))
     assert (picture < 128).any()
-
-
-def test_the_size_of_what_is_shown(example: Example) -> None:
-    for scene in example.scenes:
-        assert (scene["height"], scene["width"], scene["stride"]) == (SIZE, SIZE, 1)
-        assert scene["grid"] == [5, 5]

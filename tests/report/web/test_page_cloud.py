@@ -152,6 +152,6 @@ def test_the_point_cloud_of_another_map_and_other_colours(page: Any) -> None:
     page.select_option('[data-part="cloud-colours"]', "disparity")
     two = changed_pixels(page, CLOUD, one)
     assert (one[:, :, 3] == two[:, :, 3]).all()
-    page.select_option('[data-part="cloud-map"]', "imported/SPO")
+    page.select_option('[data-part="cloud-map"]', "external/SPO/disparity")
     assert (changed_pixels(page, CLOUD, two)[:, :, 3] != two[:, :, 3]).any()
     assert int(page.get_attribute(CLOUD, "data-points")) < SIZE * SIZE - 20, "unknown pixels have no point"

@@ -56,20 +56,6 @@ def test_the_slider_wipes_between_two_maps(page: Any) -> None:
     assert page.get_attribute('[data-part="slider"]', "aria-valuetext") == "100 % of A"
 
 
-def test_the_slider_moves_by_dragging(page: Any) -> None:
-    slider = page.locator('[data-part="slider"]')
-    slider.scroll_into_view_if_needed()
-    box = slider.bounding_box()
-    middle = box["y"] + box["height"] / 2
-    page.mouse.move(box["x"] + box["width"] / 2, middle)
-    page.mouse.down()
-    page.mouse.move(box["x"] + 0.25 * box["width"], middle, steps=5)
-    page.mouse.up()
-    value = int(slider.input_value())
-    assert 220 < value < 280
-    assert border_is(page, round(value / 1000 * SIZE))
-
-
 def test_the_picture_itself_can_be_dragged(page: Any) -> None:
     """And a drag is no click: it chooses no pixel."""
     before = page.get_attribute("#pixel", "data-pixel")
@@ -90,11 +76,11 @@ def test_the_picture_itself_can_be_dragged(page: Any) -> None:
 
 def test_swapping_and_choosing(page: Any) -> None:
     page.click('[data-part="swap"]')
-    page.wait_for_selector('#viewer[data-shown="best/optimize centre"]')
+    page.wait_for_selector('#viewer[data-shown="best/4_optimize reference_view"]')
     assert border_is(page, SIZE // 2)
-    figure = page.locator('figure[data-key="paper/initial"]')
+    figure = page.locator('figure[data-key="paper/1_initial"]')
     figure.get_by_role("button", name="as B").click()
-    page.wait_for_selector('#viewer[data-shown="best/optimize paper/initial"]')
+    page.wait_for_selector('#viewer[data-shown="best/4_optimize paper/1_initial"]')
     assert border_is(page, SIZE // 2)
     assert "paper" in part(page, "legends")
 
@@ -104,7 +90,7 @@ def test_the_read_out_shows_the_values_of_the_files(page: Any, example: Example)
     ground_truth = example.light_field(COTTON).ground_truth
     assert ground_truth is not None
     finals = {side: example.final(COTTON, variant) for side, variant in (("a", "paper"), ("b", "best"))}
-    choose(page, a="paper/optimize", b="best/optimize")
+    choose(page, a="paper/4_optimize", b="best/4_optimize")
     for x, y in PLACES:
         point_at(page, x, y)
         shown = read_out(page)
@@ -140,10 +126,10 @@ def test_the_read_out_of_other_maps_is_right_within_their_step(page: Any, exampl
     step = next(scene for scene in example.scenes if scene["scene"] == "cotton")["arrays"]
     panels = {panel["key"]: panel for panel in page.evaluate("Sepi.viewer.scene.panels")}
     maps = {
-        "paper/initial": example.stage(COTTON, "paper", "initial").disparity,
-        "best/occlusion": example.stage(COTTON, "best", "occlusion").disparity,
+        "paper/1_initial": example.stage(COTTON, "paper", "initial").disparity,
+        "best/2_occlusion": example.stage(COTTON, "best", "occlusion").disparity,
         "best/confidence": example.final(COTTON, "best").confidence,
-        "imported/SPO": example.imported,
+        "external/SPO/disparity": example.external,
     }
     for key, values in maps.items():
         choose(page, a=key)
@@ -158,7 +144,7 @@ def test_the_read_out_of_other_maps_is_right_within_their_step(page: Any, exampl
 
 
 def test_pictures_have_no_numbers(page: Any) -> None:
-    choose(page, a="centre", b="occluded-ground-truth")
+    choose(page, a="reference_view", b="occluded_ground_truth")
     point_at(page, 10, 10)
     shown = read_out(page)
     assert {shown[f"{name} {side}"] for name in ("value", "error", "confidence") for side in "ab"} == {"–"}
@@ -166,8 +152,8 @@ def test_pictures_have_no_numbers(page: Any) -> None:
 
 def test_every_panel_of_the_grid_reads_out(page: Any, example: Example) -> None:
     """The cursor over a small panel is the cursor everywhere."""
-    choose(page, b="best/optimize")
-    for key in ("ground_truth", "paper/initial"):
+    choose(page, b="best/4_optimize")
+    for key in ("ground_truth", "paper/1_initial"):
         selector = visible_tile(page, key)
         for x, y in ((12, 40), (55, 20)):
             point_at(page, x, y, selector)
@@ -203,8 +189,8 @@ def test_maps_have_the_colours_of_the_figures(page: Any, example: Example) -> No
     """A page and a paper must not disagree: viridis, the scene's limits, magenta for unknown."""
     light_field = example.light_field(COTTON)
     limits = disparity_limits(light_field)
-    expected = map_picture(example.imported, limits).astype(int)
-    shown = map_pixels(page, "imported/SPO")[:, :, :3].astype(int)
+    expected = map_picture(example.external, limits).astype(int)
+    shown = map_pixels(page, "external/SPO/disparity")[:, :, :3].astype(int)
     assert (shown[UNKNOWN] == (255, 0, 255)).all()
     assert np.abs(shown - expected).max() <= 6
     best = example.final(COTTON, "best").disparity
@@ -215,12 +201,12 @@ def test_maps_have_the_colours_of_the_figures(page: Any, example: Example) -> No
 def test_the_reference_view_is_the_picture(page: Any, example: Example) -> None:
     """Compressed, but upright, not mirrored, its colours in order."""
     light_field = example.light_field(COTTON)
-    shown = map_pixels(page, "centre")[:, :, :3].astype(int)
+    shown = map_pixels(page, "reference_view")[:, :, :3].astype(int)
     off = shown - light_field.views[light_field.reference_position]
     assert np.abs(off.mean(axis=2)).mean() < 5
     assert np.abs(off.mean(axis=(0, 1))).max() < 4
     mask = light_field.masks["occluded"]
-    over = map_pixels(page, "occluded-ground-truth")[:, :, :3].astype(int)
+    over = map_pixels(page, "occluded_ground_truth")[:, :, :3].astype(int)
     assert (over[mask][:, 0] > over[mask][:, 2] + 60).all()
     assert (np.abs(over[~mask] - shown[~mask] / 2) <= 1).all()
 
@@ -237,7 +223,7 @@ def magnified(picture: Any, x: int, y: int, side: int, reach: int = 20) -> Any:
 @pytest.mark.parametrize(("x", "y"), [(12, 30), (50, 8)])
 def test_close_ups_in_all_panels_follow_the_cursor(page: Any, x: int, y: int) -> None:
     """In a lower corner of each panel, the one that is farther away from the cursor."""
-    keys = ("ground_truth", "best/textureless")
+    keys = ("ground_truth", "best/3_textureless")
     page.locator(tile(keys[1])).scroll_into_view_if_needed()
     for key in keys:
         visible_tile(page, key)
@@ -265,10 +251,10 @@ def test_close_ups_in_all_panels_follow_the_cursor(page: Any, x: int, y: int) ->
 
 
 def test_the_large_close_ups_follow_the_cursor(page: Any) -> None:
-    choose(page, a="ground_truth", b="paper/optimize")
+    choose(page, a="ground_truth", b="paper/4_optimize")
     for x, y in ((10, 12), (60, 40)):
         point_at(page, x, y)
-        for side, key in (("a", "ground_truth"), ("b", "paper/optimize")):
+        for side, key in (("a", "ground_truth"), ("b", "paper/4_optimize")):
             seen = canvas_pixels(page, f'[data-part="close-{side}"]')[:, :, :3].astype(int)
             wanted = magnified(map_pixels(page, key), x, y, len(seen)).astype(int)
             assert (np.abs(seen - wanted).max(axis=2) < 12).mean() > 0.95
@@ -287,13 +273,13 @@ def test_another_scene_changes_everything(page: Any, example: Example) -> None:
     page.locator(CLOUD).scroll_into_view_if_needed()
     page.wait_for_selector(f"{CLOUD}[data-points]")
     cloud, picture = canvas_pixels(page, CLOUD), canvas_pixels(page, WIPE)
-    choose(page, b="paper/optimize")
+    choose(page, b="paper/4_optimize")
     show_scene(page, DOTS_TITLE)
     changed_pixels(page, CLOUD, cloud)
     assert (canvas_pixels(page, WIPE) != picture).any()
-    assert page.input_value('[data-part="b"]') == "paper/optimize", "the map that was looked at stays chosen"
+    assert page.input_value('[data-part="b"]') == "paper/4_optimize", "the map that was looked at stays chosen"
     assert part(page, "pixels").startswith("1 textured and sure")
-    assert page.locator('[data-part="b"] option[value="imported/SPO"]').count() == 0
+    assert page.locator('[data-part="b"] option[value="external/SPO/disparity"]').count() == 0
     point_at(page, 20, 44)
     assert float(read_out(page)["value b"]) == as_shown(example.final(("builtin", "dots"), "paper").disparity[44, 20])
     page.click("#next")
@@ -307,14 +293,14 @@ def test_a_scene_without_truth(page: Any, example: Example) -> None:
     """Maps and numbers, but neither truth nor errors."""
     show_scene(page, PICTURE_TITLE)
     keys = page.locator('[data-part="a"] option').evaluate_all("(all) => all.map((o) => o.value)")
-    assert "best/optimize" in keys
+    assert "best/4_optimize" in keys
     assert not [key for key in keys if "error" in key or "ground_truth" in key or "change" in key]
-    choose(page, a="best/optimize")
+    choose(page, a="best/4_optimize")
     point_at(page, 33, 12)
     shown = read_out(page)
     assert float(shown["value a"]) == as_shown(example.final(PICTURE, "best").disparity[12, 33])
     assert (shown["ground_truth"], shown["error a"]) == ("–", "–")
-    assert "truthunknown" in part(page, "facts")
+    assert "ground truthunknown" in part(page, "facts")
     assert page.locator("#changes canvas").count() == 0
 
 
@@ -322,8 +308,8 @@ def test_what_an_earlier_scene_began_is_not_shown(page: Any) -> None:
     """A slow scene, left before it is there, must not appear over the one that was chosen after it."""
     page.evaluate(
         """() => {
-          const quick = Sepi.unpackMap;
-          Sepi.unpackMap = async (...given) => {
+          const quick = Sepi.unpack;
+          Sepi.unpack = async (...given) => {
             const late = window.slow;
             if (late) await new Promise((done) => setTimeout(done, 400));
             const found = await quick(...given);
@@ -347,9 +333,9 @@ def test_what_an_earlier_scene_began_is_not_shown(page: Any) -> None:
     settled(page)
     assert page.evaluate("Sepi.viewer.scene.scene") == "picture"
     assert border_is(page, SIZE // 2)
-    selector = visible_tile(page, "best/initial")
+    selector = visible_tile(page, "best/1_initial")
     seen = cv2.resize(canvas_pixels(page, selector), (SIZE, SIZE), interpolation=cv2.INTER_AREA)
-    wanted = map_pixels(page, "best/initial")
+    wanted = map_pixels(page, "best/1_initial")
     top = slice(0, SIZE // 3)
     assert (np.abs(seen[top].astype(int) - wanted[top].astype(int)).max(axis=2) < 40).mean() > 0.8
     point_at(page, 12, 40)

@@ -7,7 +7,6 @@ Sepi.Cloud = class {
   constructor(root) {
     this.root = root;
     this.canvas = this.part("cloud");
-    this.turn = 0;
     this.pointers = new Map();
     this.part("cloud-map").addEventListener("change", () => this.load());
     this.part("cloud-colours").addEventListener("change", () => this.load());
@@ -37,14 +36,11 @@ Sepi.Cloud = class {
     const select = this.part("cloud-map");
     const before = select.value;
     select.replaceChildren(...Sepi.options(maps));
-    const first = panels.scene.first?.b;
-    const wanted = [before, first].find((key) => maps.some((panel) => panel.key === key));
-    if (wanted) select.value = wanted;
+    select.value = maps.some(({ key }) => key === before) ? before : panels.scene.first.b;
     const colours = this.part("cloud-colours");
     colours.options[0].disabled = !panels.scene.picture;
     if (!panels.scene.picture) colours.value = "disparity";
-    this.angles = [0.35, 0.2];
-    this.zoom = 1;
+    this.reset();
     const box = this.canvas.getBoundingClientRect();
     if (box.top < innerHeight && box.bottom > 0) this.load();
   }
@@ -59,14 +55,14 @@ Sepi.Cloud = class {
   async load() {
     if (!this.panels) return;
     const key = this.part("cloud-map").value;
-    const wanted = `${key} ${this.part("cloud-colours").value}`;
-    if (this.loaded === wanted || !key) return;
-    this.loaded = wanted;
+    const requested = `${key} ${this.part("cloud-colours").value}`;
+    if (this.loaded === requested || !key) return;
+    this.loaded = requested;
     const { panels } = this;
     const panel = panels.get(key);
     const disparity = await panels.values(panel);
-    const picture = await panels.picture(this.part("cloud-colours").value === "view" ? "centre" : key);
-    if (panels !== this.panels || this.loaded !== wanted) return;
+    const picture = await panels.picture(this.part("cloud-colours").value === "view" ? "reference_view" : key);
+    if (panels !== this.panels || this.loaded !== requested) return;
     const { width, height } = panels.scene;
     const image = picture.getContext("2d").getImageData(0, 0, width, height);
     this.points = Sepi.points(panels.scene, disparity, new Uint32Array(image.data.buffer));
@@ -190,7 +186,7 @@ Sepi.centred = (positions, colours) => {
   return { positions, colours, n };
 };
 
-/** Draw points, nearer ones over farther ones; returns how many lie in the picture. */
+/** Draw points, nearer ones over more distant ones; returns how many lie in the picture. */
 Sepi.splat = ({ positions, colours, n }, pixels, width, height, [yaw, pitch], zoom) => {
   const depth = new Float32Array(width * height).fill(Infinity);
   const [cy, sy, cp, sp] = [Math.cos(yaw), Math.sin(yaw), Math.cos(pitch), Math.sin(pitch)];

@@ -4,6 +4,9 @@
 
 Sepi.UNKNOWN = [255, 0, 255]; // magenta is in none of the scales
 
+/** Whether a panel is drawn over the reference view, and has no numbers. */
+Sepi.overView = ({ kind }) => ["picture", "mask", "outline"].includes(kind);
+
 /** Scales of 256 colours, [r, g, b, r, ...], by name. */
 Sepi.scales = () => {
   Sepi.knownScales ??= Object.fromEntries(
@@ -17,14 +20,24 @@ Sepi.Panels = class {
   constructor(scene) {
     this.scene = scene;
     this.list = scene.panels;
-    this.arrays = new Sepi.Arrays(scene);
-    this.drawn = new Map();
-    this.byKey = new Map(this.list.map((panel) => [panel.key, panel]));
-    this.groundTruth = this.byKey.get("ground_truth");
+    this.arrays = [];
+    this.drawn = {};
+    this.groundTruth = this.get("ground_truth");
   }
 
   get(key) {
-    return this.byKey.get(key);
+    return this.list.find((panel) => panel.key === key);
+  }
+
+  /** An array of the scene, unpacked once, when it is first asked for. */
+  array(number) {
+    this.arrays[number] ??= Sepi.unpack(this.scene.arrays[number], this.scene.width);
+    return this.arrays[number];
+  }
+
+  /** Decimals that tell the steps of an array apart. */
+  decimals(number) {
+    return this.scene.arrays[number].step < 0.01 ? 3 : 2;
   }
 
   /** Colour scale of a panel, and the values at its ends. */
@@ -37,49 +50,40 @@ Sepi.Panels = class {
 
   /** Numbers that a panel shows, as an array over the pixels; null for pictures and masks. */
   async values(panel) {
-    if (["picture", "mask", "outline"].includes(panel.kind)) return null;
-    const map = await this.arrays.get(panel.map);
+    if (Sepi.overView(panel)) return null;
+    const map = await this.array(panel.map);
     if (panel.minus === undefined) return map;
-    const other = await this.arrays.get(panel.minus);
+    const other = await this.array(panel.minus);
     if (panel.kind !== "change") return map.map((value, i) => value - other[i]);
-    const groundTruth = await this.arrays.get(panel.ground_truth);
+    const groundTruth = await this.array(panel.ground_truth);
     return map.map((value, i) => Math.abs(value - groundTruth[i]) - Math.abs(other[i] - groundTruth[i]));
-  }
-
-  /** Decimals to print a panel's numbers with. */
-  decimals(panel) {
-    return this.arrays.decimals(panel.map);
   }
 
   /** The panel as a canvas of the maps' size. */
   picture(key) {
-    if (!this.drawn.has(key)) this.drawn.set(key, this.draw(this.get(key)));
-    return this.drawn.get(key);
+    this.drawn[key] ??= this.draw(this.get(key));
+    return this.drawn[key];
   }
 
   async draw(panel) {
     const { width, height } = this.scene;
     const canvas = Sepi.canvas(width, height);
     const context = canvas.getContext("2d", { willReadFrequently: true });
-    const overView = ["picture", "mask", "outline"].includes(panel.kind);
+    const overView = Sepi.overView(panel);
     if (overView && this.scene.picture) context.drawImage(await this.view(), 0, 0);
     if (panel.kind === "picture") return canvas;
     const image = context.getImageData(0, 0, width, height);
-    if (overView) this.overlay(image.data, await this.arrays.get(panel.map), panel.kind);
+    if (overView) this.overlay(image.data, await this.array(panel.map), panel.kind);
     else this.colour(image.data, await this.values(panel), ...this.scale(panel));
     context.putImageData(image, 0, 0);
     return canvas;
   }
 
   /** The reference view as a decoded image. */
-  view() {
-    this.decoded ??= (async () => {
-      const image = new Image();
-      image.src = this.scene.picture;
-      await image.decode();
-      return image;
-    })();
-    return this.decoded;
+  async view() {
+    this.image ??= Sepi.element("img", { src: this.scene.picture });
+    await this.image.decode();
+    return this.image;
   }
 
   colour(data, values, name, low, high) {
@@ -107,7 +111,7 @@ Sepi.Panels = class {
 
 /** A legend of a panel's colours, with the values at its ends. */
 Sepi.legend = (panels, panel) => {
-  if (["picture", "mask", "outline"].includes(panel.kind)) return Sepi.element("span", { className: "legend" });
+  if (Sepi.overView(panel)) return Sepi.element("span", { className: "legend" });
   const [name, low, high] = panels.scale(panel);
   const scale = Sepi.scales()[name];
   const stops = Array.from({ length: 17 }, (_, i) => {
@@ -119,7 +123,7 @@ Sepi.legend = (panels, panel) => {
   const words = panel.ends ?? {
     disparity: ["far", "near"],
     error: ["too far", "too near"],
-    change: ["harmed", "mended"],
+    change: ["degraded", "improved"],
     confidence: ["low", "high"],
     grey: ["low", "high"],
   }[panel.kind];

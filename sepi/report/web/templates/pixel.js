@@ -24,10 +24,9 @@ Sepi.Pixels = class {
     this.scene = scene;
     this.probes = scene.probes ?? [];
     this.root.hidden = this.probes.length === 0;
-    const buttons = this.probes.map((probe, number) => {
-      const button = Sepi.element("button", { type: "button" }, `${number + 1} ${probe.label}`);
-      button.addEventListener("click", () => this.select(number));
-      return button;
+    const buttons = this.probes.map(({ label }, number) => {
+      const properties = { type: "button", onclick: () => this.select(number) };
+      return Sepi.element("button", properties, `${number + 1} ${label}`);
     });
     this.part("pixels").replaceChildren(...buttons);
     if (this.probes.length) this.select(0);
@@ -38,31 +37,28 @@ Sepi.Pixels = class {
     if (!this.probes.length) return;
     const { stride } = this.scene;
     const distance = (probe) => Math.hypot(probe.x - stride * x, probe.y - stride * y);
-    const number = this.probes.reduce(
-      (best, probe, i) => (distance(probe) < distance(this.probes[best]) ? i : best),
-      0,
-    );
+    const distances = this.probes.map(distance);
+    const number = distances.indexOf(Math.min(...distances));
     this.select(number);
+    if (distances[number] < stride) return;
     const asked = `${this.scene.dataset}/${this.scene.scene}: [[${stride * y}, ${stride * x}]]`;
     this.part("asked").textContent =
-      distance(this.probes[number]) < stride
-        ? ""
-        : `You clicked x ${stride * x}, y ${stride * y}; the nearest prepared pixel is shown. ` +
-          `To have that one: config.yaml, report, pixels: {${asked}}`;
+      `You clicked x ${stride * x}, y ${stride * y}; the nearest prepared pixel is shown. ` +
+      `To have that one: config.yaml, report, pixels: {${asked}}`;
   }
 
   select(number) {
     const probe = this.probes[number];
     this.part("asked").textContent = "";
     [...this.part("pixels").children].forEach((button, i) => button.setAttribute("aria-pressed", i === number));
-    const value = (d) => (d === null || d === undefined ? "unknown" : d.toFixed(3));
-    const occlusion = `${probe.occluded ? "occluded" : "not occluded"}; kept: ${Sepi.subset(probe.side)}`;
+    const value = (d) => d?.toFixed(3) ?? "unknown";
+    const occlusion = `${probe.occluded ? "occluded" : "not occluded"}; kept: ${Sepi.subset(probe.kept_subset)}`;
     const facts = {
       pixel: `x ${probe.x}, y ${probe.y} ([${probe.y}, ${probe.x}] in the configuration)`,
       "chosen by paper": value(probe.chosen),
       "chosen by best": value(probe.best),
-      "least cost": `${value(probe.minimum)} (all views); lowest of all with: ${Sepi.subset(probe.best_subset)}`,
-      ground_truth: value(probe.ground_truth),
+      "lowest cost": `${value(probe.minimum)} (all views); lowest of all subsets: ${Sepi.subset(probe.best_subset)}`,
+      "ground truth": value(probe.ground_truth),
       confidence: value(probe.confidence),
       occlusion: `${occlusion}${probe.textureless ? "; textureless" : ""}`,
     };
@@ -84,7 +80,7 @@ Sepi.Pixels = class {
     // known before they are decoded, so that nothing below jumps
     const size = { width: Sepi.SEPI_WIDTH, height: rows * columns };
     const names = {
-      minimum: "SEPI at the least cost",
+      minimum: "SEPI at the lowest cost",
       chosen: "SEPI at the chosen candidate",
       ground_truth: "SEPI at the ground truth",
       wrong: "SEPI at the worst candidate",
@@ -93,20 +89,12 @@ Sepi.Pixels = class {
     const figures = shown.map((name) => {
       const { disparity, src } = probe.sepi[name];
       const title = `${names[name]}: ${disparity.toFixed(3)}`;
-      return Sepi.element(
-        "figure",
-        {},
-        Sepi.element("div", { className: "sepi" }, Sepi.element("img", { src, alt: title, ...size })),
-        Sepi.element("figcaption", {}, title),
-      );
+      const picture = Sepi.element("img", { src, alt: title, ...size });
+      return Sepi.figure(Sepi.element("div", { className: "sepi" }, picture), title);
     });
-    const patch = Sepi.element(
-      "figure",
-      {},
-      Sepi.element("img", { src: probe.patch, alt: "the pixel in every view at the chosen candidate", className: "patch" }),
-      Sepi.element("figcaption", {}, "the pixel in every view"),
-    );
-    return [...figures, patch, this.keptViews(probe)];
+    const alt = "the pixel in every view at the chosen candidate";
+    const patch = Sepi.element("img", { src: probe.patch, alt, className: "patch" });
+    return [...figures, Sepi.figure(patch, "the pixel in every view"), this.keptViews(probe)];
   }
 
   /** The view grid, with the views that the half-SEPI keeps. */
@@ -121,10 +109,9 @@ Sepi.Pixels = class {
         class: probe.kept[i] === "1" ? "kept" : "left-out",
       }),
     );
-    const svg = Sepi.shape("svg", { viewBox: `0 0 ${columns} ${rows}`, class: "views", role: "img" }, ...cells);
-    const words = `views kept: ${Sepi.subset(probe.side)}`;
-    svg.setAttribute("aria-label", words);
-    return Sepi.element("figure", {}, svg, Sepi.element("figcaption", {}, words));
+    const words = `views kept: ${Sepi.subset(probe.kept_subset)}`;
+    const box = { viewBox: `0 0 ${columns} ${rows}`, class: "views", role: "img", "aria-label": words };
+    return Sepi.figure(Sepi.shape("svg", box, ...cells), words);
   }
 };
 
@@ -142,78 +129,51 @@ Sepi.shape = (name, attributes = {}, ...children) => {
 Sepi.curves = (probe) => {
   // letters keep their size on a phone
   const width = matchMedia("(max-width: 800px)").matches ? 380 : 620;
-  const [height, left, bottom, top] = [300, 44, 40, 38];
-  const costs = Object.fromEntries(
-    Object.entries(probe.costs).map(([name, text]) => [name, new Uint16Array(Sepi.bytes(text).buffer)]),
-  );
-  const highest = Math.max(0.02, ...Object.values(costs).map((curve) => Math.max(...curve) / 65535));
+  const [left, right, top, base, height] = [44, width - 20, 38, 260, 300];
+  const costs = Object.entries(probe.costs).map(([name, text]) => [name, new Uint16Array(Sepi.bytes(text).buffer)]);
+  const highest = Math.max(0.02, ...costs.map(([, curve]) => Math.max(...curve) / 65535));
   const [low, high] = probe.range;
-  const across = (d) => left + ((d - low) / (high - low || 1)) * (width - left - 20);
-  const up = (cost) => height - bottom - (cost / highest) * (height - bottom - top);
-  const lines = Object.entries(costs)
-    .sort(([one], [other]) => (one === "full") - (other === "full"))
-    .map(([name, curve]) => {
-      const last = curve.length - 1;
-      const points = Array.from(curve, (cost, k) => {
-        const d = low + ((high - low) * k) / last;
-        return `${across(d).toFixed(1)},${up(cost / 65535).toFixed(1)}`;
-      });
-      const line = Sepi.shape("polyline", { points: points.join(" "), class: name === "full" ? "full" : "part" });
-      if (Sepi.CURVES[name]) line.setAttribute("style", `stroke: ${Sepi.CURVES[name]}; stroke-width: 1.6`);
-      line.append(Sepi.shape("title", {}, name));
-      return line;
-    });
+  const at = (share) => low + share * (high - low);
+  const across = (d) => left + ((d - low) / (high - low || 1)) * (right - left);
+  const up = (cost) => base - (cost / highest) * (base - top);
+  const path = (d, name) => Sepi.shape("path", { d, class: name });
+  const text = (place, words) => Sepi.shape("text", { "text-anchor": "middle", ...place }, words);
+  const axes = [
+    path(`M${left},${top}V${base}H${right}`, "axis"),
+    ...[0, 0.25, 0.5, 0.75, 1].map(at).flatMap((d) => [
+      path(`M${across(d)},${base}v4`, "axis"),
+      text({ x: across(d), y: base + 17 }, d.toFixed(2)),
+    ]),
+    text({ x: (left + width) / 2, y: height - 4 }, "candidate disparity, pixels per view step"),
+    text({ x: left - 6, y: base + 4, "text-anchor": "end" }, "0"),
+    text({ x: left - 6, y: top + 8, "text-anchor": "end" }, highest.toFixed(2)),
+    text({ transform: `translate(12 ${(base + top) / 2}) rotate(-90)` }, "cost"),
+  ];
+  // that of all views upon the others
+  costs.sort(([one], [other]) => (one === "full") - (other === "full"));
+  const lines = costs.map(([name, curve]) => {
+    const point = (cost, k) => `${across(at(k / (curve.length - 1))).toFixed(1)},${up(cost / 65535).toFixed(1)}`;
+    const style = Sepi.CURVES[name] ? `stroke: ${Sepi.CURVES[name]}; stroke-width: 1.6` : "";
+    const looks = { points: Array.from(curve, point).join(" "), class: name === "full" ? "full" : "part", style };
+    return Sepi.shape("polyline", looks, Sepi.shape("title", {}, name));
+  });
+  const marks = Object.entries({ ground_truth: probe.ground_truth, paper: probe.chosen, best: probe.best })
+    .filter(([, d]) => d !== null)
+    .flatMap(([name, d], i) => [
+      path(`M${across(d)},${top}V${base}`, `mark ${name}`),
+      Sepi.shape("text", { x: across(d) + 3, y: top - 14 + 11 * i, class: `mark ${name}` }, name.replace("_", " ")),
+    ]);
+  const box = { viewBox: `0 0 ${width} ${height}`, class: "chart", role: "img", "aria-label": "cost over the candidates" };
+  const key = { "all views": "currentColor", ...Sepi.CURVES, quarters: "gray" };
+  const words = Object.entries(key).map(([name, colour]) => {
+    const line = Sepi.element("i");
+    line.style.background = colour;
+    return Sepi.element("span", {}, line, ` ${name} `);
+  });
   return Sepi.element(
     "div",
     {},
-    Sepi.shape(
-      "svg",
-      { viewBox: `0 0 ${width} ${height}`, class: "chart", role: "img", "aria-label": "cost over the candidates" },
-      ...Sepi.chartAxes(width, height, left, bottom, top, [low, high], highest),
-      ...lines,
-      ...Sepi.chartMarks(probe, across, up, top, height - bottom),
-    ),
-    Sepi.curveKey(),
+    Sepi.shape("svg", box, ...axes, ...lines, ...marks),
+    Sepi.element("p", { className: "key" }, ...words),
   );
 };
-
-Sepi.chartAxes = (width, height, left, bottom, top, [low, high], highest) => {
-  const base = height - bottom;
-  const text = (x, y, words, anchor = "middle") => Sepi.shape("text", { x, y, "text-anchor": anchor }, words);
-  const ticks = [0, 0.25, 0.5, 0.75, 1].flatMap((share) => {
-    const x = left + share * (width - left - 20);
-    return [
-      Sepi.shape("path", { d: `M${x},${base}v4`, class: "axis" }),
-      text(x, base + 17, (low + share * (high - low)).toFixed(2)),
-    ];
-  });
-  return [
-    Sepi.shape("path", { d: `M${left},${top}V${base}H${width - 20}`, class: "axis" }),
-    ...ticks,
-    text((left + width) / 2, height - 4, "candidate disparity, pixels per view step"),
-    text(left - 6, base + 4, "0", "end"),
-    text(left - 6, top + 8, highest.toFixed(2), "end"),
-    Sepi.shape("text", { transform: `translate(12 ${(base + top) / 2}) rotate(-90)`, "text-anchor": "middle" }, "cost"),
-  ];
-};
-
-Sepi.chartMarks = (probe, across, up, top, base) => {
-  const marks = { ground_truth: probe.ground_truth, paper: probe.chosen, best: probe.best };
-  return Object.entries(marks)
-    .filter(([, d]) => d !== null && d !== undefined)
-    .flatMap(([name, d], i) => [
-      Sepi.shape("path", { d: `M${across(d)},${top}V${base}`, class: `mark ${name}` }),
-      Sepi.shape("text", { x: across(d) + 3, y: top - 14 + 11 * i, class: `mark ${name}` }, name),
-    ]);
-};
-
-Sepi.curveKey = () =>
-  Sepi.element(
-    "p",
-    { className: "key" },
-    ...[["all views", "currentColor"], ...Object.entries(Sepi.CURVES), ["quarters", "gray"]].map(([name, colour]) => {
-      const line = Sepi.element("i");
-      line.style.background = colour;
-      return Sepi.element("span", {}, line, ` ${name} `);
-    }),
-  );

@@ -1,6 +1,6 @@
 "use strict";
 
-/* What sepi.report.web.packing packed: base64, deflate, residuals of the median edge predictor. */
+/* What sepi.report.web.packing packed: base64, deflate, differences to the row above. */
 const Sepi = {};
 
 /** The element with this id. */
@@ -13,6 +13,9 @@ Sepi.element = (name, properties = {}, ...children) => {
   made.append(...children);
   return made;
 };
+
+Sepi.figure = (content, ...caption) =>
+  Sepi.element("figure", {}, content, Sepi.element("figcaption", {}, ...caption));
 
 /** A name that may go on in the next line after _ and /. */
 Sepi.breakable = (name) =>
@@ -30,61 +33,16 @@ Sepi.inflate = async (text) => {
   return new Uint8Array(await new Response(stream).arrayBuffer());
 };
 
-/** Class of a pixel whose neighbours differ by so many steps. */
-Sepi.classOf = (activity) => (activity < 3 ? activity : Math.min(7, 33 - Math.clz32(activity - 1)));
-
-/** A map as Float32Array, row after row; NaN is unknown. */
-Sepi.unpackMap = async (array, width, height) => {
-  const planes = await Sepi.inflate(array.data);
-  const next = [...array.starts];
-  const count = width * height;
-  const levels = new Int32Array(count);
+/** A map as Float32Array, row after row; NaN is unknown. A mask is a map of 0 and 1. */
+Sepi.unpack = async ({ step, base, data }, width) => {
+  const planes = await Sepi.inflate(data);
+  const count = planes.length / 2;
+  const levels = new Uint16Array(count); // sums wrap as the differences did
   const values = new Float32Array(count);
-  for (let y = 0, i = 0; y < height; y++) {
-    for (let x = 0; x < width; x++, i++) {
-      const left = x ? levels[i - 1] : 0;
-      const up = y ? levels[i - width] : 0;
-      const corner = x && y ? levels[i - width - 1] : 0;
-      const ahead = y && x + 1 < width ? levels[i - width + 1] : 0;
-      const activity = Math.abs(left - corner) + Math.abs(up - corner) + Math.abs(up - ahead);
-      const place = next[Sepi.classOf(activity)]++;
-      const low = Math.min(left, up);
-      const high = Math.max(left, up);
-      const predicted = Math.max(low, Math.min(high, left + up - corner));
-      const folded = planes[place] | (planes[place + count] << 8);
-      levels[i] = (predicted + ((folded >> 1) ^ -(folded & 1))) & 0xffff;
-      values[i] = levels[i] ? (levels[i] - 1 + array.base) * array.step : NaN;
-    }
+  for (let i = 0; i < count; i++) {
+    const folded = planes[i] | (planes[i + count] << 8);
+    levels[i] = (i < width ? 0 : levels[i - width]) + ((folded >> 1) ^ -(folded & 1));
+    values[i] = levels[i] ? (levels[i] - 1 + base) * step : NaN;
   }
   return values;
-};
-
-/** A mask as Uint8Array of 0 and 1. */
-Sepi.unpackMask = async (array, width, height) => {
-  const bytes = await Sepi.inflate(array.data);
-  return Uint8Array.from({ length: width * height }, (_, i) => (bytes[i >> 3] >> (7 - (i & 7))) & 1);
-};
-
-/** Arrays of a scene, each unpacked once, when it is first asked for. */
-Sepi.Arrays = class {
-  constructor(scene) {
-    this.scene = scene;
-    this.unpacked = new Map();
-  }
-
-  get(number) {
-    if (!this.unpacked.has(number)) {
-      const { arrays, width, height } = this.scene;
-      const array = arrays[number];
-      const unpack = array.step === undefined ? Sepi.unpackMask : Sepi.unpackMap;
-      this.unpacked.set(number, unpack(array, width, height));
-    }
-    return this.unpacked.get(number);
-  }
-
-  /** Decimals that tell the steps of an array apart. */
-  decimals(number) {
-    const { step } = this.scene.arrays[number];
-    return step < 0.01 ? 3 : 2;
-  }
 };

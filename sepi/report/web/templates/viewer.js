@@ -21,7 +21,7 @@ Sepi.Viewer = class {
     this.watcher = new IntersectionObserver((entries) => this.seen(entries), { rootMargin: "200px" });
     this.slider.addEventListener("input", () => this.drawWipe());
     for (const side of ["a", "b"]) this.part(side).addEventListener("change", () => this.select());
-    this.part("swap").addEventListener("click", () => this.swap());
+    this.part("swap").addEventListener("click", () => this.choose({ a: this.key("b"), b: this.key("a") }));
     this.part("close-ups").addEventListener("change", () => this.drawGrid());
     this.follow(this.wipe, true);
     addEventListener("resize", () => this.drawGrid());
@@ -72,30 +72,17 @@ Sepi.Viewer = class {
     for (const side of ["a", "b"]) {
       const before = this.part(side).value;
       this.part(side).replaceChildren(...Sepi.options(list));
-      this.part(side).value = this.panels.get(before) ? before : this.first(side);
+      this.part(side).value = this.panels.get(before) ? before : this.scene.first[side];
     }
-  }
-
-  /** What is shown before anything is chosen: the reference view beside the first final map. */
-  first(side) {
-    const named = this.scene.first?.[side];
-    return named && this.panels.get(named) ? named : this.panels.list[side === "a" ? 0 : this.panels.list.length > 1 ? 1 : 0].key;
   }
 
   key(side) {
     return this.part(side).value;
   }
 
-  async swap() {
-    const [a, b] = [this.key("a"), this.key("b")];
-    this.part("a").value = b;
-    this.part("b").value = a;
-    await this.select();
-  }
-
-  async choose(side, key) {
-    this.part(side).value = key;
-    await this.select();
+  choose(keys) {
+    for (const [side, key] of Object.entries(keys)) this.part(side).value = key;
+    return this.select();
   }
 
   async select() {
@@ -105,9 +92,9 @@ Sepi.Viewer = class {
     for (const side of ["a", "b"]) {
       const panel = this.panels.get(keys[side]);
       shown[side] = { panel, picture: await this.panels.picture(panel.key), values: await this.panels.values(panel) };
-      if (panel.confidence !== undefined) shown[side].confidence = await this.panels.arrays.get(panel.confidence);
+      if (panel.confidence !== undefined) shown[side].confidence = await this.panels.array(panel.confidence);
     }
-    const groundTruth = this.panels.groundTruth && (await this.panels.arrays.get(this.panels.groundTruth.map));
+    const groundTruth = this.panels.groundTruth && (await this.panels.array(this.panels.groundTruth.map));
     if (turn !== this.turn || keys.a !== this.key("a") || keys.b !== this.key("b")) return;
     this.shown = shown;
     this.groundTruth = groundTruth;
@@ -130,8 +117,8 @@ Sepi.Viewer = class {
 
   /** What is to be said of a panel: its scores, and how finely the page holds it. */
   small(panel) {
-    const step = this.scene.arrays[panel.map]?.step;
-    return [panel.note, step && `held in steps of ${step}`].filter(Boolean).join("; ");
+    const steps = Sepi.overView(panel) ? "" : `held in steps of ${this.scene.arrays[panel.map].step}`;
+    return [panel.note, steps].filter(Boolean).join("; ");
   }
 
   drawWipe() {
@@ -145,18 +132,23 @@ Sepi.Viewer = class {
     }
     this.part("line").style.left = `${this.slider.value / 10}%`;
     this.slider.setAttribute("aria-valuetext", `${Math.round(this.slider.value / 10)} % of A`);
-    for (const side of ["a", "b"]) this.closeUp(this.part(`close-${side}`), this.shown[side].picture);
+    this.drawCloseUps();
+  }
+
+  /** The pixel of the maps that is nearest to a position. */
+  inside(x, y) {
+    const { width, height } = this.scene;
+    return [Math.max(0, Math.min(width - 1, x)), Math.max(0, Math.min(height - 1, y))];
   }
 
   /** Pixels of the maps under a pointer over an element that shows all of them. */
   pixel(element, event) {
     const box = element.getBoundingClientRect();
-    const place = (at, start, length, count) =>
-      Math.max(0, Math.min(count - 1, Math.floor(((at - start) / length) * count)));
-    return [
-      place(event.clientX, box.left, box.width, this.scene.width),
-      place(event.clientY, box.top, box.height, this.scene.height),
-    ];
+    const { width, height } = this.scene;
+    return this.inside(
+      Math.floor(((event.clientX - box.left) / box.width) * width),
+      Math.floor(((event.clientY - box.top) / box.height) * height),
+    );
   }
 
   /** Let the cursor follow the pointer over an element; a drag over the large picture moves the slider. */
@@ -181,14 +173,11 @@ Sepi.Viewer = class {
     });
     if (!wipes) return;
     element.addEventListener("keydown", (event) => {
-      const step = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }[event.key];
+      const move = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }[event.key];
       const [x, y] = this.cursor ?? [this.scene.width >> 1, this.scene.height >> 1];
-      if (step) {
+      if (move) {
         const far = event.shiftKey ? 10 : 1;
-        this.moveTo(
-          Math.max(0, Math.min(this.scene.width - 1, x + far * step[0])),
-          Math.max(0, Math.min(this.scene.height - 1, y + far * step[1])),
-        );
+        this.moveTo(...this.inside(x + far * move[0], y + far * move[1]));
       } else if (event.key === "Enter") this.chosen(x, y);
       else return;
       event.preventDefault();
@@ -201,7 +190,7 @@ Sepi.Viewer = class {
       this.pending = undefined;
       if (!this.shown) return;
       this.readOut();
-      for (const side of ["a", "b"]) this.closeUp(this.part(`close-${side}`), this.shown[side].picture);
+      this.drawCloseUps();
       this.drawGrid();
     });
   }
@@ -209,27 +198,25 @@ Sepi.Viewer = class {
   /** Numbers under the cursor. */
   readOut() {
     if (!this.shown) return;
-    const set = (name, text) => (this.part(name).textContent = text);
-    const marker = this.part("marker");
-    marker.hidden = this.cursor === null;
-    const i = this.cursor ? this.cursor[1] * this.scene.width + this.cursor[0] : -1;
-    const number = (values, decimals) => {
-      if (i < 0 || !values) return "–";
-      return Number.isNaN(values[i]) ? "unknown" : values[i].toFixed(decimals);
+    const { cursor, panels, scene } = this;
+    const show = (name, values, array) => {
+      const value = cursor && values ? values[cursor[1] * scene.width + cursor[0]] : undefined;
+      const known = Number.isNaN(value) ? "unknown" : value?.toFixed(panels.decimals(array));
+      this.part(name).textContent = known ?? "–";
     };
-    const groundTruth = this.panels.groundTruth;
-    set("ground_truth", number(this.groundTruth, groundTruth ? this.panels.decimals(groundTruth) : 0));
+    show("ground_truth", this.groundTruth, panels.groundTruth?.map);
     for (const side of ["a", "b"]) {
       const { panel, values, confidence } = this.shown[side];
-      const decimals = values ? this.panels.decimals(panel) : 0;
-      set(`value-${side}`, number(values, decimals));
-      const compares = panel.kind === "disparity" && this.groundTruth && panel !== groundTruth;
-      set(`error-${side}`, compares ? number(this.errors(side), decimals) : "–");
-      set(`confidence-${side}`, confidence ? number(confidence, this.panels.arrays.decimals(panel.confidence)) : "–");
+      show(`value-${side}`, values, panel.map);
+      const compares = cursor && panel.kind === "disparity" && this.groundTruth && panel !== panels.groundTruth;
+      show(`error-${side}`, compares && this.errors(side), panel.map);
+      show(`confidence-${side}`, confidence, panel.confidence);
     }
-    if (!this.cursor) return set("pixel", "move over a map");
-    const [x, y] = this.cursor.map((place) => place * this.scene.stride);
-    set("pixel", `x ${x}, y ${y}`);
+    const marker = this.part("marker");
+    marker.hidden = !cursor;
+    const position = cursor?.map((place) => place * scene.stride);
+    this.part("pixel").textContent = position ? `x ${position[0]}, y ${position[1]}` : "move over a map";
+    if (!cursor) return;
     marker.style.left = `${(100 * (this.cursor[0] + 0.5)) / this.scene.width}%`;
     marker.style.top = `${(100 * (this.cursor[1] + 0.5)) / this.scene.height}%`;
   }
@@ -241,12 +228,14 @@ Sepi.Viewer = class {
     return shown.errors;
   }
 
-  /** The surroundings of the cursor, magnified. */
-  closeUp(canvas, picture) {
-    const context = canvas.getContext("2d");
-    context.imageSmoothingEnabled = false;
-    context.clearRect(0, 0, canvas.width, canvas.height);
-    this.magnify(context, picture, 0, 0, canvas.width);
+  /** The surroundings of the cursor in A and B, magnified. */
+  drawCloseUps() {
+    for (const side of ["a", "b"]) {
+      const canvas = this.part(`close-${side}`);
+      const context = canvas.getContext("2d");
+      context.imageSmoothingEnabled = false;
+      this.magnify(context, this.shown[side].picture, 0, 0, canvas.width);
+    }
   }
 
   magnify(context, picture, left, top, side) {
@@ -273,26 +262,15 @@ Sepi.Viewer = class {
     this.watcher.disconnect();
     this.visible.clear();
     this.tiles = new Map();
-    const groups = new Map();
+    const tiles = (panels) => Sepi.element("div", { className: "tiles" }, ...panels.map((panel) => this.tile(panel)));
     const changes = Sepi.byId("changes");
-    changes?.replaceChildren(Sepi.element("div", { className: "tiles" }));
-    for (const panel of this.panels.list) {
-      const tile = this.tile(panel);
-      if (changes && panel.kind === "change") changes.firstChild.append(tile);
-      else if (groups.has(panel.group)) groups.get(panel.group).push(tile);
-      else groups.set(panel.group, [tile]);
-    }
+    const elsewhere = changes ? this.panels.list.filter(({ kind }) => kind === "change") : [];
+    changes?.replaceChildren(tiles(elsewhere));
+    const groups = Sepi.grouped(this.panels.list.filter((panel) => !elsewhere.includes(panel)));
     const problems = Object.entries(this.scene.problems ?? {}).map(([method, why]) => `${method}: ${why}`);
     this.part("grid").replaceChildren(
-      ...[...groups].map(([title, tiles]) =>
-        Sepi.element(
-          "section",
-          {},
-          Sepi.element("h4", {}, title),
-          Sepi.element("div", { className: "tiles" }, ...tiles),
-        ),
-      ),
-      Sepi.element("p", { className: "soft" }, problems.length ? `Not imported: ${problems.join("; ")}.` : ""),
+      ...groups.map(([title, panels]) => Sepi.element("section", {}, Sepi.element("h4", {}, title), tiles(panels))),
+      Sepi.element("p", { className: "soft" }, problems.length ? `Not available: ${problems.join("; ")}.` : ""),
     );
   }
 
@@ -302,19 +280,18 @@ Sepi.Viewer = class {
     canvas.setAttribute("aria-label", `${panel.title}${panel.note ? `: ${panel.note}` : ""}`);
     canvas.style.aspectRatio = `${this.scene.width} / ${this.scene.height}`;
     const buttons = ["a", "b"].map((side) => {
-      const button = Sepi.element("button", { type: "button", title: `show as ${side.toUpperCase()}` }, side.toUpperCase());
-      button.setAttribute("aria-label", `show ${panel.title} as ${side.toUpperCase()}`);
-      button.addEventListener("click", () => this.choose(side, panel.key));
+      const name = side.toUpperCase();
+      const button = Sepi.element("button", { type: "button", title: `show as ${name}` }, name);
+      button.setAttribute("aria-label", `show ${panel.title} as ${name}`);
+      button.addEventListener("click", () => this.choose({ [side]: panel.key }));
       return button;
     });
-    const caption = Sepi.element(
-      "figcaption",
-      {},
+    const figure = Sepi.figure(
+      canvas,
       Sepi.element("span", { className: "pair" }, ...buttons),
       ...Sepi.breakable(panel.title),
       Sepi.element("small", {}, panel.note ?? ""),
     );
-    const figure = Sepi.element("figure", {}, canvas, caption);
     figure.dataset.key = panel.key;
     this.follow(canvas);
     this.tiles.set(canvas, panel.key);
@@ -350,7 +327,7 @@ Sepi.Viewer = class {
     this.drawCursor(context, width, height, picture);
   }
 
-  /** The cursor in a small panel, and its close-up in the corner that is farther away. */
+  /** The cursor in a small panel, and its close-up in the more distant corner. */
   drawCursor(context, width, height, picture) {
     const [x, y] = [
       ((this.cursor[0] + 0.5) * width) / this.scene.width,
@@ -374,12 +351,15 @@ Sepi.Viewer = class {
   }
 };
 
-/** Options of a select, under the headings of their groups. */
-Sepi.options = (list) => {
-  const groups = new Map();
-  for (const { group, key, title } of list) {
-    if (!groups.has(group)) groups.set(group, Sepi.element("optgroup", { label: group }));
-    groups.get(group).append(Sepi.element("option", { value: key }, title));
-  }
-  return [...groups.values()];
+/** Panels under the headings of their groups, in order. */
+Sepi.grouped = (list) => {
+  const groups = new Map(list.map(({ group }) => [group, []]));
+  for (const panel of list) groups.get(panel.group).push(panel);
+  return [...groups];
 };
+
+/** Options of a select, under the headings of their groups. */
+Sepi.options = (list) =>
+  Sepi.grouped(list).map(([label, panels]) =>
+    Sepi.element("optgroup", { label }, ...panels.map(({ key, title }) => Sepi.element("option", { value: key }, title))),
+  );

@@ -1,0 +1,215 @@
+"""The panels of a scene: what there is to look at, for the pictures, the sheet of them all, and the page."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy.typing as npt
+
+from sepi.evaluate import WHOLE_MAP
+from sepi.io.scores import Evaluation
+from sepi.lightfield import FloatMap, LightField
+from sepi.report.plan import BEST_VARIANT, MAIN_VARIANT
+from sepi.stage import StageMaps
+
+Kind = Literal["picture", "disparity", "error", "change", "confidence", "grey", "mask", "outline"]
+"""How a panel is drawn: the reference view; a map on the scale of disparity; a map minus another; how much larger the
+error of a map is than that of another; a map from 0 to 1; a mask, or the borders between labels, over the view."""
+
+
+@dataclass(frozen=True)
+class Panel:
+    """A way to look at one map or two.
+
+    Attributes
+    ----------
+    key : str
+        Its name, which no other panel of the scene has, and the path of its picture below the scene's folder.
+    title, group : str
+        The group is the heading that it stands under.
+    kind : Kind
+    values : ndarray, shape (H, W), or None
+        Map, mask or labels; None for the reference view.
+    minus : ndarray, shape (H, W), or None
+        The map that an error or a change subtracts.
+    ground_truth : ndarray, shape (H, W), or None
+        What both maps of a change are compared with.
+    confidence : ndarray, shape (H, W), or None
+        Read out beside the map.
+    note : str
+        What is to be said of it.
+    ends : (str, str) or None
+        Words for the low and the high end of its scale, where they are not those of its kind.
+    precise : bool
+        Whether the page holds the map as finely as it can.
+    in_page : bool
+        Whether it is on the page and on the sheet.
+    """
+
+    key: str
+    title: str
+    group: str
+    kind: Kind
+    values: npt.NDArray[Any] | None = None
+    minus: FloatMap | None = None
+    ground_truth: FloatMap | None = None
+    confidence: FloatMap | None = None
+    note: str = ""
+    ends: tuple[str, str] | None = None
+    precise: bool = False
+    in_page: bool = True
+
+
+@dataclass(frozen=True)
+class SceneResults:
+    """Everything that is shown of a scene.
+
+    Attributes
+    ----------
+    light_field : LightField
+    maps : mapping of str to mapping of str to StageMaps
+        Variant to stage to maps, in order.
+    evaluations : mapping of str to Evaluation
+        Of each variant's final map.
+    compared : list of str
+        Variants of which every stage is on the page.
+    external : mapping of str to (ndarray (H, W), Evaluation)
+        Other methods' maps.
+    problems : mapping of str to str
+        Other methods without a map, and why.
+    """
+
+    light_field: LightField
+    maps: Mapping[str, Mapping[str, StageMaps]]
+    evaluations: Mapping[str, Evaluation]
+    compared: list[str]
+    external: Mapping[str, tuple[FloatMap, Evaluation]] = field(default_factory=dict)
+    problems: Mapping[str, str] = field(default_factory=dict)
+
+    def final(self, variant: str) -> StageMaps:
+        """The maps after the last stage."""
+        return list(self.maps[variant].values())[-1]
+
+    @property
+    def variants(self) -> list[str]:
+        """All variants, the compared ones first."""
+        return [*self.compared, *(name for name in self.maps if name not in self.compared)]
+
+
+def panels_of(results: SceneResults) -> list[Panel]:
+    """All panels of a scene, in the order of the page; without ground truth there are neither errors nor changes."""
+    return [
+        *_scene_panels(results),
+        *(panel for variant in results.variants for panel in _stage_panels(results, variant)),
+        *_error_panels(results),
+        *_external_panels(results),
+        *_change_panels(results),
+        *(panel for variant in results.variants for panel in _detail_panels(results, variant)),
+    ]
+
+
+def first_final(panels: list[Panel]) -> str:
+    """Key of the first final map: that of the first compared variant."""
+    return next(panel.key for panel in panels if panel.kind == "disparity" and panel.confidence is not None)
+
+
+def note_of(evaluation: Evaluation) -> str:
+    """The scores of a final map in one line; empty without ground truth."""
+    if not evaluation.scores:
+        return ""
+    scores = evaluation.scores["paper"][WHOLE_MAP]
+    return f"MSE {scores['mse100']:.2f}, Q25 {scores['q25']:.2f}, BadPix 0.07 {scores['badpix007']:.1f} %"
+
+
+def _scene_panels(results: SceneResults) -> Iterator[Panel]:
+    group, ground_truth = "Scene", results.light_field.ground_truth
+    yield Panel("reference_view", "reference view", group, "picture")
+    if ground_truth is not None:
+        yield Panel("ground_truth", "ground truth", group, "disparity", ground_truth, precise=True)
+    for region, mask in results.evaluations[MAIN_VARIANT].regions.items():
+        yield Panel(f"{region}_ground_truth", f"{region}, for scoring", group, "mask", mask)
+
+
+def _stage_panels(results: SceneResults, variant: str) -> Iterator[Panel]:
+    """Disparity after every stage; of the variants that are not compared, the page has the final map alone."""
+    compared, stages = variant in results.compared, results.maps[variant]
+    for number, (stage, found) in enumerate(stages.items(), start=1):
+        final = number == len(stages)
+        yield Panel(
+            f"{variant}/{number}_{stage}",
+            f"{variant}: final" if final else f"{variant} {number}: {stage}",
+            f"Stages of {variant}" if compared else "Other variants",
+            "disparity",
+            found.disparity,
+            confidence=found.confidence if final and compared else None,
+            note=note_of(results.evaluations[variant]) if final else "",
+            precise=final and compared,
+            in_page=final or compared,
+        )
+
+
+def _error_panels(results: SceneResults) -> Iterator[Panel]:
+    ground_truth = results.light_field.ground_truth
+    for variant in results.variants if ground_truth is not None else ():
+        found = results.final(variant)
+        yield Panel(
+            f"{variant}/error",
+            f"{variant}: error",
+            "Signed errors",
+            "error",
+            found.disparity,
+            minus=ground_truth,
+            confidence=found.confidence if variant in results.compared else None,
+            note=note_of(results.evaluations[variant]),
+        )
+
+
+def _external_panels(results: SceneResults) -> Iterator[Panel]:
+    ground_truth = results.light_field.ground_truth
+    for method, (disparity, evaluation) in results.external.items():
+        key, title, note = f"external/{method}/disparity", f"{method} (external)", note_of(evaluation)
+        yield Panel(key, title, "External methods", "disparity", disparity, note=note)
+    for method, (disparity, evaluation) in results.external.items() if ground_truth is not None else ():
+        key, title, note = f"external/{method}/error", f"{method} (external): error", note_of(evaluation)
+        yield Panel(key, title, "Errors of external methods", "error", disparity, minus=ground_truth, note=note)
+
+
+def _change_panels(results: SceneResults) -> Iterator[Panel]:
+    """Where a variant is less accurate, and where more, than the one it is compared with.
+
+    The paper's method is compared with its reductions, the best one with the paper's.
+    """
+    ground_truth = results.light_field.ground_truth
+    for variant in results.variants if ground_truth is not None else ():
+        if variant != MAIN_VARIANT:
+            better, worse = (variant, MAIN_VARIANT) if variant == BEST_VARIANT else (MAIN_VARIANT, variant)
+            yield Panel(
+                f"{variant}/change",
+                f"{better} beside {worse}",
+                "What each part improves and degrades",
+                "change",
+                results.final(worse).disparity,
+                minus=results.final(better).disparity,
+                ground_truth=ground_truth,
+                note="red: improved, blue: degraded",
+            )
+
+
+def _detail_panels(results: SceneResults, variant: str) -> Iterator[Panel]:
+    """Confidence, and what a variant took for occluded and textureless, with the superpixels that it used."""
+    final, shown = results.final(variant), variant in results.compared
+    kinds: dict[str, tuple[str, Kind]] = {
+        # what was detected need not be the region that is scored
+        "occluded": ("occluded, detected", "mask"),
+        "textureless": ("textureless, detected", "mask"),
+        "superpixels": ("superpixels", "outline"),
+        "lti": ("local texture intensity (LTI)", "grey"),
+    }
+    group = f"Masks and confidence of {variant}"
+    yield Panel(f"{variant}/confidence", f"{variant}: confidence", group, "confidence", final.confidence, in_page=shown)
+    for name, (title, kind) in kinds.items():
+        if name in final.extra:
+            values = final.mask(name) if kind == "mask" else final.extra[name]
+            yield Panel(f"{variant}/{name}", f"{variant}: {title}", group, kind, values, in_page=shown)

@@ -1,0 +1,48 @@
+"""A sheet of pictures with their titles."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from sepi.report.plots.pictures import Picture
+from sepi.report.plots.saving import BOTH, new_figure, save
+
+# inches: width of a panel, gap round its picture, and room for its title and for that of the sheet
+_PANEL, _GAP, _TITLE = 3.0, 0.1, 0.4
+_DOTS = 100
+
+
+def write_overview(
+    folder: Path, name: str, title: str, rows: Sequence[Sequence[tuple[str, Picture]]], endings: Sequence[str] = BOTH
+) -> None:
+    """All pictures of one size on one sheet, with their titles; equal pictures give equal bytes."""
+    height, width = rows[0][0][1].shape[:2]
+    size = (_PANEL - _GAP, (_PANEL - _GAP) * height / width)
+    row_height = size[1] + _TITLE + _GAP / 2
+    head = _TITLE if title else 0.0
+    sheet_size = (_PANEL * max(map(len, rows)), row_height * len(rows) + head)
+    figure = new_figure(*sheet_size, layout=None)
+    # one frame for all pictures, whose unit is an inch: many frames are slow to draw
+    sheet = figure.add_axes((0, 0, 1, 1))
+    sheet.set_axis_off()
+    sheet.text(sheet_size[0] / 2, sheet_size[1] - 0.1, title, fontsize=12, ha="center", va="top", parse_math=False)
+    dots = (round(size[0] * _DOTS), round(size[1] * _DOTS))
+    for number, row in enumerate(rows):
+        bottom = sheet_size[1] - head - (number + 1) * row_height + _GAP / 2
+        for column, (words, picture) in enumerate(row):
+            left = column * _PANEL + _GAP / 2
+            extent = (left, left + size[0], bottom, bottom + size[1])
+            # in the size at which it is drawn; matplotlib would take longer, and once for each file
+            way = cv2.INTER_AREA if dots[0] < width else cv2.INTER_LINEAR
+            drawn = np.asarray(cv2.resize(picture, dots, interpolation=way), np.uint8)
+            sheet.imshow(drawn, extent=extent, aspect="auto", interpolation="none")
+            place = (left + size[0] / 2, bottom + size[1] + 0.04)
+            sheet.text(*place, words, fontsize=8, ha="center", va="bottom", parse_math=False)
+    # pictures set limits of their own
+    sheet.set_xlim(0, sheet_size[0])
+    sheet.set_ylim(0, sheet_size[1])
+    save(figure, folder, name, endings)
