@@ -1,7 +1,7 @@
 """The arithmetic floor: what the multiply-adds of the plane sweep cost where nothing else does.
 
-The two kernels here do the operations of :mod:`sepi.matching.photo_consistency` (a sample: bilinear interpolation of
-three channels and the robust residual) and of :mod:`sepi.matching.plane_sweep_kernels` (a row of the window) on a few
+The two kernels here do the operations of :mod:`sepi.matching.plane_sweep_kernels` (a sample: bilinear interpolation of
+three channels and the robust residual; a row of the window) on a few
 hundred numbers that stay in the first cache, at fixed places. A sweep cannot be faster than its operations at this
 price.
 """

@@ -59,7 +59,7 @@ def sepi(
 def semi_global(
     light_field: LightField, previous: StageMaps | None, parameters: VisibilitySweepParameters, progress: Progress
 ) -> StageMaps:
-    """Depth from the two layers of all views, smoothed semi-globally; arguments and result as for ``sepi``."""
+    """Depth from colours and detail of all views, smoothed semi-globally; arguments and result as for ``sepi``."""
     result = depth_from_all_views(light_field, parameters, progress)
     return StageMaps(result.disparity, result.confidence)
 

@@ -11,7 +11,7 @@ from typing import Any
 from sepi import initial, occlusion, optimize, textureless
 from sepi.errors import SepiError
 from sepi.lightfield import LightField
-from sepi.matching.base_detail import forget_layers
+from sepi.matching.base_detail import shared_detail
 from sepi.stage import Choice, Parameters, Progress, StageMaps, no_progress
 from sepi.validation import require_known, unknown, validated
 
@@ -279,13 +279,11 @@ def estimate_depth(
         light_field = light_field.with_range(estimate_range(light_field))
     maps: StageMaps | None = None
     done = 0.0
-    try:
+    with shared_detail():
         for stage, choice in chosen.choices.items():
             maps = STAGES[stage][choice].run(light_field, maps, settings[stage], _part(progress, done, _SHARE[stage]))
             done += _SHARE[stage]
             progress(done)
-    finally:
-        forget_layers()
     assert maps is not None  # there are stages
     return maps
 

@@ -20,7 +20,6 @@ from sepi.io.pfm import write_pfm
 from sepi.io.provenance import scene_attributes, stage_attributes, step
 from sepi.io.scores import map_name, write_scores
 from sepi.lightfield import FloatMap, LightField
-from sepi.matching.base_detail import forget_layers
 from sepi.pipeline import STAGES, VARIANTS, stage_parameters
 from sepi.report import numbers
 from sepi.report.figures import page_json, read_results
@@ -145,7 +144,6 @@ def run_stages(plan: Plan, scene: tuple[str, str], light_field: LightField, vari
         write_stage(plan.stage_file(*scene, variant, stage), maps, attributes)
         timing = {"seconds": 1.5 + number, "peak_memory_mb": 200 + 10 * number}
         plan.stage_file(*scene, variant, stage, "time.json").write_text(json.dumps(timing))
-    forget_layers()
 
 
 def write_plan_scores(plan: Plan, scene: tuple[str, str], light_field: LightField) -> None:

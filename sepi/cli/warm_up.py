@@ -3,7 +3,7 @@
 Compiled code is kept on disk, beside the package or in ``NUMBA_CACHE_DIR``, so this is done once in an environment.
 Without it the first jobs of a workflow compile what they need, several of them the same at the same time. Here every
 stage of enough variants runs on a tiny light field, in two processes, since one compiles one function at a time.
-Kernels for grey, 16-bit and float views are compiled when they are first needed.
+Kernels for 16-bit and float views are compiled when they are first needed.
 """
 
 from __future__ import annotations

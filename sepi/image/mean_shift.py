@@ -23,14 +23,14 @@ from sepi.lightfield import BoolMap, FloatMap
 
 ITERATIONS = 5
 
-MOST_ITERATIONS, ACCURACY = 50, 1e-3
-"""Where the search for a mode of samples ends: steps, or a step's part of the bandwidth."""
+MAX_ITERATIONS, TOLERANCE = 50, 1e-3
+"""Where the search for a mode of samples ends: iterations, or an update's part of the bandwidth."""
 
 
 def patch_modes(
     image: FloatMap, disparity: FloatMap, mask: BoolMap, *, radius: int, sigma_colour: float, sigma_disparity: float
 ) -> FloatMap:
-    """Disparity of the colour-and-disparity mode that each wanted pixel belongs to.
+    """Disparity of the colour-and-disparity mode that each pixel of the mask belongs to.
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ def sample_modes(samples: npt.NDArray[np.float64], bandwidth: float) -> npt.NDAr
     Returns
     -------
     ndarray, shape (N, D), float64
-        Samples of one cluster get the same point but for the accuracy.
+        Samples of one cluster get the same point but for the tolerance.
     """
     modes = np.ascontiguousarray(samples, np.float64).copy()
     _sample_modes(np.ascontiguousarray(samples, np.float64), float(bandwidth), modes)
@@ -115,7 +115,7 @@ def _sample_modes(samples: Any, bandwidth: float, modes: Any) -> None:
     factor = -0.5 / bandwidth**2
     for n in prange(N):
         moved = np.empty(D)
-        for _ in range(MOST_ITERATIONS):
+        for _ in range(MAX_ITERATIONS):
             total = 0.0
             moved[:] = 0
             for m in range(N):
@@ -126,10 +126,10 @@ def _sample_modes(samples: Any, bandwidth: float, modes: Any) -> None:
                 total += weight
                 for d in range(D):
                     moved[d] += weight * samples[m, d]
-            step = 0.0
+            update = 0.0
             for d in range(D):
                 moved[d] /= total
-                step = max(step, abs(moved[d] - modes[n, d]))
+                update = max(update, abs(moved[d] - modes[n, d]))
                 modes[n, d] = moved[d]
-            if step < ACCURACY * bandwidth:
+            if update < TOLERANCE * bandwidth:
                 break

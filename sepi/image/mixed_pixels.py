@@ -1,9 +1,9 @@
-"""Which side of a depth step a pixel belongs to, by the mixture of colours in it.
+"""Which side of a depth discontinuity a pixel belongs to, by the mixture of colours in it.
 
-A pixel that an edge runs through mixes the colours ``F`` of the nearer surface and ``B`` of the farther one, and its
-residuals are small at the nearer disparity, with which the edge moves: depth maps are one pixel too wide there. Its
-colour ``I`` tells how much of it the nearer surface covers, ``(I - B) (F - B) / |F - B|^2``, with ``F`` and ``B`` from
-clean pixels close by; where that is little, the pixel goes to the farther surface.
+A pixel that an edge runs through mixes the colours ``F`` of the nearer surface and ``B`` of the more distant one, and
+its residuals are small at the nearer disparity, with which the edge moves: depth maps are one pixel too wide there. Its
+colour ``I`` tells the share of the nearer surface in it, ``(I - B) (F - B) / |F - B|^2``, with ``F`` and ``B`` from
+clean pixels close by; where that is little, the pixel goes to the more distant surface.
 """
 
 from __future__ import annotations
@@ -18,10 +18,13 @@ class MixtureParameters(Parameters):
     """Parameters of the decision by colour mixture."""
 
     alpha_threshold: float = Field(
-        0.3, ge=0, le=1, description="covered share up to which a pixel goes to the farther surface; 0 moves none"
+        0.3,
+        ge=0,
+        le=1,
+        description="share of the nearer surface up to which a pixel goes to the more distant one; 0 moves none",
     )
     alpha_discontinuity: float = Field(
-        0.3, gt=0, description="depth step beside which pixels mix, pixels per view step"
+        0.3, gt=0, description="depth discontinuity beside which pixels mix, pixels per view step"
     )
     alpha_radius: int = Field(4, ge=1, le=20, description="how far away clean colours are looked for, in pixels")
     alpha_contrast: float = Field(
@@ -32,7 +35,7 @@ class MixtureParameters(Parameters):
 def reassign_mixed_pixels(
     disparity: FloatMap, guide: FloatMap, noise: float, parameters: MixtureParameters
 ) -> FloatMap:
-    """Disparity map whose mixed pixels at steps belong to the surface that covers most of them.
+    """Disparity map whose mixed pixels belong to the surface that fills most of them.
 
     Parameters
     ----------
@@ -50,9 +53,9 @@ def reassign_mixed_pixels(
     """
     if parameters.alpha_threshold == 0:
         return disparity
-    from sepi.image.mixed_pixels_kernels import decided_pixels
+    from sepi.image.mixed_pixels_kernels import reassigned_pixels
 
-    decided: FloatMap = decided_pixels(
+    reassigned: FloatMap = reassigned_pixels(
         disparity,
         guide,
         parameters.alpha_discontinuity,
@@ -62,4 +65,4 @@ def reassign_mixed_pixels(
         # a hundredth of full scale counts as equal even without noise
         1e-4 + noise,
     )
-    return decided
+    return reassigned

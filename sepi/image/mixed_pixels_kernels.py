@@ -24,10 +24,10 @@ def _clean(disparity: Any, y: int, x: int, middle: Any, near: Any) -> bool:
 
 
 @njit(parallel=True, cache=True)
-def decided_pixels(
-    disparity: Any, guide: Any, step: Any, reach: int, contrast: Any, share: Any, least_variance: Any
+def reassigned_pixels(
+    disparity: Any, guide: Any, discontinuity: Any, radius: int, contrast: Any, threshold: Any, least_variance: Any
 ) -> Any:
-    """The map whose mixed pixels belong to the surface that covers most of them; shapes (H, W) and (H, W, 3)."""
+    """The map whose mixed pixels belong to the surface that fills most of them; shapes (H, W) and (H, W, 3)."""
     H, W = disparity.shape
     out = disparity.copy()
     for y in prange(H):
@@ -39,16 +39,16 @@ def decided_pixels(
                 for column in range(max(0, x - 1), min(W, x + 2)):
                     lowest, highest = min(lowest, disparity[row, column]), max(highest, disparity[row, column])
             middle = (lowest + highest) / 2
-            if highest - lowest < step or d <= middle:
+            if highest - lowest < discontinuity or d <= middle:
                 continue
             sums[:] = 0
-            for row in range(max(0, y - reach), min(H, y + reach + 1)):
-                for column in range(max(0, x - reach), min(W, x + reach + 1)):
+            for row in range(max(0, y - radius), min(H, y + radius + 1)):
+                for column in range(max(0, x - radius), min(W, x + radius + 1)):
                     q = disparity[row, column]
                     # surfaces beyond the two do not count
                     if (
-                        q > highest + step
-                        or q < lowest - step
+                        q > highest + discontinuity
+                        or q < lowest - discontinuity
                         or not _clean(disparity, row, column, middle, q > middle)
                     ):
                         continue
@@ -61,14 +61,14 @@ def decided_pixels(
                         own[5] += w * guide[row, column, c] ** 2
             if sums[0, 0] < _LEAST_WEIGHT or sums[1, 0] < _LEAST_WEIGHT:
                 continue
-            distance, covered, variance = 0.0, 0.0, least_variance
+            distance, projection, variance = 0.0, 0.0, least_variance
             for side in range(2):
                 variance += sums[side, 5] / sums[side, 0]
             for c in range(3):
                 far, near = sums[0, 2 + c] / sums[0, 0], sums[1, 2 + c] / sums[1, 0]
                 distance += (near - far) ** 2
-                covered += (guide[y, x, c] - far) * (near - far)
+                projection += (guide[y, x, c] - far) * (near - far)
                 variance -= far * far + near * near
-            if distance > contrast * variance and covered < share * distance:
+            if distance > contrast * variance and projection < threshold * distance:
                 out[y, x] = sums[0, 1] / sums[0, 0]
     return out

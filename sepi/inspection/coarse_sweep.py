@@ -59,7 +59,7 @@ def coarse_sweep(
     second = np.empty((H, W), np.float32)
     mean = np.empty((H, W), np.float32)
     disparity = np.empty((H, W), np.float32)
-    step = candidates[1] - candidates[0]
+    sampling = candidates[1] - candidates[0]
     for block in numba.prange((H + _BLOCK - 1) // _BLOCK):
         top = block * _BLOCK
         bottom = min(H, top + _BLOCK)
@@ -75,11 +75,11 @@ def coarse_sweep(
         for y in range(top, bottom):
             for x in range(W):
                 column[:] = volume[:, y - top, x]
-                low, other, average, place = _valley(column)
+                low, other, average, position = _valley(column)
                 lowest[y, x] = low
                 second[y, x] = other
                 mean[y, x] = average
-                disparity[y, x] = candidates[0] + place * step
+                disparity[y, x] = candidates[0] + position * sampling
     return lowest, second, mean, disparity
 
 
@@ -145,7 +145,7 @@ def _box_mean(costs, first, top, H, radius, out):  # type: ignore[no-untyped-def
 
 @numba.njit(cache=True)  # type: ignore[untyped-decorator, unused-ignore]
 def _valley(costs):  # type: ignore[no-untyped-def]
-    """Lowest cost, lowest cost outside its valley, mean cost, and the place of the lowest in candidate steps."""
+    """Lowest cost, lowest cost outside its valley, mean cost, and the position of the lowest among the candidates."""
     infinite = np.float32(np.inf)
     best, total, count = 0, np.float32(0), 0
     for n in range(costs.size):
@@ -170,7 +170,7 @@ def _valley(costs):  # type: ignore[no-untyped-def]
         other = min(other, costs[n])
     before, after = costs[best - 1], costs[best + 1]
     curvature = before - 2 * low + after
-    place = np.float32(best)
+    position = np.float32(best)
     if curvature > 0:
-        place += np.float32(0.5) * (before - after) / curvature
-    return low, other, total / np.float32(count), place
+        position += np.float32(0.5) * (before - after) / curvature
+    return low, other, total / np.float32(count), position

@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from sepi.inspection.view_order_kernels import layout_misfits
+from sepi.inspection.view_order_kernels import layout_costs
 from sepi.io.readers.options import ORDERS
 from sepi.lightfield import FloatMap, LightField, as_unit_float
 
@@ -205,7 +205,7 @@ def _tried(views: Views, reach: int, factor: int) -> Trial | None:
     count = round(_MOVEMENT / _MOVEMENT_STEP)
     candidates = (np.arange(-count, count + 1) * (_MOVEMENT_STEP / abs(offsets).max())).astype(np.float32)
     others = np.stack([views.detail(step, factor) for step in steps])
-    cost, disparity = layout_misfits(reference, others, offsets, candidates, points, _PATCH_RADIUS)
+    cost, disparity = layout_costs(reference, others, offsets, candidates, points, _PATCH_RADIUS)
     return Trial(layouts, cost, disparity * factor, float(candidates[-1]) * factor)
 
 

@@ -19,7 +19,7 @@ _MEETING = 0.75
 
 
 @numba.njit(parallel=True, cache=True)  # type: ignore[untyped-decorator, unused-ignore]
-def layout_misfits(
+def layout_costs(
     reference: FloatMap,
     views: FloatMap,
     offsets: FloatMap,
@@ -38,20 +38,20 @@ def layout_misfits(
     candidates : ndarray, shape (K,), float32
         Disparities in pixels per view step.
     points : ndarray, shape (P, 2), int64
-        Pixels ``(y, x)``, farther than ``radius`` from the border.
+        Pixels ``(y, x)``, more than ``radius`` from the border.
     radius : int
         Half width of the patch in pixels.
 
     Returns
     -------
-    misfit, disparity : ndarrays, shape (P, L), float32
+    cost, disparity : ndarrays, shape (P, L), float32
         Lowest mean over the views of ``r^2 / (r^2 + s^2)``, 0..1, where ``s^2`` is a part of the patch's own variation;
         1 where no candidate keeps half of the views in sight. The candidate of the lowest.
     """
     L, V, _ = offsets.shape
     H, W = reference.shape
     side = 2 * radius + 1
-    misfit = np.ones((len(points), L), np.float32)
+    cost = np.ones((len(points), L), np.float32)
     disparity = np.zeros((len(points), L), np.float32)
     for p in numba.prange(len(points)):
         y, x = points[p, 0] - radius, points[p, 1] - radius
@@ -72,10 +72,10 @@ def layout_misfits(
                     )
                     total += squares / (squares + variation)
                     seen += 1
-                if 2 * seen >= V and total < misfit[p, n] * seen:
-                    misfit[p, n] = total / np.float32(seen)
+                if 2 * seen >= V and total < cost[p, n] * seen:
+                    cost[p, n] = total / np.float32(seen)
                     disparity[p, n] = candidates[k]
-    return misfit, disparity
+    return cost, disparity
 
 
 @numba.njit(parallel=True, cache=True)  # type: ignore[untyped-decorator, unused-ignore]
@@ -84,7 +84,7 @@ def residuals(
 ) -> FloatMap:
     """Mean squared difference, shape (H, W) float32, of each pixel's window and where it should be seen in a view.
 
-    The view lies ``down`` and ``across`` steps from the reference. Infinite where the window leaves either picture.
+    The view lies ``down`` and ``across`` views from the reference. Infinite where the window leaves either picture.
     """
     H, W = reference.shape
     side = 2 * radius + 1
@@ -118,7 +118,7 @@ def count_occlusions(
     """Which of two surfaces hides the other where they meet in a view.
 
     A pixel that is plainly not seen in the view, though it is seen from the other side, is hidden there. What hides it
-    is a pixel of the reference that the disparities bring to the same place and that is seen in all views.
+    is a pixel of the reference that the disparities bring to the same position and that is seen in all views.
 
     Parameters
     ----------

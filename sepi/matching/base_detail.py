@@ -1,4 +1,4 @@
-"""Two layers of each view: its colours, and the fine detail that stays when smooth shading is taken out.
+"""Base-detail decomposition: the colours of each view, and the fine detail that stays without smooth shading.
 
 Photo-consistency assumes that a surface looks alike from everywhere. Shading does not: a glossy wall or floor changes
 its brightness smoothly from view to view, and where texture is weak that change outweighs it, so that the colours alone
@@ -14,9 +14,10 @@ References
 
 from __future__ import annotations
 
-import zlib
-from dataclasses import dataclass
-from typing import Annotated
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from typing import Annotated, NamedTuple
 
 import cv2
 import numpy as np
@@ -24,13 +25,15 @@ import numpy.typing as npt
 from pydantic import Field
 
 from sepi.image.noise import noise_level, residual_variance
-from sepi.lightfield import FloatMap, LightField, as_unit_float, full_scale
+from sepi.lightfield import BoolMap, FloatMap, LightField, as_unit_float, full_scale
 from sepi.stage import Parameters
 
 DETAIL_UNIT = 1 / 32000
-"""Value of one step of the detail, which is stored as int16: colours differ by at most 1."""
+"""Unit of the detail, which is stored as int16: colours differ by at most 1."""
 
-_KEPT: dict[tuple[object, ...], npt.NDArray[np.int16]] = {}
+# views and their detail, by what it was made of
+_Shared = dict[tuple[object, ...], tuple[npt.NDArray[np.generic], npt.NDArray[np.int16]]]
+_shared: ContextVar[_Shared | None] = ContextVar("_shared", default=None)
 
 
 ColourScale = Annotated[
@@ -45,7 +48,7 @@ ColourScale = Annotated[
 
 
 class BaseDetailParameters(Parameters):
-    """Parameters of the two layers and of how well they must fit."""
+    """Parameters of the decomposition, and of how well colours and detail must fit."""
 
     colour_scale: ColourScale = 0.0316
     detail_scale: float = Field(
@@ -62,18 +65,22 @@ class BaseDetailParameters(Parameters):
     base_sigma_space: float = Field(4.0, gt=0, le=20, description="width of the base's window, in pixels")
 
 
-@dataclass(frozen=True)
-class BaseDetail:
-    """The layers of all views, as the kernels want them.
+class BaseDetail(NamedTuple):
+    """Colours and detail of all views.
 
     Attributes
     ----------
     colours : ndarray, shape (T, S, 3, H, W), uint8, uint16 or float32
         In the views' own units; of grey views three times the same.
-    colour_unit : float
+    colour_unit : float32
         What a colour value is multiplied with to span 0..1.
     detail : ndarray, shape (T, S, 3 or 0, H, W), int16
-        In units of ``DETAIL_UNIT``; empty where the detail has no share.
+        Empty where the detail has no share.
+    detail_unit : float32
+        What a detail value is multiplied with.
+    present : ndarray, shape (T, S), bool
+    t0, s0 : int
+        Position of the reference view.
     noise : float
         Expected squared residual, summed over RGB, by noise alone.
     guide : ndarray, shape (H, W, 3), float32
@@ -81,8 +88,12 @@ class BaseDetail:
     """
 
     colours: npt.NDArray[np.generic]
-    colour_unit: float
+    colour_unit: np.float32
     detail: npt.NDArray[np.int16]
+    detail_unit: np.float32
+    present: BoolMap
+    t0: int
+    s0: int
     noise: float
     guide: FloatMap
 
@@ -92,7 +103,7 @@ class BaseDetail:
 
 
 def base_detail_decomposition(light_field: LightField, parameters: BaseDetailParameters) -> BaseDetail:
-    """The layers of a light field; missing views stay empty.
+    """Colours and detail of a light field; missing views stay empty.
 
     Parameters
     ----------
@@ -101,7 +112,7 @@ def base_detail_decomposition(light_field: LightField, parameters: BaseDetailPar
 
     Returns
     -------
-    Layers
+    BaseDetail
     """
     views, guide = light_field.rgb_views, light_field.reference_view
     edge = float(np.hypot(parameters.base_sigma_colour, 3 * noise_level(guide)))
@@ -109,30 +120,43 @@ def base_detail_decomposition(light_field: LightField, parameters: BaseDetailPar
         detail = _detail_of_views(light_field, parameters.base_radius, edge, parameters.base_sigma_space)
     else:
         detail = np.empty((*light_field.grid, 0, *light_field.shape), np.int16)
-    colours = np.ascontiguousarray(views.transpose(0, 1, 4, 2, 3))
-    return BaseDetail(colours, 1 / full_scale(views.dtype), detail, residual_variance(guide), guide)
+    return BaseDetail(
+        np.ascontiguousarray(views.transpose(0, 1, 4, 2, 3)),
+        np.float32(1 / full_scale(views.dtype)),
+        detail,
+        np.float32(DETAIL_UNIT),
+        light_field.present,
+        *light_field.reference_position,
+        residual_variance(guide),
+        guide,
+    )
+
+
+@contextmanager
+def shared_detail() -> Iterator[None]:
+    """Stages that run inside, in this thread, on one light field share its detail; it is freed at the end.
+
+    The views must not change meanwhile.
+    """
+    token = _shared.set({})
+    try:
+        yield
+    finally:
+        _shared.reset(token)
 
 
 def _detail_of_views(light_field: LightField, radius: int, edge: float, width: float) -> npt.NDArray[np.int16]:
-    """Each view without its edge-preserving mean; shape (T, S, 3, H, W).
-
-    The detail of the last light field is kept, since the stages of one run ask for it again.
-    """
-    views = light_field.rgb_views
-    content = zlib.crc32(np.ascontiguousarray(views).data)
-    key = (content, views.shape, views.dtype, light_field.present.tobytes(), radius, edge, width)
-    if key in _KEPT:
-        return _KEPT[key]
+    """Each view without its edge-preserving mean; shape (T, S, 3, H, W)."""
+    shared = _shared.get()
+    key = (id(light_field.views), light_field.present.tobytes(), radius, edge, width)
+    if shared is not None and key in shared:
+        return shared[key][1]
     detail = np.zeros((*light_field.grid, 3, *light_field.shape), np.int16)
     for t, s in np.argwhere(light_field.present):
-        view = as_unit_float(views[t, s])
+        view = as_unit_float(light_field.rgb_views[t, s])
         base = cv2.bilateralFilter(view, 2 * radius + 1, edge, width)
         detail[t, s] = np.rint(np.clip(view - base, -1, 1) / DETAIL_UNIT).astype(np.int16).transpose(2, 0, 1)
-    forget_layers()
-    _KEPT[key] = detail
+    if shared is not None:
+        # with the views, so that no other array gets their id meanwhile
+        shared[key] = light_field.views, detail
     return detail
-
-
-def forget_layers() -> None:
-    """Free what is kept of the last light field."""
-    _KEPT.clear()

@@ -11,15 +11,19 @@ References
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 from numba import njit, prange
 
-from sepi.matching.fastmath import EXACT
+from sepi.lightfield import BoolMap, FloatMap
+
+EXACT = {"nnan", "ninf", "nsz"}
+"""Fast-math flags that keep every rounding as written: see :mod:`sepi.matching.plane_sweep_kernels`."""
 
 SPLINE_UNIT = np.float32(1 / 3400)
-"""Value of one step of a spline coefficient, stored as int16; a checkerboard of -0.5 and 1.5 has some of +-9.5."""
+"""Unit of the spline coefficients, stored as int16; a checkerboard of -0.5 and 1.5 has some of +-9.5."""
 
 _POLE = np.float32(math.sqrt(3) - 2)
 _GAIN = np.float32((1 - (math.sqrt(3) - 2)) * (1 - 1 / (math.sqrt(3) - 2)))
@@ -28,6 +32,31 @@ MARGIN = 2
 """Coefficients beyond each side of a view."""
 
 _HORIZON = 16  # powers of the pole are below float32's precision from here on
+
+
+class SplineViews(NamedTuple):
+    """What a Gauss-Newton iteration needs of the views.
+
+    Attributes
+    ----------
+    splines : ndarray, shape (T, S, H + 2 MARGIN, W + 2 MARGIN, C), int16
+        Spline coefficients of colours and, where it has a share, detail: C is 3 or 6.
+    reference : ndarray, shape (H, W, C), float32
+        Colours, and detail, of the reference view.
+    present : ndarray, shape (T, S), bool
+    t0, s0 : int
+        Position of the reference view.
+    scales2, shares : ndarray, shape (C / 3,), float32
+        Square of the robust scale, and share in the cost, of colours and of detail.
+    """
+
+    splines: npt.NDArray[np.int16]
+    reference: FloatMap
+    present: BoolMap
+    t0: int
+    s0: int
+    scales2: FloatMap
+    shares: FloatMap
 
 
 @njit(inline="always")
@@ -111,7 +140,7 @@ def view_splines(planes: Any, unit: Any, present: Any, first: int, out: Any) -> 
 
 @njit(inline="always")
 def _spline_weights(f: Any) -> Any:
-    """Weights of the four coefficients round a place, a fraction ``f`` after the second."""
+    """Weights of the four coefficients round a position, a fraction ``f`` after the second."""
     g = np.float32(1) - f
     sixth, half, two_thirds = np.float32(1 / 6), np.float32(0.5), np.float32(2 / 3)
     return (
@@ -135,7 +164,7 @@ def _row(splines: Any, row: int, left: int, first: int, b: Any) -> Any:
 
 @njit(inline="always")
 def _sample(splines: Any, first: int, y: Any, x: Any) -> Any:
-    """Three channels of a view at a place inside it; ``splines`` has a margin of two coefficients on each side."""
+    """Three channels of a view at a position inside it; ``splines`` has a margin of two coefficients on each side."""
     top, left = int(y), int(x)
     a, b = _spline_weights(np.float32(y - top)), _spline_weights(np.float32(x - left))
     # the margin of 2 and the one coefficient before
@@ -150,7 +179,7 @@ def _sample(splines: Any, first: int, y: Any, x: Any) -> Any:
 
 @njit(inline="always")
 def _seen(y: Any, x: Any, nearest: Any, limit: Any) -> Any:
-    """Whether a place lies in a view and nothing nearer covers it."""
+    """Whether a position lies in a view and nothing nearer occludes it."""
     H, W = nearest.shape
     return (
         y >= 0
@@ -162,48 +191,42 @@ def _seen(y: Any, x: Any, nearest: Any, limit: Any) -> Any:
 
 
 @njit(parallel=True, cache=True, fastmath=EXACT, error_model="numpy")
-def mean_of_views(
-    splines: Any, present: Any, t0: int, s0: int, disparity: Any, nearest: Any, occlusion_margin: Any, scales: Any,
-    reference: Any,
-) -> Any:  # fmt: skip
+def mean_of_views(views: SplineViews, disparity: Any, nearest: Any, occlusion_margin: Any) -> Any:
     """Mean of the views that see each pixel, those unlike the reference view counting less; shape (H, W, C), float32.
 
     Parameters
     ----------
-    splines : ndarray, shape (T, S, H + 2 MARGIN, W + 2 MARGIN, C), int16
-        C is 3 or 6: colours, detail.
-    present : ndarray, shape (T, S), bool
-    t0, s0 : int
-        Place of the reference view.
+    views : SplineViews
     disparity : ndarray, shape (H, W), float32
+        Pixels per view step.
     nearest : ndarray, shape (T, S, H, W), float32
-        z-buffers.
+        z-buffers of the map in the views.
     occlusion_margin : float32
-        By how much a cover must be nearer.
-    scales : ndarray, shape (C / 3,), float32
-        Square of the robust scale of each layer.
-    reference : ndarray, shape (H, W, C), float32
+        By how much an occluder must be nearer, pixels per view step.
     """
-    T, S = present.shape
-    H, W, C = reference.shape
+    T, S = views.present.shape
+    t0, s0 = views.t0, views.s0
+    H, W, C = views.reference.shape
     out = np.empty((H, W, C), np.float32)
     for y in prange(H):
         for x in range(W):
             d = disparity[y, x]
             limit = d + occlusion_margin
-            for layer in range(C // 3):
-                c, scale = 3 * layer, scales[layer]
-                m0, m1, m2 = reference[y, x, c], reference[y, x, c + 1], reference[y, x, c + 2]
+            for part in range(C // 3):
+                c, scale2 = 3 * part, views.scales2[part]
+                m0, m1, m2 = views.reference[y, x, c], views.reference[y, x, c + 1], views.reference[y, x, c + 2]
                 total0, total1, total2, weight = m0, m1, m2, np.float32(1)
                 for t in range(T):
                     for s in range(S):
                         fy = np.float32(y) - d * np.float32(t - t0)
                         fx = np.float32(x) - d * np.float32(s - s0)
-                        if not present[t, s] or (t == t0 and s == s0) or not _seen(fy, fx, nearest[t, s], limit):
+                        if not views.present[t, s] or (t == t0 and s == s0):
                             continue
-                        v0, v1, v2 = _sample(splines[t, s], c, fy, fx)
+                        if not _seen(fy, fx, nearest[t, s], limit):
+                            continue
+                        v0, v1, v2 = _sample(views.splines[t, s], c, fy, fx)
                         z = (v0 - m0) ** 2 + (v1 - m1) ** 2 + (v2 - m2) ** 2
-                        w = scale / (scale + z)
+                        w = scale2 / (scale2 + z)
                         w *= w
                         weight += w
                         total0 += w * v0
@@ -214,51 +237,53 @@ def mean_of_views(
 
 
 @njit(parallel=True, cache=True, fastmath=EXACT, error_model="numpy")
-def normal_equations(splines: Any, present: Any, t0: int, s0: int, disparity: Any, nearest: Any, occlusion_margin: Any,
-                     scales: Any, shares: Any, mean: Any, down: Any, across: Any) -> Any:  # fmt: skip
+def normal_equations(
+    views: SplineViews, disparity: Any, nearest: Any, occlusion_margin: Any, mean: Any, down: Any, across: Any
+) -> Any:
     """Gauss-Newton sums of each pixel over the views that see it.
 
     Parameters
     ----------
-    splines, present, t0, s0, disparity, nearest, occlusion_margin, scales
+    views, disparity, nearest, occlusion_margin
         As in :func:`mean_of_views`.
-    shares : ndarray, shape (C / 3,), float32
-        Share of each layer.
     mean, down, across : ndarray, shape (H, W, C), float32
         Mean of the views and its derivatives along y and x.
 
     Returns
     -------
     gradient, curvature : ndarray, shape (H, W), float32
-        Their ratio is the step towards less cost, in pixels per view step.
+        Their ratio is the update towards less cost, in pixels per view step.
     """
-    T, S = present.shape
+    T, S = views.present.shape
+    t0, s0 = views.t0, views.s0
     H, W, C = mean.shape
     gradient, curvature = np.zeros((H, W), np.float32), np.zeros((H, W), np.float32)
     for y in prange(H):
         for x in range(W):
             d = disparity[y, x]
             limit = d + occlusion_margin
-            for layer in range(C // 3):
-                c, scale = 3 * layer, scales[layer]
+            for part in range(C // 3):
+                c, scale2 = 3 * part, views.scales2[part]
                 m0, m1, m2 = mean[y, x, c], mean[y, x, c + 1], mean[y, x, c + 2]
                 y0, y1, y2 = down[y, x, c], down[y, x, c + 1], down[y, x, c + 2]
                 x0, x1, x2 = across[y, x, c], across[y, x, c + 1], across[y, x, c + 2]
-                slope, bend = np.float32(0), np.float32(0)
+                slope, hessian = np.float32(0), np.float32(0)
                 for t in range(T):
                     for s in range(S):
                         dt, ds = np.float32(t - t0), np.float32(s - s0)
                         fy, fx = np.float32(y) - d * dt, np.float32(x) - d * ds
-                        if not present[t, s] or (t == t0 and s == s0) or not _seen(fy, fx, nearest[t, s], limit):
+                        if not views.present[t, s] or (t == t0 and s == s0):
                             continue
-                        v0, v1, v2 = _sample(splines[t, s], c, fy, fx)
+                        if not _seen(fy, fx, nearest[t, s], limit):
+                            continue
+                        v0, v1, v2 = _sample(views.splines[t, s], c, fy, fx)
                         r0, r1, r2 = v0 - m0, v1 - m1, v2 - m2
                         g0, g1, g2 = y0 * dt + x0 * ds, y1 * dt + x1 * ds, y2 * dt + x2 * ds
-                        # derivative of z / (z + scale) with respect to z
-                        w = scale / (scale + r0 * r0 + r1 * r1 + r2 * r2)
-                        w *= w / scale
+                        # derivative of z / (z + scale2) with respect to z
+                        w = scale2 / (scale2 + r0 * r0 + r1 * r1 + r2 * r2)
+                        w *= w / scale2
                         slope += w * (r0 * g0 + r1 * g1 + r2 * g2)
-                        bend += w * (g0 * g0 + g1 * g1 + g2 * g2)
-                gradient[y, x] += shares[layer] * slope
-                curvature[y, x] += shares[layer] * bend
+                        hessian += w * (g0 * g0 + g1 * g1 + g2 * g2)
+                gradient[y, x] += views.shares[part] * slope
+                curvature[y, x] += views.shares[part] * hessian
     return gradient, curvature

@@ -5,7 +5,7 @@ The straight line through a SEPI meets one sample of every view, so Eq. 3 of [1]
 ``(y - d (t - t0), x - d (s - s0))``. One ``(d, view)`` has one sub-pixel weight for the whole image, so a row is a run
 of contiguous multiply-adds that vectorises. Views are summed in *groups* (all of them for a SEPI; the parts from which
 half-SEPIs are put together), so one pass serves full and half SEPIs alike.
-The compiled loops are in :mod:`sepi.matching.photo_consistency` and :mod:`sepi.matching.plane_sweep_kernels`.
+The compiled loops are in :mod:`sepi.matching.plane_sweep_kernels`.
 
 References
 ----------
@@ -22,6 +22,7 @@ from pydantic import Field
 
 from sepi.image.noise import residual_variance
 from sepi.lightfield import BoolMap, FloatMap, LightField, full_scale
+from sepi.matching.sweep_arrays import BestMaps, Candidates, ViewStack, Window
 from sepi.stage import Parameters, Progress, no_progress
 
 
@@ -55,8 +56,8 @@ class SweepResult:
     Attributes
     ----------
     disparity, cost, mean : ndarray, shape (N, H, W), float32
-        Disparity at the minimum, refined below the candidate step by a parabola; the cost there (0..1); the mean cost
-        over all candidates. NaN where a pixel was not asked for.
+        Disparity at the minimum, refined below the disparity sampling by a parabola; the cost there (0..1); the mean
+        cost over all candidates. NaN outside the mask.
     """
 
     disparity: FloatMap
@@ -113,8 +114,7 @@ def sweep(
     """
     from numba import get_num_threads
 
-    from sepi.matching.photo_consistency import sample_offsets
-    from sepi.matching.plane_sweep_kernels import sweep_rows
+    from sepi.matching.plane_sweep_kernels import sweep_plane_rows
 
     H, W = light_field.shape
     groups = np.zeros(light_field.grid, np.int64) if groups is None else groups
@@ -123,36 +123,49 @@ def sweep(
     subsets = np.eye(groups.max() + 1, dtype=bool) if subsets is None else subsets
     groups, subsets = _without_empty(groups, subsets)
     mask = np.ones((H, W), bool) if mask is None else mask
-    views = planar(light_field)
+    colours = planar(light_field)
     noise = residual_variance(light_field.reference_view)
-    result = SweepResult(*(np.full((len(subsets), H, W), np.nan, np.float32) for _ in range(3)))
+    scale2 = np.float32((parameters.scale**2 + noise) * full_scale(colours.dtype) ** 2)
+    views = ViewStack(colours, *light_field.reference_position, groups, subsets, scale2)
     disparities = light_field.require_disparity_range().candidates(parameters.num_disparities)
-    (T, S), (t0, s0) = light_field.grid, light_field.reference_position
-    rows = _rows_at_a_stretch(H, get_num_threads())
-    strip = rows * get_num_threads()
-    for first in range(0, H, strip):
-        sweep_rows(
-            views,
-            *light_field.reference_position,
-            np.ascontiguousarray(light_field.reference_view.transpose(2, 0, 1)),
-            groups,
-            subsets,
-            mask,
-            first,
-            min(H, first + strip),
-            rows,
-            disparities,
-            *sample_offsets(disparities, np.arange(T) - t0),
-            *sample_offsets(disparities, np.arange(S) - s0),
-            np.float32((parameters.scale**2 + noise) * full_scale(views.dtype) ** 2),
-            parameters.window_radius,
-            np.float32(parameters.window_sigma**2 + noise),
-            result.disparity,
-            result.cost,
-            result.mean,
-        )
-        progress(min(H, first + strip) / H)
+    candidates = sampled_candidates(disparities, light_field.grid, light_field.reference_position)
+    guide = np.ascontiguousarray(light_field.reference_view.transpose(2, 0, 1))
+    window = Window(guide, parameters.window_radius, np.float32(parameters.window_sigma**2 + noise))
+    result = SweepResult(*(np.full((len(subsets), H, W), np.nan, np.float32) for _ in range(3)))
+    maps = BestMaps(result.disparity, result.cost, result.mean)
+    height = _rows_at_a_stretch(H, get_num_threads())
+    strip = height * get_num_threads()
+    for begin in range(0, H, strip):
+        end = min(H, begin + strip)
+        sweep_plane_rows(views, candidates, window, mask, begin, end, height, maps)
+        progress(end / H)
     return result
+
+
+def sampled_candidates(disparities: FloatMap, grid: tuple[int, int], reference: tuple[int, int]) -> Candidates:
+    """Candidates ``(K,)`` and where each row and each column of views has the samples of a reference pixel."""
+    down, across = (sample_offsets(disparities, np.arange(n) - own) for n, own in zip(grid, reference, strict=True))
+    return Candidates(disparities, *down, *across)
+
+
+def sample_offsets(disparities: FloatMap, baselines: npt.NDArray[np.int64]) -> tuple[npt.NDArray[np.int64], FloatMap]:
+    """Whole and fractional pixels from a reference pixel to its sample, along one axis: ``-d`` times the baseline.
+
+    Parameters
+    ----------
+    disparities : ndarray, shape (K,), float32
+    baselines : ndarray, shape (N,), int
+        Views from the reference view, along the axis.
+
+    Returns
+    -------
+    whole : ndarray, shape (N, K), int64
+    fraction : ndarray, shape (N, K), float32
+        0..1.
+    """
+    offset = -disparities.astype(np.float64) * baselines[:, None]
+    whole = np.floor(offset)
+    return whole.astype(np.int64), (offset - whole).astype(np.float32)
 
 
 def _rows_at_a_stretch(height: int, threads: int) -> int:

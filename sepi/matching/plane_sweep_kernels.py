@@ -1,58 +1,267 @@
-"""Compiled loops of the plane sweep.
+"""Compiled loops of the plane sweep: photo-consistency, its aggregation over windows, and the best candidate.
+
+One ``(candidate, view)`` has one sub-pixel weight for the whole picture, so a row is a run of contiguous multiply-adds
+that vectorises. Candidates next to each other mostly read the same pixels with other weights: two are done at once.
 
 No cost volume is ever held: a thread keeps the cost rows of one aggregation window, and the minimum is taken as soon as
 a pixel is aggregated. There the candidates of all groups of a pixel lie side by side: a window's weight is loaded once
 for all of them, and a pixel's costs stay in the first cache until its minima are found. Each pixel is summed by one
 thread in a fixed order: results do not depend on the number of threads.
 
-Only :func:`sweep_rows` runs in parallel.
+Only :func:`sweep_plane_rows` runs in parallel.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit, prange
+import numpy.typing as npt
+from numba import njit, prange, types
+from numba.extending import intrinsic
 
-from sepi.matching.photo_consistency import cost_row, count_views
+from sepi.lightfield import FloatMap
+from sepi.matching.sweep_arrays import BestMaps, Candidates, ViewStack, Window
+
+EXACT = {"nnan", "ninf", "nsz"}
+"""Fast-math flags that keep every rounding as written.
+
+Code that was just compiled is not optimised as the same code loaded from disk: with sums reordered or fused at will,
+the first run would give other last digits than later ones.
+"""
 
 SHORTEST_GAP = 128
-"""Columns between wanted pixels that are done rather than skipped: starting anew costs as much."""
+"""Columns between pixels of the mask that are done rather than skipped: starting anew costs as much."""
 
 TILE_WIDTH = 512
 """Columns done at a time: bounds what a thread holds, whatever the width of the picture, and keeps it in the cache."""
 
 
-@njit(cache=True, fastmath=True, error_model="numpy")
-def window_weights(guide: Any, y: int, begin: int, end: int, radius: int, variance: Any, weights: Any) -> None:
-    """Weights of the aggregation windows of columns ``begin..end`` of row ``y``: narrow in colour, summing to one.
+class Run(NamedTuple):
+    """Columns ``begin..end`` of row ``y``."""
+
+    y: int
+    begin: int
+    end: int
+
+
+class Tile(NamedTuple):
+    """Rows ``top..bottom`` of columns ``begin..end``; views are counted nearer than ``margin`` to the border."""
+
+    top: int
+    bottom: int
+    begin: int
+    end: int
+    margin: int
+
+
+class Rows(NamedTuple):
+    """Costs and numbers of samples of the rows of one window, and what is needed to fill them.
+
+    Attributes
+    ----------
+    ring, counts : ndarray, shape (size, n, G K), float32
+        Row ``r`` at ``r % size``, column ``x - radius`` of the tile at ``x``; zero outside the picture.
+    costs : ndarray, shape (G, K, n), float32
+    runs : ndarray, shape (N, 2), int64
+    """
+
+    ring: FloatMap
+    counts: FloatMap
+    costs: FloatMap
+    runs: npt.NDArray[np.int64]
+
+
+def _multiply_add(_context: Any, _a: Any, _b: Any, _c: Any) -> Any:
+    """``a * b + c`` of float32, rounded once: the processor's own instruction, whatever the optimiser does."""
+
+    def code(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+        return builder.fma(*arguments)
+
+    return types.float32(types.float32, types.float32, types.float32), code
+
+
+_fma: Any = intrinsic(_multiply_add)
+
+
+@njit(inline="always")
+def _weights(fy: Any, fx: Any) -> Any:
+    """Bilinear weights of the pixel, its right neighbour, and the two below."""
+    # a plain 1 is a 64-bit number, and would make all that follows 64 bits wide
+    ry, rx = np.float32(1) - fy, np.float32(1) - fx
+    return ry * rx, ry * fx, fy * rx, fy * fx
+
+
+@njit(inline="always")
+def _channels(pixels: Any, row: int, begin: int, end: int) -> Any:
+    """Columns ``begin..end`` of a row of ``pixels (3, rows, W)``, for each channel."""
+    return pixels[0, row, begin:end], pixels[1, row, begin:end], pixels[2, row, begin:end]
+
+
+@njit(inline="always")
+def _residual(a: Any, b: Any, reference: Any, w: Any, x: int) -> Any:
+    """Difference of a sample and its reference pixel; ``a``, ``b``: rows above and below the samples."""
+    return _fma(w[3], b[x + 1], _fma(w[2], b[x], _fma(w[1], a[x + 1], _fma(w[0], a[x], -reference[x]))))
+
+
+@njit(inline="always")
+def _robust(r0: Any, r1: Any, r2: Any, scale2: Any) -> Any:
+    """Robust residual of three channels, 0..1."""
+    z: Any = _fma(r2, r2, _fma(r1, r1, r0 * r0))
+    return z / (z + scale2)
+
+
+@njit(inline="always")
+def _add_one(out: Any, a: Any, b: Any, reference: Any, w: Any, scale2: Any) -> None:
+    """Add the robust residuals of one run of pixels; ``a``, ``b``, ``reference``: a row for each channel."""
+    a0, a1, a2 = a
+    b0, b1, b2 = b
+    g0, g1, g2 = reference
+    for x in range(out.size):
+        r0, r1, r2 = _residual(a0, b0, g0, w, x), _residual(a1, b1, g1, w, x), _residual(a2, b2, g2, w, x)
+        out[x] += _robust(r0, r1, r2, scale2)
+
+
+@njit(inline="always")
+def _add_two(out: Any, other: Any, a: Any, b: Any, reference: Any, w: Any, v: Any, scale2: Any) -> None:
+    """:func:`_add_one` of two candidates that read the same pixels: each is loaded once for both."""
+    a0, a1, a2 = a
+    b0, b1, b2 = b
+    g0, g1, g2 = reference
+    for x in range(out.size):
+        r0, r1, r2 = _residual(a0, b0, g0, w, x), _residual(a1, b1, g1, w, x), _residual(a2, b2, g2, w, x)
+        q0, q1, q2 = _residual(a0, b0, g0, v, x), _residual(a1, b1, g1, v, x), _residual(a2, b2, g2, v, x)
+        out[x] += _robust(r0, r1, r2, scale2)
+        other[x] += _robust(q0, q1, q2, scale2)
+
+
+@njit(cache=True, fastmath=EXACT, error_model="numpy")
+def _add_view(
+    views: ViewStack, candidates: Candidates, t: int, s: int, run: Run, low: int, band: Any, cost: Any
+) -> None:
+    """Add the residuals of one view to ``cost (K, n)``; ``band``: its rows from ``low`` on, and the reference row."""
+    H, W = views.colours.shape[3:]
+    y, begin, end = run
+    down, fy, across, fx = candidates.down[t], candidates.fy[t], candidates.across[s], candidates.fx[s]
+    pixels, reference = band
+    K = down.size
+    k = 0
+    while k < K:
+        here = k
+        k += 1
+        top, below = y + down[here], fy[here]
+        if top == H - 1 and below == 0:
+            # the last row has none below: seen from the one above
+            top, below = H - 2, np.float32(1)
+        left = across[here]
+        # run of pixels whose sample lies inside the view
+        first, last = max(begin, -left), min(end, W - 1 - left)
+        if top < 0 or top > H - 2 or last <= first:
+            continue
+        n, i, j = top - low, first + left, last + left + 1
+        w = _weights(below, fx[here])
+        out = cost[here, first - begin : last - begin]
+        if k < K and across[k] == left and y + down[k] == top:
+            v = _weights(fy[k], fx[k])
+            _add_two(
+                out, cost[k, first - begin : last - begin], _channels(pixels, n, i, j), _channels(pixels, n + 1, i, j),
+                _channels(reference, 0, first, last), w, v, views.scale2,
+            )  # fmt: skip
+            k += 1
+        else:
+            # made in each branch anew: numba drops their reference counts only where they are used at once
+            _add_one(
+                out, _channels(pixels, n, i, j), _channels(pixels, n + 1, i, j),
+                _channels(reference, 0, first, last), w, views.scale2,
+            )  # fmt: skip
+
+
+@njit(cache=True, fastmath=EXACT, error_model="numpy")
+def cost_row(views: ViewStack, candidates: Candidates, run: Run, cost: Any) -> None:
+    """Photo-consistency of a run of pixels, summed over each group of views, for every candidate.
 
     Parameters
     ----------
-    guide : ndarray, shape (C, H, W), float32
-        Reference view.
-    y, begin, end, radius : int
-    variance : float32
-        Squared colour distance of the fall-off.
-    weights : ndarray, shape (2 radius + 1, 2 radius + 1, end - begin), float32
-        Filled; zero outside the image.
+    views : ViewStack
+    candidates : Candidates
+    run : Run
+    cost : ndarray, shape (G, K, n), float32
+        The first columns are filled with the sum of the robust residuals (each 0..1).
     """
-    C, H, W = guide.shape
+    T, S, _, H, W = views.colours.shape
+    y, begin, end = run
+    cost[:, :, : end - begin] = 0
+    reference = views.colours[views.t0, views.s0, :, y : y + 1].astype(np.float32)
+    # rows and columns that any candidate touches, converted once for all candidates
+    rows = 2
+    for t in range(T):
+        rows = max(rows, candidates.down[t].max() - candidates.down[t].min() + 2)
+    pixels = np.empty((3, min(H, rows), W), np.float32)
+    for t in range(T):
+        low = max(0, min(H - 2, y + candidates.down[t].min()))
+        high = max(0, min(H - 2, y + candidates.down[t].max())) + 1
+        for s in range(S):
+            g = views.groups[t, s]
+            if g < 0:
+                continue
+            across = candidates.across[s]
+            leftmost, rightmost = max(0, begin + across.min()), min(W, end + across.max() + 1)
+            for c in range(3):
+                for row in range(low, high + 1):
+                    pixels[c, row - low, leftmost:rightmost] = views.colours[t, s, c, row, leftmost:rightmost]
+            _add_view(views, candidates, t, s, run, low, (pixels, reference), cost[g])
+
+
+@njit(cache=True, error_model="numpy")
+def _count_views(views: ViewStack, candidates: Candidates, run: Run, counts: Any) -> None:
+    """Number of views of each group that see each pixel of a run at each candidate, into ``counts (n, G K)``."""
+    T, S, _, H, W = views.colours.shape
+    K = candidates.disparities.size
+    G = counts.shape[1] // K
+    # views of each group and view column that have the row, at each candidate
+    having = np.zeros((G, S, K), np.float32)
+    some = np.zeros((G, S), np.bool_)
+    for t in range(T):
+        for s in range(S):
+            g = views.groups[t, s]
+            if g < 0:
+                continue
+            some[g, s] = True
+            for k in range(K):
+                top = run.y + candidates.down[t, k]
+                if top >= 0 and (top < H - 1 or (top == H - 1 and candidates.fy[t, k] == 0)):
+                    having[g, s, k] += np.float32(1)
+    for x in range(run.begin, run.end):
+        counts[x - run.begin] = 0
+        for g in range(G):
+            number = counts[x - run.begin, g * K : (g + 1) * K]
+            for s in range(S):
+                if some[g, s]:
+                    left, of_column = candidates.across[s], having[g, s]
+                    for k in range(K):
+                        inside = x + left[k] >= 0 and x + left[k] < W - 1
+                        number[k] += of_column[k] if inside else np.float32(0)
+
+
+@njit(cache=True, fastmath=EXACT, error_model="numpy")
+def _window_weights(window: Window, run: Run, weights: Any) -> None:
+    """Weights of the windows of a run of pixels, summing to one, into ``weights (size, size, n)``; zero outside."""
+    _, H, W = window.guide.shape
+    y, begin, end = run
     weights[:] = 0
     total = np.zeros(end - begin, np.float32)
-    falloff = np.float32(-0.5) / variance
-    for i in range(2 * radius + 1):
-        row = y + i - radius
+    falloff = np.float32(-0.5) / window.variance
+    for i in range(weights.shape[0]):
+        row = y + i - window.radius
         if row < 0 or row >= H:
             continue
-        for j in range(2 * radius + 1):
-            dx = j - radius
+        for j in range(weights.shape[1]):
+            dx = j - window.radius
             first, last = max(begin, -dx), min(end, W - dx)
             weight = weights[i, j, first - begin : last - begin]
-            for c in range(C):
-                here, there = guide[c, y, first:last], guide[c, row, first + dx : last + dx]
+            for c in range(3):
+                here, there = window.guide[c, y, first:last], window.guide[c, row, first + dx : last + dx]
                 for x in range(last - first):
                     e = here[x] - there[x]
                     weight[x] += e * e
@@ -60,8 +269,8 @@ def window_weights(guide: Any, y: int, begin: int, end: int, radius: int, varian
             for x in range(last - first):
                 weight[x] = np.exp(falloff * weight[x])
                 sums[x] += weight[x]
-    for i in range(2 * radius + 1):
-        for j in range(2 * radius + 1):
+    for i in range(weights.shape[0]):
+        for j in range(weights.shape[1]):
             for x in range(end - begin):
                 weights[i, j, x] /= total[x]
 
@@ -75,21 +284,14 @@ def _add_seven(target: Any, w: Any, a0: Any, a1: Any, a2: Any, a3: Any, a4: Any,
         )
 
 
-@njit(cache=True, fastmath=True, error_model="numpy")
-def _aggregate(ring: Any, y: int, x: int, H: int, weights: Any, window: Any) -> None:
-    """Weighted sum over the window of pixel ``(y, x)``, of all groups and candidates at once.
+@njit(cache=True, fastmath=EXACT, error_model="numpy")
+def _aggregate(ring: Any, y: int, x: int, H: int, weights: Any, sums: Any) -> None:
+    """Weighted sum over the window of pixel ``(y, x)``, of all groups and candidates at once, into ``sums (G K)``.
 
-    Parameters
-    ----------
-    ring : ndarray, shape (size, n, G K), float32
-        Rows of costs, row ``r`` at ``r % size``, column ``x - radius`` at ``x``.
-    y, x, H : int
-    weights : ndarray, shape (size, size, n), float32
-    window : ndarray, shape (G K,), float32
-        Filled.
+    ``ring (size, n, G K)`` is one of :class:`Rows`, ``weights (size, size, n)`` are those of :func:`_window_weights`.
     """
     size = weights.shape[0]
-    window[:] = 0
+    sums[:] = 0
     for i in range(size):
         row = y + i - size // 2
         if row < 0 or row >= H:
@@ -98,26 +300,26 @@ def _aggregate(ring: Any, y: int, x: int, H: int, weights: Any, window: Any) -> 
         w = weights[i, :, x]
         if size == 7:
             _add_seven(
-                window, (w[0], w[1], w[2], w[3], w[4], w[5], w[6]),
+                sums, (w[0], w[1], w[2], w[3], w[4], w[5], w[6]),
                 a[x], a[x + 1], a[x + 2], a[x + 3], a[x + 4], a[x + 5], a[x + 6],
             )  # fmt: skip
         else:
             for j in range(size):
                 weight, source = w[j], a[x + j]
-                for k in range(window.size):
-                    window[k] += weight * source[k]
+                for k in range(sums.size):
+                    sums[k] += weight * source[k]
 
 
-@njit(cache=True, fastmath=True, error_model="numpy")
-def _mean_costs(sums: Any, counts: Any, known: bool, subset: Any, total: Any) -> None:
+@njit(cache=True, fastmath=EXACT, error_model="numpy")
+def _mean_costs(sums: Any, counts: Any, all_seen: bool, subset: Any, total: Any) -> None:
     """Mean cost of each candidate over the views of one subset of groups.
 
     Parameters
     ----------
     sums : ndarray, shape (G, K), float32
     counts : ndarray, shape (G, K), float32
-        Numbers of samples; of all candidates those of the first, where ``known``.
-    known : bool
+        Numbers of samples; of all candidates those of the first, where ``all_seen``.
+    all_seen : bool
     subset : ndarray, shape (G,), bool
     total : ndarray, shape (K,), float32
         Filled.
@@ -131,7 +333,7 @@ def _mean_costs(sums: Any, counts: Any, known: bool, subset: Any, total: Any) ->
             source = sums[g]
             for k in range(K):
                 total[k] += source[k]
-    if known:
+    if all_seen:
         for k in range(K):
             # a subset without views matches nothing
             total[k] = total[k] / number if number > 0 else np.float32(1)
@@ -145,9 +347,9 @@ def _mean_costs(sums: Any, counts: Any, known: bool, subset: Any, total: Any) ->
         total[k] = total[k] / number if number > 0 else np.float32(1)
 
 
-@njit(cache=True, fastmath=True, error_model="numpy")
+@njit(cache=True, fastmath=EXACT, error_model="numpy")
 def _best_candidate(costs: Any, disparities: Any) -> Any:
-    """Disparity at the lowest of the costs, refined below the candidate step; that cost; the mean of all."""
+    """Disparity at the lowest of the costs, refined below the disparity sampling; that cost; the mean of all."""
     K = disparities.size
     lowest, total = costs[0], np.float32(0)
     for k in range(K):
@@ -163,23 +365,22 @@ def _best_candidate(costs: Any, disparities: Any) -> Any:
         curvature = before - 2 * lowest + after
         if curvature > 0:
             offset = np.float32(0.5) * (before - after) / curvature
-    step = (disparities[K - 1] - disparities[0]) / np.float32(K - 1)
-    return disparities[best] + offset * step, lowest, total / np.float32(K)
+    sampling = (disparities[K - 1] - disparities[0]) / np.float32(K - 1)
+    return disparities[best] + offset * sampling, lowest, total / np.float32(K)
 
 
 @njit(cache=True)
-def _needed_runs(mask: Any, y: int, begin: int, end: int, radius: int, runs: Any) -> int:
-    """Runs of columns of row ``y`` that windows of wanted pixels touch, into ``runs (N, 2)``, and how many.
+def _needed_runs(mask: Any, row: int, tile: Tile, radius: int, runs: Any) -> int:
+    """Runs of columns of a row that windows of the mask's pixels touch, into ``runs (N, 2)``, and how many.
 
-    A short gap does not end a run. Rows of all tasks count, lest a run, and with it the way a compiler sums it up,
-    depend on how the rows are shared out.
+    A short gap does not end a run.
     """
     H, W = mask.shape
     number = 0
-    for x in range(begin, end):
+    for x in range(tile.begin, tile.end):
         needed = False
-        for row in range(max(0, y - radius), min(H, y + radius + 1)):
-            needed |= mask[row, x]
+        for y in range(max(0, row - radius), min(H, row + radius + 1)):
+            needed |= mask[y, x]
         if not needed:
             continue
         first, last = max(0, x - radius), min(W, x + radius + 1)
@@ -207,96 +408,85 @@ def _transpose(costs: Any, columns: int, target: Any) -> None:
 
 @njit(cache=True, error_model="numpy")
 def _fill_row(
-    views: Any, t0: int, s0: int, groups: Any, mask: Any, row: int, begin: int, end: int, margin: int, radius: int,
-    down: Any, fy: Any, across: Any, fx: Any, scale2: Any, costs: Any, runs: Any, ring_row: Any, counts_row: Any,
-) -> None:  # fmt: skip
-    """Costs of one row into ``ring_row (n, G K)`` where they are needed, and near the border the views that see it."""
+    views: ViewStack, candidates: Candidates, mask: Any, row: int, tile: Tile, radius: int, rows: Rows
+) -> None:
+    """Costs of one row where they are needed, and near the border the number of views that see it."""
     H, W = mask.shape
-    origin = begin - radius
-    for r in range(_needed_runs(mask, row, begin, end, radius, runs)):
-        first, last = runs[r]
-        cost_row(views, t0, s0, groups, row, first, last, down, fy, across, fx, scale2, costs)
-        _transpose(costs, last - first, ring_row[first - origin :])
+    origin = tile.begin - radius
+    ring, counts = rows.ring[row % rows.ring.shape[0]], rows.counts[row % rows.ring.shape[0]]
+    for r in range(_needed_runs(mask, row, tile, radius, rows.runs)):
+        first, last = rows.runs[r]
+        cost_row(views, candidates, Run(row, first, last), rows.costs)
+        _transpose(rows.costs, last - first, ring[first - origin :])
         # windows of pixels near the border reach this far
-        inner = margin + radius
+        inner = tile.margin + radius
         left, right = last, last
         if inner <= row < H - inner:
             left = min(last, inner)
             right = max(first, left, W - inner)
-        for begin_counted, end_counted in ((first, left), (right, last)):
-            if begin_counted < end_counted:
-                count_views(
-                    groups, H, W, row, begin_counted, end_counted, down, fy, across,
-                    counts_row[begin_counted - origin :],
-                )  # fmt: skip
+        for begin, end in ((first, left), (right, last)):
+            if begin < end:
+                _count_views(views, candidates, Run(row, begin, end), counts[begin - origin :])
 
 
 @njit(cache=True, error_model="numpy")
 def _sweep_tile(
-    views: Any, t0: int, s0: int, guide: Any, groups: Any, subsets: Any, mask: Any,
-    top: int, bottom: int, begin: int, end: int, disparities: Any, down: Any, fy: Any, across: Any, fx: Any,
-    scale2: Any, radius: int, window_variance: Any, margin: int,
-    disparity: Any, cost: Any, mean: Any,
-) -> None:  # fmt: skip
-    """Sweep rows ``top..bottom``, columns ``begin..end``; nearer than ``margin`` to the border, views are counted."""
+    views: ViewStack, candidates: Candidates, window: Window, mask: Any, tile: Tile, maps: BestMaps
+) -> None:
+    """Sweep the pixels of a tile that are in the mask."""
     H, W = mask.shape
-    N, G = subsets.shape
-    K = disparities.size
-    size = 2 * radius + 1
-    width = end - begin
-    # costs of the rows of a window, with the columns of the windows at both ends; zero outside the picture
-    ring = np.zeros((size, width + 2 * radius, G * K), np.float32)
-    counts = np.zeros((size, width + 2 * radius, G * K), np.float32)
-    costs = np.empty((G, K, width + 2 * radius), np.float32)
-    runs = np.empty((width // SHORTEST_GAP + 2, 2), np.int64)
+    N, G = views.subsets.shape
+    K = candidates.disparities.size
+    radius, margin = window.radius, tile.margin
+    size, width = 2 * radius + 1, tile.end - tile.begin
+    # with the columns of the windows at both ends
+    rows = Rows(
+        np.zeros((size, width + 2 * radius, G * K), np.float32),
+        np.zeros((size, width + 2 * radius, G * K), np.float32),
+        np.empty((G, K, width + 2 * radius), np.float32),
+        np.empty((width // SHORTEST_GAP + 2, 2), np.int64),
+    )
     weights = np.empty((size, size, width), np.float32)
-    sums = np.empty(G * K, np.float32)
-    numbers = np.empty(G * K, np.float32)
+    sums, numbers = np.empty(G * K, np.float32), np.empty(G * K, np.float32)
     group_sizes = np.empty((G, K), np.float32)
     for g in range(G):
-        group_sizes[g] = (groups == g).sum()
+        group_sizes[g] = (views.groups == g).sum()
     total = np.empty(K, np.float32)
     done = -1  # last row whose costs are in the ring
-    for y in range(top, bottom):
-        if not mask[y, begin:end].any():
+    for y in range(tile.top, tile.bottom):
+        if not mask[y, tile.begin : tile.end].any():
             continue
         for row in range(max(0, y - radius, done + 1), min(H, y + radius + 1)):
-            _fill_row(
-                views, t0, s0, groups, mask, row, begin, end, margin, radius, down, fy, across, fx, scale2, costs,
-                runs, ring[row % size], counts[row % size],
-            )  # fmt: skip
+            _fill_row(views, candidates, mask, row, tile, radius, rows)
             done = row
-        window_weights(guide, y, begin, end, radius, window_variance, weights)
-        for x in range(begin, end):
+        _window_weights(window, Run(y, tile.begin, tile.end), weights)
+        for x in range(tile.begin, tile.end):
             if not mask[y, x]:
                 continue
-            _aggregate(ring, y, x - begin, H, weights, sums)
+            _aggregate(rows.ring, y, x - tile.begin, H, weights, sums)
             # away from the border every view sees every pixel of the window: nothing to count
-            known = margin <= y < H - margin and margin <= x < W - margin
-            if not known:
-                _aggregate(counts, y, x - begin, H, weights, numbers)
-            seen = group_sizes if known else numbers.reshape(G, K)
+            all_seen = margin <= y < H - margin and margin <= x < W - margin
+            if not all_seen:
+                _aggregate(rows.counts, y, x - tile.begin, H, weights, numbers)
+            seen = group_sizes if all_seen else numbers.reshape(G, K)
             for n in range(N):
-                _mean_costs(sums.reshape(G, K), seen, known, subsets[n], total)
-                disparity[n, y, x], cost[n, y, x], mean[n, y, x] = _best_candidate(total, disparities)
+                _mean_costs(sums.reshape(G, K), seen, all_seen, views.subsets[n], total)
+                best = _best_candidate(total, candidates.disparities)
+                maps.disparity[n, y, x], maps.cost[n, y, x], maps.mean[n, y, x] = best
 
 
 @njit(cache=True, parallel=True)
-def sweep_rows(
-    views: Any, t0: int, s0: int, guide: Any, groups: Any, subsets: Any, mask: Any,
-    first: int, last: int, rows: int, disparities: Any, down: Any, fy: Any, across: Any, fx: Any,
-    scale2: Any, radius: int, window_variance: Any, disparity: Any, cost: Any, mean: Any,
+def sweep_plane_rows(
+    views: ViewStack, candidates: Candidates, window: Window, mask: Any, begin: int, end: int, height: int,
+    maps: BestMaps,
 ) -> None:  # fmt: skip
-    """Sweep rows ``first..last``, so many ``rows`` of them at a stretch."""
-    W = views.shape[4]
-    reach = max(abs(disparities[0]), abs(disparities[-1]))
-    farthest = max(t0, views.shape[0] - 1 - t0, s0, views.shape[1] - 1 - s0)
-    margin = math.ceil(reach * farthest) + radius + 1
-    for task in prange((last - first + rows - 1) // rows):
-        for begin in range(0, W, TILE_WIDTH):
-            _sweep_tile(
-                views, t0, s0, guide, groups, subsets, mask,
-                first + task * rows, min(last, first + (task + 1) * rows), begin, min(W, begin + TILE_WIDTH),
-                disparities, down, fy, across, fx, scale2, radius, window_variance, margin,
-                disparity, cost, mean,
-            )  # fmt: skip
+    """Sweep the rows ``begin..end`` of the ``mask (H, W)``, so many of them, ``height``, at a stretch."""
+    T, S, _, _, W = views.colours.shape
+    t0, s0 = views.t0, views.s0
+    reach = max(abs(candidates.disparities[0]), abs(candidates.disparities[-1]))
+    margin = math.ceil(reach * max(t0, T - 1 - t0, s0, S - 1 - s0)) + window.radius + 1
+    for task in prange((end - begin + height - 1) // height):
+        top = begin + task * height
+        for left in range(0, W, TILE_WIDTH):
+            tile = Tile(top, min(end, top + height), left, min(W, left + TILE_WIDTH), margin)
+            _sweep_tile(views, candidates, window, mask, tile, maps)

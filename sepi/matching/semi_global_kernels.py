@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 from numba import njit, prange
 
-from sepi.matching.fastmath import EXACT
+EXACT = {"nnan", "ninf", "nsz"}
+"""Fast-math flags that keep every rounding as written: see :mod:`sepi.matching.plane_sweep_kernels`."""
 
 _UNREACHABLE = np.float32(1e9)
 
@@ -40,7 +41,7 @@ def aggregate(cost: Any, guide: Any, radius: int, variance: Any) -> Any:
 
 
 @njit(inline="always")
-def _step(before: Any, least: Any, cost: Any, small: Any, large: Any, path: Any) -> Any:
+def _next(before: Any, least: Any, cost: Any, small: Any, large: Any, path: Any) -> Any:
     """One pixel further along a path; ``before`` and ``path`` have an unreachable candidate at either end."""
     for k in range(cost.size):
         best = min(before[k + 1], least + large)
@@ -82,7 +83,7 @@ def semi_global(cost: Any, guide: Any, small: Any, large: Any, weakening: Any) -
                     least = _start(cost[y, x], path)
                 else:
                     p = _large_penalty(guide, y, x, y, x - dx, small, large, weakening)
-                    least = _step(before, least, cost[y, x], small, p, path)
+                    least = _next(before, least, cost[y, x], small, p, path)
                 for k in range(K):
                     out[y, x, k] += path[k + 1]
                 before, path = path, before
@@ -98,7 +99,7 @@ def semi_global(cost: Any, guide: Any, small: Any, large: Any, weakening: Any) -
                         least_row[x] = _start(cost[y, x], row[x])
                     else:
                         p = _large_penalty(guide, y, x, y - dy, x - dx, small, large, weakening)
-                        least_row[x] = _step(above[x - dx], least_above[x - dx], cost[y, x], small, p, row[x])
+                        least_row[x] = _next(above[x - dx], least_above[x - dx], cost[y, x], small, p, row[x])
                     for k in range(K):
                         out[y, x, k] += row[x, k + 1]
                 above, row = row, above
@@ -131,9 +132,9 @@ def choose(smoothed: Any, averaged: Any, disparities: Any, same: Any) -> Any:
             offset = np.float32(0)
             if 0 < best < K - 1:
                 a, b, c = smoothed[y, x, best - 1], smoothed[y, x, best], smoothed[y, x, best + 1]
-                bend = a - 2 * b + c
-                if bend > 1e-9:
-                    offset = np.float32(0.5) * (a - c) / bend
+                curvature = a - 2 * b + c
+                if curvature > 1e-9:
+                    offset = np.float32(0.5) * (a - c) / curvature
             disparity[y, x] = disparities[best] + offset * spacing
             own, other = _UNREACHABLE, _UNREACHABLE
             for k in range(K):

@@ -36,8 +36,8 @@ class StitchedEpi:
         Rows of the corresponding EPIs, 0..1, ordered by ``t``, then ``s``.
     offsets : ndarray, shape (T * S,), float64
         Shift of each row to the right, pixels (Eq. 2).
-    steps : ndarray, shape (T * S,), int
-        Place of each row along the stitched angular axis, ``s' - s0'`` = 0 for the reference view.
+    positions : ndarray, shape (T * S,), int
+        Position of each row along the stitched angular axis, ``s' - s0'`` = 0 for the reference view.
     inside : ndarray, shape (T * S,), bool
         Whether the corresponding EPI lies inside its view and the view is present.
     disparity : float
@@ -46,7 +46,7 @@ class StitchedEpi:
 
     rows: FloatMap
     offsets: np.ndarray
-    steps: np.ndarray
+    positions: np.ndarray
     inside: np.ndarray
     disparity: float
 
@@ -60,7 +60,7 @@ class StitchedEpi:
         valid : ndarray, shape (T * S,), bool
             Whether the sample lies inside its view.
         """
-        position = x - self.disparity * self.steps - self.offsets
+        position = x - self.disparity * self.positions - self.offsets
         left = np.floor(position).astype(int)
         width = self.rows.shape[1]
         valid = self.inside & (left >= 0) & (left + 1 < width)
@@ -110,12 +110,12 @@ def stitched_epi(light_field: LightField, y: int, disparity: float) -> StitchedE
     rows = np.zeros((T, S, W, 3), np.float32)
     inside = np.zeros((T, S), bool)
     offsets = np.zeros((T, S))
-    steps = np.zeros((T, S), int)
+    positions = np.zeros((T, S), int)
     for t in range(T):
         j = t - t0
         row = y - disparity * j
         offsets[t] = -disparity * S * j
-        steps[t] = S * j + np.arange(S) - s0
+        positions[t] = S * j + np.arange(S) - s0
         if not 0 <= row <= H - 1:
             continue
         top = min(int(np.floor(row)), H - 2)
@@ -125,7 +125,7 @@ def stitched_epi(light_field: LightField, y: int, disparity: float) -> StitchedE
         )
         rows[t] = (1 - (row - top)) * above + (row - top) * below
         inside[t] = light_field.present[t]
-    return StitchedEpi(rows.reshape(T * S, W, 3), offsets.ravel(), steps.ravel(), inside.ravel(), float(disparity))
+    return StitchedEpi(rows.reshape(T * S, W, 3), offsets.ravel(), positions.ravel(), inside.ravel(), float(disparity))
 
 
 def line_cost(light_field: LightField, y: int, x: int, disparity: float, scale: float) -> float:

@@ -71,10 +71,10 @@ def structure_tensor_depth(light_field: LightField, parameters: StructureTensorP
     for views, transposed in ((row, False), (column, True)):
         if len(views) < 2:
             continue
-        steps = [step for step, _ in views]
+        baselines = [baseline for baseline, _ in views]
         images = [as_unit_float(view.transpose(1, 0, 2) if transposed else view) for _, view in views]
         for shear in range(math.floor(known.minimum), math.ceil(known.maximum) + 1):
-            disparity, coherence = _sheared(steps, images, shear, parameters)
+            disparity, coherence = _sheared(baselines, images, shear, parameters)
             if transposed:
                 disparity, coherence = disparity.T, coherence.T
             trusted = (np.abs(disparity - shear) <= parameters.shear_reach) & (coherence > confidence)
@@ -85,15 +85,15 @@ def structure_tensor_depth(light_field: LightField, parameters: StructureTensorP
 
 
 def _sheared(
-    steps: list[int], images: list[FloatMap], shear: int, parameters: StructureTensorParameters
+    baselines: list[int], images: list[FloatMap], shear: int, parameters: StructureTensorParameters
 ) -> tuple[FloatMap, FloatMap]:
     """Disparity and coherence at the reference view from horizontal EPIs sheared by a whole disparity."""
     # after the shear a surface of disparity `shear` stands still from view to view
-    moved = np.stack([_shifted(image, shear * step) for step, image in zip(steps, images, strict=True)])
+    moved = np.stack([_shifted(image, shear * baseline) for baseline, image in zip(baselines, images, strict=True)])
     smooth = np.stack([_blurred(view, parameters.inner_sigma) for view in moved])
     along_x = np.stack([cv2.Sobel(view, cv2.CV_32F, 1, 0, ksize=3, scale=1 / 8) for view in smooth])
-    along_s = np.gradient(smooth, np.asarray(steps, np.float32), axis=0)
-    weight = np.exp(-0.5 * (np.asarray(steps) / parameters.outer_sigma) ** 2).astype(np.float32)
+    along_s = np.gradient(smooth, np.asarray(baselines, np.float32), axis=0)
+    weight = np.exp(-0.5 * (np.asarray(baselines) / parameters.outer_sigma) ** 2).astype(np.float32)
 
     def tensor(a: FloatMap, b: FloatMap) -> FloatMap:
         # einsum, not tensordot: a BLAS product changes its last bits with the number of threads

@@ -49,14 +49,14 @@ def halves_and_quarters(grid: tuple[int, int], reference: tuple[int, int] | None
     grid : (int, int)
         Rows and columns of views.
     reference : (int, int), optional
-        Place of the reference view, from which sides are seen; the centre unless given.
+        Position of the reference view, from which sides are seen; the centre unless given.
 
     Returns
     -------
     ViewSubsets
         Named ``full``, the four ``SIDES``, then the ``QUARTERS`` as ``left-up`` and so on.
     """
-    t, s = _steps(grid, reference)
+    t, s = _baselines(grid, reference)
     sign_t, sign_s = np.meshgrid(np.sign(t), np.sign(s), indexing="ij")
     groups = 3 * (sign_t + 1) + sign_s + 1
     # signs (dt, ds) of each group, in the order of their numbers
@@ -77,7 +77,7 @@ def half_planes(grid: tuple[int, int], directions: int, reference: tuple[int, in
     directions : int
         Number of edge orientations over half a turn.
     reference : (int, int), optional
-        Place of the reference view; the centre unless given.
+        Position of the reference view; the centre unless given.
 
     Returns
     -------
@@ -86,7 +86,7 @@ def half_planes(grid: tuple[int, int], directions: int, reference: tuple[int, in
         ``(n + 1/2) pi / directions``, measured from ``+s`` towards ``+t``.
     """
     sectors = 2 * directions
-    t, s = _steps(grid, reference)
+    t, s = _baselines(grid, reference)
     angle = np.arctan2(*np.meshgrid(t, s, indexing="ij"))
     groups = np.round(angle * sectors / (2 * np.pi)).astype(np.int64) % sectors
     start = np.arange(sectors)[:, None]
@@ -96,9 +96,9 @@ def half_planes(grid: tuple[int, int], directions: int, reference: tuple[int, in
     return ViewSubsets(groups, subsets, ("full", *(f"half-plane {n}" for n in range(sectors))))
 
 
-def _steps(
+def _baselines(
     grid: tuple[int, int], reference: tuple[int, int] | None
 ) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
-    """Steps of each row and of each column from the reference view."""
+    """View baselines of each row and of each column from the reference view."""
     t0, s0 = reference or (grid[0] // 2, grid[1] // 2)
     return np.arange(grid[0]) - t0, np.arange(grid[1]) - s0

@@ -1,22 +1,72 @@
-"""Compiled loops of the layered plane sweep: z-buffers of every view, and costs over the views that see a pixel."""
+"""Compiled loops of the visibility sweep: z-buffers of every view, and costs over the views that see a pixel."""
 
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit, prange
 
-from sepi.matching.fastmath import EXACT
+from sepi.lightfield import FloatMap
+from sepi.matching.base_detail import BaseDetail
+
+EXACT = {"nnan", "ninf", "nsz"}
+"""Fast-math flags that keep every rounding as written: see :mod:`sepi.matching.plane_sweep_kernels`."""
 
 EMPTY = np.float32(-1e9)
 """Disparity in a z-buffer where no pixel of the reference view falls: nothing is nearer."""
 
 
+class Visibility(NamedTuple):
+    """In which views a pixel is seen.
+
+    Attributes
+    ----------
+    nearest : ndarray, shape (T, S, H, W) or (T, S, H, 0), float32
+        From :func:`z_buffers`; empty: all views see all pixels.
+    occlusion_margin : float32
+        By how much an occluder must be nearer, pixels per view step.
+    occluded_view_weight : float32
+        Weight of a view in which the pixel is occluded.
+    """
+
+    nearest: FloatMap
+    occlusion_margin: np.float32
+    occluded_view_weight: np.float32
+
+
+class RobustCost(NamedTuple):
+    """Square of the robust scale, and share in the cost, of colours and of detail; shape (2,), float32."""
+
+    scales2: FloatMap
+    shares: FloatMap
+
+
+class _View(NamedTuple):
+    """A view ``(dt, ds)`` from the reference view, at row ``y`` of which costs are computed.
+
+    ``band (1 or 2, 3, rows, W + 1)`` holds the rows from ``low`` on of its colours and detail.
+    """
+
+    dt: int
+    ds: int
+    y: int
+    low: int
+    band: FloatMap
+
+
+class _Sums(NamedTuple):
+    """Weighted sums of the residuals, and of the weights, of one row; (K, W), float32. ``seen (W,)`` is scratch."""
+
+    cost: FloatMap
+    weight: FloatMap
+    seen: FloatMap
+
+
 @njit(parallel=True, cache=True)
 def z_buffers(disparity: Any, present: Any, t0: int, s0: int) -> Any:
-    """Disparity map of the reference view as each view sees it: the nearest of the pixels that touch a place.
+    """Disparity map of the reference view as each view sees it: the nearest of the pixels that touch a position.
 
     Parameters
     ----------
@@ -24,13 +74,13 @@ def z_buffers(disparity: Any, present: Any, t0: int, s0: int) -> Any:
         Pixels per view step.
     present : ndarray, shape (T, S), bool
     t0, s0 : int
-        Place of the reference view.
+        Position of the reference view.
 
     Returns
     -------
     ndarray, shape (T, S, H, W), float32
-        ``EMPTY`` where no pixel falls. A pixel covers the up to four places that its square touches, since a bilinear
-        sample beside it reads its colour too.
+        ``EMPTY`` where no pixel falls. A pixel occludes the up to four positions that its square touches, since a
+        bilinear sample beside it reads its colour too.
     """
     T, S = present.shape
     H, W = disparity.shape
@@ -53,18 +103,18 @@ def z_buffers(disparity: Any, present: Any, t0: int, s0: int) -> Any:
 
 @njit(parallel=True, cache=True)
 def occluded_in_any_view(disparity: Any, present: Any, t0: int, s0: int, occlusion_margin: Any) -> Any:
-    """Pixels that something nearer covers in one of the views that could see them; shape (H, W), bool.
+    """Pixels that something nearer occludes in one of the views that could see them; shape (H, W), bool.
 
     Parameters
     ----------
     disparity, present, t0, s0
         As in :func:`z_buffers`.
     occlusion_margin : float32
-        By how much a cover must be nearer, pixels per view step.
+        By how much an occluder must be nearer, pixels per view step.
     """
     nearest = z_buffers(disparity, present, t0, s0)
     T, S, H, W = nearest.shape
-    covered = np.zeros((H, W), np.bool_)
+    occluded = np.zeros((H, W), np.bool_)
     for y in prange(H):
         for x in range(W):
             d = disparity[y, x]
@@ -72,32 +122,39 @@ def occluded_in_any_view(disparity: Any, present: Any, t0: int, s0: int, occlusi
                 for s in range(S):
                     row, column = y - d * (t - t0) + 0.5, x - d * (s - s0) + 0.5
                     if row >= 0 and column >= 0 and row < H and column < W:
-                        covered[y, x] |= nearest[t, s, int(row), int(column)] > d + occlusion_margin
-    return covered
+                        occluded[y, x] |= nearest[t, s, int(row), int(column)] > d + occlusion_margin
+    return occluded
 
 
 @njit(inline="always")
-def _add_layer(
-    total: Any, a0: Any, b0: Any, a1: Any, b1: Any, a2: Any, b2: Any, g0: Any, g1: Any, g2: Any, seen: Any, w: Any,
-    scale2: Any, share: Any,
-) -> None:  # fmt: skip
-    """Add the robust residual of one run of pixels in one layer; ``a``, ``b``: rows above and below the samples."""
-    for x in range(total.size):
+def _add_residuals(out: Any, a: Any, b: Any, reference: Any, seen: Any, w: Any, scale2: Any, share: Any) -> None:
+    """Add the robust residuals of one run of pixels; ``a``, ``b``: rows above and below the samples, per channel."""
+    a0, a1, a2 = a
+    b0, b1, b2 = b
+    g0, g1, g2 = reference
+    for x in range(out.size):
         r0 = w[0] * a0[x] + w[1] * a0[x + 1] + w[2] * b0[x] + w[3] * b0[x + 1] - g0[x]
         r1 = w[0] * a1[x] + w[1] * a1[x + 1] + w[2] * b1[x] + w[3] * b1[x + 1] - g1[x]
         r2 = w[0] * a2[x] + w[1] * a2[x + 1] + w[2] * b2[x] + w[3] * b2[x + 1] - g2[x]
         z = r0 * r0 + r1 * r1 + r2 * r2
-        total[x] += share * seen[x] * z / (z + scale2)
+        out[x] += share * seen[x] * z / (z + scale2)
+
+
+@njit(inline="always")
+def _channels(rows: Any, row: int, begin: int, end: int) -> Any:
+    """Columns ``begin..end`` of a row of ``rows (3, n, W)``, for each channel."""
+    return rows[0, row, begin:end], rows[1, row, begin:end], rows[2, row, begin:end]
 
 
 @njit(cache=True, fastmath=EXACT, error_model="numpy")
 def _add_view(
-    band: Any, low: int, reference_view: Any, y: int, dt: int, ds: int, disparities: Any, nearest: Any, tolerance: Any,
-    hidden: Any, scales: Any, shares: Any, seen: Any, total: Any, weight: Any,
-) -> None:  # fmt: skip
-    """Add one view, whose rows from ``low`` on are in ``band (layers, 3, rows, W + 1)``, at every candidate."""
-    layers, W = band.shape[0], band.shape[3] - 1
-    H = nearest.shape[0]
+    view: _View, reference: Any, disparities: Any, nearest: Any, visibility: Visibility, robust: RobustCost, sums: _Sums
+) -> None:
+    """Add one view at every candidate; ``reference (1 or 2, 3, 1, W)``, ``nearest``: the view's own z-buffer."""
+    H, W = nearest.shape[0], reference.shape[3]
+    dt, ds, y, low, band = view
+    cost, weight, scratch = sums
+    margin, hidden = visibility.occlusion_margin, visibility.occluded_view_weight
     one = np.float32(1)
     for k in range(disparities.size):
         d = disparities[k]
@@ -111,25 +168,24 @@ def _add_view(
         if last <= first:
             continue
         n, i, j = top - low, first + left, last + left + 1
-        run = seen[first:last]
+        seen = scratch[first:last]
         if nearest.shape[1] == 0:
-            run[:] = one
+            seen[:] = one
         else:
             right = 1 if fx > 0.5 else 0
             before = nearest[top + (1 if fy > 0.5 else 0), i + right : last + left + right]
-            limit = np.float32(d + tolerance)
-            for x in range(run.size):
-                run[x] = one if before[x] <= limit else hidden
+            limit = np.float32(d + margin)
+            for x in range(seen.size):
+                seen[x] = one if before[x] <= limit else hidden
         count = weight[k, first:last]
-        for x in range(run.size):
-            count[x] += run[x]
+        for x in range(seen.size):
+            count[x] += seen[x]
         w = ((one - fy) * (one - fx), (one - fy) * fx, fy * (one - fx), fy * fx)
-        for layer in range(layers):
-            b, g = band[layer], reference_view[layer]
-            _add_layer(
-                total[k, first:last], b[0, n, i:j], b[0, n + 1, i:j], b[1, n, i:j], b[1, n + 1, i:j], b[2, n, i:j],
-                b[2, n + 1, i:j], g[0, first:last], g[1, first:last], g[2, first:last], run, w, scales[layer],
-                shares[layer],
+        for m in range(reference.shape[0]):
+            b, g = band[m], reference[m]
+            _add_residuals(
+                cost[k, first:last], _channels(b, n, i, j), _channels(b, n + 1, i, j),
+                _channels(g, 0, first, last), seen, w, robust.scales2[m], robust.shares[m],
             )  # fmt: skip
 
 
@@ -140,66 +196,51 @@ def _load(row: Any, unit: Any, out: Any) -> None:
 
 
 @njit(parallel=True, cache=True, fastmath=EXACT, error_model="numpy")
-def sweep_rows(
-    colours: Any, colour_unit: Any, detail: Any, detail_unit: Any, present: Any, t0: int, s0: int, nearest: Any,
-    disparities: Any, tolerance: Any, hidden: Any, scales: Any, shares: Any, begin: int, end: int, cost: Any,
-) -> None:  # fmt: skip
-    """Cost of every candidate for rows ``begin..end``, over the views in which nothing nearer covers the pixel.
+def sweep_visible_rows(
+    views: BaseDetail, visibility: Visibility, robust: RobustCost, disparities: Any, begin: int, end: int, cost: Any
+) -> None:
+    """Cost of every candidate for rows ``begin..end``, over the views in which nothing nearer occludes the pixel.
 
     Parameters
     ----------
-    colours : ndarray, shape (T, S, 3, H, W)
-    colour_unit, detail_unit : float32
-        What the layers' values are multiplied with.
-    detail : ndarray, shape (T, S, 3 or 0, H, W)
-    present : ndarray, shape (T, S), bool
-        Views that count.
-    t0, s0 : int
-        Place of the reference view.
-    nearest : ndarray, shape (T, S, H, W) or (T, S, H, 0), float32
-        From :func:`z_buffers`; empty: all views see all pixels.
+    views : BaseDetail
+    visibility : Visibility
+    robust : RobustCost
     disparities : ndarray, shape (K,), float32
-    tolerance : float32
-        By how much a cover must be nearer, pixels per view step.
-    hidden : float32
-        Weight of a view in which the pixel is covered.
-    scales, shares : ndarray, shape (2,), float32
-        Square of the robust scale, and share in the cost, of colours and detail.
     begin, end : int
     cost : ndarray, shape (K, H, W), float32
         Rows ``begin..end`` are filled with costs of 0..1; 1 where no view is left.
     """
-    T, S, _, H, W = colours.shape
+    T, S, _, H, W = views.colours.shape
+    t0, s0 = views.t0, views.s0
     K = disparities.size
-    layers = 2 if detail.shape[2] else 1
+    with_detail = views.detail.shape[2] > 0
+    parts = 2 if with_detail else 1
     reach = max(abs(disparities[0]), abs(disparities[K - 1])) * max(t0, T - 1 - t0)
     rows = min(H, 2 * math.ceil(reach) + 3)
     for y in prange(begin, end):
-        total, weight = np.zeros((K, W), np.float32), np.zeros((K, W), np.float32)
-        seen = np.empty(W, np.float32)
-        reference_view = np.empty((layers, 3, W), np.float32)
+        sums = _Sums(np.zeros((K, W), np.float32), np.zeros((K, W), np.float32), np.empty(W, np.float32))
+        reference = np.empty((parts, 3, 1, W), np.float32)
         # one column more, which is read but weighs nothing
-        band = np.zeros((layers, 3, rows, W + 1), np.float32)
+        band = np.zeros((parts, 3, rows, W + 1), np.float32)
         for c in range(3):
-            _load(colours[t0, s0, c, y], colour_unit, reference_view[0, c])
-            if layers == 2:
-                _load(detail[t0, s0, c, y], detail_unit, reference_view[1, c])
+            _load(views.colours[t0, s0, c, y], views.colour_unit, reference[0, c, 0])
+            if with_detail:
+                _load(views.detail[t0, s0, c, y], views.detail_unit, reference[1, c, 0])
         for t in range(T):
             ends = (y - disparities[0] * (t - t0), y - disparities[K - 1] * (t - t0))
             low = max(0, min(H - 2, math.floor(min(ends))))
             high = max(0, min(H - 2, math.floor(max(ends)))) + 1
             for s in range(S):
-                if not present[t, s] or (t == t0 and s == s0):
+                if not views.present[t, s] or (t == t0 and s == s0):
                     continue
                 for c in range(3):
                     for row in range(low, high + 1):
-                        _load(colours[t, s, c, row], colour_unit, band[0, c, row - low, :W])
-                        if layers == 2:
-                            _load(detail[t, s, c, row], detail_unit, band[1, c, row - low, :W])
-                _add_view(
-                    band, low, reference_view, y, t - t0, s - s0, disparities, nearest[t, s], tolerance, hidden, scales,
-                    shares, seen, total, weight,
-                )  # fmt: skip
+                        _load(views.colours[t, s, c, row], views.colour_unit, band[0, c, row - low, :W])
+                        if with_detail:
+                            _load(views.detail[t, s, c, row], views.detail_unit, band[1, c, row - low, :W])
+                view = _View(t - t0, s - s0, y, low, band)
+                _add_view(view, reference, disparities, visibility.nearest[t, s], visibility, robust, sums)
         for k in range(K):
             for x in range(W):
-                cost[k, y, x] = total[k, x] / weight[k, x] if weight[k, x] > 0 else np.float32(1)
+                cost[k, y, x] = sums.cost[k, x] / sums.weight[k, x] if sums.weight[k, x] > 0 else np.float32(1)

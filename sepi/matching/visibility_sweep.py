@@ -1,7 +1,7 @@
-"""Plane sweep over two layers of the views, with the views left out in which a pixel is covered.
+"""Plane sweep over colours and detail of the views, with the views left out in which a pixel is occluded.
 
-A view sees pixel ``p`` at candidate ``d`` unless something nearer than ``d`` covers the place where ``p`` would be
-seen. What covers it is known from a first depth map: each view gets a z-buffer of that map. This is the idea of the
+A view sees pixel ``p`` at candidate ``d`` unless something nearer than ``d`` occludes the position where ``p`` would be
+seen. What occludes it is known from a first depth map: each view gets a z-buffer of that map. This is the idea of the
 half-SEPI, with the part of the views chosen view by view. The compiled loops are in
 :mod:`sepi.matching.visibility_kernels`.
 """
@@ -16,7 +16,6 @@ from pydantic import Field
 from sepi.image.mixed_pixels import MixtureParameters, reassign_mixed_pixels
 from sepi.lightfield import FloatMap, LightField
 from sepi.matching.base_detail import (
-    DETAIL_UNIT,
     BaseDetail,
     BaseDetailParameters,
     ColourScale,
@@ -30,7 +29,7 @@ ROWS_PER_REPORT = 128
 
 
 class VisibilitySweepParameters(BaseDetailParameters, SmoothingParameters):
-    """Parameters of a layered sweep and of the choice among its candidates."""
+    """Parameters of a visibility sweep and of the choice among its candidates."""
 
     num_disparities: int = Field(
         91, ge=3, le=4001, description="number of candidate disparities, uniform over the range"
@@ -41,7 +40,7 @@ class VisibilityParameters(VisibilitySweepParameters, MixtureParameters, Occlusi
     """Parameters of the sweep over the views that see a pixel."""
 
     passes: int = Field(3, ge=1, le=10, description="how often visibility and depth are computed anew")
-    occluded_view_weight: float = Field(0.01, ge=0, le=1, description="weight of a view in which the pixel is covered")
+    occluded_view_weight: float = Field(0.01, ge=0, le=1, description="weight of a view in which the pixel is occluded")
 
 
 class AllViewsParameters(VisibilitySweepParameters):
@@ -71,15 +70,15 @@ def depth_from_all_views(
     SepiError
         If the disparity range is unknown.
     """
-    layers = base_detail_decomposition(light_field, parameters)
-    none = np.empty((*light_field.grid, light_field.shape[0], 0), np.float32)
-    return _swept(light_field, layers, none, 0.0, 1.0, parameters, progress)
+    everywhere = np.empty((*light_field.grid, light_field.shape[0], 0), np.float32)
+    views = base_detail_decomposition(light_field, parameters)
+    return _sweep(light_field, views, everywhere, 0.0, 1.0, parameters, progress)
 
 
 def depth_from_visible_views(
     light_field: LightField, disparity: FloatMap, parameters: VisibilityParameters, progress: Progress
 ) -> SmoothedResult:
-    """Depth over the views that see a pixel, as a first map tells, in several passes; then mixed pixels at steps.
+    """Depth over the views that see a pixel, as a first map tells, in several passes; then mixed pixels.
 
     Parameters
     ----------
@@ -101,61 +100,45 @@ def depth_from_visible_views(
     """
     from sepi.matching.visibility_kernels import z_buffers
 
-    layers = base_detail_decomposition(light_field, parameters)
+    views = base_detail_decomposition(light_field, parameters)
     n = parameters.passes
     for i in range(n):
-        nearest = z_buffers(disparity, light_field.present, *light_field.reference_position)
-        result = _swept(
+        result = _sweep(
             light_field,
-            layers,
-            nearest,
+            views,
+            z_buffers(disparity, light_field.present, *light_field.reference_position),
             parameters.occlusion_margin,
             parameters.occluded_view_weight,
             parameters,
             lambda fraction, i=i: progress((i + fraction) / n),  # type: ignore[misc]
         )
         disparity = result.disparity
-    decided = reassign_mixed_pixels(disparity, layers.guide, layers.noise, parameters)
-    return replace(result, disparity=decided)
+    return replace(result, disparity=reassign_mixed_pixels(disparity, views.guide, views.noise, parameters))
 
 
-def _swept(
+def _sweep(
     light_field: LightField,
-    layers: BaseDetail,
+    views: BaseDetail,
     nearest: FloatMap,
     occlusion_margin: float,
-    hidden: float,
+    occluded_view_weight: float,
     parameters: VisibilitySweepParameters,
     progress: Progress,
 ) -> SmoothedResult:
-    from sepi.matching.visibility_kernels import sweep_rows
+    from sepi.matching.visibility_kernels import RobustCost, Visibility, sweep_visible_rows
 
     H, W = light_field.shape
     disparities = light_field.require_disparity_range().candidates(parameters.num_disparities)
     cost = np.empty((parameters.num_disparities, H, W), np.float32)
     share = parameters.detail_share
-    scales = [layers.squared_scale(s) for s in (parameters.colour_scale, parameters.detail_scale)]
+    scales2 = [views.squared_scale(s) for s in (parameters.colour_scale, parameters.detail_scale)]
+    robust = RobustCost(np.array(scales2, np.float32), np.array([1 - share, share], np.float32))
+    visibility = Visibility(nearest, np.float32(occlusion_margin), np.float32(occluded_view_weight))
     for begin in range(0, H, ROWS_PER_REPORT):
         end = min(H, begin + ROWS_PER_REPORT)
-        sweep_rows(
-            layers.colours,
-            np.float32(layers.colour_unit),
-            layers.detail,
-            np.float32(DETAIL_UNIT),
-            light_field.present,
-            *light_field.reference_position,
-            nearest,
-            disparities,
-            np.float32(occlusion_margin),
-            np.float32(hidden),
-            np.array(scales, np.float32),
-            np.array([1 - share, share], np.float32),
-            begin,
-            end,
-            cost,
-        )
+        sweep_visible_rows(views, visibility, robust, disparities, begin, end, cost)
         # the smoothing takes about a fifth of the time
         progress(0.8 * end / H)
-    result = smooth_and_choose(cost, disparities, layers.guide, layers.noise, parameters)
+    result = smooth_and_choose(cost, disparities, views.guide, views.noise, parameters)
     progress(1.0)
     return result

@@ -42,11 +42,11 @@ def _fill_row(
                 count += 1
         # few crossings, mostly two: a sort by insertion
         for i in range(1, count):
-            crossing, place = crossings[i], i
-            while place > 0 and crossings[place - 1] > crossing:
-                crossings[place] = crossings[place - 1]
-                place -= 1
-            crossings[place] = crossing
+            crossing, position = crossings[i], i
+            while position > 0 and crossings[position - 1] > crossing:
+                crossings[position] = crossings[position - 1]
+                position -= 1
+            crossings[position] = crossing
         at_zero = planes[p, 0] + planes[p, 2] * y
         for i in range(0, count - 1, 2):
             first = max(0, int(np.ceil((max(crossings[i], -1.0) + 0.5) * samples - 0.5)))

@@ -41,7 +41,7 @@ def occluded(
     would say. Instead of a buffer on the view's pixel grid, whose rounding marks slanted planes as hidden by
     themselves, the sight line is followed through the disparity map. The nearer pixel ``q`` that hides ``p`` in the
     view at offset ``v`` lies at ``q = p + (d(q) - d(p)) v``, so one walk along ``v`` in steps of one pixel finds it at
-    its exact place. A surface whose slope, times the largest offset, is under one half (0.125 of disparity per pixel
+    its exact position. A surface whose slope, times the largest offset, is under one half (0.125 of disparity per pixel
     for 9 x 9 views) never hides itself.
 
     Parameters

@@ -14,10 +14,10 @@ from several_threads import several_threads
 from sepi.errors import SepiError
 from sepi.image.noise import noise_level, residual_variance
 from sepi.lightfield import DisparityRange, LightField
-from sepi.matching.photo_consistency import cost_row, sample_offsets
-from sepi.matching.plane_sweep import SweepParameters, planar, sweep
-from sepi.matching.plane_sweep_kernels import SHORTEST_GAP, TILE_WIDTH
+from sepi.matching.plane_sweep import SweepParameters, planar, sampled_candidates, sweep
+from sepi.matching.plane_sweep_kernels import SHORTEST_GAP, TILE_WIDTH, Run, cost_row
 from sepi.matching.stitched_epi import line_cost, stitched_epi
+from sepi.matching.sweep_arrays import ViewStack
 from sepi.matching.view_subsets import halves_and_quarters
 from sepi.scenes import render
 
@@ -152,7 +152,7 @@ def test_true_slope_is_a_straight_line_in_the_stitched_epi():
     assert np.abs(samples - light_field.reference_view[y, x]).max() < 0.02
     picture = at_truth.image()
     assert picture.shape == (25, 64, 3)
-    columns = np.round(x - at_truth.disparity * at_truth.steps).astype(int)
+    columns = np.round(x - at_truth.disparity * at_truth.positions).astype(int)
     drawn = (columns >= 0) & (columns < 64)
     np.testing.assert_allclose(picture[drawn, columns[drawn]], samples[drawn], atol=0.02)
     wrong, _ = stitched_epi(light_field, y, 0.0).along_line(x)
@@ -188,28 +188,24 @@ def test_equal_bytes_for_any_number_of_threads():
 def test_candidates_done_together_equal_candidates_done_alone():
     """Dense candidates share the pixels that they read: a weight of one used for the other would blur the minimum."""
     light_field = random_light_field(shape=(20, 40))
-    views = planar(light_field)
     disparities = np.linspace(-1.3, 1.3, 61).astype(np.float32)
     groups = halves_and_quarters(light_field.grid).groups
-    down = sample_offsets(disparities, np.arange(5) - 2)
-    across = sample_offsets(disparities, np.arange(4) - 2)
-    shared = (np.diff(down[0]) == 0).mean() * (np.diff(across[0]) == 0).mean()
+    views = ViewStack(planar(light_field), 2, 2, groups, np.eye(9, dtype=bool), np.float32(900))
+    candidates = sampled_candidates(disparities, light_field.grid, (2, 2))
+    shared = (np.diff(candidates.down) == 0).mean() * (np.diff(candidates.across) == 0).mean()
     assert 0.5 < shared < 1, "some candidates read the same pixels, some do not"
     together, alone = np.empty((2, 9, 61, 40), np.float32)
     for y in (0, 9, 19):
-        cost_row(views, 2, 2, groups, y, 0, 40, *down, *across, np.float32(900), together)
+        run = Run(y, 0, 40)
+        cost_row(views, candidates, run, together)
         for k in range(61):
-            one = np.s_[:, k : k + 1]
             single = np.empty((9, 1, 40), np.float32)
-            cost_row(
-                views, 2, 2, groups, y, 0, 40, *(np.ascontiguousarray(a[one]) for a in (*down, *across)),
-                np.float32(900), single,
-            )  # fmt: skip
+            cost_row(views, sampled_candidates(disparities[k : k + 1], light_field.grid, (2, 2)), run, single)
             alone[:, k] = single[:, 0]
-        np.testing.assert_allclose(together, alone, rtol=1e-5, atol=1e-6)
+        np.testing.assert_array_equal(together, alone)
 
 
-def test_unwanted_pixels_stay_unknown_and_wanted_ones_unchanged():
+def test_pixels_outside_the_mask_stay_unknown_and_those_inside_unchanged():
     light_field = random_light_field()
     parameters = SweepParameters(num_disparities=5, scale=0.3, window_radius=2, window_sigma=0.5)
     mask = np.zeros(light_field.shape, bool)
@@ -219,7 +215,7 @@ def test_unwanted_pixels_stay_unknown_and_wanted_ones_unchanged():
     np.testing.assert_array_equal(some.disparity[0][mask], whole.disparity[0][mask])
 
 
-def test_wanted_pixels_far_apart_equal_the_whole_picture():
+def test_pixels_far_apart_equal_the_whole_picture():
     """Columns between are passed over: a window cut short there would change the depth of the pixels beside."""
     light_field = random_light_field(grid=(3, 3), shape=(9, 4 * SHORTEST_GAP))
     parameters = SweepParameters(num_disparities=5, scale=0.3, window_radius=2, window_sigma=0.5)
@@ -227,7 +223,7 @@ def test_wanted_pixels_far_apart_equal_the_whole_picture():
     mask[[0, 3, 3, 8], [5, 4, 2 * SHORTEST_GAP, 4 * SHORTEST_GAP - 1]] = True
     some, whole = sweep(light_field, parameters, mask=mask), sweep(light_field, parameters)
     for name in ("disparity", "cost", "mean"):
-        np.testing.assert_allclose(getattr(some, name)[0][mask], getattr(whole, name)[0][mask], rtol=1e-5)
+        np.testing.assert_array_equal(getattr(some, name)[0][mask], getattr(whole, name)[0][mask])
 
 
 def test_subset_without_views_matches_nothing():
@@ -264,11 +260,11 @@ def test_kernels_are_compiled_once():
         "import numpy as np\n"
         "from sepi.lightfield import DisparityRange, LightField\n"
         "from sepi.matching.plane_sweep import SweepParameters, sweep\n"
-        "from sepi.matching.plane_sweep_kernels import sweep_rows\n"
+        "from sepi.matching.plane_sweep_kernels import sweep_plane_rows\n"
         "views = np.random.default_rng(0).integers(0, 255, (3, 3, 8, 9, 1), np.uint8)\n"
         "light_field = LightField(views, 'x', disparity_range=DisparityRange(-1, 1, 'given'))\n"
         "sweep(light_field, SweepParameters(num_disparities=3))\n"
-        "print(sum(sweep_rows.stats.cache_hits.values()), sum(sweep_rows.stats.cache_misses.values()))\n"
+        "print(sum(sweep_plane_rows.stats.cache_hits.values()), sum(sweep_plane_rows.stats.cache_misses.values()))\n"
     )
     environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
     # the first may find the kernel compiled by others, or not; the second must

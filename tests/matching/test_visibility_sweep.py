@@ -1,4 +1,4 @@
-"""The layered sweep, its z-buffers and the semi-global smoothing equal plain NumPy twins."""
+"""The visibility sweep, its z-buffers and the semi-global smoothing equal plain NumPy twins."""
 
 import numba
 import numpy as np
@@ -9,7 +9,14 @@ from several_threads import several_threads
 from sepi.lightfield import DisparityRange, LightField
 from sepi.matching.base_detail import DETAIL_UNIT, BaseDetailParameters, base_detail_decomposition
 from sepi.matching.semi_global_kernels import aggregate, choose, semi_global
-from sepi.matching.visibility_kernels import EMPTY, occluded_in_any_view, sweep_rows, z_buffers
+from sepi.matching.visibility_kernels import (
+    EMPTY,
+    RobustCost,
+    Visibility,
+    occluded_in_any_view,
+    sweep_visible_rows,
+    z_buffers,
+)
 from sepi.matching.visibility_sweep import (
     AllViewsParameters,
     VisibilityParameters,
@@ -38,11 +45,11 @@ def z_buffer_twin(disparity, dt, ds):
     return nearest
 
 
-def sweep_twin(light_field, layers, nearest, disparities, cover, hidden, scales, shares):
+def sweep_twin(light_field, views, nearest, disparities, margin, hidden, scales, shares):
     t0, s0 = light_field.reference_position
     H, W = light_field.shape
     rows, columns = np.mgrid[:H, :W].astype(float)
-    planes = [layers.colours * layers.colour_unit, layers.detail * DETAIL_UNIT][: 1 + bool(layers.detail.shape[2])]
+    planes = [views.colours * views.colour_unit, views.detail * DETAIL_UNIT][: 1 + bool(views.detail.shape[2])]
     out = np.ones((len(disparities), H, W))
     for k, d in enumerate(disparities.astype(float)):
         total, weight = np.zeros((2, H, W))
@@ -55,7 +62,7 @@ def sweep_twin(light_field, layers, nearest, disparities, cover, hidden, scales,
             if nearest is not None:
                 # halves go down, as the kernel's comparison of fractions does
                 near = np.ceil(np.stack([y, x]) - 0.5).astype(int).clip(0, [[[H - 1]], [[W - 1]]])
-                seen = np.where(nearest[t, s][near[0], near[1]] <= np.float32(d + cover), 1, hidden)
+                seen = np.where(nearest[t, s][near[0], near[1]] <= np.float32(d + margin), 1, hidden)
             for values, scale, share in zip(planes, scales, shares, strict=False):
                 sample = np.stack([map_coordinates(c, [y, x], order=1) for c in values[t, s].astype(float)])
                 squared = ((sample - values[t0, s0]) ** 2).sum(axis=0)
@@ -73,7 +80,7 @@ def test_costs_equal_a_plain_twin(channels: int, dtype: type, visible: bool) -> 
     present = np.ones((3, 4), bool)
     present[0, 1] = False
     light_field = random_light_field(channels=channels, dtype=dtype, present=present)
-    layers = base_detail_decomposition(light_field, BaseDetailParameters())
+    views = base_detail_decomposition(light_field, BaseDetailParameters())
     disparities = light_field.require_disparity_range().candidates(7)
     disparity = np.random.default_rng(1).choice(disparities, light_field.shape).astype(np.float32)
     nearest = (
@@ -83,30 +90,15 @@ def test_costs_equal_a_plain_twin(channels: int, dtype: type, visible: bool) -> 
     )
     scales, shares = np.array([0.02, 0.01], np.float32), np.array([0.4, 0.6], np.float32)
     cost = np.empty((7, 11, 13), np.float32)
-    sweep_rows(
-        layers.colours,
-        np.float32(layers.colour_unit),
-        layers.detail,
-        np.float32(DETAIL_UNIT),
-        present,
-        *light_field.reference_position,
-        nearest,
-        disparities,
-        np.float32(0.1),
-        np.float32(0.05),
-        scales,
-        shares,
-        0,
-        11,
-        cost,
-    )
+    visibility = Visibility(nearest, np.float32(0.1), np.float32(0.05))
+    sweep_visible_rows(views, visibility, RobustCost(scales, shares), disparities, 0, 11, cost)
     expected = sweep_twin(
-        light_field, layers, nearest if visible else None, disparities, np.float32(0.1), 0.05, scales, shares
+        light_field, views, nearest if visible else None, disparities, np.float32(0.1), 0.05, scales, shares
     )
     np.testing.assert_allclose(cost, expected, atol=2e-5)
 
 
-def test_z_buffers_hold_the_nearest_pixel_that_touches_a_place() -> None:
+def test_z_buffers_hold_the_nearest_pixel_that_touches_a_position() -> None:
     light_field = random_light_field()
     disparity = np.random.default_rng(2).uniform(-1.5, 1.5, light_field.shape).astype(np.float32)
     present = np.ones((3, 4), bool)
@@ -117,17 +109,17 @@ def test_z_buffers_hold_the_nearest_pixel_that_touches_a_place() -> None:
     assert (found[2, 3] == EMPTY).all()
 
 
-def test_an_occluder_covers_what_lies_beside_it() -> None:
+def test_an_occluder_hides_what_lies_beside_it() -> None:
     """A square before a wall hides the wall on each side from the views on that side, and nothing else."""
     disparity = np.zeros((40, 40), np.float32)
     disparity[15:25, 15:25] = 2
-    covered = occluded_in_any_view(disparity, np.ones((3, 3), bool), 1, 1, np.float32(0.15))
-    assert covered[18:22, 13:15].all()
-    assert covered[18:22, 25:27].all()
-    assert covered[13:15, 18:22].all()
-    assert not covered[15:25, 15:25].any()
-    assert not covered[:, :12].any()
-    assert not covered[28:].any()
+    occluded = occluded_in_any_view(disparity, np.ones((3, 3), bool), 1, 1, np.float32(0.15))
+    assert occluded[18:22, 13:15].all()
+    assert occluded[18:22, 25:27].all()
+    assert occluded[13:15, 18:22].all()
+    assert not occluded[15:25, 15:25].any()
+    assert not occluded[:, :12].any()
+    assert not occluded[28:].any()
 
 
 def aggregate_twin(cost, guide, radius, variance):

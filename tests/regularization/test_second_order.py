@@ -35,7 +35,7 @@ def test_derivatives_are_those_of_the_spline() -> None:
             np.testing.assert_allclose(found[..., c], (ends[0] - ends[1]) / 2e-4, atol=1e-3)
 
 
-def sums_twin(light_field, layers, parameters, disparity, cover):
+def sums_twin(light_field, decomposed, parameters, disparity, margin):
     """Mean of the views, gradient and curvature, with SciPy's splines."""
     t0, s0 = light_field.reference_position
     H, W = light_field.shape
@@ -43,11 +43,11 @@ def sums_twin(light_field, layers, parameters, disparity, cover):
     nearest = z_buffers(disparity, light_field.present, t0, s0)
     means, gradient, curvature = [], np.zeros((H, W)), np.zeros((H, W))
     for values, unit, scale, share in (
-        (layers.colours, layers.colour_unit, parameters.colour_scale, 1 - parameters.detail_share),
-        (layers.detail, DETAIL_UNIT, parameters.detail_scale, parameters.detail_share),
+        (decomposed.colours, decomposed.colour_unit, parameters.colour_scale, 1 - parameters.detail_share),
+        (decomposed.detail, DETAIL_UNIT, parameters.detail_scale, parameters.detail_share),
     ):
         planes = values * unit
-        scale2 = layers.squared_scale(scale)
+        scale2 = decomposed.squared_scale(scale)
         own = planes[t0, s0].astype(float)
         samples = []
         for t, s in np.argwhere(light_field.present):
@@ -55,8 +55,8 @@ def sums_twin(light_field, layers, parameters, disparity, cover):
                 continue
             y, x = rows - disparity * (t - t0), columns - disparity * (s - s0)
             inside = (y >= 0) & (y <= H - 1) & (x >= 0) & (x <= W - 1)
-            place = [np.floor(v + 0.5).astype(int).clip(0, n - 1) for v, n in ((y, H), (x, W))]
-            seen = inside & (nearest[t, s][tuple(place)] <= disparity + np.float32(cover))
+            position = [np.floor(v + 0.5).astype(int).clip(0, n - 1) for v, n in ((y, H), (x, W))]
+            seen = inside & (nearest[t, s][tuple(position)] <= disparity + np.float32(margin))
             sample = np.stack([map_coordinates(c.astype(float), [y, x], order=3, mode="mirror") for c in planes[t, s]])
             samples.append((t - t0, s - s0, seen, sample))
         total, weight = own.copy(), np.ones((H, W))
@@ -76,19 +76,19 @@ def sums_twin(light_field, layers, parameters, disparity, cover):
 
 
 def test_sums_over_the_views_equal_a_plain_twin() -> None:
-    """Wrong visibility, weights or interpolation would bias the depth below the candidate step."""
+    """Wrong visibility, weights or interpolation would bias the depth below the disparity sampling."""
     present = np.ones((3, 4), bool)
     present[1, 0] = False
-    views = np.round(255 * np.random.default_rng(2).random((3, 4, 10, 12, 3))).astype(np.uint8)
-    light_field = LightField(views, "random", present=present, disparity_range=DisparityRange(-1, 1, "given"))
+    colours = np.round(255 * np.random.default_rng(2).random((3, 4, 10, 12, 3))).astype(np.uint8)
+    light_field = LightField(colours, "random", present=present, disparity_range=DisparityRange(-1, 1, "given"))
     parameters = BaseDetailParameters(colour_scale=0.3, detail_scale=0.2)
-    layers = base_detail_decomposition(light_field, parameters)
-    matching = spline_views(light_field, layers, parameters)
+    decomposed = base_detail_decomposition(light_field, parameters)
+    views = spline_views(light_field, decomposed, parameters)
     disparity = np.random.default_rng(3).uniform(-0.9, 0.9, (10, 12)).astype(np.float32)
     nearest = z_buffers(disparity, present, *light_field.reference_position)
-    mean = view_mean(matching, disparity, nearest, 0.2)
-    gradient, curvature = gradient_and_hessian(matching, mean, disparity, nearest, 0.2)
-    expected = sums_twin(light_field, layers, parameters, disparity, 0.2)
+    mean = view_mean(views, disparity, nearest, 0.2)
+    gradient, curvature = gradient_and_hessian(views, mean, disparity, nearest, 0.2)
+    expected = sums_twin(light_field, decomposed, parameters, disparity, 0.2)
     np.testing.assert_allclose(mean, expected[0], atol=1e-3)
     for found, twin in ((gradient, expected[1]), (curvature, expected[2])):
         np.testing.assert_allclose(found, twin, atol=2e-3 * np.abs(twin).max())
@@ -114,28 +114,28 @@ def test_coefficients_of_the_strongest_pattern_do_not_wrap_round() -> None:
     np.testing.assert_allclose(inner * SPLINE_UNIT, expected, atol=2 * SPLINE_UNIT)
 
 
-def test_steps_end_at_the_true_disparity() -> None:
-    """From a fifth of a candidate step away, three steps come within a thousandth of a pixel."""
+def test_iterations_end_at_the_true_disparity() -> None:
+    """From a fifth of a candidate away, three iterations come within a thousandth of a pixel."""
     scene = render("slanted_plane", size=96)
     parameters = BaseDetailParameters()
-    matching = spline_views(scene, base_detail_decomposition(scene, parameters), parameters)
+    views = spline_views(scene, base_detail_decomposition(scene, parameters), parameters)
     disparity = (scene.ground_truth + 0.02).astype(np.float32)
     for _ in range(3):
         nearest = z_buffers(disparity, scene.present, *scene.reference_position)
-        mean = view_mean(matching, disparity, nearest, 0.15)
-        gradient, curvature = gradient_and_hessian(matching, mean, disparity, nearest, 0.15)
+        mean = view_mean(views, disparity, nearest, 0.15)
+        gradient, curvature = gradient_and_hessian(views, mean, disparity, nearest, 0.15)
         disparity = disparity + windowed_step(gradient, curvature, 3, 0.05)[0]
     assert np.abs(disparity - scene.ground_truth)[8:-8, 8:-8].mean() < 1.5e-3
 
 
-def test_steps_are_those_of_newton_and_no_longer_than_allowed() -> None:
-    """Far from the minimum the linearisation does not hold: an uncut step would throw a pixel off its surface."""
+def test_updates_are_those_of_newton_and_no_larger_than_allowed() -> None:
+    """Far from the minimum the linearisation does not hold: an uncut update would throw a pixel off its surface."""
     gradient, curvature = np.full((9, 9), 0.3, np.float32), np.full((9, 9), 10.0, np.float32)
     gradient[:, 5:] *= -100
-    step, information_there = windowed_step(gradient, curvature, 0, 0.05)
-    np.testing.assert_allclose(step[:, :5], 0.03, rtol=1e-5)
-    np.testing.assert_allclose(step[:, 5:], -0.05, rtol=1e-5)
-    np.testing.assert_allclose(information_there, 10)
+    update, curvature_there = windowed_step(gradient, curvature, 0, 0.05)
+    np.testing.assert_allclose(update[:, :5], 0.03, rtol=1e-5)
+    np.testing.assert_allclose(update[:, 5:], -0.05, rtol=1e-5)
+    np.testing.assert_allclose(curvature_there, 10)
     # a window takes the mean of both before they are divided
     wide, _ = windowed_step(gradient, curvature, 1, 9.0)
     np.testing.assert_allclose(wide[4, 4], (2 * 0.3 - 30) / 3 / 10, rtol=1e-4)

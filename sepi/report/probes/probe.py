@@ -137,7 +137,7 @@ def sepi_picture(light_field: LightField, y: int, x: int, disparity: float) -> S
         raise SepiError(f"{light_field.name}: a SEPI needs a finite disparity, got {disparity:g}")
     sepi = stitched_epi(light_field, y, disparity)
     columns = x + np.arange(-HALF_WIDTH, HALF_WIDTH + 1)
-    position = columns + (-disparity * sepi.steps - sepi.offsets)[:, None]
+    position = columns + (-disparity * sepi.positions - sepi.offsets)[:, None]
     width = sepi.rows.shape[1]
     inside = sepi.inside[:, None] & (position >= 0) & (position <= width - 1)
     # far outside, whole numbers would overflow

@@ -1,0 +1,82 @@
+"""Arrays that the plane sweep works on, in named groups: what its kernels take.
+
+Compiled functions know their fields by name; they make none themselves.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from sepi.lightfield import BoolMap, FloatMap
+
+
+class ViewStack(NamedTuple):
+    """The views that are compared.
+
+    Attributes
+    ----------
+    colours : ndarray, shape (T, S, 3, H, W), uint8, uint16 or float32
+    t0, s0 : int
+        Position of the reference view.
+    groups : ndarray, shape (T, S), int64
+        Group of each view, 0..G-1; -1 leaves a view out.
+    subsets : ndarray, shape (N, G), bool
+        Which groups make up each subset.
+    scale2 : float32
+        Square of the robust scale, in the units of the colours.
+    """
+
+    colours: npt.NDArray[np.generic]
+    t0: int
+    s0: int
+    groups: npt.NDArray[np.int64]
+    subsets: BoolMap
+    scale2: np.float32
+
+
+class Candidates(NamedTuple):
+    """Candidate disparities, and where the samples of a reference pixel lie, for each view row and each view column.
+
+    Attributes
+    ----------
+    disparities : ndarray, shape (K,), float32
+        Uniform, rising, pixels per view step.
+    down, across : ndarray, shape (T, K) and (S, K), int64
+        Whole pixels from a reference pixel to its sample.
+    fy, fx : ndarray, shape (T, K) and (S, K), float32
+        Fractional pixels beyond, 0..1.
+    """
+
+    disparities: FloatMap
+    down: npt.NDArray[np.int64]
+    fy: FloatMap
+    across: npt.NDArray[np.int64]
+    fx: FloatMap
+
+
+class Window(NamedTuple):
+    """Aggregation window: ``2 radius + 1`` pixels wide, its weights narrow in colour.
+
+    Attributes
+    ----------
+    guide : ndarray, shape (3, H, W), float32
+        Reference view.
+    radius : int
+    variance : float32
+        Squared colour distance at which the weights fall off.
+    """
+
+    guide: FloatMap
+    radius: int
+    variance: np.float32
+
+
+class BestMaps(NamedTuple):
+    """What is found of each subset of views: the best disparity, its cost, and the mean cost; (N, H, W), float32."""
+
+    disparity: FloatMap
+    cost: FloatMap
+    mean: FloatMap
