@@ -34,10 +34,12 @@ import numpy.typing as npt
 from pydantic import Field
 
 from sepi.image.edges import CannyParameters, canny_edges, depth_discontinuities, edge_angle
+from sepi.image.mixed_pixels import MixtureParameters, reassign_mixed_pixels
+from sepi.image.noise import residual_variance
 from sepi.lightfield import BoolMap, FloatMap, LightField
 from sepi.matching.plane_sweep import SweepParameters, SweepResult, sweep
 from sepi.matching.view_subsets import SIDES, half_planes, halves_and_quarters
-from sepi.matching.visibility_sweep import VisibilityParameters, depth_from_visible_views
+from sepi.matching.visibility_sweep import VisibleViewsParameters, depth_from_visible_views
 from sepi.stage import Choice, NoParameters, Progress, StageMaps, none, require_previous
 
 
@@ -68,6 +70,10 @@ class HalfSepiParameters(OcclusionParameters):
     gain_unconfirmed: float = Field(
         0.03, ge=0, le=2, description="further gain asked for where no nearer surface is found on the hidden side"
     )
+
+
+class VisibilityParameters(VisibleViewsParameters, MixtureParameters):
+    """Parameters of the views chosen one by one, and of the mixed pixels."""
 
 
 class WangParameters(OcclusionParameters):
@@ -162,11 +168,13 @@ def visibility(
 
     before = require_previous(previous)
     result = depth_from_visible_views(light_field, before.disparity, parameters, progress)
+    colours = light_field.reference_view
+    disparity = reassign_mixed_pixels(result.disparity, colours, residual_variance(colours), parameters)
     return before.updated(
-        result.disparity,
+        disparity,
         result.confidence,
         occluded=occluded_in_any_view(
-            result.disparity,
+            disparity,
             light_field.present,
             *light_field.reference_position,
             np.float32(parameters.occlusion_margin),

@@ -8,12 +8,9 @@ half-SEPI, with the part of the views chosen view by view. The compiled loops ar
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from pydantic import Field
 
-from sepi.image.mixed_pixels import MixtureParameters, reassign_mixed_pixels
 from sepi.lightfield import FloatMap, LightField
 from sepi.matching.base_detail import (
     BaseDetail,
@@ -36,7 +33,7 @@ class VisibilitySweepParameters(BaseDetailParameters, SmoothingParameters):
     )
 
 
-class VisibilityParameters(VisibilitySweepParameters, MixtureParameters, OcclusionMarginParameters):
+class VisibleViewsParameters(VisibilitySweepParameters, OcclusionMarginParameters):
     """Parameters of the sweep over the views that see a pixel."""
 
     passes: int = Field(3, ge=1, le=10, description="how often visibility and depth are computed anew")
@@ -76,9 +73,9 @@ def depth_from_all_views(
 
 
 def depth_from_visible_views(
-    light_field: LightField, disparity: FloatMap, parameters: VisibilityParameters, progress: Progress
+    light_field: LightField, disparity: FloatMap, parameters: VisibleViewsParameters, progress: Progress
 ) -> SmoothedResult:
-    """Depth over the views that see a pixel, as a first map tells, in several passes; then mixed pixels.
+    """Depth over the views that see a pixel, as a first map tells, in several passes.
 
     Parameters
     ----------
@@ -86,7 +83,7 @@ def depth_from_visible_views(
         With a known disparity range.
     disparity : ndarray, shape (H, W), float32
         The first map, pixels per view step.
-    parameters : VisibilityParameters
+    parameters : VisibleViewsParameters
     progress : callable
 
     Returns
@@ -113,7 +110,7 @@ def depth_from_visible_views(
             lambda fraction, i=i: progress((i + fraction) / n),  # type: ignore[misc]
         )
         disparity = result.disparity
-    return replace(result, disparity=reassign_mixed_pixels(disparity, views.guide, views.noise, parameters))
+    return result
 
 
 def _sweep(

@@ -19,7 +19,7 @@ from sepi.matching.visibility_kernels import (
 )
 from sepi.matching.visibility_sweep import (
     AllViewsParameters,
-    VisibilityParameters,
+    VisibleViewsParameters,
     depth_from_all_views,
     depth_from_visible_views,
 )
@@ -191,7 +191,7 @@ def test_depth_is_the_same_on_any_number_of_threads() -> None:
             numba.set_num_threads(threads)
             first = depth_from_all_views(scene, AllViewsParameters(num_disparities=21), lambda _: None)
             result = depth_from_visible_views(
-                scene, first.disparity, VisibilityParameters(num_disparities=21, passes=1), lambda _: None
+                scene, first.disparity, VisibleViewsParameters(num_disparities=21, passes=1), lambda _: None
             )
             found.append((result.disparity.tobytes(), result.confidence.tobytes()))
     finally:
@@ -205,6 +205,6 @@ def test_progress_ends_at_one() -> None:
     first = depth_from_all_views(scene, AllViewsParameters(num_disparities=5), seen.append)
     assert seen[-1] == 1
     seen.clear()
-    depth_from_visible_views(scene, first.disparity, VisibilityParameters(num_disparities=5), seen.append)
+    depth_from_visible_views(scene, first.disparity, VisibleViewsParameters(num_disparities=5), seen.append)
     assert seen[-1] == 1
     assert np.all(np.diff(seen) >= 0)
