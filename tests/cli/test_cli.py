@@ -21,6 +21,7 @@ import sepi
 from sepi import ingest
 from sepi.cli.main import main
 from sepi.io.hdf5 import read_attributes, read_stage, write_light_field
+from sepi.io.images import write_png
 from sepi.io.pfm import read_pfm, write_pfm
 from sepi.io.result_folder import RESULT_FILES
 from sepi.lightfield import LightField
@@ -431,6 +432,7 @@ def test_evaluate_reads_every_kind_of_map(pyramids: Path, result: Path, tmp_path
         ("text.h5", "map.pfm", "text.h5: not a readable HDF5 file"),
         ("other.h5", "map.pfm", "other.h5: damaged HDF5 file"),
         ("picture.png", "map.pfm", "picture.png: expected a disparity map as .pfm, .h5 or .npy"),
+        ("text.png", "map.pfm", "text.png: not a PNG"),
         ("map.pfm", "plain.h5", "plain.h5: no ground truth for view 1,1"),
     ],
 )
@@ -447,7 +449,8 @@ def test_bad_maps_are_one_line(
         file["disparity"] = np.zeros((99, 99))
     data = Path("damaged.h5").read_bytes()
     Path("damaged.h5").write_bytes(data[:100] + bytes(700) + data[800:])
-    for name in ("text.npy", "text.pfm", "text.h5", "picture.png"):
+    write_png(Path("picture.png"), np.zeros((4, 4), np.uint8))
+    for name in ("text.npy", "text.pfm", "text.h5", "text.png"):
         Path(name).write_text("hello")
     np.save("cube.npy", np.zeros((2, 3, 4)))
     np.save("words.npy", np.array([["a", "b"]]))
