@@ -56,6 +56,10 @@ class Runs:
         scenes = self.plan.scenes.get(dataset, ())
         return [scene for scene in scenes if self.scores(dataset, scene, variant)]
 
+    def scored_pairs(self, variant: str = MAIN_VARIANT) -> list[tuple[str, str]]:
+        """Every ``(dataset, scene)`` that has scores."""
+        return [(dataset, scene) for dataset in self.plan.scenes for scene in self.scored(dataset, variant)]
+
     def final(
         self, dataset: str, scene: str, score: str, region: str = WHOLE_MAP, variant: str = MAIN_VARIANT
     ) -> float:
@@ -69,27 +73,21 @@ class Runs:
         values = self._stage(dataset, scene, variant, stage)
         return Timing(values["seconds"], values["peak_memory_mb"])
 
-    def confidence(self, dataset: str, scene: str, variant: str) -> dict[str, list[float]] | None:
-        """``squared``, ``absolute``, ``curve`` and ``oracle`` of a final map; None without ground truth."""
-        found = self._scene(dataset, scene)["confidence"].get(variant)
-        return None if found is None else {name: [_number(v) for v in values] for name, values in found.items()}
+    def confidence(self, dataset: str, scene: str, variant: str) -> dict[str, list[float]]:
+        """``squared``, ``absolute``, ``curve`` and ``oracle`` of a final map that has scores."""
+        found = self._scene(dataset, scene)["confidence"][variant]
+        return {name: [_number(value) for value in values] for name, values in found.items()}
 
     def external_scores(self, dataset: str, scene: str, method: str) -> AllScores:
         """Protocol to region to scores of another method's map; empty without a map that can be scored."""
         return _with_nan(self._scene(dataset, scene)["external"][method]["scores"])
 
     def external_score(
-        self,
-        dataset: str,
-        scene: str,
-        method: str,
-        score: str,
-        region: str = WHOLE_MAP,
-        protocol: str = "paper",
+        self, dataset: str, scene: str, method: str, score: str, region: str = WHOLE_MAP
     ) -> float | None:
-        """A score of another method's map; None without a map that can be scored."""
+        """A score of another method's map by the paper's protocol; None without a map that can be scored."""
         scores = self.external_scores(dataset, scene, method)
-        return scores[protocol][region][score] if scores else None
+        return scores["paper"][region][score] if scores else None
 
     def external_problem(self, dataset: str, scene: str, method: str) -> str:
         """Why an external map has no scores, in a few words; empty where it has some or there is no ground truth."""
@@ -156,4 +154,4 @@ def _with_nan(scores: Mapping[str, Mapping[str, Mapping[str, float | None]]]) ->
 
 def _number(value: float | None) -> float:
     """JSON has no NaN: a score over no pixels is null there."""
-    return math.nan if value is None else float(value)
+    return math.nan if value is None else value

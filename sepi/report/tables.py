@@ -12,14 +12,12 @@ from sepi.errors import SepiError
 from sepi.report import published
 from sepi.report.plan import TABLES
 from sepi.report.runs import Runs, read_numbers
-from sepi.report.tabular.ablation import ablation_table
-from sepi.report.tabular.comparison import scene_table
+from sepi.report.tabular.ablation import ablation_table, parts_table
+from sepi.report.tabular.comparison import region_table, scene_table
 from sepi.report.tabular.confidence import confidence_table
 from sepi.report.tabular.latex import as_latex
 from sepi.report.tabular.layout import Report, as_csv, write
 from sepi.report.tabular.markdown import as_markdown
-from sepi.report.tabular.parts import parts_table
-from sepi.report.tabular.region_comparison import region_table
 from sepi.report.tabular.stages import runtime_table, stage_table
 
 BUILDERS: dict[str, Callable[[Runs], Report]] = {

@@ -129,3 +129,8 @@ def mean(values: Iterable[float]) -> float:
     """Mean of the scores that exist; NaN where none does (a scene may have no such region)."""
     known = [value for value in values if not math.isnan(value)]
     return sum(known) / len(known) if known else math.nan
+
+
+def average(runs: Runs, dataset: str, scenes: Iterable[str], region: str, variant: str) -> float:
+    """Mean of the MSE x100 of some scenes, of those that have such a region."""
+    return mean(runs.final(dataset, scene, "mse100", region, variant) for scene in scenes)
