@@ -76,7 +76,7 @@ def collect(plan: Plan, parameters: Parameters | None = None, parts: bool = Fals
     numbers: dict[str, Any] = {
         "made": made_here(plan.number_inputs(parts)),
         "protocols": dict(PROTOCOLS),
-        "plan": plan.content(),
+        "plan": json.loads(plan.to_json()),
         "parameters": {
             stage: {
                 choice: (parameters or {})[stage][choice]

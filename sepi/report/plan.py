@@ -9,7 +9,7 @@ import itertools
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 from pydantic import AfterValidator
 from pydantic.dataclasses import dataclass
@@ -25,14 +25,8 @@ BEST_VARIANT = "best"
 """The most accurate variant, whose figures stand there too."""
 
 TABLES = (
-    "table1_mse",
-    "table2_q25",
-    "table3_regions",
-    "table4_ablation",
-    "ablation_best",
-    "confidence",
-    "stages",
-    "runtime",
+    *("table1_mse", "table2_q25", "table3_regions", "table4_ablation", "ablation_best"),
+    *("confidence", "stages", "runtime"),
 )
 """Names of the tables, in the order of the page."""
 
@@ -94,11 +88,6 @@ class Plan:
     def to_json(self) -> str:
         """The text that :meth:`from_json` reads; the results' folder is not part of it."""
         return json.dumps({key: getattr(self, key) for key in ("scenes", "variants", "external")})
-
-    def content(self) -> dict[str, Any]:
-        """Scenes, variants and external methods as JSON has them."""
-        found: dict[str, Any] = json.loads(self.to_json())
-        return found
 
     @property
     def stages(self) -> list[str]:

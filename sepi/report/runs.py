@@ -45,11 +45,8 @@ class Runs:
 
     def scores(self, dataset: str, scene: str, variant: str, stage: str | None = None) -> AllScores:
         """Protocol to region to scores after a stage, the last unless given; empty without ground truth."""
-        stage = stage or self.plan.stages[-1]
-        found = self._stage(dataset, scene, variant, stage)["scores"]
-        if found is None:
-            raise SepiError(f"{dataset}/{scene}: these numbers have no scores of {variant} after {stage}")
-        return _with_nan(found)
+        found: AllScores = _with_nan(self._stage(dataset, scene, variant, stage or self.plan.stages[-1])["scores"])
+        return found
 
     def scored(self, dataset: str, variant: str = MAIN_VARIANT) -> list[str]:
         """Scenes of a dataset that have ground truth, and so scores; looked for with one of the variants."""
@@ -75,19 +72,13 @@ class Runs:
 
     def confidence(self, dataset: str, scene: str, variant: str) -> dict[str, list[float]]:
         """``squared``, ``absolute``, ``curve`` and ``oracle`` of a final map that has scores."""
-        found = self._scene(dataset, scene)["confidence"][variant]
-        return {name: [_number(value) for value in values] for name, values in found.items()}
+        found: dict[str, list[float]] = _with_nan(self._scene(dataset, scene)["confidence"][variant])
+        return found
 
     def external_scores(self, dataset: str, scene: str, method: str) -> AllScores:
         """Protocol to region to scores of another method's map; empty without a map that can be scored."""
-        return _with_nan(self._scene(dataset, scene)["external"][method]["scores"])
-
-    def external_score(
-        self, dataset: str, scene: str, method: str, score: str, region: str = WHOLE_MAP
-    ) -> float | None:
-        """A score of another method's map by the paper's protocol; None without a map that can be scored."""
-        scores = self.external_scores(dataset, scene, method)
-        return scores["paper"][region][score] if scores else None
+        found: AllScores = _with_nan(self._scene(dataset, scene)["external"][method]["scores"])
+        return found
 
     def external_problem(self, dataset: str, scene: str, method: str) -> str:
         """Why an external map has no scores, in a few words; empty where it has some or there is no ground truth."""
@@ -120,14 +111,7 @@ def read_numbers(path: Path) -> dict[str, Any]:
 
 
 def read_json(path: Path, keys: set[str], what: str, module: str) -> dict[str, Any]:
-    """Read a JSON object that must have certain keys.
-
-    Parameters
-    ----------
-    path : Path
-    keys : set of str
-    what, module : str
-        What the file should be, and which module writes such files; for the message.
+    """Read a JSON object that must have certain keys: ``what``, written by ``module``.
 
     Raises
     ------
@@ -145,13 +129,10 @@ def read_json(path: Path, keys: set[str], what: str, module: str) -> dict[str, A
     return found
 
 
-def _with_nan(scores: Mapping[str, Mapping[str, Mapping[str, float | None]]]) -> AllScores:
-    return {
-        protocol: {region: {name: _number(value) for name, value in found.items()} for region, found in regions.items()}
-        for protocol, regions in scores.items()
-    }
-
-
-def _number(value: float | None) -> float:
+def _with_nan(value: Any) -> Any:
     """JSON has no NaN: a score over no pixels is null there."""
+    if isinstance(value, dict):
+        return {key: _with_nan(inner) for key, inner in value.items()}
+    if isinstance(value, list):
+        return [_with_nan(inner) for inner in value]
     return math.nan if value is None else value

@@ -47,7 +47,11 @@ def _rows(runs: Runs, dataset: str) -> list[tuple[str, str, dict[str, Record]]]:
     over = [(scene, methods.SCENE, [scene]) for scene in scenes]
     over += [(methods.average_label(len(scenes)), methods.AVERAGE, scenes)] if scenes else []
     rows: list[tuple[str, str, dict[str, Record]]] = [
-        (name, kind, {r: {v: methods.average(runs, dataset, some, r, v) for v in runs.plan.listed} for r in REGIONS})
+        (
+            name,
+            kind,
+            {r: {v: methods.average(runs, dataset, some, "mse100", r, v) for v in runs.plan.listed} for r in REGIONS},
+        )
         for name, kind, some in over
     ]
     paper = published.table4().get(dataset)

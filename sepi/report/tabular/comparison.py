@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from sepi.evaluate import REGIONS
+from sepi.evaluate import REGIONS, WHOLE_MAP
 from sepi.report import published
 from sepi.report.published import PAPERS_METHOD, SceneTable
 from sepi.report.runs import Runs
@@ -80,11 +80,9 @@ def _scene_records(runs: Runs, dataset: str, score: str, paper: SceneTable, comp
     found: list[tuple[str, str, dict[str, Cell]]] = []
     for name in dict.fromkeys([*paper.scenes(dataset), *own_names]):
         figures: dict[str, Cell] = {**paper.cells.get((dataset, name), {})}
-        for method in compared if name in own_names else ():
-            if method.kind == Kind.OURS:
-                figures[method.key] = runs.final(dataset, own_names[name], score, variant=method.name)
-            elif method.kind == Kind.EXTERNAL:
-                figures[method.key] = methods.external_cell(runs, dataset, own_names[name], method.name, score)
+        if name in own_names:
+            scenes = [own_names[name]]
+            figures |= {m.key: _own_figure(runs, m, dataset, scenes, score, WHOLE_MAP) for m in compared if m.is_here}
         found.append((name, methods.SCENE, figures))
     if own_names:
         available = [figures for name, _, figures in found if name in own_names]
@@ -122,7 +120,7 @@ def region_table(runs: Runs) -> Report:
     datasets = [one for one in methods.datasets_of(plan) if one in published.DATASETS or runs.scored(one)]
     cells = {f"{dataset}_{region}": (dataset, region) for dataset in datasets for region in REGIONS[1:]}
     in_paper = {key for figures in published.table3().values() for key in figures}
-    rows = [m for m in methods.compared_methods(plan) if m.kind in (Kind.OURS, Kind.EXTERNAL) or m.key in in_paper]
+    rows = [m for m in methods.compared_methods(plan) if m.is_here or m.key in in_paper]
     figures = {key: {m.key: m.shown(_region_average(runs, m, *cell)) for m in rows} for key, cell in cells.items()}
     marks = {key: ranks({m.key: figures[key][m.key] for m in _ranked(runs, rows, cells[key][0])}) for key in cells}
     columns = {"name": Column("method", Kind.TEXT), **{key: Column(", ".join(cell)) for key, cell in cells.items()}}
@@ -149,24 +147,25 @@ def region_table(runs: Runs) -> Report:
 
 
 def _region_average(runs: Runs, method: Method, dataset: str, region: str) -> Cell:
-    """The published average, or that over the scenes available.
+    """The published average, or that over the scenes available."""
+    if method.is_here:
+        return _own_figure(runs, method, dataset, runs.scored(dataset), "mse100", region)
+    figures = published.table3().get(dataset, {}).get(method.key)
+    return None if figures is None else figures.of(region)
 
-    Where another method's map is missing, it is the problem, or how many scenes have one.
-    """
-    if method.kind == Kind.PUBLISHED:
-        figures = published.table3().get(dataset, {}).get(method.key)
-        return None if figures is None else figures.of(region)
-    scenes = runs.scored(dataset)
+
+def _own_figure(runs: Runs, method: Method, dataset: str, scenes: Sequence[str], score: str, region: str) -> Cell:
+    """Average of what was scored here; where another method's map is missing, the problem, or how many are there."""
     if not scenes:
         return None
     if method.kind == Kind.OURS:
-        return methods.average(runs, dataset, scenes, region, method.name)
-    found = [runs.external_score(dataset, scene, method.name, "mse100", region) for scene in scenes]
-    known = [figure for figure in found if figure is not None]
+        return methods.average(runs, dataset, scenes, score, region, method.name)
+    found = [runs.external_scores(dataset, scene, method.name) for scene in scenes]
+    known = [scores["paper"][region][score] for scores in found if scores]
     if len(known) == len(scenes):
         return methods.mean(known)
     problems = {runs.external_problem(dataset, scene, method.name) for scene in scenes}
-    return problems.pop() or None if not known and len(problems) == 1 else f"{len(known)} of {len(scenes)} scenes"
+    return problems.pop() if not known and len(problems) == 1 else f"{len(known)} of {len(scenes)} scenes"
 
 
 def _ranked(runs: Runs, rows: Sequence[Method], dataset: str) -> list[Method]:
