@@ -6,7 +6,6 @@ The tables, and the page that shows them, are made from this file and from nothi
 from __future__ import annotations
 
 import hashlib
-import itertools
 import json
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
@@ -37,8 +36,16 @@ from sepi.workflow.machine import this_machine
 from sepi.workflow.result_paths import stage_of
 
 LIBRARIES = (
-    *("numpy", "scipy", "scikit-image", "opencv-python-headless", "h5py", "numba", "pyamg"),
-    *("pydantic", "matplotlib", "snakemake"),
+    "numpy",
+    "scipy",
+    "scikit-image",
+    "opencv-python-headless",
+    "h5py",
+    "numba",
+    "pyamg",
+    "pydantic",
+    "matplotlib",
+    "snakemake",
 )
 """Distributions whose versions are told."""
 
@@ -156,18 +163,23 @@ def _light_field(path: Path) -> dict[str, Any]:
 
 def _stages(plan: Plan, dataset: str, scene: str, parts: bool) -> dict[str, Any]:
     """Scores and times by the path of a stage's choices; a stage that variants share is there once."""
+    files = {
+        plan.stage_key(variant, stage): plan.stage_file(dataset, scene, variant, stage, "time.json")
+        for variant in plan.collected(parts)
+        for stage in plan.stages
+    }
     # of the parts, only the last stage is scored
-    scored = plan.stages[-1:] if parts else plan.stages
-    variants = plan.collected(parts)
-    keys = [plan.stage_key(variant, stage) for variant in variants for stage in scored]
-    scores = read_scores(plan.scores_file(dataset, scene, parts), keys)
-    found: dict[str, Any] = {}
-    for variant, stage in itertools.product(variants, plan.stages):
-        key = plan.stage_key(variant, stage)
-        path = plan.stage_file(dataset, scene, variant, stage, "time.json")
+    last = [plan.stage_key(variant, plan.stages[-1]) for variant in plan.collected(parts)]
+    scores = read_scores(plan.scores_file(dataset, scene, parts), last if parts else files.keys())
+    found = {}
+    for key, path in files.items():
         took = read_json(path, {"seconds", "peak_memory_mb"}, "the time of a stage", f"sepi.{stage_of(key)}")
-        times = {name: float(took[name]) for name in ("seconds", "peak_memory_mb")}
-        found[key] = {"stage": stage_of(key), "scores": _ordered(scores[key]) if key in scores else None, **times}
+        found[key] = {
+            "stage": stage_of(key),
+            "scores": _ordered(scores[key]) if key in scores else None,
+            "seconds": float(took["seconds"]),
+            "peak_memory_mb": float(took["peak_memory_mb"]),
+        }
     return found
 
 

@@ -25,8 +25,14 @@ BEST_VARIANT = "best"
 """The most accurate variant, whose figures stand there too."""
 
 TABLES = (
-    *("table1_mse", "table2_q25", "table3_regions", "table4_ablation", "ablation_best"),
-    *("confidence", "stages", "runtime"),
+    "table1_mse",
+    "table2_q25",
+    "table3_regions",
+    "table4_ablation",
+    "ablation_best",
+    "confidence",
+    "stages",
+    "runtime",
 )
 """Names of the tables, in the order of the page."""
 
@@ -40,6 +46,7 @@ PARTS_TABLES = ("ablation_best",)
 
 
 Names = Annotated[Sequence[str], AfterValidator(tuple)]
+"""A list of names; a single text is none."""
 
 
 @dataclass(frozen=True)

@@ -40,7 +40,7 @@ class Runs:
 
     def light_field(self, dataset: str, scene: str) -> dict[str, Any]:
         """What is known about a light field: ``grid``, ``shape``, ``range``, ``sha256`` and more."""
-        found: dict[str, Any] = self._scene(dataset, scene)["light_field"]
+        found: dict[str, Any] = self._scenes[dataset, scene]["light_field"]
         return found
 
     def scores(self, dataset: str, scene: str, variant: str, stage: str | None = None) -> AllScores:
@@ -72,24 +72,21 @@ class Runs:
 
     def confidence(self, dataset: str, scene: str, variant: str) -> dict[str, list[float]]:
         """``squared``, ``absolute``, ``curve`` and ``oracle`` of a final map that has scores."""
-        found: dict[str, list[float]] = _with_nan(self._scene(dataset, scene)["confidence"][variant])
+        found: dict[str, list[float]] = _with_nan(self._scenes[dataset, scene]["confidence"][variant])
         return found
 
     def external_scores(self, dataset: str, scene: str, method: str) -> AllScores:
         """Protocol to region to scores of another method's map; empty without a map that can be scored."""
-        found: AllScores = _with_nan(self._scene(dataset, scene)["external"][method]["scores"])
+        found: AllScores = _with_nan(self._scenes[dataset, scene]["external"][method]["scores"])
         return found
 
     def external_problem(self, dataset: str, scene: str, method: str) -> str:
         """Why an external map has no scores, in a few words; empty where it has some or there is no ground truth."""
-        return str(self._scene(dataset, scene)["external"][method]["problem"])
-
-    def _scene(self, dataset: str, scene: str) -> dict[str, Any]:
-        return self._scenes[dataset, scene]
+        return str(self._scenes[dataset, scene]["external"][method]["problem"])
 
     def _stage(self, dataset: str, scene: str, variant: str, stage: str) -> dict[str, Any]:
         key = self.plan.stage_key(variant, stage)
-        stages: dict[str, dict[str, Any]] = self._scene(dataset, scene)["stages"]
+        stages: dict[str, dict[str, Any]] = self._scenes[dataset, scene]["stages"]
         if key not in stages:
             raise SepiError(f"{dataset}/{scene}: these numbers have nothing of {variant} ({key})")
         return stages[key]

@@ -8,7 +8,6 @@ from pathlib import Path
 import click
 
 from sepi.command import SepiCommand
-from sepi.errors import SepiError
 from sepi.report import published
 from sepi.report.plan import TABLES
 from sepi.report.runs import Runs, read_numbers
@@ -19,6 +18,7 @@ from sepi.report.tabular.latex import as_latex
 from sepi.report.tabular.layout import Report, as_csv, write
 from sepi.report.tabular.markdown import as_markdown
 from sepi.report.tabular.stages import runtime_table, stage_table
+from sepi.validation import require_known
 
 BUILDERS: dict[str, Callable[[Runs], Report]] = {
     "table1_mse": lambda runs: scene_table(runs, "mse100", published.table1(), "Table 1: MSE x100"),
@@ -40,9 +40,7 @@ BUILDERS: dict[str, Callable[[Runs], Report]] = {
 def command(path: Path, names: tuple[str, ...], output: Path) -> None:
     """Write the tables of a report's numbers as CSV, Markdown and LaTeX."""
     numbers = read_numbers(path)
-    for name in names:
-        if name not in numbers["tables"]:
-            raise SepiError(f"{path}: no table '{name}'; it holds: {', '.join(numbers['tables'])}")
+    require_known(f"{path}: tables", names, numbers["tables"])
     runs = Runs(numbers)
     for name in names or numbers["tables"]:
         report = BUILDERS[name](runs)

@@ -44,23 +44,21 @@ def ablation_table(runs: Runs) -> Report:
 def _rows(runs: Runs, dataset: str) -> list[tuple[str, str, dict[str, Record]]]:
     """Name, kind, and figures by region and variant: of the scenes, their average, and the paper's."""
     scenes = runs.scored(dataset)
-    over = [(scene, methods.SCENE, [scene]) for scene in scenes]
-    over += [(methods.average_label(len(scenes)), methods.AVERAGE, scenes)] if scenes else []
-    rows: list[tuple[str, str, dict[str, Record]]] = [
-        (
-            name,
-            kind,
-            {r: {v: methods.average(runs, dataset, some, "mse100", r, v) for v in runs.plan.listed} for r in REGIONS},
-        )
-        for name, kind, some in over
-    ]
+    rows = [(scene, methods.SCENE, _averages(runs, dataset, [scene])) for scene in scenes]
+    if scenes:
+        rows.append((methods.average_label(len(scenes)), methods.AVERAGE, _averages(runs, dataset, scenes)))
     paper = published.table4().get(dataset)
     if paper is not None:
-        theirs: dict[str, Record] = {
-            region: {v: printed(figures.of(region)) for v, figures in paper.items()} for region in REGIONS
-        }
+        theirs: dict[str, Record] = {r: {v: printed(paper[v].of(r)) for v in paper} for r in REGIONS}
         rows.append((methods.printed_label(dataset), methods.PRINTED_AVERAGE, theirs))
     return rows
+
+
+def _averages(runs: Runs, dataset: str, scenes: list[str]) -> dict[str, Record]:
+    def average(region: str, variant: str) -> float:
+        return methods.average(runs, dataset, scenes, "mse100", region, variant)
+
+    return {region: {variant: average(region, variant) for variant in runs.plan.listed} for region in REGIONS}
 
 
 def parts_table(runs: Runs) -> Report:
