@@ -145,14 +145,8 @@ def evaluations_of(light_field: LightField, maps: Mapping[str, FloatMap]) -> dic
     Raises
     ------
     SepiError
-        If a map does not have the light field's shape.
+        If a map does not have the ground truth's shape.
     """
-    for disparity in maps.values():
-        if disparity.shape != light_field.shape:
-            raise SepiError(
-                f"{light_field.name}: a disparity map must have the views' shape {light_field.shape}, "
-                f"got {disparity.shape}"
-            )
     if light_field.ground_truth is None or not maps:
         return {name: Evaluation() for name in maps}
     masks = region_masks(light_field)
@@ -193,7 +187,7 @@ def score_maps(
     Raises
     ------
     SepiError
-        If a map does not have the light field's shape.
+        If a map does not have the ground truth's shape.
     """
     scene = _digest_of_scene(light_field, code)
     digests = {name: _digest(scene, disparity) for name, disparity in maps.items()}

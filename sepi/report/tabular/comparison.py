@@ -86,9 +86,7 @@ def _scene_records(runs: Runs, dataset: str, score: str, paper: SceneTable, comp
         found.append((name, methods.SCENE, figures))
     if own_names:
         available = [figures for name, _, figures in found if name in own_names]
-        means = {
-            method.key: _average(method, [figures.get(method.key) for figures in available]) for method in compared
-        }
+        means = {m.key: _average(m, [figures.get(m.key) for figures in available]) for m in compared}
         found.append((methods.average_label(len(available)), methods.AVERAGE, means))
     if dataset in paper.averages:
         found.append((methods.printed_label(dataset), methods.PRINTED_AVERAGE, {**paper.averages[dataset]}))
@@ -170,7 +168,6 @@ def _own_figure(runs: Runs, method: Method, dataset: str, scenes: Sequence[str],
 
 def _ranked(runs: Runs, rows: Sequence[Method], dataset: str) -> list[Method]:
     """Methods that are ranked in a column: ours among published averages only if they are over the same scenes."""
-    is_complete = sorted(published.table1().scenes(dataset)) == sorted(_own_names(runs, dataset))
-    kinds = {Kind.PUBLISHED} if dataset in published.table3() else {Kind.OURS}
-    kinds |= {Kind.OURS} if is_complete else set()
-    return [method for method in rows if method.kind in kinds and method.learning == "none"]
+    of_paper = published.table1().scenes(dataset)
+    compares = not of_paper or sorted(of_paper) == sorted(_own_names(runs, dataset))
+    return [method for method in rows if method.learning == "none" and (compares or not method.is_here)]
