@@ -49,7 +49,7 @@ def _rows(runs: Runs, dataset: str) -> list[tuple[str, str, dict[str, Record]]]:
         rows.append((methods.average_label(len(scenes)), methods.AVERAGE, _averages(runs, dataset, scenes)))
     paper = published.table4().get(dataset)
     if paper is not None:
-        theirs: dict[str, Record] = {r: {v: printed(paper[v].of(r)) for v in paper} for r in REGIONS}
+        theirs: dict[str, Record] = {r: {v: printed(paper[v].get(r)) for v in paper} for r in REGIONS}
         rows.append((methods.printed_label(dataset), methods.PRINTED_AVERAGE, theirs))
     return rows
 

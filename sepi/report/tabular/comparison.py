@@ -148,8 +148,7 @@ def _region_average(runs: Runs, method: Method, dataset: str, region: str) -> Ce
     """The published average, or that over the scenes available."""
     if method.is_here:
         return _own_figure(runs, method, dataset, runs.scored(dataset), "mse100", region)
-    figures = published.table3().get(dataset, {}).get(method.key)
-    return None if figures is None else figures.of(region)
+    return published.table3().get(dataset, {}).get(method.key, {}).get(region)
 
 
 def _own_figure(runs: Runs, method: Method, dataset: str, scenes: Sequence[str], score: str, region: str) -> Cell:
