@@ -83,7 +83,8 @@ def score(estimate: FloatMap, ground_truth: FloatMap, border: int = 0, region: B
     chosen = chosen[inside]
     error = np.abs(estimate[inside][chosen].astype(np.float64) - ground_truth[inside][chosen])
     finite = np.isfinite(error)
-    scores: Scores = {"mse100": 100 * _mean(error[finite] ** 2), "q25": _quarter(100 * error)}
+    quarter = float(np.sort(100 * error)[error.size // 4]) if error.size else float("nan")
+    scores: Scores = {"mse100": 100 * _mean(error[finite] ** 2), "q25": quarter}
     # written so that NaN is bad
     scores |= {name: 100 * _mean(~(error <= threshold)) for name, threshold in BAD_PIXEL.items()}
     scores |= {"non_finite": int(np.count_nonzero(~finite)), "pixels": error.size}
@@ -144,14 +145,8 @@ def evaluations_of(light_field: LightField, maps: Mapping[str, FloatMap]) -> dic
     Raises
     ------
     SepiError
-        If a map does not have the light field's shape.
+        If a map does not have the ground truth's shape.
     """
-    for disparity in maps.values():
-        if disparity.shape != light_field.shape:
-            raise SepiError(
-                f"{light_field.name}: a disparity map must have the views' shape {light_field.shape}, "
-                f"got {disparity.shape}"
-            )
     if light_field.ground_truth is None or not maps:
         return {name: Evaluation() for name in maps}
     masks = region_masks(light_field)
@@ -192,7 +187,7 @@ def score_maps(
     Raises
     ------
     SepiError
-        If a map does not have the light field's shape.
+        If a map does not have the ground truth's shape.
     """
     scene = _digest_of_scene(light_field, code)
     digests = {name: _digest(scene, disparity) for name, disparity in maps.items()}
@@ -262,10 +257,6 @@ def _mean(values: FloatMap | BoolMap) -> float:
     return float(np.mean(values)) if values.size else float("nan")
 
 
-def _quarter(error: FloatMap) -> float:
-    return float(np.sort(error)[int(0.25 * error.size)]) if error.size else float("nan")
-
-
 _PATH = click.Path(path_type=Path)
 
 
@@ -282,7 +273,12 @@ def command(
     """Score the disparity maps of stage files against the light field's ground truth, if it has one."""
     light_field = read_light_field(light_field_path)
     maps = {map_name(stages, path): read_stage(path).disparity for path in paths}
-    scored, anew = score_maps(light_field, maps, {} if kept is None else _known(kept), code)
+    known: dict[str, Scored] = {}
+    if kept is not None:
+        # absent, or of an earlier version: all is scored anew
+        with suppress(SepiError):
+            known = read_evaluations(kept)
+    scored, anew = score_maps(light_field, maps, known, code)
     write_scores(output, scored, scene_attributes(light_field))
     if kept is not None:
         with atomic_path(kept) as temporary:
@@ -291,14 +287,6 @@ def command(
         click.echo(f"{light_field.name}: no ground truth, no scores", err=True)
     else:
         click.echo(f"{light_field.name}: {len(anew)} of {len(maps)} maps scored anew: {', '.join(anew)}", err=True)
-
-
-def _known(kept: Path) -> dict[str, Scored]:
-    """Earlier evaluations; none from a file that is no score file of this version."""
-    try:
-        return read_evaluations(kept)
-    except SepiError:
-        return {}
 
 
 if __name__ == "__main__":

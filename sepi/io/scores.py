@@ -92,7 +92,8 @@ def write_scores(path: Path, maps: Mapping[str, Scored], attributes: Mapping[str
         groups = file.create_group(_MAPS, track_order=True)
         first: h5py.Group | None = None
         for name, scored in maps.items():
-            group = groups.create_group(_stored_name(name))
+            # HDF5 would take a slash for a group of groups; no label of a choice has a colon
+            group = groups.create_group(name.replace("/", ":"))
             group.attrs["digest"] = scored.digest
             if first is None:
                 put_evaluation(group, scored.evaluation)
@@ -103,16 +104,16 @@ def write_scores(path: Path, maps: Mapping[str, Scored], attributes: Mapping[str
                     group[f"regions/{region}"] = first[f"regions/{region}"]
 
 
-def read_scores(path: Path) -> dict[str, AllScores]:
-    """Map to protocol to region to scores; without protocols where the scene has no ground truth.
+def read_scores(path: Path, names: Collection[str] | None = None) -> dict[str, AllScores]:
+    """Map to protocol to region to scores, of these maps or of all; no protocols where there is no ground truth.
 
     Raises
     ------
     SepiError
-        If the file is missing, not HDF5, or not a score file.
+        If the file is missing, not HDF5, not a score file, or has nothing of one of the maps.
     """
     with open_hdf5(path) as file:
-        return {_name(key): scores_in(group) for key, group in _maps(path, file).items()}
+        return {name: scores_in(group) for name, group in _groups(path, file, names).items()}
 
 
 def read_evaluations(path: Path, names: Collection[str] | None = None) -> dict[str, Scored]:
@@ -121,15 +122,10 @@ def read_evaluations(path: Path, names: Collection[str] | None = None) -> dict[s
     Raises
     ------
     SepiError
-        If the file is missing, not HDF5, not a score file, or has nothing of one of the maps.
+        As :func:`read_scores`.
     """
     with open_hdf5(path) as file:
-        maps = _maps(path, file)
-        known = [_name(key) for key in maps]
-        for name in names or ():
-            if name not in known:
-                raise SepiError(f"{path}: no scores of '{name}'; it holds: {', '.join(known) or 'none'}")
-        groups = {name: maps[_stored_name(name)] for name in (known if names is None else names)}
+        groups = _groups(path, file, names)
         return {name: Scored(str(group.attrs["digest"]), evaluation_in(group)) for name, group in groups.items()}
 
 
@@ -174,16 +170,11 @@ def without_nan(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def _maps(path: Path, file: h5py.File) -> h5py.Group:
+def _groups(path: Path, file: h5py.File, names: Collection[str] | None) -> dict[str, h5py.Group]:
     if "ground_truth" not in file.attrs or _MAPS not in file:
         raise SepiError(f"{path}: not a score file (written by python -m sepi.evaluate): no attribute 'ground_truth'")
-    return file[_MAPS]
-
-
-def _stored_name(name: str) -> str:
-    # HDF5 would take a slash for a group of groups; no label of a choice has a colon
-    return name.replace("/", ":")
-
-
-def _name(stored: str) -> str:
-    return stored.replace(":", "/")
+    groups = {stored.replace(":", "/"): group for stored, group in file[_MAPS].items()}
+    for name in names or ():
+        if name not in groups:
+            raise SepiError(f"{path}: no scores of '{name}'; it holds: {', '.join(groups) or 'none'}")
+    return groups if names is None else {name: groups[name] for name in names}

@@ -27,11 +27,13 @@ from sepi.io.external_maps import read_external_scores
 from sepi.io.hdf5 import read_light_field, read_stage
 from sepi.io.scores import Scores, read_evaluations, read_scores, without_nan
 from sepi.report.plan import PARTS_TABLES, TABLES, Plan
-from sepi.report.runs import Runs
+from sepi.report.runs import Runs, read_json
 from sepi.report.tables import BUILDERS
 from sepi.report.tabular.confidence import decile_errors, oracle, sparsification
 from sepi.report.tabular.layout import as_json, write
+from sepi.validation import require_known
 from sepi.workflow.machine import this_machine
+from sepi.workflow.result_paths import stage_of
 
 LIBRARIES = (
     "numpy",
@@ -81,8 +83,15 @@ def collect(plan: Plan, parameters: Parameters | None = None, parts: bool = Fals
     numbers: dict[str, Any] = {
         "made": made_here(plan.number_inputs(parts)),
         "protocols": dict(PROTOCOLS),
-        "plan": plan.content(),
-        "parameters": _used(plan, parameters or {}, parts),
+        "plan": json.loads(plan.to_json()),
+        "parameters": {
+            stage: {
+                choice: (parameters or {})[stage][choice]
+                for choice in dict.fromkeys(plan.variants[variant][stage] for variant in plan.collected(parts))
+                if choice in (parameters or {}).get(stage, {})
+            }
+            for stage in plan.stages
+        },
         "scenes": [_scene(plan, dataset, scene, parts) for dataset, scene in plan.pairs],
     }
     numbers = without_nan(numbers)
@@ -154,32 +163,24 @@ def _light_field(path: Path) -> dict[str, Any]:
 
 def _stages(plan: Plan, dataset: str, scene: str, parts: bool) -> dict[str, Any]:
     """Scores and times by the path of a stage's choices; a stage that variants share is there once."""
-    found: dict[str, Any] = {}
-    scores_file = plan.scores_file(dataset, scene, parts)
-    scores = read_scores(scores_file)
-    for variant in plan.parts if parts else plan.listed:
-        for stage in plan.stages:
-            key = plan.stage_key(variant, stage)
-            # of the parts, only the last stage is scored
-            is_scored = not parts or stage == plan.stages[-1]
-            if key not in found:
-                timing = _timing(plan.stage_file(dataset, scene, variant, stage, "time.json"))
-                found[key] = {"stage": plan.made_by(variant, stage), "scores": None, **timing}
-            if is_scored:
-                if key not in scores:
-                    raise SepiError(f"{scores_file}: no scores of '{key}'; it holds: {', '.join(scores) or 'none'}")
-                found[key]["scores"] = _ordered(scores_file, scores[key])
+    files = {
+        plan.stage_key(variant, stage): plan.stage_file(dataset, scene, variant, stage, "time.json")
+        for variant in plan.collected(parts)
+        for stage in plan.stages
+    }
+    # of the parts, only the last stage is scored
+    last = [plan.stage_key(variant, plan.stages[-1]) for variant in plan.collected(parts)]
+    scores = read_scores(plan.scores_file(dataset, scene, parts), last if parts else files.keys())
+    found = {}
+    for key, path in files.items():
+        took = read_json(path, {"seconds", "peak_memory_mb"}, "the time of a stage", f"sepi.{stage_of(key)}")
+        found[key] = {
+            "stage": stage_of(key),
+            "scores": _ordered(scores[key]) if key in scores else None,
+            "seconds": float(took["seconds"]),
+            "peak_memory_mb": float(took["peak_memory_mb"]),
+        }
     return found
-
-
-def _timing(path: Path) -> dict[str, float]:
-    try:
-        values = json.loads(path.read_text(encoding="utf-8"))
-        return {key: float(values[key]) for key in ("seconds", "peak_memory_mb")}
-    except OSError as error:
-        raise SepiError(f"{path}: cannot be read ({error.strerror})") from error
-    except (ValueError, KeyError, TypeError) as error:
-        raise SepiError(f'{path}: expected {{"seconds": ..., "peak_memory_mb": ...}} ({error})') from error
 
 
 def _confidence(plan: Plan, dataset: str, scene: str) -> dict[str, dict[str, list[float]]]:
@@ -193,9 +194,12 @@ def _confidence(plan: Plan, dataset: str, scene: str) -> dict[str, dict[str, lis
         confidence = read_stage(plan.stage_file(dataset, scene, variant, last)).confidence
         if error is not None:
             squared, absolute = decile_errors(confidence, error)
-            curves = {"curve": sparsification(confidence, error), "oracle": oracle(error)}
-            lists = {"squared": squared, "absolute": absolute, **curves}
-            found[variant] = {name: values.tolist() for name, values in lists.items()}
+            found[variant] = {
+                "squared": squared.tolist(),
+                "absolute": absolute.tolist(),
+                "curve": sparsification(confidence, error).tolist(),
+                "oracle": oracle(error).tolist(),
+            }
     return found
 
 
@@ -205,54 +209,25 @@ def _external(plan: Plan, dataset: str, scene: str) -> dict[str, Any]:
         return {}
     path = plan.external_file(dataset, scene)
     maps = read_external_scores(path)
-    missing = [method for method in plan.external if method not in maps]
-    if missing:
-        raise SepiError(f"{path}: no method '{missing[0]}'; it holds: {', '.join(maps) or 'none'}")
+    require_known(str(path), plan.external, maps)
     return {
         method: {key: getattr(maps[method], key) for key in ("problem", "source", "sha256")}
-        | {"scores": _ordered(path, maps[method].evaluation.scores)}
+        | {"scores": _ordered(maps[method].evaluation.scores)}
         for method in plan.external
     }
 
 
-def _ordered(path: Path, scores: Mapping[str, Mapping[str, Scores]]) -> dict[str, Any]:
-    """Scores in the order of protocols, regions and names, counts as whole numbers."""
-    try:
-        return {
-            protocol: {
-                region: {name: scores[protocol][region][name] for name in SCORES}
-                | {name: int(scores[protocol][region][name]) for name in COUNTS}
-                for region in REGIONS
-            }
-            for protocol in PROTOCOLS
-            if scores
-        }
-    except KeyError as error:
-        raise SepiError(f"{path}: not all scores are there: {error} is missing; evaluate the map again") from error
-
-
-def _used(plan: Plan, parameters: Parameters, parts: bool) -> dict[str, dict[str, Any]]:
-    """Parameters of the choices of these numbers' variants."""
-    used: dict[str, dict[str, Any]] = {}
-    for stage in plan.stages:
-        choices = dict.fromkeys(plan.variants[variant][stage] for variant in (plan.parts if parts else plan.listed))
-        known = parameters.get(stage, {})
-        used[stage] = {choice: dict(known[choice]) for choice in choices if choice in known}
-    return used
+def _ordered(scores: Mapping[str, Mapping[str, Scores]]) -> dict[str, Any]:
+    """Scores in the order of protocols, regions and names."""
+    return {
+        protocol: {region: {name: scores[protocol][region][name] for name in (*SCORES, *COUNTS)} for region in REGIONS}
+        for protocol in PROTOCOLS
+        if scores
+    }
 
 
 def _digest(values: npt.NDArray[Any]) -> str:
     return hashlib.sha256(np.ascontiguousarray(values).data.cast("B")).hexdigest()
-
-
-def _parameters(text: str) -> Parameters:
-    try:
-        value = json.loads(text)
-        return {stage: {choice: dict(found) for choice, found in choices.items()} for stage, choices in value.items()}
-    except (ValueError, TypeError, AttributeError) as error:
-        raise SepiError(
-            f'--parameters: expected JSON such as {{"initial": {{"sepi": {{"num_disparities": 91}}}}}} ({error})'
-        ) from error
 
 
 @click.command(name="python -m sepi.report.numbers", cls=SepiCommand)
@@ -264,7 +239,11 @@ def _parameters(text: str) -> Parameters:
 def command(results: Path, plan_text: str, parameters: str, parts: bool, output: Path) -> None:
     """Collect all numbers of the report in one JSON file."""
     plan = Plan.from_json(results, plan_text)
-    write(output, as_text(collect(plan, _parameters(parameters), parts)))
+    try:
+        values = json.loads(parameters)
+    except ValueError as error:
+        raise SepiError(f"--parameters: expected JSON of parameters per stage and choice ({error})") from error
+    write(output, as_text(collect(plan, values, parts)))
 
 
 if __name__ == "__main__":

@@ -5,15 +5,18 @@ The workflow declares the inputs of the report's numbers from here, and they are
 
 from __future__ import annotations
 
+import itertools
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated
+
+from pydantic import AfterValidator
+from pydantic.dataclasses import dataclass
 
 from sepi.errors import SepiError
 from sepi.pipeline import HANDED_ON, PARTS_OF_BEST
-from sepi.workflow.result_paths import PARTS_ENDING, SceneFiles, key_of, scene_files, stage_of
+from sepi.workflow.result_paths import PARTS_ENDING, SceneFiles, key_of, scene_files
 
 MAIN_VARIANT = "paper"
 """The variant that does what the paper describes; its figures stand beside the published ones."""
@@ -42,6 +45,10 @@ PARTS_TABLES = ("ablation_best",)
 """Tables of the best variant's parts; they are made from numbers of their own."""
 
 
+Names = Annotated[Sequence[str], AfterValidator(tuple)]
+"""A list of names; a single text is none."""
+
+
 @dataclass(frozen=True)
 class Plan:
     """Scenes, variants and external methods of a report.
@@ -59,9 +66,9 @@ class Plan:
     """
 
     results: Path
-    scenes: Mapping[str, Sequence[str]]
+    scenes: Mapping[str, Names]
     variants: Mapping[str, Mapping[str, str]]
-    external: Sequence[str] = ()
+    external: Names = ()
 
     @classmethod
     def from_json(cls, results: Path, text: str) -> Plan:
@@ -75,17 +82,11 @@ class Plan:
             If the text is not such JSON, or has no variant ``paper``.
         """
         try:
-            values = json.loads(text)
-            plan = cls(
-                results,
-                {dataset: _names(names) for dataset, names in values["scenes"].items()},
-                {name: {stage: str(label) for stage, label in c.items()} for name, c in values["variants"].items()},
-                _names(values.get("external", ())),
-            )
-        except (ValueError, KeyError, TypeError, AttributeError) as error:
+            plan = cls(results, **json.loads(text))
+        except (ValueError, TypeError) as error:
             raise SepiError(
                 'plan: expected JSON such as {"scenes": {DATASET: [SCENE]}, "variants": {VARIANT: {STAGE: CHOICE}}, '
-                f'"external": [NAME]}} ({error})'
+                '"external": [NAME]}'
             ) from error
         if MAIN_VARIANT not in plan.variants:
             raise SepiError(f"plan: no variant '{MAIN_VARIANT}', which stands beside the published figures")
@@ -93,15 +94,7 @@ class Plan:
 
     def to_json(self) -> str:
         """The text that :meth:`from_json` reads; the results' folder is not part of it."""
-        return json.dumps(self.content())
-
-    def content(self) -> dict[str, Any]:
-        """Scenes, variants and external methods as JSON has them."""
-        return {
-            "scenes": {dataset: list(names) for dataset, names in self.scenes.items()},
-            "variants": {variant: dict(choices) for variant, choices in self.variants.items()},
-            "external": list(self.external),
-        }
+        return json.dumps({key: getattr(self, key) for key in ("scenes", "variants", "external")})
 
     @property
     def stages(self) -> list[str]:
@@ -137,10 +130,6 @@ class Plan:
         """What names a variant's maps after a stage, in numbers and scores."""
         return key_of(self.variants[variant], stage)
 
-    def made_by(self, variant: str, stage: str) -> str:
-        """The stage that made a variant's maps after ``stage``: itself, or an earlier one whose maps it hands on."""
-        return stage_of(self.stage_key(variant, stage))
-
     def runs_stage(self, variant: str, stage: str) -> bool:
         """Whether a stage of a variant does anything; else it hands on what it is given."""
         return self.variants[variant][stage] != HANDED_ON
@@ -157,7 +146,7 @@ class Plan:
         files: list[Path] = []
         for dataset, scene in self.pairs:
             files.append(self.scores_file(dataset, scene, parts))
-            for variant in self.parts if parts else self.listed:
+            for variant in self.collected(parts):
                 files += [self.stage_file(dataset, scene, variant, stage, "time.json") for stage in self.stages]
             if not parts:
                 files.append(self.light_field_file(dataset, scene))
@@ -168,8 +157,8 @@ class Plan:
     def scored_files(self, dataset: str, scene: str, parts: bool = False) -> list[Path]:
         """The stage files whose maps are scored, each once: after every stage, with ``parts`` after the last one."""
         stages = self.stages[-1:] if parts else self.stages
-        variants = self.parts if parts else self.listed
-        return list(dict.fromkeys(self.stage_file(dataset, scene, v, stage) for v in variants for stage in stages))
+        every = itertools.product(self.collected(parts), stages)
+        return list(dict.fromkeys(self.stage_file(dataset, scene, *variant_stage) for variant_stage in every))
 
     @property
     def compared(self) -> list[str]:
@@ -186,15 +175,13 @@ class Plan:
         """All variants but those with one part of the best one switched off, which have a table of their own."""
         return [variant for variant in self.variants if variant not in PARTS_OF_BEST or variant == BEST_VARIANT]
 
+    def collected(self, parts: bool) -> list[str]:
+        """The variants of one of the two files of numbers."""
+        return self.parts if parts else self.listed
+
     def map_inputs(self, dataset: str, scene: str) -> list[Path]:
         """The files that the pictures of a scene are made from, each once."""
         files = [self.light_field_file(dataset, scene), self.scores_file(dataset, scene)]
         files += self.scored_files(dataset, scene)
         files += [self.external_file(dataset, scene)] if self.external else []
         return list(dict.fromkeys(files))
-
-
-def _names(value: Any) -> tuple[str, ...]:
-    if not isinstance(value, list | tuple):
-        raise TypeError(f"expected a list of names, got {value!r}")
-    return tuple(map(str, value))

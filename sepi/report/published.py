@@ -25,6 +25,9 @@ AVERAGE = "Average"
 PAPERS_METHOD = "zhou"
 """Key of the paper's own method."""
 
+Regions = Mapping[str, float]
+"""Region of :data:`sepi.evaluate.REGIONS` to 100 x MSE; a region that the paper prints nothing of is left out."""
+
 DATASETS: dict[str, str] = {"hci": "HCI 4D light field benchmark", "hci_2013": "HCI Blender (2013)"}
 """Datasets of the paper, under the names that this project gives them."""
 
@@ -78,19 +81,6 @@ class SceneTable:
         return [scene for name, scene in self.cells if name == dataset]
 
 
-@dataclass(frozen=True)
-class Regions:
-    """100 x MSE over the whole map, the occluded and the textureless region; None where the paper prints nothing."""
-
-    overall: float | None
-    occluded: float | None
-    textureless: float | None
-
-    def of(self, region: str) -> float | None:
-        """The figure of a region of :data:`sepi.evaluate.REGIONS`."""
-        return {WHOLE_MAP: self.overall, "occluded": self.occluded, "textureless": self.textureless}[region]
-
-
 def paper_scene(dataset: str, scene: str) -> str | None:
     """The paper's name of a scene, or None where the paper does not have it.
 
@@ -124,7 +114,7 @@ def table3() -> dict[str, dict[str, Regions]]:
     rows = _rows("table3_regions.csv")
     return {
         dataset: {
-            row["method"]: Regions(None, float(row[f"{dataset}_occluded"]), float(row[f"{dataset}_textureless"]))
+            row["method"]: {region: float(row[f"{dataset}_{region}"]) for region in ("occluded", "textureless")}
             for row in rows
         }
         for dataset in DATASETS
@@ -136,9 +126,9 @@ def table4() -> dict[str, dict[str, Regions]]:
     """Table 4 and the text's figures for Wang's occlusion stage: dataset to variant to average 100 x MSE."""
     table: dict[str, dict[str, Regions]] = {dataset: {} for dataset in DATASETS}
     for row in _rows("table4_ablation.csv"):
-        table[row["dataset"]][row["variant"]] = Regions(
-            *(float(row[region]) if row[region] else None for region in ("overall", "occluded", "textureless"))
-        )
+        columns = {WHOLE_MAP: "overall", "occluded": "occluded", "textureless": "textureless"}
+        figures = {region: float(row[column]) for region, column in columns.items() if row[column]}
+        table[row["dataset"]][row["variant"]] = figures
     return table
 
 

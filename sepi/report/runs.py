@@ -40,21 +40,22 @@ class Runs:
 
     def light_field(self, dataset: str, scene: str) -> dict[str, Any]:
         """What is known about a light field: ``grid``, ``shape``, ``range``, ``sha256`` and more."""
-        found: dict[str, Any] = self._scene(dataset, scene)["light_field"]
+        found: dict[str, Any] = self._scenes[dataset, scene]["light_field"]
         return found
 
     def scores(self, dataset: str, scene: str, variant: str, stage: str | None = None) -> AllScores:
         """Protocol to region to scores after a stage, the last unless given; empty without ground truth."""
-        stage = stage or self.plan.stages[-1]
-        found = self._stage(dataset, scene, variant, stage)["scores"]
-        if found is None:
-            raise SepiError(f"{dataset}/{scene}: these numbers have no scores of {variant} after {stage}")
-        return _with_nan(found)
+        found: AllScores = _with_nan(self._stage(dataset, scene, variant, stage or self.plan.stages[-1])["scores"])
+        return found
 
     def scored(self, dataset: str, variant: str = MAIN_VARIANT) -> list[str]:
         """Scenes of a dataset that have ground truth, and so scores; looked for with one of the variants."""
         scenes = self.plan.scenes.get(dataset, ())
         return [scene for scene in scenes if self.scores(dataset, scene, variant)]
+
+    def scored_pairs(self, variant: str = MAIN_VARIANT) -> list[tuple[str, str]]:
+        """Every ``(dataset, scene)`` that has scores."""
+        return [(dataset, scene) for dataset in self.plan.scenes for scene in self.scored(dataset, variant)]
 
     def final(
         self, dataset: str, scene: str, score: str, region: str = WHOLE_MAP, variant: str = MAIN_VARIANT
@@ -69,38 +70,23 @@ class Runs:
         values = self._stage(dataset, scene, variant, stage)
         return Timing(values["seconds"], values["peak_memory_mb"])
 
-    def confidence(self, dataset: str, scene: str, variant: str) -> dict[str, list[float]] | None:
-        """``squared``, ``absolute``, ``curve`` and ``oracle`` of a final map; None without ground truth."""
-        found = self._scene(dataset, scene)["confidence"].get(variant)
-        return None if found is None else {name: [_number(v) for v in values] for name, values in found.items()}
+    def confidence(self, dataset: str, scene: str, variant: str) -> dict[str, list[float]]:
+        """``squared``, ``absolute``, ``curve`` and ``oracle`` of a final map that has scores."""
+        found: dict[str, list[float]] = _with_nan(self._scenes[dataset, scene]["confidence"][variant])
+        return found
 
     def external_scores(self, dataset: str, scene: str, method: str) -> AllScores:
         """Protocol to region to scores of another method's map; empty without a map that can be scored."""
-        return _with_nan(self._scene(dataset, scene)["external"][method]["scores"])
-
-    def external_score(
-        self,
-        dataset: str,
-        scene: str,
-        method: str,
-        score: str,
-        region: str = WHOLE_MAP,
-        protocol: str = "paper",
-    ) -> float | None:
-        """A score of another method's map; None without a map that can be scored."""
-        scores = self.external_scores(dataset, scene, method)
-        return scores[protocol][region][score] if scores else None
+        found: AllScores = _with_nan(self._scenes[dataset, scene]["external"][method]["scores"])
+        return found
 
     def external_problem(self, dataset: str, scene: str, method: str) -> str:
         """Why an external map has no scores, in a few words; empty where it has some or there is no ground truth."""
-        return str(self._scene(dataset, scene)["external"][method]["problem"])
-
-    def _scene(self, dataset: str, scene: str) -> dict[str, Any]:
-        return self._scenes[dataset, scene]
+        return str(self._scenes[dataset, scene]["external"][method]["problem"])
 
     def _stage(self, dataset: str, scene: str, variant: str, stage: str) -> dict[str, Any]:
         key = self.plan.stage_key(variant, stage)
-        stages: dict[str, dict[str, Any]] = self._scene(dataset, scene)["stages"]
+        stages: dict[str, dict[str, Any]] = self._scenes[dataset, scene]["stages"]
         if key not in stages:
             raise SepiError(f"{dataset}/{scene}: these numbers have nothing of {variant} ({key})")
         return stages[key]
@@ -122,14 +108,7 @@ def read_numbers(path: Path) -> dict[str, Any]:
 
 
 def read_json(path: Path, keys: set[str], what: str, module: str) -> dict[str, Any]:
-    """Read a JSON object that must have certain keys.
-
-    Parameters
-    ----------
-    path : Path
-    keys : set of str
-    what, module : str
-        What the file should be, and which module writes such files; for the message.
+    """Read a JSON object that must have certain keys: ``what``, written by ``module``.
 
     Raises
     ------
@@ -147,13 +126,10 @@ def read_json(path: Path, keys: set[str], what: str, module: str) -> dict[str, A
     return found
 
 
-def _with_nan(scores: Mapping[str, Mapping[str, Mapping[str, float | None]]]) -> AllScores:
-    return {
-        protocol: {region: {name: _number(value) for name, value in found.items()} for region, found in regions.items()}
-        for protocol, regions in scores.items()
-    }
-
-
-def _number(value: float | None) -> float:
+def _with_nan(value: Any) -> Any:
     """JSON has no NaN: a score over no pixels is null there."""
-    return math.nan if value is None else float(value)
+    if isinstance(value, dict):
+        return {key: _with_nan(inner) for key, inner in value.items()}
+    if isinstance(value, list):
+        return [_with_nan(inner) for inner in value]
+    return math.nan if value is None else value

@@ -8,19 +8,17 @@ from pathlib import Path
 import click
 
 from sepi.command import SepiCommand
-from sepi.errors import SepiError
 from sepi.report import published
 from sepi.report.plan import TABLES
 from sepi.report.runs import Runs, read_numbers
-from sepi.report.tabular.ablation import ablation_table
-from sepi.report.tabular.comparison import scene_table
+from sepi.report.tabular.ablation import ablation_table, parts_table
+from sepi.report.tabular.comparison import region_table, scene_table
 from sepi.report.tabular.confidence import confidence_table
 from sepi.report.tabular.latex import as_latex
 from sepi.report.tabular.layout import Report, as_csv, write
 from sepi.report.tabular.markdown import as_markdown
-from sepi.report.tabular.parts import parts_table
-from sepi.report.tabular.region_comparison import region_table
 from sepi.report.tabular.stages import runtime_table, stage_table
+from sepi.validation import require_known
 
 BUILDERS: dict[str, Callable[[Runs], Report]] = {
     "table1_mse": lambda runs: scene_table(runs, "mse100", published.table1(), "Table 1: MSE x100"),
@@ -42,9 +40,7 @@ BUILDERS: dict[str, Callable[[Runs], Report]] = {
 def command(path: Path, names: tuple[str, ...], output: Path) -> None:
     """Write the tables of a report's numbers as CSV, Markdown and LaTeX."""
     numbers = read_numbers(path)
-    for name in names:
-        if name not in numbers["tables"]:
-            raise SepiError(f"{path}: no table '{name}'; it holds: {', '.join(numbers['tables'])}")
+    require_known(f"{path}: tables", names, numbers["tables"])
     runs = Runs(numbers)
     for name in names or numbers["tables"]:
         report = BUILDERS[name](runs)

@@ -9,6 +9,7 @@ from report_results import SCENES, VARIANTS
 
 from sepi.errors import SepiError
 from sepi.report.plan import Plan
+from sepi.workflow.result_paths import stage_of
 
 
 def test_variants_share_the_files_of_their_first_stages(plan: Plan) -> None:
@@ -27,7 +28,7 @@ def test_a_stage_that_hands_its_maps_on_has_no_file() -> None:
     assert made.stage_file("hci", "cotton", "no_occlusion", "occlusion") == folder / "initial.h5"
     assert made.stage_file("hci", "cotton", "no_occlusion", "textureless") == folder / "none/lti/textureless.h5"
     assert made.stage_file("hci", "cotton", "mine", "optimize") == folder / "initial.h5"
-    assert made.made_by("mine", "optimize") == "initial"
+    assert stage_of(made.stage_key("mine", "optimize")) == "initial"
 
 
 @pytest.mark.parametrize(
@@ -50,7 +51,7 @@ def test_a_plan_comes_back_from_its_text(plan: Plan) -> None:
     """External may be left out, as in the plans that only draw pictures."""
     whole = replace(plan, scenes={"hci": ("cotton",)}, external=("SPO", "a b"))
     assert Plan.from_json(plan.results, whole.to_json()) == whole
-    without = {key: value for key, value in whole.content().items() if key != "external"}
+    without = {key: value for key, value in json.loads(whole.to_json()).items() if key != "external"}
     assert Plan.from_json(plan.results, json.dumps(without)).external == ()
     assert whole.external_file("hci", "cotton") == plan.results / "hci/cotton/external.h5"
     assert whole.external_file("hci", "cotton") in whole.map_inputs("hci", "cotton")

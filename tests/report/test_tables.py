@@ -49,7 +49,7 @@ def test_one_table_alone(found: dict[str, Any], tmp_path: Path) -> None:
         (
             '{"plan": {}, "scenes": [], "tables": {"runtime": {}}}',
             ["--table", "ablation_best"],
-            "no table 'ablation_best'; it holds: runtime",
+            "tables: unknown 'ablation_best'; known: runtime",
         ),
     ],
 )

@@ -1,66 +1,93 @@
-"""Table 4: the error of every variant over the map and both regions, beside the figures that the paper prints."""
+"""Table 4, the error of every variant over the map and both regions, and the ablation of variant ``best``."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-
-from sepi.evaluate import REGIONS
+from sepi.evaluate import REGIONS, SCORES, WHOLE_MAP
+from sepi.pipeline import PARTS_OF_BEST
 from sepi.report import published
 from sepi.report.plan import BEST_VARIANT
 from sepi.report.runs import Runs
 from sepi.report.tabular import methods
-from sepi.report.tabular.layout import Cell, Column, Kind, Line, Report, Row, Section, entries, printed, short
+from sepi.report.tabular.layout import Column, Kind, Record, Report, line, printed, section, short
 
-# name and kind of a row, and its figures by variant and region
-_Group = tuple[str, str, Mapping[tuple[str, str], Cell]]
+_SCORES = ("mse100", "q25", "badpix007")
 
 
 def ablation_table(runs: Runs) -> Report:
     """Table 4: MSE of every variant over the map and both regions, per scene, averaged, and published."""
     variants = runs.plan.listed
-    columns = [Column("scene", Kind.TEXT), *(Column(variant, Kind.OURS) for variant in variants)]
-    data: list[Row] = []
+    columns = {"scene": Column("scene", Kind.TEXT), **{variant: Column(variant, Kind.OURS) for variant in variants}}
+    records: list[Record] = []
     sections = []
     for dataset in methods.datasets_of(runs.plan):
-        groups = _groups(runs, dataset, variants)
-        for name, kind, figures in groups:
-            data += [[dataset, name, kind, region, *(figures[v, region] for v in variants)] for region in REGIONS]
-        if groups:
-            lines = [_line(group, variants, columns) for group in groups]
-            sections.append(Section(methods.dataset_title(dataset), columns, lines))
+        lines = []
+        for name, kind, figures in _rows(runs, dataset):
+            heads = {"dataset": dataset, "scene": name, "row": kind}
+            records += [{**heads, "region": region, **figures[region]} for region in REGIONS]
+            # the regions of a variant in one cell, as the paper has them; a figure published without these stands alone
+            texts = {v: "/".join(filter(None, (short(figures[r].get(v)) for r in REGIONS))) for v in variants}
+            source = Kind.PUBLISHED if kind == methods.PRINTED_AVERAGE else Kind.OURS
+            lines.append(line(columns, {"scene": name, **texts}, source, kind))
+        if lines:
+            sections.append(section(methods.dataset_title(dataset), columns, lines))
     return Report(
         "Table 4: ablation, MSE x100 (whole map / occluded / textureless)",
         f"{methods.PROTOCOL_NOTE} The first five variants are the columns of the paper's table 4 in its order; `wang` "
         f"is the comparison in its text (published for the whole map only), `{BEST_VARIANT}` this project's own. "
         f"{methods.REGIONS_NOTE}",
         ["dataset", "scene", "row", "region", *variants],
-        data,
+        records,
         sections,
     )
 
 
-def _groups(runs: Runs, dataset: str, variants: Sequence[str]) -> list[_Group]:
-    """The rows of a dataset: its scenes, their average, and the paper's."""
-    cells = [(variant, region) for variant in variants for region in REGIONS]
+def _rows(runs: Runs, dataset: str) -> list[tuple[str, str, dict[str, Record]]]:
+    """Name, kind, and figures by region and variant: of the scenes, their average, and the paper's."""
     scenes = runs.scored(dataset)
-    ours = {
-        scene: {(v, region): runs.final(dataset, scene, "mse100", region, v) for v, region in cells} for scene in scenes
-    }
-    groups: list[_Group] = [(scene, methods.SCENE, figures) for scene, figures in ours.items()]
+    rows = [(scene, methods.SCENE, _averages(runs, dataset, [scene])) for scene in scenes]
     if scenes:
-        means = {cell: methods.mean(ours[scene][cell] for scene in scenes) for cell in cells}
-        groups.append((methods.average_label(len(scenes)), methods.AVERAGE, means))
-    if dataset in published.table4():
-        paper = published.table4()[dataset]
-        figures = {(v, region): printed(paper[v].of(region)) if v in paper else None for v, region in cells}
-        groups.append((methods.printed_label(dataset), methods.PRINTED_AVERAGE, figures))
-    return groups
+        rows.append((methods.average_label(len(scenes)), methods.AVERAGE, _averages(runs, dataset, scenes)))
+    paper = published.table4().get(dataset)
+    if paper is not None:
+        theirs: dict[str, Record] = {r: {v: printed(paper[v].get(r)) for v in paper} for r in REGIONS}
+        rows.append((methods.printed_label(dataset), methods.PRINTED_AVERAGE, theirs))
+    return rows
 
 
-def _line(group: _Group, variants: Sequence[str], columns: Sequence[Column]) -> Line:
-    """The regions of a variant in one cell, as the paper has them."""
-    name, kind, figures = group
-    # a figure published without those of the regions stands alone
-    cells = ["/".join(filter(None, (short(figures[v, region]) for region in REGIONS))) or None for v in variants]
-    is_ours = kind != methods.PRINTED_AVERAGE
-    return Line(entries(columns, [name, *cells], Kind.OURS if is_ours else Kind.PUBLISHED), kind, is_ours)
+def _averages(runs: Runs, dataset: str, scenes: list[str]) -> dict[str, Record]:
+    def average(region: str, variant: str) -> float:
+        return methods.average(runs, dataset, scenes, "mse100", region, variant)
+
+    return {region: {variant: average(region, variant) for variant in runs.plan.listed} for region in REGIONS}
+
+
+def parts_table(runs: Runs) -> Report:
+    """Scores and seconds of the best variant and of those with one part of it switched off."""
+    columns = {
+        "variant": Column("variant", Kind.TEXT),
+        "difference": Column("what differs", Kind.TEXT),
+        **{name: Column(SCORES[name], Kind.OURS) for name in _SCORES},
+        "seconds": Column("seconds"),
+    }
+    records: list[Record] = []
+    sections = []
+    for dataset, scene in runs.scored_pairs(BEST_VARIANT) if runs.plan.parts else ():
+        found = [
+            {
+                **{"dataset": dataset, "scene": scene, "variant": variant, "difference": PARTS_OF_BEST[variant]},
+                **runs.scores(dataset, scene, variant)["paper"][WHOLE_MAP],
+                "seconds": sum(runs.timing(dataset, scene, variant, stage).seconds for stage in runs.plan.stages),
+            }
+            for variant in runs.plan.parts
+        ]
+        records += found
+        sections.append(section(f"{dataset}/{scene}", columns, [line(columns, record) for record in found]))
+    return Report(
+        "Ablation of variant best",
+        f"{methods.PROTOCOL_NOTE} Each row switches one part of `best` off, or puts the paper's in its place. Seconds: "
+        "sum of the stages' processes, reading and writing included; variants that begin alike share their first "
+        "stages, which ran once.",
+        ["dataset", "scene", "variant", *_SCORES, "seconds"],
+        records,
+        sections,
+    )

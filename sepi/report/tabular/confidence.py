@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from sepi.lightfield import FloatMap
 from sepi.report.runs import Runs
-from sepi.report.tabular.layout import Column, Kind, Line, Report, Row, Section, entries
+from sepi.report.tabular.layout import Column, Kind, Record, Report, line, section
 from sepi.report.tabular.methods import PROTOCOL_NOTE
 
 DECILES = 10
@@ -74,19 +74,18 @@ def confidence_table(runs: Runs) -> Report:
     """Mean errors by decile of confidence and the area under the sparsification curve, beside the oracle's."""
     tenths = [f"decile {i}" for i in range(1, DECILES + 1)]
     heads = [*tenths, "area", "oracle", "random"]
-    columns = [Column("scene", Kind.TEXT), Column("variant", Kind.TEXT), *(Column(head, Kind.OURS) for head in heads)]
-    data: list[Row] = []
+    columns = {name: Column(name, Kind.TEXT) for name in ("scene", "variant")}
+    columns |= {head: Column(head, Kind.OURS) for head in heads}
+    records: list[Record] = []
     lines = []
-    for dataset in runs.plan.scenes:
-        for scene in runs.scored(dataset):
-            for variant in runs.plan.compared:
-                found = runs.confidence(dataset, scene, variant)
-                if found is None:
-                    continue
-                areas = [float(np.mean(found["curve"])), float(np.mean(found["oracle"])), found["curve"][0]]
-                data.append([dataset, scene, variant, "mse100", *found["squared"], *areas])
-                data.append([dataset, scene, variant, "mae100", *found["absolute"], *areas])
-                lines.append(Line(entries(columns, [f"{dataset}/{scene}", variant, *found["absolute"], *areas])))
+    for dataset, scene in runs.scored_pairs():
+        for variant in runs.plan.compared:
+            found = runs.confidence(dataset, scene, variant)
+            areas = [float(np.mean(found["curve"])), float(np.mean(found["oracle"])), found["curve"][0]]
+            for error, name in (("mse100", "squared"), ("mae100", "absolute")):
+                figures = dict(zip(heads, [*found[name], *areas], strict=True))
+                records.append({"dataset": dataset, "scene": scene, "variant": variant, "error": error, **figures})
+            lines.append(line(columns, {**records[-1], "scene": f"{dataset}/{scene}"}))
     return Report(
         "Confidence evaluation",
         f"{PROTOCOL_NOTE} Mean absolute error x100 of each tenth of the pixels, from the most confident (1) to the "
@@ -96,8 +95,8 @@ def confidence_table(runs: Runs) -> Report:
         "of all pixels, which is what a confidence that says nothing reaches. Curves: "
         "`maps/DATASET/SCENE/VARIANT/sparsification.png`.",
         ["dataset", "scene", "variant", "error", *heads],
-        data,
-        [Section("", columns, lines)],
+        records,
+        [section("", columns, lines)],
     )
 
 

@@ -6,7 +6,7 @@ import csv
 import io
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from enum import StrEnum
 from pathlib import Path
@@ -17,10 +17,13 @@ from sepi.io.files import atomic_path
 Cell = str | float | int | None
 """Text (published figures too, as printed), a figure of ours, a count, or nothing (not available)."""
 
-Row = Sequence[Cell]
+Record = Mapping[str, Cell]
+"""A row: key to cell. A CSV file has the keys that are its heads, a page those that are its columns."""
 
 BEST, SECOND = "best", "second"
 """Marks of cells."""
+
+_NOTHING: Mapping[str, Any] = {}
 
 
 class Kind(StrEnum):
@@ -92,8 +95,10 @@ class Report:
     ----------
     title, caption : str
         For the page; the caption names the protocol. Words between backticks are names from the program.
-    heads, data : sequence
-        Header and rows of the CSV file: one figure per cell.
+    heads : sequence of str
+        Header of the CSV file.
+    records : sequence of Record
+        Its rows, one figure per cell.
     sections : sequence of Section
         For the Markdown and LaTeX files and the web page.
     marked : str
@@ -103,7 +108,7 @@ class Report:
     title: str
     caption: str
     heads: Sequence[str]
-    data: Sequence[Row]
+    records: Sequence[Record]
     sections: Sequence[Section]
     marked: str = ""
 
@@ -114,10 +119,29 @@ def entry(cell: Cell, kind: Kind = Kind.FIGURE, mark: str | None = None, note: s
     return Entry(text, _value(cell, kind), kind, mark)
 
 
-def entries(columns: Sequence[Column], cells: Row, figures: Kind | None = None) -> list[Entry]:
-    """Cells of the kinds of their columns; where ``figures`` is given, all that are no words are of that kind."""
-    kinds = [figures if figures and column.kind != Kind.TEXT else column.kind for column in columns]
-    return [entry(cell, kind) for cell, kind in zip(cells, kinds, strict=True)]
+def section(heading: str, columns: Mapping[str, Column], lines: Iterable[Line]) -> Section:
+    """A part of a page; columns by their keys, as :func:`line` takes them."""
+    return Section(heading, [*columns.values()], [*lines])
+
+
+def line(
+    columns: Mapping[str, Column],
+    record: Record,
+    figures: Kind | None = None,
+    kind: str = "",
+    marks: Mapping[str, str | None] = _NOTHING,
+    notes: Mapping[str, str] = _NOTHING,
+) -> Line:
+    """A row of a page: what a record has for the keys of the columns, with marks and notes by these keys.
+
+    Cells that are no words are of the kind ``figures`` where it is given, else of their columns'.
+    """
+    cells = []
+    for key, column in columns.items():
+        cell_kind = figures if figures and column.kind != Kind.TEXT else column.kind
+        cells.append(entry(record.get(key), cell_kind, marks.get(key), notes.get(key, "")))
+    available = any(cell.text for cell in cells if cell.kind not in (Kind.TEXT, Kind.PUBLISHED))
+    return Line(cells, kind, available)
 
 
 def printed(value: float | None) -> str | None:
@@ -130,23 +154,22 @@ def short(cell: Cell) -> str:
     return _text(cell, decimals=2, no_pixels="n/a")
 
 
-def ranks(values: Sequence[float | None]) -> list[str | None]:
+def ranks(figures: Record) -> dict[str, str | None]:
     """Mark the least and the second least of some errors, equal ones alike.
 
     Parameters
     ----------
-    values : sequence of float or None
+    figures : Record
         None and NaN take no part. Compared as printed, with two decimals: what looks equal is equal.
 
     Returns
     -------
-    list of str or None
-        :data:`BEST`, :data:`SECOND` or None for each; no mark where there is nothing to compare.
+    dict
+        Key to :data:`BEST`, :data:`SECOND` or None; no mark where there is nothing to compare.
     """
-    shown = [None if value is None or math.isnan(value) else round(value, 2) for value in values]
-    known = [value for value in shown if value is not None]
-    marks = dict(zip(sorted(set(known)), (BEST, SECOND), strict=False)) if len(known) > 1 else {}
-    return [None if value is None else marks.get(value) for value in shown]
+    shown = {key: float(short(figure)) for key, figure in figures.items() if short(figure) not in ("", "n/a")}
+    marks = dict(zip(sorted(set(shown.values())), (BEST, SECOND), strict=False)) if len(shown) > 1 else {}
+    return {key: marks.get(figure) for key, figure in shown.items()}
 
 
 def write(path: Path, text: str) -> None:
@@ -160,7 +183,8 @@ def as_csv(report: Report) -> str:
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(report.heads)
-    writer.writerows([_text(cell, decimals=4, no_pixels="nan") for cell in row] for row in report.data)
+    for record in report.records:
+        writer.writerow(_text(record.get(head), decimals=4, no_pixels="nan") for head in report.heads)
     return text.getvalue()
 
 

@@ -50,6 +50,11 @@ class Method:
     kind: Kind
     learning: str = ""
 
+    @property
+    def is_here(self) -> bool:
+        """Whether its maps were scored here."""
+        return self.kind in (Kind.OURS, Kind.EXTERNAL)
+
     def shown(self, figure: Cell) -> Cell:
         """A figure of this method as the tables have it."""
         return printed(figure) if self.kind == Kind.PUBLISHED and isinstance(figure, float) else figure
@@ -76,12 +81,6 @@ def compared_methods(plan: Plan) -> list[Method]:
         taken.add(key)
         methods.append(Method(name, key, f"{name} (external)", Kind.EXTERNAL))
     return methods
-
-
-def external_cell(runs: Runs, dataset: str, scene: str, method: str, score: str) -> Cell:
-    """The score of another method's map by the paper's protocol, or what is wrong with it."""
-    figure = runs.external_score(dataset, scene, method, score)
-    return (runs.external_problem(dataset, scene, method) or None) if figure is None else figure
 
 
 def unknown_note(runs: Runs, dataset: str, scene: str, method: str) -> str:
@@ -129,3 +128,8 @@ def mean(values: Iterable[float]) -> float:
     """Mean of the scores that exist; NaN where none does (a scene may have no such region)."""
     known = [value for value in values if not math.isnan(value)]
     return sum(known) / len(known) if known else math.nan
+
+
+def average(runs: Runs, dataset: str, scenes: Iterable[str], score: str, region: str, variant: str) -> float:
+    """Mean of a score over some scenes, of those that have such a region."""
+    return mean(runs.final(dataset, scene, score, region, variant) for scene in scenes)

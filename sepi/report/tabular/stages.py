@@ -5,18 +5,23 @@ Other methods' maps stand among the scores as stage ``external``.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from dataclasses import asdict
 
 from sepi.evaluate import COUNTS, PROTOCOLS, REGIONS, SCORES, WHOLE_MAP
-from sepi.io.scores import Scores
 from sepi.report import published
 from sepi.report.plan import MAIN_VARIANT
-from sepi.report.runs import Runs
-from sepi.report.tabular.layout import Cell, Column, Kind, Line, Report, Row, Section, entries, printed
+from sepi.report.runs import Runs, Timing
+from sepi.report.tabular.layout import Cell, Column, Kind, Record, Report, line, printed, section
 from sepi.report.tabular.methods import REGIONS_NOTE, has_column
 
-_STAGE_OF_EXTERNAL = "external"
 _PARTS = [region for region in REGIONS if region != WHOLE_MAP]
+
+_SCORE_COLUMNS = {
+    "variant": Column("variant", Kind.TEXT),
+    "after": Column("after stage", Kind.TEXT),
+    **{score: Column(head) for score, head in SCORES.items()},
+    **{region: Column(f"{SCORES['mse100']}, {region}") for region in _PARTS},
+}
 
 # height and width of the views and number of view rows and columns that the published seconds are for
 _PUBLISHED_SIZE = ([512, 512], [9, 9])
@@ -24,15 +29,19 @@ _PUBLISHED_SIZE = ([512, 512], [9, 9])
 
 def stage_table(runs: Runs) -> Report:
     """Every score after every stage of every variant, and of other methods' maps, by both protocols."""
-    data: list[Row] = []
+    records: list[Record] = []
     sections = []
-    for dataset in runs.plan.scenes:
-        for scene in runs.scored(dataset):
-            for protocol, border in PROTOCOLS.items():
-                rows, lines = _score_rows(runs, dataset, scene, protocol)
-                data += rows
-                title = f"{dataset}/{scene}, protocol {protocol} (border {border})"
-                sections.append(Section(title, _SCORE_COLUMNS, lines))
+    for dataset, scene in runs.scored_pairs():
+        for protocol, border in PROTOCOLS.items():
+            found = _score_records(runs, dataset, scene, protocol)
+            records += found
+            lines = [
+                line(_SCORE_COLUMNS, record, Kind.OURS if record["choice"] else Kind.EXTERNAL)
+                for record in found
+                if record["region"] == WHOLE_MAP
+                and (record["choice"] or has_column(runs, dataset, str(record["variant"])))
+            ]
+            sections.append(section(f"{dataset}/{scene}, protocol {protocol} (border {border})", _SCORE_COLUMNS, lines))
     return Report(
         "Scores after each stage",
         "Whole map unless a region is named; both protocols. A non-finite estimate counts as bad; how many there are, "
@@ -40,71 +49,54 @@ def stage_table(runs: Runs) -> Report:
         + ("Maps of other methods stand below ours as stage `external`. " if runs.plan.external else "")
         + REGIONS_NOTE,
         ["dataset", "scene", "variant", "stage", "choice", "protocol", "region", *SCORES, *COUNTS],
-        data,
+        records,
         sections,
     )
 
 
-_SCORE_COLUMNS = [
-    *(Column(head, Kind.TEXT) for head in ("variant", "after stage")),
-    *(Column(head) for head in SCORES.values()),
-    *(Column(f"{SCORES['mse100']}, {region}") for region in _PARTS),
-]
-
-
-def _score_rows(runs: Runs, dataset: str, scene: str, protocol: str) -> tuple[list[Row], list[Line]]:
-    """A row for each map and region, and a line for each map."""
-    data: list[Row] = []
-    lines = []
-
-    def add(name: str, stage: str, choice: str | None, scores: Mapping[str, Scores] | None, problem: str = "") -> None:
-        missing: list[Cell] = [problem or None, *[None] * (len(SCORES) + len(COUNTS) - 1)]
+def _score_records(runs: Runs, dataset: str, scene: str, protocol: str) -> list[Record]:
+    """A record for each map and region, with the page's columns too; other methods' maps have no choice."""
+    maps = [
+        (variant, stage, choice, runs.scores(dataset, scene, variant, stage))
+        for variant in runs.plan.listed
+        for stage, choice in runs.plan.variants[variant].items()
+    ]
+    maps += [(name, "external", "", runs.external_scores(dataset, scene, name)) for name in runs.plan.external]
+    records: list[Record] = []
+    for name, stage, choice, scores in maps:
+        after = f"{stage} ({choice})" if choice else stage
+        heads = {"dataset": dataset, "scene": scene, "variant": name, "stage": stage, "choice": choice, "after": after}
         for region in REGIONS:
-            cells = missing
-            if scores is not None:
-                cells = [
-                    *(scores[region][score] for score in SCORES),
-                    *(int(scores[region][count]) for count in COUNTS),
-                ]
-            data.append([dataset, scene, name, stage, choice, protocol, region, *cells])
-        kind = Kind.EXTERNAL if stage == _STAGE_OF_EXTERNAL else Kind.OURS
-        if kind == Kind.OURS or has_column(runs, dataset, name):
-            after = stage if choice is None else f"{stage} ({choice})"
-            shown = missing[: len(SCORES) + len(_PARTS)]
-            if scores is not None:
-                shown = [*(scores[WHOLE_MAP][score] for score in SCORES), *(scores[part]["mse100"] for part in _PARTS)]
-            lines.append(Line(entries(_SCORE_COLUMNS, [name, after, *shown], kind)))
-
-    for variant in runs.plan.listed:
-        for stage, choice in runs.plan.variants[variant].items():
-            add(variant, stage, choice, runs.scores(dataset, scene, variant, stage)[protocol])
-    for method in runs.plan.external:
-        scores = runs.external_scores(dataset, scene, method).get(protocol)
-        add(method, _STAGE_OF_EXTERNAL, None, scores, runs.external_problem(dataset, scene, method))
-    return data, lines
+            record: Record = {**heads, "protocol": protocol, "region": region}
+            if scores:
+                parts = {part: scores[protocol][part]["mse100"] for part in _PARTS}
+                records.append({**record, **scores[protocol][region], **parts})
+            else:
+                records.append({**record, "mse100": runs.external_problem(dataset, scene, name)})
+    return records
 
 
 def runtime_table(runs: Runs) -> Report:
     """Seconds and peak memory of every stage of every variant, beside the paper's seconds."""
-    data: list[Row] = []
-    sections = []
     steps = [*runs.plan.stages, "total"]
-    columns = [
-        Column("variant", Kind.TEXT),
-        *(Column(f"{step} / s") for step in steps),
-        Column("published / this code", Kind.RATIO),
-        Column("peak memory / MB"),
-    ]
-    paper = ["paper, as published", *(printed(published.runtime().get(step)) for step in steps), None, None]
+    columns = {
+        "variant": Column("variant", Kind.TEXT),
+        **{step: Column(f"{step} / s") for step in steps},
+        "ratio": Column("published / this code", Kind.RATIO),
+        "peak_memory_mb": Column("peak memory / MB"),
+    }
+    paper = {"variant": "paper, as published"} | {step: printed(published.runtime().get(step)) for step in steps}
+    records: list[Record] = []
+    sections = []
     for dataset, scene in runs.plan.pairs:
         lines = []
         for variant in runs.plan.listed:
-            found = _time_rows(runs, dataset, scene, variant)
-            data += [[dataset, scene, variant, *row] for row in found]
-            *_, peak, _, ratio = found[-1]
-            lines.append(Line(entries(columns, [variant, *(row[2] for row in found), ratio, peak])))
-        lines.append(Line(entries(columns, paper, Kind.PUBLISHED), available=False))
-        sections.append(Section(f"{dataset}/{scene}", columns, lines))
+            found = _time_records(runs, dataset, scene, variant)
+            records += found
+            # the total has the name, the ratio and the peak of the line
+            lines.append(line(columns, {**found[-1], **{str(row["stage"]): row.get("seconds") for row in found}}))
+        lines.append(line(columns, paper, Kind.PUBLISHED))
+        sections.append(section(f"{dataset}/{scene}", columns, lines))
     heads = ["dataset", "scene", "variant", "stage", "choice", "seconds", "peak_memory_mb"]
     return Report(
         "Run time per stage",
@@ -115,33 +107,32 @@ def runtime_table(runs: Runs) -> Report:
         "views on an Intel Core i7-8700, nothing in parallel; published / this code is how many times the total of "
         "this code's `paper` fits into theirs, for scenes of that size only; the machines differ.",
         [*heads, "published_seconds", "ratio"],
-        data,
+        records,
         sections,
     )
 
 
-def _time_rows(runs: Runs, dataset: str, scene: str, variant: str) -> list[list[Cell]]:
-    """Stage, choice, seconds, peak memory, published seconds and their ratio: every stage, then the total."""
+def _time_records(runs: Runs, dataset: str, scene: str, variant: str) -> list[Record]:
+    """Every stage, then the total."""
     choices = runs.plan.variants[variant]
     # the published seconds are those of the paper's method
     paper = published.runtime() if variant == MAIN_VARIANT else {}
     light_field = runs.light_field(dataset, scene)
     compares = (light_field["shape"], light_field["grid"]) == _PUBLISHED_SIZE
-    timings = {
+    took = {
         stage: runs.timing(dataset, scene, variant, stage) for stage in choices if runs.plan.runs_stage(variant, stage)
     }
-
-    def row(step: str, seconds: float | None, peak: float | None) -> list[Cell]:
-        theirs = paper.get(step)
-        ratio = theirs / seconds if compares and theirs is not None and seconds else None
-        return [step, choices.get(step), seconds, peak, printed(theirs), ratio]
-
-    each = [
-        row(stage, timings[stage].seconds, timings[stage].peak_memory_mb)
-        if stage in timings
-        else row(stage, None, None)
-        for stage in choices
-    ]
-    total = sum(timing.seconds for timing in timings.values())
-    peak = max((timing.peak_memory_mb for timing in timings.values()), default=0.0)
-    return [*each, row("total", total, peak)]
+    took["total"] = Timing(
+        sum(timing.seconds for timing in took.values()),
+        max((timing.peak_memory_mb for timing in took.values()), default=0.0),
+    )
+    records: list[Record] = []
+    for stage in [*choices, "total"]:
+        record: dict[str, Cell] = {"dataset": dataset, "scene": scene, "variant": variant, "stage": stage}
+        record |= {"choice": choices.get(stage), "published_seconds": printed(paper.get(stage))}
+        if stage in took:
+            record |= asdict(took[stage])
+            if compares and stage in paper and took[stage].seconds:
+                record["ratio"] = paper[stage] / took[stage].seconds
+        records.append(record)
+    return records

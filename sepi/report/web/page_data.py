@@ -105,7 +105,7 @@ def ablation_bars(runs: Runs) -> list[BarGroup]:
                 Bar(
                     variant,
                     _mean(runs.final(dataset, scene, "mse100", region, variant) for scene in scenes),
-                    theirs[variant].of(region) if variant in theirs else None,
+                    theirs.get(variant, {}).get(region),
                 )
                 for variant in runs.plan.listed
             ]

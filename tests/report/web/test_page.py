@@ -347,7 +347,7 @@ def test_ablation_bars(runs: Runs, example: Example) -> None:
     whole = groups["hci", "whole map"]
     bars = {bar.variant: bar for bar in whole.rows}
     assert whole.scenes == 1
-    assert bars["paper"].published == published.table4()["hci"]["paper"].overall == 4.34
+    assert bars["paper"].published == published.table4()["hci"]["paper"]["all"] == 4.34
     assert bars["best"].published is None
     assert bars["paper"].ours == score_of(example, COTTON, "paper")
     assert whole.largest == max(score_of(example, COTTON, "paper"), score_of(example, COTTON, "best"), 4.34)
