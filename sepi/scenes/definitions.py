@@ -6,32 +6,21 @@ Lengths are fractions of the picture, disparities are pixels per view step.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from sepi.scenes.surfaces import Plane, Surface, blob, circle, everywhere, polygon, pyramid, rectangle, thread
+from sepi.scenes.surfaces import Plane, Surface, blob, everywhere, polygon, pyramid, rectangle, thread
 from sepi.scenes.textures import noise, photograph, shading
 
 
-@dataclass(frozen=True)
-class Scene:
-    """A built-in scene.
-
-    Attributes
-    ----------
-    description : str
-        What it shows, in one line.
-    surfaces : callable
-        Makes its surfaces.
-    pixel_noise : tuple of float
-        Standard deviation of the noise in each view at the left and at the right side of the picture, in units of the
-        full range.
-    """
+class Scene(NamedTuple):
+    """A built-in scene."""
 
     description: str
     surfaces: Callable[[], list[Surface]]
     pixel_noise: tuple[float, float] = (0.0, 0.0)
+    """Standard deviation at the left and at the right side of each view, full range = 1."""
 
 
 def _fronto_parallel() -> list[Surface]:
@@ -68,7 +57,7 @@ def _dots() -> list[Surface]:
     dots = []
     for row in range(6):
         for column in range(6):
-            outline = circle(0.1 + 0.16 * column, 0.1 + 0.16 * row, 0.02 + 0.0095 * row)
+            outline = blob(0.1 + 0.16 * column, 0.1 + 0.16 * row, 0.02 + 0.0095 * row)
             dots.append(Surface([outline], Plane(0.1 + 0.2 * ((column + 2 * row) % 6)), texture))
     return [ground, *dots]
 
@@ -79,8 +68,8 @@ def _pyramids() -> list[Surface]:
     front = [(0.27, 0.27, 0.0, (0.02, -0.03)), (0.74, 0.73, 0.35, (-0.05, -0.03))]
     sunk = [(0.74, 0.26, -0.2, (0.03, 0.02)), (0.26, 0.74, 0.1, (-0.03, 0.04))]
     holes, faces = [], []
-    for places, height, texture in ((front, 1.2, stone), (sunk, -1.2, brick)):
-        for x, y, turn, shift in places:
+    for positions, height, texture in ((front, 1.2, stone), (sunk, -1.2, brick)):
+        for x, y, turn, shift in positions:
             angle = turn + np.pi / 4 + np.pi / 2 * np.arange(4)
             base = np.stack([x + 0.27 * np.cos(angle), y + 0.27 * np.sin(angle)], axis=1)
             faces += pyramid(base, (x + shift[0], y + shift[1]), height, plane, texture)
@@ -116,7 +105,7 @@ def _wall() -> list[Surface]:
         Surface([poster], wall, photograph("coffee", (1.0, 1.0, 1.0), seed=21)),
         Surface([window], wall, noise(22, (0.45, 0.6, 0.75), 0.12)),
         Surface([rectangle(-3, 0.72, 4, 4)], floor, photograph("gravel", (0.9, 0.95, 1.0), seed=23)),
-        Surface([circle(0.5, 0.6, 0.1)], Plane(0.75, across=0.4), noise(24, (0.75, 0.4, 0.3), 0.13)),
+        Surface([blob(0.5, 0.6, 0.1)], Plane(0.75, across=0.4), noise(24, (0.75, 0.4, 0.3), 0.13)),
         Surface(
             [polygon((0.68, 0.9), (0.64, 0.48), (0.79, 0.44), (0.84, 0.86))],
             Plane(1.1, across=0.5),
@@ -130,9 +119,9 @@ def _curved_occluders() -> list[Surface]:
     ground = Surface([everywhere()], Plane(-2.2, across=0.4, down=0.2), photograph("grass", (1.05, 1.0, 0.85), seed=30))
     return [
         ground,
-        Surface([circle(0.25, 0.25, 0.17)], Plane(1.2, down=0.8), noise(31, (0.65, 0.45, 0.3), 0.14)),
-        Surface([circle(0.7, 0.28, 0.2), circle(0.7, 0.28, 0.12)], Plane(1.8), noise(32, (0.35, 0.5, 0.65), 0.14)),
-        Surface([circle(0.7, 0.28, 0.055)], Plane(0.2), noise(33, (0.7, 0.65, 0.35), 0.13)),
+        Surface([blob(0.25, 0.25, 0.17)], Plane(1.2, down=0.8), noise(31, (0.65, 0.45, 0.3), 0.14)),
+        Surface([blob(0.7, 0.28, 0.2), blob(0.7, 0.28, 0.12)], Plane(1.8), noise(32, (0.35, 0.5, 0.65), 0.14)),
+        Surface([blob(0.7, 0.28, 0.055)], Plane(0.2), noise(33, (0.7, 0.65, 0.35), 0.13)),
         Surface(
             [blob(0.28, 0.72, 0.18, [(3, 0.2, 0.3), (5, 0.1, 1.0)])],
             Plane(0.6, across=-0.8),
@@ -150,7 +139,9 @@ DEFINITIONS: dict[str, Scene] = {
     "pyramids": Scene("slanted pyramids, two standing and two sunk", _pyramids),
     "stripes": Scene("stripes before a plane, each of lower contrast than the one before", _stripes),
     "wall": Scene("textured objects before a large slanted wall without texture", _wall, (0.004, 0.004)),
-    "curved_occluders": Scene("occluders with curved outlines and a disparity step of up to 4", _curved_occluders),
+    "curved_occluders": Scene(
+        "occluders with curved outlines and a disparity discontinuity of up to 4", _curved_occluders
+    ),
 }
 """The built-in scenes in their order."""
 

@@ -28,38 +28,32 @@ IntArray = npt.NDArray[np.int64]
 
 
 class Drawing(NamedTuple):
-    """Surfaces as flat arrays in pixels of the centre view, for the compiled kernels.
-
-    Attributes
-    ----------
-    edges : ndarray, shape (E, 4), float64
-        Polygon edges ``x0, y0, x1, y1`` of all surfaces.
-    first_edge : ndarray, shape (P + 1,), int64
-        Surface ``p`` owns the edges ``first_edge[p]`` to ``first_edge[p + 1]``.
-    planes : ndarray, shape (P, 3), float64
-        ``a, b, c`` of each surface.
-    texels : ndarray, shape (N, 3), float32
-        Spline coefficients of all textures, one after the other.
-    first_texel, side : ndarray, shape (P,), int64
-        Where the texture of a surface begins, and its period in texels.
-    """
+    """Surfaces as flat arrays in pixels of the centre view, for the compiled kernels."""
 
     edges: FloatArray
+    """Polygon edges ``x0, y0, x1, y1`` of all surfaces, shape (E, 4)."""
     first_edge: IntArray
+    """Surface ``p`` owns the edges ``first_edge[p]`` to ``first_edge[p + 1]``."""
     planes: FloatArray
+    """``a, b, c`` of each surface, shape (P, 3)."""
     texels: FloatMap
+    """Spline coefficients of all textures, one after the other, shape (N, 3)."""
     first_texel: IntArray
+    """Where the texture of each surface begins."""
     side: IntArray
+    """Its period in texels."""
 
 
 def drawing(surfaces: Sequence[Surface], size: int) -> Drawing:
     """Put surfaces into pixels of a picture of ``size`` by ``size``."""
-    edges = [np.concatenate([_edges(outline) for outline in surface.outlines]) for surface in surfaces]
+    edges = [
+        np.concatenate([np.hstack([outline, np.roll(outline, -1, axis=0)]) for outline in surface.outlines])
+        for surface in surfaces
+    ]
     planes = []
-    for surface in surfaces:
-        b, c = surface.plane.across / size, surface.plane.down / size
-        middle = (size - 1) / 2
-        planes.append((surface.plane.at_centre - (b + c) * middle, b, c))
+    for at_centre, across, down in (surface.plane for surface in surfaces):
+        b, c = across / size, down / size
+        planes.append((at_centre - (b + c) * (size - 1) / 2, b, c))
     textures = {id(surface.texture): surface.texture for surface in surfaces}
     begin = dict(zip(textures, np.cumsum([0, *(t.shape[0] ** 2 for t in textures.values())]), strict=False))
     return Drawing(
@@ -93,35 +87,20 @@ def visible(scene: Drawing, size: int) -> tuple[FloatArray, IntArray]:
 
 
 def occluded(scene: Drawing, disparity: FloatArray, grid: tuple[int, int]) -> BoolMap:
-    """Pixels of the centre view whose surface point a nearer surface hides in at least one view of the grid.
+    """Pixels of the centre view whose surface point a nearer surface hides in at least one view of the grid ``(T, S)``.
 
-    Parameters
-    ----------
-    scene : Drawing
-        All surfaces.
-    disparity : ndarray, shape (H, W), float64
-        What ``visible`` gave.
-    grid : tuple of int
-        View rows and columns (T, S).
-
-    Returns
-    -------
-    ndarray, shape (H, W), bool
-        A point that leaves the picture in a view does not count as hidden there.
+    A point that leaves the picture in a view does not count as hidden there.
     """
     from sepi.scenes.rendering_kernels import hide
 
     hidden = np.zeros(disparity.shape, bool)
-    for t in range(grid[0]):
-        for s in range(grid[1]):
-            v, u = t - grid[0] // 2, s - grid[1] // 2
-            if (v, u) != (0, 0):
-                hide(scene.edges, scene.first_edge, scene.planes, _boxes(scene), disparity, v, u, hidden)
+    for t, s in np.ndindex(grid):
+        v, u = t - grid[0] // 2, s - grid[1] // 2
+        edges, planes = _seen_from(scene, v, u)
+        first = scene.first_edge[:-1]
+        boxes = np.hstack([np.minimum.reduceat(edges[:, :2], first), np.maximum.reduceat(edges[:, :2], first)])
+        hide(scene.first_edge, planes, edges, boxes, disparity, v, u, hidden)
     return hidden
-
-
-def _edges(outline: FloatArray) -> FloatArray:
-    return np.concatenate([outline, np.roll(outline, -1, axis=0)], axis=1)
 
 
 def _coefficients(texture: FloatMap) -> FloatMap:
@@ -145,9 +124,3 @@ def _seen_from(scene: Drawing, v: int, u: int) -> tuple[FloatArray, FloatArray]:
     # a plane seen exactly edge-on covers nothing
     stretch[np.abs(stretch) < EDGE_ON] = np.inf
     return edges, scene.planes / stretch[:, None]
-
-
-def _boxes(scene: Drawing) -> FloatArray:
-    """Smallest and largest x and y of each surface, shape (P, 4)."""
-    parts = [scene.edges[a:b, :2] for a, b in zip(scene.first_edge[:-1], scene.first_edge[1:], strict=True)]
-    return np.array([[*part.min(axis=0), *part.max(axis=0)] for part in parts])

@@ -138,16 +138,16 @@ def _spline_weights(position: float, weights: FloatArray) -> int:
 
 @numba.njit(cache=True)
 def hide(
-    edges: FloatArray,
     first_edge: IntArray,
     planes: FloatArray,
+    edges: FloatArray,
     boxes: FloatArray,
     disparity: FloatArray,
     v: int,
     u: int,
     hidden: BoolMap,
 ) -> None:
-    """Mark the pixels whose point is hidden in one view."""
+    """Mark the pixels whose point is hidden in one view: planes, edges and boxes round them are as seen there."""
     height, width = disparity.shape
     for row in range(height):
         for column in range(width):
@@ -156,16 +156,11 @@ def hide(
             if hidden[row, column] or not (-0.5 <= x < width - 0.5 and -0.5 <= y < height - 0.5):
                 continue
             for p in range(planes.shape[0]):
-                stretch = 1 - planes[p, 1] * u - planes[p, 2] * v
-                if abs(stretch) < TOLERANCE:
-                    continue
-                other = (planes[p, 0] + planes[p, 1] * x + planes[p, 2] * y) / stretch
-                cx, cy = x + u * other, y + v * other
                 if (
-                    other > d + TOLERANCE
-                    and boxes[p, 0] <= cx <= boxes[p, 2]
-                    and boxes[p, 1] <= cy <= boxes[p, 3]
-                    and _inside(edges, first_edge[p], first_edge[p + 1], cx, cy)
+                    planes[p, 0] + planes[p, 1] * x + planes[p, 2] * y > d + TOLERANCE
+                    and boxes[p, 0] <= x <= boxes[p, 2]
+                    and boxes[p, 1] <= y <= boxes[p, 3]
+                    and _inside(edges, first_edge[p], first_edge[p + 1], x, y)
                 ):
                     hidden[row, column] = True
                     break

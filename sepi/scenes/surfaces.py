@@ -7,7 +7,7 @@ left pixel, (1, 1) that of the bottom right pixel. Shapes therefore grow with th
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -21,8 +21,7 @@ Outline = npt.NDArray[np.float64]
 CIRCLE_CORNERS = 180
 
 
-@dataclass(frozen=True)
-class Plane:
+class Plane(NamedTuple):
     """Disparity ``at_centre + across * (x - 1/2) + down * (y - 1/2)`` in pixels per view step."""
 
     at_centre: float
@@ -34,26 +33,16 @@ class Plane:
         return self.at_centre + self.across * (x - 0.5) + self.down * (y - 0.5)
 
 
-@dataclass(frozen=True)
-class Surface:
-    """A planar patch.
-
-    Attributes
-    ----------
-    outlines : sequence of ndarray, shape (N, 2)
-        Closed polygons; a point inside an odd number of them belongs to the surface (a second outline cuts a hole).
-    plane : Plane
-        Disparity.
-    texture : ndarray, shape (M, M, 3), float32, 0..1
-        Periodic, one texel per pixel.
-    textureless : bool
-        The texture carries no depth.
-    """
+class Surface(NamedTuple):
+    """A planar patch."""
 
     outlines: Sequence[Outline]
+    """A point inside an odd number of them belongs to the surface (a second outline cuts a hole)."""
     plane: Plane
     texture: FloatMap
+    """Periodic, one texel per pixel, shape (M, M, 3) in 0..1."""
     textureless: bool = False
+    """The texture carries no depth."""
 
 
 def everywhere() -> Outline:
@@ -71,21 +60,8 @@ def polygon(*corners: tuple[float, float]) -> Outline:
     return np.array(corners, float)
 
 
-def circle(x: float, y: float, radius: float) -> Outline:
-    """A circle."""
-    return blob(x, y, radius)
-
-
 def blob(x: float, y: float, radius: float, waves: Sequence[tuple[int, float, float]] = ()) -> Outline:
-    """A circle whose radius varies along its way round.
-
-    Parameters
-    ----------
-    x, y, radius : float
-        Centre and mean radius.
-    waves : sequence of (int, float, float)
-        Periods round the circle, amplitude relative to the radius, and phase in radians of each wave.
-    """
+    """A circle whose radius varies along its way round: waves of (periods, amplitude / radius, phase in radians)."""
     angle = 2 * np.pi * np.arange(CIRCLE_CORNERS) / CIRCLE_CORNERS
     r = radius * (1 + sum((a * np.cos(n * angle + phase) for n, a, phase in waves), np.zeros_like(angle)))
     return np.stack([x + r * np.cos(angle), y + r * np.sin(angle)], axis=1)
@@ -100,30 +76,14 @@ def thread(start: tuple[float, float], end: tuple[float, float], width: float) -
 
 
 def pyramid(base: Outline, apex: tuple[float, float], height: float, ground: Plane, texture: FloatMap) -> list[Surface]:
-    """The faces of a pyramid.
+    """The faces of a pyramid that stands on ``ground``; its top is seen at ``apex`` in the centre view.
 
-    Parameters
-    ----------
-    base : ndarray, shape (N, 2)
-        Corners of its base, which lies on ``ground``.
-    apex : tuple of float
-        Where the top is seen in the centre view.
-    height : float
-        Disparity by which the top is nearer than the ground; negative for a pyramid sunk into it.
-    ground : Plane
-        What it stands on.
-    texture : ndarray
-        Of all faces.
+    ``height`` is the disparity by which the top is nearer than the ground; negative for a pyramid sunk into it.
     """
-    top = (*apex, ground.at(*apex) + height)
     faces = []
     for a, b in zip(base, np.roll(base, -1, axis=0), strict=True):
-        plane = _through((*a, ground.at(*a)), (*b, ground.at(*b)), top)
-        faces.append(Surface([np.stack([a, b, np.array(apex)])], plane, texture))
+        corners = np.stack([a, b, np.array(apex)])
+        disparity = [ground.at(*a), ground.at(*b), ground.at(*apex) + height]
+        plane = Plane(*np.linalg.solve(np.column_stack([np.ones(3), corners - 0.5]), disparity).tolist())
+        faces.append(Surface([corners], plane, texture))
     return faces
-
-
-def _through(*points: tuple[float, float, float]) -> Plane:
-    """The plane through three points (x, y, disparity)."""
-    p = np.array(points)
-    return Plane(*np.linalg.solve(np.column_stack([np.ones(3), p[:, :2] - 0.5]), p[:, 2]).tolist())

@@ -12,56 +12,33 @@ import numpy.typing as npt
 from sepi.lightfield import FloatMap
 
 Colour = tuple[float, float, float]
+"""Red, green, blue, full range = 1."""
 
 # Texels per period; far longer than any disparity range, so that a repetition is never a false match.
 PERIOD = 512
+# Shortest wavelength of noise in pixels.
+FINEST = 3.0
 # Part of a texture's variation that differs between the colour channels.
 CHROMA = 0.25
+# Standard deviation of the noise in a photograph.
+GRAIN = 0.05
 
 
-def noise(seed: int, colour: Colour, contrast: float, *, finest: float = 3.0, coarsest: float = 48.0) -> FloatMap:
-    """Smooth noise with equal energy in every octave between two wavelengths.
+def noise(seed: int, colour: Colour, contrast: float, *, coarsest: float = 48.0) -> FloatMap:
+    """Smooth noise round a colour with equal energy in every octave between two wavelengths in pixels.
 
-    Parameters
-    ----------
-    seed : int
-        Equal seeds give equal textures.
-    colour : tuple of float
-        Mean red, green, blue in 0..1.
-    contrast : float
-        Standard deviation of the brightness in units of the full range.
-    finest, coarsest : float
-        Wavelengths in pixels between which the noise lies. Nothing is finer than 2 pixels, so that views are sampled
-        without aliasing.
-
-    Returns
-    -------
-    ndarray, shape (PERIOD, PERIOD, 3), float32
-        Values round ``colour``, within 0..1.
+    ``contrast`` is the standard deviation of the brightness. Nothing is finer than 2 pixels, so that views are sampled
+    without aliasing.
     """
-    brightness, *chroma = _bands(np.random.default_rng(seed), finest, coarsest)
+    brightness, *chroma = _bands(np.random.default_rng(seed), coarsest)
     variation = brightness[..., None] + CHROMA * np.stack(chroma, axis=-1)
     return _limited(np.array(colour) + contrast * variation)
 
 
-def photograph(name: str, tint: Colour, *, grain: float = 0.05, seed: int = 0) -> FloatMap:
-    """A sample picture of scikit-image, mirrored so that it repeats without a seam.
+def photograph(name: str, tint: Colour, *, seed: int) -> FloatMap:
+    """A sample picture of scikit-image that is installed with it, mirrored so that it repeats without a seam.
 
-    Parameters
-    ----------
-    name : str
-        Function of ``skimage.data`` whose picture is installed with scikit-image (no download).
-    tint : tuple of float
-        Factors for red, green and blue.
-    grain : float
-        Standard deviation of fine noise added to the picture, so that its smooth parts have detail, too.
-    seed : int
-        Seed of the grain.
-
-    Returns
-    -------
-    ndarray, shape (PERIOD, PERIOD, 3), float32
-        Values in 0..1.
+    Its colours are multiplied by ``tint``; fine noise is added, so that its smooth parts have detail, too.
     """
     from skimage import data
 
@@ -74,29 +51,17 @@ def photograph(name: str, tint: Colour, *, grain: float = 0.05, seed: int = 0) -
     tile = picture[top : top + half, left : left + half]
     tile = np.concatenate([tile, tile[::-1]])
     tile = np.concatenate([tile, tile[:, ::-1]], axis=1)
-    return _limited(tile * np.array(tint) + noise(seed, (0.5, 0.5, 0.5), grain, coarsest=12) - 0.5)
+    return _limited(tile * np.array(tint) + noise(seed, (0.5, 0.5, 0.5), GRAIN, coarsest=12) - 0.5)
 
 
 def shading(colour: Colour, amplitude: float) -> FloatMap:
-    """One colour with a shading that changes over hundreds of pixels only: it carries no depth.
-
-    Parameters
-    ----------
-    colour : tuple of float
-        Mean red, green, blue in 0..1.
-    amplitude : float
-        Of the slow brightness wave, in units of the full range.
-
-    Returns
-    -------
-    ndarray, shape (PERIOD, PERIOD, 3), float32
-    """
+    """One colour with a wave of brightness that changes over hundreds of pixels only: it carries no depth."""
     phase = 2 * np.pi * np.arange(PERIOD) / PERIOD
     wave = 0.5 * amplitude * (np.sin(phase)[:, None] + np.sin(phase)[None, :])
     return _limited(np.array(colour) + wave[..., None])
 
 
-def _bands(rng: np.random.Generator, finest: float, coarsest: float) -> npt.NDArray[np.float64]:
+def _bands(rng: np.random.Generator, coarsest: float) -> npt.NDArray[np.float64]:
     """Four independent fields of unit variance, shape (4, PERIOD, PERIOD)."""
     white = rng.standard_normal((4, PERIOD, PERIOD))
     from scipy import fft
@@ -105,7 +70,7 @@ def _bands(rng: np.random.Generator, finest: float, coarsest: float) -> npt.NDAr
     # amplitude 1/f is equal energy per octave; the flanks are smooth so that no ripples appear
     with np.errstate(divide="ignore"):
         amplitude = np.where(frequency > 0, 1 / frequency, 0)
-    amplitude *= np.exp(-((frequency * finest) ** 8)) * (1 - np.exp(-((frequency * coarsest) ** 4)))
+    amplitude *= np.exp(-((frequency * FINEST) ** 8)) * (1 - np.exp(-((frequency * coarsest) ** 4)))
     fields = fft.irfft2(fft.rfft2(white) * amplitude, s=(PERIOD, PERIOD))
     normalised: npt.NDArray[np.float64] = fields / fields.std(axis=(1, 2), keepdims=True)
     return normalised
