@@ -9,8 +9,8 @@ from typing import Any
 from bench.measure import Case, Figures, Measurement, Prepared, measured_command
 from bench.scene import VARIANT, Scene, maps_before
 from sepi.evaluate import score
+from sepi.inspection import view_order
 from sepi.inspection.disparity_range import estimate_range
-from sepi.inspection.view_order import order_warning
 from sepi.io.hdf5 import read_light_field, read_stage
 from sepi.io.result_folder import write_result
 from sepi.lightfield import LightField
@@ -31,7 +31,7 @@ def read(scene: Scene) -> Prepared:
 def check_order(scene: Scene) -> Prepared:
     """Look whether the views are in the right order."""
     light_field = read_light_field(scene.light_field)
-    return Prepared(lambda: order_warning(light_field))
+    return Prepared(lambda: view_order.check_order(light_field).warning())
 
 
 def find_range(scene: Scene) -> Prepared:

@@ -16,7 +16,7 @@ import threading
 import time
 import warnings
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import FrameType
 from typing import IO, Any
@@ -131,12 +131,10 @@ def progress_bar(label: str) -> Iterator[Progress]:
 
 def peak_memory_mb() -> float:
     """The most memory that this process has held so far, MB."""
-    try:
+    with suppress(OSError, StopIteration):
         status = Path("/proc/self/status").read_text(encoding="ascii")
         # ru_maxrss below would start at what the parent held
         return next(int(line.split()[1]) for line in status.splitlines() if line.startswith("VmHWM")) / 2**10
-    except (OSError, StopIteration):
-        pass
     try:
         import resource
 
@@ -211,10 +209,8 @@ def stage_command(stage: str, choices: Mapping[str, Choice]) -> click.Command:
 
 
 def _json_object(text: str) -> dict[str, Any]:
-    try:
+    with suppress(ValueError):
         value = json.loads(text)
-    except ValueError as error:
-        raise SepiError(f"--parameters: not JSON ({error})") from error
-    if not isinstance(value, dict):
-        raise SepiError(f"--parameters: expected a JSON object such as '{{}}', got {text!r}")
-    return value
+        if isinstance(value, dict):
+            return value
+    raise SepiError(f"--parameters: expected a JSON object such as '{{}}', got {text!r}")

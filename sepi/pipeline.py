@@ -13,7 +13,7 @@ from sepi.errors import SepiError
 from sepi.lightfield import LightField
 from sepi.matching.base_detail import shared_detail
 from sepi.stage import Choice, Parameters, Progress, StageMaps, no_progress
-from sepi.validation import require_known, unknown, validated
+from sepi.validation import require_known, validated
 
 STAGES: dict[str, dict[str, Choice]] = {
     "initial": initial.CHOICES,
@@ -210,8 +210,7 @@ def variant_named(name: str) -> Variant:
     SepiError
         If there is none of this name.
     """
-    if name not in VARIANTS:
-        raise unknown("variant", name, VARIANTS)
+    require_known("variant", [name], VARIANTS)
     return VARIANTS[name]
 
 

@@ -60,9 +60,9 @@ def read_light_field(
         light_field = light_field.with_range(DisparityRange(*disparity_range, "given"))
     found = [_depth_warning(light_field)]
     if check_order:
-        from sepi.inspection.view_order import order_warning
+        from sepi.inspection.view_order import check_order as checked_order
 
-        found.append(order_warning(light_field, options.order))
+        found.append(checked_order(light_field, options.order).warning())
     for warning in filter(None, found):
         warnings.warn(f"{path}: {warning}", SepiWarning, stacklevel=2)
     return light_field

@@ -15,23 +15,18 @@ from sepi.renamed import new_name
 Model = TypeVar("Model", bound=BaseModel)
 
 
-def unknown(where: str, word: str, known: Iterable[str]) -> SepiError:
-    """The error for a word that is not one of ``known``: names it, its new name or the nearest, and all of them."""
-    words = list(known)
-    new = new_name(word, words)
-    if new is not None:
-        return SepiError(f"{where}: unknown '{word}'; it is now {new}")
-    near = difflib.get_close_matches(word, words, n=1, cutoff=0.5)
-    hint = f"did you mean '{near[0]}'? " if near else ""
-    return SepiError(f"{where}: unknown '{word}'; {hint}known: {', '.join(words) or 'nothing can be set here'}")
-
-
-def require_known(where: str, words: Iterable[str], known: Iterable[str]) -> None:
-    """Raise :func:`unknown` for the first of ``words`` that is not among ``known``."""
+def require_known(where: str, names: Iterable[str], known: Iterable[str]) -> None:
+    """Raise for the first of ``names`` that is not ``known``: with its new name, or the nearest and all of them."""
     allowed = list(known)
-    for word in words:
-        if word not in allowed:
-            raise unknown(where, str(word), allowed)
+    unknown = next((str(name) for name in names if name not in allowed), None)
+    if unknown is None:
+        return
+    new = new_name(unknown, allowed)
+    if new is not None:
+        raise SepiError(f"{where}: unknown '{unknown}'; it is now {new}")
+    near = difflib.get_close_matches(unknown, allowed, n=1, cutoff=0.5)
+    hint = f"did you mean '{near[0]}'? " if near else ""
+    raise SepiError(f"{where}: unknown '{unknown}'; {hint}known: {', '.join(allowed) or 'nothing can be set here'}")
 
 
 def validated(model: type[Model], values: Mapping[str, Any], where: str) -> Model:
@@ -61,8 +56,13 @@ def validated(model: type[Model], values: Mapping[str, Any], where: str) -> Mode
     try:
         # by way of JSON, because strict models take a JSON list for a tuple but not a Python list
         return model.model_validate_json(json.dumps(dict(values), allow_nan=False))
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        key = ".".join([where, *map(str, first["loc"])])
+        got = "" if first["type"] == "missing" else f", got {first['input']!r}"
+        raise SepiError(f"{key}: {first['msg'][:1].lower()}{first['msg'][1:]}{got}") from error
     except (TypeError, ValueError) as error:
-        raise SepiError(_first_line(error, where)) from error
+        raise SepiError(f"{where}: {error}") from error
 
 
 def _require_fields(model: type[BaseModel], values: Mapping[str, Any], where: str) -> None:
@@ -72,16 +72,3 @@ def _require_fields(model: type[BaseModel], values: Mapping[str, Any], where: st
         inner = model.model_fields[name].annotation
         if isinstance(inner, type) and issubclass(inner, BaseModel) and isinstance(value, Mapping):
             _require_fields(inner, value, f"{where}.{name}")
-
-
-def _first_line(error: Exception, where: str) -> str:
-    if not isinstance(error, ValidationError):
-        return f"{where}: {error}"
-    first = error.errors(include_url=False)[0]
-    key = ".".join([where, *(str(part) for part in first["loc"])])
-    got = "" if first["type"] == "missing" else f", got {first['input']!r}"
-    return f"{key}: {_lower_first(first['msg'])}{got}"
-
-
-def _lower_first(text: str) -> str:
-    return text[:1].lower() + text[1:]

@@ -120,7 +120,7 @@ class TestErrors:
             ('{"amuont": 1}', "first.constant: unknown 'amuont'; did you mean 'amount'? known: amount"),
             ('{"amount": "much"}', "first.constant.amount: input should be a valid number, got 'much'"),
             ("[1]", "--parameters: expected a JSON object"),
-            ("{amount}", "--parameters: not JSON"),
+            ("{amount}", "--parameters: expected a JSON object"),
         ],
     )
     def test_wrong_parameters_are_named(

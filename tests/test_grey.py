@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sepi.inspection.disparity_range import estimate_range
-from sepi.inspection.view_order import order_warning
+from sepi.inspection.view_order import check_order
 from sepi.lightfield import LightField
 from sepi.pipeline import STAGES, estimate_depth
 from sepi.reading import read_light_field
@@ -45,7 +45,7 @@ def test_what_is_found_out_about_grey_views_is_the_same(kind: str) -> None:
     """Disparity range, order of the views and the regions of the scores."""
     grey, rgb = grey_and_rgb(KINDS[kind])
     assert estimate_range(grey) == estimate_range(rgb)
-    assert order_warning(grey) == order_warning(rgb)
+    assert check_order(grey).warning() == check_order(rgb).warning()
     np.testing.assert_array_equal(textureless(grey.reference_view), textureless(rgb.reference_view))
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import re
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -32,10 +32,6 @@ class _Pair(click.ParamType[tuple[int, int]]):
         return int(match[1]), int(match[2])
 
 
-GRID = _Pair("ROWSxCOLUMNS", "xX×")
-PLACE = _Pair("ROW,COLUMN", ",")
-
-
 @dataclass(frozen=True)
 class Reading:
     """How the flags say to read a light field."""
@@ -43,47 +39,11 @@ class Reading:
     file_format: str | None
     options: ReadOptions
 
-    def read(
-        self, path: Path, *, disparity_range: tuple[float, float] | None = None, check_order: bool = True
-    ) -> LightField:
-        """The light field at ``path``; warns where another order of its views fits better.
-
-        Raises
-        ------
-        SepiError
-            As :func:`sepi.read_light_field`.
-        """
+    def read(self, path: Path, **more: Any) -> LightField:
+        """The light field at ``path``, as :func:`sepi.read_light_field` reads it."""
         from sepi.reading import read_light_field
 
-        return read_light_field(
-            path,
-            disparity_range=disparity_range,
-            file_format=self.file_format,
-            options=self.options,
-            check_order=check_order,
-        )
-
-
-@dataclass(frozen=True)
-class Geometry:
-    """The flags of the camera's geometry."""
-
-    focal_length_mm: float
-    baseline_mm: float
-    focus_distance_m: float
-    sensor_size_mm: float
-
-    def camera(self, shape: tuple[int, int]) -> Camera:
-        """Camera of views of this height and width.
-
-        Raises
-        ------
-        SepiError
-            If a number is not positive.
-        """
-        from sepi.camera import camera_from
-
-        return camera_from(**asdict(self), shape=shape)
+        return read_light_field(path, file_format=self.file_format, options=self.options, **more)
 
 
 _FLAGS = (
@@ -93,7 +53,9 @@ _FLAGS = (
         metavar="FORMAT",
         help="hci, hci-2013, images, eslf, matlab, numpy or sepi; found by looking unless given.",
     ),
-    click.option("--grid", type=GRID, metavar="ROWSxCOLUMNS", help="Grid of views in the files."),
+    click.option(
+        "--grid", type=_Pair("ROWSxCOLUMNS", "xX×"), metavar="ROWSxCOLUMNS", help="Grid of views in the files."
+    ),
     click.option(
         "--pattern",
         help="Names of views in a folder: 'view_{row}_{column}.png' or 'img{number}.jpg'; * is anything.",
@@ -104,13 +66,22 @@ _FLAGS = (
     ),
     click.option("--variable", help="Name of the array in a .mat or .npz file with several."),
     click.option("--central", type=click.IntRange(min=1), metavar="N", help="Use only the N x N views in the middle."),
-    click.option("--order", default="as-given", help="Order of the views: a word that 'sepi check' names."),
+    click.option("--order", default="as-given", help="Order of the views: a name that 'sepi check' tells."),
     click.option(
         "--exclude", multiple=True, metavar="VIEW", help="Leave a view out: ROW,COLUMN from 0, or its file; repeatable."
     ),
-    click.option("--view", type=PLACE, metavar="ROW,COLUMN", help="View whose depth is made; the centre unless given."),
+    click.option(
+        "--view",
+        type=_Pair("ROW,COLUMN", ","),
+        metavar="ROW,COLUMN",
+        help="View whose depth is made; the centre unless given.",
+    ),
     click.option("--follow-links", is_flag=True, help="Read views that are links out of their folder."),
 )
+
+
+Geometry = Callable[..., "Camera"]
+"""Makes the camera of views of a ``shape``."""
 
 
 def reading_flags(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -130,7 +101,10 @@ def reading_flags(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def camera_flags(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Give a command the flags of the camera's geometry; it gets them as one argument ``geometry``, None without."""
+    """Give a command the flags of the camera's geometry; it gets them as one argument ``geometry``, None without.
+
+    ``geometry`` is :func:`sepi.camera.camera_from` but for the shape of the views.
+    """
 
     @functools.wraps(command)
     def with_geometry(*args: Any, **values: Any) -> Any:
@@ -138,7 +112,9 @@ def camera_flags(command: Callable[..., Any]) -> Callable[..., Any]:
         missing = [_flag(name) for name, value in flags.items() if value is None]
         if 0 < len(missing) < len(flags):
             raise click.UsageError(f"metric depth needs {', '.join(map(_flag, flags))}; missing: {', '.join(missing)}")
-        return command(*args, geometry=None if missing else Geometry(**flags), **values)
+        from sepi.camera import camera_from
+
+        return command(*args, geometry=None if missing else functools.partial(camera_from, **flags), **values)
 
     for name, (unit, text) in reversed(_GEOMETRY.items()):
         with_geometry = click.option(_flag(name), name, type=float, metavar=unit, help=text)(with_geometry)

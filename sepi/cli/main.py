@@ -39,7 +39,7 @@ _RANGE_SOURCES = {
 def main() -> None:
     """Depth from light fields by stitched epipolar plane images.
 
-    A light field is a grid of views of one scene, each taken from a camera position a step to the side of the next.
+    A light field is a grid of views of one scene, each taken from a camera position a little to the side of the next.
     Its disparity map says, for each pixel of the centre view, by how many pixels it moves from view to view: the
     more, the nearer.
 
@@ -123,7 +123,7 @@ def depth(
         raise SepiError(f"{folder}: is the light field itself; choose another folder for the result")
     light_field = reading.read(light_field_path, disparity_range=disparity_range)
     if geometry is not None:
-        light_field = replace(light_field, camera=geometry.camera(light_field.shape))
+        light_field = replace(light_field, camera=geometry(shape=light_field.shape))
     light_field = settle_range(light_field)
     with progress_bar(light_field.name) as progress:
         maps = estimate_depth(light_field, chosen, parameters, progress)
@@ -158,7 +158,7 @@ def info(light_field_path: Path, geometry: Geometry | None, reading: Reading) ->
         estimated = _range(estimate_range(light_field))
     except SepiError as error:
         estimated = str(error)
-    camera = light_field.camera if geometry is None else geometry.camera(light_field.shape)
+    camera = light_field.camera if geometry is None else geometry(shape=light_field.shape)
     lines = {
         "name": light_field.name,
         "format": known_format.name,
@@ -258,8 +258,6 @@ def _range(known: DisparityRange) -> str:
 
 def _parameters(settings: tuple[str, ...], name: str, variant: Variant) -> dict[str, dict[str, Any]]:
     """Stage to field to value from ``STAGE.CHOICE.NAME=VALUE`` of the command line."""
-    from sepi.pipeline import STAGES
-
     parameters: dict[str, dict[str, Any]] = {}
     for setting in settings:
         match = re.fullmatch(r"(\w+)\.(\w+)\.(\w+)=(.*)", setting)
@@ -268,11 +266,8 @@ def _parameters(settings: tuple[str, ...], name: str, variant: Variant) -> dict[
                 f"--set {setting}: expected STAGE.CHOICE.NAME=VALUE, such as initial.semi_global.num_disparities=91"
             )
         stage, choice, field, text = match.groups()
-        require_known(f"--set {setting}", [stage], STAGES)
-        require_known(f"--set {setting}", [choice], STAGES[stage])
-        if variant.choices.get(stage) != choice:
-            used = ", ".join(f"{stage}.{choice}" for stage, choice in variant.choices.items())
-            raise SepiError(f"--set {setting}: variant {name} does not use {stage}.{choice}; it uses {used}")
+        used = [f"{stage}.{choice}" for stage, choice in variant.choices.items()]
+        require_known(f"--set {setting}: stages of variant {name}", [f"{stage}.{choice}"], used)
         try:
             value = json.loads(text)
         except ValueError:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from pathlib import Path
 
 import click
@@ -49,7 +50,7 @@ def points(
         result.picture,
         result.disparity,
         result.confidence,
-        camera=result.camera if geometry is None else geometry.camera(result.disparity.shape),
+        camera=result.camera if geometry is None else geometry(shape=result.disparity.shape),
         from_centre=result.from_centre,
         min_confidence=min_confidence,
         max_depth=max_depth,
@@ -58,7 +59,6 @@ def points(
     if not len(cloud.positions):
         raise SepiError(f"{result_path}: no point is left; lower --min-confidence or raise --max-depth")
     path = output or (result_path if result_path.is_dir() else result_path.parent) / "points.ply"
-    _require_file(path)
     if path.suffix.lower() != ".ply":
         raise SepiError(f"{path}: expected a name that ends with .ply, the format of the file")
     write_ply(path, cloud.positions, cloud.colours, cloud.comments())
@@ -86,15 +86,13 @@ def submission(results: tuple[Path, ...], output: Path, runtimes: tuple[str, ...
     """
     from sepi.scoring.hci_submission import Entry, entry_of, write_submission
 
-    _require_file(output)
     seconds = dict(_runtime(text) for text in runtimes)
     entries: dict[str, Entry] = {}
-    folders: dict[str, Path] = {}
     for folder in results:
         scene, entry = entry_of(folder, seconds)
         if scene in entries:
-            raise SepiError(f"{folder}: scene {scene} is given twice, also as {folders[scene]}")
-        entries[scene], folders[scene] = entry, folder
+            raise SepiError(f"{folder}: scene {scene} is given twice, also as {entries[scene].disparity.parent}")
+        entries[scene] = entry
     for scene in seconds.keys() - entries.keys():
         raise SepiError(f"--runtime {scene}: no result of this scene is given")
     write_submission(output, entries, partial=partial)
@@ -121,19 +119,10 @@ def check_submission(context: click.Context, path: Path, partial: bool) -> None:
     click.echo(f"{path}: no problems")
 
 
-def _require_file(path: Path) -> None:
-    """Raise if something other than a file is there, such as /dev/stdout, which a file would take the place of."""
-    if path.exists() and not path.is_file():
-        raise SepiError(f"{path}: not a file; expected the name of a file to write")
-
-
 def _runtime(text: str) -> tuple[str, float]:
     """Scene and seconds of ``SCENE=SECONDS``."""
-    scene, sign, number = text.partition("=")
-    try:
-        seconds = float(number)
-    except ValueError:
-        seconds = math.nan
-    if not (scene and sign and 0 < seconds < math.inf):
-        raise SepiError(f"--runtime {text}: expected SCENE=SECONDS with a positive number, such as cotton=12.5")
-    return scene, seconds
+    scene, _, number = text.partition("=")
+    with suppress(ValueError):
+        if scene and 0 < float(number) < math.inf:
+            return scene, float(number)
+    raise SepiError(f"--runtime {text}: expected SCENE=SECONDS with a positive number, such as cotton=12.5")

@@ -8,15 +8,14 @@ Kernels for 16-bit and float views are compiled when they are first needed.
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
 import time
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
 
 import click
 
 from sepi.command import SepiCommand
-from sepi.errors import SepiError
+from sepi.threads import use_threads
 
 SHARES: tuple[tuple[str, ...], ...] = (("paper", "no_sepi", "wang"), ("best", "best_no_detail"))
 """Variants that together call every kernel; those of one share have few kernels in common with the other's."""
@@ -30,36 +29,28 @@ def compile_kernels(variants: tuple[str, ...]) -> None:
 
     from sepi.evaluate import evaluation_of
     from sepi.inspection.disparity_range import estimate_range
-    from sepi.inspection.view_order import order_warning
+    from sepi.inspection.view_order import check_order
     from sepi.pipeline import estimate_depth
     from sepi.scenes import render
 
+    # one thread: compiling is all there is to do
+    use_threads(1)
     light_field = render(_SCENE, size=_SIZE, views=_VIEWS)
     for variant in variants:
         maps = estimate_depth(light_field, variant, {})
     bare = replace(light_field, disparity_range=None, masks={})
     evaluation_of(bare, maps.disparity)
-    order_warning(bare, "as-given")
+    check_order(bare)
     estimate_range(bare)
 
 
 @click.command(name="python -m sepi.cli.warm_up", cls=SepiCommand)
-@click.option(
-    "--share", type=click.IntRange(0, len(SHARES) - 1), help="Compile one share of the kernels, in this process."
-)
-def command(share: int | None) -> None:
+def command() -> None:
     """Compile the kernels, so that the first run need not."""
-    if share is not None:
-        compile_kernels(SHARES[share])
-        return
     started = time.perf_counter()
-    words = [sys.executable, "-m", "sepi.cli.warm_up", "--share"]
-    # one thread each: compiling is all there is to do
-    environment = os.environ | {"OMP_NUM_THREADS": "1", "NUMBA_NUM_THREADS": "1"}
-    running = [subprocess.Popen([*words, str(number)], env=environment) for number in range(len(SHARES))]
-    codes = [process.wait() for process in running]
-    if any(codes):
-        raise SepiError("the kernels could not be compiled; see above")
+    with ProcessPoolExecutor(len(SHARES), get_context("spawn")) as processes:
+        # taken from the iterator, so that an error in a process is one here
+        list(processes.map(compile_kernels, SHARES))
     click.echo(f"kernels ready after {time.perf_counter() - started:.0f} s")
 
 

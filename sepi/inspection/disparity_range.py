@@ -2,13 +2,12 @@
 
 A coarse plane sweep over far more disparities than a scene has, with few views; then the extremes of the disparities
 that can be trusted: pixels whose best match is unambiguous and whose neighbours agree. A range that is a bit too wide
-costs little; one that leaves out the nearest or farthest surface spoils that surface, so the choices below lean to the
-wide side.
+costs little; one that leaves out the nearest or most distant surface spoils that surface, so the choices below lean to
+the wide side.
 """
 
 from __future__ import annotations
 
-import itertools
 import math
 
 import cv2
@@ -18,10 +17,9 @@ import numpy.typing as npt
 from sepi.errors import SepiError
 from sepi.lightfield import BoolMap, DisparityRange, FloatMap, LightField, as_unit_float
 
-# Search: pixels per view step to each side at first, and at most
-_FIRST_EXTENT = 16.0
-_LAST_EXTENT = 64.0
-# views up to this many steps from the centre: farther ones see less of the same
+# Search: pixels per view step to each side at first, and if surfaces lie beyond
+_EXTENTS = (16.0, 32.0, 64.0)
+# views up to this many steps from the centre: more distant ones see less of the same
 _REACH = 4
 # views when there is no cross of them
 _MOST_VIEWS = 16
@@ -81,15 +79,16 @@ def estimate_range(light_field: LightField) -> DisparityRange:
     reference = _prepared(light_field.rgb_views[light_field.reference_position], factor)
     views = np.stack([_prepared(light_field.rgb_views[position], factor) for position in positions])
     offsets = np.array(positions, np.int64) - light_field.reference_position
-    # the farthest view moves by one pixel from candidate to candidate
+    # the most distant view moves by one pixel from candidate to candidate
     step = 1 / int(abs(offsets).max())
     seen = ~_dark_corners(light_field.reference_view, reference.shape)
     found: FloatMap = np.empty(0, np.float32)
-    for extent in _extents(max(reference.shape) * step / 2):
+    # at most half a picture at the most distant view
+    for extent in sorted({min(extent, max(reference.shape) * step / 2) for extent in _EXTENTS}):
         number = max(1, math.ceil(extent / step))
         candidates = (np.arange(-number, number + 1) * step).astype(np.float32)
         sweep = coarse_sweep(reference, views, offsets, candidates, np.float32(_TRUNCATION), _RADIUS)
-        trusted = sweep[3][_trusted(*sweep, step) & seen]
+        trusted = sweep[-1][_trusted(*sweep, step) & seen]
         if trusted.size > found.size:
             found = trusted
         if found.size > _ENOUGH * reference.size and abs(np.stack(_extremes(found))).max() < extent - max(1, 2 * step):
@@ -170,28 +169,15 @@ def _dark_corners(centre: FloatMap, shape: tuple[int, int]) -> BoolMap:
     return cv2.dilate(dark, np.ones((reach, reach), np.uint8)) > 0
 
 
-def _extents(most: float) -> list[float]:
-    """Half widths of the search, each twice the one before, up to ``most`` (half a picture at the farthest view)."""
-    doubled = itertools.takewhile(
-        lambda extent: extent <= _LAST_EXTENT, (_FIRST_EXTENT * 2**i for i in itertools.count())
-    )
-    return sorted({min(extent, most) for extent in doubled})
-
-
 def _trusted(lowest: FloatMap, second: FloatMap, mean: FloatMap, disparity: FloatMap, step: float) -> BoolMap:
-    """Pixels whose best candidate is believed, shape (H, W)."""
-    believed = (lowest < _MOST_AMBIGUITY * second) & (mean - lowest > _FLAT)
-    return believed & (_support(believed, disparity, step) >= _LEAST_SUPPORT)
-
-
-def _support(believed: BoolMap, disparity: FloatMap, tolerance: float) -> npt.NDArray[np.int32]:
-    """How many believed pixels of the 5x5 neighbourhood have the disparity of its centre."""
+    """Pixels whose best candidate is clear, and has enough of the like about it, shape (H, W)."""
+    clear = (lowest < _MOST_AMBIGUITY * second) & (mean - lowest > _FLAT)
     H, W = disparity.shape
-    padded = np.pad(np.where(believed, disparity, np.inf), 2, constant_values=np.inf)
-    count = np.zeros((H, W), np.int32)
-    for dy, dx in itertools.product(range(5), repeat=2):
-        count += abs(padded[dy : dy + H, dx : dx + W] - disparity) < tolerance
-    return count
+    padded = np.pad(np.where(clear, disparity, np.inf), 2, constant_values=np.inf)
+    support = np.zeros((H, W), np.int32)
+    for dy, dx in np.ndindex(5, 5):
+        support += abs(padded[dy : dy + H, dx : dx + W] - disparity) < step
+    return clear & (support >= _LEAST_SUPPORT)
 
 
 def _extremes(disparity: FloatMap) -> tuple[float, float]:

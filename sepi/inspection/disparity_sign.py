@@ -42,18 +42,10 @@ _DIRECTIONS: tuple[Step, ...] = ((0, 1), (0, -1), (1, 0), (-1, 0))
 
 
 def occlusion_votes(views: Views, trial: Trial) -> tuple[int, int]:
-    """How often the greater, and how often the lesser disparity is that of the surface in front.
+    """At how many pixels the greater, and at how many the lesser disparity is that of the surface in front.
 
-    Parameters
-    ----------
-    views : Views
-    trial : Trial
-        Its best layout is taken for right; the signs are those of that layout's first order.
-
-    Returns
-    -------
-    greater, lesser : int
-        Pixels; both 0 where there are no views on opposite sides, or hardly any contrast.
+    The best layout of the trial is taken for right; the signs are those of that layout's first order. Both numbers are
+    0 where there are no views on opposite sides, or hardly any contrast.
     """
     reach, directions = _directions(views, trial.largest_disparity)
     if not directions:

@@ -51,12 +51,8 @@ _AT_END = 0.02
 class Views:
     """The views about the middle of the grid, reduced and filtered when they are first asked for.
 
-    Attributes
-    ----------
-    steps : list of (int, int)
-        From the view in the middle to each other one that is present: rows and columns of views.
-    shape : (int, int)
-        Height and width, pixels, as reduced.
+    ``steps`` lead from the view in the middle to each other one that is present: rows and columns of views. ``shape``
+    is the height and width in pixels, as reduced.
     """
 
     def __init__(self, light_field: LightField) -> None:
@@ -74,7 +70,12 @@ class Views:
         """Grey, slightly blurred view, (H, W) float32 in 0..1, reduced by a further factor."""
         key = (*step, factor)
         if key not in self._grey:
-            self._grey[key] = self._read(step, self._factor * factor)
+            view = np.ascontiguousarray(self._views[self._middle[0] + step[0], self._middle[1] + step[1]])
+            factor *= self._factor
+            size = (max(1, view.shape[1] // factor), max(1, view.shape[0] // factor))
+            reduced = cv2.resize(view, size, interpolation=cv2.INTER_AREA) if factor > 1 else view
+            grey = as_unit_float(cv2.cvtColor(reduced, cv2.COLOR_RGB2GRAY))
+            self._grey[key] = np.asarray(cv2.GaussianBlur(grey, (0, 0), _BLUR_SIGMA), np.float32)
         return self._grey[key]
 
     def detail(self, step: Step, factor: int) -> FloatMap:
@@ -82,32 +83,19 @@ class Views:
         grey = self.plain(step, factor)
         return np.asarray(grey - cv2.blur(grey, (_HIGH_PASS, _HIGH_PASS)), np.float32)
 
-    def _read(self, step: Step, factor: int) -> FloatMap:
-        view = np.ascontiguousarray(self._views[self._middle[0] + step[0], self._middle[1] + step[1]])
-        size = (max(1, view.shape[1] // factor), max(1, view.shape[0] // factor))
-        reduced = cv2.resize(view, size, interpolation=cv2.INTER_AREA) if factor > 1 else view
-        grey = as_unit_float(cv2.cvtColor(reduced, cv2.COLOR_RGB2GRAY))
-        return np.asarray(cv2.GaussianBlur(grey, (0, 0), _BLUR_SIGMA), np.float32)
-
 
 @dataclass(frozen=True)
 class Trial:
-    """Layouts compared by the views at one distance.
-
-    Attributes
-    ----------
-    layouts : list of dict
-        Orders of each layout, with the sign that they give to its disparities.
-    cost, disparity : ndarrays, shape (P, L), float32
-        Of each point under each layout: 0..1, and pixels per view step.
-    extent : float
-        Largest disparity searched, pixels per view step.
-    """
+    """Layouts compared by the views at one distance."""
 
     layouts: list[dict[str, int]]
+    """Orders of each layout, with the sign that they give to its disparities."""
     cost: FloatMap
+    """Of each point under each layout, shape (P, L), 0..1."""
     disparity: FloatMap
+    """Likewise, pixels per view step."""
     extent: float
+    """Largest disparity searched, pixels per view step."""
 
     def matching_costs(self) -> dict[str, float]:
         """Mean matching cost of each order."""
@@ -183,7 +171,7 @@ def _distances(views: Views) -> Iterator[tuple[int, int]]:
     """Steps to the most distant view used, and further reduction: first a middle distance, then less, then more."""
     most_distant = min(REACH, max(max(map(abs, step)) for step in views.steps))
     reach = min(most_distant, _FIRST_REACH)
-    while reach >= 1:
+    while reach:
         yield reach, 1
         reach //= 2
     for factor in _REDUCTIONS:

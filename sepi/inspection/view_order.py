@@ -14,7 +14,7 @@ import numpy as np
 
 from sepi.inspection.disparity_sign import occlusion_votes
 from sepi.inspection.view_layouts import Views, best_trial
-from sepi.io.readers.options import AS_GIVEN, ORDERS, Numbers
+from sepi.io.readers.options import AS_GIVEN, ORDERS
 from sepi.lightfield import LightField
 
 # Votes that the sign needs, and the part of them that must agree
@@ -57,7 +57,7 @@ class OrderCheck:
     best: str
     clear: bool
     sign_clear: bool
-    read_in: str = AS_GIVEN
+    read_in: str
 
     def verdict(self) -> str:
         """One line for the user."""
@@ -72,7 +72,7 @@ class OrderCheck:
             return "the views are in the right order"
         return (
             f"the views are in the right order, but near and far cannot be told apart here; if depth comes out inside "
-            f"out, read it with --order {self._turned()}"
+            f"out, read it with --order {self._turned}"
         )
 
     def warning(self) -> str | None:
@@ -82,13 +82,13 @@ class OrderCheck:
     def _advice(self) -> str:
         fault = _FAULTS[self.best] if self.read_in == AS_GIVEN else f"--order {self.read_in} does not fit"
         advice = f"{fault}: read it with --order {self.best}"
-        if self.sign_clear:
-            return advice
-        return f"{advice}, or {self._turned()} if depth comes out inside out"
+        return advice if self.sign_clear else f"{advice}, or {self._turned} if depth comes out inside out"
 
+    @property
     def _turned(self) -> str:
         """The best order with near and far exchanged."""
-        return _name(ORDERS["flip-both"](ORDERS[self.best](_GRID)))
+        # turned by half, reading in the one is reading in the other
+        return next(order for order in ORDERS if _change(self.best, order) == "flip-both")
 
 
 def check_order(light_field: LightField, read_in: str = AS_GIVEN) -> OrderCheck:
@@ -125,27 +125,7 @@ def check_order(light_field: LightField, read_in: str = AS_GIVEN) -> OrderCheck:
     return OrderCheck(fits, best, trial.clear, sign_clear, read_in)
 
 
-def order_warning(light_field: LightField, read_in: str = AS_GIVEN) -> str | None:
-    """A sentence that names the order to read a light field in, where that is clearly not the given one.
-
-    Parameters
-    ----------
-    light_field : LightField
-    read_in : str
-        Order in which it was read.
-
-    Returns
-    -------
-    str or None
-    """
-    return check_order(light_field, read_in).warning()
-
-
 def _change(read_in: str, target: str) -> str:
     """The order that takes a grid read in order ``read_in`` to what reading it in order ``target`` gives."""
     turned = ORDERS[target](_GRID)
     return next(order for order in ORDERS if np.array_equal(ORDERS[order](ORDERS[read_in](_GRID)), turned))
-
-
-def _name(grid: Numbers) -> str:
-    return next(order for order in ORDERS if np.array_equal(ORDERS[order](_GRID), grid))

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from configparser import RawConfigParser
 from pathlib import Path
 
 import numpy as np
 
-from sepi.errors import SepiError
 from sepi.io.files import atomic_folder
 from sepi.io.images import write_png
 from sepi.io.pfm import write_pfm
@@ -30,58 +29,56 @@ def write_hci(light_field: LightField, folder: Path) -> None:
     Parameters
     ----------
     light_field : LightField
-        All views present, uint8 RGB, with a disparity range.
+        As :func:`sepi.scenes.render` makes it: all views present, uint8 RGB, with a disparity range.
     folder : Path
         Must not exist yet, or be empty.
 
     Raises
     ------
     SepiError
-        If the format cannot hold the light field, or the folder cannot be written.
+        If the folder cannot be written.
     """
-    if light_field.views.dtype != np.uint8 or light_field.views.shape[-1] != 3:
-        raise SepiError(f"{light_field.name}: a benchmark folder holds uint8 RGB views, got {light_field.views.dtype}")
-    if not light_field.present.all():
-        raise SepiError(f"{light_field.name}: a benchmark folder holds all views of the grid, but some are missing")
-    views = light_field.views.astype(np.uint8, copy=False)
-    settings = _settings(light_field)
     with atomic_folder(folder) as temporary:
+        views = light_field.views.astype(np.uint8, copy=False)
         for number, view in enumerate(views.reshape(-1, *light_field.shape, 3)):
             write_png(temporary / f"input_Cam{number:03d}.png", view)
-        (temporary / "parameters.cfg").write_text(settings, encoding="utf-8")
+        with (temporary / "parameters.cfg").open("w", encoding="utf-8") as file:
+            _settings(light_field).write(file)
         if light_field.ground_truth is not None:
             write_pfm(temporary / "gt_disp_lowres.pfm", light_field.ground_truth)
         for name, mask in light_field.masks.items():
             write_png(temporary / f"mask_{name}.png", mask)
 
 
-def _settings(light_field: LightField) -> str:
+def _settings(light_field: LightField) -> RawConfigParser:
     """Content of ``parameters.cfg``."""
     height, width = light_field.shape
     rows, columns = light_field.grid
     known = light_field.require_disparity_range()
-    sections: dict[str, Mapping[str, object]] = {
-        "intrinsics": {
-            "focal_length_mm": FOCAL_LENGTH_MM,
-            "image_resolution_x_px": width,
-            "image_resolution_y_px": height,
-            "sensor_size_mm": SENSOR_SIZE_MM,
-            "fstop": 100.0,
-        },
-        "extrinsics": {
-            "num_cams_x": columns,
-            "num_cams_y": rows,
-            "baseline_mm": BASELINE_MM_AT_512 * 512 / max(width, height),
-            "focus_distance_m": FOCUS_DISTANCE_M,
-            **{f"center_cam_{key}": 0.0 for key in ("x_m", "y_m", "z_m", "rx_rad", "ry_rad", "rz_rad")},
-        },
-        "meta": {
-            "scene": light_field.name,
-            "category": "built-in",
-            "disp_min": known.minimum,
-            "disp_max": known.maximum,
-            "depth_map_scale": 1.0,
-        },
-    }
-    blocks = ["\n".join([f"[{head}]", *(f"{k} = {v}" for k, v in keys.items())]) for head, keys in sections.items()]
-    return "\n\n".join(blocks) + "\n"
+    settings = RawConfigParser()
+    settings.read_dict(
+        {
+            "intrinsics": {
+                "focal_length_mm": FOCAL_LENGTH_MM,
+                "image_resolution_x_px": width,
+                "image_resolution_y_px": height,
+                "sensor_size_mm": SENSOR_SIZE_MM,
+                "fstop": 100.0,
+            },
+            "extrinsics": {
+                "num_cams_x": columns,
+                "num_cams_y": rows,
+                "baseline_mm": BASELINE_MM_AT_512 * 512 / max(width, height),
+                "focus_distance_m": FOCUS_DISTANCE_M,
+                **{f"center_cam_{key}": 0.0 for key in ("x_m", "y_m", "z_m", "rx_rad", "ry_rad", "rz_rad")},
+            },
+            "meta": {
+                "scene": light_field.name,
+                "category": "built-in",
+                "disp_min": known.minimum,
+                "disp_max": known.maximum,
+                "depth_map_scale": 1.0,
+            },
+        }
+    )
+    return settings

@@ -9,10 +9,10 @@ import numpy as np
 import numpy.typing as npt
 
 from sepi.errors import SepiError
-from sepi.lightfield import DisparityRange, FloatMap, LightField
+from sepi.lightfield import DisparityRange, LightField
 from sepi.scenes.definitions import DEFINITIONS
 from sepi.scenes.rendering import drawing, occluded, render_view, visible
-from sepi.validation import unknown
+from sepi.validation import require_known
 
 SMALLEST, LARGEST = 64, 1024
 MOST_VIEWS = 17
@@ -39,18 +39,17 @@ def render(name: str, *, size: int = 192, views: int = 9) -> LightField:
     LightField
         Views uint8 RGB; exact disparity of the surface at each pixel centre as ``ground_truth``; the masks ``occluded``
         (the point is hidden by a nearer surface in at least one view) and ``textureless`` (the surface carries no
-        depth).
-        Equal arguments give equal bytes.
+        depth). Equal arguments give equal bytes.
 
     Raises
     ------
     SepiError
         If there is no such scene, or size or views is out of bounds.
     """
-    if name not in DEFINITIONS:
-        raise unknown("built-in scenes", name, DEFINITIONS)
-    _check(f"scene {name}: size", size, SMALLEST, LARGEST, "pixels")
-    _check(f"scene {name}: views", views, 2, MOST_VIEWS, "rows and columns of views")
+    require_known("built-in scenes", [name], DEFINITIONS)
+    for what, value, least, most in (("size", size, SMALLEST, LARGEST), ("views", views, 2, MOST_VIEWS)):
+        if type(value) is not int or not least <= value <= most:
+            raise SepiError(f"scene {name}: {what}: expected a whole number from {least} to {most}, got {value!r}")
     surfaces = DEFINITIONS[name].surfaces()
     scene = drawing(surfaces, size)
     disparity, owner = visible(scene, size)
@@ -58,7 +57,10 @@ def render(name: str, *, size: int = 192, views: int = 9) -> LightField:
     deviation = np.linspace(*DEFINITIONS[name].pixel_noise, size)[:, None]
     pictures = np.empty((views, views, size, size, 3), np.uint8)
     for t, s in np.ndindex(views, views):
-        pictures[t, s] = _exposed(render_view(scene, size, t - views // 2, s - views // 2), deviation, rng)
+        picture = render_view(scene, size, t - views // 2, s - views // 2).astype(np.float64)
+        if deviation.any():
+            picture += deviation * rng.standard_normal(picture.shape)
+        pictures[t, s] = np.round(np.clip(picture, 0, 1) * 255)
     return LightField(
         views=pictures,
         name=name,
@@ -72,14 +74,6 @@ def render(name: str, *, size: int = 192, views: int = 9) -> LightField:
     )
 
 
-def _exposed(picture: FloatMap, deviation: npt.NDArray[np.float64], rng: np.random.Generator) -> npt.NDArray[np.uint8]:
-    """The picture with pixel noise, as integers."""
-    values = picture.astype(np.float64)
-    if deviation.any():
-        values += deviation * rng.standard_normal(picture.shape)
-    return np.round(np.clip(values, 0, 1) * 255).astype(np.uint8)
-
-
 def _range_around(disparity: npt.NDArray[np.float64]) -> DisparityRange:
     """Bounds in tenths that leave a margin on both sides."""
     low, high = float(disparity.min()), float(disparity.max())
@@ -87,8 +81,3 @@ def _range_around(disparity: npt.NDArray[np.float64]) -> DisparityRange:
     low, high = min(low - MARGIN, middle - LEAST_WIDTH / 2), max(high + MARGIN, middle + LEAST_WIDTH / 2)
     # rounding first keeps a bound that is a tenth up to the last bit where it is
     return DisparityRange(math.floor(round(10 * low, 6)) / 10, math.ceil(round(10 * high, 6)) / 10, "parameters")
-
-
-def _check(what: str, value: int, least: int, most: int, unit: str) -> None:
-    if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
-        raise SepiError(f"{what} must be a whole number of {unit} from {least} to {most}, got {value!r}")

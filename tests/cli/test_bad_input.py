@@ -1,8 +1,12 @@
 """Bad input of every kind, given to ``sepi depth`` as a user would: one clear line, exit code 1, nothing written."""
 
 import os
+import re
+import shutil
+import struct
 import tempfile
 import zipfile
+import zlib
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -15,9 +19,13 @@ import scipy.io
 from click.testing import CliRunner
 
 from sepi.cli.main import main
-from sepi.scenes import render
+from sepi.io.hdf5 import write_light_field
+from sepi.io.pfm import write_pfm
+from sepi.lightfield import LightField
+from sepi.scenes import render, write_hci
 
-VIEWS = render("dots", size=64, views=3).views
+SCENE = render("dots", size=64, views=3)
+VIEWS = SCENE.views
 
 Spoil = Callable[[], object]
 
@@ -32,11 +40,38 @@ def pictures(names: str = "view_{t}_{s}.png", views: np.ndarray = VIEWS, folder:
     return paths
 
 
+def benchmark_folder(folder: str = "in") -> Path:
+    write_hci(SCENE, Path(folder))
+    return Path(folder)
+
+
+def configured(key: str, value: str) -> Spoil:
+    """A benchmark folder with another value in its parameters."""
+
+    def make() -> None:
+        path = benchmark_folder() / "parameters.cfg"
+        text, count = re.subn(rf"^{key} = .*$", f"{key} = {value}", path.read_text(), flags=re.MULTILINE)
+        assert count == 1
+        path.write_text(text)
+
+    return make
+
+
+def view_twice() -> None:
+    folder = benchmark_folder()
+    shutil.copy(folder / "input_Cam004.png", folder / "input_Cam4.png")
+
+
+def only_ground_truth() -> None:
+    for path in benchmark_folder().glob("input*"):
+        path.unlink()
+
+
 def cut(path: Path, part: float = 0.5) -> None:
     path.write_bytes(path.read_bytes()[: int(path.stat().st_size * part)])
 
 
-def cut_picture(ending: str, part: float = 0.5) -> Spoil:
+def cut_picture(ending: str, part: float) -> Spoil:
     return lambda: cut(pictures("view_{t}_{s}" + ending)[4], part)
 
 
@@ -69,10 +104,14 @@ def floats(t: int, s: int, value: float) -> np.ndarray:
     return views
 
 
+def own_file_with_nan() -> None:
+    write_light_field(Path("in.h5"), LightField(np.zeros((2, 2, 8, 8, 1), np.float32), "nan"))
+    with h5py.File("in.h5", "r+") as file:
+        file["views"][0, 0, 0, 0, 0] = np.nan
+
+
 def png_claiming(width: int, height: int) -> bytes:
     """A PNG whose header, with a right checksum, claims a size that its few bytes cannot hold."""
-    import struct
-    import zlib
 
     def chunk(kind: bytes, body: bytes) -> bytes:
         return struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body))
@@ -114,12 +153,10 @@ def pickled() -> None:
 # what is made, the words after `sepi depth`, and what the one line must say
 CASES: dict[str, tuple[Spoil, str, tuple[str, ...]]] = {
     # pictures
-    "picture cut off: png": (cut_picture(".png"), "in", ("view_1_1.png", "cut off")),
-    "picture cut off: jpg": (cut_picture(".jpg", 0.9), "in", ("view_1_1.jpg", "cut off")),
-    "picture cut off: bmp": (cut_picture(".bmp"), "in", ("view_1_1.bmp", "cut off")),
-    "picture cut off: tif": (cut_picture(".tif"), "in", ("view_1_1.tif", "cut off")),
-    "picture cut off: ppm": (cut_picture(".ppm"), "in", ("view_1_1.ppm", "cut off")),
-    "picture cut off: webp": (cut_picture(".webp"), "in", ("view_1_1.webp", "cut off")),
+    **{
+        f"picture cut off: {kind}": (cut_picture(f".{kind}", part), "in", (f"view_1_1.{kind}", "cut off"))
+        for kind, part in {"png": 0.5, "jpg": 0.9, "bmp": 0.5, "tif": 0.5, "ppm": 0.5, "webp": 0.5}.items()
+    },
     "picture that is text": (lambda: pictures()[2].write_text("hello"), "in", ("view_0_2.png", "not a PNG")),
     "picture of no bytes": (lambda: pictures()[2].write_bytes(b""), "in", ("view_0_2.png", "not a PNG")),
     "picture with an absurd size": (
@@ -187,21 +224,61 @@ CASES: dict[str, tuple[Spoil, str, tuple[str, ...]]] = {
         ("in", "--grid"),
     ),
     "centre view missing": (lambda: pictures()[4].unlink(), "in", ("in", "(t, s) = (1, 1) is missing")),
-    "wrong grid": (lambda: pictures(), "in --grid 2x2", ("in", "2x2")),
+    "wrong grid": (pictures, "in --grid 2x2", ("in", "2x2")),
     "grid that is no grid of that many": (lambda: pictures("img{n}.png"), "in --grid 2x3", ("in", "2x3")),
     "absurd number in a name": (
         lambda: other(pictures()[0].with_name("view_999999_1.png"), VIEWS[0, 0]),
         "in",
         ("in", "1000000x3", "--pattern"),
     ),
-    "pattern that fits no name": (lambda: pictures(), "in --pattern img{number}.png", ("in", "img{number}.png")),
-    "pattern without numbers": (lambda: pictures(), "in --pattern view.png", ("view.png", "{row}")),
-    "pattern with half a place": (lambda: pictures(), "in --pattern view_{row}_1.png", ("{column}",)),
+    "pattern that fits no name": (pictures, "in --pattern img{number}.png", ("in", "img{number}.png")),
+    "pattern without numbers": (pictures, "in --pattern view.png", ("view.png", "{row}")),
+    "pattern with half a position": (pictures, "in --pattern view_{row}_1.png", ("{column}",)),
     "link out of the folder": (linked_out, "in", ("view_1_0.png", "link", "--follow-links")),
     "link to nowhere": (
         lambda: (pictures()[3].unlink(), Path("in/view_1_0.png").symlink_to("gone.png")),
         "in",
         ("view_1_0.png",),
+    ),
+    # benchmark folders
+    "folder of scenes": (
+        lambda: benchmark_folder("in/a"),
+        "in",
+        ("a folder of light fields; give one of them, such as in/a",),
+    ),
+    "view of a benchmark folder twice": (view_twice, "in", ("input_Cam4.png: view 4 is given twice",)),
+    "benchmark folder without centre view": (
+        lambda: (benchmark_folder() / "input_Cam004.png").unlink(),
+        "in",
+        ("centre view (t, s) = (1, 1) is missing",),
+    ),
+    "benchmark folder without views": (only_ground_truth, "in", ("no views",)),
+    "benchmark view of another size": (
+        lambda: other(benchmark_folder() / "input_Cam005.png", np.zeros((64, 60, 3), np.uint8)),
+        "in",
+        ("input_Cam005.png: 60x64",),
+    ),
+    "benchmark view cut off": (
+        lambda: cut(benchmark_folder() / "input_Cam007.png"),
+        "in",
+        ("input_Cam007.png: damaged PNG",),
+    ),
+    "nonsense parameters": (configured("disp_min", "far"), "in", ("parameters.cfg: expected numbers",)),
+    "range the wrong way round": (
+        configured("disp_min", "9"),
+        "in",
+        ("parameters.cfg: expected finite disp_min < disp_max",),
+    ),
+    "binary parameters": (
+        lambda: (benchmark_folder() / "parameters.cfg").write_bytes(b"\x80\x81"),
+        "in",
+        ("parameters.cfg: not a text file",),
+    ),
+    "wrong grid in the parameters": (configured("num_cams_x", "2"), "in", ("input_Cam008.png: beyond the 6 views",)),
+    "ground truth of another size": (
+        lambda: write_pfm(benchmark_folder() / "gt_disp_lowres.pfm", np.zeros((5, 5), np.float32)),
+        "in",
+        ("gt_disp_lowres.pfm: ground truth is (5, 5)",),
     ),
     # what the views show
     "all black": (lambda: pictures(views=np.zeros_like(VIEWS)), "in", ("in", "black")),
@@ -217,9 +294,9 @@ CASES: dict[str, tuple[Spoil, str, tuple[str, ...]]] = {
     "npy with infinity": (lambda: npy(floats(1, 2, -np.inf)), "in.npy", ("in.npy", "1,2", "--exclude")),
     "npy of floats 0..255": (lambda: npy(VIEWS.astype(np.float32)), "in.npy", ("in.npy", "0..1")),
     "npy of complex numbers": (lambda: npy(VIEWS.astype(np.complex64)), "in.npy", ("in.npy", "complex64")),
-    "axes that are none": (lambda: npy(), "in.npy --axes ABCDE", ("ABCDE",)),
-    "axes twice": (lambda: npy(), "in.npy --axes TTHWC", ("TTHWC",)),
-    "too few axes": (lambda: npy(), "in.npy --axes TSHW", ("in.npy", "TSHW")),
+    "axes that are none": (npy, "in.npy --axes ABCDE", ("ABCDE",)),
+    "axes twice": (npy, "in.npy --axes TTHWC", ("TTHWC",)),
+    "too few axes": (npy, "in.npy --axes TSHW", ("in.npy", "TSHW")),
     "npz of nothing": (lambda: np.savez("in.npz"), "in.npz", ("in.npz",)),
     "npz without views": (zero_views, "in.npz", ("in.npz",)),
     "npz cut off": (lambda: (np.savez("in.npz", LF=VIEWS), cut(Path("in.npz"))), "in.npz", ("in.npz",)),
@@ -241,6 +318,8 @@ CASES: dict[str, tuple[Spoil, str, tuple[str, ...]]] = {
     ),
     # HDF5
     "HDF5 cut off": (lambda: cut(hdf5(lambda f: f.create_dataset("LF", data=VIEWS))), "in.h5", ("in.h5",)),
+    "HDF5 of text": (lambda: Path("in.h5").write_text("x"), "in.h5", ("in.h5: not a light field",)),
+    "HDF5 of our own with NaN": (own_file_with_nan, "in.h5", ("in.h5: nan: float views must be finite",)),
     "HDF5 without views": (lambda: hdf5(lambda f: f.create_dataset("x", data=1)), "in.h5", ("in.h5", "known format")),
     "HDF5 with an absurd size": (
         lambda: hdf5(lambda f: f.create_dataset("LF", (9, 9, 10**5, 10**5, 3), np.uint8)),
@@ -270,32 +349,38 @@ CASES: dict[str, tuple[Spoil, str, tuple[str, ...]]] = {
         ("a_eslf.png", "cut off"),
     ),
     # flags
-    "unknown format": (lambda: npy(), "in.npy --format nmupy", ("did you mean 'numpy'",)),
-    "format that does not fit": (lambda: npy(), "in.npy --format matlab", ("in.npy",)),
-    "folder where a file is meant": (lambda: pictures(), "in --format numpy", ("in",)),
-    "file where a folder is meant": (lambda: npy(), "in.npy --format images", ("in.npy",)),
-    "unknown order": (lambda: npy(), "in.npy --order flip-row", ("did you mean 'flip-rows'",)),
-    "view outside the grid": (lambda: npy(), "in.npy --view 3,0", ("in.npy", "3,0", "outside the grid")),
-    "view left out that is wanted": (lambda: npy(), "in.npy --exclude 1,1", ("in.npy", "(1, 1) is missing")),
-    "view left out that is not there": (lambda: npy(), "in.npy --exclude 7,1", ("in.npy", "7,1", "outside the grid")),
-    "file left out that is not there": (lambda: pictures(), "in --exclude x.png", ("x.png",)),
+    "unknown format": (npy, "in.npy --format nmupy", ("did you mean 'numpy'",)),
+    "format that does not fit": (npy, "in.npy --format matlab", ("in.npy",)),
+    "folder where a file is meant": (pictures, "in --format numpy", ("in",)),
+    "file where a folder is meant": (npy, "in.npy --format images", ("in.npy",)),
+    "unknown order": (npy, "in.npy --order flip-row", ("did you mean 'flip-rows'",)),
+    "view outside the grid": (npy, "in.npy --view 3,0", ("in.npy", "3,0", "outside the grid")),
+    "reference view left out": (npy, "in.npy --exclude 1,1", ("in.npy", "(1, 1) is missing")),
+    "view left out that is not there": (npy, "in.npy --exclude 7,1", ("in.npy", "7,1", "outside the grid")),
+    "file left out that is not there": (pictures, "in --exclude x.png", ("x.png",)),
     "every view but one left out": (
         lambda: npy(VIEWS[:1, :2]),
         "in.npy --axes TSHWC --exclude 0,0",
         ("in.npy", "at least two views"),
     ),
-    "even middle": (lambda: npy(), "in.npy --central 2", ("in.npy", "odd")),
-    "middle larger than the grid": (lambda: npy(), "in.npy --central 5", ("in.npy", "5x5")),
-    "flag of another format": (lambda: pictures(), "in --axes TSHWC", ("in", "--axes")),
-    "inverted range": (lambda: npy(), "in.npy --disparity-range 2 1", ("MIN < MAX",)),
-    "range of no width": (lambda: npy(), "in.npy --disparity-range 1 1", ("MIN < MAX",)),
-    "huge range": (lambda: npy(), "in.npy --disparity-range -1e9 1e9", ("in.npy", "1e+09", "64 pixels")),
-    "range of NaN": (lambda: npy(), "in.npy --disparity-range nan 1", ("finite",)),
+    "even middle": (npy, "in.npy --central 2", ("in.npy", "odd")),
+    "middle larger than the grid": (npy, "in.npy --central 5", ("in.npy", "5x5")),
+    "flag of another format": (pictures, "in --axes TSHWC", ("in", "--axes")),
+    "inverted range": (npy, "in.npy --disparity-range 2 1", ("MIN < MAX",)),
+    "range of no width": (npy, "in.npy --disparity-range 1 1", ("MIN < MAX",)),
+    "huge range": (npy, "in.npy --disparity-range -1e9 1e9", ("in.npy", "1e+09", "64 pixels")),
+    "range of NaN": (npy, "in.npy --disparity-range nan 1", ("finite",)),
     "camera of negative length": (
-        lambda: npy(),
+        npy,
         "in.npy --focal-length -1 --baseline 1 --focus-distance 1 --sensor-size 1",
         ("positive",),
     ),
+    "unknown variant": (npy, "in.npy --variant papr", ("did you mean 'paper'",)),
+    "unknown parameter": (npy, "in.npy --set initial.semi_global.candidate=9", ("did you mean",)),
+    "parameter of another variant": (npy, "in.npy --set occlusion.wang.x=9", ("best: unknown 'occlusion.wang'",)),
+    "parameter out of bounds": (npy, "in.npy --set initial.semi_global.num_disparities=0", ("num_disparities",)),
+    "parameter of the wrong type": (npy, "in.npy --set initial.semi_global.num_disparities=few", ("'few'",)),
+    "parameter without value": (npy, "in.npy --set num_disparities", ("STAGE.CHOICE.NAME=VALUE",)),
     # where the maps go
     "target is a file": (lambda: (npy(), Path("out").touch()), "in.npy -o out", ("out: is a file",)),
     "target below a file": (lambda: (npy(), Path("out").touch()), "in.npy -o out/maps", ("out/maps: cannot be",)),
@@ -304,6 +389,7 @@ CASES: dict[str, tuple[Spoil, str, tuple[str, ...]]] = {
         "in -o in",
         ("in: holds the views of a light field",),
     ),
+    "target is a folder of views": (pictures, "in -o in", ("in: is the light field itself; choose another folder",)),
 }
 
 

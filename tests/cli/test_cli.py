@@ -7,10 +7,8 @@ import shutil
 import subprocess
 import sys
 import tomllib
-from collections.abc import Callable
 from pathlib import Path
 
-import cv2
 import h5py
 import numpy as np
 import pytest
@@ -214,132 +212,7 @@ def test_check_names_the_flag_that_sets_the_order_right(scene: Path) -> None:
     assert "--order" not in right.stdout.splitlines()[-1]
 
 
-# --- bad input
-
-
-def spoil_png(path: Path) -> None:
-    path.write_bytes(path.read_bytes()[:300])
-
-
-def configure(scene: Path, key: str, value: str) -> None:
-    path = scene / "parameters.cfg"
-    text, count = re.subn(rf"^{key} = .*$", f"{key} = {value}", path.read_text(), flags=re.MULTILINE)
-    assert count == 1
-    path.write_text(text)
-
-
-def other_size(path: Path) -> None:
-    cv2.imwrite(str(path), np.zeros((64, 60, 3), np.uint8))
-
-
-def file_with_nan(folder: Path) -> None:
-    write_light_field(folder / "nan.h5", LightField(np.zeros((2, 2, 8, 8, 1), np.float32), "nan"))
-    with h5py.File(folder / "nan.h5", "r+") as file:
-        file["views"][0, 0, 0, 0, 0] = np.nan
-
-
-def blank(scene: Path) -> None:
-    (scene / "parameters.cfg").unlink()
-    for path in scene.glob("input_Cam*.png"):
-        cv2.imwrite(str(path), np.full((64, 64, 3), 90, np.uint8))
-
-
-# what is done to the scene, the words of the command, and what the line must say
-BAD: dict[str, tuple[Callable[[Path], object], tuple[str, ...], str]] = {
-    "nothing there": (lambda s: None, ("absent",), "absent: no such file or folder"),
-    "empty folder": (lambda s: (s.parent / "empty").mkdir(), ("empty",), "known format"),
-    "folder of scenes": (
-        lambda s: shutil.copytree(s, s.parent / "scenes" / "a"),
-        ("scenes",),
-        "a folder of light fields; give one of them, such as scenes/a",
-    ),
-    "missing centre view": (lambda s: (s / "input_Cam004.png").unlink(), ("pyramids",), "centre view (t, s) = (1, 1)"),
-    "one view": (lambda s: [(s / f"input_Cam00{i}.png").unlink() for i in range(1, 9)], ("pyramids",), "is missing"),
-    "no view": (lambda s: [p.unlink() for p in s.glob("input*")], ("pyramids",), "no views"),
-    "view twice": (
-        lambda s: shutil.copy(s / "input_Cam004.png", s / "input_Cam4.png"),
-        ("pyramids",),
-        "input_Cam4.png: view 4 is given twice",
-    ),
-    "wrong size": (lambda s: other_size(s / "input_Cam005.png"), ("pyramids",), "input_Cam005.png: 60x64"),
-    "truncated PNG": (lambda s: spoil_png(s / "input_Cam007.png"), ("pyramids",), "input_Cam007.png: damaged PNG"),
-    "no PNG": (lambda s: (s / "input_Cam007.png").write_text("x"), ("pyramids",), "input_Cam007.png: not a PNG"),
-    "nonsense parameters": (
-        lambda s: configure(s, "disp_min", "far"),
-        ("pyramids",),
-        "parameters.cfg: expected numbers",
-    ),
-    "range the wrong way round": (
-        lambda s: configure(s, "disp_min", "9"),
-        ("pyramids",),
-        "parameters.cfg: expected finite disp_min < disp_max",
-    ),
-    "binary parameters": (
-        lambda s: (s / "parameters.cfg").write_bytes(b"\x80\x81"),
-        ("pyramids",),
-        "parameters.cfg: not a text file",
-    ),
-    "wrong grid": (
-        lambda s: configure(s, "num_cams_x", "2"),
-        ("pyramids",),
-        "input_Cam008.png: beyond the 6 views",
-    ),
-    "truth of another size": (
-        lambda s: write_pfm(s / "gt_disp_lowres.pfm", np.zeros((5, 5), np.float32)),
-        ("pyramids",),
-        "gt_disp_lowres.pfm: ground truth is (5, 5)",
-    ),
-    "views without texture": (blank, ("pyramids",), "view 1,1 is all of one colour"),
-    "not an HDF5 file": (lambda s: (s.parent / "x.h5").write_text("x"), ("x.h5",), "x.h5: not a light field"),
-    "NaN pixels": (lambda s: file_with_nan(s.parent), ("nan.h5",), "nan.h5: nan: float views must be finite"),
-    "range of no width": (lambda s: None, ("pyramids", "--disparity-range", "1", "1"), "MIN < MAX"),
-    "range not finite": (lambda s: None, ("pyramids", "--disparity-range", "nan", "1"), "finite"),
-    "unknown variant": (lambda s: None, ("pyramids", "--variant", "papr"), "did you mean 'paper'"),
-    "unknown parameter": (lambda s: None, ("pyramids", "--set", "initial.semi_global.candidate=9"), "did you mean"),
-    "parameter of another variant": (
-        lambda s: None,
-        ("pyramids", "--set", "occlusion.wang.x=9"),
-        "does not use occlusion.wang",
-    ),
-    "parameter out of bounds": (
-        lambda s: None,
-        ("pyramids", "--set", "initial.semi_global.num_disparities=0"),
-        "num_disparities",
-    ),
-    "parameter of the wrong type": (
-        lambda s: None,
-        ("pyramids", "--set", "initial.semi_global.num_disparities=few"),
-        "'few'",
-    ),
-    "parameter without value": (lambda s: None, ("pyramids", "--set", "num_disparities"), "STAGE.CHOICE.NAME=VALUE"),
-    "output is a file": (
-        lambda s: (s.parent / "out").write_text("mine"),
-        ("pyramids", "-o", "out"),
-        "out: is a file; expected a folder",
-    ),
-    "output is the input": (lambda s: None, ("pyramids", "-o", "pyramids"), "choose another folder"),
-    "output below a file": (
-        lambda s: (s.parent / "out").write_text("mine"),
-        ("pyramids", "-o", "out/maps"),
-        "out/maps: cannot be written",
-    ),
-}
-
-
-@pytest.mark.parametrize("case", BAD)
-def test_bad_input_is_one_line_and_nothing_is_written(scene: Path, case: str) -> None:
-    spoil, words, message = BAD[case]
-    spoil(scene)
-    before = everything_in(scene.parent)
-    assert message in error_of(call("depth", *words))
-    assert everything_in(scene.parent) == before
-    assert not Path("pyramids-depth").exists()
-
-
-@pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
-def test_unwritable_output(scene: Path) -> None:
-    Path("locked").mkdir(mode=0o500)
-    assert "locked/out: cannot be written" in error_of(call("depth", scene, "-o", "locked/out"))
+# --- wrong usage
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 import pytest
 
-from sepi.inspection.view_order import check_order, order_warning
+from sepi.inspection.view_order import check_order
 from sepi.io.readers.options import ORDERS
 from sepi.lightfield import LightField
 from sepi.scenes import SCENES, render
@@ -53,7 +53,7 @@ def test_the_order_that_sets_a_scene_right_is_named(name: str, word: str) -> Non
     assert found.best == word
     assert list(found.fits) == list(ORDERS)
     assert found.fits[word] < min(fit for other, fit in found.fits.items() if other != word)
-    warning = order_warning(field)
+    warning = check_order(field).warning()
     if word == "as-given":
         assert warning is None
         assert found.verdict() == "the views are in the right order"
@@ -70,7 +70,7 @@ def test_a_scene_without_occlusion_leaves_near_and_far_open(word: str) -> None:
     assert found.best in (word, TURNED[word])
     assert found.fits[word] == found.fits[TURNED[word]]
     # in such a scene the order as it is may be right
-    warned = order_warning(misread(scene("slanted_plane"), word))
+    warned = check_order(misread(scene("slanted_plane"), word)).warning()
     assert (warned is None) == (word in ("as-given", "flip-both"))
     assert warned is None or (f"--order {found.best}" in warned and TURNED[found.best] in warned)
 
@@ -90,7 +90,7 @@ def test_an_order_that_was_asked_for_is_replaced_not_added_to(given: str) -> Non
     read = misread_by_flag(files, given)
     found = check_order(read, given)
     assert found.best == "transpose-flip-rows"
-    assert (order_warning(read, given) is None) == (given == "transpose-flip-rows")
+    assert (check_order(read, given).warning() is None) == (given == "transpose-flip-rows")
 
 
 def misread_by_flag(files: LightField, word: str) -> LightField:
@@ -103,7 +103,7 @@ def misread_by_flag(files: LightField, word: str) -> LightField:
 @pytest.mark.parametrize(("size", "views"), [(64, 9), (96, 3), (96, 5), (128, 2), (64, 4)])
 @pytest.mark.parametrize("name", SCENES)
 def test_no_built_in_scene_is_warned_of(name: str, size: int, views: int) -> None:
-    assert order_warning(scene(name, size, views)) is None
+    assert check_order(scene(name, size, views)).warning() is None
 
 
 @pytest.mark.parametrize("shape", ["cross", "star", "holes", "rows"])
@@ -134,7 +134,7 @@ def test_the_reference_view_does_not_matter() -> None:
 @pytest.mark.parametrize("name", ["curved_occluders", "dots", "slanted_plane", "wall"])
 def test_thin_and_small_grids_bring_no_warning(name: str, place: tuple[slice, ...]) -> None:
     light_field = grey_field(scene(name).views[place])
-    assert order_warning(light_field) is None
+    assert check_order(light_field).warning() is None
 
 
 def test_a_row_of_views_that_runs_the_other_way_is_found() -> None:
@@ -147,7 +147,7 @@ def test_a_row_of_views_that_runs_the_other_way_is_found() -> None:
 
 def test_a_column_of_views_read_as_a_row_is_found() -> None:
     column = grey_field(scene("curved_occluders").views[:, 2:3])
-    warning = order_warning(misread(column, "transpose"))
+    warning = check_order(misread(column, "transpose")).warning()
     assert warning is not None
     assert warning.endswith("--order transpose")
 
@@ -158,7 +158,7 @@ def test_pictures_of_noise_are_left_undecided() -> None:
     found = check_order(noise)
     assert not found.clear
     assert "cannot tell" in found.verdict()
-    assert order_warning(noise) is None
+    assert check_order(noise).warning() is None
 
 
 @pytest.mark.parametrize("level", [0, 1, 128, 255])
@@ -167,7 +167,7 @@ def test_empty_pictures_are_left_undecided(level: int) -> None:
     found = check_order(flat)
     assert not found.clear
     assert found.best == "as-given"
-    assert order_warning(flat) is None
+    assert check_order(flat).warning() is None
 
 
 def test_equal_views_are_left_undecided() -> None:
@@ -179,17 +179,17 @@ def test_equal_views_are_left_undecided() -> None:
 @pytest.mark.parametrize("shape", [(2, 2), (2, 300), (300, 2), (3, 17), (16, 16), (20, 1000)])
 def test_pictures_too_small_to_tell_are_left_undecided(shape: tuple[int, int]) -> None:
     rng = np.random.default_rng(6)
-    assert order_warning(grey_field(rng.integers(0, 256, (3, 3, *shape, 1), dtype=np.uint8))) is None
+    assert check_order(grey_field(rng.integers(0, 256, (3, 3, *shape, 1), dtype=np.uint8))).warning() is None
 
 
 def test_dark_and_noisy_views_are_not_warned_of() -> None:
     light_field = scene("curved_occluders")
     rng = np.random.default_rng(7)
     noisy = light_field.views + rng.normal(0, 40, light_field.views.shape)
-    assert order_warning(grey_field(np.clip(noisy, 0, 255).astype(np.uint8))) is None
+    assert check_order(grey_field(np.clip(noisy, 0, 255).astype(np.uint8))).warning() is None
     for divisor in (12, 30, 60):
         for name in ("curved_occluders", "wall", "stripes"):
-            assert order_warning(grey_field(scene(name).views // divisor)) is None
+            assert check_order(grey_field(scene(name).views // divisor)).warning() is None
 
 
 @pytest.mark.parametrize("word", ["as-given", "flip-rows", "flip-both"])
@@ -209,7 +209,7 @@ def test_views_that_darken_outwards_are_still_in_order() -> None:
     views = (light_field.views * gain).astype(np.uint8)
     for word in ORDERS:
         assert check_order(misread(grey_field(views), word)).best in (word, TURNED[word])
-    assert order_warning(grey_field(views)) is None
+    assert check_order(grey_field(views)).warning() is None
 
 
 def test_a_large_parallax_is_found() -> None:
@@ -242,7 +242,7 @@ def test_a_lytro_picture_in_every_order(real_data: Path) -> None:
 
 
 def every_order_is_named(light_field: LightField) -> None:
-    assert order_warning(light_field) is None
+    assert check_order(light_field).warning() is None
     for word in ORDERS:
         found = check_order(misread(light_field, word))
         assert found.clear

@@ -15,7 +15,7 @@ from sepi.lightfield import LightField
 from sepi.reading import read_light_field
 from sepi.scenes import SCENES, render, rendering, write_hci
 from sepi.scenes.definitions import DEFINITIONS
-from sepi.scenes.surfaces import Plane, Surface, circle, everywhere, rectangle
+from sepi.scenes.surfaces import Plane, Surface, blob, everywhere, rectangle
 from sepi.scenes.textures import PERIOD, noise, photograph, shading
 
 SIZE, VIEWS = 96, 5
@@ -234,7 +234,7 @@ def test_textures_repeat_without_a_seam_and_keep_their_mean() -> None:
 
 def test_hole_shows_what_is_behind() -> None:
     grey = shading((0.5, 0.5, 0.5), 0.0)
-    ring = Surface([circle(0.5, 0.5, 0.4), circle(0.5, 0.5, 0.2)], Plane(1.0), grey)
+    ring = Surface([blob(0.5, 0.5, 0.4), blob(0.5, 0.5, 0.2)], Plane(1.0), grey)
     _, owner = rendering.visible(rendering.drawing([Surface([everywhere()], Plane(0.0), grey), ring], 64), 64)
     assert owner[32, 32] == 0
     assert owner[32, 51] == 1
