@@ -10,7 +10,7 @@ import numpy as np
 from bench.measure import Prepared
 from sepi.inspection.disparity_range import settle_range
 from sepi.io.hdf5 import read_light_field, read_stage, write_light_field, write_stage
-from sepi.io.provenance import stage_attributes, step
+from sepi.io.provenance import entry, stage_attributes
 from sepi.lightfield import LightField
 from sepi.pipeline import STAGES, Variant
 from sepi.reading import read_light_field as read_any
@@ -70,7 +70,7 @@ def prepare_files(scene: Scene, variant: Variant, settings: dict[str, Parameters
         steps = []
         for stage, choice in variant.choices.items():
             maps = STAGES[stage][choice].run(light_field, maps, settings[stage], no_progress)
-            steps.append(step(stage, choice, settings[stage]))
+            steps.append(entry(stage, choice, settings[stage]))
             write_stage(scene.maps(stage), maps, stage_attributes(light_field, steps))
 
     return Prepared(call)

@@ -26,7 +26,7 @@ import click
 from sepi.errors import SepiError, SepiWarning
 from sepi.io.files import atomic_path
 from sepi.io.hdf5 import read_light_field, read_stage, write_stage
-from sepi.io.provenance import history_of, stage_attributes, step
+from sepi.io.provenance import entry, history_of, stage_attributes
 from sepi.stage import Choice, Progress, no_progress
 from sepi.threads import use_threads
 from sepi.validation import validated
@@ -200,8 +200,8 @@ def stage_command(stage: str, choices: Mapping[str, Choice]) -> click.Command:
             )
         with progress_bar(f"{light_field.name} {stage}") as progress:
             result = chosen.run(light_field, maps, settings, progress)
-        steps = [*history_of(previous), step(stage, choice, settings)]
-        write_stage(output, result, stage_attributes(light_field, steps))
+        history = [*history_of(previous), entry(stage, choice, settings)]
+        write_stage(output, result, stage_attributes(light_field, history))
         if timing is not None:
             write_timing(timing, started, threads)
 

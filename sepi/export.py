@@ -14,13 +14,13 @@ from sepi.io.result_folder import write_result
 _PATH = click.Path(path_type=Path)
 
 
-@click.command(cls=SepiCommand, help="Write disparity.pfm, result.h5 and pictures from a stage file.")
+@click.command(cls=SepiCommand)
 @click.option("--light-field", "light_field_path", type=_PATH, required=True, help="HDF5 file from ingest.")
 @click.option("--maps", type=_PATH, required=True, help="File of the last stage.")
 @click.option("--variant", required=True, help="Name of the variant, for the attributes.")
 @click.option("--output", type=_PATH, required=True, help="Folder to write.")
 def main(light_field_path: Path, maps: Path, variant: str, output: Path) -> None:
-    """Write the folder of final maps."""
+    """Write disparity.pfm, result.h5 and pictures from a stage file."""
     light_field = read_light_field(light_field_path)
     attributes = result_attributes(light_field, variant, history_of(maps))
     write_result(output, light_field, read_stage(maps), attributes)

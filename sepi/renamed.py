@@ -35,8 +35,8 @@ RENAMED = {
 """Old name to the new one, which is the first word where more has to be said."""
 
 
-def new_name(word: str, known: list[str]) -> str | None:
+def new_name(name: str, known: list[str]) -> str | None:
     """What an old name is called now, if that is among the known; of ``hci_old/buddha`` the first part is looked up."""
-    head, slash, rest = word.partition("/")
+    head, slash, rest = name.partition("/")
     new = RENAMED.get(head)
     return None if new is None or f"{new.split()[0]}{slash}{rest}" not in known else f"{new}{slash}{rest}"

@@ -17,7 +17,7 @@ from sepi.external import ExternalSource, external_maps
 from sepi.io.external_maps import ExternalMap, write_external
 from sepi.io.hdf5 import read_light_field, read_stage, write_light_field, write_stage
 from sepi.io.pfm import write_pfm
-from sepi.io.provenance import scene_attributes, stage_attributes, step
+from sepi.io.provenance import entry, scene_attributes, stage_attributes
 from sepi.io.scores import map_name, write_scores
 from sepi.lightfield import FloatMap, LightField
 from sepi.pipeline import STAGES, VARIANTS, stage_parameters
@@ -139,7 +139,7 @@ def run_stages(plan: Plan, scene: tuple[str, str], light_field: LightField, vari
     steps = []
     for number, (stage, choice) in enumerate(plan.variants[variant].items()):
         maps = STAGES[stage][choice].run(light_field, maps, settings[stage], no_progress)
-        steps.append(step(stage, choice, settings[stage]))
+        steps.append(entry(stage, choice, settings[stage]))
         attributes = stage_attributes(light_field, steps)
         write_stage(plan.stage_file(*scene, variant, stage), maps, attributes)
         timing = {"seconds": 1.5 + number, "peak_memory_mb": 200 + 10 * number}

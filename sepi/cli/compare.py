@@ -42,21 +42,15 @@ def compare(a: Path, b: Path, ground_truth: Path | None, output: Path, reading: 
     maps = read_disparity(a), read_disparity(b)
     require_one_view(a, b)
     values, light_field = (None, None) if ground_truth is None else read_ground_truth(ground_truth, a, reading)
-    _require_shape(b, maps[1].shape, a, maps[0].shape)
-    for known in (values, light_field):
-        if ground_truth is not None and known is not None:
-            _require_shape(ground_truth, known.shape, a, maps[0].shape)
+    for path, other in ((b, maps[1]), (ground_truth, values), (ground_truth, light_field)):
+        if other is not None and other.shape != maps[0].shape:
+            raise SepiError(f"{path}: is {other.shape}, but {a} is {maps[0].shape} (height, width)")
     found = Comparison(_names(a, b), maps, values, light_field)
     with atomic_path(output) as temporary:
         temporary.write_text(comparison_page(found), encoding="utf-8")
     for name, scores in found.scores.items():
         click.echo(f"{name}\n{score_table(scores)}\n")
     click.echo(f"written: {output}")
-
-
-def _require_shape(path: Path, shape: tuple[int, ...], first: Path, expected: tuple[int, ...]) -> None:
-    if shape != expected:
-        raise SepiError(f"{path}: is {shape}, but {first} is {expected} (height, width)")
 
 
 def _names(a: Path, b: Path) -> tuple[str, str]:

@@ -17,7 +17,7 @@ from sepi.cli.input_options import Geometry, Reading, camera_flags, reading_flag
 from sepi.cli.results import check_submission, points, submission
 from sepi.command import SepiGroup, progress_bar
 from sepi.errors import SepiError
-from sepi.io.provenance import package_version, result_attributes, step
+from sepi.io.provenance import entry, package_version, result_attributes
 from sepi.threads import available_cores, use_threads
 from sepi.validation import require_known
 
@@ -111,8 +111,8 @@ def depth(
     use_threads(threads or available_cores())
     chosen = variant_named(variant)
     parameters = _parameters(settings, variant, chosen)
-    steps = [
-        step(stage, chosen.choices[stage], values)
+    history = [
+        entry(stage, chosen.choices[stage], values)
         for stage, values in stage_parameters(chosen, parameters).items()
         if chosen.choices[stage] != HANDED_ON
     ]
@@ -128,7 +128,7 @@ def depth(
     with progress_bar(light_field.name) as progress:
         maps = estimate_depth(light_field, chosen, parameters, progress)
     seconds = time.perf_counter() - started
-    files = write_result(folder, light_field, maps, result_attributes(light_field, variant, steps))
+    files = write_result(folder, light_field, maps, result_attributes(light_field, variant, history))
     if timing:
         with atomic_path(folder / RUNTIME) as temporary:
             temporary.write_text(f"{seconds:.3f}\n", encoding="ascii")

@@ -12,12 +12,9 @@ from sepi.errors import SepiError
 if TYPE_CHECKING:
     from sepi.lightfield import FloatMap, LightField
 
-View = tuple[tuple[int, int], tuple[int, int]]
-"""Position of a view, and rows and columns of the grid it is in."""
 
-
-def view_of(path: Path) -> View | None:
-    """The view that a result's map belongs to, and the view grid; None for a map that does not say."""
+def view_of(path: Path) -> tuple[tuple[int, int], tuple[int, int]] | None:
+    """Position of the view that a map belongs to, and size of the view grid; None for a map that does not say."""
     from sepi.io.hdf5 import read_attributes
 
     path = path / "result.h5" if path.is_dir() else path
@@ -31,12 +28,7 @@ def view_of(path: Path) -> View | None:
 
 
 def require_one_view(estimate: Path, other: Path) -> None:
-    """Raise if two maps say that they belong to different views.
-
-    Raises
-    ------
-    SepiError
-    """
+    """Raise if two maps say that they belong to different views."""
     views = view_of(estimate), view_of(other)
     if None not in views and views[0] != views[1]:
         raise SepiError(f"{other}: depth of another view than {estimate}; compare maps of one view")
@@ -56,21 +48,15 @@ def read_ground_truth(path: Path, estimate: Path, reading: Reading) -> tuple[Flo
         values = read_disparity(path)
         require_one_view(estimate, path)
         return values, None
-    light_field = _scene_of(path, estimate, reading)
-    return light_field.ground_truth, light_field
-
-
-def _scene_of(scene: Path, estimate: Path, reading: Reading) -> LightField:
-    """The light field, seen from the view that the estimate belongs to."""
     belongs = view_of(estimate)
     if belongs is not None and reading.options.view is None:
         reading = replace(reading, options=replace(reading.options, view=belongs[0]))
-    light_field = reading.read(scene, check_order=False)
+    light_field = reading.read(path, check_order=False)
     if belongs is not None and belongs != (light_field.reference_position, light_field.grid):
         (t, s), (rows, columns) = belongs
         raise SepiError(
-            f"{estimate}: depth of view {t},{s} of {rows}x{columns} views, but {scene} is read as view "
+            f"{estimate}: depth of view {t},{s} of {rows}x{columns} views, but {path} is read as view "
             f"{','.join(map(str, light_field.reference_position))} of {light_field.grid[0]}x{light_field.grid[1]}; "
             "give the flags here that 'sepi depth' had"
         )
-    return light_field
+    return light_field.ground_truth, light_field

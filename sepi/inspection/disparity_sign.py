@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sepi.inspection.coarse_sweep import coarse_sweep
-from sepi.inspection.view_layouts import REACH, Step, Trial, Views, steps_under
+from sepi.inspection.view_layouts import REACH, Baseline, Trial, Views, baselines_under
 from sepi.inspection.view_order_kernels import count_occlusions, residuals
 from sepi.lightfield import BoolMap, FloatMap
 
@@ -38,7 +38,7 @@ _SEEN = 4.0
 _HIDDEN = 9.0
 _HIDDEN_TO_SEEN = 6.0
 
-_DIRECTIONS: tuple[Step, ...] = ((0, 1), (0, -1), (1, 0), (-1, 0))
+_DIRECTIONS: tuple[Baseline, ...] = ((0, 1), (0, -1), (1, 0), (-1, 0))
 
 
 def occlusion_votes(views: Views, trial: Trial) -> tuple[int, int]:
@@ -56,33 +56,40 @@ def occlusion_votes(views: Views, trial: Trial) -> tuple[int, int]:
     if rounding > _MOST_ROUNDING:
         return 0, 0
     reference = _middle(views.plain((0, 0))) * scale
-    steps = {direction: _at(direction, reach) for direction in directions}
+    baselines = {direction: _at(direction, reach) for direction in directions}
     pictures = {
-        step: _as_bright(_middle(views.plain(step)) * scale, reference) for both in steps.values() for step in both
+        baseline: _as_bright(_middle(views.plain(baseline)) * scale, reference)
+        for both in baselines.values()
+        for baseline in both
     }
     order = next(iter(trial.best))
-    positions = {step: (int(t), int(s)) for step in pictures for t, s in steps_under(order, [step])}
+    positions = {baseline: (int(t), int(s)) for baseline in pictures for t, s in baselines_under(order, [baseline])}
     movement = min(_MOST_MOVEMENT, math.ceil(1.15 * trial.largest_disparity * reach) + 1)
     candidates = (np.arange(-movement, movement + 1) / reach).astype(np.float32)
     sides = [
-        (np.stack([pictures[step] for step in both]), np.array([positions[step] for step in both], np.int64))
-        for both in steps.values()
+        (
+            np.stack([pictures[baseline] for baseline in both]),
+            np.array([positions[baseline] for baseline in both], np.int64),
+        )
+        for both in baselines.values()
     ]
     disparity, trusted = _disparity(reference, sides, candidates)
     residual = {
-        step: residuals(reference, picture, positions[step][0], positions[step][1], disparity, _WINDOW_RADIUS)
-        for step, picture in pictures.items()
+        baseline: residuals(
+            reference, picture, positions[baseline][0], positions[baseline][1], disparity, _WINDOW_RADIUS
+        )
+        for baseline, picture in pictures.items()
     }
     noise = max(_LEAST_NOISE, rounding, _typical([values[trusted] for values in residual.values()]))
     greater, lesser = 0, 0
     for t, s in directions:
-        here, there = ([residual[step] for step in steps[direction]] for direction in ((t, s), (-t, -s)))
+        here, there = ([residual[baseline] for baseline in baselines[direction]] for direction in ((t, s), (-t, -s)))
         more, less = count_occlusions(
             here[-1],
             np.maximum(there[0], there[-1]),
             np.maximum.reduce([*here, *there]),
-            positions[steps[t, s][-1]][0],
-            positions[steps[t, s][-1]][1],
+            positions[baselines[t, s][-1]][0],
+            positions[baselines[t, s][-1]][1],
             disparity,
             trusted,
             _SEEN * noise,
@@ -94,12 +101,12 @@ def occlusion_votes(views: Views, trial: Trial) -> tuple[int, int]:
     return greater, lesser
 
 
-def _directions(views: Views, largest: float) -> tuple[int, list[Step]]:
+def _directions(views: Views, largest: float) -> tuple[int, list[Baseline]]:
     """Distance, and directions in which there are views at it and at half of it, on both sides.
 
     The most distant at which nothing moves by more than is searched: the strips that are hidden are widest there.
     """
-    present = set(views.steps)
+    present = set(views.baselines)
     for reach in range(REACH, 0, -1):
         if reach > 1 and largest * reach > _MOST_MOVEMENT:
             continue
@@ -113,8 +120,8 @@ def _directions(views: Views, largest: float) -> tuple[int, list[Step]]:
     return 1, []
 
 
-def _at(direction: Step, reach: int) -> list[Step]:
-    """Steps to the views at half of the distance and at all of it."""
+def _at(direction: Baseline, reach: int) -> list[Baseline]:
+    """Baselines to the views at half of the distance and at all of it."""
     return [(n * direction[0], n * direction[1]) for n in sorted({max(1, reach // 2), reach})]
 
 
@@ -146,8 +153,8 @@ def _disparity(
     lowest, second, mean, disparity = (np.choose(chosen, [sweep[n] for sweep in sweeps]) for n in range(4))
     with np.errstate(invalid="ignore"):
         trusted = (lowest < _MOST_AMBIGUITY * second) & (mean - lowest > _FLAT)
-    step = candidates[1] - candidates[0]
-    trusted &= abs(disparity - cv2.medianBlur(disparity, 5)) < step
+    spacing = candidates[1] - candidates[0]
+    trusted &= abs(disparity - cv2.medianBlur(disparity, 5)) < spacing
     return disparity, trusted
 
 

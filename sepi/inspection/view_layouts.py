@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -19,9 +19,10 @@ from sepi.io.readers.options import ORDERS
 from sepi.lightfield import FloatMap, LightField, as_unit_float
 
 REACH = 8
-"""Views up to this many steps away are looked at."""
+"""Views up to this many rows or columns away are looked at."""
 
-Step = tuple[int, int]
+Baseline = tuple[int, int]
+"""Rows and columns of views from one view to another."""
 
 # Larger pictures are reduced by a whole factor; smaller ones tell nothing
 _MOST_PIXELS = 300_000
@@ -29,12 +30,12 @@ _LEAST_SIDE = 16
 _BLUR_SIGMA = 0.8
 _HIGH_PASS = 9
 
-# Steps to the views that are tried first, and how many views; movement in the most distant of them, pixels, that is
-# searched, and its step; reductions that reach disparities beyond that
+# Baselines to the views that are tried first, and how many views; movement in the most distant of them, pixels, that is
+# searched, and its spacing; reductions that reach disparities beyond that
 _FIRST_REACH = 4
 _MOST_VIEWS = 16
 _MOVEMENT = 10
-_MOVEMENT_STEP = 0.6
+_MOVEMENT_SPACING = 0.6
 _REDUCTIONS = (2, 4)
 # Half width of a patch, pixels; points along a side of the picture
 _PATCH_RADIUS = 2
@@ -51,8 +52,8 @@ _AT_END = 0.02
 class Views:
     """The views about the middle of the grid, reduced and filtered when they are first asked for.
 
-    ``steps`` lead from the view in the middle to each other one that is present: rows and columns of views. ``shape``
-    is the height and width in pixels, as reduced.
+    ``baselines`` lead from the view in the middle to each other one that is present. ``shape`` is the height and width
+    in pixels, as reduced.
     """
 
     def __init__(self, light_field: LightField) -> None:
@@ -62,15 +63,15 @@ class Views:
         positions = np.argwhere(light_field.present)
         distance = abs(positions - np.array(light_field.grid) // 2).sum(axis=1)
         self._middle = positions[distance.argmin()]
-        self.steps: list[Step] = [(int(t), int(s)) for t, s in positions - self._middle if (t, s) != (0, 0)]
+        self.baselines: list[Baseline] = [(int(t), int(s)) for t, s in positions - self._middle if (t, s) != (0, 0)]
         height, width = light_field.shape
         self.shape = (height // self._factor, width // self._factor)
 
-    def plain(self, step: Step, factor: int = 1) -> FloatMap:
+    def plain(self, baseline: Baseline, factor: int = 1) -> FloatMap:
         """Grey, slightly blurred view, (H, W) float32 in 0..1, reduced by a further factor."""
-        key = (*step, factor)
+        key = (*baseline, factor)
         if key not in self._grey:
-            view = np.ascontiguousarray(self._views[self._middle[0] + step[0], self._middle[1] + step[1]])
+            view = np.ascontiguousarray(self._views[self._middle[0] + baseline[0], self._middle[1] + baseline[1]])
             factor *= self._factor
             size = (max(1, view.shape[1] // factor), max(1, view.shape[0] // factor))
             reduced = cv2.resize(view, size, interpolation=cv2.INTER_AREA) if factor > 1 else view
@@ -78,71 +79,29 @@ class Views:
             self._grey[key] = np.asarray(cv2.GaussianBlur(grey, (0, 0), _BLUR_SIGMA), np.float32)
         return self._grey[key]
 
-    def detail(self, step: Step, factor: int) -> FloatMap:
+    def detail(self, baseline: Baseline, factor: int) -> FloatMap:
         """The same, high-pass filtered: differences of brightness between views do not count."""
-        grey = self.plain(step, factor)
+        grey = self.plain(baseline, factor)
         return np.asarray(grey - cv2.blur(grey, (_HIGH_PASS, _HIGH_PASS)), np.float32)
 
 
-@dataclass(frozen=True)
-class Trial:
-    """Layouts compared by the views at one distance."""
+class Trial(NamedTuple):
+    """Layouts compared by the views at one distance: those orders of the views that differ by more than the sign."""
 
-    layouts: list[dict[str, int]]
-    """Orders of each layout, with the sign that they give to its disparities."""
-    cost: FloatMap
-    """Of each point under each layout, shape (P, L), 0..1."""
-    disparity: FloatMap
-    """Likewise, pixels per view step."""
-    extent: float
-    """Largest disparity searched, pixels per view step."""
-
-    def matching_costs(self) -> dict[str, float]:
-        """Mean matching cost of each order."""
-        mean = self.cost.mean(axis=0)
-        return {order: float(mean[n]) for n, layout in enumerate(self.layouts) for order in layout}
-
-    @property
-    def best(self) -> dict[str, int]:
-        """Orders of the layout that fits best, with their signs."""
-        return self.layouts[self._ranking[0]]
-
-    @property
-    def gap(self) -> float:
-        """By how much the next layout's matching cost is above the best's."""
-        return float(self._difference.mean())
-
-    @property
-    def errors(self) -> float:
-        """The gap in standard errors."""
-        return self.gap * math.sqrt(len(self.cost)) / max(float(self._difference.std()), 1e-6)
-
-    @property
-    def clear(self) -> bool:
-        """Whether the best layout is clearly better than any other."""
-        best, following = self.cost.mean(axis=0)[self._ranking[:2]]
-        return bool(following >= _CLEAR_RATIO * best and self.errors >= _CLEAR_ERRORS)
-
-    @property
-    def largest_disparity(self) -> float:
-        """Largest absolute disparity under the best layout, but for a few outliers."""
-        best = self._ranking[0]
-        matched = abs(self.disparity[self.cost[:, best] < _MATCHED, best])
-        return float(np.quantile(matched, 1 - _AT_END)) if matched.size else self.extent
-
-    @property
-    def within(self) -> bool:
-        """Whether the search goes beyond the scene's disparities."""
-        return self.largest_disparity < 0.95 * self.extent
-
-    @property
-    def _ranking(self) -> list[int]:
-        return [int(n) for n in self.cost.mean(axis=0).argsort(kind="stable")]
-
-    @property
-    def _difference(self) -> FloatMap:
-        best, following = self._ranking[:2]
-        return np.asarray(self.cost[:, following] - self.cost[:, best], np.float32)
+    costs: dict[str, float]
+    """Mean matching cost of each order, 0..1."""
+    best: dict[str, int]
+    """Orders of the layout that fits best, with the sign that they give to its disparities."""
+    gap: float
+    """By how much the next layout's matching cost is above the best's."""
+    errors: float
+    """The gap in standard errors."""
+    clear: bool
+    """Whether the best layout is clearly better than any other."""
+    largest_disparity: float
+    """Under the best layout, but for a few outliers: absolute, pixels per view step."""
+    within: bool
+    """Whether the search goes beyond the scene's disparities."""
 
 
 def best_trial(views: Views) -> Trial | None:
@@ -159,17 +118,17 @@ def best_trial(views: Views) -> Trial | None:
     return best
 
 
-def steps_under(order: str, steps: list[Step]) -> npt.NDArray[np.int64]:
-    """Steps of views after their grid is laid out anew by an order, shape (V, 2)."""
+def baselines_under(order: str, baselines: list[Baseline]) -> npt.NDArray[np.int64]:
+    """Baselines of views after their grid is laid out anew by an order, shape (V, 2)."""
     grid = ORDERS[order](np.arange(9).reshape(3, 3))
     # where the views one row and one column after the centre go
     matrix = np.stack([np.argwhere(grid == view)[0] - 1 for view in (7, 5)])
-    return np.asarray(np.array(steps, np.int64).reshape(-1, 2) @ matrix, np.int64)
+    return np.asarray(np.array(baselines, np.int64).reshape(-1, 2) @ matrix, np.int64)
 
 
 def _distances(views: Views) -> Iterator[tuple[int, int]]:
-    """Steps to the most distant view used, and further reduction: first a middle distance, then less, then more."""
-    most_distant = min(REACH, max(max(map(abs, step)) for step in views.steps))
+    """Baselines to the most distant view used, and further reduction: first a middle distance, then less, then more."""
+    most_distant = min(REACH, max(max(map(abs, baseline)) for baseline in views.baselines))
     reach = min(most_distant, _FIRST_REACH)
     while reach:
         yield reach, 1
@@ -181,38 +140,56 @@ def _distances(views: Views) -> Iterator[tuple[int, int]]:
 
 
 def _tried(views: Views, reach: int, factor: int) -> Trial | None:
-    """Compare the layouts by the views about ``reach`` steps away; None where they say nothing."""
-    steps = _ring(views.steps, reach)
-    layouts, offsets = _layouts(steps)
+    """Compare the layouts by the views about ``reach`` rows or columns away; None where they say nothing."""
+    baselines = _ring(views.baselines, reach)
+    layouts, offsets = _layouts(baselines)
     if len(layouts) < 2 or min(views.shape) // factor < _LEAST_SIDE:
         return None
     reference = views.detail((0, 0), factor)
     points = _points(reference)
     if len(points) < _FEWEST_POINTS:
         return None
-    count = round(_MOVEMENT / _MOVEMENT_STEP)
-    candidates = (np.arange(-count, count + 1) * (_MOVEMENT_STEP / abs(offsets).max())).astype(np.float32)
-    others = np.stack([views.detail(step, factor) for step in steps])
+    count = round(_MOVEMENT / _MOVEMENT_SPACING)
+    candidates = (np.arange(-count, count + 1) * (_MOVEMENT_SPACING / abs(offsets).max())).astype(np.float32)
+    others = np.stack([views.detail(baseline, factor) for baseline in baselines])
     cost, disparity = layout_costs(reference, others, offsets, candidates, points, _PATCH_RADIUS)
-    return Trial(layouts, cost, disparity * factor, float(candidates[-1]) * factor)
+    mean = cost.mean(axis=0)
+    best, following = mean.argsort(kind="stable")[:2]
+    difference = cost[:, following] - cost[:, best]
+    gap = float(difference.mean())
+    errors = gap * math.sqrt(len(cost)) / max(float(difference.std()), 1e-6)
+    matched = abs(factor * disparity[cost[:, best] < _MATCHED, best])
+    extent = float(candidates[-1]) * factor
+    largest = float(np.quantile(matched, 1 - _AT_END)) if matched.size else extent
+    return Trial(
+        costs={order: float(mean[n]) for n, layout in enumerate(layouts) for order in layout},
+        best=layouts[best],
+        gap=gap,
+        errors=errors,
+        clear=bool(mean[following] >= _CLEAR_RATIO * mean[best] and errors >= _CLEAR_ERRORS),
+        largest_disparity=largest,
+        within=largest < 0.95 * extent,
+    )
 
 
-def _ring(steps: list[Step], reach: int) -> list[Step]:
+def _ring(baselines: list[Baseline], reach: int) -> list[Baseline]:
     """Views beyond half of ``reach``; first those along the axes and diagonals, and more distant ones."""
 
-    def rank(step: Step) -> tuple[int, int, Step]:
-        t, s = abs(step[0]), abs(step[1])
-        return min(t, s, abs(t - s)), -max(t, s), step
+    def rank(baseline: Baseline) -> tuple[int, int, Baseline]:
+        t, s = abs(baseline[0]), abs(baseline[1])
+        return min(t, s, abs(t - s)), -max(t, s), baseline
 
-    return sorted((step for step in steps if reach / 2 < max(map(abs, step)) <= reach), key=rank)[:_MOST_VIEWS]
+    return sorted((baseline for baseline in baselines if reach / 2 < max(map(abs, baseline)) <= reach), key=rank)[
+        :_MOST_VIEWS
+    ]
 
 
-def _layouts(steps: list[Step]) -> tuple[list[dict[str, int]], FloatMap]:
+def _layouts(baselines: list[Baseline]) -> tuple[list[dict[str, int]], FloatMap]:
     """Orders that put these views at the same positions but for the sign, and those positions, shape (L, V, 2)."""
     layouts: list[dict[str, int]] = []
     positions: list[npt.NDArray[np.int64]] = []
     for order in ORDERS:
-        position = steps_under(order, steps)
+        position = baselines_under(order, baselines)
         for layout, known in zip(layouts, positions, strict=True):
             if np.array_equal(position, known) or np.array_equal(position, -known):
                 layout[order] = 1 if np.array_equal(position, known) else -1

@@ -66,8 +66,9 @@ class OrderCheck:
                 "cannot tell: no order fits clearly better than the others (too little texture, or too little movement "
                 "between the views)"
             )
-        if self.best != self.read_in:
-            return self._advice()
+        warning = self.warning()
+        if warning is not None:
+            return warning
         if self.sign_clear:
             return "the views are in the right order"
         return (
@@ -77,9 +78,8 @@ class OrderCheck:
 
     def warning(self) -> str | None:
         """What to read the light field with instead; None unless another order is clearly better."""
-        return self._advice() if self.clear and self.best != self.read_in else None
-
-    def _advice(self) -> str:
+        if not self.clear or self.best == self.read_in:
+            return None
         fault = _FAULTS[self.best] if self.read_in == AS_GIVEN else f"--order {self.read_in} does not fit"
         advice = f"{fault}: read it with --order {self.best}"
         return advice if self.sign_clear else f"{advice}, or {self._turned} if depth comes out inside out"
@@ -109,7 +109,7 @@ def check_order(light_field: LightField, read_in: str = AS_GIVEN) -> OrderCheck:
     trial = best_trial(views)
     if trial is None:
         return OrderCheck(dict.fromkeys(ORDERS, 1.0), read_in, clear=False, sign_clear=False, read_in=read_in)
-    costs = trial.matching_costs()
+    costs = dict(trial.costs)
     sign_clear = False
     if trial.clear:
         greater, lesser = occlusion_votes(views, trial)

@@ -1,7 +1,7 @@
 """What made a file: the attributes of stage files and results.
 
-A *step* is a dictionary of ``stage``, ``choice`` and ``parameters``; the steps that led to a map, in order, are its
-history.
+An *entry* is a dictionary of ``stage``, ``choice`` and ``parameters``; the entries of the stages that led to a map, in
+order, are its history.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from sepi.io.hdf5 import Attribute, read_attributes
 from sepi.lightfield import LightField
 from sepi.stage import Parameters
 
-Step = dict[str, Any]
+Entry = dict[str, Any]
 
 
 def package_version() -> str:
@@ -28,22 +28,22 @@ def package_version() -> str:
         return "unknown"
 
 
-def step(stage: str, choice: str, parameters: Parameters) -> Step:
-    """The step of a stage that ran with these parameters."""
+def entry(stage: str, choice: str, parameters: Parameters) -> Entry:
+    """The entry of a stage that ran with these parameters."""
     return {"stage": stage, "choice": choice, "parameters": parameters.model_dump(mode="json")}
 
 
-def stage_attributes(light_field: LightField, steps: Sequence[Step]) -> dict[str, Attribute]:
+def stage_attributes(light_field: LightField, history: Sequence[Entry]) -> dict[str, Attribute]:
     """Attributes of a stage file.
 
     Parameters
     ----------
     light_field : LightField
         With a known disparity range.
-    steps : sequence of Step
-        How the maps were made; the last step is the file's own, the others become ``made_from``.
+    history : sequence of Entry
+        How the maps were made; the last entry is the file's own, the others become ``made_from``.
     """
-    *before, last = steps
+    *before, last = history
     return {
         **scene_attributes(light_field),
         "stage": last["stage"],
@@ -53,17 +53,17 @@ def stage_attributes(light_field: LightField, steps: Sequence[Step]) -> dict[str
     }
 
 
-def result_attributes(light_field: LightField, variant: str, steps: Sequence[Step]) -> dict[str, Attribute]:
-    """Attributes of a variant's result: ``made_from`` holds every step."""
+def result_attributes(light_field: LightField, variant: str, history: Sequence[Entry]) -> dict[str, Attribute]:
+    """Attributes of a variant's result: ``made_from`` holds the whole history."""
     return {
         **scene_attributes(light_field),
         "variant": variant,
-        "made_from": json.dumps(list(steps), sort_keys=True),
+        "made_from": json.dumps(list(history), sort_keys=True),
     }
 
 
-def history_of(path: Path | None) -> list[Step]:
-    """The steps that made a stage file, its own last; none without a file.
+def history_of(path: Path | None) -> list[Entry]:
+    """The history of a stage file, its own entry last; none without a file.
 
     Raises
     ------

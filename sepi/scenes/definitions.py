@@ -23,14 +23,6 @@ class Scene(NamedTuple):
     """Standard deviation at the left and at the right side of each view, full range = 1."""
 
 
-def _fronto_parallel() -> list[Surface]:
-    return [Surface([everywhere()], Plane(1.0), noise(1, (0.5, 0.47, 0.43), 0.14))]
-
-
-def _slanted_plane() -> list[Surface]:
-    return [Surface([everywhere()], Plane(0.0, across=1.6, down=-0.8), noise(2, (0.42, 0.5, 0.46), 0.14))]
-
-
 def _fine_structures() -> list[Surface]:
     ground = Surface([everywhere()], Plane(-0.8, across=0.6), photograph("gravel", (1.05, 1.0, 0.9), seed=3))
     front = Plane(0.9, down=-0.4)
@@ -132,8 +124,14 @@ def _curved_occluders() -> list[Surface]:
 
 
 DEFINITIONS: dict[str, Scene] = {
-    "fronto_parallel": Scene("one textured plane of disparity exactly 1", _fronto_parallel),
-    "slanted_plane": Scene("one textured plane, tilted about both axes", _slanted_plane),
+    "fronto_parallel": Scene(
+        "one textured plane of disparity exactly 1",
+        lambda: [Surface([everywhere()], Plane(1.0), noise(1, (0.5, 0.47, 0.43), 0.14))],
+    ),
+    "slanted_plane": Scene(
+        "one textured plane, tilted about both axes",
+        lambda: [Surface([everywhere()], Plane(0.0, 1.6, -0.8), noise(2, (0.42, 0.5, 0.46), 0.14))],
+    ),
     "fine_structures": Scene("thin bars, teeth and threads before a background, with growing gaps", _fine_structures),
     "dots": Scene("small discs before a plane, under pixel noise that grows to the right", _dots, (0.02, 0.1)),
     "pyramids": Scene("slanted pyramids, two standing and two sunk", _pyramids),

@@ -11,7 +11,6 @@ import numpy.typing as npt
 from sepi.errors import SepiError
 from sepi.lightfield import DisparityRange, LightField
 from sepi.scenes.definitions import DEFINITIONS
-from sepi.scenes.rendering import drawing, occluded, render_view, visible
 from sepi.validation import require_known
 
 SMALLEST, LARGEST = 64, 1024
@@ -46,10 +45,13 @@ def render(name: str, *, size: int = 192, views: int = 9) -> LightField:
     SepiError
         If there is no such scene, or size or views is out of bounds.
     """
+    # brings the compiler with it
+    from sepi.scenes.rendering import drawing, occluded, render_view, visible
+
     require_known("built-in scenes", [name], DEFINITIONS)
     for what, value, least, most in (("size", size, SMALLEST, LARGEST), ("views", views, 2, MOST_VIEWS)):
         if type(value) is not int or not least <= value <= most:
-            raise SepiError(f"scene {name}: {what}: expected a whole number from {least} to {most}, got {value!r}")
+            raise SepiError(f"scene {name}: {what} must be a whole number from {least} to {most}, got {value!r}")
     surfaces = DEFINITIONS[name].surfaces()
     scene = drawing(surfaces, size)
     disparity, owner = visible(scene, size)

@@ -13,18 +13,15 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from sepi.lightfield import BoolMap, FloatMap
+from sepi.scenes.rendering_kernels import FloatArray, IntArray, hide, nearest, shade
 from sepi.scenes.surfaces import Surface
 
 # Sub-samples per pixel and direction.
 SAMPLES = 4
 # A plane closer than this to edge-on counts as seen from its edge.
 EDGE_ON = 1e-9
-
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
 
 
 class Drawing(NamedTuple):
@@ -68,8 +65,6 @@ def drawing(surfaces: Sequence[Surface], size: int) -> Drawing:
 
 def render_view(scene: Drawing, size: int, v: int, u: int) -> FloatMap:
     """The view ``v`` steps below and ``u`` steps to the right of the centre; shape (size, size, 3) in about 0..1."""
-    from sepi.scenes.rendering_kernels import shade
-
     picture = np.zeros((size, size, 3), np.float32)
     edges, planes = _seen_from(scene, v, u)
     shade(scene.first_edge, scene.texels, scene.first_texel, scene.side, edges, planes, v, u, SAMPLES, picture)
@@ -78,8 +73,6 @@ def render_view(scene: Drawing, size: int, v: int, u: int) -> FloatMap:
 
 def visible(scene: Drawing, size: int) -> tuple[FloatArray, IntArray]:
     """Disparity and index of the surface at each pixel centre of the centre view, each of shape (size, size)."""
-    from sepi.scenes.rendering_kernels import nearest
-
     disparity = np.empty((size, size))
     owner = np.empty((size, size), np.int64)
     nearest(scene.first_edge, scene.planes, scene.edges, disparity, owner)
@@ -91,8 +84,6 @@ def occluded(scene: Drawing, disparity: FloatArray, grid: tuple[int, int]) -> Bo
 
     A point that leaves the picture in a view does not count as hidden there.
     """
-    from sepi.scenes.rendering_kernels import hide
-
     hidden = np.zeros(disparity.shape, bool)
     for t, s in np.ndindex(grid):
         v, u = t - grid[0] // 2, s - grid[1] // 2

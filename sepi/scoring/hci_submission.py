@@ -13,7 +13,6 @@ References
 from __future__ import annotations
 
 import math
-import re
 import stat
 import struct
 import tempfile
@@ -48,10 +47,9 @@ _NAMES = {part: [f"{part}/{scene}{end}" for scene in SCENES] for part, end in ((
 _EXPECTED = {name for names in _NAMES.values() for name in names}
 
 _PIXELS = f"{SHAPE[1]}x{SHAPE[0]}"
-_NUMBER = re.compile(r"[-+]?(\d+(\.\d*)?|\.\d+)([eE][-+]?\d+)?|[-+]?(nan|inf)", re.IGNORECASE)
 # room for a header besides the pixels; for a number and white space around it
 _MOST_BYTES = {MAPS: 4 * SHAPE[0] * SHAPE[1] + 256, RUNTIMES: 64}
-# of the same kind in a report
+# about files that do not belong
 _MOST_LINES = 10
 
 
@@ -170,8 +168,7 @@ def _problems_of_archive(path: Path, partial: bool) -> list[str]:
         damaged = _unpack(archive, Path(folder))
         names = archive.namelist()
         twice = [f"{_shown(name)}: {count} files of this name" for name, count in Counter(names).items() if count > 1]
-        problems = _strangers(names) + _problems_in(Path(folder), names, damaged, partial)
-        return _first(twice, "names given more than once") + problems
+        return twice + _strangers(names) + _problems_in(Path(folder), names, damaged, partial)
 
 
 def _unpack(archive: zipfile.ZipFile, folder: Path) -> dict[str, str]:
@@ -203,8 +200,10 @@ def _strangers(names: Collection[str]) -> list[str]:
     wrapping = {parts[0] for parts in strange.values() if parts[1:2] and parts[1] in _NAMES} - {"", "__MACOSX"}
     lines = [f"{folder}/: {MAPS}/ and {RUNTIMES}/ must lie at the root, not in this folder" for folder in wrapping]
     others = [name for name, parts in strange.items() if parts[0] not in wrapping]
-    told = [f"{_shown(name)}: does not belong to a submission; leave it out" for name in others]
-    return sorted(map(_shown, lines)) + _first(told, "files that do not belong")
+    lines = sorted(map(_shown, lines))
+    lines += [f"{_shown(name)}: does not belong to a submission; leave it out" for name in others[:_MOST_LINES]]
+    more = len(others) - _MOST_LINES
+    return lines + ([f"...: {more} more files that do not belong"] if more > 0 else [])
 
 
 def _problems_in(folder: Path, names: Collection[str], damaged: Mapping[str, str], partial: bool) -> list[str]:
@@ -244,9 +243,10 @@ def _read_seconds(path: Path) -> float:
     if problem := _size_problem(RUNTIMES, path.stat().st_size):
         raise SepiError(f"{path}: {problem}")
     text = path.read_bytes().decode("ascii", "replace").strip()
-    if not _NUMBER.fullmatch(text):
-        raise SepiError(f"{path}: expected the run time in seconds as a number, got {text!r}")
-    seconds = float(text)
+    try:
+        seconds = float(text)
+    except ValueError as error:
+        raise SepiError(f"{path}: expected the run time in seconds as a number, got {text!r}") from error
     if not 0 < seconds < math.inf:
         raise SepiError(f"{path}: expected a positive number of seconds, got {text}")
     return seconds
@@ -256,11 +256,6 @@ def _size_problem(name: str, size: int) -> str | None:
     part = name.partition("/")[0]
     what = {MAPS: f"a map of {_PIXELS} pixels", RUNTIMES: "one number"}[part]
     return None if size <= _MOST_BYTES[part] else f"{size} bytes are too many for {what}"
-
-
-def _first(lines: list[str], what: str) -> list[str]:
-    more = len(lines) - _MOST_LINES
-    return lines if more <= 0 else [*lines[:_MOST_LINES], f"...: {more} more {what}"]
 
 
 def _shown(name: str) -> str:

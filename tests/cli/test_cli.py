@@ -132,11 +132,6 @@ def test_depth_from_the_file_that_ingest_wrote(scene: Path) -> None:
     assert everything_in(Path("from-file")) == everything_in(Path("from-folder"))
 
 
-def test_python_gives_the_same_map_as_the_command(scene: Path, result: Path) -> None:
-    maps = sepi.estimate_depth(sepi.read_light_field(scene), "best", {"initial": {"num_disparities": 21}})
-    np.testing.assert_array_equal(maps.disparity, read_pfm(result / "disparity.pfm"))
-
-
 def test_depth_of_another_view(scene: Path) -> None:
     called = call("depth", scene, "-o", "out", "--view", "0,2", *FAST)
     assert called.exit_code == 0
@@ -431,15 +426,6 @@ def test_program_runs_and_fails_without_traceback(pyramids: Path, tmp_path: Path
     assert (bad.returncode, bad.stdout) == (1, "")
     assert bad.stderr == "sepi: absent: no such file or folder\n"
     assert run("--version", cwd=tmp_path).stdout == f"sepi {sepi.__version__}\n"
-
-
-def test_help_starts_without_the_slow_libraries(tmp_path: Path) -> None:
-    """Every import that --help can do without is time that each command takes before it says anything."""
-    slow = ["scipy.ndimage", "scipy.sparse", "skimage", "matplotlib", "pyamg", "sepi.initial"]
-    code = f"import sys, sepi.cli.main; print(*[name for name in {slow} if name in sys.modules])"
-    source = str(Path(__file__).parents[2])
-    done = subprocess.run([sys.executable, "-c", code], cwd=source, capture_output=True, text=True, check=True)
-    assert done.stdout.split() == []
 
 
 @pytest.mark.parametrize("command", ["depth", "evaluate", "info", "check", "scenes", "points", "submission"])

@@ -374,7 +374,7 @@ def test_what_the_benchmark_would_refuse_is_not_packed(tmp_path: Path) -> None:
         assert expected in error_of(call(submission, *words, "--partial", "-o", tmp_path / "a.zip")), words
         assert (tmp_path / "a.zip").read_text() == "before"
     os.mkfifo(tmp_path / "pipe")
-    assert "pipe: not a file" in error_of(call(submission, good_one, "--partial", "-o", tmp_path / "pipe"))
+    assert "pipe: cannot be written" in error_of(call(submission, good_one, "--partial", "-o", tmp_path / "pipe"))
     assert (tmp_path / "pipe").is_fifo()
     (good_one / "disparity.pfm").unlink()
     assert "cotton/disparity.pfm: no such file" in error_of(call(submission, good_one, "--partial"))
