@@ -30,9 +30,6 @@ _BASE, _CHOICE = "base", "choice"
 # a folder's name holds 255 bytes
 _LONGEST_LABEL = 120
 
-# rough part of the running time, for the progress bar only
-_SHARE = {"initial": 0.25, "occlusion": 0.35, "textureless": 0.1, "optimize": 0.3}
-
 
 @dataclass(frozen=True)
 class Variant:
@@ -277,15 +274,13 @@ def estimate_depth(
 
         light_field = light_field.with_range(estimate_range(light_field))
     maps: StageMaps | None = None
-    done = 0.0
     with shared_detail():
-        for stage, choice in chosen.choices.items():
-            maps = STAGES[stage][choice].run(light_field, maps, settings[stage], _part(progress, done, _SHARE[stage]))
-            done += _SHARE[stage]
-            progress(done)
+        for number, (stage, choice) in enumerate(chosen.choices.items()):
+
+            def of_all(fraction: float, number: int = number) -> None:
+                progress((number + fraction) / len(STAGES))
+
+            maps = STAGES[stage][choice].run(light_field, maps, settings[stage], of_all)
+            of_all(1.0)
     assert maps is not None  # there are stages
     return maps
-
-
-def _part(progress: Progress, start: float, share: float) -> Progress:
-    return lambda fraction: progress(start + share * fraction)
