@@ -58,38 +58,29 @@ def occlusion_votes(views: Views, trial: Trial) -> tuple[int, int]:
     reference = _middle(views.plain((0, 0))) * scale
     baselines = {direction: _at(direction, reach) for direction in directions}
     pictures = {
-        baseline: _as_bright(_middle(views.plain(baseline)) * scale, reference)
-        for both in baselines.values()
-        for baseline in both
+        at: _as_bright(_middle(views.plain(at)) * scale, reference) for both in baselines.values() for at in both
     }
     order = next(iter(trial.best))
-    positions = {baseline: (int(t), int(s)) for baseline in pictures for t, s in baselines_under(order, [baseline])}
+    positions = {at: (int(t), int(s)) for at in pictures for t, s in baselines_under(order, [at])}
     movement = min(_MOST_MOVEMENT, math.ceil(1.15 * trial.largest_disparity * reach) + 1)
     candidates = (np.arange(-movement, movement + 1) / reach).astype(np.float32)
     sides = [
-        (
-            np.stack([pictures[baseline] for baseline in both]),
-            np.array([positions[baseline] for baseline in both], np.int64),
-        )
+        (np.stack([pictures[at] for at in both]), np.array([positions[at] for at in both], np.int64))
         for both in baselines.values()
     ]
     disparity, trusted = _disparity(reference, sides, candidates)
     residual = {
-        baseline: residuals(
-            reference, picture, positions[baseline][0], positions[baseline][1], disparity, _WINDOW_RADIUS
-        )
-        for baseline, picture in pictures.items()
+        at: residuals(reference, picture, *positions[at], disparity, _WINDOW_RADIUS) for at, picture in pictures.items()
     }
     noise = max(_LEAST_NOISE, rounding, _typical([values[trusted] for values in residual.values()]))
     greater, lesser = 0, 0
     for t, s in directions:
-        here, there = ([residual[baseline] for baseline in baselines[direction]] for direction in ((t, s), (-t, -s)))
+        here, there = ([residual[at] for at in baselines[direction]] for direction in ((t, s), (-t, -s)))
         more, less = count_occlusions(
             here[-1],
             np.maximum(there[0], there[-1]),
             np.maximum.reduce([*here, *there]),
-            positions[baselines[t, s][-1]][0],
-            positions[baselines[t, s][-1]][1],
+            *positions[baselines[t, s][-1]],
             disparity,
             trusted,
             _SEEN * noise,
