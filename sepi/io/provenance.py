@@ -63,13 +63,7 @@ def result_attributes(light_field: LightField, variant: str, steps: Sequence[Ste
 
 
 def history_of(path: Path | None) -> list[Step]:
-    """The steps that made a stage file, its own last; none without a file.
-
-    Raises
-    ------
-    SepiError
-        If the file is no stage file.
-    """
+    """The steps that made a stage file, its own last; none without a file."""
     if path is None:
         return []
     attributes = read_attributes(path)
