@@ -32,8 +32,8 @@ def read_pfm(path: Path) -> FloatMap:
         body = memoryview(data)[header.end() :]
         if not scale or not 0 < 4 * width * height == len(body):
             raise SepiError(
-                f"damaged PFM of {width}x{height} pixels and scale {scale:g}: expected {4 * width * height} bytes after "
-                f"the header, got {len(body)}"
+                f"damaged PFM of {width}x{height} pixels and scale {scale:g}: expected {4 * width * height} bytes "
+                f"after the header, got {len(body)}"
             )
         values = np.frombuffer(body, "<f4" if scale < 0 else ">f4").reshape(height, width)
         return values[::-1].astype(np.float32)
