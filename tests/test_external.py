@@ -14,7 +14,7 @@ from click.testing import CliRunner, Result
 from sepi.errors import SepiError, SepiWarning
 from sepi.evaluate import evaluation_of
 from sepi.external import ExternalSource, command, external_maps
-from sepi.io.external_maps import ExternalMap, read_external, read_external_scores, write_external
+from sepi.io.external_maps import ExternalMap, read_external, write_external
 from sepi.io.hdf5 import write_light_field
 from sepi.io.pfm import write_pfm
 from sepi.lightfield import LightField
@@ -169,7 +169,7 @@ class TestFile:
         """Tables need no maps."""
         external = self.external(light_field, estimate)
         write_external(tmp_path / "a.h5", {"SPO": external, "lost": ExternalMap("x", "no file")})
-        back = read_external_scores(tmp_path / "a.h5")
+        back = read_external(tmp_path / "a.h5", with_maps=False)
         assert list(back) == ["SPO", "lost"]
         assert back["SPO"].evaluation.scores == external.evaluation.scores
         assert (back["SPO"].disparity, back["SPO"].evaluation.error, back["SPO"].evaluation.regions) == (None, None, {})

@@ -42,11 +42,11 @@ def points(
       sepi points views-depth -o views.ply --focal-length 50 --baseline 10 --focus-distance 2 --sensor-size 36
     """
     from sepi.io.ply import write_ply
-    from sepi.io.point_cloud import view_points
+    from sepi.io.point_cloud import point_cloud
     from sepi.io.result_folder import read_result
 
     result = read_result(result_path)
-    cloud = view_points(
+    cloud = point_cloud(
         result.picture,
         result.disparity,
         result.confidence,
@@ -61,7 +61,7 @@ def points(
     path = output or (result_path if result_path.is_dir() else result_path.parent) / "points.ply"
     if path.suffix.lower() != ".ply":
         raise SepiError(f"{path}: expected a name that ends with .ply, the format of the file")
-    write_ply(path, cloud.positions, cloud.colours, cloud.comments())
+    write_ply(path, cloud)
     units = "metres" if cloud.metric else "relief: the camera is not known, so not to scale"
     click.echo(f"written: {path} ({len(cloud.positions)} points, {units})")
 

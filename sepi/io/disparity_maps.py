@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from sepi.errors import SepiError
-from sepi.io.hdf5 import has_dataset, read_map
+from sepi.io.hdf5 import has_dataset, open_hdf5, read_dataset
 from sepi.io.images import png_texts, read_picture
 from sepi.io.pfm import read_pfm
 from sepi.io.readers.numpy_files import read_array
@@ -81,19 +81,17 @@ def _read(path: Path, scaled: bool) -> FloatMap:
     suffix = path.suffix.lower()
     if suffix == ".pfm":
         return read_pfm(path)
-    if suffix in _HDF5:
-        return read_map(path, _DATASET)
-    if suffix == ".npy":
-        return _read_npy(path)
     if suffix == ".png":
         return _read_png(path, scaled)
-    raise _no_map(path)
-
-
-def _read_npy(path: Path) -> FloatMap:
-    values = read_array(path)
+    if suffix == ".npy":
+        values = read_array(path)
+    elif suffix in _HDF5:
+        with open_hdf5(path) as file:
+            values = read_dataset(path, file[_DATASET])
+    else:
+        raise _no_map(path)
     if values.ndim != 2 or values.dtype.kind not in "fiu":
-        raise SepiError(f"{path}: expected an array of numbers of shape (H, W)")
+        raise SepiError(f"{path}: expected an array of numbers of shape (H, W), got {values.dtype} {values.shape}")
     return np.asarray(values, np.float32)
 
 

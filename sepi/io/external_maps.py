@@ -12,17 +12,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-import h5py
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
-from sepi.errors import SepiError
 from sepi.io.disparity_maps import SUFFIXES, map_file
 from sepi.io.hdf5 import UNITS, create_hdf5, open_hdf5
 from sepi.io.scores import Evaluation, evaluation_in, put_evaluation, scores_in
 from sepi.lightfield import FloatMap
 
 _METHODS = "methods"
+_ATTRIBUTES = ("source", "problem", "sha256")
 
 
 class ExternalSource(BaseModel):
@@ -90,7 +89,7 @@ def write_external(path: Path, maps: Mapping[str, ExternalMap]) -> None:
         methods = file.create_group(_METHODS, track_order=True)
         for name, external in maps.items():
             group = methods.create_group(name)
-            for key in ("source", "problem", "sha256"):
+            for key in _ATTRIBUTES:
                 group.attrs[key] = getattr(external, key)
             if external.disparity is not None:
                 group.create_dataset("disparity", data=external.disparity)
@@ -98,40 +97,21 @@ def write_external(path: Path, maps: Mapping[str, ExternalMap]) -> None:
             put_evaluation(group, external.evaluation)
 
 
-def read_external(path: Path) -> dict[str, ExternalMap]:
+def read_external(path: Path, *, with_maps: bool = True) -> dict[str, ExternalMap]:
     """Method to what :func:`write_external` wrote of it, in the same order.
 
-    Raises
-    ------
-    SepiError
-        If the file is missing, not HDF5, or not such a file.
+    Parameters
+    ----------
+    path : Path
+    with_maps : bool
+        Whether to read disparity, errors and regions, too, rather than the scores alone.
     """
-    return _read(path, with_maps=True)
-
-
-def read_external_scores(path: Path) -> dict[str, ExternalMap]:
-    """Like :func:`read_external`, but without any map: no disparity, no errors, no regions.
-
-    Raises
-    ------
-    SepiError
-        As :func:`read_external`.
-    """
-    return _read(path, with_maps=False)
-
-
-def _read(path: Path, with_maps: bool) -> dict[str, ExternalMap]:
-    with open_hdf5(path) as file:
-        if _METHODS not in file:
-            raise SepiError(f"{path}: not a file of external maps (written by python -m sepi.external)")
-        return {name: _external(group, with_maps) for name, group in file[_METHODS].items()}
-
-
-def _external(group: h5py.Group, with_maps: bool) -> ExternalMap:
-    return ExternalMap(
-        source=str(group.attrs["source"]),
-        problem=str(group.attrs["problem"]),
-        sha256=str(group.attrs["sha256"]),
-        disparity=group["disparity"][...].astype(np.float32) if with_maps and "disparity" in group else None,
-        evaluation=evaluation_in(group) if with_maps else Evaluation(scores_in(group)),
-    )
+    with open_hdf5(path, "file of external maps (written by python -m sepi.external)") as file:
+        return {
+            name: ExternalMap(
+                **{key: str(group.attrs[key]) for key in _ATTRIBUTES},
+                disparity=group["disparity"][...].astype(np.float32) if with_maps and "disparity" in group else None,
+                evaluation=evaluation_in(group) if with_maps else Evaluation(scores_in(group)),
+            )
+            for name, group in file[_METHODS].items()
+        }

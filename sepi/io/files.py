@@ -1,4 +1,7 @@
-"""Files appear whole or not at all: write under a temporary name in the same folder, then rename."""
+"""Files that are read are sound or one clear error; files that are written appear whole or not at all.
+
+They are written under a temporary name in the same folder, then renamed.
+"""
 
 from __future__ import annotations
 
@@ -9,11 +12,45 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from sepi.errors import SepiError
+from sepi.errors import SepiError, printable
 
 # an interrupt may strike between any two instructions, also where no `finally` is in force: what is still listed when
 # the program ends was not finished, and is removed
 _unfinished: set[Path] = set()
+
+
+@contextmanager
+def naming(path: Path) -> Iterator[None]:
+    """Put the path before an error that does not begin with it."""
+    try:
+        yield
+    except SepiError as error:
+        raise error if str(error).startswith(str(path)) else SepiError(f"{path}: {error}") from error
+
+
+@contextmanager
+def reading(path: Path, kind: str) -> Iterator[None]:
+    """Turn whatever goes wrong while a file is read into one error that names it.
+
+    Libraries stumble over damage in many ways; what they say of it follows in brackets.
+
+    Parameters
+    ----------
+    path : Path
+    kind : str
+        What the file should be, after "not a".
+    """
+    try:
+        with naming(path):
+            yield
+    except (SepiError, MemoryError, AssertionError, NameError):
+        # what is no fault of the file
+        raise
+    except Exception as error:
+        if isinstance(error, OSError) and error.strerror:
+            raise SepiError(f"{path}: cannot be read ({error.strerror})") from error
+        reason = printable(str(error))[:200] or type(error).__name__
+        raise SepiError(f"{path}: not a {kind}, or damaged or cut off ({reason})") from error
 
 
 @contextmanager

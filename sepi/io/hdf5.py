@@ -19,9 +19,10 @@ import numpy.typing as npt
 
 from sepi.camera import Camera
 from sepi.errors import SepiError, printable
-from sepi.io.files import atomic_path
-from sepi.lightfield import RANGE_SOURCES, DisparityRange, FloatMap, LightField
+from sepi.io.files import atomic_path, reading
+from sepi.lightfield import RANGE_SOURCES, DisparityRange, LightField
 from sepi.stage import StageMaps
+from sepi.validation import require_known
 
 Attribute = str | float | int | tuple[float, float]
 
@@ -47,35 +48,11 @@ def write_stage(path: Path, maps: StageMaps, attributes: Mapping[str, Attribute]
 
 
 def read_stage(path: Path) -> StageMaps:
-    """Read the maps that ``write_stage`` wrote.
-
-    Raises
-    ------
-    SepiError
-        If the file is missing, not HDF5, or holds no disparity and confidence.
-    """
-    with open_hdf5(path) as file:
+    """Read the maps that ``write_stage`` wrote."""
+    with open_hdf5(path, "stage file") as file:
         maps = {name: file[name][...] for name in file}
-        names = file["view_subset"].attrs["names"] if "view_subset" in file else []
-    try:
-        return StageMaps(maps.pop("disparity"), maps.pop("confidence"), maps, tuple(name.decode() for name in names))
-    except KeyError as error:
-        raise SepiError(f"{path}: not a stage file: dataset {error} is missing") from error
-
-
-def read_map(path: Path, name: str) -> FloatMap:
-    """Read one map, (H, W) float32, of an HDF5 file.
-
-    Raises
-    ------
-    SepiError
-        If the file is missing, not HDF5, or holds no such map.
-    """
-    with open_hdf5(path) as file:
-        values = read_dataset(path, file[name])
-    if values.ndim != 2 or values.dtype.kind not in "fiu":
-        raise SepiError(f"{path}: expected '{name}' as numbers of shape (H, W), got {values.dtype} {values.shape}")
-    return values.astype(np.float32)
+        names = tuple(name.decode() for name in file["view_subset"].attrs["names"]) if "view_subset" in file else ()
+        return StageMaps(maps.pop("disparity"), maps.pop("confidence"), maps, names)
 
 
 def read_attributes(path: Path) -> dict[str, Any]:
@@ -122,46 +99,43 @@ def has_dataset(path: Path, name: str, *, if_damaged: bool = False) -> bool:
 
 
 def read_light_field(path: Path) -> LightField:
-    """Read a light field written by ``write_light_field``.
-
-    Raises
-    ------
-    SepiError
-        If the file is missing, not HDF5, or not a light field.
-    """
-    with open_hdf5(path) as file:
-        if "views" not in file or "name" not in file.attrs:
-            raise SepiError(
-                f"{path}: not a light field of this package: dataset 'views' or attribute 'name' is missing"
-            )
+    """Read a light field written by ``write_light_field``."""
+    with open_hdf5(path, "light field of this package") as file:
+        arrays = {name: read_dataset(path, file[name]) for name in ("views", "present", "ground_truth") if name in file}
         known = None
         if "disparity_range" in file.attrs:
             minimum, maximum = (float(value) for value in file.attrs["disparity_range"])
-            known = DisparityRange(minimum, maximum, _known_source(path, _text(path, file, "disparity_range_source")))
+            known = DisparityRange(minimum, maximum, _text(file, "disparity_range_source"))
+            require_known("disparity range", [known.source], RANGE_SOURCES)
         view = file.attrs.get("view")
+        ground_truth = arrays.get("ground_truth")
         return LightField(
-            views=read_dataset(path, file["views"]),
-            name=_text(path, file, "name"),
-            source=_text(path, file, "source"),
-            present=read_dataset(path, file["present"]).astype(bool),
+            views=arrays["views"],
+            name=_text(file, "name"),
+            source=_text(file, "source"),
+            present=arrays["present"].astype(bool),
             view=None if view is None else (int(view[0]), int(view[1])),
-            camera=Camera(*map(float, file.attrs["camera"])) if "camera" in file.attrs else None,
-            notes=tuple(_text(path, file, "notes").split("\0")) if "notes" in file.attrs else (),
+            camera=read_camera(file),
+            notes=tuple(_text(file, "notes").split("\0")) if "notes" in file.attrs else (),
             disparity_range=known,
-            ground_truth=read_dataset(path, file["ground_truth"]).astype(np.float32)
-            if "ground_truth" in file
-            else None,
-            masks={name: read_dataset(path, file["masks"][name]).astype(bool) for name in file.get("masks", {})},
+            ground_truth=None if ground_truth is None else ground_truth.astype(np.float32),
+            masks={name: read_dataset(path, mask).astype(bool) for name, mask in file.get("masks", {}).items()},
         )
 
 
-def require_values_inside(path: Path, dataset: h5py.Dataset) -> None:
-    """Raise unless a dataset's values can lie in the file, so that no memory is taken on the word of its shape.
+def read_camera(file: h5py.File) -> Camera | None:
+    """The camera of a light field's or a result's file, where it has one."""
+    return Camera(*map(float, file.attrs["camera"])) if "camera" in file.attrs else None
+
+
+def read_dataset(path: Path, dataset: h5py.Dataset, part: Any = ...) -> npt.NDArray[Any]:
+    """The values of a dataset, or a part of them, unless its bytes in the file cannot hold as many.
 
     Raises
     ------
     SepiError
-        If ``dataset`` is none, lies in another file, or claims more values than its bytes in the file can hold.
+        If ``dataset`` is none, lies in another file, or claims more values than it can have: no memory is taken on the
+        word of its shape.
     """
     name = printable(str(dataset.name).lstrip("/"))
     if not isinstance(dataset, h5py.Dataset) or dataset.shape is None:
@@ -172,51 +146,21 @@ def require_values_inside(path: Path, dataset: h5py.Dataset) -> None:
     # what is not compressed is stored as it is, but for chunks never written
     if held > path.stat().st_size or dataset.nbytes > held * (DEFLATE_RATIO if dataset.chunks else 1):
         raise SepiError(f"{path}: damaged HDF5 file: '{name}' of shape {dataset.shape} cannot lie in {held} bytes")
-
-
-def read_dataset(path: Path, dataset: h5py.Dataset) -> npt.NDArray[Any]:
-    """All values of a dataset.
-
-    Raises
-    ------
-    SepiError
-        As :func:`require_values_inside`.
-    """
-    require_values_inside(path, dataset)
-    return np.asarray(dataset[...])
+    return np.asarray(dataset[part])
 
 
 @contextmanager
-def open_hdf5(path: Path) -> Iterator[h5py.File]:
-    """Open an HDF5 file for reading.
-
-    Raises
-    ------
-    SepiError
-        If it is missing, not HDF5, or damaged.
-    """
+def open_hdf5(path: Path, kind: str = "readable HDF5 file") -> Iterator[h5py.File]:
+    """Open an HDF5 file for reading; ``kind`` is what it should be."""
     if not path.is_file():
         raise SepiError(f"{path}: no such file")
-    try:
-        file = h5py.File(path, "r")
-    except OSError as error:
-        raise SepiError(f"{path}: not a readable HDF5 file ({printable(str(error))})") from error
-    with file:
-        try:
-            yield file
-        except (ArithmeticError, AttributeError, LookupError, OSError, TypeError, ValueError, RuntimeError) as error:
-            raise SepiError(f"{path}: damaged HDF5 file ({printable(str(error))})") from error
+    with reading(path, kind), h5py.File(path, "r") as file:
+        yield file
 
 
 @contextmanager
 def create_hdf5(path: Path) -> Iterator[h5py.File]:
-    """Write an HDF5 file, whole or not at all.
-
-    Raises
-    ------
-    SepiError
-        If the file cannot be written, or the disk is full.
-    """
+    """Write an HDF5 file, whole or not at all."""
     with atomic_path(path) as temporary, _Disk(temporary, "w+") as disk:
         with h5py.File(disk, "w") as file:
             yield file
@@ -229,19 +173,12 @@ def _fixed(text: str) -> np.bytes_:
     return np.bytes_(text.encode() or b"\0")
 
 
-def _text(path: Path, file: h5py.File, key: str) -> str:
+def _text(file: h5py.File, key: str) -> str:
     """Text of an attribute; several texts are joined by NUL."""
     kind = file.attrs.get_id(key).get_type()
     if not isinstance(kind, h5py.h5t.TypeStringID) or kind.is_variable_str():
-        raise SepiError(f"{path}: not a light field of this package: attribute '{key}' is no text of fixed length")
-    values = np.ravel(file.attrs[key]).tolist()
-    return "\0".join(value.decode("utf-8", "replace") for value in values)
-
-
-def _known_source(path: Path, source: str) -> str:
-    if source not in RANGE_SOURCES:
-        raise SepiError(f"{path}: damaged: a disparity range {source!r}; expected one of {', '.join(RANGE_SOURCES)}")
-    return source
+        raise SepiError(f"not a light field of this package: attribute '{key}' is no text of fixed length")
+    return "\0".join(value.decode("utf-8", "replace") for value in np.ravel(file.attrs[key]).tolist())
 
 
 class _Disk(io.FileIO):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import os
 import threading
 from collections.abc import Iterator, Mapping, Sequence
@@ -16,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sepi.errors import SepiError
-from sepi.io.files import atomic_path
+from sepi.io.files import atomic_path, reading
 from sepi.io.picture_headers import Header, read_header
 from sepi.lightfield import HIGHEST, LOWEST, BoolMap
 from sepi.threads import available_cores
@@ -46,9 +45,12 @@ def read_picture(path: Path) -> Pixels:
         float32, or has float pixels that are not finite or far outside 0..1.
     """
     with _opened(path) as file:
+        header = read_header(path, file, whole=True)
+        file.seek(0)
         data = file.read()
-    header = read_header(path, io.BytesIO(data), whole=True)
-    image = _pnm_pixels(path, data, header) if header.kind == "PNM" else _decoded(path, data, header)
+    image = _decoded(path, data, header)
+    if header.white:
+        image = _stretched(path, image, header.white)
     if image.dtype == np.float32 and not (image.min() >= LOWEST and image.max() <= HIGHEST):
         what = f"{image.min():g} to {image.max():g}" if np.isfinite(image).all() else "NaN or infinite ones"
         raise SepiError(f"{path}: float pixels must be finite and within 0..1, got {what}; divide by white's value")
@@ -100,13 +102,7 @@ def read_views(paths: Sequence[Path], positions: Sequence[int] | None = None, co
 
 
 def picture_header(path: Path) -> Header:
-    """What a picture of any kind that is read is, without decoding it.
-
-    Raises
-    ------
-    SepiError
-        If the file is unreadable, or no such picture.
-    """
+    """What a picture of any kind that is read is, without decoding it."""
     with _opened(path) as file:
         return read_header(path, file)
 
@@ -154,21 +150,20 @@ def write_png(path: Path, pixels: Pixels | BoolMap, texts: Mapping[str, str] | N
 
 @contextmanager
 def _opened(path: Path) -> Iterator[IO[bytes]]:
-    try:
-        if path.is_symlink() and not path.exists():
-            raise SepiError(f"{path}: a link to {path.readlink()}, which does not exist")
-        if path.exists() and not path.is_dir() and not path.is_file():
-            raise SepiError(f"{path}: cannot be read (not a plain file)")
+    with reading(path, "picture"):
+        # a pipe would be waited for
+        if not path.is_file():
+            raise SepiError("cannot be read: no plain file, or a link to nothing")
         if path.stat().st_size > _MAX_BYTES:
-            raise SepiError(f"{path}: {path.stat().st_size} bytes are more than a picture has")
+            raise SepiError(f"{path.stat().st_size} bytes are more than a picture has")
         with path.open("rb") as file:
             yield file
-    except OSError as error:
-        raise SepiError(f"{path}: cannot be read ({error.strerror})") from error
 
 
 def _decoded(path: Path, data: bytes, header: Header) -> Pixels:
     """Pixels as OpenCV decodes them, in the order RGB."""
+    # OpenCV wants something behind the last digit of a PNM
+    data += b"\n" if header.white else b""
     try:
         with _silent_opencv():
             image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
@@ -185,25 +180,12 @@ def _decoded(path: Path, data: bytes, header: Header) -> Pixels:
     return np.ascontiguousarray(channels[:, :, :1] if header.grey else channels)
 
 
-def _pnm_pixels(path: Path, data: bytes, header: Header) -> Pixels:
-    """Pixels of a PGM or PPM, stretched to the whole range of their type."""
-    channels = 1 if header.grey else 3
-    count = header.height * header.width * channels
-    kind: np.dtype[Any] = np.dtype(np.uint8) if header.white < 256 else np.dtype(">u2")
-    full = np.iinfo(kind).max
-    values: npt.NDArray[Any]
-    if header.digits:
-        texts = data[header.start :].split()[:count]
-        if len(texts) < count or not all(text.isdigit() and len(text) < 6 for text in texts):
-            raise SepiError(f"{path}: damaged PNM: expected {count} whole numbers")
-        values = np.array([int(text) for text in texts], np.int64)
-    else:
-        values = np.frombuffer(data, kind, count, header.start)
-    if values.max() > header.white:
-        raise SepiError(f"{path}: damaged PNM: a value of {values.max()}, but white is {header.white}")
-    if header.white != full:
-        values = np.rint(values * (full / header.white))
-    return values.astype(kind.newbyteorder("=")).reshape(header.height, header.width, channels)
+def _stretched(path: Path, values: Pixels, white: int) -> Pixels:
+    """Values of a PGM or PPM, which OpenCV leaves as they are, over the whole range of their type."""
+    full = np.iinfo(values.dtype).max  # type: ignore[type-var]
+    if values.max() > white:
+        raise SepiError(f"{path}: damaged PNM: a value of {values.max()}, but white is {white}")
+    return values if white == full else np.rint(values * (full / white)).astype(values.dtype)
 
 
 def _require_memory(folder: Path, view: Pixels, count: int) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from sepi.errors import SepiError
-from sepi.io.files import atomic_path
+from sepi.io.files import atomic_path, reading
 from sepi.lightfield import FloatMap
 
 # magic, width, height, scale (its sign gives the byte order), each ended by one white space
@@ -22,29 +22,21 @@ def read_pfm(path: Path) -> FloatMap:
     -------
     ndarray, shape (H, W), float32
         Top row first.
-
-    Raises
-    ------
-    SepiError
-        If the file is unreadable, not a one-channel PFM, or shorter than its header says.
     """
-    try:
+    with reading(path, "one-channel PFM"):
         data = path.read_bytes()
-    except OSError as error:
-        raise SepiError(f"{path}: cannot be read ({error.strerror})") from error
-    header = _HEADER.match(data[:256])
-    if header is None or header[1] != b"Pf":
-        raise SepiError(f"{path}: not a one-channel PFM (expected a header 'Pf WIDTH HEIGHT SCALE')")
-    width, height, scale = int(header[2]), int(header[3]), _number(path, header[4])
-    if width == 0 or height == 0 or scale == 0:
-        raise SepiError(f"{path}: PFM header has a zero width, height or scale")
-    body = memoryview(data)[header.end() :]
-    if len(body) != 4 * width * height:
-        raise SepiError(
-            f"{path}: expected {4 * width * height} bytes after the header for {width}x{height} pixels, got {len(body)}"
-        )
-    values = np.frombuffer(body, "<f4" if scale < 0 else ">f4").reshape(height, width)
-    return values[::-1].astype(np.float32)
+        header = _HEADER.match(data[:256])
+        if header is None or header[1] != b"Pf":
+            raise SepiError("not a one-channel PFM (expected a header 'Pf WIDTH HEIGHT SCALE')")
+        width, height, scale = int(header[2]), int(header[3]), float(header[4])
+        body = memoryview(data)[header.end() :]
+        if not scale or not 0 < 4 * width * height == len(body):
+            raise SepiError(
+                f"damaged PFM of {width}x{height} pixels and scale {scale:g}: expected {4 * width * height} bytes "
+                f"after the header, got {len(body)}"
+            )
+        values = np.frombuffer(body, "<f4" if scale < 0 else ">f4").reshape(height, width)
+        return values[::-1].astype(np.float32)
 
 
 def write_pfm(path: Path, values: FloatMap) -> None:
@@ -52,10 +44,3 @@ def write_pfm(path: Path, values: FloatMap) -> None:
     height, width = values.shape
     with atomic_path(path) as temporary:
         temporary.write_bytes(f"Pf\n{width} {height}\n-1\n".encode() + values[::-1].astype("<f4").tobytes())
-
-
-def _number(path: Path, text: bytes) -> float:
-    try:
-        return float(text)
-    except ValueError as error:
-        raise SepiError(f"{path}: PFM scale is not a number: {text.decode(errors='replace')}") from error

@@ -2,6 +2,9 @@
 
 Decoders take memory on a header's word, and some fill with grey what a file that is cut off lacks. Pillow knows most
 kinds, but few sorts of TIFF, of which tifffile reads the tags; neither reads a PNM with 16 bit colours.
+
+Pillow's classes are used one by one: ``Image.open`` warns of pictures larger than half of what is read here, and
+refuses larger ones, as its class for WebP does; that limit cannot be set for one thread alone.
 """
 
 from __future__ import annotations
@@ -15,7 +18,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
 
-from sepi.errors import SepiError, printable
+from sepi.errors import SepiError
+from sepi.io.files import reading
 
 MAX_PIXELS = 2**28
 """More pixels than any camera's picture has."""
@@ -39,8 +43,8 @@ class Header:
         Bytes that a pixel takes when it is decoded.
     grey : bool
         Whether it has no colours; where the file does not say, False.
-    start, white, digits : int, int, bool
-        PNM: where the pixels begin, the value of white, whether they are written in digits.
+    white : int
+        PNM: the value of white; else 0.
     mixed_alpha : bool
         Whether decoding mixes transparency into the colours.
     """
@@ -50,9 +54,7 @@ class Header:
     width: int
     pixel_bytes: int = 3
     grey: bool = False
-    start: int = 0
     white: int = 0
-    digits: bool = False
     mixed_alpha: bool = False
 
 
@@ -81,51 +83,59 @@ def read_header(path: Path, file: IO[bytes], *, whole: bool = False) -> Header:
     if kind is None:
         raise SepiError(f"{path}: not a PNG, JPEG, TIFF, BMP, WebP, PGM or PPM picture")
     file.seek(0)
-    try:
+    with reading(path, kind):
         header = _KINDS[kind][1](file, size, whole)
-    except SepiError as error:
-        raise SepiError(f"{path}: {error}") from error
-    except Exception as error:
-        # the libraries stumble over damage in many ways
-        raise SepiError(f"{path}: damaged {kind}, perhaps cut off ({printable(str(error))[:200]})") from error
-    pixels = header.height * header.width
-    if not 1 <= pixels <= min(MAX_PIXELS, _PIXELS_PER_BYTE * size + _SMALL):
-        raise SepiError(
-            f"{path}: {header.width}x{header.height} pixels cannot be in a {kind} of {size} bytes, or are more than "
-            f"the {MAX_PIXELS} that are read"
-        )
+        if not 1 <= header.height * header.width <= min(MAX_PIXELS, _PIXELS_PER_BYTE * size + _SMALL):
+            raise SepiError(
+                f"{header.width}x{header.height} pixels cannot be in a {kind} of {size} bytes, or are more than "
+                f"the {MAX_PIXELS} that are read"
+            )
     return header
 
 
-def _by_pillow(file: IO[bytes], size: int, whole: bool) -> Header:
-    from PIL import Image, UnidentifiedImageError
+def _png(file: IO[bytes], size: int, whole: bool) -> Header:
+    from PIL.PngImagePlugin import PngImageFile
 
-    try:
-        image = Image.open(file, formats=("PNG", "JPEG", "BMP", "WEBP"))
-    except UnidentifiedImageError as error:
-        raise ValueError("its header gives no size") from error
-    except Image.DecompressionBombError as error:
-        raise SepiError(f"a picture of more pixels than any camera's ({error})") from error
-    with image:
-        # how pixels are packed; only of a PNG is it a plain text
-        packed = image.tile[0].args if image.tile else ""
-        packed = packed if isinstance(packed, str) else ""
+    with PngImageFile(file) as image:
+        # how pixels are packed: a grey PNG with transparency has colours once decoded
+        packed = str(image.tile[0].args)
         grey = packed.startswith(("1", "I", "L"))
-        header = Header(
-            {"WEBP": "WebP", "MPO": "JPEG"}.get(image.format or "", image.format or ""),
-            image.height,
-            image.width,
-            pixel_bytes=(1 if grey else 3) * (2 if "16" in packed else 1),
-            grey=grey,
-        )
-        if whole and header.kind == "JPEG":
-            image.load()
-        elif whole:
+        pixel_bytes = (1 if grey else 3) * (2 if "16" in packed else 1)
+        header = Header("PNG", image.height, image.width, pixel_bytes, grey)
+        if whole:
             image.verify()
-    # Pillow leaves out the last checksum, of which libpng prints lines of its own
-    if whole and header.kind == "PNG" and file.read(4) != zlib.crc32(b"IEND").to_bytes(4, "big"):
-        raise ValueError("bad checksum in its last chunk")
+            # Pillow leaves out the last checksum, of which libpng prints lines of its own
+            if file.read(4) != zlib.crc32(b"IEND").to_bytes(4, "big"):
+                raise ValueError("bad checksum in its last chunk")
     return header
+
+
+def _jpeg(file: IO[bytes], size: int, whole: bool) -> Header:
+    from PIL.JpegImagePlugin import JpegImageFile
+
+    with JpegImageFile(file) as image:
+        if whole:
+            image.load()
+        return Header("JPEG", image.height, image.width)
+
+
+def _bmp(file: IO[bytes], size: int, whole: bool) -> Header:
+    from PIL.BmpImagePlugin import BmpImageFile
+
+    with BmpImageFile(file) as image:
+        return Header("BMP", image.height, image.width)
+
+
+def _webp(file: IO[bytes], size: int, whole: bool) -> Header:
+    head = file.read(30)
+    if head[12:16] == b"VP8X":
+        width, height = (1 + int.from_bytes(head[at : at + 3], "little") for at in (24, 27))
+    elif head[12:16] == b"VP8L":
+        bits = int.from_bytes(head[21:25], "little")
+        width, height = 1 + bits % 2**14, 1 + (bits >> 14) % 2**14
+    else:
+        width, height = (int.from_bytes(head[at : at + 2], "little") % 2**14 for at in (26, 28))
+    return Header("WebP", height, width)
 
 
 def _tiff(file: IO[bytes], size: int, whole: bool) -> Header:
@@ -179,14 +189,14 @@ def _pnm(file: IO[bytes], size: int, whole: bool) -> Header:
     values = width * height * (1 if grey else 3)
     if match.end() + (2 * values - 1 if digits else values * depth) > size:
         raise SepiError(f"damaged PNM: the file is cut off after {size} bytes")
-    return Header("PNM", height, width, (1 if grey else 3) * depth, grey, match.end(), white, digits)
+    return Header("PNM", height, width, (1 if grey else 3) * depth, grey, white)
 
 
 _KINDS: dict[str, tuple[bytes | tuple[bytes, ...], Callable[[IO[bytes], int, bool], Header]]] = {
-    "PNG": (b"\x89PNG\r\n\x1a\n", _by_pillow),
-    "JPEG": (b"\xff\xd8\xff", _by_pillow),
+    "PNG": (b"\x89PNG\r\n\x1a\n", _png),
+    "JPEG": (b"\xff\xd8\xff", _jpeg),
     "TIFF": ((b"II*\0", b"II+\0", b"MM\0*", b"MM\0+"), _tiff),
-    "BMP": (b"BM", _by_pillow),
-    "WebP": (b"RIFF", _by_pillow),
+    "BMP": (b"BM", _bmp),
+    "WebP": (b"RIFF", _webp),
     "PNM": ((b"P2", b"P3", b"P5", b"P6"), _pnm),
 }

@@ -27,7 +27,7 @@ import numpy.typing as npt
 
 from sepi.camera import Camera
 from sepi.errors import SepiError
-from sepi.lightfield import BoolMap, FloatMap, LightField
+from sepi.lightfield import BoolMap, FloatMap
 
 Positions = npt.NDArray[np.float32]
 Colours = npt.NDArray[np.uint8]
@@ -68,23 +68,7 @@ class PointCloud:
         return "x right, y up, z towards the viewer", units
 
 
-def point_cloud(light_field: LightField, disparity: FloatMap) -> PointCloud:
-    """Every point of a light field's reference view, in its colours, and metric where it has a camera.
-
-    Raises
-    ------
-    SepiError
-        If ``disparity`` is not of the view's shape (H, W).
-    """
-    return view_points(
-        light_field.views[light_field.reference_position],
-        disparity,
-        camera=light_field.camera,
-        from_centre=light_field.from_centre,
-    )
-
-
-def view_points(
+def point_cloud(
     picture: npt.NDArray[np.generic],
     disparity: FloatMap,
     confidence: FloatMap | None = None,
@@ -127,33 +111,25 @@ def view_points(
             raise SepiError(f"point cloud: {name} is {values.shape}, the view {picture.shape[:2]} (height, width)")
     if step < 1:
         raise SepiError(f"point cloud: expected a step of at least 1 pixel, got {step}")
+    if not 0 <= min_confidence <= 1:
+        raise SepiError(f"point cloud: expected a least confidence within 0..1, got {min_confidence:g}")
+    if max_depth is not None and not max_depth > 0:
+        raise SepiError(f"point cloud: expected a positive largest depth in metres, got {max_depth:g}")
     used = np.zeros(disparity.shape, bool)
     used[::step, ::step] = True
-    used &= np.isfinite(disparity) & _confident(confidence, min_confidence)
+    used &= np.isfinite(disparity)
+    if min_confidence > 0:
+        if confidence is None:
+            raise SepiError("point cloud: a least confidence needs a confidence map")
+        # comparison with NaN is false: unknown confidence is none
+        used &= confidence >= min_confidence
     if camera is not None:
-        used &= _near(camera.depth(disparity), max_depth)
+        depth = camera.depth(disparity)
+        used &= np.isfinite(depth) & (depth > 0) & (depth <= (max_depth or np.inf))
         return _metric(picture, disparity, used, camera, from_centre)
     if max_depth is not None:
         raise SepiError("point cloud: a largest depth in metres needs the camera's geometry, which is not known")
     return _relief(picture, disparity, used)
-
-
-def _confident(confidence: FloatMap | None, min_confidence: float) -> BoolMap | bool:
-    if not 0 <= min_confidence <= 1:
-        raise SepiError(f"point cloud: expected a least confidence within 0..1, got {min_confidence:g}")
-    if min_confidence == 0:
-        return True
-    if confidence is None:
-        raise SepiError("point cloud: a least confidence needs a confidence map")
-    # comparison with NaN is false: unknown confidence is none
-    return np.asarray(confidence >= min_confidence)
-
-
-def _near(depth: FloatMap, max_depth: float | None) -> BoolMap:
-    if max_depth is not None and not max_depth > 0:
-        raise SepiError(f"point cloud: expected a positive largest depth in metres, got {max_depth:g}")
-    near = np.isfinite(depth) & (depth > 0)
-    return near if max_depth is None else near & (depth <= max_depth)
 
 
 def _metric(

@@ -63,13 +63,7 @@ def result_attributes(light_field: LightField, variant: str, history: Sequence[E
 
 
 def history_of(path: Path | None) -> list[Entry]:
-    """The history of a stage file, its own entry last; none without a file.
-
-    Raises
-    ------
-    SepiError
-        If the file is no stage file.
-    """
+    """The history of a stage file, its own entry last; none without a file."""
     if path is None:
         return []
     attributes = read_attributes(path)

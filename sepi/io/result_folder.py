@@ -8,7 +8,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +19,7 @@ import numpy.typing as npt
 from sepi.camera import Camera
 from sepi.errors import SepiError
 from sepi.io.files import atomic_files, atomic_folder, atomic_path
-from sepi.io.hdf5 import Attribute, open_hdf5, read_dataset, write_stage
+from sepi.io.hdf5 import Attribute, open_hdf5, read_camera, read_dataset, write_stage
 from sepi.io.images import png_texts, write_png
 from sepi.io.pfm import write_pfm
 from sepi.io.ply import write_ply
@@ -151,31 +151,19 @@ def read_result(path: Path) -> Result:
     ----------
     path : Path
         Folder written by :func:`write_result`, or its ``result.h5``.
-
-    Raises
-    ------
-    SepiError
-        If there is no such file, or it is damaged or not such a result.
     """
     path = path / RESULT if path.is_dir() else path
-    with open_hdf5(path) as file:
-        attributes = dict(file.attrs)
-        needed = {"view", "disparity", "confidence"} - set(file) | {"view_position", "grid"} - set(attributes)
-        if needed:
-            raise SepiError(f"{path}: not a result of 'sepi depth': {', '.join(sorted(needed))} missing")
+    with open_hdf5(path, "result of 'sepi depth'") as file:
         picture, disparity, confidence = (
             read_dataset(path, file[name]) for name in ("view", "disparity", "confidence")
         )
-        (t, s), (rows, columns) = (map(int, attributes[name]) for name in ("view_position", "grid"))
-        try:
-            camera = Camera(*map(float, attributes["camera"])) if "camera" in attributes else None
-        except SepiError as error:
-            raise SepiError(f"{path}: damaged: {error}") from error
+        (t, s), (rows, columns) = (map(int, file.attrs[name]) for name in ("view_position", "grid"))
+        scene, camera = str(file.attrs.get("scene", "")), read_camera(file)
     alike = disparity.shape == confidence.shape == picture.shape[:2]
     if not alike or picture.shape[2:] not in ((1,), (3,)):
         raise SepiError(f"{path}: damaged: view {picture.shape} and disparity {disparity.shape} do not fit together")
     return Result(
-        scene=str(attributes.get("scene", "")),
+        scene=scene,
         picture=picture,
         disparity=disparity.astype(np.float32),
         confidence=confidence.astype(np.float32),
@@ -214,33 +202,26 @@ def _require_sound(light_field: LightField, maps: StageMaps) -> None:
 def _write_files(
     folder: Path, light_field: LightField, maps: StageMaps, attributes: Mapping[str, Attribute]
 ) -> tuple[str, ...]:
+    camera, view = light_field.camera, light_field.views[light_field.reference_position]
     masks = {f"mask_{name}.png": values for name, values in maps.extra.items() if values.dtype == bool}
-    depth = {} if light_field.camera is None else {_DEPTH: light_field.camera.depth(maps.disparity)}
+    more: dict[str, npt.NDArray[Any]] = {"view": view}
+    known: dict[str, Any] = {"view_position": light_field.reference_position, "grid": light_field.grid}
+    if camera is not None:
+        more["depth"], known["camera"] = camera.depth(maps.disparity), astuple(camera)
+        write_pfm(folder / _DEPTH, more["depth"])
     write_pfm(folder / "disparity.pfm", maps.disparity)
     with atomic_path(folder / "disparity.npy") as temporary, temporary.open("wb") as file:
         np.save(file, maps.disparity.astype("<f4"), allow_pickle=False)
     _write_16bit(folder / "disparity_16bit.png", maps.disparity)
     write_png(folder / "disparity.png", colour_code(maps.disparity))
     write_png(folder / "confidence.png", _levels(maps.confidence))
-    cloud = point_cloud(light_field, maps.disparity)
-    write_ply(folder / "points.ply", cloud.positions, cloud.colours, cloud.comments())
-    for name, values in depth.items():
-        write_pfm(folder / name, values)
+    cloud = point_cloud(view, maps.disparity, camera=camera, from_centre=light_field.from_centre)
+    write_ply(folder / "points.ply", cloud)
     for name, mask in masks.items():
         write_png(folder / name, mask, _MASK_TEXT)
-    _write_all(folder / RESULT, light_field, maps, attributes)
-    return (*RESULT_FILES[:-1], *depth, *masks, RESULT)
-
-
-def _write_all(path: Path, light_field: LightField, maps: StageMaps, attributes: Mapping[str, Attribute]) -> None:
-    """Write every map, the view and where it stands, the camera and what made the maps as one HDF5 file."""
-    camera = light_field.camera
-    more: dict[str, npt.NDArray[Any]] = {"view": light_field.views[light_field.reference_position]}
-    known: dict[str, Any] = {"view_position": light_field.reference_position, "grid": light_field.grid}
-    if camera is not None:
-        more["depth"] = camera.depth(maps.disparity)
-        known["camera"] = (camera.scale, camera.offset, camera.focal_px)
-    write_stage(path, maps.updated(maps.disparity, maps.confidence, **more), {**attributes, **known})
+    everything = maps.updated(maps.disparity, maps.confidence, **more)
+    write_stage(folder / RESULT, everything, {**attributes, **known})
+    return (*RESULT_FILES[:-1], *([] if camera is None else [_DEPTH]), *masks, RESULT)
 
 
 def _remove_others(folder: Path, made: Collection[str]) -> None:

@@ -22,6 +22,7 @@ from sepi.io.hdf5 import UNITS, Attribute, create_hdf5, open_hdf5
 from sepi.lightfield import BoolMap, FloatMap
 
 _MAPS = "maps"
+_KIND = "score file (written by python -m sepi.evaluate)"
 
 Scores = dict[str, float]
 """Score to value, for one protocol and region."""
@@ -112,7 +113,7 @@ def read_scores(path: Path, names: Collection[str] | None = None) -> dict[str, A
     SepiError
         If the file is missing, not HDF5, not a score file, or has nothing of one of the maps.
     """
-    with open_hdf5(path) as file:
+    with open_hdf5(path, _KIND) as file:
         return {name: scores_in(group) for name, group in _groups(path, file, names).items()}
 
 
@@ -124,7 +125,7 @@ def read_evaluations(path: Path, names: Collection[str] | None = None) -> dict[s
     SepiError
         As :func:`read_scores`.
     """
-    with open_hdf5(path) as file:
+    with open_hdf5(path, _KIND) as file:
         groups = _groups(path, file, names)
         return {name: Scored(str(group.attrs["digest"]), evaluation_in(group)) for name, group in groups.items()}
 
@@ -171,8 +172,6 @@ def without_nan(value: Any) -> Any:
 
 
 def _groups(path: Path, file: h5py.File, names: Collection[str] | None) -> dict[str, h5py.Group]:
-    if "ground_truth" not in file.attrs or _MAPS not in file:
-        raise SepiError(f"{path}: not a score file (written by python -m sepi.evaluate): no attribute 'ground_truth'")
     groups = {stored.replace(":", "/"): group for stored, group in file[_MAPS].items()}
     for name in names or ():
         if name not in groups:

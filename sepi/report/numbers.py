@@ -23,7 +23,7 @@ import psutil
 from sepi.command import SepiCommand
 from sepi.errors import SepiError
 from sepi.evaluate import COUNTS, PROTOCOLS, REGIONS, SCORES
-from sepi.io.external_maps import read_external_scores
+from sepi.io.external_maps import read_external
 from sepi.io.hdf5 import read_light_field, read_stage
 from sepi.io.scores import Scores, read_evaluations, read_scores, without_nan
 from sepi.report.plan import PARTS_TABLES, TABLES, Plan
@@ -208,7 +208,7 @@ def _external(plan: Plan, dataset: str, scene: str) -> dict[str, Any]:
     if not plan.external:
         return {}
     path = plan.external_file(dataset, scene)
-    maps = read_external_scores(path)
+    maps = read_external(path, with_maps=False)
     require_known(str(path), plan.external, maps)
     return {
         method: {key: getattr(maps[method], key) for key in ("problem", "source", "sha256")}

@@ -142,7 +142,7 @@ class TestWhatIsNoMap:
         for length in (8, 12, 20, 26, 40, 100, len(whole) - 1):
             path.write_bytes(whole[:length])
             is_disparity(path)
-            assert "damaged PNG" in self.error(path)
+            assert "not a PNG, or damaged" in self.error(path)
 
 
 def test_evaluate_takes_png_maps(result: Path, disparity: np.ndarray, tmp_path: Path) -> None:

@@ -72,7 +72,7 @@ def replace(file: h5py.File, name: str, values: np.ndarray) -> None:
 
 
 BAD_FILES: dict[str, tuple[Callable[[Path], None], str]] = {
-    "cut off": (cut, "not a readable HDF5 file"),
+    "cut off": (cut, "not a light field of this package, or damaged or cut off"),
     "no name": (spoiled(lambda f: f.attrs.pop("name")), "name"),
     "no source": (spoiled(lambda f: f.attrs.pop("source")), "damaged"),
     "range of three numbers": (spoiled(lambda f: f.attrs.__setitem__("disparity_range", [1, 2, 3])), "damaged"),

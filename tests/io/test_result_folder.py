@@ -257,10 +257,10 @@ def _huge(file: h5py.File) -> None:
 
 
 BAD_RESULTS = {
-    "no view": (_replaced("view", None), "view missing"),
-    "stage file": (lambda file: file.attrs.pop("view_position"), "view_position missing"),
+    "no view": (_replaced("view", None), "not a result of 'sepi depth'"),
+    "stage file": (lambda file: file.attrs.pop("view_position"), "view_position"),
     "grid of one number": (lambda file: file.attrs.__setitem__("grid", 3), "damaged"),
-    "camera of nonsense": (lambda file: file.attrs.__setitem__("camera", (0.0, 1.0, -2.0)), "damaged"),
+    "camera of nonsense": (lambda file: file.attrs.__setitem__("camera", (0.0, 1.0, -2.0)), "camera"),
     "camera of two numbers": (lambda file: file.attrs.__setitem__("camera", (1.0, 1.0)), "damaged"),
     "view of another size": (_replaced("view", np.zeros((4, 4, 3), np.uint8)), "do not fit"),
     "view of two channels": (_replaced("view", np.zeros((*SHAPE, 2), np.uint8)), "do not fit"),

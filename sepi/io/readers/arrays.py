@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import math
-import warnings
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +17,8 @@ from sepi.lightfield import HIGHEST, LOWEST, BoolMap, LightField
 from sepi.validation import require_known
 
 Array = npt.NDArray[np.generic]
+Shapes = Mapping[str, tuple[tuple[int, ...], np.dtype[Any]]]
+"""Name of each array in a file to its shape and type."""
 
 # "N" is the number t * S + s of a view
 _LAYOUTS = ("TSHWC", "TSHW", "NHWC")
@@ -27,15 +27,7 @@ _AXES_HELP = "T, S: row and column of the view; H, W: of the pixel; C: colour"
 _LISTED = 12
 
 
-def light_field_from_array(
-    array: Array,
-    *,
-    name: str,
-    source: str,
-    options: ReadOptions,
-    axes: str | None = None,
-    notes: Sequence[str] = (),
-) -> LightField:
+def light_field_from_array(array: Array, path: Path, options: ReadOptions, *, axes: str | None = None) -> LightField:
     """A light field from an array of all its views.
 
     Views that are all zeros, or NaN throughout, are taken as missing (light field cameras have none in the corners,
@@ -45,15 +37,13 @@ def light_field_from_array(
     ----------
     array : ndarray of 4 or 5 axes, uint8, uint16, float32 or float64
         Integers span their whole range, floats 0..1.
-    name, source : str
-        Of the light field.
+    path : Path
+        Where it comes from: name and source of the light field.
     options : ReadOptions
         ``axes``, ``grid``, ``central``, ``order``, ``exclude`` and ``view`` are used.
     axes : str, optional
         Order of the axes where the format fixes it, as ``options.axes`` gives it elsewhere; guessed from the shape
         where neither is given.
-    notes : sequence of str
-        What the reader assumed, to be passed on to the user.
 
     Returns
     -------
@@ -66,37 +56,42 @@ def light_field_from_array(
         If the axes cannot be told apart or contradict the options, the values are of another type or range, or a view
         that is not excluded holds some values that are not finite.
     """
+    source = str(path)
     kind = _pixel_type(source, array.dtype)
     given = axes or options.axes
     letters = _found_axes(source, array.shape, options.grid) if given is None else _checked_axes(source, array, given)
     stack, laid_out = _as_stack(source, array, letters, options.grid)
     numbers = arrange_numbers(source, stack.shape[:2], options)
-    filled = _fill(source, stack, numbers, kind)
+    views: Array = np.zeros((*numbers.shape, *stack.shape[2:]), kind)
+    # those left out are not even looked at
+    unknown = _fill(source, views, stack, numbers)
+    present: BoolMap = np.any(views, axis=(2, 3, 4))
+    black = [(t, s) for t, s in np.argwhere((numbers >= 0) & ~present).tolist() if (t, s) not in unknown]
+    if not present.any():
+        # a light field that is all black is none with all views missing
+        for position in black:
+            present[position] = True
+        black = []
     reference = options.view or (numbers.shape[0] // 2, numbers.shape[1] // 2)
-    if reference in filled.blank:
+    if reference in [*black, *unknown]:
         raise SepiError(
             f"{source}: view {reference[0]},{reference[1]} is black (all zeros) or NaN, so taken as missing; depth is "
             "made for it, unless --view ROW,COLUMN names another"
         )
     assumed = [] if given else [f"axes taken as {' '.join(letters)}; --axes sets them otherwise"]
+    missing = [*_missing_notes("all zeros", black), *_missing_notes("NaN throughout", unknown)]
     return LightField(
-        views=filled.views,
-        name=name,
+        views=views,
+        name=path.stem,
         source=source,
-        present=filled.present,
+        present=present,
         view=options.view,
-        notes=(*notes, *assumed, *laid_out, *filled.notes),
+        notes=(*assumed, *laid_out, *missing),
     )
 
 
 def rearrange(light_field: LightField, options: ReadOptions) -> LightField:
-    """A light field whose views are arranged as asked for; ground truth and masks stay with the view they belong to.
-
-    Raises
-    ------
-    SepiError
-        If the options do not fit its grid.
-    """
+    """A light field whose views are arranged as asked for; ground truth and masks stay with the view they belong to."""
     numbers = arrange_numbers(light_field.source or light_field.name, light_field.grid, options)
     T, S = light_field.grid
     if np.array_equal(numbers, np.arange(T * S).reshape(T, S)):
@@ -111,25 +106,21 @@ def rearrange(light_field: LightField, options: ReadOptions) -> LightField:
     return replace(light_field, views=views, present=present, view=options.view, ground_truth=None, masks={})
 
 
-def variable_of(source: str, shapes: Mapping[str, tuple[int, ...]], requested: str | None) -> str:
+def variable_of(path: Path, arrays: Shapes, requested: str | None) -> str:
     """Name of the array that is the light field, of those in a file.
 
     Parameters
     ----------
-    source : str
-        Path, for messages.
-    shapes : mapping of str to tuple of int
-        Name of each array of numbers to its shape.
+    path : Path
+        For messages.
+    arrays : mapping of str to tuple
+        Name of each array to its shape and type.
     requested : str, optional
-        The user's choice. Without: the only array of 4 or 5 axes, or ``LF`` among several.
-
-    Raises
-    ------
-    SepiError
-        If there is no such array, or several.
+        The user's choice. Without: the only array of numbers of 4 or 5 axes, or ``LF`` among several.
     """
+    shapes = {name: shape for name, (shape, kind) in arrays.items() if kind.kind in "iuf" or name == requested}
     if requested is not None:
-        require_known(f"{source}: --variable", [requested], shapes)
+        require_known(f"{path}: --variable", [requested], shapes)
         return requested
     fitting = [name for name, shape in shapes.items() if len(shape) in (4, 5)]
     if len(fitting) == 1:
@@ -140,34 +131,8 @@ def variable_of(source: str, shapes: Mapping[str, tuple[int, ...]], requested: s
         f"{printable(name)} {'x'.join(map(str, shapes[name]))}" for name in list(fitting or shapes)[:_LISTED]
     )
     if fitting:
-        raise SepiError(f"{source}: holds several arrays of 4 or 5 axes; choose one with --variable: {listed}")
-    raise SepiError(f"{source}: holds no array of numbers of 4 or 5 axes (found: {listed or 'nothing'})")
-
-
-@contextmanager
-def damage_named(path: Path, kind: str) -> Iterator[None]:
-    """Turn whatever the libraries stumble over in a damaged file into one error, and keep their warnings here."""
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            yield
-    except SepiError:
-        raise
-    except Exception as error:
-        if isinstance(error, OSError) and error.strerror:
-            raise SepiError(f"{path}: cannot be read ({error.strerror})") from error
-        reason = printable(str(error)) or type(error).__name__
-        raise SepiError(f"{path}: damaged {kind} ({reason[:200]})") from error
-
-
-@dataclass(frozen=True)
-class _Filled:
-    """Views at their positions; ``blank`` are those that are there but hold nothing."""
-
-    views: Array
-    present: BoolMap
-    blank: tuple[tuple[int, int], ...]
-    notes: tuple[str, ...]
+        raise SepiError(f"{path}: holds several arrays of 4 or 5 axes; choose one with --variable: {listed}")
+    raise SepiError(f"{path}: holds no array of numbers of 4 or 5 axes (found: {listed or 'nothing'})")
 
 
 def _pixel_type(source: str, kind: np.dtype[Any]) -> np.dtype[Any]:
@@ -269,42 +234,26 @@ def _as_stack(source: str, array: Array, letters: str, grid: tuple[int, int] | N
     return views[..., :3], notes
 
 
-def _fill(source: str, stack: Array, numbers: Numbers, kind: np.dtype[Any]) -> _Filled:
-    """Put the views in their positions; those left out are not even looked at."""
-    views: Array = np.zeros((*numbers.shape, *stack.shape[2:]), kind)
-    present = np.zeros(numbers.shape, bool)
-    black: list[tuple[int, int]] = []
-    unknown: list[tuple[int, int]] = []
+def _fill(source: str, views: Array, stack: Array, numbers: Numbers) -> list[tuple[int, int]]:
+    """Put the views in their positions; those that are NaN throughout stay zero and are returned."""
+    unknown = []
     for t, s in np.argwhere(numbers >= 0).tolist():
         view = stack[divmod(int(numbers[t, s]), stack.shape[1])]
-        if kind.kind == "f" and not _is_known(source, (t, s), view):
+        if view.dtype.kind == "f" and not _is_known(source, (t, s), view):
             unknown.append((t, s))
-            continue
-        views[t, s] = view
-        present[t, s] = views[t, s].any()
-        if not present[t, s]:
-            black.append((t, s))
-    notes = []
-    if black and not present.any():
-        # a light field that is all black is none with all views missing
-        present[tuple(np.transpose(black))] = True
-        black = []
-    for what, positions in (("all zeros", black), ("NaN throughout", unknown)):
-        if positions:
-            more = f" and {len(positions) - _LISTED} more" if len(positions) > _LISTED else ""
-            listed = " ".join(f"{t},{s}" for t, s in positions[:_LISTED])
-            notes.append(f"views that are {what} taken as missing: {listed}{more}")
-    return _Filled(views, present, (*black, *unknown), tuple(notes))
+        else:
+            views[t, s] = view
+    return unknown
+
+
+def _missing_notes(what: str, positions: Sequence[tuple[int, int]]) -> list[str]:
+    listed = " ".join(f"{t},{s}" for t, s in positions[:_LISTED])
+    more = f" and {len(positions) - _LISTED} more" if len(positions) > _LISTED else ""
+    return [f"views that are {what} taken as missing: {listed}{more}"] if positions else []
 
 
 def _is_known(source: str, position: tuple[int, int], view: Array) -> bool:
-    """Whether a view of floats holds values; False for NaN throughout.
-
-    Raises
-    ------
-    SepiError
-        If some are not finite, or far outside 0..1.
-    """
+    """Whether a view of floats holds values; False for NaN throughout."""
     where = f"{source}: view {position[0]},{position[1]}"
     with np.errstate(invalid="ignore"):
         low, high = float(view.min()), float(view.max())

@@ -17,10 +17,10 @@ from pathlib import Path
 import numpy as np
 
 from sepi.errors import SepiError
-from sepi.io.images import SUFFIXES, Pixels, read_picture
-from sepi.io.readers.options import ReadOptions, arrange_numbers, require_unused
+from sepi.io.images import SUFFIXES, read_picture
+from sepi.io.readers.options import ReadOptions, arrange_numbers
 from sepi.io.readers.view_files import MAX_VIEWS
-from sepi.lightfield import MIN_SIZE, BoolMap, LightField
+from sepi.lightfield import MIN_SIZE, LightField
 
 BLOCK = (14, 14)
 """Rows and columns of pixels under a lenslet in the archive's pictures."""
@@ -43,13 +43,7 @@ def read(path: Path, options: ReadOptions) -> LightField:
         Any picture.
     options : ReadOptions
         ``grid`` is the size of the block under a lenslet.
-
-    Raises
-    ------
-    SepiError
-        If the picture is damaged or too small for its grid of views, or the options do not fit.
     """
-    require_unused(str(path), options, ("pattern", "axes", "variable", "follow_links"))
     T, S = grid = options.grid or BLOCK
     if not 2 <= T * S <= MAX_VIEWS:
         raise SepiError(f"{path}: --grid {T}x{S}: expected a grid of 2 to {MAX_VIEWS} views")
@@ -77,8 +71,7 @@ def read(path: Path, options: ReadOptions) -> LightField:
     light_field = LightField(
         views=views, name=path.resolve().stem, source=str(path), present=present, view=options.view, notes=tuple(notes)
     )
-    dark = _dark_views(views, present, light_field.reference_position)
-    return replace(light_field, notes=(*notes, *_dark_notes(dark)))
+    return replace(light_field, notes=(*notes, *_dark_notes(light_field)))
 
 
 def _usual_side(grid: tuple[int, int]) -> int | None:
@@ -88,14 +81,11 @@ def _usual_side(grid: tuple[int, int]) -> int | None:
     return side if side > 1 else None
 
 
-def _dark_views(views: Pixels, present: BoolMap, reference: tuple[int, int]) -> list[tuple[int, int]]:
-    """Places of views that are much darker than the reference view."""
-    brightness = views.mean(axis=(2, 3, 4), dtype=np.float64)
-    dark = present & (brightness < _DARK * brightness[reference])
-    return [(int(t), int(s)) for t, s in np.argwhere(dark)]
-
-
-def _dark_notes(dark: list[tuple[int, int]]) -> list[str]:
+def _dark_notes(light_field: LightField) -> list[str]:
+    """Which views are much darker than the reference view."""
+    brightness = light_field.views.mean(axis=(2, 3, 4), dtype=np.float64)
+    limit = _DARK * brightness[light_field.reference_position]
+    dark = np.argwhere(light_field.present & (brightness < limit)).tolist()
     if not dark:
         return []
     flags = " ".join(f"--exclude {t},{s}" for t, s in dark)

@@ -7,9 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from sepi.errors import SepiError
-from sepi.io.hdf5 import has_dataset
+from sepi.io.files import naming
+from sepi.io.hdf5 import has_dataset, read_light_field
 from sepi.io.images import SUFFIXES
-from sepi.io.readers import eslf, hci, hci_2013, image_folder, matlab, numpy_files, sepi_hdf5
+from sepi.io.readers import eslf, hci, hci_2013, image_folder, matlab, numpy_files
+from sepi.io.readers.arrays import rearrange
 from sepi.io.readers.options import ReadOptions
 from sepi.lightfield import LightField
 from sepi.validation import require_known
@@ -26,24 +28,42 @@ class Format:
     matches : callable
         Whether a path looks like this format; quick, and never raises.
     read : callable
-        Reads it, or raises :class:`SepiError`.
+        Reads a light field as its files have it, or raises :class:`SepiError` where they are damaged, contradict each
+        other or do not fit the options.
+    options : tuple of str
+        What of :class:`ReadOptions` only some formats have a use for, and this one does.
     """
 
     name: str
     description: str
     matches: Callable[[Path], bool]
     read: Callable[[Path, ReadOptions], LightField]
+    options: tuple[str, ...] = ()
 
+
+_ARRAY_OPTIONS = ("grid", "axes", "variable")
 
 FORMATS = {
-    "hci": Format("HCI folder", "input_Cam000.png, ...", hci.matches, hci.read),
-    "images": Format("folder of views", "a numbered picture for each", image_folder.matches, image_folder.read),
-    "eslf": Format("Lytro lenslet picture", "NAME_eslf.png", eslf.matches, eslf.read),
+    "hci": Format("HCI folder", "input_Cam000.png, ...", hci.matches, hci.read, ("grid", "follow_links")),
+    "images": Format(
+        "folder of views",
+        "a numbered picture for each",
+        image_folder.matches,
+        image_folder.read,
+        ("grid", "pattern", "follow_links"),
+    ),
+    "eslf": Format("Lytro lenslet picture", "NAME_eslf.png", eslf.matches, eslf.read, ("grid",)),
     # before the other kinds of HDF5: MATLAB's is told by its header or ending
-    "matlab": Format("MATLAB file", ".mat with an array such as LF", matlab.matches, matlab.read),
-    "numpy": Format("NumPy file", ".npy or .npz", numpy_files.matches, numpy_files.read),
+    "matlab": Format("MATLAB file", ".mat with an array such as LF", matlab.matches, matlab.read, _ARRAY_OPTIONS),
+    "numpy": Format("NumPy file", ".npy or .npz", numpy_files.matches, numpy_files.read, _ARRAY_OPTIONS),
     "hci-2013": Format("HCI 2013 HDF5", "with LF (T, S, H, W, 3)", hci_2013.matches, hci_2013.read),
-    "sepi": Format("sepi HDF5", "written by this package", sepi_hdf5.matches, sepi_hdf5.read),
+    # last, so that it gets what is too damaged to tell
+    "sepi": Format(
+        "sepi HDF5",
+        "written by this package",
+        lambda path: has_dataset(path, "views", if_damaged=True),
+        lambda path, options: rearrange(read_light_field(path), options),
+    ),
 }
 """Word for ``--format`` to format; the first that matches reads."""
 
@@ -90,19 +110,21 @@ def read(path: Path, options: ReadOptions, file_format: str | None = None) -> Li
     -------
     LightField
         Its ``disparity_range`` is None if the scene gives none.
-
-    Raises
-    ------
-    SepiError
-        If nothing is there, the format is unknown, or the files are damaged or contradict each other or the options.
     """
     known = format_of(path, file_format)
-    try:
+    _require_used(path, known, options)
+    with naming(path):
         light_field = known.read(path, options)
         return light_field if options.view is None else light_field.seen_from(options.view)
-    except SepiError as error:
-        # what only the light field as a whole can find wrong
-        raise error if str(error).startswith(str(path)) else SepiError(f"{path}: {error}") from error
+
+
+def _require_used(path: Path, known: Format, options: ReadOptions) -> None:
+    """Raise where an option is given that a format has no use for: the user would think that it did something."""
+    for name in ("grid", "pattern", "axes", "variable", "follow_links"):
+        if getattr(options, name) not in (None, False) and name not in known.options:
+            others = ", ".join(other.name for other in FORMATS.values() if name in other.options)
+            flag = "--" + name.replace("_", "-")
+            raise SepiError(f"{path}: {flag} does not apply to this format ({known.name}); it is for: {others}")
 
 
 def _what_else(path: Path) -> str:

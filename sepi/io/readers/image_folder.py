@@ -7,12 +7,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 from sepi.errors import SepiError
+from sepi.io.files import reading
 from sepi.io.images import SUFFIXES
-from sepi.io.readers.options import ReadOptions, require_unused
+from sepi.io.readers.options import ReadOptions
 from sepi.io.readers.view_files import MAX_VIEWS, read_grid
 from sepi.io.readers.view_names import EXAMPLES, ViewNumbers, infer_view_numbers, parse_view_numbers
 from sepi.lightfield import LightField
@@ -20,13 +20,8 @@ from sepi.lightfield import LightField
 _POSITIONS_PER_PICTURE = 100
 
 
-@dataclass(frozen=True)
-class _Layout:
-    """The given grid, the number ``t * S + s`` in it of each name, and what was assumed."""
-
-    grid: tuple[int, int]
-    positions: dict[str, int]
-    notes: tuple[str, ...]
+_Layout = tuple[tuple[int, int], dict[str, int], list[str]]
+"""The given grid, the number ``t * S + s`` in it of each name, and what was assumed."""
 
 
 def matches(path: Path) -> bool:
@@ -46,20 +41,11 @@ def read(path: Path, options: ReadOptions) -> LightField:
     -------
     LightField
         Its notes say how the names were understood.
-
-    Raises
-    ------
-    SepiError
-        If the names do not tell the views' positions, a view is given twice, damaged or unlike the others, or the
-        options do not fit.
     """
-    require_unused(str(path), options, ("axes", "variable"))
     if not path.is_dir():
         raise SepiError(f"{path}: not a folder of views")
-    try:
+    with reading(path, "folder of views"):
         files = _files(path)
-    except OSError as error:
-        raise SepiError(f"{path}: cannot be read ({error.strerror})") from error
     pictures = [file.name for file in files if file.suffix.lower() in SUFFIXES]
     if options.pattern is None:
         named = infer_view_numbers(str(path), pictures)
@@ -69,17 +55,19 @@ def read(path: Path, options: ReadOptions) -> LightField:
         raise SepiError(f"{path}: only one view, {next(iter(named.numbers))}; depth needs at least two")
     _require_different(path, named)
     two_numbers = len(next(iter(named.numbers.values()))) == 2
-    layout = _by_row_and_column(path, named, options) if two_numbers else _by_number(path, named, options)
-    views = {number: path / name for name, number in layout.positions.items()}
-    arranged = read_grid(path, views, layout.grid, options)
+    grid, positions, notes = (
+        _by_row_and_column(path, named, options) if two_numbers else _by_number(path, named, options)
+    )
+    views = {number: path / name for name, number in positions.items()}
+    pixels, present, _ = read_grid(path, views, grid, options)
     unmatched = [name for name in named.unmatched if name in pictures]
     return LightField(
-        views=arranged.views,
+        views=pixels,
         name=path.resolve().name,
         source=str(path),
-        present=arranged.present,
+        present=present,
         view=options.view,
-        notes=(*_left_out(unmatched), *layout.notes),
+        notes=(*_left_out(unmatched), *notes),
     )
 
 
@@ -138,7 +126,7 @@ def _by_row_and_column(path: Path, named: ViewNumbers, options: ReadOptions) -> 
         name: (row - base[0]) // step * grid[1] + (column - base[1]) // step
         for name, (row, column) in named.numbers.items()
     }
-    return _Layout(grid, positions, tuple(notes))
+    return grid, positions, notes
 
 
 def _by_number(path: Path, named: ViewNumbers, options: ReadOptions) -> _Layout:
@@ -164,7 +152,7 @@ def _by_number(path: Path, named: ViewNumbers, options: ReadOptions) -> _Layout:
     if base not in (0, 1):
         notes.append(f"the names count views from {base}")
     notes += _step_notes(step)
-    return _Layout(grid, {name: (number - base) // step for name, number in numbers.items()}, tuple(notes))
+    return grid, {name: (number - base) // step for name, number in numbers.items()}, notes
 
 
 def _base(lowest: int, highest: int, count: int) -> int:

@@ -18,6 +18,7 @@ References
 from __future__ import annotations
 
 import struct
+import warnings
 import zlib
 from pathlib import Path
 from typing import Any
@@ -26,10 +27,13 @@ import h5py
 import numpy as np
 
 from sepi.errors import SepiError
+from sepi.io.files import reading
 from sepi.io.hdf5 import open_hdf5, read_dataset
-from sepi.io.readers.arrays import Array, damage_named, light_field_from_array, variable_of
-from sepi.io.readers.options import ReadOptions, require_unused
+from sepi.io.readers.arrays import Array, Shapes, light_field_from_array, variable_of
+from sepi.io.readers.options import ReadOptions
 from sepi.lightfield import LightField
+
+_KIND = "MATLAB file"
 
 # other classes are text, logical values, cells, ...
 _NUMBERS = ("uint8", "int8", "uint16", "int16", "uint32", "int32", "single", "uint64", "int64", "double")
@@ -61,62 +65,43 @@ def matches(path: Path) -> bool:
 
 
 def read(path: Path, options: ReadOptions) -> LightField:
-    """Read the array ``options.variable`` of a MATLAB file; without it, the only one that can be a light field.
-
-    Raises
-    ------
-    SepiError
-        If the file is damaged or of another version, or holds no such array; else as
-        :func:`sepi.io.readers.arrays.light_field_from_array`.
-    """
-    require_unused(str(path), options, ("pattern", "follow_links"))
-    found = shapes(path)
-    name = variable_of(str(path), {name: shape for name, (shape, _) in found.items()}, options.variable)
-    array = _read_7_3(path, name) if h5py.is_hdf5(path) else _read_5(path, name, found[name][1])
+    """Read the array ``options.variable`` of a MATLAB file; without it, the only one that can be a light field."""
+    shapes = array_shapes(path)
+    name = variable_of(path, shapes, options.variable)
+    array = _read_7_3(path, name) if h5py.is_hdf5(path) else _read_5(path, name, shapes[name][1])
     # the axes that MATLAB dropped
     while array.ndim < len(options.axes or "") <= 5:
         array = array[..., None]
-    return light_field_from_array(array, name=path.stem, source=str(path), options=options)
+    return light_field_from_array(array, path, options)
 
 
-def shapes(path: Path) -> dict[str, tuple[tuple[int, ...], np.dtype[Any]]]:
-    """Shape and type, as MATLAB shows them, of each array of real numbers in a file; their values are not read.
-
-    Raises
-    ------
-    SepiError
-        If the file is damaged or of another version.
-    """
+def array_shapes(path: Path) -> Shapes:
+    """Shape and type, as MATLAB shows them, of each array of real numbers in a file; their values are not read."""
     head = _head(path)
     if head[-4:] in _BYTE_ORDERS:
         from scipy.io import whosmat
 
-        with damage_named(path, "MATLAB file"):
+        with reading(path, _KIND), warnings.catch_warnings(action="ignore"):
             names = _real_arrays(path)
             return {name: (shape, np.dtype(kind)) for name, shape, kind in whosmat(path) if name in names}
     if h5py.is_hdf5(path):
         with open_hdf5(path) as file:
             arrays = {name: file[name] for name in file if _is_numbers(file.get(name))}
-            return {
-                name: (array.shape[:: -1 if _is_turned(path, array) else 1], array.dtype)
-                for name, array in arrays.items()
-            }
+            turn = {name: -1 if _is_turned(path, array) else 1 for name, array in arrays.items()}
+            return {name: (array.shape[:: turn[name]], array.dtype) for name, array in arrays.items()}
     what = "is damaged" if head.startswith(_TEXT_7_3) else "is not a MATLAB file of version 5 or 7.3"
     raise SepiError(f"{path}: {what}; save it in MATLAB with -v7 or -v7.3")
 
 
 def _head(path: Path) -> bytes:
-    try:
-        with path.open("rb") as file:
-            return file.read(_HEADER)
-    except OSError as error:
-        raise SepiError(f"{path}: cannot be read ({error.strerror})") from error
+    with reading(path, _KIND), path.open("rb") as file:
+        return file.read(_HEADER)
 
 
 def _read_5(path: Path, name: str, kind: np.dtype[Any]) -> Array:
     from scipy.io import loadmat
 
-    with damage_named(path, "MATLAB file"):
+    with reading(path, _KIND), warnings.catch_warnings(action="ignore"):
         values: Array = loadmat(path, variable_names=[name])[name]
         # MATLAB saves doubles that are small whole numbers as bytes
         return values.astype(kind, copy=False)
@@ -131,7 +116,7 @@ def _real_arrays(path: Path) -> set[str]:
             kind, length = struct.unpack(order + "II", tag)
             end = file.tell() + length
             if end > path.stat().st_size:
-                raise SepiError(f"{path}: damaged MATLAB file: it is cut off")
+                raise SepiError("damaged MATLAB file: it is cut off")
             head = file.read(min(length, _PREFIX))
             if kind == _COMPRESSED:
                 head = zlib.decompressobj().decompress(head, _PREFIX)
@@ -140,7 +125,7 @@ def _real_arrays(path: Path) -> set[str]:
             if flags & 0xFF in _CLASSES and not flags & (_COMPLEX | _LOGICAL):
                 _, _, name, (stored_as, _) = _parts(order, head)
                 if stored_as not in _TYPES:
-                    raise SepiError(f"{path}: damaged MATLAB file: an array with values of type {stored_as}")
+                    raise SepiError(f"damaged MATLAB file: an array with values of type {stored_as}")
                 names.add(name[1].decode("latin-1"))
             file.seek(end)
     return names

@@ -9,7 +9,7 @@ counts them.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,14 +33,6 @@ ORDERS: dict[str, Callable[[Numbers], Numbers]] = {
     "transpose-flip-both": lambda grid: grid.T[::-1, ::-1],
 }
 """The eight ways to lay out a grid: each takes the given grid to the light field's."""
-
-_MEANT_FOR = {
-    "grid": "files that do not say their grid themselves",
-    "pattern": "folders of views (--format images)",
-    "axes": "arrays (.mat, .npy, .npz)",
-    "variable": "files with several arrays (.mat, .npz)",
-    "follow_links": "folders",
-}
 
 _POSITION = re.compile(r"\s*(\d{1,6})\s*,\s*(\d{1,6})\s*")
 
@@ -118,29 +110,6 @@ def arrange_numbers(
         _require_inside(source, numbers, options.view)
     excluded = [_excluded(source, view, numbers, names or {}) for view in options.exclude]
     return np.where(np.isin(numbers, excluded), -1, numbers)
-
-
-def require_unused(source: str, options: ReadOptions, names: Iterable[str]) -> None:
-    """Raise where an option is given that a format has no use for.
-
-    Parameters
-    ----------
-    source : str
-        Path, for the message.
-    options : ReadOptions
-    names : iterable of str
-        Attributes of ``options`` that must be as they are unless given.
-
-    Raises
-    ------
-    SepiError
-        Naming the flag and what it is for.
-    """
-    unset = ReadOptions()
-    for name in names:
-        if getattr(options, name) != getattr(unset, name):
-            flag = "--" + name.replace("_", "-")
-            raise SepiError(f"{source}: {flag} does not apply to this format; it is for {_MEANT_FOR[name]}")
 
 
 def position_of(numbers: Numbers, number: int) -> tuple[int, int] | None:

@@ -86,9 +86,9 @@ def _arrays(path: Path) -> list[tuple[tuple[int, ...], int]]:
     """Shape and bytes of a value of each array in a file that may be a light field, and that the file can hold."""
     try:
         if numpy_files.matches(path):
-            arrays = list(numpy_files.shapes(path).values())
+            arrays = list(numpy_files.array_shapes(path).values())
         elif matlab.matches(path):
-            arrays = list(matlab.shapes(path).values())
+            arrays = list(matlab.array_shapes(path).values())
         else:
             with open_hdf5(path) as file:
                 entries = (entry for entry in map(file.get, file) if isinstance(entry, h5py.Dataset))

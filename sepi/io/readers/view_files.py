@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -17,25 +16,9 @@ MAX_VIEWS = 10_000
 """More views than any grid has."""
 
 
-@dataclass(frozen=True)
-class ViewGrid:
-    """Views at their positions.
-
-    Attributes
-    ----------
-    views : ndarray, shape (T, S, H, W, C)
-        Zero where a view is missing.
-    present : ndarray, shape (T, S), bool
-    numbers : ndarray, shape (T, S), int64
-        Number of each view in the given grid; -1 for excluded ones.
-    """
-
-    views: Pixels
-    present: BoolMap
-    numbers: Numbers
-
-
-def read_grid(folder: Path, files: Mapping[int, Path], grid: tuple[int, int], options: ReadOptions) -> ViewGrid:
+def read_grid(
+    folder: Path, files: Mapping[int, Path], grid: tuple[int, int], options: ReadOptions
+) -> tuple[Pixels, BoolMap, Numbers]:
     """Read the views of a grid and put them in their positions; those left out are not even opened.
 
     Parameters
@@ -47,6 +30,14 @@ def read_grid(folder: Path, files: Mapping[int, Path], grid: tuple[int, int], op
     grid : (int, int)
         Rows and columns of the given grid.
     options : ReadOptions
+
+    Returns
+    -------
+    views : ndarray, shape (T, S, H, W, C)
+        Zero where a view is missing.
+    present : ndarray, shape (T, S), bool
+    numbers : ndarray, shape (T, S), int64
+        Number of each view in the given grid; -1 for excluded ones.
 
     Raises
     ------
@@ -63,19 +54,13 @@ def read_grid(folder: Path, files: Mapping[int, Path], grid: tuple[int, int], op
     if not paths:
         raise SepiError(f"{folder}: no view is left")
     if not options.follow_links:
-        require_within(folder, paths)
+        _require_within(folder, paths)
     views = read_views(paths, [int(position) for position in positions], numbers.size)
-    return ViewGrid(views.reshape(*numbers.shape, *views.shape[1:]), present, numbers)
+    return views.reshape(*numbers.shape, *views.shape[1:]), present, numbers
 
 
-def require_within(folder: Path, paths: Iterable[Path]) -> None:
-    """Raise if one of the files is a link that leads out of the folder.
-
-    Raises
-    ------
-    SepiError
-        Naming the link and where it leads.
-    """
+def _require_within(folder: Path, paths: Iterable[Path]) -> None:
+    """Raise if one of the files is a link that leads out of the folder."""
     home = folder.resolve()
     for path in paths:
         if not path.is_symlink():

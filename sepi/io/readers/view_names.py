@@ -64,11 +64,6 @@ def parse_view_numbers(source: str, names: Iterable[str], pattern: str) -> ViewN
     names : iterable of str
     pattern : str
         Name of a view with ``{row}`` and ``{column}``, or ``{number}``; ``*`` stands for anything.
-
-    Raises
-    ------
-    SepiError
-        If the pattern is none, or no name is like it.
     """
     names = sorted(names)
     form = _compiled(source, pattern)
@@ -208,20 +203,20 @@ def _suggested(view: _Name, varying: Sequence[int]) -> str:
 
 def _compiled(source: str, pattern: str) -> re.Pattern[str]:
     """The pattern as a regular expression that takes no longer than the name's length squared."""
-    fault = f"{source}: pattern '{pattern}': "
-    if "/" in pattern or "\\" in pattern:
-        raise SepiError(f"{fault}expected the name of a file in the folder, without folders")
-    if len(pattern) > 255:
-        raise SepiError(f"{source}: a pattern of {len(pattern)} characters is longer than any file's name")
     parts = re.findall(r"\{[^{}]*\}|\*|[^{}*]+|[{}]", pattern)
-    fields = [part[1:-1] for part in parts if part[0] in "{}"]
-    unknown = [field for field in fields if field not in _FIELDS]
-    if unknown:
-        raise SepiError(f"{fault}only {{row}}, {{column}} and {{number}} may stand in braces; such as {EXAMPLES}")
-    if sorted(fields) not in (["column", "row"], ["number"]):
-        raise SepiError(f"{fault}expected {{row}} and {{column}} once each, or {{number}} once; such as {EXAMPLES}")
-    if any(first[0] == "{" == second[0] for first, second in pairwise(parts)):
-        raise SepiError(f"{fault}something must stand between {{row}} and {{column}}")
+    fields = sorted(part for part in parts if part[0] in "{}")
+    touching = any(first[0] == "{" == second[0] for first, second in pairwise(parts))
+    # no file's name is longer
+    if (
+        fields not in (["{column}", "{row}"], ["{number}"])
+        or touching
+        or len(pattern) > 255
+        or set("/\\") & set(pattern)
+    ):
+        raise SepiError(
+            f"{source}: pattern '{pattern[:255]}': expected the name of a file in the folder, with {{row}} and "
+            f"{{column}} once each and something between them, or {{number}} once; such as {EXAMPLES}"
+        )
     segments = [""]
     for part in parts:
         if part == "*":

@@ -26,7 +26,7 @@ GREY = RGB[..., 0]
 
 
 def taken(array: np.ndarray, **options: object) -> LightField:
-    return light_field_from_array(array, name="toy", source="toy.npy", options=ReadOptions(**options))
+    return light_field_from_array(array, Path("toy.npy"), ReadOptions(**options))
 
 
 def refused(array: np.ndarray, **options: object) -> str:
@@ -313,7 +313,7 @@ def test_shape_and_length_that_agree_on_a_lie(tmp_path: Path) -> None:
         assert old in content
         content = content.replace(old, struct.pack(f"<{len(new)}Q", *new))
     (tmp_path / "lie.h5").write_bytes(content)
-    with pytest.raises(SepiError, match=r"lie\.h5: damaged HDF5 file"):
+    with pytest.raises(SepiError, match=r"lie\.h5: not a file of the first HCI benchmark, or damaged"):
         read(tmp_path / "lie.h5", ReadOptions(), "hci-2013")
 
 

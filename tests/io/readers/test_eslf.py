@@ -163,6 +163,6 @@ def test_damaged_picture_is_one_line_that_names_it(tmp_path: Path, capfd: pytest
     path = tmp_path / "a_eslf.png"
     imageio.imwrite(path, lenslets(stack((14, 14))))
     path.write_bytes(path.read_bytes()[:-20])
-    with pytest.raises(SepiError, match=r"a_eslf\.png: damaged PNG"):
+    with pytest.raises(SepiError, match=r"a_eslf\.png: not a PNG, or damaged"):
         read(path, ReadOptions())
     assert capfd.readouterr() == ("", "")

@@ -162,7 +162,7 @@ BAD_FOLDERS: dict[str, tuple[Callable[[Path], object], str, str]] = {
         "input_Cam001.png",
         "cannot be read",
     ),
-    "truncated PNG": (lambda f: cut(f / "input_Cam003.png"), "input_Cam003.png", "damaged PNG"),
+    "truncated PNG": (lambda f: cut(f / "input_Cam003.png"), "input_Cam003.png", "not a PNG, or damaged"),
     "damaged PNG": (lambda f: flip(f / "input_Cam003.png"), "input_Cam003.png", "checksum"),
     "not a PNG": (lambda f: (f / "input_Cam003.png").write_text("hello"), "input_Cam003.png", "not a PNG"),
     "empty PNG": (lambda f: (f / "input_Cam000.png").write_bytes(b""), "input_Cam000.png", "not a PNG"),
@@ -173,18 +173,18 @@ BAD_FOLDERS: dict[str, tuple[Callable[[Path], object], str, str]] = {
         "input_Cam004.png",
         "grey",
     ),
-    "range the wrong way round": (config(disp_min="3"), "parameters.cfg", "disp_min < disp_max"),
-    "range of no width": (config(disp_min="2"), "parameters.cfg", "disp_min < disp_max"),
+    "range the wrong way round": (config(disp_min="3"), "parameters.cfg", "MIN < MAX"),
+    "range of no width": (config(disp_min="2"), "parameters.cfg", "MIN < MAX"),
     "range not a number": (config(disp_max="near"), "parameters.cfg", "'near'"),
     "range NaN": (config(disp_max="nan"), "parameters.cfg", "finite"),
     "range infinite": (config(disp_max="inf"), "parameters.cfg", "finite"),
     "half a range": (
         lambda f: (f / "parameters.cfg").write_text("[meta]\ndisp_min = 1"),
         "parameters.cfg",
-        "disp_max is not given",
+        "both disp_min and disp_max",
     ),
-    "no cameras": (config(num_cams_x="0"), "parameters.cfg", "at least 1"),
-    "half a camera": (config(num_cams_x="2.5"), "parameters.cfg", "whole numbers"),
+    "no cameras": (config(num_cams_x="0"), "parameters.cfg", "num_cams_x: input should be greater than 0"),
+    "half a camera": (config(num_cams_x="2.5"), "parameters.cfg", "num_cams_x: input should be a valid integer"),
     "fewer cameras than views": (config(num_cams_x="2"), "input_Cam005.png", "2x2 grid that parameters.cfg gives"),
     "parameters of another size": (config(image_resolution_x_px="512"), "parameters.cfg", "image_resolution"),
     "parameters without section": (
@@ -200,7 +200,7 @@ BAD_FOLDERS: dict[str, tuple[Callable[[Path], object], str, str]] = {
     "parameters not text": (
         lambda f: (f / "parameters.cfg").write_bytes(b"\xff\xfe\x00"),
         "parameters.cfg",
-        "not a text file",
+        "not a text file with",
     ),
     "truth of another size": (
         lambda f: write_pfm(f / "gt_disp_lowres.pfm", np.zeros((12, 15), np.float32)),
@@ -218,7 +218,7 @@ BAD_FOLDERS: dict[str, tuple[Callable[[Path], object], str, str]] = {
         "mask_textureless.png",
         "black and white",
     ),
-    "mask damaged": (lambda f: cut(f / "mask_planes_lowres.png"), "mask_planes_lowres.png", "damaged PNG"),
+    "mask damaged": (lambda f: cut(f / "mask_planes_lowres.png"), "mask_planes_lowres.png", "not a PNG, or damaged"),
 }
 
 
