@@ -246,7 +246,7 @@ def test_interrupted_command_leaves_nothing_running(tmp_path: Path) -> None:
     mark = tmp_path / "mark"
     child = f"import pathlib, time; pathlib.Path({str(mark)!r}).write_text('x'); time.sleep(60)"
     case = f"Case('g', 'n', command, ('timeit', {child!r}))"
-    program = f"from bench.measure import *\nfrom bench.measure import command\nif __name__ == '__main__': measured({case}, 1)"
+    program = f"from bench.measure import Case, command, measured\nif __name__ == '__main__': measured({case}, 1)"
     process = subprocess.Popen([sys.executable, "-c", program], stderr=subprocess.DEVNULL, start_new_session=True)
     try:
         deadline = time.monotonic() + 60
