@@ -324,10 +324,12 @@ def _external(name: str, entry: Mapping[str, Any], variants: Collection[str]) ->
     source = validated(ExternalSource, entry, where)
     if name in variants:
         raise SepiError(f"{where}: a variant has this name; give the method another")
-    if not name.strip() or name != name.strip() or "/" in name or name.startswith(".") or not name.isprintable():
-        raise SepiError(f"{where}: a method's name must be printable text without '/', not beginning with '.'")
-    if len(name.encode()) > _LONGEST_METHOD:
-        raise SepiError(f"config.external.{name[:20]}...: a method's name must have at most {_LONGEST_METHOD} bytes")
+    plain = name.strip() == name != "" and "/" not in name and not name.startswith(".") and name.isprintable()
+    if not plain or len(name.encode()) > _LONGEST_METHOD:
+        raise SepiError(
+            f"config.external.{name[:_LONGEST_METHOD]}: a method's name must be printable text without '/', not "
+            f"beginning with '.', of at most {_LONGEST_METHOD} bytes"
+        )
     require_known(f"{where}.path", re.findall(r"\{[^{}]*\}", source.path), ("{dataset}", "{scene}"))
     path = Path(os.path.expanduser(source.path))
     if "{scene}" not in source.path and (path.is_file() or (path.suffix.lower() in SUFFIXES and not path.is_dir())):

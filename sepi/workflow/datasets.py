@@ -137,8 +137,10 @@ def _require_plain(name: str, where: str) -> None:
 
 def _benchmark_scene(folder: Path) -> Scene | None:
     views = sorted(folder.glob(VIEW_PATTERN))
+    if not views:
+        return None
     others = sorted({path for pattern in _OTHER_PATTERNS for path in folder.glob(pattern)})
-    return Scene("hci", folder.name, folder, (*views, *others), *size_of(views)) if views else None
+    return Scene("hci", folder.name, folder, (*views, *others), *size_of(views))
 
 
 def _archive_scene(path: Path) -> Scene | None:
