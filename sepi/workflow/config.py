@@ -248,10 +248,7 @@ def load_settings(values: Mapping[str, Any]) -> Settings:
     entries = {**VARIANT_ENTRIES, **config.variants}
     variants = {name: _variant(name, entries) for name in entries}
     return Settings(
-        {
-            (scene.dataset, scene.name): replace(scene, disparity_range=ranges.get(name))
-            for name, scene in scenes.items()
-        },
+        {(one.dataset, one.name): replace(one, disparity_range=ranges.get(name)) for name, one in scenes.items()},
         variants,
         stage_settings(config.stages, variants),
         {name: _external(name, entry, variants) for name, entry in config.external.items()},

@@ -21,6 +21,8 @@ _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.+-]*")
 _LIBRARIES = 300
 # bytes of a pixel of 8-bit colours
 _RGB = 3
+# root/scene, root/category/scene, and a level more
+_DEPTH = 3
 
 
 @dataclass(frozen=True)
@@ -99,10 +101,10 @@ def scenes_in(root: Path, dataset: str, where: str) -> list[Scene]:
     SepiError
         If there is no such folder, no scene in it, two scenes of one name, or a name that is no plain word.
     """
-    scene_at, depth, expected = _KINDS[dataset]
+    find, expected = _FINDERS[dataset]
     if not (root.is_dir() or (root.is_file() and dataset == "hci_2013")):
         raise SepiError(f"{where}: no folder '{root}'")
-    scenes = list(_found(root.resolve(), scene_at, depth))
+    scenes = list(find(root.resolve()))
     if not scenes:
         raise SepiError(f"{where}: no scene in '{root}' (expected {expected})")
     for name, count in Counter(scene.name for scene in scenes).items():
@@ -135,35 +137,29 @@ def _require_plain(name: str, where: str) -> None:
         raise SepiError(f"{where}: a scene must be named with letters, digits and _ . + - only: '{name}'")
 
 
-def _benchmark_scene(folder: Path) -> Scene | None:
+def _benchmark_scenes(folder: Path, depth: int = _DEPTH) -> Iterator[Scene]:
     views = sorted(folder.glob(VIEW_PATTERN))
-    if not views:
-        return None
-    others = sorted({path for pattern in _OTHER_PATTERNS for path in folder.glob(pattern)})
-    return Scene("hci", folder.name, folder, (*views, *others), *size_of(views))
+    if views:
+        others = sorted({path for pattern in _OTHER_PATTERNS for path in folder.glob(pattern)})
+        yield Scene("hci", folder.name, folder, (*views, *others), *size_of(views))
+    elif depth:
+        for inner in sorted(folder.iterdir()):
+            if inner.is_dir() and not inner.name.startswith("."):
+                yield from _benchmark_scenes(inner, depth - 1)
 
 
-def _archive_scene(path: Path) -> Scene | None:
-    if path.is_dir() or not hci_2013.matches(path):
-        return None
-    name = path.parent.name if path.stem.lower() == "lf" else path.stem
-    return Scene("hci_2013", name, path, (path,), *size_of((path,)))
-
-
-def _found(path: Path, scene_at: Callable[[Path], Scene | None], depth: int) -> Iterator[Scene]:
-    """The scene at a path, or those below it."""
-    scene = scene_at(path)
-    if scene:
-        yield scene
-    elif path.is_dir() and depth:
+def _archive_scenes(path: Path, depth: int = _DEPTH + 1) -> Iterator[Scene]:
+    if path.is_dir() and depth:
         for inner in sorted(path.iterdir()):
             if not inner.name.startswith("."):
-                yield from _found(inner, scene_at, depth - 1)
+                yield from _archive_scenes(inner, depth - 1)
+    elif hci_2013.matches(path):
+        name = path.parent.name if path.stem.lower() == "lf" else path.stem
+        yield Scene("hci_2013", name, path, (path,), *size_of((path,)))
 
 
-# dataset to what makes a scene of a path, how deep below the root it may be (a category, and a level more), and what
-# is looked for
-_KINDS: dict[str, tuple[Callable[[Path], Scene | None], int, str]] = {
-    "hci": (_benchmark_scene, 3, f"folders with {VIEW_PATTERN}"),
-    "hci_2013": (_archive_scene, 4, f"HDF5 files with a dataset {hci_2013.VIEWS}"),
+# dataset to what yields its scenes below a folder, and what is looked for
+_FINDERS: dict[str, tuple[Callable[[Path], Iterator[Scene]], str]] = {
+    "hci": (_benchmark_scenes, f"folders with {VIEW_PATTERN}"),
+    "hci_2013": (_archive_scenes, f"HDF5 files with a dataset {hci_2013.VIEWS}"),
 }
