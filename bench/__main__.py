@@ -8,15 +8,17 @@ from typing import Any
 
 import click
 import numba
+from tqdm import tqdm
 
 from bench import plot, tables
-from bench.plan import GROUPS, measure
-from bench.result import Result, read, write
+from bench.cases import GROUPS
+from bench.measure import Case, Measurement, Result, measured, read_result
 from bench.scene import Scene
 from sepi.command import SepiGroup
 from sepi.errors import SepiError
 from sepi.io.files import atomic_path
 from sepi.scenes import SCENES
+from sepi.threads import use_threads
 from sepi.workflow.machine import this_machine
 
 _PATH = click.Path(path_type=Path)
@@ -33,7 +35,9 @@ def main() -> None:
 )
 @click.option("--repeats", type=click.IntRange(min=1), default=5, show_default=True, help="Timed calls of each case.")
 @click.option("--threads", type=click.IntRange(min=1), help="Threads to use; one per core unless given.")
-@click.option("--group", "groups", type=click.Choice(GROUPS), multiple=True, help="Measure only this; repeatable.")
+@click.option(
+    "--group", "groups", type=click.Choice(list(GROUPS)), multiple=True, help="Measure only this; repeatable."
+)
 @click.option("--small", is_flag=True, help="A tiny scene, once: shows that everything runs, not how fast.")
 @click.option("--output", type=_PATH, default=Path("reports"), show_default=True, help="Folder to write to.")
 def run(scene: str, repeats: int, threads: int | None, groups: tuple[str, ...], small: bool, output: Path) -> None:
@@ -43,25 +47,32 @@ def run(scene: str, repeats: int, threads: int | None, groups: tuple[str, ...], 
     if small and "large" in groups:
         raise click.UsageError("--small has no large light field; leave out --small or --group large")
     most = numba.config.NUMBA_NUM_THREADS  # type: ignore[attr-defined]
-    if threads is not None and threads > most:
+    threads = threads or most
+    if threads > most:
         raise SepiError(f"--threads {threads}: this machine runs at most {most} at once")
-    settings: dict[str, Any] = {
-        "scene": scene if scene in SCENES else Path(scene).name,
-        "num_disparities": 21 if small else 181,
-        "threads": threads or most,
-        "repeats": 1 if small else repeats,
-    }
-    chosen = set(groups or (name for name in GROUPS if not (small and name == "large")))
+    use_threads(threads)
+    repeats, num_disparities = (1, 21) if small else (repeats, 181)
     with tempfile.TemporaryDirectory(prefix="sepi-bench-") as folder:
-        name = scene if scene in SCENES else str(Path(scene).absolute())
-        size, views = (64, 5) if small else (512, 9)
-        found, failed = measure(Scene(name, size, views, Path(folder)), settings, chosen, small)
+        files = Scene(scene, Path(folder), num_disparities, threads, small)
+        light_field = files.write_files()
+        (T, S), (H, W) = light_field.grid, light_field.shape
+        settings: dict[str, Any] = {
+            "scene": scene if scene in SCENES else Path(scene).name,
+            "num_disparities": num_disparities,
+            "threads": threads,
+            "repeats": repeats,
+            "size": f"{W}x{H}",
+            "views": f"{T}x{S}",
+            "pixels": f"{light_field.views.dtype} x {light_field.views.shape[4]}",
+        }
+        # those asked for in their own order; all unless any is
+        chosen = [name for name in GROUPS if name in (groups or GROUPS) and not (small and name == "large")]
+        found, failed = _all_measured([case for name in chosen for case in GROUPS[name](files)], repeats, threads)
     result = Result(this_machine(), settings, tuple(found))
-    output.mkdir(parents=True, exist_ok=True)
-    write(result, output / "bench.json")
+    for name, text in (("bench.json", result.as_json()), ("bench.md", tables.page(result))):
+        with atomic_path(output / name) as temporary:
+            temporary.write_text(text, encoding="utf-8")
     plot.write(result, output / "bench.png")
-    with atomic_path(output / "bench.md") as temporary:
-        temporary.write_text(_page(result), encoding="utf-8")
     click.echo(f"written to {output}/: bench.json bench.md bench.png")
     if failed:
         raise SepiError(f"{failed} of the benchmark's cases failed; the others are written")
@@ -72,22 +83,26 @@ def run(scene: str, repeats: int, threads: int | None, groups: tuple[str, ...], 
 @click.argument("after", type=_PATH)
 def compare(before: Path, after: Path) -> None:
     """Print the results BEFORE and AFTER, two files bench.json, side by side."""
-    old, new = read(before), read(after)
-    table = tables.comparison(old, new)
-    if not table.rows:
+    old, new = read_result(before), read_result(after)
+    rows = tables.comparison(old, new)
+    if not rows:
         raise SepiError(f"{before} and {after}: nothing was measured in both")
     for difference in tables.differences(old, new):
         click.echo(f"sepi: warning: not the same {difference}", err=True)
-    click.echo(f"# Before and after\n\nMedian seconds of each case.\n\n{table.markdown()}")
+    click.echo(f"# Before and after\n\nMedian seconds of each case.\n\n{tables.markdown(rows)}")
 
 
-def _page(result: Result) -> str:
-    """The result as Markdown."""
-    facts = [", ".join(f"{key} {value}" for key, value in one.items()) for one in (result.settings, result.machine)]
-    parts = ["# Benchmark", f"Medians. {facts[0]}.", f"Machine: {facts[1]}."]
-    for heading, table in tables.sections(result).items():
-        parts += [f"## {heading}", table.markdown()]
-    return "\n\n".join(parts) + "\n"
+def _all_measured(cases: list[Case], repeats: int, threads: int) -> tuple[list[Measurement], int]:
+    """Measurements, and how many cases failed; each of those is warned of."""
+    found = []
+    with tqdm(cases, disable=None, leave=False, bar_format="{n}/{total} {desc} |{bar}|") as bar:
+        for case in bar:
+            bar.set_description(f"{case.group}: {case.name}"[:50].ljust(50))
+            try:
+                found.append(measured(case, repeats, threads))
+            except SepiError as error:
+                click.echo(f"sepi: warning: {error}", err=True)
+    return found, len(cases) - len(found)
 
 
 if __name__ == "__main__":

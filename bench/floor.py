@@ -8,12 +8,13 @@ price.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from numba import njit, prange
 
-from bench.measure import Case, Figures, Prepared
+from bench.measure import Figures, Measurement, Prepared
 
 NUMBERS = 512
 PASSES = 20_000
@@ -57,33 +58,33 @@ def _windows(threads: int, passes: int, data: Any, out: Any) -> None:
                 )
 
 
-def _prepare(kernel: Any, threads: int, per_number: float) -> Prepared:
-    generator = np.random.default_rng(0)
-    data = generator.random((threads, 7, NUMBERS), np.float32)
+KERNELS: dict[str, tuple[Any, int]] = {"sample": (_samples, 1), "multiply-add of the window": (_windows, 7)}
+"""Name to kernel, and how many operations it does on a number; their price is seconds over operations."""
+
+WINDOW_OPERATIONS = "window_operations"
+"""Figure of a sweep: multiply-adds of its windows, beside its ``samples``."""
+
+
+def prepare(name: str, threads: int) -> Prepared:
+    """One of the kernels, all ``threads`` at work; says how many operations it did."""
+    kernel, per_number = KERNELS[name]
+    data = np.random.default_rng(0).random((threads, 7, NUMBERS), np.float32)
     out = np.zeros((threads, NUMBERS), np.float32)
-
-    def call() -> None:
-        kernel(threads, PASSES, data, out)
-
-    def figures(_: Any) -> Figures:
-        return {"operations": threads * PASSES * NUMBERS * per_number}
-
-    return Prepared(call, figures)
+    operations = float(threads * PASSES * NUMBERS * per_number)
+    return Prepared(lambda: kernel(threads, PASSES, data, out), lambda _: {"operations": operations})
 
 
-def samples(threads: int) -> Prepared:
-    """Operations of one sample of an RGB view, all ``threads`` at work."""
-    return _prepare(_samples, threads, 1)
+def seconds(prices: Mapping[str, Measurement], figures: Figures) -> float | None:
+    """Seconds that a sweep's operations alone take; None for what is no sweep or of grey views.
 
-
-def windows(threads: int) -> Prepared:
-    """Multiply-adds of the window, seven at a time."""
-    return _prepare(_windows, threads, 7)
-
-
-def cases(threads: int) -> list[Case]:
-    """Both kernels; the price is median seconds over the figure ``operations``."""
-    return [
-        Case("floor", "sample", samples, (threads,), threads=threads),
-        Case("floor", "multiply-add of the window", windows, (threads,), threads=threads),
-    ]
+    Parameters
+    ----------
+    prices : mapping of str to Measurement
+        Of the kernels, by name.
+    figures : mapping of str to number
+        Of the sweep.
+    """
+    if not prices or figures.get("channels") != 3:
+        return None
+    sample, window = (prices[name].median / prices[name].figures["operations"] for name in KERNELS)
+    return figures["samples"] * sample + figures[WINDOW_OPERATIONS] * window

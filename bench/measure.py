@@ -1,31 +1,32 @@
-"""Measuring: a case in a process of its own, its median time and its peak memory."""
+"""Measuring: a case in a process of its own, its median time and its peak memory; and the result of all as a file."""
 
 from __future__ import annotations
 
-import json
 import multiprocessing
-import os
 import signal
 import statistics
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field
-from typing import Annotated, Any
+from pathlib import Path
+from typing import Annotated, Any, Literal, NamedTuple
 
-from pydantic import Field
+from pydantic import Field, TypeAdapter, ValidationError
 
-from sepi.command import megabytes, peak_memory_mb
+from sepi.command import peak_memory_mb
 from sepi.errors import SepiError
 from sepi.threads import use_threads
 
 Figures = dict[str, float]
 
+PEAK_MEMORY = "peak_memory_mb"
+"""Figure of a case whose work is done by a process that it starts."""
 
-@dataclass(frozen=True)
-class Prepared:
+
+class Prepared(NamedTuple):
     """A case whose inputs are available.
 
     Attributes
@@ -52,10 +53,12 @@ class Case:
         A function of a module, called with ``arguments`` in the process of the case; returns a :class:`Prepared`.
     arguments : tuple
     figures : mapping of str to number
-        What is known beforehand, such as the number of samples.
-    threads : int
-    once : bool
-        Too long to be repeated: timed at its first call, which loads the compiled kernels too.
+        What is known beforehand, such as the number of candidates.
+    threads : int or None
+        None for those of the whole run.
+    most : int
+        At most so many timed calls. A case of 1 is too long to be repeated: timed at its first call, which loads the
+        compiled kernels too.
     """
 
     group: str
@@ -63,8 +66,8 @@ class Case:
     prepare: Callable[..., Prepared]
     arguments: tuple[Any, ...] = ()
     figures: Figures = field(default_factory=dict)
-    threads: int = 1
-    once: bool = False
+    threads: int | None = None
+    most: int = 1000
 
 
 @dataclass(frozen=True)
@@ -94,7 +97,54 @@ class Measurement:
         return statistics.median(self.seconds)
 
 
-def measured(case: Case, repeats: int) -> Measurement:
+@dataclass(frozen=True)
+class Result:
+    """What one run measured: the content of ``bench.json``.
+
+    Attributes
+    ----------
+    machine : mapping
+        Processor, cores and versions; no names of hosts or users.
+    settings : mapping
+        Scene, size, views, num_disparities, threads, repeats.
+    measurements : tuple of Measurement
+    format : int
+        Of the file.
+    """
+
+    machine: dict[str, Any]
+    settings: dict[str, Any]
+    measurements: tuple[Measurement, ...]
+    format: Literal[1] = 1
+
+    def group(self, name: str) -> dict[str, Measurement]:
+        """Measurements of one group by name."""
+        return {m.name: m for m in self.measurements if m.group == name}
+
+    def as_json(self) -> str:
+        """The text of the file."""
+        return _RESULT.dump_json(self, indent=1).decode() + "\n"
+
+
+_RESULT = TypeAdapter(Result)
+
+
+def read_result(path: Path) -> Result:
+    """Read a result.
+
+    Raises
+    ------
+    SepiError
+        If the file is no result of a benchmark.
+    """
+    try:
+        return _RESULT.validate_json(path.read_bytes())
+    except ValidationError as error:
+        reason = error.errors()[0]["msg"]
+        raise SepiError(f"{path}: not a benchmark's result (expected the JSON that `run` wrote): {reason}") from error
+
+
+def measured(case: Case, repeats: int, threads: int = 1) -> Measurement:
     """Measure a case in a fresh process: one call to load what is loaded once, then ``repeats`` timed ones.
 
     Raises
@@ -105,13 +155,13 @@ def measured(case: Case, repeats: int) -> Measurement:
     # forked from a process that has imported what all cases need and done nothing: none inherits another's memory
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload(
-        ["bench.plan", "sepi.matching.plane_sweep_kernels", "sepi.image.mean_shift", "skimage.segmentation"]
+        ["bench.cases", "sepi.matching.plane_sweep_kernels", "sepi.image.mean_shift", "skimage.segmentation"]
     )
     try:
         with ProcessPoolExecutor(1, context) as pool:
-            future = pool.submit(_measure, case, repeats)
+            future = pool.submit(_measure, case, repeats, threads)
             try:
-                seconds, memory, figures = future.result()
+                return future.result()
             except KeyboardInterrupt:
                 for process in multiprocessing.active_children():
                     process.terminate()
@@ -119,61 +169,43 @@ def measured(case: Case, repeats: int) -> Measurement:
     except Exception as error:
         reason = " ".join(f"{type(error).__name__}: {error}".split())
         raise SepiError(f"benchmark {case.group}, {case.name}: {reason}") from error
-    return Measurement(case.group, case.name, tuple(seconds), memory, {**case.figures, **figures})
 
 
-def _measure(case: Case, repeats: int) -> tuple[list[float], float, Figures]:
-    """In the new process: prepare and call; seconds of each call, peak memory in MB and figures."""
-    use_threads(case.threads)
+def _measure(case: Case, repeats: int, threads: int) -> Measurement:
+    """In the new process: prepare and call."""
+    use_threads(case.threads or threads)
     prepared = case.prepare(*case.arguments)
-    if not case.once:
+    if case.most > 1:
         prepared.call()
     seconds, result = [], None
-    for _ in range(1 if case.once else repeats):
+    for _ in range(min(repeats, case.most)):
         started = time.perf_counter()
         result = prepared.call()
         seconds.append(time.perf_counter() - started)
-    return seconds, peak_memory_mb(), prepared.figures(result)
+    memory = peak_memory_mb()
+    figures = {**case.figures, **prepared.figures(result)}
+    return Measurement(case.group, case.name, tuple(seconds), figures.pop(PEAK_MEMORY, memory), figures)
 
 
-# a process of its own, since a new process inherits the peak memory of the one that starts it
-_STARTER = """
-import json, resource, subprocess, sys, time
-started = time.perf_counter()
-code = subprocess.run(sys.argv[1:], stdout=subprocess.DEVNULL).returncode
-seconds = time.perf_counter() - started
-print(json.dumps([seconds, resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss, code]))
+# the module named first, as `python -m` runs it; the last thing it says is its peak memory
+_MODULE = """
+import atexit, runpy, sys
+from sepi.command import peak_memory_mb
+atexit.register(lambda: print(peak_memory_mb(), file=sys.stderr))
+del sys.argv[0]
+runpy.run_module(sys.argv[0], run_name="__main__", alter_sys=True)
 """
 
 
-def measured_command(group: str, name: str, arguments: Sequence[str], repeats: int) -> Measurement:
-    """Measure a Python command as a user would: the whole process from start to end; once before, to warm the disk.
+def command(*arguments: str) -> Prepared:
+    """A module of Python and its arguments, run as a user would: a whole process from start to end."""
+    # an interrupted benchmark ends this process, and an exception ends what it waits for
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
 
-    Raises
-    ------
-    SepiError
-        If it fails; the message holds its last words.
-    """
-    seconds, peaks = [], []
-    for _ in range(repeats + 1):
-        command = [sys.executable, "-I", "-S", "-c", _STARTER, sys.executable, *arguments]
-        said, complained = _output(command)
-        taken, peak, code = json.loads(said)
-        if code:
-            raise SepiError(f"benchmark {group}, {name}: {' '.join(complained.split()[-40:])}")
-        seconds.append(taken)
-        peaks.append(megabytes(peak))
-    return Measurement(group, name, tuple(seconds[1:]), max(peaks))
+    def call() -> str:
+        done = subprocess.run([sys.executable, "-c", _MODULE, *arguments], capture_output=True, text=True, check=False)
+        if done.returncode:
+            raise SepiError(" ".join(done.stderr.split()[-40:]))
+        return done.stderr
 
-
-def _output(command: Sequence[str]) -> tuple[str, str]:
-    """What a command prints and complains; nothing that it started is left running when this is interrupted."""
-    process = subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
-    )
-    try:
-        return process.communicate()
-    except BaseException:
-        os.killpg(process.pid, signal.SIGKILL)
-        process.communicate()
-        raise
+    return Prepared(call, lambda said: {PEAK_MEMORY: float(said.split()[-1])})

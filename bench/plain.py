@@ -7,14 +7,14 @@ Whole pictures at a time, float32, no loop over pixels; the three differ in who 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import cv2
 import numpy as np
 from scipy import ndimage
 
-from bench.measure import Case, Figures, Prepared
+from bench.measure import Figures, Prepared
 from sepi.image.noise import residual_variance
 from sepi.io.hdf5 import read_light_field
 from sepi.lightfield import FloatMap, LightField, as_unit_float
@@ -29,18 +29,13 @@ def by_numpy(view: FloatMap, down: float, across: float) -> FloatMap:
     top, left = math.floor(down), math.floor(across)
     fy, fx = np.float32(down - top), np.float32(across - left)
     H, W, _ = view.shape
+    margin = max(abs(top), abs(left)) + 1
+    padded = np.pad(view, ((margin, margin), (margin, margin), (0, 0)))
     moved = np.zeros_like(view)
-    # a sample on the last row needs none below
-    rows = range(max(0, -top), min(H, H - top - (fy > 0)))
-    columns = range(max(0, -left), min(W, W - left - (fx > 0)))
-    if not rows or not columns:
-        return moved
-    target = moved[rows.start : rows.stop, columns.start : columns.stop]
     for dy, wy in ((0, 1 - fy), (1, fy)):
         for dx, wx in ((0, 1 - fx), (1, fx)):
-            if wy * wx != 0:
-                y, x = rows.start + top + dy, columns.start + left + dx
-                target += wy * wx * view[y : y + len(rows), x : x + len(columns)]
+            y, x = margin + top + dy, margin + left + dx
+            moved += wy * wx * padded[y : y + H, x : x + W]
     return moved
 
 
@@ -61,6 +56,9 @@ def by_opencv(view: FloatMap, down: float, across: float) -> FloatMap:
     return np.asarray(moved, np.float32).reshape(H, W, C)
 
 
+WARPS: dict[str, Warp] = {"NumPy slices": by_numpy, "SciPy ndimage.shift": by_scipy, "OpenCV warpAffine": by_opencv}
+
+
 def plain_sweep(light_field: LightField, parameters: SweepParameters, warp: Warp) -> tuple[FloatMap, FloatMap]:
     """Candidate of the lowest cost of each pixel, and that cost; both of shape (H, W), float32 (Eq. 3-4).
 
@@ -75,12 +73,11 @@ def plain_sweep(light_field: LightField, parameters: SweepParameters, warp: Warp
     reference_view = light_field.reference_view
     noise = residual_variance(reference_view)
     weights = _window_weights(reference_view, parameters.window_radius, parameters.window_sigma**2 + noise)
+    scale2 = np.float32(parameters.scale**2 + noise)
     lowest = np.full(light_field.shape, np.inf, np.float32)
     best = np.zeros(light_field.shape, np.float32)
     for disparity in light_field.require_disparity_range().candidates(parameters.num_disparities):
-        total, number = _candidate_cost(
-            light_field, views, reference_view, float(disparity), parameters.scale**2 + noise, warp
-        )
+        total, number = _candidate_cost(light_field, views, float(disparity), scale2, warp)
         seen = _aggregated(number, weights)
         cost = np.divide(_aggregated(total, weights), seen, out=np.ones_like(total), where=seen > 0)
         better = cost < lowest
@@ -90,7 +87,7 @@ def plain_sweep(light_field: LightField, parameters: SweepParameters, warp: Warp
 
 
 def _candidate_cost(
-    light_field: LightField, views: FloatMap, reference_view: FloatMap, disparity: float, scale2: float, warp: Warp
+    light_field: LightField, views: FloatMap, disparity: float, scale2: np.float32, warp: Warp
 ) -> tuple[FloatMap, FloatMap]:
     """Sum of the robust residuals over the views at one disparity, and how many views see each pixel."""
     H, W = light_field.shape
@@ -101,46 +98,38 @@ def _candidate_cost(
         if (t, s) == (t0, s0):
             continue
         down, across = -disparity * (t - t0), -disparity * (s - s0)
-        residual = warp(views[t, s], down, across)
-        residual -= reference_view
+        residual = warp(views[t, s], down, across) - light_field.reference_view
         squared = np.einsum("yxc,yxc->yx", residual, residual)
         inside = (y + down >= 0) & (y + down <= H - 1) & (x + across >= 0) & (np.floor(x + across) < W - 1)
-        total += np.where(inside, squared / (squared + np.float32(scale2)), 0)
+        total += np.where(inside, squared / (squared + scale2), 0)
         number += inside
     return total, number
 
 
 def _window_weights(reference_view: FloatMap, radius: int, variance: float) -> FloatMap:
-    """Weights of each pixel's window, (2 r + 1, 2 r + 1, H, W), zero outside the picture."""
-    size = 2 * radius + 1
-    weights = np.zeros((size, size, *reference_view.shape[:2]), np.float32)
-    for i, j, here, there in _window(reference_view.shape[:2], radius):
-        squared = ((reference_view[here] - reference_view[there]) ** 2).sum(axis=2)
-        weights[(i, j, *here)] = np.exp(-0.5 * squared / np.float32(variance))
-    return np.asarray(weights / weights.sum(axis=(0, 1)), np.float32)
+    """Weights of each pixel's window, (H, W, 2 r + 1, 2 r + 1), zero outside the picture."""
+    squared = sum(
+        (_windows(channel, radius, np.inf) - channel[..., None, None]) ** 2
+        for channel in reference_view.transpose(2, 0, 1)
+    )
+    weights = np.exp(-0.5 * squared / np.float32(variance))
+    return np.asarray(weights / weights.sum(axis=(2, 3), keepdims=True), np.float32)
 
 
 def _aggregated(values: FloatMap, weights: FloatMap) -> FloatMap:
     """Weighted sum over each pixel's window."""
-    total = np.zeros_like(values)
-    for i, j, here, there in _window(values.shape, len(weights) // 2):
-        total[here] += weights[(i, j, *here)] * values[there]
-    return total
+    return np.asarray(np.einsum("yxij,yxij->yx", _windows(values, weights.shape[2] // 2, 0), weights))
 
 
-def _window(shape: tuple[int, ...], radius: int) -> Iterator[tuple[int, int, tuple[slice, slice], tuple[slice, slice]]]:
-    """Place in the window, the pixels that have a neighbour there, and those neighbours."""
-    H, W = shape
-    for i in range(-radius, radius + 1):
-        for j in range(-radius, radius + 1):
-            here = (slice(max(0, -i), min(H, H - i)), slice(max(0, -j), min(W, W - j)))
-            there = (slice(max(0, i), min(H, H + i)), slice(max(0, j), min(W, W + j)))
-            yield i + radius, j + radius, here, there
+def _windows(values: FloatMap, radius: int, outside: float) -> FloatMap:
+    """Each pixel's window, (H, W, 2 r + 1, 2 r + 1); a view of one copy."""
+    size = 2 * radius + 1
+    return np.lib.stride_tricks.sliding_window_view(np.pad(values, radius, constant_values=outside), (size, size))
 
 
-def prepare(scene: Path, num_disparities: int, warp: Warp) -> Prepared:
+def prepare(path: Path, num_disparities: int, warp: Warp) -> Prepared:
     """The plain sweep of a scene; says how far its lowest costs are from those of the compiled one."""
-    light_field = read_light_field(scene)
+    light_field = read_light_field(path)
     parameters = SweepParameters(num_disparities=num_disparities)
 
     def figures(result: tuple[FloatMap, FloatMap]) -> Figures:
@@ -148,13 +137,3 @@ def prepare(scene: Path, num_disparities: int, warp: Warp) -> Prepared:
         return {"largest_difference": float(difference.max()), "mean_difference": float(difference.mean())}
 
     return Prepared(lambda: plain_sweep(light_field, parameters, warp), figures)
-
-
-def cases(scene: Path, num_disparities: int, threads: int) -> list[Case]:
-    """The plain sweeps, each once: long enough to measure, and nothing in them is compiled at the first call."""
-    known = {"num_disparities": float(num_disparities)}
-    rivals = {"NumPy slices": by_numpy, "SciPy ndimage.shift": by_scipy, "OpenCV warpAffine": by_opencv}
-    return [
-        Case("beside", name, prepare, (scene, num_disparities, warp), known, threads=threads, once=True)
-        for name, warp in rivals.items()
-    ]

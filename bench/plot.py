@@ -8,8 +8,8 @@ from typing import Any
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from bench.result import Result
-from bench.tables import AXES, beside
+from bench.measure import Result
+from bench.tables import AXES, per_candidate
 from sepi.io.files import atomic_path
 
 
@@ -18,19 +18,17 @@ def write(result: Result, path: Path) -> None:
     figure = Figure(figsize=(13, 7), layout="constrained")
     FigureCanvasAgg(figure)
     first, *others, last = figure.subplots(2, 3).ravel()
-    _steps(first, result)
+    steps = {name: m.median for name, m in result.group("stages").items()}
+    for panel, bars, log in ((first, steps, False), (last, per_candidate(result), True)):
+        panel.barh(list(bars), list(bars.values()), color="tab:green" if log else "tab:blue", log=log)
+        panel.invert_yaxis()
+    first.set(title="from files to maps", xlabel="seconds")
+    last.set(title="initial stage beside plain ones", xlabel="seconds per candidate")
     for panel, axis in zip(others, AXES, strict=True):
         _growth(panel, result, axis)
-    _beside(last, result)
     with atomic_path(path) as temporary:
         # no version of the library, so that equal results give equal files
         figure.savefig(temporary, dpi=100, format="png", metadata={"Software": None})
-
-
-def _steps(panel: Any, result: Result) -> None:
-    measurements = list(result.group("stages").values())[::-1]
-    panel.barh([m.name for m in measurements], [m.median for m in measurements], color="tab:blue")
-    panel.set(title="from files to maps", xlabel="seconds")
 
 
 def _growth(panel: Any, result: Result, axis: str) -> None:
@@ -46,9 +44,3 @@ def _growth(panel: Any, result: Result, axis: str) -> None:
         panel.minorticks_off()
         panel.legend()
     panel.set(title=f"growth with {axis} (dotted: linear)", xlabel=axis, ylabel="seconds")
-
-
-def _beside(panel: Any, result: Result) -> None:
-    rows = list(beside(result).rows)[::-1]
-    panel.barh([row[0] for row in rows], [float(row[1]) for row in rows], color="tab:green", log=True)
-    panel.set(title="initial stage beside plain ones", xlabel="seconds per candidate")

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
-from bench.measure import Prepared
 from sepi.inspection.disparity_range import settle_range
 from sepi.io.hdf5 import read_light_field, read_stage, write_light_field, write_stage
 from sepi.io.provenance import entry, stage_attributes
 from sepi.lightfield import LightField
-from sepi.pipeline import STAGES, Variant
+from sepi.pipeline import STAGES, stage_parameters, variant_named
 from sepi.reading import read_light_field as read_any
 from sepi.scenes import SCENES, render
 from sepi.scenes.folder import write_hci
@@ -21,87 +22,91 @@ from sepi.stage import Parameters, StageMaps, no_progress
 VARIANT = "paper"
 """Variant whose steps are measured."""
 
+GROWING_SCENE = "curved_occluders"
+
 
 @dataclass(frozen=True)
 class Scene:
-    """A scene and the files that its cases share.
+    """A scene, and the folder of the files that its cases share.
 
     Attributes
     ----------
     name : str
         Of a built-in scene, or the path of a light field.
-    size, views : int
-        Of a built-in scene.
     folder : Path
-        Holds the files.
+        Holds the light field ``scene.h5``, its range settled, and the maps after each stage, such as ``initial.h5``.
+    num_disparities : int
+        Candidates of the stages that sweep.
+    threads : int
+        Of the run.
+    small : bool
+        Whether to measure on next to nothing.
     """
 
     name: str
-    size: int
-    views: int
     folder: Path
+    num_disparities: int
+    threads: int
+    small: bool
 
     @property
     def source(self) -> Path:
         """The light field as a user has it: a folder of PNG files, or the path given."""
-        return self.folder / self.name if self.name in SCENES else Path(self.name)
+        return self.folder / self.name if self.name in SCENES else Path(self.name).absolute()
 
     @property
-    def light_field(self) -> Path:
-        """The light field as HDF5, its range settled."""
+    def path(self) -> Path:
+        """The light field as HDF5."""
         return self.folder / "scene.h5"
 
-    def maps(self, stage: str) -> Path:
-        """Maps after a stage."""
-        return self.folder / f"{stage}.h5"
+    @cached_property
+    def parameters(self) -> dict[str, Parameters]:
+        """What each stage runs with."""
+        return stage_parameters(variant_named(VARIANT), sweep_values(self.num_disparities))
 
-
-def prepare_files(scene: Scene, variant: Variant, settings: dict[str, Parameters]) -> Prepared:
-    """Write the light field and the maps after each stage of a variant."""
-
-    def call() -> None:
-        if scene.name in SCENES:
-            light_field = render(scene.name, size=scene.size, views=scene.views)
-            write_hci(light_field, scene.source)
+    def write_files(self) -> LightField:
+        """Write the light field and the maps after each stage; returns the light field."""
+        if self.name in SCENES:
+            size, views = (64, 5) if self.small else (512, 9)
+            light_field = render(self.name, size=size, views=views)
+            write_hci(light_field, self.source)
         else:
-            light_field = settle_range(read_any(scene.source))
-        write_light_field(scene.light_field, light_field)
+            light_field = settle_range(read_any(self.source))
+        write_light_field(self.path, light_field)
         maps: StageMaps | None = None
-        steps = []
-        for stage, choice in variant.choices.items():
-            maps = STAGES[stage][choice].run(light_field, maps, settings[stage], no_progress)
-            steps.append(entry(stage, choice, settings[stage]))
-            write_stage(scene.maps(stage), maps, stage_attributes(light_field, steps))
+        entries = []
+        for stage, choice in variant_named(VARIANT).choices.items():
+            maps = STAGES[stage][choice].run(light_field, maps, self.parameters[stage], no_progress)
+            entries.append(entry(stage, choice, self.parameters[stage]))
+            write_stage(self.folder / f"{stage}.h5", maps, stage_attributes(light_field, entries))
+        return light_field
 
-    return Prepared(call)
+    def grown(self, size: int, views: int) -> Path:
+        """File of a light field of this size and this many views a side."""
+        return self.folder / f"{size}x{views}.h5"
 
+    def write_grown(self, needed: Collection[tuple[int, int]]) -> None:
+        """Write the files of :meth:`grown`, each of a size and a number of views a side.
 
-def prepare_grown(source: Path, growth: dict[str, tuple[int, int]], folder: Path) -> Prepared:
-    """Write ``NAME.h5`` for each name, of the size and views a side that stand with it.
-
-    The picture is cut off or laid side by side with itself, which keeps its texture; the outer views are left out.
-    """
-
-    def call() -> None:
-        whole = read_light_field(source)
-        for name, (size, views) in growth.items():
+        The picture is cut off or laid side by side with itself, which keeps its texture; the outer views are left out.
+        """
+        whole = render(GROWING_SCENE, size=64 if self.small else 192, views=max(views for _, views in needed))
+        for size, views in set(needed):
             t, s = whole.reference_position[0] - views // 2, whole.reference_position[1] - views // 2
             some = whole.views[t : t + views, s : s + views]
             copies = [-(-size // length) for length in whole.shape]
             some = np.tile(some, (1, 1, *copies, 1))[:, :, :size, :size]
-            light_field = LightField(some, name, disparity_range=whole.disparity_range)
-            write_light_field(folder / f"{name}.h5", light_field)
-
-    return Prepared(call)
+            path = self.grown(size, views)
+            write_light_field(path, LightField(some, path.stem, disparity_range=whole.disparity_range))
 
 
-def prepare_render(name: str, size: int, views: int, path: Path) -> Prepared:
-    """Write a built-in scene as HDF5."""
-    return Prepared(lambda: write_light_field(path, render(name, size=size, views=views)))
+def sweep_values(num_disparities: int) -> dict[str, dict[str, int]]:
+    """Parameters of the stages that sweep."""
+    return {stage: {"num_disparities": num_disparities} for stage in ("initial", "occlusion")}
 
 
-def maps_before(scene: Scene, stage: str) -> StageMaps | None:
-    """Maps that a stage builds on."""
+def inputs(path: Path, stage: str) -> tuple[LightField, StageMaps | None]:
+    """A light field, and beside it the maps that a stage builds on; none for the first stage."""
     names = list(STAGES)
     number = names.index(stage)
-    return read_stage(scene.maps(names[number - 1])) if number else None
+    return read_light_field(path), read_stage(path.with_name(f"{names[number - 1]}.h5")) if number else None

@@ -13,10 +13,9 @@ import pyamg
 import scipy.sparse as sparse
 from scipy.sparse import linalg
 
-from bench.measure import Case, Figures, Prepared
-from bench.scene import Scene, maps_before
+from bench.measure import Figures, Prepared
+from bench.scene import inputs
 from sepi.errors import SepiError
-from sepi.io.hdf5 import read_light_field
 from sepi.regularization.wls import (
     WlsParameters,
     data_weight,
@@ -31,11 +30,6 @@ Solver = Callable[[Any, Vector, Vector, float], Vector]
 """Takes matrix, right side, start and the relative residual to reach."""
 
 MAX_ITERATIONS = 20_000
-
-
-def own(matrix: Any, right: Vector, start: Vector, rtol: float) -> Vector:
-    """The project's: Jacobi, and multigrid where that does not arrive soon."""
-    return solve(matrix, right, start.astype(np.float32), rtol)
 
 
 def multigrid(kind: str, matrix: Any, right: Vector, start: Vector, rtol: float) -> Vector:
@@ -67,7 +61,8 @@ def direct(matrix: Any, right: Vector, start: Vector, rtol: float) -> Vector:
 
 SOLVERS: dict[str, Solver] = {
     "direct (SuperLU)": direct,
-    "sepi's": own,
+    # Jacobi, and multigrid where that does not arrive soon
+    "sepi's": lambda matrix, right, start, rtol: solve(matrix, right, start.astype(np.float32), rtol),
     "multigrid, Ruge-Stuben + CG": partial(multigrid, "ruge_stuben"),
     "multigrid, smoothed aggregation + CG": partial(multigrid, "smoothed_aggregation"),
     "Jacobi + CG": jacobi,
@@ -83,10 +78,9 @@ def _conjugate_gradients(matrix: Any, right: Vector, start: Vector, rtol: float,
     return np.asarray(solution)
 
 
-def prepare(scene: Scene, solver: Solver, exact: Path) -> Prepared:
-    """Solve a scene's system; the first solver leaves its solution in ``exact`` for the others to be held against."""
-    light_field = read_light_field(scene.light_field)
-    before = maps_before(scene, "optimize")
+def prepare(path: Path, name: str) -> Prepared:
+    """Solve a scene's system; the exact solver leaves its solution beside for the others to be held against."""
+    light_field, before = inputs(path, "optimize")
     assert before is not None  # it is not the first stage
     parameters = WlsParameters()
     confidence = rectified_confidence(before.confidence, before.mask("textureless"), parameters)
@@ -94,6 +88,7 @@ def prepare(scene: Scene, solver: Solver, exact: Path) -> Prepared:
     smoothness = smoothness_coefficient(light_field.reference_view, confidence, parameters)
     matrix, right = energy_system(before.disparity, weight, smoothness, parameters.alpha)
     start = before.disparity.astype(np.float64).ravel()
+    exact = path.with_name("exact.npy")
 
     def figures(solution: Vector) -> Figures:
         if not exact.exists():
@@ -106,10 +101,4 @@ def prepare(scene: Scene, solver: Solver, exact: Path) -> Prepared:
             "mean_difference": float(difference.mean()),
         }
 
-    return Prepared(lambda: solver(matrix, right, start, parameters.rtol), figures)
-
-
-def cases(scene: Scene, threads: int) -> list[Case]:
-    """Each solver, the exact one first."""
-    exact = scene.folder / "exact.npy"
-    return [Case("solvers", name, prepare, (scene, solver, exact), threads=threads) for name, solver in SOLVERS.items()]
+    return Prepared(lambda: SOLVERS[name](matrix, right, start, parameters.rtol), figures)

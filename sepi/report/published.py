@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-from sepi.evaluate import WHOLE_MAP
+from sepi.evaluate import REGIONS, WHOLE_MAP
 
 FOLDER = Path(__file__).parent / "published"
 """Where the data files are."""
@@ -25,11 +25,11 @@ AVERAGE = "Average"
 PAPERS_METHOD = "zhou"
 """Key of the paper's own method."""
 
-Regions = Mapping[str, float]
-"""Region of :data:`sepi.evaluate.REGIONS` to 100 x MSE; a region that the paper prints nothing of is left out."""
-
 DATASETS: dict[str, str] = {"hci": "HCI 4D light field benchmark", "hci_2013": "HCI Blender (2013)"}
 """Datasets of the paper, under the names that this project gives them."""
+
+RegionTable = dict[str, dict[str, float]]
+"""Method or variant to region of :data:`sepi.evaluate.REGIONS` to average 100 x MSE; no key where none is printed."""
 
 
 @dataclass(frozen=True)
@@ -109,26 +109,23 @@ def table2() -> SceneTable:
 
 
 @cache
-def table3() -> dict[str, dict[str, Regions]]:
-    """Table 3: dataset to method key to average 100 x MSE in the two regions."""
-    rows = _rows("table3_regions.csv")
+def table3() -> dict[str, RegionTable]:
+    """Table 3, by dataset: methods in the occluded and the textureless region."""
     return {
         dataset: {
-            row["method"]: {region: float(row[f"{dataset}_{region}"]) for region in ("occluded", "textureless")}
-            for row in rows
+            row["method"]: {region: float(row[f"{dataset}_{region}"]) for region in REGIONS if region != WHOLE_MAP}
+            for row in _rows("table3_regions.csv")
         }
         for dataset in DATASETS
     }
 
 
 @cache
-def table4() -> dict[str, dict[str, Regions]]:
-    """Table 4 and the text's figures for Wang's occlusion stage: dataset to variant to average 100 x MSE."""
-    table: dict[str, dict[str, Regions]] = {dataset: {} for dataset in DATASETS}
+def table4() -> dict[str, RegionTable]:
+    """Table 4 and the text's figures for Wang's occlusion stage, by dataset: variants over map and regions."""
+    table: dict[str, RegionTable] = {dataset: {} for dataset in DATASETS}
     for row in _rows("table4_ablation.csv"):
-        columns = {WHOLE_MAP: "overall", "occluded": "occluded", "textureless": "textureless"}
-        figures = {region: float(row[column]) for region, column in columns.items() if row[column]}
-        table[row["dataset"]][row["variant"]] = figures
+        table[row["dataset"]][row["variant"]] = {region: float(row[region]) for region in REGIONS if row[region]}
     return table
 
 

@@ -7,6 +7,7 @@ import math
 import os
 import re
 from collections.abc import Collection, Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
@@ -239,19 +240,19 @@ def load_settings(values: Mapping[str, Any]) -> Settings:
     spelled = {key: _with_numbers(value) for key, value in _with_paths(values).items()}
     config = validated(Config, spelled, "config")
     scenes = _scenes(config)
-    ranges = {}
-    for name, (minimum, maximum) in config.disparity_range.items():
-        require_known("config.disparity_range", [name], [f"{dataset}/{scene}" for dataset, scene in scenes])
+    ranges = config.disparity_range
+    require_known("config.disparity_range", ranges, scenes)
+    for name, (minimum, maximum) in ranges.items():
         DisparityRange(minimum, maximum, f"config.disparity_range of {name}")
-        ranges[name] = (minimum, maximum)
+    _require_inside(config.report.pixels, scenes)
     entries = {**VARIANT_ENTRIES, **config.variants}
     variants = {name: _variant(name, entries) for name in entries}
     return Settings(
-        {key: replace(scene, disparity_range=ranges.get("/".join(key))) for key, scene in scenes.items()},
+        {(one.dataset, one.name): replace(one, disparity_range=ranges.get(name)) for name, one in scenes.items()},
         variants,
         stage_settings(config.stages, variants),
         {name: _external(name, entry, variants) for name, entry in config.external.items()},
-        _report(config.report, scenes),
+        config.report,
     )
 
 
@@ -280,22 +281,20 @@ def _with_numbers(value: Any, top: bool = True) -> Any:
     if value in _WORDS:
         return _WORDS[value]
     for kind in (int, float):
-        try:
+        with suppress(ValueError):
             number = kind(value)
-        except ValueError:
-            continue
-        return number if math.isfinite(number) else value
+            return number if math.isfinite(number) else value
     return value
 
 
-def _scenes(config: Config) -> dict[tuple[str, str], Scene]:
+def _scenes(config: Config) -> dict[str, Scene]:
+    """Every scene, by ``DATASET/NAME``."""
     require_known("config.builtin.scenes", config.builtin.scenes, SCENES)
     size = config.builtin.size
     scenes = [Scene("builtin", name, None, (), _BUILTIN_VIEWS, size, size) for name in config.builtin.scenes]
-    if config.hci_root:
-        scenes += scenes_in(Path(config.hci_root).expanduser(), "hci", "config.hci_root")
-    if config.hci_2013_root:
-        scenes += scenes_in(Path(config.hci_2013_root).expanduser(), "hci_2013", "config.hci_2013_root")
+    for dataset, root in (("hci", config.hci_root), ("hci_2013", config.hci_2013_root)):
+        if root:
+            scenes += scenes_in(Path(root).expanduser(), dataset, f"config.{dataset}_root")
     for name, values in config.light_fields.items():
         where = f"config.light_fields.{name}"
         own = validated(OwnLightField, values, where)
@@ -304,7 +303,7 @@ def _scenes(config: Config) -> dict[tuple[str, str], Scene]:
         scenes.append(own_scene(name, Path(own.path).expanduser(), own.flags, where))
     if not scenes:
         raise SepiError("config: no scene to run on; name some in builtin.scenes or light_fields, or set hci_root")
-    return {(scene.dataset, scene.name): scene for scene in scenes}
+    return {f"{scene.dataset}/{scene.name}": scene for scene in scenes}
 
 
 def _variant(name: str, entries: Mapping[str, Any]) -> Variant:
@@ -322,10 +321,12 @@ def _external(name: str, entry: Mapping[str, Any], variants: Collection[str]) ->
     source = validated(ExternalSource, entry, where)
     if name in variants:
         raise SepiError(f"{where}: a variant has this name; give the method another")
-    if not name.strip() or name != name.strip() or "/" in name or name.startswith(".") or not name.isprintable():
-        raise SepiError(f"{where}: a method's name must be printable text without '/', not beginning with '.'")
-    if len(name.encode()) > _LONGEST_METHOD:
-        raise SepiError(f"config.external.{name[:20]}...: a method's name must have at most {_LONGEST_METHOD} bytes")
+    plain = name.strip() == name != "" and "/" not in name and not name.startswith(".") and name.isprintable()
+    if not plain or len(name.encode()) > _LONGEST_METHOD:
+        raise SepiError(
+            f"config.external.{name[:_LONGEST_METHOD]}: a method's name must be printable text without '/', not "
+            f"beginning with '.', of at most {_LONGEST_METHOD} bytes"
+        )
     require_known(f"{where}.path", re.findall(r"\{[^{}]*\}", source.path), ("{dataset}", "{scene}"))
     path = Path(os.path.expanduser(source.path))
     if "{scene}" not in source.path and (path.is_file() or (path.suffix.lower() in SUFFIXES and not path.is_dir())):
@@ -338,16 +339,14 @@ def _external(name: str, entry: Mapping[str, Any], variants: Collection[str]) ->
     return source
 
 
-def _report(report: Report, scenes: Mapping[tuple[str, str], Scene]) -> Report:
-    """The report's keys, their pixels checked against the sizes of the scenes."""
-    named = {"/".join(key): scene for key, scene in scenes.items()}
-    require_known("config.report.pixels", report.pixels, named)
-    for name, pixels in report.pixels.items():
-        scene = named[name]
+def _require_inside(chosen: Mapping[str, list[tuple[int, int]]], scenes: Mapping[str, Scene]) -> None:
+    """Check the report's pixels against the sizes of the scenes."""
+    require_known("config.report.pixels", chosen, scenes)
+    for name, pixels in chosen.items():
+        scene = scenes[name]
         for y, x in pixels:
             if y >= scene.height or x >= scene.width:
                 raise SepiError(
                     f"config.report.pixels.{name}: row {y}, column {x} lies outside the view, which has {scene.height} "
                     f"rows and {scene.width} columns, counted from 0"
                 )
-    return report

@@ -28,15 +28,13 @@ class RunLog(logging.Handler):
     Parameters
     ----------
     usual : logging.Handler
-        Snakemake's own, for what is shown as ever.
-    stream : text file
-        Where the progress goes: as a bar if it is a terminal.
+        Snakemake's own, for what is shown as ever; the progress goes where it writes, as a bar if that is a terminal.
     """
 
-    def __init__(self, usual: logging.Handler, stream: TextIO) -> None:
+    def __init__(self, usual: logging.Handler) -> None:
         super().__init__()
         self._usual = usual
-        self._stream = stream
+        self._stream: TextIO = getattr(usual, "stream", sys.stderr)
         self._bar: tqdm[Any] | None = None
         self._total = self._begun = 0
         self._failed = False
@@ -45,10 +43,9 @@ class RunLog(logging.Handler):
     def emit(self, record: logging.LogRecord) -> None:
         """Show what a record tells of the run, if anything."""
         event = getattr(record, "event", None)
-        if event == LogEvent.JOB_FINISHED:
-            self._running.pop(record.job_id, None)  # type: ignore[attr-defined]
-        elif event == LogEvent.JOB_ERROR:
-            self._running.pop(getattr(record, "jobid", -1), None)
+        if event in (LogEvent.JOB_FINISHED, LogEvent.JOB_ERROR):
+            # one of them spells it otherwise
+            self._running.pop(getattr(record, "job_id", getattr(record, "jobid", -1)), None)
         self._failed |= record.levelno >= logging.ERROR
         # what --quiet leaves out
         if not self._usual.filter(record):
@@ -60,7 +57,8 @@ class RunLog(logging.Handler):
         elif event == LogEvent.PROGRESS:
             self._advance(record.done, record.total)  # type: ignore[attr-defined]
         elif event not in _SILENT and (event is not None or self._failed or not _CHATTER.match(record.getMessage())):
-            self._pass_on(record)
+            with tqdm.external_write_mode(self._stream):
+                self._usual.emit(record)
 
     def close(self) -> None:
         """End the bar, so that what is printed next stands below it."""
@@ -83,25 +81,15 @@ class RunLog(logging.Handler):
         if self._bar is None:
             print(f"{self._begun:{len(str(self._total))}} of {self._total}  {message}", file=self._stream, flush=True)
         else:
-            self._bar.set_description_str(self._in_hand())
+            self._bar.set_description_str("; ".join(self._running.values()))
 
     def _advance(self, done: int, total: int) -> None:
         if self._bar is not None:
             self._bar.total = total
-            self._bar.set_description_str(self._in_hand(), refresh=False)
+            self._bar.set_description_str("; ".join(self._running.values()), refresh=False)
             self._bar.update(done - self._bar.n)
             if done == total:
                 self.close()
-
-    def _in_hand(self) -> str:
-        return "; ".join(self._running.values())
-
-    def _pass_on(self, record: logging.LogRecord) -> None:
-        if self._bar is not None:
-            self._bar.clear()
-        self._usual.emit(record)
-        if self._bar is not None:
-            self._bar.refresh()
 
 
 def show_progress(logger: logging.Logger) -> RunLog | None:
@@ -116,6 +104,6 @@ def show_progress(logger: logging.Logger) -> RunLog | None:
     if usual is None:
         return None
     logger.removeHandler(usual)
-    shown = RunLog(usual, getattr(usual, "stream", sys.stderr))
+    shown = RunLog(usual)
     logger.addHandler(shown)
     return shown

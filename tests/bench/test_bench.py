@@ -13,13 +13,11 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from bench import choices, plan, tables
-from bench.__main__ import main
-from bench.measure import Case, Measurement, Prepared, measured, measured_command
-from bench.plain import Warp, by_numpy, by_opencv, by_scipy, plain_sweep
-from bench.result import Result, read, write
+from bench import choices, floor, tables
+from bench.__main__ import _all_measured, main
+from bench.measure import Case, Measurement, Prepared, Result, command, measured, read_result
+from bench.plain import WARPS, Warp, plain_sweep
 from bench.solvers import SOLVERS
-from bench.stages import WINDOW_OPERATIONS
 from sepi.errors import SepiError
 from sepi.matching.plane_sweep import SweepParameters, sweep
 from sepi.regularization.wls import energy_system
@@ -58,22 +56,25 @@ class TestMeasuring:
         assert len(found.seconds) == 4
         assert found.median == np.median(found.seconds)
         assert found.figures == {"known": 3.0, "sum": 2.0**17}
-        assert len(measured(Case("g", "n", holding, (1,), once=True), 4).seconds) == 1
+        assert len(measured(Case("g", "n", holding, (1,), most=1), 4).seconds) == 1
 
     def test_failing_case_is_named(self) -> None:
         with pytest.raises(SepiError, match=r"^benchmark g, n: ValueError: too bright$"):
             measured(Case("g", "n", failing), 1)
 
     def test_command_is_timed_from_start_to_end(self) -> None:
-        found = measured_command("g", "n", ["-c", "import time; time.sleep(0.3)"], 2)
+        """Its memory is its own too, not that of the process that starts it."""
+        found = measured(Case("g", "n", command, ("timeit", "-n1", "-r1", "import time; time.sleep(0.3)")), 2)
         assert len(found.seconds) == 2
-        assert 0.3 < found.median < 3
-        assert found.peak_memory_mb < 50, "a bare interpreter: not the memory of the process that measures"
+        assert 0.3 < found.median < 5
+        assert found.figures == {}
+        large = measured(Case("g", "n", command, ("timeit", "-n1", "-r1", "b'x' * 300 * 2**20")), 1)
+        assert large.peak_memory_mb - found.peak_memory_mb == pytest.approx(300, abs=30)
         with pytest.raises(SepiError, match=r"benchmark g, n: .*no such thing"):
-            measured_command("g", "n", ["-c", "raise SystemExit('no such thing')"], 1)
+            measured(Case("g", "n", command, ("timeit", "raise SystemExit('no such thing')")), 1)
 
 
-@pytest.mark.parametrize("warp", [by_numpy, by_scipy, by_opencv])
+@pytest.mark.parametrize("warp", WARPS.values(), ids=list(WARPS))
 @pytest.mark.parametrize("name", ["curved_occluders", "stripes"])
 def test_plain_implementations_give_the_compiled_costs(name: str, warp: Warp) -> None:
     """A yardstick that computes something else measures nothing. Bounds the compiled sweep's rounding, too."""
@@ -118,14 +119,11 @@ class TestTables:
         found = result(
             measurement("floor", "sample", 2.0, operations=4e9),
             measurement("floor", "multiply-add of the window", 1.0, operations=1e10),
-            measurement("stages", "initial", 5.0, samples=4e9, channels=3, **{WINDOW_OPERATIONS: 5e9}),
+            measurement("stages", "initial", 5.0, samples=4e9, channels=3, **{floor.WINDOW_OPERATIONS: 5e9}),
             measurement("stages", "optimize", 5.0),
         )
-        assert tables.floor_seconds(found, found.group("stages")["initial"]) == pytest.approx(2.5)
-        rows = {row[0]: row for row in tables.steps(found).rows}
-        assert "50 %" in rows["initial"]
-        assert rows["optimize"][5] == ""
-        assert rows["sum"][1] == "10.0"
+        assert [row["times its floor"] for row in tables.steps(found)] == ["2.00", ""]
+        assert [row["share %"] for row in tables.steps(found)] == ["50.0", "50.0"]
 
     def test_time_per_sample_and_speed_up(self) -> None:
         found = result(
@@ -135,24 +133,29 @@ class TestTables:
                 for axis, value, seconds in (("num_disparities", 5, 2e-6), ("threads", 1, 8.0), ("threads", 2, 4.0))
             )
         )
-        assert tables.growth(found, "threads").rows[1][:3] == ["2", "4.00", "2.00"]
+        assert list(tables.growth(found, "threads")[1].values())[:3] == ["2", "4.00", "2.00"]
         # 2 microseconds for 100 pixels, 4 views, 5 candidates
-        assert tables.growth(found, "num_disparities").rows[0][2] == "1.00"
+        assert tables.growth(found, "num_disparities")[0]["initial, ns per sample"] == "1.00"
 
     def test_times_the_plain_ones(self) -> None:
         found = result(
-            measurement("stages", "initial", 20.0),
+            measurement("beside", "sepi", 20.0, num_disparities=10),
             measurement("beside", "slow", 40.0, num_disparities=2, mean_difference=0, largest_difference=0),
         )
-        assert tables.beside(found).rows[1][:3] == ["slow", "20.0", "10.0"]
+        row = tables.beside(found)[1]
+        assert (row[""], row["s per candidate"], row["times sepi's"]) == ("slow", "20.0", "10.0")
 
 
 class TestCompare:
     @pytest.fixture
     def files(self, tmp_path: Path) -> tuple[Path, Path]:
         before, after = tmp_path / "before.json", tmp_path / "after.json"
-        write(result(measurement("stages", "initial", 2.0, mse100=1.5), measurement("stages", "gone", 1.0)), before)
-        write(result(measurement("stages", "initial", 1.0, mse100=1.5), measurement("stages", "new", 1.0)), after)
+        before.write_text(
+            result(measurement("stages", "initial", 2.0, mse100=1.5), measurement("stages", "gone", 1.0)).as_json()
+        )
+        after.write_text(
+            result(measurement("stages", "initial", 1.0, mse100=1.5), measurement("stages", "new", 1.0)).as_json()
+        )
         return before, after
 
     def test_ratio_of_what_both_measured(self, files: tuple[Path, Path]) -> None:
@@ -164,8 +167,8 @@ class TestCompare:
 
     def test_other_settings_are_pointed_out(self, files: tuple[Path, Path]) -> None:
         """A ratio of two machines or two sizes is not one of two versions."""
-        other = replace(read(files[1]), machine={"processor": "slide rule"}, settings={"scene": "dots"})
-        write(other, files[1])
+        other = replace(read_result(files[1]), machine={"processor": "slide rule"}, settings={"scene": "dots"})
+        files[1].write_text(other.as_json())
         called = CliRunner().invoke(main, ["compare", *map(str, files)])
         assert "not the same processor: abacus before, slide rule after" in called.stderr
         assert "not the same threads: 1 before, None after" in called.stderr
@@ -181,7 +184,7 @@ class TestCompare:
         assert str(files[1]) in called.stderr
 
     def test_nothing_in_common(self, files: tuple[Path, Path]) -> None:
-        write(result(measurement("solvers", "Jacobi", 1.0)), files[1])
+        files[1].write_text(result(measurement("solvers", "Jacobi", 1.0)).as_json())
         called = CliRunner().invoke(main, ["compare", *map(str, files)])
         assert called.exit_code == 1
         assert "nothing was measured in both" in called.stderr
@@ -231,8 +234,8 @@ def test_more_threads_than_cores(tmp_path: Path) -> None:
     assert "--threads 999: this machine runs at most" in called.stderr
 
 
-def test_failing_cases_do_not_lose_the_others(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture) -> None:
-    found, failed = plan._all_measured([Case("g", "bad", failing), Case("g", "good", holding, (1,))], 1)
+def test_failing_cases_do_not_lose_the_others(capsys: pytest.CaptureFixture) -> None:
+    found, failed = _all_measured([Case("g", "bad", failing), Case("g", "good", holding, (1,))], 1, 1)
     assert [m.name for m in found] == ["good"]
     assert failed == 1
     assert "sepi: warning: benchmark g, bad: ValueError: too bright" in capsys.readouterr().err
@@ -242,7 +245,8 @@ def test_interrupted_command_leaves_nothing_running(tmp_path: Path) -> None:
     """A benchmark that is stopped must not go on in the background."""
     mark = tmp_path / "mark"
     child = f"import pathlib, time; pathlib.Path({str(mark)!r}).write_text('x'); time.sleep(60)"
-    program = f"from bench.measure import measured_command; measured_command('g', 'n', ['-c', {child!r}], 1)"
+    case = f"Case('g', 'n', command, ('timeit', {child!r}))"
+    program = f"from bench.measure import Case, command, measured\nif __name__ == '__main__': measured({case}, 1)"
     process = subprocess.Popen([sys.executable, "-c", program], stderr=subprocess.DEVNULL, start_new_session=True)
     try:
         deadline = time.monotonic() + 60

@@ -63,8 +63,7 @@ def test_tables_agree_with_each_other() -> None:
     """The full method's averages are printed in tables 1, 3 and 4; they must be the same figures."""
     for dataset, variants in published.table4().items():
         full, regions = variants["paper"], published.table3()[dataset]["zhou"]
-        assert full["all"] == published.table1().averages[dataset]["zhou"]
-        assert full == {"all": full["all"], **regions}
+        assert full == {"all": published.table1().averages[dataset]["zhou"], **regions}
 
 
 def test_ablation_columns_are_in_the_papers_order() -> None:
@@ -77,7 +76,7 @@ def test_ablation_columns_are_in_the_papers_order() -> None:
             "no_occlusion_no_textureless",
             "wang",
         ]
-        assert variants["wang"].keys() == {"all"}
+        assert list(variants["wang"]) == ["all"]
 
 
 def test_running_times_add_up() -> None:

@@ -1,0 +1,233 @@
+"""The table of cases: for each group, what is measured on which files, with what known beforehand."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import h5py
+
+from bench import floor, plain, solvers
+from bench.measure import Case, Figures, Prepared, command
+from bench.scene import VARIANT, Scene, inputs, sweep_values
+from sepi.evaluate import score
+from sepi.inspection.disparity_range import estimate_range
+from sepi.inspection.view_order import check_order
+from sepi.io.hdf5 import read_light_field, read_stage
+from sepi.io.result_folder import write_result
+from sepi.lightfield import LightField
+from sepi.matching.view_subsets import halves_and_quarters
+from sepi.pipeline import STAGES, estimate_depth, variant_named
+from sepi.reading import read_light_field as read_any
+from sepi.stage import Parameters, StageMaps, no_progress
+
+GROWTH = {"size": (128, 256, 512, 1024), "views": (3, 5, 7, 9, 13, 17), "num_disparities": (46, 91, 181, 362)}
+SMALL_GROWTH = {"size": (64, 128), "views": (3,), "num_disparities": (11, 21)}
+GROWTH_REPEATS = 3
+"""Long enough to see how time grows, short enough to wait for."""
+
+LARGE = (1024, 17)
+"""Size and views a side of the large light field."""
+
+COMPRESSIONS: dict[str, dict[str, Any]] = {
+    "none": {},
+    "lzf": {"compression": "lzf"},
+    "gzip 1": {"compression": "gzip", "compression_opts": 1},
+    "gzip 1, shuffled": {"compression": "gzip", "compression_opts": 1, "shuffle": True},
+    "gzip 4, shuffled": {"compression": "gzip", "compression_opts": 4, "shuffle": True},
+}
+"""Name to arguments of h5py; filters that plain h5py cannot read are left out."""
+
+
+def _stage_cases(scene: Scene) -> Iterator[Case]:
+    """The command as a whole, a job on next to nothing, the arithmetic floor, and each step from files to maps."""
+    sweeps = [
+        f"--set={name}.num_disparities={scene.num_disparities}" for name in ("initial.sepi", "occlusion.half_sepi")
+    ]
+    options = ("--threads", str(scene.threads), "--variant", VARIANT, *sweeps)
+    output = str(scene.folder / "depth")
+    yield Case(
+        "whole",
+        "sepi depth, files to maps",
+        command,
+        ("sepi", "depth", str(scene.source), "--output", output, *options),
+    )
+    scene.write_grown([(64, 3)])
+    tiny, output = str(scene.grown(64, 3)), str(scene.folder / "tiny-initial.h5")
+    job = ("sepi.initial", "--choice", "sepi", "--light-field", tiny, "--output", output)
+    yield Case("whole", "start of a job", command, job)
+    for name in floor.KERNELS:
+        yield Case("floor", name, floor.prepare, (name, scene.threads))
+    yield Case("stages", "read the views", read, (scene.source,))
+    yield Case("stages", "check their order", inspect, (scene.path, check_order))
+    # where the scene does not give it
+    if read_light_field(scene.path).require_disparity_range().source == "estimated":
+        yield Case("stages", "estimate the range", inspect, (scene.path, estimate_range))
+    for name, choice in variant_named(VARIANT).choices.items():
+        yield Case("stages", name, stage, (scene.path, name, choice, scene.parameters[name]))
+    yield Case("stages", "write the maps", write, (scene.path,))
+
+
+def _growth_cases(scene: Scene) -> Iterator[Case]:
+    """Initial stage and all stages, one axis growing at a time."""
+    axes = SMALL_GROWTH if scene.small else GROWTH
+    powers = {2**n for n in range(scene.threads.bit_length())} | {scene.threads}
+    start = {
+        "size": min(256, max(axes["size"])),
+        "views": min(9, max(axes["views"])),
+        "num_disparities": scene.num_disparities,
+        "threads": scene.threads,
+    }
+    points = [(axis, start | {axis: value}) for axis, values in axes.items() for value in values]
+    # threads are for large pictures
+    size = min(512, max(axes["size"]))
+    points += [("threads", start | {"size": size, "threads": value}) for value in sorted(powers)]
+    scene.write_grown([(at["size"], at["views"]) for _, at in points])
+    for axis, at in points:
+        settings = scene.parameters["initial"].model_copy(update={"num_disparities": at["num_disparities"]})
+        path = scene.grown(at["size"], at["views"])
+        for group, prepare, arguments in (
+            ("growth, initial", stage, (path, "initial", "sepi", settings)),
+            ("growth, all stages", whole, (path, at["num_disparities"])),
+        ):
+            figures = {key: float(value) for key, value in at.items()}
+            yield Case(group, f"{axis} {at[axis]}", prepare, arguments, figures, at["threads"], GROWTH_REPEATS)
+
+
+def _large_case(scene: Scene) -> Iterator[Case]:
+    scene.write_grown([LARGE, (64, 3)])
+    # kernels for such views are compiled before the timed call
+    whole(scene.grown(64, 3), scene.num_disparities).call()
+    size, views = LARGE
+    arguments = (scene.grown(size, views), scene.num_disparities)
+    yield Case("large", f"{views}x{views} views of {size}x{size}", whole, arguments, most=1)
+
+
+def _plain_cases(scene: Scene) -> Iterator[Case]:
+    """The initial stage, then the plain ones: long enough to measure once, and nothing in them is compiled then."""
+    known = {"num_disparities": float(scene.num_disparities)}
+    yield Case("beside", "sepi", stage, (scene.path, "initial", "sepi", scene.parameters["initial"]), known)
+    number = 3 if scene.small else 20
+    for name, warp in plain.WARPS.items():
+        yield Case(
+            "beside", name, plain.prepare, (scene.path, number, warp), {"num_disparities": float(number)}, most=1
+        )
+
+
+def _solver_cases(scene: Scene) -> Iterator[Case]:
+    for name in solvers.SOLVERS:
+        yield Case("solvers", name, solvers.prepare, (scene.path, name))
+
+
+def _storage_cases(scene: Scene) -> Iterator[Case]:
+    """Writing, then reading, of each content with each of HDF5's own compressions."""
+    for content in ("views", "maps", "masks"):
+        for option in list(COMPRESSIONS)[: 2 if scene.small else None]:
+            for prepare in (store, load):
+                yield Case("storage", f"{prepare.__name__} {content}, {option}", prepare, (scene.path, content, option))
+
+
+GROUPS: dict[str, Callable[[Scene], Iterator[Case]]] = {
+    "stages": _stage_cases,
+    "growth": _growth_cases,
+    "beside": _plain_cases,
+    "solvers": _solver_cases,
+    "storage": _storage_cases,
+    "large": _large_case,
+}
+"""Name of each group to the function that gives its cases, their files written."""
+
+
+def read(source: Path) -> Prepared:
+    """Read the light field as the user has it, without the check of its order."""
+    return Prepared(lambda: read_any(source, check_order=False))
+
+
+def inspect(path: Path, question: Callable[[LightField], Any]) -> Prepared:
+    """Ask something of a light field: whether its views are in the right order, which disparities it has."""
+    light_field = read_light_field(path)
+    return Prepared(lambda: question(light_field))
+
+
+def stage(path: Path, name: str, choice: str, settings: Parameters) -> Prepared:
+    """Run one stage on the maps of the one before; says its scores, and what its sweep computes."""
+    light_field, before = inputs(path, name)
+
+    def figures(maps: StageMaps) -> Figures:
+        found = _operations(light_field, choice, settings, maps)
+        if light_field.ground_truth is not None:
+            # a stage made faster must not be made worse
+            scores = score(maps.disparity, light_field.ground_truth)
+            found |= {key: float(scores[key]) for key in ("mse100", "q25", "badpix007")}
+        return found
+
+    return Prepared(lambda: STAGES[name][choice].run(light_field, before, settings, no_progress), figures)
+
+
+def whole(path: Path, num_disparities: int) -> Prepared:
+    """All stages of the variant, from a light field in memory to its maps."""
+    light_field = read_light_field(path)
+    values = sweep_values(num_disparities)
+    return Prepared(lambda: estimate_depth(light_field, variant_named(VARIANT), values))
+
+
+def write(path: Path) -> Prepared:
+    """Write all that ``sepi depth`` writes."""
+    light_field = read_light_field(path)
+    maps = read_stage(path.with_name("optimize.h5"))
+
+    def call() -> None:
+        with tempfile.TemporaryDirectory(dir=path.parent) as folder:
+            write_result(Path(folder) / "result", light_field, maps)
+
+    return Prepared(call)
+
+
+def store(path: Path, content: str, option: str) -> Prepared:
+    """Write all views, or the maps of 32 bits or the masks of 8 of the last stage; says the file's size."""
+    if content == "views":
+        arrays: dict[str, Any] = {"views": read_light_field(path).views}
+    else:
+        maps = read_stage(path.with_name("optimize.h5")).all()
+        arrays = {name: one for name, one in maps.items() if (one.dtype.itemsize >= 4) == (content == "maps")}
+    target = path.with_name(f"{content} {option}.h5")
+
+    def call() -> None:
+        with h5py.File(target, "w") as file:
+            for name, values in arrays.items():
+                file.create_dataset(name, data=values, **COMPRESSIONS[option])
+
+    return Prepared(call, lambda _: {"megabytes": target.stat().st_size / 1e6})
+
+
+def load(path: Path, content: str, option: str) -> Prepared:
+    """Read the file that :func:`store` left."""
+
+    def call() -> None:
+        with h5py.File(path.with_name(f"{content} {option}.h5")) as file:
+            for name in file:
+                file[name][...]
+
+    return Prepared(call)
+
+
+def _operations(light_field: LightField, choice: str, settings: Any, maps: StageMaps) -> Figures:
+    """Samples that a stage's sweep compares, and multiply-adds of its windows; nothing for other stages."""
+    H, W = light_field.shape
+    if choice == "sepi":
+        pixels, groups = H * W, 1
+    elif choice == "half_sepi":
+        pixels = int(maps.extra["occlusion_candidates"].sum())
+        numbers = halves_and_quarters(light_field.grid, light_field.reference_position).groups
+        # the reference view's own group is empty
+        groups = len(set(numbers.ravel().tolist()) - {int(numbers[light_field.reference_position])})
+    else:
+        return {}
+    window = (2 * settings.window_radius + 1) ** 2
+    return {
+        "samples": float(pixels * (light_field.present.sum() - 1) * settings.num_disparities),
+        "channels": float(light_field.views.shape[-1]),
+        floor.WINDOW_OPERATIONS: float(pixels * settings.num_disparities * groups * window),
+    }
