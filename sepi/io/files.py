@@ -43,7 +43,7 @@ def reading(path: Path, kind: str) -> Iterator[None]:
     try:
         with naming(path):
             yield
-    except (SepiError, MemoryError, AssertionError, NameError):
+    except (SepiError, AssertionError, NameError):
         # what is no fault of the file
         raise
     except Exception as error:

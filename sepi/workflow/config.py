@@ -27,8 +27,8 @@ from sepi.validation import require_known, validated
 from sepi.workflow.datasets import Scene, own_scene, scenes_in
 from sepi.workflow.parameters import default_values, stage_settings
 
-# names of folders and panels that stand beside those of variants
-_RESERVED = ("stages", "external", "ground_truth", "reference_view")
+# names of folders, panels and columns of tables that stand beside those of variants
+_RESERVED = ("stages", "external", "ground_truth", "reference_view", "dataset", "scene", "row", "region")
 # a file name holds 255 bytes, and pictures of a method are folders of its name
 _LONGEST_METHOD = 80
 # the built-in scenes have 9x9 views

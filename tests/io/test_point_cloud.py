@@ -232,17 +232,17 @@ def test_camera_flags_give_metres(result: Path, tmp_path: Path) -> None:
 
 
 def test_clear_line_where_no_cloud_can_be_made(result: Path, tmp_path: Path) -> None:
-    os.mkfifo(tmp_path / "pipe")
-    (tmp_path / "link").symlink_to(tmp_path / "pipe")
+    os.mkfifo(tmp_path / "pipe.ply")
+    (tmp_path / "link.ply").symlink_to(tmp_path / "pipe.ply")
     cases = {
         (tmp_path / "gone",): "no such file",
         (tmp_path,): "result.h5",
         (result, "--max-depth", 3): "camera's geometry",
         (result, "--min-confidence", 2): "0..1",
         (result, "--min-confidence", 1): "no point is left",
-        (result, "-o", result): "toy-depth: not a file",
-        (result, "-o", tmp_path / "pipe"): "pipe: not a file",
-        (result, "-o", tmp_path / "link"): "link: not a file",
+        (result, "-o", result): "toy-depth: expected a name that ends with .ply",
+        (result, "-o", tmp_path / "pipe.ply"): "pipe.ply: cannot be written (not a file)",
+        (result, "-o", tmp_path / "link.ply"): "link.ply: cannot be written (not a file)",
     }
     for words, expected in cases.items():
         called = call(*words)
@@ -250,6 +250,6 @@ def test_clear_line_where_no_cloud_can_be_made(result: Path, tmp_path: Path) -> 
         (line,) = called.stderr.splitlines()
         assert line.startswith("sepi: ")
         assert expected in line
-    assert (tmp_path / "pipe").is_fifo()
-    assert (tmp_path / "link").is_symlink()
+    assert (tmp_path / "pipe.ply").is_fifo()
+    assert (tmp_path / "link.ply").is_symlink()
     assert call(result, "--focal-length", 50).exit_code == 2

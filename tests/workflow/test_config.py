@@ -120,6 +120,7 @@ def test_defaults_run_every_builtin_scene_and_variant() -> None:
             "config.variants.other.base: the variant would be built on itself",
         ),
         ({"variants": {"paper": {"base": "best"}}}, "config.variants.paper: a built-in variant has a fixed meaning"),
+        ({"variants": {"region": {"base": "wang"}}}, "config.variants.region: a variant's name must be letters"),
         ({"variants": {"a/b": {"base": "wang"}}}, "config.variants.a/b: a variant's name must be letters"),
         (
             {"stages": {"shared": {"plane_sweeps": {}}}},
