@@ -154,12 +154,12 @@ def _prepared(view: npt.NDArray[np.generic], factor: int) -> FloatMap:
     return np.asarray(smooth - cv2.blur(smooth, (_HIGH_PASS, _HIGH_PASS)), np.float32)
 
 
-def _dark_corners(centre: FloatMap, shape: tuple[int, int]) -> BoolMap:
+def _dark_corners(reference_view: FloatMap, shape: tuple[int, int]) -> BoolMap:
     """What the lens leaves black in the corners, and what lies so near that the filters mix it in; of ``shape``.
 
     The edge of such a corner moves from view to view as the lens has it, not as anything in the scene.
     """
-    brightness = centre.max(axis=2)
+    brightness = reference_view.max(axis=2)
     black = brightness < _BLACK * np.quantile(brightness, 0.99)
     black = cv2.resize(black.astype(np.uint8), shape[::-1], interpolation=cv2.INTER_AREA)
     _, labels = cv2.connectedComponents(black)

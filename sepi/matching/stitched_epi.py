@@ -25,7 +25,7 @@ from sepi.lightfield import FloatMap, LightField, as_unit_float
 
 @dataclass(frozen=True)
 class StitchedEpi:
-    """A SEPI for one centre-view pixel and one candidate disparity.
+    """A SEPI for one pixel of the reference view and one candidate disparity.
 
     The rows keep their own samples; ``offsets`` says how far each is shifted. Only drawing resamples them, so samples
     along the line are as exact as the views.
