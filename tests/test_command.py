@@ -14,6 +14,7 @@ import h5py
 import numpy as np
 import pytest
 from click.testing import CliRunner, Result
+from error_lines import error_of
 from pydantic import Field
 
 from sepi.command import SepiCommand, progress_bar, stage_command
@@ -55,14 +56,6 @@ def light_field(tmp_path: Path) -> Path:
 
 def call(command: click.Command, *words: object) -> Result:
     return CliRunner().invoke(command, [str(word) for word in words])
-
-
-def error_of(result: Result) -> str:
-    """The one line of a failed command."""
-    assert result.exit_code == 1
-    assert result.stderr.startswith("sepi: ")
-    assert result.stderr.count("\n") == 1
-    return result.stderr.strip()
 
 
 def files(folder: Path) -> list[str]:

@@ -194,15 +194,7 @@ def _seen(y: Any, x: Any, nearest: Any, limit: Any) -> Any:
 def mean_of_views(views: SplineViews, disparity: Any, nearest: Any, occlusion_margin: Any) -> Any:
     """Mean of the views that see each pixel, those unlike the reference view counting less; shape (H, W, C), float32.
 
-    Parameters
-    ----------
-    views : SplineViews
-    disparity : ndarray, shape (H, W), float32
-        Pixels per view step.
-    nearest : ndarray, shape (T, S, H, W), float32
-        z-buffers of the map in the views.
-    occlusion_margin : float32
-        By how much an occluder must be nearer, pixels per view step.
+    Arguments as of :func:`sepi.matching.gauss_newton.view_mean`, the margin as float32.
     """
     T, S = views.present.shape
     t0, s0 = views.t0, views.s0

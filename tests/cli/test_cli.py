@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 import yaml
 from click.testing import CliRunner, Result
+from error_lines import error_of
 
 import sepi
 from sepi import ingest
@@ -53,16 +54,6 @@ def result(pyramids: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def call(*words: object) -> Result:
     return CliRunner().invoke(main, [str(word) for word in words])
-
-
-def error_of(called: Result) -> str:
-    """The one line that a failed command prints."""
-    assert called.exit_code == 1, called.output
-    assert called.stdout == ""
-    assert isinstance(called.exception, SystemExit)
-    (line,) = called.stderr.splitlines()
-    assert line.startswith("sepi: ")
-    return line
 
 
 def everything_in(folder: Path) -> dict[str, bytes]:

@@ -6,19 +6,11 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from error_lines import reading_error
 
-from sepi.errors import SepiError
 from sepi.io.hdf5 import write_light_field
 from sepi.lightfield import DisparityRange, LightField
 from sepi.reading import read_light_field
-
-
-def error_of(path: Path) -> str:
-    with pytest.raises(SepiError) as caught:
-        read_light_field(path)
-    message = str(caught.value)
-    assert "\n" not in message
-    return message
 
 
 def cut(path: Path) -> None:
@@ -100,6 +92,6 @@ def test_bad_file_is_one_line_that_names_it(tmp_path: Path, light_field: LightFi
     spoil, word = BAD_FILES[case]
     write_light_field(tmp_path / "lf.h5", light_field)
     spoil(tmp_path / "lf.h5")
-    message = error_of(tmp_path / "lf.h5")
+    message = reading_error(tmp_path / "lf.h5")
     assert "lf.h5" in message
     assert word in message

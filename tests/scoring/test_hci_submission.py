@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner, Result
+from error_lines import error_of
 
 from sepi.cli.results import check_submission, submission
 from sepi.errors import SepiError
@@ -60,14 +61,6 @@ def made(request: pytest.FixtureRequest, tmp_path: Path) -> Callable[[Files], Pa
 
 def call(command: object, *words: object) -> Result:
     return CliRunner().invoke(command, [str(word) for word in words])
-
-
-def error_of(called: Result) -> str:
-    assert called.exit_code == 1, called.output
-    assert called.stdout == ""
-    (line,) = called.stderr.splitlines()
-    assert line.startswith("sepi: ")
-    return line
 
 
 # --- check

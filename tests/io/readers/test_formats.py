@@ -4,8 +4,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from error_lines import reading_error
 
-from sepi.errors import SepiError
 from sepi.io.images import write_png
 from sepi.io.readers.formats import format_of
 from sepi.io.result_folder import write_result
@@ -24,38 +24,31 @@ def square(tmp_path: Path) -> Path:
     return tmp_path / "square"
 
 
-def error_of(path: Path) -> str:
-    with pytest.raises(SepiError) as caught:
-        format_of(path)
-    assert "\n" not in str(caught.value)
-    return str(caught.value)
-
-
 def test_empty_folder_lists_the_known_formats(tmp_path: Path) -> None:
-    message = error_of(tmp_path)
+    message = reading_error(tmp_path, format_of)
     assert "HCI folder" in message
     assert "HDF5" in message
 
 
 def test_folder_of_scenes_names_one(square: Path) -> None:
-    assert f"such as {square}" in error_of(square.parent)
+    assert f"such as {square}" in reading_error(square.parent, format_of)
 
 
 def test_nothing_there(tmp_path: Path) -> None:
-    assert error_of(tmp_path / "absent").endswith("absent: no such file or folder")
+    assert reading_error(tmp_path / "absent", format_of).endswith("absent: no such file or folder")
 
 
 def test_one_view_of_many(square: Path) -> None:
-    assert "give the folder of all views" in error_of(square / "input_Cam003.png")
+    assert "give the folder of all views" in reading_error(square / "input_Cam003.png", format_of)
 
 
 def test_file_of_no_known_format(tmp_path: Path) -> None:
     (tmp_path / "notes.txt").write_text("hello")
-    assert "not a light field of a known format" in error_of(tmp_path / "notes.txt")
+    assert "not a light field of a known format" in reading_error(tmp_path / "notes.txt", format_of)
 
 
 def test_a_result_is_not_taken_for_a_light_field(tmp_path: Path) -> None:
     flat = np.zeros((12, 16), np.float32)
     write_result(tmp_path / "out", LightField(VIEWS, "toy"), StageMaps(flat, flat), {})
     for path in (tmp_path / "out", tmp_path / "out" / "result.h5"):
-        assert "holds a disparity map, not a light field" in error_of(path)
+        assert "holds a disparity map, not a light field" in reading_error(path, format_of)

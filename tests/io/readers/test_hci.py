@@ -7,6 +7,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from error_lines import reading_error
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -62,14 +63,6 @@ def full(tmp_path: Path) -> Path:
     for name in ("occluded", "planes_lowres"):
         cv2.imwrite(str(folder / f"mask_{name}.png"), mask)
     return folder
-
-
-def error_of(path: Path) -> str:
-    with pytest.raises(SepiError) as caught:
-        read_light_field(path)
-    message = str(caught.value)
-    assert "\n" not in message
-    return message
 
 
 def test_view_number_is_columns_times_row_plus_column(square: Path) -> None:
@@ -226,7 +219,7 @@ BAD_FOLDERS: dict[str, tuple[Callable[[Path], object], str, str]] = {
 def test_bad_folder_is_one_line_that_names_the_file(full: Path, case: str, capfd: pytest.CaptureFixture[str]) -> None:
     spoil, file, word = BAD_FOLDERS[case]
     spoil(full)
-    message = error_of(full)
+    message = reading_error(full)
     assert file in message
     assert word in message
     # neither OpenCV nor libpng adds lines of its own
@@ -243,13 +236,13 @@ def test_a_missing_view_is_known_to_be_missing(square: Path) -> None:
 
 def test_missing_centre_view_without_parameters(square: Path) -> None:
     (square / "input_Cam004.png").unlink()
-    assert "the centre view (t, s) = (1, 1) is missing" in error_of(square)
+    assert "the centre view (t, s) = (1, 1) is missing" in reading_error(square)
 
 
 def test_count_that_makes_no_square(square: Path) -> None:
     """Without parameters the grid is taken to be square; eight views could be 2x4 or 4x2."""
     (square / "input_Cam008.png").unlink()
-    message = error_of(square)
+    message = reading_error(square)
     assert "8, which is no square grid" in message
     assert "num_cams_x" in message
 
@@ -257,7 +250,7 @@ def test_count_that_makes_no_square(square: Path) -> None:
 def test_one_view_is_no_light_field(square: Path) -> None:
     for path in sorted(square.glob("*.png"))[1:]:
         path.unlink()
-    assert "at least two views" in error_of(square)
+    assert "at least two views" in reading_error(square)
 
 
 NUMBERS = st.sampled_from(
@@ -313,4 +306,4 @@ def test_real_scene_with_a_view_missing(hci: Path, tmp_path: Path) -> None:
     assert np.argwhere(~light_field.present).tolist() == [[0, 3]]
     assert light_field.ground_truth is not None
     (tmp_path / "cotton/input_Cam040.png").unlink()
-    assert "the centre view (t, s) = (4, 4) is missing" in error_of(tmp_path / "cotton")
+    assert "the centre view (t, s) = (4, 4) is missing" in reading_error(tmp_path / "cotton")
