@@ -6,7 +6,9 @@ Conventions, shared by every module:
 - the centre view is ``(T // 2, S // 2)``; the *reference* view, whose depth is made, is the centre view unless another
   is asked for;
 - disparity ``d`` is in pixels per view step, positive when nearer than the focus plane; the reference-view
-  pixel ``(y, x)`` is seen in view ``(t, s)`` at ``(y - d * (t - t0), x - d * (s - s0))``.
+  pixel ``(y, x)`` is seen in view ``(t, s)`` at ``(y - d * (t - t0), x - d * (s - s0))``;
+- a view step is that from one column of views to the next. Where rows are another distance apart, or views stand off
+  the grid, ``baselines`` takes the place of ``(t - t0, s - s0)``.
 """
 
 from __future__ import annotations
@@ -84,6 +86,11 @@ class LightField:
         Named regions for evaluation (``"occluded"``, ``"textureless"``, ...).
     view : tuple of int or None
         Grid position ``(t0, s0)`` of the reference view; None: the centre view.
+    row_spacing : float
+        Distance from one row of views to the next, in view steps.
+    positions : ndarray, shape (T, S, 2), float64, or None
+        Where each view was taken, ``(down, across)`` in view steps from a common origin; None: on the grid, at
+        ``(row_spacing * t, s)``. Those of missing views do not count.
     camera : Camera or None
         Geometry that turns disparity into metric depth, where it is known.
     notes : tuple of str
@@ -92,8 +99,8 @@ class LightField:
     Raises
     ------
     SepiError
-        If a shape or dtype is not as above, floats are not finite or far outside 0..1, or the reference view lies
-        outside the grid or is missing.
+        If a shape or dtype is not as above, floats are not finite or far outside 0..1, the row spacing is no positive
+        number, or the reference view lies outside the grid or is missing.
     """
 
     views: npt.NDArray[np.generic]
@@ -104,6 +111,8 @@ class LightField:
     ground_truth: FloatMap | None = None
     masks: Mapping[str, BoolMap] = field(default_factory=dict)
     view: tuple[int, int] | None = None
+    row_spacing: float = 1.0
+    positions: npt.NDArray[np.float64] | None = None
     camera: Camera | None = None
     notes: tuple[str, ...] = ()
 
@@ -143,6 +152,15 @@ class LightField:
             raise SepiError(f"{self.name}: depth needs at least two views, only the {which} {t},{s} is present")
         if v.dtype == np.float32:
             _require_unit(self.name, v[self.present])
+        if not (np.isfinite(self.row_spacing) and self.row_spacing > 0):
+            raise SepiError(f"{self.name}: row_spacing must be a positive number, got {self.row_spacing:g}")
+        if self.positions is not None and (
+            self.positions.shape != (*v.shape[:2], 2) or not np.isfinite(self.positions[self.present]).all()
+        ):
+            raise SepiError(
+                f"{self.name}: positions must be finite, of shape (T, S, 2) = {(*v.shape[:2], 2)}, got "
+                f"{self.positions.shape}"
+            )
         for what, array in {"ground_truth": self.ground_truth, **self.masks}.items():
             if array is not None and array.shape != self.shape:
                 raise SepiError(
@@ -169,6 +187,24 @@ class LightField:
     def grid(self) -> tuple[int, int]:
         """Number of view rows and columns ``(T, S)``."""
         return self.views.shape[0], self.views.shape[1]
+
+    @property
+    def baselines(self) -> npt.NDArray[np.float64]:
+        """Baseline ``(down, across)`` from the reference view to each view, in view steps; shape (T, S, 2).
+
+        A pixel ``(y, x)`` of disparity ``d`` is seen in view ``(t, s)`` at ``(y, x) - d * baselines[t, s]``. Zero for
+        missing views, of which nobody asks.
+        """
+        positions = self.positions
+        if positions is None:
+            positions = np.stack(np.meshgrid(*map(np.arange, self.grid), indexing="ij"), axis=2).astype(np.float64)
+            positions[..., 0] *= self.row_spacing
+        return np.where(self.present[..., None], positions - positions[self.reference_position], 0.0)
+
+    @property
+    def reach(self) -> float:
+        """Distance of the farthest view from the reference view along either axis, in view steps."""
+        return float(np.abs(self.baselines).max())
 
     @property
     def rgb_views(self) -> npt.NDArray[np.generic]:

@@ -60,6 +60,9 @@ class ReadOptions:
         Views to leave out: positions ``"T,S"`` or file names.
     view : tuple of int, optional
         Position ``(t, s)`` of the view whose depth is made; the centre view unless given.
+    row_spacing : float, optional
+        Distance from one row of views to the next in the light field's grid, as a multiple of that from one column to
+        the next.
     follow_links : bool
         Read views that are links to files outside their folder.
     """
@@ -72,6 +75,7 @@ class ReadOptions:
     order: str = AS_GIVEN
     exclude: tuple[str, ...] = ()
     view: tuple[int, int] | None = None
+    row_spacing: float | None = None
     follow_links: bool = False
 
 
