@@ -11,7 +11,6 @@ import math
 
 import numba
 import numpy as np
-import numpy.typing as npt
 
 from sepi.lightfield import FloatMap
 
@@ -23,7 +22,7 @@ _BLOCK = 16
 def coarse_sweep(
     reference: FloatMap,
     views: FloatMap,
-    offsets: npt.NDArray[np.int64],
+    offsets: FloatMap,
     candidates: FloatMap,
     truncation: np.float32,
     radius: int,
@@ -36,8 +35,8 @@ def coarse_sweep(
         The reference view.
     views : ndarray, shape (V, H, W), float32
         Other views.
-    offsets : ndarray, shape (V, 2), int64
-        Grid position ``(t - t0, s - s0)`` of each.
+    offsets : ndarray, shape (V, 2), float32
+        Baseline ``(down, across)`` of each, view steps.
     candidates : ndarray, shape (N,), float32
         Disparities in pixels per view step, uniform, rising.
     truncation : float32
@@ -90,8 +89,8 @@ def _row_costs(reference, views, offsets, candidate, truncation, y, cost):  # ty
     seen = np.zeros(W, np.float32)
     cost[:] = 0
     for v in range(len(views)):
-        down = y - candidate * np.float32(offsets[v, 0])
-        across = -candidate * np.float32(offsets[v, 1])
+        down = y - candidate * offsets[v, 0]
+        across = -candidate * offsets[v, 1]
         row = math.floor(down)
         shift = math.floor(across)
         # one column fewer than fit, for the right neighbour of the sample

@@ -78,9 +78,9 @@ def estimate_range(light_field: LightField) -> DisparityRange:
     factor = math.ceil(math.sqrt(math.prod(light_field.shape) / _MOST_PIXELS))
     reference = _prepared(light_field.rgb_views[light_field.reference_position], factor)
     views = np.stack([_prepared(light_field.rgb_views[position], factor) for position in positions])
-    offsets = np.array(positions, np.int64) - light_field.reference_position
+    offsets = np.stack([light_field.baselines[position] for position in positions]).astype(np.float32)
     # the most distant view moves by one pixel from candidate to candidate
-    step = 1 / int(abs(offsets).max())
+    step = 1 / float(abs(offsets).max())
     seen = ~_dark_corners(light_field.reference_view, reference.shape)
     found: FloatMap = np.empty(0, np.float32)
     # at most half a picture at the most distant view

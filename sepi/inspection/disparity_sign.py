@@ -1,12 +1,15 @@
 """Which of two surfaces is in front, by what hides what: the sign of the disparities.
 
-Where two surfaces meet in a view, the nearer one is seen. Its disparity must be the greater; if it is the lesser again
-and again, all disparities have the wrong sign.
+Where two surfaces meet in a view, the nearer one is seen. So of two pixels of the reference view that the disparities
+bring to the same position of a view, one matches the views on that side worse than those on the opposite side: it is
+hidden there. It must be the one of the lesser disparity; if it is the other again and again, all disparities have the
+wrong sign.
 """
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -14,7 +17,7 @@ import numpy.typing as npt
 
 from sepi.inspection.coarse_sweep import coarse_sweep
 from sepi.inspection.view_layouts import REACH, Baseline, Trial, Views, baselines_under
-from sepi.inspection.view_order_kernels import count_occlusions, residuals
+from sepi.inspection.view_order_kernels import residuals
 from sepi.lightfield import BoolMap, FloatMap
 
 # Movement searched at most, pixels; of larger pictures, the middle is looked at
@@ -26,70 +29,165 @@ _SWEEP_RADIUS = 2
 _TRUNCATION = 1.5
 _FLAT = 0.02
 _MOST_AMBIGUITY = 0.6
-# Residuals: half width of the window, pixels; least that is taken for noise, the picture's variance = 1; as multiples
-# of the noise, those of pixels that are seen and that are hidden; least ratio of the two at one pixel
-_WINDOW_RADIUS = 2
-_LEAST_NOISE = 3e-4
-# what rounding to 8 bits adds to the square of a difference, full range = 1; most of it, the picture's variance = 1:
+# Surfaces: pixels whose disparity this part of a window of so many pixels has too, within the sampling; noise makes
+# pixels of one surface look like two
+_SURFACE_WINDOW = 7
+_LEAST_SUPPORT = 0.6
+# What rounding to 8 bits adds to the square of a difference, full range = 1; most of it, the picture's variance = 1:
 # in pictures of a few grey levels, rounding looks like surfaces
 _ROUNDING = 1 / (6 * 255**2)
 _MOST_ROUNDING = 0.02
-_SEEN = 4.0
-_HIDDEN = 9.0
-_HIDDEN_TO_SEEN = 6.0
+# Residuals: half width of the window, pixels; least that is taken for noise, the picture's variance = 1 (interpolation
+# leaves as much); most of a pixel that is seen; as a multiple of the noise, least of one that is hidden
+_WINDOW_RADIUS = 2
+_LEAST_NOISE = 3e-3
+_SEEN = 0.3
+_HIDDEN = 4.0
+# Two surfaces count as two where they are this far apart in a view, pixels; they meet in it within this distance
+_LEAST_SHIFT = 1.5
+_MEETING = 0.75
+# Logarithm of the ratio of residuals that one pair counts at most; least that tells anything
+_MOST_EVIDENCE = 2.0
+_LEAST_EVIDENCE = 1.0
+# Side of a region, pixels, at most and as part of the picture's (pairs in one region are one observation); its pairs
+_REGION = 16
+_REGIONS_ACROSS = 16
+_PAIRS = 3
 
 _DIRECTIONS: tuple[Baseline, ...] = ((0, 1), (0, -1), (1, 0), (-1, 0))
 
 
-def occlusion_votes(views: Views, trial: Trial) -> tuple[int, int]:
-    """At how many pixels the greater, and at how many the lesser disparity is that of the surface in front.
+class Evidence(NamedTuple):
+    """What occlusion says of the sign of the disparities, by regions of the picture.
 
-    The best layout of the trial is taken for right; the signs are those of that layout's first order. Both numbers are
-    0 where there are no views on opposite sides, or hardly any contrast.
+    Attributes
+    ----------
+    mean : float
+        From -2 to 2: above 0 where the surface of the greater disparity is in front, as it should be.
+    errors : float
+        Absolute value of the mean, in standard errors.
+    regions : int
+        How many regions have a say.
     """
+
+    mean: float
+    errors: float
+    regions: int
+
+
+def occlusion_evidence(views: Views, trial: Trial) -> Evidence:
+    """Whether the surface of the greater disparity is the one in front.
+
+    The best layout of the trial is taken for right; the sign is that of the layout's first order. There is no evidence
+    where there are no views on opposite sides, or hardly any contrast.
+    """
+    none = Evidence(0.0, 0.0, 0)
     reach, directions = _directions(views, trial.largest_disparity)
     if not directions:
-        return 0, 0
+        return none
     # in units of the picture's own contrast
     scale = np.float32(1 / max(float(views.plain((0, 0)).std()), 1e-6))
     rounding = _ROUNDING * float(scale) ** 2
     if rounding > _MOST_ROUNDING:
-        return 0, 0
+        return none
     reference = _middle(views.plain((0, 0))) * scale
     baselines = {direction: _at(direction, reach) for direction in directions}
-    pictures = {
-        at: _as_bright(_middle(views.plain(at)) * scale, reference) for both in baselines.values() for at in both
-    }
+    pictures = {at: _middle(views.plain(at)) * scale for both in baselines.values() for at in both}
     order = next(iter(trial.best))
-    positions = {at: (int(t), int(s)) for at in pictures for t, s in baselines_under(order, [at])}
+    positions = {at: baselines_under(order, views.in_steps([at]))[0].astype(np.float32) for at in pictures}
     movement = min(_MOST_MOVEMENT, math.ceil(1.15 * trial.largest_disparity * reach) + 1)
-    candidates = (np.arange(-movement, movement + 1) / reach).astype(np.float32)
+    sampling = 1 / reach
+    candidates = (np.arange(-movement, movement + 1) * sampling).astype(np.float32)
     sides = [
-        (np.stack([pictures[at] for at in both]), np.array([positions[at] for at in both], np.int64))
+        (np.stack([pictures[at] for at in both]), np.stack([positions[at] for at in both]))
         for both in baselines.values()
     ]
     disparity, trusted = _disparity(reference, sides, candidates)
+    surface = trusted & (_support(disparity, trusted, sampling) >= _LEAST_SUPPORT)
     residual = {
-        at: residuals(reference, picture, *positions[at], disparity, _WINDOW_RADIUS) for at, picture in pictures.items()
+        at: residuals(reference, picture, *map(float, positions[at]), disparity, _WINDOW_RADIUS)
+        for at, picture in pictures.items()
     }
     noise = max(_LEAST_NOISE, rounding, _typical([values[trusted] for values in residual.values()]))
-    greater, lesser = 0, 0
+    total, count = np.zeros((2, *_regions(disparity.shape)))
     for t, s in directions:
-        here, there = ([residual[at] for at in baselines[direction]] for direction in ((t, s), (-t, -s)))
-        more, less = count_occlusions(
-            here[-1],
+        there = [residual[at] for at in baselines[-t, -s]]
+        _add_pairs(
+            residual[baselines[t, s][-1]],
             np.maximum(there[0], there[-1]),
-            np.maximum.reduce([*here, *there]),
-            *positions[baselines[t, s][-1]],
             disparity,
-            trusted,
-            _SEEN * noise,
-            _HIDDEN * noise,
-            _HIDDEN_TO_SEEN,
+            surface,
+            positions[baselines[t, s][-1]],
+            noise,
             2 * movement,
+            total,
+            count,
         )
-        greater, lesser = greater + more, lesser + less
-    return greater, lesser
+    return _summary(total, count)
+
+
+def _add_pairs(
+    residual: FloatMap,
+    opposite: FloatMap,
+    disparity: FloatMap,
+    surface: BoolMap,
+    baseline: npt.NDArray[np.float32],
+    noise: float,
+    farthest: int,
+    total: npt.NDArray[np.float64],
+    count: npt.NDArray[np.float64],
+) -> None:
+    """Add what pairs of pixels that meet in a view say to the sums, and their number, of each region.
+
+    ``residual`` is that of the view, ``opposite`` the worst of the views on the other side; both pixels are seen there.
+    """
+    H, W = disparity.shape
+    side = _side(disparity.shape)
+    usable = surface & (opposite <= _SEEN) & np.isfinite(residual)
+    rise = np.zeros((H, W), np.float32)
+    rise[usable] = np.log((residual[usable] + noise) / (opposite[usable] + noise))
+    length = float(np.abs(baseline).max())
+    down, across = (int(n) for n in np.sign(baseline))
+    for distance in range(2, farthest + 1):
+        dy, dx = down * distance, across * distance
+        if abs(dy) >= H or abs(dx) >= W:
+            break
+        # the pixel that is farther away, and the nearer one that comes to lie before it
+        far = np.s_[max(0, -dy) : H - max(0, dy), max(0, -dx) : W - max(0, dx)]
+        near = np.s_[max(0, dy) : H - max(0, -dy), max(0, dx) : W - max(0, -dx)]
+        shift = (disparity[near] - disparity[far]) * length
+        meeting = usable[far] & usable[near] & (abs(shift - distance) <= _MEETING) & (shift >= _LEAST_SHIFT)
+        meeting &= np.maximum(residual[far], residual[near]) > _HIDDEN * noise
+        meeting &= np.maximum(rise[far], rise[near]) > _LEAST_EVIDENCE
+        y, x = np.nonzero(meeting)
+        region = (y + far[0].start) // side, (x + far[1].start) // side
+        evidence = np.clip(rise[far][meeting] - rise[near][meeting], -_MOST_EVIDENCE, _MOST_EVIDENCE)
+        np.add.at(total, region, evidence)
+        np.add.at(count, region, 1)
+
+
+def _summary(total: npt.NDArray[np.float64], count: npt.NDArray[np.float64]) -> Evidence:
+    """Mean over the regions, each weighed by the root of its pairs, and how sure it is."""
+    heard = count >= _PAIRS
+    regions = int(heard.sum())
+    if regions < 2:
+        return Evidence(0.0, 0.0, regions)
+    values, weights = total[heard] / count[heard], np.sqrt(count[heard])
+    mean = float((weights * values).sum() / weights.sum())
+    # regions that all say the same are not without error
+    deviation = max(float(np.sqrt((weights**2 * (values - mean) ** 2).sum() / (weights**2).sum())), 0.1)
+    error = deviation * float(np.sqrt((weights**2).sum()) / weights.sum())
+    return Evidence(mean, abs(mean) / error, regions)
+
+
+def _side(shape: tuple[int, ...]) -> int:
+    """Side of a region, pixels."""
+    return max(4, min(_REGION, round(math.sqrt(math.prod(shape)) / _REGIONS_ACROSS)))
+
+
+def _regions(shape: tuple[int, ...]) -> tuple[int, int]:
+    side = _side(shape)
+    return -(-shape[0] // side), -(-shape[1] // side)
 
 
 def _directions(views: Views, largest: float) -> tuple[int, list[Baseline]]:
@@ -123,14 +221,8 @@ def _middle(picture: FloatMap) -> FloatMap:
     return np.ascontiguousarray(picture[rows, columns])
 
 
-def _as_bright(picture: FloatMap, reference: FloatMap) -> FloatMap:
-    """A view with the mean of the reference: lenses darken the views towards the edge of the grid."""
-    mean = float(picture.mean())
-    return np.asarray(picture * np.float32(float(reference.mean()) / mean if mean > 0 else 1), np.float32)
-
-
 def _disparity(
-    reference: FloatMap, sides: list[tuple[FloatMap, npt.NDArray[np.int64]]], candidates: FloatMap
+    reference: FloatMap, sides: list[tuple[FloatMap, FloatMap]], candidates: FloatMap
 ) -> tuple[FloatMap, BoolMap]:
     """Disparity of each pixel, and where it is trusted, by the side from which the pixel is seen best.
 
@@ -147,6 +239,17 @@ def _disparity(
     spacing = candidates[1] - candidates[0]
     trusted &= abs(disparity - cv2.medianBlur(disparity, 5)) < spacing
     return disparity, trusted
+
+
+def _support(disparity: FloatMap, trusted: BoolMap, sampling: float) -> FloatMap:
+    """Part of the window round each pixel that is trusted and has its disparity, 0..1, shape (H, W)."""
+    H, W = disparity.shape
+    radius = _SURFACE_WINDOW // 2
+    padded = np.pad(np.where(trusted, disparity, np.inf), radius, constant_values=np.inf)
+    alike = np.zeros((H, W), np.float32)
+    for dy, dx in np.ndindex(_SURFACE_WINDOW, _SURFACE_WINDOW):
+        alike += abs(padded[dy : dy + H, dx : dx + W] - disparity) < sampling
+    return alike / np.float32(_SURFACE_WINDOW**2)
 
 
 def _typical(parts: list[FloatMap]) -> float:

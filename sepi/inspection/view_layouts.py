@@ -1,7 +1,8 @@
 """How well views fit together under each order of their grid, but for the sign of the disparities.
 
 Points of one view are matched with other views under each layout, over disparities of both signs: in the right layout
-each point has a disparity at which all views agree.
+each point has a disparity at which all views agree. Layouts can also differ in how far rows of views are apart, see
+:mod:`sepi.inspection.row_spacing`.
 """
 
 from __future__ import annotations
@@ -34,41 +35,81 @@ _HIGH_PASS = 9
 # searched, and its spacing; reductions that reach disparities beyond that
 _FIRST_REACH = 4
 _MOST_VIEWS = 16
-_MOVEMENT = 10
+MOVEMENT = 10
 _MOVEMENT_SPACING = 0.6
 _REDUCTIONS = (2, 4)
+# Views that are worth nothing: brightness and contrast as part of the reference's
+_LEAST_BRIGHTNESS = 0.3
+_LEAST_CONTRAST = 0.4
 # Half width of a patch, pixels; points along a side of the picture
 _PATCH_RADIUS = 2
 _CELLS = 24
 # Clear: fewest points, next layout's matching cost over the best's, and how many standard errors their difference is
-_FEWEST_POINTS = 30
+FEWEST_POINTS = 30
 _CLEAR_RATIO = 1.1
 _CLEAR_ERRORS = 8.0
 # Matching cost of a point that is matched, and part of those that may lie at an end of the search
-_MATCHED = 0.5
-_AT_END = 0.02
+MATCHED = 0.5
+AT_END = 0.02
 
 
 class Views:
     """The views about the middle of the grid, reduced and filtered when they are first asked for.
 
-    ``baselines`` lead from the view in the middle to each other one that is present. ``shape`` is the height and width
-    in pixels, as reduced.
+    ``baselines`` lead from the view in the middle to each other one that is present, in rows and columns;
+    ``row_spacing`` is the light field's, and may be set. ``shape`` is the height and width in pixels, as reduced.
     """
 
     def __init__(self, light_field: LightField) -> None:
         self._views = light_field.rgb_views
         self._factor = max(1, math.ceil(math.sqrt(math.prod(light_field.shape) / _MOST_PIXELS)))
         self._grey: dict[tuple[int, int, int], FloatMap] = {}
+        self._worth: dict[Baseline, bool] = {}
         positions = np.argwhere(light_field.present)
         distance = abs(positions - np.array(light_field.grid) // 2).sum(axis=1)
         self._middle = positions[distance.argmin()]
         self.baselines: list[Baseline] = [(int(t), int(s)) for t, s in positions - self._middle if (t, s) != (0, 0)]
         height, width = light_field.shape
         self.shape = (height // self._factor, width // self._factor)
+        self.row_spacing = light_field.row_spacing
+
+    def in_steps(self, baselines: list[Baseline]) -> npt.NDArray[np.float64]:
+        """Baselines in view steps, shape (V, 2)."""
+        return np.array(baselines, np.float64).reshape(-1, 2) * (self.row_spacing, 1)
+
+    def is_too_small(self, factor: int) -> bool:
+        """Whether the views tell nothing, reduced by a further factor."""
+        return min(self.shape) // factor < _LEAST_SIDE
+
+    def worth_matching(self, baselines: list[Baseline]) -> list[Baseline]:
+        """Those of the views that are neither dark nor dull beside the reference; all, if those are too few.
+
+        Lenses darken and blur the views towards the edge of the grid, so that hardly more than noise is left.
+        """
+        kept = [baseline for baseline in baselines if self._is_worth_matching(baseline)]
+        return kept if 2 * len(kept) >= min(len(baselines), 4) else baselines
+
+    def _is_worth_matching(self, baseline: Baseline) -> bool:
+        if baseline not in self._worth:
+            (mean, contrast), (own_mean, own_contrast) = self._light(baseline), self._light((0, 0))
+            self._worth[baseline] = mean >= _LEAST_BRIGHTNESS * own_mean and contrast >= _LEAST_CONTRAST * own_contrast
+        return self._worth[baseline]
+
+    def _light(self, baseline: Baseline) -> tuple[float, float]:
+        """Mean and contrast of a view as it is."""
+        grey = self._read(baseline, 1)
+        detail = grey - cv2.blur(grey, (_HIGH_PASS, _HIGH_PASS))
+        return float(grey.mean()), float(detail.std())
 
     def plain(self, baseline: Baseline, factor: int = 1) -> FloatMap:
-        """Grey, slightly blurred view, (H, W) float32 in 0..1, reduced by a further factor."""
+        """Grey, slightly blurred view, (H, W) float32, reduced by a further factor; as bright as the reference."""
+        grey = self._read(baseline, factor)
+        if baseline == (0, 0):
+            return grey
+        mean = float(grey.mean())
+        return np.asarray(grey * np.float32(float(self._read((0, 0), factor).mean()) / mean if mean > 0 else 1))
+
+    def _read(self, baseline: Baseline, factor: int) -> FloatMap:
         key = (*baseline, factor)
         if key not in self._grey:
             view = np.ascontiguousarray(self._views[self._middle[0] + baseline[0], self._middle[1] + baseline[1]])
@@ -107,7 +148,7 @@ class Trial(NamedTuple):
 def best_trial(views: Views) -> Trial | None:
     """The first trial that is clear and whose search is wide enough, or else the clearest; None if there is nothing."""
     best: Trial | None = None
-    for reach, factor in _distances(views):
+    for reach, factor in search_distances(views):
         trial = _tried(views, reach, factor)
         if trial is None:
             continue
@@ -118,15 +159,15 @@ def best_trial(views: Views) -> Trial | None:
     return best
 
 
-def baselines_under(order: str, baselines: list[Baseline]) -> npt.NDArray[np.int64]:
-    """Baselines of views after their grid is laid out anew by an order, shape (V, 2)."""
+def baselines_under(order: str, baselines: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """Baselines (V, 2) of views after their grid is laid out anew by an order."""
     grid = ORDERS[order](np.arange(9).reshape(3, 3))
     # where the views one row and one column after the centre go
     matrix = np.stack([np.argwhere(grid == view)[0] - 1 for view in (7, 5)])
-    return np.asarray(np.array(baselines, np.int64).reshape(-1, 2) @ matrix, np.int64)
+    return np.asarray(baselines @ matrix)
 
 
-def _distances(views: Views) -> Iterator[tuple[int, int]]:
+def search_distances(views: Views) -> Iterator[tuple[int, int]]:
     """Baselines to the most distant view used, and further reduction: first a middle distance, then less, then more."""
     most_distant = min(REACH, max(max(map(abs, baseline)) for baseline in views.baselines))
     reach = min(most_distant, _FIRST_REACH)
@@ -141,38 +182,48 @@ def _distances(views: Views) -> Iterator[tuple[int, int]]:
 
 def _tried(views: Views, reach: int, factor: int) -> Trial | None:
     """Compare the layouts by the views about ``reach`` rows or columns away; None where they say nothing."""
-    baselines = _ring(views.baselines, reach)
-    layouts, offsets = _layouts(baselines)
-    if len(layouts) < 2 or min(views.shape) // factor < _LEAST_SIDE:
+    baselines = views.worth_matching(ring(views.baselines, reach))
+    layouts, offsets = _layouts(views.in_steps(baselines))
+    if len(layouts) < 2 or views.is_too_small(factor):
         return None
     reference = views.detail((0, 0), factor)
-    points = _points(reference)
-    if len(points) < _FEWEST_POINTS:
+    points = points_to_match(reference)
+    if len(points) < FEWEST_POINTS:
         return None
-    count = round(_MOVEMENT / _MOVEMENT_SPACING)
+    count = round(MOVEMENT / _MOVEMENT_SPACING)
     candidates = (np.arange(-count, count + 1) * (_MOVEMENT_SPACING / abs(offsets).max())).astype(np.float32)
     others = np.stack([views.detail(baseline, factor) for baseline in baselines])
     cost, disparity = layout_costs(reference, others, offsets, candidates, points, _PATCH_RADIUS)
     mean = cost.mean(axis=0)
     best, following = mean.argsort(kind="stable")[:2]
-    difference = cost[:, following] - cost[:, best]
-    gap = float(difference.mean())
-    errors = gap * math.sqrt(len(cost)) / max(float(difference.std()), 1e-6)
-    matched = abs(factor * disparity[cost[:, best] < _MATCHED, best])
+    gap, errors = _difference(cost[:, best], cost[:, following])
+    matched = abs(factor * disparity[cost[:, best] < MATCHED, best])
     extent = float(candidates[-1]) * factor
-    largest = float(np.quantile(matched, 1 - _AT_END)) if matched.size else extent
+    largest = float(np.quantile(matched, 1 - AT_END)) if matched.size else extent
     return Trial(
         costs={order: float(mean[n]) for n, layout in enumerate(layouts) for order in layout},
         best=layouts[best],
         gap=gap,
         errors=errors,
-        clear=bool(mean[following] >= _CLEAR_RATIO * mean[best] and errors >= _CLEAR_ERRORS),
+        clear=is_clear(cost[:, best], cost[:, following]),
         largest_disparity=largest,
         within=largest < 0.95 * extent,
     )
 
 
-def _ring(baselines: list[Baseline], reach: int) -> list[Baseline]:
+def is_clear(cost: FloatMap, other: FloatMap) -> bool:
+    """Whether the costs of points (P,) under one layout are clearly lower than under another."""
+    return bool(other.mean() >= _CLEAR_RATIO * cost.mean()) and _difference(cost, other)[1] >= _CLEAR_ERRORS
+
+
+def _difference(cost: FloatMap, other: FloatMap) -> tuple[float, float]:
+    """By how much the other's mean is above the first's, and how many standard errors that is."""
+    difference = other - cost
+    gap = float(difference.mean())
+    return gap, gap * math.sqrt(len(cost)) / max(float(difference.std()), 1e-6)
+
+
+def ring(baselines: list[Baseline], reach: int) -> list[Baseline]:
     """Views beyond half of ``reach``; first those along the axes and diagonals, and more distant ones."""
 
     def rank(baseline: Baseline) -> tuple[int, int, Baseline]:
@@ -184,10 +235,10 @@ def _ring(baselines: list[Baseline], reach: int) -> list[Baseline]:
     ]
 
 
-def _layouts(baselines: list[Baseline]) -> tuple[list[dict[str, int]], FloatMap]:
-    """Orders that put these views at the same positions but for the sign, and those positions, shape (L, V, 2)."""
+def _layouts(baselines: npt.NDArray[np.float64]) -> tuple[list[dict[str, int]], FloatMap]:
+    """Orders that put views ``(V, 2)`` at the same positions but for the sign, and those positions, (L, V, 2)."""
     layouts: list[dict[str, int]] = []
-    positions: list[npt.NDArray[np.int64]] = []
+    positions: list[npt.NDArray[np.float64]] = []
     for order in ORDERS:
         position = baselines_under(order, baselines)
         for layout, known in zip(layouts, positions, strict=True):
@@ -200,11 +251,14 @@ def _layouts(baselines: list[Baseline]) -> tuple[list[dict[str, int]], FloatMap]
     return layouts, np.stack(positions).astype(np.float32)
 
 
-def _points(detail: FloatMap) -> npt.NDArray[np.int64]:
-    """Pixels ``(y, x)`` to match, shape (P, 2): the one of each cell of the picture that is most like a corner."""
+def points_to_match(detail: FloatMap, most: int | None = None) -> npt.NDArray[np.int64]:
+    """Pixels ``(y, x)`` to match, shape (P, 2): the one of each cell of the picture that is most like a corner.
+
+    With ``most``, only so many that are it most of all, in their order in the picture.
+    """
     H, W = detail.shape
     # away from the border as far as views move, where the picture is large enough
-    edge = min(_MOVEMENT, min(H, W) // 4) + _PATCH_RADIUS + 1
+    edge = min(MOVEMENT, min(H, W) // 4) + _PATCH_RADIUS + 1
     strength = cv2.cornerMinEigenVal(detail, 5)[edge : H - edge, edge : W - edge]
     side = max(2, math.ceil(math.sqrt(strength.size) / _CELLS))
     rows, columns = strength.shape[0] // side, strength.shape[1] // side
@@ -215,4 +269,8 @@ def _points(detail: FloatMap) -> npt.NDArray[np.int64]:
     position = flat.argmax(axis=2)
     y = np.arange(rows)[:, None] * side + position // side + edge
     x = np.arange(columns)[None] * side + position % side + edge
-    return np.asarray(np.stack([y, x], axis=2)[flat.max(axis=2) > 0], np.int64)
+    points, strengths = np.stack([y, x], axis=2).reshape(-1, 2), flat.max(axis=2).ravel()
+    kept = np.flatnonzero(strengths > 0)
+    if most is not None:
+        kept = np.sort(kept[np.argsort(-strengths[kept], kind="stable")[:most]])
+    return np.asarray(points[kept], np.int64)

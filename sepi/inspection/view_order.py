@@ -12,14 +12,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sepi.inspection.disparity_sign import occlusion_votes
+from sepi.inspection.disparity_sign import occlusion_evidence
 from sepi.inspection.view_layouts import Views, best_trial
 from sepi.io.readers.options import AS_GIVEN, ORDERS
 from sepi.lightfield import LightField
 
-# Votes that the sign needs, and the part of them that must agree
-_FEWEST_VOTES = 30
-_MAJORITY = 0.8
+# What the sign needs: regions of the picture where one surface is seen to hide another, the mean of what they say
+# (-2 to 2), and how many standard errors that is
+_FEWEST_REGIONS = 6
+_LEAST_EVIDENCE = 1.0
+_CLEAR_ERRORS = 4.0
 
 _FAULTS = {
     "flip-rows": "the rows of views run the other way",
@@ -112,13 +114,16 @@ def check_order(light_field: LightField, read_in: str = AS_GIVEN) -> OrderCheck:
     costs = dict(trial.costs)
     sign_clear = False
     if trial.clear:
-        greater, lesser = occlusion_votes(views, trial)
-        votes = greater + lesser
-        sign_clear = votes >= _FEWEST_VOTES and max(greater, lesser) >= _MAJORITY * votes
+        evidence = occlusion_evidence(views, trial)
+        sign_clear = (
+            evidence.regions >= _FEWEST_REGIONS
+            and abs(evidence.mean) >= _LEAST_EVIDENCE
+            and evidence.errors >= _CLEAR_ERRORS
+        )
         if sign_clear:
             # at most half way to the next layout: the wrong sign is still the better layout
             for order, sign in trial.best.items():
-                costs[order] += trial.gap / 2 * (lesser if sign > 0 else greater) / votes
+                costs[order] += trial.gap / 2 * (0.5 - sign * evidence.mean / 4)
     # from changes of the light field available to orders that take the place of the given one
     fits = {order: costs[_change(read_in, order)] for order in ORDERS}
     best = min(ORDERS, key=lambda order: (fits[order], order != read_in))

@@ -8,14 +8,10 @@ import numba
 import numpy as np
 import numpy.typing as npt
 
-from sepi.lightfield import BoolMap, FloatMap
+from sepi.lightfield import FloatMap
 
 # difference of two patches that counts one half, as part of the patch's own variation
 _HALF = np.float32(0.25)
-
-# Two surfaces count as two where they are this far apart in a view, pixels; they meet in it within this distance
-_LEAST_SHIFT = 1.5
-_MEETING = 0.75
 
 
 @numba.njit(parallel=True, cache=True)  # type: ignore[untyped-decorator, unused-ignore]
@@ -34,9 +30,9 @@ def layout_costs(
     reference : ndarray, shape (H, W), float32
     views : ndarray, shape (V, H, W), float32
     offsets : ndarray, shape (L, V, 2), float32
-        Steps ``(t - t0, s - s0)`` of each view under each layout.
+        Baseline ``(down, across)`` of each view under each layout.
     candidates : ndarray, shape (K,), float32
-        Disparities in pixels per view step.
+        Disparities in pixels per unit of the baselines.
     points : ndarray, shape (P, 2), int64
         Pixels ``(y, x)``, more than ``radius`` from the border.
     radius : int
@@ -84,7 +80,7 @@ def residuals(
 ) -> FloatMap:
     """Mean squared difference, shape (H, W) float32, of each pixel's window and where it should be seen in a view.
 
-    The view lies ``down`` and ``across`` views from the reference. Infinite where the window leaves either picture.
+    The view lies ``down`` and ``across`` view steps away. Infinite where the window leaves either picture.
     """
     H, W = reference.shape
     side = 2 * radius + 1
@@ -99,70 +95,6 @@ def residuals(
                 squares = _squares(patch, view, row, column, np.float32(v - row), np.float32(u - column))
                 out[y + radius, x + radius] = squares / np.float32(side * side)
     return out
-
-
-@numba.njit(parallel=True, cache=True)  # type: ignore[untyped-decorator, unused-ignore]
-def count_occlusions(
-    residual: FloatMap,
-    opposite: FloatMap,
-    everywhere: FloatMap,
-    down: float,
-    across: float,
-    disparity: FloatMap,
-    trusted: BoolMap,
-    good: float,
-    bad: float,
-    factor: float,
-    reach: int,
-) -> tuple[int, int]:
-    """Which of two surfaces hides the other where they meet in a view.
-
-    A pixel that is plainly not seen in the view, though it is seen from the other side, is hidden there. What hides it
-    is a pixel of the reference that the disparities bring to the same position and that is seen in all views.
-
-    Parameters
-    ----------
-    residual : ndarray, shape (H, W), float32
-        Of the view, as by :func:`residuals`.
-    opposite, everywhere : ndarrays, shape (H, W), float32
-        Worst residual of the views on the other side, and of the views on both sides.
-    down, across : float
-        Steps from the reference to the view.
-    disparity, trusted : ndarrays, shape (H, W)
-    good, bad : float
-        Residuals up to and from which a pixel is seen, and is not.
-    factor : float
-        Least ratio of ``residual`` to ``opposite`` of a hidden pixel.
-    reach : int
-        Farthest that two pixels that meet can be apart, pixels.
-
-    Returns
-    -------
-    greater, lesser : int
-        How often the surface of the greater, and of the lesser disparity was the one seen.
-    """
-    H, W = disparity.shape
-    length = math.sqrt(down * down + across * across)
-    greater, lesser = 0, 0
-    for y in numba.prange(H):
-        for x in range(W):
-            if not (trusted[y, x] and opposite[y, x] <= good and bad <= residual[y, x] < np.inf):
-                continue
-            if residual[y, x] < factor * opposite[y, x]:
-                continue
-            best, winner = np.inf, 0
-            for k in range(-reach, reach + 1):
-                v, u = round(y + k * down / length), round(x + k * across / length)
-                if v < 0 or u < 0 or v >= H or u >= W or not trusted[v, u] or everywhere[v, u] > good:
-                    continue
-                shift = (disparity[v, u] - disparity[y, x]) * length
-                if abs(shift) >= _LEAST_SHIFT and abs(shift - k) <= _MEETING and residual[v, u] < best:
-                    best, winner = residual[v, u], 1 if shift > 0 else -1
-            if winner > 0:
-                greater += 1
-            elif winner < 0:
-                lesser += 1
-    return greater, lesser
 
 
 @numba.njit(cache=True, inline="always")  # type: ignore[untyped-decorator, unused-ignore]

@@ -1,0 +1,249 @@
+"""Which grid a numbered sequence of views fills, found from the views alone.
+
+Names that only count the views leave open how many rows and columns there are, whether they are counted row by row or
+column by column, whether the camera ran back and forth, and whether the views fill the grid at all: crosses and discs
+of views are common. Each arrangement of so many views is tried; in the right one neighbours fit together everywhere.
+"""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from sepi.errors import SepiError, SepiWarning
+from sepi.inspection.view_layouts import FEWEST_POINTS, MOVEMENT, Baseline, Views, baselines_under, points_to_match
+from sepi.inspection.view_order_kernels import layout_costs
+from sepi.io.readers.options import ReadOptions, arrange_numbers
+from sepi.lightfield import LightField
+
+Positions = npt.NDArray[np.int64]
+
+# Discs of at most this radius are tried, and grids whose longer side is at most so many times the shorter
+_LARGEST_RADIUS = 24
+_MOST_SLENDER = 6
+# Views that others are matched with, from all over the sequence, how many others, and points of each; the part of these
+# views that fits worst decides: a wrong arrangement may be right but for the ends of its rows
+_REFERENCES = 24
+_NEIGHBOURS = 12
+_POINTS = 40
+_WORST = 3
+_RADIUS = 2
+_SAMPLING = 0.6
+# Distances to the others, and reductions by which movement is searched that is too large otherwise
+_DISTANCES = ((2, 1), (2, 2), (2, 4), (6, 1))
+# The rows of views may run up or down; near and far do not matter
+_ORDERS = ("as-given", "flip-rows")
+# What tells: the next arrangement's matching cost over the best's, and from where on no other distance is looked at;
+# the most that views have which fit together
+_CLEAR_RATIO = 1.15
+_PLAIN_RATIO = 1.5
+_MOST_COST = 0.65
+# positions from one to the next by the golden ratio lie evenly, and in step with no row
+_GOLDEN = (math.sqrt(5) - 1) / 2
+
+
+class Arrangement(NamedTuple):
+    """A way to put a sequence of views into a grid.
+
+    Attributes
+    ----------
+    name : str
+        For people: ``"3x3 row by row"``.
+    positions : ndarray, shape (N, 2), int64
+        Row and column of each view of the sequence.
+    """
+
+    name: str
+    positions: Positions
+
+    @property
+    def grid(self) -> tuple[int, int]:
+        """Rows and columns."""
+        rows, columns = self.positions.max(axis=0) + 1
+        return int(rows), int(columns)
+
+
+def arrange(light_field: LightField, options: ReadOptions) -> LightField:
+    """Put views that stand in one row, in the order of their numbers, into the grid in which they fit together.
+
+    Parameters
+    ----------
+    light_field : LightField
+        Of a single row of views.
+    options : ReadOptions
+        ``central``, ``order``, ``exclude`` by position and ``view`` are those in the grid.
+
+    Returns
+    -------
+    LightField
+        With a note on the arrangement.
+
+    Warns
+    -----
+    SepiWarning
+        If the views do not tell, and as many would fill a square, which is taken.
+
+    Raises
+    ------
+    SepiError
+        If the views fit together in no arrangement, or do not tell, or the options do not fit the grid.
+    """
+    source, count = light_field.source or light_field.name, light_field.grid[1]
+    tried = list(arrangements(count))
+    costs = _costs(Views(light_field), light_field.present[0], tried)
+    ranked = sorted(range(len(tried)), key=lambda n: costs[n])
+    names = ", ".join(way.name for way in tried)
+    if math.isfinite(costs[ranked[0]]) and costs[ranked[0]] > _MOST_COST:
+        raise SepiError(
+            f"{source}: {count} views without row and column, and in no arrangement tried ({names}) they fit together; "
+            "give --grid ROWSxCOLUMNS, or leave pictures out that are no views with --exclude"
+        )
+    best = tried[ranked[0]]
+    if len(tried) > 1 and not costs[ranked[1]] >= _CLEAR_RATIO * costs[ranked[0]]:
+        square = next(
+            (way for way in tried if way.grid[0] == way.grid[1] and len(way.positions) == way.grid[0] ** 2), None
+        )
+        if square is None:
+            raise SepiError(
+                f"{source}: {count} views without row and column, and the views do not tell which arrangement is "
+                f"theirs ({names}); give --grid ROWSxCOLUMNS"
+            )
+        warnings.warn(
+            f"{source}: the views do not tell which grid they fill; taken for {square.name}, --grid sets it otherwise",
+            SepiWarning,
+            stacklevel=2,
+        )
+        best = square
+    note = f"{count} numbered views taken for {best.name}, by how they fit together; --grid sets it otherwise"
+    return _placed(light_field, best, options, note)
+
+
+def arrangements(count: int) -> Iterator[Arrangement]:
+    """The ways to put so many views into a grid that are tried; a square first."""
+    sides = [side for side in range(math.isqrt(count), 1, -1) if count % side == 0 and count <= _MOST_SLENDER * side**2]
+    for short in sides:
+        long = count // short
+        for rows, columns in sorted({(short, long), (long, short)}):
+            grid = np.stack(np.divmod(np.arange(count), columns), axis=1)
+            yield Arrangement(f"{rows}x{columns} row by row", grid)
+            back = grid.copy()
+            back[grid[:, 0] % 2 == 1, 1] = columns - 1 - back[grid[:, 0] % 2 == 1, 1]
+            yield Arrangement(f"{rows}x{columns} row by row, back and forth", back)
+            # of a grid of as many rows as columns this is the turned one, of others the turned one of the other
+            yield Arrangement(f"{columns}x{rows} column by column", grid[:, ::-1])
+            yield Arrangement(f"{columns}x{rows} column by column, back and forth", back[:, ::-1])
+    line = np.stack([np.zeros(count, np.int64), np.arange(count)], axis=1)
+    yield Arrangement(f"a single row of {count}", line)
+    yield Arrangement(f"a single column of {count}", line[:, ::-1])
+    yield from _crosses(count)
+    yield from _discs(count)
+
+
+def _crosses(count: int) -> Iterator[Arrangement]:
+    """Crosses of a row and a column of equal length; that which comes first is whole, the other without the middle."""
+    if count % 4 != 1 or count < 5:
+        return
+    half = count // 4
+    along = np.arange(2 * half + 1)
+    middle = np.full_like(along, half)
+    whole = np.stack([middle, along], axis=1)
+    rest = np.delete(whole[:, ::-1], half, axis=0)
+    side = 2 * half + 1
+    yield Arrangement(f"a cross of {side}x{side}, the row first", np.concatenate([whole, rest]))
+    yield Arrangement(f"a cross of {side}x{side}, the column first", np.concatenate([whole, rest])[:, ::-1])
+    # one view after the other as in the whole grid
+    cross = np.concatenate([whole, rest])
+    in_grid = cross[np.lexsort((cross[:, 1], cross[:, 0]))]
+    yield Arrangement(f"a cross of {side}x{side} row by row", in_grid)
+    yield Arrangement(f"a cross of {side}x{side} column by column", in_grid[:, ::-1])
+
+
+def _discs(count: int) -> Iterator[Arrangement]:
+    """Discs of views round the middle of a grid."""
+    y, x = np.mgrid[-_LARGEST_RADIUS : _LARGEST_RADIUS + 1, -_LARGEST_RADIUS : _LARGEST_RADIUS + 1]
+    distances = np.unique(y**2 + x**2)
+    # the first is one view, the second and third are a cross and a square of 3x3
+    for distance in distances[(distances > 2) & (distances <= _LARGEST_RADIUS**2)]:
+        disc = np.argwhere(y**2 + x**2 <= distance)
+        if len(disc) == count and math.isqrt(count) ** 2 != count:
+            positions = disc - disc.min(axis=0)
+            side = int(positions.max()) + 1
+            yield Arrangement(f"a disc in {side}x{side} row by row", positions)
+            yield Arrangement(f"a disc in {side}x{side} column by column", positions[:, ::-1])
+
+
+def _costs(views: Views, present: npt.NDArray[np.bool_], tried: list[Arrangement]) -> list[float]:
+    """Matching cost of each arrangement, 0..1, by the views that tell them apart best; infinite without texture."""
+    best, clearest = [math.inf] * len(tried), 0.0
+    for reach, factor in _DISTANCES:
+        if views.is_too_small(factor):
+            continue
+        costs = [_cost(views, present, way.positions, reach, factor) for way in tried]
+        first, second = sorted([*costs, math.inf])[:2]
+        clear = second / max(first, 1e-6) if first <= _MOST_COST and len(tried) > 1 else 1 - first
+        if math.isfinite(first) and clear > clearest:
+            best, clearest = costs, clear
+        if clearest >= _PLAIN_RATIO:
+            break
+    return best
+
+
+def _cost(views: Views, present: npt.NDArray[np.bool_], positions: Positions, reach: int, factor: int) -> float:
+    """How badly views fit their neighbours, where they fit worst, under the better of the orders."""
+    count = len(positions)
+    places = dict.fromkeys(int(count * ((n + 0.5) * _GOLDEN % 1)) for n in range(_REFERENCES))
+    costs = []
+    for place in places:
+        near = _neighbours(positions, present, place, reach)
+        if not present[place] or not near:
+            continue
+        reference = views.detail(_baseline(place, count), factor)
+        points = points_to_match(reference, _POINTS)
+        if len(points) < FEWEST_POINTS:
+            continue
+        others = np.stack([views.detail(_baseline(n, count), factor) for n in near])
+        offsets = np.stack([baselines_under(order, positions[near] - positions[place]) for order in _ORDERS])
+        steps = round(MOVEMENT / _SAMPLING)
+        candidates = (np.arange(-steps, steps + 1) * (_SAMPLING / abs(offsets).max())).astype(np.float32)
+        cost, _ = layout_costs(reference, others, offsets.astype(np.float32), candidates, points, _RADIUS)
+        costs.append(cost.mean(axis=0))
+    if not costs:
+        return math.inf
+    worst = np.sort(np.stack(costs), axis=0)[-math.ceil(len(costs) / _WORST) :]
+    return float(worst.mean(axis=0).min())
+
+
+def _neighbours(positions: Positions, present: npt.NDArray[np.bool_], place: int, reach: int) -> list[int]:
+    """Views of the sequence about one, those along the axes and diagonals first; some of those there are."""
+    steps = abs(positions - positions[place])
+    far = steps.max(axis=1)
+    near = np.flatnonzero(present & (far <= reach) & (far > (reach - 1) // 2))
+    rank = sorted(near.tolist(), key=lambda n: (min(*steps[n], abs(steps[n][0] - steps[n][1])), int(far[n]), n))
+    return rank[:_NEIGHBOURS]
+
+
+def _baseline(place: int, count: int) -> Baseline:
+    """From the middle of the sequence."""
+    return 0, place - count // 2
+
+
+def _placed(light_field: LightField, way: Arrangement, options: ReadOptions, note: str) -> LightField:
+    """The light field in the grid of an arrangement, turned and cut as the options have it."""
+    rows, columns = way.grid
+    sequence = np.full((rows, columns), -1)
+    sequence[tuple(way.positions.T)] = np.arange(len(way.positions))
+    numbers = arrange_numbers(light_field.source or light_field.name, way.grid, options)
+    # number in the grid to number in the sequence; -1 where there is no view, or it was left out
+    order = np.where(numbers >= 0, sequence.ravel()[numbers], -1)
+    present = (order >= 0) & light_field.present[0][order]
+    views = light_field.views[0][order]
+    views[~present] = 0
+    return replace(
+        light_field, views=views, present=present, view=options.view, arranged=True, notes=(*light_field.notes, note)
+    )

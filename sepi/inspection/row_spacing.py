@@ -1,0 +1,164 @@
+"""How far rows of views are apart, as a multiple of the distance of columns, found from the views alone.
+
+A camera gantry may move by other steps up and down than sideways. Points of one view are matched with views above,
+below and beside it under each spacing tried, in each layout of the views: in the right one each point has a disparity
+at which all views agree.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from sepi.inspection.view_layouts import (
+    AT_END,
+    FEWEST_POINTS,
+    MATCHED,
+    MOVEMENT,
+    Baseline,
+    Views,
+    baselines_under,
+    is_clear,
+    points_to_match,
+    ring,
+    search_distances,
+)
+from sepi.inspection.view_order_kernels import layout_costs
+from sepi.lightfield import FloatMap, LightField
+
+# Spacings tried, and how many between one and its double
+_MOST = 4.0
+_PER_OCTAVE = 5
+# Points that are enough to tell spacings apart, and to measure the one found; half width of a patch, pixels
+_POINTS_TO_TELL = 150
+_RADIUS = 2
+# Layouts up to the sign
+_ORDERS = ("as-given", "flip-rows", "transpose", "transpose-flip-rows")
+# Movement in the farthest view, pixels: spacing of what is searched, and the most when the spacing is measured
+_SAMPLING = 0.6
+_MOST_MOVEMENT = 80.0
+# Rounds of measuring, and spacings to each side of the last round's best
+_ROUNDS = 2
+_EACH_SIDE = 4
+# What is not worth a word: less than that is the error of the measurement
+_LEAST_DIFFERENCE = 0.04
+
+
+def settle_row_spacing(light_field: LightField) -> LightField:
+    """The light field with the row spacing that its views tell, and a note; as it is where they tell none.
+
+    Nothing is done where a spacing or positions of the views are known already.
+    """
+    if light_field.positions is not None or light_field.row_spacing != 1:
+        return light_field
+    spacing = estimate_row_spacing(Views(light_field))
+    if spacing is None:
+        return light_field
+    spacing = round(spacing, 3)
+    note = f"rows of views are {spacing:g} times as far apart as columns, by the views; --row-spacing sets it"
+    return replace(light_field, row_spacing=spacing, notes=(*light_field.notes, note))
+
+
+class _Trial(NamedTuple):
+    """What the views at one distance say."""
+
+    spacing: float
+    order: str
+    baselines: list[Baseline]
+    movement: float
+    clear: bool
+
+
+def estimate_row_spacing(views: Views) -> float | None:
+    """Distance of rows in view steps, where another than that of the columns fits clearly better.
+
+    Parameters
+    ----------
+    views : Views
+        The distance that they have is not looked at.
+
+    Returns
+    -------
+    float or None
+        In the order in which the light field was read. None where rows are as far apart as columns, where there is
+        only one of either, or where the views do not tell.
+    """
+    for reach, factor in search_distances(views):
+        trial = _tried(views, reach, factor)
+        if trial is not None:
+            measured = _measured(views, trial) if trial.clear else 1.0
+            return None if abs(math.log(measured)) < _LEAST_DIFFERENCE else measured
+    return None
+
+
+def _tried(views: Views, reach: int, factor: int) -> _Trial | None:
+    """The spacing that fits best; None where views at this distance do not tell.
+
+    It is clear if it fits clearly better than equal spacing in any layout.
+    """
+    baselines = views.worth_matching(ring(views.baselines, reach))
+    if not any(t for t, _ in baselines) or not any(s for _, s in baselines) or views.is_too_small(factor):
+        return None
+    count = round(_PER_OCTAVE * math.log2(_MOST))
+    hypotheses = [(order, 2 ** (n / _PER_OCTAVE)) for order in _ORDERS for n in range(-count, count + 1)]
+    found = _matched(views, baselines, factor, hypotheses, float(MOVEMENT), _POINTS_TO_TELL)
+    if found is None:
+        return None
+    cost, movement = found
+    mean = cost.mean(axis=0)
+    best = int(mean.argmin())
+    usual = min((n for n, (_, spacing) in enumerate(hypotheses) if spacing == 1), key=lambda n: mean[n])
+    moved = movement[cost[:, best] < MATCHED, best]
+    if moved.size < FEWEST_POINTS or np.quantile(moved, 1 - AT_END) > 0.95 * MOVEMENT:
+        return None
+    order, spacing = hypotheses[best]
+    clear = is_clear(cost[:, best], cost[:, usual])
+    return _Trial(spacing, order, baselines, factor * float(moved.max()), clear)
+
+
+def _measured(views: Views, trial: _Trial) -> float:
+    """The spacing of a trial, to about a hundredth."""
+    spacing, width = trial.spacing, 1 / _PER_OCTAVE
+    for _ in range(_ROUNDS):
+        tried = [spacing * 2 ** (width * n / _EACH_SIDE) for n in range(-_EACH_SIDE, _EACH_SIDE + 1)]
+        movement = min(trial.movement + 1, _MOST_MOVEMENT)
+        found = _matched(views, trial.baselines, 1, [(trial.order, one) for one in tried], movement, None)
+        if found is None:
+            return spacing
+        spacing = tried[int(found[0].mean(axis=0).argmin())]
+        width /= _EACH_SIDE
+    return spacing
+
+
+def _matched(
+    views: Views,
+    baselines: list[Baseline],
+    factor: int,
+    hypotheses: list[tuple[str, float]],
+    movement: float,
+    most_points: int | None,
+) -> tuple[FloatMap, FloatMap] | None:
+    """Matching cost of each point under each order and spacing, and how far it moves in the farthest view, pixels.
+
+    Both of shape (P, L), float32; None where there are too few points.
+    """
+    reference = views.detail((0, 0), factor)
+    points = points_to_match(reference, most_points)
+    if len(points) < FEWEST_POINTS:
+        return None
+    others = np.stack([views.detail(baseline, factor) for baseline in baselines])
+    offsets = np.stack([_in_units_of_the_farthest(baselines, order, spacing) for order, spacing in hypotheses])
+    count = round(movement / _SAMPLING)
+    candidates = (np.arange(-count, count + 1) * _SAMPLING).astype(np.float32)
+    cost, moved = layout_costs(reference, others, offsets.astype(np.float32), candidates, points, _RADIUS)
+    return cost, abs(moved)
+
+
+def _in_units_of_the_farthest(baselines: list[Baseline], order: str, spacing: float) -> npt.NDArray[np.float64]:
+    """Baselines (V, 2) in an order and a spacing, in units of the longest: all hypotheses search the same movement."""
+    offsets = baselines_under(order, np.array(baselines, np.float64) * (spacing, 1))
+    return offsets / abs(offsets).max()
