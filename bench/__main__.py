@@ -17,7 +17,9 @@ from bench.scene import Scene
 from sepi.command import SepiGroup
 from sepi.errors import SepiError
 from sepi.io.files import atomic_path
-from sepi.scenes import SCENES
+from sepi.io.readers.options import AS_GIVEN, ReadOptions
+from sepi.reading import read_light_field
+from sepi.scenes import SCENES, render
 from sepi.threads import use_threads
 from sepi.workflow.machine import this_machine
 
@@ -90,6 +92,37 @@ def compare(before: Path, after: Path) -> None:
     for difference in tables.differences(old, new):
         click.echo(f"sepi: warning: not the same {difference}", err=True)
     click.echo(f"# Before and after\n\nMedian seconds of each case.\n\n{tables.markdown(rows)}")
+
+
+@main.command()
+@click.argument("light_fields", metavar="INPUT[@ORDER]...", nargs=-1, required=True)
+def disturb(light_fields: tuple[str, ...]) -> None:
+    """What is found in light fields and in disturbed copies: order of the views, range, spacing of rows.
+
+    Each INPUT is a built-in scene or the path of a light field whose views are in the right order, or are so in the
+    order named after '@'.
+    """
+    from bench.disturbed import disturbed_verdicts
+
+    total: dict[str, list[int]] = {}
+    click.echo(f"{'light field':24} {'disturbance':20} right open wrong   range             rows")
+    for given in light_fields:
+        path, _, order = given.partition("@")
+        if path in SCENES:
+            light_field = render(path)
+        else:
+            light_field = read_light_field(path, options=ReadOptions(order=order or AS_GIVEN), check_order=False)
+        for name, found in disturbed_verdicts(light_field):
+            counts = [found.orders[word] for word in ("right", "open", "wrong")]
+            known = found.range
+            limits = "none" if known is None else f"{known.minimum:g} to {known.maximum:g}"
+            click.echo(
+                f"{light_field.name:24} {name:20} {counts[0]:5} {counts[1]:4} {counts[2]:5}   {limits:17} "
+                f"{found.row_spacing:g}"
+            )
+            total[name] = [a + b for a, b in zip(total.get(name, [0, 0, 0]), counts, strict=True)]
+    for name, counts in total.items():
+        click.echo(f"{'all':24} {name:20} {counts[0]:5} {counts[1]:4} {counts[2]:5}")
 
 
 def _all_measured(cases: list[Case], repeats: int, threads: int) -> tuple[list[Measurement], int]:

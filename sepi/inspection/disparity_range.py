@@ -1,40 +1,51 @@
 """Find the disparity range of a scene from its views alone.
 
-A coarse plane sweep over far more disparities than a scene has, with few views; then the extremes of the disparities
-that can be trusted: pixels whose best match is unambiguous and whose neighbours agree. A range that is a bit too wide
-costs little; one that leaves out the nearest or most distant surface spoils that surface, so the choices below lean to
-the wide side.
+A coarse plane sweep over far more disparities than a scene has tells where the scene lies; a second one, about there
+only, with views as far away as possible, tells its range. Only disparities that can be trusted count: those of
+surfaces, patches of pixels whose best match is unambiguous and whose neighbours agree. The range is that of nearly all
+of them, with a margin: one that is too narrow spoils the nearest or most distant surface, one that is too wide costs
+time and accuracy.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
+from typing import NamedTuple
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
 from sepi.errors import SepiError
 from sepi.lightfield import BoolMap, DisparityRange, FloatMap, LightField, as_unit_float
 
-# Search: pixels per view step to each side at first, and if surfaces lie beyond
+# Search: pixels per view step to each side at first, and if surfaces lie beyond; views up to this many steps away at
+# first, and if surfaces move by more than so many pixels
 _EXTENTS = (16.0, 32.0, 64.0)
-# views up to this many steps from the centre: more distant ones see less of the same
-_REACH = 4
+_REACHES = (4, 2, 1)
+_FAR = 40.0
+# movement in the farthest view when the range is measured: pixels at most, also as part of the shorter side; sampling
+_MOST_MOVEMENT = 24.0
+_MOST_MOVEMENT_PART = 0.25
+_SAMPLING = 0.5
 # views when there is no cross of them
 _MOST_VIEWS = 16
+# views that are much darker than the reference are not looked at
+_LEAST_BRIGHTNESS = 0.3
 # larger pictures are reduced by a whole factor
 _MOST_PIXELS = 600_000
 
-# Filters, pixels: against noise, against differences of brightness between views; matching window
+# Filters, pixels: against noise, against differences of brightness between views; matching windows of the two sweeps
 _BLUR_SIGMA = 0.8
 _HIGH_PASS = 9
-_RADIUS = 2
+_SEARCH_RADIUS = 2
+_RADIUS = 3
 # largest difference that counts, full range = 1
 _TRUNCATION = 0.1
 
-# What is black, as part of the brightest there is
+# What is black, as part of the brightest there is; how much of a picture a lens leaves black: more is background
 _BLACK = 0.05
+_MOST_BLACK = 0.35
 
 # Trust: lowest cost as part of the lowest outside its valley. A limit on the cost itself would add nothing here, and
 # would have to know the noise.
@@ -43,14 +54,25 @@ _MOST_AMBIGUITY = 0.8
 _FLAT = 1e-4
 # pixels of the 5x5 neighbourhood, itself included, that agree within a candidate step
 _LEAST_SUPPORT = 13
-# trusted pixels that a range needs, as part of the picture, for the search to end
-_ENOUGH = 0.02
+# pixels of a patch, as part of the picture, and at least
+_PATCH = 3e-4
 _FEWEST_PIXELS = 20
+# trusted pixels for the search to end, as part of the picture
+_ENOUGH = 0.02
 
-# Range: extreme pixels that may be wrong (a number and a part of all), and the margin on each side as part of the span
-_OUTLIERS = 4
-_OUTLIER_PART = 1e-5
-_MARGIN = 0.06
+# Range: part of the pixels that is left out on either side, and the margin, as part of the span; in the search, fewer
+_OUTLIERS = 0.001
+_MARGIN = 0.07
+_SEARCH_OUTLIERS = 0.0002
+# outliers when it is decided whether surfaces lie beyond what was searched
+_BEYOND = 0.001
+
+
+class _Found(NamedTuple):
+    """Disparities of the pixels that are trusted, and those of the patches that they make; pixels per view step."""
+
+    pixels: FloatMap
+    patches: FloatMap
 
 
 def estimate_range(light_field: LightField) -> DisparityRange:
@@ -71,38 +93,24 @@ def estimate_range(light_field: LightField) -> DisparityRange:
     SepiError
         If too few pixels can be matched (no texture, or no disparity within 64 pixels per view step).
     """
-    # here, since it brings the compiler with it, and most scenes name their range
-    from sepi.inspection.coarse_sweep import coarse_sweep
-
-    positions = _positions(light_field)
     factor = math.ceil(math.sqrt(math.prod(light_field.shape) / _MOST_PIXELS))
-    reference = _prepared(light_field.rgb_views[light_field.reference_position], factor)
-    views = np.stack([_prepared(light_field.rgb_views[position], factor) for position in positions])
-    offsets = np.stack([light_field.baselines[position] for position in positions]).astype(np.float32)
-    # the most distant view moves by one pixel from candidate to candidate
-    step = 1 / float(abs(offsets).max())
-    seen = ~_dark_corners(light_field.reference_view, reference.shape)
-    found: FloatMap = np.empty(0, np.float32)
-    # at most half a picture at the most distant view
-    for extent in sorted({min(extent, max(reference.shape) * step / 2) for extent in _EXTENTS}):
-        number = max(1, math.ceil(extent / step))
-        candidates = (np.arange(-number, number + 1) * step).astype(np.float32)
-        sweep = coarse_sweep(reference, views, offsets, candidates, np.float32(_TRUNCATION), _RADIUS)
-        trusted = sweep[-1][_trusted(*sweep, step) & seen]
-        if trusted.size > found.size:
-            found = trusted
-        if found.size > _ENOUGH * reference.size and abs(np.stack(_extremes(found))).max() < extent - max(1, 2 * step):
-            break
-    if found.size < _FEWEST_PIXELS:
-        raise SepiError(
-            f"{light_field.name}: the disparity range cannot be estimated, too few pixels match between the views; "
-            "give one (MIN MAX, pixels per view step)"
-        )
-    low, high = _extremes(found)
-    margin = max(_MARGIN * (high - low), step / 2)
-    # two decimals: a number that can be read and typed
+    views = _Views(light_field, factor)
+    low, high, sampling = _searched(views)
+    # the search is sure to about two candidates
+    measured = _measured(views, low - 2 * sampling, high + 2 * sampling)
+    if measured.pixels.size < _FEWEST_PIXELS:
+        raise _undecided(light_field)
+    low, high = (float(value) for value in np.quantile(measured.pixels, [_OUTLIERS, 1 - _OUTLIERS]))
+    # small surfaces far before or behind the others are not outliers
+    low, high = min(low, float(measured.patches.min())), max(high, float(measured.patches.max()))
+    margin = max(_MARGIN * (high - low), _SAMPLING / 10 / views.reach)
+    # two decimals more than the margin's first: numbers that can be read and typed
+    digits = max(2, 1 - math.floor(math.log10(factor * margin)))
+    scale = 10**digits
     return DisparityRange(
-        math.floor(100 * factor * (low - margin)) / 100, math.ceil(100 * factor * (high + margin)) / 100, "estimated"
+        math.floor(scale * factor * (low - margin)) / scale,
+        math.ceil(scale * factor * (high + margin)) / scale,
+        "estimated",
     )
 
 
@@ -128,25 +136,128 @@ def settle_range(light_field: LightField, given: tuple[float, float] | None = No
     return light_field
 
 
-def _positions(light_field: LightField) -> list[tuple[int, int]]:
-    """Grid positions to match with the centre: its row and column; any others where those are not there."""
-    t0, s0 = light_field.reference_position
-    present = [
-        (int(t), int(s))
-        for t, s in np.argwhere(light_field.present)
-        if (t, s) != (t0, s0) and max(abs(t - t0), abs(s - s0)) <= _REACH
-    ]
-    cross = [(t, s) for t, s in present if t == t0 or s == s0]
-    if len(cross) > 1:
-        return cross
-    if present:
-        return present[:: math.ceil(len(present) / _MOST_VIEWS)]
-    raise SepiError(f"{light_field.name}: no view within {_REACH} steps of the centre is present")
+class _Views:
+    """The reference view and others, filtered, reduced by a whole factor; disparities are in reduced pixels."""
+
+    def __init__(self, light_field: LightField, factor: int) -> None:
+        self.light_field, self._factor = light_field, factor
+        self._prepared: dict[tuple[int, int], FloatMap] = {}
+        self._own = light_field.reference_position
+        self.reference = self._view(self._own)
+        self.seen = ~_dark_corners(light_field.reference_view, self.reference.shape)
+        self.reach = 1
+
+    def distances(self) -> tuple[int, int]:
+        """Rows or columns from the reference view to the nearest and the farthest other view."""
+        away = abs(np.argwhere(self.light_field.present) - self._own).max(axis=1)
+        away = away[away > 0]
+        return int(away.min()), int(away.max())
+
+    def sweep(self, reach: int, distances: Iterable[int], candidates: FloatMap, radius: int) -> _Found:
+        """Match the reference with views at some distances, ``reach`` at most; disparities that can be trusted."""
+        # here, since it brings the compiler with it, and most scenes name their range
+        from sepi.inspection.coarse_sweep import coarse_sweep
+
+        self.reach = reach
+        positions = self._positions(reach, set(distances))
+        if not positions:
+            return _Found(np.empty(0, np.float32), np.empty(0, np.float32))
+        views = np.stack([self._view(position) for position in positions])
+        baselines = np.stack([self.light_field.baselines[position] for position in positions]).astype(np.float32)
+        limit = np.float32(_TRUNCATION)
+        sweep = coarse_sweep(self.reference, views, baselines, candidates, limit, radius)
+        sampling = float(candidates[1] - candidates[0])
+        # neighbours agree within a pixel of the most distant view, however finely it is searched
+        tolerance = max(sampling, 1 / reach)
+        return _patches(_trusted(*sweep, tolerance) & self.seen, sweep[-1], tolerance)
+
+    def _positions(self, reach: int, distances: set[int]) -> list[tuple[int, int]]:
+        """Grid positions in the row and the column of the reference view; any others where those are not there."""
+        t0, s0 = self._own
+        present = [
+            (int(t), int(s))
+            for t, s in np.argwhere(self.light_field.present)
+            if 0 < max(abs(t - t0), abs(s - s0)) <= reach
+        ]
+        cross = [(t, s) for t, s in present if t == t0 or s == s0]
+        if len(cross) < 2:
+            return self._bright(present[:: math.ceil(len(present) / _MOST_VIEWS)]) if present else []
+        return self._bright([(t, s) for t, s in cross if max(abs(t - t0), abs(s - s0)) in distances] or cross)
+
+    def _bright(self, positions: list[tuple[int, int]]) -> list[tuple[int, int]]:
+        """Those that are not much darker than the reference view; all, if that leaves too few."""
+        views = self.light_field.rgb_views
+        limit = _LEAST_BRIGHTNESS * float(views[self._own].mean())
+        bright = [position for position in positions if float(views[position].mean()) >= limit]
+        return bright if len(bright) > 1 else positions
+
+    def _view(self, position: tuple[int, int]) -> FloatMap:
+        if position not in self._prepared:
+            view = np.asarray(as_unit_float(self.light_field.rgb_views[position]).mean(axis=2), np.float32)
+            own = as_unit_float(self.light_field.rgb_views[self._own]).mean()
+            # as bright as the reference: lenses darken the views towards the edge of the grid
+            mean = float(view.mean())
+            if position != self._own and mean > 0:
+                view *= np.float32(float(own) / mean)
+            self._prepared[position] = _prepared(view, self._factor)
+        return self._prepared[position]
 
 
-def _prepared(view: npt.NDArray[np.generic], factor: int) -> FloatMap:
-    """Grey, reduced, high-pass filtered picture, (H, W) float32, of a view (H, W, C)."""
-    grey = as_unit_float(view).mean(axis=2)
+def _searched(views: _Views) -> tuple[float, float, float]:
+    """Lowest and highest disparity of a wide search, and its sampling."""
+    nearest, farthest = views.distances()
+    if nearest > _REACHES[0]:
+        raise SepiError(f"{views.light_field.name}: no view within {_REACHES[0]} steps of the centre is present")
+    best, sampling, extent = _Found(np.empty(0, np.float32), np.empty(0, np.float32)), 1.0, 0.0
+    size = views.reference.size
+    for reach in [n for n in _REACHES if nearest <= n <= farthest] or [nearest]:
+        # at most half a picture at the most distant view
+        widest = max(views.reference.shape) / 2 / reach
+        for wanted in sorted({min(wanted, widest) for wanted in _EXTENTS}):
+            if wanted < extent:
+                continue
+            number = max(1, math.ceil(wanted * reach))
+            candidates = (np.arange(-number, number + 1) / reach).astype(np.float32)
+            found = views.sweep(reach, range(1, reach + 1), candidates, _SEARCH_RADIUS)
+            if found.pixels.size > best.pixels.size:
+                best, sampling, extent = found, 1 / reach, wanted
+            if found.pixels.size > _ENOUGH * size and _largest(found) < wanted - max(1, 2 / reach):
+                break
+        if best.pixels.size > _ENOUGH * size and _largest(best) / sampling < _FAR:
+            break
+    if best.pixels.size < _FEWEST_PIXELS:
+        raise _undecided(views.light_field)
+    low, high = np.quantile(best.pixels, [_SEARCH_OUTLIERS, 1 - _SEARCH_OUTLIERS])
+    return float(low), float(high), sampling
+
+
+def _measured(views: _Views, low: float, high: float) -> _Found:
+    """Disparities between two, by views as far away as possible."""
+    _, farthest = views.distances()
+    movement = min(_MOST_MOVEMENT, _MOST_MOVEMENT_PART * min(views.reference.shape))
+    reach = int(max(1, min(farthest, movement / max(abs(low), abs(high)))))
+    sampling = _SAMPLING / reach
+    numbers = np.arange(math.floor(low / sampling), math.ceil(high / sampling) + 1)
+    distances = [max(1, round(reach * n / 4)) for n in range(1, 5)]
+    return views.sweep(reach, distances, (numbers * sampling).astype(np.float32), _RADIUS)
+
+
+def _largest(found: _Found) -> float:
+    """Largest absolute disparity but for outliers; infinite if there are none."""
+    if not found.pixels.size:
+        return math.inf
+    return float(abs(np.quantile(found.pixels, [_BEYOND, 1 - _BEYOND])).max())
+
+
+def _undecided(light_field: LightField) -> SepiError:
+    return SepiError(
+        f"{light_field.name}: the disparity range cannot be estimated, too few pixels match between the views; "
+        "give one (MIN MAX, pixels per view step)"
+    )
+
+
+def _prepared(grey: FloatMap, factor: int) -> FloatMap:
+    """Reduced, high-pass filtered picture, (H, W) float32, of a grey one."""
     if factor > 1:
         size = (max(1, grey.shape[1] // factor), max(1, grey.shape[0] // factor))
         grey = cv2.resize(grey, size, interpolation=cv2.INTER_AREA)
@@ -157,14 +268,17 @@ def _prepared(view: npt.NDArray[np.generic], factor: int) -> FloatMap:
 def _dark_corners(reference_view: FloatMap, shape: tuple[int, int]) -> BoolMap:
     """What the lens leaves black in the corners, and what lies so near that the filters mix it in; of ``shape``.
 
-    The edge of such a corner moves from view to view as the lens has it, not as anything in the scene.
+    The edge of such a corner moves from view to view as the lens has it, not as anything in the scene. Where more is
+    black than a lens leaves, it is the scene's background.
     """
     brightness = reference_view.max(axis=2)
     black = brightness < _BLACK * np.quantile(brightness, 0.99)
+    if black.mean() > _MOST_BLACK:
+        return np.zeros(shape, bool)
     black = cv2.resize(black.astype(np.uint8), shape[::-1], interpolation=cv2.INTER_AREA)
     _, labels = cv2.connectedComponents(black)
     corners = set(labels[[0, 0, -1, -1], [0, -1, 0, -1]].tolist()) - {0}
-    reach = 2 * (_HIGH_PASS + _RADIUS) + 1
+    reach = 2 * (_HIGH_PASS + _SEARCH_RADIUS) + 1
     dark = np.isin(labels, list(corners)).astype(np.uint8)
     return cv2.dilate(dark, np.ones((reach, reach), np.uint8)) > 0
 
@@ -180,8 +294,23 @@ def _trusted(lowest: FloatMap, second: FloatMap, mean: FloatMap, disparity: Floa
     return clear & (support >= _LEAST_SUPPORT)
 
 
-def _extremes(disparity: FloatMap) -> tuple[float, float]:
-    """Lowest and highest disparity but for a few outliers."""
-    ordered = np.sort(disparity)
-    left_out = min(int(_OUTLIERS + _OUTLIER_PART * ordered.size), (ordered.size - 1) // 2)
-    return float(ordered[left_out]), float(ordered[-1 - left_out])
+def _patches(trusted: BoolMap, disparity: FloatMap, tolerance: float) -> _Found:
+    """Trusted pixels in patches that are large enough: neighbours whose disparities are close to each other's."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    numbers = np.arange(trusted.size).reshape(trusted.shape)
+    pairs = []
+    for one, other in ((np.s_[:, 1:], np.s_[:, :-1]), (np.s_[1:], np.s_[:-1])):
+        joined = trusted[one] & trusted[other] & (abs(disparity[one] - disparity[other]) < tolerance)
+        pairs.append(np.stack([numbers[one][joined], numbers[other][joined]]))
+    rows, columns = np.concatenate(pairs, axis=1)
+    graph = coo_array((np.ones(rows.size, np.int8), (rows, columns)), shape=(trusted.size, trusted.size))
+    _, labels = connected_components(graph, directed=False)
+    areas = np.bincount(labels[trusted.ravel()], minlength=int(labels.max()) + 1)
+    kept = trusted.ravel() & (areas[labels] >= max(_FEWEST_PIXELS, _PATCH * trusted.size))
+    labels, pixels = labels[kept], disparity.ravel()[kept]
+    order = np.lexsort((pixels, labels))
+    starts = np.flatnonzero(np.diff(labels[order], prepend=-1))
+    middles = starts + np.diff(starts, append=labels.size) // 2
+    return _Found(pixels, pixels[order][middles])

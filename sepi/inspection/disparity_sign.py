@@ -105,7 +105,7 @@ def occlusion_evidence(views: Views, trial: Trial) -> Evidence:
     disparity, trusted = _disparity(reference, sides, candidates)
     surface = trusted & (_support(disparity, trusted, sampling) >= _LEAST_SUPPORT)
     residual = {
-        at: residuals(reference, picture, *map(float, positions[at]), disparity, _WINDOW_RADIUS)
+        at: residuals(reference, picture, float(positions[at][0]), float(positions[at][1]), disparity, _WINDOW_RADIUS)
         for at, picture in pictures.items()
     }
     noise = max(_LEAST_NOISE, rounding, _typical([values[trusted] for values in residual.values()]))

@@ -161,4 +161,4 @@ def _matched(
 def _in_units_of_the_farthest(baselines: list[Baseline], order: str, spacing: float) -> npt.NDArray[np.float64]:
     """Baselines (V, 2) in an order and a spacing, in units of the longest: all hypotheses search the same movement."""
     offsets = baselines_under(order, np.array(baselines, np.float64) * (spacing, 1))
-    return offsets / abs(offsets).max()
+    return np.asarray(offsets / abs(offsets).max())

@@ -1,0 +1,81 @@
+"""Rows of views that are another distance apart than columns: found, measured, and not invented."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sepi.inspection.row_spacing import estimate_row_spacing, settle_row_spacing
+from sepi.inspection.view_layouts import Views
+from sepi.inspection.view_order import check_order
+from sepi.io.readers.options import ORDERS
+from sepi.lightfield import LightField
+from sepi.scenes import SCENES, render
+
+
+def every_other(name: str, rows: int, columns: int, views: int = 9) -> LightField:
+    """Rows and columns of a scene left out: what is left is ``rows / columns`` times as far apart."""
+    whole = render(name, size=128, views=views)
+    t, s = whole.reference_position
+    return LightField(whole.views[t % rows :: rows, s % columns :: columns], name)
+
+
+@pytest.mark.parametrize("name", ["curved_occluders", "dots", "wall", "slanted_plane"])
+@pytest.mark.parametrize(("rows", "columns"), [(2, 1), (1, 2), (3, 1), (4, 1)])
+def test_spacing_is_measured(name: str, rows: int, columns: int) -> None:
+    """Taken for equal, no disparity fits rows and columns at once, and depth is nonsense."""
+    light_field = settle_row_spacing(every_other(name, rows, columns))
+    assert light_field.row_spacing == pytest.approx(rows / columns, rel=0.03)
+    assert f"{light_field.row_spacing:g} times as far apart as columns" in light_field.notes[-1]
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_equal_spacing_is_left_alone(name: str) -> None:
+    light_field = render(name, size=96, views=5)
+    assert settle_row_spacing(light_field) is light_field
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_the_order_is_found_beside_the_spacing(order: str) -> None:
+    """Both are unknown at first; the one must not hide the other."""
+    right = every_other("curved_occluders", 2, 1)
+    T, S = right.grid
+    turned_grid = (S, T) if order.startswith("transpose") else (T, S)
+    numbers = ORDERS[order](np.arange(T * S).reshape(turned_grid))
+    views = np.empty((T * S, *right.views.shape[2:]), right.views.dtype)
+    views[numbers.ravel()] = right.views.reshape(views.shape)
+    read = settle_row_spacing(LightField(views.reshape(*turned_grid, *views.shape[1:]), "turned"))
+    assert read.row_spacing == pytest.approx(0.5 if order.startswith("transpose") else 2, rel=0.03)
+    found = check_order(read)
+    assert found.clear
+    assert found.best == order
+
+
+def test_what_is_known_is_not_estimated() -> None:
+    light_field = every_other("dots", 2, 1)
+    told = LightField(light_field.views, "told", row_spacing=1.9)
+    assert settle_row_spacing(told) is told
+    positions = np.stack(np.meshgrid(2.0 * np.arange(5), np.arange(9.0), indexing="ij"), axis=2)
+    placed = LightField(light_field.views, "placed", positions=positions)
+    assert settle_row_spacing(placed) is placed
+
+
+@pytest.mark.parametrize("part", [np.s_[2:3], np.s_[:, 2:3]])
+def test_a_single_row_or_column_has_no_spacing(part: tuple[slice, ...]) -> None:
+    light_field = LightField(render("dots", size=96, views=5).views[part], "line")
+    assert estimate_row_spacing(Views(light_field)) is None
+
+
+def test_pictures_of_noise_have_none() -> None:
+    rng = np.random.default_rng(5)
+    noise = LightField(rng.integers(0, 256, (5, 5, 80, 80, 3), dtype=np.uint8), "noise")
+    assert settle_row_spacing(noise) is noise
+
+
+def test_real_gantry(real: Path) -> None:
+    """Views 35 px apart along columns and 14 along rows, measured by block matching: 0.394."""
+    from sepi.reading import read_light_field
+
+    light_field = read_light_field(real / "t_rex")
+    assert light_field.row_spacing == pytest.approx(0.394, abs=0.008)
+    assert not [word for word in (check_order(light_field).warning(),) if word]
