@@ -260,7 +260,7 @@ def _prepared(grey: FloatMap, factor: int) -> FloatMap:
     """Reduced, high-pass filtered picture, (H, W) float32, of a grey one."""
     if factor > 1:
         size = (max(1, grey.shape[1] // factor), max(1, grey.shape[0] // factor))
-        grey = cv2.resize(grey, size, interpolation=cv2.INTER_AREA)
+        grey = np.asarray(cv2.resize(grey, size, interpolation=cv2.INTER_AREA), np.float32)
     smooth = cv2.GaussianBlur(grey, (0, 0), _BLUR_SIGMA)
     return np.asarray(smooth - cv2.blur(smooth, (_HIGH_PASS, _HIGH_PASS)), np.float32)
 
