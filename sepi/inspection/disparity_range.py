@@ -21,7 +21,7 @@ from sepi.lightfield import BoolMap, DisparityRange, FloatMap, LightField, as_un
 
 # Search: pixels per view step to each side at first, and if surfaces lie beyond; views up to this many steps away at
 # first, and if surfaces move by more than so many pixels
-_EXTENTS = (16.0, 32.0, 64.0)
+_EXTENTS = (16.0, 32.0, 64.0, 128.0)
 _REACHES = (4, 2, 1)
 _FAR = 40.0
 # movement in the farthest view when the range is measured: pixels at most, also as part of the shorter side; sampling
@@ -91,7 +91,7 @@ def estimate_range(light_field: LightField) -> DisparityRange:
     Raises
     ------
     SepiError
-        If too few pixels can be matched (no texture, or no disparity within 64 pixels per view step).
+        If too few pixels can be matched (no texture, or no disparity within 128 pixels per view step).
     """
     factor = math.ceil(math.sqrt(math.prod(light_field.shape) / _MOST_PIXELS))
     views = _Views(light_field, factor)

@@ -37,7 +37,7 @@ _FIRST_REACH = 4
 _MOST_VIEWS = 16
 MOVEMENT = 10
 _MOVEMENT_SPACING = 0.6
-_REDUCTIONS = (2, 4)
+_REDUCTIONS = (2, 4, 8)
 # Views that are worth nothing: brightness and contrast as part of the reference's
 _LEAST_BRIGHTNESS = 0.3
 _LEAST_CONTRAST = 0.4
