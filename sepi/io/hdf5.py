@@ -69,6 +69,8 @@ def write_light_field(path: Path, light_field: LightField) -> None:
         file.create_dataset("views", data=light_field.views)
         file["views"].attrs["axes"] = "t s y x channel"
         file.create_dataset("present", data=light_field.present)
+        # what jobs on this file need: told without reading it
+        file.attrs["reach"] = light_field.reach
         file.attrs["name"] = _fixed(light_field.name)
         file.attrs["source"] = _fixed(light_field.source)
         if known is not None:
