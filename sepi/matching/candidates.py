@@ -8,7 +8,7 @@ where these would be finer than is of use, and more where they would be coarser 
 from __future__ import annotations
 
 import math
-from typing import ClassVar, NamedTuple, Self
+from typing import TYPE_CHECKING, ClassVar, NamedTuple, Self
 
 from sepi.lightfield import FloatMap, LightField
 from sepi.stage import Parameters
@@ -68,11 +68,11 @@ def _intervals(moved: float, sampling: float) -> int:
 
 
 class CandidateParameters(Parameters):
-    """Parameters of a sweep over candidate disparities."""
+    """Parameters of a sweep over candidate disparities: what follows from the two that each sweep declares."""
 
-    rule: ClassVar[CandidateRule]
-
-    num_disparities: int | None = None
+    if TYPE_CHECKING:
+        rule: ClassVar[CandidateRule]
+        num_disparities: int | None
 
     def number(self, light_field: LightField) -> int:
         """Number of candidates: as set, else by the rule.

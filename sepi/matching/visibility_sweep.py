@@ -28,7 +28,7 @@ ROWS_PER_REPORT = 128
 """Rows of the picture between two calls of the progress function."""
 
 
-CANDIDATES = CandidateRule(usual=91, finest=0.08, coarsest=0.4, volume_bytes=2**30)
+CANDIDATES = CandidateRule(usual=91, finest=0.03, coarsest=0.4, volume_bytes=2**30)
 """The optimisation goes back to the views, so these need not be as fine as the paper's."""
 
 BYTES_PER_CANDIDATE = 12
