@@ -35,7 +35,8 @@ UNITS = {"disparity": "pixels per view step", "confidence": "0..1", "depth": "me
 def write_stage(path: Path, maps: StageMaps, attributes: Mapping[str, Attribute]) -> None:
     """Write a stage's maps and the attributes that say what made them."""
     with create_hdf5(path) as file:
-        for name, values in maps.all().items():
+        # in the order in which they are read back: the file does not tell whether they came from one
+        for name, values in sorted(maps.all().items()):
             # small integers and masks shrink to almost nothing; float maps hardly compress
             compression = {"compression": "gzip", "compression_opts": 1} if values.dtype.itemsize < 4 else {}
             dataset = file.create_dataset(name, data=values, **compression)
