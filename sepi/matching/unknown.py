@@ -106,17 +106,21 @@ def without_signal(light_field: LightField, disparity: FloatMap) -> BoolMap:
     """
     view, dtype = light_field.reference_view, light_field.views.dtype
     rounding = _FLOAT_ROUNDING if dtype == np.float32 else _ROUNDING / full_scale(dtype)
+    energy, brightness = _energy(view), view.max(axis=2)
     bright = view.min(axis=2) >= SATURATED
-    energy = _energy(view)
     found = _large(_beside(bright & (energy < _of_noise(rounding)), bright))
-    white = float(np.quantile(view.max(axis=2), 0.999))
+    white = float(np.quantile(brightness, 0.999))
+    # without the noise of single pixels
+    level = cv2.blur(view, (3, 3)).max(axis=2)
+    most = min(noise_level(view), _MOST_NOISE * white)
     for share, at_corners in ((BLACK, False), (LENS_CORNER, True)):
         limit = share * white
-        noise = _noise_of_dark(view, limit, white, rounding)
-        level = _level(view) <= limit + noise
+        # texture passes for noise; where it is dark there may be less of both
+        noise = max(min(most, noise_level(view, level <= limit + most)), rounding)
+        even = level <= limit + noise
         # a single bright pixel in the dark is noise, too
-        dark = level | (view.max(axis=2) <= limit + _NOISE_REACH * noise)
-        core = level & (energy < _of_noise(noise))
+        dark = even | (brightness <= limit + _NOISE_REACH * noise)
+        core = even & (energy < _of_noise(noise))
         if _large(_beside(core, dark), at_corners).any():
             mean, number = _mean_of_dark(light_field, disparity, limit + _NOISE_REACH * noise)
             shared = _energy(mean)
@@ -147,18 +151,6 @@ def _nearest_first(light_field: LightField) -> npt.NDArray[np.int64]:
     others[light_field.reference_position] = False
     distance = (light_field.baselines[others] ** 2).sum(axis=1)
     return np.argwhere(others)[np.argsort(distance, kind="stable")]
-
-
-def _level(view: FloatMap) -> FloatMap:
-    """Brightness without the noise of single pixels, (H, W)."""
-    return np.asarray(cv2.blur(view, (3, 3)).max(axis=2))
-
-
-def _noise_of_dark(view: FloatMap, limit: float, white: float, rounding: float) -> float:
-    """Standard deviation of the noise where a view is no brighter than ``limit`` and its noise."""
-    noise = min(noise_level(view), _MOST_NOISE * white)
-    # texture passes for noise; where it is dark there may be less of both
-    return max(min(noise, noise_level(view, _level(view) <= limit + noise)), rounding)
 
 
 def _mean_of_dark(light_field: LightField, disparity: FloatMap, limit: float) -> tuple[FloatMap, FloatMap]:
