@@ -1,12 +1,16 @@
 """Which pixels count as unknown: a surface that nobody saw must not pass for depth, nor a bare wall for nothing."""
 
+from pathlib import Path
+
 import cv2
 import numpy as np
 import pytest
 
+from sepi.io.readers.options import ReadOptions
 from sepi.lightfield import DisparityRange, LightField
 from sepi.matching.unknown import held_by_few, unknown_pixels, with_unknown
 from sepi.pipeline import VARIANTS, estimate_depth
+from sepi.reading import read_light_field
 from sepi.stage import StageMaps
 
 H, W = 72, 96
@@ -166,3 +170,39 @@ def test_marking_leaves_all_else_as_it_was() -> None:
     np.testing.assert_array_equal(after.confidence[DISC], before.confidence[DISC])
     assert after.confidence.dtype == np.float32
     assert after.extra.keys() == {"occluded", "unknown"}
+
+
+# --- real light fields
+
+
+def real_mask(real_data: Path, name: str, **options: object) -> tuple[np.ndarray, np.ndarray]:
+    """Unknown pixels of a real light field, and its reference view's brightness."""
+    if not (real_data / name).exists():
+        pytest.skip(f"real light field not found at {real_data / name}")
+    scene = read_light_field(real_data / name, options=ReadOptions(**options), check_order=False)
+    known = np.zeros(scene.shape, np.float32) if scene.ground_truth is None else scene.ground_truth
+    return unknown_pixels(scene, known), scene.reference_view.max(axis=2)
+
+
+@pytest.mark.parametrize("name", ["hci_new/cotton", "hci_new/antinous", "real/t_rex", "real/legoknights3"])
+def test_pictures_that_are_seen_all_over_have_no_unknown_pixels(real_data: Path, name: str) -> None:
+    """Dark floor, black helmets and white paper are surfaces: their depth must stay in the cloud."""
+    found, _ = real_mask(real_data, name)
+    assert not found.any()
+
+
+def test_what_surrounds_a_glow_in_the_dark_is_unknown(real_data: Path) -> None:
+    """Two glowing things in the dark: all but them, and their glow, is a guess."""
+    found, brightness = real_mask(real_data, "real/seahorse5/camImagesFlat")
+    assert 0.9 < found.mean() < 0.96
+    assert not found[brightness > 0.1].any()
+
+
+def test_a_lenss_dark_corners_are_unknown(real_data: Path) -> None:
+    found, brightness = real_mask(real_data, "lytro/2067")
+    assert found[[0, 0, -1, -1], [0, -1, 0, -1]].all()
+    assert 0.02 < found.mean() < 0.03
+    H, W = found.shape
+    y, x = np.mgrid[:H, :W]
+    assert not found[np.hypot((y - H / 2) / H, (x - W / 2) / W) < 0.5].any()
+    assert (found | (brightness > 0)).mean() > 0.998
