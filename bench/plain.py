@@ -76,7 +76,7 @@ def plain_sweep(light_field: LightField, parameters: SweepParameters, warp: Warp
     scale2 = np.float32(parameters.scale**2 + noise)
     lowest = np.full(light_field.shape, np.inf, np.float32)
     best = np.zeros(light_field.shape, np.float32)
-    for disparity in light_field.require_disparity_range().candidates(parameters.num_disparities):
+    for disparity in parameters.candidates(light_field):
         total, number = _candidate_cost(light_field, views, float(disparity), scale2, warp)
         seen = _aggregated(number, weights)
         cost = np.divide(_aggregated(total, weights), seen, out=np.ones_like(total), where=seen > 0)

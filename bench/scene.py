@@ -77,7 +77,7 @@ class Scene:
         entries = []
         for stage, choice in variant_named(VARIANT).choices.items():
             maps = STAGES[stage][choice].run(light_field, maps, self.parameters[stage], no_progress)
-            entries.append(entry(stage, choice, self.parameters[stage]))
+            entries.append(entry(stage, choice, self.parameters[stage], light_field))
             write_stage(self.folder / f"{stage}.h5", maps, stage_attributes(light_field, entries))
         return light_field
 

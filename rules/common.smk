@@ -13,6 +13,7 @@ from sepi.pipeline import HANDED_ON, STAGES, VARIANTS, choice_of
 from sepi.report.plan import Plan
 from sepi.validation import require_known
 from sepi.workflow.code_digest import ROOT, code_digest, stage_modules
+from sepi.workflow.candidates import candidates_mb
 from sepi.workflow.config import load_settings
 from sepi.workflow.result_paths import PARTS_ENDING, RESULTS, key_of, scene_files
 from sepi.workflow.run_log import show_progress
@@ -137,6 +138,17 @@ def threads_for(wildcards):
 def memory_for(*needs, **more):
     """Function of wildcards: memory of a job in MB (:meth:`sepi.workflow.datasets.Scene.memory_mb`)."""
     return lambda wildcards: scene_of(wildcards).memory_mb(*needs, **more)
+
+
+def sweep_memory_for(stage, **needs):
+    """Function of wildcards: memory of a job in MB that may hold a cost volume; of the usual size in ``needs``."""
+
+    def memory(wildcards):
+        scene, label = scene_of(wildcards), wildcards[stage]
+        light_field = scene_files(wildcards.dataset, wildcards.scene).light_field
+        return scene.memory_mb(**needs) + candidates_mb(scene, light_field, SETTINGS.parameters[stage][label])
+
+    return memory
 
 
 def is_new(file):

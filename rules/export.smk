@@ -14,7 +14,7 @@ rule export:
         "benchmarks/{dataset}/{scene}/{variant}/export.tsv"
     threads: 1
     resources:
-        mem_mb=memory_for(bytes_per_sample=4),
+        mem_mb=memory_for(bytes_per_sample=4, bytes_per_pixel=300),
     params:
         folder=str(SCENE.variant("{variant}")),
         code=code_digest("sepi.export"),

@@ -11,7 +11,7 @@ rule initial:
         stage_log("benchmarks", "initial", "tsv")
     threads: threads_for
     resources:
-        mem_mb=memory_for(bytes_per_sample=13, bytes_per_pixel=1300),
+        mem_mb=sweep_memory_for("initial", bytes_per_sample=13, bytes_per_pixel=1300),
     params:
         choice=choice_for("initial"),
         parameters=parameters_of("initial"),

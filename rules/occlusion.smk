@@ -12,7 +12,7 @@ rule occlusion:
         stage_log("benchmarks", "occlusion", "tsv")
     threads: threads_for
     resources:
-        mem_mb=memory_for(bytes_per_sample=18, bytes_per_pixel=1400),
+        mem_mb=sweep_memory_for("occlusion", bytes_per_sample=18, bytes_per_pixel=1400),
     params:
         choice=choice_for("occlusion"),
         parameters=parameters_of("occlusion"),

@@ -200,7 +200,7 @@ def stage_command(stage: str, choices: Mapping[str, Choice]) -> click.Command:
             )
         with progress_bar(f"{light_field.name} {stage}") as progress:
             result = chosen.run(light_field, maps, settings, progress)
-        history = [*history_of(previous), entry(stage, choice, settings)]
+        history = [*history_of(previous), entry(stage, choice, settings, light_field)]
         write_stage(output, result, stage_attributes(light_field, history))
         if timing is not None:
             write_timing(timing, started, threads)

@@ -1,7 +1,8 @@
 """Evaluation: how far a disparity map is from the ground truth, by two protocols and over three regions.
 
 Scores follow the paper (section V) and the HCI 4D light field benchmark. A non-finite estimate counts as bad and is
-reported, where the benchmark's own toolkit counts it as good. Pixels without finite ground truth are left out.
+reported, where the benchmark's own toolkit counts it as good. Pixels of the mask ``unknown`` are scored as they stand:
+no answer is no excuse. Pixels without finite ground truth are left out.
 """
 
 from __future__ import annotations

@@ -10,6 +10,7 @@ from sepi.command import SepiCommand
 from sepi.io.hdf5 import read_light_field, read_stage
 from sepi.io.provenance import history_of, result_attributes
 from sepi.io.result_folder import write_result
+from sepi.matching.unknown import with_unknown
 
 _PATH = click.Path(path_type=Path)
 
@@ -20,10 +21,10 @@ _PATH = click.Path(path_type=Path)
 @click.option("--variant", required=True, help="Name of the variant, for the attributes.")
 @click.option("--output", type=_PATH, required=True, help="Folder to write.")
 def main(light_field_path: Path, maps: Path, variant: str, output: Path) -> None:
-    """Write disparity.pfm, result.h5 and pictures from a stage file."""
+    """Write disparity.pfm, result.h5 and pictures from a stage file, with what no view knows marked."""
     light_field = read_light_field(light_field_path)
     attributes = result_attributes(light_field, variant, history_of(maps))
-    write_result(output, light_field, read_stage(maps), attributes)
+    write_result(output, light_field, with_unknown(light_field, read_stage(maps)), attributes)
 
 
 if __name__ == "__main__":

@@ -12,6 +12,7 @@ from sepi import initial, occlusion, optimize, textureless
 from sepi.errors import SepiError
 from sepi.lightfield import LightField
 from sepi.matching.base_detail import shared_detail
+from sepi.matching.unknown import with_unknown
 from sepi.stage import Choice, Parameters, Progress, StageMaps, no_progress
 from sepi.validation import require_known, validated
 
@@ -260,7 +261,7 @@ def estimate_depth(
     -------
     StageMaps
         ``disparity`` (H, W) float32 in pixels per view step, ``confidence`` (H, W) float32 in 0..1, ``extra`` maps of
-        the stages.
+        the stages and ``unknown``, bool: pixels that no view knows anything about, of confidence 0.
 
     Raises
     ------
@@ -283,4 +284,4 @@ def estimate_depth(
             maps = STAGES[stage][choice].run(light_field, maps, settings[stage], of_all)
             of_all(1.0)
     assert maps is not None  # there are stages
-    return maps
+    return with_unknown(light_field, maps)

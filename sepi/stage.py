@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -30,6 +30,10 @@ class Parameters(BaseModel):
     """Parameters of one choice of a stage: frozen, unknown keys refused, each with a default and a description."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+    def settled(self, light_field: LightField) -> Self:
+        """These parameters with what follows from a light field of known disparity range filled in."""
+        return self
 
 
 class NoParameters(Parameters):

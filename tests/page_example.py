@@ -139,7 +139,7 @@ def run_stages(plan: Plan, scene: tuple[str, str], light_field: LightField, vari
     steps = []
     for number, (stage, choice) in enumerate(plan.variants[variant].items()):
         maps = STAGES[stage][choice].run(light_field, maps, settings[stage], no_progress)
-        steps.append(entry(stage, choice, settings[stage]))
+        steps.append(entry(stage, choice, settings[stage], light_field))
         attributes = stage_attributes(light_field, steps)
         write_stage(plan.stage_file(*scene, variant, stage), maps, attributes)
         timing = {"seconds": 1.5 + number, "peak_memory_mb": 200 + 10 * number}

@@ -17,7 +17,7 @@ from sepi.cli.input_options import Geometry, Reading, camera_flags, reading_flag
 from sepi.cli.results import check_submission, points, submission
 from sepi.command import SepiGroup, progress_bar
 from sepi.errors import SepiError
-from sepi.io.provenance import entry, package_version, result_attributes
+from sepi.io.provenance import Entry, entry, package_version, result_attributes
 from sepi.threads import available_cores, use_threads
 from sepi.validation import require_known
 
@@ -105,17 +105,14 @@ def depth(
     from sepi.inspection.disparity_range import settle_range
     from sepi.io.files import atomic_path
     from sepi.io.result_folder import RUNTIME, require_target, write_result
+    from sepi.matching.unknown import UNKNOWN
     from sepi.pipeline import HANDED_ON, estimate_depth, stage_parameters, variant_named
 
     started = time.perf_counter()
     use_threads(threads or available_cores())
     chosen = variant_named(variant)
     parameters = _parameters(settings, variant, chosen)
-    history = [
-        entry(stage, chosen.choices[stage], values)
-        for stage, values in stage_parameters(chosen, parameters).items()
-        if chosen.choices[stage] != HANDED_ON
-    ]
+    of_stages = stage_parameters(chosen, parameters)
     whole = light_field_path.resolve()
     folder = output or Path(f"{whole.name if whole.is_dir() else whole.stem}-depth")
     require_target(folder)
@@ -125,6 +122,11 @@ def depth(
     if geometry is not None:
         light_field = replace(light_field, camera=geometry(shape=light_field.shape))
     light_field = settle_range(light_field)
+    history = [
+        entry(stage, chosen.choices[stage], values, light_field)
+        for stage, values in of_stages.items()
+        if chosen.choices[stage] != HANDED_ON
+    ]
     with progress_bar(light_field.name) as progress:
         maps = estimate_depth(light_field, chosen, parameters, progress)
     seconds = time.perf_counter() - started
@@ -133,7 +135,10 @@ def depth(
         with atomic_path(folder / RUNTIME) as temporary:
             temporary.write_text(f"{seconds:.3f}\n", encoding="ascii")
     click.echo(f"{light_field.name}: {_size(light_field)}")
-    click.echo(f"disparity range: {_range(light_field.require_disparity_range())}")
+    click.echo(f"disparity range: {_range(light_field.require_disparity_range())}{_candidates(history)}")
+    unknown = float(maps.mask(UNKNOWN).mean())
+    if unknown:
+        click.echo(f"unknown: {100 * unknown:.2g} % of the pixels; no view knows anything about them")
     click.echo(f"written to {folder}/: {' '.join(files)}")
 
 
@@ -254,6 +259,12 @@ def _depth_of(light_field: LightField) -> str:
 
 def _range(known: DisparityRange) -> str:
     return f"{known.minimum:g} to {known.maximum:g} pixels per view step ({_RANGE_SOURCES[known.source]})"
+
+
+def _candidates(history: list[Entry]) -> str:
+    """How many candidates there are in the range; nothing where no stage has any."""
+    known = [step["parameters"]["num_disparities"] for step in history if "num_disparities" in step["parameters"]]
+    return f", {' and '.join(map(str, dict.fromkeys(known)))} candidates" if known else ""
 
 
 def _parameters(settings: tuple[str, ...], name: str, variant: Variant) -> dict[str, dict[str, Any]]:

@@ -22,6 +22,7 @@ _PARTIAL = click.option("--partial", is_flag=True, help="Take fewer than the ben
 @click.option("--min-confidence", type=float, default=0.0, metavar="X", help="Leave out less sure pixels; 0 to 1.")
 @click.option("--max-depth", type=float, metavar="M", help="Leave out points more distant than this many metres.")
 @click.option("--step", type=click.IntRange(min=1), default=1, metavar="N", help="Use every Nth row and column only.")
+@click.option("--keep-unknown", is_flag=True, help="Keep pixels that no view knows anything about.")
 @camera_flags
 def points(
     result_path: Path,
@@ -29,6 +30,7 @@ def points(
     min_confidence: float,
     max_depth: float | None,
     step: int,
+    keep_unknown: bool,
     geometry: Geometry | None,
 ) -> None:
     """Write the coloured point cloud of RESULT as a PLY file.
@@ -55,9 +57,11 @@ def points(
         min_confidence=min_confidence,
         max_depth=max_depth,
         step=step,
+        unknown=None if keep_unknown else result.unknown,
     )
     if not len(cloud.positions):
-        raise SepiError(f"{result_path}: no point is left; lower --min-confidence or raise --max-depth")
+        tried = "lower --min-confidence, raise --max-depth or give --keep-unknown"
+        raise SepiError(f"{result_path}: no point is left; {tried}")
     path = output or (result_path if result_path.is_dir() else result_path.parent) / "points.ply"
     if path.suffix.lower() != ".ply":
         raise SepiError(f"{path}: expected a name that ends with .ply, the format of the file")

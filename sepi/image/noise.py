@@ -5,7 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from sepi.lightfield import FloatMap
+from sepi.lightfield import BoolMap, FloatMap
 
 # a second difference along both axes: blind to planes and to straight edges along the axes (Immerkaer 1996,
 # doi:10.1006/cviu.1996.0060); its response to white noise of standard deviation 1 has standard deviation 6
@@ -13,7 +13,7 @@ _MASK = np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]], np.float32)
 _MEDIAN_TO_SIGMA: float = 1 / 0.6745
 
 
-def noise_level(image: FloatMap) -> float:
+def noise_level(image: FloatMap, region: BoolMap | None = None) -> float:
     """Standard deviation of the noise in one channel, by the median of the mask's response.
 
     The median, where Immerkaer takes the mean, leaves out edges and most texture.
@@ -22,13 +22,19 @@ def noise_level(image: FloatMap) -> float:
     ----------
     image : ndarray, shape (H, W, C), float32
         Values in 0..1.
+    region : ndarray, shape (H, W), bool, optional
+        Where to measure; everywhere unless given.
 
     Returns
     -------
     float
-        In the image's units, 0..1.
+        In the image's units, 0..1; 0 over no pixels.
     """
     response = np.abs(cv2.filter2D(np.ascontiguousarray(image), cv2.CV_32F, _MASK))
+    if region is not None:
+        response = response[region]
+        if not response.size:
+            return 0.0
     return float(np.median(response).item() * _MEDIAN_TO_SIGMA / 6)
 
 

@@ -35,7 +35,8 @@ UNITS = {"disparity": "pixels per view step", "confidence": "0..1", "depth": "me
 def write_stage(path: Path, maps: StageMaps, attributes: Mapping[str, Attribute]) -> None:
     """Write a stage's maps and the attributes that say what made them."""
     with create_hdf5(path) as file:
-        for name, values in maps.all().items():
+        # in the order in which they are read back: the file does not tell whether they came from one
+        for name, values in sorted(maps.all().items()):
             # small integers and masks shrink to almost nothing; float maps hardly compress
             compression = {"compression": "gzip", "compression_opts": 1} if values.dtype.itemsize < 4 else {}
             dataset = file.create_dataset(name, data=values, **compression)
@@ -69,6 +70,8 @@ def write_light_field(path: Path, light_field: LightField) -> None:
         file.create_dataset("views", data=light_field.views)
         file["views"].attrs["axes"] = "t s y x channel"
         file.create_dataset("present", data=light_field.present)
+        # what jobs on this file need: told without reading it
+        file.attrs["reach"] = light_field.reach
         file.attrs["name"] = _fixed(light_field.name)
         file.attrs["source"] = _fixed(light_field.source)
         if known is not None:

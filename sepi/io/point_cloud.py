@@ -78,6 +78,7 @@ def point_cloud(
     min_confidence: float = 0.0,
     max_depth: float | None = None,
     step: int = 1,
+    unknown: BoolMap | None = None,
 ) -> PointCloud:
     """Point cloud of one view; pixels without a finite disparity, and those at or beyond infinity, have no point.
 
@@ -99,6 +100,8 @@ def point_cloud(
         Leave out points more distant than this, metres.
     step : int
         Use every so-many-th row and column of pixels.
+    unknown : ndarray, shape (H, W), bool, optional
+        Pixels to leave out.
 
     Raises
     ------
@@ -106,7 +109,7 @@ def point_cloud(
         If the maps are not of the picture's size, a number is out of bounds, ``max_depth`` is given without a camera,
         or ``min_confidence`` without a confidence.
     """
-    for name, values in {"disparity": disparity, "confidence": confidence}.items():
+    for name, values in {"disparity": disparity, "confidence": confidence, "unknown": unknown}.items():
         if values is not None and values.shape != picture.shape[:2]:
             raise SepiError(f"point cloud: {name} is {values.shape}, the view {picture.shape[:2]} (height, width)")
     if step < 1:
@@ -118,6 +121,8 @@ def point_cloud(
     used = np.zeros(disparity.shape, bool)
     used[::step, ::step] = True
     used &= np.isfinite(disparity)
+    if unknown is not None:
+        used &= ~unknown
     if min_confidence > 0:
         if confidence is None:
             raise SepiError("point cloud: a least confidence needs a confidence map")

@@ -28,9 +28,10 @@ def package_version() -> str:
         return "unknown"
 
 
-def entry(stage: str, choice: str, parameters: Parameters) -> Entry:
-    """The entry of a stage that ran with these parameters."""
-    return {"stage": stage, "choice": choice, "parameters": parameters.model_dump(mode="json")}
+def entry(stage: str, choice: str, parameters: Parameters, light_field: LightField) -> Entry:
+    """The entry of a stage that ran with these parameters on a light field of known disparity range."""
+    settled = parameters.settled(light_field)
+    return {"stage": stage, "choice": choice, "parameters": settled.model_dump(mode="json")}
 
 
 def stage_attributes(light_field: LightField, history: Sequence[Entry]) -> dict[str, Attribute]:

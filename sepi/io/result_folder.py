@@ -24,7 +24,7 @@ from sepi.io.images import png_texts, write_png
 from sepi.io.pfm import write_pfm
 from sepi.io.ply import write_ply
 from sepi.io.point_cloud import point_cloud
-from sepi.lightfield import FloatMap, LightField
+from sepi.lightfield import BoolMap, FloatMap, LightField
 from sepi.stage import StageMaps
 
 RESULT = "result.h5"
@@ -45,6 +45,11 @@ RUNTIME = "runtime.txt"
 
 _DEPTH = "depth.pfm"
 
+# masks that have a meaning here
+_UNKNOWN = "unknown"
+# neutral grey is none of the colours of the scale
+_GREY = 128
+
 # part of the pixels beyond each end of the colour scale, so that a few wrong pixels do not use it up
 _BEYOND = 0.005
 
@@ -64,6 +69,8 @@ class Result:
         The view.
     disparity, confidence : ndarray, shape (H, W), float32
         Pixels per view step; 0..1.
+    unknown : ndarray, shape (H, W), bool
+        Pixels that no view knows anything about; none in a result that does not say.
     camera : Camera or None
         Where it is known.
     from_centre : (int, int)
@@ -74,6 +81,7 @@ class Result:
     picture: npt.NDArray[np.generic]
     disparity: FloatMap
     confidence: FloatMap
+    unknown: BoolMap
     camera: Camera | None
     from_centre: tuple[int, int]
 
@@ -84,8 +92,9 @@ def write_result(
     """Write the maps of a light field.
 
     Disparity as ``disparity.pfm``, ``disparity.npy`` and ``disparity_16bit.png`` (numbers) and ``disparity.png``
-    (colours, from far, dark blue, to near, yellow), ``confidence.png`` from black (0) to white (1), ``mask_NAME.png``
-    of each boolean map, ``points.ply``, ``depth.pfm`` in metres where the light field has a camera, and ``result.h5``
+    (colours, from far, dark blue, to near, yellow; grey where the mask ``unknown`` is set), ``confidence.png`` from
+    black (0) to white (1), ``mask_NAME.png`` of each boolean map, ``points.ply`` without what is unknown, ``depth.pfm``
+    in metres where the light field has a camera, and ``result.h5``
     with everything: all maps, the view itself, the camera and ``attributes``. Equal content gives equal bytes.
 
     A new folder appears whole or not at all; in an existing one the files are replaced when all are written, masks,
@@ -157,9 +166,10 @@ def read_result(path: Path) -> Result:
         picture, disparity, confidence = (
             read_dataset(path, file[name]) for name in ("view", "disparity", "confidence")
         )
+        unknown = read_dataset(path, file[_UNKNOWN]) if _UNKNOWN in file else np.zeros(disparity.shape, bool)
         (t, s), (rows, columns) = (map(int, file.attrs[name]) for name in ("view_position", "grid"))
         scene, camera = str(file.attrs.get("scene", "")), read_camera(file)
-    alike = disparity.shape == confidence.shape == picture.shape[:2]
+    alike = disparity.shape == confidence.shape == unknown.shape == picture.shape[:2]
     if not alike or picture.shape[2:] not in ((1,), (3,)):
         raise SepiError(f"{path}: damaged: view {picture.shape} and disparity {disparity.shape} do not fit together")
     return Result(
@@ -167,19 +177,24 @@ def read_result(path: Path) -> Result:
         picture=picture,
         disparity=disparity.astype(np.float32),
         confidence=confidence.astype(np.float32),
+        unknown=unknown.astype(bool),
         camera=camera,
         from_centre=(t - rows // 2, s - columns // 2),
     )
 
 
-def colour_code(values: FloatMap) -> npt.NDArray[np.uint8]:
-    """A map (H, W) in perceptually uniform colours, (H, W, 3) RGB; black where it is not finite."""
+def colour_code(values: FloatMap, unknown: BoolMap | None = None) -> npt.NDArray[np.uint8]:
+    """A map (H, W) in perceptually uniform colours, (H, W, 3) RGB; grey where unknown, black where not finite."""
     finite = np.isfinite(values)
-    low, high = np.quantile(values[finite], (_BEYOND, 1 - _BEYOND)) if finite.any() else (0.0, 0.0)
+    # what is unknown takes no part of the scale
+    counted = finite if unknown is None else finite & ~unknown
+    low, high = np.quantile(values[counted], (_BEYOND, 1 - _BEYOND)) if counted.any() else (0.0, 0.0)
     # a constant map gets the middle colour
     unit = (values - low) / (high - low) if high > low else np.full(values.shape, 0.5)
     levels = _levels(np.where(finite, unit, 0))
     colours = np.asarray(cv2.applyColorMap(levels, cv2.COLORMAP_VIRIDIS), np.uint8)[:, :, ::-1].copy()
+    if unknown is not None:
+        colours[unknown] = _GREY
     colours[~finite] = 0
     return colours
 
@@ -213,9 +228,10 @@ def _write_files(
     with atomic_path(folder / "disparity.npy") as temporary, temporary.open("wb") as file:
         np.save(file, maps.disparity.astype("<f4"), allow_pickle=False)
     _write_16bit(folder / "disparity_16bit.png", maps.disparity)
-    write_png(folder / "disparity.png", colour_code(maps.disparity))
+    unknown = maps.mask(_UNKNOWN)
+    write_png(folder / "disparity.png", colour_code(maps.disparity, unknown))
     write_png(folder / "confidence.png", _levels(maps.confidence))
-    cloud = point_cloud(view, maps.disparity, camera=camera, from_centre=light_field.from_centre)
+    cloud = point_cloud(view, maps.disparity, camera=camera, from_centre=light_field.from_centre, unknown=unknown)
     write_ply(folder / "points.ply", cloud)
     for name, mask in masks.items():
         write_png(folder / name, mask, _MASK_TEXT)

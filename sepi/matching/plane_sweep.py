@@ -15,6 +15,7 @@ References
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -22,15 +23,25 @@ from pydantic import Field
 
 from sepi.image.noise import residual_variance
 from sepi.lightfield import BoolMap, FloatMap, LightField, full_scale
+from sepi.matching.candidates import MOST_CANDIDATES, CandidateParameters, CandidateRule
 from sepi.matching.sweep_arrays import BestMaps, Candidates, ViewStack, Window
-from sepi.stage import Parameters, Progress, no_progress
+from sepi.stage import Progress, no_progress
+
+CANDIDATES = CandidateRule(usual=181, finest=0.02, coarsest=0.5)
+"""The paper's number, for light fields like the paper's."""
 
 
-class SweepParameters(Parameters):
+class SweepParameters(CandidateParameters):
     """Parameters of a plane sweep."""
 
-    num_disparities: int = Field(
-        181, ge=3, le=4001, description="number of candidate disparities, uniform over the range"
+    rule: ClassVar[CandidateRule] = CANDIDATES
+
+    num_disparities: int | None = Field(
+        None,
+        ge=3,
+        le=MOST_CANDIDATES,
+        description="number of candidate disparities, uniform over the range; null: 181, or fewer for a narrow range "
+        "and more for a wide one (docs/method.md)",
     )
     scale: float = Field(
         0.0165,
@@ -127,7 +138,7 @@ def sweep(
     noise = residual_variance(light_field.reference_view)
     scale2 = np.float32((parameters.scale**2 + noise) * full_scale(colours.dtype) ** 2)
     views = ViewStack(colours, *light_field.reference_position, groups, subsets, scale2)
-    disparities = light_field.require_disparity_range().candidates(parameters.num_disparities)
+    disparities = parameters.candidates(light_field)
     candidates = sampled_candidates(disparities, light_field.grid, light_field.reference_position)
     guide = np.ascontiguousarray(light_field.reference_view.transpose(2, 0, 1))
     window = Window(guide, parameters.window_radius, np.float32(parameters.window_sigma**2 + noise))

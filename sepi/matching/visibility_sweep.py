@@ -8,6 +8,8 @@ half-SEPI, with the part of the views chosen view by view. The compiled loops ar
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 import numpy as np
 from pydantic import Field
 
@@ -18,6 +20,7 @@ from sepi.matching.base_detail import (
     ColourScale,
     base_detail_decomposition,
 )
+from sepi.matching.candidates import MOST_CANDIDATES, CandidateParameters, CandidateRule
 from sepi.matching.semi_global import SmoothedResult, SmoothingParameters, smooth_and_choose
 from sepi.stage import OcclusionMarginParameters, Progress
 
@@ -25,11 +28,24 @@ ROWS_PER_REPORT = 128
 """Rows of the picture between two calls of the progress function."""
 
 
-class VisibilitySweepParameters(BaseDetailParameters, SmoothingParameters):
+CANDIDATES = CandidateRule(usual=91, finest=0.03, coarsest=0.4, volume_bytes=2**30)
+"""The optimisation goes back to the views, so these need not be as fine as the paper's."""
+
+BYTES_PER_CANDIDATE = 12
+"""Of each pixel: the costs, their averages, and these smoothed."""
+
+
+class VisibilitySweepParameters(CandidateParameters, BaseDetailParameters, SmoothingParameters):
     """Parameters of a visibility sweep and of the choice among its candidates."""
 
-    num_disparities: int = Field(
-        91, ge=3, le=4001, description="number of candidate disparities, uniform over the range"
+    rule: ClassVar[CandidateRule] = CANDIDATES
+
+    num_disparities: int | None = Field(
+        None,
+        ge=3,
+        le=MOST_CANDIDATES,
+        description="number of candidate disparities, uniform over the range; null: 91, or fewer for a narrow range "
+        "and more for a wide one (docs/best.md)",
     )
 
 
@@ -125,8 +141,8 @@ def _sweep(
     from sepi.matching.visibility_kernels import RobustCost, Visibility, sweep_visible_rows
 
     H, W = light_field.shape
-    disparities = light_field.require_disparity_range().candidates(parameters.num_disparities)
-    cost = np.empty((parameters.num_disparities, H, W), np.float32)
+    disparities = parameters.candidates(light_field)
+    cost = np.empty((len(disparities), H, W), np.float32)
     share = parameters.detail_share
     scales2 = [views.squared_scale(s) for s in (parameters.colour_scale, parameters.detail_scale)]
     robust = RobustCost(np.array(scales2, np.float32), np.array([1 - share, share], np.float32))

@@ -21,6 +21,7 @@ from sepi.io.files import atomic_path
 from sepi.io.hdf5 import read_light_field, read_stage
 from sepi.io.images import write_png
 from sepi.io.scores import read_evaluations
+from sepi.matching.unknown import with_unknown
 from sepi.report.panels import Panel, SceneResults, first_final, panels_of
 from sepi.report.plan import MAIN_VARIANT, Plan
 from sepi.report.plots.overview import write_overview
@@ -41,11 +42,14 @@ def read_results(plan: Plan, dataset: str, scene: str) -> SceneResults:
         variant: {stage: read(plan.stage_file(dataset, scene, variant, stage)) for stage in plan.stages}
         for variant in plan.listed
     }
+    light_field = read_light_field(plan.light_field_file(dataset, scene))
+    for stages in maps.values():
+        stages[plan.stages[-1]] = with_unknown(light_field, stages[plan.stages[-1]])
     keys = {variant: plan.stage_key(variant, plan.stages[-1]) for variant in maps}
     scored = read_evaluations(plan.scores_file(dataset, scene), list(keys.values()))
     external = read_external(plan.external_file(dataset, scene)) if plan.external else {}
     return SceneResults(
-        light_field=read_light_field(plan.light_field_file(dataset, scene)),
+        light_field=light_field,
         maps=maps,
         evaluations={variant: scored[key].evaluation for variant, key in keys.items()},
         compared=plan.compared,

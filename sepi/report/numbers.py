@@ -26,6 +26,7 @@ from sepi.evaluate import COUNTS, PROTOCOLS, REGIONS, SCORES
 from sepi.io.external_maps import read_external
 from sepi.io.hdf5 import read_light_field, read_stage
 from sepi.io.scores import Scores, read_evaluations, read_scores, without_nan
+from sepi.matching.unknown import with_unknown
 from sepi.report.plan import PARTS_TABLES, TABLES, Plan
 from sepi.report.runs import Runs, read_json
 from sepi.report.tables import BUILDERS
@@ -191,8 +192,10 @@ def _confidence(plan: Plan, dataset: str, scene: str) -> dict[str, dict[str, lis
     scored = read_evaluations(plan.scores_file(dataset, scene), list(keys.values()))
     for variant, key in keys.items():
         error = scored[key].evaluation.error
-        confidence = read_stage(plan.stage_file(dataset, scene, variant, last)).confidence
         if error is not None:
+            maps = read_stage(plan.stage_file(dataset, scene, variant, last))
+            light_field = read_light_field(plan.light_field_file(dataset, scene))
+            confidence = with_unknown(light_field, maps).confidence
             squared, absolute = decile_errors(confidence, error)
             found[variant] = {
                 "squared": squared.tolist(),

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from sepi.evaluate import WHOLE_MAP
 from sepi.io.scores import Evaluation
 from sepi.lightfield import FloatMap, LightField
+from sepi.matching.unknown import UNKNOWN
 from sepi.report.plan import BEST_VARIANT, MAIN_VARIANT
 from sepi.stage import StageMaps
 
@@ -204,12 +205,13 @@ def _detail_panels(results: SceneResults, variant: str) -> Iterator[Panel]:
         # what was detected need not be the region that is scored
         "occluded": ("occluded, detected", "mask"),
         "textureless": ("textureless, detected", "mask"),
+        UNKNOWN: ("unknown to all views", "mask"),
         "superpixels": ("superpixels", "outline"),
         "lti": ("local texture intensity (LTI)", "grey"),
     }
     group = f"Masks and confidence of {variant}"
     yield Panel(f"{variant}/confidence", f"{variant}: confidence", group, "confidence", final.confidence, in_page=shown)
     for name, (title, kind) in kinds.items():
-        if name in final.extra:
+        if name in final.extra and (name != UNKNOWN or final.mask(name).any()):
             values = final.mask(name) if kind == "mask" else final.extra[name]
             yield Panel(f"{variant}/{name}", f"{variant}: {title}", group, kind, values, in_page=shown)

@@ -70,7 +70,10 @@ def test_depth_writes_the_maps_and_says_so(scene: Path) -> None:
     assert "pyramids: 3x3 views (rows x columns) of 64x64 pixels" in called.stdout
     known = read_light_field(scene).require_disparity_range()
     assert f"disparity range: {known.minimum} to {known.maximum} pixels per view step (from the" in called.stdout
-    masks = {"mask_occluded.png", "mask_textureless.png"}
+    # as set for the first stage, and by the rule for the second
+    assert "scene's parameters), 21 and 91 candidates\n" in called.stdout
+    assert "unknown" not in called.stdout.split("written to")[0]
+    masks = {"mask_occluded.png", "mask_textureless.png", "mask_unknown.png"}
     assert set(os.listdir("pyramids-depth")) == {*RESULT_FILES, *masks, "depth.pfm"}
     assert f"written to pyramids-depth/: {' '.join(RESULT_FILES[:-1])}" in called.stdout
     disparity = read_pfm(Path("pyramids-depth/disparity.pfm"))

@@ -231,6 +231,29 @@ def test_camera_flags_give_metres(result: Path, tmp_path: Path) -> None:
     assert 0 < len(positions) < (confidence >= 0.5).sum()
 
 
+def test_unknown_pixels_have_no_point_unless_asked_for(tmp_path: Path) -> None:
+    """The surface that stands over a black background is a guess; a sheet of points there spoils the cloud."""
+    rng = np.random.default_rng(6)
+    unknown = rng.random((H, W)) > 0.6
+    maps = StageMaps(rng.random((H, W), np.float32), rng.random((H, W), np.float32), {"unknown": unknown})
+    write_result(tmp_path / "out", light_field(), maps)
+    picture = light_field().views[2, 3]
+    _, colours, _ = read_back(tmp_path / "out" / "points.ply")
+    np.testing.assert_array_equal(colours, picture[~unknown])
+    assert call(tmp_path / "out").exit_code == 0
+    np.testing.assert_array_equal(read_back(tmp_path / "out" / "points.ply")[1], picture[~unknown])
+    assert call(tmp_path / "out", "--keep-unknown").exit_code == 0
+    np.testing.assert_array_equal(read_back(tmp_path / "out" / "points.ply")[1], picture.reshape(-1, 3))
+    write_result(
+        tmp_path / "none", light_field(), maps.updated(maps.disparity, maps.confidence, unknown=unknown | True)
+    )
+    called = call(tmp_path / "none")
+    assert called.exit_code == 1
+    assert "give --keep-unknown" in called.stderr
+    with pytest.raises(SepiError, match="unknown is"):
+        point_cloud(picture, maps.disparity, unknown=unknown[1:])
+
+
 def test_clear_line_where_no_cloud_can_be_made(result: Path, tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe.ply")
     (tmp_path / "link.ply").symlink_to(tmp_path / "pipe.ply")

@@ -325,3 +325,40 @@ def test_colours_show_finite_values_whatever_else_is_there() -> None:
 def test_colours_of_a_map_without_contrast(value: float) -> None:
     picture = colour_code(np.full((4, 5), value, np.float32))
     assert (picture == picture[0, 0]).all()
+
+
+def test_unknown_pixels_are_grey_and_take_no_part_of_the_scale() -> None:
+    """A guess over a black background must neither look like depth nor use up the colours of what is known."""
+    values = np.linspace(-1, 1, 400, dtype=np.float32).reshape(20, 20)
+    unknown = np.zeros(values.shape, bool)
+    unknown[15:] = True
+    values[16:] = 50
+    values[19, 19] = np.nan
+    picture = colour_code(values, unknown)
+    assert (picture[15:][np.isfinite(values[15:])] == 128).all()
+    assert (picture[19, 19] == 0).all()
+    assert not (picture[:15] == picture[:15, :, :1]).all(axis=2).any()
+    np.testing.assert_array_equal(picture[:15], colour_code(values[:15]))
+
+
+def test_unknown_pixels_are_in_the_folder(tmp_path: Path, light_field: LightField, maps: StageMaps) -> None:
+    """As a mask, without points, and read back; the disparity stays a number in every format."""
+    unknown = np.zeros(SHAPE, bool)
+    unknown[4:9, 5:] = True
+    known = replace(light_field, camera=None)
+    named = write_result(tmp_path, known, maps.updated(maps.disparity, maps.confidence, unknown=unknown))
+    assert "mask_unknown.png" in named
+    np.testing.assert_array_equal(pixels_of(tmp_path / "mask_unknown.png") > 0, unknown)
+    assert (pixels_of(tmp_path / "disparity.png")[unknown] == 128).all()
+    assert (pixels_of(tmp_path / "disparity_16bit.png")[unknown] > 0).all()
+    np.testing.assert_array_equal(np.load(tmp_path / "disparity.npy"), maps.disparity)
+    np.testing.assert_array_equal(read_result(tmp_path).unknown, unknown)
+    points = np.isfinite(maps.disparity) & ~unknown
+    assert f"element vertex {points.sum()}\n".encode() in (tmp_path / "points.ply").read_bytes()
+
+
+def test_a_result_that_does_not_tell_what_is_unknown_can_be_read(
+    tmp_path: Path, light_field: LightField, maps: StageMaps
+) -> None:
+    write_result(tmp_path, light_field, maps)
+    assert not read_result(tmp_path).unknown.any()

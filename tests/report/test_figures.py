@@ -4,9 +4,11 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from report_results import VARIANTS, light_field, run
+from report_results import VARIANTS, light_field, run, with_results
 
+from sepi.io.hdf5 import write_light_field
 from sepi.report import figures
+from sepi.report.panels import panels_of
 from sepi.report.plan import Plan
 
 
@@ -32,6 +34,23 @@ def test_pictures_of_a_scene(plan: Plan, tmp_path: Path) -> None:
     assert written == common | {f"{variant}/{name}.png" for variant in VARIANTS for name in each}
     centre = cv2.imread(str(tmp_path / "reference_view.png"))[:, :, ::-1]
     np.testing.assert_array_equal(centre, light_field("cotton").views[1, 1])
+
+
+def test_what_no_view_knows_is_shown(tmp_path: Path) -> None:
+    """Else the smooth surface that stands over a black corner passes for depth on the page."""
+    plan = with_results(Plan(tmp_path / "results", {"hci": ["cotton"]}, VARIANTS))
+    scene = light_field("cotton")
+    scene.views[:, :, :15, :20] = 0
+    write_light_field(plan.light_field_file("hci", "cotton"), scene)
+    panels = {panel.key: panel for panel in panels_of(figures.read_results(plan, "hci", "cotton"))}
+    for variant in VARIANTS:
+        expected = np.zeros(scene.shape, bool)
+        expected[:15, :20] = True
+        np.testing.assert_array_equal(panels[f"{variant}/unknown"].values, expected)
+        assert not panels[f"{variant}/confidence"].values[expected].any()
+    draw(plan, tmp_path / "pictures", "hci", "cotton")
+    assert (tmp_path / "pictures" / "paper" / "unknown.png").is_file()
+    assert (cv2.imread(str(tmp_path / "pictures" / "paper" / "confidence.png"))[:15, :20] == 0).all()
 
 
 def test_pictures_without_ground_truth(plan: Plan, tmp_path: Path) -> None:

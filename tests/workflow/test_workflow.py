@@ -507,6 +507,7 @@ def test_own_light_fields_of_any_format_get_maps(workflow: Workflow, tmp_path: P
     result = own.run(*targets, *maps)
     assert result.returncode == 0, result.stdout
     assert [read_attributes(own.folder / file)["variant"] for file in maps] == [QUICK, QUICK]
+    assert all("unknown" in read_stage(own.folder / file).extra for file in maps)
     kept = read_light_field(own.folder / "results/own/right/lightfield.h5", check_order=False)
     assert kept.reference_position == (2, 1)
     assert np.argwhere(~kept.present).tolist() == [[0, 0]]

@@ -82,7 +82,7 @@ def cost_curves(light_field: LightField, y: int, x: int, parameters: SweepParame
     """
     require_inside(light_field, y, x)
     (T, S), (t0, s0), (H, W) = light_field.grid, light_field.reference_position, light_field.shape
-    disparities = light_field.require_disparity_range().candidates(parameters.num_disparities)
+    disparities = parameters.candidates(light_field)
     noise = residual_variance(light_field.reference_view)
     r = parameters.window_radius
     rows = np.arange(max(0, y - r), min(H, y + r + 1))

@@ -179,7 +179,10 @@ def total_seconds(*reports: Numbers) -> float:
 def parameter_rows(numbers: Numbers) -> list[tuple[str, list[tuple[str, Any]]]]:
     """Stage and choice, and its parameters."""
     return [
-        (f"{stage}: {choice}", list(values.items()))
+        (
+            f"{stage}: {choice}",
+            [(name, "by range and grid" if value is None else value) for name, value in values.items()],
+        )
         for stage, choices in numbers["parameters"].items()
         for choice, values in choices.items()
     ]

@@ -1,0 +1,103 @@
+"""How many candidate disparities a sweep takes, where the user does not say.
+
+What must be fine is the sampling in the view that moves most: a candidate further, a pixel moves there by the disparity
+sampling times the distance of the farthest view. A sweep has a number of candidates that is *usual*; it takes fewer
+where these would be finer than is of use, and more where they would be coarser than its optimisation can bridge.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, ClassVar, NamedTuple, Self
+
+from sepi.lightfield import FloatMap, LightField
+from sepi.stage import Parameters
+
+LEAST_CANDIDATES = 25
+"""However narrow the range is."""
+
+MOST_CANDIDATES = 4001
+"""However wide it is."""
+
+
+class CandidateRule(NamedTuple):
+    """The number of candidates of a sweep, from the disparity range and the distance of the farthest view.
+
+    Attributes
+    ----------
+    usual : int
+        Number for ranges that are neither narrow nor wide.
+    finest, coarsest : float
+        Least and largest sampling in the farthest view with the usual number, pixels.
+    volume_bytes : int or None
+        What a cost volume of float32 may take with more than the usual number; None for a sweep that holds none.
+    """
+
+    usual: int
+    finest: float
+    coarsest: float
+    volume_bytes: int | None = None
+
+    def number(self, width: float, reach: float, pixels: int) -> int:
+        """Number of candidates.
+
+        Parameters
+        ----------
+        width : float
+            Of the disparity range, pixels per view step.
+        reach : float
+            Distance of the farthest view, view steps.
+        pixels : int
+            Of a view.
+        """
+        moved = width * reach
+        sampling = moved / (self.usual - 1)
+        if self.finest <= sampling <= self.coarsest:
+            return self.usual
+        if sampling < self.finest:
+            return max(LEAST_CANDIDATES, _intervals(moved, self.finest) + 1)
+        most = MOST_CANDIDATES
+        if self.volume_bytes is not None:
+            most = min(most, max(self.usual, self.volume_bytes // (4 * pixels)))
+        return min(most, _intervals(moved, self.coarsest) + 1)
+
+
+def _intervals(moved: float, sampling: float) -> int:
+    # half a millionth of an interval is rounding
+    return math.ceil(moved / sampling - 5e-7)
+
+
+class CandidateParameters(Parameters):
+    """Parameters of a sweep over candidate disparities: what follows from the two that each sweep declares."""
+
+    if TYPE_CHECKING:
+        rule: ClassVar[CandidateRule]
+        num_disparities: int | None
+
+    def number(self, light_field: LightField) -> int:
+        """Number of candidates: as set, else by the rule.
+
+        Raises
+        ------
+        SepiError
+            If the disparity range is unknown.
+        """
+        known = light_field.require_disparity_range()
+        if self.num_disparities is not None:
+            return self.num_disparities
+        height, width = light_field.shape
+        return self.rule.number(known.maximum - known.minimum, light_field.reach, height * width)
+
+    def candidates(self, light_field: LightField) -> FloatMap:
+        """The candidates, uniform over the range, both ends included; shape (K,), float32.
+
+        Raises
+        ------
+        SepiError
+            If the disparity range is unknown.
+        """
+        return light_field.require_disparity_range().candidates(self.number(light_field))
+
+    def settled(self, light_field: LightField) -> Self:
+        """These parameters with the number of candidates that a light field gets."""
+        return self.model_copy(update={"num_disparities": self.number(light_field)})

@@ -1,0 +1,204 @@
+"""Pixels that no view knows anything about, and what becomes of them in the final maps.
+
+A depth map has a value everywhere. At some pixels it is a guess for which there is no evidence at all:
+
+- regions without a signal, where the view is as dark as nothing, or at full scale, and varies no more than its noise: a
+  black background, what is overexposed;
+- the dark corners that a lens leaves (vignettes), which stray light may lift above black;
+- pixels that hardly any other view holds: at their disparity they lie outside the others' pictures.
+
+A bare wall is none of these: it is neither black nor overexposed, and what it borders on tells its depth.
+"""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from sepi.image.noise import noise_level
+from sepi.lightfield import BoolMap, FloatMap, LightField, as_unit_float, full_scale
+from sepi.stage import StageMaps
+
+UNKNOWN = "unknown"
+"""Name of the map."""
+
+BLACK = 0.01
+"""As dark as nothing: brightness as part of the brightest there is..."""
+
+LENS_CORNER = 0.05
+"""...and where a region holds a corner of the picture, which stray light may have lifted."""
+
+SATURATED = 254 / 255
+"""As bright as can be told."""
+
+LEAST_SHARE = 2e-3
+"""Part of the picture below which a region without a signal belongs to what surrounds it..."""
+
+LEAST_AREA = 100
+"""...and so does one of fewer pixels."""
+
+LEAST_VIEWS = 2
+"""Other views that must hold a pixel, where there are as many."""
+
+# squared gradients are averaged over so many pixels each way; more than so many times what noise explains is a signal
+_WINDOW = 5
+_NOISE_FACTOR = 4.0
+# white noise hardly ever exceeds so many of its standard deviations
+_NOISE_REACH = 4.0
+# views whose mean tells faint texture from noise
+_MOST_AVERAGED = 16
+# share of a view's squared gradients that stays in the mean of many views where it is texture; of noise less stays,
+# though neighbours from one sensor have some of it in common
+_SHARED = 0.5
+# noise beyond this part of the brightest there is would be texture
+_MOST_NOISE = 0.03
+# least noise: rounding of integers, in levels; of floats
+_ROUNDING = 0.3
+_FLOAT_ROUNDING = 1e-5
+
+
+def with_unknown(light_field: LightField, maps: StageMaps) -> StageMaps:
+    """A variant's final maps with the mask ``unknown``, and no confidence there; the disparity stays as it is.
+
+    Parameters
+    ----------
+    light_field : LightField
+    maps : StageMaps
+        Of the last stage.
+
+    Returns
+    -------
+    StageMaps
+    """
+    unknown = unknown_pixels(light_field, maps.disparity)
+    return maps.updated(maps.disparity, np.where(unknown, np.float32(0), maps.confidence), **{UNKNOWN: unknown})
+
+
+def unknown_pixels(light_field: LightField, disparity: FloatMap) -> BoolMap:
+    """Pixels that no view knows anything about.
+
+    Parameters
+    ----------
+    light_field : LightField
+    disparity : ndarray, shape (H, W), float32
+        Final disparity, pixels per view step.
+
+    Returns
+    -------
+    ndarray, shape (H, W), bool
+    """
+    return without_signal(light_field, disparity) | held_by_few(light_field, disparity)
+
+
+def without_signal(light_field: LightField, disparity: FloatMap) -> BoolMap:
+    """Regions that are black, or at full scale, with nothing above the noise.
+
+    Parameters
+    ----------
+    light_field : LightField
+    disparity : ndarray, shape (H, W), float32
+        Pixels per view step. What views agree about at these disparities is no noise.
+
+    Returns
+    -------
+    ndarray, shape (H, W), bool
+    """
+    view, dtype = light_field.reference_view, light_field.views.dtype
+    rounding = _FLOAT_ROUNDING if dtype == np.float32 else _ROUNDING / full_scale(dtype)
+    energy, brightness = _energy(view), view.max(axis=2)
+    bright = view.min(axis=2) >= SATURATED
+    found = _large(_beside(bright & (energy < _of_noise(rounding)), bright))
+    white = float(np.quantile(brightness, 0.999))
+    # without the noise of single pixels
+    level = cv2.blur(view, (3, 3)).max(axis=2)
+    most = min(noise_level(view), _MOST_NOISE * white)
+    for share, at_corners in ((BLACK, False), (LENS_CORNER, True)):
+        limit = share * white
+        # texture passes for noise; where it is dark there may be less of both
+        noise = max(min(most, noise_level(view, level <= limit + most)), rounding)
+        even = level <= limit + noise
+        # a single bright pixel in the dark is noise, too
+        dark = even | (brightness <= limit + _NOISE_REACH * noise)
+        core = even & (energy < _of_noise(noise))
+        if _large(_beside(core, dark), at_corners).any():
+            mean, number = _mean_of_dark(light_field, disparity, limit + _NOISE_REACH * noise)
+            shared = _energy(mean)
+            core &= (shared < _of_noise(rounding)) | (shared < energy * (_SHARED + (1 - _SHARED) / number))
+            found |= _large(_beside(core, dark), at_corners)
+    return found
+
+
+def held_by_few(light_field: LightField, disparity: FloatMap) -> BoolMap:
+    """Pixels that lie, at their disparity, outside all but one of the other views; shape (H, W), bool."""
+    H, W = disparity.shape
+    others = _nearest_first(light_field)
+    least = min(LEAST_VIEWS, len(others))
+    y, x = (side.ravel() for side in np.mgrid[:H, :W])
+    d, held = disparity.ravel().astype(np.float64), np.zeros(H * W, np.int64)
+    left = np.arange(H * W)
+    # the nearest views hold almost every pixel
+    for down, across in light_field.baselines[tuple(others.T)]:
+        row, column = y[left] - d[left] * down, x[left] - d[left] * across
+        held[left] += (row >= -0.5) & (row <= H - 0.5) & (column >= -0.5) & (column <= W - 0.5)
+        left = left[held[left] < least]
+    return (held < least).reshape(H, W)
+
+
+def _nearest_first(light_field: LightField) -> npt.NDArray[np.int64]:
+    """Grid positions of the other views that are present, (N, 2)."""
+    others = light_field.present.copy()
+    others[light_field.reference_position] = False
+    distance = (light_field.baselines[others] ** 2).sum(axis=1)
+    return np.argwhere(others)[np.argsort(distance, kind="stable")]
+
+
+def _mean_of_dark(light_field: LightField, disparity: FloatMap, limit: float) -> tuple[FloatMap, FloatMap]:
+    """Mean of the views that are no brighter than ``limit`` where they see a pixel, and their number.
+
+    Returns
+    -------
+    mean : ndarray, shape (H, W, 3), float32
+    number : ndarray, shape (H, W), float32
+        At least 1, for the reference view.
+    """
+    total = light_field.reference_view.copy()
+    number = np.ones(disparity.shape, np.float32)
+    y, x = (side.astype(np.float32) for side in np.mgrid[: disparity.shape[0], : disparity.shape[1]])
+    baselines = light_field.baselines.astype(np.float32)
+    for t, s in _nearest_first(light_field)[:_MOST_AVERAGED]:
+        down, across = baselines[t, s]
+        position = x - disparity * across, y - disparity * down
+        seen = cv2.remap(as_unit_float(light_field.rgb_views[t, s]), *position, cv2.INTER_LINEAR, borderValue=(1, 1, 1))
+        dark = seen.max(axis=2) <= limit
+        total += seen * dark[..., None]
+        number += dark
+    return total / number[..., None], number
+
+
+def _energy(image: FloatMap) -> FloatMap:
+    """Squared gradients of an image (H, W, 3), summed over channels, mean over a window; shape (H, W)."""
+    down, across = np.gradient(image, axis=(0, 1))
+    return np.asarray(cv2.blur((down**2 + across**2).sum(axis=2), (_WINDOW, _WINDOW)))
+
+
+def _of_noise(noise: float) -> float:
+    """Energy up to which there is nothing but noise of this standard deviation."""
+    # central differences halve the noise along each of the two axes; three channels
+    return _NOISE_FACTOR * 3 * noise**2
+
+
+def _beside(core: BoolMap, region: BoolMap) -> BoolMap:
+    """The pixels of a region whose window, or that of a neighbour, reaches into its core."""
+    # a window that reaches beyond the region is not flat, nor are its outermost pixels
+    reach = np.ones((_WINDOW + 2, _WINDOW + 2), np.uint8)
+    return np.asarray(region & (cv2.dilate(core.astype(np.uint8), reach) > 0))
+
+
+def _large(region: BoolMap, at_corners: bool = False) -> BoolMap:
+    """The connected parts of a region that are large enough for a background, and hold a corner of the picture."""
+    _, labels, figures, _ = cv2.connectedComponentsWithStats(region.astype(np.uint8), connectivity=4)
+    kept = figures[:, cv2.CC_STAT_AREA] >= max(LEAST_AREA, LEAST_SHARE * region.size)
+    if at_corners:
+        kept &= np.isin(np.arange(len(kept)), labels[[0, 0, -1, -1], [0, -1, 0, -1]])
+    return np.asarray(kept[labels] & region)
