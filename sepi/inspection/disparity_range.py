@@ -17,6 +17,7 @@ import cv2
 import numpy as np
 
 from sepi.errors import SepiError
+from sepi.inspection.dark_corners import dark_corners
 from sepi.lightfield import BoolMap, DisparityRange, FloatMap, LightField, as_unit_float
 
 # Search: pixels per view step to each side at first, and if surfaces lie beyond; views up to this many steps away at
@@ -42,10 +43,6 @@ _SEARCH_RADIUS = 2
 _RADIUS = 3
 # largest difference that counts, full range = 1
 _TRUNCATION = 0.1
-
-# What is black, as part of the brightest there is; how much of a picture a lens leaves black: more is background
-_BLACK = 0.05
-_MOST_BLACK = 0.35
 
 # Trust: lowest cost as part of the lowest outside its valley. A limit on the cost itself would add nothing here, and
 # would have to know the noise.
@@ -144,7 +141,7 @@ class _Views:
         self._prepared: dict[tuple[int, int], FloatMap] = {}
         self._own = light_field.reference_position
         self.reference = self._view(self._own)
-        self.seen = ~_dark_corners(light_field.reference_view, self.reference.shape)
+        self.seen = ~dark_corners(light_field.reference_view, self.reference.shape, _HIGH_PASS + _SEARCH_RADIUS)
         self.reach = 1
 
     def distances(self) -> tuple[int, int]:
@@ -263,24 +260,6 @@ def _prepared(grey: FloatMap, factor: int) -> FloatMap:
         grey = np.asarray(cv2.resize(grey, size, interpolation=cv2.INTER_AREA), np.float32)
     smooth = cv2.GaussianBlur(grey, (0, 0), _BLUR_SIGMA)
     return np.asarray(smooth - cv2.blur(smooth, (_HIGH_PASS, _HIGH_PASS)), np.float32)
-
-
-def _dark_corners(reference_view: FloatMap, shape: tuple[int, int]) -> BoolMap:
-    """What the lens leaves black in the corners, and what lies so near that the filters mix it in; of ``shape``.
-
-    The edge of such a corner moves from view to view as the lens has it, not as anything in the scene. Where more is
-    black than a lens leaves, it is the scene's background.
-    """
-    brightness = reference_view.max(axis=2)
-    black = brightness < _BLACK * np.quantile(brightness, 0.99)
-    if black.mean() > _MOST_BLACK:
-        return np.zeros(shape, bool)
-    black = cv2.resize(black.astype(np.uint8), shape[::-1], interpolation=cv2.INTER_AREA)
-    _, labels = cv2.connectedComponents(black)
-    corners = set(labels[[0, 0, -1, -1], [0, -1, 0, -1]].tolist()) - {0}
-    reach = 2 * (_HIGH_PASS + _SEARCH_RADIUS) + 1
-    dark = np.isin(labels, list(corners)).astype(np.uint8)
-    return cv2.dilate(dark, np.ones((reach, reach), np.uint8)) > 0
 
 
 def _trusted(lowest: FloatMap, second: FloatMap, mean: FloatMap, disparity: FloatMap, step: float) -> BoolMap:

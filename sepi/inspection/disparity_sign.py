@@ -16,13 +16,15 @@ import numpy as np
 import numpy.typing as npt
 
 from sepi.inspection.coarse_sweep import coarse_sweep
+from sepi.inspection.dark_corners import dark_corners
 from sepi.inspection.view_layouts import REACH, Baseline, Trial, Views, baselines_under
 from sepi.inspection.view_order_kernels import residuals
-from sepi.lightfield import BoolMap, FloatMap
+from sepi.lightfield import BoolMap, FloatMap, LightField
 
-# Movement searched at most, pixels; of larger pictures, the middle is looked at
+# Movement searched at most, pixels; larger pictures are reduced by a whole factor, less than where the order of the
+# views is looked for: strips that are hidden are narrow
 _MOST_MOVEMENT = 16
-_MOST_PIXELS = 200_000
+_MOST_PIXELS = 1_200_000
 # Matching: half width of the window, pixels; largest difference of one view, and what flat areas differ by, the
 # picture's deviation = 1; lowest cost as part of the lowest outside its valley
 _SWEEP_RADIUS = 2
@@ -75,14 +77,16 @@ class Evidence(NamedTuple):
     regions: int
 
 
-def occlusion_evidence(views: Views, trial: Trial) -> Evidence:
+def occlusion_evidence(light_field: LightField, trial: Trial) -> Evidence:
     """Whether the surface of the greater disparity is the one in front.
 
     The best layout of the trial is taken for right; the sign is that of the layout's first order. There is no evidence
     where there are no views on opposite sides, or hardly any contrast.
     """
     none = Evidence(0.0, 0.0, 0)
-    reach, directions = _directions(views, trial.largest_disparity)
+    views = Views(light_field, _MOST_PIXELS)
+    largest = trial.largest_disparity / views.factor
+    reach, directions = _directions(views, largest)
     if not directions:
         return none
     # in units of the picture's own contrast
@@ -90,12 +94,12 @@ def occlusion_evidence(views: Views, trial: Trial) -> Evidence:
     rounding = _ROUNDING * float(scale) ** 2
     if rounding > _MOST_ROUNDING:
         return none
-    reference = _middle(views.plain((0, 0))) * scale
+    reference = views.plain((0, 0)) * scale
     baselines = {direction: _at(direction, reach) for direction in directions}
-    pictures = {at: _middle(views.plain(at)) * scale for both in baselines.values() for at in both}
+    pictures = {at: views.plain(at) * scale for both in baselines.values() for at in both}
     order = next(iter(trial.best))
     positions = {at: baselines_under(order, views.in_steps([at]))[0].astype(np.float32) for at in pictures}
-    movement = min(_MOST_MOVEMENT, math.ceil(1.15 * trial.largest_disparity * reach) + 1)
+    movement = min(_MOST_MOVEMENT, math.ceil(1.15 * largest * reach) + 1)
     sampling = 1 / reach
     candidates = (np.arange(-movement, movement + 1) * sampling).astype(np.float32)
     sides = [
@@ -104,6 +108,7 @@ def occlusion_evidence(views: Views, trial: Trial) -> Evidence:
     ]
     disparity, trusted = _disparity(reference, sides, candidates)
     surface = trusted & (_support(disparity, trusted, sampling) >= _LEAST_SUPPORT)
+    surface &= ~dark_corners(views.reference_view, reference.shape, movement)
     residual = {
         at: residuals(reference, picture, float(positions[at][0]), float(positions[at][1]), disparity, _WINDOW_RADIUS)
         for at, picture in pictures.items()
@@ -212,13 +217,6 @@ def _directions(views: Views, largest: float) -> tuple[int, list[Baseline]]:
 def _at(direction: Baseline, reach: int) -> list[Baseline]:
     """Baselines to the views at half of the distance and at all of it."""
     return [(n * direction[0], n * direction[1]) for n in sorted({max(1, reach // 2), reach})]
-
-
-def _middle(picture: FloatMap) -> FloatMap:
-    """The middle of a picture, of the same proportions, where it is large."""
-    part = min(1.0, math.sqrt(_MOST_PIXELS / picture.size))
-    rows, columns = (slice(round(n * (1 - part) / 2), round(n * (1 + part) / 2)) for n in picture.shape)
-    return np.ascontiguousarray(picture[rows, columns])
 
 
 def _disparity(

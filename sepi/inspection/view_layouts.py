@@ -57,12 +57,13 @@ class Views:
     """The views about the middle of the grid, reduced and filtered when they are first asked for.
 
     ``baselines`` lead from the view in the middle to each other one that is present, in rows and columns;
-    ``row_spacing`` is the light field's, and may be set. ``shape`` is the height and width in pixels, as reduced.
+    ``row_spacing`` is the light field's. ``factor`` is what larger pictures are reduced by, ``shape`` their height and
+    width then, in pixels.
     """
 
-    def __init__(self, light_field: LightField) -> None:
+    def __init__(self, light_field: LightField, most_pixels: int = _MOST_PIXELS) -> None:
         self._views = light_field.rgb_views
-        self._factor = max(1, math.ceil(math.sqrt(math.prod(light_field.shape) / _MOST_PIXELS)))
+        self.factor = max(1, math.ceil(math.sqrt(math.prod(light_field.shape) / most_pixels)))
         self._grey: dict[tuple[int, int, int], FloatMap] = {}
         self._worth: dict[Baseline, bool] = {}
         positions = np.argwhere(light_field.present)
@@ -70,8 +71,13 @@ class Views:
         self._middle = positions[distance.argmin()]
         self.baselines: list[Baseline] = [(int(t), int(s)) for t, s in positions - self._middle if (t, s) != (0, 0)]
         height, width = light_field.shape
-        self.shape = (height // self._factor, width // self._factor)
+        self.shape = (height // self.factor, width // self.factor)
         self.row_spacing = light_field.row_spacing
+
+    @property
+    def reference_view(self) -> FloatMap:
+        """The view in the middle as it is, (H, W, 3) float32."""
+        return as_unit_float(self._views[tuple(self._middle)])
 
     def in_steps(self, baselines: list[Baseline]) -> npt.NDArray[np.float64]:
         """Baselines in view steps, shape (V, 2)."""
@@ -113,7 +119,7 @@ class Views:
         key = (*baseline, factor)
         if key not in self._grey:
             view = np.ascontiguousarray(self._views[self._middle[0] + baseline[0], self._middle[1] + baseline[1]])
-            factor *= self._factor
+            factor *= self.factor
             size = (max(1, view.shape[1] // factor), max(1, view.shape[0] // factor))
             reduced = cv2.resize(view, size, interpolation=cv2.INTER_AREA) if factor > 1 else view
             grey = as_unit_float(cv2.cvtColor(reduced, cv2.COLOR_RGB2GRAY))
@@ -140,7 +146,7 @@ class Trial(NamedTuple):
     clear: bool
     """Whether the best layout is clearly better than any other."""
     largest_disparity: float
-    """Under the best layout, but for a few outliers: absolute, pixels per view step."""
+    """Under the best layout, but for a few outliers: absolute, pixels of the light field per view step."""
     within: bool
     """Whether the search goes beyond the scene's disparities."""
 
@@ -206,7 +212,7 @@ def _tried(views: Views, reach: int, factor: int) -> Trial | None:
         gap=gap,
         errors=errors,
         clear=is_clear(cost[:, best], cost[:, following]),
-        largest_disparity=largest,
+        largest_disparity=views.factor * largest,
         within=largest < 0.95 * extent,
     )
 

@@ -20,7 +20,7 @@ from sepi.lightfield import LightField
 # What the sign needs: regions of the picture where one surface is seen to hide another, the mean of what they say
 # (-2 to 2), and how many standard errors that is
 _FEWEST_REGIONS = 6
-_LEAST_EVIDENCE = 1.0
+_LEAST_EVIDENCE = 0.8
 _CLEAR_ERRORS = 4.0
 
 _FAULTS = {
@@ -107,14 +107,13 @@ def check_order(light_field: LightField, read_in: str = AS_GIVEN) -> OrderCheck:
     -------
     OrderCheck
     """
-    views = Views(light_field)
-    trial = best_trial(views)
+    trial = best_trial(Views(light_field))
     if trial is None:
         return OrderCheck(dict.fromkeys(ORDERS, 1.0), read_in, clear=False, sign_clear=False, read_in=read_in)
     costs = dict(trial.costs)
     sign_clear = False
     if trial.clear:
-        evidence = occlusion_evidence(views, trial)
+        evidence = occlusion_evidence(light_field, trial)
         sign_clear = (
             evidence.regions >= _FEWEST_REGIONS
             and abs(evidence.mean) >= _LEAST_EVIDENCE

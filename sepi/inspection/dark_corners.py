@@ -1,0 +1,43 @@
+"""Dark corners that a lens leaves in its pictures: they are no surfaces of the scene.
+
+The edge of such a corner moves from view to view as the lens has it, not as anything in the scene, and it hides what is
+behind it like something near.
+"""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from sepi.lightfield import BoolMap, FloatMap
+
+# What is black, as part of the brightest there is; how much of a picture a lens leaves black: more is background
+_BLACK = 0.05
+_MOST_BLACK = 0.35
+
+
+def dark_corners(reference_view: FloatMap, shape: tuple[int, ...], reach: int) -> BoolMap:
+    """What the lens leaves black in the corners, and what lies so near that filters mix it in.
+
+    Parameters
+    ----------
+    reference_view : ndarray, shape (H, W, 3), float32
+    shape : tuple of int
+        Height and width of the result; the picture is reduced to them.
+    reach : int
+        How far filters reach, pixels of the result.
+
+    Returns
+    -------
+    ndarray, bool
+        Of ``shape``; all False where more is black than a lens leaves, since then it is the scene's background.
+    """
+    brightness = reference_view.max(axis=2)
+    black = brightness < _BLACK * np.quantile(brightness, 0.99)
+    if black.mean() > _MOST_BLACK:
+        return np.zeros(shape, bool)
+    reduced = cv2.resize(black.astype(np.uint8), shape[::-1], interpolation=cv2.INTER_AREA)
+    _, labels = cv2.connectedComponents(reduced)
+    corners = set(labels[[0, 0, -1, -1], [0, -1, 0, -1]].tolist()) - {0}
+    dark = np.isin(labels, list(corners)).astype(np.uint8)
+    return np.asarray(cv2.dilate(dark, np.ones((2 * reach + 1, 2 * reach + 1), np.uint8)) > 0)
