@@ -115,7 +115,8 @@ def read(path: Path, options: ReadOptions, file_format: str | None = None) -> Li
     _require_used(path, known, options)
     with naming(path):
         light_field = known.read(path, options)
-        return light_field if options.view is None else light_field.seen_from(options.view)
+        seen = options.view if light_field.arranged else None
+        return light_field if seen is None else light_field.seen_from(seen)
 
 
 def _require_used(path: Path, known: Format, options: ReadOptions) -> None:
