@@ -100,9 +100,9 @@ def format_of(path: Path, file_format: str | None = None) -> Format:
             return known
     inner = list(islice(_inside(path), _LISTED + 1)) if path.is_dir() and not _is_result(path) else []
     if inner:
-        found = f"such as {inner[0]}" if len(inner) == 1 else ", ".join(map(str, inner[:_LISTED]))
+        found = f", such as {inner[0]}" if len(inner) == 1 else f": {', '.join(map(str, inner[:_LISTED]))}"
         more = ", ..." if len(inner) > _LISTED else ""
-        raise SepiError(f"{path}: a folder of light fields; give one of them, {found}{more}")
+        raise SepiError(f"{path}: a folder of light fields; give one of them{found}{more}")
     expected = ", ".join(f"{known.name} ({known.description})" for known in FORMATS.values())
     raise SepiError(f"{path}: {_what_else(path)}; expected {expected}")
 
