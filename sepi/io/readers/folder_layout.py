@@ -96,7 +96,7 @@ def widened(folder: Path, named: ViewNumbers, numbers: Numbers, others: Numbers,
     if options.grid is not None or whole.grid == layout.grid:
         return whole
     if whole.arranged:
-        fits = layout.fill < 1 and (whole.fill == 1 or whole.fill >= _AS_FULL * layout.fill)
+        fits = whole.fill == 1 or 1 > layout.fill <= whole.fill / _AS_FULL
     else:
         # whether the ends of a sequence belong to it nobody can tell, but that sequences rather fill a square
         fits = not _is_square(layout.grid[1]) and _is_square(whole.grid[1])

@@ -13,7 +13,7 @@ Values = tuple[int, ...]
 
 # Least part of the positions between the first and the last that must be taken: of a running number (the others are
 # missing views, not a measure such as the time), and of a grid whose row and column are two of several numbers
-_COUNTED = 0.5
+_COUNTED = 2 / 3
 _FILLED = 0.5
 # how many times better two numbers must fill their grid than any other two
 _CLEARLY = 1.5

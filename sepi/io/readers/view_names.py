@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from itertools import combinations, pairwise, takewhile
 
 from sepi.errors import SepiError
-from sepi.io.readers.view_counts import Counting, Kind, Values, counting, fill, is_count
+from sepi.io.readers.view_counts import Counting, Kind, Values, counting, fill, is_count, origin
 
 EXAMPLES = "'view_{row}_{column}.png' or 'img{number}.jpg'"
 
@@ -201,18 +201,27 @@ class _Group:
         self._hyphens = _separators([[signs for signs, _ in name.numbers] for name in cuts])
         self._decimal_hyphens = _separators([[signs for signs, _ in name.decimals] for name in cuts])
         everything = range(len(cuts[0].numbers))
-        rows = [self.numbers_of(name, everything) or () for name in self.names]
-        self.columns: list[Values] = list(zip(*rows, strict=True))
+        # decimals that count do so in steps of their own
+        self._origins = [(0, 1) for _ in everything]
+        read = [self.numbers_of(name, everything) or () for name in self.names]
+        counts = list(zip(*read, strict=True))
+        if decimals_count:
+            self._origins = [origin(values) for values in counts]
+            read = [self.numbers_of(name, everything) or () for name in self.names]
+        self.columns: list[Values] = list(zip(*read, strict=True))
 
     def numbers_of(self, name: str, columns: Sequence[int]) -> tuple[int, ...] | None:
         """Some of the numbers of a name; None where it is unlike those of the group."""
         cut = self._cut(name)
         if cut.texts != self._texts:
             return None
-        return tuple(_signed(*cut.numbers[at], self._hyphens[at]) for at in columns)
+        values = (_signed(*cut.numbers[at], self._hyphens[at]) for at in columns)
+        return tuple(
+            (value - self._origins[at][0]) // self._origins[at][1] for value, at in zip(values, columns, strict=True)
+        )
 
     def decimals_of(self, name: str) -> tuple[float, ...]:
-        """The decimal numbers of one of the group's names that do not count."""
+        """The decimal numbers of one of the group's names."""
         decimals = zip(self._cut(name).decimals, self._decimal_hyphens, strict=True)
         return tuple(-float(text) if _is_minus(signs, hyphen) else float(text) for (signs, text), hyphen in decimals)
 
@@ -254,8 +263,9 @@ class _Group:
             signs = match[0][: -len(text)]
             texts[-1] += stem[at : match.start()]
             at = match.end()
-            if match.lastgroup == "decimal" and not self._decimals_count:
+            if match.lastgroup == "decimal":
                 decimals.append((signs, text))
+            if match.lastgroup == "decimal" and not self._decimals_count:
                 # names with other decimals are alike
                 texts[-1] += _MARK
             elif len(text) > _MAX_DIGITS:
