@@ -62,10 +62,10 @@ def read(path: Path, options: ReadOptions) -> LightField:
 
 
 def views_shape(path: Path) -> tuple[tuple[int, ...], np.dtype[Any]]:
-    """Shape (T, S, H, W, C) and type of the views of such a file; their values are not read."""
+    """Shape (T, S, H, W), and C if in colour, and type of the views of such a file; their values are not read."""
     with _opened(path) as group:
         shape, _ = _shape(path, group)
-        return shape, group[_channels(group)[0]].dtype
+        return shape[: 5 if shape[4] > 1 else 4], group[_channels(group)[0]].dtype
 
 
 @contextmanager
