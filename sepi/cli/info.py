@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from sepi.cli.input_options import Geometry, Reading, camera_flags, reading_flags
+from sepi.command import SepiCommand
 from sepi.errors import SepiError
 
 # imported in the functions: `sepi --help` does without what they import
@@ -25,7 +26,7 @@ _RANGE_SOURCES = {
 _as_json = click.option("--json", "as_json", is_flag=True, help="Print one JSON object; see docs/formats.md.")
 
 
-@click.command(short_help="Show what is known about the light field INPUT.")
+@click.command(cls=SepiCommand, short_help="Show what is known about the light field INPUT.")
 @click.argument("light_field_path", metavar="INPUT", type=_PATH)
 @camera_flags
 @reading_flags
@@ -87,7 +88,7 @@ def info(light_field_path: Path, geometry: Geometry | None, reading: Reading, as
         click.echo(f"{'note:':17}{note}")
 
 
-@click.command(short_help="Check the order of the views of the light field INPUT.")
+@click.command(cls=SepiCommand, short_help="Check the order of the views of the light field INPUT.")
 @click.argument("light_field_path", metavar="INPUT", type=_PATH)
 @reading_flags
 @_as_json

@@ -124,7 +124,7 @@ def _require_no_place(folder: Path, named: ViewNumbers, name: str, why: str, opt
     """Raise where a picture that is unlike the views is needed as one."""
     if name in widened(folder, named, named.numbers, _numbers_of(named, [name]), options).positions:
         raise SepiError(
-            f"{folder / name}: {why}, and its name is that of one; replace it, or leave it out with --exclude {name}"
+            f"{folder / name}: {why}; all views must be alike, so replace it, or leave it out with --exclude {name}"
         )
 
 

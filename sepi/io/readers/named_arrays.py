@@ -58,11 +58,9 @@ def light_field_from_arrays(
 
 def _channels_from(red: str) -> Iterator[tuple[str, ...]]:
     """Names of three channels of which the first is this one: ``lfr lfg lfb``, ``LF_Red LF_Green LF_Blue``."""
-    for words in _COLOURS:
-        for style in _STYLES:
-            styled = [style(word) for word in words]
-            for match in re.finditer(styled[0], red):
-                yield tuple(red[: match.start()] + word + red[match.end() :] for word in styled)
+    for red_word, *others in dict.fromkeys((*map(style, words),) for words in _COLOURS for style in _STYLES):
+        for match in re.finditer(red_word, red):
+            yield red, *(red[: match.start()] + word + red[match.end() :] for word in others)
 
 
 def _arrays_of(path: Path, arrays: Shapes, requested: str | None) -> tuple[str, ...]:
