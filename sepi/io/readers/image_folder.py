@@ -26,6 +26,9 @@ from sepi.io.readers.view_files import read_grid
 from sepi.io.readers.view_names import ViewNumbers, infer_view_numbers, parse_view_numbers, sorted_view_numbers
 from sepi.lightfield import LightField
 
+# steps by which cameras that stand on the grid may seem to miss it: decimals are rounded
+_ON_GRID = 1e-3
+
 
 def matches(path: Path) -> bool:
     """Whether ``path`` is a folder with at least two pictures that have numbers in their names."""
@@ -141,10 +144,16 @@ def _with_positions(
         found = positions_from_cameras(given[numbers][..., pair], light_field.present)
         if found is not None:
             positions, row_spacing = found
-            apart = f"rows {row_spacing:.3g} steps apart, " if min(numbers.shape) > 1 else ""
             strays = off_grid(positions, row_spacing, light_field.present)
-            note = f"camera positions from the names; {apart}off the grid by up to {strays:.2g} steps"
-            return replace(light_field, positions=positions, row_spacing=row_spacing, notes=(*light_field.notes, note))
+            on_grid = strays < _ON_GRID
+            apart = f"rows {row_spacing:.3g} steps apart, " if min(numbers.shape) > 1 else ""
+            where = "on the grid" if on_grid else f"off the grid by up to {strays:.2g} steps"
+            return replace(
+                light_field,
+                positions=None if on_grid else positions,
+                row_spacing=row_spacing,
+                notes=(*light_field.notes, f"camera positions from the names; {apart}{where}"),
+            )
     return light_field
 
 

@@ -170,7 +170,9 @@ def _best_reading(source: str, names: Sequence[str]) -> tuple[_Group, Counting |
         group = _Group(source, names, form, decimals_count)
         readings.append((group, counted := counting(group.columns)))
         if counted is not None and counted.kind is Kind.GRID:
-            return readings[-1]
+            row, column = (group.columns[at] for at in counted.columns)
+            if fill(row, column):
+                return readings[-1]
     return next((reading for reading in readings if reading[1] is None or reading[1].columns), readings[0])
 
 

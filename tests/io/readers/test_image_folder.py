@@ -265,6 +265,12 @@ NAMED: dict[str, tuple[list[str], ReadOptions, list[list[int]], str]] = {
         grid_of(3, 2),
         "rows 0.333 steps",
     ),
+    "positions with signs": (
+        by_place("cam_{:+.2f}_{:+.2f}.png", (-0.15, -0.05, 0.05, 0.15), (-0.05, 0.05)),
+        ReadOptions(),
+        grid_of(4, 2),
+        "rows 1 steps apart, on the grid",
+    ),
     "running number and names such as 03.07": (
         [f"{3 * t + s}_{t:02d}.{s:02d}.png" for t, s in itertools.product(range(3), range(3))],
         ReadOptions(),
