@@ -12,7 +12,7 @@ import numpy as np
 from sepi.errors import SepiError, SepiWarning
 from sepi.io.readers.camera_positions import with_row_spacing
 from sepi.io.readers.formats import read
-from sepi.io.readers.options import ReadOptions
+from sepi.io.readers.options import ReadOptions, in_grid
 from sepi.lightfield import DisparityRange, LightField
 
 # 16-bit views darker than this, a sixteenth of the full scale, hold fewer bits or next to no light
@@ -59,7 +59,7 @@ def read_light_field(
     if not light_field.arranged:
         from sepi.inspection.arrangement import arrange
 
-        light_field = arrange(light_field, options)
+        light_field = arrange(light_field, in_grid(options))
     if options.row_spacing is not None:
         light_field = with_row_spacing(light_field, options.row_spacing)
     _require_contrast(path, light_field)

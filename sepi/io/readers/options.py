@@ -127,6 +127,11 @@ def unarranged(options: ReadOptions) -> ReadOptions:
     return replace(options, central=None, order=AS_GIVEN, exclude=names, view=None)
 
 
+def in_grid(options: ReadOptions) -> ReadOptions:
+    """What of the options is left to do when the grid of the views is found: files were excluded before."""
+    return replace(options, exclude=tuple(filter(is_position, options.exclude)))
+
+
 def position_of(numbers: Numbers, number: int) -> tuple[int, int] | None:
     """Where a view of the given grid stands, ``(t, s)``; None where it was left out."""
     positions = np.argwhere(numbers == number)

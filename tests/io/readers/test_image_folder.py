@@ -5,6 +5,7 @@ for doubt are asked about. A view in a wrong place makes the depth nonsense with
 import itertools
 import os
 import time
+import warnings
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
@@ -20,6 +21,8 @@ from sepi.io.readers.formats import format_of, read
 from sepi.io.readers.options import ReadOptions
 from sepi.io.readers.view_names import infer_view_numbers, parse_view_numbers
 from sepi.lightfield import LightField
+from sepi.reading import read_light_field
+from sepi.scenes import render
 
 
 def pixels(place: int) -> np.ndarray:
@@ -571,6 +574,21 @@ def test_any_file_can_be_excluded(tmp_path: Path, name: str) -> None:
     assert places_of(read(folder, ReadOptions(exclude=(name,)))) == places
     with pytest.raises(SepiError, match=r"view 'gone\.png' to exclude: expected a position"):
         read(folder, ReadOptions(exclude=(name, "gone.png")))
+
+
+def test_views_of_a_sequence_can_be_excluded_by_name_and_by_place(tmp_path: Path) -> None:
+    """The name counts before the grid is found, the place in it after."""
+    views = render("curved_occluders", size=64, views=3).views
+    folder = tmp_path / "f"
+    folder.mkdir()
+    for number in range(9):
+        imageio.imwrite(folder / f"{number}.png", views[divmod(number, 3)])
+    options = ReadOptions(exclude=("0.png", "2,2"))
+    with warnings.catch_warnings(action="ignore"):
+        light_field = read_light_field(folder, options=options)
+    assert light_field.arranged
+    assert np.argwhere(~light_field.present).tolist() == [[0, 0], [2, 2]]
+    np.testing.assert_array_equal(light_field.views[light_field.present], views.reshape(9, 64, 64, 3)[1:8])
 
 
 @pytest.mark.parametrize("at", [0, 8])
