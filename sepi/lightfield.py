@@ -95,6 +95,9 @@ class LightField:
         Geometry that turns disparity into metric depth, where it is known.
     notes : tuple of str
         What the reader assumed or left out, for the user.
+    arranged : bool
+        False: the views stand in one row, in their order, and their grid is yet to be found; nothing can be matched
+        before, and the centre of the row may be missing.
 
     Raises
     ------
@@ -115,6 +118,7 @@ class LightField:
     positions: npt.NDArray[np.float64] | None = None
     camera: Camera | None = None
     notes: tuple[str, ...] = ()
+    arranged: bool = True
 
     def __post_init__(self) -> None:
         v = self.views
@@ -144,7 +148,7 @@ class LightField:
                 f"columns from 0 to {v.shape[1] - 1}"
             )
         which = "centre view" if self.reference_position == (v.shape[0] // 2, v.shape[1] // 2) else "view"
-        if not self.present[self.reference_position]:
+        if self.arranged and not self.present[self.reference_position]:
             raise SepiError(
                 f"{self.name}: the {which} (t, s) = {self.reference_position} is missing; depth is made for it"
             )

@@ -10,8 +10,9 @@ from pathlib import Path
 import numpy as np
 
 from sepi.errors import SepiError, SepiWarning
+from sepi.io.readers.camera_positions import with_row_spacing
 from sepi.io.readers.formats import read
-from sepi.io.readers.options import ReadOptions
+from sepi.io.readers.options import ReadOptions, in_grid
 from sepi.lightfield import DisparityRange, LightField
 
 # 16-bit views darker than this, a sixteenth of the full scale, hold fewer bits or next to no light
@@ -37,7 +38,7 @@ def read_light_field(
     file_format : str, optional
         A key of ``sepi.io.readers.formats.FORMATS``; found by looking unless given.
     options : ReadOptions, optional
-        What the files do not say: grid, name pattern, axes, order, views to leave out, reference view.
+        What the files do not say: grid, name pattern, axes, order, views to leave out, reference view, row spacing.
     check_order : bool
         Warn (:class:`SepiWarning`) where another order of the views clearly fits better.
 
@@ -49,12 +50,18 @@ def read_light_field(
     Raises
     ------
     SepiError
-        If nothing is there, the format is unknown, the files are damaged or contradict each other or the options, or
-        there is nothing to match in the views.
+        If nothing is there, the format is unknown, the files are damaged or contradict each other or the options,
+        the grid of the views cannot be told, or there is nothing to match in the views.
     """
     path = Path(path)
     options = options or ReadOptions()
     light_field = read(path, options, file_format)
+    if not light_field.arranged:
+        from sepi.inspection.arrangement import arrange
+
+        light_field = arrange(light_field, in_grid(options))
+    if options.row_spacing is not None:
+        light_field = with_row_spacing(light_field, options.row_spacing)
     _require_contrast(path, light_field)
     if disparity_range is not None:
         light_field = light_field.with_range(DisparityRange(*disparity_range, "given"))

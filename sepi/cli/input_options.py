@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import math
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -32,6 +33,22 @@ class _Pair(click.ParamType[tuple[int, int]]):
         return int(match[1]), int(match[2])
 
 
+class _Positive(click.ParamType[float]):
+    """A number above zero."""
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        try:
+            number = float(value)
+        except ValueError:
+            number = math.nan
+        if not 0 < number < math.inf:
+            self.fail(f"expected a number above 0, got {value!r}", param, ctx)
+        return number
+
+
 @dataclass(frozen=True)
 class Reading:
     """How the flags say to read a light field."""
@@ -51,7 +68,7 @@ _FLAGS = (
         "--format",
         "file_format",
         metavar="FORMAT",
-        help="hci, hci-2013, images, eslf, matlab, numpy or sepi; found by looking unless given.",
+        help="hci, hci-2013, images, eslf, matlab, numpy, openlf or sepi; found by looking unless given.",
     ),
     click.option(
         "--grid", type=_Pair("ROWSxCOLUMNS", "xX×"), metavar="ROWSxCOLUMNS", help="Grid of views in the files."
@@ -68,13 +85,19 @@ _FLAGS = (
     click.option("--central", type=click.IntRange(min=1), metavar="N", help="Use only the N x N views in the middle."),
     click.option("--order", default="as-given", help="Order of the views: a name that 'sepi check' tells."),
     click.option(
-        "--exclude", multiple=True, metavar="VIEW", help="Leave a view out: ROW,COLUMN from 0, or its file; repeatable."
+        "--exclude", multiple=True, metavar="VIEW", help="Leave a view out: ROW,COLUMN from 0, or a file; repeatable."
     ),
     click.option(
         "--view",
         type=_Pair("ROW,COLUMN", ","),
         metavar="ROW,COLUMN",
         help="View whose depth is made; the centre unless given.",
+    ),
+    click.option(
+        "--row-spacing",
+        type=_Positive("F"),
+        metavar="F",
+        help="Distance of rows of views in steps of columns, if they differ.",
     ),
     click.option("--follow-links", is_flag=True, help="Read views that are links out of their folder."),
 )
@@ -91,7 +114,7 @@ def reading_flags(command: Callable[..., Any]) -> Callable[..., Any]:
     def with_reading(*args: Any, file_format: str | None, follow_links: bool, **values: Any) -> Any:
         from sepi.io.readers.options import ReadOptions
 
-        names = ("grid", "pattern", "axes", "variable", "central", "order", "exclude", "view")
+        names = ("grid", "pattern", "axes", "variable", "central", "order", "exclude", "view", "row_spacing")
         options = ReadOptions(**{name: values.pop(name) for name in names}, follow_links=follow_links)
         return command(*args, reading=Reading(file_format, options), **values)
 

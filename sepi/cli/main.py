@@ -13,6 +13,7 @@ import click
 
 from sepi.cli.compare import compare
 from sepi.cli.evaluate import evaluate
+from sepi.cli.info import check, info, range_text, size_text
 from sepi.cli.input_options import Geometry, Reading, camera_flags, reading_flags
 from sepi.cli.results import check_submission, points, submission
 from sepi.command import SepiGroup, progress_bar
@@ -23,15 +24,9 @@ from sepi.validation import require_known
 
 # Modules that are slow to import, such as the stages, are imported in the commands that need them.
 if TYPE_CHECKING:
-    from sepi.lightfield import DisparityRange, LightField
     from sepi.pipeline import Variant
 
 _PATH = click.Path(path_type=Path)
-_RANGE_SOURCES = {
-    "parameters": "from the scene's parameters",
-    "given": "as given",
-    "estimated": "estimated from the views",
-}
 
 
 @click.group(cls=SepiGroup, context_settings={"help_option_names": ["-h", "--help"]})
@@ -134,77 +129,12 @@ def depth(
     if timing:
         with atomic_path(folder / RUNTIME) as temporary:
             temporary.write_text(f"{seconds:.3f}\n", encoding="ascii")
-    click.echo(f"{light_field.name}: {_size(light_field)}")
-    click.echo(f"disparity range: {_range(light_field.require_disparity_range())}{_candidates(history)}")
+    click.echo(f"{light_field.name}: {size_text(light_field)}")
+    click.echo(f"disparity range: {range_text(light_field.require_disparity_range())}{_candidates(history)}")
     unknown = float(maps.mask(UNKNOWN).mean())
     if unknown:
         click.echo(f"unknown: {100 * unknown:.2g} % of the pixels; no view knows anything about them")
     click.echo(f"written to {folder}/: {' '.join(files)}")
-
-
-@main.command(short_help="Show what is known about the light field INPUT.")
-@click.argument("light_field_path", metavar="INPUT", type=_PATH)
-@camera_flags
-@reading_flags
-def info(light_field_path: Path, geometry: Geometry | None, reading: Reading) -> None:
-    """Show what is known about the light field INPUT, with an estimate of its disparity range.
-
-    INPUT is anything that 'sepi depth' reads, with the same flags. Rows and columns of views are counted from 0.
-    """
-    from sepi.inspection.disparity_range import estimate_range
-    from sepi.io.readers.formats import format_of
-
-    known_format = format_of(light_field_path, reading.file_format)
-    light_field = reading.read(light_field_path)
-    t0, s0 = light_field.reference_position
-    missing = [f"{t},{s}" for t, s in zip(*(~light_field.present).nonzero(), strict=True)]
-    own = light_field.disparity_range
-    try:
-        estimated = _range(estimate_range(light_field))
-    except SepiError as error:
-        estimated = str(error)
-    camera = light_field.camera if geometry is None else geometry(shape=light_field.shape)
-    lines = {
-        "name": light_field.name,
-        "format": known_format.name,
-        "views": _size(light_field),
-        "depth made for": f"view {t0},{s0}",
-        "missing views": f"{len(missing)}: {' '.join(missing)}" if missing else "none",
-        "pixels": _depth_of(light_field),
-        "disparity range": "none given; the estimate is used" if own is None else _range(own),
-        "estimated range": estimated,
-        "metric depth": "unknown camera" if camera is None else f"{camera.scale:g} m / (disparity + {camera.offset:g})",
-        "ground truth": "none" if light_field.ground_truth is None else "yes",
-        "masks": ", ".join(light_field.masks) or "none",
-    }
-    for key, value in lines.items():
-        click.echo(f"{key + ':':17}{value}")
-    for note in light_field.notes:
-        click.echo(f"{'note:':17}{note}")
-
-
-@main.command(short_help="Check the order of the views of the light field INPUT.")
-@click.argument("light_field_path", metavar="INPUT", type=_PATH)
-@reading_flags
-@click.pass_context
-def check(context: click.Context, light_field_path: Path, reading: Reading) -> None:
-    """Check whether the views of the light field INPUT are in the order that depth needs.
-
-    Software does not agree on whether rows of views go up or down, columns left or right, or which of the two comes
-    first; in a wrong order depth is inside out or nonsense. The views tell: all eight orders are tried, and the flag
-    is named that sets INPUT right. Exits with 1 where another order clearly fits better.
-    """
-    from sepi.inspection.view_order import check_order
-
-    light_field = reading.read(light_field_path, check_order=False)
-    found = check_order(light_field, reading.options.order)
-    click.echo(f"{light_field.name}: {_size(light_field)}")
-    click.echo("order, and how well the views match in it (matching cost, 0 to 1; less is better):")
-    for order, cost in found.fits.items():
-        click.echo(f"  {order:24}{cost:8.4f}{'  best' if order == found.best and found.clear else ''}")
-    click.echo(found.verdict())
-    if found.warning() is not None:
-        context.exit(1)
 
 
 @main.command(short_help="Write built-in scenes with exact ground truth.")
@@ -240,25 +170,8 @@ def scenes(names: tuple[str, ...], output: Path, size: int, views: int, only_lis
         click.echo(f"written: {output / name}/")
 
 
-for command in (evaluate, compare, points, submission, check_submission):
+for command in (info, check, evaluate, compare, points, submission, check_submission):
     main.add_command(command)
-
-
-def _size(light_field: LightField) -> str:
-    (rows, columns), (height, width) = light_field.grid, light_field.shape
-    present = int(light_field.present.sum())
-    number = "" if present == rows * columns else f", {present} of {rows * columns}"
-    return f"{rows}x{columns} views (rows x columns{number}) of {width}x{height} pixels"
-
-
-def _depth_of(light_field: LightField) -> str:
-    kind = light_field.views.dtype
-    bits = f"{8 * kind.itemsize} bit{' float' if kind.kind == 'f' else ''}"
-    return f"{'RGB' if light_field.views.shape[4] == 3 else 'grey'}, {bits}; values as stored, no gamma applied"
-
-
-def _range(known: DisparityRange) -> str:
-    return f"{known.minimum:g} to {known.maximum:g} pixels per view step ({_RANGE_SOURCES[known.source]})"
 
 
 def _candidates(history: list[Entry]) -> str:

@@ -90,7 +90,7 @@ def read_views(paths: Sequence[Path], positions: Sequence[int] | None = None, co
         if image.shape != first.shape or image.dtype != first.dtype:
             raise SepiError(
                 f"{paths[index]}: {_described(image)}, but {paths[0].name} is {_described(first)}; "
-                "all views must be alike"
+                "all views must be alike; --exclude leaves one out"
             )
         views[positions[index]] = image
 

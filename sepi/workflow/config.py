@@ -53,6 +53,7 @@ class Builtin(_Keys):
 
 _Count = Annotated[int, Field(ge=1)]
 _Index = Annotated[int, Field(ge=0)]
+_Spacing = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 
 
 class OwnLightField(_Keys):
@@ -68,6 +69,7 @@ class OwnLightField(_Keys):
     order: str | None = None
     exclude: list[str] = []
     view: tuple[_Index, _Index] | None = None
+    row_spacing: _Spacing | None = None
     follow_links: bool = False
 
     @property
@@ -76,7 +78,7 @@ class OwnLightField(_Keys):
         pairs = {"grid": "x", "view": ","}
         flags: list[str] = []
         for key, value in self.model_dump(exclude={"path", "exclude", "follow_links"}, exclude_none=True).items():
-            flags += [f"--{key}", pairs[key].join(map(str, value)) if key in pairs else str(value)]
+            flags += [f"--{key.replace('_', '-')}", pairs[key].join(map(str, value)) if key in pairs else str(value)]
         flags += [flag for view in self.exclude for flag in ("--exclude", view)]
         return (*flags, "--follow-links") if self.follow_links else tuple(flags)
 
@@ -116,7 +118,7 @@ class Config(_Keys):
         {},
         description="Dataset 'own': light fields of any format that 'sepi depth' reads, by a name of yours, such as "
         "{lego: {path: /data/lego, grid: [17, 17]}}. Beside path: format, grid, pattern, axes, variable, central, "
-        "order, exclude, view, follow_links, which mean what the flags of 'sepi depth' mean.",
+        "order, exclude, view, row_spacing, follow_links, which mean what the flags of 'sepi depth' mean.",
     )
     external: dict[str, dict[str, Any]] = Field(
         {},

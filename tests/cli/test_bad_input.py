@@ -220,7 +220,7 @@ CASES: dict[str, tuple[Spoil, str, tuple[str, ...]]] = {
     ),
     "running number missing": (
         lambda: pictures("img{n}.png")[5].unlink(),
-        "in",
+        "in --grid 2x3",
         ("in", "--grid"),
     ),
     "centre view missing": (lambda: pictures()[4].unlink(), "in", ("in", "(t, s) = (1, 1) is missing")),
@@ -296,7 +296,7 @@ CASES: dict[str, tuple[Spoil, str, tuple[str, ...]]] = {
     "npy of three axes": (lambda: npy(VIEWS[0, 0]), "in.npy", ("in.npy", "axes")),
     "npy with NaN": (lambda: npy(floats(1, 2, np.nan)), "in.npy", ("in.npy", "1,2", "--exclude")),
     "npy with infinity": (lambda: npy(floats(1, 2, -np.inf)), "in.npy", ("in.npy", "1,2", "--exclude")),
-    "npy of floats 0..255": (lambda: npy(VIEWS.astype(np.float32)), "in.npy", ("in.npy", "0..1")),
+    "npy of floats of 32 bit": (lambda: npy(VIEWS * 1e6), "in.npy", ("in.npy", "0..1")),
     "npy of complex numbers": (lambda: npy(VIEWS.astype(np.complex64)), "in.npy", ("in.npy", "complex64")),
     "axes that are none": (npy, "in.npy --axes ABCDE", ("ABCDE",)),
     "axes twice": (npy, "in.npy --axes TTHWC", ("TTHWC",)),

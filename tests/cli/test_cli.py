@@ -371,6 +371,58 @@ def test_info_says_which_view_of_an_even_grid_is_meant(tmp_path: Path) -> None:
     assert re.search(r"depth made for: +view 1,2\n", call("info", tmp_path / "even.h5", "--view", "1,2").stdout)
 
 
+def test_info_as_json_has_what_its_text_has(pyramids: Path, tmp_path: Path) -> None:
+    """Programs that choose among light fields need numbers, not words."""
+    known = json.loads(call("info", "--json", pyramids, "--row-spacing", 0.5).stdout)
+    assert known["name"] == "pyramids"
+    assert known["format"] == "hci"
+    assert known["grid"] == [3, 3]
+    assert (known["views"], known["height"], known["width"], known["channels"]) == (9, 64, 64, 3)
+    assert (known["dtype"], known["row_spacing"], known["positions"]) == ("uint8", 0.5, None)
+    assert (known["reference_view"], known["missing_views"]) == ([1, 1], [])
+    assert known["disparity_range"]["source"] == "parameters"
+    assert known["disparity_range"]["minimum"] < known["disparity_range"]["maximum"]
+    assert known["camera"].keys() == {"scale_m", "offset"}
+    assert known["ground_truth"] is True
+    assert known["masks"] == ["occluded", "textureless"]
+    present = np.ones((3, 2), bool)
+    present[0, 1] = False
+    views = np.full((3, 2, 8, 9, 1), 7, np.uint16)
+    views[:, :, 4, 4] = 9
+    positions = np.arange(12.0).reshape(3, 2, 2)
+    dark = LightField(views, "dark", present=present, notes=("made up",), positions=positions)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("sepi.reading.read", lambda *_: dark)
+        np.save(tmp_path / "a.npy", views)
+        known = json.loads(call("info", "--json", tmp_path / "a.npy").stdout)
+    assert known["missing_views"] == [[0, 1]]
+    assert known["positions"] == [[[0, 1], None], [[4, 5], [6, 7]], [[8, 9], [10, 11]]]
+    assert known["notes"] == ["made up"]
+    assert (known["disparity_range"], known["estimated_range"], known["camera"]) == (None, None, None)
+    assert "cannot be estimated" in known["estimate_failure"]
+
+
+def test_check_as_json_has_what_its_text_has(tmp_path: Path) -> None:
+    """And ends with the same code, so that a script may ask either."""
+    views = render("curved_occluders", size=96, views=5).views
+    np.save(tmp_path / "views.npy", views[:, ::-1])
+    called = call("check", "--json", tmp_path / "views.npy")
+    assert called.exit_code == 1
+    found = json.loads(called.stdout)
+    assert len(found["costs"]) == 8
+    assert found["best"] == "flip-columns" == min(found["costs"], key=found["costs"].get)
+    assert (found["clear"], found["read_in"], found["grid"]) == (True, "as-given", [5, 5])
+    assert found["warning"] == found["verdict"]
+    right = call("check", "--json", tmp_path / "views.npy", "--order", "flip-columns")
+    assert right.exit_code == 0
+    assert json.loads(right.stdout)["warning"] is None
+
+
+@pytest.mark.parametrize("value", ["0", "-1", "nan", "inf", "wide"])
+def test_a_row_spacing_that_is_none_is_refused(scene: Path, value: str) -> None:
+    assert f"expected a number above 0, got '{value}'" in call("info", scene, "--row-spacing", value).stderr
+
+
 def test_scenes_are_written_and_read_back(tmp_path: Path) -> None:
     words = ("--size", 64, "--views", 3, "-o", tmp_path / "made")
     called = call("scenes", "dots", "stripes", *words)

@@ -312,12 +312,13 @@ class TestOwnLightFields:
             "order": "flip-rows",
             "exclude": ["0,0", "4,4"],
             "view": [2, 3],
+            "row_spacing": 0.5,
             "follow_links": True,
         }
         settings = load_settings({"light_fields": {"lego": entry}, "disparity_range": {"own/lego": [-1, 2]}})
         scene = settings.scene("own", "lego")
-        words = "--format matlab --grid 9x9 --central 5 --order flip-rows --view 2,3 --exclude 0,0 --exclude 4,4"
-        assert scene.flags == (*words.split(), "--follow-links")
+        words = "--format matlab --grid 9x9 --central 5 --order flip-rows --view 2,3 --row-spacing 0.5"
+        assert scene.flags == (*words.split(), "--exclude", "0,0", "--exclude", "4,4", "--follow-links")
         assert scene.files == (tmp_path / "lego.mat",)
         assert scene.disparity_range == (-1, 2)
         assert (scene.views, scene.height, scene.width) == (81, 10, 10)
@@ -343,6 +344,10 @@ class TestOwnLightFields:
                 "a.order: unknown 'flip-row'; did you mean 'flip-rows'",
             ),
             ({"path": "/", "format": "nmupy"}, "config.light_fields.a.format: unknown 'nmupy'; did you mean 'numpy'"),
+            (
+                {"path": "/", "row_spacing": 0.0},
+                "config.light_fields.a.row_spacing: input should be greater than 0",
+            ),
             ({"path": "/", "central": 0}, "config.light_fields.a.central: input should be greater than or equal to 1"),
             (
                 {"path": "/", "view": [-1, 2]},

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,14 +11,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from sepi.errors import SepiError, printable
-from sepi.io.readers.options import Numbers, ReadOptions, arrange_numbers, position_of
-from sepi.lightfield import HIGHEST, LOWEST, BoolMap, LightField
-from sepi.validation import require_known
+from sepi.errors import SepiError
+from sepi.io.readers.camera_positions import reordered
+from sepi.io.readers.options import Numbers, ReadOptions, arrange_numbers, position_of, unarranged
+from sepi.io.readers.scales import Scale, scale_of
+from sepi.lightfield import BoolMap, LightField
 
 Array = npt.NDArray[np.generic]
-Shapes = Mapping[str, tuple[tuple[int, ...], np.dtype[Any]]]
-"""Name of each array in a file to its shape and type."""
 
 # "N" is the number t * S + s of a view
 _LAYOUTS = ("TSHWC", "TSHW", "NHWC")
@@ -36,7 +35,7 @@ def light_field_from_array(array: Array, path: Path, options: ReadOptions, *, ax
     Parameters
     ----------
     array : ndarray of 4 or 5 axes, uint8, uint16, float32 or float64
-        Integers span their whole range, floats 0..1.
+        Integers span their whole range; floats 0..1, or 0 to 255 or 65535 as integers of 8 or 16 bit do.
     path : Path
         Where it comes from: name and source of the light field.
     options : ReadOptions
@@ -48,7 +47,8 @@ def light_field_from_array(array: Array, path: Path, options: ReadOptions, *, ax
     Returns
     -------
     LightField
-        Views uint8, uint16 or float32 at their positions, zero where missing.
+        Views uint8, uint16 or float32 at their positions, zero where missing. Not arranged where the views have one
+        axis and no grid is given.
 
     Raises
     ------
@@ -57,14 +57,18 @@ def light_field_from_array(array: Array, path: Path, options: ReadOptions, *, ax
         that is not excluded holds some values that are not finite.
     """
     source = str(path)
-    kind = _pixel_type(source, array.dtype)
+    _require_pixel_type(source, array.dtype)
     given = axes or options.axes
     letters = _found_axes(source, array.shape, options.grid) if given is None else _checked_axes(source, array, given)
-    stack, laid_out = _as_stack(source, array, letters, options.grid)
+    stack, channel_notes = _as_stack(source, array, letters, options.grid)
+    arranged = "N" not in letters or options.grid is not None
+    if not arranged:
+        options = unarranged(options)
     numbers = arrange_numbers(source, stack.shape[:2], options)
-    views: Array = np.zeros((*numbers.shape, *stack.shape[2:]), kind)
+    scale = scale_of(source, stack, numbers)
+    views: Array = np.zeros((*numbers.shape, *stack.shape[2:]), scale.dtype)
     # those left out are not even looked at
-    unknown = _fill(source, views, stack, numbers)
+    unknown = _fill(views, stack, numbers, scale)
     present: BoolMap = np.any(views, axis=(2, 3, 4))
     black = [(t, s) for t, s in np.argwhere((numbers >= 0) & ~present).tolist() if (t, s) not in unknown]
     if not present.any():
@@ -73,7 +77,7 @@ def light_field_from_array(array: Array, path: Path, options: ReadOptions, *, ax
             present[position] = True
         black = []
     reference = options.view or (numbers.shape[0] // 2, numbers.shape[1] // 2)
-    if reference in [*black, *unknown]:
+    if arranged and reference in [*black, *unknown]:
         raise SepiError(
             f"{source}: view {reference[0]},{reference[1]} is black (all zeros) or NaN, so taken as missing; depth is "
             "made for it, unless --view ROW,COLUMN names another"
@@ -86,7 +90,8 @@ def light_field_from_array(array: Array, path: Path, options: ReadOptions, *, ax
         source=source,
         present=present,
         view=options.view,
-        notes=(*assumed, *laid_out, *missing),
+        notes=(*assumed, *channel_notes, *scale.notes, *missing),
+        arranged=arranged,
     )
 
 
@@ -100,48 +105,26 @@ def rearrange(light_field: LightField, options: ReadOptions) -> LightField:
     views = light_field.views.reshape(T * S, *light_field.views.shape[2:])[numbers]
     present = light_field.present.ravel()[numbers] & (numbers >= 0)
     views[~present] = 0
+    positions, row_spacing = reordered(light_field.positions, light_field.row_spacing, options.order, numbers)
+    view, truth, masks = options.view, None, {}
     position = position_of(numbers, light_field.reference_position[0] * S + light_field.reference_position[1])
     if position is not None and (light_field.view is not None or light_field.ground_truth is not None):
-        return replace(light_field, views=views, present=present, view=position)
-    return replace(light_field, views=views, present=present, view=options.view, ground_truth=None, masks={})
-
-
-def variable_of(path: Path, arrays: Shapes, requested: str | None) -> str:
-    """Name of the array that is the light field, of those in a file.
-
-    Parameters
-    ----------
-    path : Path
-        For messages.
-    arrays : mapping of str to tuple
-        Name of each array to its shape and type.
-    requested : str, optional
-        The user's choice. Without: the only array of numbers of 4 or 5 axes, or ``LF`` among several.
-    """
-    shapes = {name: shape for name, (shape, kind) in arrays.items() if kind.kind in "iuf" or name == requested}
-    if requested is not None:
-        require_known(f"{path}: --variable", [requested], shapes)
-        return requested
-    fitting = [name for name, shape in shapes.items() if len(shape) in (4, 5)]
-    if len(fitting) == 1:
-        return fitting[0]
-    if "LF" in fitting:
-        return "LF"
-    listed = ", ".join(
-        f"{printable(name)} {'x'.join(map(str, shapes[name]))}" for name in list(fitting or shapes)[:_LISTED]
+        view, truth, masks = position, light_field.ground_truth, dict(light_field.masks)
+    return replace(
+        light_field,
+        views=views,
+        present=present,
+        view=view,
+        ground_truth=truth,
+        masks=masks,
+        positions=positions,
+        row_spacing=row_spacing,
     )
-    if fitting:
-        raise SepiError(f"{path}: holds several arrays of 4 or 5 axes; choose one with --variable: {listed}")
-    raise SepiError(f"{path}: holds no array of numbers of 4 or 5 axes (found: {listed or 'nothing'})")
 
 
-def _pixel_type(source: str, kind: np.dtype[Any]) -> np.dtype[Any]:
-    """The type in a light field for values of this type, whatever their byte order."""
-    if kind.kind == "u" and kind.itemsize in (1, 2):
-        return np.dtype(f"u{kind.itemsize}")
-    if kind.kind == "f" and kind.itemsize in (4, 8):
-        return np.dtype(np.float32)
-    raise SepiError(f"{source}: values of type {kind}; expected uint8, uint16, or float32 or float64 within 0..1")
+def _require_pixel_type(source: str, kind: np.dtype[Any]) -> None:
+    if (kind.kind, kind.itemsize) not in (("u", 1), ("u", 2), ("f", 4), ("f", 8)):
+        raise SepiError(f"{source}: values of type {kind}; expected uint8, uint16, or float32 or float64 within 0..1")
 
 
 def _checked_axes(source: str, array: Array, text: str) -> str:
@@ -170,12 +153,11 @@ def _found_axes(source: str, shape: tuple[int, ...], grid: tuple[int, int] | Non
         if shape[3] in (1, 3, 4) and shape[2] > 4:
             if grid is not None and shape[0] == math.prod(grid):
                 return "NHWC"
-            if grid is None and math.isqrt(shape[0]) ** 2 == shape[0]:
+            if grid is None and (not found or math.isqrt(shape[0]) ** 2 == shape[0]):
                 found.append("NHWC")
-            elif not found:
+            elif not found and grid is not None:
                 raise SepiError(
-                    f"{source}: {shape[0]} views of shape {shape[1:]} make no "
-                    f"{'square grid' if grid is None else f'grid of {grid[0]}x{grid[1]}'}; "
+                    f"{source}: {shape[0]} views of shape {shape[1:]} make no grid of {grid[0]}x{grid[1]}; "
                     "say their grid with --grid ROWSxCOLUMNS"
                 )
     else:
@@ -217,9 +199,7 @@ def _as_stack(source: str, array: Array, letters: str, grid: tuple[int, int] | N
         )
     notes = ["4th channel (transparency or weight) left out"] if size["C"] == 4 else []
     if "N" in letters and grid is None:
-        side = math.isqrt(size["N"])
-        notes.append(f"views taken as a grid of {side}x{side}, row by row; --grid sets it otherwise")
-        grid = side, side
+        grid = 1, size["N"]
     elif "N" not in letters and grid not in (None, (size["T"], size["S"])):
         raise SepiError(
             f"{source}: --grid {grid[0]}x{grid[1]}, but the array has {size['T']}x{size['S']} views "
@@ -234,15 +214,15 @@ def _as_stack(source: str, array: Array, letters: str, grid: tuple[int, int] | N
     return views[..., :3], notes
 
 
-def _fill(source: str, views: Array, stack: Array, numbers: Numbers) -> list[tuple[int, int]]:
+def _fill(views: Array, stack: Array, numbers: Numbers, scale: Scale) -> list[tuple[int, int]]:
     """Put the views in their positions; those that are NaN throughout stay zero and are returned."""
     unknown = []
     for t, s in np.argwhere(numbers >= 0).tolist():
         view = stack[divmod(int(numbers[t, s]), stack.shape[1])]
-        if view.dtype.kind == "f" and not _is_known(source, (t, s), view):
+        if view.dtype.kind == "f" and np.isnan(view).all():
             unknown.append((t, s))
         else:
-            views[t, s] = view
+            views[t, s] = view if scale.divisor == 1 else view / scale.divisor
     return unknown
 
 
@@ -250,23 +230,3 @@ def _missing_notes(what: str, positions: Sequence[tuple[int, int]]) -> list[str]
     listed = " ".join(f"{t},{s}" for t, s in positions[:_LISTED])
     more = f" and {len(positions) - _LISTED} more" if len(positions) > _LISTED else ""
     return [f"views that are {what} taken as missing: {listed}{more}"] if positions else []
-
-
-def _is_known(source: str, position: tuple[int, int], view: Array) -> bool:
-    """Whether a view of floats holds values; False for NaN throughout."""
-    where = f"{source}: view {position[0]},{position[1]}"
-    with np.errstate(invalid="ignore"):
-        low, high = float(view.min()), float(view.max())
-    if not (math.isfinite(low) and math.isfinite(high)):
-        if np.isnan(view).all():
-            return False
-        raise SepiError(
-            f"{where} holds values that are not finite (NaN or infinite); mend it, or leave it out with "
-            f"--exclude {position[0]},{position[1]}"
-        )
-    if low < LOWEST or high > HIGHEST:
-        raise SepiError(
-            f"{where} has values from {low:g} to {high:g}; floats are expected within 0..1, so divide them by their "
-            "full scale (255 for 8 bit), or store uint8 or uint16"
-        )
-    return True

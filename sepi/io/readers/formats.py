@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 
 from sepi.errors import SepiError
 from sepi.io.files import naming
 from sepi.io.hdf5 import has_dataset, read_light_field
 from sepi.io.images import SUFFIXES
-from sepi.io.readers import eslf, hci, hci_2013, image_folder, matlab, numpy_files
+from sepi.io.readers import eslf, hci, hci_2013, image_folder, matlab, numpy_files, open_lf
 from sepi.io.readers.arrays import rearrange
 from sepi.io.readers.options import ReadOptions
 from sepi.lightfield import LightField
@@ -41,6 +42,10 @@ class Format:
     options: tuple[str, ...] = ()
 
 
+# light fields that a message names, and levels of folders in which it looks for them
+_LISTED = 5
+_DEPTH = 1
+
 _ARRAY_OPTIONS = ("grid", "axes", "variable")
 
 FORMATS = {
@@ -56,6 +61,8 @@ FORMATS = {
     # before the other kinds of HDF5: MATLAB's is told by its header or ending
     "matlab": Format("MATLAB file", ".mat with an array such as LF", matlab.matches, matlab.read, _ARRAY_OPTIONS),
     "numpy": Format("NumPy file", ".npy or .npz", numpy_files.matches, numpy_files.read, _ARRAY_OPTIONS),
+    # before the other kinds with something called LF
+    "openlf": Format("OpenLF HDF5", "with a group LF", open_lf.matches, open_lf.read),
     "hci-2013": Format("HCI 2013 HDF5", "with LF (T, S, H, W, 3)", hci_2013.matches, hci_2013.read),
     # last, so that it gets what is too damaged to tell
     "sepi": Format(
@@ -91,6 +98,11 @@ def format_of(path: Path, file_format: str | None = None) -> Format:
     for known in FORMATS.values():
         if known.matches(path):
             return known
+    inner = list(islice(_inside(path), _LISTED + 1)) if path.is_dir() and not _is_result(path) else []
+    if inner:
+        found = f", such as {inner[0]}" if len(inner) == 1 else f": {', '.join(map(str, inner[:_LISTED]))}"
+        more = ", ..." if len(inner) > _LISTED else ""
+        raise SepiError(f"{path}: a folder of light fields; give one of them{found}{more}")
     expected = ", ".join(f"{known.name} ({known.description})" for known in FORMATS.values())
     raise SepiError(f"{path}: {_what_else(path)}; expected {expected}")
 
@@ -115,7 +127,8 @@ def read(path: Path, options: ReadOptions, file_format: str | None = None) -> Li
     _require_used(path, known, options)
     with naming(path):
         light_field = known.read(path, options)
-        return light_field if options.view is None else light_field.seen_from(options.view)
+        seen = options.view if light_field.arranged else None
+        return light_field if seen is None else light_field.seen_from(seen)
 
 
 def _require_used(path: Path, known: Format, options: ReadOptions) -> None:
@@ -129,13 +142,28 @@ def _require_used(path: Path, known: Format, options: ReadOptions) -> None:
 
 def _what_else(path: Path) -> str:
     """What a path that is no light field seems to be, for who gave the wrong one of several."""
-    result = path / "result.h5" if path.is_dir() else path
-    if has_dataset(result, "disparity"):
+    if _is_result(path):
         return "holds a disparity map, not a light field"
     if path.is_file():
         picture = path.suffix.lower() in SUFFIXES
         return "a single picture; give the folder of all views" if picture else "not a light field of a known format"
-    inner = next((entry for entry in sorted(path.iterdir()) if any(f.matches(entry) for f in FORMATS.values())), None)
-    if inner is not None:
-        return f"a folder of light fields; give one of them, such as {inner}"
     return "not a light field of a known format"
+
+
+def _is_result(path: Path) -> bool:
+    return has_dataset(path / "result.h5" if path.is_dir() else path, "disparity")
+
+
+def _inside(folder: Path, depth: int = _DEPTH) -> Iterator[Path]:
+    """The light fields in a folder, and in folders of it."""
+    try:
+        entries = sorted(folder.iterdir())
+    except OSError:
+        return
+    for entry in entries:
+        if entry.name.startswith("."):
+            continue
+        if any(known.matches(entry) for known in FORMATS.values()):
+            yield entry
+        elif depth and entry.is_dir() and not entry.is_symlink():
+            yield from _inside(entry, depth - 1)

@@ -50,6 +50,10 @@ def read(path: Path, options: ReadOptions) -> LightField:
         camera, where the file gives them.
     """
     with open_hdf5(path, "file of the first HCI benchmark") as file:
+        if isinstance(file.get(VIEWS), h5py.Group):
+            raise SepiError(
+                f"{path}: '{VIEWS}' is a group, not the array of the first HCI benchmark; see --format openlf"
+            )
         views = read_dataset(path, file[VIEWS])
         shape = views.shape
         if len(shape) != 5 or shape[4] not in (1, 3):

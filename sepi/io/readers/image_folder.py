@@ -1,27 +1,33 @@
-"""Folders with one picture for each view, under any names that count them.
+"""Folders with one picture for each view, under any names that count or sort them.
 
-Names give row and column, ``view_03_07.png``, or number the views through row by row, ``img_034.jpg``.
+Names give row and column, ``view_03_07.png``, or number the views through, ``img_034.jpg``. They may also say where the
+cameras stood, ``out_00_01_-703.002197_468.153625.png``.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from itertools import combinations
 from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
 
 from sepi.errors import SepiError
 from sepi.io.files import reading
 from sepi.io.images import SUFFIXES
-from sepi.io.readers.options import ReadOptions
-from sepi.io.readers.view_files import MAX_VIEWS, read_grid
-from sepi.io.readers.view_names import EXAMPLES, ViewNumbers, infer_view_numbers, parse_view_numbers
+from sepi.io.readers.camera_positions import off_grid, positions_from_cameras
+from sepi.io.readers.folder_layout import Layout, Numbers, widened
+from sepi.io.readers.odd_pictures import odd_pictures
+from sepi.io.readers.options import ReadOptions, is_position, unarranged
+from sepi.io.readers.view_files import read_grid
+from sepi.io.readers.view_names import ViewNumbers, infer_view_numbers, parse_view_numbers, sorted_view_numbers
 from sepi.lightfield import LightField
 
-_POSITIONS_PER_PICTURE = 100
-
-
-_Layout = tuple[tuple[int, int], dict[str, int], list[str]]
-"""The given grid, the number ``t * S + s`` in it of each name, and what was assumed."""
+# steps by which cameras that stand on the grid may seem to miss it: decimals are rounded
+_ON_GRID = 1e-3
 
 
 def matches(path: Path) -> bool:
@@ -40,35 +46,115 @@ def read(path: Path, options: ReadOptions) -> LightField:
     Returns
     -------
     LightField
-        Its notes say how the names were understood.
+        Its notes say how the names were understood. Not arranged where they only number or sort the views and no grid
+        is given.
     """
     if not path.is_dir():
         raise SepiError(f"{path}: not a folder of views")
     with reading(path, "folder of views"):
-        files = _files(path)
-    pictures = [file.name for file in files if file.suffix.lower() in SUFFIXES]
-    if options.pattern is None:
-        named = infer_view_numbers(str(path), pictures)
-    else:
-        named = parse_view_numbers(str(path), [file.name for file in files], options.pattern)
+        files = [file.name for file in _files(path)]
+    excluded = {name for name in options.exclude if name in files and not is_position(name)}
+    considered = [name for name in files if name not in excluded and (options.pattern or _is_picture(name))]
+    named, odd = _views(path, considered, options)
     if len(named.numbers) < 2:
         raise SepiError(f"{path}: only one view, {next(iter(named.numbers))}; depth needs at least two")
     _require_different(path, named)
-    two_numbers = len(next(iter(named.numbers.values()))) == 2
-    grid, positions, notes = (
-        _by_row_and_column(path, named, options) if two_numbers else _by_number(path, named, options)
-    )
-    views = {number: path / name for name, number in positions.items()}
-    pixels, present, _ = read_grid(path, views, grid, options)
-    unmatched = [name for name in named.unmatched if name in pictures]
-    return LightField(
+    for name, why in odd.items():
+        _require_no_place(path, named, name, why, options)
+    layout = widened(path, named, named.numbers, _numbers_of(named, excluded), options)
+    if not layout.arranged:
+        options = unarranged(options)
+    views = {layout.positions[name]: path / name for name in named.numbers}
+    pixels, present, numbers = read_grid(path, views, layout.grid, options)
+    unmatched = [name for name in named.unmatched if _is_picture(name)]
+    light_field = LightField(
         views=pixels,
         name=path.resolve().name,
         source=str(path),
         present=present,
         view=options.view,
-        notes=(*_left_out(unmatched), *notes),
+        notes=(
+            *_left_out(unmatched, "whose name is unlike the views'", "whose names are unlike the views'"),
+            *_left_out(list(odd), *2 * ["of another size than all others"]),
+            *layout.notes,
+        ),
+        arranged=layout.arranged,
     )
+    return _with_positions(light_field, named, layout, numbers) if layout.arranged else light_field
+
+
+def _views(folder: Path, names: Sequence[str], options: ReadOptions) -> tuple[ViewNumbers, dict[str, str]]:
+    """What the names of the views say, and the pictures that are set apart for their size, with what is odd about them.
+
+    They are set apart first: the name of a thumbnail may differ in a number that all views share.
+    """
+    odd = _odd(folder, filter(_is_picture, names))
+    named = _named(folder, [name for name in names if name not in odd], options)
+    if not odd:
+        # among pictures of other names, such as small copies of all views, none may stand out
+        odd = _odd(folder, named.numbers)
+        if odd:
+            named = _named(folder, [name for name in names if name not in odd], options)
+    return named, odd
+
+
+def _odd(folder: Path, names: Iterable[str]) -> dict[str, str]:
+    return {path.name: why for path, why in odd_pictures([folder / name for name in names]).items()}
+
+
+def _named(folder: Path, names: Sequence[str], options: ReadOptions) -> ViewNumbers:
+    if options.pattern is not None:
+        return parse_view_numbers(str(folder), names, options.pattern)
+    try:
+        return infer_view_numbers(str(folder), names)
+    except SepiError:
+        # a grid that is given and filled needs no more than an order
+        if options.grid is None or math.prod(options.grid) != len(names):
+            raise
+        return sorted_view_numbers(names)
+
+
+def _is_picture(name: str) -> bool:
+    return Path(name).suffix.lower() in SUFFIXES
+
+
+def _numbers_of(named: ViewNumbers, names: Iterable[str]) -> Numbers:
+    """Numbers of names that are like those of the views."""
+    return {name: numbers for name in sorted(names) if (numbers := named.numbers_of(name)) is not None}
+
+
+def _require_no_place(folder: Path, named: ViewNumbers, name: str, why: str, options: ReadOptions) -> None:
+    """Raise where a picture that is unlike the views is needed as one."""
+    if name in widened(folder, named, named.numbers, _numbers_of(named, [name]), options).positions:
+        raise SepiError(
+            f"{folder / name}: {why}; all views must be alike, so replace it, or leave it out with --exclude {name}"
+        )
+
+
+def _with_positions(
+    light_field: LightField, named: ViewNumbers, layout: Layout, numbers: npt.NDArray[np.int64]
+) -> LightField:
+    """The light field with the positions of its cameras where two decimal numbers of the names fit its grid."""
+    at = {position: named.decimals.get(name, ()) for name, position in layout.positions.items()}
+    count = min(map(len, at.values()))
+    given = np.full((layout.grid[0] * layout.grid[1], count), np.nan)
+    for position, decimals in at.items():
+        given[position] = decimals
+    for pair in combinations(range(count), 2):
+        found = positions_from_cameras(given[numbers][..., pair], light_field.present)
+        if found is not None:
+            positions, row_spacing = found
+            strays = off_grid(positions, row_spacing, light_field.present)
+            on_grid = strays < _ON_GRID
+            apart = f"rows {row_spacing:.3g} steps apart, " if min(numbers.shape) > 1 else ""
+            where = "on the grid" if on_grid else f"off the grid by up to {strays:.2g} steps"
+            return replace(
+                light_field,
+                positions=None if on_grid else positions,
+                row_spacing=row_spacing,
+                notes=(*light_field.notes, f"camera positions from the names; {apart}{where}"),
+            )
+    return light_field
 
 
 def _files(folder: Path) -> list[Path]:
@@ -80,13 +166,11 @@ def _files(folder: Path) -> list[Path]:
     )
 
 
-def _left_out(names: Sequence[str]) -> list[str]:
+def _left_out(names: Sequence[str], singular: str, plural: str) -> list[str]:
     if not names:
         return []
-    pictures = "1 picture whose name is" if len(names) == 1 else f"{len(names)} pictures whose names are"
-    left = "was" if len(names) == 1 else "were"
-    more = ", ..." if len(names) > 3 else ""
-    return [f"{pictures} unlike the views' {left} left out: {', '.join(names[:3])}{more}"]
+    pictures = f"1 picture {singular} was" if len(names) == 1 else f"{len(names)} pictures {plural} were"
+    return [f"{pictures} left out: {', '.join(names[:3])}{', ...' if len(names) > 3 else ''}"]
 
 
 def _require_different(path: Path, named: ViewNumbers) -> None:
@@ -96,105 +180,3 @@ def _require_different(path: Path, named: ViewNumbers) -> None:
             where = ", ".join(map(str, numbers))
             raise SepiError(f"{path / name}: view {where} is given twice, also as {seen[numbers]}")
         seen[numbers] = name
-
-
-def _by_row_and_column(path: Path, named: ViewNumbers, options: ReadOptions) -> _Layout:
-    rows, columns = zip(*named.numbers.values(), strict=True)
-    base = min(rows), min(columns)
-    step = math.gcd(*(row - base[0] for row in rows), *(column - base[1] for column in columns))
-    spread = max(rows) - base[0], max(columns) - base[1]
-    if options.grid is not None:
-        grid = options.grid
-        # views that are missing, if the grid has a position for them
-        step = 1 if spread[0] < grid[0] and spread[1] < grid[1] else step
-    else:
-        grid = spread[0] // step + 1, spread[1] // step + 1
-        _require_plausible(path, grid, named)
-    if spread[0] // step >= grid[0] or spread[1] // step >= grid[1]:
-        raise SepiError(
-            f"{path}: the names have rows {base[0]} to {max(rows)} and columns {base[1]} to {max(columns)}, which the "
-            f"{grid[0]}x{grid[1]} grid that --grid gives does not hold"
-        )
-    first = next(iter(named.numbers))
-    notes = []
-    if options.pattern is None:
-        notes = [f"names are taken for row and column, in that order ({first}); --order transpose if the other way"]
-    if base[0] not in (0, 1) or base[1] not in (0, 1):
-        notes.append(f"the names count rows from {base[0]}, columns from {base[1]}")
-    notes += _step_notes(step)
-    positions = {
-        name: (row - base[0]) // step * grid[1] + (column - base[1]) // step
-        for name, (row, column) in named.numbers.items()
-    }
-    return grid, positions, notes
-
-
-def _by_number(path: Path, named: ViewNumbers, options: ReadOptions) -> _Layout:
-    numbers = {name: number for name, (number,) in named.numbers.items()}
-    lowest, highest = min(numbers.values()), max(numbers.values())
-    step = math.gcd(*(number - lowest for number in numbers.values()))
-    if options.grid is None:
-        base = lowest
-        grid, note = _inferred_grid(path, named, [(number - base) // step for number in numbers.values()])
-    else:
-        grid, note = options.grid, ""
-        count = grid[0] * grid[1]
-        base = _base(lowest, highest, count)
-        # numbers that are missing, if the grid has a position for them
-        step = 1 if highest - base < count else step
-        if (highest - base) // step >= count:
-            name = max(numbers, key=lambda name: numbers[name])
-            raise SepiError(
-                f"{path / name}: beyond the {count} views of the {grid[0]}x{grid[1]} grid that --grid gives, numbered "
-                f"from {base}"
-            )
-    notes = [note or f"views are numbered {lowest} to {highest}, taken row by row; --order transpose if by columns"]
-    if base not in (0, 1):
-        notes.append(f"the names count views from {base}")
-    notes += _step_notes(step)
-    return grid, {name: (number - base) // step for name, number in numbers.items()}, notes
-
-
-def _base(lowest: int, highest: int, count: int) -> int:
-    """The number of the first position: 0 or 1 where only that lets the numbers end with the grid."""
-    if lowest > 1 and highest in (count - 1, count):
-        return highest - count + 1
-    return lowest
-
-
-def _inferred_grid(path: Path, named: ViewNumbers, positions: Sequence[int]) -> tuple[tuple[int, int], str]:
-    """The grid that the views fill, and what was assumed."""
-    count = len(positions)
-    numbers = [number for (number,) in named.numbers.values()]
-    span = f"{min(numbers)} to {max(numbers)}"
-    if max(positions) + 1 != count:
-        raise SepiError(
-            f"{path}: {count} pictures numbered {span}, so numbers are missing; give --grid ROWSxCOLUMNS of the whole "
-            f"grid, or --pattern, such as {EXAMPLES}, if another number counts them"
-        )
-    side = math.isqrt(count)
-    square = side**2 == count
-    line = (1, count) if named.line == "row" else (count, 1)
-    if square and not (named.line and named.line_likely):
-        return (side, side), f"views are numbered {span}, taken for a {side}x{side} grid row by row"
-    if square:
-        raise SepiError(
-            f"{path}: the names ({next(iter(named.numbers))}) may be those of a single {named.line} of {count} views "
-            f"or of a {side}x{side} grid; give --grid {line[0]}x{line[1]} or --grid {side}x{side}"
-        )
-    if named.line:
-        return line, f"the names all have one {named.line}: taken for a single {named.line} of {count} views"
-    raise SepiError(f"{path}: {count} views numbered {span} are no square grid; give --grid ROWSxCOLUMNS")
-
-
-def _require_plausible(path: Path, grid: tuple[int, int], named: ViewNumbers) -> None:
-    positions, pictures = grid[0] * grid[1], len(named.numbers)
-    if positions > min(MAX_VIEWS, _POSITIONS_PER_PICTURE * pictures):
-        raise SepiError(
-            f"{path}: the names ({next(iter(named.numbers))}) give a grid of {grid[0]}x{grid[1]} positions for "
-            f"{pictures} pictures; say which numbers are row and column with --pattern, such as {EXAMPLES}"
-        )
-
-
-def _step_notes(step: int) -> list[str]:
-    return [f"the numbers go up in steps of {step}, taken for neighbouring views"] if step > 1 else []

@@ -29,7 +29,8 @@ import numpy as np
 from sepi.errors import SepiError
 from sepi.io.files import reading
 from sepi.io.hdf5 import open_hdf5, read_dataset
-from sepi.io.readers.arrays import Array, Shapes, light_field_from_array, variable_of
+from sepi.io.readers.arrays import Array
+from sepi.io.readers.named_arrays import Shapes, light_field_from_arrays
 from sepi.io.readers.options import ReadOptions
 from sepi.lightfield import LightField
 
@@ -65,14 +66,17 @@ def matches(path: Path) -> bool:
 
 
 def read(path: Path, options: ReadOptions) -> LightField:
-    """Read the array ``options.variable`` of a MATLAB file; without it, the only one that can be a light field."""
+    """Read the array ``options.variable`` of a MATLAB file; without it, what can be a light field."""
     shapes = array_shapes(path)
-    name = variable_of(path, shapes, options.variable)
-    array = _read_7_3(path, name) if h5py.is_hdf5(path) else _read_5(path, name, shapes[name][1])
-    # the axes that MATLAB dropped
-    while array.ndim < len(options.axes or "") <= 5:
-        array = array[..., None]
-    return light_field_from_array(array, path, options)
+
+    def load(name: str) -> Array:
+        array = _read_7_3(path, name) if h5py.is_hdf5(path) else _read_5(path, name, shapes[name][1])
+        # the axes that MATLAB dropped
+        while array.ndim < len(options.axes or "") <= 5:
+            array = array[..., None]
+        return array
+
+    return light_field_from_arrays(path, shapes, options, load)
 
 
 def array_shapes(path: Path) -> Shapes:

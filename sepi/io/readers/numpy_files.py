@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import warnings
 import zipfile
 from pathlib import Path
@@ -12,7 +13,8 @@ from numpy.lib import format as npy
 from sepi.errors import SepiError, printable
 from sepi.io.files import reading
 from sepi.io.hdf5 import DEFLATE_RATIO
-from sepi.io.readers.arrays import Array, Shapes, light_field_from_array, variable_of
+from sepi.io.readers.arrays import Array, light_field_from_array
+from sepi.io.readers.named_arrays import Shapes, light_field_from_arrays
 from sepi.io.readers.options import ReadOptions
 from sepi.lightfield import LightField
 
@@ -33,11 +35,11 @@ def matches(path: Path) -> bool:
 
 
 def read(path: Path, options: ReadOptions) -> LightField:
-    """Read the array of a NumPy file; of an archive, ``options.variable`` or the only one that can be a light field."""
-    zipped = _is_zipped(path)
-    if zipped or options.variable is not None:
-        name = variable_of(path, array_shapes(path), options.variable)
-    return light_field_from_array(_read_member(path, name) if zipped else read_array(path), path, options)
+    """Read the array of a NumPy file; of an archive, ``options.variable`` or what can be a light field."""
+    if not _is_zipped(path) and options.variable is None:
+        return light_field_from_array(read_array(path), path, options)
+    load = functools.partial(_read_member, path) if _is_zipped(path) else lambda _: read_array(path)
+    return light_field_from_arrays(path, array_shapes(path), options, load)
 
 
 def read_array(path: Path) -> Array:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -92,7 +92,7 @@ def arrange_numbers(
         Rows and columns ``(T, S)`` of the given grid.
     options : ReadOptions
     names : mapping of str to int, optional
-        Number ``t * S + s`` of each file, so that views can be excluded by name.
+        Number ``t * S + s`` of each file, so that views can be excluded by name; -1 for files that are no views.
 
     Returns
     -------
@@ -114,6 +114,22 @@ def arrange_numbers(
         _require_inside(source, numbers, options.view)
     excluded = [_excluded(source, view, numbers, names or {}) for view in options.exclude]
     return np.where(np.isin(numbers, excluded), -1, numbers)
+
+
+def is_position(view: str) -> bool:
+    """Whether a view to exclude is named by its position."""
+    return _POSITION.fullmatch(view) is not None
+
+
+def unarranged(options: ReadOptions) -> ReadOptions:
+    """What of the options means something before the grid of the views is known."""
+    names = tuple(view for view in options.exclude if not is_position(view))
+    return replace(options, central=None, order=AS_GIVEN, exclude=names, view=None)
+
+
+def in_grid(options: ReadOptions) -> ReadOptions:
+    """What of the options is left to do when the grid of the views is found: files were excluded before."""
+    return replace(options, exclude=tuple(filter(is_position, options.exclude)))
 
 
 def position_of(numbers: Numbers, number: int) -> tuple[int, int] | None:

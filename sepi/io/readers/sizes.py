@@ -12,7 +12,7 @@ import h5py
 from sepi.errors import SepiError
 from sepi.io.hdf5 import DEFLATE_RATIO, open_hdf5
 from sepi.io.images import SUFFIXES, picture_header
-from sepi.io.readers import eslf, matlab, numpy_files
+from sepi.io.readers import eslf, matlab, numpy_files, open_lf
 
 # what is taken where no header tells: a view of the benchmark
 _USUAL_SIDE = 512
@@ -89,6 +89,8 @@ def _arrays(path: Path) -> list[tuple[tuple[int, ...], int]]:
             arrays = list(numpy_files.array_shapes(path).values())
         elif matlab.matches(path):
             arrays = list(matlab.array_shapes(path).values())
+        elif open_lf.matches(path):
+            arrays = [open_lf.views_shape(path)]
         else:
             with open_hdf5(path) as file:
                 entries = (entry for entry in map(file.get, file) if isinstance(entry, h5py.Dataset))

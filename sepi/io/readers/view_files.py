@@ -47,7 +47,9 @@ def read_grid(
     """
     if grid[0] * grid[1] > MAX_VIEWS:
         raise SepiError(f"{folder}: a grid of {grid[0]}x{grid[1]} views; expected at most {MAX_VIEWS} views")
-    numbers = arrange_numbers(str(folder), grid, options, {path.name: number for number, path in files.items()})
+    # what is no view may be excluded, too
+    names = {path.name: -1 for path in folder.iterdir()} | {path.name: number for number, path in files.items()}
+    numbers = arrange_numbers(str(folder), grid, options, names)
     present = np.isin(numbers, list(files))
     positions = np.flatnonzero(present)
     paths = [files[int(number)] for number in numbers.ravel()[positions]]

@@ -2,24 +2,39 @@
 
 from __future__ import annotations
 
+import functools
 import re
 from collections import defaultdict
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
-from itertools import pairwise
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import combinations, pairwise, takewhile
 
 from sepi.errors import SepiError
+from sepi.io.readers.view_counts import Counting, Kind, Values, counting, fill, is_count, origin
 
 EXAMPLES = "'view_{row}_{column}.png' or 'img{number}.jpg'"
 
 _FIELDS = ("row", "column", "number")
 _MAX_DIGITS = 18
-_SMALL = 100
+# decimals of a decimal number that counts views
+_FINE = 6
+_FINEST = 10**_FINE
+# part of the largest group of names from which on another group is as likely the views
+_RIVAL = 0.5
+# part of a grid that a suggested pattern must fill
+_WELL_FILLED = 0.5
+# in place of a decimal number; no name has it
+_MARK = "/"
 
-# a minus sign is one only after what separates words; after a letter or a digit it is a hyphen
-_SIGN = r"(?:(?<![^_ ,(\[=])-)?"
-_DECIMAL = rf"(?P<decimal>(?<![0-9.]){_SIGN}[0-9]++\.[0-9]++(?![0-9.]))|"
-_INTEGER = rf"(?P<integer>{_SIGN}[0-9]++)"
+_DECIMAL = r"(?P<decimal>[+-]*+(?<![0-9.])[0-9]++\.[0-9]++(?![0-9.]))|"
+_INTEGER = r"(?P<integer>[+-]*+[0-9]++)"
+# ways to find the numbers, and whether decimals may count: camera positions beside numbers that count, names such as
+# 03.07.png, and names with nothing but positions such as 0.5_1.0.png
+_FORMS = (
+    (re.compile(_DECIMAL + _INTEGER), False),
+    (re.compile(_INTEGER), False),
+    (re.compile(_DECIMAL + _INTEGER), True),
+)
 
 
 @dataclass(frozen=True)
@@ -29,29 +44,25 @@ class ViewNumbers:
     Attributes
     ----------
     numbers : dict of str to tuple of int
-        Name to ``(row, column)``, or to ``(number,)`` where views are numbered through.
+        Name to ``(row, column)``, or to ``(number,)`` where views are numbered through or only sorted.
+    numbers_of : callable
+        The same numbers of any other name that is like those of the views; None for other names.
     unmatched : tuple of str
         Names that were left out.
-    line : {"row", "column"} or None
-        For views numbered through: whether the one number that all names share stands where the number of the row or
-        of the column would, so that the views may be a single one.
-    line_likely : bool
-        Whether that number is written in the same way as the views' numbers.
+    kind : Kind
+        What the numbers are.
+    decimals : dict of str to tuple of float
+        Name to the decimal numbers in it.
+    pattern : str
+        Where the names hold other numbers that differ and count nothing: which of them are taken.
     """
 
     numbers: dict[str, tuple[int, ...]]
+    numbers_of: Callable[[str], tuple[int, ...] | None]
     unmatched: tuple[str, ...] = ()
-    line: str | None = None
-    line_likely: bool = False
-
-
-@dataclass(frozen=True)
-class _Name:
-    """A name cut into the text between its numbers and the numbers' texts."""
-
-    name: str
-    texts: tuple[str, ...]
-    numbers: tuple[str, ...]
+    kind: Kind = Kind.COUNT
+    decimals: dict[str, tuple[float, ...]] = field(default_factory=dict)
+    pattern: str = ""
 
 
 def parse_view_numbers(source: str, names: Iterable[str], pattern: str) -> ViewNumbers:
@@ -72,15 +83,28 @@ def parse_view_numbers(source: str, names: Iterable[str], pattern: str) -> ViewN
     if not matches:
         found = f"; found: {', '.join(names[:3])}{', ...' if len(names) > 3 else ''}" if names else ""
         raise SepiError(f"{source}: no file has a name like '{pattern}'{found}")
-    columns = [_values([match[field] for match in matches.values()]) for field in fields]
+    # where all have a minus sign it only separates
+    hyphens = [all(match[field].startswith("-") for match in matches.values()) for field in fields]
+
+    def numbers_of(name: str) -> tuple[int, ...] | None:
+        match = form.fullmatch(name)
+        if match is None:
+            return None
+        return tuple(
+            abs(int(match[field])) if hyphen else int(match[field])
+            for field, hyphen in zip(fields, hyphens, strict=True)
+        )
+
     return ViewNumbers(
-        dict(zip(matches, zip(*columns, strict=True), strict=True)),
+        {name: numbers for name in matches if (numbers := numbers_of(name)) is not None},
+        numbers_of,
         tuple(name for name in names if name not in matches),
+        Kind.GRID if len(fields) == 2 else Kind.COUNT,
     )
 
 
 def infer_view_numbers(source: str, names: Iterable[str]) -> ViewNumbers:
-    """Numbers that differ from name to name, among names that are alike but for their numbers.
+    """Numbers that count the views, among names that are alike but for their numbers.
 
     Decimal numbers, such as a camera's position, do not count the views.
 
@@ -96,109 +120,221 @@ def infer_view_numbers(source: str, names: Iterable[str]) -> ViewNumbers:
         If the names do not tell which of them are views or which of their numbers count them.
     """
     names = sorted(names)
-    for form in (_DECIMAL + _INTEGER, _INTEGER):  # without decimals: names such as 03.07.png
-        group = _largest_group(source, [_cut(name, re.compile(form)) for name in names])
-        varying = _varying(group)
-        if varying:
-            break
-    else:
+    group, counted = _best_reading(source, names)
+    if counted is None:
+        raise SepiError(
+            f"{source}: several numbers differ from name to name ({group.names[0]}), and no two of them alone fill a "
+            f"grid; give --pattern, such as {group.suggestion()}"
+        )
+    if not counted.columns:
         raise SepiError(
             f"{source}: no number in the names counts the views ({', '.join(names[:3])}); give --pattern, such as "
             f"{EXAMPLES}"
         )
-    if len(varying) > 2:
-        raise SepiError(
-            f"{source}: {len(varying)} numbers differ from name to name ({group[0].name}); give --pattern, such as "
-            f"'{_suggested(group[0], varying)}'"
-        )
-    kept = {view.name for view in group}
-    columns = [_values([view.numbers[at] for view in group]) for at in varying]
-    line, line_likely = _line(group, varying[0]) if len(varying) == 1 else (None, False)
+    numbers = {name: group.numbers_of(name, counted.columns) or () for name in group.names}
+    numbers_of: Callable[[str], tuple[int, ...] | None] = functools.partial(group.numbers_of, columns=counted.columns)
+    if counted.kind is Kind.SORT:
+        ranks = {key: rank for rank, key in enumerate(sorted(set(numbers.values())))}
+        numbers = {name: (ranks[key],) for name, key in numbers.items()}
+        # of names that only sort, no other has a place among the views
+        numbers_of = _no_numbers
+    kept = set(group.names)
     return ViewNumbers(
-        dict(zip([view.name for view in group], zip(*columns, strict=True), strict=True)),
+        numbers,
+        numbers_of,
         tuple(name for name in names if name not in kept),
-        line,
-        line_likely,
+        counted.kind,
+        {name: group.decimals_of(name) for name in group.names},
+        group.pattern(counted.columns) if counted.kind is not Kind.SORT and group.varies_beside(counted) else "",
     )
 
 
-def _cut(name: str, form: re.Pattern[str]) -> _Name:
-    stem, dot, suffix = name.rpartition(".")
-    if not dot:
-        stem, suffix = name, ""
-    texts, numbers, at = [""], [], 0
-    for match in form.finditer(stem):
-        texts[-1] += stem[at : match.start()]
-        at = match.end()
-        if match.lastgroup == "decimal" or len(match[0]) > _MAX_DIGITS:
-            # a mark that no name has, so that names with other decimals are alike
-            texts[-1] += "/" if match.lastgroup == "decimal" else match[0]
-        else:
-            numbers.append(match[0])
-            texts.append("")
-    texts[-1] += stem[at:]
-    return _Name(name, (*texts, suffix.lower()), tuple(numbers))
+def sorted_view_numbers(names: Iterable[str]) -> ViewNumbers:
+    """All names in their natural order, ``img9`` before ``img10``."""
+
+    def key(name: str) -> tuple[list[tuple[int, str]], str]:
+        parts = re.split(r"([0-9]+)", name)
+        return [(int(part), "") if at % 2 else (0, part) for at, part in enumerate(parts)], name
+
+    return ViewNumbers({name: (rank,) for rank, name in enumerate(sorted(names, key=key))}, _no_numbers, kind=Kind.SORT)
 
 
-def _largest_group(source: str, names: Sequence[_Name]) -> list[_Name]:
-    """The largest group of names of the same texts."""
-    groups: dict[tuple[str, ...], list[_Name]] = defaultdict(list)
-    for name in names:
-        if name.numbers or "/" in "".join(name.texts):
-            groups[name.texts].append(name)
+def _no_numbers(_: str) -> None:
+    return None
+
+
+def _best_reading(source: str, names: Sequence[str]) -> tuple[_Group, Counting | None]:
+    """The names cut in the way that gives a grid; else in the first that gives any count."""
+    readings = []
+    for form, decimals_count in _FORMS:
+        group = _Group(source, names, form, decimals_count)
+        readings.append((group, counted := counting(group.columns)))
+        if counted is not None and counted.kind is Kind.GRID:
+            row, column = (group.columns[at] for at in counted.columns)
+            if fill(row, column):
+                return readings[-1]
+    return next((reading for reading in readings if reading[1] is None or reading[1].columns), readings[0])
+
+
+class _Group:
+    """The largest group of names that are alike but for their numbers.
+
+    Parameters
+    ----------
+    source : str
+        For messages.
+    names : sequence of str
+    form : pattern
+        Of the numbers.
+    decimals_count : bool
+        Whether decimal numbers may count views.
+    """
+
+    def __init__(self, source: str, names: Sequence[str], form: re.Pattern[str], decimals_count: bool) -> None:
+        self._form, self._decimals_count = form, decimals_count
+        cut = {name: self._cut(name) for name in names}
+        groups: dict[tuple[str, ...], list[str]] = defaultdict(list)
+        for name in names:
+            if cut[name].numbers or cut[name].decimals:
+                groups[cut[name].texts].append(name)
+        self.names = _largest(source, groups)
+        self._texts = cut[self.names[0]].texts
+        cuts = [cut[name] for name in self.names]
+        self._hyphens = _separators([[signs for signs, _ in name.numbers] for name in cuts])
+        self._decimal_hyphens = _separators([[signs for signs, _ in name.decimals] for name in cuts])
+        everything = range(len(cuts[0].numbers))
+        # decimals that count do so in steps of their own
+        self._origins = [(0, 1) for _ in everything]
+        read = [self.numbers_of(name, everything) or () for name in self.names]
+        counts = list(zip(*read, strict=True))
+        if decimals_count:
+            self._origins = [origin(values) for values in counts]
+            read = [self.numbers_of(name, everything) or () for name in self.names]
+        self.columns: list[Values] = list(zip(*read, strict=True))
+
+    def numbers_of(self, name: str, columns: Sequence[int]) -> tuple[int, ...] | None:
+        """Some of the numbers of a name; None where it is unlike those of the group."""
+        cut = self._cut(name)
+        if cut.texts != self._texts:
+            return None
+        values = (_signed(*cut.numbers[at], self._hyphens[at]) for at in columns)
+        return tuple(
+            (value - self._origins[at][0]) // self._origins[at][1] for value, at in zip(values, columns, strict=True)
+        )
+
+    def decimals_of(self, name: str) -> tuple[float, ...]:
+        """The decimal numbers of one of the group's names."""
+        decimals = zip(self._cut(name).decimals, self._decimal_hyphens, strict=True)
+        return tuple(-float(text) if _is_minus(signs, hyphen) else float(text) for (signs, text), hyphen in decimals)
+
+    def varies_beside(self, counted: Counting) -> bool:
+        """Whether other numbers differ, too."""
+        known = {self.columns[at] for at in counted.columns}
+        return any(len(set(values)) > 1 and values not in known for values in self.columns)
+
+    def pattern(self, columns: Sequence[int], fixed: bool = False) -> str:
+        """The pattern that takes these numbers; others that differ are free, or ``fixed`` as in the first name."""
+        words = ("{row}", "{column}") if len(columns) == 2 else ("{number}",)
+        fields = dict(zip(columns, words, strict=True))
+        parts = []
+        for at, (signs, text) in enumerate(self._cut(self.names[0]).numbers):
+            free = not fixed and len(set(self.columns[at])) > 1
+            parts.append(self._hyphens[at] + fields[at] if at in fields else "*" if free else signs + text)
+            parts.append(self._texts[at + 1])
+        ending = self.names[0].rpartition(".")[2] if self._texts[-1] else ""
+        return (self._texts[0] + "".join(parts) + ("." + ending if ending else "")).replace(_MARK, "*")
+
+    def suggestion(self) -> str:
+        """A pattern that can be followed, in quotes; examples where there is none."""
+        numbers = range(len(self.columns))
+        pairs = sorted(combinations(numbers, 2), key=lambda pair: (-pair[1], -pair[0]))
+        for fixed in (False, True):
+            for columns in (*pairs, *((at,) for at in numbers)):
+                pattern = self.pattern(columns, fixed)
+                if _works(pattern, self.names):
+                    return f"'{pattern}'"
+        return EXAMPLES
+
+    def _cut(self, name: str) -> _Cut:
+        stem, dot, suffix = name.rpartition(".")
+        if not dot:
+            stem, suffix = name, ""
+        texts, numbers, decimals, at = [""], [], [], 0
+        for match in self._form.finditer(stem):
+            text = match[0].lstrip("+-")
+            signs = match[0][: -len(text)]
+            texts[-1] += stem[at : match.start()]
+            at = match.end()
+            if match.lastgroup == "decimal":
+                decimals.append((signs, text))
+            if match.lastgroup == "decimal" and not self._decimals_count:
+                # names with other decimals are alike
+                texts[-1] += _MARK
+            elif len(text) > _MAX_DIGITS:
+                texts[-1] += match[0]
+            else:
+                numbers.append((signs, text))
+                texts.append("")
+        texts[-1] += stem[at:]
+        return _Cut((*texts, suffix.lower()), tuple(numbers), tuple(decimals))
+
+
+@dataclass(frozen=True)
+class _Cut:
+    """A name cut into the text between its numbers and, each with what stands before it of + and -, its numbers."""
+
+    texts: tuple[str, ...]
+    numbers: tuple[tuple[str, str], ...]
+    decimals: tuple[tuple[str, str], ...]
+
+
+def _largest(source: str, groups: Mapping[tuple[str, ...], list[str]]) -> list[str]:
     ranked = sorted(groups.values(), key=len, reverse=True)
     if not ranked:
         raise SepiError(f"{source}: no picture's name has a number; expected names such as {EXAMPLES}")
-    if len(ranked) > 1 and len(ranked[0]) == len(ranked[1]):
+    # one stray picture is none of two views; of more, half as many may be the views of something else
+    if len(ranked) > 1 and len(ranked[1]) >= min(len(ranked[0]), max(2, _RIVAL * len(ranked[0]))):
         raise SepiError(
-            f"{source}: as many pictures are named like {ranked[0][0].name} as like {ranked[1][0].name}; say which are "
-            f"the views with --pattern, such as {EXAMPLES}"
+            f"{source}: about as many pictures are named like {ranked[0][0]} as like {ranked[1][0]} ({len(ranked[0])} "
+            f"and {len(ranked[1])}); say which are the views with --pattern, such as {EXAMPLES}"
         )
     return ranked[0]
 
 
-def _varying(group: Sequence[_Name]) -> list[int]:
-    """Which numbers differ from name to name, leaving out those that repeat another."""
-    columns: dict[tuple[int, ...], int] = {}
-    for at in range(len(group[0].numbers)):
-        values = tuple(int(view.numbers[at]) for view in group)
-        if len(set(values)) > 1:
-            columns.setdefault(values, at)
-    return sorted(columns.values())
+def _separators(signs: Sequence[Sequence[str]]) -> list[str]:
+    """Of the signs before each number, those that all names have: hyphens, where no sign is a plus."""
+    columns = [list(column) for column in zip(*signs, strict=True)]
+    signed = any("+" in sign for column in columns for sign in column)
+    return [_common_start([sign[:-1] for sign in column] if signed else column) for column in columns]
 
 
-def _values(texts: Sequence[str]) -> list[int]:
-    """The numbers; where all have a minus sign it only separates."""
-    hyphens = all(text.startswith("-") for text in texts)
-    return [abs(int(text)) if hyphens else int(text) for text in texts]
+def _common_start(texts: Sequence[str]) -> str:
+    # the texts between the first and the last of them in order begin as both do
+    pairs = zip(min(texts), max(texts), strict=False)
+    return "".join(letter for letter, _ in takewhile(lambda pair: pair[0] == pair[1], pairs))
 
 
-def _line(group: Sequence[_Name], at: int) -> tuple[str | None, bool]:
-    """Whether the number before or after the one that varies, the same in all names, may be a row or a column."""
-    written = [view.numbers[at] for view in group]
-    count = len(group[0].numbers)
-    beside = {line: index for line, index in (("row", at - 1), ("column", at + 1)) if 0 <= index < count}
-    shared = {
-        line: group[0].numbers[index]
-        for line, index in beside.items()
-        if len({int(view.numbers[index]) for view in group}) == 1 and abs(int(group[0].numbers[index])) < _SMALL
-    }
-    if len(shared) != 1:
-        return None, False
-    line, number = next(iter(shared.items()))
-    widths = {len(text) for text in written}
-    padded = len(widths) == 1
-    return line, len(number) in widths if padded else number == str(int(number))
+def _is_minus(signs: str, separator: str) -> bool:
+    return "-" in signs[len(separator) :]
 
 
-def _suggested(view: _Name, varying: Sequence[int]) -> str:
-    """A pattern that takes the last two numbers for row and column."""
-    fields = {varying[-2]: "{row}", varying[-1]: "{column}"}
-    middle = (
-        f"{fields.get(at, '*' if at in varying else number)}{text}"
-        for at, (number, text) in enumerate(zip(view.numbers, view.texts[1:-1], strict=True))
-    )
-    return "".join((view.texts[0], *middle, ".", view.texts[-1])).replace("/", "*")
+def _signed(signs: str, text: str, separator: str) -> int:
+    # the digits of a decimal that counts, as those of all others of its place in thousandths of thousandths
+    whole, _, part = text.partition(".")
+    value = int(whole) * _FINEST + int(part.ljust(_FINE, "0")[:_FINE]) if part else int(whole)
+    return -value if _is_minus(signs, separator) else value
+
+
+def _works(pattern: str, names: Sequence[str]) -> bool:
+    """Whether a pattern gives each of several names a place of its own in a grid that they fill, or in a sequence."""
+    try:
+        found = parse_view_numbers("", names, pattern).numbers
+    except SepiError:
+        return False
+    columns = list(zip(*found.values(), strict=True))
+    if len(found) < 2 or len(set(found.values())) < len(found):
+        return False
+    return is_count(columns[0]) if len(columns) == 1 else fill(*columns) >= _WELL_FILLED
 
 
 def _compiled(source: str, pattern: str) -> re.Pattern[str]:
@@ -222,7 +358,7 @@ def _compiled(source: str, pattern: str) -> re.Pattern[str]:
         if part == "*":
             segments.append("")
         elif part[0] == "{":
-            segments[-1] += rf"(?<![0-9])(?P<{part[1:-1]}>-?[0-9]{{1,{_MAX_DIGITS}}}+)(?![0-9])"
+            segments[-1] += rf"(?<![0-9])(?P<{part[1:-1]}>[+-]?[0-9]{{1,{_MAX_DIGITS}}}+)(?![0-9])"
         else:
             segments[-1] += re.escape(part)
     first, *middle = segments

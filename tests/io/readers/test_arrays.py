@@ -116,19 +116,30 @@ def test_empty_arrays_are_refused() -> None:
 # --- views in one row
 
 
-def test_views_in_a_row_make_a_square_grid() -> None:
-    views = RNG.integers(1, 256, (9, 20, 24, 3), np.uint8)
-    light_field = taken(views)
-    np.testing.assert_array_equal(light_field.views, views.reshape(3, 3, 20, 24, 3))
-    assert "views taken as a grid of 3x3, row by row; --grid sets it otherwise" in light_field.notes
+@pytest.mark.parametrize("count", [9, 12])
+def test_views_in_a_row_wait_for_their_grid(count: int) -> None:
+    """Of 12 views nobody knows by the array whether they are 3x4 or 4x3, of 9 not whether they are a cross."""
+    views = RNG.integers(1, 256, (count, 20, 24, 3), np.uint8)
+    light_field = taken(views, central=9, view=(3, 3), exclude=("4,4",), order="transpose")
+    np.testing.assert_array_equal(light_field.views, views[None])
+    assert not light_field.arranged
+    assert light_field.view is None
+    assert light_field.present.all()
 
 
 def test_views_in_a_row_make_the_grid_that_is_given() -> None:
-    """Of 12 views nobody knows whether they are 3x4 or 4x3."""
     views = RNG.integers(1, 256, (12, 20, 24, 3), np.uint8)
-    np.testing.assert_array_equal(taken(views, grid=(3, 4)).views, views.reshape(3, 4, 20, 24, 3))
-    assert "--grid ROWSxCOLUMNS" in refused(views)
+    light_field = taken(views, grid=(3, 4))
+    assert light_field.arranged
+    np.testing.assert_array_equal(light_field.views, views.reshape(3, 4, 20, 24, 3))
     assert "no grid of 5x5" in refused(views, grid=(5, 5))
+
+
+def test_a_row_of_views_may_lack_its_middle() -> None:
+    """Which view is the reference view is settled with the grid."""
+    views = RNG.integers(1, 256, (9, 20, 24, 3), np.uint8)
+    views[4] = 0
+    assert np.argwhere(~taken(views).present).tolist() == [[0, 4]]
 
 
 def test_axis_n_is_the_number_of_the_view() -> None:
@@ -167,12 +178,42 @@ def test_other_types_are_refused(kind: type) -> None:
     assert f"values of type {np.dtype(kind)}; expected uint8, uint16" in refused(np.ones(RGB.shape, kind))
 
 
-def test_floats_of_0_to_255_are_refused() -> None:
-    """Taken as 0..1 they would be white all over."""
-    message = refused(RGB.astype(np.float32))
+@pytest.mark.parametrize("kind", ["<f4", "f8"])
+@pytest.mark.parametrize(("integer", "factor"), [(np.uint8, 1), (np.uint16, 257)])
+def test_floats_that_are_whole_numbers_are_integers(kind: str, integer: type, factor: int) -> None:
+    """MATLAB's doubles of 0 to 255, taken as 0..1, would be white all over."""
+    views = RGB.astype(integer) * integer(factor)
+    light_field = taken(views.astype(kind))
+    assert light_field.views.dtype == integer
+    np.testing.assert_array_equal(light_field.views, views)
+    assert any(f"taken as {8 * np.dtype(integer).itemsize} bit" in note for note in light_field.notes)
+
+
+@pytest.mark.parametrize(("factor", "white"), [(0.9, 255), (200.5, 65535)])
+def test_other_floats_beyond_1_are_parts_of_white(factor: float, white: int) -> None:
+    """Resampled pictures are no whole numbers any more."""
+    views = RGB * factor
+    light_field = taken(views)
+    assert light_field.views.dtype == np.float32
+    np.testing.assert_allclose(light_field.views, views / white, rtol=1e-6)
+    assert any(f"white being {white}" in note for note in light_field.notes)
+
+
+@pytest.mark.parametrize("views", [RGB * 1000.5, RGB - 130.0, RGB / 60.0])
+def test_floats_of_no_scale_are_refused(views: np.ndarray) -> None:
+    """Below zero, beyond 16 bit, or a little beyond 1: nobody can know what white is."""
+    message = refused(views)
     assert "view 0,0" in message
-    assert "within 0..1" in message
-    assert "255" in message
+    assert "within 0..1, 0..255 or 0..65535" in message
+
+
+def test_views_left_out_do_not_change_the_scale() -> None:
+    """A damaged view that is excluded must not make all others black."""
+    views = RGB / 255
+    views[0, 0] *= 200
+    light_field = taken(views, exclude=("0,0",))
+    np.testing.assert_allclose(light_field.views[1], views[1], rtol=1e-6)
+    assert not any("white" in note for note in light_field.notes)
 
 
 def test_values_beyond_float32_are_refused() -> None:

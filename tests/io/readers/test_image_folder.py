@@ -5,6 +5,7 @@ for doubt are asked about. A view in a wrong place makes the depth nonsense with
 import itertools
 import os
 import time
+import warnings
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
@@ -20,6 +21,8 @@ from sepi.io.readers.formats import format_of, read
 from sepi.io.readers.options import ReadOptions
 from sepi.io.readers.view_names import infer_view_numbers, parse_view_numbers
 from sepi.lightfield import LightField
+from sepi.reading import read_light_field
+from sepi.scenes import render
 
 
 def pixels(place: int) -> np.ndarray:
@@ -128,16 +131,26 @@ NAMED: dict[str, tuple[list[str], ReadOptions, list[list[int]], str]] = {
         [[0, 1, -1], [2, 3, -1]],
         "",
     ),
-    "running number": (by_number("img{}.png", range(9)), ReadOptions(), grid_of(3, 3), "3x3 grid row by row"),
-    "running number from 1": (by_number("img{:03d}.png", range(1, 17)), ReadOptions(), grid_of(4, 4), "1 to 16"),
-    "running number from 7": (by_number("img{:03d}.png", range(7, 16)), ReadOptions(), grid_of(3, 3), "views from 7"),
+    "running number": (by_number("img{}.png", range(9)), ReadOptions(grid=(3, 3)), grid_of(3, 3), "row by row"),
+    "running number from 1": (
+        by_number("{:03d}.png", range(1, 17)),
+        ReadOptions(grid=(4, 4)),
+        grid_of(4, 4),
+        "1 to 16",
+    ),
+    "running number from 7": (by_number("{:03d}.png", range(7, 16)), ReadOptions(grid=(3, 3)), grid_of(3, 3), "from 7"),
     "running number, not square": (
         by_number("{}.png", range(6)),
         ReadOptions(grid=(2, 3)),
         grid_of(2, 3),
         "row by row",
     ),
-    "running number in steps": (by_number("{}.png", range(0, 90, 10)), ReadOptions(), grid_of(3, 3), "steps of 10"),
+    "running number in steps": (
+        by_number("{}.png", range(0, 90, 10)),
+        ReadOptions(grid=(3, 3)),
+        grid_of(3, 3),
+        "steps of 10",
+    ),
     "running number with gaps": (
         by_number("{}.png", (0, 2, 3)),
         ReadOptions(grid=(2, 2)),
@@ -146,9 +159,127 @@ NAMED: dict[str, tuple[list[str], ReadOptions, list[list[int]], str]] = {
     ),
     "first views missing": (by_number("{}.png", (2, 3)), ReadOptions(grid=(2, 2)), [[-1, -1], [0, 1]], "2 to 3"),
     "first views missing, from 1": (by_number("{}.png", (3, 4)), ReadOptions(grid=(2, 2)), [[-1, -1], [0, 1]], ""),
-    "a scene's number": (by_number("scene_7_img_{:03d}.png", range(9)), ReadOptions(), grid_of(3, 3), "3x3"),
-    "one row": (by_number("view_00_{:02d}.png", range(7)), ReadOptions(), grid_of(1, 7), "single row of 7"),
-    "one column": (by_number("view_{:02d}_03.png", range(5)), ReadOptions(), grid_of(5, 1), "single column of 5"),
+    "a scene's number": (by_number("s_7_img_{:03d}.png", range(9)), ReadOptions(grid=(3, 3)), grid_of(3, 3), "0 to 8"),
+    "one column, said so": (by_number("view_{:02d}_03.png", range(5)), ReadOptions(grid=(5, 1)), grid_of(5, 1), ""),
+    # --- no grid: the views say which
+    "sequence": (by_number("img{}.png", range(7)), ReadOptions(), grid_of(1, 7), "numbered 0 to 6"),
+    "sequence under a shared number": (by_number("view_00_{:02d}.png", range(9)), ReadOptions(), grid_of(1, 9), ""),
+    "sequence with gaps": (
+        by_number("img_{:03d}.png", (1, 2, 4, 5, 6, 9)),
+        ReadOptions(),
+        [[0, 1, -1, 2, 3, 4, -1, -1, 5]],
+        "numbered 1 to 9, 3 of them missing",
+    ),
+    # the grid is not known, so a position in it means nothing yet
+    "sequence with options of the grid": (
+        by_number("{}.png", range(1, 6)),
+        ReadOptions(central=9, order="transpose", view=(3, 3), exclude=("7,7", "2.png")),
+        [[0, -1, 2, 3, 4]],
+        "",
+    ),
+    "times": (
+        by_number("IMG_20150106_{}.png", (102134, 102138, 102143, 102148)),
+        ReadOptions(),
+        grid_of(1, 4),
+        "count no views",
+    ),
+    "times and a grid": (
+        by_number("IMG_20150106_{}.png", (102134, 102138, 102142, 102148)),
+        ReadOptions(grid=(2, 2)),
+        grid_of(2, 2),
+        "count no views",
+    ),
+    "times over midnight": (
+        [f"IMG_{time}.png" for time in ("20150106_235951", "20150106_235959", "20150107_000003", "20150107_000011")],
+        ReadOptions(),
+        grid_of(1, 4),
+        "count no views",
+    ),
+    "minutes and seconds and a grid": (
+        by_place("v_{}_{}.png", (10,), (3, 40))
+        + by_place("v_{}_{}.png", (11,), (9, 40))
+        + ["v_12_3.png", "v_12_57.png"],
+        ReadOptions(grid=(2, 3)),
+        grid_of(2, 3),
+        "count no views",
+    ),
+    "numbers beyond any count and a grid": (
+        by_number("{}.png", (10**20, 10**20 + 5, 10**20 + 77, 10**21)),
+        ReadOptions(grid=(2, 2)),
+        grid_of(2, 2),
+        "",
+    ),
+    "running number and time": (
+        [f"{number}_{time}.png" for number, time in enumerate((34, 38, 61, 79), 1)],
+        ReadOptions(grid=(2, 2)),
+        grid_of(2, 2),
+        "as in '{number}_*.png'",
+    ),
+    # --- signs
+    "signs": (by_place("v_{:+d}_{:+d}.png", (-1, 0, 1), (-2, -1, 0)), ReadOptions(), grid_of(3, 3), "columns from -2"),
+    "signs without separators": (by_place("v{:+03d}{:+03d}.png", (-1, 0, 1), (0, 1)), ReadOptions(), grid_of(3, 2), ""),
+    "minus after a letter": (by_place("r{}c{}.png", (-1, 0, 1), (-1, 0)), ReadOptions(), grid_of(3, 2), "rows from -1"),
+    "minus after a hyphen": (
+        by_place("v-{}-{}.png", (-1, 0), (-1, 0, 1)),
+        ReadOptions(),
+        grid_of(2, 3),
+        "rows from -1",
+    ),
+    "pattern with signs": (
+        by_place("v_{:+d}_{:+d}_x7.png", (-1, 0, 1), (-1, 0)),
+        ReadOptions(pattern="v_{row}_{column}_x*.png"),
+        grid_of(3, 2),
+        "rows from -1",
+    ),
+    "a disc with signs": (
+        ["v_-1_+0.png", "v_+0_-1.png", "v_+0_+0.png", "v_+0_+1.png", "v_+1_+0.png"],
+        ReadOptions(),
+        [[-1, 0, -1], [1, 2, 3], [-1, 4, -1]],
+        "",
+    ),
+    # --- more numbers than two
+    "running number, row, column": (
+        [f"IMG_{3 * t + s:04d}_{t:02d}_{s:02d}.png" for t, s in itertools.product(range(3), range(3))],
+        ReadOptions(),
+        grid_of(3, 3),
+        "as in 'IMG_*_{row}_{column}.png'",
+    ),
+    "there and back": (
+        [f"{3 * t + (2 - s if t % 2 else s)}_{t}_{s}.png" for t, s in itertools.product(range(3), range(3))],
+        ReadOptions(),
+        grid_of(3, 3),
+        "as in '*_{row}_{column}.png'",
+    ),
+    "function of row and column": (
+        [f"{t}_{s}_{5 * s + 11 * t}x.png" for t, s in itertools.product(range(2), range(3))],
+        ReadOptions(),
+        grid_of(2, 3),
+        "as in '{row}_{column}_*x.png'",
+    ),
+    "row, column, millimetres": (
+        [f"{t}_{s}_{10 * t}mm_{50 - 10 * s}mm.png" for t, s in itertools.product(range(3), range(3))],
+        ReadOptions(),
+        grid_of(3, 3),
+        "",
+    ),
+    "positions alone": (
+        by_place("cam_{}_{}.png", (0.0, 0.5, 1.0), (-1.5, 0.0)),
+        ReadOptions(),
+        grid_of(3, 2),
+        "rows 0.333 steps",
+    ),
+    "positions with signs": (
+        by_place("cam_{:+.2f}_{:+.2f}.png", (-0.15, -0.05, 0.05, 0.15), (-0.05, 0.05)),
+        ReadOptions(),
+        grid_of(4, 2),
+        "rows 1 steps apart, on the grid",
+    ),
+    "running number and names such as 03.07": (
+        [f"{3 * t + s}_{t:02d}.{s:02d}.png" for t, s in itertools.product(range(3), range(3))],
+        ReadOptions(),
+        grid_of(3, 3),
+        "",
+    ),
     "one row of 9, said so": (
         by_number("view_00_{:02d}.png", range(9)),
         ReadOptions(grid=(1, 9)),
@@ -170,13 +301,13 @@ NAMED: dict[str, tuple[list[str], ReadOptions, list[list[int]], str]] = {
     ),
     "pattern of a number": (
         by_number("v1.{}.png", range(4)),
-        ReadOptions(pattern="v1.{number}.png"),
+        ReadOptions(pattern="v1.{number}.png", grid=(2, 2)),
         grid_of(2, 2),
         "",
     ),
     "pattern with stars": (
         by_number("a12bcc{:03d}dd.png", range(4)),
-        ReadOptions(pattern="a*c{number}*.png"),
+        ReadOptions(pattern="a*c{number}*.png", grid=(2, 2)),
         grid_of(2, 2),
         "",
     ),
@@ -220,11 +351,14 @@ def test_views_stand_where_their_names_say(tmp_path: Path, case: str) -> None:
     assert ("in that order" in " ".join(light_field.notes)) == (
         options.pattern is None
         and "numbered" not in light_field.notes[0]
-        and "all have one" not in light_field.notes[0]
+        and "count no views" not in light_field.notes[0]
+    )
+    assert light_field.arranged == (
+        options.grid is not None or "in that order" in " ".join(light_field.notes) or "{row}" in (options.pattern or "")
     )
     assert light_field.name == "my scene"
     assert light_field.source == str(folder)
-    if options.view:
+    if options.view and light_field.arranged:
         assert light_field.reference_position == options.view
 
 
@@ -254,7 +388,7 @@ def test_depth_of_pixels_is_kept(tmp_path: Path, sort: str) -> None:
         by_number("{}.tif", range(4)),
         lambda path, rgb: cv2.imwrite(str(path), convert(rgb)[:, :, ::-1]),
     )
-    light_field = read(folder, ReadOptions())
+    light_field = read(folder, ReadOptions(grid=(2, 2)))
     assert light_field.views.dtype == kind
     for number in range(4):
         np.testing.assert_array_equal(light_field.views[divmod(number, 2)], convert(pixels(number)))
@@ -289,17 +423,21 @@ BAD: dict[str, tuple[list[str], ReadOptions, str]] = {
     "every name another": (["a1b.png", "b1a.png", "c3.png"], ReadOptions(), "--pattern"),
     "no numbers": (["a.png", "b.png"], ReadOptions(), "no picture's name has a number"),
     "numbers all alike": (["a1.png", "a01.png"], ReadOptions(), "no number in the names counts the views"),
-    "three numbers": (
-        [f"{t}_{s}_{5 * s + 11 * t}x.png" for t, s in itertools.product(range(2), range(3))],
+    "several light fields": (
+        [f"f{f}_{t}_{s}.png" for f, t, s in itertools.product(range(2), range(3), range(3))],
         ReadOptions(),
-        "'*_{row}_{column}x.png'",
+        "such as 'f0_{row}_{column}.png'",
     ),
+    "two running numbers": (["1_3.png", "2_1.png", "3_2.png"], ReadOptions(), "--pattern, such as '{number}_*.png'"),
+    "times that do not fill the grid": (
+        by_number("{}.png", (102134, 102138, 102143)),
+        ReadOptions(grid=(2, 2)),
+        "the names only sort the 3 pictures, and the 2x2 grid that --grid gives has 4 views",
+    ),
+    "rows and columns of --grid exchanged": (PLACES[:6], ReadOptions(grid=(3, 2)), "which the 3x2 grid"),
+    "about as many of two sorts": ([*PLACES, *by_place("w_{}_{}.png", range(2), range(3))], ReadOptions(), "(9 and 6)"),
     "one picture": (["a1.png", "b.png"], ReadOptions(), "no number in the names counts"),
     "one picture by pattern": (["a1.png", "a.png"], ReadOptions(pattern="a{number}.png"), "only one view, a1.png"),
-    "not square": (by_number("{}.png", range(8)), ReadOptions(), "give --grid ROWSxCOLUMNS"),
-    "gaps": (by_number("{}.png", (0, 1, 2, 4)), ReadOptions(), "numbers are missing"),
-    "one row or a square": (by_number("view_00_{:02d}.png", range(9)), ReadOptions(), "--grid 1x9 or --grid 3x3"),
-    "one column or a square": (by_number("v_{}_0.png", range(4)), ReadOptions(), "--grid 4x1 or --grid 2x2"),
     "twice": ([*PLACES, "v_01_01.png"], ReadOptions(), "view 1, 1 is given twice, also as v_01_01.png"),
     "twice under two endings": (
         ["1.png", "2.png", "1.PNG"],
@@ -308,9 +446,13 @@ BAD: dict[str, tuple[list[str], ReadOptions, str]] = {
     ),
     "twice by pattern": (["a1b.png", "a1c.png"], ReadOptions(pattern="a{number}*"), "given twice"),
     "huge row": ([*PLACES, "v_999999999_1.png"], ReadOptions(), "1000000000x3"),
-    "huge numbers": (["v_0_0.png", f"v_{10**17}_{10**17}.png", "v_1_0.png"], ReadOptions(), "--pattern"),
-    "huge running number": (["0.png", "1.png", "999999999999.png"], ReadOptions(), "numbers are missing"),
-    "sparse": (["0_0.png", "1_1.png", "300_2.png"], ReadOptions(), "301x3"),
+    "huge numbers": (
+        ["v_0_0.png", f"v_{10**17}_{10**17}.png", "v_1_0.png", f"v_1_{10**17}.png"],
+        ReadOptions(),
+        "--pattern",
+    ),
+    "huge running number": (["0.png", "1.png", "999999999999.png"], ReadOptions(grid=(2, 2)), "only sort"),
+    "sparse": (["0_0.png", "1_1.png", "300_1.png", "300_2.png"], ReadOptions(), "301x3"),
     "huge grid": (PLACES, ReadOptions(grid=(999_999, 999_999)), "at most 10000 views"),
     "small grid": (PLACES, ReadOptions(grid=(2, 3)), "the 2x3 grid that --grid gives"),
     "no grid": (PLACES, ReadOptions(grid=(0, 0)), "0x0"),
@@ -392,6 +534,140 @@ def test_bad_view_is_one_line_that_names_it(tmp_path: Path, case: str, capfd: py
     assert capfd.readouterr() == ("", "")
 
 
+SURPLUS = {
+    "a small picture beside the grid": ("v_9_9.png", True),
+    "a small picture numbered on": ("v_0_3.png", True),
+    "a small picture of another name": ("thumb_7.png", True),
+    "a small picture of another scene": ("u_0_0.png", True),
+    "a small view under another writing of its name": ("v_01_01.png", True),
+    "a small picture at a corner": ("v_0_0.png", False),
+    "a small picture within": ("v_1_2.png", False),
+}
+
+
+@pytest.mark.parametrize("case", SURPLUS)
+def test_a_picture_of_another_size_is_left_out_unless_the_grid_needs_it(tmp_path: Path, case: str) -> None:
+    """A thumbnail must not stop the reading, nor a hole in the grid come about without a word."""
+    name, left_out = SURPLUS[case]
+    folder = put(tmp_path / "f", PLACES)
+    imageio.imwrite(folder / name, pixels(5)[1:])
+    excluded = read(folder, ReadOptions(exclude=(name,)))
+    expected = np.array(grid_of(3, 3))
+    if left_out:
+        light_field = read(folder, ReadOptions())
+        assert any(name in note and "left out" in note for note in light_field.notes)
+        assert places_of(light_field) == expected.tolist()
+    else:
+        with pytest.raises(SepiError, match=f"{name}: 5x3 pixels, .* --exclude {name}$"):
+            read(folder, ReadOptions())
+        expected[expected == PLACES.index(name)] = -1
+    assert places_of(excluded) == expected.tolist()
+    assert not any(name in note for note in excluded.notes)
+
+
+@pytest.mark.parametrize("name", ["v_7.png", "v_10.png", "depth.png", "v_1_1.png", "notes.txt"])
+def test_any_file_can_be_excluded(tmp_path: Path, name: str) -> None:
+    """Nobody should have to know which pictures would have been left out anyhow."""
+    folder = put(tmp_path / "f", by_number("v_{}.png", range(9)))
+    (folder / name).write_bytes(b"damaged")
+    places = [[-1 if name == f"v_{number}.png" else number for number in range(9)]]
+    assert places_of(read(folder, ReadOptions(exclude=(name,)))) == places
+    with pytest.raises(SepiError, match=r"view 'gone\.png' to exclude: expected a position"):
+        read(folder, ReadOptions(exclude=(name, "gone.png")))
+
+
+def test_views_of_a_sequence_can_be_excluded_by_name_and_by_place(tmp_path: Path) -> None:
+    """The name counts before the grid is found, the place in it after."""
+    views = render("curved_occluders", size=64, views=3).views
+    folder = tmp_path / "f"
+    folder.mkdir()
+    for number in range(9):
+        imageio.imwrite(folder / f"{number}.png", views[divmod(number, 3)])
+    options = ReadOptions(exclude=("0.png", "2,2"))
+    with warnings.catch_warnings(action="ignore"):
+        light_field = read_light_field(folder, options=options)
+    assert light_field.arranged
+    assert np.argwhere(~light_field.present).tolist() == [[0, 0], [2, 2]]
+    np.testing.assert_array_equal(light_field.views[light_field.present], views.reshape(9, 64, 64, 3)[1:8])
+
+
+@pytest.mark.parametrize("at", [0, 8])
+def test_the_end_of_a_sequence_is_missing_where_it_then_fills_a_square(tmp_path: Path, at: int) -> None:
+    """Of 9 views without the first, 8 in a row would give no grid or a wrong one."""
+    folder = put(tmp_path / "f", by_number("{}.png", range(9)))
+    left = list(range(9))
+    left[at] = -1
+    assert places_of(read(folder, ReadOptions(exclude=(f"{at}.png",)))) == [left]
+    # and is none of the views where they fill one without it
+    imageio.imwrite(folder / "9.png", pixels(5))
+    assert places_of(read(folder, ReadOptions(exclude=("9.png",)))) == grid_of(1, 9)
+
+
+def test_an_edge_that_is_excluded_by_name_is_part_of_the_grid_still(tmp_path: Path) -> None:
+    """Else the centre view, whose depth is made, would be another one."""
+    folder = put(tmp_path / "f", PLACES)
+    light_field = read(folder, ReadOptions(exclude=("v_0_0.png", "v_0_1.png", "v_0_2.png")))
+    assert places_of(light_field) == [[-1, -1, -1], [3, 4, 5], [6, 7, 8]]
+
+
+def test_a_sequence_may_lack_its_middle(tmp_path: Path) -> None:
+    """The reference view is settled when its grid is known; until then a hole is none too bad."""
+    folder = put(tmp_path / "f", by_number("{}.png", (0, 1, 3, 4)))
+    assert places_of(read(folder, ReadOptions())) == [[0, 1, -1, 2, 3]]
+
+
+@pytest.mark.parametrize("case", ["several light fields", "two running numbers"])
+def test_the_pattern_that_an_error_suggests_can_be_followed(tmp_path: Path, case: str) -> None:
+    names, _, _ = BAD[case]
+    folder = put(tmp_path / "f", names)
+    with pytest.raises(SepiError) as caught:
+        read(folder, ReadOptions())
+    pattern = str(caught.value).split("'")[-2]
+    assert read(folder, ReadOptions(pattern=pattern)).present.all()
+
+
+GANTRY = {
+    (
+        t,
+        s,
+    ): f"out_{t:02d}_{s:02d}_{-381.5 - 9.5 * t + 0.1 * s:.4f}_{468.0 + 10 * s + ((t, s) == (1, 2)) / 2:.4f}.png"
+    for t, s in itertools.product(range(3), range(4))
+}
+
+
+def test_camera_positions_in_names_are_those_of_the_views(tmp_path: Path) -> None:
+    """Cameras of a gantry stand up to a fifth of a step off their places: pixels, where views are far apart."""
+    light_field = read(put(tmp_path / "f", GANTRY.values()), ReadOptions())
+    assert light_field.row_spacing == pytest.approx(0.95, abs=0.02)
+    steps = light_field.positions - light_field.positions[0, 0]
+    np.testing.assert_allclose(steps[2, 0], [1.9, 0], atol=0.02)
+    np.testing.assert_allclose(steps[1, 2] - steps[1, 1], [-0.01, 1.05], atol=0.02)
+    assert any(note.startswith("camera positions from the names; rows 0.9") for note in light_field.notes)
+
+
+@pytest.mark.parametrize("order", ["flip-rows", "flip-columns", "transpose", "transpose-flip-both"])
+def test_camera_positions_follow_the_order(tmp_path: Path, order: str) -> None:
+    """Each view keeps its place whatever the order, or its baseline points the wrong way."""
+    folder = put(tmp_path / "f", GANTRY.values())
+    names, ordered = read(folder, ReadOptions()), read(folder, ReadOptions(order=order))
+    spread = np.ptp(ordered.positions, axis=(0, 1))
+    assert (np.diff(ordered.positions[:, 0, 0]) > 0).all()
+    assert (np.diff(ordered.positions[0, :, 1]) > 0).all()
+    expected = np.ptp(names.positions, axis=(0, 1))
+    if "transpose" in order:
+        expected = expected[::-1] / names.row_spacing
+        assert ordered.row_spacing == pytest.approx(1 / names.row_spacing)
+    np.testing.assert_allclose(spread, expected)
+
+
+def test_decimals_that_fit_no_grid_count_nothing(tmp_path: Path) -> None:
+    """Exposures or temperatures must not move the views."""
+    names = [f"{t}_{s}_{0.1 * ((t * 7 + s * 5) % 4):.1f}_{(t * s) % 3:.1f}.png" for t, s in np.ndindex(3, 3)]
+    light_field = read(put(tmp_path / "f", names), ReadOptions())
+    assert light_field.positions is None
+    assert light_field.row_spacing == 1
+
+
 def test_bad_view_can_be_excluded(tmp_path: Path) -> None:
     folder = put(tmp_path / "f", PLACES)
     (folder / "v_1_2.png").write_bytes(b"")
@@ -422,7 +698,7 @@ def test_hci_folder_stays_one(tmp_path: Path) -> None:
     assert format_of(folder).name == "HCI folder"
     with pytest.raises(SepiError, match="--pattern does not apply"):
         read(folder, ReadOptions(pattern="input_Cam{number}.png"))
-    by_names = read(folder, ReadOptions(pattern="input_Cam{number}.png"), "images")
+    by_names = read(folder, ReadOptions(pattern="input_Cam{number}.png", grid=(3, 3)), "images")
     np.testing.assert_array_equal(by_names.views, read(folder, ReadOptions()).views)
 
 
@@ -436,6 +712,7 @@ def test_any_names_give_numbers_or_an_error(names: list[str]) -> None:
     except SepiError:
         return
     assert set(found.numbers) | set(found.unmatched) == set(names)
+    assert all(found.numbers_of(name) in (None, numbers) for name, numbers in found.numbers.items())
     assert all(len(numbers) in (1, 2) for numbers in found.numbers.values())
     assert len({len(numbers) for numbers in found.numbers.values()}) == 1
 

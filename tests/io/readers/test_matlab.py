@@ -255,3 +255,36 @@ def test_other_versions_say_what_to_do(tmp_path: Path) -> None:
     (tmp_path / "empty.mat").touch()
     for name in ("four.mat", "text.mat", "empty.mat"):
         assert "not a MATLAB file of version 5 or 7.3; save it in MATLAB with -v7 or -v7.3" in refused(tmp_path / name)
+
+
+CHANNELS = {
+    "lower case": ("lfr", "lfg", "lfb"),
+    "upper case": ("LF_R", "LF_G", "LF_B"),
+    "words": ("red_views", "green_views", "blue_views"),
+    "in the middle": ("Lred", "Lgreen", "Lblue"),
+}
+
+
+@pytest.mark.parametrize("case", CHANNELS)
+def test_three_arrays_may_be_the_colours_of_one_light_field(tmp_path: Path, case: str) -> None:
+    """Taken one by one they are three grey light fields, each with a third of what tells surfaces apart."""
+    names = CHANNELS[case]
+    views = np.random.default_rng(1).integers(1, 255, (3, 4, 12, 14, 3), np.uint8)
+    # not in the order of the channels
+    arrays = {name: views[..., channel].astype(float) for channel, name in reversed(list(enumerate(names)))}
+    scipy.io.savemat(tmp_path / "a.mat", arrays)
+    light_field = read(tmp_path / "a.mat", ReadOptions())
+    np.testing.assert_array_equal(light_field.views, views)
+    assert f"the arrays {', '.join(names)} are taken as red, green and blue" in light_field.notes
+    one = read(tmp_path / "a.mat", ReadOptions(variable=names[1]))
+    np.testing.assert_array_equal(one.views, views[..., 1:2])
+    turned = {name: array.transpose(2, 3, 0, 1) for name, array in arrays.items()}
+    np.savez(tmp_path / "a.npz", **turned)
+    np.testing.assert_array_equal(read(tmp_path / "a.npz", ReadOptions(axes="HWTS")).views, views)
+
+
+def test_three_arrays_that_differ_are_not_the_colours_of_one(tmp_path: Path) -> None:
+    arrays = {"lfr": np.ones((3, 3, 9, 9)), "lfg": np.ones((3, 3, 9, 9)), "lfb": np.ones((3, 3, 9, 8))}
+    scipy.io.savemat(tmp_path / "a.mat", arrays)
+    with pytest.raises(SepiError, match="choose one with --variable"):
+        read(tmp_path / "a.mat", ReadOptions())

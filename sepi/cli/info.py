@@ -1,0 +1,174 @@
+"""``sepi info`` and ``sepi check``: what is known about a light field, and whether its views are in the right order."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from sepi.cli.input_options import Geometry, Reading, camera_flags, reading_flags
+from sepi.command import SepiCommand
+from sepi.errors import SepiError
+
+# imported in the functions: `sepi --help` does without what they import
+if TYPE_CHECKING:
+    from sepi.lightfield import DisparityRange, LightField
+
+_PATH = click.Path(path_type=Path)
+_RANGE_SOURCES = {
+    "parameters": "from the scene's parameters",
+    "given": "as given",
+    "estimated": "estimated from the views",
+}
+
+_as_json = click.option("--json", "as_json", is_flag=True, help="Print one JSON object; see docs/formats.md.")
+
+
+@click.command(cls=SepiCommand, short_help="Show what is known about the light field INPUT.")
+@click.argument("light_field_path", metavar="INPUT", type=_PATH)
+@camera_flags
+@reading_flags
+@_as_json
+def info(light_field_path: Path, geometry: Geometry | None, reading: Reading, as_json: bool) -> None:
+    """Show what is known about the light field INPUT, with an estimate of its disparity range.
+
+    INPUT is anything that 'sepi depth' reads, with the same flags. Rows and columns of views are counted from 0.
+    """
+    from sepi.inspection.disparity_range import estimate_range
+    from sepi.io.readers.formats import FORMATS, format_of
+
+    known_format = format_of(light_field_path, reading.file_format)
+    light_field = reading.read(light_field_path)
+    try:
+        estimated: DisparityRange | str = estimate_range(light_field)
+    except SepiError as error:
+        estimated = str(error)
+    camera = light_field.camera if geometry is None else geometry(shape=light_field.shape)
+    missing = [(int(t), int(s)) for t, s in zip(*(~light_field.present).nonzero(), strict=True)]
+    t0, s0 = light_field.reference_position
+    own = light_field.disparity_range
+    if as_json:
+        known = {
+            **_described(light_field),
+            "format": next(word for word, known in FORMATS.items() if known == known_format),
+            "missing_views": missing,
+            "reference_view": (t0, s0),
+            "positions": _positions(light_field),
+            "disparity_range": None if own is None else _range_values(own),
+            "estimated_range": None if isinstance(estimated, str) else _range_values(estimated),
+            "estimate_failure": estimated if isinstance(estimated, str) else None,
+            "camera": None if camera is None else {"scale_m": camera.scale, "offset": camera.offset},
+            "ground_truth": light_field.ground_truth is not None,
+            "masks": sorted(light_field.masks),
+            "notes": light_field.notes,
+        }
+        click.echo(json.dumps(known, allow_nan=False))
+        return
+    listed = " ".join(f"{t},{s}" for t, s in missing)
+    lines = {
+        "name": light_field.name,
+        "format": known_format.name,
+        "views": size_text(light_field),
+        "depth made for": f"view {t0},{s0}",
+        "missing views": f"{len(missing)}: {listed}" if missing else "none",
+        "pixels": _pixels(light_field),
+        "disparity range": "none given; the estimate is used" if own is None else range_text(own),
+        "estimated range": estimated if isinstance(estimated, str) else range_text(estimated),
+        "metric depth": "unknown camera" if camera is None else f"{camera.scale:g} m / (disparity + {camera.offset:g})",
+        "ground truth": "none" if light_field.ground_truth is None else "yes",
+        "masks": ", ".join(light_field.masks) or "none",
+    }
+    if light_field.row_spacing != 1:
+        lines["row spacing"] = f"{light_field.row_spacing:g} view steps"
+    for key, value in lines.items():
+        click.echo(f"{key + ':':17}{value}")
+    for note in light_field.notes:
+        click.echo(f"{'note:':17}{note}")
+
+
+@click.command(cls=SepiCommand, short_help="Check the order of the views of the light field INPUT.")
+@click.argument("light_field_path", metavar="INPUT", type=_PATH)
+@reading_flags
+@_as_json
+@click.pass_context
+def check(context: click.Context, light_field_path: Path, reading: Reading, as_json: bool) -> None:
+    """Check whether the views of the light field INPUT are in the order that depth needs.
+
+    Software does not agree on whether rows of views go up or down, columns left or right, or which of the two comes
+    first; in a wrong order depth is inside out or nonsense. The views tell: all eight orders are tried, and the flag
+    is named that sets INPUT right. Exits with 1 where another order clearly fits better.
+    """
+    from sepi.inspection.view_order import check_order
+
+    light_field = reading.read(light_field_path, check_order=False)
+    found = check_order(light_field, reading.options.order)
+    if as_json:
+        known = {
+            **_described(light_field),
+            "costs": {order: float(cost) for order, cost in found.fits.items()},
+            "best": found.best,
+            "clear": bool(found.clear),
+            "sign_clear": bool(found.sign_clear),
+            "read_in": found.read_in,
+            "verdict": found.verdict(),
+            "warning": found.warning(),
+        }
+        click.echo(json.dumps(known, allow_nan=False))
+    else:
+        click.echo(f"{light_field.name}: {size_text(light_field)}")
+        click.echo("order, and how well the views match in it (matching cost, 0 to 1; less is better):")
+        for order, cost in found.fits.items():
+            click.echo(f"  {order:24}{cost:8.4f}{'  best' if order == found.best and found.clear else ''}")
+        click.echo(found.verdict())
+    if found.warning() is not None:
+        context.exit(1)
+
+
+def size_text(light_field: LightField) -> str:
+    """Grid of views and their size, in words."""
+    (rows, columns), (height, width) = light_field.grid, light_field.shape
+    present = int(light_field.present.sum())
+    number = "" if present == rows * columns else f", {present} of {rows * columns}"
+    return f"{rows}x{columns} views (rows x columns{number}) of {width}x{height} pixels"
+
+
+def range_text(known: DisparityRange) -> str:
+    """A disparity range and where it is from, in words."""
+    return f"{known.minimum:g} to {known.maximum:g} pixels per view step ({_RANGE_SOURCES[known.source]})"
+
+
+def _pixels(light_field: LightField) -> str:
+    kind = light_field.views.dtype
+    bits = f"{8 * kind.itemsize} bit{' float' if kind.kind == 'f' else ''}"
+    return f"{'RGB' if light_field.views.shape[4] == 3 else 'grey'}, {bits}; values as stored, no gamma applied"
+
+
+def _described(light_field: LightField) -> dict[str, Any]:
+    """What is known of every light field, for JSON."""
+    return {
+        "name": light_field.name,
+        "source": light_field.source,
+        "grid": light_field.grid,
+        "views": int(light_field.present.sum()),
+        "height": light_field.shape[0],
+        "width": light_field.shape[1],
+        "channels": light_field.views.shape[4],
+        "dtype": light_field.views.dtype.name,
+        "row_spacing": light_field.row_spacing,
+    }
+
+
+def _positions(light_field: LightField) -> list[list[list[float] | None]] | None:
+    """Position of each view, null where it is missing; None for views on the grid."""
+    if light_field.positions is None:
+        return None
+    rows = zip(light_field.positions.tolist(), light_field.present.tolist(), strict=True)
+    return [
+        [place if present else None for place, present in zip(places, there, strict=True)] for places, there in rows
+    ]
+
+
+def _range_values(known: DisparityRange) -> dict[str, Any]:
+    return {"minimum": float(known.minimum), "maximum": float(known.maximum), "source": known.source}

@@ -1,0 +1,89 @@
+"""Files that hold arrays by name: which of them is the light field."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sepi.errors import SepiError, printable
+from sepi.io.readers.arrays import Array, light_field_from_array
+from sepi.io.readers.options import ReadOptions
+from sepi.lightfield import LightField
+from sepi.validation import require_known
+
+Shapes = Mapping[str, tuple[tuple[int, ...], np.dtype[Any]]]
+"""Name of each array in a file to its shape and type."""
+
+# words for the channels; how the first of them may be written
+_COLOURS = (("red", "green", "blue"), ("r", "g", "b"))
+_STYLES = (str.lower, str.upper, str.capitalize)
+# arrays that a message names
+_LISTED = 12
+
+
+def light_field_from_arrays(
+    path: Path, shapes: Shapes, options: ReadOptions, load: Callable[[str], Array]
+) -> LightField:
+    """The light field of a file with arrays: the one that is it, or three that are its channels.
+
+    Parameters
+    ----------
+    path : Path
+    shapes : mapping of str to tuple
+        Name of each array to its shape and type.
+    options : ReadOptions
+        ``variable`` names one; the others as :func:`sepi.io.readers.arrays.light_field_from_array` uses them.
+    load : callable
+        Reads the array of a name.
+
+    Raises
+    ------
+    SepiError
+        If no array, or several, can be the light field, or it cannot be read.
+    """
+    names = _arrays_of(path, shapes, options.variable)
+    if len(names) == 1:
+        return light_field_from_array(load(names[0]), path, options)
+    if options.axes is not None:
+        options = replace(options, axes=re.sub("[cC]", "", options.axes) + "C")
+    light_field = light_field_from_array(np.stack([load(name) for name in names], axis=-1), path, options)
+    note = f"the arrays {', '.join(map(printable, names))} are taken as red, green and blue"
+    return replace(light_field, notes=(note, *light_field.notes))
+
+
+def _channels_from(red: str) -> Iterator[tuple[str, ...]]:
+    """Names of three channels of which the first is this one: ``lfr lfg lfb``, ``LF_Red LF_Green LF_Blue``."""
+    for red_word, *others in dict.fromkeys((*map(style, words),) for words in _COLOURS for style in _STYLES):
+        for match in re.finditer(red_word, red):
+            yield red, *(red[: match.start()] + word + red[match.end() :] for word in others)
+
+
+def _arrays_of(path: Path, arrays: Shapes, requested: str | None) -> tuple[str, ...]:
+    """Name of the array that is the light field, of those in a file, or names of its red, green and blue one.
+
+    Without the user's choice it is the only array of numbers of 4 or 5 axes, or ``LF`` or three channels among several.
+    """
+    shapes = {name: shape for name, (shape, kind) in arrays.items() if kind.kind in "iuf" or name == requested}
+    if requested is not None:
+        require_known(f"{path}: --variable", [requested], shapes)
+        return (requested,)
+    fitting = [name for name, shape in shapes.items() if len(shape) in (4, 5)]
+    if len(fitting) == 1:
+        return (fitting[0],)
+    if "LF" in fitting:
+        return ("LF",)
+    triples = [names for name in fitting for names in _channels_from(name) if set(names) <= set(fitting)]
+    triples = [names for names in triples if len({arrays[name] for name in names}) == 1 and len(shapes[names[0]]) == 4]
+    if len(triples) == 1:
+        return triples[0]
+    listed = ", ".join(
+        f"{printable(name)} {'x'.join(map(str, shapes[name]))}" for name in list(fitting or shapes)[:_LISTED]
+    )
+    if fitting:
+        raise SepiError(f"{path}: holds several arrays of 4 or 5 axes; choose one with --variable: {listed}")
+    raise SepiError(f"{path}: holds no array of numbers of 4 or 5 axes (found: {listed or 'nothing'})")

@@ -1,0 +1,41 @@
+"""Pictures in a folder of views that are none of them, told by their size."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+
+from sepi.errors import SepiError
+from sepi.io.images import picture_header
+
+# part of the pictures, or one, that may be odd where all others agree
+_ODD = 0.1
+
+
+def odd_pictures(paths: Sequence[Path]) -> dict[Path, str]:
+    """The few pictures of another size than all others, and what is odd about them; none where no size prevails.
+
+    Pictures that cannot be read, and links, are left to those that read them.
+    """
+    sizes = {path: size for path in paths if (size := _size(path)) is not None}
+    if not sizes:
+        return {}
+    usual, count = Counter(sizes.values()).most_common(1)[0]
+    if count < 2 or len(sizes) - count > max(1, _ODD * len(sizes)):
+        return {}
+    return {
+        path: f"{size[0]}x{size[1]} pixels, but all other views have {usual[0]}x{usual[1]}"
+        for path, size in sizes.items()
+        if size != usual
+    }
+
+
+def _size(path: Path) -> tuple[int, int] | None:
+    if path.is_symlink():
+        return None
+    try:
+        header = picture_header(path)
+    except SepiError:
+        return None
+    return header.width, header.height
