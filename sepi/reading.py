@@ -40,7 +40,8 @@ def read_light_field(
     options : ReadOptions, optional
         What the files do not say: grid, name pattern, axes, order, views to leave out, reference view, row spacing.
     check_order : bool
-        Warn (:class:`SepiWarning`) where another order of the views clearly fits better.
+        Look at the views: warn (:class:`SepiWarning`) where another order of them clearly fits better, and find how far
+        their rows are apart where nothing says so.
 
     Returns
     -------
@@ -60,9 +61,13 @@ def read_light_field(
         from sepi.inspection.arrangement import arrange
 
         light_field = arrange(light_field, in_grid(options))
+    _require_contrast(path, light_field)
     if options.row_spacing is not None:
         light_field = with_row_spacing(light_field, options.row_spacing)
-    _require_contrast(path, light_field)
+    elif check_order:
+        from sepi.inspection.row_spacing import settle_row_spacing
+
+        light_field = settle_row_spacing(light_field)
     if disparity_range is not None:
         light_field = light_field.with_range(DisparityRange(*disparity_range, "given"))
     found = [_depth_warning(light_field)]

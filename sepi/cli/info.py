@@ -100,9 +100,12 @@ def check(context: click.Context, light_field_path: Path, reading: Reading, as_j
     first; in a wrong order depth is inside out or nonsense. The views tell: all eight orders are tried, and the flag
     is named that sets INPUT right. Exits with 1 where another order clearly fits better.
     """
+    from sepi.inspection.row_spacing import settle_row_spacing
     from sepi.inspection.view_order import check_order
 
     light_field = reading.read(light_field_path, check_order=False)
+    if reading.options.row_spacing is None:
+        light_field = settle_row_spacing(light_field)
     found = check_order(light_field, reading.options.order)
     if as_json:
         known = {

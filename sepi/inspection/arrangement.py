@@ -203,11 +203,11 @@ def _cost(views: Views, present: npt.NDArray[np.bool_], positions: Positions, re
         near = _neighbours(positions, present, place, reach)
         if not present[place] or not near:
             continue
-        reference = views.detail(_baseline(place, count), factor)
+        reference = views.detail(_baseline(views, place), factor)
         points = points_to_match(reference, _POINTS)
         if len(points) < FEWEST_POINTS:
             continue
-        others = np.stack([views.detail(_baseline(n, count), factor) for n in near])
+        others = np.stack([views.detail(_baseline(views, n), factor) for n in near])
         offsets = np.stack([baselines_under(order, positions[near] - positions[place]) for order in _ORDERS])
         steps = round(MOVEMENT / _SAMPLING)
         candidates = (np.arange(-steps, steps + 1) * (_SAMPLING / abs(offsets).max())).astype(np.float32)
@@ -228,9 +228,9 @@ def _neighbours(positions: Positions, present: npt.NDArray[np.bool_], place: int
     return rank[:_NEIGHBOURS]
 
 
-def _baseline(place: int, count: int) -> Baseline:
-    """From the middle of the sequence."""
-    return 0, place - count // 2
+def _baseline(views: Views, place: int) -> Baseline:
+    """From the view in the middle to one of the sequence."""
+    return 0, place - views.middle[1]
 
 
 def _placed(light_field: LightField, way: Arrangement, options: ReadOptions, note: str) -> LightField:

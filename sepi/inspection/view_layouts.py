@@ -56,7 +56,7 @@ AT_END = 0.02
 class Views:
     """The views about the middle of the grid, reduced and filtered when they are first asked for.
 
-    ``baselines`` lead from the view in the middle to each other one that is present, in rows and columns;
+    ``middle`` is the position of the view in the middle, ``baselines`` lead from it to each other one that is present, in rows and columns;
     ``row_spacing`` is the light field's. ``factor`` is what larger pictures are reduced by, ``shape`` their height and
     width then, in pixels.
     """
@@ -68,8 +68,10 @@ class Views:
         self._worth: dict[Baseline, bool] = {}
         positions = np.argwhere(light_field.present)
         distance = abs(positions - np.array(light_field.grid) // 2).sum(axis=1)
-        self._middle = positions[distance.argmin()]
-        self.baselines: list[Baseline] = [(int(t), int(s)) for t, s in positions - self._middle if (t, s) != (0, 0)]
+        t0, s0 = self.middle = tuple(map(int, positions[distance.argmin()]))
+        self.baselines: list[Baseline] = [
+            (int(t) - t0, int(s) - s0) for t, s in positions if (int(t), int(s)) != self.middle
+        ]
         height, width = light_field.shape
         self.shape = (height // self.factor, width // self.factor)
         self.row_spacing = light_field.row_spacing
@@ -77,7 +79,7 @@ class Views:
     @property
     def reference_view(self) -> FloatMap:
         """The view in the middle as it is, (H, W, 3) float32."""
-        return as_unit_float(self._views[tuple(self._middle)])
+        return as_unit_float(self._views[self.middle])
 
     def in_steps(self, baselines: list[Baseline]) -> npt.NDArray[np.float64]:
         """Baselines in view steps, shape (V, 2)."""
@@ -118,7 +120,7 @@ class Views:
     def _read(self, baseline: Baseline, factor: int) -> FloatMap:
         key = (*baseline, factor)
         if key not in self._grey:
-            view = np.ascontiguousarray(self._views[self._middle[0] + baseline[0], self._middle[1] + baseline[1]])
+            view = np.ascontiguousarray(self._views[self.middle[0] + baseline[0], self.middle[1] + baseline[1]])
             factor *= self.factor
             size = (max(1, view.shape[1] // factor), max(1, view.shape[0] // factor))
             reduced = cv2.resize(view, size, interpolation=cv2.INTER_AREA) if factor > 1 else view

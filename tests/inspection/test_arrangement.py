@@ -101,7 +101,9 @@ def test_options_speak_of_the_grid() -> None:
 def test_views_that_fit_in_no_arrangement_are_refused() -> None:
     """Pictures of different things in a folder would be taken for views, and their depth for one."""
     rng = np.random.default_rng(1)
-    noise = LightField(rng.integers(0, 256, (1, 9, 64, 64, 3), dtype=np.uint8), "noise", source="folder", arranged=False)
+    noise = LightField(
+        rng.integers(0, 256, (1, 9, 64, 64, 3), dtype=np.uint8), "noise", source="folder", arranged=False
+    )
     with pytest.raises(SepiError, match=r"folder: 9 views .*in no arrangement tried \(3x3 row by row.*--grid"):
         arrange(noise, ReadOptions())
 
