@@ -104,7 +104,7 @@ def arrange(light_field: LightField, options: ReadOptions) -> LightField:
             f"{source}: {count} views without row and column, and in no arrangement tried ({names}) they fit together; "
             "give --grid ROWSxCOLUMNS, or leave pictures out that are no views with --exclude"
         )
-    best = tried[ranked[0]]
+    best, reason = tried[ranked[0]], "by how they fit together"
     if len(tried) > 1 and not costs[ranked[1]] >= _CLEAR_RATIO * costs[ranked[0]]:
         square = next(
             (way for way in tried if way.grid[0] == way.grid[1] and len(way.positions) == way.grid[0] ** 2), None
@@ -119,8 +119,8 @@ def arrange(light_field: LightField, options: ReadOptions) -> LightField:
             SepiWarning,
             stacklevel=2,
         )
-        best = square
-    note = f"{count} numbered views taken for {best.name}, by how they fit together; --grid sets it otherwise"
+        best, reason = square, "since the views do not tell"
+    note = f"{count} numbered views taken for {best.name}, {reason}; --grid sets it otherwise"
     return _placed(light_field, best, options, note)
 
 

@@ -41,6 +41,8 @@ _BLUR_SIGMA = 0.8
 _HIGH_PASS = 9
 _SEARCH_RADIUS = 2
 _RADIUS = 3
+# window of the median of disparities
+_MEDIAN = 5
 # largest difference that counts, full range = 1
 _TRUNCATION = 0.1
 
@@ -59,7 +61,7 @@ _ENOUGH = 0.02
 
 # Range: part of the pixels that is left out on either side, and the margin, as part of the span; in the search, fewer
 _OUTLIERS = 0.001
-_MARGIN = 0.07
+_MARGIN = 0.06
 _SEARCH_OUTLIERS = 0.0002
 # outliers when it is decided whether surfaces lie beyond what was searched
 _BEYOND = 0.001
@@ -166,7 +168,9 @@ class _Views:
         sampling = float(candidates[1] - candidates[0])
         # neighbours agree within a pixel of the most distant view, however finely it is searched
         tolerance = max(sampling, 1 / reach)
-        return _patches(_trusted(*sweep, tolerance) & self.seen, sweep[-1], tolerance)
+        # against noise, which would stretch the range
+        smooth = np.asarray(cv2.medianBlur(sweep[-1], _MEDIAN), np.float32)
+        return _patches(_trusted(*sweep, tolerance) & self.seen, smooth, tolerance)
 
     def _positions(self, reach: int, distances: set[int]) -> list[tuple[int, int]]:
         """Grid positions in the row and the column of the reference view; any others where those are not there."""

@@ -56,9 +56,9 @@ AT_END = 0.02
 class Views:
     """The views about the middle of the grid, reduced and filtered when they are first asked for.
 
-    ``middle`` is the position of the view in the middle, ``baselines`` lead from it to each other one that is present, in rows and columns;
-    ``row_spacing`` is the light field's. ``factor`` is what larger pictures are reduced by, ``shape`` their height and
-    width then, in pixels.
+    ``middle`` is the position of the view in the middle, ``baselines`` lead from it to each other one that is present,
+    in rows and columns; ``row_spacing`` is the light field's. ``factor`` is what larger pictures are reduced by,
+    ``shape`` their height and width then, in pixels.
     """
 
     def __init__(self, light_field: LightField, most_pixels: int = _MOST_PIXELS) -> None:
