@@ -115,6 +115,8 @@ def check(context: click.Context, light_field_path: Path, reading: Reading, as_j
             "clear": bool(found.clear),
             "sign_clear": bool(found.sign_clear),
             "read_in": found.read_in,
+            "regions": found.regions,
+            "agreeing": found.agreeing,
             "verdict": found.verdict(),
             "warning": found.warning(),
         }

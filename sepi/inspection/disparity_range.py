@@ -49,8 +49,8 @@ _TRUNCATION = 0.1
 # Trust: lowest cost as part of the lowest outside its valley. A limit on the cost itself would add nothing here, and
 # would have to know the noise.
 _MOST_AMBIGUITY = 0.8
-# mean above lowest cost, full range = 1: less is rounding
-_FLAT = 1e-4
+# mean above lowest cost, the brightest of the picture = 1: less is rounding, or the blocks of JPEG
+_FLAT = 2e-3
 # pixels of the 5x5 neighbourhood, itself included, that agree within a candidate step
 _LEAST_SUPPORT = 13
 # pixels of a patch, as part of the picture, and at least
@@ -144,6 +144,7 @@ class _Views:
         self._own = light_field.reference_position
         self.reference = self._view(self._own)
         self.seen = ~dark_corners(light_field.reference_view, self.reference.shape, _HIGH_PASS + _SEARCH_RADIUS)
+        self.brightest = float(np.quantile(light_field.reference_view.max(axis=2), 0.99))
         self.reach = 1
 
     def distances(self) -> tuple[int, int]:
@@ -166,11 +167,12 @@ class _Views:
         limit = np.float32(_TRUNCATION)
         sweep = coarse_sweep(self.reference, views, baselines, candidates, limit, radius)
         sampling = float(candidates[1] - candidates[0])
+        flat = _FLAT * self.brightest
         # neighbours agree within a pixel of the most distant view, however finely it is searched
         tolerance = max(sampling, 1 / reach)
         # against noise, which would stretch the range
         smooth = np.asarray(cv2.medianBlur(sweep[-1], _MEDIAN), np.float32)
-        return _patches(_trusted(*sweep, tolerance) & self.seen, smooth, tolerance)
+        return _patches(_trusted(*sweep, tolerance, flat) & self.seen, smooth, tolerance)
 
     def _positions(self, reach: int, distances: set[int]) -> list[tuple[int, int]]:
         """Grid positions in the row and the column of the reference view; any others where those are not there."""
@@ -266,14 +268,16 @@ def _prepared(grey: FloatMap, factor: int) -> FloatMap:
     return np.asarray(smooth - cv2.blur(smooth, (_HIGH_PASS, _HIGH_PASS)), np.float32)
 
 
-def _trusted(lowest: FloatMap, second: FloatMap, mean: FloatMap, disparity: FloatMap, step: float) -> BoolMap:
+def _trusted(
+    lowest: FloatMap, second: FloatMap, mean: FloatMap, disparity: FloatMap, tolerance: float, flat: float
+) -> BoolMap:
     """Pixels whose best candidate is clear, and has enough of the like about it, shape (H, W)."""
-    clear = (lowest < _MOST_AMBIGUITY * second) & (mean - lowest > _FLAT)
+    clear = (lowest < _MOST_AMBIGUITY * second) & (mean - lowest > flat)
     H, W = disparity.shape
     padded = np.pad(np.where(clear, disparity, np.inf), 2, constant_values=np.inf)
     support = np.zeros((H, W), np.int32)
     for dy, dx in np.ndindex(5, 5):
-        support += abs(padded[dy : dy + H, dx : dx + W] - disparity) < step
+        support += abs(padded[dy : dy + H, dx : dx + W] - disparity) < tolerance
     return clear & (support >= _LEAST_SUPPORT)
 
 

@@ -31,6 +31,7 @@ _SWEEP_RADIUS = 2
 _TRUNCATION = 1.5
 _FLAT = 0.02
 _MOST_AMBIGUITY = 0.6
+_NOISE_FLOOR = 0.05
 # Surfaces: pixels whose disparity this part of a window of so many pixels has too, within the sampling; noise makes
 # pixels of one surface look like two
 _SURFACE_WINDOW = 7
@@ -68,13 +69,14 @@ class Evidence(NamedTuple):
         From -2 to 2: above 0 where the surface of the greater disparity is in front, as it should be.
     errors : float
         Absolute value of the mean, in standard errors.
-    regions : int
-        How many regions have a say.
+    regions, agreeing : int
+        How many regions have a say, and how many of them say what the mean says.
     """
 
     mean: float
     errors: float
     regions: int
+    agreeing: int
 
 
 def occlusion_evidence(light_field: LightField, trial: Trial) -> Evidence:
@@ -83,7 +85,7 @@ def occlusion_evidence(light_field: LightField, trial: Trial) -> Evidence:
     The best layout of the trial is taken for right; the sign is that of the layout's first order. There is no evidence
     where there are no views on opposite sides, or hardly any contrast.
     """
-    none = Evidence(0.0, 0.0, 0)
+    none = Evidence(0.0, 0.0, 0, 0)
     views = Views(light_field, _MOST_PIXELS)
     largest = trial.largest_disparity / views.factor
     reach, directions = _directions(views, largest)
@@ -119,7 +121,7 @@ def occlusion_evidence(light_field: LightField, trial: Trial) -> Evidence:
         there = [residual[at] for at in baselines[-t, -s]]
         _add_pairs(
             residual[baselines[t, s][-1]],
-            np.maximum(there[0], there[-1]),
+            np.asarray(np.mean(there, axis=0), np.float32),
             disparity,
             surface,
             positions[baselines[t, s][-1]],
@@ -144,7 +146,7 @@ def _add_pairs(
 ) -> None:
     """Add what pairs of pixels that meet in a view say to the sums, and their number, of each region.
 
-    ``residual`` is that of the view, ``opposite`` the worst of the views on the other side; both pixels are seen there.
+    ``residual`` is that of the view, ``opposite`` the mean of those on the other side, where both pixels are seen.
     """
     H, W = disparity.shape
     side = _side(disparity.shape)
@@ -176,13 +178,13 @@ def _summary(total: npt.NDArray[np.float64], count: npt.NDArray[np.float64]) -> 
     heard = count >= _PAIRS
     regions = int(heard.sum())
     if regions < 2:
-        return Evidence(0.0, 0.0, regions)
+        return Evidence(0.0, 0.0, regions, 0)
     values, weights = total[heard] / count[heard], np.sqrt(count[heard])
     mean = float((weights * values).sum() / weights.sum())
     # regions that all say the same are not without error
     deviation = max(float(np.sqrt((weights**2 * (values - mean) ** 2).sum() / (weights**2).sum())), 0.1)
     error = deviation * float(np.sqrt((weights**2).sum()) / weights.sum())
-    return Evidence(mean, abs(mean) / error, regions)
+    return Evidence(mean, abs(mean) / error, regions, int((values * mean > 0).sum()))
 
 
 def _side(shape: tuple[int, ...]) -> int:
@@ -200,7 +202,8 @@ def _directions(views: Views, largest: float) -> tuple[int, list[Baseline]]:
 
     The most distant at which nothing moves by more than is searched: the strips that are hidden are widest there.
     """
-    present = set(views.baselines)
+    axes = [(n * t, n * s) for t, s in _DIRECTIONS for n in range(1, REACH + 1)]
+    present = set(views.worth_matching([baseline for baseline in views.baselines if baseline in axes]))
     for reach in range(REACH, 0, -1):
         if reach > 1 and largest * reach > _MOST_MOVEMENT:
             continue
@@ -215,8 +218,8 @@ def _directions(views: Views, largest: float) -> tuple[int, list[Baseline]]:
 
 
 def _at(direction: Baseline, reach: int) -> list[Baseline]:
-    """Baselines to the views at half of the distance and at all of it."""
-    return [(n * direction[0], n * direction[1]) for n in sorted({max(1, reach // 2), reach})]
+    """Baselines to the views at the distance and at quarters of it."""
+    return [(n * direction[0], n * direction[1]) for n in sorted({max(1, reach * k // 4) for k in range(1, 5)})]
 
 
 def _disparity(
@@ -233,7 +236,9 @@ def _disparity(
     chosen = np.stack([sweep[0] for sweep in sweeps]).argmin(axis=0)
     lowest, second, mean, disparity = (np.choose(chosen, [sweep[n] for sweep in sweeps]) for n in range(4))
     with np.errstate(invalid="ignore"):
-        trusted = (lowest < _MOST_AMBIGUITY * second) & (mean - lowest > _FLAT)
+        # what noise adds to every cost says nothing
+        floor = np.quantile(lowest[np.isfinite(lowest)], _NOISE_FLOOR) if np.isfinite(lowest).any() else 0
+        trusted = (lowest - floor < _MOST_AMBIGUITY * (second - floor)) & (mean - lowest > _FLAT)
     spacing = candidates[1] - candidates[0]
     trusted &= abs(disparity - cv2.medianBlur(disparity, 5)) < spacing
     return disparity, trusted

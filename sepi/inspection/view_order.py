@@ -12,16 +12,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sepi.inspection.disparity_sign import occlusion_evidence
+from sepi.inspection.disparity_sign import Evidence, occlusion_evidence
 from sepi.inspection.view_layouts import Views, best_trial
 from sepi.io.readers.options import AS_GIVEN, ORDERS
 from sepi.lightfield import LightField
 
-# What the sign needs: regions of the picture where one surface is seen to hide another, the mean of what they say
-# (-2 to 2), and how many standard errors that is
-_FEWEST_REGIONS = 6
-_LEAST_EVIDENCE = 0.8
-_CLEAR_ERRORS = 4.0
+# What the sign needs: regions of the picture where one surface is seen to hide another, the mean of what they say (-2 to
+# 2), and how many standard errors that is; and what it takes to say that near and far are exchanged
+_FEWEST_REGIONS = 5
+_LEAST_EVIDENCE, _LEAST_ERRORS = 0.75, 3.5
+_PLAIN_EVIDENCE, _PLAIN_ERRORS = 1.0, 5.0
 
 _FAULTS = {
     "flip-rows": "the rows of views run the other way",
@@ -53,6 +53,8 @@ class OrderCheck:
         Whether occlusion tells near from far.
     read_in : str
         Order in which the light field was read.
+    regions, agreeing : int
+        Regions of the picture where one surface is seen to hide another, and those that agree on the sign.
     """
 
     fits: Mapping[str, float]
@@ -60,6 +62,8 @@ class OrderCheck:
     clear: bool
     sign_clear: bool
     read_in: str
+    regions: int = 0
+    agreeing: int = 0
 
     def verdict(self) -> str:
         """One line for the user."""
@@ -84,7 +88,9 @@ class OrderCheck:
             return None
         fault = _FAULTS[self.best] if self.read_in == AS_GIVEN else f"--order {self.read_in} does not fit"
         advice = f"{fault}: read it with --order {self.best}"
-        return advice if self.sign_clear else f"{advice}, or {self._turned} if depth comes out inside out"
+        if not self.sign_clear:
+            return f"{advice}, or {self._turned} if depth comes out inside out"
+        return f"{advice} (so says what hides what in {self.agreeing} of {self.regions} regions of the picture)"
 
     @property
     def _turned(self) -> str:
@@ -111,14 +117,12 @@ def check_order(light_field: LightField, read_in: str = AS_GIVEN) -> OrderCheck:
     if trial is None:
         return OrderCheck(dict.fromkeys(ORDERS, 1.0), read_in, clear=False, sign_clear=False, read_in=read_in)
     costs = dict(trial.costs)
-    sign_clear = False
+    sign_clear, evidence = False, None
     if trial.clear:
         evidence = occlusion_evidence(light_field, trial)
-        sign_clear = (
-            evidence.regions >= _FEWEST_REGIONS
-            and abs(evidence.mean) >= _LEAST_EVIDENCE
-            and evidence.errors >= _CLEAR_ERRORS
-        )
+        # near and far as they are, if the order is right but for them: to doubt that takes more
+        kept = next((sign for order, sign in trial.best.items() if order == AS_GIVEN), None)
+        sign_clear = _is_clear(evidence, plainly=kept is not None and kept * evidence.mean < 0)
         if sign_clear:
             # at most half way to the next layout: the wrong sign is still the better layout
             for order, sign in trial.best.items():
@@ -126,7 +130,14 @@ def check_order(light_field: LightField, read_in: str = AS_GIVEN) -> OrderCheck:
     # from changes of the light field available to orders that take the place of the given one
     fits = {order: costs[_change(read_in, order)] for order in ORDERS}
     best = min(ORDERS, key=lambda order: (fits[order], order != read_in))
-    return OrderCheck(fits, best, trial.clear, sign_clear, read_in)
+    if evidence is None:
+        return OrderCheck(fits, best, trial.clear, sign_clear, read_in)
+    return OrderCheck(fits, best, trial.clear, sign_clear, read_in, evidence.regions, evidence.agreeing)
+
+
+def _is_clear(evidence: Evidence, plainly: bool) -> bool:
+    mean, errors = (_PLAIN_EVIDENCE, _PLAIN_ERRORS) if plainly else (_LEAST_EVIDENCE, _LEAST_ERRORS)
+    return evidence.regions >= _FEWEST_REGIONS and abs(evidence.mean) >= mean and evidence.errors >= errors
 
 
 def _change(read_in: str, target: str) -> str:
