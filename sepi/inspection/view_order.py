@@ -17,8 +17,8 @@ from sepi.inspection.view_layouts import Views, best_trial
 from sepi.io.readers.options import AS_GIVEN, ORDERS
 from sepi.lightfield import LightField
 
-# What the sign needs: regions of the picture where one surface is seen to hide another, the mean of what they say (-2 to
-# 2), and how many standard errors that is; and what it takes to say that near and far are exchanged
+# What the sign needs: regions of the picture where one surface is seen to hide another, the mean of what they say
+# (-2 to 2), and how many standard errors that is; and what it takes to say that near and far are exchanged
 _FEWEST_REGIONS = 5
 _LEAST_EVIDENCE, _LEAST_ERRORS = 0.75, 3.5
 _PLAIN_EVIDENCE, _PLAIN_ERRORS = 1.0, 5.0
