@@ -42,6 +42,7 @@ _ORDERS = ("as-given", "flip-rows")
 # What tells: the next arrangement's matching cost over the best's, and from where on no other distance is looked at;
 # the most that views have which fit together
 _CLEAR_RATIO = 1.15
+_LEAST_DIFFERENCE = 0.01
 _PLAIN_RATIO = 1.5
 _MOST_COST = 0.65
 # positions from one to the next by the golden ratio lie evenly, and in step with no row
@@ -105,7 +106,7 @@ def arrange(light_field: LightField, options: ReadOptions) -> LightField:
             "give --grid ROWSxCOLUMNS, or leave pictures out that are no views with --exclude"
         )
     best, reason = tried[ranked[0]], "by how they fit together"
-    if len(tried) > 1 and not costs[ranked[1]] >= _CLEAR_RATIO * costs[ranked[0]]:
+    if len(tried) > 1 and not _CLEAR_RATIO * costs[ranked[0]] + _LEAST_DIFFERENCE <= costs[ranked[1]] < math.inf:
         square = next(
             (way for way in tried if way.grid[0] == way.grid[1] and len(way.positions) == way.grid[0] ** 2), None
         )
@@ -180,7 +181,7 @@ def _discs(count: int) -> Iterator[Arrangement]:
 
 def _costs(views: Views, present: npt.NDArray[np.bool_], tried: list[Arrangement]) -> list[float]:
     """Matching cost of each arrangement, 0..1, by the views that tell them apart best; infinite without texture."""
-    best, clearest = [math.inf] * len(tried), 0.0
+    best, clearest = [math.inf] * len(tried), -1.0
     for reach, factor in _DISTANCES:
         if views.is_too_small(factor):
             continue
