@@ -1,18 +1,19 @@
 """The whole method on real benchmark scenes: the figures it has to reach, and what each stage is worth."""
 
-from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
+import cv2
 import numpy as np
-import numpy.typing as npt
 import pytest
-from real_gantry import gantry
 from real_scenes import final_maps, final_scores, maps_after, scene
 
 from sepi.evaluate import score
-from sepi.lightfield import DisparityRange, LightField
+from sepi.io.readers.options import ReadOptions
+from sepi.lightfield import DisparityRange, LightField, as_unit_float
 from sepi.matching.plane_sweep import SweepParameters, sweep
 from sepi.pipeline import VARIANTS
+from sepi.reading import read_light_field
 from sepi.report.tabular.confidence import decile_errors
 
 # MSE x100 and Q25 x100 on the whole map, as the paper prints them for its own method
@@ -87,17 +88,40 @@ def test_views_match_better_where_their_cameras_really_stood(real_data: Path) ->
     folder = real_data / "real" / "gantry-jellybeans"
     if not folder.is_dir():
         pytest.skip(f"no real light field at {folder}")
-    whole, positions = gantry(folder)
-    part = np.s_[130:230, 280:430]
-    views = np.ascontiguousarray(whole.views[:, :, *part])
-    light_field = LightField(views, "gantry", disparity_range=DisparityRange(-4.5, 2, "given"))
-    textured = np.hypot(*np.gradient(light_field.reference_view.mean(axis=2))) > 0.02
+    whole = read_light_field(folder, options=ReadOptions(order="flip-rows"), check_order=False)
+    assert whole.positions is not None
+    views = np.ascontiguousarray(whole.views[:, :, 130:230, 280:430])
+    known = DisparityRange(-4.5, 2, "given")
+    textured = np.hypot(*np.gradient(as_unit_float(views[8, 8]).mean(axis=2))) > 0.02
 
-    def cost(positions: npt.NDArray[np.float64] | None) -> float:
+    def cost(**standing: Any) -> float:
         parameters = SweepParameters(num_disparities=66, window_radius=1)
-        return float(sweep(replace(light_field, positions=positions), parameters).cost[0][textured].mean())
+        light_field = LightField(views, "gantry", disparity_range=known, **standing)
+        return float(sweep(light_field, parameters).cost[0][textured].mean())
 
-    on_grid, where_they_stood = cost(None), cost(positions)
-    assert where_they_stood < on_grid - 0.01
+    where_they_stood = cost(positions=whole.positions)
+    assert where_they_stood < cost(row_spacing=whole.row_spacing) - 0.01
     # as if the names' vertical coordinate ran the other way
-    assert cost((positions * [-1, 1])[::-1]) > where_they_stood + 0.01
+    assert where_they_stood < cost(positions=(whole.positions * [-1, 1])[::-1]) - 0.01
+
+
+def test_views_match_best_where_rows_are_as_close_as_they_are(real_data: Path) -> None:
+    """Rows 15 pixels apart and columns 35: depth from views taken for an even grid is nonsense."""
+    folder = real_data / "real" / "t_rex"
+    if not folder.is_dir():
+        pytest.skip(f"no real light field at {folder}")
+    whole = read_light_field(folder, check_order=False)
+    small = [
+        [cv2.resize(view, None, fx=1 / 4, fy=1 / 4, interpolation=cv2.INTER_AREA) for view in row]
+        for row in whole.views
+    ]
+    known = DisparityRange(-14, 14, "given")
+    costs = {
+        row_spacing: sweep(
+            LightField(np.array(small), "t_rex", disparity_range=known, row_spacing=row_spacing),
+            SweepParameters(num_disparities=141, window_radius=1),
+        ).cost.mean()
+        for row_spacing in (0.33, 0.38, 0.43, 0.6, 1.0)
+    }
+    assert min(costs, key=costs.__getitem__) == 0.38
+    assert costs[0.38] < 0.75 * costs[1.0]
