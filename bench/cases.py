@@ -220,7 +220,7 @@ def _operations(light_field: LightField, choice: str, settings: Any, maps: Stage
         pixels, groups = H * W, 1
     elif choice == "half_sepi":
         pixels = int(maps.extra["occlusion_candidates"].sum())
-        numbers = halves_and_quarters(light_field.grid, light_field.reference_position).groups
+        numbers = halves_and_quarters(light_field).groups
         # the reference view's own group is empty
         groups = len(set(numbers.ravel().tolist()) - {int(numbers[light_field.reference_position])})
     else:

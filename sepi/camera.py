@@ -8,6 +8,9 @@ zero. With the focal length ``f`` in pixels, a point at depth ``Z`` has the disp
 This is the formula of the HCI 4D light field benchmark [1]_, whose ``beta`` is ``b f F``; it gives the focal length and
 the sensor size in millimetres, the size being that of the longer side of the picture.
 
+Disparities are in pixels per view step, so ``b`` is the distance from one column of cameras to the next, whatever that
+of rows; where there is one column only, that from one row to the next.
+
 References
 ----------
 .. [1] K. Honauer, O. Johannsen, D. Kondermann, B. Goldluecke, "A dataset and evaluation methodology for depth
@@ -79,7 +82,7 @@ def camera_from(
     focal_length_mm, sensor_size_mm : float
         Focal length, and width or height of the sensor, whichever is longer, in millimetres.
     baseline_mm : float
-        Distance between neighbouring cameras in millimetres.
+        Distance between neighbouring columns of cameras (rows, where there is one column only) in millimetres.
     focus_distance_m : float
         Depth at which the disparity is zero, in metres; infinite for cameras that look straight ahead.
     shape : (int, int)

@@ -208,9 +208,7 @@ def region_masks(light_field: LightField) -> dict[str, BoolMap]:
         from sepi.scoring import regions
 
         if "occluded" not in masks:
-            masks["occluded"] = regions.occluded(
-                light_field.ground_truth, light_field.grid, light_field.reference_position, light_field.present
-            )
+            masks["occluded"] = regions.occluded(light_field.ground_truth, light_field.baselines)
         if "textureless" not in masks:
             masks["textureless"] = regions.textureless(light_field.reference_view)
     return {name: masks[name] for name in names}
@@ -224,9 +222,8 @@ def _error(disparity: FloatMap, ground_truth: FloatMap) -> FloatMap:
 
 def _digest_of_scene(light_field: LightField, code: str) -> str:
     """Digest of what decides the scores beside the map: code, ground truth, masks, and what masks are computed from."""
-    grid = (light_field.grid, light_field.reference_position)
-    facts = [code, _versions(), grid, list(light_field.masks), list(REGIONS), PROTOCOLS, BAD_PIXEL]
-    arrays: list[npt.NDArray[Any]] = [light_field.present, *light_field.masks.values()]
+    facts = [code, _versions(), list(light_field.masks), list(REGIONS), PROTOCOLS, BAD_PIXEL]
+    arrays: list[npt.NDArray[Any]] = [light_field.baselines, *light_field.masks.values()]
     arrays += [] if light_field.ground_truth is None else [light_field.ground_truth, light_field.reference_view]
     return _digest(repr(facts), *arrays)
 

@@ -177,10 +177,13 @@ class LightField:
         return self.view or (self.views.shape[0] // 2, self.views.shape[1] // 2)
 
     @property
-    def from_centre(self) -> tuple[int, int]:
-        """Rows below and columns to the right of the grid's centre view at which the reference view stands."""
-        (t, s), (rows, columns) = self.reference_position, self.grid
-        return t - rows // 2, s - columns // 2
+    def from_centre(self) -> tuple[float, float]:
+        """Baseline ``(down, across)`` from the grid's centre view to the reference view, in view steps."""
+        (t, s), centre = self.reference_position, (self.grid[0] // 2, self.grid[1] // 2)
+        if self.positions is not None and self.present[centre]:
+            down, across = (self.positions[t, s] - self.positions[centre]).tolist()
+            return down, across
+        return (t - centre[0]) * self.row_spacing, float(s - centre[1])
 
     @property
     def shape(self) -> tuple[int, int]:

@@ -106,7 +106,7 @@ def half_sepi(
 
     before = require_previous(previous)
     candidates = occlusion_candidates(light_field.reference_view, before.disparity, parameters)
-    views = halves_and_quarters(light_field.grid, light_field.reference_position)
+    views = halves_and_quarters(light_field)
     result = sweep(
         light_field, parameters, groups=views.groups, subsets=views.subsets, mask=candidates, progress=progress
     )
@@ -138,7 +138,7 @@ def wang(
     """
     before = require_previous(previous)
     candidates = occlusion_candidates(light_field.reference_view, before.disparity, parameters)
-    views = half_planes(light_field.grid, parameters.directions, light_field.reference_position)
+    views = half_planes(light_field, parameters.directions)
     result = sweep(
         light_field, parameters, groups=views.groups, subsets=views.subsets, mask=candidates, progress=progress
     )
@@ -174,10 +174,7 @@ def visibility(
         disparity,
         result.confidence,
         occluded=occluded_in_any_view(
-            disparity,
-            light_field.present,
-            *light_field.reference_position,
-            np.float32(parameters.occlusion_margin),
+            disparity, light_field.present, light_field.baselines, np.float32(parameters.occlusion_margin)
         ),
     )
 

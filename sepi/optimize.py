@@ -137,7 +137,7 @@ def second_order(
     for i in range(total):
         progress((i + 0.5) / (total + 1))
         smooth = i >= parameters.refinements
-        nearest = z_buffers(disparity, light_field.present, *light_field.reference_position)
+        nearest = z_buffers(disparity, light_field.present, light_field.baselines)
         if i <= parameters.refinements:
             # later steps are too small to change it
             mean = view_mean(matching, disparity, nearest, parameters.occlusion_margin)

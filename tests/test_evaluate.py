@@ -7,6 +7,7 @@ import h5py
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from geometries import grid_baselines
 
 from sepi.errors import SepiError
 from sepi.evaluate import command, evaluation_of, score
@@ -121,7 +122,7 @@ def test_masks_come_from_the_scene_or_are_computed() -> None:
     mask = np.ones((40, 40), bool)
     found = evaluation_of(scene(ground_truth, {"textureless": mask}), ground_truth)
     assert found.region_sources == {"occluded": "computed", "textureless": "scene"}
-    np.testing.assert_array_equal(found.regions["occluded"], regions.occluded(ground_truth, (3, 3)))
+    np.testing.assert_array_equal(found.regions["occluded"], regions.occluded(ground_truth, grid_baselines((3, 3))))
     np.testing.assert_array_equal(found.regions["textureless"], mask)
 
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from geometries import jittered
 from scipy.ndimage import gaussian_filter
 
 from sepi.errors import SepiError
@@ -64,7 +65,7 @@ def test_half_away_from_the_nearer_surface_is_kept(near_side, kept):
     light_field = two_planes(near_side)
     _, maps = run(light_field)
     names = maps.subset_names
-    assert names == halves_and_quarters(light_field.grid).names
+    assert names == halves_and_quarters(light_field).names
     across = np.s_[15:-15, EDGE - 2 : EDGE] if near_side == "right" else None
     if near_side == "left":
         across = np.s_[15:-15, EDGE : EDGE + 2]
@@ -117,8 +118,12 @@ def test_stage_without_a_stage_before_it_is_an_error():
         CHOICES["none"].run(two_planes("right"), None, CHOICES["none"].parameters(), no_progress)
 
 
+def blank(grid, **known):
+    return LightField(np.zeros((*grid, 2, 2, 3), np.uint8), "blank", **known)
+
+
 def test_halves_and_quarters_partition_the_views():
-    views = halves_and_quarters((9, 9))
+    views = halves_and_quarters(blank((9, 9)))
     members = {n: subset[views.groups] for n, subset in zip(views.names, views.subsets, strict=True)}
     assert members["full"].all()
     assert members["left"][:, :5].all()
@@ -128,10 +133,32 @@ def test_halves_and_quarters_partition_the_views():
     np.testing.assert_array_equal(members["right-down"], members["right"] & members["down"])
 
 
+@pytest.mark.parametrize("row_spacing", [0.1, 1, 4])
+def test_a_view_close_to_the_dividing_line_stands_on_it(row_spacing):
+    """Left out of a half for a hair's breadth, a row of views would be missing from the depth beside an edge."""
+    positions = jittered((5, 7)) * [row_spacing, 1]
+    positions[0, 0] = positions[4, 3]  # a view far from its place counts where it is
+    views = halves_and_quarters(blank((5, 7), positions=positions))
+    even = halves_and_quarters(blank((5, 7), row_spacing=row_spacing))
+    expected = even.groups.copy()
+    expected[0, 0] = even.groups[4, 3]
+    np.testing.assert_array_equal(views.groups, expected)
+    np.testing.assert_array_equal(even.groups, halves_and_quarters(blank((5, 7))).groups)
+
+
+def test_half_planes_are_those_of_the_picture_where_rows_are_closer():
+    """Edges have their angle in the picture: the views that see past one lie beyond its line there, not in the grid."""
+    views = half_planes(blank((9, 9), row_spacing=0.25), 8)
+    t, s = np.mgrid[-4:5, -4:5]
+    angle = np.pi / 16
+    facing = s * np.cos(angle) + 0.25 * t * np.sin(angle)
+    np.testing.assert_array_equal(views.subsets[1][views.groups][facing != 0], (facing > 0)[facing != 0])
+
+
 def test_half_planes_face_their_direction():
     """A half plane that faced the wrong way would keep the occluded views."""
     directions = 8
-    views = half_planes((9, 9), directions)
+    views = half_planes(blank((9, 9)), directions)
     t, s = np.mgrid[-4:5, -4:5]
     for n in range(2 * directions):
         member = views.subsets[1 + n][views.groups]

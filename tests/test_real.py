@@ -1,13 +1,19 @@
 """The whole method on real benchmark scenes: the figures it has to reach, and what each stage is worth."""
 
 from pathlib import Path
+from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 from real_scenes import final_maps, final_scores, maps_after, scene
 
 from sepi.evaluate import score
+from sepi.io.readers.options import ReadOptions
+from sepi.lightfield import DisparityRange, LightField, as_unit_float
+from sepi.matching.plane_sweep import SweepParameters, sweep
 from sepi.pipeline import VARIANTS
+from sepi.reading import read_light_field
 from sepi.report.tabular.confidence import decile_errors
 
 # MSE x100 and Q25 x100 on the whole map, as the paper prints them for its own method
@@ -75,3 +81,47 @@ def test_error_falls_with_confidence(hci: Path, name: str) -> None:
     final = final_maps(hci / name, "best")
     for errors in decile_errors(final.confidence, final.disparity - scene(hci / name).ground_truth):
         assert np.all(np.diff(errors) > 0), errors
+
+
+def test_views_match_better_where_their_cameras_really_stood(real_data: Path) -> None:
+    """A gantry's cameras stand a few hundredths of a step off the grid, which blurs its depth: the views must tell."""
+    folder = real_data / "real" / "gantry-jellybeans"
+    if not folder.is_dir():
+        pytest.skip(f"no real light field at {folder}")
+    whole = read_light_field(folder, options=ReadOptions(order="flip-rows"), check_order=False)
+    assert whole.positions is not None
+    views = np.ascontiguousarray(whole.views[:, :, 130:230, 280:430])
+    known = DisparityRange(-4.5, 2, "given")
+    textured = np.hypot(*np.gradient(as_unit_float(views[8, 8]).mean(axis=2))) > 0.02
+
+    def cost(**standing: Any) -> float:
+        parameters = SweepParameters(num_disparities=66, window_radius=1)
+        light_field = LightField(views, "gantry", disparity_range=known, **standing)
+        return float(sweep(light_field, parameters).cost[0][textured].mean())
+
+    where_they_stood = cost(positions=whole.positions)
+    assert where_they_stood < cost(row_spacing=whole.row_spacing) - 0.01
+    # as if the names' vertical coordinate ran the other way
+    assert where_they_stood < cost(positions=(whole.positions * [-1, 1])[::-1]) - 0.01
+
+
+def test_views_match_best_where_rows_are_as_close_as_they_are(real_data: Path) -> None:
+    """Rows 15 pixels apart and columns 35: depth from views taken for an even grid is nonsense."""
+    folder = real_data / "real" / "t_rex"
+    if not folder.is_dir():
+        pytest.skip(f"no real light field at {folder}")
+    whole = read_light_field(folder, check_order=False)
+    small = [
+        [cv2.resize(view, None, fx=1 / 4, fy=1 / 4, interpolation=cv2.INTER_AREA) for view in row]
+        for row in whole.views
+    ]
+    known = DisparityRange(-14, 14, "given")
+    costs = {
+        row_spacing: sweep(
+            LightField(np.array(small), "t_rex", disparity_range=known, row_spacing=row_spacing),
+            SweepParameters(num_disparities=141, window_radius=1),
+        ).cost.mean()
+        for row_spacing in (0.33, 0.38, 0.43, 0.6, 1.0)
+    }
+    assert min(costs, key=costs.__getitem__) == 0.38
+    assert costs[0.38] < 0.75 * costs[1.0]

@@ -146,7 +146,7 @@ def camera_flags(command: Callable[..., Any]) -> Callable[..., Any]:
 
 _GEOMETRY = {
     "focal_length_mm": ("MM", "Focal length, millimetres; with the next three: metric depth."),
-    "baseline_mm": ("MM", "Distance from camera to camera, millimetres."),
+    "baseline_mm": ("MM", "Distance from column to column of cameras (row to row, if one column), millimetres."),
     "focus_distance_m": ("M", "Depth at which nothing moves from view to view, metres; inf for parallel cameras."),
     "sensor_size_mm": ("MM", "Longer side of the sensor, millimetres."),
 }

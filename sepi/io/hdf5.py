@@ -79,6 +79,11 @@ def write_light_field(path: Path, light_field: LightField) -> None:
             file.attrs["disparity_range_source"] = _fixed(known.source)
         if light_field.view is not None:
             file.attrs["view"] = light_field.view
+        file.attrs["row_spacing"] = light_field.row_spacing
+        if light_field.positions is not None:
+            file.create_dataset("positions", data=light_field.positions)
+            file["positions"].attrs["axes"] = "t s (down, across)"
+            file["positions"].attrs["units"] = "view steps"
         if light_field.camera is not None:
             file.attrs["camera"] = astuple(light_field.camera)
         if light_field.notes:
@@ -104,20 +109,23 @@ def has_dataset(path: Path, name: str, *, if_damaged: bool = False) -> bool:
 def read_light_field(path: Path) -> LightField:
     """Read a light field written by ``write_light_field``."""
     with open_hdf5(path, "light field of this package") as file:
-        arrays = {name: read_dataset(path, file[name]) for name in ("views", "present", "ground_truth") if name in file}
+        known_arrays = ("views", "present", "positions", "ground_truth")
+        arrays = {name: read_dataset(path, file[name]) for name in known_arrays if name in file}
         known = None
         if "disparity_range" in file.attrs:
             minimum, maximum = (float(value) for value in file.attrs["disparity_range"])
             known = DisparityRange(minimum, maximum, _text(file, "disparity_range_source"))
             require_known("disparity range", [known.source], RANGE_SOURCES)
         view = file.attrs.get("view")
-        ground_truth = arrays.get("ground_truth")
+        ground_truth, positions = arrays.get("ground_truth"), arrays.get("positions")
         return LightField(
             views=arrays["views"],
             name=_text(file, "name"),
             source=_text(file, "source"),
             present=arrays["present"].astype(bool),
             view=None if view is None else (int(view[0]), int(view[1])),
+            row_spacing=float(file.attrs.get("row_spacing", 1)),
+            positions=None if positions is None else positions.astype(np.float64),
             camera=read_camera(file),
             notes=tuple(_text(file, "notes").split("\0")) if "notes" in file.attrs else (),
             disparity_range=known,

@@ -6,12 +6,12 @@ shows upright and the right way round. The origin is the camera of the view that
 Where the camera is known, positions are in metres. Cameras look the same way and stand a baseline apart; their pictures
 are shifted so that a point at the focus distance is at the same pixel in all of them (:mod:`sepi.camera`). The shift
 moves the principal point: at the grid's centre view it is the middle of the picture ``(cx, cy)``, and in a view ``n``
-columns to its right ``cx + n * offset``, with the camera's ``offset`` in pixels per view step. So pixel ``(y, x)`` at
-depth ``Z`` is the point ::
+view steps to its right ``cx + n * offset``, with the camera's ``offset`` in pixels per view step. So pixel ``(y, x)``
+at depth ``Z`` is the point ::
 
     X = (x - cx - n * offset) * Z / focal_px        Y = (y - cy - m * offset) * Z / focal_px
 
-for a view ``n`` columns to the right of and ``m`` rows below the centre view; X to the right and Y down, in metres.
+for a view ``n`` view steps to the right of and ``m`` below the centre view; X to the right and Y down, in metres.
 
 Where it is not known, the cloud is a relief: x and y in pixels from the middle, z the disparity, stretched so that its
 range is a third of the picture's width. Shape and proportions are then not those of the scene.
@@ -74,7 +74,7 @@ def point_cloud(
     confidence: FloatMap | None = None,
     *,
     camera: Camera | None = None,
-    from_centre: tuple[int, int] = (0, 0),
+    from_centre: tuple[float, float] = (0, 0),
     min_confidence: float = 0.0,
     max_depth: float | None = None,
     step: int = 1,
@@ -92,8 +92,8 @@ def point_cloud(
         0..1; needed for ``min_confidence``.
     camera : Camera, optional
         Makes the cloud metric; a relief without.
-    from_centre : (int, int)
-        Rows below and columns to the right of the grid's centre view at which the view stands.
+    from_centre : (float, float)
+        Baseline (down, across) from the grid's centre view to this view, in view steps.
     min_confidence : float
         Leave out pixels of lower confidence.
     max_depth : float, optional
@@ -138,7 +138,11 @@ def point_cloud(
 
 
 def _metric(
-    picture: npt.NDArray[np.generic], disparity: FloatMap, used: BoolMap, camera: Camera, from_centre: tuple[int, int]
+    picture: npt.NDArray[np.generic],
+    disparity: FloatMap,
+    used: BoolMap,
+    camera: Camera,
+    from_centre: tuple[float, float],
 ) -> PointCloud:
     across, down = _from_middle(used)
     depth = camera.depth(disparity[used]).astype(np.float64)

@@ -83,5 +83,7 @@ def scene_attributes(light_field: LightField) -> dict[str, Attribute]:
         "source": light_field.source,
         "disparity_range": (known.minimum, known.maximum),
         "disparity_range_source": known.source,
+        "row_spacing": light_field.row_spacing,
+        "positions": "grid" if light_field.positions is None else "given",
         "version": package_version(),
     }

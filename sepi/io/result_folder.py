@@ -73,8 +73,8 @@ class Result:
         Pixels that no view knows anything about; none in a result that does not say.
     camera : Camera or None
         Where it is known.
-    from_centre : (int, int)
-        Rows below and columns to the right of the grid's centre view at which the view stands.
+    from_centre : (float, float)
+        Baseline (down, across) from the grid's centre view to the view, in view steps.
     """
 
     scene: str
@@ -83,7 +83,7 @@ class Result:
     confidence: FloatMap
     unknown: BoolMap
     camera: Camera | None
-    from_centre: tuple[int, int]
+    from_centre: tuple[float, float]
 
 
 def write_result(
@@ -168,6 +168,8 @@ def read_result(path: Path) -> Result:
         )
         unknown = read_dataset(path, file[_UNKNOWN]) if _UNKNOWN in file else np.zeros(disparity.shape, bool)
         (t, s), (rows, columns) = (map(int, file.attrs[name]) for name in ("view_position", "grid"))
+        # results of earlier versions: rows as far apart as columns, no view off the grid
+        down, across = map(float, file.attrs.get("from_centre", (t - rows // 2, s - columns // 2)))
         scene, camera = str(file.attrs.get("scene", "")), read_camera(file)
     alike = disparity.shape == confidence.shape == unknown.shape == picture.shape[:2]
     if not alike or picture.shape[2:] not in ((1,), (3,)):
@@ -179,7 +181,7 @@ def read_result(path: Path) -> Result:
         confidence=confidence.astype(np.float32),
         unknown=unknown.astype(bool),
         camera=camera,
-        from_centre=(t - rows // 2, s - columns // 2),
+        from_centre=(down, across),
     )
 
 
@@ -220,7 +222,11 @@ def _write_files(
     camera, view = light_field.camera, light_field.views[light_field.reference_position]
     masks = {f"mask_{name}.png": values for name, values in maps.extra.items() if values.dtype == bool}
     more: dict[str, npt.NDArray[Any]] = {"view": view}
-    known: dict[str, Any] = {"view_position": light_field.reference_position, "grid": light_field.grid}
+    known: dict[str, Any] = {
+        "view_position": light_field.reference_position,
+        "grid": light_field.grid,
+        "from_centre": light_field.from_centre,
+    }
     if camera is not None:
         more["depth"], known["camera"] = camera.depth(maps.disparity), astuple(camera)
         write_pfm(folder / _DEPTH, more["depth"])

@@ -81,6 +81,8 @@ class BaseDetail(NamedTuple):
     present : ndarray, shape (T, S), bool
     t0, s0 : int
         Position of the reference view.
+    baselines : ndarray, shape (T, S, 2), float64
+        Down and across from the reference view, in view steps.
     noise : float
         Expected squared residual, summed over RGB, by noise alone.
     guide : ndarray, shape (H, W, 3), float32
@@ -94,6 +96,7 @@ class BaseDetail(NamedTuple):
     present: BoolMap
     t0: int
     s0: int
+    baselines: npt.NDArray[np.float64]
     noise: float
     guide: FloatMap
 
@@ -127,6 +130,7 @@ def base_detail_decomposition(light_field: LightField, parameters: BaseDetailPar
         np.float32(DETAIL_UNIT),
         light_field.present,
         *light_field.reference_position,
+        light_field.baselines,
         residual_variance(guide),
         guide,
     )

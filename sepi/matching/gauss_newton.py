@@ -1,10 +1,10 @@
 """Disparity below the disparity sampling: Gauss-Newton on the residuals of all views that see a pixel.
 
-For pixel ``p``, view ``v`` and mean ``m`` of the views, the residual ``r_v(d) = L_v(p - d v) - m(p)`` changes with the
-disparity by ``-g v``, where ``g`` is the derivative of the mean along y and x. With robust weights ``w`` the cost is
-least at an update of ``sum(w r g v) / sum(w (g v)^2)``, both sums over a window. The mean of the views has much less
-noise than the reference view, so that its derivatives are sound even where texture is faint; views are interpolated by
-cubic splines, since linear interpolation pulls the minimum towards half pixels.
+For pixel ``p``, a view of baseline ``v`` and mean ``m`` of the views, the residual ``r_v(d) = L_v(p - d v) - m(p)``
+changes with the disparity by ``-g v``, where ``g`` is the derivative of the mean along y and x. With robust weights
+``w`` the cost is least at an update of ``sum(w r g v) / sum(w (g v)^2)``, both sums over a window. The mean of the
+views has much less noise than the reference view, so that its derivatives are sound even where texture is faint; views
+are interpolated by cubic splines, since linear interpolation pulls the minimum towards half pixels.
 """
 
 from __future__ import annotations
@@ -36,12 +36,20 @@ def spline_views(light_field: LightField, views: BaseDetail, parameters: BaseDet
     splines = np.zeros((*light_field.grid, *padded, 3 * len(planes)), np.int16)
     for i, (values, unit, _, _) in enumerate(planes):
         view_splines(values, unit, light_field.present, 3 * i, splines)
+    others = light_field.present.copy()
+    others[light_field.reference_position] = False
+    down, across = light_field.baselines[others].astype(np.float32).T
+    rows, columns = np.nonzero(others)
+    runs = np.flatnonzero(np.diff(down, prepend=np.nan).astype(bool) | np.diff(rows, prepend=-1).astype(bool))
     own = [values[light_field.reference_position].astype(np.float32) * unit for values, unit, _, _ in planes]
     return SplineViews(
         splines,
         np.ascontiguousarray(np.concatenate(own).transpose(1, 2, 0)),
-        light_field.present,
-        *light_field.reference_position,
+        columns,
+        np.ascontiguousarray(across),
+        np.append(runs, columns.size),
+        rows[runs],
+        down[runs],
         np.array([views.squared_scale(scale) for _, _, scale, _ in planes], np.float32),
         np.array([share for _, _, _, share in planes], np.float32),
     )

@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit, prange
 
-from sepi.lightfield import BoolMap, FloatMap
+from sepi.lightfield import FloatMap
 
 EXACT = {"nnan", "ninf", "nsz"}
 """Fast-math flags that keep every rounding as written: see :mod:`sepi.matching.plane_sweep_kernels`."""
@@ -43,18 +43,28 @@ class SplineViews(NamedTuple):
         Spline coefficients of colours and, where it has a share, detail: C is 3 or 6.
     reference : ndarray, shape (H, W, C), float32
         Colours, and detail, of the reference view.
-    present : ndarray, shape (T, S), bool
-    t0, s0 : int
-        Position of the reference view.
+    columns : ndarray, shape (N,), int64
+        Column in the grid of each view that is present, but for the reference view.
+    across : ndarray, shape (N,), float32
+        Their baselines, in view steps.
+    begins : ndarray, shape (R + 1,), int64
+        Where among them each run of views begins that stand in one row and equally far down, and the end of the last
+        one. What depends on the row of pixels alone is computed once for a run.
+    rows : ndarray, shape (R,), int64
+        Row in the grid of each run.
+    down : ndarray, shape (R,), float32
+        Their baselines, in view steps.
     scales2, shares : ndarray, shape (C / 3,), float32
         Square of the robust scale, and share in the cost, of colours and of detail.
     """
 
     splines: npt.NDArray[np.int16]
     reference: FloatMap
-    present: BoolMap
-    t0: int
-    s0: int
+    columns: npt.NDArray[np.int64]
+    across: FloatMap
+    begins: npt.NDArray[np.int64]
+    rows: npt.NDArray[np.int64]
+    down: FloatMap
     scales2: FloatMap
     shares: FloatMap
 
@@ -196,8 +206,6 @@ def mean_of_views(views: SplineViews, disparity: Any, nearest: Any, occlusion_ma
 
     Arguments as of :func:`sepi.matching.gauss_newton.view_mean`, the margin as float32.
     """
-    T, S = views.present.shape
-    t0, s0 = views.t0, views.s0
     H, W, C = views.reference.shape
     out = np.empty((H, W, C), np.float32)
     for y in prange(H):
@@ -208,12 +216,10 @@ def mean_of_views(views: SplineViews, disparity: Any, nearest: Any, occlusion_ma
                 c, scale2 = 3 * part, views.scales2[part]
                 m0, m1, m2 = views.reference[y, x, c], views.reference[y, x, c + 1], views.reference[y, x, c + 2]
                 total0, total1, total2, weight = m0, m1, m2, np.float32(1)
-                for t in range(T):
-                    for s in range(S):
-                        fy = np.float32(y) - d * np.float32(t - t0)
-                        fx = np.float32(x) - d * np.float32(s - s0)
-                        if not views.present[t, s] or (t == t0 and s == s0):
-                            continue
+                for r in range(views.down.size):
+                    t, fy = views.rows[r], np.float32(y) - d * views.down[r]
+                    for n in range(views.begins[r], views.begins[r + 1]):
+                        s, fx = views.columns[n], np.float32(x) - d * views.across[n]
                         if not _seen(fy, fx, nearest[t, s], limit):
                             continue
                         v0, v1, v2 = _sample(views.splines[t, s], c, fy, fx)
@@ -246,8 +252,6 @@ def normal_equations(
     gradient, curvature : ndarray, shape (H, W), float32
         Their ratio is the update towards less cost, in pixels per view step.
     """
-    T, S = views.present.shape
-    t0, s0 = views.t0, views.s0
     H, W, C = mean.shape
     gradient, curvature = np.zeros((H, W), np.float32), np.zeros((H, W), np.float32)
     for y in prange(H):
@@ -260,17 +264,17 @@ def normal_equations(
                 y0, y1, y2 = down[y, x, c], down[y, x, c + 1], down[y, x, c + 2]
                 x0, x1, x2 = across[y, x, c], across[y, x, c + 1], across[y, x, c + 2]
                 slope, hessian = np.float32(0), np.float32(0)
-                for t in range(T):
-                    for s in range(S):
-                        dt, ds = np.float32(t - t0), np.float32(s - s0)
-                        fy, fx = np.float32(y) - d * dt, np.float32(x) - d * ds
-                        if not views.present[t, s] or (t == t0 and s == s0):
-                            continue
+                for r in range(views.down.size):
+                    t, v = views.rows[r], views.down[r]
+                    fy = np.float32(y) - d * v
+                    for n in range(views.begins[r], views.begins[r + 1]):
+                        s, u = views.columns[n], views.across[n]
+                        fx = np.float32(x) - d * u
                         if not _seen(fy, fx, nearest[t, s], limit):
                             continue
                         v0, v1, v2 = _sample(views.splines[t, s], c, fy, fx)
                         r0, r1, r2 = v0 - m0, v1 - m1, v2 - m2
-                        g0, g1, g2 = y0 * dt + x0 * ds, y1 * dt + x1 * ds, y2 * dt + x2 * ds
+                        g0, g1, g2 = y0 * v + x0 * u, y1 * v + x1 * u, y2 * v + x2 * u
                         # derivative of z / (z + scale2) with respect to z
                         w = scale2 / (scale2 + r0 * r0 + r1 * r1 + r2 * r2)
                         w *= w / scale2

@@ -1,8 +1,8 @@
 """The plane sweep: photo-consistency of every candidate disparity over all views or over groups of them (Eq. 3).
 
 The straight line through a SEPI meets one sample of every view, so Eq. 3 of [1]_ is a plane sweep: for a candidate
-``d`` the reference-view pixel ``(y, x)`` is compared with the bilinear sample of view ``(t, s)`` at
-``(y - d (t - t0), x - d (s - s0))``. One ``(d, view)`` has one sub-pixel weight for the whole image, so a row is a run
+``d`` the reference-view pixel ``(y, x)`` is compared with the bilinear sample of the view of baseline ``(v, u)`` at
+``(y - d v, x - d u)``. One ``(d, view)`` has one sub-pixel weight for the whole image, so a row is a run
 of contiguous multiply-adds that vectorises. Views are summed in *groups* (all of them for a SEPI; the parts from which
 half-SEPIs are put together), so one pass serves full and half SEPIs alike.
 The compiled loops are in :mod:`sepi.matching.plane_sweep_kernels`.
@@ -139,7 +139,7 @@ def sweep(
     scale2 = np.float32((parameters.scale**2 + noise) * full_scale(colours.dtype) ** 2)
     views = ViewStack(colours, *light_field.reference_position, groups, subsets, scale2)
     disparities = parameters.candidates(light_field)
-    candidates = sampled_candidates(disparities, light_field.grid, light_field.reference_position)
+    candidates = sampled_candidates(disparities, light_field.baselines)
     guide = np.ascontiguousarray(light_field.reference_view.transpose(2, 0, 1))
     window = Window(guide, parameters.window_radius, np.float32(parameters.window_sigma**2 + noise))
     result = SweepResult(*(np.full((len(subsets), H, W), np.nan, np.float32) for _ in range(3)))
@@ -153,28 +153,31 @@ def sweep(
     return result
 
 
-def sampled_candidates(disparities: FloatMap, grid: tuple[int, int], reference: tuple[int, int]) -> Candidates:
-    """Candidates ``(K,)`` and where each row and each column of views has the samples of a reference pixel."""
-    down, across = (sample_offsets(disparities, np.arange(n) - own) for n, own in zip(grid, reference, strict=True))
-    return Candidates(disparities, *down, *across)
+def sampled_candidates(disparities: FloatMap, baselines: npt.NDArray[np.float64]) -> Candidates:
+    """Candidates ``(K,)`` and where views of these baselines ``(T, S, 2)`` have the samples of a reference pixel."""
+    (down, row), (across, column) = (np.unique(baselines[..., axis], return_inverse=True) for axis in (0, 1))
+    entries = (*sample_offsets(disparities, down), *sample_offsets(disparities, across))
+    reach = float(np.abs(disparities[[0, -1]]).max() * np.abs(baselines).max())
+    grid = baselines.shape[:2]
+    return Candidates(disparities, row.reshape(grid), column.reshape(grid), *entries, reach)
 
 
-def sample_offsets(disparities: FloatMap, baselines: npt.NDArray[np.int64]) -> tuple[npt.NDArray[np.int64], FloatMap]:
+def sample_offsets(disparities: FloatMap, baselines: npt.NDArray[np.float64]) -> tuple[npt.NDArray[np.int64], FloatMap]:
     """Whole and fractional pixels from a reference pixel to its sample, along one axis: ``-d`` times the baseline.
 
     Parameters
     ----------
     disparities : ndarray, shape (K,), float32
-    baselines : ndarray, shape (N,), int
-        Views from the reference view, along the axis.
+    baselines : ndarray, shape (...), float64
+        Of each view from the reference view, along the axis, in view steps.
 
     Returns
     -------
-    whole : ndarray, shape (N, K), int64
-    fraction : ndarray, shape (N, K), float32
+    whole : ndarray, shape (..., K), int64
+    fraction : ndarray, shape (..., K), float32
         0..1.
     """
-    offset = -disparities.astype(np.float64) * baselines[:, None]
+    offset = -disparities.astype(np.float64) * baselines[..., None]
     whole = np.floor(offset)
     return whole.astype(np.int64), (offset - whole).astype(np.float32)
 

@@ -143,7 +143,8 @@ def _add_view(
     """Add the residuals of one view to ``cost (K, n)``; ``band``: its rows from ``low`` on, and the reference row."""
     H, W = views.colours.shape[3:]
     y, begin, end = run
-    down, fy, across, fx = candidates.down[t], candidates.fy[t], candidates.across[s], candidates.fx[s]
+    r, c = candidates.row[t, s], candidates.column[t, s]
+    down, fy, across, fx = candidates.down[r], candidates.fy[r], candidates.across[c], candidates.fx[c]
     pixels, reference = band
     K = down.size
     k = 0
@@ -194,19 +195,21 @@ def cost_row(views: ViewStack, candidates: Candidates, run: Run, cost: Any) -> N
     cost[:, :, : end - begin] = 0
     reference = views.colours[views.t0, views.s0, :, y : y + 1].astype(np.float32)
     # rows and columns that any candidate touches, converted once for all candidates
+    last = candidates.disparities.size - 1
     rows = 2
-    for t in range(T):
-        rows = max(rows, candidates.down[t].max() - candidates.down[t].min() + 2)
+    for r in range(candidates.down.shape[0]):
+        rows = max(rows, abs(candidates.down[r, last] - candidates.down[r, 0]) + 2)
     pixels = np.empty((3, min(H, rows), W), np.float32)
     for t in range(T):
-        low = max(0, min(H - 2, y + candidates.down[t].min()))
-        high = max(0, min(H - 2, y + candidates.down[t].max())) + 1
         for s in range(S):
             g = views.groups[t, s]
             if g < 0:
                 continue
-            across = candidates.across[s]
-            leftmost, rightmost = max(0, begin + across.min()), min(W, end + across.max() + 1)
+            r, u = candidates.row[t, s], candidates.column[t, s]
+            one, other = y + candidates.down[r, 0], y + candidates.down[r, last]
+            low, high = max(0, min(H - 2, min(one, other))), max(0, min(H - 2, max(one, other))) + 1
+            one, other = candidates.across[u, 0], candidates.across[u, last]
+            leftmost, rightmost = max(0, begin + min(one, other)), min(W, end + max(one, other) + 1)
             for c in range(3):
                 for row in range(low, high + 1):
                     pixels[c, row - low, leftmost:rightmost] = views.colours[t, s, c, row, leftmost:rightmost]
@@ -218,27 +221,28 @@ def _count_views(views: ViewStack, candidates: Candidates, run: Run, counts: Any
     """Number of views of each group that see each pixel of a run at each candidate, into ``counts (n, G K)``."""
     T, S, _, H, W = views.colours.shape
     K = candidates.disparities.size
+    U = candidates.across.shape[0]
     G = counts.shape[1] // K
-    # views of each group and view column that have the row, at each candidate
-    having = np.zeros((G, S, K), np.float32)
-    some = np.zeros((G, S), np.bool_)
+    # views of each group, and equally far across, that have the row, at each candidate
+    having = np.zeros((G, U, K), np.float32)
+    some = np.zeros((G, U), np.bool_)
     for t in range(T):
         for s in range(S):
-            g = views.groups[t, s]
+            g, r, u = views.groups[t, s], candidates.row[t, s], candidates.column[t, s]
             if g < 0:
                 continue
-            some[g, s] = True
+            some[g, u] = True
             for k in range(K):
-                top = run.y + candidates.down[t, k]
-                if top >= 0 and (top < H - 1 or (top == H - 1 and candidates.fy[t, k] == 0)):
-                    having[g, s, k] += np.float32(1)
+                top = run.y + candidates.down[r, k]
+                if top >= 0 and (top < H - 1 or (top == H - 1 and candidates.fy[r, k] == 0)):
+                    having[g, u, k] += np.float32(1)
     for x in range(run.begin, run.end):
         counts[x - run.begin] = 0
         for g in range(G):
             number = counts[x - run.begin, g * K : (g + 1) * K]
-            for s in range(S):
-                if some[g, s]:
-                    left, of_column = candidates.across[s], having[g, s]
+            for u in range(U):
+                if some[g, u]:
+                    left, of_column = candidates.across[u], having[g, u]
                     for k in range(K):
                         inside = x + left[k] >= 0 and x + left[k] < W - 1
                         number[k] += of_column[k] if inside else np.float32(0)
@@ -481,10 +485,8 @@ def sweep_plane_rows(
     maps: BestMaps,
 ) -> None:  # fmt: skip
     """Sweep the rows ``begin..end`` of the ``mask (H, W)``, so many of them, ``height``, at a stretch."""
-    T, S, _, _, W = views.colours.shape
-    t0, s0 = views.t0, views.s0
-    reach = max(abs(candidates.disparities[0]), abs(candidates.disparities[-1]))
-    margin = math.ceil(reach * max(t0, T - 1 - t0, s0, S - 1 - s0)) + window.radius + 1
+    W = views.colours.shape[4]
+    margin = math.ceil(candidates.reach) + window.radius + 1
     for task in prange((end - begin + height - 1) // height):
         top = begin + task * height
         for left in range(0, W, TILE_WIDTH):

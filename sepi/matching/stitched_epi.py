@@ -4,7 +4,8 @@ An EPI ``E_{y,t}(x, s)`` stacks row ``y`` of the views of grid row ``t``. A scen
 line ``x = x0 - d (s - s0)`` into it, and a parallel line into each corresponding EPI ``E_{y_j,t_j}`` with
 ``y_j = y0 - d (t_j - t0)``. Shifting the EPI of ``j = t_j - t0`` by ``-d N_s j`` (Eq. 2; the paper writes ``j N_s /
 k`` with the slope ``k = 1/d`` and the opposite sign convention) puts all lines onto one, and concatenating them (Eq.
-1) gives an image with ``N_t N_s`` rows.
+1) gives an image with ``N_t N_s`` rows. Where views stand off the grid, or rows another distance apart, their baselines
+take the place of ``t - t0`` and ``s - s0``, so that lines stay straight.
 
 The estimator does not build these images: :mod:`sepi.matching.plane_sweep` visits the same samples directly.
 
@@ -36,8 +37,8 @@ class StitchedEpi:
         Rows of the corresponding EPIs, 0..1, ordered by ``t``, then ``s``.
     offsets : ndarray, shape (T * S,), float64
         Shift of each row to the right, pixels (Eq. 2).
-    positions : ndarray, shape (T * S,), int
-        Position of each row along the stitched angular axis, ``s' - s0'`` = 0 for the reference view.
+    positions : ndarray, shape (T * S,), float64
+        Position of each row along the stitched angular axis, ``s' - s0'`` = 0 for the reference view, in view steps.
     inside : ndarray, shape (T * S,), bool
         Whether the corresponding EPI lies inside its view and the view is present.
     disparity : float
@@ -106,25 +107,17 @@ def stitched_epi(light_field: LightField, y: int, disparity: float) -> StitchedE
     (T, S), (H, W) = light_field.grid, light_field.shape
     if not 0 <= y < H:
         raise SepiError(f"{light_field.name}: row {y} lies outside the reference view (0..{H - 1})")
-    t0, s0 = light_field.reference_position
-    rows = np.zeros((T, S, W, 3), np.float32)
-    inside = np.zeros((T, S), bool)
-    offsets = np.zeros((T, S))
-    positions = np.zeros((T, S), int)
-    for t in range(T):
-        j = t - t0
-        row = y - disparity * j
-        offsets[t] = -disparity * S * j
-        positions[t] = S * j + np.arange(S) - s0
-        if not 0 <= row <= H - 1:
-            continue
-        top = min(int(np.floor(row)), H - 2)
-        above, below = (
-            as_unit_float(light_field.rgb_views[t, :, top]),
-            as_unit_float(light_field.rgb_views[t, :, top + 1]),
-        )
-        rows[t] = (1 - (row - top)) * above + (row - top) * below
-        inside[t] = light_field.present[t]
+    down, across = np.moveaxis(light_field.baselines, 2, 0)
+    j = np.repeat(np.arange(T)[:, None] - light_field.reference_position[0], S, axis=1)
+    offsets, positions = -disparity * S * j, S * j + across
+    row = y - disparity * down
+    inside = light_field.present & (row >= 0) & (row <= H - 1)
+    top = np.clip(np.floor(row), 0, H - 2).astype(int)
+    view = np.ix_(np.arange(T), np.arange(S))
+    above, below = (as_unit_float(light_field.rgb_views[(*view, top + below)]) for below in (0, 1))
+    weight = (row - top)[..., None, None]
+    samples = (1 - weight).astype(np.float32) * above + weight.astype(np.float32) * below
+    rows = np.where(inside[..., None, None], samples, np.float32(0))
     return StitchedEpi(rows.reshape(T * S, W, 3), offsets.ravel(), positions.ravel(), inside.ravel(), float(disparity))
 
 

@@ -5,12 +5,16 @@ structure tensor gives the direction along which the image does not change, henc
 more coherent of the two EPIs decides [1]_. Only the views of the centre row and column take part.
 
 Finite differences between neighbouring views are right for disparities below about half a pixel, so the EPIs are first
-sheared by every whole disparity of the range, and the most coherent estimate that stays within its shear is kept.
+sheared by every whole disparity of the range, and the most coherent estimate that stays within its shear is kept. Where
+rows are further apart than columns, it is every whole disparity per row. Views that stand off the grid are sheared by
+where they really stand, along and across their EPI, and those less than a tenth of a step from another are left out.
 
 References
 ----------
 .. [1] Wanner, Goldluecke: Globally consistent depth labeling of 4D light fields. CVPR 2012.
    doi:10.1109/CVPR.2012.6247656
+.. [2] Keys: Cubic convolution interpolation for digital image processing. IEEE Transactions on Acoustics, Speech, and
+   Signal Processing 29(6), 1981. doi:10.1109/TASSP.1981.1163711
 """
 
 from __future__ import annotations
@@ -19,10 +23,12 @@ import math
 
 import cv2
 import numpy as np
+import numpy.typing as npt
 from pydantic import Field
 
 from sepi.errors import SepiError
 from sepi.lightfield import FloatMap, LightField, as_unit_float
+from sepi.matching.view_subsets import grid_steps
 from sepi.stage import Parameters
 
 
@@ -61,39 +67,53 @@ def structure_tensor_depth(light_field: LightField, parameters: StructureTensorP
     known = light_field.require_disparity_range()
     best = np.full(light_field.shape, (known.minimum + known.maximum) / 2, np.float32)
     confidence = np.zeros(light_field.shape, np.float32)
-    row = [(s - s0, light_field.rgb_views[t0, s]) for s in range(light_field.grid[1]) if light_field.present[t0, s]]
-    column = [(t - t0, light_field.rgb_views[t, s0]) for t in range(light_field.grid[0]) if light_field.present[t, s0]]
-    if max(len(row), len(column)) < 2:
+    if max(light_field.present[t0].sum(), light_field.present[:, s0].sum()) < 2:
         raise SepiError(
             f"{light_field.name}: the structure tensor needs a second view in the row or the column of view {t0},{s0}"
         )
-    # a vertical EPI is the horizontal one of the transposed views
-    for views, transposed in ((row, False), (column, True)):
-        if len(views) < 2:
+    # closer together, the same shears are finer than they need to be
+    steps = np.maximum(grid_steps(light_field), 1).tolist()
+    # along rows first: where both EPIs are equally coherent, the horizontal one decides
+    for axis in (1, 0):
+        baselines, images = _of_one_line(light_field, axis, steps[axis])
+        if len(images) < 2:
             continue
-        baselines = [baseline for baseline, _ in views]
-        images = [as_unit_float(view.transpose(1, 0, 2) if transposed else view) for _, view in views]
-        for shear in range(math.floor(known.minimum), math.ceil(known.maximum) + 1):
+        low, high = known.minimum * steps[axis], known.maximum * steps[axis]
+        for shear in range(math.floor(low), math.ceil(high) + 1):
             disparity, coherence = _sheared(baselines, images, shear, parameters)
-            if transposed:
+            if axis == 0:
                 disparity, coherence = disparity.T, coherence.T
             trusted = (np.abs(disparity - shear) <= parameters.shear_reach) & (coherence > confidence)
-            trusted &= (disparity >= known.minimum) & (disparity <= known.maximum)
-            best[trusted] = disparity[trusted]
+            trusted &= (disparity >= low) & (disparity <= high)
+            best[trusted] = disparity[trusted] / np.float32(steps[axis])
             confidence[trusted] = coherence[trusted]
     return best, confidence
 
 
+def _of_one_line(light_field: LightField, axis: int, step: float) -> tuple[npt.NDArray[np.float64], list[FloatMap]]:
+    """Views of the reference view's row (``axis`` 1) or column (0): baselines (N, 2) in ``step``, and pictures.
+
+    A vertical EPI is the horizontal one of the transposed views, so all about a column is transposed.
+    """
+    t0, s0 = light_field.reference_position
+    line = np.s_[t0] if axis else np.s_[:, s0]
+    present = light_field.present[line]
+    baselines, views = light_field.baselines[line][present] / step, light_field.rgb_views[line][present]
+    _, kept = np.unique(np.round(baselines[:, axis], 1), return_index=True)
+    images = [as_unit_float(view if axis else view.transpose(1, 0, 2)) for view in views[kept]]
+    return (baselines if axis else baselines[:, ::-1])[kept], images
+
+
 def _sheared(
-    baselines: list[int], images: list[FloatMap], shear: int, parameters: StructureTensorParameters
+    baselines: npt.NDArray[np.float64], images: list[FloatMap], shear: int, parameters: StructureTensorParameters
 ) -> tuple[FloatMap, FloatMap]:
     """Disparity and coherence at the reference view from horizontal EPIs sheared by a whole disparity."""
     # after the shear a surface of disparity `shear` stands still from view to view
     moved = np.stack([_shifted(image, shear * baseline) for baseline, image in zip(baselines, images, strict=True)])
     smooth = np.stack([_blurred(view, parameters.inner_sigma) for view in moved])
     along_x = np.stack([cv2.Sobel(view, cv2.CV_32F, 1, 0, ksize=3, scale=1 / 8) for view in smooth])
-    along_s = np.gradient(smooth, np.asarray(baselines, np.float32), axis=0)
-    weight = np.exp(-0.5 * (np.asarray(baselines) / parameters.outer_sigma) ** 2).astype(np.float32)
+    along_s = np.gradient(smooth, baselines[:, 1].astype(np.float32), axis=0)
+    weight = np.exp(-0.5 * (baselines[:, 1] / parameters.outer_sigma) ** 2).astype(np.float32)
 
     def tensor(a: FloatMap, b: FloatMap) -> FloatMap:
         # einsum, not tensordot: a BLAS product changes its last bits with the number of threads
@@ -109,10 +129,26 @@ def _sheared(
     return disparity.astype(np.float32), coherence.astype(np.float32)
 
 
-def _shifted(image: FloatMap, pixels: int) -> FloatMap:
-    """Image whose column ``x`` is the given one's column ``x - pixels``, edge columns repeated."""
-    columns = np.clip(np.arange(image.shape[1]) - pixels, 0, image.shape[1] - 1)
-    return image[:, columns]
+def _shifted(image: FloatMap, pixels: npt.NDArray[np.float64]) -> FloatMap:
+    """Image moved so many pixels down and to the right, edges repeated; by cubic convolution between pixels [2]_."""
+    for axis, distance in enumerate(pixels.round(6)):
+        if not distance:
+            continue
+        whole = math.floor(distance)
+        places = np.clip(np.arange(image.shape[axis]) - whole, 0, image.shape[axis] - 1)
+        image = image.take(places, axis)
+        if distance != whole:
+            taps = _cubic(distance - whole)
+            turned = taps if axis else taps.T
+            image = np.asarray(cv2.filter2D(image, -1, turned, borderType=cv2.BORDER_REPLICATE), np.float32)
+    return image
+
+
+def _cubic(f: float) -> FloatMap:
+    """Weights (1, 5) of the pixels ``x - 2`` to ``x + 2`` in the value at ``x - f``, ``f`` in 0..1."""
+    t = np.abs(np.arange(-2, 3) + f)
+    near, far = (1.5 * t - 2.5) * t**2 + 1, ((2.5 - 0.5 * t) * t - 4) * t + 2
+    return np.where(t <= 1, near, np.where(t < 2, far, 0))[None].astype(np.float32)
 
 
 def _blurred(image: FloatMap, sigma: float) -> FloatMap:

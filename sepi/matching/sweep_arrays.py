@@ -38,23 +38,32 @@ class ViewStack(NamedTuple):
 
 
 class Candidates(NamedTuple):
-    """Candidate disparities, and where the samples of a reference pixel lie, for each view row and each view column.
+    """Candidate disparities, and where the samples of a reference pixel lie in each view.
+
+    Views equally far down, as those of a row of the grid are, share an entry; likewise across.
 
     Attributes
     ----------
     disparities : ndarray, shape (K,), float32
         Uniform, rising, pixels per view step.
-    down, across : ndarray, shape (T, K) and (S, K), int64
-        Whole pixels from a reference pixel to its sample.
-    fy, fx : ndarray, shape (T, K) and (S, K), float32
+    row, column : ndarray, shape (T, S), int64
+        Number of each view's entry down, 0..V-1, and across, 0..U-1.
+    down, across : ndarray, shape (V, K) and (U, K), int64
+        Whole pixels from a reference pixel to its sample; an entry never falls, or never rises, along the candidates.
+    fy, fx : ndarray, shape (V, K) and (U, K), float32
         Fractional pixels beyond, 0..1.
+    reach : float
+        Pixels to the farthest sample, along either axis.
     """
 
     disparities: FloatMap
+    row: npt.NDArray[np.int64]
+    column: npt.NDArray[np.int64]
     down: npt.NDArray[np.int64]
     fy: FloatMap
     across: npt.NDArray[np.int64]
     fx: FloatMap
+    reach: float
 
 
 class Window(NamedTuple):

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from sepi.lightfield import BoolMap
+from sepi.lightfield import BoolMap, LightField
 
 
 @dataclass(frozen=True)
@@ -37,47 +37,45 @@ SIDES = {"left": (0, -1), "right": (0, 1), "up": (-1, 0), "down": (1, 0)}
 
 QUARTERS = (("left", "up"), ("left", "down"), ("right", "up"), ("right", "down"))
 
+HALVES_AND_QUARTERS = ("full", *SIDES, *(f"{a}-{b}" for a, b in QUARTERS))
+"""Names of the subsets of :func:`halves_and_quarters`."""
 
-def halves_and_quarters(grid: tuple[int, int], reference: tuple[int, int] | None = None) -> ViewSubsets:
+
+def halves_and_quarters(light_field: LightField) -> ViewSubsets:
     """All views, the four halves of the paper, and their four overlaps; the dividing line belongs to both sides.
 
     Where a pixel is occluded horizontally and vertically at once, as at any slanted edge, the views it keeps are those
-    of both halves.
+    of both halves. A view less than half a row or column from the dividing line stands on it.
 
     Parameters
     ----------
-    grid : (int, int)
-        Rows and columns of views.
-    reference : (int, int), optional
-        Position of the reference view, from which sides are seen; the centre unless given.
+    light_field : LightField
+        Sides are seen from its reference view.
 
     Returns
     -------
     ViewSubsets
-        Named ``full``, the four ``SIDES``, then the ``QUARTERS`` as ``left-up`` and so on.
+        Named ``HALVES_AND_QUARTERS``.
     """
-    t, s = _baselines(grid, reference)
-    sign_t, sign_s = np.meshgrid(np.sign(t), np.sign(s), indexing="ij")
+    steps = light_field.baselines / grid_steps(light_field)
+    sign_t, sign_s = np.moveaxis(np.where(np.abs(steps) < 0.5, 0, np.sign(steps)).astype(np.int64), 2, 0)
     groups = 3 * (sign_t + 1) + sign_s + 1
     # signs (dt, ds) of each group, in the order of their numbers
     signs = np.array([(dt, ds) for dt in (-1, 0, 1) for ds in (-1, 0, 1)])
     sides = {name: signs @ np.array(direction) >= 0 for name, direction in SIDES.items()}
-    named = {"full": np.ones(9, bool), **sides}
-    named.update({f"{a}-{b}": sides[a] & sides[b] for a, b in QUARTERS})
-    return ViewSubsets(groups, np.array(list(named.values())), tuple(named))
+    quarters = [sides[a] & sides[b] for a, b in QUARTERS]
+    return ViewSubsets(groups, np.array([np.ones(9, bool), *sides.values(), *quarters]), HALVES_AND_QUARTERS)
 
 
-def half_planes(grid: tuple[int, int], directions: int, reference: tuple[int, int] | None = None) -> ViewSubsets:
+def half_planes(light_field: LightField, directions: int) -> ViewSubsets:
     """All views, then for each of ``directions`` edge orientations the views on its one and on its other side.
 
     Parameters
     ----------
-    grid : (int, int)
-        Rows and columns of views.
+    light_field : LightField
+        Sides are seen from its reference view.
     directions : int
         Number of edge orientations over half a turn.
-    reference : (int, int), optional
-        Position of the reference view; the centre unless given.
 
     Returns
     -------
@@ -86,8 +84,7 @@ def half_planes(grid: tuple[int, int], directions: int, reference: tuple[int, in
         ``(n + 1/2) pi / directions``, measured from ``+s`` towards ``+t``.
     """
     sectors = 2 * directions
-    t, s = _baselines(grid, reference)
-    angle = np.arctan2(*np.meshgrid(t, s, indexing="ij"))
+    angle = np.arctan2(*np.moveaxis(light_field.baselines, 2, 0))
     groups = np.round(angle * sectors / (2 * np.pi)).astype(np.int64) % sectors
     start = np.arange(sectors)[:, None]
     # sectors n - directions/2 + 1 .. n + directions/2 lie within a quarter turn of the middle between n and n + 1
@@ -96,9 +93,16 @@ def half_planes(grid: tuple[int, int], directions: int, reference: tuple[int, in
     return ViewSubsets(groups, subsets, ("full", *(f"half-plane {n}" for n in range(sectors))))
 
 
-def _baselines(
-    grid: tuple[int, int], reference: tuple[int, int] | None
-) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
-    """View baselines of each row and of each column from the reference view."""
-    t0, s0 = reference or (grid[0] // 2, grid[1] // 2)
-    return np.arange(grid[0]) - t0, np.arange(grid[1]) - s0
+def grid_steps(light_field: LightField) -> npt.NDArray[np.float64]:
+    """Mean distance from row to row and from column to column, in view steps; shape (2,).
+
+    By least squares where views stand off the grid; 1 along an axis on which all views stand at one place.
+    """
+    if light_field.positions is None:
+        return np.array([light_field.row_spacing, 1.0])
+    numbers = np.argwhere(light_field.present).astype(np.float64)
+    numbers -= numbers.mean(axis=0)
+    along = np.abs((numbers * light_field.positions[light_field.present]).sum(axis=0))
+    steps = np.ones(2)
+    np.divide(along, (numbers**2).sum(axis=0), out=steps, where=along > 0)
+    return steps

@@ -44,13 +44,13 @@ class RobustCost(NamedTuple):
 
 
 class _View(NamedTuple):
-    """A view ``(dt, ds)`` from the reference view, at row ``y`` of which costs are computed.
+    """A view of baseline ``(v, u)``, and the row ``y`` of the reference view whose costs are computed.
 
     ``band (1 or 2, 3, rows, W + 1)`` holds the rows from ``low`` on of its colours and detail.
     """
 
-    dt: int
-    ds: int
+    v: float
+    u: float
     y: int
     low: int
     band: FloatMap
@@ -65,7 +65,7 @@ class _Sums(NamedTuple):
 
 
 @njit(parallel=True, cache=True)
-def z_buffers(disparity: Any, present: Any, t0: int, s0: int) -> Any:
+def z_buffers(disparity: Any, present: Any, baselines: Any) -> Any:
     """Disparity map of the reference view as each view sees it: the nearest of the pixels that touch a position.
 
     Parameters
@@ -73,8 +73,8 @@ def z_buffers(disparity: Any, present: Any, t0: int, s0: int) -> Any:
     disparity : ndarray, shape (H, W), float32
         Pixels per view step.
     present : ndarray, shape (T, S), bool
-    t0, s0 : int
-        Position of the reference view.
+    baselines : ndarray, shape (T, S, 2), float64
+        Down and across from the reference view, in view steps.
 
     Returns
     -------
@@ -91,10 +91,11 @@ def z_buffers(disparity: Any, present: Any, t0: int, s0: int) -> Any:
         buffer[:] = EMPTY
         if not present[t, s]:
             continue
+        v, u = baselines[t, s, 0], baselines[t, s, 1]
         for y in range(H):
             for x in range(W):
                 d = disparity[y, x]
-                top, left = math.floor(y - d * (t - t0)), math.floor(x - d * (s - s0))
+                top, left = math.floor(y - d * v), math.floor(x - d * u)
                 for row in range(max(top, 0), min(top + 2, H)):
                     for column in range(max(left, 0), min(left + 2, W)):
                         buffer[row, column] = max(buffer[row, column], d)
@@ -102,17 +103,17 @@ def z_buffers(disparity: Any, present: Any, t0: int, s0: int) -> Any:
 
 
 @njit(parallel=True, cache=True)
-def occluded_in_any_view(disparity: Any, present: Any, t0: int, s0: int, occlusion_margin: Any) -> Any:
+def occluded_in_any_view(disparity: Any, present: Any, baselines: Any, occlusion_margin: Any) -> Any:
     """Pixels that something nearer occludes in one of the views that could see them; shape (H, W), bool.
 
     Parameters
     ----------
-    disparity, present, t0, s0
+    disparity, present, baselines
         As in :func:`z_buffers`.
     occlusion_margin : float32
         By how much an occluder must be nearer, pixels per view step.
     """
-    nearest = z_buffers(disparity, present, t0, s0)
+    nearest = z_buffers(disparity, present, baselines)
     T, S, H, W = nearest.shape
     occluded = np.zeros((H, W), np.bool_)
     for y in prange(H):
@@ -120,7 +121,7 @@ def occluded_in_any_view(disparity: Any, present: Any, t0: int, s0: int, occlusi
             d = disparity[y, x]
             for t in range(T):
                 for s in range(S):
-                    row, column = y - d * (t - t0) + 0.5, x - d * (s - s0) + 0.5
+                    row, column = y - d * baselines[t, s, 0] + 0.5, x - d * baselines[t, s, 1] + 0.5
                     if row >= 0 and column >= 0 and row < H and column < W:
                         occluded[y, x] |= nearest[t, s, int(row), int(column)] > d + occlusion_margin
     return occluded
@@ -152,13 +153,13 @@ def _add_view(
 ) -> None:
     """Add one view at every candidate; ``reference (1 or 2, 3, 1, W)``, ``nearest``: the view's own z-buffer."""
     H, W = nearest.shape[0], reference.shape[3]
-    dt, ds, y, low, band = view
+    v, u, y, low, band = view
     cost, weight, scratch = sums
     margin, hidden = visibility.occlusion_margin, visibility.occluded_view_weight
     one = np.float32(1)
     for k in range(disparities.size):
         d = disparities[k]
-        down, across = y - d * dt, -d * ds
+        down, across = y - d * v, -d * u
         if down < 0 or down > H - 1:
             continue
         top, left = min(int(down), H - 2), math.floor(across)
@@ -216,7 +217,7 @@ def sweep_visible_rows(
     K = disparities.size
     with_detail = views.detail.shape[2] > 0
     parts = 2 if with_detail else 1
-    reach = max(abs(disparities[0]), abs(disparities[K - 1])) * max(t0, T - 1 - t0)
+    reach = max(abs(disparities[0]), abs(disparities[K - 1])) * np.abs(views.baselines[:, :, 0]).max()
     rows = min(H, 2 * math.ceil(reach) + 3)
     for y in prange(begin, end):
         sums = _Sums(np.zeros((K, W), np.float32), np.zeros((K, W), np.float32), np.empty(W, np.float32))
@@ -228,18 +229,19 @@ def sweep_visible_rows(
             if with_detail:
                 _load(views.detail[t0, s0, c, y], views.detail_unit, reference[1, c, 0])
         for t in range(T):
-            ends = (y - disparities[0] * (t - t0), y - disparities[K - 1] * (t - t0))
-            low = max(0, min(H - 2, math.floor(min(ends))))
-            high = max(0, min(H - 2, math.floor(max(ends)))) + 1
             for s in range(S):
                 if not views.present[t, s] or (t == t0 and s == s0):
                     continue
+                v, u = views.baselines[t, s, 0], views.baselines[t, s, 1]
+                ends = (y - disparities[0] * v, y - disparities[K - 1] * v)
+                low = max(0, min(H - 2, math.floor(min(ends))))
+                high = max(0, min(H - 2, math.floor(max(ends)))) + 1
                 for c in range(3):
                     for row in range(low, high + 1):
                         _load(views.colours[t, s, c, row], views.colour_unit, band[0, c, row - low, :W])
                         if with_detail:
                             _load(views.detail[t, s, c, row], views.detail_unit, band[1, c, row - low, :W])
-                view = _View(t - t0, s - s0, y, low, band)
+                view = _View(v, u, y, low, band)
                 _add_view(view, reference, disparities, visibility.nearest[t, s], visibility, robust, sums)
         for k in range(K):
             for x in range(W):

@@ -119,7 +119,7 @@ def depth_from_visible_views(
         result = _sweep(
             light_field,
             views,
-            z_buffers(disparity, light_field.present, *light_field.reference_position),
+            z_buffers(disparity, light_field.present, light_field.baselines),
             parameters.occlusion_margin,
             parameters.occluded_view_weight,
             parameters,

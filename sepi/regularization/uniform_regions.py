@@ -87,7 +87,7 @@ def fill_uniform_regions(
 
     colours = BaseDetailParameters(colour_scale=parameters.colour_scale, detail_share=0.0)
     matching = spline_views(light_field, base_detail_decomposition(light_field, colours), colours)
-    nearest = z_buffers(before.disparity, light_field.present, *light_field.reference_position)
+    nearest = z_buffers(before.disparity, light_field.present, light_field.baselines)
     mean = view_mean(matching, before.disparity, nearest, parameters.occlusion_margin)
     views = int(light_field.present.sum())
     rounding = 0.3 / full_scale(light_field.views.dtype) if light_field.views.dtype != np.float32 else 0.0

@@ -147,6 +147,8 @@ def _light_field(path: Path) -> dict[str, Any]:
     known = found.disparity_range
     return {
         "grid": list(found.grid),
+        "row_spacing": found.row_spacing,
+        "positions": "grid" if found.positions is None else "given",
         "shape": list(found.shape),
         "channels": found.views.shape[4],
         "dtype": str(found.views.dtype),

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from sepi.errors import SepiError
 from sepi.io.files import atomic_folder
 from sepi.io.images import write_png
 from sepi.io.pfm import write_pfm
@@ -29,15 +30,18 @@ def write_hci(light_field: LightField, folder: Path) -> None:
     Parameters
     ----------
     light_field : LightField
-        As :func:`sepi.scenes.render` makes it: all views present, uint8 RGB, with a disparity range.
+        As :func:`sepi.scenes.render` makes it: all views present, uint8 RGB, with a disparity range; rows as far apart
+        as columns, which is all that the layout can say.
     folder : Path
         Must not exist yet, or be empty.
 
     Raises
     ------
     SepiError
-        If the folder cannot be written.
+        If rows are another distance apart than columns, views stand off the grid, or the folder cannot be written.
     """
+    if light_field.row_spacing != 1 or light_field.positions is not None:
+        raise SepiError(f"{light_field.name}: the layout of the HCI benchmark needs views on a grid of even spacing")
     with atomic_folder(folder) as temporary:
         views = light_field.views.astype(np.uint8, copy=False)
         for number, view in enumerate(views.reshape(-1, *light_field.shape, 3)):

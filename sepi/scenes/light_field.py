@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import zlib
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
@@ -20,7 +21,14 @@ MOST_VIEWS = 17
 MARGIN, LEAST_WIDTH = 0.2, 2.0
 
 
-def render(name: str, *, size: int = 192, views: int = 9) -> LightField:
+def render(
+    name: str,
+    *,
+    size: int = 192,
+    views: int = 9,
+    row_spacing: float = 1.0,
+    positions: npt.NDArray[np.float64] | None = None,
+) -> LightField:
     """Render a built-in scene.
 
     Parameters
@@ -32,6 +40,10 @@ def render(name: str, *, size: int = 192, views: int = 9) -> LightField:
         textures stay.
     views : int
         Rows and columns of the view grid, 2 to 17.
+    row_spacing : float
+        Distance from one row of views to the next, in view steps.
+    positions : ndarray, shape (views, views, 2), float64, optional
+        Where each view is taken, ``(down, across)`` in view steps; on the grid unless given.
 
     Returns
     -------
@@ -43,7 +55,8 @@ def render(name: str, *, size: int = 192, views: int = 9) -> LightField:
     Raises
     ------
     SepiError
-        If there is no such scene, or size or views is out of bounds.
+        If there is no such scene, size or views is out of bounds, or row spacing or positions are none of a light
+        field.
     """
     # brings the compiler with it
     from sepi.scenes.rendering import drawing, occluded, render_view, visible
@@ -55,25 +68,26 @@ def render(name: str, *, size: int = 192, views: int = 9) -> LightField:
     surfaces = DEFINITIONS[name].surfaces()
     scene = drawing(surfaces, size)
     disparity, owner = visible(scene, size)
-    rng = np.random.default_rng(zlib.crc32(name.encode()))
-    deviation = np.linspace(*DEFINITIONS[name].pixel_noise, size)[:, None]
-    pictures = np.empty((views, views, size, size, 3), np.uint8)
-    for t, s in np.ndindex(views, views):
-        picture = render_view(scene, size, t - views // 2, s - views // 2).astype(np.float64)
-        if deviation.any():
-            picture += deviation * rng.standard_normal(picture.shape)
-        pictures[t, s] = np.round(np.clip(picture, 0, 1) * 255)
-    return LightField(
-        views=pictures,
+    light_field = LightField(
+        views=np.zeros((views, views, size, size, 3), np.uint8),
         name=name,
         source="built-in",
         disparity_range=_range_around(disparity),
         ground_truth=disparity.astype(np.float32),
-        masks={
-            "occluded": occluded(scene, disparity, (views, views)),
-            "textureless": np.array([surface.textureless for surface in surfaces])[owner],
-        },
+        masks={"textureless": np.array([surface.textureless for surface in surfaces])[owner]},
+        row_spacing=row_spacing,
+        positions=positions,
     )
+    baselines = light_field.baselines
+    rng = np.random.default_rng(zlib.crc32(name.encode()))
+    deviation = np.linspace(*DEFINITIONS[name].pixel_noise, size)[:, None]
+    for t, s in np.ndindex(views, views):
+        picture = render_view(scene, size, *baselines[t, s]).astype(np.float64)
+        if deviation.any():
+            picture += deviation * rng.standard_normal(picture.shape)
+        light_field.views[t, s] = np.round(np.clip(picture, 0, 1) * 255)
+    masks = {"occluded": occluded(scene, disparity, baselines), **light_field.masks}
+    return replace(light_field, masks=masks)
 
 
 def _range_around(disparity: npt.NDArray[np.float64]) -> DisparityRange:

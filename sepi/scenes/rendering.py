@@ -1,6 +1,6 @@
 """Exact rendering of planar surfaces into the views of a light field.
 
-A plane of disparity ``d(x, y) = a + b x + c y`` in the centre view is seen in the view ``(v, u)`` steps away at
+A plane of disparity ``d(x, y) = a + b x + c y`` in the centre view is seen in the view of baseline ``(v, u)`` at
 ``(x', y') = (x - u d, y - v d)``. Solved for the disparity, ``d = (a + b x' + c y') / (1 - b u - c v)``: it is a plane
 there, too, and a polygon stays a polygon. So each view is drawn by filling polygons along sub-pixel rows, the largest
 disparity wins, and the texture is looked up at ``(x' + u d, y' + v d)``; nothing is resampled from another view.
@@ -63,8 +63,9 @@ def drawing(surfaces: Sequence[Surface], size: int) -> Drawing:
     )
 
 
-def render_view(scene: Drawing, size: int, v: int, u: int) -> FloatMap:
+def render_view(scene: Drawing, size: int, v: float, u: float) -> FloatMap:
     """The view ``v`` steps below and ``u`` steps to the right of the centre; shape (size, size, 3) in about 0..1."""
+    v, u = float(v), float(u)  # whole numbers would be compiled for anew
     picture = np.zeros((size, size, 3), np.float32)
     edges, planes = _seen_from(scene, v, u)
     shade(scene.first_edge, scene.texels, scene.first_texel, scene.side, edges, planes, v, u, SAMPLES, picture)
@@ -79,14 +80,14 @@ def visible(scene: Drawing, size: int) -> tuple[FloatArray, IntArray]:
     return disparity, owner
 
 
-def occluded(scene: Drawing, disparity: FloatArray, grid: tuple[int, int]) -> BoolMap:
-    """Pixels of the centre view whose surface point a nearer surface hides in at least one view of the grid ``(T, S)``.
+def occluded(scene: Drawing, disparity: FloatArray, baselines: FloatArray) -> BoolMap:
+    """Pixels of the centre view whose surface point a nearer surface hides in at least one of the views.
 
-    A point that leaves the picture in a view does not count as hidden there.
+    ``baselines (T, S, 2)`` are those of the views from the centre view. A point that leaves the picture in a view does
+    not count as hidden there.
     """
     hidden = np.zeros(disparity.shape, bool)
-    for t, s in np.ndindex(grid):
-        v, u = t - grid[0] // 2, s - grid[1] // 2
+    for v, u in baselines.reshape(-1, 2):
         edges, planes = _seen_from(scene, v, u)
         first = scene.first_edge[:-1]
         boxes = np.hstack([np.minimum.reduceat(edges[:, :2], first), np.maximum.reduceat(edges[:, :2], first)])
@@ -104,7 +105,7 @@ def _coefficients(texture: FloatMap) -> FloatMap:
     return values.reshape(-1, 3).astype(np.float32)
 
 
-def _seen_from(scene: Drawing, v: int, u: int) -> tuple[FloatArray, FloatArray]:
+def _seen_from(scene: Drawing, v: float, u: float) -> tuple[FloatArray, FloatArray]:
     """Edges and planes as they are in a view."""
     of_edge = np.repeat(scene.planes, np.diff(scene.first_edge), axis=0)
     x, y = scene.edges[:, 0::2], scene.edges[:, 1::2]

@@ -76,8 +76,8 @@ def shade(
     side: IntArray,
     edges: FloatArray,
     planes: FloatArray,
-    v: int,
-    u: int,
+    v: float,
+    u: float,
     samples: int,
     picture: FloatMap,
 ) -> None:
@@ -143,8 +143,8 @@ def hide(
     edges: FloatArray,
     boxes: FloatArray,
     disparity: FloatArray,
-    v: int,
-    u: int,
+    v: float,
+    u: float,
     hidden: BoolMap,
 ) -> None:
     """Mark the pixels whose point is hidden in one view: planes, edges and boxes round them are as seen there."""

@@ -31,50 +31,38 @@ _STRETCH = 2.0
 
 def occluded(
     ground_truth: FloatMap,
-    grid: tuple[int, int],
-    reference_position: tuple[int, int] | None = None,
-    present: BoolMap | None = None,
+    baselines: npt.NDArray[np.float64],
 ) -> BoolMap:
     """Pixels of the reference view that at least one other view does not see.
 
     A pixel is hidden in a view if a nearer pixel lands within half a pixel of it there: what a z-buffer of that view
     would say. Instead of a buffer on the view's pixel grid, whose rounding marks slanted planes as hidden by
     themselves, the sight line is followed through the disparity map. The nearer pixel ``q`` that hides ``p`` in the
-    view at offset ``v`` lies at ``q = p + (d(q) - d(p)) v``, so one walk along ``v`` in steps of one pixel finds it at
-    its exact position. A surface whose slope, times the largest offset, is under one half (0.125 of disparity per pixel
-    for 9 x 9 views) never hides itself.
+    view of baseline ``v`` lies at ``q = p + (d(q) - d(p)) v``, so one walk along ``v`` in steps of one pixel finds it
+    at its exact position. A surface whose slope, times the largest baseline, is under one half (0.125 of disparity per
+    pixel for 9 x 9 views) never hides itself.
 
     Parameters
     ----------
     ground_truth : ndarray, shape (H, W), float32
         Disparity in pixels per view step; pixels that are not finite neither hide nor are hidden.
-    grid : tuple of int
-        Number of view rows and columns ``(T, S)``.
-    reference_position : tuple of int, optional
-        Position of the reference view; the centre unless given.
-    present : ndarray, shape (T, S), bool, optional
-        Which views there are; all unless given.
+    baselines : ndarray, shape (T, S, 2), float64
+        Down and across from the reference view, in view steps; zero for missing views.
 
     Returns
     -------
     ndarray, shape (H, W), bool
         A pixel that falls outside a view counts as seen by it.
     """
-    rows, columns = grid
-    t0, s0 = reference_position or (rows // 2, columns // 2)
-    offsets = [
-        (t - t0, s - s0)
-        for t in range(rows)
-        for s in range(columns)
-        if (t, s) != (t0, s0) and (present is None or present[t, s])
-    ]
-    # far views hide most: looking at them first ends the search early
-    offsets.sort(key=lambda offset: -max(abs(offset[0]), abs(offset[1])))
+    reach = np.abs(baselines).max(axis=2).ravel()
+    # far views hide most: looking at them first ends the search early; those that stand where the reference view does
+    # hide nothing
+    order = np.argsort(-reach, kind="stable")[: np.count_nonzero(reach)]
     finite = np.isfinite(ground_truth)
-    if not finite.any() or not offsets:
+    if not finite.any():
         return np.zeros(ground_truth.shape, bool)
     filled = np.where(finite, ground_truth, -np.inf).astype(np.float64)
-    hidden: BoolMap = _hidden(filled, np.array(offsets, np.int64), float(ground_truth[finite].max()))
+    hidden: BoolMap = _hidden(filled, baselines.reshape(-1, 2)[order], float(ground_truth[finite].max()))
     return hidden
 
 
@@ -113,34 +101,34 @@ def _without_small(mask: BoolMap) -> BoolMap:
 
 
 @numba.njit(cache=True)
-def _hidden(ground_truth: npt.NDArray[np.float64], offsets: npt.NDArray[np.int64], nearest: float) -> BoolMap:
-    """``occluded`` with -inf for unknown disparities, the view offsets ``(N, 2)`` and the largest disparity."""
+def _hidden(ground_truth: npt.NDArray[np.float64], baselines: npt.NDArray[np.float64], nearest: float) -> BoolMap:
+    """``occluded`` with -inf for unknown disparities, baselines ``(N, 2)`` and the largest disparity."""
     height, width = ground_truth.shape
     result = np.zeros((height, width), np.bool_)
     for y in range(height):
         for x in range(width):
-            for n in range(len(offsets)):
-                if _hidden_in(ground_truth, y, x, offsets[n, 0], offsets[n, 1], nearest):
+            for n in range(len(baselines)):
+                if _hidden_in(ground_truth, y, x, baselines[n, 0], baselines[n, 1], nearest):
                     result[y, x] = True
                     break
     return result
 
 
 @numba.njit(cache=True)
-def _hidden_in(ground_truth: npt.NDArray[np.float64], y: int, x: int, dt: int, ds: int, nearest: float) -> bool:
-    """Whether the view at offset ``(dt, ds)`` does not see the pixel ``(y, x)``."""
+def _hidden_in(ground_truth: npt.NDArray[np.float64], y: int, x: int, v: float, u: float, nearest: float) -> bool:
+    """Whether the view of baseline ``(v, u)`` does not see the pixel ``(y, x)``."""
     height, width = ground_truth.shape
     own = ground_truth[y, x]
-    landing_y, landing_x = y - own * dt, x - own * ds
+    landing_y, landing_x = y - own * v, x - own * u
     # also false for unknown disparities
     if not (0 <= landing_y <= height - 1 and 0 <= landing_x <= width - 1):
         return False
-    steps_per_disparity = max(abs(dt), abs(ds))
+    steps_per_disparity = max(abs(v), abs(u))
     before = 0.0
-    # the sight line rises by one pixel of the larger offset per step; no surface is above `nearest`
+    # the sight line rises by one pixel along the longer axis per step; no surface is above `nearest`
     for step in range(1, int((nearest - own) * steps_per_disparity + _HALF_PIXEL) + 1):
-        row = int(np.floor(y + step * dt / steps_per_disparity + 0.5))
-        column = int(np.floor(x + step * ds / steps_per_disparity + 0.5))
+        row = int(np.floor(y + step * v / steps_per_disparity + 0.5))
+        column = int(np.floor(x + step * u / steps_per_disparity + 0.5))
         if not (0 <= row < height and 0 <= column < width):
             return False
         # pixels by which the surface here lands beyond the pixel looked at

@@ -1,5 +1,6 @@
 """The package's own HDF5 files: all that is known comes back, and a damaged one is one clear error."""
 
+import dataclasses
 from collections.abc import Callable
 from pathlib import Path
 
@@ -7,6 +8,7 @@ import h5py
 import numpy as np
 import pytest
 from error_lines import reading_error
+from geometries import GEOMETRIES, standing
 
 from sepi.io.hdf5 import write_light_field
 from sepi.lightfield import DisparityRange, LightField
@@ -44,6 +46,24 @@ def test_light_field_file_gives_back_all_that_is_known(tmp_path: Path, light_fie
     assert back.disparity_range == light_field.disparity_range
 
 
+@pytest.mark.parametrize("geometry", GEOMETRIES)
+def test_where_the_views_stand_comes_back(tmp_path: Path, light_field: LightField, geometry: str) -> None:
+    """The stages of the workflow read it from this file: forgotten there, it would be as if nobody knew it."""
+    written = dataclasses.replace(light_field, **standing(geometry, light_field.grid))
+    write_light_field(tmp_path / "lf.h5", written)
+    back = read_light_field(tmp_path / "lf.h5")
+    assert back.row_spacing == written.row_spacing
+    assert (back.positions is None) == (written.positions is None)
+    np.testing.assert_array_equal(back.baselines, written.baselines)
+
+
+def test_files_of_earlier_versions_stand_on_an_even_grid(tmp_path: Path, light_field: LightField) -> None:
+    write_light_field(tmp_path / "lf.h5", light_field)
+    with h5py.File(tmp_path / "lf.h5", "r+") as file:
+        del file.attrs["row_spacing"]
+    assert read_light_field(tmp_path / "lf.h5").row_spacing == 1
+
+
 def test_equal_light_fields_give_equal_bytes(tmp_path: Path, light_field: LightField) -> None:
     for name in ("a.h5", "b.h5"):
         write_light_field(tmp_path / name, light_field)
@@ -72,6 +92,11 @@ BAD_FILES: dict[str, tuple[Callable[[Path], None], str]] = {
     "views of four axes": (
         spoiled(lambda f: replace(f, "views", np.zeros((3, 4, 4, 3), np.uint8))),
         "(T, S, H, W, C)",
+    ),
+    "rows at no distance": (spoiled(lambda f: f.attrs.__setitem__("row_spacing", 0)), "row_spacing must be a positive"),
+    "positions of another grid": (
+        spoiled(lambda f: f.create_dataset("positions", data=np.zeros((3, 3, 2)))),
+        "positions must be finite, of shape (T, S, 2) = (2, 3, 2)",
     ),
     "views of text": (spoiled(lambda f: replace(f, "views", np.array(b"text"))), "(T, S, H, W, C)"),
     "NaN pixels": (

@@ -56,13 +56,14 @@ def test_metric_point_lies_where_the_pinhole_camera_sees_it() -> None:
 
 
 @pytest.mark.parametrize("view", [(2, 5), (0, 3), (4, 0)])
-def test_clouds_of_two_views_coincide_a_baseline_apart(view: tuple[int, int]) -> None:
+@pytest.mark.parametrize("row_spacing", [1.0, 0.5])
+def test_clouds_of_two_views_coincide_a_baseline_apart(view: tuple[int, int], row_spacing: float) -> None:
     """Whoever merges the clouds of several views must get one scene: the sheared views' principal points differ.
 
     The views are made by the definition of disparity alone; whole pixels keep that exact.
     """
     centre = (2, 3)
-    down, right = view[0] - centre[0], view[1] - centre[1]
+    down, right = row_spacing * (view[0] - centre[0]), view[1] - centre[1]
     first = np.random.default_rng(3).choice([-1.0, 0.0, 2.0], (H, W)).astype(np.float32)
     second = np.full((H, W), np.nan, np.float32)
     pairs = {}
@@ -75,7 +76,7 @@ def test_clouds_of_two_views_coincide_a_baseline_apart(view: tuple[int, int]) ->
     kept = np.full((H, W), np.nan, np.float32)
     for y, x in pairs.values():
         kept[y, x] = first[y, x]
-    scene = light_field(camera=CAMERA)
+    scene = light_field(camera=CAMERA, row_spacing=row_spacing)
     from_first = cloud_of(scene, kept).positions
     from_second = cloud_of(scene.seen_from(view), second).positions
     assert len(from_first) == len(from_second) > 100

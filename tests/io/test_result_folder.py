@@ -11,8 +11,9 @@ from PIL import Image
 
 from sepi.camera import Camera
 from sepi.errors import SepiError
+from sepi.io.provenance import result_attributes
 from sepi.io.result_folder import RESULT_FILES, colour_code, read_result, write_result
-from sepi.lightfield import LightField
+from sepi.lightfield import DisparityRange, LightField
 from sepi.stage import StageMaps
 
 SHAPE = (12, 16)
@@ -143,6 +144,23 @@ def test_result_holds_the_view_that_the_maps_belong_to(
         assert back.from_centre == (place[0] - 1, place[1] - 2)
         np.testing.assert_array_equal(back.picture, light_field.views[place])
         np.testing.assert_array_equal(back.confidence, maps.confidence)
+
+
+def test_result_says_where_the_views_stood(tmp_path: Path, light_field: LightField, maps: StageMaps) -> None:
+    """Clouds of other views are moved by this; a reader of the disparity must know what its view step is."""
+    closer = replace(light_field, view=(0, 4), row_spacing=0.5, disparity_range=DisparityRange(-2, 3, "given"))
+    write_result(tmp_path / "closer", closer, maps, result_attributes(closer, "best", []))
+    positions = np.moveaxis(np.indices((3, 5)), 0, 2) * 0.9
+    moved = replace(closer, row_spacing=1.0, positions=positions)
+    write_result(tmp_path / "moved", moved, maps, result_attributes(moved, "best", []))
+    for name, expected in (("closer", (0.5, "grid", -0.5, 2)), ("moved", (1, "given", -0.9, 1.8))):
+        with h5py.File(tmp_path / name / "result.h5") as file:
+            spacing, kind, place = (file.attrs[key] for key in ("row_spacing", "positions", "from_centre"))
+        assert (spacing, kind, *place) == pytest.approx(expected)
+        assert read_result(tmp_path / name).from_centre == pytest.approx(expected[2:])
+    with h5py.File(tmp_path / "closer" / "result.h5", "r+") as file:
+        del file.attrs["from_centre"]  # as earlier versions wrote it
+    assert read_result(tmp_path / "closer").from_centre == (-1, 2)
 
 
 def test_equal_results_give_equal_bytes(tmp_path: Path, light_field: LightField, maps: StageMaps) -> None:

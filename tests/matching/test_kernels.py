@@ -94,7 +94,8 @@ def test_changed_source_is_compiled_anew(tmp_path: Path) -> None:
         "colours = np.random.default_rng(0).integers(0, 255, (3, 3, 3, 9, 9)).astype(np.uint8);"
         "subsets, groups = np.ones((1, 1), bool), np.zeros((3, 3), np.int64);"
         "views = ViewStack(colours, 1, 1, groups, subsets, np.float32(900));"
-        "candidates = sampled_candidates(np.linspace(-1, 1, 5).astype(np.float32), (3, 3), (1, 1));"
+        "baselines = np.moveaxis(np.indices((3, 3)), 0, 2) - 1.0;"
+        "candidates = sampled_candidates(np.linspace(-1, 1, 5).astype(np.float32), baselines);"
         "cost = np.zeros((1, 5, 9), np.float32); cost_row(views, candidates, Run(4, 0, 9), cost);"
         "print(sum(cost_row.stats.cache_misses.values()), cost.sum())"
     )

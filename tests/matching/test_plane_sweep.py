@@ -8,6 +8,7 @@ from pathlib import Path
 import numba
 import numpy as np
 import pytest
+from geometries import GEOMETRIES, standing
 from scipy.ndimage import map_coordinates
 from several_threads import several_threads
 
@@ -22,12 +23,13 @@ from sepi.matching.view_subsets import halves_and_quarters
 from sepi.scenes import render
 
 
-def random_light_field(grid=(5, 4), shape=(14, 17), channels=3, dtype=np.uint8, seed=0):
+def random_light_field(grid=(5, 4), shape=(14, 17), channels=3, dtype=np.uint8, seed=0, geometry="grid"):
     generator = np.random.default_rng(seed)
     views = generator.random((*grid, *shape, channels), np.float32)
     if dtype != np.float32:
         views = np.round(views * np.iinfo(dtype).max).astype(dtype)
-    return LightField(views, "random", disparity_range=DisparityRange(-1.3, 1.1, "given"))
+    known = DisparityRange(-1.3, 1.1, "given")
+    return LightField(views, "random", disparity_range=known, **standing(geometry, grid))
 
 
 def twin(light_field, parameters, groups, subset):
@@ -46,7 +48,8 @@ def twin(light_field, parameters, groups, subset):
             if (t, s) == (t0, s0) or not light_field.present[t, s] or not subset[groups[t, s]]:
                 continue
             for k, d in enumerate(candidates.astype(float)):
-                y, x = rows - d * (t - t0), columns - d * (s - s0)
+                down, across = light_field.baselines[t, s]
+                y, x = rows - d * down, columns - d * across
                 inside = (y >= 0) & (y <= H - 1) & (x >= 0) & (np.floor(x) + 1 <= W - 1)
                 sample = np.stack([map_coordinates(c, [y, x], order=1) for c in np.moveaxis(views[t, s], 2, 0)], axis=2)
                 squared = ((sample - centre) ** 2).sum(axis=2)
@@ -80,7 +83,7 @@ def test_sweep_equals_its_numpy_twin(radius, channels, dtype):
     """Wrong sampling, borders, counts or weights would show as a wrong depth map."""
     light_field = random_light_field(channels=channels, dtype=dtype)
     parameters = SweepParameters(num_disparities=11, scale=0.3, window_radius=radius, window_sigma=0.5)
-    views = halves_and_quarters(light_field.grid)
+    views = halves_and_quarters(light_field)
     result = sweep(light_field, parameters, groups=views.groups, subsets=views.subsets)
     for n in (0, 1, 4, 6):
         disparity, cost, mean = twin(light_field, parameters, views.groups, views.subsets[n])
@@ -90,12 +93,13 @@ def test_sweep_equals_its_numpy_twin(radius, channels, dtype):
         assert np.mean(np.abs(result.disparity[n] - disparity) > 2e-3) < 0.01
 
 
+@pytest.mark.parametrize("geometry", GEOMETRIES)
 @pytest.mark.parametrize("view", [(0, 3), (4, 0), (1, 1)])
-def test_depth_of_another_view_than_the_centre(view):
-    """Steps counted from the wrong view would shift every sample of the depth map that was asked for."""
-    light_field = random_light_field().seen_from(view)
+def test_depth_of_another_view_than_the_centre(view, geometry):
+    """Steps counted from the wrong view, or on a grid where there is none, would shift every sample of the map."""
+    light_field = random_light_field(geometry=geometry).seen_from(view)
     parameters = SweepParameters(num_disparities=11, scale=0.3, window_radius=1, window_sigma=0.5)
-    views = halves_and_quarters(light_field.grid, view)
+    views = halves_and_quarters(light_field)
     result = sweep(light_field, parameters, groups=views.groups, subsets=views.subsets)
     for n in range(len(views.names)):
         _, cost, mean = twin(light_field, parameters, views.groups, views.subsets[n])
@@ -129,10 +133,11 @@ def test_missing_views_are_left_out():
     np.testing.assert_array_equal(results[0].disparity, results[1].disparity)
 
 
+@pytest.mark.parametrize("geometry", GEOMETRIES)
 @pytest.mark.parametrize("disparity", [-0.75, 0.0, 0.4])
-def test_sweep_visits_the_samples_of_the_stitched_epi(disparity):
+def test_sweep_visits_the_samples_of_the_stitched_epi(disparity, geometry):
     """The fast sweep and the paper's construction (shift, concatenate, follow the line) are the same cost (Eq. 1-3)."""
-    light_field = random_light_field(shape=(12, 15))
+    light_field = random_light_field(shape=(12, 15), geometry=geometry)
     light_field = light_field.with_range(DisparityRange(disparity - 0.5, disparity + 0.5, "given"))
     parameters = SweepParameters(num_disparities=3, scale=0.3, window_radius=0)
     scale = float(np.sqrt(parameters.scale**2 + residual_variance(light_field.reference_view)))
@@ -168,7 +173,7 @@ def test_equal_bytes_for_any_number_of_threads():
     """A rerun on another machine must give the same file."""
     light_field = render("curved_occluders", size=96, views=5)
     parameters = SweepParameters(num_disparities=31)
-    views = halves_and_quarters(light_field.grid)
+    views = halves_and_quarters(light_field)
     scattered = np.random.default_rng(0).random(light_field.shape) < 0.01
     before = numba.get_num_threads()
     for subsets, mask in ((None, None), (views.subsets, scattered)):
@@ -189,9 +194,9 @@ def test_candidates_done_together_equal_candidates_done_alone():
     """Dense candidates share the pixels that they read: a weight of one used for the other would blur the minimum."""
     light_field = random_light_field(shape=(20, 40))
     disparities = np.linspace(-1.3, 1.3, 61).astype(np.float32)
-    groups = halves_and_quarters(light_field.grid).groups
+    groups = halves_and_quarters(light_field).groups
     views = ViewStack(planar(light_field), 2, 2, groups, np.eye(9, dtype=bool), np.float32(900))
-    candidates = sampled_candidates(disparities, light_field.grid, (2, 2))
+    candidates = sampled_candidates(disparities, light_field.baselines)
     shared = (np.diff(candidates.down) == 0).mean() * (np.diff(candidates.across) == 0).mean()
     assert 0.5 < shared < 1, "some candidates read the same pixels, some do not"
     together, alone = np.empty((2, 9, 61, 40), np.float32)
@@ -200,7 +205,7 @@ def test_candidates_done_together_equal_candidates_done_alone():
         cost_row(views, candidates, run, together)
         for k in range(61):
             single = np.empty((9, 1, 40), np.float32)
-            cost_row(views, sampled_candidates(disparities[k : k + 1], light_field.grid, (2, 2)), run, single)
+            cost_row(views, sampled_candidates(disparities[k : k + 1], light_field.baselines), run, single)
             alone[:, k] = single[:, 0]
         np.testing.assert_array_equal(together, alone)
 
@@ -229,7 +234,7 @@ def test_pixels_far_apart_equal_the_whole_picture():
 def test_subset_without_views_matches_nothing():
     """Seen from a corner of the grid, some parts hold no view: their cost is the worst there is, and is a number."""
     light_field = random_light_field(grid=(3, 3), shape=(40, 44)).seen_from((0, 0))
-    views = halves_and_quarters(light_field.grid, (0, 0))
+    views = halves_and_quarters(light_field)
     parameters = SweepParameters(num_disparities=5, scale=0.3, window_radius=1, window_sigma=0.5)
     result = sweep(light_field, parameters, groups=views.groups, subsets=views.subsets)
     empty = views.names.index("left-up")

@@ -3,6 +3,7 @@
 import numba
 import numpy as np
 import pytest
+from geometries import GEOMETRIES, grid_baselines, standing
 from scipy.ndimage import map_coordinates
 from several_threads import several_threads
 
@@ -26,11 +27,12 @@ from sepi.matching.visibility_sweep import (
 from sepi.scenes import render
 
 
-def random_light_field(grid=(3, 4), shape=(11, 13), channels=3, dtype=np.uint8, present=None):
+def random_light_field(grid=(3, 4), shape=(11, 13), channels=3, dtype=np.uint8, present=None, geometry="grid"):
     views = np.random.default_rng(0).random((*grid, *shape, channels), np.float32)
     if dtype != np.float32:
         views = np.round(views * np.iinfo(dtype).max).astype(dtype)
-    return LightField(views, "random", present=present, disparity_range=DisparityRange(-1.3, 1.1, "given"))
+    known = DisparityRange(-1.3, 1.1, "given")
+    return LightField(views, "random", present=present, disparity_range=known, **standing(geometry, grid))
 
 
 def z_buffer_twin(disparity, dt, ds):
@@ -56,7 +58,8 @@ def sweep_twin(light_field, views, nearest, disparities, margin, hidden, scales,
         for t, s in np.argwhere(light_field.present):
             if (t, s) == (t0, s0):
                 continue
-            y, x = rows - d * (t - t0), columns - d * (s - s0)
+            down, across = light_field.baselines[t, s]
+            y, x = rows - d * down, columns - d * across
             inside = (y >= 0) & (y <= H - 1) & (x >= 0) & (x <= W - 1)
             seen = np.ones((H, W))
             if nearest is not None:
@@ -75,19 +78,16 @@ def sweep_twin(light_field, views, nearest, disparities, margin, hidden, scales,
 @pytest.mark.parametrize("channels", [1, 3])
 @pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.float32])
 @pytest.mark.parametrize("visible", [False, True])
-def test_costs_equal_a_plain_twin(channels: int, dtype: type, visible: bool) -> None:
+@pytest.mark.parametrize("geometry", GEOMETRIES)
+def test_costs_equal_a_plain_twin(channels: int, dtype: type, visible: bool, geometry: str) -> None:
     """A wrong sample, weight or view here is a wrong depth everywhere."""
     present = np.ones((3, 4), bool)
     present[0, 1] = False
-    light_field = random_light_field(channels=channels, dtype=dtype, present=present)
+    light_field = random_light_field(channels=channels, dtype=dtype, present=present, geometry=geometry)
     views = base_detail_decomposition(light_field, BaseDetailParameters())
     disparities = light_field.require_disparity_range().candidates(7)
     disparity = np.random.default_rng(1).choice(disparities, light_field.shape).astype(np.float32)
-    nearest = (
-        z_buffers(disparity, present, *light_field.reference_position)
-        if visible
-        else np.empty((3, 4, 11, 0), np.float32)
-    )
+    nearest = z_buffers(disparity, present, light_field.baselines) if visible else np.empty((3, 4, 11, 0), np.float32)
     scales, shares = np.array([0.02, 0.01], np.float32), np.array([0.4, 0.6], np.float32)
     cost = np.empty((7, 11, 13), np.float32)
     visibility = Visibility(nearest, np.float32(0.1), np.float32(0.05))
@@ -98,14 +98,17 @@ def test_costs_equal_a_plain_twin(channels: int, dtype: type, visible: bool) -> 
     np.testing.assert_allclose(cost, expected, atol=2e-5)
 
 
-def test_z_buffers_hold_the_nearest_pixel_that_touches_a_position() -> None:
-    light_field = random_light_field()
+@pytest.mark.parametrize("geometry", GEOMETRIES)
+def test_z_buffers_hold_the_nearest_pixel_that_touches_a_position(geometry: str) -> None:
+    """An occluder at the wrong place leaves out views that see the pixel, and keeps those that do not."""
+    light_field = random_light_field(geometry=geometry)
     disparity = np.random.default_rng(2).uniform(-1.5, 1.5, light_field.shape).astype(np.float32)
     present = np.ones((3, 4), bool)
     present[2, 3] = False
-    found = z_buffers(disparity, present, 1, 2)
+    found = z_buffers(disparity, present, light_field.baselines)
     for t, s in np.argwhere(present):
-        np.testing.assert_array_equal(found[t, s], z_buffer_twin(disparity, t - 1, s - 2).astype(np.float32))
+        expected = z_buffer_twin(disparity, *light_field.baselines[t, s])
+        np.testing.assert_array_equal(found[t, s], expected.astype(np.float32))
     assert (found[2, 3] == EMPTY).all()
 
 
@@ -113,7 +116,7 @@ def test_an_occluder_hides_what_lies_beside_it() -> None:
     """A square before a wall hides the wall on each side from the views on that side, and nothing else."""
     disparity = np.zeros((40, 40), np.float32)
     disparity[15:25, 15:25] = 2
-    occluded = occluded_in_any_view(disparity, np.ones((3, 3), bool), 1, 1, np.float32(0.15))
+    occluded = occluded_in_any_view(disparity, np.ones((3, 3), bool), grid_baselines((3, 3)), np.float32(0.15))
     assert occluded[18:22, 13:15].all()
     assert occluded[18:22, 25:27].all()
     assert occluded[13:15, 18:22].all()

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from geometries import GEOMETRIES, standing
 from scipy.ndimage import map_coordinates, spline_filter
 from scipy.sparse import diags
 from scipy.sparse.linalg import spsolve
@@ -40,7 +41,7 @@ def sums_twin(light_field, decomposed, parameters, disparity, margin):
     t0, s0 = light_field.reference_position
     H, W = light_field.shape
     rows, columns = np.mgrid[:H, :W].astype(float)
-    nearest = z_buffers(disparity, light_field.present, t0, s0)
+    nearest = z_buffers(disparity, light_field.present, light_field.baselines)
     means, gradient, curvature = [], np.zeros((H, W)), np.zeros((H, W))
     for values, unit, scale, share in (
         (decomposed.colours, decomposed.colour_unit, parameters.colour_scale, 1 - parameters.detail_share),
@@ -53,12 +54,13 @@ def sums_twin(light_field, decomposed, parameters, disparity, margin):
         for t, s in np.argwhere(light_field.present):
             if (t, s) == (t0, s0):
                 continue
-            y, x = rows - disparity * (t - t0), columns - disparity * (s - s0)
+            v, u = light_field.baselines[t, s]
+            y, x = rows - disparity * v, columns - disparity * u
             inside = (y >= 0) & (y <= H - 1) & (x >= 0) & (x <= W - 1)
-            position = [np.floor(v + 0.5).astype(int).clip(0, n - 1) for v, n in ((y, H), (x, W))]
+            position = [np.floor(a + 0.5).astype(int).clip(0, n - 1) for a, n in ((y, H), (x, W))]
             seen = inside & (nearest[t, s][tuple(position)] <= disparity + np.float32(margin))
             sample = np.stack([map_coordinates(c.astype(float), [y, x], order=3, mode="mirror") for c in planes[t, s]])
-            samples.append((t - t0, s - s0, seen, sample))
+            samples.append((v, u, seen, sample))
         total, weight = own.copy(), np.ones((H, W))
         for _, _, seen, sample in samples:
             w = seen / (1 + ((sample - own) ** 2).sum(axis=0) / scale2) ** 2
@@ -67,25 +69,28 @@ def sums_twin(light_field, decomposed, parameters, disparity, margin):
         mean = total / weight
         means.append(np.moveaxis(mean, 0, 2))
         down, across = spline_derivatives(means[-1].astype(np.float32))
-        for dt, ds, seen, sample in samples:
-            r, g = np.moveaxis(sample - mean, 0, 2), down * dt + across * ds
+        for v, u, seen, sample in samples:
+            r, g = np.moveaxis(sample - mean, 0, 2), down * v + across * u
             w = share * seen / scale2 / (1 + (r**2).sum(axis=2) / scale2) ** 2
             gradient += w * (r * g).sum(axis=2)
             curvature += w * (g * g).sum(axis=2)
     return np.concatenate(means, axis=2), gradient, curvature
 
 
-def test_sums_over_the_views_equal_a_plain_twin() -> None:
+@pytest.mark.parametrize("geometry", GEOMETRIES)
+def test_sums_over_the_views_equal_a_plain_twin(geometry: str) -> None:
     """Wrong visibility, weights or interpolation would bias the depth below the disparity sampling."""
     present = np.ones((3, 4), bool)
     present[1, 0] = False
     colours = np.round(255 * np.random.default_rng(2).random((3, 4, 10, 12, 3))).astype(np.uint8)
-    light_field = LightField(colours, "random", present=present, disparity_range=DisparityRange(-1, 1, "given"))
+    known = DisparityRange(-1, 1, "given")
+    standing_so = standing(geometry, (3, 4))
+    light_field = LightField(colours, "random", present=present, disparity_range=known, **standing_so)
     parameters = BaseDetailParameters(colour_scale=0.3, detail_scale=0.2)
     decomposed = base_detail_decomposition(light_field, parameters)
     views = spline_views(light_field, decomposed, parameters)
     disparity = np.random.default_rng(3).uniform(-0.9, 0.9, (10, 12)).astype(np.float32)
-    nearest = z_buffers(disparity, present, *light_field.reference_position)
+    nearest = z_buffers(disparity, present, light_field.baselines)
     mean = view_mean(views, disparity, nearest, 0.2)
     gradient, curvature = gradient_and_hessian(views, mean, disparity, nearest, 0.2)
     expected = sums_twin(light_field, decomposed, parameters, disparity, 0.2)
@@ -121,7 +126,7 @@ def test_iterations_end_at_the_true_disparity() -> None:
     views = spline_views(scene, base_detail_decomposition(scene, parameters), parameters)
     disparity = (scene.ground_truth + 0.02).astype(np.float32)
     for _ in range(3):
-        nearest = z_buffers(disparity, scene.present, *scene.reference_position)
+        nearest = z_buffers(disparity, scene.present, scene.baselines)
         mean = view_mean(views, disparity, nearest, 0.15)
         gradient, curvature = gradient_and_hessian(views, mean, disparity, nearest, 0.15)
         disparity = disparity + windowed_step(gradient, curvature, 3, 0.05)[0]

@@ -72,6 +72,8 @@ def test_numbers_say_what_they_are_of(complete: Plan) -> None:
     assert known.ground_truth is not None
     expected = {
         "grid": [3, 3],
+        "row_spacing": 1.0,
+        "positions": "grid",
         "shape": [SIZE, SIZE],
         "channels": 3,
         "dtype": "uint8",

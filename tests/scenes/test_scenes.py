@@ -7,6 +7,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from geometries import grid_baselines, standing
 from scipy import ndimage
 
 from sepi.errors import SepiError
@@ -22,14 +23,14 @@ SIZE, VIEWS = 96, 5
 
 
 @cache
-def scene(name: str) -> LightField:
-    return render(name, size=SIZE, views=VIEWS)
+def scene(name: str, geometry: str = "grid") -> LightField:
+    return render(name, size=SIZE, views=VIEWS, **standing(geometry, (VIEWS, VIEWS)))
 
 
-def steps(light_field: LightField) -> list[tuple[int, int, int, int]]:
+def steps(light_field: LightField) -> list[tuple[int, int, float, float]]:
     """Grid position of every view but the centre, and its steps down and right from there."""
-    (T, S), (t0, s0) = light_field.grid, light_field.reference_position
-    return [(t, s, t - t0, s - s0) for t in range(T) for s in range(S) if (t, s) != (t0, s0)]
+    (T, S), centre = light_field.grid, light_field.reference_position
+    return [(t, s, *light_field.baselines[t, s]) for t in range(T) for s in range(S) if (t, s) != centre]
 
 
 def warp_error(light_field: LightField, offset: float) -> float:
@@ -52,13 +53,25 @@ def warp_error(light_field: LightField, offset: float) -> float:
     return float(np.concatenate(errors).mean())
 
 
-@pytest.mark.parametrize("name", [name for name in SCENES if name != "dots"])
-def test_every_view_shows_the_centre_view_where_the_truth_says(name: str) -> None:
+@pytest.mark.parametrize(
+    ("name", "geometry"),
+    [(name, "grid") for name in SCENES if name != "dots"]
+    + [("pyramids", "closer rows"), ("curved_occluders", "off the grid")],
+)
+def test_every_view_shows_the_centre_view_where_the_truth_says(name: str, geometry: str) -> None:
     """A wrong sign, axis or half pixel in truth or views would make a perfect method look bad."""
-    at_truth = warp_error(scene(name), 0.0)
+    shown = scene(name, geometry)
+    at_truth = warp_error(shown, 0.0)
     assert at_truth < 2.0
-    assert warp_error(scene(name), 0.02) > at_truth
-    assert warp_error(scene(name), -0.02) > at_truth
+    assert warp_error(shown, 0.02) > at_truth
+    assert warp_error(shown, -0.02) > at_truth
+
+
+def test_the_layout_of_the_benchmark_takes_even_grids_only(tmp_path: Path) -> None:
+    """Who read such a folder would get a wrong depth: it cannot say where the views stand."""
+    with pytest.raises(SepiError, match=r"wall: the layout .* even spacing"):
+        write_hci(render("wall", size=64, views=2, row_spacing=0.5), tmp_path / "wall")
+    assert not (tmp_path / "wall").exists()
 
 
 def test_a_plane_of_disparity_one_moves_by_whole_pixels() -> None:
@@ -67,7 +80,7 @@ def test_a_plane_of_disparity_one_moves_by_whole_pixels() -> None:
     centre = light_field.views[light_field.reference_position]
     inner = slice(3, SIZE - 3)
     for t, s, dt, ds in steps(light_field):
-        shifted = np.roll(light_field.views[t, s], (dt, ds), axis=(0, 1))
+        shifted = np.roll(light_field.views[t, s], (int(dt), int(ds)), axis=(0, 1))
         np.testing.assert_array_equal(shifted[inner, inner], centre[inner, inner])
 
 
@@ -87,7 +100,7 @@ def test_the_same_scene_is_the_same_bytes_each_time(name: str) -> None:
 FINE = 5
 
 
-def z_buffered(name: str) -> np.ndarray:
+def z_buffered(name: str, geometry: str) -> np.ndarray:
     """Occluded pixels by brute force: the ground truth at five times the resolution, splatted into every view."""
     drawn = rendering.drawing(DEFINITIONS[name].surfaces(), FINE * SIZE)
     drawn = drawn._replace(planes=drawn.planes * FINE)
@@ -95,7 +108,7 @@ def z_buffered(name: str) -> np.ndarray:
     y, x = np.mgrid[: d.shape[0], : d.shape[1]]
     centres = slice(FINE // 2, None, FINE)
     hidden = np.zeros((SIZE, SIZE), bool)
-    for _, _, dt, ds in steps(scene(name)):
+    for _, _, dt, ds in steps(scene(name, geometry)):
         at_y, at_x = np.rint(y - d * dt).astype(int), np.rint(x - d * ds).astype(int)
         inside = (np.minimum(at_y, at_x) >= 0) & (np.maximum(at_y, at_x) < d.shape[0])
         at_y[~inside] = at_x[~inside] = -1
@@ -106,10 +119,13 @@ def z_buffered(name: str) -> np.ndarray:
     return hidden
 
 
-@pytest.mark.parametrize("name", list(SCENES))
-def test_occlusion_mask_agrees_with_a_z_buffer_of_the_truth(name: str) -> None:
+@pytest.mark.parametrize(
+    ("name", "geometry"),
+    [(name, "grid") for name in SCENES] + [("curved_occluders", "closer rows"), ("curved_occluders", "off the grid")],
+)
+def test_occlusion_mask_agrees_with_a_z_buffer_of_the_truth(name: str, geometry: str) -> None:
     """A z-buffer rounds positions, so it may differ next to a boundary of the mask, and nowhere else."""
-    mask, hidden = scene(name).masks["occluded"], z_buffered(name)
+    mask, hidden = scene(name, geometry).masks["occluded"], z_buffered(name, geometry)
     around = np.ones((3, 3))
     # both, for a band so thin that one of them has lost it
     boundary = [ndimage.binary_dilation(m, around) & ~ndimage.binary_erosion(m, around) for m in (mask, hidden)]
@@ -128,7 +144,7 @@ def test_square_before_a_plane_hides_exactly_the_ring_around_it() -> None:
     inside[16:32, 16:32] = True
     np.testing.assert_array_equal(owner == 1, inside)
     expected = ndimage.binary_dilation(inside, np.ones((3, 3))) & ~inside
-    np.testing.assert_array_equal(rendering.occluded(drawn, disparity, (3, 3)), expected)
+    np.testing.assert_array_equal(rendering.occluded(drawn, disparity, grid_baselines((3, 3))), expected)
 
 
 def test_what_leaves_the_picture_is_not_occluded() -> None:
@@ -137,7 +153,7 @@ def test_what_leaves_the_picture_is_not_occluded() -> None:
     strip = rectangle(-1, -1, 1.5 / 64, 2)  # ends at x = 1 in the centre view and at x = 7 in the view to its left
     drawn = rendering.drawing([Surface([everywhere()], Plane(-3.0), grey), Surface([strip], Plane(6.0), grey)], 64)
     disparity, _ = rendering.visible(drawn, 64)
-    hidden = rendering.occluded(drawn, disparity, (3, 3))
+    hidden = rendering.occluded(drawn, disparity, grid_baselines((3, 3)))
     # the plane's column x is at x - 3 in that view: up to column 9 hidden, but columns 1 and 2 outside
     np.testing.assert_array_equal(hidden[8:-8].all(axis=0), (np.arange(64) >= 3) & (np.arange(64) <= 9))
     assert not hidden[:, 1:3].any()
@@ -216,6 +232,8 @@ def test_default_is_nine_by_nine_views_of_192_pixels() -> None:
         ({"name": "wall", "size": 96.0}, r"size .* got 96\.0"),
         ({"name": "wall", "views": 1}, "scene wall: views .* from 2"),
         ({"name": "wall", "views": True}, "views .* got True"),
+        ({"name": "wall", "row_spacing": 0.0}, "wall: row_spacing must be a positive number, got 0"),
+        ({"name": "wall", "positions": np.zeros((3, 3, 2))}, r"wall: positions .* \(9, 9, 2\), got \(3, 3, 2\)"),
     ],
 )
 def test_bad_arguments_are_named(arguments: dict, message: str) -> None:

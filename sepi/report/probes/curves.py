@@ -81,7 +81,7 @@ def cost_curves(light_field: LightField, y: int, x: int, parameters: SweepParame
         If the pixel lies outside the reference view or the disparity range is unknown.
     """
     require_inside(light_field, y, x)
-    (T, S), (t0, s0), (H, W) = light_field.grid, light_field.reference_position, light_field.shape
+    (t0, s0), (H, W) = light_field.reference_position, light_field.shape
     disparities = parameters.candidates(light_field)
     noise = residual_variance(light_field.reference_view)
     r = parameters.window_radius
@@ -92,18 +92,19 @@ def cost_curves(light_field: LightField, y: int, x: int, parameters: SweepParame
     weights = np.exp(-0.5 * (difference**2).sum(axis=0) / np.float32(parameters.window_sigma**2 + noise))
     weights = (weights / weights.sum()).astype(np.float32)
     scale2 = np.float32(parameters.scale**2 + noise)
-    views = halves_and_quarters(light_field.grid, light_field.reference_position)
+    views = halves_and_quarters(light_field)
     sums, counts = np.zeros((2, views.subsets.shape[1], len(disparities)), np.float32)
-    down, fy = sample_offsets(disparities, np.arange(T) - t0)
-    across, fx = sample_offsets(disparities, np.arange(S) - s0)
+    baselines = light_field.baselines
+    down, fy = sample_offsets(disparities, baselines[..., 0])
+    across, fx = sample_offsets(disparities, baselines[..., 1])
     for t, s in np.argwhere(light_field.present):
         if (t, s) == (t0, s0):
             continue
-        top, left = rows + down[t][:, None], columns + across[s][:, None]
+        top, left = rows + down[t, s][:, None], columns + across[t, s][:, None]
         # as the sweep counts: a sample on the last row needs none below, one on the last column does not count
-        inside_y = (top >= 0) & ((top < H - 1) | ((top == H - 1) & (fy[t] == 0)[:, None]))
+        inside_y = (top >= 0) & ((top < H - 1) | ((top == H - 1) & (fy[t, s] == 0)[:, None]))
         inside_x = (left >= 0) & (left < W - 1)
-        squared = _squared_residuals(light_field.rgb_views[t, s], reference_view, top, left, fy[t], fx[s])
+        squared = _squared_residuals(light_field.rgb_views[t, s], reference_view, top, left, fy[t, s], fx[t, s])
         residual = squared / (squared + scale2)
         if not (inside_y.all() and inside_x.all()):
             residual *= inside_y[:, :, None] & inside_x[:, None]

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sepi.lightfield import BoolMap, FloatMap, LightField
-from sepi.matching.view_subsets import SIDES, halves_and_quarters
+from sepi.matching.view_subsets import HALVES_AND_QUARTERS, SIDES
 from sepi.stage import StageMaps
 
 APART = 12
@@ -110,8 +110,7 @@ def _sure(texture: FloatMap, maps: StageMaps) -> FloatMap:
 
 def _occluded(texture: FloatMap, maps: StageMaps) -> list[tuple[str, FloatMap]]:
     """A label and score for each half of the views that is kept somewhere, the highest score first."""
-    names = halves_and_quarters((3, 3)).names
-    subset = kept_subsets(maps)
+    names, subset = HALVES_AND_QUARTERS, kept_subsets(maps)
     # a map that changes from pixel to pixel has been smoothed over the edge, or is not sure which side is which
     even = 1 / (1 + _spread(maps.disparity, 1) / _DISCONTINUITY)
     clear = even * np.minimum(texture / _CLEAR_TEXTURE, 1) * np.nan_to_num(maps.confidence)

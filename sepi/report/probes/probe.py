@@ -184,7 +184,7 @@ def probe(
     """
     y, x, _ = pixel
     curves = cost_curves(light_field, y, x, parameters)
-    views = halves_and_quarters(light_field.grid, light_field.reference_position)
+    views = halves_and_quarters(light_field)
     number = int(kept_subsets(maps)[y, x])
     if maps.subset_names and maps.subset_names != views.names:
         raise SepiError(

@@ -7,6 +7,7 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
+from geometries import GEOMETRIES, standing
 
 from sepi.errors import SepiError
 from sepi.lightfield import DisparityRange, LightField
@@ -57,6 +58,8 @@ def occluder():
         ({"view": (0, 3)}, 1),
         ({"view": (3, 1), "present": missing_views()}, 2),
         ({"grid": (1, 5)}, 2),
+        (standing("closer rows", (5, 4)), 2),
+        ({"present": missing_views(), **standing("off the grid", (5, 4))}, 1),
         ({"shape": (2, 3)}, 3),
     ],
 )
@@ -64,7 +67,7 @@ def test_curves_are_what_the_sweep_minimises(settings, radius):
     """A curve drawn from other samples, weights or counts would explain a depth that was found another way."""
     light_field = random_light_field(**settings)
     parameters = SweepParameters(num_disparities=10, scale=0.3, window_radius=radius, window_sigma=0.5)
-    views = halves_and_quarters(light_field.grid, light_field.reference_position)
+    views = halves_and_quarters(light_field)
     result = sweep(light_field, parameters, groups=views.groups, subsets=views.subsets)
     H, W = light_field.shape
     corners_and_inside = [(0, 0), (H - 1, W - 1), (0, W - 1), (H - 1, 0), (H // 2, W // 2), (H // 2, 1), (1, W // 2)]
@@ -105,12 +108,14 @@ def plane(disparity, grid=(5, 5), size=60, **known):
     generator = np.random.default_rng(1)
     waves = generator.normal(scale=0.5, size=(12, 2))
     phases = generator.uniform(0, 2 * np.pi, 12)
-    t, s, y, x = np.ogrid[: grid[0], : grid[1], :size, :size]
-    t0, s0 = known.get("view") or (grid[0] // 2, grid[1] // 2)
-    v, u = y + disparity * (t - t0), x + disparity * (s - s0)
+    views = np.zeros((*grid, size, size, 1), np.float32)
+    light_field = LightField(views, "plane", disparity_range=DisparityRange(-2, 2, "given"), **known)
+    y, x = np.ogrid[:size, :size]
+    baselines = light_field.baselines[:, :, None, None]
+    v, u = y + disparity * baselines[..., 0], x + disparity * baselines[..., 1]
     values = sum(np.cos(a * v + b * u + p) for (a, b), p in zip(waves, phases, strict=True))
-    values = (0.5 + values / 24).astype(np.float32)
-    return LightField(values[..., None], "plane", disparity_range=DisparityRange(-2, 2, "given"), **known)
+    views[..., 0] = 0.5 + values / 24
+    return light_field
 
 
 def raggedness(picture):
@@ -119,9 +124,10 @@ def raggedness(picture):
 
 
 @pytest.mark.parametrize("view", [None, (1, 3)])
-def test_the_right_candidate_gives_upright_stripes(view):
+@pytest.mark.parametrize("geometry", GEOMETRIES)
+def test_the_right_candidate_gives_upright_stripes(view, geometry):
     """The point of the picture: the reader sees at a glance which candidate is right."""
-    light_field = plane(1.25, view=view)
+    light_field = plane(1.25, view=view, **standing(geometry, (5, 5)))
     right, near, wrong = (sepi_picture(light_field, 30, 30, d) for d in (1.25, 1.0, -0.75))
     assert raggedness(right) < 1.5
     assert raggedness(near) > 4 * raggedness(right)
@@ -196,7 +202,7 @@ def test_sides_of_another_occlusion_stage_are_refused():
     """Wang's half planes are numbered otherwise; their names would be wrong, or an index out of range."""
     light_field = plane(0.5)
     maps = made_maps(light_field, view_subset=np.full((60, 60), 3, np.uint8))
-    maps = replace(maps, subset_names=half_planes(light_field.grid, 8).names)
+    maps = replace(maps, subset_names=half_planes(light_field, 8).names)
     with pytest.raises(SepiError, match=r"half-plane 0.*expected those of half_sepi, full, left"):
         probe(light_field, InterestingPixel(20, 30, ""), maps=maps, parameters=SweepParameters(num_disparities=5))
 

@@ -1,0 +1,89 @@
+"""Light fields whose rows are closer together than columns, or whose views stand off the grid: depth and metres."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from geometries import ROW_SPACING, jittered, standing
+
+from sepi.camera import camera_from
+from sepi.initial import CHOICES
+from sepi.lightfield import LightField
+from sepi.pipeline import estimate_depth
+from sepi.scenes import render
+from sepi.stage import no_progress
+
+SCENE, SIZE, VIEWS = "curved_occluders", 128, 7
+
+
+@cache
+def scene(geometry: str) -> LightField:
+    return render(SCENE, size=SIZE, views=VIEWS, **standing(geometry, (VIEWS, VIEWS)))
+
+
+def error(light_field: LightField, variant: str) -> float:
+    assert light_field.ground_truth is not None
+    return float(np.abs(estimate_depth(light_field, variant).disparity - light_field.ground_truth).mean())
+
+
+@cache
+def error_on_the_grid(variant: str) -> float:
+    return error(scene("grid"), variant)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("variant", ["paper", "best", "wang", "no_sepi", "best_half_sepi"])
+@pytest.mark.parametrize(("geometry", "worse"), [("closer rows", 3.0), ("off the grid", 1.15)])
+def test_depth_is_as_good_as_on_the_grid(variant: str, geometry: str, worse: float) -> None:
+    """Who knows where the cameras stood must get what an even grid gives; each stage has to use it.
+
+    Taken for a grid, the same views give a depth that is so many times worse.
+    """
+    right = scene(geometry)
+    found = error(right, variant)
+    assert found < 1.3 * error_on_the_grid(variant)
+    assert error(replace(right, row_spacing=1.0, positions=None), variant) > worse * found
+
+
+@pytest.mark.parametrize("row_spacing", [0.43, 1.0, 5.0])
+def test_structure_tensor_shears_rows_by_their_own_spacing(row_spacing: float) -> None:
+    """From vertical EPIs alone: shears that are whole per column only would miss what lies between them."""
+    light_field = render("slanted_plane", size=64, views=7, row_spacing=row_spacing)
+    column = np.zeros((7, 7), bool)
+    column[:, 3] = True
+    light_field = replace(light_field, present=column)
+    choice = CHOICES["structure_tensor"]
+    found = choice.run(light_field, None, choice.parameters(), no_progress).disparity
+    assert light_field.ground_truth is not None
+    error = np.abs(found - light_field.ground_truth)[8:-8]
+    assert np.median(error) * max(row_spacing, 1) < 0.1
+
+
+def test_structure_tensor_takes_views_that_stand_at_one_place() -> None:
+    """A camera that took a picture twice would divide by zero."""
+    positions = jittered((3, 5))
+    positions[1, 4] = positions[1, 3]
+    whole = render("slanted_plane", size=64, views=5)
+    light_field = LightField(whole.views[1:4], "twice", disparity_range=whole.disparity_range, positions=positions)
+    choice = CHOICES["structure_tensor"]
+    found = choice.run(light_field, None, choice.parameters(), no_progress)
+    assert np.isfinite(found.disparity).all()
+    assert np.isfinite(found.confidence).all()
+
+
+def test_metres_are_right_where_rows_are_closer() -> None:
+    """The baseline is that of columns: taken for that of rows, everything would stand at the wrong distance."""
+    baseline, focus, focal, sensor = 20.0, 2.0, 50.0, 36.0
+    camera = camera_from(
+        focal_length_mm=focal, baseline_mm=baseline, focus_distance_m=focus, sensor_size_mm=sensor, shape=(96, 96)
+    )
+    light_field = replace(render("slanted_plane", size=96, views=7, row_spacing=ROW_SPACING), camera=camera)
+    depth = camera.depth(estimate_depth(light_field, "best").disparity)
+    # similar triangles between the centre view and the lowest one, 3 rows down, in metres
+    apart = 3 * ROW_SPACING * baseline / 1000
+    focal_px = focal / sensor * 96
+    assert light_field.ground_truth is not None
+    moved = light_field.ground_truth * light_field.baselines[6, 3, 0]
+    expected = apart * focal_px / (moved + apart * focal_px / focus)
+    assert np.median(np.abs(depth / expected - 1)) < 5e-3
