@@ -7,7 +7,7 @@ one, and *open* if it says that it cannot tell (or not which of near and far is 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -138,12 +138,12 @@ class Verdicts(NamedTuple):
     row_spacing: float
 
 
-def disturbed_verdicts(light_field: LightField) -> Iterator[tuple[str, Verdicts]]:
-    """Each disturbance of a light field whose views are in the right order, and what is found then."""
+def disturbed_verdicts(light_field: LightField, turns: Iterable[str] = ORDERS) -> Iterator[tuple[str, Verdicts]]:
+    """Each disturbance of a light field whose views are in the right order, and what is found then; turned so."""
     for name, disturbance in DISTURBANCES.items():
         changed = disturbance.change(_bare(light_field))
         spaced = settle_row_spacing(changed)
-        orders = Counter(_verdict(changed, turn) for turn in ORDERS)
+        orders = Counter(_verdict(changed, turn) for turn in turns)
         try:
             known = estimate_range(spaced)
         except SepiError:

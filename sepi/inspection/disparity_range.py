@@ -49,8 +49,15 @@ _TRUNCATION = 0.1
 # Trust: lowest cost as part of the lowest outside its valley. A limit on the cost itself would add nothing here, and
 # would have to know the noise.
 _MOST_AMBIGUITY = 0.8
-# mean above lowest cost, the brightest of the picture = 1: less is rounding, or the blocks of JPEG
-_FLAT = 2e-3
+# mean above lowest cost, the brightest of the picture = 1: less is rounding, or, where JPEG left blocks, their edges,
+# which match those of any other block
+_FLAT = 1e-3
+_FLAT_BLOCKS = 2e-3
+# side of these blocks; a picture has them where differences across their edges are so many times those inside; larger
+# differences than this, full range = 1, are the scene's
+_BLOCK = 8
+_BLOCKINESS = 1.9
+_FAINT = 4 / 255
 # pixels of the 5x5 neighbourhood, itself included, that agree within a candidate step
 _LEAST_SUPPORT = 13
 # pixels of a patch, as part of the picture, and at least
@@ -144,7 +151,8 @@ class _Views:
         self._own = light_field.reference_position
         self.reference = self._view(self._own)
         self.seen = ~dark_corners(light_field.reference_view, self.reference.shape, _HIGH_PASS + _SEARCH_RADIUS)
-        self.brightest = float(np.quantile(light_field.reference_view.max(axis=2), 0.99))
+        view = light_field.reference_view
+        self._flat = (_FLAT_BLOCKS if _has_blocks(view) else _FLAT) * float(np.quantile(view.max(axis=2), 0.99))
         self.reach = 1
 
     def distances(self) -> tuple[int, int]:
@@ -167,12 +175,11 @@ class _Views:
         limit = np.float32(_TRUNCATION)
         sweep = coarse_sweep(self.reference, views, baselines, candidates, limit, radius)
         sampling = float(candidates[1] - candidates[0])
-        flat = _FLAT * self.brightest
         # neighbours agree within a pixel of the most distant view, however finely it is searched
         tolerance = max(sampling, 1 / reach)
         # against noise, which would stretch the range
         smooth = np.asarray(cv2.medianBlur(sweep[-1], _MEDIAN), np.float32)
-        return _patches(_trusted(*sweep, tolerance, flat) & self.seen, smooth, tolerance)
+        return _patches(_trusted(*sweep, tolerance, self._flat) & self.seen, smooth, tolerance)
 
     def _positions(self, reach: int, distances: set[int]) -> list[tuple[int, int]]:
         """Grid positions in the row and the column of the reference view; any others where those are not there."""
@@ -266,6 +273,19 @@ def _prepared(grey: FloatMap, factor: int) -> FloatMap:
         grey = np.asarray(cv2.resize(grey, size, interpolation=cv2.INTER_AREA), np.float32)
     smooth = cv2.GaussianBlur(grey, (0, 0), _BLUR_SIGMA)
     return np.asarray(smooth - cv2.blur(smooth, (_HIGH_PASS, _HIGH_PASS)), np.float32)
+
+
+def _has_blocks(view: FloatMap) -> bool:
+    """Whether strong JPEG compression left its blocks in a picture, (H, W, 3)."""
+    grey = view.mean(axis=2)
+    ratios = []
+    for picture in (grey, grey.T):
+        faint = np.minimum(abs(np.diff(picture, axis=1)), _FAINT).mean(axis=0)
+        edges = np.arange(faint.size) % _BLOCK == _BLOCK - 1
+        if not edges.any():
+            return False
+        ratios.append(float(faint[edges].mean()) / max(float(faint[~edges].mean()), 1e-6))
+    return min(ratios) > _BLOCKINESS
 
 
 def _trusted(

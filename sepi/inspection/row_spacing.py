@@ -32,9 +32,9 @@ from sepi.lightfield import FloatMap, LightField
 
 # Spacings tried, and how many between one and its double
 _MOST = 4.0
-_PER_OCTAVE = 5
+_PER_OCTAVE = 4
 # Points that are enough to tell spacings apart, and to measure the one found; half width of a patch, pixels
-_POINTS_TO_TELL = 150
+_POINTS_TO_TELL, _POINTS_TO_CHOOSE = 80, 150
 _RADIUS = 2
 # Layouts up to the sign
 _ORDERS = ("as-given", "flip-rows", "transpose", "transpose-flip-rows")
@@ -104,8 +104,15 @@ def _tried(views: Views, reach: int, factor: int) -> _Trial | None:
     if not any(t for t, _ in baselines) or not any(s for _, s in baselines) or views.is_too_small(factor):
         return None
     count = round(_PER_OCTAVE * math.log2(_MOST))
-    hypotheses = [(order, 2 ** (n / _PER_OCTAVE)) for order in _ORDERS for n in range(-count, count + 1)]
+    spacings = [2 ** (n / _PER_OCTAVE) for n in range(-count, count + 1)]
+    # most light fields are in order, and their rows as far apart as their columns: a few hypotheses tell
+    hypotheses = [(_ORDERS[0], spacing) for spacing in (0.5, 1.0, 2.0)]
     found = _matched(views, baselines, factor, hypotheses, float(MOVEMENT), _POINTS_TO_TELL)
+    if found is None or not all(is_clear(found[0][:, 1], found[0][:, other]) for other in (0, 2)):
+        hypotheses = [(order, spacing) for order in _ORDERS for spacing in spacings]
+    else:
+        hypotheses = [(_ORDERS[0], spacing) for spacing in spacings]
+    found = _matched(views, baselines, factor, hypotheses, float(MOVEMENT), _POINTS_TO_CHOOSE)
     if found is None:
         return None
     cost, movement = found

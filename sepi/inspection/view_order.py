@@ -87,10 +87,10 @@ class OrderCheck:
         if not self.clear or self.best == self.read_in:
             return None
         fault = _FAULTS[self.best] if self.read_in == AS_GIVEN else f"--order {self.read_in} does not fit"
-        advice = f"{fault}: read it with --order {self.best}"
+        advice = f"read it with --order {self.best}"
         if not self.sign_clear:
-            return f"{advice}, or {self._turned} if depth comes out inside out"
-        return f"{advice} (so says what hides what in {self.agreeing} of {self.regions} regions of the picture)"
+            return f"{fault}: {advice}, or {self._turned} if depth comes out inside out"
+        return f"{fault} (what hides what agrees in {self.agreeing} of {self.regions} regions of the picture): {advice}"
 
     @property
     def _turned(self) -> str:

@@ -1,0 +1,37 @@
+"""The bench of disturbed light fields, and what it is for: never a wrong word on the order of the views."""
+
+import pytest
+from click.testing import CliRunner
+
+from bench.__main__ import main
+from bench.disturbed import DISTURBANCES, disturbed_verdicts
+from sepi.scenes import render
+
+
+@pytest.mark.parametrize("name", ["curved_occluders", "wall", "slanted_plane"])
+def test_no_verdict_is_wrong(name: str) -> None:
+    """A wrong word turns depth inside out, or makes nonsense of it."""
+    found = dict(disturbed_verdicts(render(name, size=96, views=5), ["as-given", "flip-both", "transpose-flip-rows"]))
+    assert list(found) == list(DISTURBANCES)
+    assert not any(verdicts.orders["wrong"] for verdicts in found.values())
+    assert all(sum(verdicts.orders.values()) == 3 for verdicts in found.values())
+    told = sum(verdicts.orders["right"] for verdicts in found.values())
+    assert (told > 18) == (name == "curved_occluders")
+    assert all(verdicts.row_spacing == 1 for verdicts in found.values())
+
+
+def test_the_command_prints_a_table(monkeypatch: pytest.MonkeyPatch) -> None:
+    first = dict(list(DISTURBANCES.items())[:2])
+    monkeypatch.setattr("bench.disturbed.DISTURBANCES", first)
+    result = CliRunner().invoke(main, ["disturb", "fronto_parallel"])
+    assert result.exit_code == 0, result.output
+    rows = result.output.splitlines()
+    assert len(rows) == 1 + 2 * len(first)
+    assert rows[1].split()[:7] == ["fronto_parallel", "as", "it", "is", "0", "8", "0"]
+    assert rows[-1].split()[-1] == "0"
+
+
+def test_an_unknown_light_field_is_refused() -> None:
+    result = CliRunner().invoke(main, ["disturb", "nowhere/at/all"])
+    assert result.exit_code != 0
+    assert "nowhere/at/all" in result.output
