@@ -174,12 +174,12 @@ def _add_pairs(
 
 
 def _summary(total: npt.NDArray[np.float64], count: npt.NDArray[np.float64]) -> Evidence:
-    """Mean over the regions, each weighed by the root of its pairs, and how sure it is."""
+    """Mean over the regions, each weighed by its pairs, and how sure it is."""
     heard = count >= _PAIRS
     regions = int(heard.sum())
     if regions < 2:
         return Evidence(0.0, 0.0, regions, 0)
-    values, weights = total[heard] / count[heard], np.sqrt(count[heard])
+    values, weights = total[heard] / count[heard], count[heard]
     mean = float((weights * values).sum() / weights.sum())
     # regions that all say the same are not without error
     deviation = max(float(np.sqrt((weights**2 * (values - mean) ** 2).sum() / (weights**2).sum())), 0.1)

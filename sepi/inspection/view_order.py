@@ -21,7 +21,7 @@ from sepi.lightfield import LightField
 # (-2 to 2), and how many standard errors that is; and what it takes to say that near and far are exchanged
 _FEWEST_REGIONS = 5
 _LEAST_EVIDENCE, _LEAST_ERRORS = 0.75, 3.5
-_PLAIN_EVIDENCE, _PLAIN_ERRORS = 1.0, 5.0
+_PLAIN_EVIDENCE, _PLAIN_ERRORS = 0.85, 3.75
 
 _FAULTS = {
     "flip-rows": "the rows of views run the other way",
