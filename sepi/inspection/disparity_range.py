@@ -49,8 +49,8 @@ _TRUNCATION = 0.1
 # Trust: lowest cost as part of the lowest outside its valley. A limit on the cost itself would add nothing here, and
 # would have to know the noise.
 _MOST_AMBIGUITY = 0.8
-# mean above lowest cost, the brightest of the picture = 1: less is rounding, or, where JPEG left blocks, their edges,
-# which match those of any other block
+# mean above lowest cost, the brightest of the picture = 1: less is rounding; full range = 1: less is, where JPEG left
+# blocks, their edges, which match those of any other block
 _FLAT = 1e-3
 _FLAT_BLOCKS = 2e-3
 # side of these blocks; a picture has them where differences across their edges are so many times those inside; larger
@@ -152,7 +152,7 @@ class _Views:
         self.reference = self._view(self._own)
         self.seen = ~dark_corners(light_field.reference_view, self.reference.shape, _HIGH_PASS + _SEARCH_RADIUS)
         view = light_field.reference_view
-        self._flat = (_FLAT_BLOCKS if _has_blocks(view) else _FLAT) * float(np.quantile(view.max(axis=2), 0.99))
+        self._flat = max(_FLAT * float(np.quantile(view.max(axis=2), 0.99)), _FLAT_BLOCKS if _has_blocks(view) else 0.0)
         self.reach = 1
 
     def distances(self) -> tuple[int, int]:

@@ -65,6 +65,21 @@ def test_real_scenes(hci: Path, name: str, every: int) -> None:
     assert known.maximum - known.minimum < 1.35 * every * np.ptp(ground_truth)
 
 
+@pytest.mark.parametrize("name", ["cotton", "antinous"])
+@pytest.mark.parametrize("kind", ["noise of 10/255", "JPEG of quality 30", "grey", "half size", "16 bit"])
+def test_disturbed_real_scenes(hci: Path, name: str, kind: str) -> None:
+    """Blocks of JPEG match those a block further, and noise stretches what is measured: candidates would be wasted."""
+    from bench.disturbed import DISTURBANCES
+
+    whole = read_light_field(hci / name, check_order=False)
+    assert whole.ground_truth is not None
+    change, factor = DISTURBANCES[kind]
+    known = estimate_range(change(whole))
+    low, high = factor * np.quantile(whole.ground_truth, [0.0025, 0.9975])
+    assert holds(known, low, high)
+    assert known.maximum - known.minimum < 1.5 * (high - low)
+
+
 @pytest.mark.parametrize(("back", "front"), [(-2, 3), (0.5, 1.5), (4, 7), (-9, -6), (-14, -12)])
 def test_two_planes(back: float, front: float) -> None:
     known = estimate_range(planes(back, front, square=30))
