@@ -103,13 +103,13 @@ def estimate_range(light_field: LightField) -> DisparityRange:
     views = _Views(light_field, factor)
     low, high, sampling = _searched(views)
     # the search is sure to about two candidates
-    measured = _measured(views, low - 2 * sampling, high + 2 * sampling)
+    measured, reach = _measured(views, low - 2 * sampling, high + 2 * sampling)
     if measured.pixels.size < _FEWEST_PIXELS:
         raise _undecided(light_field)
     low, high = (float(value) for value in np.quantile(measured.pixels, [_OUTLIERS, 1 - _OUTLIERS]))
     # small surfaces far before or behind the others are not outliers
     low, high = min(low, float(measured.patches.min())), max(high, float(measured.patches.max()))
-    margin = max(_MARGIN * (high - low), _SAMPLING / 10 / views.reach)
+    margin = max(_MARGIN * (high - low), _SAMPLING / 10 / reach)
     # two decimals more than the margin's first: numbers that can be read and typed
     digits = max(2, 1 - math.floor(math.log10(factor * margin)))
     scale = 10**digits
@@ -153,7 +153,6 @@ class _Views:
         self.seen = ~dark_corners(light_field.reference_view, self.reference.shape, _HIGH_PASS + _SEARCH_RADIUS)
         view = light_field.reference_view
         self._flat = max(_FLAT * float(np.quantile(view.max(axis=2), 0.99)), _FLAT_BLOCKS if _has_blocks(view) else 0.0)
-        self.reach = 1
 
     def distances(self) -> tuple[int, int]:
         """Rows or columns from the reference view to the nearest and the farthest other view."""
@@ -166,12 +165,11 @@ class _Views:
         # here, since it brings the compiler with it, and most scenes name their range
         from sepi.inspection.coarse_sweep import coarse_sweep
 
-        self.reach = reach
         positions = self._positions(reach, set(distances))
         if not positions:
             return _Found(np.empty(0, np.float32), np.empty(0, np.float32))
         views = np.stack([self._view(position) for position in positions])
-        baselines = np.stack([self.light_field.baselines[position] for position in positions]).astype(np.float32)
+        baselines = self.light_field.baselines[tuple(np.transpose(positions))].astype(np.float32)
         limit = np.float32(_TRUNCATION)
         sweep = coarse_sweep(self.reference, views, baselines, candidates, limit, radius)
         sampling = float(candidates[1] - candidates[0])
@@ -241,15 +239,15 @@ def _searched(views: _Views) -> tuple[float, float, float]:
     return float(low), float(high), sampling
 
 
-def _measured(views: _Views, low: float, high: float) -> _Found:
-    """Disparities between two, by views as far away as possible."""
+def _measured(views: _Views, low: float, high: float) -> tuple[_Found, int]:
+    """Disparities between two, by views as far away as possible; and how far that is."""
     _, farthest = views.distances()
     movement = min(_MOST_MOVEMENT, _MOST_MOVEMENT_PART * min(views.reference.shape))
     reach = int(max(1, min(farthest, movement / max(abs(low), abs(high)))))
     sampling = _SAMPLING / reach
     numbers = np.arange(math.floor(low / sampling), math.ceil(high / sampling) + 1)
     distances = [max(1, round(reach * n / 4)) for n in range(1, 5)]
-    return views.sweep(reach, distances, (numbers * sampling).astype(np.float32), _RADIUS)
+    return views.sweep(reach, distances, (numbers * sampling).astype(np.float32), _RADIUS), reach
 
 
 def _largest(found: _Found) -> float:
