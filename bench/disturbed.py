@@ -18,28 +18,11 @@ import numpy.typing as npt
 from sepi.errors import SepiError
 from sepi.inspection.disparity_range import estimate_range
 from sepi.inspection.row_spacing import settle_row_spacing
-from sepi.inspection.view_order import check_order
-from sepi.io.readers.options import ORDERS
+from sepi.inspection.view_order import change_of_order, check_order, turned_by_half
+from sepi.io.readers.options import AS_GIVEN, ORDERS
 from sepi.lightfield import DisparityRange, LightField, as_unit_float
 
 View = npt.NDArray[np.uint8]
-
-# the turn back of each turn
-_BACK = {
-    turn: next(
-        back
-        for back in ORDERS
-        if np.array_equal(ORDERS[back](ORDERS[turn](np.arange(6).reshape(2, 3))), np.arange(6).reshape(2, 3))
-    )
-    for turn in ORDERS
-}
-_TURNED_BY_HALF = {
-    "as-given": "flip-both",
-    "flip-rows": "flip-columns",
-    "transpose": "transpose-flip-both",
-    "transpose-flip-rows": "transpose-flip-columns",
-}
-_TURNED_BY_HALF |= {second: first for first, second in _TURNED_BY_HALF.items()}
 
 
 class Disturbance(NamedTuple):
@@ -158,7 +141,7 @@ def _bare(light_field: LightField) -> LightField:
 
 def _verdict(light_field: LightField, turn: str) -> str:
     """What is said of the light field with its grid turned."""
-    (rows, columns), right = light_field.grid, _BACK[turn]
+    (rows, columns), right = light_field.grid, change_of_order(turn, AS_GIVEN)
     numbers = ORDERS[turn](np.arange(rows * columns).reshape(rows, columns))
     views = light_field.views.reshape(rows * columns, *light_field.views.shape[2:])[numbers]
     turned = LightField(views, light_field.name, present=light_field.present.ravel()[numbers])
@@ -167,7 +150,7 @@ def _verdict(light_field: LightField, turn: str) -> str:
         return "open"
     if found.sign_clear:
         return "right" if found.best in _same(right, turned.grid) else "wrong"
-    possible = {*_same(right, turned.grid), *_same(_TURNED_BY_HALF[right], turned.grid)}
+    possible = {*_same(right, turned.grid), *_same(turned_by_half(right), turned.grid)}
     return "open" if found.best in possible else "wrong"
 
 

@@ -79,7 +79,7 @@ class OrderCheck:
             return "the views are in the right order"
         return (
             f"the views are in the right order, but near and far cannot be told apart here; if depth comes out inside "
-            f"out, read it with --order {self._turned}"
+            f"out, read it with --order {turned_by_half(self.best)}"
         )
 
     def warning(self) -> str | None:
@@ -89,14 +89,8 @@ class OrderCheck:
         fault = _FAULTS[self.best] if self.read_in == AS_GIVEN else f"--order {self.read_in} does not fit"
         advice = f"read it with --order {self.best}"
         if not self.sign_clear:
-            return f"{fault}: {advice}, or {self._turned} if depth comes out inside out"
+            return f"{fault}: {advice}, or {turned_by_half(self.best)} if depth comes out inside out"
         return f"{fault} (what hides what agrees in {self.agreeing} of {self.regions} regions of the picture): {advice}"
-
-    @property
-    def _turned(self) -> str:
-        """The best order with near and far exchanged."""
-        # turned by half, reading in the one is reading in the other
-        return next(order for order in ORDERS if _change(self.best, order) == "flip-both")
 
 
 def check_order(light_field: LightField, read_in: str = AS_GIVEN) -> OrderCheck:
@@ -128,7 +122,7 @@ def check_order(light_field: LightField, read_in: str = AS_GIVEN) -> OrderCheck:
             for order, sign in trial.best.items():
                 costs[order] += trial.gap / 2 * (0.5 - sign * evidence.mean / 4)
     # from changes of the light field available to orders that take the place of the given one
-    fits = {order: costs[_change(read_in, order)] for order in ORDERS}
+    fits = {order: costs[change_of_order(read_in, order)] for order in ORDERS}
     best = min(ORDERS, key=lambda order: (fits[order], order != read_in))
     if evidence is None:
         return OrderCheck(fits, best, trial.clear, sign_clear, read_in)
@@ -140,7 +134,13 @@ def _is_clear(evidence: Evidence, plainly: bool) -> bool:
     return evidence.regions >= _FEWEST_REGIONS and abs(evidence.mean) >= mean and evidence.errors >= errors
 
 
-def _change(read_in: str, target: str) -> str:
+def change_of_order(read_in: str, target: str) -> str:
     """The order that takes a grid read in order ``read_in`` to what reading it in order ``target`` gives."""
     turned = ORDERS[target](_GRID)
     return next(order for order in ORDERS if np.array_equal(ORDERS[order](ORDERS[read_in](_GRID)), turned))
+
+
+def turned_by_half(order: str) -> str:
+    """The order that differs from another by half a turn, which exchanges near and far."""
+    # reading in the one and turning is reading in the other
+    return next(other for other in ORDERS if change_of_order(order, other) == "flip-both")

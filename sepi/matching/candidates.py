@@ -8,7 +8,9 @@ where these would be finer than is of use, and more where they would be coarser 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, ClassVar, NamedTuple, Self
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
+
+from pydantic import Field
 
 from sepi.lightfield import FloatMap, LightField
 from sepi.stage import Parameters
@@ -60,6 +62,17 @@ class CandidateRule(NamedTuple):
         if self.volume_bytes is not None:
             most = min(most, max(self.usual, self.volume_bytes // (4 * pixels)))
         return min(most, _intervals(moved, self.coarsest) + 1)
+
+
+def number_field(rule: CandidateRule, document: str) -> Any:
+    """The parameter ``num_disparities`` of a sweep whose rule ``document`` explains."""
+    return Field(
+        None,
+        ge=3,
+        le=MOST_CANDIDATES,
+        description=f"number of candidate disparities, uniform over the range; null: {rule.usual}, or fewer for a "
+        f"narrow range and more for a wide one ({document})",
+    )
 
 
 def _intervals(moved: float, sampling: float) -> int:

@@ -23,7 +23,7 @@ from pydantic import Field
 
 from sepi.image.noise import residual_variance
 from sepi.lightfield import BoolMap, FloatMap, LightField, full_scale
-from sepi.matching.candidates import MOST_CANDIDATES, CandidateParameters, CandidateRule
+from sepi.matching.candidates import CandidateParameters, CandidateRule, number_field
 from sepi.matching.sweep_arrays import BestMaps, Candidates, ViewStack, Window
 from sepi.stage import Progress, no_progress
 
@@ -36,13 +36,7 @@ class SweepParameters(CandidateParameters):
 
     rule: ClassVar[CandidateRule] = CANDIDATES
 
-    num_disparities: int | None = Field(
-        None,
-        ge=3,
-        le=MOST_CANDIDATES,
-        description="number of candidate disparities, uniform over the range; null: 181, or fewer for a narrow range "
-        "and more for a wide one (docs/method.md)",
-    )
+    num_disparities: int | None = number_field(CANDIDATES, "docs/method.md")
     scale: float = Field(
         0.0165,
         ge=1e-6,

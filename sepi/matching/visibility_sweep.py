@@ -20,7 +20,7 @@ from sepi.matching.base_detail import (
     ColourScale,
     base_detail_decomposition,
 )
-from sepi.matching.candidates import MOST_CANDIDATES, CandidateParameters, CandidateRule
+from sepi.matching.candidates import CandidateParameters, CandidateRule, number_field
 from sepi.matching.semi_global import SmoothedResult, SmoothingParameters, smooth_and_choose
 from sepi.stage import OcclusionMarginParameters, Progress
 
@@ -40,13 +40,7 @@ class VisibilitySweepParameters(CandidateParameters, BaseDetailParameters, Smoot
 
     rule: ClassVar[CandidateRule] = CANDIDATES
 
-    num_disparities: int | None = Field(
-        None,
-        ge=3,
-        le=MOST_CANDIDATES,
-        description="number of candidate disparities, uniform over the range; null: 91, or fewer for a narrow range "
-        "and more for a wide one (docs/best.md)",
-    )
+    num_disparities: int | None = number_field(CANDIDATES, "docs/best.md")
 
 
 class VisibleViewsParameters(VisibilitySweepParameters, OcclusionMarginParameters):
