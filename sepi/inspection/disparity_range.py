@@ -52,7 +52,7 @@ _MOST_AMBIGUITY = 0.8
 # mean above lowest cost, the brightest of the picture = 1: less is rounding; full range = 1: less is, where JPEG left
 # blocks, their edges, which match those of any other block
 _FLAT = 1e-3
-_FLAT_BLOCKS = 2e-3
+_FLAT_BLOCKS = 3e-3
 # side of these blocks; a picture has them where differences across their edges are so many times those inside; larger
 # differences than this, full range = 1, are the scene's
 _BLOCK = 8

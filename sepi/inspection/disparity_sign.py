@@ -17,10 +17,12 @@ import numpy.typing as npt
 
 from sepi.inspection.coarse_sweep import coarse_sweep
 from sepi.inspection.dark_corners import dark_corners
-from sepi.inspection.view_layouts import REACH, Baseline, Trial, Views, baselines_under
+from sepi.inspection.view_layouts import Baseline, Trial, Views, baselines_under
 from sepi.inspection.view_order_kernels import residuals
 from sepi.lightfield import BoolMap, FloatMap, LightField
 
+# Views up to this many rows or columns away are looked at: the farther, the wider the strips that are hidden
+_FARTHEST = 24
 # Movement searched at most, pixels; larger pictures are reduced by a whole factor, less than where the order of the
 # views is looked for: strips that are hidden are narrow
 _MOST_MOVEMENT = 16
@@ -46,6 +48,8 @@ _WINDOW_RADIUS = 2
 _LEAST_NOISE = 3e-3
 _SEEN = 0.3
 _HIDDEN = 4.0
+# So many of the farthest views on each side are asked what is hidden in them
+_HIDING_VIEWS = 2
 # Two surfaces count as two where they are this far apart in a view, pixels; they meet in it within this distance
 _LEAST_SHIFT = 1.5
 _MEETING = 0.75
@@ -79,11 +83,12 @@ class Evidence(NamedTuple):
     agreeing: int
 
 
-def occlusion_evidence(light_field: LightField, trial: Trial) -> Evidence:
+def occlusion_evidence(light_field: LightField, trial: Trial, many_views: bool = False) -> Evidence:
     """Whether the surface of the greater disparity is the one in front.
 
     The best layout of the trial is taken for right; the sign is that of the layout's first order. There is no evidence
-    where there are no views on opposite sides, or hardly any contrast.
+    where there are no views on opposite sides, or hardly any contrast. The views of the middle row and column hide
+    least of each other; many views, also off them, see more where there is noise or little texture.
     """
     none = Evidence(0.0, 0.0, 0, 0)
     views = Views(light_field, _MOST_PIXELS)
@@ -97,39 +102,40 @@ def occlusion_evidence(light_field: LightField, trial: Trial) -> Evidence:
     if rounding > _MOST_ROUNDING:
         return none
     reference = views.plain((0, 0)) * scale
-    baselines = {direction: _at(direction, reach) for direction in directions}
-    pictures = {at: views.plain(at) * scale for both in baselines.values() for at in both}
+    sides = {
+        direction: _at(direction, reach) + (_beside(views, direction, reach) if many_views else [])
+        for direction in directions
+    }
+    pictures = {at: views.plain(at) * scale for side in sides.values() for at in side}
     order = next(iter(trial.best))
     positions = {at: baselines_under(order, views.in_steps([at]))[0].astype(np.float32) for at in pictures}
     movement = min(_MOST_MOVEMENT, math.ceil(1.15 * largest * reach) + 1)
     sampling = 1 / reach
     candidates = (np.arange(-movement, movement + 1) * sampling).astype(np.float32)
-    sides = [
-        (np.stack([pictures[at] for at in both]), np.stack([positions[at] for at in both]))
-        for both in baselines.values()
-    ]
-    disparity, trusted = _disparity(reference, sides, candidates)
+    disparity, trusted = _disparity(
+        reference,
+        [
+            (np.stack([pictures[at] for at in side]), np.stack([positions[at] for at in side]))
+            for side in sides.values()
+        ],
+        candidates,
+    )
     surface = trusted & (_support(disparity, trusted, sampling) >= _LEAST_SUPPORT)
     surface &= ~dark_corners(views.reference_view, reference.shape, movement)
     residual = {
-        at: residuals(reference, picture, float(positions[at][0]), float(positions[at][1]), disparity, _WINDOW_RADIUS)
-        for at, picture in pictures.items()
+        at: residuals(
+            reference, pictures[at], float(positions[at][0]), float(positions[at][1]), disparity, _WINDOW_RADIUS
+        )
+        for direction in directions
+        for at in _at(direction, reach)
     }
     noise = max(_LEAST_NOISE, rounding, _typical([values[trusted] for values in residual.values()]))
     total, count = np.zeros((2, *_regions(disparity.shape)))
     for t, s in directions:
-        there = [residual[at] for at in baselines[-t, -s]]
-        _add_pairs(
-            residual[baselines[t, s][-1]],
-            np.asarray(np.mean(there, axis=0), np.float32),
-            disparity,
-            surface,
-            positions[baselines[t, s][-1]],
-            noise,
-            2 * movement,
-            total,
-            count,
-        )
+        there = [residual[at] for at in _at((-t, -s), reach)]
+        opposite = np.asarray(np.mean(there, axis=0), np.float32)
+        for at in _at((t, s), reach)[-_HIDING_VIEWS:]:
+            _add_pairs(residual[at], opposite, disparity, surface, positions[at], noise, 2 * movement, total, count)
     return _summary(total, count)
 
 
@@ -202,9 +208,9 @@ def _directions(views: Views, largest: float) -> tuple[int, list[Baseline]]:
 
     The most distant at which nothing moves by more than is searched: the strips that are hidden are widest there.
     """
-    axes = [(n * t, n * s) for t, s in _DIRECTIONS for n in range(1, REACH + 1)]
+    axes = [(n * t, n * s) for t, s in _DIRECTIONS for n in range(1, _FARTHEST + 1)]
     present = set(views.worth_matching([baseline for baseline in views.baselines if baseline in axes]))
-    for reach in range(REACH, 0, -1):
+    for reach in range(_FARTHEST, 0, -1):
         if reach > 1 and largest * reach > _MOST_MOVEMENT:
             continue
         both = [
@@ -220,6 +226,15 @@ def _directions(views: Views, largest: float) -> tuple[int, list[Baseline]]:
 def _at(direction: Baseline, reach: int) -> list[Baseline]:
     """Baselines to the views at the distance and at quarters of it."""
     return [(n * direction[0], n * direction[1]) for n in sorted({max(1, reach * k // 4) for k in range(1, 5)})]
+
+
+def _beside(views: Views, direction: Baseline, reach: int) -> list[Baseline]:
+    """Baselines to the views on one side that are off its axis, at 45 degrees to each of those on it."""
+    t, s = direction
+    distances = [abs(down + across) for down, across in _at(direction, reach)]
+    corners = [(n * (t + k * s), n * (s + k * t)) for n in distances for k in (-1, 1)]
+    present = set(views.baselines)
+    return views.worth_matching([corner for corner in corners if corner in present])
 
 
 def _disparity(

@@ -57,8 +57,8 @@ class Views:
     """The views about the middle of the grid, reduced and filtered when they are first asked for.
 
     ``middle`` is the position of the view in the middle, ``baselines`` lead from it to each other one that is present,
-    in rows and columns; ``row_spacing`` is the light field's. ``factor`` is what larger pictures are reduced by,
-    ``shape`` their height and width then, in pixels.
+    in rows and columns. ``factor`` is what larger pictures are reduced by, ``shape`` their height and width then, in
+    pixels.
     """
 
     def __init__(self, light_field: LightField, most_pixels: int = _MOST_PIXELS) -> None:
@@ -74,7 +74,7 @@ class Views:
         ]
         height, width = light_field.shape
         self.shape = (height // self.factor, width // self.factor)
-        self.row_spacing = light_field.row_spacing
+        self._positions = light_field.baselines
 
     @property
     def reference_view(self) -> FloatMap:
@@ -83,7 +83,8 @@ class Views:
 
     def in_steps(self, baselines: list[Baseline]) -> npt.NDArray[np.float64]:
         """Baselines in view steps, shape (V, 2)."""
-        return np.array(baselines, np.float64).reshape(-1, 2) * (self.row_spacing, 1)
+        t, s = (np.array(baselines, np.int64).reshape(-1, 2) + self.middle).T
+        return np.asarray(self._positions[t, s] - self._positions[self.middle], np.float64)
 
     def is_too_small(self, factor: int) -> bool:
         """Whether the views tell nothing, reduced by a further factor."""

@@ -111,12 +111,15 @@ def check_order(light_field: LightField, read_in: str = AS_GIVEN) -> OrderCheck:
     if trial is None:
         return OrderCheck(dict.fromkeys(ORDERS, 1.0), read_in, clear=False, sign_clear=False, read_in=read_in)
     costs = dict(trial.costs)
-    sign_clear, evidence = False, None
+    sign_clear, evidence = False, Evidence(0.0, 0.0, 0, 0)
     if trial.clear:
-        evidence = occlusion_evidence(light_field, trial)
         # near and far as they are, if the order is right but for them: to doubt that takes more
         kept = next((sign for order, sign in trial.best.items() if order == AS_GIVEN), None)
-        sign_clear = _is_clear(evidence, plainly=kept is not None and kept * evidence.mean < 0)
+        for many_views in (False, True):
+            evidence = occlusion_evidence(light_field, trial, many_views)
+            sign_clear = _is_clear(evidence, plainly=kept is not None and kept * evidence.mean < 0)
+            if sign_clear:
+                break
         if sign_clear:
             # at most half way to the next layout: the wrong sign is still the better layout
             for order, sign in trial.best.items():
@@ -124,8 +127,6 @@ def check_order(light_field: LightField, read_in: str = AS_GIVEN) -> OrderCheck:
     # from changes of the light field available to orders that take the place of the given one
     fits = {order: costs[change_of_order(read_in, order)] for order in ORDERS}
     best = min(ORDERS, key=lambda order: (fits[order], order != read_in))
-    if evidence is None:
-        return OrderCheck(fits, best, trial.clear, sign_clear, read_in)
     return OrderCheck(fits, best, trial.clear, sign_clear, read_in, evidence.regions, evidence.agreeing)
 
 

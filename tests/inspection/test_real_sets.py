@@ -73,6 +73,16 @@ def test_the_views_are_put_where_they_belong(real_data: Path, name: str) -> None
         assert known.warning in found[0]
 
 
+@pytest.mark.parametrize("name", ["legoknights3", "t_rex", "mansion51"])
+def test_near_and_far_are_told(real_data: Path, name: str) -> None:
+    """A row of fifty views moves little from one to the next: what hides what shows between distant ones."""
+    spacing = 0.396 if name == "t_rex" else None
+    light_field = known_set(real_data, name, ReadOptions(order=SETS[name].order, row_spacing=spacing))
+    found = check_order(light_field, SETS[name].order)
+    assert found.sign_clear
+    assert found.verdict() == "the views are in the right order"
+
+
 @pytest.mark.parametrize("name", SETS)
 def test_the_range_holds_the_scene_and_little_more(real_data: Path, name: str) -> None:
     """Too narrow, it cuts off the nearest or most distant surface; too wide, it costs time and accuracy."""

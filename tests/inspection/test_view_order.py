@@ -10,6 +10,7 @@ import pytest
 from sepi.inspection.view_order import check_order
 from sepi.io.readers.options import ORDERS
 from sepi.lightfield import LightField
+from sepi.reading import read_light_field
 from sepi.scenes import SCENES, render
 
 TURNED = {
@@ -239,6 +240,14 @@ def test_a_lytro_picture_in_every_order(real_data: Path) -> None:
     folder = real_data / "lytro" / "2067"
     rows = [[cv2.imread(str(folder / f"2067_{t:02}_{s:02}.png")) for s in range(1, 10)] for t in range(1, 10)]
     every_order_is_named(grey_field(np.array(rows)[..., ::-1]))
+
+
+@pytest.mark.parametrize("kind", ["noise of 10/255", "half size"])
+def test_near_and_far_are_told_in_noise_and_in_small_pictures(hci: Path, kind: str) -> None:
+    """One axis of views is too few where texture is faint: depth inside out would go unnoticed."""
+    from bench.disturbed import DISTURBANCES
+
+    every_order_is_named(DISTURBANCES[kind].change(read_light_field(hci / "cotton", check_order=False)))
 
 
 def every_order_is_named(light_field: LightField) -> None:
