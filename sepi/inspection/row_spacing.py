@@ -38,14 +38,19 @@ _POINTS_TO_TELL, _POINTS_TO_CHOOSE = 80, 150
 _RADIUS = 2
 # Layouts up to the sign
 _ORDERS = ("as-given", "flip-rows", "transpose", "transpose-flip-rows")
-# Movement in the farthest view, pixels: spacing of what is searched, and the most when the spacing is measured
+# Movement in the farthest view, pixels: spacing of what is searched, spacing where movements are compared, and the most
+# when the spacing is measured
 _SAMPLING = 0.6
+_FINE_SAMPLING = 0.1
 _MOST_MOVEMENT = 80.0
 # Rounds of measuring, and spacings to each side of the last round's best
 _ROUNDS = 2
 _EACH_SIDE = 4
 # What is not worth a word: less than that is the error of the measurement
 _LEAST_DIFFERENCE = 0.04
+# Spacings up to this factor from one need a second witness: between samples noise is smoothed, and lenslet pictures are
+# decoded with shifts of a few hundredths of a pixel, both of which can make a tenth more or less fit better
+_DOUBTED = 1.25
 
 
 def settle_row_spacing(light_field: LightField) -> LightField:
@@ -91,7 +96,10 @@ def estimate_row_spacing(views: Views) -> float | None:
         trial = _tried(views, reach, factor)
         if trial is not None:
             measured = _measured(views, trial) if trial.clear else 1.0
-            return None if abs(math.log(measured)) < _LEAST_DIFFERENCE else measured
+            if abs(math.log(measured)) < _LEAST_DIFFERENCE:
+                return None
+            near = abs(math.log(measured)) < math.log(_DOUBTED)
+            return None if near and not _is_seen_in_movements(views, trial, measured) else measured
     return None
 
 
@@ -119,7 +127,7 @@ def _tried(views: Views, reach: int, factor: int) -> _Trial | None:
     mean = cost.mean(axis=0)
     best = int(mean.argmin())
     usual = min((n for n, (_, spacing) in enumerate(hypotheses) if spacing == 1), key=lambda n: mean[n])
-    moved = movement[cost[:, best] < MATCHED, best]
+    moved = abs(movement[cost[:, best] < MATCHED, best])
     if moved.size < FEWEST_POINTS or np.quantile(moved, 1 - AT_END) > 0.95 * MOVEMENT:
         return None
     order, spacing = hypotheses[best]
@@ -141,6 +149,33 @@ def _measured(views: Views, trial: _Trial) -> float:
     return spacing
 
 
+def _is_seen_in_movements(views: Views, trial: _Trial, spacing: float) -> bool:
+    """Whether the ratio of points' movements along columns of views to those along rows is that, surely not one.
+
+    A line through both movements may miss the origin, so that a shift of all views does not count.
+    """
+    # here, since it takes a while to load, and hardly any light field needs it
+    from scipy.stats import theilslopes
+
+    movements, fits = [], []
+    for axis in (0, 1):
+        along = [baseline for baseline in trial.baselines if baseline[1 - axis] == 0]
+        hypothesis = [(trial.order, 1.0)]
+        found = _matched(views, along, 1, hypothesis, trial.movement + 1, None, _FINE_SAMPLING) if along else None
+        if found is None:
+            return False
+        cost, moved = found
+        movements.append(moved[:, 0] / max(abs(baseline[axis]) for baseline in along))
+        fits.append(cost[:, 0] < MATCHED)
+    matched = fits[0] & fits[1]
+    if matched.sum() < FEWEST_POINTS or not np.ptp(movements[1][matched]):
+        return False
+    line = theilslopes(movements[0][matched], movements[1][matched])
+    # all of the slope's interval of confidence is nearer to the spacing than to one
+    middle = math.sqrt(spacing)
+    return bool(line.low_slope > middle if spacing > 1 else line.low_slope > 0 and line.high_slope < middle)
+
+
 def _matched(
     views: Views,
     baselines: list[Baseline],
@@ -148,8 +183,9 @@ def _matched(
     hypotheses: list[tuple[str, float]],
     movement: float,
     most_points: int | None,
+    sampling: float = _SAMPLING,
 ) -> tuple[FloatMap, FloatMap] | None:
-    """Matching cost of each point under each order and spacing, and how far it moves in the farthest view, pixels.
+    """Matching cost of each point under each order and spacing, and its movement to the farthest view, pixels.
 
     Both of shape (P, L), float32; None where there are too few points.
     """
@@ -159,10 +195,10 @@ def _matched(
         return None
     others = np.stack([views.detail(baseline, factor) for baseline in baselines])
     offsets = np.stack([_in_units_of_the_farthest(baselines, order, spacing) for order, spacing in hypotheses])
-    count = round(movement / _SAMPLING)
-    candidates = (np.arange(-count, count + 1) * _SAMPLING).astype(np.float32)
+    count = round(movement / sampling)
+    candidates = (np.arange(-count, count + 1) * sampling).astype(np.float32)
     cost, moved = layout_costs(reference, others, offsets.astype(np.float32), candidates, points, _RADIUS)
-    return cost, abs(moved)
+    return cost, moved
 
 
 def _in_units_of_the_farthest(baselines: list[Baseline], order: str, spacing: float) -> npt.NDArray[np.float64]:

@@ -64,6 +64,9 @@ def test_the_views_are_put_where_they_belong(real_data: Path, name: str) -> None
         light_field = read_light_field(known_set(real_data, name).source)
     assert light_field.grid == known.grid
     assert light_field.present.sum() == known.views
+    # of the gantry's camera positions, and of steps of 35 and 14 pixels; a Lytro's shifted views are no other spacing
+    spacing = {"gantry-jellybeans": 0.981, "t_rex": 0.394}.get(name, 1)
+    assert light_field.row_spacing == pytest.approx(spacing, abs=0 if spacing == 1 else 0.008)
     found = [str(warning.message) for warning in caught if issubclass(warning.category, SepiWarning)]
     if known.warning is None:
         assert not found

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
@@ -10,6 +11,7 @@ from sepi.inspection.view_layouts import Views
 from sepi.inspection.view_order import check_order
 from sepi.io.readers.options import ORDERS
 from sepi.lightfield import LightField
+from sepi.reading import read_light_field
 from sepi.scenes import SCENES, render
 
 
@@ -27,6 +29,20 @@ def test_spacing_is_measured(name: str, rows: int, columns: int) -> None:
     light_field = settle_row_spacing(every_other(name, rows, columns))
     assert light_field.row_spacing == pytest.approx(rows / columns, rel=0.03)
     assert f"{light_field.row_spacing:g} times as far apart as columns" in light_field.notes[-1]
+
+
+def stretched(views: np.ndarray, factor: float) -> LightField:
+    """Pictures that are higher: what moves across rows of views does so by more pixels."""
+    T, S, H, W, C = views.shape
+    size = (W, round(factor * H))
+    higher = [cv2.resize(view, size, interpolation=cv2.INTER_AREA) for view in views.reshape(T * S, H, W, C)]
+    return LightField(np.stack(higher).reshape(T, S, size[1], W, C), "stretched")
+
+
+@pytest.mark.parametrize("factor", [0.85, 1.2])
+def test_a_spacing_near_one_is_measured(hci: Path, factor: float) -> None:
+    light_field = settle_row_spacing(stretched(read_light_field(hci / "antinous", check_order=False).views, factor))
+    assert light_field.row_spacing == pytest.approx(factor, rel=0.03)
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -74,8 +90,6 @@ def test_pictures_of_noise_have_none() -> None:
 
 def test_real_gantry(real_data: Path) -> None:
     """Views 35 px apart along columns and 14 along rows, measured by block matching: 0.394."""
-    from sepi.reading import read_light_field
-
     light_field = read_light_field(real_data / "real" / "t_rex")
     assert light_field.row_spacing == pytest.approx(0.394, abs=0.008)
     assert check_order(light_field).warning() is None
