@@ -22,6 +22,16 @@ include: "rules/external.smk"
 include: "rules/report.smk"
 
 
+# a few seconds each, whatever the number of scenes: not worth a submission to a cluster
+localrules:
+    tables,
+    parts_table,
+    charts,
+    parts_chart,
+    graph,
+    page,
+
+
 # Tables and figures, and the maps of the most accurate variant, of the paper's, and of variants that the user added
 rule all:
     default_target: True

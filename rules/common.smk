@@ -13,7 +13,7 @@ from sepi.pipeline import HANDED_ON, STAGES, VARIANTS, choice_of
 from sepi.report.plan import Plan
 from sepi.validation import require_known
 from sepi.workflow.code_digest import ROOT, code_digest, stage_modules
-from sepi.workflow.candidates import candidates_mb
+from sepi.workflow.candidates import candidates_factor, candidates_mb
 from sepi.workflow.config import load_settings
 from sepi.workflow.result_paths import PARTS_ENDING, RESULTS, key_of, scene_files
 from sepi.workflow.run_log import show_progress
@@ -40,6 +40,11 @@ PLAN = Plan(RESULTS, SCENES_BY_DATASET, VARIANT_LABELS, list(SETTINGS.external))
 # the rules' patterns
 SCENE = scene_files("{dataset}", "{scene}")
 LABELS = {stage: f"{{{stage}}}" for stage in STAGES}
+
+
+# a group of jobs that depend on each other is one submission to a cluster: all that is made of a scene. (Several small scenes
+# with --group-components; run locally, a group means nothing.)
+GROUP = "scene"
 
 
 wildcard_constraints:
@@ -136,19 +141,51 @@ def threads_for(wildcards):
 
 
 def memory_for(*needs, **more):
-    """Function of wildcards: memory of a job in MB (:meth:`sepi.workflow.datasets.Scene.memory_mb`)."""
-    return lambda wildcards: scene_of(wildcards).memory_mb(*needs, **more)
+    """Function of wildcards: memory of a job in MB (:meth:`sepi.workflow.datasets.Scene.memory_mb`).
+
+    A job that is tried again, since a cluster ended it for want of memory, asks for more.
+    """
+
+    def memory(wildcards, attempt):
+        return attempt * scene_of(wildcards).memory_mb(*needs, **more)
+
+    return memory
+
+
+def minutes_for(*seconds, **more):
+    """Function of wildcards: time of a job in minutes (:meth:`sepi.workflow.datasets.Scene.minutes`)."""
+
+    def minutes(wildcards, attempt):
+        return attempt * scene_of(wildcards).minutes(*seconds, **more)
+
+    return minutes
 
 
 def sweep_memory_for(stage, **needs):
     """Function of wildcards: memory of a job in MB that may hold a cost volume; of the usual size in ``needs``."""
 
-    def memory(wildcards):
-        scene, label = scene_of(wildcards), wildcards[stage]
-        light_field = scene_files(wildcards.dataset, wildcards.scene).light_field
-        return scene.memory_mb(**needs) + candidates_mb(scene, light_field, SETTINGS.parameters[stage][label])
+    def memory(wildcards, attempt):
+        scene = scene_of(wildcards)
+        return attempt * (scene.memory_mb(**needs) + candidates_mb(scene, *sweep_of(stage, wildcards)))
 
     return memory
+
+
+def sweep_minutes_for(stage, seconds_per_megasample, **more):
+    """Function of wildcards: time of a job in minutes that may go through candidates; through the usual number as given."""
+
+    def minutes(wildcards, attempt):
+        scene = scene_of(wildcards)
+        factor = candidates_factor(scene, *sweep_of(stage, wildcards))
+        return attempt * scene.minutes(factor * seconds_per_megasample, **more)
+
+    return minutes
+
+
+def sweep_of(stage, wildcards):
+    """A scene's light field, and the parameters of the choice that a stage makes of it."""
+    light_field = scene_files(wildcards.dataset, wildcards.scene).light_field
+    return light_field, SETTINGS.parameters[stage][wildcards[stage]]
 
 
 def is_new(file):

@@ -12,9 +12,12 @@ rule evaluate:
         "logs/{dataset}/{scene}/scores{which}.log",
     benchmark:
         "benchmarks/{dataset}/{scene}/scores{which}.tsv"
+    group:
+        GROUP
     threads: 1
     resources:
-        mem_mb=lambda wildcards, input: memory_for(4, bytes_per_pixel=200 + 50 * len(input.maps))(wildcards),
+        mem_mb=lambda wildcards, input, attempt: memory_for(4, 200 + 50 * len(input.maps))(wildcards, attempt),
+        runtime=lambda wildcards, input, attempt: minutes_for(0.1, 0.1 * len(input.maps))(wildcards, attempt),
     params:
         stages=str(SCENE.stages),
         kept=str(SCENE.kept_scores("{which}")),

@@ -12,9 +12,12 @@ rule export:
         "logs/{dataset}/{scene}/{variant}/export.log",
     benchmark:
         "benchmarks/{dataset}/{scene}/{variant}/export.tsv"
+    group:
+        GROUP
     threads: 1
     resources:
         mem_mb=memory_for(bytes_per_sample=4, bytes_per_pixel=300),
+        runtime=minutes_for(0.1),
     params:
         folder=str(SCENE.variant("{variant}")),
         code=code_digest("sepi.export"),

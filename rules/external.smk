@@ -18,9 +18,12 @@ rule external:
         "logs/{dataset}/{scene}/external.log",
     benchmark:
         "benchmarks/{dataset}/{scene}/external.tsv"
+    group:
+        GROUP
     threads: 1
     resources:
         mem_mb=memory_for(bytes_per_sample=4, bytes_per_pixel=200 + 10 * len(SETTINGS.external)),
+        runtime=minutes_for(0.1),
     params:
         maps=lambda wildcards: SETTINGS.external_json(wildcards.dataset, wildcards.scene),
         scene="{dataset}/{scene}",

@@ -9,9 +9,12 @@ rule ingest:
         "logs/{dataset}/{scene}/ingest.log",
     benchmark:
         "benchmarks/{dataset}/{scene}/ingest.tsv"
+    group:
+        GROUP
     threads: threads_for
     resources:
         mem_mb=memory_for(bytes_per_sample=12, copies=3),
+        runtime=minutes_for(0.2),
     params:
         source=ingest_source,
         disparity_range=ingest_range,

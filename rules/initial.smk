@@ -9,9 +9,12 @@ rule initial:
         stage_log("logs", "initial", "log"),
     benchmark:
         stage_log("benchmarks", "initial", "tsv")
+    group:
+        GROUP
     threads: threads_for
     resources:
         mem_mb=sweep_memory_for("initial", bytes_per_sample=13, bytes_per_pixel=1300),
+        runtime=sweep_minutes_for("initial", 1.0),
     params:
         choice=choice_for("initial"),
         parameters=parameters_of("initial"),

@@ -10,9 +10,12 @@ rule occlusion:
         stage_log("logs", "occlusion", "log"),
     benchmark:
         stage_log("benchmarks", "occlusion", "tsv")
+    group:
+        GROUP
     threads: threads_for
     resources:
         mem_mb=sweep_memory_for("occlusion", bytes_per_sample=18, bytes_per_pixel=1400),
+        runtime=sweep_minutes_for("occlusion", 1.0),
     params:
         choice=choice_for("occlusion"),
         parameters=parameters_of("occlusion"),

@@ -10,9 +10,12 @@ rule optimize:
         stage_log("logs", "optimize", "log"),
     benchmark:
         stage_log("benchmarks", "optimize", "tsv")
+    group:
+        GROUP
     threads: threads_for
     resources:
         mem_mb=memory_for(bytes_per_sample=30, bytes_per_pixel=1500),
+        runtime=minutes_for(0.2),
     params:
         choice=choice_for("optimize"),
         parameters=parameters_of("optimize"),

@@ -57,6 +57,7 @@ rule numbers:
     resources:
         # light fields are read one after the other
         mem_mb=500 + max(scene.samples for scene in SETTINGS.scenes.values()) * 8 // 2**20,
+        runtime=5 + sum(scene.minutes(0.1) for scene in SETTINGS.scenes.values()) // 5,
     params:
         # functions: braces in names are no wildcards
         plan=lambda wildcards: PLAN.to_json(),
@@ -182,9 +183,12 @@ rule maps:
         "logs/{dataset}/{scene}/maps.log",
     benchmark:
         "benchmarks/{dataset}/{scene}/maps.tsv"
+    group:
+        GROUP
     threads: 1
     resources:
         mem_mb=memory_for(bytes_per_sample=4, bytes_per_pixel=1000),
+        runtime=minutes_for(0.1, 10),
     params:
         plan=plan_of_scene,
         pixels=pixels_of,

@@ -10,9 +10,12 @@ rule textureless:
         stage_log("logs", "textureless", "log"),
     benchmark:
         stage_log("benchmarks", "textureless", "tsv")
+    group:
+        GROUP
     threads: threads_for
     resources:
         mem_mb=memory_for(bytes_per_sample=17, bytes_per_pixel=500),
+        runtime=minutes_for(0.2),
     params:
         choice=choice_for("textureless"),
         parameters=parameters_of("textureless"),

@@ -15,9 +15,9 @@ DATA = Path(os.environ.get("SEPI_DATA", Path(__file__).parents[2] / "shared" / "
 
 
 # what a test is marked with for a fixture that it uses
-_MARKS = {"real_data": "real", "browser": "browser"}
+_MARKS = {"real_data": "real", "browser": "browser", "slurm": "slurm"}
 # what takes longest is begun first, so that several processes end at about the same time
-_FIRST = ("real", "workflow", "slow", "browser")
+_FIRST = ("slurm", "real", "workflow", "slow", "browser")
 # files whose tests share what takes long to make: real maps, a run of the workflow, a report, kernels for other types
 _TOGETHER = {
     **dict.fromkeys(["test_real", "test_real_formats"], "real"),
@@ -25,6 +25,7 @@ _TOGETHER = {
     **dict.fromkeys(["test_page_cloud", "test_page_pixels", "test_page_viewer"], "page"),
     "test_pipeline": "types",
     "test_workflow": "workflow",
+    "test_slurm": "slurm",
 }
 
 

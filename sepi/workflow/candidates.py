@@ -1,4 +1,4 @@
-"""Memory of a job by its number of candidates, which is known once the light field is read."""
+"""Memory and time of a job by its number of candidates, which is known once the light field is read."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ from pathlib import Path
 
 from sepi.errors import SepiError
 from sepi.io.hdf5 import read_attributes
-from sepi.matching.visibility_sweep import BYTES_PER_CANDIDATE, CANDIDATES, VisibilitySweepParameters
+from sepi.matching.candidates import CandidateParameters
+from sepi.matching.visibility_sweep import BYTES_PER_CANDIDATE, VisibilitySweepParameters
 from sepi.stage import Parameters
 from sepi.workflow.datasets import Scene
 
@@ -25,12 +26,23 @@ def candidates_mb(scene: Scene, light_field: Path, parameters: Parameters) -> in
     """
     if not isinstance(parameters, VisibilitySweepParameters):
         return 0
-    number = parameters.num_disparities or CANDIDATES.usual
-    if parameters.num_disparities is None:
-        # absent, or of an earlier version: it is made before the job runs
-        with suppress(SepiError, KeyError):
-            known = read_attributes(light_field)
-            minimum, maximum = known["disparity_range"]
-            number = CANDIDATES.number(float(maximum - minimum), float(known["reach"]), scene.height * scene.width)
-    more = max(0, number - CANDIDATES.usual) * BYTES_PER_CANDIDATE * scene.height * scene.width
-    return round(more / 2**20)
+    more = max(0, _number(scene, light_field, parameters) - parameters.rule.usual)
+    return round(more * BYTES_PER_CANDIDATE * scene.height * scene.width / 2**20)
+
+
+def candidates_factor(scene: Scene, light_field: Path, parameters: Parameters) -> float:
+    """How many times the usual number of candidates a job goes through; 1 where it does not sweep over any."""
+    if not isinstance(parameters, CandidateParameters):
+        return 1.0
+    return _number(scene, light_field, parameters) / parameters.rule.usual
+
+
+def _number(scene: Scene, light_field: Path, parameters: CandidateParameters) -> int:
+    if parameters.num_disparities is not None:
+        return parameters.num_disparities
+    # absent, or of an earlier version: it is made before the job runs
+    with suppress(SepiError, KeyError):
+        known = read_attributes(light_field)
+        minimum, maximum = known["disparity_range"]
+        return parameters.rule.number(float(maximum - minimum), float(known["reach"]), scene.height * scene.width)
+    return parameters.rule.usual

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections import Counter
 from collections.abc import Callable, Iterator
@@ -19,6 +20,10 @@ _OTHER_PATTERNS = ("parameters.cfg", "gt_disp_lowres.pfm", "*mask*.png")
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.+-]*")
 # what Python and its libraries take before any data, in MB
 _LIBRARIES = 300
+# seconds that Python takes to start and to import, and how much slower than measured a cluster's node may be, with
+# others' jobs beside
+_START_SECONDS = 20
+_SLOWER = 4
 # bytes of a pixel of 8-bit colours
 _RGB = 3
 # root/scene, root/category/scene, and a level more
@@ -78,6 +83,17 @@ class Scene:
         wider = copies * max(0, self.pixel_bytes - _RGB)
         held = (bytes_per_sample + wider) * self.samples + bytes_per_pixel * self.height * self.width
         return _LIBRARIES + round(held / 2**20)
+
+    def minutes(self, seconds_per_megasample: float, seconds_per_megapixel: float = 0) -> int:
+        """Time to ask a cluster for, in minutes: several times what a job on this scene takes on one core.
+
+        Parameters
+        ----------
+        seconds_per_megasample, seconds_per_megapixel : float
+            What a job takes for a million pixels of all views, and of one view, as measured.
+        """
+        measured = (seconds_per_megasample * self.samples + seconds_per_megapixel * self.height * self.width) / 1e6
+        return math.ceil((_START_SECONDS + _SLOWER * measured) / 60)
 
 
 def scenes_in(root: Path, dataset: str, where: str) -> list[Scene]:

@@ -11,18 +11,14 @@ import re
 import shutil
 import signal
 import subprocess
-import sys
-import time
-from collections.abc import Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-import yaml
 from pydantic import ValidationError
+from workflow_copy import SIZE, TINY, Workflow, copy_of_the_project, edited, files_below, wait_for
 
 from sepi.io.hdf5 import read_attributes, read_stage
 from sepi.io.scores import read_scores
@@ -33,84 +29,12 @@ from sepi.workflow.parameters import GROUPS, SHARED
 
 pytestmark = pytest.mark.workflow
 
-REPOSITORY = Path(__file__).parents[2]
-SIZE = 64
-# few candidates: the result does not matter here
-TINY = {
-    "builtin": {"scenes": ["dots"], "size": SIZE},
-    "stages": {
-        "shared": {"plane_sweep": {"num_disparities": 21}, "base_detail_sweep": {"num_disparities": 21}},
-        "occlusion": {"visibility": {"passes": 1}},
-    },
-}
 # two scenes, the paper's six variants and best; stage files that variants share are made once, choice none is no job
 COMPLETE = {"ingest": 2, "initial": 6, "occlusion": 8, "textureless": 10, "optimize": 14}
 # the variant of the fewest stages
 QUICK = "no_occlusion_no_textureless"
 # what the ablation of best asks for beyond that
 PARTS = {"initial": 2, "occlusion": 8, "textureless": 8, "optimize": 14}
-
-
-@dataclass(frozen=True)
-class Workflow:
-    """A copy of the workflow and the package, and a folder to run it in."""
-
-    tree: Path
-    folder: Path
-    config: dict[str, Any]
-
-    def command(self, *targets: str, flags: tuple[str, ...] = ()) -> list[str]:
-        """Snakemake with this configuration."""
-        self.folder.mkdir(exist_ok=True)
-        config = self.folder / "config.yaml"
-        config.write_text(yaml.safe_dump(self.config))
-        snakefile = str(self.tree / "Snakefile")
-        words = ["-m", "snakemake", "--snakefile", snakefile, "--configfile", str(config)]
-        return [sys.executable, *words, *flags, "--", *targets]
-
-    @property
-    def environment(self) -> dict[str, str]:
-        """Environment in which the copy of the package is the one imported."""
-        return os.environ | {"PYTHONPATH": str(self.tree)}
-
-    def run(self, *targets: str, flags: tuple[str, ...] = (), **environment: str) -> subprocess.CompletedProcess[str]:
-        """Run Snakemake to its end; stdout holds its messages too."""
-        return subprocess.run(
-            self.command(*targets, flags=flags),
-            cwd=self.folder,
-            env=self.environment | environment,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-            check=False,
-            timeout=300,
-        )
-
-    def plan(self, *targets: str) -> dict[str, int]:
-        """Rule to number of jobs that a run would have, but for those that only collect."""
-        result = self.run(*targets, flags=("--dry-run",))
-        assert result.returncode == 0, result.stdout
-        if "Nothing to be done" in result.stdout:
-            return {}
-        table = result.stdout.split("Job stats:")[1].split("total")[0]
-        return {rule: int(count) for rule, count in re.findall(r"^(\w+) +(\d+)$", table, re.MULTILINE)}
-
-    def stage_plan(self, *targets: str) -> dict[str, int]:
-        """The plan without what comes after the stages (scores, tables, maps)."""
-        return {rule: count for rule, count in self.plan(*targets).items() if rule in COMPLETE}
-
-    def with_config(self, **values: Any) -> "Workflow":
-        """The same workflow with other values of some keys."""
-        return replace(self, config=self.config | values)
-
-
-def copy_of_the_project(folder: Path) -> Path:
-    """Snakefile, rules and package; numba's compiled code comes with the package's __pycache__."""
-    for name in ("sepi", "rules", "profiles"):
-        shutil.copytree(REPOSITORY / name, folder / name)
-    for name in ("Snakefile", "config.yaml"):
-        shutil.copy2(REPOSITORY / name, folder / name)
-    return folder
 
 
 @pytest.fixture(scope="module")
@@ -132,19 +56,6 @@ def finished(workflow: Workflow) -> Workflow:
     assert result.returncode == 0, result.stdout
     (done.folder / "stdout").write_text(result.stdout)
     return done
-
-
-@contextmanager
-def edited(path: Path, old: str, new: str) -> Iterator[None]:
-    """A file with a replacement, for a while."""
-    text, times = path.read_text(), path.stat()
-    assert old in text
-    path.write_text(text.replace(old, new, 1))
-    try:
-        yield
-    finally:
-        path.write_text(text)
-        os.utime(path, ns=(times.st_atime_ns, times.st_mtime_ns))
 
 
 class TestAll:
@@ -570,16 +481,3 @@ def test_an_interrupted_run_leaves_no_half_file_and_resumes(
         result = slow.run(target)
     assert result.returncode == 0, result.stdout
     assert (slow.folder / target).is_file()
-
-
-def files_below(folder: Path) -> list[Path]:
-    """Every file, hidden ones too."""
-    return [path for path in folder.rglob("*") if path.is_file()]
-
-
-def wait_for(condition: Any, seconds: float = 60) -> None:
-    """Wait until a condition holds."""
-    end = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < end, "timed out"
-        time.sleep(0.05)

@@ -1,0 +1,139 @@
+"""The workflow on a real Slurm: as few submissions as scenes, the bytes of a local run, and its faults told and mended."""
+
+import os
+import re
+import shutil
+import signal
+import subprocess
+import tempfile
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+from hashlib import sha256
+from pathlib import Path
+
+import pytest
+from one_node import one_node_slurm, queue, why_not
+from workflow_copy import SIZE, TINY, Workflow, copy_of_the_project, edited, files_below, wait_for
+
+from sepi.scenes import render, write_hci
+
+pytestmark = [pytest.mark.workflow, pytest.mark.slow]
+
+CORES = 2
+# the profile, on a cluster without accounting, and looking sooner at what was submitted
+ON_SLURM = (
+    *("--workflow-profile", "profiles/slurm", "--cores", str(CORES), "--resources", "mem_mb=4000", "--retries", "0"),
+    *("--slurm-status-command", "squeue", "--slurm-init-seconds-before-status-checks", "2"),
+)
+SCENES = ("one", "two")
+TARGETS = tuple(f"results/hci/{scene}/paper/result.h5" for scene in SCENES)
+# what a run writes anew each time it makes a file
+TIMES = ".time.json"
+
+
+@pytest.fixture(scope="module")
+def slurm() -> Iterator[None]:
+    """A Slurm of one node; where it cannot be, a skipped test, or a failed one where it is required."""
+    lacking = why_not()
+    if lacking is not None:
+        if os.environ.get("SEPI_REQUIRE_SLURM"):
+            pytest.fail(f"a one-node Slurm is required here (SEPI_REQUIRE_SLURM): {lacking}")
+        pytest.skip(f"no one-node Slurm: {lacking}")
+    # the path of a socket may be no longer than 107 bytes, and only root may write on the way to it
+    folder = Path(tempfile.mkdtemp(prefix="slurm-", dir="/run"))
+    try:
+        with one_node_slurm(folder / "node", CORES):
+            yield
+    finally:
+        shutil.rmtree(folder)
+
+
+@pytest.fixture(scope="module")
+def workflow(tmp_path_factory: pytest.TempPathFactory) -> Workflow:
+    """Two tiny scenes, and a copy of the workflow."""
+    root = tmp_path_factory.mktemp("cluster")
+    for name in SCENES:
+        write_hci(render("dots", size=SIZE, views=3), root / "scenes" / name)
+    config = TINY | {"builtin": {"scenes": []}, "hci_root": str(root / "scenes")}
+    return Workflow(copy_of_the_project(root / "tree"), root / "cluster", config)
+
+
+def on_slurm(workflow: Workflow, *targets: str) -> subprocess.CompletedProcess[str]:
+    profile = str(workflow.tree / "profiles" / "slurm")
+    flags = tuple(profile if word == "profiles/slurm" else word for word in ON_SLURM)
+    return workflow.run(*targets, flags=flags)
+
+
+def digests(workflow: Workflow) -> dict[str, str]:
+    """File below results/ to what it holds."""
+    results = workflow.folder / "results"
+    files = [path for path in files_below(results) if not path.name.endswith(TIMES)]
+    return {str(path.relative_to(results)): sha256(path.read_bytes()).hexdigest() for path in files}
+
+
+def test_a_scene_is_one_submission_with_the_bytes_of_a_local_run(slurm: None, workflow: Workflow) -> None:
+    """Submitted one by one, six jobs of a second each take minutes in a queue."""
+    result = on_slurm(workflow, *TARGETS)
+    assert result.returncode == 0, result.stdout
+    assert len(re.findall("has been submitted with SLURM jobid", result.stdout)) == len(SCENES)
+    local = replace(workflow, folder=workflow.folder.with_name("local"))
+    assert local.run(*TARGETS).returncode == 0
+    assert digests(workflow) == digests(local)
+    assert "Nothing to be done" in on_slurm(workflow, *TARGETS).stdout
+
+
+def test_several_scenes_are_one_submission_if_asked(slurm: None, workflow: Workflow) -> None:
+    both = replace(workflow, folder=workflow.folder.with_name("both"))
+    flags = (*ON_SLURM[2:], "--workflow-profile", str(both.tree / "profiles/slurm"), "--group-components", "scene=2")
+    result = both.run(*TARGETS, flags=flags)
+    assert result.returncode == 0, result.stdout
+    assert len(re.findall("has been submitted with SLURM jobid", result.stdout)) == 1
+
+
+def test_a_failing_job_is_told_within_a_minute(slurm: None, workflow: Workflow) -> None:
+    """Otherwise one waits for a run that cannot end well; the other scene is made all the same."""
+    picture = Path(workflow.config["hci_root"]) / "one" / "input_Cam004.png"
+    whole = picture.read_bytes()
+    failing = replace(workflow, folder=workflow.folder.with_name("failing"))
+    try:
+        picture.write_bytes(whole[: len(whole) // 2])
+        begun = time.monotonic()
+        result = on_slurm(failing, *TARGETS)
+        seconds = time.monotonic() - begun
+    finally:
+        picture.write_bytes(whole)
+    assert result.returncode != 0
+    assert f"sepi: {picture}: not a PNG, or damaged or cut off" in result.stdout
+    assert seconds < 60
+    assert [(failing.folder / target).exists() for target in TARGETS] == [False, True]
+    mended = on_slurm(failing, *TARGETS)
+    assert mended.returncode == 0, mended.stdout
+
+
+def test_a_killed_run_goes_on_where_it_was(slurm: None, workflow: Workflow) -> None:
+    """What was submitted is still in the queue; taken from it as documented, nothing of it disturbs the next run."""
+    killed = replace(workflow, folder=workflow.folder.with_name("killed"))
+    files = killed.tree / "sepi" / "io" / "files.py"
+    sleep = 'import os, time\n        time.sleep(float(os.environ.get("SLEEP", "0")))'
+    profile = str(killed.tree / "profiles" / "slurm")
+    flags = tuple(profile if word == "profiles/slurm" else word for word in ON_SLURM)
+    with edited(files, "temporary.replace(path)", f"{sleep}\n        temporary.replace(path)"):
+        process = subprocess.Popen(
+            killed.command(*TARGETS, flags=flags),
+            cwd=killed.folder,
+            env=killed.environment | {"SLEEP": "3"},
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            start_new_session=True,
+        )
+        wait_for(lambda: list((killed.folder / "results").rglob("lightfield.h5")))
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+        assert queue() != []
+        subprocess.run(["scancel", *(f"--name={name}" for name in set(queue()))], check=True)
+        wait_for(lambda: queue() == [])
+        assert killed.run(*TARGETS, flags=("--unlock",)).returncode == 0
+        result = on_slurm(killed, *TARGETS)
+    assert result.returncode == 0, result.stdout
+    assert digests(killed) == digests(workflow)

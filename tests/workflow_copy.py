@@ -1,0 +1,119 @@
+"""A copy of the workflow and the package that a test may run, and change, in a folder of its own."""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from sepi.pipeline import STAGES
+
+REPOSITORY = Path(__file__).parents[1]
+SIZE = 64
+# few candidates: the result does not matter here
+TINY = {
+    "builtin": {"scenes": ["dots"], "size": SIZE},
+    "stages": {
+        "shared": {"plane_sweep": {"num_disparities": 21}, "base_detail_sweep": {"num_disparities": 21}},
+        "occlusion": {"visibility": {"passes": 1}},
+    },
+}
+
+# what makes maps
+_STAGE_RULES = ("ingest", *STAGES)
+
+
+@dataclass(frozen=True)
+class Workflow:
+    """A copy of the workflow and the package, and a folder to run it in."""
+
+    tree: Path
+    folder: Path
+    config: dict[str, Any]
+
+    def command(self, *targets: str, flags: tuple[str, ...] = ()) -> list[str]:
+        """Snakemake with this configuration."""
+        self.folder.mkdir(exist_ok=True)
+        config = self.folder / "config.yaml"
+        config.write_text(yaml.safe_dump(self.config))
+        snakefile = str(self.tree / "Snakefile")
+        words = ["-m", "snakemake", "--snakefile", snakefile, "--configfile", str(config)]
+        return [sys.executable, *words, *flags, "--", *targets]
+
+    @property
+    def environment(self) -> dict[str, str]:
+        """Environment in which the copy of the package is the one imported."""
+        return os.environ | {"PYTHONPATH": str(self.tree)}
+
+    def run(self, *targets: str, flags: tuple[str, ...] = (), **environment: str) -> subprocess.CompletedProcess[str]:
+        """Run Snakemake to its end; stdout holds its messages too."""
+        return subprocess.run(
+            self.command(*targets, flags=flags),
+            cwd=self.folder,
+            env=self.environment | environment,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            check=False,
+            timeout=300,
+        )
+
+    def plan(self, *targets: str) -> dict[str, int]:
+        """Rule to number of jobs that a run would have, but for those that only collect."""
+        result = self.run(*targets, flags=("--dry-run",))
+        assert result.returncode == 0, result.stdout
+        if "Nothing to be done" in result.stdout:
+            return {}
+        table = result.stdout.split("Job stats:")[1].split("total")[0]
+        return {rule: int(count) for rule, count in re.findall(r"^(\w+) +(\d+)$", table, re.MULTILINE)}
+
+    def stage_plan(self, *targets: str) -> dict[str, int]:
+        """The plan without what comes after the stages (scores, tables, maps)."""
+        return {rule: count for rule, count in self.plan(*targets).items() if rule in _STAGE_RULES}
+
+    def with_config(self, **values: Any) -> "Workflow":
+        """The same workflow with other values of some keys."""
+        return replace(self, config=self.config | values)
+
+
+def copy_of_the_project(folder: Path) -> Path:
+    """Snakefile, rules and package; numba's compiled code comes with the package's __pycache__."""
+    for name in ("sepi", "rules", "profiles"):
+        shutil.copytree(REPOSITORY / name, folder / name)
+    for name in ("Snakefile", "config.yaml"):
+        shutil.copy2(REPOSITORY / name, folder / name)
+    return folder
+
+
+@contextmanager
+def edited(path: Path, old: str, new: str) -> Iterator[None]:
+    """A file with a replacement, for a while."""
+    text, times = path.read_text(), path.stat()
+    assert old in text
+    path.write_text(text.replace(old, new, 1))
+    try:
+        yield
+    finally:
+        path.write_text(text)
+        os.utime(path, ns=(times.st_atime_ns, times.st_mtime_ns))
+
+
+def files_below(folder: Path) -> list[Path]:
+    """Every file, hidden ones too."""
+    return [path for path in folder.rglob("*") if path.is_file()]
+
+
+def wait_for(condition: Any, seconds: float = 60) -> None:
+    """Wait until a condition holds."""
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end, "timed out"
+        time.sleep(0.05)
