@@ -1,6 +1,7 @@
 # Light field depth by stitched epipolar plane images: from light fields to the paper's tables.
 #
 #   snakemake all         tables, figures and maps of every configured dataset
+#   snakemake scenes      what is made of each scene, without the tables and the page that need all of them
 #   snakemake ablation    the five columns of the paper's table 4, Wang's occlusion stage, and the parts of variant best
 #   snakemake -- FILE     one file: results/DATASET/SCENE/VARIANT/disparity.pfm
 #
@@ -37,9 +38,17 @@ rule all:
     default_target: True
     input:
         report_files(),
-        result_files(["best", "paper", *SETTINGS.own_variants]),
+        result_files(LISTED_MAPS),
     message:
         "all tables, figures and maps are made"
+
+
+# What `all` makes of every scene. Scenes do not depend on each other here, so `--batch scenes=1/10` plans a tenth of them
+rule scenes:
+    input:
+        [SCENE_COMPLETE.format(dataset=dataset, scene=scene) for dataset, scene in SETTINGS.scenes],
+    message:
+        "all scenes are made"
 
 
 # Table 4, the ablation of variant best, and the maps of all their variants

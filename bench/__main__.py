@@ -125,6 +125,18 @@ def disturb(light_fields: tuple[str, ...]) -> None:
         click.echo(f"{'all':24} {name:20} {counts[0]:5} {counts[1]:4} {counts[2]:5}")
 
 
+@main.command()
+@click.argument("benchmarks", type=_PATH)
+def estimates(benchmarks: Path) -> None:
+    """Print what the workflow's jobs took, beside the time and the memory that they had asked a cluster for.
+
+    BENCHMARKS is the folder of that name of a run with --benchmark-extended.
+    """
+    from bench.estimates import jobs_below, rows
+
+    click.echo(tables.markdown(rows(jobs_below(benchmarks))))
+
+
 def _all_measured(cases: list[Case], repeats: int, threads: int) -> tuple[list[Measurement], int]:
     """Measurements, and how many cases failed; each of those is warned of."""
     found = []

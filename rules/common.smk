@@ -42,6 +42,12 @@ SCENE = scene_files("{dataset}", "{scene}")
 LABELS = {stage: f"{{{stage}}}" for stage in STAGES}
 
 
+# a file that says that everything of a scene is made
+SCENE_COMPLETE = f"{RESULTS}/{{dataset}}/{{scene}}/complete"
+# variants whose final maps everybody gets
+LISTED_MAPS = ["best", "paper", *SETTINGS.own_variants]
+
+
 # a group of jobs that depend on each other is one submission to a cluster: all that is made of a scene. (Several small scenes
 # with --group-components; run locally, a group means nothing.)
 GROUP = "scene"
@@ -96,11 +102,11 @@ def final_file(wildcards):
     return PLAN.stage_file(wildcards.dataset, wildcards.scene, wildcards.variant, PLAN.stages[-1])
 
 
-def result_files(variants):
-    """The final maps of every configured scene for these variants."""
+def result_files(variants, scenes=SETTINGS.scenes):
+    """The final maps of scenes for these variants."""
     return [
         str(PLAN.files(dataset, scene).variant(variant) / name)
-        for dataset, scene in SETTINGS.scenes
+        for dataset, scene in scenes
         for variant in variants
         for name in RESULT_FILES
     ]
@@ -113,7 +119,8 @@ def choice_for(stage):
 
 def parameters_of(stage):
     """Function of wildcards: the parameters of a stage's choice as JSON, so that a change of them is seen."""
-    return lambda wildcards: SETTINGS.parameters_json(stage, wildcards[stage])
+    known = {label: SETTINGS.parameters_json(stage, label) for label in SETTINGS.parameters[stage]}
+    return lambda wildcards: known[wildcards[stage]]
 
 
 def scene_of(wildcards):

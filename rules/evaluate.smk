@@ -17,7 +17,7 @@ rule evaluate:
     threads: 1
     resources:
         mem_mb=lambda wildcards, input, attempt: memory_for(4, 200 + 50 * len(input.maps))(wildcards, attempt),
-        runtime=lambda wildcards, input, attempt: minutes_for(0.1, 0.1 * len(input.maps))(wildcards, attempt),
+        runtime=lambda wildcards, input, attempt: minutes_for(0.05, 0.15 * len(input.maps))(wildcards, attempt),
     params:
         stages=str(SCENE.stages),
         kept=str(SCENE.kept_scores("{which}")),

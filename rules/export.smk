@@ -17,7 +17,7 @@ rule export:
     threads: 1
     resources:
         mem_mb=memory_for(bytes_per_sample=4, bytes_per_pixel=300),
-        runtime=minutes_for(0.1),
+        runtime=minutes_for(0.05),
     params:
         folder=str(SCENE.variant("{variant}")),
         code=code_digest("sepi.export"),

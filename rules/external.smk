@@ -23,7 +23,7 @@ rule external:
     threads: 1
     resources:
         mem_mb=memory_for(bytes_per_sample=4, bytes_per_pixel=200 + 10 * len(SETTINGS.external)),
-        runtime=minutes_for(0.1),
+        runtime=minutes_for(0.05),
     params:
         maps=lambda wildcards: SETTINGS.external_json(wildcards.dataset, wildcards.scene),
         scene="{dataset}/{scene}",

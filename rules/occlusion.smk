@@ -15,7 +15,7 @@ rule occlusion:
     threads: threads_for
     resources:
         mem_mb=sweep_memory_for("occlusion", bytes_per_sample=18, bytes_per_pixel=1400),
-        runtime=sweep_minutes_for("occlusion", 1.0),
+        runtime=sweep_minutes_for("occlusion", 0.4),
     params:
         choice=choice_for("occlusion"),
         parameters=parameters_of("occlusion"),

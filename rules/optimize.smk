@@ -15,7 +15,7 @@ rule optimize:
     threads: threads_for
     resources:
         mem_mb=memory_for(bytes_per_sample=30, bytes_per_pixel=1500),
-        runtime=minutes_for(0.2),
+        runtime=minutes_for(0.35),
     params:
         choice=choice_for("optimize"),
         parameters=parameters_of("optimize"),

@@ -188,7 +188,7 @@ rule maps:
     threads: 1
     resources:
         mem_mb=memory_for(bytes_per_sample=4, bytes_per_pixel=1000),
-        runtime=minutes_for(0.1, 10),
+        runtime=minutes_for(0.05, 15),
     params:
         plan=plan_of_scene,
         pixels=pixels_of,
@@ -199,6 +199,23 @@ rule maps:
         "python -m sepi.report.figures --results {RESULTS} --plan {params.plan:q} "
         "--dataset {wildcards.dataset:q} --scene {wildcards.scene:q} --pixels {params.pixels:q} "
         "--output {output.folder:q} --page {output.page:q} 2> {log:q}"
+
+
+# Everything that is made of a scene by itself, with an empty file to ask for
+rule scene:
+    input:
+        pictures="reports/maps/{dataset}/{scene}",
+        maps=lambda wildcards: result_files(LISTED_MAPS, [(wildcards.dataset, wildcards.scene)]),
+    output:
+        touch(SCENE_COMPLETE),
+    group:
+        GROUP
+    threads: 1
+    resources:
+        mem_mb=100,
+        runtime=1,
+    message:
+        "{wildcards.dataset}/{wildcards.scene}: complete"
 
 
 # The rules themselves, as Snakemake draws them

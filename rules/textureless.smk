@@ -15,7 +15,7 @@ rule textureless:
     threads: threads_for
     resources:
         mem_mb=memory_for(bytes_per_sample=17, bytes_per_pixel=500),
-        runtime=minutes_for(0.2),
+        runtime=minutes_for(0.1),
     params:
         choice=choice_for("textureless"),
         parameters=parameters_of("textureless"),

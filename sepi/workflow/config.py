@@ -192,8 +192,10 @@ class Settings:
         SepiError
             If there is none; the message suggests the nearest.
         """
-        require_known("dataset", [dataset], self.datasets)
-        require_known(f"scene of dataset '{dataset}'", [name], self.scenes_of(dataset))
+        # thousands of jobs ask: all names are gone through only where one is wrong
+        if (dataset, name) not in self.scenes:
+            require_known("dataset", [dataset], self.datasets)
+            require_known(f"scene of dataset '{dataset}'", [name], self.scenes_of(dataset))
         return self.scenes[dataset, name]
 
     def parameters_json(self, stage: str, label: str) -> str:
