@@ -16,6 +16,7 @@ from sepi.workflow.code_digest import ROOT, code_digest, stage_modules
 from sepi.workflow.candidates import candidates_factor, candidates_mb
 from sepi.workflow.config import load_settings
 from sepi.workflow.result_paths import PARTS_ENDING, RESULTS, key_of, scene_files
+from sepi.workflow.run_folder import say_so, take_over
 from sepi.workflow.run_log import show_progress
 
 STARTED = time.time()
@@ -229,6 +230,12 @@ def print_written(tables, maps):
     for title, files in groups.items():
         if files:
             print(f"{title} written:", *dict.fromkeys(files), sep="\n  ", flush=True)
+
+
+# a run that was killed does not stop the next one
+if workflow.is_main_process and not workflow.output_settings.dryrun:
+    if take_over(Path(workflow.overwrite_workdir or "."), map(Path, [RESULTS, "reports"])):
+        say_so()
 
 
 # a progress bar, or a line for each job; a dry run is as Snakemake shows it

@@ -27,6 +27,10 @@ TINY = {
     },
 }
 
+# in place of what renames a finished file: as many seconds later as the environment says
+SLOW_WRITING = """import os, time
+        time.sleep(float(os.environ.get("SLEEP", "0")))
+        temporary.replace(path)"""
 # what makes maps
 _STAGE_RULES = ("ingest", *STAGES)
 

@@ -6,6 +6,7 @@ They are written under a temporary name in the same folder, then renamed.
 from __future__ import annotations
 
 import atexit
+import re
 import secrets
 import shutil
 from collections.abc import Iterator
@@ -17,6 +18,13 @@ from sepi.errors import SepiError, printable
 # an interrupt may strike between any two instructions, also where no `finally` is in force: what is still listed when
 # the program ends was not finished, and is removed
 _unfinished: set[Path] = set()
+_TOKEN_BYTES = 6
+_TEMPORARY = re.compile(rf"\..+-[0-9a-f]{{{2 * _TOKEN_BYTES}}}(\.[^.]*)?")
+
+
+def is_temporary(path: Path) -> bool:
+    """Whether a path has the name of a temporary file or folder of this module."""
+    return _TEMPORARY.fullmatch(path.name) is not None
 
 
 @contextmanager
@@ -111,17 +119,17 @@ def atomic_files(folder: Path) -> Iterator[Path]:
 def _temporary_beside(path: Path, suffix: str, target: Path) -> Iterator[Path]:
     """A name for a temporary file or folder, removed at the end; an error of the system is one about ``target``."""
     # the token keeps two programs that write the same file apart; a long name is cut so that the whole fits
-    temporary = path.parent / f".{path.stem[:40]}-{secrets.token_hex(6)}{suffix}"
+    temporary = path.parent / f".{path.stem[:40]}-{secrets.token_hex(_TOKEN_BYTES)}{suffix}"
     _unfinished.add(temporary)
     try:
         yield temporary
     except OSError as error:
         raise SepiError(f"{target}: cannot be written ({error.strerror or error})") from error
     finally:
-        _remove(temporary)
+        remove_temporary(temporary)
 
 
-def _remove(temporary: Path) -> None:
+def remove_temporary(temporary: Path) -> None:
     """Remove a temporary file or folder that was not renamed."""
     if temporary.is_dir():
         shutil.rmtree(temporary, ignore_errors=True)
@@ -135,4 +143,4 @@ def _remove(temporary: Path) -> None:
 @atexit.register
 def _remove_unfinished() -> None:
     for temporary in list(_unfinished):
-        _remove(temporary)
+        remove_temporary(temporary)

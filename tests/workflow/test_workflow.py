@@ -18,8 +18,9 @@ from typing import Any
 import numpy as np
 import pytest
 from pydantic import ValidationError
-from workflow_copy import SIZE, TINY, Workflow, copy_of_the_project, edited, files_below, wait_for
+from workflow_copy import SIZE, SLOW_WRITING, TINY, Workflow, copy_of_the_project, edited, files_below, wait_for
 
+from sepi.io.files import is_temporary
 from sepi.io.hdf5 import read_attributes, read_stage
 from sepi.io.scores import read_scores
 from sepi.pipeline import STAGES, VARIANTS
@@ -90,6 +91,14 @@ class TestAll:
     def test_again_does_nothing(self, finished: Workflow) -> None:
         assert finished.plan("all") == {}
         assert finished.stage_plan("ablation") == PARTS
+
+    def test_scenes_go_in_batches(self, finished: Workflow) -> None:
+        """Thousands of light fields do not fit one plan; what they share is left to `all`."""
+        assert finished.plan("scenes") == {"scene": 2, "scenes": 1}
+        first = finished.run("scenes", flags=("--dry-run", "--batch", "scenes=1/2"))
+        assert first.returncode == 0, first.stdout
+        assert "builtin/dots: complete" in first.stdout
+        assert "hci/box: complete" not in first.stdout
 
     def test_no_temporary_file_is_left(self, finished: Workflow) -> None:
         hidden = [path for path in (finished.folder / "results").rglob(".*") if path.name != ".snakemake_timestamp"]
@@ -453,11 +462,9 @@ def test_an_interrupted_run_leaves_no_half_file_and_resumes(
     """Ctrl-C at the terminal, or a machine that goes down, in the middle of writing a stage file."""
     slow = Workflow(copy_of_the_project(tmp_path / "tree"), tmp_path / "run", TINY)
     files = slow.tree / "sepi" / "io" / "files.py"
-    sleep = 'import os, time\n        time.sleep(float(os.environ.get("SLEEP", "0")))'
-    waiting = f"{sleep}\n        temporary.replace(path)"
     target = f"results/builtin/dots/{QUICK}/result.h5"
     light_field = slow.folder / "results/builtin/dots/lightfield.h5"
-    with edited(files, "temporary.replace(path)", waiting):
+    with edited(files, "temporary.replace(path)", SLOW_WRITING):
         process = subprocess.Popen(
             slow.command(target),
             cwd=slow.folder,
@@ -475,9 +482,28 @@ def test_an_interrupted_run_leaves_no_half_file_and_resumes(
         assert not light_field.exists()
         if number == signal.SIGINT:
             assert files_below(slow.folder / "results") == []
-        else:
-            assert slow.run(target).returncode != 0  # locked: Snakemake cannot know that the other run is dead
-            assert slow.run(target, flags=("--unlock",)).returncode == 0
         result = slow.run(target)
     assert result.returncode == 0, result.stdout
+    assert ("the last run here was killed" in result.stdout) == (number == signal.SIGKILL)
     assert (slow.folder / target).is_file()
+    assert not [path for path in files_below(slow.folder / "results") if is_temporary(path)]
+
+
+def test_two_runs_at_once_do_not_meet(workflow: Workflow, tmp_path: Path) -> None:
+    """The second is told that the folder is in use, and harms nothing."""
+    slow = Workflow(copy_of_the_project(tmp_path / "tree"), tmp_path / "run", TINY)
+    target = "results/builtin/dots/lightfield.h5"
+    with edited(slow.tree / "sepi" / "io" / "files.py", "temporary.replace(path)", SLOW_WRITING):
+        first = subprocess.Popen(
+            slow.command(target),
+            cwd=slow.folder,
+            env=slow.environment | {"SLEEP": "8"},
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+        wait_for(lambda: list((slow.folder / "results").rglob(".lightfield-*.h5")))
+        second = slow.run(target)
+        assert second.returncode != 0
+        assert "Directory cannot be locked" in second.stdout
+        assert first.wait(timeout=60) == 0
+        assert slow.plan(target) == {}
