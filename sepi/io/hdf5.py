@@ -1,11 +1,15 @@
 """All HDF5 reading and writing: light fields and stage files.
 
+A file begins with a digest of all that follows it (in what HDF5 calls the user block, which other programs skip), so that
+damage is told before anything is made of it: HDF5 itself may read other numbers, crash, or hang.
+
 A stage file holds ``disparity (H, W) float32`` in pixels per view step, ``confidence (H, W) float32`` in 0..1, the
 stage's own maps, and attributes that say what made them. Equal content gives equal bytes.
 """
 
 from __future__ import annotations
 
+import hashlib
 import io
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -28,6 +32,10 @@ Attribute = str | float | int | tuple[float, float]
 
 DEFLATE_RATIO = 1100
 """Bytes that a byte can unpack to; zlib's limit is 1032."""
+
+# the user block: HDF5 wants a power of two, 512 at least
+_BLOCK = 512
+_MARK = b"sepi sha256 "
 
 UNITS = {"disparity": "pixels per view step", "confidence": "0..1", "depth": "metres"}
 
@@ -56,9 +64,9 @@ def read_stage(path: Path) -> StageMaps:
         return StageMaps(maps.pop("disparity"), maps.pop("confidence"), maps, names)
 
 
-def read_attributes(path: Path) -> dict[str, Any]:
-    """Attributes of an HDF5 file."""
-    with open_hdf5(path) as file:
+def read_attributes(path: Path, check: bool = True) -> dict[str, Any]:
+    """Attributes of an HDF5 file; unchecked, without reading the whole file for its digest."""
+    with open_hdf5(path, check=check) as file:
         return dict(file.attrs)
 
 
@@ -100,9 +108,10 @@ def has_dataset(path: Path, name: str, *, if_damaged: bool = False) -> bool:
     if not path.is_file() or not h5py.is_hdf5(path):
         return False
     try:
+        _require_sound(path)
         with h5py.File(path, "r") as file:
             return name in file
-    except (OSError, LookupError, ValueError, RuntimeError):
+    except (SepiError, OSError, LookupError, ValueError, RuntimeError):
         return if_damaged
 
 
@@ -161,22 +170,50 @@ def read_dataset(path: Path, dataset: h5py.Dataset, part: Any = ...) -> npt.NDAr
 
 
 @contextmanager
-def open_hdf5(path: Path, kind: str = "readable HDF5 file") -> Iterator[h5py.File]:
-    """Open an HDF5 file for reading; ``kind`` is what it should be."""
+def open_hdf5(path: Path, kind: str = "readable HDF5 file", check: bool = True) -> Iterator[h5py.File]:
+    """Open an HDF5 file for reading; ``kind`` is what it should be.
+
+    Raises
+    ------
+    SepiError
+        If it is none, or its digest, where it has one, is not that of its content.
+    """
     if not path.is_file():
         raise SepiError(f"{path}: no such file")
-    with reading(path, kind), h5py.File(path, "r") as file:
-        yield file
+    with reading(path, kind):
+        if check:
+            _require_sound(path)
+        with h5py.File(path, "r") as file:
+            yield file
+
+
+def _require_sound(path: Path) -> None:
+    """Refuse a file of this package that is not as it was written."""
+    with path.open("rb") as file:
+        block = file.read(_BLOCK)
+        if block.startswith(_MARK) and block != _block(file):
+            raise SepiError(f"{path}: damaged, or changed by another program: its content is not what was written; remove it and make it again")
+
+
+def _block(file: io.BufferedReader | io.BufferedRandom) -> bytes:
+    """The user block for what follows in a file."""
+    file.seek(_BLOCK)
+    return (_MARK + hashlib.file_digest(file, "sha256").hexdigest().encode()).ljust(_BLOCK, b"\0")
 
 
 @contextmanager
 def create_hdf5(path: Path) -> Iterator[h5py.File]:
     """Write an HDF5 file, whole or not at all."""
-    with atomic_path(path) as temporary, _Disk(temporary, "w+") as disk:
-        with h5py.File(disk, "w") as file:
-            yield file
-        if disk.failure is not None:
-            raise disk.failure
+    with atomic_path(path) as temporary:
+        with _Disk(temporary, "w+") as disk:
+            with h5py.File(disk, "w", userblock_size=_BLOCK) as file:
+                yield file
+            if disk.failure is not None:
+                raise disk.failure
+        with temporary.open("r+b") as written:
+            block = _block(written)
+            written.seek(0)
+            written.write(block)
 
 
 def _fixed(text: str) -> np.bytes_:

@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 import scipy.io
 from click.testing import CliRunner
+from hdf5_edits import changed
 
 from sepi.cli.main import main
 from sepi.io.hdf5 import write_light_field
@@ -106,7 +107,7 @@ def floats(t: int, s: int, value: float) -> np.ndarray:
 
 def own_file_with_nan() -> None:
     write_light_field(Path("in.h5"), LightField(np.zeros((2, 2, 8, 8, 1), np.float32), "nan"))
-    with h5py.File("in.h5", "r+") as file:
+    with changed(Path("in.h5")) as file:
         file["views"][0, 0, 0, 0, 0] = np.nan
 
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from error_lines import reading_error
 from geometries import GEOMETRIES, standing
+from hdf5_edits import changed
 
 from sepi.io.hdf5 import write_light_field
 from sepi.lightfield import DisparityRange, LightField
@@ -59,7 +60,7 @@ def test_where_the_views_stand_comes_back(tmp_path: Path, light_field: LightFiel
 
 def test_files_of_earlier_versions_stand_on_an_even_grid(tmp_path: Path, light_field: LightField) -> None:
     write_light_field(tmp_path / "lf.h5", light_field)
-    with h5py.File(tmp_path / "lf.h5", "r+") as file:
+    with changed(tmp_path / "lf.h5") as file:
         del file.attrs["row_spacing"]
     assert read_light_field(tmp_path / "lf.h5").row_spacing == 1
 
@@ -72,7 +73,7 @@ def test_equal_light_fields_give_equal_bytes(tmp_path: Path, light_field: LightF
 
 def spoiled(change: Callable[[h5py.File], object]) -> Callable[[Path], None]:
     def spoil(path: Path) -> None:
-        with h5py.File(path, "r+") as file:
+        with changed(path) as file:
             change(file)
 
     return spoil
@@ -84,7 +85,7 @@ def replace(file: h5py.File, name: str, values: np.ndarray) -> None:
 
 
 BAD_FILES: dict[str, tuple[Callable[[Path], None], str]] = {
-    "cut off": (cut, "not a light field of this package, or damaged or cut off"),
+    "cut off": (cut, "damaged, or changed by another program"),
     "no name": (spoiled(lambda f: f.attrs.pop("name")), "name"),
     "no source": (spoiled(lambda f: f.attrs.pop("source")), "damaged"),
     "range of three numbers": (spoiled(lambda f: f.attrs.__setitem__("disparity_range", [1, 2, 3])), "damaged"),

@@ -92,7 +92,8 @@ def _arrays(path: Path) -> list[tuple[tuple[int, ...], int]]:
         elif open_lf.matches(path):
             arrays = [open_lf.views_shape(path)]
         else:
-            with open_hdf5(path) as file:
+            # the size alone, of many: whoever reads the views checks the file
+            with open_hdf5(path, check=False) as file:
                 entries = (entry for entry in map(file.get, file) if isinstance(entry, h5py.Dataset))
                 arrays = [(entry.shape or (), entry.dtype) for entry in entries]
     except SepiError:

@@ -8,6 +8,7 @@ import h5py
 import numpy as np
 import pytest
 import scipy.io
+from hdf5_edits import changed
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -337,7 +338,7 @@ def test_excluded_views_of_own_files_are_gone(own: Path) -> None:
 @pytest.mark.parametrize("name", ["views", "present", "ground_truth"])
 def test_own_files_that_claim_more_than_they_hold(own: Path, name: str) -> None:
     """A file of 2 KB may claim terabytes of fill values."""
-    with h5py.File(own, "a") as file:
+    with changed(own) as file:
         del file[name]
         file.create_dataset(name, (9, 9, 100_000, 100_000, 3), np.uint8)
     with pytest.raises(SepiError, match=f"own.h5: damaged HDF5 file: '{name}' .* cannot lie in 0 bytes"):

@@ -1,0 +1,129 @@
+"""The workflow, killed at random moments: the next run makes what an undisturbed one does.
+
+``SEPI_FAULTS`` says how many kills; `make faults` asks for a hundred.
+"""
+
+import os
+import random
+import signal
+import subprocess
+import time
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import replace
+from hashlib import sha256
+
+import psutil
+import pytest
+from workflow_copy import SIZE, TINY, Workflow, copy_of_the_project, files_below
+
+from sepi.io.files import is_temporary
+from sepi.scenes import render, write_hci
+
+pytestmark = [pytest.mark.workflow, pytest.mark.slow]
+
+KILLS = int(os.environ.get("SEPI_FAULTS", "6"))
+# everything that is made of a scene: every rule but those of the report
+TARGET = "results/hci/box/complete"
+# seconds within which a run is killed
+LONGEST = 12.0
+# what is killed: the workflow, a job's shell, or what that started
+VICTIMS = ("workflow", "job", "child")
+
+
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Workflow:
+    """A run to its end."""
+    root = tmp_path_factory.mktemp("faults")
+    write_hci(render("curved_occluders", size=SIZE, views=3), root / "scenes" / "box")
+    config = TINY | {"builtin": {"scenes": []}, "hci_root": str(root / "scenes")}
+    workflow = Workflow(copy_of_the_project(root / "tree"), root / "undisturbed", config)
+    result = workflow.run(TARGET)
+    assert result.returncode == 0, result.stdout
+    return workflow
+
+
+def made(workflow: Workflow) -> dict[str, str]:
+    """File to digest, of all that is made of a scene but times and what holds them."""
+    folders = [workflow.folder / "results", workflow.folder / "reports" / "maps"]
+    files = [path for folder in folders for path in files_below(folder) if not path.name.endswith(".time.json")]
+    return {str(path.relative_to(workflow.folder)): sha256(path.read_bytes()).hexdigest() for path in files}
+
+
+def victim(run: psutil.Process, kind: str) -> psutil.Process:
+    """The process to kill; the workflow itself where it has no job at the moment."""
+    jobs = run.children()
+    if kind == "workflow" or not jobs:
+        return run
+    job = random.choice(jobs)
+    below = job.children(recursive=True) if kind == "child" else []
+    return random.choice(below) if below else job
+
+
+def killed_runs(workflow: Workflow, kills: int) -> Iterator[str]:
+    """Begin a run as often as it takes for so many to be killed; what was killed of each."""
+    for number in range(kills):
+        process = subprocess.Popen(
+            workflow.command(TARGET),
+            cwd=workflow.folder,
+            env=workflow.environment,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            start_new_session=True,
+        )
+        time.sleep(random.uniform(0.5, LONGEST))
+        kind = VICTIMS[number % len(VICTIMS)]
+        with suppress(psutil.NoSuchProcess):
+            victim(psutil.Process(process.pid), kind).kill()
+        # one that only lost a job ends by itself
+        process.wait(timeout=120)
+        yield kind if process.returncode else "nothing"
+
+
+def test_killed_at_any_moment(undisturbed: Workflow) -> None:
+    """However often; and the documented way to go on is to start again."""
+    random.seed(KILLS)
+    disturbed = replace(undisturbed, folder=undisturbed.folder.with_name("disturbed"))
+    expected, left, runs = made(undisturbed), KILLS, 0
+    while left:
+        # several kills on the way to one finished run, then from the start
+        in_a_row = min(left, random.randint(1, 3))
+        told = list(killed_runs(disturbed, in_a_row))
+        result = disturbed.run(TARGET)
+        assert result.returncode == 0, (told, result.stdout)
+        assert made(disturbed) == expected, told
+        hidden = [path for path in disturbed.folder.rglob(".*") if is_temporary(path)]
+        assert not hidden, told
+        left -= in_a_row
+        runs += 1
+        disturbed = replace(disturbed, folder=disturbed.folder.with_name(f"disturbed-{runs}"))
+
+
+def test_a_terminal_that_closes(undisturbed: Workflow) -> None:
+    """SIGHUP and SIGTERM end a run as Ctrl-C does: nothing half written, and the next one goes on."""
+    expected = made(undisturbed)
+    for number in (signal.SIGHUP, signal.SIGTERM):
+        closed = replace(undisturbed, folder=undisturbed.folder.with_name(number.name))
+        process = subprocess.Popen(
+            closed.command(TARGET),
+            cwd=closed.folder,
+            env=closed.environment,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            start_new_session=True,
+        )
+        time.sleep(5)
+        os.killpg(process.pid, number)
+        process.wait(timeout=60)
+        result = closed.run(TARGET)
+        assert result.returncode == 0, result.stdout
+        assert made(closed) == expected
+
+
+def test_the_same_on_one_thread_and_on_four(undisturbed: Workflow) -> None:
+    """More cores must not be another result."""
+    for cores in (1, 4):
+        other = replace(undisturbed, folder=undisturbed.folder.with_name(f"cores-{cores}"))
+        result = other.run(TARGET, flags=("--cores", str(cores), "--set-threads", f"initial={cores}"))
+        assert result.returncode == 0, result.stdout
+        assert made(other) == made(undisturbed)
