@@ -1,6 +1,7 @@
 # make        environment, then `snakemake all` on the built-in scenes
 # make check  environment, then the fast part of the tests: for every save
 # make test   environment, then the whole test suite, on all cores
+# make faults  environment, then a hundred kills of the workflow and thousands of damaged files: a quarter of an hour
 # make coverage  the whole test suite, and the share of lines and branches that it runs
 # make lint   style, format, types and imports
 # make bench  environment, then times, memory and growth of the pipeline, to reports/
@@ -12,7 +13,7 @@ PYTHON := $(shell for p in python3 python3.11 python3.12 python3.13; do \
 BIN := .venv/bin
 READY := .venv/ready
 
-.PHONY: all check test coverage lint bench clean
+.PHONY: all check test faults coverage lint bench clean
 .DEFAULT_GOAL := all
 
 all: $(READY)
@@ -27,6 +28,10 @@ check: $(READY)
 
 test: $(READY)
 	$(TESTS)
+
+# what `make test` does a few times, a hundred times
+faults: $(READY)
+	$(ONE_THREAD) SEPI_FAULTS=100 $(BIN)/python -m pytest tests/faults tests/io/test_damage.py
 
 # absolute, since tests start processes elsewhere
 coverage: export COVERAGE_RCFILE := $(CURDIR)/pyproject.toml

@@ -22,7 +22,7 @@ from sepi.scenes import render, write_hci
 
 pytestmark = [pytest.mark.workflow, pytest.mark.slow]
 
-KILLS = int(os.environ.get("SEPI_FAULTS", "6"))
+KILLS = int(os.environ.get("SEPI_FAULTS", "3"))
 # everything that is made of a scene: every rule but those of the report
 TARGET = "results/hci/box/complete"
 # seconds within which a run is killed
