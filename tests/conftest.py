@@ -26,6 +26,7 @@ _TOGETHER = {
     "test_pipeline": "types",
     "test_workflow": "workflow",
     "test_slurm": "slurm",
+    "test_kills": "faults",
 }
 
 
