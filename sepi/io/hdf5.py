@@ -1,7 +1,7 @@
 """All HDF5 reading and writing: light fields and stage files.
 
-A file begins with a digest of all that follows it (in what HDF5 calls the user block, which other programs skip), so that
-damage is told before anything is made of it: HDF5 itself may read other numbers, crash, or hang.
+A file begins with a digest of all that follows it (in what HDF5 calls the user block, which other programs skip), so
+that damage is told before anything is made of it: HDF5 itself may read other numbers, crash, or hang.
 
 A stage file holds ``disparity (H, W) float32`` in pixels per view step, ``confidence (H, W) float32`` in 0..1, the
 stage's own maps, and attributes that say what made them. Equal content gives equal bytes.
@@ -192,7 +192,9 @@ def _require_sound(path: Path) -> None:
     with path.open("rb") as file:
         block = file.read(_BLOCK)
         if block.startswith(_MARK) and block != _block(file):
-            raise SepiError(f"{path}: damaged, or changed by another program: its content is not what was written; remove it and make it again")
+            raise SepiError(
+                f"{path}: damaged, or changed by another program: its content is not what was written; remove it and make it again"
+            )
 
 
 def _block(file: io.BufferedReader | io.BufferedRandom) -> bytes:

@@ -1,0 +1,49 @@
+"""Commands that get too little of what a machine has: one clear line, and nothing half written."""
+
+import os
+import resource
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from sepi.scenes import render, write_hci
+
+COMMAND = [sys.executable, "-c", "import sys; from sepi.cli.main import main; sys.exit(main())", "depth"]
+# bytes of address space: enough to start, not for the maps of a benchmark scene
+LITTLE = 1_500_000_000
+
+
+@pytest.mark.real
+@pytest.mark.skipif(sys.platform != "linux", reason="needs a limit on the address space that is kept")
+def test_too_little_memory_is_one_line(hci: Path, tmp_path: Path) -> None:
+    """Not a traceback from inside a library; and a script sees that it failed."""
+    result = subprocess.run(
+        [*COMMAND, str(hci / "cotton"), "-o", str(tmp_path / "maps")],
+        env=os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "NUMBA_NUM_THREADS": "1"},
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=120,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (LITTLE, LITTLE)),
+    )
+    assert result.returncode == 1
+    assert "Traceback" not in result.stderr
+    assert result.stderr.splitlines()[-1].startswith("sepi: not enough memory")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_few_file_handles_are_enough(tmp_path: Path) -> None:
+    """A grid has hundreds of pictures, of which a system may let only few be open."""
+    write_hci(render("dots", size=64, views=9), tmp_path / "dots")
+    result = subprocess.run(
+        [*COMMAND, "dots", "-o", "maps"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=120,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_NOFILE, (16, 16)),
+    )
+    assert result.returncode == 0, result.stderr
