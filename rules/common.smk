@@ -7,6 +7,7 @@ import sys
 import time
 from pathlib import Path
 
+from sepi.command import WORKFLOW_PROCESS
 from sepi.errors import SepiError
 from sepi.io.result_folder import RESULT_FILES
 from sepi.pipeline import HANDED_ON, STAGES, VARIANTS, choice_of
@@ -25,6 +26,9 @@ STARTED = time.time()
 # whose code the digests are made of
 for name, folder in {"PATH": Path(sys.executable).parent, "PYTHONPATH": ROOT}.items():
     os.environ[name] = os.pathsep.join([str(folder), *filter(None, [os.environ.get(name)])])
+# ... and end with it, whatever ends it: what a job that nobody waits for goes on to write would meet the next run's. For
+# this they take the place of their shell (`exec`)
+os.environ[WORKFLOW_PROCESS] = str(os.getpid())
 
 try:
     SETTINGS = load_settings(config)

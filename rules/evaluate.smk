@@ -25,5 +25,5 @@ rule evaluate:
     message:
         "{wildcards.dataset}/{wildcards.scene}: scores"
     shell:
-        "python -m sepi.evaluate --light-field {input.light_field:q} --stages {params.stages:q} --code {params.code} "
+        "exec python -m sepi.evaluate --light-field {input.light_field:q} --stages {params.stages:q} --code {params.code} "
         "--kept {params.kept:q} --output {output.scores:q} {input.maps:q} 2> {log:q}"

@@ -24,5 +24,5 @@ rule export:
     message:
         "{wildcards.dataset}/{wildcards.scene}: maps of variant {wildcards.variant}"
     shell:
-        "python -m sepi.export --light-field {input.light_field:q} --maps {input.maps:q} "
+        "exec python -m sepi.export --light-field {input.light_field:q} --maps {input.maps:q} "
         "--variant {wildcards.variant:q} --output {params.folder:q} 2> {log:q}"

@@ -31,5 +31,5 @@ rule external:
     message:
         "{wildcards.dataset}/{wildcards.scene}: maps of external methods"
     shell:
-        "python -m sepi.external --light-field {input.light_field:q} --maps {params.maps:q} "
+        "exec python -m sepi.external --light-field {input.light_field:q} --maps {params.maps:q} "
         "--scene {params.scene:q} --output {output.maps:q} 2> {log:q}"

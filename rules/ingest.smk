@@ -22,5 +22,5 @@ rule ingest:
     message:
         "{wildcards.dataset}/{wildcards.scene}: reading the light field"
     shell:
-        "python -m sepi.ingest {params.source:q} {params.disparity_range:q} --threads {threads} "
+        "exec python -m sepi.ingest {params.source:q} {params.disparity_range:q} --threads {threads} "
         "--output {output.light_field:q} 2> {log:q}"

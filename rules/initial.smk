@@ -22,4 +22,4 @@ rule initial:
     message:
         stage_message("initial", "initial depth")
     shell:
-        "python -m sepi.initial --light-field {input.light_field:q} " + STAGE_FLAGS
+        "exec python -m sepi.initial --light-field {input.light_field:q} " + STAGE_FLAGS

@@ -23,4 +23,4 @@ rule occlusion:
     message:
         stage_message("occlusion", "occlusion")
     shell:
-        "python -m sepi.occlusion --light-field {input.light_field:q} --previous {input.previous:q} " + STAGE_FLAGS
+        "exec python -m sepi.occlusion --light-field {input.light_field:q} --previous {input.previous:q} " + STAGE_FLAGS

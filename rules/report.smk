@@ -67,7 +67,7 @@ rule numbers:
     message:
         "numbers of the report"
     shell:
-        "python -m sepi.report.numbers --results {RESULTS} --plan {params.plan:q} --parameters {params.parameters:q} "
+        "exec python -m sepi.report.numbers --results {RESULTS} --plan {params.plan:q} --parameters {params.parameters:q} "
         "{params.flags} --output {output:q} 2> {log:q}"
 
 
@@ -92,7 +92,7 @@ rule tables:
     message:
         "tables"
     shell:
-        "python -m sepi.report.tables --numbers {input:q} --output reports 2> {log:q}"
+        "exec python -m sepi.report.tables --numbers {input:q} --output reports 2> {log:q}"
 
 
 # What each part of variant best gains and costs
@@ -116,7 +116,7 @@ rule parts_table:
     message:
         "table of the parts of best"
     shell:
-        "python -m sepi.report.tables --numbers {input:q} --output reports 2> {log:q}"
+        "exec python -m sepi.report.tables --numbers {input:q} --output reports 2> {log:q}"
 
 
 # Charts of the numbers, for a paper
@@ -138,7 +138,7 @@ rule charts:
     message:
         "charts"
     shell:
-        "python -m sepi.report.charts --numbers {input:q} --chart ablation --chart time_and_memory "
+        "exec python -m sepi.report.charts --numbers {input:q} --chart ablation --chart time_and_memory "
         "--output reports/figures 2> {log:q}"
 
 
@@ -162,7 +162,7 @@ rule parts_chart:
     message:
         "chart of the parts of best"
     shell:
-        "python -m sepi.report.charts --numbers {input:q} --chart ablation_best --output reports/figures 2> {log:q}"
+        "exec python -m sepi.report.charts --numbers {input:q} --chart ablation_best --output reports/figures 2> {log:q}"
 
 
 # Pictures of a scene: reference view, ground truth, each stage and variant, errors, masks, external methods' maps, and all
@@ -196,7 +196,7 @@ rule maps:
     message:
         "{wildcards.dataset}/{wildcards.scene}: pictures"
     shell:
-        "python -m sepi.report.figures --results {RESULTS} --plan {params.plan:q} "
+        "exec python -m sepi.report.figures --results {RESULTS} --plan {params.plan:q} "
         "--dataset {wildcards.dataset:q} --scene {wildcards.scene:q} --pixels {params.pixels:q} "
         "--output {output.folder:q} --page {output.page:q} 2> {log:q}"
 
@@ -235,7 +235,7 @@ rule graph:
     message:
         "rule graph"
     shell:
-        "python -m sepi.report.graph --snakefile {input[0]:q} {params.flags} --output {output:q} 2> {log:q}"
+        "exec python -m sepi.report.graph --snakefile {input[0]:q} {params.flags} --output {output:q} 2> {log:q}"
 
 
 # The page: all numbers, tables and scenes in one file
@@ -261,5 +261,5 @@ rule page:
     message:
         "page of the report"
     shell:
-        "python -m sepi.report.page --numbers {input.numbers:q} {params.parts} --graph {input.graph:q} "
+        "exec python -m sepi.report.page --numbers {input.numbers:q} {params.parts} --graph {input.graph:q} "
         "--output {output:q} {input.scenes:q} 2> {log:q}"

@@ -10,6 +10,7 @@ import atexit
 import functools
 import gc
 import json
+import os
 import signal
 import sys
 import threading
@@ -35,6 +36,13 @@ from sepi.validation import validated
 _ENDING = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
 
 
+WORKFLOW_PROCESS = "SEPI_WORKFLOW_PROCESS"
+"""Environment variable: number of the process that a command ends with; the workflow sets its own for its jobs."""
+
+# Linux: the signal that a process gets when its parent is gone
+_PR_SET_PDEATHSIG = 1
+
+
 class _Shown(click.ClickException):
     """A user's error as click shows it: ``sepi: MESSAGE`` on stderr, exit code 1."""
 
@@ -51,6 +59,7 @@ class SepiCommand(click.Command):
         # short job; the memory goes back to the system anyway
         atexit.register(gc.freeze)
         with shown_errors(), _rare_collections():
+            _end_with_the_workflow()
             return super().invoke(ctx)
 
 
@@ -58,6 +67,20 @@ class SepiGroup(click.Group):
     """A click group whose subcommands are :class:`SepiCommand`."""
 
     command_class = SepiCommand
+
+
+def _end_with_the_workflow() -> None:
+    """Where this is a job of the workflow, and the system can, ask to be ended when the workflow is."""
+    workflow = os.environ.get(WORKFLOW_PROCESS)
+    if workflow is None or sys.platform != "linux":
+        return
+    import ctypes
+
+    with suppress(OSError, AttributeError):
+        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
+    # gone before it could be asked; or there is a process between, as where a user calls the command in a rule's place
+    if os.getppid() == 1 != int(workflow):
+        sys.exit(128 + signal.SIGTERM)
 
 
 @contextmanager

@@ -3,6 +3,7 @@
 import os
 import re
 import shutil
+import signal
 import subprocess
 import sys
 import time
@@ -68,6 +69,19 @@ class Workflow:
             text=True,
             check=False,
             timeout=300,
+        )
+
+    def start(self, *targets: str, flags: tuple[str, ...] = (), **environment: str) -> subprocess.Popen[bytes]:
+        """Run Snakemake beside the test, in a session of its own, as a terminal does."""
+        return subprocess.Popen(
+            self.command(*targets, flags=flags),
+            cwd=self.folder,
+            env=self.environment | environment,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            start_new_session=True,
+            # a background process of a shell ignores SIGINT; a user's does not
+            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
         )
 
     def plan(self, *targets: str) -> dict[str, int]:

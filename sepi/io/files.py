@@ -82,20 +82,24 @@ def atomic_path(path: Path) -> Iterator[Path]:
 
 
 @contextmanager
-def atomic_folder(path: Path) -> Iterator[Path]:
+def atomic_folder(path: Path, replace: bool = False) -> Iterator[Path]:
     """Give a temporary folder beside ``path`` to fill; rename it on success, remove it on any failure.
+
+    With ``replace``, it takes the place of a folder that is there.
 
     Raises
     ------
     SepiError
         If ``path`` exists and is not an empty folder, or cannot be made or written to, or the disk is full.
     """
-    if path.exists() and not (path.is_dir() and not any(path.iterdir())):
+    if path.exists() and not (path.is_dir() and (replace or not any(path.iterdir()))):
         raise SepiError(f"{path}: exists already; remove it or choose a folder that does not exist")
     with _temporary_beside(path, "", path) as temporary:
         path.parent.mkdir(parents=True, exist_ok=True)
         temporary.mkdir()
         yield temporary
+        if replace:
+            shutil.rmtree(path, ignore_errors=True)
         temporary.replace(path)
 
 

@@ -192,9 +192,7 @@ def _require_sound(path: Path) -> None:
     with path.open("rb") as file:
         block = file.read(_BLOCK)
         if block.startswith(_MARK) and block != _block(file):
-            raise SepiError(
-                f"{path}: damaged, or changed by another program: its content is not what was written; remove it and make it again"
-            )
+            raise SepiError(f"{path}: damaged, or changed by another program; remove it and make it again")
 
 
 def _block(file: io.BufferedReader | io.BufferedRandom) -> bytes:

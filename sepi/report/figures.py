@@ -17,7 +17,7 @@ import numpy as np
 
 from sepi.command import SepiCommand
 from sepi.io.external_maps import read_external
-from sepi.io.files import atomic_path
+from sepi.io.files import atomic_folder, atomic_path
 from sepi.io.hdf5 import read_light_field, read_stage
 from sepi.io.images import write_png
 from sepi.io.scores import read_evaluations
@@ -113,9 +113,11 @@ def command(
     panels = panels_of(found)
     asked = [InterestingPixel(int(y), int(x), "asked for") for y, x in json.loads(pixels)]
     probes = scene_probes(found, plan.stage_file(dataset, scene, MAIN_VARIANT, plan.stages[-1]), asked)
-    write_scene(found, panels, f"{dataset}/{scene}", output)
-    if probes:
-        write_probes(output / "pixels", probes, reference_picture(found.light_field))
+    # some pictures without the others would count as made
+    with atomic_folder(output, replace=True) as folder:
+        write_scene(found, panels, f"{dataset}/{scene}", folder)
+        if probes:
+            write_probes(folder / "pixels", probes, reference_picture(found.light_field))
     if page is not None:
         with atomic_path(page) as temporary:
             text = json.dumps(page_json(found, panels, dataset, scene, probes), separators=(",", ":"))

@@ -59,6 +59,15 @@ def workflow(tmp_path_factory: pytest.TempPathFactory) -> Workflow:
     return Workflow(copy_of_the_project(root / "tree"), root / "cluster", config)
 
 
+@pytest.fixture(scope="module")
+def expected(workflow: Workflow) -> dict[str, str]:
+    """What a run on this machine, without Slurm, makes."""
+    local = replace(workflow, folder=workflow.folder.with_name("local"))
+    result = local.run(*TARGETS)
+    assert result.returncode == 0, result.stdout
+    return digests(local)
+
+
 def on_slurm(workflow: Workflow, *targets: str) -> subprocess.CompletedProcess[str]:
     profile = str(workflow.tree / "profiles" / "slurm")
     flags = tuple(profile if word == "profiles/slurm" else word for word in ON_SLURM)
@@ -72,14 +81,14 @@ def digests(workflow: Workflow) -> dict[str, str]:
     return {str(path.relative_to(results)): sha256(path.read_bytes()).hexdigest() for path in files}
 
 
-def test_a_scene_is_one_submission_with_the_bytes_of_a_local_run(slurm: None, workflow: Workflow) -> None:
+def test_a_scene_is_one_submission_with_the_bytes_of_a_local_run(
+    slurm: None, workflow: Workflow, expected: dict[str, str]
+) -> None:
     """Submitted one by one, six jobs of a second each take minutes in a queue."""
     result = on_slurm(workflow, *TARGETS)
     assert result.returncode == 0, result.stdout
     assert len(re.findall("has been submitted with SLURM jobid", result.stdout)) == len(SCENES)
-    local = replace(workflow, folder=workflow.folder.with_name("local"))
-    assert local.run(*TARGETS).returncode == 0
-    assert digests(workflow) == digests(local)
+    assert digests(workflow) == expected
     assert "Nothing to be done" in on_slurm(workflow, *TARGETS).stdout
 
 
@@ -111,21 +120,14 @@ def test_a_failing_job_is_told_within_a_minute(slurm: None, workflow: Workflow) 
     assert mended.returncode == 0, mended.stdout
 
 
-def test_a_killed_run_goes_on_where_it_was(slurm: None, workflow: Workflow) -> None:
+def test_a_killed_run_goes_on_where_it_was(slurm: None, workflow: Workflow, expected: dict[str, str]) -> None:
     """What was submitted is still in the queue; taken from it as documented, nothing of it disturbs the next run."""
     killed = replace(workflow, folder=workflow.folder.with_name("killed"))
     files = killed.tree / "sepi" / "io" / "files.py"
     profile = str(killed.tree / "profiles" / "slurm")
     flags = tuple(profile if word == "profiles/slurm" else word for word in ON_SLURM)
     with edited(files, "temporary.replace(path)", SLOW_WRITING):
-        process = subprocess.Popen(
-            killed.command(*TARGETS, flags=flags),
-            cwd=killed.folder,
-            env=killed.environment | {"SLEEP": "3"},
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-            start_new_session=True,
-        )
+        process = killed.start(*TARGETS, flags=flags, SLEEP="3")
         wait_for(lambda: list((killed.folder / "results").rglob("lightfield.h5")))
         process.send_signal(signal.SIGKILL)
         process.wait()
@@ -134,4 +136,4 @@ def test_a_killed_run_goes_on_where_it_was(slurm: None, workflow: Workflow) -> N
         wait_for(lambda: queue() == [])
         result = on_slurm(killed, *TARGETS)
     assert result.returncode == 0, result.stdout
-    assert digests(killed) == digests(workflow)
+    assert digests(killed) == expected

@@ -6,7 +6,6 @@
 import os
 import random
 import signal
-import subprocess
 import time
 from collections.abc import Iterator
 from contextlib import suppress
@@ -63,14 +62,7 @@ def victim(run: psutil.Process, kind: str) -> psutil.Process:
 def killed_runs(workflow: Workflow, kills: int) -> Iterator[str]:
     """Begin a run as often as it takes for so many to be killed; what was killed of each."""
     for number in range(kills):
-        process = subprocess.Popen(
-            workflow.command(TARGET),
-            cwd=workflow.folder,
-            env=workflow.environment,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-            start_new_session=True,
-        )
+        process = workflow.start(TARGET)
         time.sleep(random.uniform(0.5, LONGEST))
         kind = VICTIMS[number % len(VICTIMS)]
         with suppress(psutil.NoSuchProcess):
@@ -104,14 +96,7 @@ def test_a_terminal_that_closes(undisturbed: Workflow) -> None:
     expected = made(undisturbed)
     for number in (signal.SIGHUP, signal.SIGTERM):
         closed = replace(undisturbed, folder=undisturbed.folder.with_name(number.name))
-        process = subprocess.Popen(
-            closed.command(TARGET),
-            cwd=closed.folder,
-            env=closed.environment,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-            start_new_session=True,
-        )
+        process = closed.start(TARGET)
         time.sleep(5)
         os.killpg(process.pid, number)
         process.wait(timeout=60)

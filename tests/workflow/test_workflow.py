@@ -10,7 +10,6 @@ import os
 import re
 import shutil
 import signal
-import subprocess
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -465,16 +464,7 @@ def test_an_interrupted_run_leaves_no_half_file_and_resumes(
     target = f"results/builtin/dots/{QUICK}/result.h5"
     light_field = slow.folder / "results/builtin/dots/lightfield.h5"
     with edited(files, "temporary.replace(path)", SLOW_WRITING):
-        process = subprocess.Popen(
-            slow.command(target),
-            cwd=slow.folder,
-            env=slow.environment | {"SLEEP": "60"},
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-            start_new_session=True,
-            # a background process of a shell ignores SIGINT; a user's does not
-            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
-        )
+        process = slow.start(target, SLEEP="60")
         wait_for(lambda: list(light_field.parent.glob(".lightfield-*.h5")))
         # as a terminal does: to Snakemake and its jobs alike
         os.killpg(process.pid, number)
@@ -494,13 +484,7 @@ def test_two_runs_at_once_do_not_meet(workflow: Workflow, tmp_path: Path) -> Non
     slow = Workflow(copy_of_the_project(tmp_path / "tree"), tmp_path / "run", TINY)
     target = "results/builtin/dots/lightfield.h5"
     with edited(slow.tree / "sepi" / "io" / "files.py", "temporary.replace(path)", SLOW_WRITING):
-        first = subprocess.Popen(
-            slow.command(target),
-            cwd=slow.folder,
-            env=slow.environment | {"SLEEP": "8"},
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-        )
+        first = slow.start(target, SLEEP="8")
         wait_for(lambda: list((slow.folder / "results").rglob(".lightfield-*.h5")))
         second = slow.run(target)
         assert second.returncode != 0
