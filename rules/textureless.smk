@@ -23,4 +23,5 @@ rule textureless:
     message:
         stage_message("textureless", "textureless regions")
     shell:
-        "exec python -m sepi.textureless --light-field {input.light_field:q} --previous {input.previous:q} " + STAGE_FLAGS
+        "exec python -m sepi.textureless --light-field {input.light_field:q} --previous {input.previous:q} "
+        + STAGE_FLAGS
