@@ -63,3 +63,8 @@ rule ablation:
 onsuccess:
     print_warnings()
     print_written([*report_files(), *ablation_files()], result_files(SETTINGS.variants))
+
+
+# a job may have been killed
+onerror:
+    remove_unfinished(MADE)

@@ -17,7 +17,7 @@ from sepi.workflow.code_digest import ROOT, code_digest, stage_modules
 from sepi.workflow.candidates import candidates_factor, candidates_mb
 from sepi.workflow.config import load_settings
 from sepi.workflow.result_paths import PARTS_ENDING, RESULTS, key_of, scene_files
-from sepi.workflow.run_folder import say_so, take_over
+from sepi.workflow.run_folder import remove_unfinished, say_so, take_over
 from sepi.workflow.run_log import show_progress
 
 STARTED = time.time()
@@ -236,9 +236,12 @@ def print_written(tables, maps):
             print(f"{title} written:", *dict.fromkeys(files), sep="\n  ", flush=True)
 
 
+# where all that is made is
+MADE = [Path(RESULTS), Path("reports")]
+
 # a run that was killed does not stop the next one
 if workflow.is_main_process and not workflow.output_settings.dryrun:
-    if take_over(Path(workflow.overwrite_workdir or "."), map(Path, [RESULTS, "reports"])):
+    if take_over(Path(workflow.overwrite_workdir or "."), MADE):
         say_so()
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import platform
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
 from typing import TextIO
@@ -64,8 +64,7 @@ def take_over(folder: Path, made: Iterable[Path]) -> bool:
     if killed:
         for path in locks:
             path.unlink(missing_ok=True)
-        for path in _unfinished(made):
-            remove_temporary(path)
+        remove_unfinished(made)
     if not locks or killed:
         run.truncate(0)
         run.write(f"{machine}\n")
@@ -83,8 +82,10 @@ def say_so() -> None:
     )
 
 
-def _unfinished(folders: Iterable[Path]) -> Iterator[Path]:
+def remove_unfinished(folders: Iterable[Path]) -> None:
+    """Remove the files that jobs had begun to write when they were killed; to be called where no job runs."""
     for folder in folders:
         # a folder may go while it is looked at
         with suppress(OSError):
-            yield from [path for path in folder.rglob(".*") if is_temporary(path)]
+            for path in [path for path in folder.rglob(".*") if is_temporary(path)]:
+                remove_temporary(path)
