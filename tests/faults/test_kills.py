@@ -6,15 +6,26 @@
 import os
 import random
 import signal
+import sys
 import time
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import replace
 from hashlib import sha256
+from pathlib import Path
 
 import psutil
 import pytest
-from workflow_copy import SIZE, TINY, Workflow, copy_of_the_project, files_below
+from workflow_copy import (
+    SIZE,
+    SLOW_WRITING,
+    TINY,
+    Workflow,
+    copy_of_the_project,
+    edited,
+    files_below,
+    wait_for,
+)
 
 from sepi.io.files import is_temporary
 from sepi.scenes import render, write_hci
@@ -89,6 +100,23 @@ def test_killed_at_any_moment(undisturbed: Workflow) -> None:
         left -= in_a_row
         runs += 1
         disturbed = replace(disturbed, folder=disturbed.folder.with_name(f"disturbed-{runs}"))
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux tells a process that its parent is gone")
+def test_a_job_ends_with_its_workflow(undisturbed: Workflow) -> None:
+    """Otherwise it goes on beside the next run, and both write the same files."""
+    lonely = replace(undisturbed, folder=undisturbed.folder.with_name("lonely"))
+
+    def unfinished() -> list[Path]:
+        return [path for path in files_below(lonely.folder / "results") if is_temporary(path)]
+
+    with edited(lonely.tree / "sepi" / "io" / "files.py", "temporary.replace(path)", SLOW_WRITING):
+        process = lonely.start(TARGET, SLEEP="60")
+        wait_for(unfinished)
+        process.kill()
+        process.wait()
+        # what it had begun to write, it removes
+        wait_for(lambda: not unfinished(), seconds=15)
 
 
 def test_a_terminal_that_closes(undisturbed: Workflow) -> None:
