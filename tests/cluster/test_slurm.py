@@ -21,11 +21,6 @@ from sepi.scenes import render, write_hci
 pytestmark = [pytest.mark.workflow, pytest.mark.slow]
 
 CORES = 2
-# the profile, on a cluster without accounting, and looking sooner at what was submitted
-ON_SLURM = (
-    *("--workflow-profile", "profiles/slurm", "--cores", str(CORES), "--resources", "mem_mb=4000", "--retries", "0"),
-    *("--slurm-status-command", "squeue", "--slurm-init-seconds-before-status-checks", "2"),
-)
 SCENES = ("one", "two")
 TARGETS = tuple(f"results/hci/{scene}/paper/result.h5" for scene in SCENES)
 # what a run writes anew each time it makes a file
@@ -68,10 +63,17 @@ def expected(workflow: Workflow) -> dict[str, str]:
     return digests(local)
 
 
-def on_slurm(workflow: Workflow, *targets: str) -> subprocess.CompletedProcess[str]:
-    profile = str(workflow.tree / "profiles" / "slurm")
-    flags = tuple(profile if word == "profiles/slurm" else word for word in ON_SLURM)
-    return workflow.run(*targets, flags=flags)
+def flags(workflow: Workflow) -> tuple[str, ...]:
+    """The profile, on a cluster without accounting, and looking sooner at what was submitted."""
+    return (
+        *("--workflow-profile", str(workflow.tree / "profiles" / "slurm"), "--cores", str(CORES)),
+        *("--resources", "mem_mb=4000", "--retries", "0", "--slurm-status-command", "squeue"),
+        *("--slurm-init-seconds-before-status-checks", "2"),
+    )
+
+
+def on_slurm(workflow: Workflow, *targets: str, more: tuple[str, ...] = ()) -> subprocess.CompletedProcess[str]:
+    return workflow.run(*targets, flags=(*flags(workflow), *more))
 
 
 def digests(workflow: Workflow) -> dict[str, str]:
@@ -94,8 +96,7 @@ def test_a_scene_is_one_submission_with_the_bytes_of_a_local_run(
 
 def test_several_scenes_are_one_submission_if_asked(slurm: None, workflow: Workflow) -> None:
     both = replace(workflow, folder=workflow.folder.with_name("both"))
-    flags = (*ON_SLURM[2:], "--workflow-profile", str(both.tree / "profiles/slurm"), "--group-components", "scene=2")
-    result = both.run(*TARGETS, flags=flags)
+    result = on_slurm(both, *TARGETS, more=("--group-components", "scene=2"))
     assert result.returncode == 0, result.stdout
     assert len(re.findall("has been submitted with SLURM jobid", result.stdout)) == 1
 
@@ -124,10 +125,8 @@ def test_a_killed_run_goes_on_where_it_was(slurm: None, workflow: Workflow, expe
     """What was submitted is still in the queue; taken from it as documented, nothing of it disturbs the next run."""
     killed = replace(workflow, folder=workflow.folder.with_name("killed"))
     files = killed.tree / "sepi" / "io" / "files.py"
-    profile = str(killed.tree / "profiles" / "slurm")
-    flags = tuple(profile if word == "profiles/slurm" else word for word in ON_SLURM)
     with edited(files, "temporary.replace(path)", SLOW_WRITING):
-        process = killed.start(*TARGETS, flags=flags, SLEEP="3")
+        process = killed.start(*TARGETS, flags=flags(killed), SLEEP="3")
         wait_for(lambda: list((killed.folder / "results").rglob("lightfield.h5")))
         process.send_signal(signal.SIGKILL)
         process.wait()
