@@ -60,11 +60,17 @@ rule ablation:
         "all ablations are made"
 
 
+onstart:
+    note_run(well=False)
+
+
 onsuccess:
+    note_run(well=True)
     print_warnings()
     print_written([*report_files(), *ablation_files()], result_files(SETTINGS.variants))
 
 
-# a job may have been killed
+# a job may have been killed, the clock set back, the disk be full
 onerror:
-    remove_unfinished(MADE)
+    tidy_up(MADE)
+    say_if_full(Path())

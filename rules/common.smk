@@ -17,7 +17,7 @@ from sepi.workflow.code_digest import ROOT, code_digest, stage_modules
 from sepi.workflow.candidates import candidates_factor, candidates_mb
 from sepi.workflow.config import load_settings
 from sepi.workflow.result_paths import PARTS_ENDING, RESULTS, key_of, scene_files
-from sepi.workflow.run_folder import remove_unfinished, say_so, take_over
+from sepi.workflow.run_folder import note_run, say_if_full, say_so, take_over, tidy_up
 from sepi.workflow.run_log import show_progress
 
 STARTED = time.time()

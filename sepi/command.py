@@ -118,7 +118,7 @@ def shown_errors() -> Iterator[None]:
             raise
         raise _Shown(f"{error.filename}: {error.strerror}") from error
     except MemoryError as error:
-        raise _Shown(f"not enough memory ({error or 'no more is to be had'})") from error
+        raise _Shown(f"not enough memory ({str(error) or 'no more is to be had'})") from error
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)

@@ -26,7 +26,7 @@ _TOGETHER = {
     "test_pipeline": "types",
     "test_workflow": "workflow",
     "test_slurm": "slurm",
-    "test_kills": "faults",
+    **dict.fromkeys(["test_kills", "test_machine"], "faults"),
 }
 
 

@@ -129,6 +129,9 @@ def _temporary_beside(path: Path, suffix: str, target: Path) -> Iterator[Path]:
         yield temporary
     except OSError as error:
         raise SepiError(f"{target}: cannot be written ({error.strerror or error})") from error
+    except SepiError as error:
+        # of a file inside a temporary folder: under the name that it was to have
+        raise SepiError(str(error).replace(str(temporary), str(target))) from error
     finally:
         remove_temporary(temporary)
 

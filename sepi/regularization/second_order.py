@@ -20,6 +20,7 @@ import scipy.sparse as sparse
 from scipy.sparse.linalg import LinearOperator, cg, splu
 
 from sepi.lightfield import FloatMap
+from sepi.regularization.direct_solver import require_blas_memory
 
 FloatArray = npt.NDArray[np.float64]
 Corner = tuple[slice, slice]
@@ -131,6 +132,7 @@ def _two_levels(matrix: sparse.csr_matrix, shape: tuple[int, ...]) -> LinearOper
     coarse = (onto @ matrix @ planes).tocsc()
     # blocks of one pixel's width have slopes that do nothing
     coarse = coarse + sparse.diags(np.full(coarse.shape[0], 1e-9 * max(float(coarse.diagonal().max()), 1e-9)))
+    require_blas_memory()
     factors = splu(coarse.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
     inverse = 1 / matrix.diagonal()
 

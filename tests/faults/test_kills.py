@@ -11,53 +11,22 @@ import time
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import replace
-from hashlib import sha256
 from pathlib import Path
 
 import psutil
 import pytest
-from workflow_copy import (
-    SIZE,
-    SLOW_WRITING,
-    TINY,
-    Workflow,
-    copy_of_the_project,
-    edited,
-    files_below,
-    wait_for,
-)
+from one_scene import PART, TARGET, healed, made
+from workflow_copy import SLOW_WRITING, Workflow, edited, files_below, wait_for
 
 from sepi.io.files import is_temporary
-from sepi.scenes import render, write_hci
 
 pytestmark = [pytest.mark.workflow, pytest.mark.slow]
 
 KILLS = int(os.environ.get("SEPI_FAULTS", "3"))
-# everything that is made of a scene: every rule but those of the report
-TARGET = "results/hci/box/complete"
 # seconds within which a run is killed
 LONGEST = 12.0
 # what is killed: the workflow, a job's shell, or what that started
 VICTIMS = ("workflow", "job", "child")
-
-
-@pytest.fixture(scope="module")
-def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Workflow:
-    """A run to its end."""
-    root = tmp_path_factory.mktemp("faults")
-    write_hci(render("curved_occluders", size=SIZE, views=3), root / "scenes" / "box")
-    config = TINY | {"builtin": {"scenes": []}, "hci_root": str(root / "scenes")}
-    workflow = Workflow(copy_of_the_project(root / "tree"), root / "undisturbed", config)
-    result = workflow.run(TARGET)
-    assert result.returncode == 0, result.stdout
-    return workflow
-
-
-def made(workflow: Workflow) -> dict[str, str]:
-    """File to digest, of all that is made of a scene but times and what holds them."""
-    folders = [workflow.folder / "results", workflow.folder / "reports" / "maps"]
-    files = [path for folder in folders for path in files_below(folder) if not path.name.endswith(".time.json")]
-    return {str(path.relative_to(workflow.folder)): sha256(path.read_bytes()).hexdigest() for path in files}
 
 
 def victim(run: psutil.Process, kind: str) -> psutil.Process:
@@ -92,11 +61,7 @@ def test_killed_at_any_moment(undisturbed: Workflow) -> None:
         # several kills on the way to one finished run, then from the start
         in_a_row = min(left, random.randint(1, 3))
         told = list(killed_runs(disturbed, in_a_row))
-        result = disturbed.run(TARGET)
-        assert result.returncode == 0, (told, result.stdout)
-        assert made(disturbed) == expected, told
-        hidden = [path for path in disturbed.folder.rglob(".*") if is_temporary(path)]
-        assert not hidden, told
+        healed(disturbed, expected, told=told)
         left -= in_a_row
         runs += 1
         disturbed = replace(disturbed, folder=disturbed.folder.with_name(f"disturbed-{runs}"))
@@ -124,13 +89,11 @@ def test_a_terminal_that_closes(undisturbed: Workflow) -> None:
     expected = made(undisturbed)
     for number in (signal.SIGHUP, signal.SIGTERM):
         closed = replace(undisturbed, folder=undisturbed.folder.with_name(number.name))
-        process = closed.start(TARGET)
-        time.sleep(5)
+        process = closed.start(PART)
+        wait_for(lambda: list((closed.folder / "results").rglob("lightfield.h5")))
         os.killpg(process.pid, number)
         process.wait(timeout=60)
-        result = closed.run(TARGET)
-        assert result.returncode == 0, result.stdout
-        assert made(closed) == expected
+        healed(closed, expected, PART)
 
 
 def test_the_same_on_one_thread_and_on_four(undisturbed: Workflow) -> None:

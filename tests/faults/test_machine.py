@@ -1,0 +1,160 @@
+"""The workflow on a machine with faults: a clear line, nothing half written, and the next run heals."""
+
+import os
+import re
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from one_scene import PART, TARGET, healed, made, nothing_half_written
+from workflow_copy import SIZE, SLOW_WRITING, Workflow, edited, files_below, wait_for
+
+from sepi.io.files import is_temporary
+from sepi.scenes import render, write_hci
+
+pytestmark = [pytest.mark.workflow, pytest.mark.slow]
+
+DAY = 86_400
+# root may write where nobody may; without this right it is as any other user
+AS_A_USER = ("setpriv", "--bounding-set=-dac_override") if sys.platform == "linux" and os.geteuid() == 0 else ()
+# kilobytes of address space that all modules take, before any of them has done anything
+IMPORTS = """
+import pkgutil, sepi, scipy.sparse.linalg, skimage.segmentation
+for module in pkgutil.walk_packages(sepi.__path__, "sepi."):
+    if not module.name.endswith("__main__"):
+        __import__(module.name)
+print(next(line.split()[1] for line in open("/proc/self/status") if line.startswith("VmPeak")))
+"""
+
+
+@contextmanager
+def disk(folder: Path, kilobytes: int) -> Iterator[None]:
+    """A disk of its own for a folder."""
+    folder.mkdir()
+    mount("-t", "tmpfs", "-o", f"size={kilobytes}k", "tmpfs", str(folder))
+    try:
+        yield
+    finally:
+        # also while a job that was ended still has it open
+        subprocess.run(["umount", "--lazy", str(folder)], check=True)
+
+
+def mount(*words: str) -> None:
+    """Mount; where that is not allowed the test is skipped."""
+    if sys.platform != "linux":
+        pytest.skip("mounts a small disk, as Linux does it")
+    result = subprocess.run(["mount", *words], check=False, capture_output=True, text=True)
+    if result.returncode:
+        pytest.skip(f"a small disk cannot be mounted here (as root it can): {result.stderr.strip()}")
+
+
+def kilobytes_of(workflow: Workflow) -> int:
+    """What a whole run takes of a disk."""
+    return sum(-(-path.stat().st_size // 4096) * 4 for path in files_below(workflow.folder))
+
+
+@pytest.mark.parametrize("percent", [30, 80])
+def test_a_disk_that_is_full(undisturbed: Workflow, percent: int) -> None:
+    """Half of a file under its own name would be taken for the whole by the next run."""
+    full = replace(undisturbed, folder=undisturbed.folder.with_name(f"full-{percent}"))
+    whole = kilobytes_of(undisturbed)
+    expected = made(undisturbed)
+    with disk(full.folder, whole * percent // 100):
+        result = full.run(TARGET)
+        assert result.returncode != 0
+        assert "No space left on device" in result.stdout
+        assert "Traceback" not in result.stdout
+        assert nothing_half_written(full, expected)
+        mount("-o", f"remount,size={4 * whole}k", str(full.folder))
+        healed(full, expected)
+
+
+def test_folders_that_turn_read_only(undisturbed: Workflow) -> None:
+    """As a share does of which the rights are changed."""
+    expected = made(undisturbed)
+    closed = replace(undisturbed, folder=undisturbed.folder.with_name("closed"))
+    with edited(closed.tree / "sepi" / "io" / "files.py", "temporary.replace(path)", SLOW_WRITING):
+        process = subprocess.Popen(
+            [*AS_A_USER, *closed.command(PART)],
+            cwd=closed.folder,
+            env=closed.environment | {"SLEEP": "0.5"},
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+        )
+        results = closed.folder / "results"
+        wait_for(lambda: list(results.rglob("initial.h5")))
+        folders = [results, *(path for path in results.rglob("*") if path.is_dir())]
+        for folder in folders:
+            folder.chmod(0o555)
+        told = process.communicate(timeout=60)[0]
+    assert process.returncode != 0
+    assert re.search(r"sepi: results/\S+: cannot be written \(Permission denied\)|Permission denied: '", told), told
+    assert nothing_half_written(closed, expected)
+    for folder in folders:
+        folder.chmod(0o755)
+    healed(closed, expected, PART)
+
+
+def test_jobs_that_get_too_little_memory(undisturbed: Workflow, tmp_path: Path) -> None:
+    """One line says so, not a traceback from inside a library; and with more memory the run goes on."""
+    write_hci(render("curved_occluders", size=3 * SIZE, views=9), tmp_path / "scenes" / "box")
+    config = undisturbed.config | {"hci_root": str(tmp_path / "scenes")}
+    poor = replace(undisturbed, folder=tmp_path / "poor", config=config)
+    one_thread = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "NUMBA_NUM_THREADS": "1"}
+    imports = subprocess.run(
+        [sys.executable, "-c", IMPORTS], env=os.environ | one_thread, check=True, capture_output=True, text=True
+    )
+    # and some for small maps
+    limit = int(imports.stdout) + 20_000
+    first = 'include: "rules/common.smk"'
+    target = "results/hci/box/best/result.h5"
+    with edited(poor.tree / "Snakefile", first, f"shell.prefix('ulimit -v {limit}; ')\n\n\n{first}"):
+        result = poor.run(target, flags=("--cores", "1"), **one_thread)
+    assert result.returncode != 0
+    assert re.search("^sepi: not enough memory", result.stdout, re.MULTILINE), result.stdout
+    assert "Traceback" not in result.stdout
+    assert not [path for path in poor.folder.rglob(".*") if is_temporary(path)]
+    again = poor.run(target, flags=("--cores", "1"))
+    assert again.returncode == 0, again.stdout
+
+
+def test_a_clock_that_is_set_back_during_a_run(undisturbed: Workflow) -> None:
+    """What is made then is older than what it is made of, which Snakemake refuses until the old time has come again."""
+    expected = made(undisturbed)
+    back = replace(undisturbed, folder=undisturbed.folder.with_name("back"))
+    with edited(back.tree / "sepi" / "io" / "files.py", "temporary.replace(path)", SLOW_WRITING):
+        process = back.start(PART, SLEEP="0.5")
+        wait_for(lambda: list((back.folder / "results").rglob("initial.h5")))
+        changed_times(back.folder / "results", DAY)
+        assert process.wait(timeout=60) != 0
+    healed(back, expected, PART)
+
+
+@pytest.mark.parametrize("seconds", [-DAY, DAY])
+def test_a_clock_that_is_set_between_two_runs(undisturbed: Workflow, seconds: int) -> None:
+    """Half of the work was done on a day that is yet to come, or long ago."""
+    expected = made(undisturbed)
+    jumped = replace(undisturbed, folder=undisturbed.folder.with_name(f"jumped{seconds}"))
+    half = "results/hci/box/stages/sepi/initial.h5"
+    result = jumped.run(half)
+    assert result.returncode == 0, result.stdout
+    changed_times(jumped.folder, seconds)
+    made_before = jumped.folder / half
+    time_of_it = made_before.stat().st_mtime
+    healed(jumped, expected, PART)
+    # not made again, but of no later time than now
+    assert made_before.stat().st_mtime == pytest.approx(min(time_of_it, time.time()), abs=60)
+    assert jumped.plan(PART) == {}
+
+
+def changed_times(folder: Path, seconds: int) -> None:
+    """Let files and folders be made so much later: earlier, where negative."""
+    for path in [*folder.rglob("*")]:
+        status = path.stat()
+        os.utime(path, (status.st_atime + seconds, status.st_mtime + seconds))
