@@ -18,6 +18,7 @@ from sepi.command import SepiGroup
 from sepi.errors import SepiError
 from sepi.io.files import atomic_path
 from sepi.io.readers.options import AS_GIVEN, ReadOptions
+from sepi.pipeline import VARIANTS
 from sepi.reading import read_light_field
 from sepi.scenes import SCENES, render
 from sepi.threads import use_threads
@@ -135,6 +136,34 @@ def estimates(benchmarks: Path) -> None:
     from bench.estimates import jobs_below, rows
 
     click.echo(tables.markdown(rows(jobs_below(benchmarks))))
+
+
+@main.command()
+@click.option(
+    "--scene", type=click.Choice(SCENES), default="curved_occluders", show_default=True, help="Built-in scene."
+)
+@click.option("--size", type=click.IntRange(min=64), default=128, show_default=True, help="Width and height.")
+@click.option("--views", type=click.IntRange(min=3), default=7, show_default=True, help="Views in each direction.")
+@click.option("--threads", type=click.IntRange(min=1), multiple=True, default=(1, 2, 4, 8), show_default=True)
+@click.option("--variant", "variants", type=click.Choice(list(VARIANTS)), multiple=True, help="Only this; repeatable.")
+@click.option("--cold/--no-cold", default=True, show_default=True, help="Once more with the kernels compiled anew.")
+def digests(scene: str, size: int, views: int, threads: tuple[int, ...], variants: tuple[str, ...], cold: bool) -> None:
+    """Print a digest of the maps of every variant, and fail where numbers of threads or compiling anew change it."""
+    from bench.digests import Condition
+    from bench.digests import digests as digests_of
+
+    conditions = [*map(Condition, threads), *([Condition(threads[-1], cold=True)] if cold else [])]
+    chosen = variants or tuple(VARIANTS)
+    with tqdm(conditions, disable=None, leave=False, bar_format="{n}/{total} {desc} |{bar}|") as bar:
+        found = [digests_of(condition, chosen, scene, size, views) for condition in bar]
+    rows = []
+    for variant in chosen:
+        others = [str(c) for c, one in zip(conditions, found, strict=True) if one[variant] != found[0][variant]]
+        rows.append({"variant": variant, "sha256": found[0][variant][:16], "other with": "; ".join(others) or "none"})
+    click.echo(f"{scene}, {views}x{views} views of {size}x{size}: {'; '.join(map(str, conditions))}\n")
+    click.echo(tables.markdown(rows))
+    if any(row["other with"] != "none" for row in rows):
+        raise SepiError("the maps depend on the threads or on when the kernels were compiled")
 
 
 def _all_measured(cases: list[Case], repeats: int, threads: int) -> tuple[list[Measurement], int]:

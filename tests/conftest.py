@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from sepi.threads import available_cores
+
 if TYPE_CHECKING:
     from page_example import Example
 
@@ -37,6 +39,12 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             if fixture in getattr(item, "fixturenames", ()):
                 item.add_marker(mark)
     items.sort(key=lambda item: min((n for n, mark in enumerate(_FIRST) if item.get_closest_marker(mark)), default=9))
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_auto_num_workers() -> int:
+    """One process more than there are cores, since those of a cluster and of the workflow mostly wait."""
+    return available_cores() + 1
 
 
 @pytest.hookimpl(optionalhook=True)

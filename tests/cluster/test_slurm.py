@@ -8,14 +8,17 @@ import subprocess
 import tempfile
 import time
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
 
+import psutil
 import pytest
 from one_node import one_node_slurm, queue, why_not
 from workflow_copy import SIZE, SLOW_WRITING, TINY, Workflow, copy_of_the_project, edited, files_below, wait_for
 
+from sepi.pipeline import VARIANTS
 from sepi.scenes import render, write_hci
 
 pytestmark = [pytest.mark.workflow, pytest.mark.slow]
@@ -23,6 +26,7 @@ pytestmark = [pytest.mark.workflow, pytest.mark.slow]
 CORES = 2
 SCENES = ("one", "two")
 TARGETS = tuple(f"results/hci/{scene}/paper/result.h5" for scene in SCENES)
+ALL_VARIANTS = tuple(f"results/hci/one/{variant}/result.h5" for variant in VARIANTS)
 # what a run writes anew each time it makes a file
 TIMES = ".time.json"
 
@@ -55,11 +59,17 @@ def workflow(tmp_path_factory: pytest.TempPathFactory) -> Workflow:
 
 
 @pytest.fixture(scope="module")
-def expected(workflow: Workflow) -> dict[str, str]:
-    """What a run on this machine, without Slurm, makes."""
+def local(workflow: Workflow) -> Workflow:
+    """A run on this machine, without Slurm."""
     local = replace(workflow, folder=workflow.folder.with_name("local"))
     result = local.run(*TARGETS)
     assert result.returncode == 0, result.stdout
+    return local
+
+
+@pytest.fixture(scope="module")
+def expected(local: Workflow) -> dict[str, str]:
+    """What it made."""
     return digests(local)
 
 
@@ -83,6 +93,14 @@ def digests(workflow: Workflow) -> dict[str, str]:
     return {str(path.relative_to(results)): sha256(path.read_bytes()).hexdigest() for path in files}
 
 
+def is_ingest_of(workflow: Workflow, scene: str, process: psutil.Process) -> bool:
+    """Whether a process is the job that reads a light field for this workflow."""
+    with suppress(psutil.Error):
+        words = process.cmdline()
+        return words[-1:] == [f"results/hci/{scene}/lightfield.h5"] and process.cwd() == str(workflow.folder)
+    return False
+
+
 def test_a_scene_is_one_submission_with_the_bytes_of_a_local_run(
     slurm: None, workflow: Workflow, expected: dict[str, str]
 ) -> None:
@@ -92,6 +110,33 @@ def test_a_scene_is_one_submission_with_the_bytes_of_a_local_run(
     assert len(re.findall("has been submitted with SLURM jobid", result.stdout)) == len(SCENES)
     assert digests(workflow) == expected
     assert "Nothing to be done" in on_slurm(workflow, *TARGETS).stdout
+
+
+def test_every_variant_has_the_bytes_of_a_local_run(slurm: None, workflow: Workflow, local: Workflow) -> None:
+    """A cluster's jobs get other numbers of threads, and an environment of their own."""
+    here = replace(local, folder=local.folder.with_name("local-variants"))
+    result = here.run(*ALL_VARIANTS)
+    assert result.returncode == 0, result.stdout
+    there = replace(workflow, folder=workflow.folder.with_name("variants"))
+    result = on_slurm(there, *ALL_VARIANTS)
+    assert result.returncode == 0, result.stdout
+    assert digests(there) == digests(here)
+
+
+def test_killed_jobs_are_told_and_made_again(slurm: None, workflow: Workflow, expected: dict[str, str]) -> None:
+    """By the system, where memory is short: one of a scene's jobs, or the process on the node that runs them all."""
+    wounded = replace(workflow, folder=workflow.folder.with_name("wounded"))
+    with edited(wounded.tree / "sepi" / "io" / "files.py", "temporary.replace(path)", SLOW_WRITING):
+        process = wounded.start(*TARGETS, flags=flags(wounded), SLEEP="3")
+        for scene in SCENES:
+            wait_for(lambda of=wounded.folder / "results" / "hci" / scene: list(of.glob(".lightfield-*")))
+            job = next(one for one in psutil.process_iter() if is_ingest_of(wounded, scene, one))
+            (job if scene == "one" else job.parents()[0]).kill()
+        assert process.wait(timeout=60) != 0
+    wait_for(lambda: queue() == [])
+    result = on_slurm(wounded, *TARGETS)
+    assert result.returncode == 0, result.stdout
+    assert digests(wounded) == expected
 
 
 def test_several_scenes_are_one_submission_if_asked(slurm: None, workflow: Workflow) -> None:

@@ -90,7 +90,8 @@ def test_a_terminal_that_closes(undisturbed: Workflow) -> None:
     for number in (signal.SIGHUP, signal.SIGTERM):
         closed = replace(undisturbed, folder=undisturbed.folder.with_name(number.name))
         process = closed.start(PART)
-        wait_for(lambda: list((closed.folder / "results").rglob("lightfield.h5")))
+        results = closed.folder / "results"
+        wait_for(lambda folder=results: list(folder.rglob("lightfield.h5")))
         os.killpg(process.pid, number)
         process.wait(timeout=60)
         healed(closed, expected, PART)

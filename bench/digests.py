@@ -1,0 +1,69 @@
+"""Whether maps are the same, byte for byte, on any number of threads, with kernels compiled before or anew."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Iterable, Iterator
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
+from hashlib import sha256
+from multiprocessing import get_context
+from typing import NamedTuple
+
+# read when a library is loaded
+_THREADS = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "OPENCV_FOR_THREADS_NUM")
+_CACHE = "NUMBA_CACHE_DIR"
+
+
+class Condition(NamedTuple):
+    """How a process computes: threads, also more than there are cores, and whether it has to compile the kernels."""
+
+    threads: int
+    cold: bool = False
+
+    def __str__(self) -> str:
+        return f"{self.threads} thread{'s' * (self.threads > 1)}{', compiled anew' * self.cold}"
+
+
+def digests(condition: Condition, variants: Iterable[str], scene: str, size: int, views: int) -> dict[str, str]:
+    """Digest of the maps of each variant, of a built-in scene, computed in a process of its own."""
+    with _environment(condition), ProcessPoolExecutor(1, get_context("spawn")) as process:
+        return process.submit(_digests, condition.threads, tuple(variants), scene, size, views).result()
+
+
+@contextmanager
+def _environment(condition: Condition) -> Iterator[None]:
+    before = {name: os.environ.get(name) for name in (*_THREADS, _CACHE)}
+    with tempfile.TemporaryDirectory(prefix="sepi-kernels-") as empty:
+        os.environ.update(dict.fromkeys(_THREADS, str(condition.threads)))
+        if condition.cold:
+            os.environ[_CACHE] = empty
+        try:
+            yield
+        finally:
+            for name, value in before.items():
+                os.environ.pop(name, None)
+                if value is not None:
+                    os.environ[name] = value
+
+
+def _digests(threads: int, variants: tuple[str, ...], scene: str, size: int, views: int) -> dict[str, str]:
+    import cv2
+    import numba
+
+    from sepi.pipeline import estimate_depth
+    from sepi.scenes import render
+
+    # not by sepi.threads, which takes no more than there are cores
+    numba.set_num_threads(threads)
+    cv2.setNumThreads(threads)
+    light_field = render(scene, size=size, views=views)
+    found = {}
+    for variant in variants:
+        digest = sha256()
+        for name, values in sorted(estimate_depth(light_field, variant).all().items()):
+            digest.update(f"{name} {values.dtype} {values.shape}".encode())
+            digest.update(values.tobytes())
+        found[variant] = digest.hexdigest()
+    return found

@@ -1,0 +1,28 @@
+"""The comparison of maps on other numbers of threads."""
+
+import pytest
+from click.testing import CliRunner
+
+import bench.digests
+from bench.__main__ import main
+
+SMALL = ["digests", "--size", "64", "--views", "3", "--variant", "no_occlusion_no_textureless"]
+
+
+def test_one_digest_on_more_threads_than_cores() -> None:
+    """Sums that depend on who computes what would make a map that nobody can reproduce."""
+    result = CliRunner().invoke(main, [*SMALL, "--no-cold", "--threads", "1", "--threads", "3"])
+    assert result.exit_code == 0, result.output
+    heading, *_, row = result.output.strip().splitlines()
+    assert heading.endswith(": 1 thread; 3 threads")
+    assert row.strip("| ").endswith("none")
+
+
+def test_a_difference_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With the threads that make it, and not with exit code 0."""
+    monkeypatch.setattr(
+        bench.digests, "digests", lambda condition, variants, *_: dict.fromkeys(variants, str(condition))
+    )
+    result = CliRunner().invoke(main, [*SMALL, "--threads", "1"])
+    assert result.exit_code == 1
+    assert "1 thread, compiled anew |" in result.output
