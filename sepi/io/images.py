@@ -207,9 +207,11 @@ def _by_pillow(path: Path, data: bytes, header: Header) -> Pixels | None:
         (PngImageFile if header.kind == "PNG" else JpegImageFile)(io.BytesIO(data)) as image,
     ):
         wider = header.kind == "PNG" and "16" in str(image.tile[0].args) and not header.grey
-        if wider or image.mode not in _HELD_AS:
-            return None
         try:
+            if wider or image.mode not in _HELD_AS:
+                # whether all of it is there: OpenCV fills with grey what is missing
+                image.load()
+                return None
             values = np.asarray(image.convert(_HELD_AS[image.mode]))
         except OSError as error:
             raise SepiError(f"damaged {header.kind}, perhaps cut off: its pixels cannot be decoded") from error

@@ -190,6 +190,9 @@ def _tiff(file: IO[bytes], size: int, whole: bool) -> Header:
     if photometric not in ((0, 1, 2, 3, 6) if bits == 8 else (1, 2)):
         raise SepiError("a TIFF that is neither grey with black as zero nor RGB; save it as one of these")
     height, width, counts = page.imagelength, page.imagewidth, page.databytecounts
+    if not all(isinstance(number, int) for number in (height, width, page.tilelength, page.tilewidth)):
+        # several of them: a product with one would be a list as long as the other says
+        raise SepiError("damaged TIFF: its height and width are not one number each")
     if max(start + count for start, count in zip(page.dataoffsets, counts, strict=True)) > size:
         raise SepiError(f"damaged TIFF: the file is cut off after {size} bytes")
     if page.compression == tifffile.COMPRESSION.NONE and sum(counts) < width * height * samples * bits // 8:

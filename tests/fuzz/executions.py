@@ -56,10 +56,8 @@ class Target:
         Puts into the folder what has to lie beside the file; it is left alone.
     names_path : bool
         Whether messages begin with a path; what a user types has none.
-    wrapping : Wrapping, optional
+    wrappings : tuple of Wrapping
         What hides the content of the file from changes.
-    parsers : tuple of str
-        Packages written in Python that do the parsing; the guided run sees what it reaches in them, too.
     """
 
     file: str
@@ -67,8 +65,7 @@ class Target:
     read: Callable[[Path], object]
     around: Callable[[Path], object] = lambda _: None
     names_path: bool = True
-    wrapping: Wrapping | None = None
-    parsers: tuple[str, ...] = ()
+    wrappings: tuple[Wrapping, ...] = ()
 
     def first(self) -> list[bytes]:
         """The files to begin with."""

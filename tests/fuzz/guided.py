@@ -6,6 +6,7 @@ begin with; what readers must not do, with the file that made them do so, in ``b
 """
 
 import argparse
+import importlib
 import importlib.util
 import json
 import os
@@ -22,6 +23,9 @@ from pathlib import Path
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 
+# what is seen of the package from the beginning, and libraries in Python that parse
+_SEEN = ("sepi.io", "sepi.inspection", "sepi.cli", "sepi.workflow", "sepi.reading")
+_PARSERS = ("PIL.PngImagePlugin", "PIL.JpegImagePlugin", "PIL.BmpImagePlugin", "tifffile")
 # part of the new files that libFuzzer makes by its own changes
 _ITS_OWN = 0.5
 # MB that the process of a target may hold: what it begins with, and what an execution may take
@@ -127,9 +131,13 @@ def _fuzz(name: str, folder: Path, seconds: float) -> None:
 
     import atheris
 
-    compiled = [_module(path) for path in ROOT.glob("sepi/**/*.py") if "njit" in path.read_text(encoding="utf-8")]
+    modules = {_module(path): path.read_text(encoding="utf-8") for path in ROOT.glob("sepi/**/*.py")}
     # numba compiles what is written, not what Atheris makes of it
-    with atheris.instrument_imports(include=["sepi"], exclude=compiled):
+    compiled = [module for module, text in modules.items() if "njit" in text]
+    with atheris.instrument_imports(include=["sepi", *_PARSERS], exclude=compiled):
+        # what would be imported when it is called for
+        for module in (*(module for module in modules if module.startswith(_SEEN)), *_PARSERS):
+            importlib.import_module(module)
         from executions import MOST_BYTES, SECONDS, FindingError, Trial
         from mutations import mutated
         from targets import TARGETS
@@ -172,7 +180,7 @@ def _fuzz(name: str, folder: Path, seconds: float) -> None:
             rng = random.Random(seed)
             if rng.random() < _ITS_OWN:
                 return bytes(atheris.Mutate(data, most))
-            return mutated(data, first, rng, target.wrapping)[:most]
+            return mutated(data, first, rng, target.wrappings)[:most]
 
         flags = [
             f"-max_total_time={seconds:.0f}",
@@ -192,7 +200,7 @@ def _fuzz(name: str, folder: Path, seconds: float) -> None:
 
 
 def _module(path: Path) -> str:
-    return ".".join(path.relative_to(ROOT).with_suffix("").parts)
+    return ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
 
 
 def _line(name: str, tally: Tally) -> str:

@@ -17,6 +17,8 @@ _ASCII_NUMBER = re.compile(rb"[-+]?[0-9]+(?:\.[0-9]+)?(?:e[-+]?[0-9]+)?")
 _LONGEST = 64
 # changes that are made at a time, at most
 _MOST = 4
+# part of the changes of wrapped files that is made inside
+_INSIDE = 0.7
 
 
 @dataclass(frozen=True)
@@ -35,8 +37,8 @@ class Wrapping:
     close: Callable[[bytes], bytes]
 
 
-def mutated(data: bytes, others: Sequence[bytes], rng: random.Random, wrapping: Wrapping | None = None) -> bytes:
-    """A few changes in a file; half of those of a wrapped one are made inside.
+def mutated(data: bytes, others: Sequence[bytes], rng: random.Random, wrappings: Sequence[Wrapping] = ()) -> bytes:
+    """A few changes in a file; most of those of a wrapped one are made inside.
 
     Parameters
     ----------
@@ -44,9 +46,11 @@ def mutated(data: bytes, others: Sequence[bytes], rng: random.Random, wrapping: 
     others : sequence of bytes
         Files of the same kind, of which parts are put in.
     rng : random.Random
-    wrapping : Wrapping, optional
+    wrappings : sequence of Wrapping
+        Ways in which the files may be wrapped.
     """
-    if wrapping is not None and rng.random() < 0.5:
+    if wrappings and rng.random() < _INSIDE:
+        wrapping = rng.choice(wrappings)
         try:
             inner = [wrapping.open(one) for one in (data, *others)]
         except Exception:
@@ -129,6 +133,9 @@ _CHANGES = (
 )
 
 
+_SIGNATURE = b"\x89PNG\r\n\x1a\n"
+
+
 def _png_closed(data: bytes) -> bytes:
     """A PNG with the right checksum behind each chunk."""
     parts, at = [data[:8]], 8
@@ -138,6 +145,23 @@ def _png_closed(data: bytes) -> bytes:
         parts += [data[at : at + 4], body, struct.pack(">I", zlib.crc32(body))]
         at += 12 + length
     return b"".join(parts) + data[at:]
+
+
+def _pixels_opened(data: bytes) -> bytes:
+    """The body of the header of a PNG, and its rows as they are before they are packed."""
+    packed, at = b"", 8
+    while at + 12 <= len(data):
+        (length,) = struct.unpack_from(">I", data, at)
+        packed += data[at + 8 : at + 8 + length] if data[at + 4 : at + 8] == b"IDAT" else b""
+        at += 12 + length
+    return data[16:29] + zlib.decompress(packed)
+
+
+def _pixels_closed(content: bytes) -> bytes:
+    bodies = {b"IHDR": content[:13], b"IDAT": zlib.compress(content[13:], 1), b"IEND": b""}
+    return _png_closed(
+        _SIGNATURE + b"".join(struct.pack(">I", len(body)) + kind + body + bytes(4) for kind, body in bodies.items())
+    )
 
 
 def _zip_opened(data: bytes) -> bytes:
@@ -175,5 +199,5 @@ def _mat_closed(content: bytes) -> bytes:
     return header + struct.pack("<II", _MAT_PACKED, len(packed)) + packed
 
 
-PNG = Wrapping(lambda data: data, _png_closed)
-MAT = Wrapping(_mat_opened, _mat_closed)
+PNG = (Wrapping(lambda data: data, _png_closed), Wrapping(_pixels_opened, _pixels_closed))
+MAT = (Wrapping(_mat_opened, _mat_closed),)

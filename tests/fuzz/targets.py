@@ -73,8 +73,8 @@ def _submission(path: Path) -> None:
             raise SepiError(problem)
 
 
-def _pictures_of(seed: Callable[[Path], Iterable[bytes]], ending: str, *parsers: str) -> Target:
-    return Target(f"a.{ending}", seed, _picture, parsers=parsers)
+def _pictures_of(seed: Callable[[Path], Iterable[bytes]], ending: str) -> Target:
+    return Target(f"a.{ending}", seed, _picture)
 
 
 def _hdf5(seed: Callable[[Path], Iterable[bytes]], *reads: Callable[[Path], object], name: str = "a.h5") -> Target:
@@ -82,33 +82,33 @@ def _hdf5(seed: Callable[[Path], Iterable[bytes]], *reads: Callable[[Path], obje
 
 
 TARGETS: dict[str, Target] = {
-    "png": Target("a.png", seeds.png_files, _picture, wrapping=PNG, parsers=("PIL",)),
-    "jpeg": _pictures_of(seeds.jpeg_files, "jpg", "PIL"),
-    "tiff": _pictures_of(seeds.tiff_files, "tif", "tifffile"),
-    "bmp": _pictures_of(seeds.bmp_files, "bmp", "PIL"),
+    "png": Target("a.png", seeds.png_files, _picture, wrappings=PNG),
+    "jpeg": _pictures_of(seeds.jpeg_files, "jpg"),
+    "tiff": _pictures_of(seeds.tiff_files, "tif"),
+    "bmp": _pictures_of(seeds.bmp_files, "bmp"),
     "webp": _pictures_of(seeds.webp_files, "webp"),
     "pnm": _pictures_of(seeds.pnm_files, "pgm"),
     "pfm": Target("a.pfm", seeds.pfm_files, _each(_map, _map_with_scale)),
     "map-npy": Target("a.npy", seeds.npy_map_files, _each(_map, _map_with_scale)),
-    "map-png": Target("a.png", texts.map_png_files, _each(_map, _map_with_scale), wrapping=PNG, parsers=("PIL",)),
+    "map-png": Target("a.png", texts.map_png_files, _each(_map, _map_with_scale), wrappings=PNG),
     "map-hdf5": _hdf5(seeds.hdf5_map_files, _map),
     "hci-parameters": Target("parameters.cfg", texts.parameter_files, texts.read_parent, seeds.hci_pictures),
-    "hci-mask": Target("mask_occluded.png", seeds.mask_files, texts.read_parent, seeds.hci_folder, wrapping=PNG),
+    "hci-mask": Target("mask_occluded.png", seeds.mask_files, texts.read_parent, seeds.hci_folder, wrappings=PNG),
     "hci-truth": Target("gt_disp_lowres.pfm", seeds.pfm_files, texts.read_parent, seeds.hci_folder),
     "hci-2013": _hdf5(seeds.hci_2013_files, _light_field),
     "openlf": _hdf5(seeds.open_lf_files, _light_field),
-    "mat-5": Target("a.mat", seeds.mat_5_files, _light_field, wrapping=MAT),
+    "mat-5": Target("a.mat", seeds.mat_5_files, _light_field, wrappings=MAT),
     "mat-7.3": _hdf5(seeds.mat_7_3_files, _light_field, name="a.mat"),
     "npy": Target("a.npy", seeds.npy_files, _light_field),
-    "npz": Target("a.npz", seeds.npz_files, _light_field, wrapping=seeds.NPZ),
-    "eslf": Target("a_eslf.png", texts.lenslet_files, _light_field, wrapping=PNG),
+    "npz": Target("a.npz", seeds.npz_files, _light_field, wrappings=(seeds.NPZ,)),
+    "eslf": Target("a_eslf.png", texts.lenslet_files, _light_field, wrappings=PNG),
     "looked-at": Target("a.npy", texts.larger_npy_files, read_light_field),
     "own-light-field": _hdf5(seeds.own_light_field_files, read_own, _light_field),
     "stage": _hdf5(seeds.stage_files, read_stage, history_of, view_of),
     "result": _hdf5(seeds.result_files, read_result, view_of, _map),
     "scores": _hdf5(seeds.score_files, read_evaluations, read_scores),
     "external-maps": _hdf5(seeds.external_files, read_external, lambda path: read_external(path, with_maps=False)),
-    "submission": Target("a.zip", seeds.submission_files, _submission, wrapping=seeds.SUBMISSION, parsers=("zipfile",)),
+    "submission": Target("a.zip", seeds.submission_files, _submission, wrappings=(seeds.SUBMISSION,)),
     "runtime": Target("runtime.txt", texts.runtime_files, texts.read_runtime),
     "json": Target("a.json", seeds.json_files, read_numbers),
     "json-flags": Target("a.json", seeds.json_files, texts.read_json_flags, names_path=False),

@@ -45,7 +45,7 @@ def test_a_value_or_one_clear_line(tmp_path: Path, name: str) -> None:
     assert not refused or name in PARTLY_REFUSED
     rng = random.Random(name)
     for number in range(EXECUTIONS):
-        data = mutated(rng.choice(first), first, rng, target.wrapping)[:MOST_BYTES]
+        data = mutated(rng.choice(first), first, rng, target.wrappings)[:MOST_BYTES]
         try:
             trial.run(data)
         except FindingError as finding:

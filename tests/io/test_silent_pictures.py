@@ -76,6 +76,24 @@ def test_jpeg_that_claims_to_be_huge_takes_no_memory(tmp_path: Path) -> None:
         tracemalloc.stop()
 
 
+@pytest.mark.parametrize("tag", [256, 257])
+def test_tiff_of_several_widths_takes_no_memory(tmp_path: Path, tag: int) -> None:
+    """It used to be a list of as many numbers as the other side says, or no memory left."""
+    whole = cv2.imencode(".tif", SMOOTH, (cv2.IMWRITE_TIFF_COMPRESSION, 1))[1].tobytes()
+    entries = {number: next(at for at in range(len(whole)) if is_entry(whole, at, number)) for number in (256, 257)}
+    for number, at in entries.items():
+        claimed = struct.pack("<HHII", number, 4, 2, 0) if number == tag else struct.pack("<HHII", number, 4, 1, 10**9)
+        whole = whole[:at] + claimed + whole[at + 12 :]
+    (tmp_path / "a.tif").write_bytes(whole)
+    with pytest.raises(SepiError, match="height and width are not one number each"):
+        read_picture(tmp_path / "a.tif")
+
+
+def is_entry(tiff: bytes, at: int, tag: int) -> bool:
+    """Whether an entry of this tag, of one short or long number, stands in a TIFF."""
+    return tiff[at : at + 8] in (struct.pack("<HHI", tag, kind, 1) for kind in (3, 4))
+
+
 SORTS = {
     "palette": PICTURE.quantize(9),
     "palette of 1 bit": PICTURE.quantize(2),
