@@ -2,6 +2,7 @@
 # make check  environment, then the fast part of the tests: for every save
 # make test   environment, then the whole test suite, on all cores
 # make faults  environment, then a hundred kills of the workflow and thousands of damaged files: a quarter of an hour
+# make fuzz   environment, then an hour (SECONDS=3600) of files made to trip the readers, led by what code they reach
 # make coverage  the whole test suite, and the share of lines and branches that it runs
 # make lint   style, format, types and imports
 # make bench  environment, then times, memory and growth of the pipeline, to reports/
@@ -13,7 +14,7 @@ PYTHON := $(shell for p in python3 python3.11 python3.12 python3.13; do \
 BIN := .venv/bin
 READY := .venv/ready
 
-.PHONY: all check test faults coverage lint bench clean
+.PHONY: all check test faults fuzz coverage lint bench clean
 .DEFAULT_GOAL := all
 
 all: $(READY)
@@ -31,7 +32,13 @@ test: $(READY)
 
 # what `make test` does a few times, a hundred times
 faults: $(READY)
-	$(ONE_THREAD) SEPI_FAULTS=100 $(BIN)/python -m pytest tests/faults tests/io/test_damage.py
+	$(ONE_THREAD) SEPI_FAULTS=100 $(BIN)/python -m pytest tests/faults tests/fuzz tests/io/test_damage.py
+
+# not among the pinned versions: nothing else needs it
+SECONDS ?= 3600
+fuzz: $(READY)
+	$(BIN)/python -c 'import atheris' 2>/dev/null || $(BIN)/python -m pip install --quiet --editable '.[fuzz]'
+	$(ONE_THREAD) $(BIN)/python tests/fuzz/guided.py --seconds $(SECONDS)
 
 # absolute, since tests start processes elsewhere
 coverage: export COVERAGE_RCFILE := $(CURDIR)/pyproject.toml

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
 def view_of(path: Path) -> tuple[tuple[int, int], tuple[int, int]] | None:
     """Position of the view that a map belongs to, and size of the view grid; None for a map that does not say."""
+    from sepi.io.files import reading
     from sepi.io.hdf5 import read_attributes
 
     path = path / "result.h5" if path.is_dir() else path
@@ -23,7 +24,8 @@ def view_of(path: Path) -> tuple[tuple[int, int], tuple[int, int]] | None:
     attributes = read_attributes(path)
     if not {"view_position", "grid"} <= set(attributes):
         return None
-    (t, s), (rows, columns) = (map(int, attributes[name]) for name in ("view_position", "grid"))
+    with reading(path, "result of 'sepi depth'"):
+        (t, s), (rows, columns) = (map(int, attributes[name]) for name in ("view_position", "grid"))
     return (t, s), (rows, columns)
 
 

@@ -12,11 +12,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import h5py
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
 from sepi.io.disparity_maps import SUFFIXES, map_file
-from sepi.io.hdf5 import UNITS, create_hdf5, open_hdf5
+from sepi.io.hdf5 import UNITS, attribute, create_hdf5, open_hdf5, read_dataset
 from sepi.io.scores import Evaluation, evaluation_in, put_evaluation, scores_in
 from sepi.lightfield import FloatMap
 
@@ -109,9 +110,13 @@ def read_external(path: Path, *, with_maps: bool = True) -> dict[str, ExternalMa
     with open_hdf5(path, "file of external maps (written by python -m sepi.external)") as file:
         return {
             name: ExternalMap(
-                **{key: str(group.attrs[key]) for key in _ATTRIBUTES},
-                disparity=group["disparity"][...].astype(np.float32) if with_maps and "disparity" in group else None,
+                **{key: str(attribute(group, key)) for key in _ATTRIBUTES},
+                disparity=_disparity(path, group) if with_maps else None,
                 evaluation=evaluation_in(group) if with_maps else Evaluation(scores_in(group)),
             )
             for name, group in file[_METHODS].items()
         }
+
+
+def _disparity(path: Path, group: h5py.Group) -> FloatMap | None:
+    return read_dataset(path, group["disparity"]).astype(np.float32) if "disparity" in group else None

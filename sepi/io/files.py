@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from sepi.errors import SepiError, printable
+from sepi.errors import SepiError, one_line, printable
 
 # an interrupt may strike between any two instructions, also where no `finally` is in force: what is still listed when
 # the program ends was not finished, and is removed
@@ -33,7 +33,10 @@ def naming(path: Path) -> Iterator[None]:
     try:
         yield
     except SepiError as error:
-        raise error if str(error).startswith(str(path)) else SepiError(f"{path}: {error}") from error
+        if str(error).startswith(one_line(str(path))):
+            # not from itself: who follows the causes of an error would never end
+            raise
+        raise SepiError(f"{path}: {error}") from error
 
 
 @contextmanager
@@ -51,7 +54,7 @@ def reading(path: Path, kind: str) -> Iterator[None]:
     try:
         with naming(path):
             yield
-    except (SepiError, AssertionError, NameError):
+    except (SepiError, AssertionError, NameError, MemoryError):
         # what is no fault of the file
         raise
     except Exception as error:

@@ -11,8 +11,11 @@ from __future__ import annotations
 
 import hashlib
 import io
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+import os
+import signal
+import warnings
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from dataclasses import astuple
 from pathlib import Path
 from typing import Any
@@ -36,6 +39,8 @@ DEFLATE_RATIO = 1100
 # the user block: HDF5 wants a power of two, 512 at least
 _BLOCK = 512
 _MARK = b"sepi sha256 "
+# seconds in which an attribute must be read
+_PATIENCE = 1
 
 UNITS = {"disparity": "pixels per view step", "confidence": "0..1", "depth": "metres"}
 
@@ -59,15 +64,16 @@ def write_stage(path: Path, maps: StageMaps, attributes: Mapping[str, Attribute]
 def read_stage(path: Path) -> StageMaps:
     """Read the maps that ``write_stage`` wrote."""
     with open_hdf5(path, "stage file") as file:
-        maps = {name: file[name][...] for name in file}
-        names = tuple(name.decode() for name in file["view_subset"].attrs["names"]) if "view_subset" in file else ()
+        maps = {name: read_dataset(path, file[name]) for name in file}
+        subset = file.get("view_subset")
+        names = () if subset is None else tuple(name.decode() for name in attribute(subset, "names"))
         return StageMaps(maps.pop("disparity"), maps.pop("confidence"), maps, names)
 
 
 def read_attributes(path: Path, check: bool = True) -> dict[str, Any]:
     """Attributes of an HDF5 file; unchecked, without reading the whole file for its digest."""
     with open_hdf5(path, check=check) as file:
-        return dict(file.attrs)
+        return {name: attribute(file, name) for name in file.attrs}
 
 
 def write_light_field(path: Path, light_field: LightField) -> None:
@@ -122,10 +128,10 @@ def read_light_field(path: Path) -> LightField:
         arrays = {name: read_dataset(path, file[name]) for name in known_arrays if name in file}
         known = None
         if "disparity_range" in file.attrs:
-            minimum, maximum = (float(value) for value in file.attrs["disparity_range"])
+            minimum, maximum = map(float, attribute(file, "disparity_range"))
             known = DisparityRange(minimum, maximum, _text(file, "disparity_range_source"))
             require_known("disparity range", [known.source], RANGE_SOURCES)
-        view = file.attrs.get("view")
+        view = attribute(file, "view") if "view" in file.attrs else None
         ground_truth, positions = arrays.get("ground_truth"), arrays.get("positions")
         return LightField(
             views=arrays["views"],
@@ -133,7 +139,7 @@ def read_light_field(path: Path) -> LightField:
             source=_text(file, "source"),
             present=arrays["present"].astype(bool),
             view=None if view is None else (int(view[0]), int(view[1])),
-            row_spacing=float(file.attrs.get("row_spacing", 1)),
+            row_spacing=float(attribute(file, "row_spacing")) if "row_spacing" in file.attrs else 1.0,
             positions=None if positions is None else positions.astype(np.float64),
             camera=read_camera(file),
             notes=tuple(_text(file, "notes").split("\0")) if "notes" in file.attrs else (),
@@ -145,7 +151,24 @@ def read_light_field(path: Path) -> LightField:
 
 def read_camera(file: h5py.File) -> Camera | None:
     """The camera of a light field's or a result's file, where it has one."""
-    return Camera(*map(float, file.attrs["camera"])) if "camera" in file.attrs else None
+    return Camera(*map(float, attribute(file, "camera"))) if "camera" in file.attrs else None
+
+
+def attribute(holder: h5py.Group | h5py.Dataset, key: str) -> Any:
+    """The value of an attribute; text of fixed length as text, too.
+
+    Raises
+    ------
+    KeyError
+        If there is none.
+    SepiError
+        If HDF5 hangs on it, or crashes, as it does on text of variable length in damaged files.
+    """
+    doubtful = holder.attrs.get_id(key).dtype.hasobject and not _has_digest(Path(holder.file.filename))
+    if doubtful and not _comes_back(lambda: holder.attrs[key]):
+        raise SepiError(f"damaged HDF5 file: its attribute '{printable(key)}' cannot be read")
+    value = holder.attrs[key]
+    return value.decode("utf-8", "replace") if isinstance(value, bytes) else value
 
 
 def read_dataset(path: Path, dataset: h5py.Dataset, part: Any = ...) -> npt.NDArray[Any]:
@@ -162,6 +185,9 @@ def read_dataset(path: Path, dataset: h5py.Dataset, part: Any = ...) -> npt.NDAr
         raise SepiError(f"{path}: damaged HDF5 file: '{name}' is no array")
     if dataset.is_virtual or dataset.external or dataset.file.filename != str(path):
         raise SepiError(f"{path}: the values of '{name}' lie in another file; copy them into this one")
+    if dataset.dtype.hasobject:
+        # as of such attributes
+        raise SepiError(f"{path}: the values of '{name}' are of variable length; expected numbers")
     held = dataset.id.get_storage_size()
     # what is not compressed is stored as it is, but for chunks never written
     if held > path.stat().st_size or dataset.nbytes > held * (DEFLATE_RATIO if dataset.chunks else 1):
@@ -193,6 +219,31 @@ def _require_sound(path: Path) -> None:
         block = file.read(_BLOCK)
         if block.startswith(_MARK) and block != _block(file):
             raise SepiError(f"{path}: damaged, or changed by another program; remove it and make it again")
+
+
+def _has_digest(path: Path) -> bool:
+    """Whether a file that was opened begins with a digest, which was looked at then."""
+    with path.open("rb") as file:
+        return file.read(len(_MARK)) == _MARK
+
+
+def _comes_back(read: Callable[[], object]) -> bool:
+    """Whether a call ends, well or with an exception; tried in another process, which takes a few milliseconds."""
+    if not hasattr(os, "fork"):
+        # not on this system: the call has to be risked
+        return True
+    with warnings.catch_warnings(action="ignore"):
+        # of threads, which Python warns of: nothing that they may hold is used here but HDF5's lock, which h5py minds
+        child = os.fork()
+    if child == 0:
+        try:
+            signal.signal(signal.SIGALRM, signal.SIG_DFL)
+            signal.alarm(_PATIENCE)
+            with suppress(Exception):
+                read()
+        finally:
+            os._exit(0)
+    return os.waitpid(child, 0)[1] == 0
 
 
 def _block(file: io.BufferedReader | io.BufferedRandom) -> bytes:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import io
 import os
 import threading
+import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
@@ -16,7 +18,7 @@ import numpy.typing as npt
 
 from sepi.errors import SepiError
 from sepi.io.files import atomic_path, reading
-from sepi.io.picture_headers import Header, read_header
+from sepi.io.picture_headers import Header, plain_png, read_header
 from sepi.lightfield import HIGHEST, LOWEST, BoolMap
 from sepi.threads import available_cores
 
@@ -26,6 +28,8 @@ SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp",
 """Ends of names, in small letters, of the pictures that can be read."""
 
 _MAX_BYTES = 2**32
+# sorts of pixels, as Pillow calls them, and as what sorts they are taken; transparency is left out
+_HELD_AS = {"1": "L", "L": "L", "LA": "LA", "P": "RGB", "RGB": "RGB", "RGBA": "RGBA", "I;16": "I;16"}
 
 
 def read_picture(path: Path) -> Pixels:
@@ -161,7 +165,13 @@ def _opened(path: Path) -> Iterator[IO[bytes]]:
 
 
 def _decoded(path: Path, data: bytes, header: Header) -> Pixels:
-    """Pixels as OpenCV decodes them, in the order RGB."""
+    """Pixels of a picture, in the order RGB."""
+    usual = _by_pillow(path, data, header)
+    if usual is not None:
+        return usual
+    if header.kind == "PNG":
+        with reading(path, header.kind):
+            data = plain_png(data)
     # OpenCV wants something behind the last digit of a PNM
     data += b"\n" if header.white else b""
     try:
@@ -178,6 +188,36 @@ def _decoded(path: Path, data: bytes, header: Header) -> Pixels:
     channels = image[:, :, None] if image.ndim == 2 else image[:, :, 2::-1]
     # grey with transparency is decoded to colours
     return np.ascontiguousarray(channels[:, :, :1] if header.grey else channels)
+
+
+def _by_pillow(path: Path, data: bytes, header: Header) -> Pixels | None:
+    """Pixels of a PNG or JPEG; None for colours of 16 bit or for printing, whose values Pillow would change.
+
+    They are those that OpenCV gives, in the same time, but damage is told and nothing is printed about it: the
+    libraries below OpenCV have their own way to the terminal.
+    """
+    if header.kind not in ("PNG", "JPEG"):
+        return None
+    from PIL.JpegImagePlugin import JpegImageFile
+    from PIL.PngImagePlugin import PngImageFile
+
+    with (
+        reading(path, header.kind),
+        warnings.catch_warnings(action="ignore"),
+        (PngImageFile if header.kind == "PNG" else JpegImageFile)(io.BytesIO(data)) as image,
+    ):
+        wider = header.kind == "PNG" and "16" in str(image.tile[0].args) and not header.grey
+        try:
+            if wider or image.mode not in _HELD_AS:
+                # whether all of it is there: OpenCV fills with grey what is missing
+                image.load()
+                return None
+            values = np.asarray(image.convert(_HELD_AS[image.mode]))
+        except OSError as error:
+            raise SepiError(f"damaged {header.kind}, perhaps cut off: its pixels cannot be decoded") from error
+        if values.ndim == 2:
+            values = values[:, :, None]
+        return np.ascontiguousarray(values[:, :, :1] if header.grey else values[:, :, :3])
 
 
 def _stretched(path: Path, values: Pixels, white: int) -> Pixels:

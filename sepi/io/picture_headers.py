@@ -27,6 +27,10 @@ MAX_PIXELS = 2**28
 # more than any of the compressions reaches on pictures of 8 bit; small pictures of one colour may shrink further
 _PIXELS_PER_BYTE = 1100
 _SMALL = 2**24
+# chunks of a PNG that decide its colours, and its last one; bytes that are unpacked at a time
+_DECIDING = (b"IHDR", b"IDAT")
+_PNG_END = b"\0\0\0\0IEND" + zlib.crc32(b"IEND").to_bytes(4, "big")
+_PART = 2**20
 
 
 @dataclass(frozen=True)
@@ -68,7 +72,7 @@ def read_header(path: Path, file: IO[bytes], *, whole: bool = False) -> Header:
     file : binary file
         Its first bytes are read, or as much as tells whether all of it is there.
     whole : bool
-        Whether a PNG or JPEG that is cut off or damaged behind its header is refused, too.
+        Whether a PNG that is cut off or damaged behind its header is refused, too.
 
     Raises
     ------
@@ -110,13 +114,42 @@ def _png(file: IO[bytes], size: int, whole: bool) -> Header:
     return header
 
 
+def plain_png(data: bytes) -> bytes:
+    """A PNG without all that does not decide its colours, of which libpng prints lines of its own.
+
+    Parameters
+    ----------
+    data : bytes
+        A sound one without a palette.
+
+    Raises
+    ------
+    zlib.error, ValueError
+        If its pixels cannot be unpacked; of that, too, libpng would print a line.
+    """
+    kept, at, unpacking = [data[:8]], 8, zlib.decompressobj()
+    while at + 12 <= len(data):
+        length = int.from_bytes(data[at : at + 4], "big")
+        kind, end = data[at + 4 : at + 8], at + 12 + length
+        if kind in _DECIDING:
+            kept.append(data[at:end])
+        if kind == b"IDAT":
+            packed = data[at + 8 : end - 4]
+            while packed:
+                # a part at a time: what comes out is not needed
+                unpacking.decompress(packed, _PART)
+                packed = unpacking.unconsumed_tail
+        at = end
+    if not unpacking.eof:
+        raise ValueError("its pixels are cut off")
+    return b"".join([*kept, _PNG_END])
+
+
 def _jpeg(file: IO[bytes], size: int, whole: bool) -> Header:
     from PIL.JpegImagePlugin import JpegImageFile
 
     with JpegImageFile(file) as image:
-        if whole:
-            image.load()
-        return Header("JPEG", image.height, image.width)
+        return Header("JPEG", image.height, image.width, 1 if image.mode == "L" else 3, image.mode == "L")
 
 
 def _bmp(file: IO[bytes], size: int, whole: bool) -> Header:
@@ -157,6 +190,9 @@ def _tiff(file: IO[bytes], size: int, whole: bool) -> Header:
     if photometric not in ((0, 1, 2, 3, 6) if bits == 8 else (1, 2)):
         raise SepiError("a TIFF that is neither grey with black as zero nor RGB; save it as one of these")
     height, width, counts = page.imagelength, page.imagewidth, page.databytecounts
+    if not all(isinstance(number, int) for number in (height, width, page.tilelength, page.tilewidth)):
+        # several of them: a product with one would be a list as long as the other says
+        raise SepiError("damaged TIFF: its height and width are not one number each")
     if max(start + count for start, count in zip(page.dataoffsets, counts, strict=True)) > size:
         raise SepiError(f"damaged TIFF: the file is cut off after {size} bytes")
     if page.compression == tifffile.COMPRESSION.NONE and sum(counts) < width * height * samples * bits // 8:

@@ -19,7 +19,7 @@ import numpy.typing as npt
 from sepi.camera import Camera
 from sepi.errors import SepiError
 from sepi.io.files import atomic_files, atomic_folder, atomic_path
-from sepi.io.hdf5 import Attribute, open_hdf5, read_camera, read_dataset, write_stage
+from sepi.io.hdf5 import Attribute, attribute, open_hdf5, read_camera, read_dataset, write_stage
 from sepi.io.images import png_texts, write_png
 from sepi.io.pfm import write_pfm
 from sepi.io.ply import write_ply
@@ -167,10 +167,12 @@ def read_result(path: Path) -> Result:
             read_dataset(path, file[name]) for name in ("view", "disparity", "confidence")
         )
         unknown = read_dataset(path, file[_UNKNOWN]) if _UNKNOWN in file else np.zeros(disparity.shape, bool)
-        (t, s), (rows, columns) = (map(int, file.attrs[name]) for name in ("view_position", "grid"))
+        (t, s), (rows, columns) = (map(int, attribute(file, name)) for name in ("view_position", "grid"))
         # results of earlier versions: rows as far apart as columns, no view off the grid
-        down, across = map(float, file.attrs.get("from_centre", (t - rows // 2, s - columns // 2)))
-        scene, camera = str(file.attrs.get("scene", "")), read_camera(file)
+        told = attribute(file, "from_centre") if "from_centre" in file.attrs else (t - rows // 2, s - columns // 2)
+        down, across = map(float, told)
+        scene = str(attribute(file, "scene")) if "scene" in file.attrs else ""
+        camera = read_camera(file)
     alike = disparity.shape == confidence.shape == unknown.shape == picture.shape[:2]
     if not alike or picture.shape[2:] not in ((1,), (3,)):
         raise SepiError(f"{path}: damaged: view {picture.shape} and disparity {disparity.shape} do not fit together")

@@ -18,7 +18,7 @@ import h5py
 import numpy as np
 
 from sepi.errors import SepiError
-from sepi.io.hdf5 import UNITS, Attribute, create_hdf5, open_hdf5
+from sepi.io.hdf5 import UNITS, Attribute, attribute, create_hdf5, open_hdf5, read_dataset
 from sepi.lightfield import BoolMap, FloatMap
 
 _MAPS = "maps"
@@ -127,7 +127,7 @@ def read_evaluations(path: Path, names: Collection[str] | None = None) -> dict[s
     """
     with open_hdf5(path, _KIND) as file:
         groups = _groups(path, file, names)
-        return {name: Scored(str(group.attrs["digest"]), evaluation_in(group)) for name, group in groups.items()}
+        return {name: Scored(str(attribute(group, "digest")), evaluation_in(group)) for name, group in groups.items()}
 
 
 def put_evaluation(group: h5py.Group, evaluation: Evaluation) -> None:
@@ -146,19 +146,20 @@ def put_evaluation(group: h5py.Group, evaluation: Evaluation) -> None:
 def scores_in(group: h5py.Group) -> AllScores:
     """The scores alone of what :func:`put_evaluation` wrote: protocol to region to scores."""
     return {
-        protocol: {region: {key: value.item() for key, value in cell.attrs.items()} for region, cell in regions.items()}
+        protocol: {region: {key: attribute(cell, key).item() for key in cell.attrs} for region, cell in regions.items()}
         for protocol, regions in group.get("scores", {}).items()
     }
 
 
 def evaluation_in(group: h5py.Group) -> Evaluation:
     """What :func:`put_evaluation` wrote."""
+    path = Path(group.file.filename)
     regions: Mapping[str, Any] = group.get("regions", {})
     return Evaluation(
         scores=scores_in(group),
-        error=group["error"][...].astype(np.float32) if "error" in group else None,
-        regions={name: mask[...].astype(bool) for name, mask in regions.items()},
-        region_sources={name: str(mask.attrs["source"]) for name, mask in regions.items()},
+        error=read_dataset(path, group["error"]).astype(np.float32) if "error" in group else None,
+        regions={name: read_dataset(path, mask).astype(bool) for name, mask in regions.items()},
+        region_sources={name: str(attribute(mask, "source")) for name, mask in regions.items()},
     )
 
 

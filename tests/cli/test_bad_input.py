@@ -20,6 +20,8 @@ from click.testing import CliRunner
 from hdf5_edits import changed
 
 from sepi.cli.main import main
+from sepi.cli.scene_argument import view_of
+from sepi.errors import SepiError
 from sepi.io.hdf5 import write_light_field
 from sepi.io.pfm import write_pfm
 from sepi.lightfield import LightField
@@ -480,3 +482,12 @@ def test_names_with_spaces_and_letters_of_any_script(
     called = CliRunner().invoke(main, ["depth", "--set", "initial.semi_global.num_disparities=11", "--", name])
     assert called.exit_code == 0, called.output
     assert Path(f"{name}-depth/disparity.pfm").is_file()
+
+
+def test_a_result_of_another_program_that_says_nonsense_of_its_view(tmp_path: Path) -> None:
+    """It used to be a traceback when the result was scored."""
+    with h5py.File(tmp_path / "result.h5", "w") as file:
+        file["disparity"] = np.zeros((4, 5), np.float32)
+        file.attrs["view_position"], file.attrs["grid"] = [], [3, 3]
+    with pytest.raises(SepiError, match=r"result\.h5: not a result of 'sepi depth', or damaged"):
+        view_of(tmp_path / "result.h5")

@@ -12,10 +12,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sepi.errors import SepiError
+from sepi.errors import SepiError, SepiWarning
 from sepi.io import files
 from sepi.io.files import atomic_folder, atomic_path
 from sepi.io.hdf5 import create_hdf5
+from sepi.io.pfm import read_pfm
 from sepi.io.result_folder import RESULT_FILES
 from sepi.scenes import render, write_hci
 
@@ -242,3 +243,22 @@ def test_depth_stopped_at_any_time_leaves_all_of_the_maps_or_none(scene: Path, t
         process.communicate(timeout=60)
         left = names_in(folder)
         assert left in ([], names_in(tmp_path / "whole")), (part, left)
+
+
+def test_an_error_is_one_line_whatever_is_in_a_name(tmp_path: Path) -> None:
+    """A file's name may hold what clears a terminal, or ends a line of a log."""
+    path = tmp_path / "a\x1b[2J\nb.pfm"
+    path.write_bytes(b"Pf")
+    with pytest.raises(SepiError) as caught:
+        read_pfm(path)
+    assert str(caught.value).isprintable()
+    assert str(caught.value).startswith(f"{tmp_path}/a?[2J b.pfm: not a one-channel PFM")
+    # who follows its causes comes to an end
+    assert caught.value.__cause__ is not caught.value
+    assert str(SepiWarning("a\tb\x00")) == "a b?"
+
+
+def test_too_little_memory_is_no_fault_of_the_file(tmp_path: Path) -> None:
+    """Who hears that a sound file is damaged downloads it again."""
+    with pytest.raises(MemoryError), files.reading(tmp_path / "a.mat", "MATLAB file"):
+        raise MemoryError

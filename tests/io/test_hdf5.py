@@ -121,3 +121,28 @@ def test_bad_file_is_one_line_that_names_it(tmp_path: Path, light_field: LightFi
     message = reading_error(tmp_path / "lf.h5")
     assert "lf.h5" in message
     assert word in message
+
+
+def hanging(path: Path) -> Path:
+    """A file of another program with text of a length of its own, and damage where HDF5 keeps that."""
+    with h5py.File(path, "w") as file:
+        file["LF"] = np.ones((2, 2, 4, 5, 3), np.uint8)
+        file.attrs["dH"] = "0.05"
+        file.attrs["focalLength"], file.attrs["shift"] = 300.0, 1.25
+    content = path.read_bytes()
+    # the heap of such texts: its objects follow a head of 16 bytes
+    at = content.index(b"GCOL") + 16
+    path.write_bytes(content[:at] + bytes(48) + content[at + 48 :])
+    return path
+
+
+def test_text_on_which_hdf5_hangs_is_refused(tmp_path: Path) -> None:
+    """The command would not end, and could not be interrupted either."""
+    assert "its attribute 'dH' cannot be read" in reading_error(hanging(tmp_path / "a.h5"))
+
+
+def test_values_of_variable_length_are_refused(tmp_path: Path) -> None:
+    """They may hang in the same way, and are no numbers."""
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["LF"] = ["text"]
+    assert "'LF' are of variable length" in reading_error(tmp_path / "a.h5")

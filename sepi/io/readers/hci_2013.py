@@ -15,6 +15,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
@@ -22,7 +23,7 @@ import numpy.typing as npt
 
 from sepi.camera import Camera
 from sepi.errors import SepiError
-from sepi.io.hdf5 import has_dataset, open_hdf5, read_dataset
+from sepi.io.hdf5 import attribute, has_dataset, open_hdf5, read_dataset
 from sepi.io.readers.arrays import light_field_from_array
 from sepi.io.readers.options import ReadOptions, arrange_numbers
 from sepi.lightfield import FloatMap, LightField
@@ -86,13 +87,14 @@ def _read_camera(file: h5py.File) -> tuple[Camera | None, str]:
 
 def _number(file: h5py.File, key: str) -> float:
     """An attribute that is a number, or an array or text of one."""
-    values = np.ravel(file.attrs[key])
+    given = attribute(file, key)
+    values = np.ravel(given)
     try:
         if values.size != 1:
             raise ValueError
         return float(values[0])
     except (TypeError, ValueError) as error:
-        raise SepiError(f"expected the attribute '{key}' to be a number, got {file.attrs[key]!r}") from error
+        raise SepiError(f"expected the attribute '{key}' to be a number, got {given!r}") from error
 
 
 def _read_depth(path: Path, file: h5py.File, shape: tuple[int, ...], view: tuple[int, int]) -> DepthMap | None:
@@ -100,13 +102,19 @@ def _read_depth(path: Path, file: h5py.File, shape: tuple[int, ...], view: tuple
     dataset = file[DEPTH]
     if dataset.shape == shape[2:4]:
         centre = shape[0] // 2, shape[1] // 2
-        return read_dataset(path, dataset).astype(np.float64) if view == centre else None
+        return _as_numbers(read_dataset(path, dataset)) if view == centre else None
     if dataset.shape == shape[:4]:
-        return read_dataset(path, dataset, view).astype(np.float64)
+        return _as_numbers(read_dataset(path, dataset, view))
     raise SepiError(
         f"{path}: '{DEPTH}' has shape {dataset.shape}; expected {shape[:4]} like the views, or {shape[2:4]} for the "
         "centre view"
     )
+
+
+def _as_numbers(depth: npt.NDArray[Any]) -> DepthMap:
+    # a number that is none may be of a sort that is warned of
+    with np.errstate(invalid="ignore"):
+        return depth.astype(np.float64)
 
 
 def _disparity(depth: DepthMap, camera: Camera) -> FloatMap:

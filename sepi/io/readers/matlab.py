@@ -21,14 +21,14 @@ import struct
 import warnings
 import zlib
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import h5py
 import numpy as np
 
 from sepi.errors import SepiError
 from sepi.io.files import reading
-from sepi.io.hdf5 import open_hdf5, read_dataset
+from sepi.io.hdf5 import DEFLATE_RATIO, attribute, open_hdf5, read_dataset
 from sepi.io.readers.arrays import Array
 from sepi.io.readers.named_arrays import Shapes, light_field_from_arrays
 from sepi.io.readers.options import ReadOptions
@@ -82,7 +82,8 @@ def read(path: Path, options: ReadOptions) -> LightField:
 def array_shapes(path: Path) -> Shapes:
     """Shape and type, as MATLAB shows them, of each array of real numbers in a file; their values are not read."""
     head = _head(path)
-    if head[-4:] in _BYTE_ORDERS:
+    # what begins with a zero is of version 4 to SciPy, whatever else the header says
+    if head[-4:] in _BYTE_ORDERS and 0 not in head[:4]:
         from scipy.io import whosmat
 
         with reading(path, _KIND), warnings.catch_warnings(action="ignore"):
@@ -122,21 +123,35 @@ def _real_arrays(path: Path) -> set[str]:
             if end > path.stat().st_size:
                 raise SepiError("damaged MATLAB file: it is cut off")
             head = file.read(min(length, _PREFIX))
+            # bytes that the values can take
+            most = length
             if kind == _COMPRESSED:
+                most = length * DEFLATE_RATIO
                 head = zlib.decompressobj().decompress(head, _PREFIX)
                 kind, head = struct.unpack_from(order + "I", head)[0], head[8:]
             flags = struct.unpack_from(order + "I", head, 8)[0] if kind == _MATRIX else 0
             if flags & 0xFF in _CLASSES and not flags & (_COMPLEX | _LOGICAL):
-                _, _, name, (stored_as, _) = _parts(order, head)
-                if stored_as not in _TYPES:
-                    raise SepiError(f"damaged MATLAB file: an array with values of type {stored_as}")
-                names.add(name[1].decode("latin-1"))
+                *before, values = _parts(order, head)
+                if values.kind not in _TYPES:
+                    raise SepiError(f"damaged MATLAB file: an array with values of type {values.kind}")
+                # SciPy takes memory on its word; the parts before it were here
+                if values.length > most:
+                    raise ValueError("an array that is longer than the file")
+                names.add(before[2].data.decode("latin-1"))
             file.seek(end)
     return names
 
 
-def _parts(order: str, head: bytes) -> list[tuple[int, bytes]]:
-    """Type and data of the first four elements of a matrix; of the values only as much as ``head`` holds."""
+class _Part(NamedTuple):
+    """An element: its type, the length that its tag states, and as much of its data as was looked at."""
+
+    kind: int
+    length: int
+    data: bytes
+
+
+def _parts(order: str, head: bytes) -> list[_Part]:
+    """The first four elements of a matrix."""
     parts = []
     at = 0
     for _ in range(4):
@@ -145,7 +160,7 @@ def _parts(order: str, head: bytes) -> list[tuple[int, bytes]]:
         if kind >> 16:
             # up to four bytes of data stand in the tag itself
             kind, length, start, after = kind & 0xFFFF, kind >> 16, at + 4, at + 8
-        parts.append((kind, head[start : start + length]))
+        parts.append(_Part(kind, length, head[start : start + length]))
         at = after
     return parts
 
@@ -164,5 +179,4 @@ def _is_turned(path: Path, dataset: h5py.Dataset) -> bool:
 def _is_numbers(entry: Any) -> bool:
     if not isinstance(entry, h5py.Dataset) or entry.dtype.kind not in "iuf" or entry.shape is None:
         return False
-    kind = entry.attrs.get("MATLAB_class", b"double")
-    return (kind.decode(errors="replace") if isinstance(kind, bytes) else str(kind)) in _NUMBERS
+    return "MATLAB_class" not in entry.attrs or attribute(entry, "MATLAB_class") in _NUMBERS

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import math
 import warnings
 import zipfile
 from pathlib import Path
@@ -60,6 +61,9 @@ def array_shapes(path: Path) -> Shapes:
                 _require_room(path, info)
                 with archive.open(info) as file:
                     shape, _, kind = _HEADERS[npy.read_magic(file)](file)
+                # NumPy takes memory for it before it reads
+                if math.prod(shape) * kind.itemsize > info.file_size:
+                    raise ValueError(f"{info.filename} of shape {shape} cannot lie in {info.file_size} bytes")
                 found[info.filename.removesuffix(".npy")] = shape, kind
     return found
 

@@ -22,7 +22,7 @@ import h5py
 import numpy as np
 
 from sepi.errors import SepiError, printable
-from sepi.io.hdf5 import open_hdf5, read_dataset
+from sepi.io.hdf5 import attribute, open_hdf5, read_dataset
 from sepi.io.readers.arrays import Array, light_field_from_array
 from sepi.io.readers.options import ReadOptions
 from sepi.lightfield import LightField
@@ -124,13 +124,14 @@ def _mosaic(path: Path, dataset: h5py.Dataset, shape: tuple[int, int], kind: int
 
 
 def _number(path: Path, group: h5py.Group, key: str) -> int:
-    values = np.ravel(group.attrs[key])
+    given = attribute(group, key)
+    values = np.ravel(given)
     if values.size != 1 or values.dtype.kind not in "iuf" or not 0 <= values[0] < 2**31 or values[0] != int(values[0]):
-        raise SepiError(f"{path}: expected the attribute '{key}' to be a whole number, got {group.attrs[key]!r}")
+        raise SepiError(f"{path}: expected the attribute '{key}' to be a whole number, got {given!r}")
     return int(values[0])
 
 
 def _length(group: h5py.Group, key: str) -> float:
     """An attribute that is a number; NaN where there is none."""
-    values = np.ravel(group.attrs.get(key, math.nan))
+    values = np.ravel(attribute(group, key) if key in group.attrs else math.nan)
     return float(values[0]) if values.size == 1 and values.dtype.kind in "iuf" else math.nan

@@ -201,7 +201,10 @@ class _Group:
         self._texts = cut[self.names[0]].texts
         cuts = [cut[name] for name in self.names]
         self._hyphens = _separators([[signs for signs, _ in name.numbers] for name in cuts])
-        self._decimal_hyphens = _separators([[signs for signs, _ in name.decimals] for name in cuts])
+        # where some names have a decimal number and others a whole one, they do not say where cameras stood
+        self._decimals_alike = len({tuple("." in text for _, text in name.numbers) for name in cuts}) == 1
+        decimals = [[signs for signs, _ in name.decimals] for name in cuts] if self._decimals_alike else []
+        self._decimal_hyphens = _separators(decimals)
         everything = range(len(cuts[0].numbers))
         # decimals that count do so in steps of their own
         self._origins = [(0, 1) for _ in everything]
@@ -223,7 +226,9 @@ class _Group:
         )
 
     def decimals_of(self, name: str) -> tuple[float, ...]:
-        """The decimal numbers of one of the group's names."""
+        """The decimal numbers of one of the group's names; none where not all names have them in the same places."""
+        if not self._decimals_alike:
+            return ()
         decimals = zip(self._cut(name).decimals, self._decimal_hyphens, strict=True)
         return tuple(-float(text) if _is_minus(signs, hyphen) else float(text) for (signs, text), hyphen in decimals)
 

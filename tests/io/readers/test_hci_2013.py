@@ -153,3 +153,13 @@ def test_a_group_or_nothing_in_place_of_the_views(tmp_path: Path) -> None:
 def test_axes_are_fixed(tmp_path: Path) -> None:
     for options in ({"axes": "TSHWC"}, {"variable": "LF"}, {"grid": (3, 5)}, {"follow_links": True}):
         assert "does not apply" in refused(write(tmp_path / "a.h5"), **options)
+
+
+def test_depth_that_signals_is_unknown_without_a_word(tmp_path: Path) -> None:
+    """A NaN of the sort that processors signal came out as a warning about a cast."""
+    depth = DEPTH.copy()
+    depth[1, 2, 0, 0] = np.array([0x7FA00000], np.uint32).view(np.float32)[0]
+    raw = depth.view(np.uint32)
+    raw[1, 2, 0, 0] = 0x7FA00000
+    ground_truth = taken(write(tmp_path / "a.h5", depth=depth)).ground_truth
+    assert np.isnan(ground_truth[0, 0])

@@ -761,3 +761,9 @@ def test_lytro_views_are_read(real_data: Path) -> None:
     assert light_field.grid == (9, 9)
     assert light_field.present.all()
     np.testing.assert_array_equal(light_field.views[2, 6], imageio.imread(folder / "2067_03_07.png")[:, :, :3])
+
+
+def test_names_with_decimals_in_different_places_are_read(tmp_path: Path) -> None:
+    """One name with a whole number where others have decimals used to end in a traceback."""
+    names = [f"{468.125 + 4.5 * s}_{-703.25 + 4.5 * t}.png" for t in range(3) for s in range(3)]
+    assert len(infer_view_numbers("folder", ["4294967295_-703.25.png", *names[1:]]).numbers) == 9

@@ -288,3 +288,11 @@ def test_three_arrays_that_differ_are_not_the_colours_of_one(tmp_path: Path) -> 
     scipy.io.savemat(tmp_path / "a.mat", arrays)
     with pytest.raises(SepiError, match="choose one with --variable"):
         read(tmp_path / "a.mat", ReadOptions())
+
+
+def test_a_header_that_scipy_takes_for_version_4(tmp_path: Path) -> None:
+    """One byte of zero in it, and SciPy takes memory on the word of a header that is none."""
+    scipy.io.savemat(tmp_path / "a.mat", {"LF": LF})
+    content = (tmp_path / "a.mat").read_bytes()
+    (tmp_path / "a.mat").write_bytes(content[:3] + b"\0" + content[4:])
+    assert "not a MATLAB file of version 5 or 7.3" in refused(tmp_path / "a.mat")

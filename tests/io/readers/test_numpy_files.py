@@ -153,3 +153,14 @@ def test_records_and_other_content_are_refused(tmp_path: Path) -> None:
     with zipfile.ZipFile(tmp_path / "pictures.npz", "w") as archive:
         archive.writestr("readme.txt", "views")
     assert "found: nothing" in refused(tmp_path / "pictures.npz")
+
+
+def test_a_member_whose_header_claims_more_than_the_archive(tmp_path: Path) -> None:
+    """NumPy would take 240 GB for it, and the user would be told of memory rather than of the file."""
+    header = io.BytesIO()
+    np.lib.format.write_array_header_1_0(
+        header, {"descr": "|u1", "fortran_order": False, "shape": (2, 2, 10**6, 10**5)}
+    )
+    with zipfile.ZipFile(tmp_path / "lie.npz", "w") as archive:
+        archive.writestr("LF.npy", header.getvalue() + bytes(100))
+    assert "not a NumPy file, or damaged" in refused(tmp_path / "lie.npz")

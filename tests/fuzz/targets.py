@@ -1,0 +1,121 @@
+"""The readers of all that a user hands in, by name: what they begin with, and how they are called."""
+
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+import seed_files as seeds
+import texts
+from executions import Target
+from mutations import MAT, PNG
+
+from sepi.cli.scene_argument import view_of
+from sepi.errors import SepiError
+from sepi.io.disparity_maps import is_disparity, read_disparity
+from sepi.io.external_maps import read_external
+from sepi.io.hdf5 import read_light_field as read_own
+from sepi.io.hdf5 import read_stage
+from sepi.io.images import picture_header, png_texts, read_picture
+from sepi.io.provenance import history_of
+from sepi.io.readers.formats import format_of, read
+from sepi.io.readers.options import ReadOptions
+from sepi.io.readers.sizes import size_of
+from sepi.io.result_folder import read_result
+from sepi.io.scores import read_evaluations, read_scores
+from sepi.reading import read_light_field
+from sepi.report.runs import read_numbers
+from sepi.scoring.hci_submission import problems_of
+
+
+def _each(*reads: Callable[[Path], object]) -> Callable[[Path], object]:
+    """Every one of several readers of a file, also where another refuses it; the first refusal is raised."""
+
+    def read_all(path: Path) -> None:
+        refused = []
+        for one in reads:
+            try:
+                one(path)
+            except SepiError as error:
+                refused.append(error)
+        if refused:
+            raise refused[0]
+
+    return read_all
+
+
+def _light_field(path: Path) -> None:
+    """A light field as ``sepi depth`` reads it, but for what it finds out from the pixels."""
+    # of damaged files it must give some size, since the workflow plans with them, too
+    size_of([path])
+    format_of(path)
+    read(path, ReadOptions())
+
+
+def _picture(path: Path) -> None:
+    png_texts(path)
+    picture_header(path)
+    read_picture(path)
+
+
+def _map(path: Path) -> None:
+    is_disparity(path)
+    read_disparity(path)
+    read_disparity(path, scale=-0.5, offset=1)
+
+
+def _map_with_scale(path: Path) -> None:
+    read_disparity(path, scale=1e300, offset=-1e300)
+
+
+def _submission(path: Path) -> None:
+    for problem in problems_of(path, partial=True):
+        if not problem.isprintable():
+            # as a user sees it
+            raise SepiError(problem)
+
+
+def _pictures_of(seed: Callable[[Path], Iterable[bytes]], ending: str) -> Target:
+    return Target(f"a.{ending}", seed, _picture)
+
+
+def _hdf5(seed: Callable[[Path], Iterable[bytes]], *reads: Callable[[Path], object], name: str = "a.h5") -> Target:
+    return Target(name, seed, _each(*reads))
+
+
+TARGETS: dict[str, Target] = {
+    "png": Target("a.png", seeds.png_files, _picture, wrappings=PNG),
+    "jpeg": _pictures_of(seeds.jpeg_files, "jpg"),
+    "tiff": _pictures_of(seeds.tiff_files, "tif"),
+    "bmp": _pictures_of(seeds.bmp_files, "bmp"),
+    "webp": _pictures_of(seeds.webp_files, "webp"),
+    "pnm": _pictures_of(seeds.pnm_files, "pgm"),
+    "pfm": Target("a.pfm", seeds.pfm_files, _each(_map, _map_with_scale)),
+    "map-npy": Target("a.npy", seeds.npy_map_files, _each(_map, _map_with_scale)),
+    "map-png": Target("a.png", texts.map_png_files, _each(_map, _map_with_scale), wrappings=PNG),
+    "map-hdf5": _hdf5(seeds.hdf5_map_files, _map),
+    "hci-parameters": Target("parameters.cfg", texts.parameter_files, texts.read_parent, seeds.hci_pictures),
+    "hci-mask": Target("mask_occluded.png", seeds.mask_files, texts.read_parent, seeds.hci_folder, wrappings=PNG),
+    "hci-truth": Target("gt_disp_lowres.pfm", seeds.pfm_files, texts.read_parent, seeds.hci_folder),
+    "hci-2013": _hdf5(seeds.hci_2013_files, _light_field),
+    "openlf": _hdf5(seeds.open_lf_files, _light_field),
+    "mat-5": Target("a.mat", seeds.mat_5_files, _light_field, wrappings=MAT),
+    "mat-7.3": _hdf5(seeds.mat_7_3_files, _light_field, name="a.mat"),
+    "npy": Target("a.npy", seeds.npy_files, _light_field),
+    "npz": Target("a.npz", seeds.npz_files, _light_field, wrappings=(seeds.NPZ,)),
+    "eslf": Target("a_eslf.png", texts.lenslet_files, _light_field, wrappings=PNG),
+    "looked-at": Target("a.npy", texts.larger_npy_files, read_light_field),
+    "own-light-field": _hdf5(seeds.own_light_field_files, read_own, _light_field),
+    "stage": _hdf5(seeds.stage_files, read_stage, history_of, view_of),
+    "result": _hdf5(seeds.result_files, read_result, view_of, _map),
+    "scores": _hdf5(seeds.score_files, read_evaluations, read_scores),
+    "external-maps": _hdf5(seeds.external_files, read_external, lambda path: read_external(path, with_maps=False)),
+    "submission": Target("a.zip", seeds.submission_files, _submission, wrappings=(seeds.SUBMISSION,)),
+    "runtime": Target("runtime.txt", texts.runtime_files, texts.read_runtime),
+    "json": Target("a.json", seeds.json_files, read_numbers),
+    "json-flags": Target("a.json", seeds.json_files, texts.read_json_flags, names_path=False),
+    "names-of-views": Target("names.txt", texts.name_files, texts.read_names, texts.one_picture),
+    "pattern": Target("pattern.txt", texts.pattern_files, texts.read_pattern, names_path=False),
+    "config": Target("config.yaml", texts.config_files, texts.read_config, texts.config_folder, names_path=False),
+    "flags": Target("flags.txt", texts.flag_files, texts.read_flags, texts.flag_folder, names_path=False),
+    "settings": Target("settings.txt", texts.setting_files, texts.read_settings, names_path=False),
+}
+"""Name to target."""

@@ -1,0 +1,113 @@
+"""Damage in pictures is told by one line, and not printed by libpng or libjpeg; pixels are those that OpenCV gives."""
+
+import struct
+import tracemalloc
+import zlib
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from PIL import Image
+
+from sepi.errors import SepiError
+from sepi.io.images import read_picture
+
+SMOOTH = np.stack([*np.mgrid[:40, :50], np.full((40, 50), 100)], 2).astype(np.uint8)
+PICTURE = Image.fromarray(SMOOTH)
+
+
+def silent(path: Path, capfd: pytest.CaptureFixture[str]) -> np.ndarray | str:
+    """A picture, or the line with which it is refused; libraries in C say nothing."""
+    try:
+        found: np.ndarray | str = read_picture(path)
+    except SepiError as error:
+        found = str(error)
+    assert capfd.readouterr() == ("", "")
+    return found
+
+
+def chunk(kind: bytes, body: bytes) -> bytes:
+    return struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body))
+
+
+@pytest.mark.parametrize("kind", [np.uint8, np.uint16])
+def test_png_whose_pixels_do_not_fit_their_own_checksum(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], kind: type
+) -> None:
+    """They are not those that were written; libpng would print a line without the file's name, and go on."""
+    rows = np.zeros((4, 1 + 5 * 3 * kind().itemsize), np.uint8).tobytes()
+    packed = bytearray(zlib.compress(rows))
+    packed[-1] ^= 1
+    head = struct.pack(">IIBBBBB", 5, 4, 8 * kind().itemsize, 2, 0, 0, 0)
+    parts = chunk(b"IHDR", head), chunk(b"IDAT", bytes(packed)), chunk(b"IEND", b"")
+    (tmp_path / "a.png").write_bytes(b"\x89PNG\r\n\x1a\n" + b"".join(parts))
+    assert str(silent(tmp_path / "a.png", capfd)).startswith(f"{tmp_path / 'a.png'}: ")
+
+
+@pytest.mark.parametrize("kind", [np.uint8, np.uint16])
+def test_png_with_chunks_that_libpng_warns_of(tmp_path: Path, capfd: pytest.CaptureFixture[str], kind: type) -> None:
+    """A colour profile that it does not like would be a line on the terminal for each of a hundred views."""
+    pixels = np.arange(60, dtype=kind).reshape(4, 5, 3)
+    plain = cv2.imencode(".png", pixels[:, :, ::-1])[1].tobytes()
+    profile = chunk(b"iCCP", b"sRGB\0\0" + zlib.compress(bytes(40)))
+    (tmp_path / "a.png").write_bytes(plain[:33] + profile + chunk(b"PLTE", bytes(3)) + plain[33:])
+    np.testing.assert_array_equal(silent(tmp_path / "a.png", capfd), pixels)
+
+
+def test_jpeg_with_bytes_that_do_not_belong(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    """The library goes on after them; it used to print a line without the file's name."""
+    whole = cv2.imencode(".jpg", SMOOTH)[1].tobytes()
+    (tmp_path / "a.jpg").write_bytes(whole[:20] + b"\0\0\0" + whole[20:])
+    assert isinstance(silent(tmp_path / "a.jpg", capfd), np.ndarray)
+
+
+def test_jpeg_that_claims_to_be_huge_takes_no_memory(tmp_path: Path) -> None:
+    """It used to be decoded before its size was looked at: 12 GB for a file of a kilobyte."""
+    whole = cv2.imencode(".jpg", SMOOTH)[1].tobytes()
+    at = whole.index(b"\xff\xc0") + 5
+    (tmp_path / "a.jpg").write_bytes(whole[:at] + struct.pack(">HH", 65000, 65000) + whole[at + 4 :])
+    tracemalloc.start()
+    try:
+        with pytest.raises(SepiError, match="pixels cannot be in a JPEG"):
+            read_picture(tmp_path / "a.jpg")
+        assert tracemalloc.get_traced_memory()[1] < 10**7
+    finally:
+        tracemalloc.stop()
+
+
+@pytest.mark.parametrize("tag", [256, 257])
+def test_tiff_of_several_widths_takes_no_memory(tmp_path: Path, tag: int) -> None:
+    """It used to be a list of as many numbers as the other side says, or no memory left."""
+    whole = cv2.imencode(".tif", SMOOTH, (cv2.IMWRITE_TIFF_COMPRESSION, 1))[1].tobytes()
+    entries = {number: next(at for at in range(len(whole)) if is_entry(whole, at, number)) for number in (256, 257)}
+    for number, at in entries.items():
+        claimed = struct.pack("<HHII", number, 4, 2, 16) if number == tag else struct.pack("<HHII", number, 4, 1, 10**9)
+        whole = whole[:at] + claimed + whole[at + 12 :]
+    (tmp_path / "a.tif").write_bytes(whole)
+    with pytest.raises(SepiError, match=r"a\.tif: .*damaged"):
+        read_picture(tmp_path / "a.tif")
+
+
+def is_entry(tiff: bytes, at: int, tag: int) -> bool:
+    """Whether an entry of this tag, of one short or long number, stands in a TIFF."""
+    return tiff[at : at + 8] in (struct.pack("<HHI", tag, kind, 1) for kind in (3, 4))
+
+
+SORTS = {
+    "palette": PICTURE.quantize(9),
+    "palette of 1 bit": PICTURE.quantize(2),
+    "1 bit": PICTURE.convert("1"),
+    "grey": PICTURE.convert("L"),
+}
+
+
+@pytest.mark.parametrize("sort", SORTS)
+@pytest.mark.parametrize("transparent", [False, True])
+def test_every_sort_of_png_is_read_as_opencv_reads_it(tmp_path: Path, sort: str, transparent: bool) -> None:
+    """Colours must not depend on who decodes them."""
+    SORTS[sort].save(tmp_path / "a.png", **({"transparency": 1} if transparent else {}))
+    found = read_picture(tmp_path / "a.png")
+    expected = cv2.imread(str(tmp_path / "a.png"), cv2.IMREAD_UNCHANGED)
+    expected = expected[:, :, None] if expected.ndim == 2 else expected[:, :, 2::-1]
+    np.testing.assert_array_equal(found, expected[:, :, : found.shape[2]])
