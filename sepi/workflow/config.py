@@ -24,13 +24,11 @@ from sepi.pipeline import VARIANT_ENTRIES, VARIANTS, Variant, variant_from
 from sepi.scenes import SCENES
 from sepi.stage import Parameters
 from sepi.validation import require_known, validated
-from sepi.workflow.datasets import Scene, own_scene, scenes_in
+from sepi.workflow.datasets import LONGEST_NAME, Scene, own_scene, require_plain_path, scenes_in
 from sepi.workflow.parameters import default_values, stage_settings
 
 # names of folders, panels and columns of tables that stand beside those of variants
 _RESERVED = ("stages", "external", "ground_truth", "reference_view", "dataset", "scene", "row", "region")
-# a file name holds 255 bytes, and pictures of a method are folders of its name
-_LONGEST_METHOD = 80
 # the built-in scenes have 9x9 views
 _BUILTIN_VIEWS = 81
 # keys whose values are text even where they look like numbers
@@ -307,6 +305,9 @@ def _scenes(config: Config) -> dict[str, Scene]:
         scenes.append(own_scene(name, Path(own.path).expanduser(), own.flags, where))
     if not scenes:
         raise SepiError("config: no scene to run on; name some in builtin.scenes or light_fields, or set hci_root")
+    for scene in scenes:
+        for file in scene.files:
+            require_plain_path(str(file), f"config: scene {scene.dataset}/{scene.name}")
     return {f"{scene.dataset}/{scene.name}": scene for scene in scenes}
 
 
@@ -315,8 +316,11 @@ def _variant(name: str, entries: Mapping[str, Any]) -> Variant:
     where = f"config.variants.{name}"
     if name in VARIANTS and variant != VARIANTS[name]:
         raise SepiError(f"{where}: a built-in variant has a fixed meaning; give yours another name")
-    if not name.isidentifier() or name in _RESERVED:
-        raise SepiError(f"{where}: a variant's name must be letters, digits and _, and none of {', '.join(_RESERVED)}")
+    if not name.isidentifier() or name in _RESERVED or len(name.encode()) > LONGEST_NAME:
+        raise SepiError(
+            f"{where}: a variant's name must be letters, digits and _, at most {LONGEST_NAME}, and none of "
+            f"{', '.join(_RESERVED)}"
+        )
     return variant
 
 
@@ -326,12 +330,13 @@ def _external(name: str, entry: Mapping[str, Any], variants: Collection[str]) ->
     if name in variants:
         raise SepiError(f"{where}: a variant has this name; give the method another")
     plain = name.strip() == name != "" and "/" not in name and not name.startswith(".") and name.isprintable()
-    if not plain or len(name.encode()) > _LONGEST_METHOD:
+    if not plain or len(name.encode()) > LONGEST_NAME:
         raise SepiError(
-            f"config.external.{name[:_LONGEST_METHOD]}: a method's name must be printable text without '/', not "
-            f"beginning with '.', of at most {_LONGEST_METHOD} bytes"
+            f"config.external.{name[:LONGEST_NAME]}: a method's name must be printable text without '/', not "
+            f"beginning with '.', of at most {LONGEST_NAME} bytes"
         )
     require_known(f"{where}.path", re.findall(r"\{[^{}]*\}", source.path), ("{dataset}", "{scene}"))
+    require_plain_path(source.path.replace("{dataset}", "").replace("{scene}", ""), f"{where}.path")
     path = Path(os.path.expanduser(source.path))
     if "{scene}" not in source.path and (path.is_file() or (path.suffix.lower() in SUFFIXES and not path.is_dir())):
         # one file would be taken for the map of every scene

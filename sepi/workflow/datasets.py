@@ -14,10 +14,15 @@ from sepi.io.readers import hci_2013
 from sepi.io.readers.sizes import size_of
 
 VIEW_PATTERN = "input_Cam*.png"
+
+LONGEST_NAME = 80
+"""Bytes of the name of a scene, a variant or a method: a file's holds 255, and some are made of several."""
+
 # what a scene's folder may hold besides views, and ingest reads
 _OTHER_PATTERNS = ("parameters.cfg", "gt_disp_lowres.pfm", "*mask*.png")
 # a scene's name is a folder name below results/ and a word on the command line
-_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.+-]*")
+_NAME = re.compile(rf"[A-Za-z0-9][A-Za-z0-9_.+-]{{0,{LONGEST_NAME - 1}}}")
+_REPLACED = re.compile("<[a-z][a-z0-9_]*>|[{}]+")
 # what Python and its libraries take before any data, in MB
 _LIBRARIES = 300
 # seconds that Python takes to start and to import, and how much slower than measured a cluster's node may be, with
@@ -96,6 +101,19 @@ class Scene:
         return math.ceil((_START_SECONDS + _SLOWER * measured) / 60)
 
 
+def require_plain_path(path: str, where: str) -> None:
+    """Refuse a path that Snakemake would take for another.
+
+    Raises
+    ------
+    SepiError
+        If there is a word in angle brackets in it, or a brace, which Snakemake replaces.
+    """
+    found = _REPLACED.search(path)
+    if found:
+        raise SepiError(f"{where}: Snakemake would replace '{found[0]}' in '{path}'; rename it, or link to it")
+
+
 def scenes_in(root: Path, dataset: str, where: str) -> list[Scene]:
     """Every light field of a dataset below a folder, by name.
 
@@ -150,7 +168,9 @@ def own_scene(name: str, source: Path, flags: tuple[str, ...], where: str) -> Sc
 
 def _require_plain(name: str, where: str) -> None:
     if not _NAME.fullmatch(name):
-        raise SepiError(f"{where}: a scene must be named with letters, digits and _ . + - only: '{name}'")
+        raise SepiError(
+            f"{where}: a scene must be named with letters, digits and _ . + - only, at most {LONGEST_NAME}: '{name}'"
+        )
 
 
 def _benchmark_scenes(folder: Path, depth: int = _DEPTH) -> Iterator[Scene]:
