@@ -194,13 +194,13 @@ def smooth_second_order(
     """Second-order smoothing of ``target``, whose discontinuities are looked for in ``shape``; all shapes (H, W), but
     for the colours ``guide``, (H, W, 3).
     """
-    from sepi.regularization.second_order import second_difference_matrix, smoothness_weights, solve_smooth
+    from sepi.regularization.second_order import second_difference_stencil, smoothness_weights, solve_smooth
 
     variance = parameters.smooth_colour**2 + 4 * residual_variance(guide)
     weights = smoothness_weights(shape, guide, reliability, parameters.second_difference_threshold, variance)
     weights = [parameters.strength * w + LEAST_SMOOTHNESS for w in weights]
-    matrix = second_difference_matrix(weights, target.shape)
-    return solve_smooth(matrix, weight, target, parameters.rtol, parameters.max_iterations)
+    stencil = second_difference_stencil(weights, target.shape)
+    return solve_smooth(stencil, weight, target, parameters.rtol, parameters.max_iterations)
 
 
 CHOICES = {
