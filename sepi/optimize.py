@@ -23,8 +23,9 @@ import cv2
 import numpy as np
 from pydantic import Field, model_validator
 
+from sepi.image.noise import residual_variance
 from sepi.lightfield import FloatMap, LightField
-from sepi.matching.base_detail import BaseDetail, BaseDetailParameters, base_detail_decomposition
+from sepi.matching.base_detail import BaseDetailParameters, base_detail_decomposition
 from sepi.regularization.wls import (
     WlsParameters,
     data_weight,
@@ -128,8 +129,7 @@ def second_order(
     from sepi.matching.visibility_kernels import z_buffers
 
     before = require_previous(previous)
-    layers = base_detail_decomposition(light_field, parameters)
-    matching = spline_views(light_field, layers, parameters)
+    matching = spline_views(light_field, base_detail_decomposition(light_field, parameters, last=True), parameters)
     disparity = before.disparity
     uniform = before.mask("textureless")
     reliability = np.where(uniform, 1, reliable(before.confidence, parameters)).astype(np.float32)
@@ -149,7 +149,9 @@ def second_order(
         if smooth:
             weight = np.minimum(curvature / max(float(np.percentile(curvature, 90)), 1e-9), 1) * reliability
             weight = np.where(uniform, np.float32(UNIFORM_WEIGHT), weight)
-            target = smooth_second_order(target, disparity, weight, reliability, layers, parameters)
+            # as large as all views, and made anew for the next step
+            del nearest
+            target = smooth_second_order(target, disparity, weight, reliability, light_field.reference_view, parameters)
         disparity = target
     return before.updated(disparity, smooth_confidence(disparity, curvature))
 
@@ -186,17 +188,19 @@ def smooth_second_order(
     shape: FloatMap,
     weight: FloatMap,
     reliability: FloatMap,
-    layers: BaseDetail,
+    guide: FloatMap,
     parameters: SecondOrderParameters,
 ) -> FloatMap:
-    """Second-order smoothing of ``target``, whose discontinuities are looked for in ``shape``; all shapes (H, W)."""
-    from sepi.regularization.second_order import second_difference_matrix, smoothness_weights, solve_smooth
+    """Second-order smoothing of ``target``, whose discontinuities are looked for in ``shape``; all shapes (H, W), but
+    for the colours ``guide``, (H, W, 3).
+    """
+    from sepi.regularization.second_order import second_difference_stencil, smoothness_weights, solve_smooth
 
-    variance = parameters.smooth_colour**2 + 4 * layers.noise
-    weights = smoothness_weights(shape, layers.guide, reliability, parameters.second_difference_threshold, variance)
+    variance = parameters.smooth_colour**2 + 4 * residual_variance(guide)
+    weights = smoothness_weights(shape, guide, reliability, parameters.second_difference_threshold, variance)
     weights = [parameters.strength * w + LEAST_SMOOTHNESS for w in weights]
-    matrix = second_difference_matrix(weights, target.shape)
-    return solve_smooth(matrix, weight, target, parameters.rtol, parameters.max_iterations)
+    stencil = second_difference_stencil(weights, target.shape)
+    return solve_smooth(stencil, weight, target, parameters.rtol, parameters.max_iterations)
 
 
 CHOICES = {

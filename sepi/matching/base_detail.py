@@ -105,13 +105,17 @@ class BaseDetail(NamedTuple):
         return scale**2 + self.noise
 
 
-def base_detail_decomposition(light_field: LightField, parameters: BaseDetailParameters) -> BaseDetail:
+def base_detail_decomposition(
+    light_field: LightField, parameters: BaseDetailParameters, *, last: bool = False
+) -> BaseDetail:
     """Colours and detail of a light field; missing views stay empty.
 
     Parameters
     ----------
     light_field : LightField
     parameters : BaseDetailParameters
+    last : bool
+        Whether no later stage needs the detail: it is not kept for one then (:func:`shared_detail`).
 
     Returns
     -------
@@ -120,11 +124,12 @@ def base_detail_decomposition(light_field: LightField, parameters: BaseDetailPar
     views, guide = light_field.rgb_views, light_field.reference_view
     edge = float(np.hypot(parameters.base_sigma_colour, 3 * noise_level(guide)))
     if parameters.detail_share > 0:
-        detail = _detail_of_views(light_field, parameters.base_radius, edge, parameters.base_sigma_space)
+        detail = _detail_of_views(light_field, parameters.base_radius, edge, parameters.base_sigma_space, last)
     else:
         detail = np.empty((*light_field.grid, 0, *light_field.shape), np.int16)
     return BaseDetail(
-        np.ascontiguousarray(views.transpose(0, 1, 4, 2, 3)),
+        # as they are in memory: nothing is copied
+        views.transpose(0, 1, 4, 2, 3),
         np.float32(1 / full_scale(views.dtype)),
         detail,
         np.float32(DETAIL_UNIT),
@@ -149,18 +154,20 @@ def shared_detail() -> Iterator[None]:
         _shared.reset(token)
 
 
-def _detail_of_views(light_field: LightField, radius: int, edge: float, width: float) -> npt.NDArray[np.int16]:
+def _detail_of_views(
+    light_field: LightField, radius: int, edge: float, width: float, last: bool
+) -> npt.NDArray[np.int16]:
     """Each view without its edge-preserving mean; shape (T, S, 3, H, W)."""
     shared = _shared.get()
     key = (id(light_field.views), light_field.present.tobytes(), radius, edge, width)
     if shared is not None and key in shared:
-        return shared[key][1]
+        return shared.pop(key)[1] if last else shared[key][1]
     detail = np.zeros((*light_field.grid, 3, *light_field.shape), np.int16)
     for t, s in np.argwhere(light_field.present):
         view = as_unit_float(light_field.rgb_views[t, s])
         base = cv2.bilateralFilter(view, 2 * radius + 1, edge, width)
         detail[t, s] = np.rint(np.clip(view - base, -1, 1) / DETAIL_UNIT).astype(np.int16).transpose(2, 0, 1)
-    if shared is not None:
+    if shared is not None and not last:
         # with the views, so that no other array gets their id meanwhile
         shared[key] = light_field.views, detail
     return detail

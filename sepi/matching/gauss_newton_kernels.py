@@ -173,10 +173,8 @@ def _row(splines: Any, row: int, left: int, first: int, b: Any) -> Any:
 
 
 @njit(inline="always")
-def _sample(splines: Any, first: int, y: Any, x: Any) -> Any:
-    """Three channels of a view at a position inside it; ``splines`` has a margin of two coefficients on each side."""
-    top, left = int(y), int(x)
-    a, b = _spline_weights(np.float32(y - top)), _spline_weights(np.float32(x - left))
+def _sample(splines: Any, first: int, top: int, left: int, a: Any, b: Any) -> Any:
+    """Three channels of a view at a position inside it, by its whole pixels and the weights of its fractions."""
     # the margin of 2 and the one coefficient before
     p, q = _row(splines, top + 1, left + 1, first, b), _row(splines, top + 2, left + 1, first, b)
     r, s = _row(splines, top + 3, left + 1, first, b), _row(splines, top + 4, left + 1, first, b)
@@ -200,6 +198,22 @@ def _seen(y: Any, x: Any, nearest: Any, limit: Any) -> Any:
     )
 
 
+@njit(inline="always")
+def _three(values: Any, first: int) -> Any:
+    return values[first], values[first + 1], values[first + 2]
+
+
+@njit(inline="always")
+def _add_to_mean(sample: Any, of: Any, scale2: Any, sums: Any) -> Any:
+    """Sums of three channels and of the weights, with one more sample; ``of``: what it should be like."""
+    v0, v1, v2 = sample
+    m0, m1, m2 = of
+    z = (v0 - m0) ** 2 + (v1 - m1) ** 2 + (v2 - m2) ** 2
+    w = scale2 / (scale2 + z)
+    w *= w
+    return sums[0] + w * v0, sums[1] + w * v1, sums[2] + w * v2, sums[3] + w
+
+
 @njit(parallel=True, cache=True, fastmath=EXACT, error_model="numpy")
 def mean_of_views(views: SplineViews, disparity: Any, nearest: Any, occlusion_margin: Any) -> Any:
     """Mean of the views that see each pixel, those unlike the reference view counting less; shape (H, W, C), float32.
@@ -207,31 +221,57 @@ def mean_of_views(views: SplineViews, disparity: Any, nearest: Any, occlusion_ma
     Arguments as of :func:`sepi.matching.gauss_newton.view_mean`, the margin as float32.
     """
     H, W, C = views.reference.shape
+    with_detail = C > 3
+    second = 3 if with_detail else 0
     out = np.empty((H, W, C), np.float32)
+    one = np.float32(1)
     for y in prange(H):
         for x in range(W):
-            d = disparity[y, x]
+            d, own = disparity[y, x], views.reference[y, x]
             limit = d + occlusion_margin
-            for part in range(C // 3):
-                c, scale2 = 3 * part, views.scales2[part]
-                m0, m1, m2 = views.reference[y, x, c], views.reference[y, x, c + 1], views.reference[y, x, c + 2]
-                total0, total1, total2, weight = m0, m1, m2, np.float32(1)
-                for r in range(views.down.size):
-                    t, fy = views.rows[r], np.float32(y) - d * views.down[r]
-                    for n in range(views.begins[r], views.begins[r + 1]):
-                        s, fx = views.columns[n], np.float32(x) - d * views.across[n]
-                        if not _seen(fy, fx, nearest[t, s], limit):
-                            continue
-                        v0, v1, v2 = _sample(views.splines[t, s], c, fy, fx)
-                        z = (v0 - m0) ** 2 + (v1 - m1) ** 2 + (v2 - m2) ** 2
-                        w = scale2 / (scale2 + z)
-                        w *= w
-                        weight += w
-                        total0 += w * v0
-                        total1 += w * v1
-                        total2 += w * v2
-                out[y, x, c], out[y, x, c + 1], out[y, x, c + 2] = total0 / weight, total1 / weight, total2 / weight
+            colour, detail = _three(own, 0), _three(own, second)
+            of_colour = colour[0], colour[1], colour[2], one
+            of_detail = detail[0], detail[1], detail[2], one
+            for r in range(views.down.size):
+                t, fy = views.rows[r], np.float32(y) - d * views.down[r]
+                top = int(fy)
+                a = _spline_weights(np.float32(fy - top))
+                for n in range(views.begins[r], views.begins[r + 1]):
+                    s, fx = views.columns[n], np.float32(x) - d * views.across[n]
+                    if not _seen(fy, fx, nearest[t, s], limit):
+                        continue
+                    left = int(fx)
+                    b = _spline_weights(np.float32(fx - left))
+                    splines = views.splines[t, s]
+                    of_colour = _add_to_mean(_sample(splines, 0, top, left, a, b), colour, views.scales2[0], of_colour)
+                    if with_detail:
+                        of_detail = _add_to_mean(
+                            _sample(splines, 3, top, left, a, b), detail, views.scales2[1], of_detail
+                        )
+            mean = out[y, x]
+            mean[0], mean[1], mean[2] = (
+                of_colour[0] / of_colour[3],
+                of_colour[1] / of_colour[3],
+                of_colour[2] / of_colour[3],
+            )
+            if with_detail:
+                mean[3], mean[4], mean[5] = (
+                    of_detail[0] / of_detail[3],
+                    of_detail[1] / of_detail[3],
+                    of_detail[2] / of_detail[3],
+                )
     return out
+
+
+@njit(inline="always")
+def _add_to_equations(sample: Any, mean: Any, down: Any, across: Any, v: Any, u: Any, scale2: Any, sums: Any) -> Any:
+    """Slope and curvature of the cost of three channels with one more sample, of a view of baseline ``(v, u)``."""
+    r0, r1, r2 = sample[0] - mean[0], sample[1] - mean[1], sample[2] - mean[2]
+    g0, g1, g2 = down[0] * v + across[0] * u, down[1] * v + across[1] * u, down[2] * v + across[2] * u
+    # derivative of z / (z + scale2) with respect to z
+    w = scale2 / (scale2 + r0 * r0 + r1 * r1 + r2 * r2)
+    w *= w / scale2
+    return sums[0] + w * (r0 * g0 + r1 * g1 + r2 * g2), sums[1] + w * (g0 * g0 + g1 * g1 + g2 * g2)
 
 
 @njit(parallel=True, cache=True, fastmath=EXACT, error_model="numpy")
@@ -253,33 +293,43 @@ def normal_equations(
         Their ratio is the update towards less cost, in pixels per view step.
     """
     H, W, C = mean.shape
+    with_detail = C > 3
+    second = 3 if with_detail else 0
     gradient, curvature = np.zeros((H, W), np.float32), np.zeros((H, W), np.float32)
+    zero = np.float32(0)
     for y in prange(H):
         for x in range(W):
             d = disparity[y, x]
             limit = d + occlusion_margin
-            for part in range(C // 3):
-                c, scale2 = 3 * part, views.scales2[part]
-                m0, m1, m2 = mean[y, x, c], mean[y, x, c + 1], mean[y, x, c + 2]
-                y0, y1, y2 = down[y, x, c], down[y, x, c + 1], down[y, x, c + 2]
-                x0, x1, x2 = across[y, x, c], across[y, x, c + 1], across[y, x, c + 2]
-                slope, hessian = np.float32(0), np.float32(0)
-                for r in range(views.down.size):
-                    t, v = views.rows[r], views.down[r]
-                    fy = np.float32(y) - d * v
-                    for n in range(views.begins[r], views.begins[r + 1]):
-                        s, u = views.columns[n], views.across[n]
-                        fx = np.float32(x) - d * u
-                        if not _seen(fy, fx, nearest[t, s], limit):
-                            continue
-                        v0, v1, v2 = _sample(views.splines[t, s], c, fy, fx)
-                        r0, r1, r2 = v0 - m0, v1 - m1, v2 - m2
-                        g0, g1, g2 = y0 * v + x0 * u, y1 * v + x1 * u, y2 * v + x2 * u
-                        # derivative of z / (z + scale2) with respect to z
-                        w = scale2 / (scale2 + r0 * r0 + r1 * r1 + r2 * r2)
-                        w *= w / scale2
-                        slope += w * (r0 * g0 + r1 * g1 + r2 * g2)
-                        hessian += w * (g0 * g0 + g1 * g1 + g2 * g2)
-                gradient[y, x] += views.shares[part] * slope
-                curvature[y, x] += views.shares[part] * hessian
+            colour, colour_down, colour_across = _three(mean[y, x], 0), _three(down[y, x], 0), _three(across[y, x], 0)
+            detail = _three(mean[y, x], second)
+            detail_down, detail_across = _three(down[y, x], second), _three(across[y, x], second)
+            of_colour, of_detail = (zero, zero), (zero, zero)
+            for r in range(views.down.size):
+                t, v = views.rows[r], views.down[r]
+                fy = np.float32(y) - d * v
+                top = int(fy)
+                a = _spline_weights(np.float32(fy - top))
+                for n in range(views.begins[r], views.begins[r + 1]):
+                    s, u = views.columns[n], views.across[n]
+                    fx = np.float32(x) - d * u
+                    if not _seen(fy, fx, nearest[t, s], limit):
+                        continue
+                    left = int(fx)
+                    b = _spline_weights(np.float32(fx - left))
+                    splines = views.splines[t, s]
+                    of_colour = _add_to_equations(
+                        _sample(splines, 0, top, left, a, b), colour, colour_down, colour_across, v, u,
+                        views.scales2[0], of_colour,
+                    )  # fmt: skip
+                    if with_detail:
+                        of_detail = _add_to_equations(
+                            _sample(splines, 3, top, left, a, b), detail, detail_down, detail_across, v, u,
+                            views.scales2[1], of_detail,
+                        )  # fmt: skip
+            gradient[y, x] += views.shares[0] * of_colour[0]
+            curvature[y, x] += views.shares[0] * of_colour[1]
+            if with_detail:
+                gradient[y, x] += views.shares[1] * of_detail[0]
+                curvature[y, x] += views.shares[1] * of_detail[1]
     return gradient, curvature

@@ -87,6 +87,8 @@ def smooth_and_choose(
 
     variance = np.float32(parameters.window_sigma**2 + noise)
     averaged = aggregate(cost, guide, parameters.window_radius, variance)
+    # the volume is large: it goes, unless the caller holds it
+    del cost
     penalties = parameters.small_penalty, parameters.large_penalty, parameters.colour_weakening
     smoothed = semi_global(averaged, guide, *(np.float32(p) for p in penalties))
     same = min(SAME_MINIMUM, SAME_SHARE * float(disparities[-1] - disparities[0]))

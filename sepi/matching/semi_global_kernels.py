@@ -10,6 +10,9 @@ from numba import njit, prange
 EXACT = {"nnan", "ninf", "nsz"}
 """Fast-math flags that keep every rounding as written: see :mod:`sepi.matching.plane_sweep_kernels`."""
 
+PATHS_AT_ONCE = 32
+"""Paths from row to row that a thread follows together: their costs lie side by side, and fit in its cache."""
+
 _UNREACHABLE = np.float32(1e9)
 
 
@@ -68,42 +71,72 @@ def _start(cost: Any, path: Any) -> Any:
     return cost.min()
 
 
+@njit(inline="always")
+def _add(path: Any, out: Any) -> None:
+    for k in range(out.size):
+        out[k] += path[k + 1]
+
+
+@njit(cache=True, fastmath=EXACT)
+def _along_row(cost: Any, guide: Any, y: int, dx: int, penalties: Any, out: Any) -> None:
+    """Add the smoothed costs of the path along row ``y``."""
+    small, large, weakening = penalties
+    W, K = cost.shape[1:]
+    before, path = np.full(K + 2, _UNREACHABLE, np.float32), np.full(K + 2, _UNREACHABLE, np.float32)
+    least = np.float32(0)
+    for i in range(W):
+        x = i if dx > 0 else W - 1 - i
+        if i == 0:
+            least = _start(cost[y, x], path)
+        else:
+            p = _large_penalty(guide, y, x, y, x - dx, small, large, weakening)
+            least = _next(before, least, cost[y, x], small, p, path)
+        _add(path, out[y, x])
+        before, path = path, before
+
+
+@njit(cache=True, fastmath=EXACT)
+def _along_lines(cost: Any, guide: Any, first: int, last: int, dy: int, dx: int, penalties: Any, out: Any) -> None:
+    """Add the smoothed costs of paths from row to row: those that begin in columns ``first..last``.
+
+    One that leaves the picture at a side goes on, as a new one, at the other: all have a pixel in each row.
+    """
+    small, large, weakening = penalties
+    H, W, K = cost.shape
+    paths = np.full((2, last - first, K + 2), _UNREACHABLE, np.float32)
+    least = np.zeros(last - first, np.float32)
+    for i in range(H):
+        y = i if dy > 0 else H - 1 - i
+        before, path = paths[(i + 1) % 2], paths[i % 2]
+        for line in range(last - first):
+            x = (first + line + dx * i) % W
+            if i == 0 or x - dx < 0 or x - dx >= W:
+                least[line] = _start(cost[y, x], path[line])
+            else:
+                p = _large_penalty(guide, y, x, y - dy, x - dx, small, large, weakening)
+                least[line] = _next(before[line], least[line], cost[y, x], small, p, path[line])
+            _add(path[line], out[y, x])
+
+
 @njit(parallel=True, cache=True, fastmath=EXACT)
 def semi_global(cost: Any, guide: Any, small: Any, large: Any, weakening: Any) -> Any:
-    """Sum of the smoothed costs along eight paths; shapes (H, W, K), float32."""
+    """Sum of the smoothed costs along eight paths; shapes (H, W, K), float32.
+
+    Paths of one direction do not meet, so a thread goes through many of them by itself, from border to border: waiting
+    for each other in every row takes ten times as long where another program has one of the cores.
+    """
     H, W, K = cost.shape
     out = np.zeros((H, W, K), np.float32)
+    penalties = small, large, weakening
     for y in prange(H):
-        for dx in (1, -1):
-            before, path = np.full(K + 2, _UNREACHABLE, np.float32), np.full(K + 2, _UNREACHABLE, np.float32)
-            least = np.float32(0)
-            for i in range(W):
-                x = i if dx > 0 else W - 1 - i
-                if i == 0:
-                    least = _start(cost[y, x], path)
-                else:
-                    p = _large_penalty(guide, y, x, y, x - dx, small, large, weakening)
-                    least = _next(before, least, cost[y, x], small, p, path)
-                for k in range(K):
-                    out[y, x, k] += path[k + 1]
-                before, path = path, before
+        _along_row(cost, guide, y, 1, penalties, out)
+        _along_row(cost, guide, y, -1, penalties, out)
+    pieces = -(-W // PATHS_AT_ONCE)
     for dy in (1, -1):
         for dx in (0, 1, -1):
-            above = np.full((W, K + 2), _UNREACHABLE, np.float32)
-            row = np.full((W, K + 2), _UNREACHABLE, np.float32)
-            least_above, least_row = np.zeros(W, np.float32), np.zeros(W, np.float32)
-            for i in range(H):
-                y = i if dy > 0 else H - 1 - i
-                for x in prange(W):
-                    if i == 0 or x - dx < 0 or x - dx >= W:
-                        least_row[x] = _start(cost[y, x], row[x])
-                    else:
-                        p = _large_penalty(guide, y, x, y - dy, x - dx, small, large, weakening)
-                        least_row[x] = _next(above[x - dx], least_above[x - dx], cost[y, x], small, p, row[x])
-                    for k in range(K):
-                        out[y, x, k] += row[x, k + 1]
-                above, row = row, above
-                least_above, least_row = least_row, least_above
+            for piece in prange(pieces):
+                first = piece * PATHS_AT_ONCE
+                _along_lines(cost, guide, first, min(W, first + PATHS_AT_ONCE), dy, dx, penalties, out)
     return out
 
 

@@ -8,7 +8,7 @@ half-SEPI, with the part of the views chosen view by view. The compiled loops ar
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from pydantic import Field
@@ -23,6 +23,9 @@ from sepi.matching.base_detail import (
 from sepi.matching.candidates import CandidateParameters, CandidateRule, number_field
 from sepi.matching.semi_global import SmoothedResult, SmoothingParameters, smooth_and_choose
 from sepi.stage import OcclusionMarginParameters, Progress
+
+if TYPE_CHECKING:
+    from sepi.matching.visibility_kernels import Visibility
 
 ROWS_PER_REPORT = 128
 """Rows of the picture between two calls of the progress function."""
@@ -77,9 +80,11 @@ def depth_from_all_views(
     SepiError
         If the disparity range is unknown.
     """
+    from sepi.matching.visibility_kernels import Visibility
+
     everywhere = np.empty((*light_field.grid, light_field.shape[0], 0), np.float32)
     views = base_detail_decomposition(light_field, parameters)
-    return _sweep(light_field, views, everywhere, 0.0, 1.0, parameters, progress)
+    return _sweep(light_field, views, Visibility(everywhere, np.float32(0), np.float32(1)), parameters, progress)
 
 
 def depth_from_visible_views(
@@ -105,17 +110,16 @@ def depth_from_visible_views(
     SepiError
         If the disparity range is unknown.
     """
-    from sepi.matching.visibility_kernels import z_buffers
+    from sepi.matching.visibility_kernels import Visibility, z_buffers
 
     views = base_detail_decomposition(light_field, parameters)
+    margin, weight = np.float32(parameters.occlusion_margin), np.float32(parameters.occluded_view_weight)
     n = parameters.passes
     for i in range(n):
         result = _sweep(
             light_field,
             views,
-            z_buffers(disparity, light_field.present, light_field.baselines),
-            parameters.occlusion_margin,
-            parameters.occluded_view_weight,
+            Visibility(z_buffers(disparity, light_field.present, light_field.baselines), margin, weight),
             parameters,
             lambda fraction, i=i: progress((i + fraction) / n),  # type: ignore[misc]
         )
@@ -126,26 +130,37 @@ def depth_from_visible_views(
 def _sweep(
     light_field: LightField,
     views: BaseDetail,
-    nearest: FloatMap,
-    occlusion_margin: float,
-    occluded_view_weight: float,
+    visibility: Visibility,
     parameters: VisibilitySweepParameters,
     progress: Progress,
 ) -> SmoothedResult:
-    from sepi.matching.visibility_kernels import RobustCost, Visibility, sweep_visible_rows
-
-    H, W = light_field.shape
     disparities = parameters.candidates(light_field)
+    # neither is held by a name here: each goes as soon as it has been used
+    cost = [_costs(views, visibility, disparities, parameters, progress)]
+    del visibility
+    result = smooth_and_choose(cost.pop(), disparities, views.guide, views.noise, parameters)
+    progress(1.0)
+    return result
+
+
+def _costs(
+    views: BaseDetail,
+    visibility: Visibility,
+    disparities: FloatMap,
+    parameters: VisibilitySweepParameters,
+    progress: Progress,
+) -> FloatMap:
+    """Cost of every candidate, 0..1; shape (K, H, W), float32."""
+    from sepi.matching.visibility_kernels import RobustCost, sweep_visible_rows
+
+    H, W, _ = views.guide.shape
     cost = np.empty((len(disparities), H, W), np.float32)
     share = parameters.detail_share
     scales2 = [views.squared_scale(s) for s in (parameters.colour_scale, parameters.detail_scale)]
     robust = RobustCost(np.array(scales2, np.float32), np.array([1 - share, share], np.float32))
-    visibility = Visibility(nearest, np.float32(occlusion_margin), np.float32(occluded_view_weight))
     for begin in range(0, H, ROWS_PER_REPORT):
         end = min(H, begin + ROWS_PER_REPORT)
         sweep_visible_rows(views, visibility, robust, disparities, begin, end, cost)
         # the smoothing takes about a fifth of the time
         progress(0.8 * end / H)
-    result = smooth_and_choose(cost, disparities, views.guide, views.noise, parameters)
-    progress(1.0)
-    return result
+    return cost

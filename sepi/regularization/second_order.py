@@ -3,9 +3,10 @@ knows.
 
 Minimises ``sum_p w_p (d_p - z_p)^2 + sum_q c_q (D_q d)^2`` over disparities ``d``, where ``z`` is the data, ``w`` its
 weight, and ``D_q`` the second differences along x, along y and across; ``c_q`` is small where that of the data is
-large, unless the data there is worth little, and where the colours change. The system has 13 entries a row and is
-solved by conjugate gradients; what those are slow at, curvature over long distances, is taken by a direct solve for one
-plane for each block of pixels, added to the diagonal as preconditioner (two-level Schwarz, [1]_).
+large, unless the data there is worth little, and where the colours change. The system has 13 entries a row, a stencil
+that is never put into a sparse matrix, and is solved by conjugate gradients; what those are slow at, curvature over
+long distances, is taken by a direct solve for one plane for each block of pixels, added to the diagonal as
+preconditioner (two-level Schwarz, [1]_). The compiled loops are in :mod:`sepi.regularization.second_order_kernels`.
 
 References
 ----------
@@ -14,19 +15,17 @@ References
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 import numpy.typing as npt
-import scipy.sparse as sparse
-from scipy.sparse.linalg import LinearOperator, cg, splu
 
 from sepi.lightfield import FloatMap
 from sepi.regularization.direct_solver import require_blas_memory
 
 FloatArray = npt.NDArray[np.float64]
 Corner = tuple[slice, slice]
-
-BLOCK = 8
-"""Width of the preconditioner's blocks, pixels."""
 
 _ALL = slice(None)
 # first, middle, last pixel of second differences along x and y; corners of the mixed difference
@@ -77,31 +76,56 @@ def smoothness_weights(
     ]
 
 
-def second_difference_matrix(weights: list[FloatArray], shape: tuple[int, int]) -> sparse.csr_matrix:
-    """Matrix of the smoothness term: ``d^T A d`` is the weighted sum of squared second differences."""
-    numbers = np.arange(shape[0] * shape[1], dtype=np.int32).reshape(shape)
-    total = sparse.csr_matrix((numbers.size, numbers.size))
-    for corners, factors, weight in zip(
-        (_ALONG_X, _ALONG_Y, _ACROSS), (_SECOND, _SECOND, _MIXED), weights, strict=True
+def second_difference_stencil(weights: list[FloatArray], shape: tuple[int, int]) -> FloatArray:
+    """Matrix of the smoothness term, ``A``: ``d^T A d`` is the weighted sum of squared second differences.
+
+    Parameters
+    ----------
+    weights : list of ndarray
+        From :func:`smoothness_weights`.
+    shape : tuple of int
+        ``(H, W)``.
+
+    Returns
+    -------
+    ndarray, shape (7, H, W), float64
+        Entries of each pixel with itself and with those to the right by 1 and 2, below by 1 and 2, below to the right,
+        and below to the left; the matrix is symmetric.
+    """
+    stencil = np.zeros((7, *shape))
+    own, right, right2, below, below2, on, back = stencil
+    along_x, along_y, across = weights
+    for first, middle, last, weight, near, far in (
+        (*_ALONG_X, along_x, right, right2),
+        (*_ALONG_Y, along_y, below, below2),
     ):
-        root = np.sqrt(weight).ravel()
-        rows = np.tile(np.arange(root.size, dtype=np.int32), len(corners))
-        columns = np.concatenate([numbers[p].ravel() for p in corners])
-        values = np.concatenate([f * root for f in factors])
-        difference = sparse.csr_matrix((values, (rows, columns)), shape=(root.size, numbers.size))
-        total = total + difference.T @ difference
-    return total.tocsr()
+        own[first] += weight
+        own[middle] += 4 * weight
+        own[last] += weight
+        near[first] -= 2 * weight
+        near[middle] -= 2 * weight
+        far[first] += weight
+    for corner in _ACROSS:
+        own[corner] += across
+    top_left, top_right, bottom_left, _ = _ACROSS
+    right[top_left] -= across
+    right[bottom_left] -= across
+    below[top_left] -= across
+    below[top_right] -= across
+    on[top_left] += across
+    back[top_right] += across
+    return stencil
 
 
 def solve_smooth(
-    smoothness: sparse.csr_matrix, weight: FloatMap, data: FloatMap, rtol: float, max_iterations: int
+    smoothness: FloatArray, weight: FloatMap, data: FloatMap, rtol: float, max_iterations: int
 ) -> FloatMap:
     """Disparities of least energy.
 
     Parameters
     ----------
-    smoothness : sparse matrix, shape (H W, H W)
-        From :func:`second_difference_matrix`, times the strength.
+    smoothness : ndarray, shape (7, H, W), float64
+        From :func:`second_difference_stencil`, times the strength.
     weight, data : ndarray, shape (H, W), float32
         ``w`` and ``z``; the data is also where the solver starts.
     rtol : float
@@ -113,45 +137,78 @@ def solve_smooth(
     -------
     ndarray, shape (H, W), float32
     """
-    w = weight.ravel().astype(np.float64) + 1e-9
-    matrix = (smoothness + sparse.diags(w)).tocsr()
-    start = data.ravel().astype(np.float64)
+    from scipy.sparse.linalg import LinearOperator, cg
+
+    from sepi.regularization.second_order_kernels import MARGIN, product
+
+    w = weight.astype(np.float64) + 1e-9
+    start = data.astype(np.float64)
     # smoothness does not know constants: without the mean, the rtol does not depend on where zero lies
     mean = np.average(start, weights=w)
-    start = start - mean
-    solution, _ = cg(
-        matrix, w * start, x0=start, rtol=rtol, atol=0, maxiter=max_iterations, M=_two_levels(matrix, data.shape)
-    )
-    return np.asarray(solution + mean, np.float32).reshape(data.shape)
+    start -= mean
+    stencil = np.pad(smoothness, ((0, 0), (MARGIN, MARGIN), (MARGIN, MARGIN)))
+    inside = np.s_[MARGIN:-MARGIN, MARGIN:-MARGIN]
+    stencil[0][inside] += w
+    shape = stencil.shape[1:]
+
+    def times(vector: FloatArray) -> FloatArray:
+        out = np.zeros(shape)
+        product(stencil, vector.reshape(shape), out)
+        return out.ravel()
+
+    size = shape[0] * shape[1]
+    matrix = LinearOperator((size, size), matvec=times, dtype=np.float64)
+    inverse = LinearOperator((size, size), matvec=_two_levels(stencil), dtype=np.float64)
+    right, first = np.pad(w * start, MARGIN).ravel(), np.pad(start, MARGIN).ravel()
+    solution, _ = cg(matrix, right, x0=first, rtol=rtol, atol=0, maxiter=max_iterations, M=inverse)
+    return np.asarray(solution.reshape(shape)[inside] + mean, np.float32)
 
 
-def _two_levels(matrix: sparse.csr_matrix, shape: tuple[int, ...]) -> LinearOperator:
+def _two_levels(stencil: FloatArray) -> Callable[[FloatArray], FloatArray]:
     """Preconditioner: the diagonal, plus a direct solve for one plane for each block."""
-    planes = _block_planes(shape)
-    onto = planes.T.tocsr()
-    coarse = (onto @ matrix @ planes).tocsc()
-    # blocks of one pixel's width have slopes that do nothing
-    coarse = coarse + sparse.diags(np.full(coarse.shape[0], 1e-9 * max(float(coarse.diagonal().max()), 1e-9)))
-    require_blas_memory()
-    factors = splu(coarse.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
-    inverse = 1 / matrix.diagonal()
+    from sepi.regularization.second_order_kernels import diagonal_and_planes, onto_planes
+
+    factors = _planes_system(stencil)
+    shape = stencil.shape[1:]
+    blocks = _blocks(stencil)
+    with np.errstate(divide="ignore"):
+        inverse = 1 / stencil[0]
 
     def apply(residual: FloatArray) -> FloatArray:
-        residual = residual.ravel()
-        return np.asarray(inverse * residual + planes @ factors.solve(onto @ residual))
+        vector, out, onto = residual.reshape(shape), np.zeros(shape), np.empty((*blocks, 3))
+        onto_planes(vector, onto)
+        diagonal_and_planes(inverse, vector, factors.solve(onto.ravel()).reshape(onto.shape), out)
+        return out.ravel()
 
-    return LinearOperator(matrix.shape, matvec=apply)
+    return apply
 
 
-def _block_planes(shape: tuple[int, ...]) -> sparse.csr_matrix:
-    """Constant and two slopes on each block, as columns; shape (H W, 3 blocks)."""
-    y, x = np.mgrid[: shape[0], : shape[1]]
-    blocks_across = -(-shape[1] // BLOCK)
-    number = 3 * ((y // BLOCK) * blocks_across + x // BLOCK).ravel()
-    middle = (BLOCK - 1) / 2
-    values = [np.ones(number.size), ((x % BLOCK - middle) / BLOCK).ravel(), ((y % BLOCK - middle) / BLOCK).ravel()]
-    pixels = np.tile(np.arange(number.size), 3)
-    columns = np.concatenate([number, number + 1, number + 2])
-    return sparse.csr_matrix(
-        (np.concatenate(values), (pixels, columns)), shape=(number.size, 3 * blocks_across * -(-shape[0] // BLOCK))
-    )
+def _planes_system(stencil: FloatArray) -> Any:
+    """Factors of the system as one plane for each block sees it: constant, slope along x, slope along y."""
+    import scipy.sparse as sparse
+    from scipy.sparse.linalg import splu
+
+    from sepi.regularization.second_order_kernels import matrix_of_planes
+
+    rows, columns = _blocks(stencil)
+    entries = np.zeros((rows, columns, 9, 3, 3))
+    matrix_of_planes(stencil, entries)
+    by, bx, neighbour, i, j = np.ogrid[:rows, :columns, :9, :3, :3]
+    other_y, other_x = by + neighbour // 3 - 1, bx + neighbour % 3 - 1
+    there = (other_y >= 0) & (other_y < rows) & (other_x >= 0) & (other_x < columns)
+    there = np.broadcast_to(there, entries.shape)
+    row = np.broadcast_to(3 * (by * columns + bx) + i, entries.shape)[there]
+    column = np.broadcast_to(3 * (other_y * columns + other_x) + j, entries.shape)[there]
+    size = 3 * rows * columns
+    matrix = sparse.csc_matrix((entries[there], (row, column)), shape=(size, size))
+    # blocks of one pixel's width have slopes that do nothing
+    matrix = matrix + sparse.diags(np.full(size, 1e-9 * max(float(matrix.diagonal().max()), 1e-9)))
+    require_blas_memory()
+    return splu(matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+
+
+def _blocks(stencil: FloatArray) -> tuple[int, int]:
+    """Rows and columns of blocks."""
+    from sepi.regularization.second_order_kernels import BLOCK, MARGIN
+
+    return tuple(-(-(n - 2 * MARGIN) // BLOCK) for n in stencil.shape[1:])

@@ -1,0 +1,133 @@
+"""Compiled loops of the second-order smoothing: its matrix and the planes of its preconditioner, as stencils.
+
+Pictures have a margin of :data:`MARGIN` pixels of zeros on each side, so that no loop has to look where it is. What
+is called in every step of the solver takes a millisecond, and threads that wait for each other take longer than that
+where another program has one of the cores: it runs on one.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from numba import njit, prange
+
+EXACT = {"nnan", "ninf", "nsz"}
+"""Fast-math flags that keep every rounding as written: see :mod:`sepi.matching.plane_sweep_kernels`."""
+
+MARGIN = 2
+"""How far second differences reach, pixels."""
+
+BLOCK = 8
+"""Width of the preconditioner's blocks, pixels."""
+
+_MIDDLE = (BLOCK - 1) / 2
+
+
+@njit(cache=True, fastmath=EXACT)
+def product(stencil: Any, vector: Any, out: Any) -> None:
+    """The matrix times a picture.
+
+    Parameters
+    ----------
+    stencil : ndarray, shape (7, H + 2 MARGIN, W + 2 MARGIN), float64
+        Of :func:`sepi.regularization.second_order.second_difference_stencil`, with a margin.
+    vector, out : ndarray, shape (H + 2 MARGIN, W + 2 MARGIN), float64
+        With a margin of zeros; that of ``out`` is not touched.
+    """
+    rows, columns = vector.shape
+    for y in range(MARGIN, rows - MARGIN):
+        c, right, right2 = stencil[0, y], stencil[1, y], stencil[2, y]
+        below, below2, on, back = stencil[3, y], stencil[4, y], stencil[5, y], stencil[6, y]
+        above, above2, on_above, back_above = stencil[3, y - 1], stencil[4, y - 2], stencil[5, y - 1], stencil[6, y - 1]
+        v, v1, v2, w1, w2 = vector[y], vector[y + 1], vector[y + 2], vector[y - 1], vector[y - 2]
+        target = out[y]
+        for x in range(MARGIN, columns - MARGIN):
+            along = c[x] * v[x] + (right[x] * v[x + 1] + right[x - 1] * v[x - 1])
+            along += right2[x] * v[x + 2] + right2[x - 2] * v[x - 2]
+            down = (below[x] * v1[x] + above[x] * w1[x]) + (below2[x] * v2[x] + above2[x] * w2[x])
+            across = (on[x] * v1[x + 1] + on_above[x - 1] * w1[x - 1]) + (
+                back[x] * v1[x - 1] + back_above[x + 1] * w1[x + 1]
+            )
+            target[x] = along + down + across
+
+
+@njit(cache=True, fastmath=EXACT)
+def onto_planes(vector: Any, out: Any) -> None:
+    """Inner products of a picture with constant and slopes of each block; ``out (rows, columns of blocks, 3)``."""
+    H, W = vector.shape[0] - 2 * MARGIN, vector.shape[1] - 2 * MARGIN
+    for by in range(out.shape[0]):
+        for bx in range(out.shape[1]):
+            constant, slope_x, slope_y = 0.0, 0.0, 0.0
+            for y in range(by * BLOCK, min(H, (by + 1) * BLOCK)):
+                for x in range(bx * BLOCK, min(W, (bx + 1) * BLOCK)):
+                    value = vector[y + MARGIN, x + MARGIN]
+                    constant += value
+                    slope_x += value * ((x - bx * BLOCK - _MIDDLE) / BLOCK)
+                    slope_y += value * ((y - by * BLOCK - _MIDDLE) / BLOCK)
+            out[by, bx, 0], out[by, bx, 1], out[by, bx, 2] = constant, slope_x, slope_y
+
+
+@njit(cache=True, fastmath=EXACT)
+def diagonal_and_planes(inverse: Any, vector: Any, planes: Any, out: Any) -> None:
+    """``inverse * vector``, plus the planes ``(rows, columns of blocks, 3)``; pictures with margins."""
+    H, W = vector.shape[0] - 2 * MARGIN, vector.shape[1] - 2 * MARGIN
+    for y in range(H):
+        row = planes[y // BLOCK]
+        dy = (y % BLOCK - _MIDDLE) / BLOCK
+        for x in range(W):
+            p = row[x // BLOCK]
+            here = p[0] + p[1] * ((x % BLOCK - _MIDDLE) / BLOCK) + p[2] * dy
+            out[y + MARGIN, x + MARGIN] = inverse[y + MARGIN, x + MARGIN] * vector[y + MARGIN, x + MARGIN] + here
+
+
+@njit(inline="always")
+def _add_entry(out: Any, by: int, bx: int, y: int, x: int, dy: int, dx: int, value: Any) -> None:
+    """Add the matrix's entry of pixel ``(y, x)`` and the one ``(dy, dx)`` further, as seen by their blocks' planes."""
+    if value == 0:
+        return
+    other_y, other_x = (y + dy) // BLOCK, (x + dx) // BLOCK
+    block = out[by, bx, 3 * (other_y - by + 1) + other_x - bx + 1]
+    px, py = (x - bx * BLOCK - _MIDDLE) / BLOCK, (y - by * BLOCK - _MIDDLE) / BLOCK
+    qx, qy = (x + dx - other_x * BLOCK - _MIDDLE) / BLOCK, (y + dy - other_y * BLOCK - _MIDDLE) / BLOCK
+    block[0, 0] += value
+    block[0, 1] += value * qx
+    block[0, 2] += value * qy
+    block[1, 0] += px * value
+    block[1, 1] += px * value * qx
+    block[1, 2] += px * value * qy
+    block[2, 0] += py * value
+    block[2, 1] += py * value * qx
+    block[2, 2] += py * value * qy
+
+
+@njit(parallel=True, cache=True, fastmath=EXACT)
+def matrix_of_planes(stencil: Any, out: Any) -> None:
+    """The matrix as the planes see it.
+
+    Parameters
+    ----------
+    stencil : ndarray, as in :func:`product`
+    out : ndarray, shape (rows of blocks, columns of blocks, 9, 3, 3), float64
+        Zeros, to which are added: entries of a block's planes with those of itself and of its neighbours, in the order
+        of reading.
+    """
+    H, W = stencil.shape[1] - 2 * MARGIN, stencil.shape[2] - 2 * MARGIN
+    m = MARGIN
+    for by in prange(out.shape[0]):
+        for y in range(by * BLOCK, min(H, (by + 1) * BLOCK)):
+            for x in range(W):
+                bx = x // BLOCK
+                s, r = y + m, x + m
+                _add_entry(out, by, bx, y, x, 0, 0, stencil[0, s, r])
+                _add_entry(out, by, bx, y, x, 0, 1, stencil[1, s, r])
+                _add_entry(out, by, bx, y, x, 0, -1, stencil[1, s, r - 1])
+                _add_entry(out, by, bx, y, x, 0, 2, stencil[2, s, r])
+                _add_entry(out, by, bx, y, x, 0, -2, stencil[2, s, r - 2])
+                _add_entry(out, by, bx, y, x, 1, 0, stencil[3, s, r])
+                _add_entry(out, by, bx, y, x, -1, 0, stencil[3, s - 1, r])
+                _add_entry(out, by, bx, y, x, 2, 0, stencil[4, s, r])
+                _add_entry(out, by, bx, y, x, -2, 0, stencil[4, s - 2, r])
+                _add_entry(out, by, bx, y, x, 1, 1, stencil[5, s, r])
+                _add_entry(out, by, bx, y, x, -1, -1, stencil[5, s - 1, r - 1])
+                _add_entry(out, by, bx, y, x, 1, -1, stencil[6, s, r])
+                _add_entry(out, by, bx, y, x, -1, 1, stencil[6, s - 1, r + 1])
