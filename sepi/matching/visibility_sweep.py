@@ -34,8 +34,8 @@ ROWS_PER_REPORT = 128
 CANDIDATES = CandidateRule(usual=91, finest=0.03, coarsest=0.4, volume_bytes=2**30)
 """The optimisation goes back to the views, so these need not be as fine as the paper's."""
 
-BYTES_PER_CANDIDATE = 12
-"""Of each pixel: the costs, their averages, and these smoothed."""
+BYTES_PER_CANDIDATE = 8
+"""Of each pixel: two at a time of the costs, their averages, and these smoothed."""
 
 
 class VisibilitySweepParameters(CandidateParameters, BaseDetailParameters, SmoothingParameters):

@@ -24,7 +24,7 @@ def written(path: Path, width: float) -> Path:
 def test_a_wide_range_asks_for_its_cost_volume(tmp_path: Path) -> None:
     light_field = written(tmp_path / "lf.h5", 100)
     # 100 px to views 2 steps away, 0.4 px apart there
-    assert candidates_mb(SCENE, light_field, AllViewsParameters()) == round(410 * 12 * 300 * 400 / 2**20)
+    assert candidates_mb(SCENE, light_field, AllViewsParameters()) == round(410 * 8 * 300 * 400 / 2**20)
     assert candidates_mb(SCENE, light_field, SweepParameters()) == 0
 
 
@@ -36,4 +36,4 @@ def test_usual_narrow_and_yet_unread_ones_ask_for_no_more(tmp_path: Path) -> Non
 
 def test_a_number_that_is_set_counts(tmp_path: Path) -> None:
     found = candidates_mb(SCENE, tmp_path / "gone.h5", AllViewsParameters(num_disparities=191))
-    assert found == round(100 * 12 * 300 * 400 / 2**20)
+    assert found == round(100 * 8 * 300 * 400 / 2**20)
