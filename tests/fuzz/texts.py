@@ -150,7 +150,12 @@ stages:
 def config_files(_: Path) -> list[bytes]:
     """A configuration with every key, and its parts."""
     parts = CONFIG.split("\nlight_fields")
-    return [CONFIG.encode(), parts[0].encode(), b"light_fields" + parts[1].encode(), b"stages: {initial: {sepi: null}}"]
+    return [
+        CONFIG.encode(),
+        parts[0].encode(),
+        b"light_fields" + parts[1].encode(),
+        b"stages: &a {initial: {sepi: null, x: *a}}",
+    ]
 
 
 def config_folder(folder: Path) -> None:
