@@ -234,7 +234,7 @@ def stage_command(stage: str, choices: Mapping[str, Choice]) -> click.Command:
 
 
 def _json_object(text: str) -> dict[str, Any]:
-    with suppress(ValueError):
+    with suppress(ValueError, RecursionError):
         value = json.loads(text)
         if isinstance(value, dict):
             return value
