@@ -503,3 +503,9 @@ def test_values_that_lie_too_deep_in_each_other_are_one_line(tmp_path: Path) -> 
     setting = f"initial.sepi.num_disparities={deep}"
     called = CliRunner().invoke(main, ["depth", str(tmp_path), "--variant", "paper", "--set", setting])
     assert "num_disparities: input should be a valid integer" in error_of(called)
+
+
+def test_a_path_that_the_system_refuses_is_shown_without_what_commands_a_terminal() -> None:
+    """A name from elsewhere, given by a pattern of the shell, must not clear the screen."""
+    called = CliRunner().invoke(main, ["info", "\x1b[2J" + "a" * 300])
+    assert error_of(called).startswith("sepi: ?[2Ja")
