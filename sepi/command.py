@@ -24,7 +24,7 @@ from typing import IO, Any
 
 import click
 
-from sepi.errors import SepiError, SepiWarning
+from sepi.errors import SepiError, SepiWarning, one_line
 from sepi.io.files import atomic_path
 from sepi.io.hdf5 import read_light_field, read_stage, write_stage
 from sepi.io.provenance import entry, history_of, stage_attributes
@@ -112,11 +112,11 @@ def shown_errors() -> Iterator[None]:
             warnings.showwarning = functools.partial(_show_warning, shown)
             yield
     except SepiError as error:
-        raise _Shown(" ".join(str(error).split())) from error
+        raise _Shown(str(error)) from error
     except OSError as error:
         if error.filename is None:
             raise
-        raise _Shown(f"{error.filename}: {error.strerror}") from error
+        raise _Shown(one_line(f"{error.filename}: {error.strerror}")) from error
     except MemoryError as error:
         raise _Shown(f"not enough memory ({str(error) or 'no more is to be had'})") from error
     finally:
@@ -128,7 +128,7 @@ def _show_warning(
     shown: Callable[..., None], message: Warning | str, category: type[Warning], *where: Any, **more: Any
 ) -> None:
     if issubclass(category, SepiWarning):
-        click.echo(f"sepi: warning: {' '.join(str(message).split())}", err=True)
+        click.echo(f"sepi: warning: {message}", err=True)
     else:
         shown(message, category, *where, **more)
 
@@ -234,7 +234,7 @@ def stage_command(stage: str, choices: Mapping[str, Choice]) -> click.Command:
 
 
 def _json_object(text: str) -> dict[str, Any]:
-    with suppress(ValueError):
+    with suppress(ValueError, RecursionError):
         value = json.loads(text)
         if isinstance(value, dict):
             return value

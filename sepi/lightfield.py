@@ -20,7 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sepi.camera import Camera
-from sepi.errors import SepiError
+from sepi.errors import SepiError, one_line
 
 FloatMap = npt.NDArray[np.float32]
 BoolMap = npt.NDArray[np.bool_]
@@ -123,8 +123,9 @@ class LightField:
     def __post_init__(self) -> None:
         v = self.views
         for key in ("name", "source"):
-            # names of files need not be text; what is not cannot be printed or stored
-            object.__setattr__(self, key, getattr(self, key).encode("utf-8", "replace").decode())
+            # names of files need not be text, or one line of it; what is not cannot be printed or stored
+            object.__setattr__(self, key, _shown(getattr(self, key)))
+        object.__setattr__(self, "notes", tuple(map(_shown, self.notes)))
         if not isinstance(v, np.ndarray):
             raise SepiError(f"{self.name}: views must be an array of shape (T, S, H, W, C), got a {type(v).__name__}")
         if v.ndim != 5 or v.shape[4] not in (1, 3) or 0 in v.shape:
@@ -254,6 +255,10 @@ class LightField:
         if view == self.reference_position:
             return self
         return replace(self, view=view, ground_truth=None, masks={})
+
+
+def _shown(text: str) -> str:
+    return one_line(text.encode("utf-8", "replace").decode())
 
 
 def _require_unit(name: str, values: npt.NDArray[np.generic]) -> None:

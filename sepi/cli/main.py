@@ -194,7 +194,7 @@ def _parameters(settings: tuple[str, ...], name: str, variant: Variant) -> dict[
         require_known(f"--set {setting}: stages of variant {name}", [f"{stage}.{choice}"], used)
         try:
             value = json.loads(text)
-        except ValueError:
+        except (ValueError, RecursionError):
             value = text
         parameters.setdefault(stage, {})[field] = value
     return parameters

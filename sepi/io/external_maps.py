@@ -17,7 +17,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
 from sepi.io.disparity_maps import SUFFIXES, map_file
-from sepi.io.hdf5 import UNITS, attribute, create_hdf5, open_hdf5, read_dataset
+from sepi.io.hdf5 import UNITS, attribute, create_hdf5, members, open_hdf5, read_dataset
 from sepi.io.scores import Evaluation, evaluation_in, put_evaluation, scores_in
 from sepi.lightfield import FloatMap
 
@@ -114,7 +114,7 @@ def read_external(path: Path, *, with_maps: bool = True) -> dict[str, ExternalMa
                 disparity=_disparity(path, group) if with_maps else None,
                 evaluation=evaluation_in(group) if with_maps else Evaluation(scores_in(group)),
             )
-            for name, group in file[_METHODS].items()
+            for name, group in members(file[_METHODS])
         }
 
 

@@ -145,13 +145,22 @@ def read_light_field(path: Path) -> LightField:
             notes=tuple(_text(file, "notes").split("\0")) if "notes" in file.attrs else (),
             disparity_range=known,
             ground_truth=None if ground_truth is None else ground_truth.astype(np.float32),
-            masks={name: read_dataset(path, mask).astype(bool) for name, mask in file.get("masks", {}).items()},
+            masks={name: read_dataset(path, mask).astype(bool) for name, mask in members(file.get("masks", {}))},
         )
 
 
 def read_camera(file: h5py.File) -> Camera | None:
     """The camera of a light field's or a result's file, where it has one."""
     return Camera(*map(float, attribute(file, "camera"))) if "camera" in file.attrs else None
+
+
+def members(group: h5py.Group | Mapping[str, Any]) -> list[tuple[str, Any]]:
+    """Names and entries of a group, all at once.
+
+    Until the last is taken from h5py's own iterator, it holds its lock: where an error ends a loop before, for as long
+    as anyone keeps that error. Another thread that needs HDF5, be it to forget a file, would wait for ever.
+    """
+    return list(group.items())
 
 
 def attribute(holder: h5py.Group | h5py.Dataset, key: str) -> Any:

@@ -191,7 +191,7 @@ def _decoded(path: Path, data: bytes, header: Header) -> Pixels:
 
 
 def _by_pillow(path: Path, data: bytes, header: Header) -> Pixels | None:
-    """Pixels of a PNG or JPEG; None for colours of 16 bit or for printing, whose values Pillow would change.
+    """Pixels of a PNG or JPEG; None for colours or transparency of 16 bit, and colours for printing.
 
     They are those that OpenCV gives, in the same time, but damage is told and nothing is printed about it: the
     libraries below OpenCV have their own way to the terminal.
@@ -206,11 +206,13 @@ def _by_pillow(path: Path, data: bytes, header: Header) -> Pixels | None:
         warnings.catch_warnings(action="ignore"),
         (PngImageFile if header.kind == "PNG" else JpegImageFile)(io.BytesIO(data)) as image,
     ):
-        wider = header.kind == "PNG" and "16" in str(image.tile[0].args) and not header.grey
+        # Pillow would halve their depth
+        wider = header.kind == "PNG" and "16" in str(image.tile[0].args) and image.mode != "I;16"
         try:
             if wider or image.mode not in _HELD_AS:
-                # whether all of it is there: OpenCV fills with grey what is missing
-                image.load()
+                if header.kind == "JPEG":
+                    # whether all of it is there: OpenCV fills with grey what is missing
+                    image.load()
                 return None
             values = np.asarray(image.convert(_HELD_AS[image.mode]))
         except OSError as error:

@@ -71,7 +71,7 @@ def history_of(path: Path | None) -> list[Entry]:
     try:
         last = {"stage": str(attributes["stage"]), "choice": str(attributes["choice"])}
         return [*json.loads(attributes["made_from"]), {**last, "parameters": json.loads(attributes["parameters"])}]
-    except (KeyError, ValueError) as error:
+    except (KeyError, ValueError, RecursionError) as error:
         raise SepiError(f"{path}: not a stage file: its attributes do not say what made it ({error})") from error
 
 

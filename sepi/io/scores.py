@@ -18,7 +18,7 @@ import h5py
 import numpy as np
 
 from sepi.errors import SepiError
-from sepi.io.hdf5 import UNITS, Attribute, attribute, create_hdf5, open_hdf5, read_dataset
+from sepi.io.hdf5 import UNITS, Attribute, attribute, create_hdf5, members, open_hdf5, read_dataset
 from sepi.lightfield import BoolMap, FloatMap
 
 _MAPS = "maps"
@@ -146,20 +146,22 @@ def put_evaluation(group: h5py.Group, evaluation: Evaluation) -> None:
 def scores_in(group: h5py.Group) -> AllScores:
     """The scores alone of what :func:`put_evaluation` wrote: protocol to region to scores."""
     return {
-        protocol: {region: {key: attribute(cell, key).item() for key in cell.attrs} for region, cell in regions.items()}
-        for protocol, regions in group.get("scores", {}).items()
+        protocol: {
+            region: {key: attribute(cell, key).item() for key in cell.attrs} for region, cell in members(regions)
+        }
+        for protocol, regions in members(group.get("scores", {}))
     }
 
 
 def evaluation_in(group: h5py.Group) -> Evaluation:
     """What :func:`put_evaluation` wrote."""
     path = Path(group.file.filename)
-    regions: Mapping[str, Any] = group.get("regions", {})
+    regions = members(group.get("regions", {}))
     return Evaluation(
         scores=scores_in(group),
         error=read_dataset(path, group["error"]).astype(np.float32) if "error" in group else None,
-        regions={name: read_dataset(path, mask).astype(bool) for name, mask in regions.items()},
-        region_sources={name: str(attribute(mask, "source")) for name, mask in regions.items()},
+        regions={name: read_dataset(path, mask).astype(bool) for name, mask in regions},
+        region_sources={name: str(attribute(mask, "source")) for name, mask in regions},
     )
 
 
@@ -173,7 +175,7 @@ def without_nan(value: Any) -> Any:
 
 
 def _groups(path: Path, file: h5py.File, names: Collection[str] | None) -> dict[str, h5py.Group]:
-    groups = {stored.replace(":", "/"): group for stored, group in file[_MAPS].items()}
+    groups = {stored.replace(":", "/"): group for stored, group in members(file[_MAPS])}
     for name in names or ():
         if name not in groups:
             raise SepiError(f"{path}: no scores of '{name}'; it holds: {', '.join(groups) or 'none'}")

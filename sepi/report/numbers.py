@@ -246,7 +246,7 @@ def command(results: Path, plan_text: str, parameters: str, parts: bool, output:
     plan = Plan.from_json(results, plan_text)
     try:
         values = json.loads(parameters)
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise SepiError(f"--parameters: expected JSON of parameters per stage and choice ({error})") from error
     write(output, as_text(collect(plan, values, parts)))
 

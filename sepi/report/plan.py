@@ -83,7 +83,7 @@ class Plan:
         """
         try:
             plan = cls(results, **json.loads(text))
-        except (ValueError, TypeError) as error:
+        except (ValueError, TypeError, RecursionError) as error:
             raise SepiError(
                 'plan: expected JSON such as {"scenes": {DATASET: [SCENE]}, "variants": {VARIANT: {STAGE: CHOICE}}, '
                 '"external": [NAME]}'

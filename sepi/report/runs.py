@@ -119,7 +119,7 @@ def read_json(path: Path, keys: set[str], what: str, module: str) -> dict[str, A
         found = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise SepiError(f"{path}: cannot be read ({error.strerror})") from error
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise SepiError(f"{path}: not JSON ({error}); expected what python -m {module} writes") from error
     if not isinstance(found, dict) or not keys <= found.keys():
         raise SepiError(f"{path}: not {what}, which python -m {module} writes")

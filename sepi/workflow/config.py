@@ -239,7 +239,10 @@ def load_settings(values: Mapping[str, Any]) -> Settings:
     SepiError
         One line that names the first key, scene, variant, stage or choice that is wrong, and what would be right.
     """
-    spelled = {key: _with_numbers(value) for key, value in _with_paths(values).items()}
+    try:
+        spelled = {key: _with_numbers(value) for key, value in _with_paths(values).items()}
+    except RecursionError as error:
+        raise SepiError("config: a key holds itself (by & and *), or values lie too deep in each other") from error
     config = validated(Config, spelled, "config")
     scenes = _scenes(config)
     ranges = config.disparity_range
@@ -338,7 +341,9 @@ def _external(name: str, entry: Mapping[str, Any], variants: Collection[str]) ->
     require_known(f"{where}.path", re.findall(r"\{[^{}]*\}", source.path), ("{dataset}", "{scene}"))
     require_plain_path(source.path.replace("{dataset}", "").replace("{scene}", ""), f"{where}.path")
     path = Path(os.path.expanduser(source.path))
-    if "{scene}" not in source.path and (path.is_file() or (path.suffix.lower() in SUFFIXES and not path.is_dir())):
+    if "{scene}" not in source.path and (
+        os.path.isfile(path) or (path.suffix.lower() in SUFFIXES and not os.path.isdir(path))
+    ):
         # one file would be taken for the map of every scene
         raise SepiError(
             f"{where}.path: '{source.path}' is one file; write {{scene}} for the scene's name, or give the folder"

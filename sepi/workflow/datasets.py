@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import re
 from collections import Counter
 from collections.abc import Callable, Iterator
@@ -136,7 +137,8 @@ def scenes_in(root: Path, dataset: str, where: str) -> list[Scene]:
         If there is no such folder, no scene in it, two scenes of one name, or a name that is no plain word.
     """
     find, expected = _FINDERS[dataset]
-    if not (root.is_dir() or (root.is_file() and dataset == "hci_2013")):
+    # os.path: a name that is too long names nothing, and is no error there
+    if not (os.path.isdir(root) or (os.path.isfile(root) and dataset == "hci_2013")):
         raise SepiError(f"{where}: no folder '{root}'")
     scenes = list(find(root.resolve()))
     if not scenes:
@@ -158,7 +160,7 @@ def own_scene(name: str, source: Path, flags: tuple[str, ...], where: str) -> Sc
         If nothing is there, or ``name`` is no plain word.
     """
     _require_plain(name, where)
-    if not source.exists():
+    if not os.path.exists(source):
         raise SepiError(f"{where}: no file or folder '{source}'")
     source = source.resolve()
     inside = [path for path in sorted(source.iterdir()) if path.is_file()] if source.is_dir() else [source]

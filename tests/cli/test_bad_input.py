@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 import scipy.io
 from click.testing import CliRunner
+from error_lines import error_of, reading_error
 from hdf5_edits import changed
 
 from sepi.cli.main import main
@@ -25,6 +26,7 @@ from sepi.errors import SepiError
 from sepi.io.hdf5 import write_light_field
 from sepi.io.pfm import write_pfm
 from sepi.lightfield import LightField
+from sepi.report.runs import read_numbers
 from sepi.scenes import render, write_hci
 
 SCENE = render("dots", size=64, views=3)
@@ -491,3 +493,19 @@ def test_a_result_of_another_program_that_says_nonsense_of_its_view(tmp_path: Pa
         file.attrs["view_position"], file.attrs["grid"] = [], [3, 3]
     with pytest.raises(SepiError, match=r"result\.h5: not a result of 'sepi depth', or damaged"):
         view_of(tmp_path / "result.h5")
+
+
+def test_values_that_lie_too_deep_in_each_other_are_one_line(tmp_path: Path) -> None:
+    """Python's parser of JSON gives up with a traceback of its own."""
+    deep = "[" * 100_000
+    (tmp_path / "numbers.json").write_text(deep)
+    assert "not JSON" in reading_error(tmp_path / "numbers.json", read_numbers)
+    setting = f"initial.sepi.num_disparities={deep}"
+    called = CliRunner().invoke(main, ["depth", str(tmp_path), "--variant", "paper", "--set", setting])
+    assert "num_disparities: input should be a valid integer" in error_of(called)
+
+
+def test_a_path_that_the_system_refuses_is_shown_without_what_commands_a_terminal() -> None:
+    """A name from elsewhere, given by a pattern of the shell, must not clear the screen."""
+    called = CliRunner().invoke(main, ["info", "\x1b[2J" + "a" * 300])
+    assert error_of(called).startswith("sepi: ?[2Ja")

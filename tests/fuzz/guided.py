@@ -12,9 +12,9 @@ import json
 import os
 import random
 import re
+import shutil
 import subprocess
 import sys
-import tempfile
 import time
 from dataclasses import dataclass, field
 from hashlib import sha256
@@ -67,37 +67,36 @@ def main() -> int:
     names = chosen.targets or list(TARGETS)
     tallies = {}
     for name in names:
-        tallies[name] = _run(name, chosen.folder, chosen.seconds / len(names))
+        tallies[name] = _run(name, TARGETS[name].file, chosen.folder, chosen.seconds / len(names))
         print(_line(name, tallies[name]), flush=True)
     print("\n" + _table(tallies))
     return int(any(tally.findings for tally in tallies.values()))
 
 
-def _run(name: str, folder: Path, seconds: float) -> Tally:
-    """Let a target run, again and again where a file ends its process."""
+def _run(name: str, file: str, folder: Path, seconds: float) -> Tally:
+    """Let a target that reads ``file`` run, again and again where one ends its process."""
     tally, began = Tally(), time.monotonic()
     for _ in range(_MOST_ENDS):
         left = seconds - (time.monotonic() - began)
         if left < 1 and tally.executions:
             break
-        command = [
-            sys.executable,
-            __file__,
-            "--child",
-            "--seconds",
-            f"{max(left, 1):.0f}",
-            "--folder",
-            str(folder),
-            name,
-        ]
+        flags = ["--child", f"--seconds={max(left, 1):.0f}", f"--folder={folder}"]
         before = set((folder / "findings").glob(f"{name}-*"))
         try:
             ended = subprocess.run(
-                command, capture_output=True, text=True, errors="replace", timeout=max(left, 1) + _GRACE, check=False
+                [sys.executable, __file__, *flags, name],
+                capture_output=True,
+                text=True,
+                errors="replace",
+                timeout=max(left, 1) + _GRACE,
+                check=False,
             )
         except subprocess.TimeoutExpired:
-            tally.findings["hang"] = "did not end in its time"
-            break
+            # not even by libFuzzer's own clock
+            _add(tally, folder, name)
+            kept = shutil.copy(_room(folder, name) / file, folder / "findings" / f"{name}-hang")
+            tally.findings[str(kept)] = f"did not end {_stack(folder / f'{name}.stack')}"
+            continue
         _add(tally, folder, name)
         if ended.returncode:
             if not tally.executions:
@@ -107,6 +106,11 @@ def _run(name: str, folder: Path, seconds: float) -> Tally:
                 tally.findings.setdefault(str(path), f"ended the process {where}")
     tally.seconds = time.monotonic() - began
     return tally
+
+
+def _room(folder: Path, name: str) -> Path:
+    """Where a target reads its files: after a process was killed, the one that it hung on is there."""
+    return folder / "rooms" / name
 
 
 def _add(tally: Tally, folder: Path, name: str) -> None:
@@ -149,8 +153,11 @@ def _fuzz(name: str, folder: Path, seconds: float) -> None:
     first = target.first()
     for seed in first:
         (corpus / sha256(seed).hexdigest()[:16]).write_bytes(seed)
-    with tempfile.TemporaryDirectory() as room, (folder / f"{name}.stack").open("w") as stack:
-        trial = Trial(target, Path(room))
+    room = _room(folder, name)
+    shutil.rmtree(room, ignore_errors=True)
+    room.mkdir(parents=True)
+    with (folder / f"{name}.stack").open("w") as stack:
+        trial = Trial(target, room)
         tally, noted = Tally(), time.monotonic()
 
         def note() -> None:

@@ -175,8 +175,9 @@ def zip_of(name: str, *, packed: bool = True) -> Wrapping:
 
     def closed(content: bytes) -> bytes:
         whole = io.BytesIO()
-        with zipfile.ZipFile(whole, "w", zipfile.ZIP_DEFLATED if packed else zipfile.ZIP_STORED) as archive:
-            archive.writestr(zipfile.ZipInfo(name), content, compresslevel=1)
+        with zipfile.ZipFile(whole, "w") as archive:
+            kind = zipfile.ZIP_DEFLATED if packed else zipfile.ZIP_STORED
+            archive.writestr(zipfile.ZipInfo(name), content, compress_type=kind, compresslevel=1)
         return whole.getvalue()
 
     return Wrapping(_zip_opened, closed)

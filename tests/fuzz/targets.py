@@ -68,9 +68,7 @@ def _map_with_scale(path: Path) -> None:
 
 def _submission(path: Path) -> None:
     for problem in problems_of(path, partial=True):
-        if not problem.isprintable():
-            # as a user sees it
-            raise SepiError(problem)
+        assert problem.isprintable(), problem
 
 
 def _pictures_of(seed: Callable[[Path], Iterable[bytes]], ending: str) -> Target:

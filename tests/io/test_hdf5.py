@@ -1,6 +1,7 @@
 """The package's own HDF5 files: all that is known comes back, and a damaged one is one clear error."""
 
 import dataclasses
+import threading
 from collections.abc import Callable
 from pathlib import Path
 
@@ -11,7 +12,10 @@ from error_lines import reading_error
 from geometries import GEOMETRIES, standing
 from hdf5_edits import changed
 
+from sepi.errors import SepiError
+from sepi.io.external_maps import read_external
 from sepi.io.hdf5 import write_light_field
+from sepi.io.scores import read_evaluations
 from sepi.lightfield import DisparityRange, LightField
 from sepi.reading import read_light_field
 
@@ -139,6 +143,27 @@ def hanging(path: Path) -> Path:
 def test_text_on_which_hdf5_hangs_is_refused(tmp_path: Path) -> None:
     """The command would not end, and could not be interrupted either."""
     assert "its attribute 'dH' cannot be read" in reading_error(hanging(tmp_path / "a.h5"))
+
+
+@pytest.mark.parametrize("read", [read_light_field, read_evaluations, read_external])
+def test_an_error_that_is_kept_does_not_keep_others_from_hdf5(tmp_path: Path, read: Callable[[Path], object]) -> None:
+    """A session that goes on after a bad file would hang for ever at the next one that it reads in a thread."""
+    with h5py.File(hanging(tmp_path / "a.h5"), "r+") as file:
+        file["views"], file["present"] = file["LF"], np.ones((2, 2), bool)
+        file.attrs["name"] = file.attrs["source"] = np.bytes_("a")
+        for name in ("masks", "maps/one", "methods/one"):
+            file.create_group(name).attrs.update({"digest": 1, "source": 1, "problem": 1, "sha256": 1})
+        for name in ("masks", "maps/one/regions", "methods/one/regions"):
+            # no array, and one that is not reached
+            file.create_group(f"{name}/a")
+            file[f"{name}/b"] = np.ones((4, 5), bool)
+        del file["LF"]
+    with pytest.raises(SepiError) as kept:
+        read(tmp_path / "a.h5")
+    other = threading.Thread(target=lambda: h5py.File(tmp_path / "b.h5", "w").close(), daemon=True)
+    other.start()
+    other.join(10)
+    assert not other.is_alive(), f"waits because of: {kept.value}"
 
 
 def test_values_of_variable_length_are_refused(tmp_path: Path) -> None:

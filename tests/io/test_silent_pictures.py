@@ -111,3 +111,37 @@ def test_every_sort_of_png_is_read_as_opencv_reads_it(tmp_path: Path, sort: str,
     expected = cv2.imread(str(tmp_path / "a.png"), cv2.IMREAD_UNCHANGED)
     expected = expected[:, :, None] if expected.ndim == 2 else expected[:, :, 2::-1]
     np.testing.assert_array_equal(found, expected[:, :, : found.shape[2]])
+
+
+def png_16(colour: int, rows: bytes, size: tuple[int, int] = (5, 4), interlaced: bool = False) -> bytes:
+    """A PNG of 16 bit of a colour type, with these rows."""
+    head = struct.pack(">IIBBBBB", *size, 16, colour, 0, 0, interlaced)
+    parts = chunk(b"IHDR", head), chunk(b"IDAT", zlib.compress(rows)), chunk(b"IEND", b"")
+    return b"\x89PNG\r\n\x1a\n" + b"".join(parts)
+
+
+@pytest.mark.parametrize(("colour", "samples"), [(2, 3), (4, 2), (6, 4)])
+def test_16_bits_stay_16_bits(tmp_path: Path, colour: int, samples: int) -> None:
+    """Half of them would be lost, and with them what tells faint texture."""
+    values = np.random.default_rng(0).integers(0, 65536, (4, 5, samples), np.uint16)
+    rows = b"".join(b"\0" + row.astype(">u2").tobytes() for row in values)
+    (tmp_path / "a.png").write_bytes(png_16(colour, rows))
+    expected = values[:, :, :1] if samples == 2 else values[:, :, :3]
+    np.testing.assert_array_equal(read_picture(tmp_path / "a.png"), expected)
+
+
+@pytest.mark.parametrize("size", [(1, 1), (5, 4), (8, 9), (3, 17)])
+def test_interlaced_pictures_of_16_bits(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], size: tuple[int, int]
+) -> None:
+    """They are stored as seven pictures, of which small ones lack some."""
+    starts = [(0, 0, 8, 8), (4, 0, 8, 8), (0, 4, 4, 8), (2, 0, 4, 4), (0, 2, 2, 4), (1, 0, 2, 2), (0, 1, 1, 2)]
+    values = np.random.default_rng(0).integers(0, 65536, (size[1], size[0], 3), np.uint16)
+    parts = [values[top::down, left::across].astype(">u2") for left, top, across, down in starts]
+    rows = b"".join(b"\0" + row.tobytes() for part in parts if part.size for row in part)
+    (tmp_path / "a.png").write_bytes(png_16(2, rows, size, interlaced=True))
+    np.testing.assert_array_equal(silent(tmp_path / "a.png", capfd), values)
+    # more, and fewer, than the header says
+    for wrong in (rows + bytes(9), rows[:-1]):
+        (tmp_path / "a.png").write_bytes(png_16(2, wrong, size, interlaced=True))
+        assert "not a PNG, or damaged" in str(silent(tmp_path / "a.png", capfd))

@@ -35,6 +35,8 @@ def test_a_stage_that_hands_its_maps_on_has_no_file() -> None:
     ("text", "message"),
     [
         ("{", "plan: expected JSON"),
+        # deeper than Python's parser goes
+        ("[" * 100_000, "plan: expected JSON"),
         ('{"scenes": {}}', "plan: expected JSON"),
         ('{"scenes": {}, "variants": {"mine": {"initial": "sepi"}}}', "no variant 'paper'"),
         ('{"scenes": [], "variants": {}}', "plan: expected JSON"),

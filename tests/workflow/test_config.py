@@ -146,6 +146,20 @@ def test_a_wrong_key_or_value_is_named(values: dict[str, Any], expected: str) ->
     assert expected in message_of(values)
 
 
+@pytest.mark.parametrize("key", ["light_fields", "variants", "stages", "report"])
+def test_a_key_that_holds_itself_is_told(key: str) -> None:
+    """A slip with YAML's & and * used to be a traceback of a thousand lines."""
+    assert "config: a key holds itself" in message_of(yaml.safe_load(f"{key}: &a {{x: *a}}"))
+
+
+@pytest.mark.parametrize("key", ["hci_root", "hci_2013_root", "light_fields", "external"])
+def test_a_path_that_is_too_long_is_told(key: str) -> None:
+    """The line must name the key; the system names the path alone, which is all too long to find it by."""
+    long = "a" * 5000 + ".pfm"
+    entry = {"light_fields": {"lego": {"path": long}}, "external": {"other": long}}
+    assert f"config.{key}" in message_of({key: entry.get(key, long)})
+
+
 def test_numbers_left_as_text_are_numbers() -> None:
     """Snakemake hands over ``--config 'builtin={size: 96}'`` as text, and YAML reads 1e-1 as text."""
     settings = load_settings({"builtin": {"size": "96"}, "disparity_range": {"builtin/dots": ["-2", "1e-1"]}})

@@ -154,6 +154,14 @@ def _is_result(path: Path) -> bool:
     return has_dataset(path / "result.h5" if path.is_dir() else path, "disparity")
 
 
+def _is_empty(path: Path) -> bool:
+    """Whether a file has no bytes; what a system gives in place of them may be waited for without end."""
+    try:
+        return path.is_file() and path.stat().st_size == 0
+    except OSError:
+        return True
+
+
 def _inside(folder: Path, depth: int = _DEPTH) -> Iterator[Path]:
     """The light fields in a folder, and in folders of it."""
     try:
@@ -161,7 +169,7 @@ def _inside(folder: Path, depth: int = _DEPTH) -> Iterator[Path]:
     except OSError:
         return
     for entry in entries:
-        if entry.name.startswith("."):
+        if entry.name.startswith(".") or _is_empty(entry):
             continue
         if any(known.matches(entry) for known in FORMATS.values()):
             yield entry

@@ -130,14 +130,17 @@ def _real_arrays(path: Path) -> set[str]:
                 head = zlib.decompressobj().decompress(head, _PREFIX)
                 kind, head = struct.unpack_from(order + "I", head)[0], head[8:]
             flags = struct.unpack_from(order + "I", head, 8)[0] if kind == _MATRIX else 0
+            parts = _parts(order, head) if kind == _MATRIX else []
+            # SciPy takes memory on the word of each, of variables that nobody asks for, too
+            if any(part.length > len(part.data) for part in parts[:3]):
+                raise ValueError("a variable whose head is longer than the file")
             if flags & 0xFF in _CLASSES and not flags & (_COMPLEX | _LOGICAL):
-                *before, values = _parts(order, head)
+                _, _, name, values = parts
                 if values.kind not in _TYPES:
                     raise SepiError(f"damaged MATLAB file: an array with values of type {values.kind}")
-                # SciPy takes memory on its word; the parts before it were here
                 if values.length > most:
                     raise ValueError("an array that is longer than the file")
-                names.add(before[2].data.decode("latin-1"))
+                names.add(name.data.decode("latin-1"))
             file.seek(end)
     return names
 
@@ -151,10 +154,10 @@ class _Part(NamedTuple):
 
 
 def _parts(order: str, head: bytes) -> list[_Part]:
-    """The first four elements of a matrix."""
-    parts = []
+    """The first four elements of a matrix, or as many as there are."""
+    parts: list[_Part] = []
     at = 0
-    for _ in range(4):
+    while at + 8 <= len(head) and len(parts) < 4:
         kind, length = struct.unpack_from(order + "II", head, at)
         start, after = at + 8, at + 8 + -(-length // 8) * 8
         if kind >> 16:

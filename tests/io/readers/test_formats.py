@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from error_lines import reading_error
 
+from sepi.errors import SepiError
 from sepi.io.images import write_png
 from sepi.io.readers.formats import format_of
 from sepi.io.result_folder import write_result
@@ -52,3 +53,11 @@ def test_a_result_is_not_taken_for_a_light_field(tmp_path: Path) -> None:
     write_result(tmp_path / "out", LightField(VIEWS, "toy"), StageMaps(flat, flat), {})
     for path in (tmp_path / "out", tmp_path / "out" / "result.h5"):
         assert "holds a disparity map, not a light field" in reading_error(path, format_of)
+
+
+def test_an_empty_file_is_not_offered_as_a_light_field(tmp_path: Path) -> None:
+    """A system's own files look so, too, and whoever reads them may wait for ever."""
+    np.save(tmp_path / "full.npy", np.zeros((2, 2, 8, 9, 3), np.uint8))
+    (tmp_path / "empty.npy").touch()
+    with pytest.raises(SepiError, match=r"such as .*full\.npy$"):
+        format_of(tmp_path)

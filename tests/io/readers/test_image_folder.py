@@ -767,3 +767,16 @@ def test_names_with_decimals_in_different_places_are_read(tmp_path: Path) -> Non
     """One name with a whole number where others have decimals used to end in a traceback."""
     names = [f"{468.125 + 4.5 * s}_{-703.25 + 4.5 * t}.png" for t in range(3) for s in range(3)]
     assert len(infer_view_numbers("folder", ["4294967295_-703.25.png", *names[1:]]).numbers) == 9
+
+
+def test_names_that_command_a_terminal_are_shown_without(tmp_path: Path) -> None:
+    """A folder from elsewhere must not clear the screen of who looks at it, or write lines of its own there."""
+    folder = tmp_path / "two\nlines"
+    folder.mkdir()
+    for number in range(4):
+        assert cv2.imwrite(str(folder / f"view\x1b[2J_{number // 2}_{number % 2}.png"), np.full((8, 9, 3), 7))
+    assert cv2.imwrite(str(folder / "other\x1b.png"), np.full((8, 9, 3), 7))
+    light_field = read(folder, ReadOptions())
+    shown = (light_field.name, light_field.source, *light_field.notes)
+    assert all(map(str.isprintable, shown))
+    assert light_field.name == "two lines"

@@ -296,3 +296,12 @@ def test_a_header_that_scipy_takes_for_version_4(tmp_path: Path) -> None:
     content = (tmp_path / "a.mat").read_bytes()
     (tmp_path / "a.mat").write_bytes(content[:3] + b"\0" + content[4:])
     assert "not a MATLAB file of version 5 or 7.3" in refused(tmp_path / "a.mat")
+
+
+def test_a_variable_beside_the_light_field_whose_name_claims_2_gb(tmp_path: Path) -> None:
+    """SciPy would take the memory for it, although nobody asked for that variable."""
+    scipy.io.savemat(tmp_path / "a.mat", {"note": "text of a variable", "LF": LF})
+    content = (tmp_path / "a.mat").read_bytes()
+    at = content.index(b"note") - 4
+    (tmp_path / "a.mat").write_bytes(content[:at] + struct.pack("<II", 1, 2**31 - 8) + content[at + 8 :])
+    assert "longer than the file" in refused(tmp_path / "a.mat")

@@ -4,6 +4,7 @@ import io
 import re
 import resource
 import struct
+import tracemalloc
 import zipfile
 from pathlib import Path
 
@@ -164,3 +165,13 @@ def test_a_member_whose_header_claims_more_than_the_archive(tmp_path: Path) -> N
     with zipfile.ZipFile(tmp_path / "lie.npz", "w") as archive:
         archive.writestr("LF.npy", header.getvalue() + bytes(100))
     assert "not a NumPy file, or damaged" in refused(tmp_path / "lie.npz")
+
+
+def test_a_header_longer_than_the_file_takes_no_memory(tmp_path: Path) -> None:
+    (tmp_path / "long.npy").write_bytes(b"\x93NUMPY\x02\x00" + struct.pack("<I", 2**32 - 1) + b" " * 100)
+    tracemalloc.start()
+    try:
+        assert "a header of 4294967295 bytes" in refused(tmp_path / "long.npy")
+        assert tracemalloc.get_traced_memory()[1] < 10**7
+    finally:
+        tracemalloc.stop()
