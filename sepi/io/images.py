@@ -118,6 +118,8 @@ def png_texts(path: Path) -> dict[str, str]:
     if not path.is_file():
         return {}
     try:
+        # whose size is looked at first: Pillow decodes all of it for the texts behind its pixels
+        picture_header(path)
         with PngImagePlugin.PngImageFile(path) as image:
             return {key: str(text) for key, text in image.text.items()}
     except Exception:

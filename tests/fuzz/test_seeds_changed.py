@@ -27,7 +27,7 @@ def watched(capfd: pytest.CaptureFixture[str]) -> Iterator[None]:
     with capfd.disabled():
         # the terminal, which pytest takes away during tests
         terminal = os.dup(2)
-    faulthandler.dump_traceback_later(6 * SECONDS, exit=True, file=terminal)
+    faulthandler.dump_traceback_later(6 * SECONDS + EXECUTIONS, exit=True, file=terminal)
     yield
     faulthandler.cancel_dump_traceback_later()
     os.close(terminal)

@@ -1,5 +1,6 @@
 """Damage in pictures is told by one line, and not printed by libpng or libjpeg; pixels are those that OpenCV gives."""
 
+import resource
 import struct
 import tracemalloc
 import zlib
@@ -11,7 +12,7 @@ import pytest
 from PIL import Image
 
 from sepi.errors import SepiError
-from sepi.io.images import read_picture
+from sepi.io.images import png_texts, read_picture
 
 SMOOTH = np.stack([*np.mgrid[:40, :50], np.full((40, 50), 100)], 2).astype(np.uint8)
 PICTURE = Image.fromarray(SMOOTH)
@@ -92,6 +93,16 @@ def test_tiff_of_several_widths_takes_no_memory(tmp_path: Path, tag: int) -> Non
 def is_entry(tiff: bytes, at: int, tag: int) -> bool:
     """Whether an entry of this tag, of one short or long number, stands in a TIFF."""
     return tiff[at : at + 8] in (struct.pack("<HHI", tag, kind, 1) for kind in (3, 4))
+
+
+def test_texts_of_a_png_that_claims_to_be_huge_take_no_memory(tmp_path: Path) -> None:
+    """Pillow decodes all of it for them: gigabytes for 65 bytes, only to see whether it is a map."""
+    head = struct.pack(">IIBBBBB", 10, 2**27, 8, 6, 0, 0, 0)
+    parts = chunk(b"IHDR", head), chunk(b"tEXt", b"scale\0001"), chunk(b"IDAT", zlib.compress(bytes(99)))
+    (tmp_path / "a.png").write_bytes(b"\x89PNG\r\n\x1a\n" + b"".join(parts))
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    assert png_texts(tmp_path / "a.png") == {}
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 500_000  # KB
 
 
 SORTS = {
