@@ -1,7 +1,7 @@
 # make        environment, then `snakemake all` on the built-in scenes
 # make check  environment, then the fast part of the tests: for every save
 # make test   environment, then the whole test suite, on all cores
-# make faults  environment, then a hundred kills of the workflow and thousands of damaged files: a quarter of an hour
+# make faults  environment, then a hundred kills of the workflow and thousands of damaged files: half an hour
 # make fuzz   environment, then an hour (SECONDS=3600) of files made to trip the readers, led by what code they reach
 # make coverage  the whole test suite, and the share of lines and branches that it runs
 # make lint   style, format, types and imports

@@ -48,6 +48,11 @@ def read_picture(path: Path) -> Pixels:
         If the file is unreadable, no picture of these kinds, cut off or damaged, of other numbers than 8 or 16 bit or
         float32, or has float pixels that are not finite or far outside 0..1.
     """
+    with _no_warnings():
+        return _read(path)
+
+
+def _read(path: Path) -> Pixels:
     with _opened(path) as file:
         header = read_header(path, file, whole=True)
         file.seek(0)
@@ -90,7 +95,7 @@ def read_views(paths: Sequence[Path], positions: Sequence[int] | None = None, co
     views = np.zeros((count, *first.shape), first.dtype)
 
     def fill(index: int) -> None:
-        image = read_picture(paths[index])
+        image = _read(paths[index])
         if image.shape != first.shape or image.dtype != first.dtype:
             raise SepiError(
                 f"{paths[index]}: {_described(image)}, but {paths[0].name} is {_described(first)}; "
@@ -99,7 +104,7 @@ def read_views(paths: Sequence[Path], positions: Sequence[int] | None = None, co
         views[positions[index]] = image
 
     # decoding runs outside Python's lock, so threads share the work
-    with ThreadPoolExecutor(min(8, available_cores())) as pool:
+    with _no_warnings(), ThreadPoolExecutor(min(8, available_cores())) as pool:
         for _ in pool.map(fill, range(len(paths))):
             pass
     return views
@@ -155,6 +160,17 @@ def write_png(path: Path, pixels: Pixels | BoolMap, texts: Mapping[str, str] | N
 
 
 @contextmanager
+def _no_warnings() -> Iterator[None]:
+    """Keep Pillow from warning of what is told as an error, or does not matter.
+
+    Not to be used by several threads at once: Python has one list of filters for all, and who leaves last would put
+    back what another had set, so that no warning was ever shown again.
+    """
+    with warnings.catch_warnings(action="ignore"):
+        yield
+
+
+@contextmanager
 def _opened(path: Path) -> Iterator[IO[bytes]]:
     with reading(path, "picture"):
         # a pipe would be waited for
@@ -205,7 +221,6 @@ def _by_pillow(path: Path, data: bytes, header: Header) -> Pixels | None:
 
     with (
         reading(path, header.kind),
-        warnings.catch_warnings(action="ignore"),
         (PngImageFile if header.kind == "PNG" else JpegImageFile)(io.BytesIO(data)) as image,
     ):
         # Pillow would halve their depth

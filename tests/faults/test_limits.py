@@ -12,7 +12,7 @@ from sepi.scenes import render, write_hci
 
 COMMAND = [sys.executable, "-c", "import sys; from sepi.cli.main import main; sys.exit(main())", "depth"]
 # bytes of address space: enough to start, not for the maps of a benchmark scene
-LITTLE = 1_500_000_000
+LITTLE = 1_000_000_000
 
 
 @pytest.mark.real

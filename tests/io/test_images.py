@@ -428,3 +428,13 @@ def test_written_picture_is_read_back(tmp_path: Path, pixels: np.ndarray) -> Non
 def test_mask_is_white_inside(tmp_path: Path) -> None:
     write_png(tmp_path / "mask.png", np.array([[True, False]]))
     assert read_picture(tmp_path / "mask.png")[:, :, 0].tolist() == [[255, 0]]
+
+
+def test_warnings_are_shown_after_views_were_read(tmp_path: Path) -> None:
+    """Threads that silence a library and end in another order would silence all that comes after."""
+    for number in range(24):
+        write_png(tmp_path / f"{number:02}.png", np.full((64, 64, 3), number, np.uint8))
+    before = list(warnings.filters)
+    for _ in range(20):
+        read_views(sorted(tmp_path.iterdir()))
+    assert warnings.filters == before
