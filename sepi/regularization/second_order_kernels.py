@@ -11,8 +11,7 @@ from typing import Any
 
 from numba import njit, prange
 
-EXACT = {"nnan", "ninf", "nsz"}
-"""Fast-math flags that keep every rounding as written: see :mod:`sepi.matching.plane_sweep_kernels`."""
+from sepi.matching.visibility_kernels import EXACT
 
 MARGIN = 2
 """How far second differences reach, pixels."""
