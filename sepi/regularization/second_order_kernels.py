@@ -11,7 +11,8 @@ from typing import Any
 
 from numba import njit, prange
 
-from sepi.matching.visibility_kernels import EXACT
+EXACT = {"nnan", "ninf", "nsz"}
+"""Fast-math flags that keep every rounding as written: see :mod:`sepi.matching.plane_sweep_kernels`."""
 
 MARGIN = 2
 """How far second differences reach, pixels."""
