@@ -34,12 +34,13 @@ import numpy.typing as npt
 from pydantic import Field
 
 from sepi.image.edges import CannyParameters, canny_edges, depth_discontinuities, edge_angle
+from sepi.image.isolated_pixels import join_isolated_pixels
 from sepi.image.mixed_pixels import MixtureParameters, reassign_mixed_pixels
 from sepi.image.noise import residual_variance
 from sepi.lightfield import BoolMap, FloatMap, LightField
 from sepi.matching.plane_sweep import SweepParameters, SweepResult, sweep
-from sepi.matching.view_subsets import SIDES, half_planes, halves_and_quarters
-from sepi.matching.visibility_sweep import VisibleViewsParameters, depth_from_visible_views
+from sepi.matching.view_subsets import SIDES, half_planes, halves_and_quarters, spread_views
+from sepi.matching.visibility_sweep import VisibleViewsParameters, depth_from_visible_views, occluded_in_any_view
 from sepi.stage import Choice, NoParameters, Progress, StageMaps, none, require_previous
 
 
@@ -164,17 +165,16 @@ def visibility(
     StageMaps
         Adds ``occluded``, bool: pixels that something nearer occludes in some view.
     """
-    from sepi.matching.visibility_kernels import occluded_in_any_view
-
     before = require_previous(previous)
     result = depth_from_visible_views(light_field, before.disparity, parameters, progress)
     colours = light_field.reference_view
     disparity = reassign_mixed_pixels(result.disparity, colours, residual_variance(colours), parameters)
+    disparity = join_isolated_pixels(disparity, colours, parameters.occlusion_margin)
     return before.updated(
         disparity,
         result.confidence,
         occluded=occluded_in_any_view(
-            disparity, light_field.present, light_field.baselines, np.float32(parameters.occlusion_margin)
+            light_field, disparity, parameters.occlusion_margin, spread_views(light_field, parameters.views)
         ),
     )
 

@@ -25,7 +25,8 @@ from pydantic import Field, model_validator
 
 from sepi.image.noise import residual_variance
 from sepi.lightfield import FloatMap, LightField
-from sepi.matching.base_detail import BaseDetailParameters, base_detail_decomposition
+from sepi.matching.base_detail import BaseDetailParameters
+from sepi.matching.view_subsets import spread_views
 from sepi.regularization.wls import (
     WlsParameters,
     data_weight,
@@ -60,6 +61,7 @@ LEAST_SMOOTHNESS = 1e-8
 class SecondOrderParameters(BaseDetailParameters, OcclusionMarginParameters):
     """Parameters of Gauss-Newton refinement and second-order smoothing."""
 
+    views: int | None = Field(None, ge=2, description="views that are compared, at least; null: all")
     refinements: int = Field(0, ge=0, le=20, description="Gauss-Newton steps before the first smoothing")
     refinement_radius: int = Field(3, ge=0, le=20, description="window of these steps, 2 r + 1 pixels")
     solves: int = Field(2, ge=0, le=10, description="rounds of one Gauss-Newton step and one smoothing")
@@ -125,11 +127,11 @@ def second_order(
     StageMaps
         ``confidence`` is that of :func:`smooth_confidence`.
     """
-    from sepi.matching.gauss_newton import gradient_and_hessian, spline_views, view_mean, windowed_step
-    from sepi.matching.visibility_kernels import z_buffers
+    from sepi.matching.gauss_newton import GaussNewton, windowed_step
 
     before = require_previous(previous)
-    matching = spline_views(light_field, base_detail_decomposition(light_field, parameters, last=True), parameters)
+    compared = spread_views(light_field, parameters.views)
+    matching = GaussNewton(light_field, parameters, parameters.occlusion_margin, compared)
     disparity = before.disparity
     uniform = before.mask("textureless")
     reliability = np.where(uniform, 1, reliable(before.confidence, parameters)).astype(np.float32)
@@ -137,11 +139,10 @@ def second_order(
     for i in range(total):
         progress((i + 0.5) / (total + 1))
         smooth = i >= parameters.refinements
-        nearest = z_buffers(disparity, light_field.present, light_field.baselines)
         if i <= parameters.refinements:
             # later steps are too small to change it
-            mean = view_mean(matching, disparity, nearest, parameters.occlusion_margin)
-        gradient, curvature = gradient_and_hessian(matching, mean, disparity, nearest, parameters.occlusion_margin)
+            mean = matching.mean(disparity)
+        gradient, curvature = matching.gradient_and_hessian(mean, disparity)
         radius = parameters.solve_radius if smooth else parameters.refinement_radius
         step, curvature = windowed_step(gradient, curvature, radius, parameters.max_update)
         # where no view knows anything, a step would follow the noise
@@ -149,8 +150,6 @@ def second_order(
         if smooth:
             weight = np.minimum(curvature / max(float(np.percentile(curvature, 90)), 1e-9), 1) * reliability
             weight = np.where(uniform, np.float32(UNIFORM_WEIGHT), weight)
-            # as large as all views, and made anew for the next step
-            del nearest
             target = smooth_second_order(target, disparity, weight, reliability, light_field.reference_view, parameters)
         disparity = target
     return before.updated(disparity, smooth_confidence(disparity, curvature))

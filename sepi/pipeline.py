@@ -5,13 +5,15 @@ from __future__ import annotations
 import hashlib
 import re
 from collections.abc import Mapping
+from contextlib import nullcontext
 from dataclasses import dataclass, field
 from typing import Any
 
 from sepi import initial, occlusion, optimize, textureless
 from sepi.errors import SepiError
 from sepi.lightfield import LightField
-from sepi.matching.base_detail import shared_detail
+from sepi.matching.memory_limit import bytes_of_bands
+from sepi.matching.row_bands import band_memory
 from sepi.matching.unknown import with_unknown
 from sepi.stage import Choice, Parameters, Progress, StageMaps, no_progress
 from sepi.validation import require_known, validated
@@ -166,6 +168,13 @@ VARIANT_ENTRIES: dict[str, dict[str, Any]] = {
         "textureless": "uniform_planes",
         "optimize": "second_order",
     },
+    # few views and candidates, and no more rounds than needed
+    "fast": {
+        "initial": {"choice": "semi_global", "first_views": 9, "first_sampling": 3},
+        "occlusion": {"choice": "visibility", "passes": 1, "views": 25, "sampling": 2},
+        "textureless": {"choice": "uniform_planes", "views": 25},
+        "optimize": {"choice": "second_order", "views": 25, "solves": 1},
+    },
     "best_paper_initial": {"base": "best", "initial": "sepi"},
     # colours alone must tell surfaces apart: their scale is narrower than beside the detail
     "best_no_detail": {
@@ -181,8 +190,8 @@ VARIANT_ENTRIES: dict[str, dict[str, Any]] = {
     "best_wls": {"base": "best", "optimize": "wls"},
 }
 """The built-in variants as :func:`variant_from` reads them: the paper's method, the other four columns of its table 4
-in their order, and the text's other occlusion stage; then the most accurate variant, and the same with one part
-switched off or put back to the paper's."""
+in their order, and the text's other occlusion stage; then the most accurate variant, a quick one, and the most accurate
+one with one part switched off or put back to the paper's."""
 
 DEFAULT_VARIANT = "best"
 """Variant of ``sepi depth``."""
@@ -243,6 +252,7 @@ def estimate_depth(
     variant: str | Variant = DEFAULT_VARIANT,
     parameters: Mapping[str, Mapping[str, Any]] | None = None,
     progress: Progress = no_progress,
+    memory: int | None = None,
 ) -> StageMaps:
     """Disparity, confidence and masks of a light field's reference view.
 
@@ -256,6 +266,9 @@ def estimate_depth(
         Stage to field to value, where the defaults do not suit: ``{"initial": {"num_disparities": 91}}``.
     progress : callable
         Called with the fraction done, 0..1.
+    memory : int, optional
+        Bytes that the process should stay within, the light field and Python itself included. The maps are the same;
+        with little memory it takes longer.
 
     Returns
     -------
@@ -266,7 +279,7 @@ def estimate_depth(
     Raises
     ------
     SepiError
-        If the variant, a stage or a field is unknown, or a value is not allowed.
+        If the variant, a stage or a field is unknown, a value is not allowed, or the memory cannot be enough.
     """
     chosen = variant_named(variant) if isinstance(variant, str) else variant
     settings = stage_parameters(chosen, parameters)
@@ -275,7 +288,8 @@ def estimate_depth(
 
         light_field = light_field.with_range(estimate_range(light_field))
     maps: StageMaps | None = None
-    with shared_detail():
+    limited = nullcontext() if memory is None else band_memory(bytes_of_bands(light_field, settings.values(), memory))
+    with limited:
         for number, (stage, choice) in enumerate(chosen.choices.items()):
 
             def of_all(fraction: float, number: int = number) -> None:

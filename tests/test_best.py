@@ -1,11 +1,6 @@
 """What variant ``best`` adds to the paper's stages: detail, visibility, mixed pixels, uniform regions, confidence."""
 
-import gc
-import threading
-import weakref
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -13,19 +8,15 @@ import pytest
 from sepi.evaluate import score
 from sepi.image.mixed_pixels import MixtureParameters, reassign_mixed_pixels
 from sepi.lightfield import DisparityRange, LightField
-from sepi.matching import base_detail
 from sepi.matching.base_detail import (
     DETAIL_UNIT,
     BaseDetailParameters,
-    _detail_of_views,
     base_detail_decomposition,
-    shared_detail,
 )
-from sepi.pipeline import PARTS_OF_BEST, STAGES, VARIANTS, estimate_depth
+from sepi.pipeline import PARTS_OF_BEST, VARIANTS, estimate_depth
 from sepi.regularization.uniform_regions import UniformPlanesParameters, ransac_plane, uniform_regions
 from sepi.report.tabular.confidence import decile_errors, oracle, sparsification
 from sepi.scenes import render
-from sepi.stage import no_progress
 
 
 @pytest.mark.parametrize(
@@ -76,71 +67,10 @@ def test_detail_leaves_out_shading_and_edges() -> None:
     step = np.where(x >= 20, 0.4, 0)
     view = np.repeat((shading + texture + step)[..., None], 3, axis=2).astype(np.float32)
     field = LightField(np.broadcast_to(view, (1, 2, 40, 40, 3)).copy(), "s")
-    detail = base_detail_decomposition(field, BaseDetailParameters()).detail[0, 0, 0] * DETAIL_UNIT
+    detail = base_detail_decomposition(field, BaseDetailParameters()).detail[0, 0] * DETAIL_UNIT
     inner = detail[6:-6, 6:-6]
     assert np.corrcoef(inner.ravel(), texture[6:-6, 6:-6].ravel())[0, 1] > 0.95
     assert np.abs(inner).max() < 0.03
-
-
-def test_stages_of_a_run_share_the_detail() -> None:
-    """Half a second for each stage; but another light field, and other parameters, have their own."""
-    scene = render("dots", size=64)
-
-    def detail(scene: LightField, **parameters: int) -> np.ndarray:
-        return base_detail_decomposition(scene, BaseDetailParameters(**parameters)).detail
-
-    with shared_detail():
-        first = detail(scene)
-        assert detail(scene.with_range(DisparityRange(-1, 1, "given"))) is first
-        assert not np.array_equal(detail(scene, base_radius=2), first)
-        inverted = replace(scene, views=255 - scene.views)
-        assert not np.array_equal(detail(inverted), first)
-        np.testing.assert_array_equal(detail(scene), first)
-    assert detail(scene) is not first
-
-
-def test_no_detail_stays_in_memory(monkeypatch: pytest.MonkeyPatch) -> None:
-    """81 views of 512 x 512 pixels are 127 MB."""
-    made = []
-
-    def recorded(*arguments: Any) -> np.ndarray:
-        detail = _detail_of_views(*arguments)
-        made.append(weakref.ref(detail))
-        return detail
-
-    monkeypatch.setattr(base_detail, "_detail_of_views", recorded)
-    scene = render("dots", size=64)
-    estimate_depth(scene, "best", {"initial": {"num_disparities": 11}, "occlusion": {"num_disparities": 11}})
-    assert len(made) > 1
-    first = STAGES["initial"]["semi_global"]
-    first.run(scene, None, first.parameters(num_disparities=11), no_progress)
-    gc.collect()
-    assert [reference for reference in made if reference() is not None] == []
-
-
-def test_two_light_fields_in_two_threads() -> None:
-    """Each thread has its own detail, whatever the other begins or ends meanwhile."""
-    scenes = [render(name, size=64) for name in ("dots", "pyramids")]
-    alone = [base_detail_decomposition(scene, BaseDetailParameters()).detail for scene in scenes]
-    begun, ended = threading.Event(), threading.Event()
-
-    def longer() -> bool:
-        with shared_detail():
-            first = base_detail_decomposition(scenes[0], BaseDetailParameters()).detail
-            begun.set()
-            assert ended.wait(60)
-            again = base_detail_decomposition(scenes[0], BaseDetailParameters()).detail
-            return again is first and np.array_equal(again, alone[0])
-
-    def shorter() -> bool:
-        assert begun.wait(60)
-        with shared_detail():
-            found = base_detail_decomposition(scenes[1], BaseDetailParameters()).detail
-        ended.set()
-        return np.array_equal(found, alone[1])
-
-    with ThreadPoolExecutor(2) as pool:
-        assert all(result.result() for result in [pool.submit(longer), pool.submit(shorter)])
 
 
 def test_mixed_pixels_go_to_the_surface_that_fills_them() -> None:

@@ -59,6 +59,12 @@ def main() -> None:
 )
 @click.option("--threads", type=click.IntRange(min=1), help="Threads to use; one per core unless given.")
 @click.option(
+    "--memory",
+    type=click.IntRange(min=1),
+    metavar="MB",
+    help="Stay within so much memory; the same maps, more slowly. As much as is of use unless given.",
+)
+@click.option(
     "--set",
     "settings",
     multiple=True,
@@ -74,6 +80,7 @@ def depth(
     variant: str,
     disparity_range: tuple[float, float] | None,
     threads: int | None,
+    memory: int | None,
     settings: tuple[str, ...],
     timing: bool,
     geometry: Geometry | None,
@@ -85,9 +92,9 @@ def depth(
     shows how it is read, 'sepi check' whether its views are in the right order. Writes the disparity as numbers and in
     colour, confidence, masks and a point cloud; depth in metres where the camera is known.
 
-    Variants: best (the most accurate), paper (the method as published), no_sepi, no_occlusion, no_textureless,
-    no_occlusion_no_textureless (parts of it switched off), wang (another treatment of occlusion); best_no_detail and
-    others that docs/best.md lists (parts of best switched off).
+    Variants: best (the most accurate), fast (half its time), paper (the method as published), no_sepi, no_occlusion,
+    no_textureless, no_occlusion_no_textureless (parts of it switched off), wang (another treatment of occlusion);
+    best_no_detail and others that docs/best.md lists (parts of best switched off).
 
     \b
     Examples:
@@ -123,7 +130,7 @@ def depth(
         if chosen.choices[stage] != HANDED_ON
     ]
     with progress_bar(light_field.name) as progress:
-        maps = estimate_depth(light_field, chosen, parameters, progress)
+        maps = estimate_depth(light_field, chosen, parameters, progress, memory and memory * 2**20)
     seconds = time.perf_counter() - started
     files = write_result(folder, light_field, maps, result_attributes(light_field, variant, history))
     if timing:

@@ -14,27 +14,19 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
-from contextvars import ContextVar
 from typing import Annotated, NamedTuple
 
-import cv2
 import numpy as np
 import numpy.typing as npt
 from pydantic import Field
 
 from sepi.image.noise import noise_level, residual_variance
-from sepi.lightfield import BoolMap, FloatMap, LightField, as_unit_float, full_scale
+from sepi.lightfield import BoolMap, FloatMap, LightField, full_scale
+from sepi.matching.row_bands import Rows
 from sepi.stage import Parameters
 
 DETAIL_UNIT = 1 / 32000
 """Unit of the detail, which is stored as int16: colours differ by at most 1."""
-
-# views and their detail, by what it was made of
-_Shared = dict[tuple[object, ...], tuple[npt.NDArray[np.generic], npt.NDArray[np.int16]]]
-_shared: ContextVar[_Shared | None] = ContextVar("_shared", default=None)
-
 
 ColourScale = Annotated[
     float,
@@ -52,7 +44,7 @@ class BaseDetailParameters(Parameters):
 
     colour_scale: ColourScale = 0.0316
     detail_scale: float = Field(
-        0.0045,
+        0.0038,
         ge=1e-6,
         le=2,
         description="residual of the detail at which its cost is one half; RGB distance, colours in 0..1",
@@ -60,7 +52,7 @@ class BaseDetailParameters(Parameters):
     detail_share: float = Field(0.6, ge=0, le=1, description="share of the detail in the cost; 0 uses colours alone")
     base_radius: int = Field(4, ge=1, le=20, description="bilateral window of 2 r + 1 pixels that takes detail out")
     base_sigma_colour: float = Field(
-        0.0314, gt=0, le=2, description="sum of the RGB differences that counts as an edge of the base, colours in 0..1"
+        0.05, gt=0, le=2, description="sum of the RGB differences that counts as an edge of the base, colours in 0..1"
     )
     base_sigma_space: float = Field(4.0, gt=0, le=20, description="width of the base's window, in pixels")
 
@@ -74,11 +66,14 @@ class BaseDetail(NamedTuple):
         In the views' own units; of grey views three times the same.
     colour_unit : float32
         What a colour value is multiplied with to span 0..1.
-    detail : ndarray, shape (T, S, 3 or 0, H, W), int16
-        Empty where the detail has no share.
+    detail : ndarray, shape (T, S, n or 0, W), int16
+        Mean over the channels; rows from ``low`` on; empty where the detail has no share.
     detail_unit : float32
         What a detail value is multiplied with.
+    low : int
+        First row of the detail.
     present : ndarray, shape (T, S), bool
+        The views that are compared.
     t0, s0 : int
         Position of the reference view.
     baselines : ndarray, shape (T, S, 2), float64
@@ -93,6 +88,7 @@ class BaseDetail(NamedTuple):
     colour_unit: np.float32
     detail: npt.NDArray[np.int16]
     detail_unit: np.float32
+    low: int
     present: BoolMap
     t0: int
     s0: int
@@ -106,7 +102,10 @@ class BaseDetail(NamedTuple):
 
 
 def base_detail_decomposition(
-    light_field: LightField, parameters: BaseDetailParameters, *, last: bool = False
+    light_field: LightField,
+    parameters: BaseDetailParameters,
+    rows: Rows | None = None,
+    present: BoolMap | None = None,
 ) -> BaseDetail:
     """Colours and detail of a light field; missing views stay empty.
 
@@ -114,60 +113,40 @@ def base_detail_decomposition(
     ----------
     light_field : LightField
     parameters : BaseDetailParameters
-    last : bool
-        Whether no later stage needs the detail: it is not kept for one then (:func:`shared_detail`).
+    rows : Rows, optional
+        The rows whose detail is wanted; all unless given.
+    present : ndarray, shape (T, S), bool, optional
+        The views that are wanted; all that are present unless given.
 
     Returns
     -------
     BaseDetail
     """
+    from sepi.matching.base_detail_kernels import detail_of_views
+
     views, guide = light_field.rgb_views, light_field.reference_view
-    edge = float(np.hypot(parameters.base_sigma_colour, 3 * noise_level(guide)))
-    if parameters.detail_share > 0:
-        detail = _detail_of_views(light_field, parameters.base_radius, edge, parameters.base_sigma_space, last)
-    else:
-        detail = np.empty((*light_field.grid, 0, *light_field.shape), np.int16)
+    height, width = light_field.shape
+    rows = rows or Rows(0, height)
+    present = light_field.present if present is None else present
+    # as they are in memory: nothing is copied
+    colours = views.transpose(0, 1, 4, 2, 3)
+    unit = np.float32(1 / full_scale(views.dtype))
+    with_detail = parameters.detail_share > 0
+    # pages that nobody writes to take no memory
+    detail = np.zeros((*light_field.grid, rows.high - rows.low if with_detail else 0, width), np.int16)
+    if with_detail:
+        edge = float(np.hypot(parameters.base_sigma_colour, 3 * noise_level(guide)))
+        radius, space = parameters.base_radius, parameters.base_sigma_space
+        detail_of_views(colours, unit, present, rows.low, radius, edge, space, np.float32(DETAIL_UNIT), detail)
     return BaseDetail(
-        # as they are in memory: nothing is copied
-        views.transpose(0, 1, 4, 2, 3),
-        np.float32(1 / full_scale(views.dtype)),
+        colours,
+        unit,
         detail,
         np.float32(DETAIL_UNIT),
-        light_field.present,
+        rows.low,
+        present,
         *light_field.reference_position,
         light_field.baselines,
         residual_variance(guide),
         guide,
     )
-
-
-@contextmanager
-def shared_detail() -> Iterator[None]:
-    """Stages that run inside, in this thread, on one light field share its detail; it is freed at the end.
-
-    The views must not change meanwhile.
-    """
-    token = _shared.set({})
-    try:
-        yield
-    finally:
-        _shared.reset(token)
-
-
-def _detail_of_views(
-    light_field: LightField, radius: int, edge: float, width: float, last: bool
-) -> npt.NDArray[np.int16]:
-    """Each view without its edge-preserving mean; shape (T, S, 3, H, W)."""
-    shared = _shared.get()
-    key = (id(light_field.views), light_field.present.tobytes(), radius, edge, width)
-    if shared is not None and key in shared:
-        return shared.pop(key)[1] if last else shared[key][1]
-    detail = np.zeros((*light_field.grid, 3, *light_field.shape), np.int16)
-    for t, s in np.argwhere(light_field.present):
-        view = as_unit_float(light_field.rgb_views[t, s])
-        base = cv2.bilateralFilter(view, 2 * radius + 1, edge, width)
-        detail[t, s] = np.rint(np.clip(view - base, -1, 1) / DETAIL_UNIT).astype(np.int16).transpose(2, 0, 1)
-    if shared is not None and not last:
-        # with the views, so that no other array gets their id meanwhile
-        shared[key] = light_field.views, detail
-    return detail

@@ -9,94 +9,153 @@ are interpolated by cubic splines, since linear interpolation pulls the minimum 
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import cv2
 import numpy as np
 
-from sepi.lightfield import FloatMap, LightField
-from sepi.matching.base_detail import BaseDetail, BaseDetailParameters
-from sepi.matching.gauss_newton_kernels import (
-    MARGIN,
-    SplineViews,
-    mean_of_views,
-    normal_equations,
-    spline_coefficients,
-    view_splines,
-)
+from sepi.lightfield import BoolMap, FloatMap, LightField
+from sepi.matching.base_detail import BaseDetailParameters, base_detail_decomposition
+from sepi.matching.gauss_newton_kernels import Seeing, SplineViews, mean_of_views, normal_equations
+from sepi.matching.row_bands import Band, Rows, row_bands
+from sepi.matching.spline_kernels import MARGIN, REACH, SPLINE_UNIT, spline_coefficients, view_splines
+from sepi.matching.visibility_kernels import z_buffers
 
 _SMOOTH = np.array([1, 4, 1], np.float32) / 6
 _DIFFERENCE = np.array([-1, 0, 1], np.float32) / 2
 
+BYTES_PER_PIXEL = 2 * 4 + 2 + 4
+"""Of a pixel of a view: four coefficients, the detail, and the z-buffer."""
 
-def spline_views(light_field: LightField, views: BaseDetail, parameters: BaseDetailParameters) -> SplineViews:
-    """Splines of all views' colours and, where it has a share, detail."""
-    planes = [(views.colours, views.colour_unit, parameters.colour_scale, 1 - parameters.detail_share)]
-    if parameters.detail_share > 0:
-        planes.append((views.detail, views.detail_unit, parameters.detail_scale, parameters.detail_share))
-    padded = (n + 2 * MARGIN for n in light_field.shape)
-    splines = np.zeros((*light_field.grid, *padded, 3 * len(planes)), np.int16)
-    for i, (values, unit, _, _) in enumerate(planes):
-        view_splines(values, unit, light_field.present, 3 * i, splines)
-    others = light_field.present.copy()
+
+class GaussNewton:
+    """Gauss-Newton sums over the views of a light field.
+
+    Parameters
+    ----------
+    light_field : LightField
+    parameters : BaseDetailParameters
+        How well colours and detail must fit.
+    occlusion_margin : float
+        By how much an occluder must be nearer, pixels per view step.
+    present : ndarray, shape (T, S), bool, optional
+        The views that are compared; all unless given.
+    """
+
+    def __init__(
+        self,
+        light_field: LightField,
+        parameters: BaseDetailParameters,
+        occlusion_margin: float,
+        present: BoolMap | None = None,
+    ) -> None:
+        self._light_field = light_field
+        self._parameters = parameters
+        self._present = light_field.present if present is None else present
+        self._margin = np.float32(occlusion_margin)
+        # of the whole picture, where there is memory for it
+        self._splines: SplineViews | None = None
+        self._nearest: tuple[FloatMap, FloatMap] | None = None
+
+    def mean(self, disparity: FloatMap) -> FloatMap:
+        """Mean of the views that see each pixel.
+
+        Parameters
+        ----------
+        disparity : ndarray, shape (H, W), float32
+            Pixels per view step.
+
+        Returns
+        -------
+        ndarray, shape (H, W, 4), float32
+            Colours, and detail or 0.
+        """
+        mean = np.empty((*disparity.shape, 4), np.float32)
+
+        def add(views: SplineViews, seeing: Seeing, band: Band) -> None:
+            mean_of_views(views, seeing, disparity, band.begin, band.end, mean)
+
+        self._in_bands(disparity, add)
+        return mean
+
+    def gradient_and_hessian(self, mean: FloatMap, disparity: FloatMap) -> tuple[FloatMap, FloatMap]:
+        """Gradient and curvature of the cost of each pixel, before any window.
+
+        Parameters
+        ----------
+        mean : ndarray, shape (H, W, 4), float32
+            From :meth:`mean`; of a slightly different map is good enough.
+        disparity : ndarray, shape (H, W), float32
+            Pixels per view step.
+
+        Returns
+        -------
+        gradient, curvature : ndarray, shape (H, W), float32
+            The curvature is the inverse variance of the disparity, 1 / (pixels per view step)^2.
+        """
+        gradient, curvature = np.empty_like(disparity), np.empty_like(disparity)
+        image = mean, *spline_derivatives(mean)
+
+        def add(views: SplineViews, seeing: Seeing, band: Band) -> None:
+            normal_equations(views, seeing, disparity, image, band.begin, band.end, gradient, curvature)
+
+        self._in_bands(disparity, add)
+        return gradient, curvature
+
+    def _in_bands(self, disparity: FloatMap, add: Callable[[SplineViews, Seeing, Band], None]) -> None:
+        field = self._light_field
+        bands = row_bands(field, self._present, float(np.abs(disparity).max()), BYTES_PER_PIXEL)
+        if len(bands) == 1:
+            if self._splines is None:
+                self._splines = spline_views(field, self._parameters, bands[0].rows, self._present)
+            if self._nearest is None or self._nearest[0] is not disparity:
+                self._nearest = None
+                self._nearest = disparity, z_buffers(disparity, self._present, field.baselines, *bands[0].rows)
+            add(self._splines, Seeing(self._nearest[1], self._margin), bands[0])
+            return
+        for band in bands:
+            nearest = z_buffers(disparity, self._present, field.baselines, *band.rows)
+            add(spline_views(field, self._parameters, band.rows, self._present), Seeing(nearest, self._margin), band)
+
+
+def spline_views(
+    light_field: LightField, parameters: BaseDetailParameters, rows: Rows, present: BoolMap
+) -> SplineViews:
+    """Splines of some rows of the views' colours and, where it has a share, detail."""
+    height, width = light_field.shape
+    # what the convolution reaches; mirrored at the picture's ends
+    reach = MARGIN + REACH
+    wider = Rows(max(0, min(rows.low - reach, height - reach - 1)), min(height, max(rows.high, 0) + reach + 1))
+    views = base_detail_decomposition(light_field, parameters, wider, present)
+    shape = (rows.high - rows.low + 2 * MARGIN, width + 2 * MARGIN, 4)
+    splines = np.zeros((*light_field.grid, *shape), np.int16)
+    view_splines(
+        views.colours, views.colour_unit, views.detail, views.detail_unit, wider.low, present, rows.low,
+        splines,
+    )  # fmt: skip
+    others = present.copy()
     others[light_field.reference_position] = False
     down, across = light_field.baselines[others].astype(np.float32).T
-    rows, columns = np.nonzero(others)
-    runs = np.flatnonzero(np.diff(down, prepend=np.nan).astype(bool) | np.diff(rows, prepend=-1).astype(bool))
-    own = [values[light_field.reference_position].astype(np.float32) * unit for values, unit, _, _ in planes]
+    in_row, columns = np.nonzero(others)
+    runs = np.flatnonzero(np.diff(down, prepend=np.nan).astype(bool) | np.diff(in_row, prepend=-1).astype(bool))
+    own = np.zeros((height, width, 4), np.float32)
+    own[..., :3] = views.guide
+    if views.detail.size:
+        own[wider.low : wider.high, :, 3] = views.detail[light_field.reference_position] * views.detail_unit
+    scales = parameters.colour_scale, parameters.detail_scale
     return SplineViews(
         splines,
-        np.ascontiguousarray(np.concatenate(own).transpose(1, 2, 0)),
+        SPLINE_UNIT,
+        rows.low,
+        own,
         columns,
         np.ascontiguousarray(across),
         np.append(runs, columns.size),
-        rows[runs],
+        in_row[runs],
         down[runs],
-        np.array([views.squared_scale(scale) for _, _, scale, _ in planes], np.float32),
-        np.array([share for _, _, _, share in planes], np.float32),
+        np.array([views.squared_scale(scale) for scale in scales], np.float32),
+        np.array([1 - parameters.detail_share, parameters.detail_share], np.float32),
     )
-
-
-def view_mean(views: SplineViews, disparity: FloatMap, nearest: FloatMap, occlusion_margin: float) -> FloatMap:
-    """Mean of the views that see each pixel.
-
-    Parameters
-    ----------
-    views : SplineViews
-    disparity : ndarray, shape (H, W), float32
-        Pixels per view step.
-    nearest : ndarray, shape (T, S, H, W), float32
-        z-buffers of the map in the views.
-    occlusion_margin : float
-        By how much an occluder must be nearer, pixels per view step.
-
-    Returns
-    -------
-    ndarray, shape (H, W, C), float32
-    """
-    mean: FloatMap = mean_of_views(views, disparity, nearest, np.float32(occlusion_margin))
-    return mean
-
-
-def gradient_and_hessian(
-    views: SplineViews, mean: FloatMap, disparity: FloatMap, nearest: FloatMap, occlusion_margin: float
-) -> tuple[FloatMap, FloatMap]:
-    """Gradient and curvature of the cost of each pixel, before any window.
-
-    Parameters
-    ----------
-    views : SplineViews
-    mean : ndarray, shape (H, W, C), float32
-        From :func:`view_mean`; of a slightly different map is good enough.
-    disparity, nearest, occlusion_margin
-        As in :func:`view_mean`.
-
-    Returns
-    -------
-    gradient, curvature : ndarray, shape (H, W), float32
-        The curvature is the inverse variance of the disparity, 1 / (pixels per view step)^2.
-    """
-    margin = np.float32(occlusion_margin)
-    gradient, curvature = normal_equations(views, disparity, nearest, margin, mean, *spline_derivatives(mean))
-    return gradient, curvature
 
 
 def windowed_step(gradient: FloatMap, curvature: FloatMap, radius: int, max_update: float) -> tuple[FloatMap, FloatMap]:

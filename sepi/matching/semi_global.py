@@ -14,6 +14,7 @@ References
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from pydantic import Field
@@ -31,6 +32,10 @@ HALF_CONFIDENT = 0.05
 """Margin of cost at which the confidence is one half."""
 
 
+SmallPenalty = Annotated[float, Field(ge=0, description="cost of a change by one candidate along a path")]
+"""A parameter whose default is not the same for every sweep."""
+
+
 class SmoothingParameters(Parameters):
     """Parameters of aggregation and semi-global smoothing."""
 
@@ -38,10 +43,10 @@ class SmoothingParameters(Parameters):
     window_sigma: float = Field(
         0.01, ge=1e-6, le=10, description="colour distance at which a window pixel's weight falls, colours in 0..1"
     )
-    small_penalty: float = Field(0.02, ge=0, description="cost of a change by one candidate along a path")
+    small_penalty: SmallPenalty = 0.03
     large_penalty: float = Field(1.0, ge=0, description="cost of a larger change where the colour stays")
     colour_weakening: float = Field(
-        50.0, ge=0, description="how much a colour change weakens the larger penalty, per sum of RGB differences"
+        65.0, ge=0, description="how much a colour change weakens the larger penalty, per sum of RGB differences"
     )
 
 

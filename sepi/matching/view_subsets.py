@@ -1,4 +1,4 @@
-"""Parts of the view grid from which half-SEPIs are put together.
+"""Parts of the view grid: those from which half-SEPIs are put together, and few views that stand for all.
 
 A sweep sums the costs of groups of views; a subset is a union of groups. Occlusion at a straight edge hides the views
 on one side of a line through the reference view, so the subsets worth asking for are halves and quarters.
@@ -91,6 +91,40 @@ def half_planes(light_field: LightField, directions: int) -> ViewSubsets:
     inside = (np.arange(sectors)[None] - start + directions // 2 - 1) % sectors < directions
     subsets = np.concatenate([np.ones((1, sectors), bool), inside])
     return ViewSubsets(groups, subsets, ("full", *(f"half-plane {n}" for n in range(sectors))))
+
+
+def spread_views(light_field: LightField, at_least: int | None) -> BoolMap:
+    """Few views that are spread evenly over the grid and reach as far as all, or nearly so.
+
+    Every second, fourth, ... row and column from the reference view, or of these every other view as on a chess board;
+    the fewest that are ``at_least`` so many, and all views where there are not more.
+
+    Parameters
+    ----------
+    light_field : LightField
+    at_least : int or None
+        None: all views.
+
+    Returns
+    -------
+    ndarray, shape (T, S), bool
+        Views that are present; the reference view is among them.
+    """
+    if at_least is None:
+        return light_field.present
+    t0, s0 = light_field.reference_position
+    down, across = np.indices(light_field.grid) - np.array([t0, s0])[:, None, None]
+    chosen = light_field.present
+    step = 1
+    while True:
+        rows_and_columns = (down % step == 0) & (across % step == 0)
+        chess_board = rows_and_columns & ((down + across) // step % 2 == 0)
+        for part in (rows_and_columns, chess_board):
+            fewer = light_field.present & part
+            if fewer.sum() < at_least:
+                return chosen
+            chosen = fewer
+        step *= 2
 
 
 def grid_steps(light_field: LightField) -> npt.NDArray[np.float64]:

@@ -23,8 +23,10 @@ class Visibility(NamedTuple):
 
     Attributes
     ----------
-    nearest : ndarray, shape (T, S, H, W) or (T, S, H, 0), float32
+    nearest : ndarray, shape (T, S, n, W) or (T, S, n, 0), float32
         From :func:`z_buffers`; empty: all views see all pixels.
+    low : int
+        First row of ``nearest``.
     occlusion_margin : float32
         By how much an occluder must be nearer, pixels per view step.
     occluded_view_weight : float32
@@ -32,6 +34,7 @@ class Visibility(NamedTuple):
     """
 
     nearest: FloatMap
+    low: int
     occlusion_margin: np.float32
     occluded_view_weight: np.float32
 
@@ -46,7 +49,7 @@ class RobustCost(NamedTuple):
 class _View(NamedTuple):
     """A view of baseline ``(v, u)``, and the row ``y`` of the reference view whose costs are computed.
 
-    ``band (1 or 2, 3, rows, W + 1)`` holds the rows from ``low`` on of its colours and detail.
+    ``band (3 or 4, rows, W + 1)`` holds the rows from ``low`` on of its colours and detail.
     """
 
     v: float
@@ -65,7 +68,7 @@ class _Sums(NamedTuple):
 
 
 @njit(parallel=True, cache=True)
-def z_buffers(disparity: Any, present: Any, baselines: Any) -> Any:
+def z_buffers(disparity: Any, present: Any, baselines: Any, low: int, high: int) -> Any:
     """Disparity map of the reference view as each view sees it: the nearest of the pixels that touch a position.
 
     Parameters
@@ -73,71 +76,110 @@ def z_buffers(disparity: Any, present: Any, baselines: Any) -> Any:
     disparity : ndarray, shape (H, W), float32
         Pixels per view step.
     present : ndarray, shape (T, S), bool
+        Other views are left empty: their values are undefined.
     baselines : ndarray, shape (T, S, 2), float64
         Down and across from the reference view, in view steps.
+    low, high : int
+        The rows of the views that are wanted.
 
     Returns
     -------
-    ndarray, shape (T, S, H, W), float32
+    ndarray, shape (T, S, high - low, W), float32
         ``EMPTY`` where no pixel falls. A pixel occludes the up to four positions that its square touches, since a
         bilinear sample beside it reads its colour too.
     """
     T, S = present.shape
     H, W = disparity.shape
-    nearest = np.empty((T, S, H, W), np.float32)
+    nearest = np.empty((T, S, high - low, W), np.float32)
+    least, most = float(disparity.min()), float(disparity.max())
     for view in prange(T * S):
         t, s = view // S, view % S
-        buffer = nearest[t, s]
-        buffer[:] = EMPTY
         if not present[t, s]:
             continue
+        buffer = nearest[t, s]
+        buffer[:] = EMPTY
         v, u = baselines[t, s, 0], baselines[t, s, 1]
-        for y in range(H):
+        # rows farther away do not get here
+        first = max(0, math.floor(low - 1 + min(least * v, most * v)))
+        last = min(H, math.ceil(high + max(least * v, most * v)) + 1)
+        for y in range(first, last):
             for x in range(W):
                 d = disparity[y, x]
-                top, left = math.floor(y - d * v), math.floor(x - d * u)
-                for row in range(max(top, 0), min(top + 2, H)):
+                top, left = math.floor(y - d * v) - low, math.floor(x - d * u)
+                if 0 <= top < high - low - 1 and 0 <= left < W - 1:
+                    buffer[top, left] = max(buffer[top, left], d)
+                    buffer[top, left + 1] = max(buffer[top, left + 1], d)
+                    buffer[top + 1, left] = max(buffer[top + 1, left], d)
+                    buffer[top + 1, left + 1] = max(buffer[top + 1, left + 1], d)
+                    continue
+                for row in range(max(top, 0), min(top + 2, high - low)):
                     for column in range(max(left, 0), min(left + 2, W)):
                         buffer[row, column] = max(buffer[row, column], d)
     return nearest
 
 
 @njit(parallel=True, cache=True)
-def occluded_in_any_view(disparity: Any, present: Any, baselines: Any, occlusion_margin: Any) -> Any:
-    """Pixels that something nearer occludes in one of the views that could see them; shape (H, W), bool.
+def occluded_in_any_view(
+    disparity: Any, present: Any, baselines: Any, nearest: Any, low: int, occlusion_margin: Any, begin: int, end: int
+) -> Any:
+    """Pixels that something nearer occludes in one of the views that could see them.
 
     Parameters
     ----------
     disparity, present, baselines
         As in :func:`z_buffers`.
+    nearest : ndarray, shape (T, S, n, W), float32
+        From :func:`z_buffers`, rows from ``low`` on.
+    low : int
     occlusion_margin : float32
         By how much an occluder must be nearer, pixels per view step.
+    begin, end : int
+        The rows that are wanted.
+
+    Returns
+    -------
+    ndarray, shape (end - begin, W), bool
     """
-    nearest = z_buffers(disparity, present, baselines)
-    T, S, H, W = nearest.shape
-    occluded = np.zeros((H, W), np.bool_)
-    for y in prange(H):
+    T, S = present.shape
+    H, W = disparity.shape
+    occluded = np.zeros((end - begin, W), np.bool_)
+    for y in prange(begin, end):
         for x in range(W):
             d = disparity[y, x]
             for t in range(T):
                 for s in range(S):
                     row, column = y - d * baselines[t, s, 0] + 0.5, x - d * baselines[t, s, 1] + 0.5
-                    if row >= 0 and column >= 0 and row < H and column < W:
-                        occluded[y, x] |= nearest[t, s, int(row), int(column)] > d + occlusion_margin
+                    if present[t, s] and row >= 0 and column >= 0 and row < H and column < W:
+                        occluded[y - begin, x] |= nearest[t, s, int(row) - low, int(column)] > d + occlusion_margin
     return occluded
 
 
 @njit(inline="always")
-def _add_residuals(out: Any, a: Any, b: Any, reference: Any, seen: Any, w: Any, scale2: Any, share: Any) -> None:
-    """Add the robust residuals of one run of pixels; ``a``, ``b``: rows above and below the samples, per channel."""
+def _interpolated(a: Any, b: Any, w: Any, x: int) -> Any:
+    """Bilinear sample of one channel; ``a``, ``b``: rows above and below the samples."""
+    return w[0] * a[x] + w[1] * a[x + 1] + w[2] * b[x] + w[3] * b[x + 1]
+
+
+@njit(inline="always")
+def _add_colours(out: Any, a: Any, b: Any, reference: Any, seen: Any, w: Any, scale2: Any, share: Any) -> None:
+    """Add the robust residuals of one run of pixels; ``a``, ``b``, ``reference``: a row for each channel."""
     a0, a1, a2 = a
     b0, b1, b2 = b
     g0, g1, g2 = reference
     for x in range(out.size):
-        r0 = w[0] * a0[x] + w[1] * a0[x + 1] + w[2] * b0[x] + w[3] * b0[x + 1] - g0[x]
-        r1 = w[0] * a1[x] + w[1] * a1[x + 1] + w[2] * b1[x] + w[3] * b1[x + 1] - g1[x]
-        r2 = w[0] * a2[x] + w[1] * a2[x + 1] + w[2] * b2[x] + w[3] * b2[x + 1] - g2[x]
+        r0 = _interpolated(a0, b0, w, x) - g0[x]
+        r1 = _interpolated(a1, b1, w, x) - g1[x]
+        r2 = _interpolated(a2, b2, w, x) - g2[x]
         z = r0 * r0 + r1 * r1 + r2 * r2
+        out[x] += share * seen[x] * z / (z + scale2)
+
+
+@njit(inline="always")
+def _add_detail(out: Any, a: Any, b: Any, reference: Any, seen: Any, w: Any, scale2: Any, share: Any) -> None:
+    """:func:`_add_colours` of the detail, which is one channel that counts as three equal ones."""
+    for x in range(out.size):
+        r = _interpolated(a, b, w, x) - reference[x]
+        z = np.float32(3) * r * r
         out[x] += share * seen[x] * z / (z + scale2)
 
 
@@ -149,10 +191,11 @@ def _channels(rows: Any, row: int, begin: int, end: int) -> Any:
 
 @njit(cache=True, fastmath=EXACT, error_model="numpy")
 def _add_view(
-    view: _View, reference: Any, disparities: Any, nearest: Any, visibility: Visibility, robust: RobustCost, sums: _Sums
-) -> None:
-    """Add one view at every candidate; ``reference (1 or 2, 3, 1, W)``, ``nearest``: the view's own z-buffer."""
-    H, W = nearest.shape[0], reference.shape[3]
+    view: _View, H: int, reference: Any, disparities: Any, nearest: Any, visibility: Visibility, robust: RobustCost,
+    sums: _Sums,
+) -> None:  # fmt: skip
+    """Add one view at every candidate; ``reference (3 or 4, W)``, ``nearest``: the view's own z-buffer."""
+    W = reference.shape[1]
     v, u, y, low, band = view
     cost, weight, scratch = sums
     margin, hidden = visibility.occlusion_margin, visibility.occluded_view_weight
@@ -174,7 +217,7 @@ def _add_view(
             seen[:] = one
         else:
             right = 1 if fx > 0.5 else 0
-            before = nearest[top + (1 if fy > 0.5 else 0), i + right : last + left + right]
+            before = nearest[top - visibility.low + (1 if fy > 0.5 else 0), i + right : last + left + right]
             limit = np.float32(d + margin)
             for x in range(seen.size):
                 seen[x] = one if before[x] <= limit else hidden
@@ -182,11 +225,15 @@ def _add_view(
         for x in range(seen.size):
             count[x] += seen[x]
         w = ((one - fy) * (one - fx), (one - fy) * fx, fy * (one - fx), fy * fx)
-        for m in range(reference.shape[0]):
-            b, g = band[m], reference[m]
-            _add_residuals(
-                cost[k, first:last], _channels(b, n, i, j), _channels(b, n + 1, i, j),
-                _channels(g, 0, first, last), seen, w, robust.scales2[m], robust.shares[m],
+        _add_colours(
+            cost[k, first:last], _channels(band, n, i, j), _channels(band, n + 1, i, j),
+            (reference[0, first:last], reference[1, first:last], reference[2, first:last]),
+            seen, w, robust.scales2[0], robust.shares[0],
+        )  # fmt: skip
+        if reference.shape[0] > 3:
+            _add_detail(
+                cost[k, first:last], band[3, n, i:j], band[3, n + 1, i:j], reference[3, first:last],
+                seen, w, robust.scales2[1], robust.shares[1],
             )  # fmt: skip
 
 
@@ -216,18 +263,18 @@ def sweep_visible_rows(
     t0, s0 = views.t0, views.s0
     K = disparities.size
     with_detail = views.detail.shape[2] > 0
-    parts = 2 if with_detail else 1
+    channels = 4 if with_detail else 3
     reach = max(abs(disparities[0]), abs(disparities[K - 1])) * np.abs(views.baselines[:, :, 0]).max()
     rows = min(H, 2 * math.ceil(reach) + 3)
     for y in prange(begin, end):
         sums = _Sums(np.zeros((K, W), np.float32), np.zeros((K, W), np.float32), np.empty(W, np.float32))
-        reference = np.empty((parts, 3, 1, W), np.float32)
+        reference = np.empty((channels, W), np.float32)
         # one column more, which is read but weighs nothing
-        band = np.zeros((parts, 3, rows, W + 1), np.float32)
+        band = np.zeros((channels, rows, W + 1), np.float32)
         for c in range(3):
-            _load(views.colours[t0, s0, c, y], views.colour_unit, reference[0, c, 0])
-            if with_detail:
-                _load(views.detail[t0, s0, c, y], views.detail_unit, reference[1, c, 0])
+            _load(views.colours[t0, s0, c, y], views.colour_unit, reference[c])
+        if with_detail:
+            _load(views.detail[t0, s0, y - views.low], views.detail_unit, reference[3])
         for t in range(T):
             for s in range(S):
                 if not views.present[t, s] or (t == t0 and s == s0):
@@ -236,13 +283,13 @@ def sweep_visible_rows(
                 ends = (y - disparities[0] * v, y - disparities[K - 1] * v)
                 low = max(0, min(H - 2, math.floor(min(ends))))
                 high = max(0, min(H - 2, math.floor(max(ends)))) + 1
-                for c in range(3):
-                    for row in range(low, high + 1):
-                        _load(views.colours[t, s, c, row], views.colour_unit, band[0, c, row - low, :W])
-                        if with_detail:
-                            _load(views.detail[t, s, c, row], views.detail_unit, band[1, c, row - low, :W])
+                for row in range(low, high + 1):
+                    for c in range(3):
+                        _load(views.colours[t, s, c, row], views.colour_unit, band[c, row - low, :W])
+                    if with_detail:
+                        _load(views.detail[t, s, row - views.low], views.detail_unit, band[3, row - low, :W])
                 view = _View(v, u, y, low, band)
-                _add_view(view, reference, disparities, visibility.nearest[t, s], visibility, robust, sums)
+                _add_view(view, H, reference, disparities, visibility.nearest[t, s], visibility, robust, sums)
         for k in range(K):
             for x in range(W):
                 cost[k, y, x] = sums.cost[k, x] / sums.weight[k, x] if sums.weight[k, x] > 0 else np.float32(1)

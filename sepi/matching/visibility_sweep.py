@@ -2,26 +2,26 @@
 
 A view sees pixel ``p`` at candidate ``d`` unless something nearer than ``d`` occludes the position where ``p`` would be
 seen. What occludes it is known from a first depth map: each view gets a z-buffer of that map. This is the idea of the
-half-SEPI, with the part of the views chosen view by view. The compiled loops are in
+half-SEPI, with the part of the views chosen view by view. All maps but the last only tell what is hidden where: a few
+views, spread over the grid, and every other candidate are enough for them. The compiled loops are in
 :mod:`sepi.matching.visibility_kernels`.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from pydantic import Field
 
-from sepi.lightfield import FloatMap, LightField
-from sepi.matching.base_detail import (
-    BaseDetail,
-    BaseDetailParameters,
-    ColourScale,
-    base_detail_decomposition,
-)
+from sepi.image.noise import residual_variance
+from sepi.lightfield import BoolMap, FloatMap, LightField
+from sepi.matching.base_detail import BaseDetailParameters, ColourScale, base_detail_decomposition
 from sepi.matching.candidates import CandidateParameters, CandidateRule, number_field
-from sepi.matching.semi_global import SmoothedResult, SmoothingParameters, smooth_and_choose
+from sepi.matching.row_bands import Band, row_bands
+from sepi.matching.semi_global import SmallPenalty, SmoothedResult, SmoothingParameters, smooth_and_choose
+from sepi.matching.view_subsets import spread_views
 from sepi.stage import OcclusionMarginParameters, Progress
 
 if TYPE_CHECKING:
@@ -37,6 +37,9 @@ CANDIDATES = CandidateRule(usual=91, finest=0.03, coarsest=0.4, volume_bytes=2**
 BYTES_PER_CANDIDATE = 8
 """Of each pixel: two at a time of the costs, their averages, and these smoothed."""
 
+BYTES_PER_PIXEL = 2 + 4
+"""Of a pixel of a view: the detail, and the z-buffer."""
+
 
 class VisibilitySweepParameters(CandidateParameters, BaseDetailParameters, SmoothingParameters):
     """Parameters of a visibility sweep and of the choice among its candidates."""
@@ -44,6 +47,16 @@ class VisibilitySweepParameters(CandidateParameters, BaseDetailParameters, Smoot
     rule: ClassVar[CandidateRule] = CANDIDATES
 
     num_disparities: int | None = number_field(CANDIDATES, "docs/best.md")
+    views: int = Field(41, ge=2, description="views that the last map compares, at least; spread evenly over the grid")
+    first_views: int = Field(25, ge=2, description="views that the maps before it compare, at least")
+    sampling: float = Field(
+        1.0, ge=1, le=8, description="distance of the last map's candidates; 1: as num_disparities says"
+    )
+    first_sampling: float = Field(2.0, ge=1, le=8, description="distance of the candidates of the maps before it")
+
+    def fewer(self, light_field: LightField, sampling: float) -> int:
+        """How many candidates, so many times as far apart as usual."""
+        return max(2, round((self.number(light_field) - 1) / sampling) + 1)
 
 
 class VisibleViewsParameters(VisibilitySweepParameters, OcclusionMarginParameters):
@@ -57,12 +70,13 @@ class AllViewsParameters(VisibilitySweepParameters):
     """Parameters of the first depth map: a narrow scale of the colours bears with views that do not see the pixel."""
 
     colour_scale: ColourScale = 0.0077
+    small_penalty: SmallPenalty = 0.04
 
 
 def depth_from_all_views(
     light_field: LightField, parameters: VisibilitySweepParameters, progress: Progress
 ) -> SmoothedResult:
-    """Depth as if every view saw every pixel.
+    """Depth by a few views, as if each saw every pixel.
 
     Parameters
     ----------
@@ -80,11 +94,7 @@ def depth_from_all_views(
     SepiError
         If the disparity range is unknown.
     """
-    from sepi.matching.visibility_kernels import Visibility
-
-    everywhere = np.empty((*light_field.grid, light_field.shape[0], 0), np.float32)
-    views = base_detail_decomposition(light_field, parameters)
-    return _sweep(light_field, views, Visibility(everywhere, np.float32(0), np.float32(1)), parameters, progress)
+    return _sweep(light_field, False, None, parameters, progress)
 
 
 def depth_from_visible_views(
@@ -110,16 +120,12 @@ def depth_from_visible_views(
     SepiError
         If the disparity range is unknown.
     """
-    from sepi.matching.visibility_kernels import Visibility, z_buffers
-
-    views = base_detail_decomposition(light_field, parameters)
-    margin, weight = np.float32(parameters.occlusion_margin), np.float32(parameters.occluded_view_weight)
     n = parameters.passes
     for i in range(n):
         result = _sweep(
             light_field,
-            views,
-            Visibility(z_buffers(disparity, light_field.present, light_field.baselines), margin, weight),
+            i == n - 1,
+            disparity,
             parameters,
             lambda fraction, i=i: progress((i + fraction) / n),  # type: ignore[misc]
         )
@@ -127,40 +133,110 @@ def depth_from_visible_views(
     return result
 
 
+def occluded_in_any_view(
+    light_field: LightField, disparity: FloatMap, occlusion_margin: float, present: BoolMap
+) -> BoolMap:
+    """Pixels that something nearer occludes in one of the views that could see them.
+
+    Parameters
+    ----------
+    light_field : LightField
+    disparity : ndarray, shape (H, W), float32
+        Pixels per view step.
+    occlusion_margin : float
+        By how much an occluder must be nearer, pixels per view step.
+    present : ndarray, shape (T, S), bool
+        The views that are looked at.
+
+    Returns
+    -------
+    ndarray, shape (H, W), bool
+    """
+    from sepi.matching import visibility_kernels as kernels
+
+    baselines = light_field.baselines
+    occluded = np.empty(light_field.shape, bool)
+    for begin, end, rows in row_bands(light_field, present, float(np.abs(disparity).max()), BYTES_PER_PIXEL):
+        nearest = kernels.z_buffers(disparity, present, baselines, *rows)
+        occluded[begin:end] = kernels.occluded_in_any_view(
+            disparity, present, baselines, nearest, rows.low, np.float32(occlusion_margin), begin, end
+        )
+    return occluded
+
+
 def _sweep(
     light_field: LightField,
-    views: BaseDetail,
-    visibility: Visibility,
+    last: bool,
+    disparity: FloatMap | None,
     parameters: VisibilitySweepParameters,
     progress: Progress,
 ) -> SmoothedResult:
-    disparities = parameters.candidates(light_field)
-    # neither is held by a name here: each goes as soon as it has been used
-    cost = [_costs(views, visibility, disparities, parameters, progress)]
-    del visibility
-    result = smooth_and_choose(cost.pop(), disparities, views.guide, views.noise, parameters)
+    """A map: the last one, or one of those before it, which only tell what is hidden where."""
+    present = spread_views(light_field, parameters.views if last else parameters.first_views)
+    disparities = light_field.require_disparity_range().candidates(
+        parameters.fewer(light_field, parameters.sampling if last else parameters.first_sampling)
+    )
+    height, width = light_field.shape
+    cost = np.empty((len(disparities), height, width), np.float32)
+    for band in row_bands(light_field, present, float(np.abs(disparities).max()), BYTES_PER_PIXEL):
+        # the smoothing takes about a fifth of the time
+        _add_costs(
+            light_field,
+            present,
+            disparity,
+            parameters,
+            band,
+            disparities,
+            cost,
+            lambda row: progress(0.8 * row / height),
+        )
+    guide = light_field.reference_view
+    # not held by a name: it goes as soon as it has been used
+    volume = [cost]
+    del cost
+    result = smooth_and_choose(volume.pop(), disparities, guide, residual_variance(guide), parameters)
     progress(1.0)
     return result
 
 
-def _costs(
-    views: BaseDetail,
-    visibility: Visibility,
-    disparities: FloatMap,
+def _add_costs(
+    light_field: LightField,
+    present: BoolMap,
+    disparity: FloatMap | None,
     parameters: VisibilitySweepParameters,
-    progress: Progress,
-) -> FloatMap:
-    """Cost of every candidate, 0..1; shape (K, H, W), float32."""
+    band: Band,
+    disparities: FloatMap,
+    cost: FloatMap,
+    done: Callable[[int], None],
+) -> None:
+    """Cost of every candidate, 0..1, for the rows of a band, into ``cost (K, H, W)``."""
     from sepi.matching.visibility_kernels import RobustCost, sweep_visible_rows
 
-    H, W, _ = views.guide.shape
-    cost = np.empty((len(disparities), H, W), np.float32)
+    views = base_detail_decomposition(light_field, parameters, band.rows, present)
+    visibility = _visibility(light_field, present, disparity, parameters, band)
     share = parameters.detail_share
     scales2 = [views.squared_scale(s) for s in (parameters.colour_scale, parameters.detail_scale)]
     robust = RobustCost(np.array(scales2, np.float32), np.array([1 - share, share], np.float32))
-    for begin in range(0, H, ROWS_PER_REPORT):
-        end = min(H, begin + ROWS_PER_REPORT)
+    for begin in range(band.begin, band.end, ROWS_PER_REPORT):
+        end = min(band.end, begin + ROWS_PER_REPORT)
         sweep_visible_rows(views, visibility, robust, disparities, begin, end, cost)
-        # the smoothing takes about a fifth of the time
-        progress(0.8 * end / H)
-    return cost
+        done(end)
+
+
+def _visibility(
+    light_field: LightField,
+    present: BoolMap,
+    disparity: FloatMap | None,
+    parameters: VisibilitySweepParameters,
+    band: Band,
+) -> Visibility:
+    """In which views the pixels of a band are seen: in all of them where no map tells."""
+    from sepi.matching.visibility_kernels import Visibility, z_buffers
+
+    low, high = band.rows
+    if disparity is None or not isinstance(parameters, VisibleViewsParameters):
+        everywhere = np.empty((*light_field.grid, high - low, 0), np.float32)
+        return Visibility(everywhere, low, np.float32(0), np.float32(1))
+    nearest = z_buffers(disparity, present, light_field.baselines, low, high)
+    margin, weight = np.float32(parameters.occlusion_margin), np.float32(parameters.occluded_view_weight)
+    return Visibility(nearest, low, margin, weight)

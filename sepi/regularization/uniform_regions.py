@@ -22,7 +22,8 @@ from pydantic import Field
 
 from sepi.image.noise import noise_level
 from sepi.lightfield import BoolMap, FloatMap, LightField, full_scale
-from sepi.matching.base_detail import BaseDetailParameters, base_detail_decomposition
+from sepi.matching.base_detail import BaseDetailParameters
+from sepi.matching.view_subsets import spread_views
 from sepi.stage import OcclusionMarginParameters, StageMaps
 
 LEAST_NOISE = 1e-5
@@ -37,6 +38,7 @@ class UniformPlanesParameters(OcclusionMarginParameters):
     colour_scale: float = Field(
         0.0316, ge=1e-6, le=2, description="residual at which a view counts half in the mean; RGB distance, 0..1"
     )
+    views: int | None = Field(None, ge=2, description="views that are averaged, at least; null: all")
     window_radius: int = Field(4, ge=1, le=20, description="gradients are averaged over 2 r + 1 pixels")
     noise_factor: float = Field(
         4.0, gt=0, description="squared gradient, in units of what noise explains, below which a region is uniform"
@@ -82,14 +84,12 @@ def fill_uniform_regions(
     """
     from scipy import ndimage
 
-    from sepi.matching.gauss_newton import spline_views, view_mean
-    from sepi.matching.visibility_kernels import z_buffers
+    from sepi.matching.gauss_newton import GaussNewton
 
     colours = BaseDetailParameters(colour_scale=parameters.colour_scale, detail_share=0.0)
-    matching = spline_views(light_field, base_detail_decomposition(light_field, colours), colours)
-    nearest = z_buffers(before.disparity, light_field.present, light_field.baselines)
-    mean = view_mean(matching, before.disparity, nearest, parameters.occlusion_margin)
-    views = int(light_field.present.sum())
+    compared = spread_views(light_field, parameters.views)
+    mean = GaussNewton(light_field, colours, parameters.occlusion_margin, compared).mean(before.disparity)[..., :3]
+    views = int(compared.sum())
     rounding = 0.3 / full_scale(light_field.views.dtype) if light_field.views.dtype != np.float32 else 0.0
     variance = max(noise_level(light_field.reference_view), rounding, LEAST_NOISE) ** 2 / views
     uniform = uniform_regions(mean, variance, before.confidence, parameters)

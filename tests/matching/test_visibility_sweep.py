@@ -3,18 +3,19 @@
 import numba
 import numpy as np
 import pytest
-from geometries import GEOMETRIES, grid_baselines, standing
+from geometries import GEOMETRIES, standing
 from scipy.ndimage import map_coordinates
 from several_threads import several_threads
 
 from sepi.lightfield import DisparityRange, LightField
+from sepi.matching import visibility_kernels as kernels
 from sepi.matching.base_detail import DETAIL_UNIT, BaseDetailParameters, base_detail_decomposition
 from sepi.matching.semi_global_kernels import aggregate, choose, semi_global
+from sepi.matching.view_subsets import spread_views
 from sepi.matching.visibility_kernels import (
     EMPTY,
     RobustCost,
     Visibility,
-    occluded_in_any_view,
     sweep_visible_rows,
     z_buffers,
 )
@@ -23,8 +24,10 @@ from sepi.matching.visibility_sweep import (
     VisibleViewsParameters,
     depth_from_all_views,
     depth_from_visible_views,
+    occluded_in_any_view,
 )
 from sepi.scenes import render
+from sepi.stage import no_progress
 
 
 def random_light_field(grid=(3, 4), shape=(11, 13), channels=3, dtype=np.uint8, present=None, geometry="grid"):
@@ -33,6 +36,57 @@ def random_light_field(grid=(3, 4), shape=(11, 13), channels=3, dtype=np.uint8, 
         views = np.round(views * np.iinfo(dtype).max).astype(dtype)
     known = DisparityRange(-1.3, 1.1, "given")
     return LightField(views, "random", present=present, disparity_range=known, **standing(geometry, grid))
+
+
+@pytest.mark.parametrize(
+    ("grid", "view", "at_least", "rows", "count"),
+    [
+        ((9, 9), (4, 4), 25, "x.x.x.x.x", 25),
+        ((9, 9), (4, 4), 26, "x.x.x.x.x", 41),
+        ((9, 9), (4, 4), 13, "x...x...x", 13),
+        ((9, 9), (3, 4), 16, ".x.x.x.x.", 20),
+        ((5, 5), (2, 2), 25, "xxxxx", 25),
+        ((3, 3), (1, 1), 25, "xxx", 9),
+        ((1, 51), (0, 25), 25, "x", 25),
+        ((17, 17), (8, 8), 25, "x...x...x...x...x", 25),
+        ((2, 2), (0, 0), 2, "x.", 2),
+    ],
+)
+def test_few_views_that_stand_for_all(grid, view, at_least, rows, count) -> None:
+    """Views on one side alone, or near the middle alone, would tell less of what hides what."""
+    field = LightField(np.zeros((*grid, 4, 4, 3), np.uint8), "grid", view=view)
+    chosen = spread_views(field, at_least)
+    assert chosen[view]
+    assert chosen.sum() == count
+    assert ["x" if some else "." for some in chosen[:, view[1]]] == list(rows)
+
+
+def test_views_that_are_missing_do_not_stand_for_others() -> None:
+    present = np.ones((9, 9), bool)
+    present[::2] = False
+    present[4] = True
+    field = LightField(np.zeros((9, 9, 4, 4, 3), np.uint8), "holes", present=present)
+    chosen = spread_views(field, 9)
+    assert not (chosen & ~present).any()
+    assert 9 <= chosen.sum() < present.sum()
+
+
+def test_all_maps_but_the_last_compare_few_views(monkeypatch) -> None:
+    """They only tell what is hidden where; the last one is what the user gets."""
+    compared = []
+    monkeypatch.setattr(
+        kernels,
+        "sweep_visible_rows",
+        lambda views, _visibility, _robust, candidates, *others: (
+            compared.append((int(views.present.sum()), candidates.size)) or others[-1].fill(0)
+        ),
+    )
+    field = render("dots", size=64)
+    of_first = AllViewsParameters(first_views=13, num_disparities=21)
+    first = depth_from_all_views(field, of_first, no_progress)
+    of_visible = VisibleViewsParameters(first_views=13, passes=3, num_disparities=21)
+    depth_from_visible_views(field, first.disparity, of_visible, no_progress)
+    assert compared == [(13, 11), (13, 11), (13, 11), (41, 21)]
 
 
 def z_buffer_twin(disparity, dt, ds):
@@ -51,7 +105,10 @@ def sweep_twin(light_field, views, nearest, disparities, margin, hidden, scales,
     t0, s0 = light_field.reference_position
     H, W = light_field.shape
     rows, columns = np.mgrid[:H, :W].astype(float)
-    planes = [views.colours * views.colour_unit, views.detail * DETAIL_UNIT][: 1 + bool(views.detail.shape[2])]
+    planes = [views.colours * views.colour_unit]
+    if views.detail.shape[2]:
+        # one channel that counts as three
+        planes.append(np.repeat(views.detail[:, :, None] * DETAIL_UNIT, 3, axis=2))
     out = np.ones((len(disparities), H, W))
     for k, d in enumerate(disparities.astype(float)):
         total, weight = np.zeros((2, H, W))
@@ -87,10 +144,12 @@ def test_costs_equal_a_plain_twin(channels: int, dtype: type, visible: bool, geo
     views = base_detail_decomposition(light_field, BaseDetailParameters())
     disparities = light_field.require_disparity_range().candidates(7)
     disparity = np.random.default_rng(1).choice(disparities, light_field.shape).astype(np.float32)
-    nearest = z_buffers(disparity, present, light_field.baselines) if visible else np.empty((3, 4, 11, 0), np.float32)
+    nearest = (
+        z_buffers(disparity, present, light_field.baselines, 0, 11) if visible else np.empty((3, 4, 11, 0), np.float32)
+    )
     scales, shares = np.array([0.02, 0.01], np.float32), np.array([0.4, 0.6], np.float32)
     cost = np.empty((7, 11, 13), np.float32)
-    visibility = Visibility(nearest, np.float32(0.1), np.float32(0.05))
+    visibility = Visibility(nearest, 0, np.float32(0.1), np.float32(0.05))
     sweep_visible_rows(views, visibility, RobustCost(scales, shares), disparities, 0, 11, cost)
     expected = sweep_twin(
         light_field, views, nearest if visible else None, disparities, np.float32(0.1), 0.05, scales, shares
@@ -105,18 +164,18 @@ def test_z_buffers_hold_the_nearest_pixel_that_touches_a_position(geometry: str)
     disparity = np.random.default_rng(2).uniform(-1.5, 1.5, light_field.shape).astype(np.float32)
     present = np.ones((3, 4), bool)
     present[2, 3] = False
-    found = z_buffers(disparity, present, light_field.baselines)
+    found = z_buffers(disparity, present, light_field.baselines, 0, 11)
     for t, s in np.argwhere(present):
         expected = z_buffer_twin(disparity, *light_field.baselines[t, s])
         np.testing.assert_array_equal(found[t, s], expected.astype(np.float32))
-    assert (found[2, 3] == EMPTY).all()
 
 
 def test_an_occluder_hides_what_lies_beside_it() -> None:
     """A square before a wall hides the wall on each side from the views on that side, and nothing else."""
     disparity = np.zeros((40, 40), np.float32)
     disparity[15:25, 15:25] = 2
-    occluded = occluded_in_any_view(disparity, np.ones((3, 3), bool), grid_baselines((3, 3)), np.float32(0.15))
+    field = LightField(np.zeros((3, 3, 40, 40, 1), np.uint8), "square")
+    occluded = occluded_in_any_view(field, disparity, 0.15, field.present)
     assert occluded[18:22, 13:15].all()
     assert occluded[18:22, 25:27].all()
     assert occluded[13:15, 18:22].all()

@@ -1,0 +1,118 @@
+"""Compiled loop of the base-detail decomposition: a bilateral filter whose result is taken away at once.
+
+The weight ``exp(-q)`` of a difference is computed as ``(1 - q / 32)^32``, which differs from it by 0.01 at most, ends
+at zero, and is made of multiplications, so that the loop over a row vectorises.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numba import njit, prange
+
+EXACT = {"nnan", "ninf", "nsz"}
+"""Fast-math flags that keep every rounding as written: see :mod:`sepi.matching.plane_sweep_kernels`."""
+
+ROWS_AT_ONCE = 32
+"""Rows that a thread does at a stretch: those of the windows are converted once for all of them."""
+
+
+@njit(inline="always")
+def _mirrored(i: int, n: int) -> int:
+    """Index in a line of ``n`` that is mirrored at its ends, for ever."""
+    period = max(1, 2 * n - 2)
+    i = abs(i) % period
+    return min(i, period - i)
+
+
+@njit(inline="always")
+def _add_neighbour(here: Any, there: Any, falloff: Any, nearness: Any, total: Any, weights: Any) -> None:
+    """Add one pixel of the window to every pixel of a row; ``there``: with its mean, too."""
+    a0, a1, a2 = here
+    b0, b1, b2, mean = there
+    one, zero = np.float32(1), np.float32(0)
+    for x in range(total.size):
+        difference = abs(a0[x] - b0[x]) + abs(a1[x] - b1[x]) + abs(a2[x] - b2[x])
+        w = max(zero, one - falloff * difference * difference)
+        w *= w
+        w *= w
+        w *= w
+        w *= w
+        w *= w * nearness
+        total[x] += w * mean[x]
+        weights[x] += w
+
+
+@njit(inline="always")
+def _load_row(view: Any, unit: Any, y: int, radius: int, out: Any) -> None:
+    """A row of a view, its channels and their mean, mirrored at both ends, into ``out (4, W + 2 radius)``."""
+    W = view.shape[2]
+    for c in range(3):
+        values, row = view[c, y], out[c]
+        for x in range(W):
+            row[radius + x] = np.float32(values[x]) * unit
+        for x in range(radius):
+            row[x] = row[radius + _mirrored(x - radius, W)]
+            row[radius + W + x] = row[radius + _mirrored(W + x, W)]
+    third = np.float32(1 / 3)
+    for x in range(out.shape[1]):
+        out[3, x] = (out[0, x] + out[1, x] + out[2, x]) * third
+
+
+@njit(parallel=True, cache=True, fastmath=EXACT, error_model="numpy")
+def detail_of_views(
+    colours: Any, unit: Any, present: Any, low: int, radius: int, edge: float, width: float, detail_unit: Any, out: Any
+) -> None:
+    """Mean of the channels without its edge-preserving mean, of some rows of every view.
+
+    Parameters
+    ----------
+    colours : ndarray, shape (T, S, 3, H, W)
+    unit : float32
+        What the colours are multiplied with to span 0..1.
+    present : ndarray, shape (T, S), bool
+        Other views are left as they are.
+    low : int
+        First of the rows.
+    radius : int
+        The window is a disc.
+    edge, width : float
+        Standard deviations of the weights: of the sum of the RGB differences, colours in 0..1, and in pixels.
+    detail_unit : float32
+        Unit of the result.
+    out : ndarray, shape (T, S, n, W), int16
+        Filled.
+    """
+    T, S, _, H, W = colours.shape
+    n = out.shape[2]
+    pieces = (n + ROWS_AT_ONCE - 1) // ROWS_AT_ONCE
+    falloff = np.float32(1 / (64 * edge * edge))
+    for task in prange(T * S * pieces):
+        view, first = task // pieces, (task % pieces) * ROWS_AT_ONCE
+        t, s = view // S, view % S
+        if not present[t, s]:
+            continue
+        last = min(n, first + ROWS_AT_ONCE)
+        rows = np.empty((ROWS_AT_ONCE + 2 * radius, 4, W + 2 * radius), np.float32)
+        for i in range(last - first + 2 * radius):
+            _load_row(colours[t, s], unit, _mirrored(low + first + i - radius, H), radius, rows[i])
+        total, weights = np.empty(W, np.float32), np.empty(W, np.float32)
+        for y in range(first, last):
+            a = rows[y - first + radius]
+            total[:] = 0
+            weights[:] = 0
+            for dy in range(-radius, radius + 1):
+                b = rows[y - first + radius + dy]
+                for dx in range(-radius, radius + 1):
+                    if dy * dy + dx * dx > radius * radius:
+                        continue
+                    nearness = np.float32(math.exp(-0.5 * (dy * dy + dx * dx) / (width * width)))
+                    i, j = radius + dx, radius + dx + W
+                    here = a[0, radius : radius + W], a[1, radius : radius + W], a[2, radius : radius + W]
+                    there = b[0, i:j], b[1, i:j], b[2, i:j], b[3, i:j]
+                    _add_neighbour(here, there, falloff, nearness, total, weights)
+            for x in range(W):
+                value = (a[3, radius + x] - total[x] / weights[x]) / detail_unit
+                out[t, s, y, x] = np.int16(math.floor(value + np.float32(0.5)))

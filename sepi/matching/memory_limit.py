@@ -1,0 +1,57 @@
+"""A limit on the memory of an estimate: what is taken whatever happens, and what that leaves for the bands.
+
+The views, the maps and the cost volumes of variant ``best`` are held as a whole; what is made of all views at once is
+made in bands of rows (:mod:`sepi.matching.row_bands`), narrower ones where there is less memory. The results
+are the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from sepi.errors import SepiError
+from sepi.lightfield import LightField
+from sepi.matching.row_bands import least_band_bytes
+from sepi.matching.visibility_sweep import BYTES_PER_CANDIDATE, VisibilitySweepParameters
+from sepi.stage import Parameters
+
+_LIBRARIES = 300 * 2**20
+"""Python with what it imports, and what is allocated for the moment."""
+
+_BYTES_OF_MAPS = 200
+"""Of each pixel: maps, the reference view, the systems of the regularisation."""
+
+
+def bytes_of_bands(light_field: LightField, stages: Iterable[Parameters], memory: int) -> int:
+    """What the bands may take, so that an estimate stays within a limit.
+
+    Parameters
+    ----------
+    light_field : LightField
+        With a known disparity range.
+    stages : iterable of Parameters
+        Parameters of the stages that will run.
+    memory : int
+        The limit, bytes.
+
+    Returns
+    -------
+    int
+        Bytes.
+
+    Raises
+    ------
+    SepiError
+        If the limit is less than what is needed in any case.
+    """
+    height, width = light_field.shape
+    sweeps = [p.number(light_field) / p.sampling for p in stages if isinstance(p, VisibilitySweepParameters)]
+    volume = BYTES_PER_CANDIDATE * max(sweeps, default=0)
+    whole = _LIBRARIES + light_field.views.nbytes + round((volume + _BYTES_OF_MAPS) * height * width)
+    least = whole + (least_band_bytes(light_field) if sweeps else 0)
+    if memory < least:
+        raise SepiError(
+            f"{light_field.name}: takes at least {-(-least // 2**20)} MB with these views and candidates, more than "
+            f"the {memory // 2**20} MB that it may take; fewer candidates, a narrower range or variant paper take less"
+        )
+    return memory - whole

@@ -1,0 +1,93 @@
+"""Bands of picture rows: what is made of all views at once, a band at a time, so that memory stays bounded.
+
+A row of the reference view is seen in rows of the other views that are no farther than the largest disparity times the
+longest baseline. What is computed of the views' rows (detail, splines, z-buffers) does not depend on where a band
+begins: results are the same for any number of bands.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from itertools import pairwise
+from typing import NamedTuple
+
+from sepi.lightfield import BoolMap, LightField
+
+USUAL_BYTES = 2**29
+"""What the bands may take unless somebody says otherwise."""
+
+MOST_BYTES_PER_PIXEL = 14
+"""Of a pixel of a view: what the greediest of those that go through bands holds."""
+
+FEWEST_ROWS = 16
+"""Of a band, however little memory there is."""
+
+_bytes: ContextVar[int] = ContextVar("_bytes", default=USUAL_BYTES)
+
+
+class Rows(NamedTuple):
+    """Rows ``low..high`` of the views."""
+
+    low: int
+    high: int
+
+
+class Band(NamedTuple):
+    """Rows ``begin..end`` of the reference view, and those of the other views that they may be seen in."""
+
+    begin: int
+    end: int
+    rows: Rows
+
+
+@contextmanager
+def band_memory(number: int) -> Iterator[None]:
+    """Bands made inside, in this thread, take about so many bytes at a time, or as few as they can."""
+    token = _bytes.set(number)
+    try:
+        yield
+    finally:
+        _bytes.reset(token)
+
+
+def row_bands(light_field: LightField, present: BoolMap, reach: float, bytes_per_pixel: int) -> list[Band]:
+    """The bands in which a light field is gone through.
+
+    Parameters
+    ----------
+    light_field : LightField
+    present : ndarray, shape (T, S), bool
+        The views that are compared.
+    reach : float
+        Largest absolute disparity, pixels per view step.
+    bytes_per_pixel : int
+        What is held of each pixel of each view of a band.
+
+    Returns
+    -------
+    list of Band
+        From the top to the bottom; one if all fits.
+    """
+    height, width = light_field.shape
+    moved = _rows_moved(light_field, present, reach)
+    fitting = _bytes.get() // max(1, bytes_per_pixel * width * int(present.sum()))
+    number = 1 if fitting >= height else math.ceil(height / max(FEWEST_ROWS, fitting - 2 * moved))
+    ends = [round(height * i / number) for i in range(number + 1)]
+    return [Band(begin, end, Rows(max(0, begin - moved), min(height, end + moved))) for begin, end in pairwise(ends)]
+
+
+def least_band_bytes(light_field: LightField) -> int:
+    """What the narrowest bands take, at most; the disparity range must be known."""
+    known = light_field.require_disparity_range()
+    moved = _rows_moved(light_field, light_field.present, max(abs(known.minimum), abs(known.maximum)))
+    height, width = light_field.shape
+    rows = min(height, FEWEST_ROWS + 2 * moved)
+    return MOST_BYTES_PER_PIXEL * rows * width * int(light_field.present.sum())
+
+
+def _rows_moved(light_field: LightField, present: BoolMap, reach: float) -> int:
+    """By how many rows a pixel moves at most, and its sample reaches further."""
+    return math.ceil(reach * float(abs(light_field.baselines[present][:, 0]).max(initial=0.0))) + 2

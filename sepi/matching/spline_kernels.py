@@ -1,0 +1,143 @@
+"""Compiled loops that make cubic splines of the views.
+
+Spline coefficients are a convolution with ``sqrt(3) (sqrt(3) - 2)^|k|`` along each axis, mirrored at the ends [1]_; cut
+off where it is below single precision, so that a row's coefficients do not depend on rows far away.
+
+References
+----------
+.. [1] Unser: Splines, a perfect fit for signal and image processing. IEEE Signal Processing Magazine 16(6), 1999.
+   doi:10.1109/79.799930
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numba import njit, prange
+
+EXACT = {"nnan", "ninf", "nsz"}
+"""Fast-math flags that keep every rounding as written: see :mod:`sepi.matching.plane_sweep_kernels`."""
+
+SPLINE_UNIT = np.float32(1 / 3400)
+"""Unit of the spline coefficients, stored as int16; a checkerboard of -0.5 and 1.5 has some of +-9.5."""
+
+REACH = 12
+"""How far the coefficients' convolution reaches; beyond it is less than 1e-6."""
+
+_FILTER = np.array([math.sqrt(3) * (math.sqrt(3) - 2) ** abs(k) for k in range(-REACH, REACH + 1)], np.float32)
+
+MARGIN = 2
+"""Coefficients beyond each side of a view."""
+
+ROWS_AT_ONCE = 64
+"""Rows of a view that a thread does at a stretch."""
+
+
+@njit(inline="always")
+def _mirrored(i: int, n: int) -> int:
+    """Index in a line of ``n`` that is mirrored at its ends, for ever."""
+    period = max(1, 2 * n - 2)
+    i = abs(i) % period
+    return min(i, period - i)
+
+
+@njit(inline="always")
+def _add_weighted(row: Any, weight: Any, out: Any) -> None:
+    for x in range(out.size):
+        out[x] += weight * np.float32(row[x])
+
+
+@njit(cache=True, fastmath=EXACT)
+def _coefficient_row(rows: Any, padded: Any, out: Any) -> None:
+    """Coefficients of one row.
+
+    Parameters
+    ----------
+    rows : ndarray, shape (2 REACH + 1, W), float32
+        The row in the middle, and those round it.
+    padded : ndarray, shape (W + 2 MARGIN + 2 REACH,), float32
+        Scratch.
+    out : ndarray, shape (W + 2 MARGIN,), float32
+        Filled.
+    """
+    W = rows.shape[1]
+    side = MARGIN + REACH
+    inner = padded[side : side + W]
+    inner[:] = 0
+    for k in range(2 * REACH + 1):
+        _add_weighted(rows[k], _FILTER[k], inner)
+    for x in range(side):
+        padded[side - 1 - x] = inner[_mirrored(-1 - x, W)]
+        padded[side + W + x] = inner[_mirrored(W + x, W)]
+    out[:] = 0
+    for k in range(2 * REACH + 1):
+        _add_weighted(padded[k : k + out.size], _FILTER[k], out)
+
+
+@njit(inline="always")
+def _load(row: Any, unit: Any, out: Any) -> None:
+    for x in range(out.size):
+        out[x] = np.float32(row[x]) * unit
+
+
+@njit(cache=True, fastmath=EXACT)
+def spline_coefficients(image: Any) -> Any:
+    """Cubic spline coefficients of an image (H, W), float32."""
+    H, W = image.shape
+    rows = np.empty((H + 2 * REACH, W), np.float32)
+    for i in range(H + 2 * REACH):
+        rows[i] = image[_mirrored(i - REACH, H)]
+    out = np.empty((H, W), np.float32)
+    padded, row = np.empty(W + 2 * (MARGIN + REACH), np.float32), np.empty(W + 2 * MARGIN, np.float32)
+    for y in range(H):
+        _coefficient_row(rows[y : y + 2 * REACH + 1], padded, row)
+        out[y] = row[MARGIN : MARGIN + W]
+    return out
+
+
+@njit(parallel=True, cache=True, fastmath=EXACT)
+def view_splines(
+    colours: Any, colour_unit: Any, detail: Any, detail_unit: Any, detail_low: int, present: Any, low: int, out: Any
+) -> None:
+    """Coefficients of every view's colours and detail.
+
+    Parameters
+    ----------
+    colours : ndarray, shape (T, S, 3, H, W)
+    colour_unit : float32
+        What the colours are multiplied with.
+    detail : ndarray, shape (T, S, n or 0, W), int16
+        Rows from ``detail_low`` on, which reach ``REACH`` farther than those that are wanted, or to the picture's end.
+    detail_unit : float32
+    detail_low : int
+    present : ndarray, shape (T, S), bool
+    low : int
+        The row after the first ``MARGIN`` ones.
+    out : ndarray, shape (T, S, n + 2 MARGIN, W + 2 MARGIN, 4), int16
+        Mirrored in the margins.
+    """
+    T, S, _, H, W = colours.shape
+    n = out.shape[2]
+    channels = 4 if detail.shape[2] > 0 else 3
+    pieces = (n + ROWS_AT_ONCE - 1) // ROWS_AT_ONCE
+    for task in prange(T * S * pieces):
+        view, first = task // pieces, (task % pieces) * ROWS_AT_ONCE
+        t, s = view // S, view % S
+        if not present[t, s]:
+            continue
+        last = min(n, first + ROWS_AT_ONCE)
+        rows = np.empty((channels, ROWS_AT_ONCE + 2 * REACH, W), np.float32)
+        for i in range(last - first + 2 * REACH):
+            y = _mirrored(low - MARGIN + first + i - REACH, H)
+            for c in range(3):
+                _load(colours[t, s, c, y], colour_unit / SPLINE_UNIT, rows[c, i])
+            if channels > 3:
+                _load(detail[t, s, y - detail_low], detail_unit / SPLINE_UNIT, rows[3, i])
+        padded, row = np.empty(W + 2 * (MARGIN + REACH), np.float32), np.empty(W + 2 * MARGIN, np.float32)
+        for i in range(first, last):
+            for c in range(channels):
+                _coefficient_row(rows[c, i - first : i - first + 2 * REACH + 1], padded, row)
+                for x in range(row.size):
+                    out[t, s, i, x, c] = np.int16(math.floor(row[x] + np.float32(0.5)))

@@ -1,0 +1,96 @@
+"""Bands of rows: as many as memory asks for, and the same bytes whatever their number."""
+
+import subprocess
+import sys
+from typing import Any
+
+import numpy as np
+import pytest
+from geometries import GEOMETRIES, standing
+
+from sepi.errors import SepiError
+from sepi.lightfield import DisparityRange, LightField
+from sepi.matching import row_bands as module
+from sepi.matching.memory_limit import bytes_of_bands
+from sepi.matching.row_bands import FEWEST_ROWS, band_memory, row_bands
+from sepi.pipeline import estimate_depth, stage_parameters, variant_named
+from sepi.scenes import render
+
+
+def test_bands_cover_the_picture_and_what_it_is_seen_in() -> None:
+    field = LightField(np.zeros((5, 5, 200, 40, 3), np.uint8), "grid")
+    assert len(row_bands(field, field.present, 1.5, 10)) == 1
+    with band_memory(100 * 40 * 25 * 10):
+        bands = row_bands(field, field.present, 1.5, 10)
+    assert len(bands) > 1
+    assert [band.begin for band in bands] == [0, *(band.end for band in bands[:-1])]
+    assert bands[-1].end == 200
+    for begin, end, (low, high) in bands:
+        # two rows of views away, a pixel moves by three rows, and its sample touches one more
+        assert low <= max(0, begin - 4)
+        assert high >= min(200, end + 4)
+        assert high - low <= 100
+
+
+def test_bands_are_never_narrower_than_useful() -> None:
+    field = LightField(np.zeros((5, 5, 200, 40, 3), np.uint8), "grid")
+    with band_memory(1):
+        assert all(band.end - band.begin >= FEWEST_ROWS - 1 for band in row_bands(field, field.present, 1.5, 10))
+
+
+@pytest.mark.parametrize("geometry", GEOMETRIES)
+@pytest.mark.parametrize("variant", ["best", "best_no_detail"])
+def test_maps_are_the_same_for_any_number_of_bands(variant: str, geometry: str, monkeypatch: Any) -> None:
+    """Someone with less memory gets the map that others get."""
+    scene = render("wall", size=64)
+    field = LightField(
+        scene.views[2:7, 2:7], "wall", disparity_range=scene.disparity_range, **standing(geometry, (5, 5))
+    )
+    numbers = []
+    bands = module.row_bands
+    for name in ("sepi.matching.visibility_sweep", "sepi.matching.gauss_newton"):
+        monkeypatch.setattr(
+            f"{name}.row_bands", lambda *arguments: numbers.append(len(found := bands(*arguments))) or found
+        )
+    few = {"initial": {"num_disparities": 21}, "occlusion": {"num_disparities": 21}}
+    at_once = estimate_depth(field, variant, few)
+    assert set(numbers) == {1}
+    numbers.clear()
+    with band_memory(1):
+        in_bands = estimate_depth(field, variant, few)
+    assert set(numbers) == {4}
+    np.testing.assert_array_equal(in_bands.disparity, at_once.disparity)
+    np.testing.assert_array_equal(in_bands.confidence, at_once.confidence)
+    for name, values in at_once.extra.items():
+        np.testing.assert_array_equal(in_bands.extra[name], values)
+
+
+def test_a_limit_on_memory_leaves_the_rest_to_the_bands() -> None:
+    field = LightField(
+        np.zeros((5, 5, 400, 500, 3), np.uint8), "grid", disparity_range=DisparityRange(-1.5, 1.5, "given")
+    )
+    stages = list(stage_parameters(variant_named("best")).values())
+    megabyte = 2**20
+    few, many = (bytes_of_bands(field, stages, n * megabyte) for n in (600, 800))
+    assert many - few == 200 * megabyte
+    with pytest.raises(SepiError, match=r"grid: takes at least \d+ MB .* more than the 100 MB"):
+        bytes_of_bands(field, stages, 100 * megabyte)
+    # 91 candidates of 400 x 500 pixels are 139 MB
+    assert bytes_of_bands(field, list(stage_parameters(variant_named("paper")).values()), 600 * megabyte) > few
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("limit", [500, 800])
+def test_an_estimate_stays_within_its_memory(limit: int) -> None:
+    """What somebody says that the machine has is what the process takes, libraries and light field included."""
+    code = f"""
+import resource
+from sepi.matching.memory_limit import bytes_of_bands
+from sepi.pipeline import estimate_depth, stage_parameters, variant_named
+from sepi.scenes import render
+field = render("pyramids", size=400)
+estimate_depth(field, "best", memory={limit} * 2**20)
+print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**10)
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert float(done.stdout) <= limit
