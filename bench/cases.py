@@ -19,7 +19,7 @@ from sepi.io.hdf5 import read_light_field, read_stage
 from sepi.io.result_folder import write_result
 from sepi.lightfield import LightField
 from sepi.matching.view_subsets import halves_and_quarters
-from sepi.pipeline import STAGES, estimate_depth, variant_named
+from sepi.pipeline import HANDED_ON, STAGES, estimate_depth, stage_parameters, variant_named
 from sepi.reading import read_light_field as read_any
 from sepi.stage import Parameters, StageMaps, no_progress
 
@@ -30,6 +30,8 @@ GROWTH_REPEATS = 3
 
 LARGE = (1024, 17)
 """Size and views a side of the large light field."""
+
+VARIANTS_BESIDE = ("paper", "best", "fast")
 
 COMPRESSIONS: dict[str, dict[str, Any]] = {
     "none": {},
@@ -70,6 +72,21 @@ def _stage_cases(scene: Scene) -> Iterator[Case]:
     yield Case("stages", "write the maps", write, (scene.path,))
 
 
+def _variant_cases(scene: Scene) -> Iterator[Case]:
+    """Variants side by side: from files to maps, in one process, on one thread; and each stage of them."""
+    output = str(scene.folder / "variant")
+    for variant in VARIANTS_BESIDE:
+        words = ("depth", str(scene.source), "--output", output, "--threads", str(scene.threads), "--variant", variant)
+        yield Case("variants", f"{variant}, files to maps", command, ("sepi", *words))
+        yield Case("variants", f"{variant}, once more in a process", whole_variant, (scene.path, variant))
+        if scene.threads > 1:
+            yield Case("variants", f"{variant}, so on one thread", whole_variant, (scene.path, variant), threads=1)
+    for variant in VARIANTS_BESIDE:
+        for name, choice in variant_named(variant).choices.items():
+            if choice != HANDED_ON:
+                yield Case("variants", f"{variant}: {name}", stage_of_variant, (scene.path, variant, name))
+
+
 def _growth_cases(scene: Scene) -> Iterator[Case]:
     """Initial stage and all stages, one axis growing at a time."""
     axes = SMALL_GROWTH if scene.small else GROWTH
@@ -101,8 +118,10 @@ def _large_case(scene: Scene) -> Iterator[Case]:
     # kernels for such views are compiled before the timed call
     whole(scene.grown(64, 3), scene.num_disparities).call()
     size, views = LARGE
-    arguments = (scene.grown(size, views), scene.num_disparities)
-    yield Case("large", f"{views}x{views} views of {size}x{size}", whole, arguments, most=1)
+    path, name = scene.grown(size, views), f"{views}x{views} views of {size}x{size}"
+    yield Case("large", name, whole, (path, scene.num_disparities), most=1)
+    whole_variant(scene.grown(64, 3), "best").call()
+    yield Case("large", f"{name}, variant best", whole_variant, (path, "best"), most=1)
 
 
 def _plain_cases(scene: Scene) -> Iterator[Case]:
@@ -131,6 +150,7 @@ def _storage_cases(scene: Scene) -> Iterator[Case]:
 
 GROUPS: dict[str, Callable[[Scene], Iterator[Case]]] = {
     "stages": _stage_cases,
+    "variants": _variant_cases,
     "growth": _growth_cases,
     "beside": _plain_cases,
     "solvers": _solver_cases,
@@ -156,12 +176,7 @@ def stage(path: Path, name: str, choice: str, settings: Parameters) -> Prepared:
     light_field, before = inputs(path, name)
 
     def figures(maps: StageMaps) -> Figures:
-        found = _operations(light_field, choice, settings, maps)
-        if light_field.ground_truth is not None:
-            # a stage made faster must not be made worse
-            scores = score(maps.disparity, light_field.ground_truth)
-            found |= {key: float(scores[key]) for key in ("mse100", "q25", "badpix007")}
-        return found
+        return _operations(light_field, choice, settings, maps) | _scores(light_field, maps)
 
     return Prepared(lambda: STAGES[name][choice].run(light_field, before, settings, no_progress), figures)
 
@@ -171,6 +186,28 @@ def whole(path: Path, num_disparities: int) -> Prepared:
     light_field = read_light_field(path)
     values = sweep_values(num_disparities)
     return Prepared(lambda: estimate_depth(light_field, variant_named(VARIANT), values))
+
+
+def whole_variant(path: Path, variant: str) -> Prepared:
+    """All stages of a variant, from a light field in memory to its maps; says their scores."""
+    light_field = read_light_field(path)
+    return Prepared(lambda: estimate_depth(light_field, variant), lambda maps: _scores(light_field, maps))
+
+
+def stage_of_variant(path: Path, variant: str, name: str) -> Prepared:
+    """One stage of a variant, on the maps that the stages before it make first."""
+    light_field = read_light_field(path)
+    chosen = variant_named(variant)
+    settings = stage_parameters(chosen)
+    maps: StageMaps | None = None
+    for before, choice in chosen.choices.items():
+        if before == name:
+            break
+        maps = STAGES[before][choice].run(light_field, maps, settings[before], no_progress)
+    run = STAGES[name][chosen.choices[name]].run
+    return Prepared(
+        lambda: run(light_field, maps, settings[name], no_progress), lambda found: _scores(light_field, found)
+    )
 
 
 def write(path: Path) -> Prepared:
@@ -211,6 +248,14 @@ def load(path: Path, content: str, option: str) -> Prepared:
                 file[name][...]
 
     return Prepared(call)
+
+
+def _scores(light_field: LightField, maps: StageMaps) -> Figures:
+    """What is made faster must not be made worse; nothing without ground truth."""
+    if light_field.ground_truth is None:
+        return {}
+    scores = score(maps.disparity, light_field.ground_truth)
+    return {key: float(scores[key]) for key in ("mse100", "q25", "badpix007")}
 
 
 def _operations(light_field: LightField, choice: str, settings: Any, maps: StageMaps) -> Figures:

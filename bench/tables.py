@@ -39,6 +39,7 @@ def sections(result: Result) -> dict[str, list[Row]]:
     """Every table for which there are measurements, by its heading."""
     tables = {
         "Whole": [_row(m) for m in (result.group("whole") | result.group("large")).values()],
+        "Variants": [_row(m, _scores(m)) for m in result.group("variants").values()],
         "Steps": steps(result),
         **{f"Growth with {axis}, built-in scene": growth(result, axis) for axis in AXES},
         "Initial stage beside plain ones": beside(result),
@@ -56,7 +57,7 @@ def steps(result: Result) -> list[Row]:
     for m in steps.values():
         least = floor.seconds(prices, m.figures)
         more = {"share %": 100 * m.median / total, "times its floor": None if least is None else m.median / least}
-        rows.append(_row(m, {**more, **{heading: m.figures.get(key) for key, heading in SCORES.items()}}))
+        rows.append(_row(m, {**more, **_scores(m)}))
     return rows
 
 
@@ -124,6 +125,10 @@ def differences(before: Result, after: Result) -> list[str]:
         for key in dict.fromkeys([*old, *new])
         if old.get(key) != new.get(key)
     ]
+
+
+def _scores(m: Measurement) -> dict[str, float | None]:
+    return {heading: m.figures.get(key) for key, heading in SCORES.items()}
 
 
 def _row(m: Measurement, more: Mapping[str, float | None] = {}) -> Row:

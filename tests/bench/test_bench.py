@@ -206,15 +206,20 @@ def test_small_run_measures_everything(tmp_path: Path) -> None:
     assert called.stderr == "", "quiet in a pipe"
     content = json.loads((tmp_path / "bench.json").read_text())
     groups = {m["group"] for m in content["measurements"]}
-    assert groups >= {"whole", "stages", "floor", "growth, initial", "growth, all stages", "beside", "solvers"}
+    assert groups >= {"whole", "stages", "variants", "floor", "beside", "solvers"}
+    assert groups >= {"growth, initial", "growth, all stages"}
     assert all(min(m["seconds"]) > 0 and m["peak_memory_mb"] > 0 for m in content["measurements"])
     stages = {m["name"]: m["figures"] for m in content["measurements"] if m["group"] == "stages"}
     assert content["settings"]["views"] == "5x5"
     assert stages["initial"]["samples"] == 24 * 21 * 64 * 64
+    variants = {m["name"]: m["figures"] for m in content["measurements"] if m["group"] == "variants"}
+    assert {"fast, files to maps", "best, once more in a process", "best: optimize"} <= set(variants)
+    assert 0 < variants["fast: optimize"]["mse100"] == variants["fast, once more in a process"]["mse100"]
     assert 0 < stages["optimize"]["mse100"] < stages["initial"]["mse100"]
     page = (tmp_path / "bench.md").read_text()
     for heading in (
         "Whole",
+        "Variants",
         "Steps",
         "Growth with size, built-in scene",
         "Initial stage beside plain ones",
