@@ -247,7 +247,7 @@ class TestRerun:
         result = changed.run(target)
         assert result.returncode == 0, result.stdout
         told = (changed.folder / "logs/builtin/dots/scores.log").read_text()
-        assert "1 of 19 maps scored anew: semi_global/visibility/uniform_planes/second_order" in told
+        assert "2 of 23 maps scored anew: semi_global/visibility/uniform_planes/second_order" in told
         before, after = (read_scores(flow.folder / target) for flow in (finished, changed))
         # a score over no pixels is NaN, which equals nothing
         assert [name for name in after if str(after[name]) != str(before[name])] == [
