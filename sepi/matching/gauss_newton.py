@@ -100,6 +100,8 @@ class GaussNewton:
             normal_equations(views, seeing, disparity, image, band.begin, band.end, gradient, curvature)
 
         self._in_bands(disparity, add)
+        # the next map is another one
+        self._nearest = None
         return gradient, curvature
 
     def _in_bands(self, disparity: FloatMap, add: Callable[[SplineViews, Seeing, Band], None]) -> None:
