@@ -4,8 +4,8 @@
 variance (Eq. 3-4), and its distinctness as confidence (Eq. 5). The line meets one sample of each view, so this is a
 plane sweep (:mod:`sepi.matching.plane_sweep`); the construction itself is in :mod:`sepi.matching.stitched_epi`.
 
-``semi_global`` compares colours and fine detail (:mod:`sepi.matching.base_detail`) over all views, and smooths the
-costs semi-globally (:mod:`sepi.matching.semi_global`).
+``semi_global`` compares colours and fine detail (:mod:`sepi.matching.base_detail`) of a few views that are spread over
+the grid, and smooths the costs semi-globally (:mod:`sepi.matching.semi_global`).
 
 ``structure_tensor`` is the initial depth that the paper's ablation puts in its place
 (:mod:`sepi.matching.structure_tensor`).
@@ -59,7 +59,7 @@ def sepi(
 def semi_global(
     light_field: LightField, previous: StageMaps | None, parameters: VisibilitySweepParameters, progress: Progress
 ) -> StageMaps:
-    """Depth from colours and detail of all views, smoothed semi-globally; arguments and result as for ``sepi``."""
+    """Depth from colours and detail of a few views, smoothed semi-globally; arguments and result as for ``sepi``."""
     result = depth_from_all_views(light_field, parameters, progress)
     return StageMaps(result.disparity, result.confidence)
 

@@ -45,7 +45,7 @@ def bytes_of_bands(light_field: LightField, stages: Iterable[Parameters], memory
         If the limit is less than what is needed in any case.
     """
     height, width = light_field.shape
-    sweeps = [p.number(light_field) / p.sampling for p in stages if isinstance(p, VisibilitySweepParameters)]
+    sweeps = [p.fewer(light_field, p.finest_sampling) for p in stages if isinstance(p, VisibilitySweepParameters)]
     volume = BYTES_PER_CANDIDATE * max(sweeps, default=0)
     whole = _LIBRARIES + light_field.views.nbytes + round((volume + _BYTES_OF_MAPS) * height * width)
     least = whole + (least_band_bytes(light_field) if sweeps else 0)

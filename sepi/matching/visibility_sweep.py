@@ -47,12 +47,17 @@ class VisibilitySweepParameters(CandidateParameters, BaseDetailParameters, Smoot
     rule: ClassVar[CandidateRule] = CANDIDATES
 
     num_disparities: int | None = number_field(CANDIDATES, "docs/best.md")
-    views: int = Field(41, ge=2, description="views that the last map compares, at least; spread evenly over the grid")
-    first_views: int = Field(25, ge=2, description="views that the maps before it compare, at least")
-    sampling: float = Field(
-        1.0, ge=1, le=8, description="distance of the last map's candidates; 1: as num_disparities says"
+    first_views: int = Field(
+        25, ge=2, description="views that all maps but the last compare, at least; spread evenly over the grid"
     )
-    first_sampling: float = Field(2.0, ge=1, le=8, description="distance of the candidates of the maps before it")
+    first_sampling: float = Field(
+        2.0, ge=1, le=8, description="distance of their candidates; 1: as num_disparities says"
+    )
+
+    @property
+    def finest_sampling(self) -> float:
+        """Least distance of the candidates of any map; 1: as ``num_disparities`` says."""
+        return self.first_sampling
 
     def fewer(self, light_field: LightField, sampling: float) -> int:
         """How many candidates, so many times as far apart as usual."""
@@ -62,8 +67,15 @@ class VisibilitySweepParameters(CandidateParameters, BaseDetailParameters, Smoot
 class VisibleViewsParameters(VisibilitySweepParameters, OcclusionMarginParameters):
     """Parameters of the sweep over the views that see a pixel."""
 
+    views: int = Field(41, ge=2, description="views that the last map compares, at least")
+    sampling: float = Field(1.0, ge=1, le=8, description="distance of its candidates; 1: as num_disparities says")
     passes: int = Field(3, ge=1, le=10, description="how often visibility and depth are computed anew")
     occluded_view_weight: float = Field(0.01, ge=0, le=1, description="weight of a view in which the pixel is occluded")
+
+    @property
+    def finest_sampling(self) -> float:
+        """Least distance of the candidates of any map; 1: as ``num_disparities`` says."""
+        return min(self.sampling, self.first_sampling) if self.passes > 1 else self.sampling
 
 
 class AllViewsParameters(VisibilitySweepParameters):
@@ -94,7 +106,8 @@ def depth_from_all_views(
     SepiError
         If the disparity range is unknown.
     """
-    return _sweep(light_field, False, None, parameters, progress)
+    views = spread_views(light_field, parameters.first_views)
+    return _sweep(light_field, views, parameters.first_sampling, None, parameters, progress)
 
 
 def depth_from_visible_views(
@@ -122,9 +135,11 @@ def depth_from_visible_views(
     """
     n = parameters.passes
     for i in range(n):
+        last = i == n - 1
         result = _sweep(
             light_field,
-            i == n - 1,
+            spread_views(light_field, parameters.views if last else parameters.first_views),
+            parameters.sampling if last else parameters.first_sampling,
             disparity,
             parameters,
             lambda fraction, i=i: progress((i + fraction) / n),  # type: ignore[misc]
@@ -166,16 +181,14 @@ def occluded_in_any_view(
 
 def _sweep(
     light_field: LightField,
-    last: bool,
+    present: BoolMap,
+    sampling: float,
     disparity: FloatMap | None,
     parameters: VisibilitySweepParameters,
     progress: Progress,
 ) -> SmoothedResult:
-    """A map: the last one, or one of those before it, which only tell what is hidden where."""
-    present = spread_views(light_field, parameters.views if last else parameters.first_views)
-    disparities = light_field.require_disparity_range().candidates(
-        parameters.fewer(light_field, parameters.sampling if last else parameters.first_sampling)
-    )
+    """A map over some of the views, of candidates ``sampling`` times as far apart as usual."""
+    disparities = light_field.require_disparity_range().candidates(parameters.fewer(light_field, sampling))
     height, width = light_field.shape
     cost = np.empty((len(disparities), height, width), np.float32)
     for band in row_bands(light_field, present, float(np.abs(disparities).max()), BYTES_PER_PIXEL):
