@@ -84,12 +84,13 @@ def test_a_limit_on_memory_leaves_the_rest_to_the_bands() -> None:
 def test_an_estimate_stays_within_its_memory(limit: int) -> None:
     """What somebody says that the machine has is what the process takes, libraries and light field included."""
     code = """
-import resource, sys
+import sys
+from sepi.command import peak_memory_mb
 from sepi.pipeline import estimate_depth
 from sepi.scenes import render
 size, views, limit = map(int, sys.argv[1:])
 estimate_depth(render("pyramids", size=size, views=views), "best", memory=limit * 2**20)
-print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**10)
+print(peak_memory_mb())
 """
     # the first one may compile the kernels, for which there is no limit
     for size, views in ((64, 3), (400, 9)):
