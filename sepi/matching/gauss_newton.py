@@ -127,7 +127,7 @@ def spline_views(
     height, width = light_field.shape
     # what the convolution reaches; mirrored at the picture's ends
     reach = MARGIN + REACH
-    wider = Rows(max(0, min(rows.low - reach, height - reach - 1)), min(height, max(rows.high, 0) + reach + 1))
+    wider = Rows(max(0, min(rows.low - reach, height - reach - 1)), min(height, rows.high + reach + 1))
     views = base_detail_decomposition(light_field, parameters, wider, present)
     shape = (rows.high - rows.low + 2 * MARGIN, width + 2 * MARGIN, 4)
     splines = np.zeros((*light_field.grid, *shape), np.int16)
@@ -137,9 +137,6 @@ def spline_views(
     )  # fmt: skip
     others = present.copy()
     others[light_field.reference_position] = False
-    down, across = light_field.baselines[others].astype(np.float32).T
-    in_row, columns = np.nonzero(others)
-    runs = np.flatnonzero(np.diff(down, prepend=np.nan).astype(bool) | np.diff(in_row, prepend=-1).astype(bool))
     own = np.zeros((height, width, 4), np.float32)
     own[..., :3] = views.guide
     if views.detail.size:
@@ -150,11 +147,8 @@ def spline_views(
         SPLINE_UNIT,
         rows.low,
         own,
-        columns,
-        np.ascontiguousarray(across),
-        np.append(runs, columns.size),
-        in_row[runs],
-        down[runs],
+        np.argwhere(others),
+        light_field.baselines[others].astype(np.float32),
         np.array([views.squared_scale(scale) for scale in scales], np.float32),
         np.array([1 - parameters.detail_share, parameters.detail_share], np.float32),
     )

@@ -36,17 +36,10 @@ class SplineViews(NamedTuple):
         The row after the margin.
     reference : ndarray, shape (H, W, 4), float32
         Colours and detail of the reference view.
-    columns : ndarray, shape (N,), int64
-        Column in the grid of each view that is present, but for the reference view.
-    across : ndarray, shape (N,), float32
-        Their baselines, in view steps.
-    begins : ndarray, shape (R + 1,), int64
-        Where among them each run of views begins that stand in one row and equally far down, and the end of the last
-        one. What depends on the row of pixels alone is computed once for a run.
-    rows : ndarray, shape (R,), int64
-        Row in the grid of each run.
-    down : ndarray, shape (R,), float32
-        Their baselines, in view steps.
+    places : ndarray, shape (N, 2), int64
+        Row and column in the grid of each view that is compared, but for the reference view.
+    baselines : ndarray, shape (N, 2), float32
+        Theirs, down and across, in view steps.
     scales2, shares : ndarray, shape (2,), float32
         Square of the robust scale, and share in the cost, of colours and of detail.
     """
@@ -55,11 +48,8 @@ class SplineViews(NamedTuple):
     unit: np.float32
     low: int
     reference: FloatMap
-    columns: npt.NDArray[np.int64]
-    across: FloatMap
-    begins: npt.NDArray[np.int64]
-    rows: npt.NDArray[np.int64]
-    down: FloatMap
+    places: npt.NDArray[np.int64]
+    baselines: FloatMap
     scales2: FloatMap
     shares: FloatMap
 
@@ -145,11 +135,27 @@ def _spline_weights(f: Any, unit: Any) -> Any:
 
 
 @njit(inline="always")
-def _sample(splines: Any, view: int, row: int, left: int, a: Any, b: Any) -> Any:
-    """Four channels of a view; ``row``, ``left``: first row of the splines and first column that count."""
-    _, _, n, columns, _ = splines.shape
-    stride = 4 * columns
-    return _weighted_sum(splines, (view * n + row) * stride + 4 * left, stride, a, b)
+def _is_seen(views: SplineViews, seeing: Seeing, n: int, shape: Any, fy: Any, fx: Any, d: Any) -> bool:
+    """Whether position ``(fy, fx)`` lies in view ``n``, and nothing nearer than ``d`` occludes it."""
+    H, W = shape
+    half = np.float32(0.5)
+    if fy < 0 or fy > H - 1 or fx < 0 or fx > W - 1:
+        return False
+    nearest: Any = seeing.nearest[views.places[n, 0], views.places[n, 1]]
+    return bool(nearest[int(fy + half) - views.low, int(fx + half)] <= d + seeing.occlusion_margin)
+
+
+@njit(inline="always")
+def _sample(views: SplineViews, n: int, fy: Any, fx: Any) -> Any:
+    """Four channels of view ``n`` at a position inside it."""
+    _, S, rows, columns, _ = views.splines.shape
+    top, left, stride = int(fy), int(fx), 4 * columns
+    a = _spline_weights(fy - np.float32(top), views.unit)
+    b = _spline_weights(fx - np.float32(left), np.float32(1))
+    view = views.places[n, 0] * S + views.places[n, 1]
+    # the margin, less the one coefficient before
+    start = (view * rows + top - views.low + 1) * stride + 4 * (left + 1)
+    return _weighted_sum(views.splines, start, stride, a, b)
 
 
 @njit(inline="always")
@@ -160,26 +166,15 @@ def _robust_weight(z: Any, scale2: Any) -> Any:
 
 
 @njit(inline="always")
-def _add_to_mean(views: SplineViews, n: int, t: int, y: int, v: Any, seeing: Seeing, disparity: Any, sums: Any) -> None:
-    """Add view ``n``, which stands ``v`` down in row ``t``, to a row of pixels; ``sums (W, 6)``: those of the four
-    channels, and the weights of colours and of detail.
-    """
-    H, W = disparity.shape
-    nearest, margin = seeing
-    s, u = views.columns[n], views.across[n]
-    view = t * views.splines.shape[1] + s
-    one, half = np.float32(1), np.float32(0.5)
-    for x in range(W):
+def _add_to_mean(views: SplineViews, n: int, y: int, seeing: Seeing, disparity: Any, sums: Any) -> None:
+    """Add view ``n`` to a row of pixels; ``sums (W, 6)``: of the four channels, and of their weights."""
+    v, u = views.baselines[n]
+    for x in range(disparity.shape[1]):
         d = disparity[y, x]
         fy, fx = np.float32(y) - d * v, np.float32(x) - d * u
-        if fy < 0 or fy > H - 1 or fx < 0 or fx > W - 1:
+        if not _is_seen(views, seeing, n, disparity.shape, fy, fx, d):
             continue
-        if nearest[t, s, int(fy + half) - views.low, int(fx + half)] > d + margin:
-            continue
-        top, left = int(fy), int(fx)
-        a, b = _spline_weights(fy - np.float32(top), views.unit), _spline_weights(fx - np.float32(left), one)
-        # the margin, less the one coefficient before
-        v0, v1, v2, v3 = _sample(views.splines, view, top - views.low + 1, left + 1, a, b)
+        v0, v1, v2, v3 = _sample(views, n, fy, fx)
         own, total = views.reference[y, x], sums[x]
         w = _robust_weight((v0 - own[0]) ** 2 + (v1 - own[1]) ** 2 + (v2 - own[2]) ** 2, views.scales2[0])
         total[0] += w * v0
@@ -211,9 +206,8 @@ def mean_of_views(views: SplineViews, seeing: Seeing, disparity: Any, begin: int
         # a view after the other: its four rows stay in the first cache
         sums = np.ones((W, 6), np.float32)
         sums[:, :4] = views.reference[y]
-        for r in range(views.down.size):
-            for n in range(views.begins[r], views.begins[r + 1]):
-                _add_to_mean(views, n, views.rows[r], y, views.down[r], seeing, disparity, sums)
+        for n in range(len(views.places)):
+            _add_to_mean(views, n, y, seeing, disparity, sums)
         for x in range(W):
             for c in range(4):
                 out[y, x, c] = sums[x, c] / sums[x, 4 if c < 3 else 5]
@@ -221,27 +215,20 @@ def mean_of_views(views: SplineViews, seeing: Seeing, disparity: Any, begin: int
 
 @njit(inline="always")
 def _add_to_equations(
-    views: SplineViews, n: int, t: int, y: int, v: Any, seeing: Seeing, disparity: Any, image: Any, sums: Any
+    views: SplineViews, n: int, y: int, seeing: Seeing, disparity: Any, image: Any, sums: Any
 ) -> None:
     """Add view ``n`` to a row of pixels; ``image``: the mean and its derivatives; ``sums (W, 4)``: slope and curvature
     of colours and of detail.
     """
-    H, W = disparity.shape
-    nearest, margin = seeing
     mean, down, across = image
-    s, u = views.columns[n], views.across[n]
-    view = t * views.splines.shape[1] + s
-    one, half, three = np.float32(1), np.float32(0.5), np.float32(3)
-    for x in range(W):
+    v, u = views.baselines[n]
+    three = np.float32(3)
+    for x in range(disparity.shape[1]):
         d = disparity[y, x]
         fy, fx = np.float32(y) - d * v, np.float32(x) - d * u
-        if fy < 0 or fy > H - 1 or fx < 0 or fx > W - 1:
+        if not _is_seen(views, seeing, n, disparity.shape, fy, fx, d):
             continue
-        if nearest[t, s, int(fy + half) - views.low, int(fx + half)] > d + margin:
-            continue
-        top, left = int(fy), int(fx)
-        a, b = _spline_weights(fy - np.float32(top), views.unit), _spline_weights(fx - np.float32(left), one)
-        v0, v1, v2, v3 = _sample(views.splines, view, top - views.low + 1, left + 1, a, b)
+        v0, v1, v2, v3 = _sample(views, n, fy, fx)
         m, p, q, total = mean[y, x], down[y, x], across[y, x], sums[x]
         r0, r1, r2, r3 = v0 - m[0], v1 - m[1], v2 - m[2], v3 - m[3]
         g0, g1, g2, g3 = p[0] * v + q[0] * u, p[1] * v + q[1] * u, p[2] * v + q[2] * u, p[3] * v + q[3] * u
@@ -272,9 +259,8 @@ def normal_equations(
     colour, detail = views.shares[0] / views.scales2[0], views.shares[1] / views.scales2[1]
     for y in prange(begin, end):
         sums = np.zeros((W, 4), np.float32)
-        for r in range(views.down.size):
-            for n in range(views.begins[r], views.begins[r + 1]):
-                _add_to_equations(views, n, views.rows[r], y, views.down[r], seeing, disparity, image, sums)
+        for n in range(len(views.places)):
+            _add_to_equations(views, n, y, seeing, disparity, image, sums)
         for x in range(W):
             gradient[y, x] = colour * sums[x, 0] + detail * sums[x, 2]
             curvature[y, x] = colour * sums[x, 1] + detail * sums[x, 3]

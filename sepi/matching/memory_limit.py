@@ -11,9 +11,10 @@ from collections.abc import Iterable
 
 from sepi.errors import SepiError
 from sepi.lightfield import LightField
+from sepi.matching.base_detail import BaseDetailParameters
 from sepi.matching.row_bands import least_band_bytes
 from sepi.matching.visibility_sweep import BYTES_PER_CANDIDATE, VisibilitySweepParameters
-from sepi.stage import Parameters
+from sepi.stage import OcclusionMarginParameters, Parameters
 
 _LIBRARIES = 300 * 2**20
 """Python with what it imports, and what is allocated for the moment."""
@@ -44,11 +45,17 @@ def bytes_of_bands(light_field: LightField, stages: Iterable[Parameters], memory
     SepiError
         If the limit is less than what is needed in any case.
     """
+    # here, since it loads what compiles
+    from sepi.matching.gauss_newton import BYTES_PER_PIXEL
+
+    stages = list(stages)
     height, width = light_field.shape
     sweeps = [p.fewer(light_field, p.finest_sampling) for p in stages if isinstance(p, VisibilitySweepParameters)]
     volume = BYTES_PER_CANDIDATE * max(sweeps, default=0)
     whole = _LIBRARIES + light_field.views.nbytes + round((volume + _BYTES_OF_MAPS) * height * width)
-    least = whole + (least_band_bytes(light_field) if sweeps else 0)
+    in_bands = any(isinstance(p, (BaseDetailParameters, OcclusionMarginParameters)) for p in stages)
+    # the optimisation holds most of a pixel
+    least = whole + (least_band_bytes(light_field, BYTES_PER_PIXEL) if in_bands else 0)
     if memory < least:
         raise SepiError(
             f"{light_field.name}: takes at least {-(-least // 2**20)} MB with these views and candidates, more than "

@@ -19,9 +19,6 @@ from sepi.lightfield import BoolMap, LightField
 USUAL_BYTES = 2**29
 """What the bands may take unless somebody says otherwise."""
 
-MOST_BYTES_PER_PIXEL = 14
-"""Of a pixel of a view: what the greediest of those that go through bands holds."""
-
 FEWEST_ROWS = 16
 """Of a band, however little memory there is."""
 
@@ -79,13 +76,13 @@ def row_bands(light_field: LightField, present: BoolMap, reach: float, bytes_per
     return [Band(begin, end, Rows(max(0, begin - moved), min(height, end + moved))) for begin, end in pairwise(ends)]
 
 
-def least_band_bytes(light_field: LightField) -> int:
+def least_band_bytes(light_field: LightField, bytes_per_pixel: int) -> int:
     """What the narrowest bands take, at most; the disparity range must be known."""
     known = light_field.require_disparity_range()
     moved = _rows_moved(light_field, light_field.present, max(abs(known.minimum), abs(known.maximum)))
     height, width = light_field.shape
     rows = min(height, FEWEST_ROWS + 2 * moved)
-    return MOST_BYTES_PER_PIXEL * rows * width * int(light_field.present.sum())
+    return bytes_per_pixel * rows * width * int(light_field.present.sum())
 
 
 def _rows_moved(light_field: LightField, present: BoolMap, reach: float) -> int:
