@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from sepi.evaluate import score
+from sepi.image.isolated_pixels import join_isolated_pixels
 from sepi.image.mixed_pixels import MixtureParameters, reassign_mixed_pixels
 from sepi.lightfield import DisparityRange, LightField
 from sepi.matching.base_detail import (
@@ -71,6 +72,22 @@ def test_detail_leaves_out_shading_and_edges() -> None:
     inner = detail[6:-6, 6:-6]
     assert np.corrcoef(inner.ravel(), texture[6:-6, 6:-6].ravel())[0, 1] > 0.95
     assert np.abs(inner).max() < 0.03
+
+
+def test_a_pixel_that_stands_alone_joins_the_neighbour_of_its_colour() -> None:
+    """One pixel is no surface; two that lie side by side, or corner to corner, may be."""
+    disparity = np.zeros((8, 9), np.float32)
+    disparity[:, 5:] = 1
+    colours = np.repeat(disparity[..., None], 3, axis=2) * 0.5
+    found = disparity.copy()
+    # of the far surface's colour, at the edge; of the near one's, in the picture's corner
+    found[3, 4], found[0, 8] = 2, -2
+    np.testing.assert_array_equal(join_isolated_pixels(found, colours, 0.15), disparity)
+    pair = disparity.copy()
+    pair[3, 3] = pair[4, 2] = 2
+    np.testing.assert_array_equal(join_isolated_pixels(pair, colours, 0.15), pair)
+    slope = np.add.outer(np.arange(8), np.arange(9)).astype(np.float32) * 0.1
+    np.testing.assert_array_equal(join_isolated_pixels(slope, colours, 0.15), slope)
 
 
 def test_mixed_pixels_go_to_the_surface_that_fills_them() -> None:

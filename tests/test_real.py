@@ -75,6 +75,19 @@ def test_best_variant_reaches_its_figures(hci: Path, name: str) -> None:
     assert result["non_finite"] == 0
 
 
+# of the fastest method that does not learn (Mishiba 2020), run on these scenes
+PEER = {"cotton": (0.86, 0.41, 1.91), "antinous": (5.02, 0.64, 8.3)}
+
+
+@pytest.mark.parametrize("name", PEER)
+def test_fast_variant_is_more_accurate_than_the_fastest_peer(hci: Path, name: str) -> None:
+    """Who takes it for its speed does not get a worse map for it than elsewhere."""
+    result = final_scores(hci / name, "fast")
+    for key, figure in zip(("mse100", "q25", "badpix007"), PEER[name], strict=True):
+        assert result[key] < figure
+    assert result["non_finite"] == 0
+
+
 @pytest.mark.parametrize("name", BEST_BOUNDS)
 def test_error_falls_with_confidence(hci: Path, name: str) -> None:
     """Who keeps the confident pixels must get the better ones, all the way down."""

@@ -164,6 +164,18 @@ def test_depth_with_run_time(scene: Path) -> None:
     assert not Path("out/runtime.txt").exists()
 
 
+def test_depth_within_a_limit_of_memory(scene: Path) -> None:
+    """The same maps; a limit that cannot be kept is told before anything is written."""
+    assert call("depth", scene, "-o", "out", *FAST).exit_code == 0
+    assert call("depth", scene, "-o", "within", "--memory", 400, *FAST).exit_code == 0
+    assert Path("within/disparity.pfm").read_bytes() == Path("out/disparity.pfm").read_bytes()
+    called = call("depth", scene, "-o", "none", "--memory", 10, *FAST)
+    assert called.exit_code == 1
+    assert "takes at least" in called.stderr
+    assert "more than the 10 MB" in called.stderr
+    assert not Path("none").exists()
+
+
 def test_a_warning_does_not_stop_the_depth(scene: Path) -> None:
     """Views in the wrong order give a map that looks like one; the user must hear of it, and of the way out."""
     views = render("curved_occluders", size=96, views=5).views
