@@ -21,9 +21,9 @@ from sepi.lightfield import LightField
 from sepi.matching.plane_sweep import SweepParameters, sweep
 from sepi.matching.structure_tensor import StructureTensorParameters, structure_tensor_depth
 from sepi.matching.visibility_sweep import (
-    AllViewsParameters,
+    FirstDepthParameters,
     VisibilitySweepParameters,
-    depth_from_all_views,
+    first_depth,
 )
 from sepi.stage import Choice, Progress, StageMaps
 
@@ -60,7 +60,7 @@ def semi_global(
     light_field: LightField, previous: StageMaps | None, parameters: VisibilitySweepParameters, progress: Progress
 ) -> StageMaps:
     """Depth from colours and detail of a few views, smoothed semi-globally; arguments and result as for ``sepi``."""
-    result = depth_from_all_views(light_field, parameters, progress)
+    result = first_depth(light_field, parameters, progress)
     return StageMaps(result.disparity, result.confidence)
 
 
@@ -75,7 +75,7 @@ def structure_tensor(
 
 CHOICES = {
     "sepi": Choice(SweepParameters, sepi),
-    "semi_global": Choice(AllViewsParameters, semi_global),
+    "semi_global": Choice(FirstDepthParameters, semi_global),
     "structure_tensor": Choice(StructureTensorParameters, structure_tensor),
 }
 

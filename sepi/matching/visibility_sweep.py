@@ -78,16 +78,14 @@ class VisibleViewsParameters(VisibilitySweepParameters, OcclusionMarginParameter
         return min(self.sampling, self.first_sampling) if self.passes > 1 else self.sampling
 
 
-class AllViewsParameters(VisibilitySweepParameters):
+class FirstDepthParameters(VisibilitySweepParameters):
     """Parameters of the first depth map: a narrow scale of the colours bears with views that do not see the pixel."""
 
     colour_scale: ColourScale = 0.0077
     small_penalty: SmallPenalty = 0.04
 
 
-def depth_from_all_views(
-    light_field: LightField, parameters: VisibilitySweepParameters, progress: Progress
-) -> SmoothedResult:
+def first_depth(light_field: LightField, parameters: VisibilitySweepParameters, progress: Progress) -> SmoothedResult:
     """Depth by a few views, as if each saw every pixel.
 
     Parameters

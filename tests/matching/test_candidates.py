@@ -11,7 +11,7 @@ from sepi.matching.candidates import LEAST_CANDIDATES, MOST_CANDIDATES, Candidat
 from sepi.matching.plane_sweep import CANDIDATES as PAPER
 from sepi.matching.plane_sweep import SweepParameters
 from sepi.matching.visibility_sweep import CANDIDATES as BEST
-from sepi.matching.visibility_sweep import AllViewsParameters
+from sepi.matching.visibility_sweep import FirstDepthParameters
 from sepi.pipeline import STAGES
 from sepi.scenes import SCENES, render
 
@@ -34,7 +34,7 @@ def test_light_fields_like_the_papers_get_the_published_number(width: float) -> 
 def test_built_in_scenes_get_the_usual_number(scene: str) -> None:
     light_field = render(scene, size=64)
     assert SweepParameters().number(light_field) == 181
-    assert AllViewsParameters().number(light_field) == 91
+    assert FirstDepthParameters().number(light_field) == 91
 
 
 @pytest.mark.parametrize("rule", [PAPER, BEST, CandidateRule(91, 0.1, 0.35)])
@@ -77,7 +77,7 @@ def test_rows_further_apart_count() -> None:
 def test_a_number_that_is_set_goes_before() -> None:
     square = field_5x5()
     assert SweepParameters(num_disparities=5).candidates(square).tolist() == [-20, -10, 0, 10, 20]
-    assert AllViewsParameters(num_disparities=5).settled(square).num_disparities == 5
+    assert FirstDepthParameters(num_disparities=5).settled(square).num_disparities == 5
 
 
 def test_what_is_settled_is_what_runs() -> None:

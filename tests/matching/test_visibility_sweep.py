@@ -20,10 +20,10 @@ from sepi.matching.visibility_kernels import (
     z_buffers,
 )
 from sepi.matching.visibility_sweep import (
-    AllViewsParameters,
+    FirstDepthParameters,
     VisibleViewsParameters,
-    depth_from_all_views,
     depth_from_visible_views,
+    first_depth,
     occluded_in_any_view,
 )
 from sepi.scenes import render
@@ -82,8 +82,8 @@ def test_all_maps_but_the_last_compare_few_views(monkeypatch) -> None:
         ),
     )
     field = render("dots", size=64)
-    of_first = AllViewsParameters(first_views=13, num_disparities=21)
-    first = depth_from_all_views(field, of_first, no_progress)
+    of_first = FirstDepthParameters(first_views=13, num_disparities=21)
+    first = first_depth(field, of_first, no_progress)
     of_visible = VisibleViewsParameters(first_views=13, passes=3, num_disparities=21)
     depth_from_visible_views(field, first.disparity, of_visible, no_progress)
     assert compared == [(13, 11), (13, 11), (13, 11), (41, 21)]
@@ -240,7 +240,7 @@ def test_grey_views_give_the_depth_of_equal_colours() -> None:
     fields = [
         LightField(views, "s", disparity_range=scene.disparity_range) for views in (grey, np.repeat(grey, 3, axis=4))
     ]
-    one, three = (depth_from_all_views(f, AllViewsParameters(num_disparities=21), lambda _: None) for f in fields)
+    one, three = (first_depth(f, FirstDepthParameters(num_disparities=21), lambda _: None) for f in fields)
     np.testing.assert_allclose(one.disparity, three.disparity, atol=1e-3)
 
 
@@ -251,7 +251,7 @@ def test_depth_is_the_same_on_any_number_of_threads() -> None:
     try:
         for threads in (1, several_threads()):
             numba.set_num_threads(threads)
-            first = depth_from_all_views(scene, AllViewsParameters(num_disparities=21), lambda _: None)
+            first = first_depth(scene, FirstDepthParameters(num_disparities=21), lambda _: None)
             result = depth_from_visible_views(
                 scene, first.disparity, VisibleViewsParameters(num_disparities=21, passes=1), lambda _: None
             )
@@ -264,7 +264,7 @@ def test_depth_is_the_same_on_any_number_of_threads() -> None:
 def test_progress_ends_at_one() -> None:
     seen: list[float] = []
     scene = render("fronto_parallel", size=64)
-    first = depth_from_all_views(scene, AllViewsParameters(num_disparities=5), seen.append)
+    first = first_depth(scene, FirstDepthParameters(num_disparities=5), seen.append)
     assert seen[-1] == 1
     seen.clear()
     depth_from_visible_views(scene, first.disparity, VisibleViewsParameters(num_disparities=5), seen.append)

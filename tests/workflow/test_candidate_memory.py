@@ -7,7 +7,7 @@ import numpy as np
 from sepi.io.hdf5 import write_light_field
 from sepi.lightfield import DisparityRange, LightField
 from sepi.matching.plane_sweep import SweepParameters
-from sepi.matching.visibility_sweep import AllViewsParameters
+from sepi.matching.visibility_sweep import FirstDepthParameters
 from sepi.workflow.candidates import candidates_mb
 from sepi.workflow.datasets import Scene
 
@@ -24,16 +24,16 @@ def written(path: Path, width: float) -> Path:
 def test_a_wide_range_asks_for_its_cost_volume(tmp_path: Path) -> None:
     light_field = written(tmp_path / "lf.h5", 100)
     # 100 px to views 2 steps away, 0.4 px apart there
-    assert candidates_mb(SCENE, light_field, AllViewsParameters()) == round(410 * 8 * 300 * 400 / 2**20)
+    assert candidates_mb(SCENE, light_field, FirstDepthParameters()) == round(410 * 8 * 300 * 400 / 2**20)
     assert candidates_mb(SCENE, light_field, SweepParameters()) == 0
 
 
 def test_usual_narrow_and_yet_unread_ones_ask_for_no_more(tmp_path: Path) -> None:
     for width in (0.5, 5):
-        assert candidates_mb(SCENE, written(tmp_path / f"{width}.h5", width), AllViewsParameters()) == 0
-    assert candidates_mb(SCENE, tmp_path / "gone.h5", AllViewsParameters()) == 0
+        assert candidates_mb(SCENE, written(tmp_path / f"{width}.h5", width), FirstDepthParameters()) == 0
+    assert candidates_mb(SCENE, tmp_path / "gone.h5", FirstDepthParameters()) == 0
 
 
 def test_a_number_that_is_set_counts(tmp_path: Path) -> None:
-    found = candidates_mb(SCENE, tmp_path / "gone.h5", AllViewsParameters(num_disparities=191))
+    found = candidates_mb(SCENE, tmp_path / "gone.h5", FirstDepthParameters(num_disparities=191))
     assert found == round(100 * 8 * 300 * 400 / 2**20)
