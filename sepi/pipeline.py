@@ -172,7 +172,7 @@ VARIANT_ENTRIES: dict[str, dict[str, Any]] = {
     "fast": {
         "initial": {"choice": "semi_global", "first_views": 9, "first_sampling": 3},
         "occlusion": {"choice": "visibility", "passes": 1, "views": 25, "sampling": 2},
-        "textureless": {"choice": "uniform_planes", "views": 25},
+        "textureless": {"choice": "uniform_planes", "views": 9},
         "optimize": {"choice": "second_order", "views": 25, "solves": 1},
     },
     "best_paper_initial": {"base": "best", "initial": "sepi"},

@@ -9,6 +9,7 @@ wrong sign.
 from __future__ import annotations
 
 import math
+from enum import Enum
 from typing import NamedTuple
 
 import cv2
@@ -21,6 +22,10 @@ from sepi.inspection.view_layouts import Baseline, Trial, Views, baselines_under
 from sepi.inspection.view_order_kernels import residuals
 from sepi.lightfield import BoolMap, FloatMap, LightField
 
+# A glance looks at bands of so many rows, one of so many; it tells little in pictures of fewer pixels
+_BAND_ROWS = 24
+_BANDS = 3
+_LEAST_PIXELS_TO_GLANCE = 100_000
 # Views up to this many rows or columns away are looked at: the farther, the wider the strips that are hidden
 _FARTHEST = 24
 # Movement searched at most, pixels; larger pictures are reduced by a whole factor, less than where the order of the
@@ -83,48 +88,56 @@ class Evidence(NamedTuple):
     agreeing: int
 
 
-def occlusion_evidence(light_field: LightField, trial: Trial, many_views: bool = False) -> Evidence:
+class Look(Enum):
+    """How closely the views are looked at; the closer, the longer it takes."""
+
+    GLANCE = 1
+    """Bands of rows in the views beside the reference: enough where many things hide others."""
+    AXES = 2
+    """The views of the middle row and column, which hide least of each other."""
+    MANY_VIEWS = 3
+    """Also views off them, which see more where there is noise or little texture."""
+
+
+def occlusion_evidence(light_field: LightField, trial: Trial, look: Look) -> Evidence:
     """Whether the surface of the greater disparity is the one in front.
 
     The best layout of the trial is taken for right; the sign is that of the layout's first order. There is no evidence
-    where there are no views on opposite sides, or hardly any contrast. The views of the middle row and column hide
-    least of each other; many views, also off them, see more where there is noise or little texture.
+    where there are no views on opposite sides, or hardly any contrast.
     """
-    none = Evidence(0.0, 0.0, 0, 0)
     views = Views(light_field, _MOST_PIXELS)
+    order = next(iter(trial.best))
     largest = trial.largest_disparity / views.factor
     reach, directions = _directions(views, largest)
-    if not directions:
-        return none
+    rows = np.ones(views.shape[0], bool)
+    if look is Look.GLANCE:
+        # what moves along rows does not leave its band
+        directions = [d for d in directions if not baselines_under(order, views.in_steps(_at(d, reach)))[:, 0].any()]
+        rows = np.arange(views.shape[0]) // _BAND_ROWS % _BANDS == _BANDS // 2
     # in units of the picture's own contrast
     scale = np.float32(1 / max(float(views.plain((0, 0)).std()), 1e-6))
     rounding = _ROUNDING * float(scale) ** 2
-    if rounding > _MOST_ROUNDING:
-        return none
-    reference = views.plain((0, 0)) * scale
+    too_small = look is Look.GLANCE and math.prod(views.shape) < _LEAST_PIXELS_TO_GLANCE
+    if not directions or rounding > _MOST_ROUNDING or too_small:
+        return Evidence(0.0, 0.0, 0, 0)
     sides = {
-        direction: _at(direction, reach) + (_beside(views, direction, reach) if many_views else [])
+        direction: _at(direction, reach) + (_beside(views, direction, reach) if look is Look.MANY_VIEWS else [])
         for direction in directions
     }
-    pictures = {at: views.plain(at) * scale for side in sides.values() for at in side}
-    order = next(iter(trial.best))
+    pictures = {at: views.plain(at)[rows] * scale for side in [[(0, 0)], *sides.values()] for at in side}
     positions = {at: baselines_under(order, views.in_steps([at]))[0].astype(np.float32) for at in pictures}
     movement = min(_MOST_MOVEMENT, math.ceil(1.15 * largest * reach) + 1)
     sampling = 1 / reach
-    candidates = (np.arange(-movement, movement + 1) * sampling).astype(np.float32)
     disparity, trusted = _disparity(
-        reference,
-        [
-            (np.stack([pictures[at] for at in side]), np.stack([positions[at] for at in side]))
-            for side in sides.values()
-        ],
-        candidates,
+        pictures[0, 0],
+        [(np.stack([pictures[v] for v in side]), np.stack([positions[v] for v in side])) for side in sides.values()],
+        (np.arange(-movement, movement + 1) * sampling).astype(np.float32),
     )
     surface = trusted & (_support(disparity, trusted, sampling) >= _LEAST_SUPPORT)
-    surface &= ~dark_corners(views.reference_view, reference.shape, movement)
+    surface &= ~dark_corners(views.reference_view, views.shape, movement)[rows]
     residual = {
         at: residuals(
-            reference, pictures[at], float(positions[at][0]), float(positions[at][1]), disparity, _WINDOW_RADIUS
+            pictures[0, 0], pictures[at], float(positions[at][0]), float(positions[at][1]), disparity, _WINDOW_RADIUS
         )
         for direction in directions
         for at in _at(direction, reach)

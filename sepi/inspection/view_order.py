@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sepi.inspection.disparity_sign import Evidence, occlusion_evidence
+from sepi.inspection.disparity_sign import Evidence, Look, occlusion_evidence
 from sepi.inspection.view_layouts import Views, best_trial
 from sepi.io.readers.options import AS_GIVEN, ORDERS
 from sepi.lightfield import LightField
@@ -115,10 +115,12 @@ def check_order(light_field: LightField, read_in: str = AS_GIVEN) -> OrderCheck:
     if trial.clear:
         # near and far as they are, if the order is right but for them: to doubt that takes more
         kept = next((sign for order, sign in trial.best.items() if order == AS_GIVEN), None)
-        for many_views in (False, True):
-            evidence = occlusion_evidence(light_field, trial, many_views)
-            sign_clear = _is_clear(evidence, plainly=kept is not None and kept * evidence.mean < 0)
-            if sign_clear:
+        for look in Look:
+            evidence = occlusion_evidence(light_field, trial, look)
+            doubted = kept is not None and kept * evidence.mean < 0
+            sign_clear = _is_clear(evidence, plainly=doubted or look is Look.GLANCE)
+            # a glance may say that all is well; to say that it is not takes a closer look
+            if sign_clear and not (look is Look.GLANCE and (kept is None or doubted)):
                 break
         if sign_clear:
             # at most half way to the next layout: the wrong sign is still the better layout

@@ -29,6 +29,8 @@ from sepi.stage import OcclusionMarginParameters, StageMaps
 LEAST_NOISE = 1e-5
 """Noise below which rounding of float32 is noise too; integers have at least 0.3 levels by rounding."""
 
+# residuals that are computed at once: enough to save calls, few enough for the cache
+_AT_ONCE = 2**17
 _PIXELS_OF_A_PLANE = 12  # least border to fit one to
 
 
@@ -38,7 +40,7 @@ class UniformPlanesParameters(OcclusionMarginParameters):
     colour_scale: float = Field(
         0.0316, ge=1e-6, le=2, description="residual at which a view counts half in the mean; RGB distance, 0..1"
     )
-    views: int | None = Field(None, ge=2, description="views that are averaged, at least; null: all")
+    views: int | None = Field(25, ge=2, description="views that are averaged, at least; null: all")
     window_radius: int = Field(4, ge=1, le=20, description="gradients are averaged over 2 r + 1 pixels")
     noise_factor: float = Field(
         4.0, gt=0, description="squared gradient, in units of what noise explains, below which a region is uniform"
@@ -174,16 +176,37 @@ def ransac_plane(
     positions, values = positions[order], values[order]
     triples = np.random.default_rng(0).integers(values.size, size=(parameters.ransac_iterations, 3))
     triples = triples[np.abs(np.linalg.det(positions[triples])) > 1e-9]
-    best, chosen = -np.inf, None
-    for plane in np.linalg.solve(positions[triples], values[triples, None])[..., 0]:
-        residual = values - positions @ plane
-        inliers = np.abs(residual) < parameters.tolerance
-        score = inliers.sum() - parameters.behind_penalty * (residual < -parameters.tolerance).sum()
-        if score > best:
-            best, chosen = score, inliers
-    if chosen is None or chosen.sum() < max(3, parameters.min_inlier_ratio * values.size):
+    planes = np.linalg.solve(positions[triples], values[triples, None])[..., 0]
+    if not len(planes):
+        return None
+    parts = np.array_split(planes, -(-len(planes) * values.size // _AT_ONCE))
+    scores = np.concatenate([_scores(positions, values, part, parameters) for part in parts])
+    chosen = abs(_residuals(positions, values, planes[scores.argmax(), None])[0]) < parameters.tolerance
+    if chosen.sum() < max(3, parameters.min_inlier_ratio * values.size):
         return None
     return np.asarray(np.linalg.lstsq(positions[chosen], values[chosen], rcond=None)[0])
+
+
+def _scores(
+    positions: npt.NDArray[np.float64],
+    values: npt.NDArray[np.float64],
+    planes: npt.NDArray[np.float64],
+    parameters: UniformPlanesParameters,
+) -> npt.NDArray[np.float64]:
+    """How much of a border agrees with each of some planes (P, 3), less what lies behind it."""
+    residual = _residuals(positions, values, planes)
+    agreeing = (abs(residual) < parameters.tolerance).sum(axis=1)
+    behind = (residual < -parameters.tolerance).sum(axis=1)
+    return np.asarray(agreeing - parameters.behind_penalty * behind)
+
+
+def _residuals(
+    positions: npt.NDArray[np.float64], values: npt.NDArray[np.float64], planes: npt.NDArray[np.float64]
+) -> npt.NDArray[np.float64]:
+    """By how much each of N values is above each of P planes, (P, N)."""
+    a, b, c = planes.T[..., None]
+    # term by term: a product of matrices rounds as the number of threads has it
+    return np.asarray(values - (a + b * positions[:, 1] + c * positions[:, 2]))
 
 
 def _basis(y: npt.NDArray[np.int64], x: npt.NDArray[np.int64], shape: tuple[int, ...]) -> npt.NDArray[np.float64]:

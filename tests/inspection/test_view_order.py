@@ -7,6 +7,8 @@ import cv2
 import numpy as np
 import pytest
 
+from sepi.inspection.disparity_sign import Evidence, Look, occlusion_evidence
+from sepi.inspection.view_layouts import Trial
 from sepi.inspection.view_order import check_order
 from sepi.io.readers.options import ORDERS
 from sepi.lightfield import LightField
@@ -248,6 +250,23 @@ def test_near_and_far_are_told_in_noise_and_in_small_pictures(hci: Path, kind: s
     from bench.disturbed import DISTURBANCES
 
     every_order_is_named(DISTURBANCES[kind].change(read_light_field(hci / "cotton", check_order=False)))
+
+
+def test_a_glance_may_say_that_all_is_well_but_not_that_it_is_not(hci: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every run would wait for the closer look, or one third of the rows would have depth turned inside out."""
+    looks: list[Look] = []
+
+    def noted(light_field: LightField, trial: Trial, look: Look) -> Evidence:
+        looks.append(look)
+        return occlusion_evidence(light_field, trial, look)
+
+    monkeypatch.setattr("sepi.inspection.view_order.occlusion_evidence", noted)
+    light_field = read_light_field(hci / "cotton", check_order=False)
+    assert check_order(light_field).sign_clear
+    assert looks == [Look.GLANCE]
+    looks.clear()
+    assert check_order(misread(light_field, "flip-both")).best == "flip-both"
+    assert looks == [Look.GLANCE, Look.AXES]
 
 
 def every_order_is_named(light_field: LightField) -> None:
