@@ -39,6 +39,7 @@ from sepi.image.mixed_pixels import MixtureParameters, reassign_mixed_pixels
 from sepi.image.noise import residual_variance
 from sepi.lightfield import BoolMap, FloatMap, LightField
 from sepi.matching.plane_sweep import SweepParameters, SweepResult, sweep
+from sepi.matching.surface_shares import SurfaceShareParameters, reassign_by_shares
 from sepi.matching.view_subsets import SIDES, half_planes, halves_and_quarters, spread_views
 from sepi.matching.visibility_sweep import VisibleViewsParameters, depth_from_visible_views, occluded_in_any_view
 from sepi.stage import Choice, NoParameters, Progress, StageMaps, none, require_previous
@@ -73,7 +74,7 @@ class HalfSepiParameters(OcclusionParameters):
     )
 
 
-class VisibilityParameters(VisibleViewsParameters, MixtureParameters):
+class VisibilityParameters(VisibleViewsParameters, MixtureParameters, SurfaceShareParameters):
     """Parameters of the views chosen one by one, and of the mixed pixels."""
 
 
@@ -169,6 +170,7 @@ def visibility(
     result = depth_from_visible_views(light_field, before.disparity, parameters, progress)
     colours = light_field.reference_view
     disparity = reassign_mixed_pixels(result.disparity, colours, residual_variance(colours), parameters)
+    disparity = reassign_by_shares(light_field, disparity, parameters)
     disparity = join_isolated_pixels(disparity, colours, parameters.occlusion_margin)
     return before.updated(
         disparity,

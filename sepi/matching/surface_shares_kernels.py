@@ -1,0 +1,351 @@
+"""Compiled loops of the decision by shares of the views (:mod:`sepi.matching.surface_shares`)."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit, prange
+
+from sepi.lightfield import BoolMap, FloatMap
+
+FEWEST_VIEWS = 3
+"""That see a piece of background, before its colour counts."""
+
+FEWEST_SAMPLES = 8
+"""Views from which a share is told."""
+
+SHARES = 12
+"""That are tried, from 0 to 1; none is one half."""
+
+_CLEAN_RADIUS = 4  # how far away clean colours of the nearer surface are looked for, pixels
+_SAME_SURFACE = 0.25  # difference of disparity, pixels per view step
+_CLEAN_DEVIATION = 0.02  # of a surface's colour from its clean neighbours', beyond their own; 0..1
+_HELD = 4.0  # how many samples' weight the clean colours have beyond their own
+_FREE_DEVIATION = 0.3  # the same where the surface's colour is free, 0..1
+_MOST_DEVIATION2 = 0.01  # squared residual that one view counts at most in the background's variance
+_UNKNOWN = 1e3  # cost where nothing tells
+
+
+class RimViews(NamedTuple):
+    """The views that are compared, and what hides what in them.
+
+    Attributes
+    ----------
+    pixels : ndarray, shape (T, S, H, W, C), uint8, uint16 or float32
+    unit : float32
+        What they are multiplied with to be 0..1.
+    places : ndarray, shape (N, 2), int64
+        Row and column in the grid of each view that is compared.
+    baselines : ndarray, shape (N, 2), float64
+        Theirs, down and across, in view steps.
+    nearest : ndarray, shape (T, S, n, W), float32
+        z-buffers of the map, its nearer surfaces widened by a pixel, so that no mixed pixel counts as background.
+    low : int
+        First row of ``nearest``.
+    """
+
+    pixels: npt.NDArray[Any]
+    unit: np.float32
+    places: npt.NDArray[np.int64]
+    baselines: npt.NDArray[np.float64]
+    nearest: FloatMap
+    low: int
+
+
+class Rim(NamedTuple):
+    """The pixels beside a depth step, and the two surfaces that may be theirs.
+
+    Attributes
+    ----------
+    near, far : ndarray, shape (H, W), float32
+        Disparities of both surfaces; the map's own elsewhere.
+    inside : ndarray, shape (H, W), bool
+        Whether a pixel lies beside a step.
+    is_near : ndarray, shape (H, W), bool
+        Which of the two the map has.
+    """
+
+    near: FloatMap
+    far: FloatMap
+    inside: BoolMap
+    is_near: BoolMap
+
+
+class Background(NamedTuple):
+    """What the views show behind the nearer surfaces.
+
+    Attributes
+    ----------
+    colour : ndarray, shape (H, W, 3), float32
+    variance : ndarray, shape (H, W), float32
+        Of the views' colours, mean of the channels.
+    views : ndarray, shape (H, W), int32
+        How many see it.
+    """
+
+    colour: FloatMap
+    variance: FloatMap
+    views: npt.NDArray[np.int32]
+
+
+@njit(parallel=True, cache=True)
+def rim_of(disparity: Any, radius: int, step: Any) -> Any:
+    """Surfaces on both sides of each depth step, means over a window by nearness; ``Rim`` of ``disparity (H, W)``.
+
+    A pixel lies beside a step where the disparities within ``radius`` pixels differ by ``step``.
+    """
+    H, W = disparity.shape
+    near, far = disparity.copy(), disparity.copy()
+    inside, is_near = np.zeros((H, W), np.bool_), np.zeros((H, W), np.bool_)
+    for y in prange(H):
+        for x in range(W):
+            top, bottom = max(0, y - radius), min(H, y + radius + 1)
+            left, right = max(0, x - radius), min(W, x + radius + 1)
+            lowest = highest = disparity[y, x]
+            for i in range(top, bottom):
+                for j in range(left, right):
+                    lowest, highest = min(lowest, disparity[i, j]), max(highest, disparity[i, j])
+            if highest - lowest < step:
+                continue
+            middle = (lowest + highest) / 2
+            sums = np.zeros((2, 2))
+            for i in range(top, bottom):
+                for j in range(left, right):
+                    weight = 1 / (1 + (i - y) ** 2 + (j - x) ** 2)
+                    side = 1 if disparity[i, j] > middle else 0
+                    sums[side, 0] += weight
+                    sums[side, 1] += weight * disparity[i, j]
+            inside[y, x] = True
+            far[y, x], near[y, x] = sums[0, 1] / sums[0, 0], sums[1, 1] / sums[1, 0]
+            is_near[y, x] = disparity[y, x] > (near[y, x] + far[y, x]) / 2
+    return Rim(near, far, inside, is_near)
+
+
+@njit(inline="always")
+def _sees(views: RimViews, view: int, d: Any, y: int, x: int, margin: Any) -> Any:
+    """Whether a view shows a pixel of disparity ``d``, and where: row and column of the sample, and its fractions."""
+    H, W = views.pixels.shape[2], views.pixels.shape[3]
+    down, across = y - d * views.baselines[view, 0], x - d * views.baselines[view, 1]
+    if down < 0 or across < 0 or down >= H - 1 or across >= W - 1:
+        return False, 0, 0, 0.0, 0.0
+    row, column = int(down), int(across)
+    nearest = views.nearest[
+        views.places[view, 0], views.places[view, 1], int(down + 0.5) - views.low, int(across + 0.5)
+    ]
+    return nearest <= d + margin, row, column, down - row, across - column
+
+
+@njit(inline="always")
+def _sample(views: RimViews, view: int, c: int, row: int, column: int, fy: Any, fx: Any) -> Any:
+    """Bilinear sample of one channel, 0..1; grey counts as three equal ones."""
+    picture = views.pixels[views.places[view, 0], views.places[view, 1]]
+    k = min(c, picture.shape[2] - 1)
+    upper = (1 - fx) * picture[row, column, k] + fx * picture[row, column + 1, k]
+    lower = (1 - fx) * picture[row + 1, column, k] + fx * picture[row + 1, column + 1, k]
+    return ((1 - fy) * upper + fy * lower) * views.unit
+
+
+@njit(parallel=True, cache=True)
+def background_of(views: RimViews, layer: Any, wanted: Any, margin: Any, begin: int, end: int) -> Any:
+    """Colours of the more distant surfaces, medians over the views that see them.
+
+    Parameters
+    ----------
+    views : RimViews
+    layer : ndarray, shape (H, W), float32
+        Disparity of the more distant surface, also where a nearer one hides it.
+    wanted : ndarray, shape (H, W), bool
+    margin : float32
+        By how much an occluder must be nearer, pixels per view step.
+    begin, end : int
+        Rows that are made; others are left undefined.
+
+    Returns
+    -------
+    Background
+    """
+    H, W = layer.shape
+    N = len(views.places)
+    colour, variance = np.empty((H, W, 3), np.float32), np.empty((H, W), np.float32)
+    count = np.zeros((H, W), np.int32)
+    for y in prange(begin, end):
+        samples = np.empty((3, N), np.float32)
+        for x in range(W):
+            if not wanted[y, x]:
+                continue
+            n = 0
+            for view in range(N):
+                seen, row, column, fy, fx = _sees(views, view, layer[y, x], y, x, margin)
+                if seen:
+                    for c in range(3):
+                        samples[c, n] = _sample(views, view, c, row, column, fy, fx)
+                    n += 1
+            count[y, x] = n
+            if n < FEWEST_VIEWS:
+                continue
+            total = 0.0
+            for c in range(3):
+                middle = np.median(samples[c, :n])
+                colour[y, x, c] = middle
+                for v in range(n):
+                    total += min((samples[c, v] - middle) ** 2, _MOST_DEVIATION2)
+            variance[y, x] = total / (3 * n)
+    return Background(colour, variance, count)
+
+
+@njit(inline="always")
+def _behind(background: Background, row: int, column: int, fy: Any, fx: Any, out: Any) -> Any:
+    """Colour between pixels of the background into ``out (3,)``, and its variance; negative where it is not known."""
+    for i in range(row, row + 2):
+        for j in range(column, column + 2):
+            if background.views[i, j] < FEWEST_VIEWS:
+                return -1.0
+    a, b, c, d = (1 - fy) * (1 - fx), (1 - fy) * fx, fy * (1 - fx), fy * fx
+    for k in range(3):
+        B = background.colour[:, :, k]
+        out[k] = a * B[row, column] + b * B[row, column + 1] + c * B[row + 1, column] + d * B[row + 1, column + 1]
+    V = background.variance
+    return a * V[row, column] + b * V[row, column + 1] + c * V[row + 1, column] + d * V[row + 1, column + 1]
+
+
+@njit(inline="always")
+def _clean_colour(guide: Any, clean: Any, disparity: Any, near: Any, y: int, x: int, out: Any) -> Any:
+    """Colour of the nearer surface beside a pixel into ``out (3,)``, and its variance; negative if there is none."""
+    H, W = disparity.shape
+    weights, squares = 0.0, 0.0
+    out[:] = 0
+    for i in range(max(0, y - _CLEAN_RADIUS), min(H, y + _CLEAN_RADIUS + 1)):
+        for j in range(max(0, x - _CLEAN_RADIUS), min(W, x + _CLEAN_RADIUS + 1)):
+            if clean[i, j] and abs(disparity[i, j] - near) < _SAME_SURFACE:
+                weight = 1 / (1 + (i - y) ** 2 + (j - x) ** 2) ** 2
+                weights += weight
+                for c in range(3):
+                    out[c] += weight * guide[i, j, c]
+                    squares += weight * guide[i, j, c] ** 2
+    if weights == 0:
+        return -1.0
+    variance = squares / weights
+    for c in range(3):
+        out[c] /= weights
+        variance -= out[c] ** 2
+    return max(variance, 0.0) / 3
+
+
+@njit(inline="always")
+def _cost_of_share(share: Any, colours: Any, behind: Any, noise: Any, clean: Any, held: Any, scale2: Any) -> Any:
+    """Mean robust residual of views that show a share of one colour before the background, 0..1.
+
+    The colour is that which fits best, and is held near ``clean (3,)`` with the weight ``held`` of so many views;
+    ``colours (N, 3)``, ``behind (N, 3)`` and its variance ``noise (N,)`` are the samples.
+    """
+    n = len(noise)
+    rest = 1 - share
+    fit = np.empty(3)
+    total = 0.0
+    for c in range(3):
+        along = 0.0
+        for v in range(n):
+            along += colours[v, c] - rest * behind[v, c]
+        fit[c] = min(max((share * along + held * clean[c]) / (share * share * n + held), 0.0), 1.0)
+        total += held * (fit[c] - clean[c]) ** 2 / scale2
+    for v in range(n):
+        own = scale2 + rest * rest * noise[v]
+        for c in range(3):
+            residual = (colours[v, c] - share * fit[c] - rest * behind[v, c]) ** 2
+            total += residual / (residual + own)
+    return total / (3 * n)
+
+
+@njit(inline="always")
+def _cost_alone(views: RimViews, guide: Any, d: Any, y: int, x: int, margin: Any, scale2: Any) -> Any:
+    """Mean robust residual of a pixel that moves with ``d``, over the views that see it, 0..1."""
+    total, n = 0.0, 0
+    for view in range(len(views.places)):
+        seen, row, column, fy, fx = _sees(views, view, d, y, x, margin)
+        if seen:
+            for c in range(3):
+                residual = (_sample(views, view, c, row, column, fy, fx) - guide[y, x, c]) ** 2
+                total += residual / (residual + scale2)
+            n += 1
+    # the reference view itself always fits
+    return total / (3 * (n - 1)) if n > FEWEST_VIEWS else _UNKNOWN
+
+
+@njit(parallel=True, cache=True)
+def evidence_of_shares(
+    views: RimViews, rim: Rim, background: Background, disparity: Any, guide: Any, clean: Any, margin: Any,
+    scale2: Any, begin: int, end: int, evidence: Any,
+) -> None:  # fmt: skip
+    """By how much the other surface explains the views better than the one that a pixel has.
+
+    Along the nearer surface's disparity each view shows the same share of that surface before another piece of
+    background. More than half is near, less is far.
+
+    Parameters
+    ----------
+    views : RimViews
+    rim : Rim
+    background : Background
+    disparity : ndarray, shape (H, W), float32
+    guide : ndarray, shape (H, W, 3), float32
+        Reference view, 0..1.
+    clean : ndarray, shape (H, W), bool
+        Pixels of one surface alone.
+    margin : float32
+        By how much an occluder must be nearer, pixels per view step.
+    scale2 : float
+        Square of the residual at which a view counts half.
+    begin, end : int
+        Rows that are made.
+    evidence : ndarray, shape (H, W), float32
+        Filled with differences of mean costs, -1..1; 0 where the views do not tell.
+    """
+    H, W = disparity.shape
+    N = len(views.places)
+    for y in prange(begin, end):
+        colours, behind, noise = np.empty((N, 3)), np.empty((N, 3)), np.empty(N)
+        own = np.empty(3)
+        for x in range(W):
+            if not rim.inside[y, x]:
+                continue
+            near, far = rim.near[y, x], rim.far[y, x]
+            n = 0
+            for view in range(N):
+                seen, row, column, fy, fx = _sees(views, view, near, y, x, margin)
+                down = y - (near - far) * views.baselines[view, 0]
+                across = x - (near - far) * views.baselines[view, 1]
+                if not seen or down < 0 or across < 0 or down >= H - 1 or across >= W - 1:
+                    continue
+                i, j = int(down), int(across)
+                noise[n] = _behind(background, i, j, down - i, across - j, behind[n])
+                if noise[n] < 0:
+                    continue
+                for c in range(3):
+                    colours[n, c] = _sample(views, view, c, row, column, fy, fx)
+                n += 1
+            if n < FEWEST_SAMPLES:
+                continue
+            variance = _clean_colour(guide, clean, disparity, near, y, x, own)
+            # a surface may be darker or brighter towards its edge, so that it must be far whatever its colour; and
+            # before a bare background any colour is a share of another, so that it must be near by the colour it has
+            if rim.is_near[y, x]:
+                variance = _FREE_DEVIATION**2
+            elif variance < 0:
+                variance = 1.0
+            else:
+                variance = (variance + _CLEAN_DEVIATION**2) / _HELD
+            held = scale2 / variance
+            low = high = _UNKNOWN
+            for k in range(SHARES):
+                share = k / (SHARES - 1)
+                cost = _cost_of_share(share, colours[:n], behind[:n], noise[:n], own, held, scale2)
+                if share < 0.5:
+                    low = min(low, cost)
+                else:
+                    high = min(high, cost)
+            if rim.is_near[y, x]:
+                evidence[y, x] = high - low
+            else:
+                evidence[y, x] = min(low, _cost_alone(views, guide, far, y, x, margin, scale2)) - high
