@@ -169,8 +169,8 @@ def visibility(
     before = require_previous(previous)
     result = depth_from_visible_views(light_field, before.disparity, parameters, progress)
     colours = light_field.reference_view
-    disparity = reassign_mixed_pixels(result.disparity, colours, residual_variance(colours), parameters)
-    disparity = reassign_by_shares(light_field, disparity, parameters)
+    disparity = reassign_by_shares(light_field, result.disparity, parameters)
+    disparity = reassign_mixed_pixels(disparity, colours, residual_variance(colours), parameters)
     disparity = join_isolated_pixels(disparity, colours, parameters.occlusion_margin)
     return before.updated(
         disparity,

@@ -9,6 +9,7 @@ import numpy as np
 from numba import njit, prange
 
 _WIDTH = 1.0  # of the window's weights, pixels
+_MOST_APART = 0.15  # squared distance of a mixture from all mixtures of both sides, in units of their variance
 _LEAST_WEIGHT = 0.05  # of clean pixels of each side, in pixels right beside
 
 
@@ -61,14 +62,17 @@ def reassigned_pixels(
                         own[5] += w * guide[row, column, c] ** 2
             if sums[0, 0] < _LEAST_WEIGHT or sums[1, 0] < _LEAST_WEIGHT:
                 continue
-            distance, projection, variance = 0.0, 0.0, least_variance
+            distance, projection, variance, apart = 0.0, 0.0, least_variance, 0.0
             for side in range(2):
                 variance += sums[side, 5] / sums[side, 0]
             for c in range(3):
                 far, near = sums[0, 2 + c] / sums[0, 0], sums[1, 2 + c] / sums[1, 0]
                 distance += (near - far) ** 2
                 projection += (guide[y, x, c] - far) * (near - far)
+                apart += (guide[y, x, c] - far) ** 2
                 variance -= far * far + near * near
-            if distance > contrast * variance and projection < threshold * distance:
+            # what is left of the colour beside both: a surface darker towards its edge is no mixture
+            apart -= max(projection, 0.0) ** 2 / max(distance, 1e-12)
+            if distance > contrast * variance and projection < threshold * distance and apart < _MOST_APART * variance:
                 out[y, x] = sums[0, 1] / sums[0, 0]
     return out

@@ -11,17 +11,26 @@ surfaces are one pixel too wide, and narrow gaps between them close.
 
 from __future__ import annotations
 
+import math
+from typing import TYPE_CHECKING
+
 import cv2
 import numpy as np
 from pydantic import Field
 
 from sepi.image.noise import noise_level
-from sepi.lightfield import BoolMap, FloatMap, LightField, full_scale
+from sepi.lightfield import FloatMap, LightField, full_scale
 from sepi.matching.row_bands import row_bands
 from sepi.matching.view_subsets import spread_views
 from sepi.stage import OcclusionMarginParameters
 
-_BYTES_PER_PIXEL = 4
+if TYPE_CHECKING:
+    from sepi.matching.surface_shares_kernels import Rim
+
+_LEAST_SCALE = 0.005
+"""Of the residual at which a view counts half, beside noise; 0..1."""
+
+BYTES_PER_PIXEL = 4
 """Of a pixel of a view: the z-buffer."""
 
 
@@ -29,21 +38,22 @@ class SurfaceShareParameters(OcclusionMarginParameters):
     """Parameters of the decision by shares."""
 
     share_evidence: float = Field(
-        0.01, ge=0, le=1, description="difference of mean costs, 0..1, that moves a pixel; 1 moves none"
+        0.007, ge=0, le=1, description="difference of mean costs, 0..1, that moves a pixel; 1 moves none"
     )
     share_step: float = Field(
-        0.2, gt=0, description="depth step beside which shares are looked at, pixels per view step"
+        0.3, gt=0, description="depth step beside which shares are looked at, pixels per view step"
     )
     share_radius: int = Field(2, ge=1, le=10, description="distance from the step within which they are, in pixels")
     share_scale: float = Field(
-        0.03, ge=1e-6, le=2, description="residual at which a view counts half; difference of one channel, 0..1"
+        0.15,
+        gt=0,
+        le=2,
+        description="residual at which a view counts half, as part of the difference of both surfaces' colours",
     )
     share_views: int = Field(81, ge=2, description="views that are compared, at least")
 
 
-def reassign_by_shares(
-    light_field: LightField, disparity: FloatMap, parameters: SurfaceShareParameters
-) -> FloatMap:
+def reassign_by_shares(light_field: LightField, disparity: FloatMap, parameters: SurfaceShareParameters) -> FloatMap:
     """Disparity map whose pixels beside depth steps belong to the surface that fills most of them.
 
     Parameters
@@ -59,48 +69,52 @@ def reassign_by_shares(
     """
     if parameters.share_evidence == 1:
         return disparity
+    from sepi.matching.surface_shares_kernels import rim_of
+
+    rim: Rim = rim_of(disparity, parameters.share_radius, parameters.share_step)
+    if not rim.inside.any():
+        return disparity
+    evidence = _evidence(light_field, disparity, rim, parameters)
+    return np.where(evidence > parameters.share_evidence, np.where(rim.is_near, rim.far, rim.near), disparity)
+
+
+def _evidence(light_field: LightField, disparity: FloatMap, rim: Rim, parameters: SurfaceShareParameters) -> FloatMap:
+    """By how much the other surface explains the views better than the one that a pixel has, shape (H, W)."""
     from sepi.matching import surface_shares_kernels as kernels
     from sepi.matching.visibility_kernels import z_buffers
 
-    rim = kernels.rim_of(disparity, parameters.share_radius, parameters.share_step)
-    if not rim.inside.any():
-        return disparity
-    compared = spread_views(light_field, parameters.share_views)
+    present = spread_views(light_field, parameters.share_views)
     guide = light_field.reference_view
-    scale2 = parameters.share_scale**2 + 2 * noise_level(guide) ** 2
-    layer, distance = _more_distant_layer(disparity, rim.far, rim.inside, parameters.occlusion_margin)
-    moved = float((rim.near - rim.far).max()) * float(np.abs(light_field.baselines[compared]).max())
-    wanted = distance <= moved + 2
-    widened = cv2.dilate(disparity, np.ones((3, 3), np.uint8))
-    clean = disparity - cv2.erode(disparity, np.ones((3, 3), np.uint8)) < parameters.share_step
+    scales2 = _LEAST_SCALE**2 + 2 * noise_level(guide) ** 2, parameters.share_scale**2
+    around = np.ones((3, 3), np.uint8)
+    clean = disparity - cv2.erode(disparity, around) < parameters.share_step
+    widened = cv2.dilate(disparity, around)
     margin = np.float32(parameters.occlusion_margin)
-    places, baselines = np.argwhere(compared), light_field.baselines[compared]
-    unit = np.float32(1 / full_scale(light_field.views.dtype))
+    layer, distance = _more_distant_layer(disparity, rim, margin)
+    # how far from a pixel the pieces of background lie that views show with it
+    step = float((rim.near - rim.far).max())
+    moved = math.ceil(step * float(np.abs(light_field.baselines[present]).max())) + 2
     evidence = np.zeros_like(disparity)
-    # a piece of background lies as far away as both surfaces move apart, and is looked for in other views
-    reach = float(np.abs(disparity).max()) + float((rim.near - rim.far).max())
+    places, baselines = np.argwhere(present), light_field.baselines[present]
+    unit = np.float32(1 / full_scale(light_field.views.dtype))
     height = light_field.shape[0]
-    rows_apart = int(np.ceil(moved)) + 2
-    for begin, end, rows in row_bands(light_field, compared, reach, _BYTES_PER_PIXEL):
-        nearest = z_buffers(widened, compared, light_field.baselines, *rows)
+    for begin, end, rows in row_bands(light_field, present, float(np.abs(disparity).max()) + step, BYTES_PER_PIXEL):
+        nearest = z_buffers(widened, present, light_field.baselines, *rows)
         views = kernels.RimViews(light_field.views, unit, places, baselines, nearest, rows.low)
         background = kernels.background_of(
-            views, layer, wanted, margin, max(0, begin - rows_apart), min(height, end + rows_apart)
+            views, layer, distance <= moved, margin, max(0, begin - moved), min(height, end + moved)
         )
         kernels.evidence_of_shares(
-            views, rim, background, disparity, guide, clean, margin, scale2, begin, end, evidence
+            views, rim, background, disparity, guide, clean, margin, scales2, begin, end, evidence
         )
-    other = np.where(rim.is_near, rim.far, rim.near)
-    return np.where(evidence > parameters.share_evidence, other, disparity)
+    return evidence
 
 
-def _more_distant_layer(
-    disparity: FloatMap, far: FloatMap, inside: BoolMap, margin: float
-) -> tuple[FloatMap, FloatMap]:
+def _more_distant_layer(disparity: FloatMap, rim: Rim, margin: np.float32) -> tuple[FloatMap, FloatMap]:
     """The map with the more distant surface of the next step in place of all that is nearer, and the distance to it."""
-    outside = (~inside).astype(np.uint8)
+    outside = (~rim.inside).astype(np.uint8)
     distance, labels = cv2.distanceTransformWithLabels(outside, cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL)
     of_label = np.zeros(labels.max() + 1, np.float32)
-    of_label[labels[inside]] = far[inside]
+    of_label[labels[rim.inside]] = rim.far[rim.inside]
     behind = of_label[labels]
     return np.where(disparity > behind + margin, behind, disparity), distance

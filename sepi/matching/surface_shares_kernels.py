@@ -21,9 +21,12 @@ SHARES = 12
 
 _CLEAN_RADIUS = 4  # how far away clean colours of the nearer surface are looked for, pixels
 _SAME_SURFACE = 0.25  # difference of disparity, pixels per view step
-_CLEAN_DEVIATION = 0.02  # of a surface's colour from its clean neighbours', beyond their own; 0..1
-_HELD = 4.0  # how many samples' weight the clean colours have beyond their own
-_FREE_DEVIATION = 0.3  # the same where the surface's colour is free, 0..1
+# standard deviation of a surface's colour from its clean neighbours', beyond theirs; by what its square is divided, as
+# errors of views go together; the same where the colour is free, and where no clean one is known; colours in 0..1
+_CLEAN_DEVIATION = 0.02
+_HELD = 4.0
+_FREE_DEVIATION = 0.3
+_UNKNOWN_DEVIATION = 1.0
 _MOST_DEVIATION2 = 0.01  # squared residual that one view counts at most in the background's variance
 _UNKNOWN = 1e3  # cost where nothing tells
 
@@ -138,13 +141,36 @@ def _sees(views: RimViews, view: int, d: Any, y: int, x: int, margin: Any) -> An
 
 
 @njit(inline="always")
-def _sample(views: RimViews, view: int, c: int, row: int, column: int, fy: Any, fx: Any) -> Any:
-    """Bilinear sample of one channel, 0..1; grey counts as three equal ones."""
+def _cubic(f: Any) -> Any:
+    """Weights of four neighbours, the second and third of which a sample lies between (Catmull and Rom's)."""
+    return (
+        f * (-0.5 + f * (1 - 0.5 * f)),
+        1 + f * f * (-2.5 + 1.5 * f),
+        f * (0.5 + f * (2 - 1.5 * f)),
+        f * f * (-0.5 + 0.5 * f),
+    )
+
+
+@njit(inline="always")
+def _sample(views: RimViews, view: int, row: int, column: int, fy: Any, fx: Any, out: Any) -> None:
+    """Colour between pixels of a view into ``out (3,)``, 0..1; grey counts as three equal channels.
+
+    Cubic, since a bilinear sample takes from the peak of what is two pixels wide.
+    """
     picture = views.pixels[views.places[view, 0], views.places[view, 1]]
-    k = min(c, picture.shape[2] - 1)
-    upper = (1 - fx) * picture[row, column, k] + fx * picture[row, column + 1, k]
-    lower = (1 - fx) * picture[row + 1, column, k] + fx * picture[row + 1, column + 1, k]
-    return ((1 - fy) * upper + fy * lower) * views.unit
+    H, W, C = picture.shape
+    down, across = _cubic(fy), _cubic(fx)
+    for c in range(C):
+        total = 0.0
+        for i in range(4):
+            line = picture[min(max(row - 1 + i, 0), H - 1)]
+            along = 0.0
+            for j in range(4):
+                along += across[j] * line[min(max(column - 1 + j, 0), W - 1), c]
+            total += down[i] * along
+        out[c] = total * views.unit
+    for c in range(C, 3):
+        out[c] = out[0]
 
 
 @njit(parallel=True, cache=True)
@@ -171,7 +197,7 @@ def background_of(views: RimViews, layer: Any, wanted: Any, margin: Any, begin: 
     colour, variance = np.empty((H, W, 3), np.float32), np.empty((H, W), np.float32)
     count = np.zeros((H, W), np.int32)
     for y in prange(begin, end):
-        samples = np.empty((3, N), np.float32)
+        samples, colour_there = np.empty((3, N), np.float32), np.empty(3)
         for x in range(W):
             if not wanted[y, x]:
                 continue
@@ -179,8 +205,8 @@ def background_of(views: RimViews, layer: Any, wanted: Any, margin: Any, begin: 
             for view in range(N):
                 seen, row, column, fy, fx = _sees(views, view, layer[y, x], y, x, margin)
                 if seen:
-                    for c in range(3):
-                        samples[c, n] = _sample(views, view, c, row, column, fy, fx)
+                    _sample(views, view, row, column, fy, fx, colour_there)
+                    samples[:, n] = colour_there
                     n += 1
             count[y, x] = n
             if n < FEWEST_VIEWS:
@@ -211,13 +237,23 @@ def _behind(background: Background, row: int, column: int, fy: Any, fx: Any, out
 
 
 @njit(inline="always")
-def _clean_colour(guide: Any, clean: Any, disparity: Any, near: Any, y: int, x: int, out: Any) -> Any:
-    """Colour of the nearer surface beside a pixel into ``out (3,)``, and its variance; negative if there is none."""
+def _nearer_colour(
+    guide: Any, clean: Any, disparity: Any, near: Any, middle: Any, y: int, x: int, out: Any, limits: Any
+) -> Any:
+    """Colour of the nearer surface beside a pixel into ``out (3,)``, and its variance.
+
+    That of clean pixels, or else the pixel's own. ``limits (2, 3)`` are the least and most that the surface shows.
+    """
     H, W = disparity.shape
     weights, squares = 0.0, 0.0
     out[:] = 0
+    limits[0], limits[1] = 1.0, 0.0
     for i in range(max(0, y - _CLEAN_RADIUS), min(H, y + _CLEAN_RADIUS + 1)):
         for j in range(max(0, x - _CLEAN_RADIUS), min(W, x + _CLEAN_RADIUS + 1)):
+            if disparity[i, j] > middle:
+                for c in range(3):
+                    limits[0, c] = min(limits[0, c], guide[i, j, c])
+                    limits[1, c] = max(limits[1, c], guide[i, j, c])
             if clean[i, j] and abs(disparity[i, j] - near) < _SAME_SURFACE:
                 weight = 1 / (1 + (i - y) ** 2 + (j - x) ** 2) ** 2
                 weights += weight
@@ -225,20 +261,49 @@ def _clean_colour(guide: Any, clean: Any, disparity: Any, near: Any, y: int, x: 
                     out[c] += weight * guide[i, j, c]
                     squares += weight * guide[i, j, c] ** 2
     if weights == 0:
-        return -1.0
+        out[:] = guide[y, x]
+        return _UNKNOWN_DEVIATION**2
     variance = squares / weights
     for c in range(3):
         out[c] /= weights
         variance -= out[c] ** 2
-    return max(variance, 0.0) / 3
+    return (max(variance, 0.0) / 3 + _CLEAN_DEVIATION**2) / _HELD
 
 
 @njit(inline="always")
-def _cost_of_share(share: Any, colours: Any, behind: Any, noise: Any, clean: Any, held: Any, scale2: Any) -> Any:
+def _along_near(
+    views: RimViews, background: Background, near: Any, far: Any, y: int, x: int, margin: Any, out: Any, behind: Any,
+    noise: Any,
+) -> int:  # fmt: skip
+    """What the views show of a pixel that moves with ``near``, and what is behind it there; how many tell both.
+
+    Into ``out`` and ``behind (N, 3)``, and the variance of the latter into ``noise (N,)``.
+    """
+    H, W = background.views.shape
+    n = 0
+    for view in range(len(views.places)):
+        seen, row, column, fy, fx = _sees(views, view, near, y, x, margin)
+        # where the background that is there in the view is in the reference view
+        down = y - (near - far) * views.baselines[view, 0]
+        across = x - (near - far) * views.baselines[view, 1]
+        if not seen or down < 0 or across < 0 or down >= H - 1 or across >= W - 1:
+            continue
+        i, j = int(down), int(across)
+        noise[n] = _behind(background, i, j, down - i, across - j, behind[n])
+        if noise[n] >= 0:
+            _sample(views, view, row, column, fy, fx, out[n])
+            n += 1
+    return n
+
+
+@njit(inline="always")
+def _cost_of_share(
+    share: Any, colours: Any, behind: Any, noise: Any, own: Any, held: Any, limits: Any, scale2: Any
+) -> Any:
     """Mean robust residual of views that show a share of one colour before the background, 0..1.
 
-    The colour is that which fits best, and is held near ``clean (3,)`` with the weight ``held`` of so many views;
-    ``colours (N, 3)``, ``behind (N, 3)`` and its variance ``noise (N,)`` are the samples.
+    The colour is that which fits best within ``limits (2, 3)``, and is held near ``own (3,)`` with the weight of
+    ``held`` views. ``colours`` and ``behind (N, 3)`` and the variance ``noise (N,)`` of the latter are the samples.
     """
     n = len(noise)
     rest = 1 - share
@@ -248,25 +313,27 @@ def _cost_of_share(share: Any, colours: Any, behind: Any, noise: Any, clean: Any
         along = 0.0
         for v in range(n):
             along += colours[v, c] - rest * behind[v, c]
-        fit[c] = min(max((share * along + held * clean[c]) / (share * share * n + held), 0.0), 1.0)
-        total += held * (fit[c] - clean[c]) ** 2 / scale2
+        best = (share * along + held * own[c]) / (share * share * n + held)
+        fit[c] = min(max(best, limits[0, c]), limits[1, c])
+        total += held * (fit[c] - own[c]) ** 2 / scale2
     for v in range(n):
-        own = scale2 + rest * rest * noise[v]
+        half = scale2 + rest * rest * noise[v]
         for c in range(3):
             residual = (colours[v, c] - share * fit[c] - rest * behind[v, c]) ** 2
-            total += residual / (residual + own)
+            total += residual / (residual + half)
     return total / (3 * n)
 
 
 @njit(inline="always")
-def _cost_alone(views: RimViews, guide: Any, d: Any, y: int, x: int, margin: Any, scale2: Any) -> Any:
-    """Mean robust residual of a pixel that moves with ``d``, over the views that see it, 0..1."""
+def _cost_alone(views: RimViews, guide: Any, d: Any, y: int, x: int, margin: Any, scale2: Any, colour: Any) -> Any:
+    """Mean robust residual of a pixel that moves with ``d``, over the views that see it, 0..1; ``colour (3,)`` scratch."""
     total, n = 0.0, 0
     for view in range(len(views.places)):
         seen, row, column, fy, fx = _sees(views, view, d, y, x, margin)
         if seen:
+            _sample(views, view, row, column, fy, fx, colour)
             for c in range(3):
-                residual = (_sample(views, view, c, row, column, fy, fx) - guide[y, x, c]) ** 2
+                residual = (colour[c] - guide[y, x, c]) ** 2
                 total += residual / (residual + scale2)
             n += 1
     # the reference view itself always fits
@@ -276,7 +343,7 @@ def _cost_alone(views: RimViews, guide: Any, d: Any, y: int, x: int, margin: Any
 @njit(parallel=True, cache=True)
 def evidence_of_shares(
     views: RimViews, rim: Rim, background: Background, disparity: Any, guide: Any, clean: Any, margin: Any,
-    scale2: Any, begin: int, end: int, evidence: Any,
+    scales2: Any, begin: int, end: int, evidence: Any,
 ) -> None:  # fmt: skip
     """By how much the other surface explains the views better than the one that a pixel has.
 
@@ -295,57 +362,45 @@ def evidence_of_shares(
         Pixels of one surface alone.
     margin : float32
         By how much an occluder must be nearer, pixels per view step.
-    scale2 : float
-        Square of the residual at which a view counts half.
+    scales2 : tuple of float
+        Square of the residual at which a view counts half: the least, and what the squared difference of both surfaces'
+        colours adds to it, times this; errors of samples grow with it.
     begin, end : int
         Rows that are made.
     evidence : ndarray, shape (H, W), float32
-        Filled with differences of mean costs, -1..1; 0 where the views do not tell.
+        Filled with differences of mean costs, -1..1; left alone where the views do not tell.
     """
-    H, W = disparity.shape
+    W = disparity.shape[1]
     N = len(views.places)
     for y in prange(begin, end):
         colours, behind, noise = np.empty((N, 3)), np.empty((N, 3)), np.empty(N)
-        own = np.empty(3)
+        own, limits, scratch = np.empty(3), np.empty((2, 3)), np.empty(3)
         for x in range(W):
             if not rim.inside[y, x]:
                 continue
             near, far = rim.near[y, x], rim.far[y, x]
-            n = 0
-            for view in range(N):
-                seen, row, column, fy, fx = _sees(views, view, near, y, x, margin)
-                down = y - (near - far) * views.baselines[view, 0]
-                across = x - (near - far) * views.baselines[view, 1]
-                if not seen or down < 0 or across < 0 or down >= H - 1 or across >= W - 1:
-                    continue
-                i, j = int(down), int(across)
-                noise[n] = _behind(background, i, j, down - i, across - j, behind[n])
-                if noise[n] < 0:
-                    continue
-                for c in range(3):
-                    colours[n, c] = _sample(views, view, c, row, column, fy, fx)
-                n += 1
+            n = _along_near(views, background, near, far, y, x, margin, colours, behind, noise)
             if n < FEWEST_SAMPLES:
                 continue
-            variance = _clean_colour(guide, clean, disparity, near, y, x, own)
-            # a surface may be darker or brighter towards its edge, so that it must be far whatever its colour; and
-            # before a bare background any colour is a share of another, so that it must be near by the colour it has
+            variance = _nearer_colour(guide, clean, disparity, near, (near + far) / 2, y, x, own, limits)
             if rim.is_near[y, x]:
+                # surfaces get darker or brighter towards their edge: to be far, a pixel must be so whatever its colour.
+                # To be near it must have the surface's colour: before a bare background, any is a share of another
                 variance = _FREE_DEVIATION**2
-            elif variance < 0:
-                variance = 1.0
-            else:
-                variance = (variance + _CLEAN_DEVIATION**2) / _HELD
-            held = scale2 / variance
+            apart2 = 0.0
+            for v in range(n):
+                for c in range(3):
+                    apart2 += (own[c] - behind[v, c]) ** 2
+            scale2 = scales2[0] + scales2[1] * apart2 / (3 * n)
             low = high = _UNKNOWN
             for k in range(SHARES):
                 share = k / (SHARES - 1)
-                cost = _cost_of_share(share, colours[:n], behind[:n], noise[:n], own, held, scale2)
-                if share < 0.5:
+                cost = _cost_of_share(share, colours[:n], behind[:n], noise[:n], own, scale2 / variance, limits, scale2)
+                if 2 * k < SHARES - 1:
                     low = min(low, cost)
                 else:
                     high = min(high, cost)
             if rim.is_near[y, x]:
                 evidence[y, x] = high - low
             else:
-                evidence[y, x] = min(low, _cost_alone(views, guide, far, y, x, margin, scale2)) - high
+                evidence[y, x] = min(low, _cost_alone(views, guide, far, y, x, margin, scale2, scratch)) - high
