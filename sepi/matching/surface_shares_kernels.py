@@ -326,7 +326,7 @@ def _cost_of_share(
 
 @njit(inline="always")
 def _cost_alone(views: RimViews, guide: Any, d: Any, y: int, x: int, margin: Any, scale2: Any, colour: Any) -> Any:
-    """Mean robust residual of a pixel that moves with ``d``, over the views that see it, 0..1; ``colour (3,)`` scratch."""
+    """Mean robust residual of a pixel that moves with ``d``, over views that see it, 0..1; ``colour (3,)`` is scratch."""
     total, n = 0.0, 0
     for view in range(len(views.places)):
         seen, row, column, fy, fx = _sees(views, view, d, y, x, margin)
