@@ -19,16 +19,19 @@ import numpy as np
 from pydantic import Field
 
 from sepi.image.noise import noise_level
-from sepi.lightfield import FloatMap, LightField, full_scale
+from sepi.lightfield import BoolMap, FloatMap, LightField, full_scale
 from sepi.matching.row_bands import row_bands
 from sepi.matching.view_subsets import spread_views
 from sepi.stage import OcclusionMarginParameters
 
 if TYPE_CHECKING:
-    from sepi.matching.surface_shares_kernels import Rim
+    from sepi.matching.surface_shares_kernels import Rim, RimViews
 
 _LEAST_SCALE = 0.005
 """Of the residual at which a view counts half, beside noise; 0..1."""
+
+_MOST_DARKENING = math.log(1.25)
+"""Logarithm of the ratio of brightness up to which a view is taken for another exposure of the same."""
 
 BYTES_PER_PIXEL = 4
 """Of a pixel of a view: the z-buffer."""
@@ -83,7 +86,6 @@ def _evidence(light_field: LightField, disparity: FloatMap, rim: Rim, parameters
     from sepi.matching import surface_shares_kernels as kernels
     from sepi.matching.visibility_kernels import z_buffers
 
-    present = spread_views(light_field, parameters.share_views)
     guide = light_field.reference_view
     scales2 = _LEAST_SCALE**2 + 2 * noise_level(guide) ** 2, parameters.share_scale**2
     around = np.ones((3, 3), np.uint8)
@@ -91,16 +93,17 @@ def _evidence(light_field: LightField, disparity: FloatMap, rim: Rim, parameters
     widened = cv2.dilate(disparity, around)
     margin = np.float32(parameters.occlusion_margin)
     layer, distance = _more_distant_layer(disparity, rim, margin)
+    views = _views_alike(light_field, disparity, clean, parameters)
+    present = np.zeros(light_field.grid, bool)
+    present[tuple(views.places.T)] = True
     # how far from a pixel the pieces of background lie that views show with it
     step = float((rim.near - rim.far).max())
-    moved = math.ceil(step * float(np.abs(light_field.baselines[present]).max())) + 2
+    moved = math.ceil(step * float(np.abs(views.baselines).max())) + 2
     evidence = np.zeros_like(disparity)
-    places, baselines = np.argwhere(present), light_field.baselines[present]
-    unit = np.float32(1 / full_scale(light_field.views.dtype))
     height = light_field.shape[0]
     for begin, end, rows in row_bands(light_field, present, float(np.abs(disparity).max()) + step, BYTES_PER_PIXEL):
         nearest = z_buffers(widened, present, light_field.baselines, *rows)
-        views = kernels.RimViews(light_field.views, unit, places, baselines, nearest, rows.low)
+        views = views._replace(nearest=nearest, low=rows.low)
         background = kernels.background_of(
             views, layer, distance <= moved, margin, max(0, begin - moved), min(height, end + moved)
         )
@@ -110,6 +113,25 @@ def _evidence(light_field: LightField, disparity: FloatMap, rim: Rim, parameters
     return evidence
 
 
+def _views_alike(
+    light_field: LightField, disparity: FloatMap, clean: BoolMap, parameters: SurfaceShareParameters
+) -> RimViews:
+    """The views that are compared, as bright as the reference, without those that show it badly or are much darker.
+
+    Lenses darken and blur views towards the edge of the grid; shares would take that for another surface.
+    """
+    from sepi.matching.surface_shares_kernels import RimViews, brightness_of_views
+
+    present = spread_views(light_field, parameters.share_views)
+    places, baselines = np.argwhere(present), light_field.baselines[present]
+    units = np.full(len(places), 1 / full_scale(light_field.views.dtype), np.float32)
+    views = RimViews(light_field.views, units, places, baselines, np.empty((0, 0, 0, 0), np.float32), 0)
+    brightness, residual = brightness_of_views(views, disparity, light_field.reference_view, clean)
+    alike = (abs(np.log(brightness)) < _MOST_DARKENING) & (residual <= 2 * np.median(residual) + _LEAST_SCALE)
+    units = (units / brightness).astype(np.float32)
+    return views._replace(units=units[alike], places=places[alike], baselines=baselines[alike])
+
+
 def _more_distant_layer(disparity: FloatMap, rim: Rim, margin: np.float32) -> tuple[FloatMap, FloatMap]:
     """The map with the more distant surface of the next step in place of all that is nearer, and the distance to it."""
     outside = (~rim.inside).astype(np.uint8)
@@ -117,4 +139,4 @@ def _more_distant_layer(disparity: FloatMap, rim: Rim, margin: np.float32) -> tu
     of_label = np.zeros(labels.max() + 1, np.float32)
     of_label[labels[rim.inside]] = rim.far[rim.inside]
     behind = of_label[labels]
-    return np.where(disparity > behind + margin, behind, disparity), distance
+    return np.where(disparity > behind + margin, behind, disparity), np.asarray(distance, np.float32)

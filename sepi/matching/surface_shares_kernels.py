@@ -28,6 +28,8 @@ _HELD = 4.0
 _FREE_DEVIATION = 0.3
 _UNKNOWN_DEVIATION = 1.0
 _MOST_DEVIATION2 = 0.01  # squared residual that one view counts at most in the background's variance
+_STRIDE = 4  # pixels from one to the next that tell the brightness of a view
+_MOST_DIFFERENCE = 0.1  # of one channel, that counts in a view's residual
 _UNKNOWN = 1e3  # cost where nothing tells
 
 
@@ -37,8 +39,8 @@ class RimViews(NamedTuple):
     Attributes
     ----------
     pixels : ndarray, shape (T, S, H, W, C), uint8, uint16 or float32
-    unit : float32
-        What they are multiplied with to be 0..1.
+    units : ndarray, shape (N,), float32
+        What the pixels of each view that is compared are multiplied with to be 0..1, and as bright as the reference.
     places : ndarray, shape (N, 2), int64
         Row and column in the grid of each view that is compared.
     baselines : ndarray, shape (N, 2), float64
@@ -50,7 +52,7 @@ class RimViews(NamedTuple):
     """
 
     pixels: npt.NDArray[Any]
-    unit: np.float32
+    units: FloatMap
     places: npt.NDArray[np.int64]
     baselines: npt.NDArray[np.float64]
     nearest: FloatMap
@@ -168,9 +170,55 @@ def _sample(views: RimViews, view: int, row: int, column: int, fy: Any, fx: Any,
             for j in range(4):
                 along += across[j] * line[min(max(column - 1 + j, 0), W - 1), c]
             total += down[i] * along
-        out[c] = total * views.unit
+        out[c] = total * views.units[view]
     for c in range(C, 3):
         out[c] = out[0]
+
+
+@njit(parallel=True, cache=True)
+def brightness_of_views(views: RimViews, disparity: Any, guide: Any, clean: Any) -> Any:
+    """How bright each view is beside the reference, and how badly it shows the same.
+
+    Parameters
+    ----------
+    views : RimViews
+        Its z-buffers are not looked at.
+    disparity : ndarray, shape (H, W), float32
+    guide : ndarray, shape (H, W, 3), float32
+        Reference view, 0..1.
+    clean : ndarray, shape (H, W), bool
+        Pixels that are looked at, some of them.
+
+    Returns
+    -------
+    brightness, residual : ndarray, shape (N,), float64
+        Ratio of the sums of the colours; mean absolute difference of one channel, 0..1, that is left.
+    """
+    H, W = disparity.shape
+    N = len(views.places)
+    brightness, residual = np.ones(N), np.zeros(N)
+    for view in prange(N):
+        colour = np.empty(3)
+        for turn in range(2):
+            own, other, rest, n = 1e-9, 1e-9, 0.0, 1
+            for y in range(0, H, _STRIDE):
+                for x in range(0, W, _STRIDE):
+                    down = y - disparity[y, x] * views.baselines[view, 0]
+                    across = x - disparity[y, x] * views.baselines[view, 1]
+                    if not clean[y, x] or down < 0 or across < 0 or down >= H - 1 or across >= W - 1:
+                        continue
+                    row, column = int(down), int(across)
+                    _sample(views, view, row, column, down - row, across - column, colour)
+                    for c in range(3):
+                        own += guide[y, x, c]
+                        other += colour[c]
+                        rest += min(abs(colour[c] / brightness[view] - guide[y, x, c]), _MOST_DIFFERENCE)
+                        n += 1
+            if turn == 0:
+                brightness[view] = other / own
+            else:
+                residual[view] = rest / n
+    return brightness, residual
 
 
 @njit(parallel=True, cache=True)
@@ -326,7 +374,7 @@ def _cost_of_share(
 
 @njit(inline="always")
 def _cost_alone(views: RimViews, guide: Any, d: Any, y: int, x: int, margin: Any, scale2: Any, colour: Any) -> Any:
-    """Mean robust residual of a pixel that moves with ``d``, over views that see it, 0..1; ``colour (3,)`` is scratch."""
+    """Mean robust residual of a pixel that moves with ``d``, over views that see it; ``colour`` is scratch."""
     total, n = 0.0, 0
     for view in range(len(views.places)):
         seen, row, column, fy, fx = _sees(views, view, d, y, x, margin)
