@@ -108,6 +108,16 @@ def test_mixed_pixels_go_to_the_surface_that_fills_them() -> None:
     np.testing.assert_array_equal(reassign_mixed_pixels(wide, flat, 0.0, MixtureParameters()), wide)
 
 
+def test_a_colour_beside_all_mixtures_is_none() -> None:
+    """The dark edge of a bright surface before a wall of another colour belongs to the surface."""
+    guide = np.full((20, 20, 3), (0.2, 0.4, 0.4), np.float32)
+    guide[:, 9:] = 0.8
+    guide[:, 9] = (0.3, 0.2, 0.1)
+    disparity = np.zeros((20, 20), np.float32)
+    disparity[:, 9:] = 1
+    np.testing.assert_array_equal(reassign_mixed_pixels(disparity, guide, 0.0, MixtureParameters()), disparity)
+
+
 def test_uniform_is_what_the_noise_explains() -> None:
     """Faint texture above the noise is texture, whatever its contrast; noise is not."""
     random = np.random.default_rng(0)

@@ -48,7 +48,7 @@ class SurfaceShareParameters(OcclusionMarginParameters):
     )
     share_radius: int = Field(2, ge=1, le=10, description="distance from the step within which they are, in pixels")
     share_scale: float = Field(
-        0.15,
+        0.17,
         gt=0,
         le=2,
         description="residual at which a view counts half, as part of the difference of both surfaces' colours",

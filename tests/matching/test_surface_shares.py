@@ -1,0 +1,310 @@
+"""Near or far beside a depth step by shares of the views: what it says of exact scenes, and equal to a plain twin."""
+
+from typing import Any
+
+import cv2
+import numba
+import numpy as np
+import numpy.typing as npt
+import pytest
+from geometries import GEOMETRIES, standing
+from several_threads import several_threads
+
+from sepi.lightfield import LightField
+from sepi.matching import surface_shares_kernels as kernels
+from sepi.matching.row_bands import band_memory
+from sepi.matching.surface_shares import SurfaceShareParameters, reassign_by_shares
+from sepi.matching.visibility_kernels import z_buffers
+from sepi.scenes import render
+
+USUAL = SurfaceShareParameters()
+AROUND = np.ones((3, 3), np.uint8)
+
+
+def wrong(disparity: npt.NDArray[np.float32], truth: npt.NDArray[np.float32]) -> int:
+    """Pixels of the wrong surface."""
+    return int((abs(disparity - truth) > 0.3).sum())
+
+
+@pytest.mark.parametrize("name", ["stripes", "curved_occluders", "dots"])
+@pytest.mark.parametrize("change", ["too wide", "too narrow"])
+def test_edges_are_found_again(name: str, change: str) -> None:
+    """Surfaces a pixel too wide close narrow gaps, those a pixel too narrow lose what is thin."""
+    scene = render(name, size=128)
+    truth = scene.ground_truth
+    assert truth is not None
+    changed = (cv2.dilate if change == "too wide" else cv2.erode)(truth, AROUND)
+    before = wrong(changed, truth)
+    assert before > 500
+    assert wrong(reassign_by_shares(scene, changed, USUAL), truth) < 0.35 * before
+
+
+@pytest.mark.parametrize("name", ["stripes", "curved_occluders", "dots", "slanted_plane", "pyramids"])
+def test_what_is_right_stays(name: str) -> None:
+    scene = render(name, size=128)
+    assert scene.ground_truth is not None
+    assert wrong(reassign_by_shares(scene, scene.ground_truth, USUAL), scene.ground_truth) < 0.01 * 128**2
+
+
+def test_one_asks_for_more_than_there_can_be() -> None:
+    """The ablation without shares."""
+    scene = render("stripes", size=64)
+    assert scene.ground_truth is not None
+    wide = cv2.dilate(scene.ground_truth, AROUND)
+    assert reassign_by_shares(scene, wide, SurfaceShareParameters(share_evidence=1)) is wide
+
+
+def edge(rim: float, background: float = 0.0) -> tuple[LightField, npt.NDArray[np.float32]]:
+    """A bright surface whose last two pixels have the brightness ``rim``, before a wall, and its exact disparity.
+
+    The pattern of the wall has the contrast ``background``; pixels are means over their area.
+    """
+    H, W, fine, near, far, end = 40, 60, 16, 1.0, -0.5, 31.3
+    x = (np.arange(W * fine) + 0.5) / fine - 0.5
+    y = np.arange(H)[:, None]
+    random = np.random.default_rng(5)
+    waves = random.uniform(0.2, 1.2, (12, 2)), random.uniform(0, 6, 12)
+    views = np.empty((5, 5, H, W, 1), np.float32)
+    for t, s in np.ndindex(5, 5):
+        # what a sample shows of each surface, as if it were alone
+        at_y, at_x = y + far * (t - 2), x[None] + far * (s - 2)
+        wall = 0.45 + background * np.mean(
+            [np.sin(v * at_y + u * at_x + p) for (v, u), p in zip(*waves, strict=True)], axis=0
+        )
+        on_surface = x + near * (s - 2)
+        surface = np.where(on_surface > end - 2, rim, 0.75)
+        picture = np.where(on_surface[None] < end, surface[None], wall)
+        views[t, s, :, :, 0] = picture.reshape(H, W, fine).mean(axis=2)
+    truth = np.where(np.arange(W)[None] < end, np.float32(near), np.float32(far)) + np.zeros((H, 1), np.float32)
+    return LightField(views, "edge"), truth.astype(np.float32)
+
+
+@pytest.mark.parametrize("background", [0.0, 0.3])
+def test_a_surface_darker_towards_its_edge_keeps_it(background: float) -> None:
+    """Silhouettes of round things are darker: as shares of the bright surface they would be lost."""
+    field, truth = edge(rim=0.55, background=background)
+    inner = np.s_[4:-4]
+    assert wrong(reassign_by_shares(field, truth, USUAL)[inner], truth[inner]) == 0
+
+
+@pytest.mark.parametrize("background", [0.0, 0.1, 0.3])
+def test_a_surface_one_pixel_too_wide_gets_its_edge_back(background: float) -> None:
+    """Also before a bare wall, whose colour the surface does not show."""
+    field, truth = edge(rim=0.75, background=background)
+    wide = cv2.dilate(truth, AROUND)
+    inner = np.s_[6:-6]
+    assert wrong(wide[inner], truth[inner]) == 28
+    assert wrong(reassign_by_shares(field, wide, USUAL)[inner], truth[inner]) == 0
+
+
+@pytest.mark.parametrize("factor", [0.15, 1.15])
+def test_dark_views_and_other_exposures_do_no_harm(factor: float) -> None:
+    """Lenses darken the views at the edge of the grid: edges would move by pixels."""
+    scene = render("curved_occluders", size=128)
+    assert scene.ground_truth is not None
+    wide = cv2.dilate(scene.ground_truth, AROUND)
+    views = scene.views * np.float32(0.8)
+    views[[0, -1]] = views[[0, -1]] * np.float32(factor)
+    views[:, [0, -1]] = views[:, [0, -1]] * np.float32(factor)
+    if scene.views.dtype != np.float32:
+        views = np.rint(views).astype(scene.views.dtype)
+    changed = LightField(views, "changed")
+    before = wrong(wide, scene.ground_truth)
+    assert wrong(reassign_by_shares(changed, wide, USUAL), scene.ground_truth) < 0.4 * before
+
+
+@pytest.mark.parametrize("geometry", GEOMETRIES)
+def test_grey_bands_and_threads_change_nothing(geometry: str) -> None:
+    """The same bytes, however much memory and however many processors there are, and for grey as three colours."""
+    scene = render("dots", size=96)
+    assert scene.ground_truth is not None
+    wide = cv2.dilate(scene.ground_truth, AROUND)
+    grey = np.rint(scene.views[2:7, 2:7].mean(axis=4, keepdims=True)).astype(np.uint8)
+    field = LightField(grey, "grey", **standing(geometry, (5, 5)))
+    threefold = LightField(np.repeat(grey, 3, axis=4), "grey", **standing(geometry, (5, 5)))
+    expected = reassign_by_shares(field, wide, USUAL)
+    assert (expected != wide).any()
+    np.testing.assert_array_equal(reassign_by_shares(threefold, wide, USUAL), expected)
+    with band_memory(1):
+        np.testing.assert_array_equal(reassign_by_shares(field, wide, USUAL), expected)
+    threads = several_threads()
+    numba.set_num_threads(1)
+    try:
+        np.testing.assert_array_equal(reassign_by_shares(field, wide, USUAL), expected)
+    finally:
+        numba.set_num_threads(threads)
+
+
+def cubic(picture: npt.NDArray[Any], y: float, x: float) -> npt.NDArray[np.float64]:
+    """Colour (C,) of a picture (H, W, C) between its pixels, by Catmull and Rom's spline; its border goes on."""
+    row, column = int(y), int(x)
+
+    def weights(f: float) -> npt.NDArray[np.float64]:
+        basis = np.array([[0, -1, 2, -1], [2, 0, -5, 3], [0, 1, 4, -3], [0, 0, -1, 1]]) / 2
+        return basis @ np.array([1, f, f * f, f**3])
+
+    rows = np.clip(np.arange(row - 1, row + 3), 0, picture.shape[0] - 1)
+    columns = np.clip(np.arange(column - 1, column + 3), 0, picture.shape[1] - 1)
+    patch = picture[np.ix_(rows, columns)].astype(np.float64)
+    return np.einsum("i,j,ijc->c", weights(y - row), weights(x - column), patch)
+
+
+class Twin:
+    """The kernels, pixel by pixel and with whole arrays of views."""
+
+    def __init__(self, views: kernels.RimViews, margin: float) -> None:
+        self.views, self.margin = views, margin
+        self.H, self.W = views.pixels.shape[2:4]
+
+    def seen(self, d: float, y: int, x: int) -> list[tuple[int, npt.NDArray[np.float64]]]:
+        """Views that show a pixel, and the colours they show."""
+        found = []
+        for n, ((t, s), (v, u)) in enumerate(zip(self.views.places, self.views.baselines, strict=True)):
+            down, across = y - d * v, x - d * u
+            if min(down, across) < 0 or down >= self.H - 1 or across >= self.W - 1:
+                continue
+            if self.views.nearest[t, s, int(down + 0.5), int(across + 0.5)] <= d + self.margin:
+                found.append((n, cubic(self.views.pixels[t, s], down, across) * self.views.units[n]))
+        return found
+
+    def background(self, d: float, y: int, x: int) -> tuple[npt.NDArray[np.float64], float, int]:
+        colours = np.array([colour for _, colour in self.seen(d, y, x)]).reshape(-1, 3).astype(np.float32)
+        if len(colours) < kernels.FEWEST_VIEWS:
+            return np.zeros(3), 0.0, len(colours)
+        middle = np.median(colours, axis=0)
+        return middle, float(np.minimum((colours - middle) ** 2, 0.01).mean()), len(colours)
+
+    def evidence(
+        self, rim: kernels.Rim, background: kernels.Background, disparity: npt.NDArray[np.float32],
+        guide: npt.NDArray[np.float32], clean: npt.NDArray[np.bool_], scales2: tuple[float, float], y: int, x: int,
+    ) -> float:  # fmt: skip
+        near, far = float(rim.near[y, x]), float(rim.far[y, x])
+        colours, behind, noise = [], [], []
+        for n, colour in self.seen(near, y, x):
+            v, u = self.views.baselines[n]
+            down, across = y - (near - far) * v, x - (near - far) * u
+            if min(down, across) < 0 or down >= self.H - 1 or across >= self.W - 1:
+                continue
+            i, j = int(down), int(across)
+            patch = np.s_[i : i + 2, j : j + 2]
+            if (background.views[patch] < kernels.FEWEST_VIEWS).any():
+                continue
+            weights = np.outer([1 - (down - i), down - i], [1 - (across - j), across - j])
+            colours.append(colour)
+            behind.append(np.einsum("ij,ijc->c", weights, background.colour[patch]))
+            noise.append((weights * background.variance[patch]).sum())
+        if len(colours) < kernels.FEWEST_SAMPLES:
+            return 0.0
+        C, B, N = np.array(colours), np.array(behind), np.array(noise)[:, None]
+        yy, xx = np.mgrid[: self.H, : self.W]
+        window = (abs(yy - y) <= 4) & (abs(xx - x) <= 4)
+        shown = guide[window & (disparity > (near + far) / 2)]
+        pure = window & clean & (abs(disparity - near) < 0.25)
+        if pure.any():
+            weight = 1 / (1 + (yy - y) ** 2 + (xx - x) ** 2)[pure] ** 2
+            own = np.average(guide[pure].astype(np.float64), axis=0, weights=weight)
+            spread = np.average((guide[pure].astype(np.float64) ** 2).sum(axis=1), weights=weight) - (own**2).sum()
+            variance = (max(spread, 0) / 3 + 0.02**2) / 4
+        else:
+            own, variance = guide[y, x].astype(np.float64), 1.0
+        if rim.is_near[y, x]:
+            variance = 0.3**2
+        scale2 = scales2[0] + scales2[1] * ((own - B) ** 2).mean()
+        costs = []
+        for a in np.arange(kernels.SHARES) / (kernels.SHARES - 1):
+            held = scale2 / variance
+            F = (a * (C - (1 - a) * B).sum(axis=0) + held * own) / (a * a * len(C) + held)
+            F = np.clip(F, shown.min(axis=0), shown.max(axis=0))
+            residual2 = (C - a * F - (1 - a) * B) ** 2
+            cost = (residual2 / (residual2 + scale2 + (1 - a) ** 2 * N)).sum() + held * ((F - own) ** 2).sum() / scale2
+            costs.append(cost / C.size)
+        half = kernels.SHARES // 2
+        low, high = min(costs[:half]), min(costs[half:])
+        if rim.is_near[y, x]:
+            return high - low
+        alone = self.seen(far, y, x)
+        if len(alone) > kernels.FEWEST_VIEWS:
+            residual2 = (np.array([colour for _, colour in alone]) - guide[y, x]) ** 2
+            low = min(low, (residual2 / (residual2 + scale2)).sum() / (3 * (len(alone) - 1)))
+        return low - high
+
+
+def twin_rim(disparity: npt.NDArray[np.float32], y: int, x: int, radius: int) -> tuple[float, float, float]:
+    """Step, and means of the disparities on its near and far side."""
+    rows, columns = slice(max(0, y - radius), y + radius + 1), slice(max(0, x - radius), x + radius + 1)
+    yy, xx = np.mgrid[: disparity.shape[0], : disparity.shape[1]][:, rows, columns]
+    window = disparity[rows, columns].astype(np.float64)
+    weight = 1 / (1 + (yy - y) ** 2 + (xx - x) ** 2)
+    near = window > (window.min() + window.max()) / 2
+    if not near.any():
+        return 0.0, 0.0, 0.0
+    return (
+        np.ptp(window),
+        np.average(window[near], weights=weight[near]),
+        np.average(window[~near], weights=weight[~near]),
+    )
+
+
+@pytest.mark.parametrize("geometry", GEOMETRIES)
+@pytest.mark.parametrize("dtype", [np.uint8, np.float32])
+def test_kernels_equal_a_plain_twin(geometry: str, dtype: Any) -> None:
+    """Every rim pixel of a small picture, with a view missing."""
+    random = np.random.default_rng(2)
+    views = random.random((4, 5, 12, 14, 3), np.float32)
+    if dtype == np.uint8:
+        views = np.rint(255 * views).astype(np.uint8)
+    present = np.ones((4, 5), bool)
+    present[0, 1] = False
+    field = LightField(views, "random", present=present, **standing(geometry, (4, 5)))
+    disparity = np.full((12, 14), -0.4, np.float32)
+    disparity[3:9, 4:9] = 0.6
+    disparity += random.uniform(-0.05, 0.05, disparity.shape).astype(np.float32)
+    margin = np.float32(0.15)
+    rim = kernels.rim_of(disparity, 2, 0.3)
+    for y, x in np.ndindex(disparity.shape):
+        step, near, far = twin_rim(disparity, y, x, 2)
+        assert rim.inside[y, x] == (step >= 0.3)
+        if rim.inside[y, x]:
+            np.testing.assert_allclose([rim.near[y, x], rim.far[y, x]], [near, far], rtol=1e-5)
+            assert rim.is_near[y, x] == (disparity[y, x] > (near + far) / 2)
+    nearest = z_buffers(cv2.dilate(disparity, AROUND), present, field.baselines, 0, 12)
+    unit = np.float32(1 / 255 if dtype == np.uint8 else 1)
+    units = random.uniform(0.9, 1.1, present.sum()).astype(np.float32) * unit
+    rim_views = kernels.RimViews(views, units, np.argwhere(present), field.baselines[present], nearest, 0)
+    twin = Twin(rim_views, float(margin))
+    layer = np.where(rim.is_near, rim.far, disparity)
+    background = kernels.background_of(rim_views, layer, np.ones_like(present, shape=layer.shape), margin, 0, 12)
+    for y, x in np.ndindex(disparity.shape):
+        colour, variance, count = twin.background(float(layer[y, x]), y, x)
+        assert background.views[y, x] == count
+        if count >= kernels.FEWEST_VIEWS:
+            np.testing.assert_allclose(background.colour[y, x], colour, atol=1e-6)
+            np.testing.assert_allclose(background.variance[y, x], variance, atol=1e-7)
+    clean = disparity - cv2.erode(disparity, AROUND) < 0.3
+    guide = field.reference_view
+    evidence = np.zeros_like(disparity)
+    scales2 = (0.02**2, 0.3**2)
+    kernels.evidence_of_shares(rim_views, rim, background, disparity, guide, clean, margin, scales2, 0, 12, evidence)
+    told = [
+        (evidence[y, x], twin.evidence(rim, background, disparity, guide, clean, scales2, y, x))
+        for y, x in np.argwhere(rim.inside)
+    ]
+    assert sum(value != 0 for value, _ in told) > 30
+    np.testing.assert_allclose(*np.array(told).T, atol=2e-5)
+
+
+def test_brightness_is_told_view_by_view() -> None:
+    """Beside the reference, over what both show."""
+    random = np.random.default_rng(3)
+    picture = cv2.GaussianBlur(random.random((40, 48, 3), np.float32), (0, 0), 3)
+    factors = np.array([[0.5, 1, 1.2]], np.float32)
+    views = np.clip(picture * factors[..., None, None, None], 0, 1)
+    field = LightField(views, "bright")
+    still = np.zeros((40, 48), np.float32)
+    rim_views = kernels.RimViews(
+        views, np.ones(3, np.float32), np.argwhere(field.present), field.baselines[field.present],
+        np.empty((0, 0, 0, 0), np.float32), 0,
+    )  # fmt: skip
+    brightness, residual = kernels.brightness_of_views(rim_views, still, field.reference_view, still == 0)
+    np.testing.assert_allclose(brightness, factors[0], rtol=0.02)
+    assert (residual < 0.01).all()
