@@ -15,7 +15,8 @@ orientation, and the half with the smaller cost is kept. ``none`` hands the init
 
 ``visibility`` chooses the views one by one: those in which nothing of the map so far occludes the pixel
 (:mod:`sepi.matching.visibility_sweep`); pixels that a depth discontinuity runs through then go to the surface that
-fills most of them (:mod:`sepi.image.mixed_pixels`).
+fills most of them, by all views (:mod:`sepi.matching.surface_shares`) and by the colours of the reference view
+(:mod:`sepi.image.mixed_pixels`).
 
 References
 ----------

@@ -60,6 +60,20 @@ def test_gloss_does_not_move_faint_texture() -> None:
     assert errors["best"] < 0.5 * errors["best_no_detail"]
 
 
+# 100 x MSE of variant best on scenes that are edges for the most part
+EDGE_BOUNDS = {"fine_structures": 2.8, "stripes": 0.7, "curved_occluders": 1.8, "dots": 0.8}
+
+
+@pytest.mark.parametrize("name", EDGE_BOUNDS)
+def test_edges_are_sharp(name: str) -> None:
+    """Surfaces a pixel too wide, or gaps closed, would double the figure; so would smeared edges."""
+    scene = render(name, size=192)
+    errors = {variant: estimate_depth(scene, variant).disparity - scene.ground_truth for variant in ("best", "paper")}
+    mse = {variant: 100 * np.mean(error**2) for variant, error in errors.items()}
+    assert mse["best"] <= EDGE_BOUNDS[name]
+    assert mse["best"] < 0.6 * mse["paper"]
+
+
 def test_detail_leaves_out_shading_and_edges() -> None:
     """Smooth brightness and strong edges stay in the base, faint texture is the detail."""
     y, x = np.mgrid[:40, :40]

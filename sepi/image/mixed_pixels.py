@@ -3,7 +3,8 @@
 A pixel that an edge runs through mixes the colours ``F`` of the nearer surface and ``B`` of the more distant one, and
 its residuals are small at the nearer disparity, with which the edge moves: depth maps are one pixel too wide there. Its
 colour ``I`` tells the share of the nearer surface in it, ``(I - B) (F - B) / |F - B|^2``, with ``F`` and ``B`` from
-clean pixels close by; where that is little, the pixel goes to the more distant surface.
+clean pixels close by; where that is little, the pixel goes to the more distant surface. A colour that lies beside all
+mixtures of both is none: surfaces are darker, or of another colour, towards their edge.
 """
 
 from __future__ import annotations

@@ -25,7 +25,8 @@ from sepi.matching.view_subsets import spread_views
 from sepi.stage import OcclusionMarginParameters
 
 if TYPE_CHECKING:
-    from sepi.matching.surface_shares_kernels import Rim, RimViews
+    from sepi.matching.depth_step_kernels import Rim
+    from sepi.matching.surface_shares_kernels import RimViews
 
 _LEAST_SCALE = 0.005
 """Of the residual at which a view counts half, beside noise; 0..1."""
@@ -72,7 +73,7 @@ def reassign_by_shares(light_field: LightField, disparity: FloatMap, parameters:
     """
     if parameters.share_evidence == 1:
         return disparity
-    from sepi.matching.surface_shares_kernels import rim_of
+    from sepi.matching.depth_step_kernels import rim_of
 
     rim: Rim = rim_of(disparity, parameters.share_radius, parameters.share_step)
     if not rim.inside.any():

@@ -8,7 +8,8 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit, prange
 
-from sepi.lightfield import BoolMap, FloatMap
+from sepi.lightfield import FloatMap
+from sepi.matching.depth_step_kernels import Rim
 
 FEWEST_VIEWS = 3
 """That see a piece of background, before its colour counts."""
@@ -59,25 +60,6 @@ class RimViews(NamedTuple):
     low: int
 
 
-class Rim(NamedTuple):
-    """The pixels beside a depth step, and the two surfaces that may be theirs.
-
-    Attributes
-    ----------
-    near, far : ndarray, shape (H, W), float32
-        Disparities of both surfaces; the map's own elsewhere.
-    inside : ndarray, shape (H, W), bool
-        Whether a pixel lies beside a step.
-    is_near : ndarray, shape (H, W), bool
-        Which of the two the map has.
-    """
-
-    near: FloatMap
-    far: FloatMap
-    inside: BoolMap
-    is_near: BoolMap
-
-
 class Background(NamedTuple):
     """What the views show behind the nearer surfaces.
 
@@ -93,39 +75,6 @@ class Background(NamedTuple):
     colour: FloatMap
     variance: FloatMap
     views: npt.NDArray[np.int32]
-
-
-@njit(parallel=True, cache=True)
-def rim_of(disparity: Any, radius: int, step: Any) -> Any:
-    """Surfaces on both sides of each depth step, means over a window by nearness; ``Rim`` of ``disparity (H, W)``.
-
-    A pixel lies beside a step where the disparities within ``radius`` pixels differ by ``step``.
-    """
-    H, W = disparity.shape
-    near, far = disparity.copy(), disparity.copy()
-    inside, is_near = np.zeros((H, W), np.bool_), np.zeros((H, W), np.bool_)
-    for y in prange(H):
-        for x in range(W):
-            top, bottom = max(0, y - radius), min(H, y + radius + 1)
-            left, right = max(0, x - radius), min(W, x + radius + 1)
-            lowest = highest = disparity[y, x]
-            for i in range(top, bottom):
-                for j in range(left, right):
-                    lowest, highest = min(lowest, disparity[i, j]), max(highest, disparity[i, j])
-            if highest - lowest < step:
-                continue
-            middle = (lowest + highest) / 2
-            sums = np.zeros((2, 2))
-            for i in range(top, bottom):
-                for j in range(left, right):
-                    weight = 1 / (1 + (i - y) ** 2 + (j - x) ** 2)
-                    side = 1 if disparity[i, j] > middle else 0
-                    sums[side, 0] += weight
-                    sums[side, 1] += weight * disparity[i, j]
-            inside[y, x] = True
-            far[y, x], near[y, x] = sums[0, 1] / sums[0, 0], sums[1, 1] / sums[1, 0]
-            is_near[y, x] = disparity[y, x] > (near[y, x] + far[y, x]) / 2
-    return Rim(near, far, inside, is_near)
 
 
 @njit(inline="always")

@@ -12,6 +12,7 @@ from several_threads import several_threads
 
 from sepi.lightfield import LightField
 from sepi.matching import surface_shares_kernels as kernels
+from sepi.matching.depth_step_kernels import Rim, rim_of
 from sepi.matching.row_bands import band_memory
 from sepi.matching.surface_shares import SurfaceShareParameters, reassign_by_shares
 from sepi.matching.visibility_kernels import z_buffers
@@ -175,7 +176,7 @@ class Twin:
         return middle, float(np.minimum((colours - middle) ** 2, 0.01).mean()), len(colours)
 
     def evidence(
-        self, rim: kernels.Rim, background: kernels.Background, disparity: npt.NDArray[np.float32],
+        self, rim: Rim, background: kernels.Background, disparity: npt.NDArray[np.float32],
         guide: npt.NDArray[np.float32], clean: npt.NDArray[np.bool_], scales2: tuple[float, float], y: int, x: int,
     ) -> float:  # fmt: skip
         near, far = float(rim.near[y, x]), float(rim.far[y, x])
@@ -260,7 +261,7 @@ def test_kernels_equal_a_plain_twin(geometry: str, dtype: Any) -> None:
     disparity[3:9, 4:9] = 0.6
     disparity += random.uniform(-0.05, 0.05, disparity.shape).astype(np.float32)
     margin = np.float32(0.15)
-    rim = kernels.rim_of(disparity, 2, 0.3)
+    rim = rim_of(disparity, 2, 0.3)
     for y, x in np.ndindex(disparity.shape):
         step, near, far = twin_rim(disparity, y, x, 2)
         assert rim.inside[y, x] == (step >= 0.3)
