@@ -34,7 +34,7 @@ COMPLETE = {"ingest": 2, "initial": 8, "occlusion": 10, "textureless": 12, "opti
 # the variant of the fewest stages
 QUICK = "no_occlusion_no_textureless"
 # what the ablation of best asks for beyond that
-PARTS = {"initial": 2, "occlusion": 8, "textureless": 8, "optimize": 14}
+PARTS = {"initial": 2, "occlusion": 10, "textureless": 10, "optimize": 16}
 
 
 @pytest.fixture(scope="module")
