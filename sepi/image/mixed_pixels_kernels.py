@@ -9,7 +9,7 @@ import numpy as np
 from numba import njit, prange
 
 _WIDTH = 1.0  # of the window's weights, pixels
-_MOST_APART = 0.15  # squared distance of a mixture from all mixtures of both sides, in units of their variance
+_MOST_APART = 0.15  # squared distance of a pixel's colour from all mixtures of both sides, in units of their variance
 _LEAST_WEIGHT = 0.05  # of clean pixels of each side, in pixels right beside
 
 

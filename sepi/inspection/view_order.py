@@ -115,12 +115,12 @@ def check_order(light_field: LightField, read_in: str = AS_GIVEN) -> OrderCheck:
     if trial.clear:
         # near and far as they are, if the order is right but for them: to doubt that takes more
         kept = next((sign for order, sign in trial.best.items() if order == AS_GIVEN), None)
-        for look in Look:
+        # a glance may say that all is well; to say that it is not takes a closer look
+        for look in Look if kept is not None else (Look.AXES, Look.MANY_VIEWS):
             evidence = occlusion_evidence(light_field, trial, look)
             doubted = kept is not None and kept * evidence.mean < 0
             sign_clear = _is_clear(evidence, plainly=doubted or look is Look.GLANCE)
-            # a glance may say that all is well; to say that it is not takes a closer look
-            if sign_clear and not (look is Look.GLANCE and (kept is None or doubted)):
+            if sign_clear and not (look is Look.GLANCE and doubted):
                 break
         if sign_clear:
             # at most half way to the next layout: the wrong sign is still the better layout

@@ -31,8 +31,8 @@ if TYPE_CHECKING:
 _LEAST_SCALE = 0.005
 """Of the residual at which a view counts half, beside noise; 0..1."""
 
-_MOST_DARKENING = math.log(1.25)
-"""Logarithm of the ratio of brightness up to which a view is taken for another exposure of the same."""
+_MOST_DARKENING = 1.25
+"""Ratio of brightness, either way, up to which a view is taken for another exposure of the same."""
 
 BYTES_PER_PIXEL = 4
 """Of a pixel of a view: the z-buffer."""
@@ -128,9 +128,10 @@ def _views_alike(
     units = np.full(len(places), 1 / full_scale(light_field.views.dtype), np.float32)
     views = RimViews(light_field.views, units, places, baselines, np.empty((0, 0, 0, 0), np.float32), 0)
     brightness, residual = brightness_of_views(views, disparity, light_field.reference_view, clean)
-    alike = (abs(np.log(brightness)) < _MOST_DARKENING) & (residual <= 2 * np.median(residual) + _LEAST_SCALE)
-    units = (units / brightness).astype(np.float32)
-    return views._replace(units=units[alike], places=places[alike], baselines=baselines[alike])
+    alike = (brightness > 1 / _MOST_DARKENING) & (brightness < _MOST_DARKENING)
+    alike &= residual <= 2 * np.median(residual) + _LEAST_SCALE
+    units = (units[alike] / brightness[alike]).astype(np.float32)
+    return views._replace(units=units, places=places[alike], baselines=baselines[alike])
 
 
 def _more_distant_layer(disparity: FloatMap, rim: Rim, margin: np.float32) -> tuple[FloatMap, FloatMap]:
