@@ -28,6 +28,7 @@ from sepi.errors import SepiError, SepiWarning, one_line
 from sepi.io.files import atomic_path
 from sepi.io.hdf5 import read_light_field, read_stage, write_stage
 from sepi.io.provenance import entry, history_of, stage_attributes
+from sepi.memory import KERNELS, require_memory
 from sepi.stage import Choice, Progress, no_progress
 from sepi.threads import use_threads
 from sepi.validation import validated
@@ -223,6 +224,7 @@ def stage_command(stage: str, choices: Mapping[str, Choice]) -> click.Command:
             raise SepiError(
                 f"{previous}: maps of {maps.disparity.shape} do not belong to {light_field_path} of {light_field.shape}"
             )
+        require_memory(KERNELS)
         with progress_bar(f"{light_field.name} {stage}") as progress:
             result = chosen.run(light_field, maps, settings, progress)
         history = [*history_of(previous), entry(stage, choice, settings, light_field)]

@@ -12,7 +12,7 @@ from typing import Any
 from sepi import initial, occlusion, optimize, textureless
 from sepi.errors import SepiError
 from sepi.lightfield import LightField
-from sepi.matching.memory_limit import bytes_of_bands
+from sepi.matching.memory_limit import bytes_of_bands, require_memory_of
 from sepi.matching.row_bands import band_memory
 from sepi.matching.unknown import with_unknown
 from sepi.stage import Choice, Parameters, Progress, StageMaps, no_progress
@@ -282,6 +282,8 @@ def estimate_depth(
     ------
     SepiError
         If the variant, a stage or a field is unknown, a value is not allowed, or the memory cannot be enough.
+    MemoryError
+        If a limit on the process's address space cannot be enough.
     """
     chosen = variant_named(variant) if isinstance(variant, str) else variant
     settings = stage_parameters(chosen, parameters)
@@ -289,6 +291,7 @@ def estimate_depth(
         from sepi.inspection.disparity_range import estimate_range
 
         light_field = light_field.with_range(estimate_range(light_field))
+    require_memory_of(light_field, settings.values())
     maps: StageMaps | None = None
     limited = nullcontext() if memory is None else band_memory(bytes_of_bands(light_field, settings.values(), memory))
     with limited:

@@ -14,6 +14,7 @@ from sepi.io.readers.camera_positions import with_row_spacing
 from sepi.io.readers.formats import read
 from sepi.io.readers.options import ReadOptions, in_grid
 from sepi.lightfield import DisparityRange, LightField
+from sepi.memory import KERNELS, require_memory
 
 # 16-bit views darker than this, a sixteenth of the full scale, hold fewer bits or next to no light
 _NARROW = 4096
@@ -53,10 +54,13 @@ def read_light_field(
     SepiError
         If nothing is there, the format is unknown, the files are damaged or contradict each other or the options,
         the grid of the views cannot be told, or there is nothing to match in the views.
+    MemoryError
+        If a limit on the process's address space leaves too little to look at them.
     """
     path = Path(path)
     options = options or ReadOptions()
     light_field = read(path, options, file_format)
+    require_memory(KERNELS)
     if not light_field.arranged:
         from sepi.inspection.arrangement import arrange
 

@@ -14,6 +14,7 @@ from sepi.lightfield import LightField
 from sepi.matching.base_detail import BaseDetailParameters
 from sepi.matching.row_bands import least_band_bytes
 from sepi.matching.visibility_sweep import BYTES_PER_CANDIDATE, VisibilitySweepParameters
+from sepi.memory import MORE_KERNELS, require_memory
 from sepi.stage import OcclusionMarginParameters, Parameters
 
 _LIBRARIES = 300 * 2**20
@@ -21,6 +22,24 @@ _LIBRARIES = 300 * 2**20
 
 _BYTES_OF_MAPS = 200
 """Of each pixel: maps, the reference view, the systems of the regularisation."""
+
+
+def require_memory_of(light_field: LightField, stages: Iterable[Parameters]) -> None:
+    """See that there is memory for an estimate, where a limit on the process's address space is set.
+
+    Parameters
+    ----------
+    light_field : LightField
+        With a known disparity range.
+    stages : iterable of Parameters
+        Parameters of the stages that will run.
+
+    Raises
+    ------
+    MemoryError
+    """
+    _, least = _bytes_taken(light_field, stages)
+    require_memory(least - _LIBRARIES - light_field.views.nbytes + MORE_KERNELS)
 
 
 def bytes_of_bands(light_field: LightField, stages: Iterable[Parameters], memory: int) -> int:
@@ -45,6 +64,17 @@ def bytes_of_bands(light_field: LightField, stages: Iterable[Parameters], memory
     SepiError
         If the limit is less than what is needed in any case.
     """
+    whole, least = _bytes_taken(light_field, stages)
+    if memory < least:
+        raise SepiError(
+            f"{light_field.name}: takes at least {-(-least // 2**20)} MB with these views and candidates, more than "
+            f"the {memory // 2**20} MB that it may take; fewer candidates, a narrower range or variant paper take less"
+        )
+    return memory - whole
+
+
+def _bytes_taken(light_field: LightField, stages: Iterable[Parameters]) -> tuple[int, int]:
+    """What is held as a whole, and that with the narrowest bands."""
     # here, since it loads what compiles
     from sepi.matching.gauss_newton import BYTES_PER_PIXEL
 
@@ -55,10 +85,4 @@ def bytes_of_bands(light_field: LightField, stages: Iterable[Parameters], memory
     whole = _LIBRARIES + light_field.views.nbytes + round((volume + _BYTES_OF_MAPS) * height * width)
     in_bands = any(isinstance(p, (BaseDetailParameters, OcclusionMarginParameters)) for p in stages)
     # the optimisation holds most of a pixel
-    least = whole + (least_band_bytes(light_field, BYTES_PER_PIXEL) if in_bands else 0)
-    if memory < least:
-        raise SepiError(
-            f"{light_field.name}: takes at least {-(-least // 2**20)} MB with these views and candidates, more than "
-            f"the {memory // 2**20} MB that it may take; fewer candidates, a narrower range or variant paper take less"
-        )
-    return memory - whole
+    return whole, whole + (least_band_bytes(light_field, BYTES_PER_PIXEL) if in_bands else 0)

@@ -18,7 +18,7 @@ from scipy.sparse.linalg import spsolve
 
 from sepi.image.superpixels import Adjacency, FloatArray, Superpixels
 from sepi.lightfield import BoolMap, FloatMap
-from sepi.regularization.direct_solver import require_blas_memory
+from sepi.memory import BLAS_BUFFER, require_memory
 
 UNIT = 15.0
 """Length over which gradients are measured, pixels: about a superpixel, so that the three unknowns are alike."""
@@ -137,7 +137,7 @@ def propagate(
     solution = planes.copy()
     trust = np.ones(len(affinity))
     data_weight = weight
-    require_blas_memory()
+    require_memory(BLAS_BUFFER)
     for spread in _shrinking(coupling.tolerance):
         left, right = _normal_equations(segments, disparity, data_weight, design)
         continuity = _continuity(adjacent, at_first, at_second, strength * trust, coupling.slope, len(segments))

@@ -22,7 +22,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sepi.lightfield import FloatMap
-from sepi.regularization.direct_solver import require_blas_memory
+from sepi.memory import BLAS_BUFFER, require_memory
 
 FloatArray = npt.NDArray[np.float64]
 Corner = tuple[slice, slice]
@@ -211,7 +211,7 @@ def _planes_system(stencil: FloatArray) -> Any:
     matrix = sparse.csc_matrix((entries[there], (row, column)), shape=(size, size))
     # blocks of one pixel's width have slopes that do nothing
     matrix = matrix + sparse.diags(np.full(size, 1e-9 * max(float(matrix.diagonal().max()), 1e-9)))
-    require_blas_memory()
+    require_memory(BLAS_BUFFER)
     return splu(matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
 
 

@@ -11,14 +11,17 @@ import pytest
 from sepi.scenes import render, write_hci
 
 COMMAND = [sys.executable, "-c", "import sys; from sepi.cli.main import main; sys.exit(main())", "depth"]
-# bytes of address space: enough to start, not for the maps of a benchmark scene
-LITTLE = 1_000_000_000
 
 
+@pytest.mark.parametrize("limit", [700, 800, 900, 1000, 1100])
 @pytest.mark.real
 @pytest.mark.skipif(sys.platform != "linux", reason="needs a limit on the address space that is kept")
-def test_too_little_memory_is_one_line(hci: Path, tmp_path: Path) -> None:
-    """Not a traceback from inside a library; and a script sees that it failed."""
+def test_too_little_memory_is_one_line(hci: Path, tmp_path: Path, limit: int) -> None:
+    """Not a traceback from inside a library, nor its abort; and a script sees that it failed.
+
+    ``limit`` is of the address space, in MB: enough to start, not for the maps of a benchmark scene.
+    """
+    allowed = limit * 10**6
     result = subprocess.run(
         [*COMMAND, str(hci / "cotton"), "-o", str(tmp_path / "maps")],
         env=os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "NUMBA_NUM_THREADS": "1"},
@@ -26,7 +29,7 @@ def test_too_little_memory_is_one_line(hci: Path, tmp_path: Path) -> None:
         text=True,
         check=False,
         timeout=120,
-        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (LITTLE, LITTLE)),
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (allowed, allowed)),
     )
     assert result.returncode == 1
     assert "Traceback" not in result.stderr

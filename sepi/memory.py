@@ -1,0 +1,35 @@
+"""Memory that must be there before a library takes it that does not know how to do without."""
+
+from __future__ import annotations
+
+import numpy as np
+
+BLAS_BUFFER = 64_000_000
+"""OpenBLAS takes 32 MB at its first call; bytes, with some to spare."""
+
+KERNELS = 384_000_000
+"""The first compiled kernels, the libraries that load them and what threads set aside; bytes, with some to spare."""
+
+MORE_KERNELS = 128_000_000
+"""Kernels of all stages, the libraries being there; bytes, with some to spare."""
+
+
+def require_memory(number: int) -> None:
+    """See that there is memory where a limit on the process's address space is set (``ulimit -v``).
+
+    OpenBLAS asks for its buffer again and again, without end, where the limit is reached, and LLVM ends the process.
+
+    Parameters
+    ----------
+    number : int
+        Bytes.
+
+    Raises
+    ------
+    MemoryError
+    """
+    try:
+        # taken, not written to, and given back at once
+        np.empty(number, np.uint8)
+    except MemoryError as error:
+        raise MemoryError(f"{number // 10**6} MB more are needed than a limit on this process leaves") from error
