@@ -71,7 +71,7 @@ rule numbers:
         "{params.flags} --output {output:q} 2> {log:q}"
 
 
-# Tables 1 to 4, the scores after each stage, the run times and the confidence evaluation
+# Tables 1 to 4, the scores after each stage and at depth discontinuities, the run times, the confidence evaluation
 rule tables:
     input:
         "reports/report.json",

@@ -1,4 +1,4 @@
-"""Evaluation: how far a disparity map is from the ground truth, by two protocols and over three regions.
+"""Evaluation: how far a disparity map is from the ground truth, by two protocols and over four regions.
 
 Scores follow the paper (section V) and the HCI 4D light field benchmark. A non-finite estimate counts as bad and is
 reported, where the benchmark's own toolkit counts it as good. Pixels of the mask ``unknown`` are scored as they stand:
@@ -26,6 +26,7 @@ from sepi.io.hdf5 import read_light_field, read_stage
 from sepi.io.provenance import scene_attributes
 from sepi.io.scores import AllScores, Evaluation, Scored, Scores, map_name, read_evaluations, write_scores
 from sepi.lightfield import BoolMap, FloatMap, LightField
+from sepi.scoring.edges import Edges, edges_of, fattening_and_thinning
 
 PROTOCOLS: dict[str, int] = {"paper": 0, "benchmark": 15}
 """Protocol to the pixels left out on each side."""
@@ -40,6 +41,9 @@ SCORES: dict[str, str] = {
 }
 """Score to its name in tables."""
 
+EDGE_SCORES: dict[str, str] = {"fattening": "fattening %", "thinning": "thinning %"}
+"""Score of what happens beside depth discontinuities (:mod:`sepi.scoring.edges`) to its name in tables."""
+
 COUNTS: dict[str, str] = {"non_finite": "non-finite", "pixels": "pixels"}
 """Count that stands beside the scores to its name in tables."""
 
@@ -47,10 +51,22 @@ WHOLE_MAP = "all"
 """Name of the region that is the whole map."""
 
 REGIONS: tuple[str, ...] = (WHOLE_MAP, "occluded", "textureless")
+"""Regions of the paper's tables."""
+
+DISCONTINUITIES = "discontinuities"
+"""Name of the region beside depth discontinuities."""
+
+SCORED_REGIONS: tuple[str, ...] = (*REGIONS, DISCONTINUITIES)
 """Regions that are scored."""
 
 
-def score(estimate: FloatMap, ground_truth: FloatMap, border: int = 0, region: BoolMap | None = None) -> Scores:
+def score(
+    estimate: FloatMap,
+    ground_truth: FloatMap,
+    border: int = 0,
+    region: BoolMap | None = None,
+    edges: Edges | None = None,
+) -> Scores:
     """Scores of a disparity map.
 
     Parameters
@@ -61,14 +77,17 @@ def score(estimate: FloatMap, ground_truth: FloatMap, border: int = 0, region: B
         Pixels left out on each side: 0 for the paper's protocol, 15 for the benchmark's.
     region : ndarray, shape (H, W), bool, optional
         Where to score; everywhere unless given.
+    edges : Edges, optional
+        Those of the ground truth, which are found unless given.
 
     Returns
     -------
     dict
         ``mse100``: 100 x mean squared error over finite estimates; ``q25``: the 25th percentile of 100 x absolute
         error, not interpolated; ``badpix007``, ``badpix003``, ``badpix001``: percentage of pixels with a larger error
-        than 0.07, 0.03, 0.01, a non-finite estimate being one; ``non_finite``, ``pixels``: counts. A score over no
-        pixels is NaN.
+        than 0.07, 0.03, 0.01, a non-finite estimate being one; ``fattening``, ``thinning``: as
+        :func:`sepi.scoring.edges.fattening_and_thinning`; ``non_finite``, ``pixels``: counts. A score over no pixels is
+        NaN.
 
     Raises
     ------
@@ -80,14 +99,15 @@ def score(estimate: FloatMap, ground_truth: FloatMap, border: int = 0, region: B
     if region is not None:
         _require_shape("region", region, estimate)
         chosen = chosen & region
-    inside = np.s_[border : -border or None, border : -border or None]
-    chosen = chosen[inside]
-    error = np.abs(estimate[inside][chosen].astype(np.float64) - ground_truth[inside][chosen])
+    chosen = chosen & _within(border, chosen.shape)
+    error = np.abs(estimate[chosen].astype(np.float64) - ground_truth[chosen])
     finite = np.isfinite(error)
     quarter = float(np.sort(100 * error)[error.size // 4]) if error.size else float("nan")
     scores: Scores = {"mse100": 100 * _mean(error[finite] ** 2), "q25": quarter}
     # written so that NaN is bad
     scores |= {name: 100 * _mean(~(error <= threshold)) for name, threshold in BAD_PIXEL.items()}
+    edge_scores = fattening_and_thinning(estimate, edges or edges_of(ground_truth), chosen)
+    scores |= dict(zip(EDGE_SCORES, edge_scores, strict=True))
     scores |= {"non_finite": int(np.count_nonzero(~finite)), "pixels": error.size}
     return scores
 
@@ -105,24 +125,25 @@ def score_regions(
     estimate, ground_truth : ndarray, shape (H, W), float32
         Disparity in pixels per view step.
     masks : mapping of str to ndarray, shape (H, W), bool, optional
-        Those of :func:`region_masks`; without them the whole map is the only region.
+        Those of :func:`region_masks`; without them the regions are the whole map and the discontinuities.
     protocols : mapping of str to int
         Protocol to the pixels left out on each side.
 
     Returns
     -------
     dict
-        Protocol (``paper``, ``benchmark``) to region (``all``, ``occluded``, ``textureless``) to the scores of
-        :func:`score`.
+        Protocol (``paper``, ``benchmark``) to region (``all``, ``occluded``, ``textureless``,
+        ``discontinuities``) to the scores of :func:`score`.
 
     Raises
     ------
     SepiError
         If shapes differ.
     """
-    regions: dict[str, BoolMap | None] = {WHOLE_MAP: None, **(masks or {})}
+    edges = edges_of(ground_truth)
+    regions: dict[str, BoolMap | None] = {WHOLE_MAP: None, **(masks or {DISCONTINUITIES: edges.region})}
     return {
-        protocol: {name: score(estimate, ground_truth, border, mask) for name, mask in regions.items()}
+        protocol: {name: score(estimate, ground_truth, border, mask, edges) for name, mask in regions.items()}
         for protocol, border in protocols.items()
     }
 
@@ -139,7 +160,7 @@ def evaluations_of(light_field: LightField, maps: Mapping[str, FloatMap]) -> dic
     ----------
     light_field : LightField
         Its own masks ``occluded`` and ``textureless`` are used where it has them, else those of
-        ``sepi.scoring.regions``. Without ground truth the evaluations are empty.
+        :mod:`sepi.scoring.regions`. Without ground truth the evaluations are empty.
     maps : mapping of str to ndarray, shape (H, W), float32
         Name to disparity in pixels per view step.
 
@@ -152,6 +173,7 @@ def evaluations_of(light_field: LightField, maps: Mapping[str, FloatMap]) -> dic
         return {name: Evaluation() for name in maps}
     masks = region_masks(light_field)
     sources = {name: "scene" if name in light_field.masks else "computed" for name in masks}
+    sources[DISCONTINUITIES] = "computed"
     return {
         name: Evaluation(
             scores=score_regions(disparity, light_field.ground_truth, masks),
@@ -199,7 +221,10 @@ def score_maps(
 
 
 def region_masks(light_field: LightField) -> dict[str, BoolMap]:
-    """The masks ``occluded`` and ``textureless``, (H, W) bool: the scene's own, else computed from its ground truth."""
+    """The masks ``occluded``, ``textureless`` and ``discontinuities``, (H, W) bool, computed from the ground truth.
+
+    The first two are the scene's own where it has them.
+    """
     if light_field.ground_truth is None:
         raise SepiError(f"{light_field.name}: regions for evaluation need ground truth, and this scene has none")
     names = ("occluded", "textureless")
@@ -211,7 +236,8 @@ def region_masks(light_field: LightField) -> dict[str, BoolMap]:
             masks["occluded"] = regions.occluded(light_field.ground_truth, light_field.baselines)
         if "textureless" not in masks:
             masks["textureless"] = regions.textureless(light_field.reference_view)
-    return {name: masks[name] for name in names}
+    found = {name: masks[name] for name in names}
+    return found | {DISCONTINUITIES: edges_of(light_field.ground_truth).region}
 
 
 def _error(disparity: FloatMap, ground_truth: FloatMap) -> FloatMap:
@@ -222,7 +248,7 @@ def _error(disparity: FloatMap, ground_truth: FloatMap) -> FloatMap:
 
 def _digest_of_scene(light_field: LightField, code: str) -> str:
     """Digest of what decides the scores beside the map: code, ground truth, masks, and what masks are computed from."""
-    facts = [code, _versions(), list(light_field.masks), list(REGIONS), PROTOCOLS, BAD_PIXEL]
+    facts = [code, _versions(), list(light_field.masks), list(SCORED_REGIONS), PROTOCOLS, BAD_PIXEL]
     arrays: list[npt.NDArray[Any]] = [light_field.baselines, *light_field.masks.values()]
     arrays += [] if light_field.ground_truth is None else [light_field.ground_truth, light_field.reference_view]
     return _digest(repr(facts), *arrays)
@@ -243,6 +269,13 @@ def _digest(text: str, *arrays: npt.NDArray[Any]) -> str:
         total.update(f"{values.shape} {values.dtype}".encode())
         total.update(np.ascontiguousarray(values).data.cast("B"))
     return total.hexdigest()
+
+
+def _within(border: int, shape: tuple[int, ...]) -> BoolMap:
+    """All pixels but those of a border."""
+    inside = np.zeros(shape, bool)
+    inside[border : -border or None, border : -border or None] = True
+    return inside
 
 
 def _require_shape(what: str, values: FloatMap | BoolMap, estimate: FloatMap) -> None:

@@ -10,7 +10,7 @@ from click.testing import CliRunner
 from geometries import grid_baselines
 
 from sepi.errors import SepiError
-from sepi.evaluate import command, evaluation_of, score
+from sepi.evaluate import EDGE_SCORES, command, evaluation_of, score
 from sepi.io.hdf5 import write_light_field, write_stage
 from sepi.io.scores import read_evaluations, read_scores
 from sepi.lightfield import DisparityRange, LightField
@@ -71,7 +71,9 @@ def test_scores_equal_a_plain_twin(border: int) -> None:
     ground_truth[20, 20] = np.inf
     estimate[random.random(ground_truth.shape) < 0.1] = np.nan
     estimate[18, 18] = -np.inf
-    assert score(estimate, ground_truth, border) == pytest.approx(twin(estimate, ground_truth, border))
+    found, expected = score(estimate, ground_truth, border), twin(estimate, ground_truth, border)
+    assert {name: found[name] for name in expected} == pytest.approx(expected)
+    assert found.keys() - expected.keys() == set(EDGE_SCORES)
 
 
 def test_unknown_estimates_are_bad_and_reported() -> None:
@@ -109,7 +111,7 @@ def test_scores_are_by_protocol_and_regions() -> None:
     mask[:10] = True
     result = evaluation_of(scene(ground_truth, {"occluded": mask}), ground_truth + np.float32(0.05)).scores
     assert list(result) == ["paper", "benchmark"]
-    assert list(result["paper"]) == ["all", "occluded", "textureless"]
+    assert list(result["paper"]) == ["all", "occluded", "textureless", "discontinuities"]
     assert result["paper"]["all"]["pixels"] == 1600
     assert result["benchmark"]["all"]["pixels"] == 100
     assert result["paper"]["occluded"]["pixels"] == 400
@@ -121,7 +123,7 @@ def test_masks_come_from_the_scene_or_are_computed() -> None:
     ground_truth[10:30, 10:30] = 1
     mask = np.ones((40, 40), bool)
     found = evaluation_of(scene(ground_truth, {"textureless": mask}), ground_truth)
-    assert found.region_sources == {"occluded": "computed", "textureless": "scene"}
+    assert found.region_sources == {"occluded": "computed", "textureless": "scene", "discontinuities": "computed"}
     np.testing.assert_array_equal(found.regions["occluded"], regions.occluded(ground_truth, grid_baselines((3, 3))))
     np.testing.assert_array_equal(found.regions["textureless"], mask)
 
@@ -187,8 +189,8 @@ def test_command_writes_what_evaluate_finds(tmp_path: Path) -> None:
         found = back[name].evaluation
         assert found.error is not None
         np.testing.assert_array_equal(found.error, estimate - ground_truth)
-        assert set(found.regions) == {"occluded", "textureless"}
-        assert found.region_sources == {"occluded": "computed", "textureless": "computed"}
+        assert found.region_sources == dict.fromkeys(["occluded", "textureless", "discontinuities"], "computed")
+        assert found.regions.keys() == found.region_sources.keys()
     assert path.read_bytes() == run_command(tmp_path, light_field, maps, "again.h5")[0].read_bytes()
 
 

@@ -64,9 +64,9 @@ def score_table(scores: AllScores) -> str:
     """Scores as aligned columns."""
     from tabulate import tabulate
 
-    from sepi.evaluate import COUNTS, SCORES
+    from sepi.evaluate import COUNTS, EDGE_SCORES, SCORES
 
-    heads = SCORES | COUNTS
+    heads = SCORES | EDGE_SCORES | COUNTS
     rows = [
         [protocol, region, *(_cell(values[name]) for name in heads)]
         for protocol, regions in scores.items()

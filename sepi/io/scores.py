@@ -101,7 +101,7 @@ def write_scores(path: Path, maps: Mapping[str, Scored], attributes: Mapping[str
                 first = group
             else:
                 put_evaluation(group, replace(scored.evaluation, regions={}))
-                for region in scored.evaluation.regions:
+                for region in sorted(scored.evaluation.regions):
                     group[f"regions/{region}"] = first[f"regions/{region}"]
 
 

@@ -22,7 +22,7 @@ import psutil
 
 from sepi.command import SepiCommand
 from sepi.errors import SepiError
-from sepi.evaluate import COUNTS, PROTOCOLS, REGIONS, SCORES
+from sepi.evaluate import COUNTS, EDGE_SCORES, PROTOCOLS, SCORED_REGIONS, SCORES
 from sepi.io.external_maps import read_external
 from sepi.io.hdf5 import read_light_field, read_stage
 from sepi.io.scores import Scores, read_evaluations, read_scores, without_nan
@@ -224,8 +224,9 @@ def _external(plan: Plan, dataset: str, scene: str) -> dict[str, Any]:
 
 def _ordered(scores: Mapping[str, Mapping[str, Scores]]) -> dict[str, Any]:
     """Scores in the order of protocols, regions and names."""
+    names = (*SCORES, *EDGE_SCORES, *COUNTS)
     return {
-        protocol: {region: {name: scores[protocol][region][name] for name in (*SCORES, *COUNTS)} for region in REGIONS}
+        protocol: {region: {name: scores[protocol][region][name] for name in names} for region in SCORED_REGIONS}
         for protocol in PROTOCOLS
         if scores
     }

@@ -30,6 +30,7 @@ TABLES = (
     "table3_regions",
     "table4_ablation",
     "ablation_best",
+    "edges",
     "confidence",
     "stages",
     "runtime",

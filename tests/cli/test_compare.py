@@ -166,7 +166,7 @@ def test_a_scene_brings_its_view_its_truth_and_its_regions(browser: Any, tmp_pat
         point_at(page, 30, 12)
         assert float(read_out(page)["value b"]) == pytest.approx(0.04, abs=0.0011)
         rows = page.locator("table.sortable tbody tr").all_text_contents()
-        assert len(rows) == 6
+        assert len(rows) == 8
         assert any("occluded" in row for row in rows)
         page.locator(CLOUD).scroll_into_view_if_needed()
         page.wait_for_selector(f"{CLOUD}[data-points]")

@@ -26,6 +26,7 @@ def test_pictures_of_a_scene(plan: Plan, tmp_path: Path) -> None:
         "ground_truth.png",
         "occluded_ground_truth.png",
         "textureless_ground_truth.png",
+        "discontinuities_ground_truth.png",
     }
     stages = {"1_initial", "2_occlusion", "3_textureless", "4_optimize"}
     each = stages | {"error", "confidence", "occluded", "textureless", "superpixels"}

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from sepi.evaluate import COUNTS, SCORES, region_masks, score_regions
+from sepi.evaluate import COUNTS, EDGE_SCORES, SCORES, region_masks, score_regions
 from sepi.io.scores import AllScores
 from sepi.lightfield import FloatMap, LightField
 from sepi.report.page import SCRIPTS, colour_scales, embedded_scenes, environment
@@ -20,7 +20,7 @@ from sepi.report.web.viewer import viewer_json
 # part of the pixels beyond each end of the colour scale, so that a few wrong ones do not use it up
 _BEYOND = 0.005
 
-_SHOWN = ("mse100", "q25", "badpix007", "non_finite")
+_SHOWN = ("mse100", "q25", "badpix007", "fattening", "thinning", "non_finite")
 
 
 @dataclass(frozen=True)
@@ -116,7 +116,7 @@ def _score_section(found: Comparison) -> dict[str, Any] | None:
     """A table for the page: a row per protocol and region, each score of both maps, the better one marked."""
     if not found.scores:
         return None
-    heads = SCORES | COUNTS
+    heads = SCORES | EDGE_SCORES | COUNTS
     columns = [Column("protocol", Kind.TEXT), Column("region", Kind.TEXT)]
     columns += [Column(f"{heads[name]}, {title}", Kind.OURS) for name in _SHOWN for title in found.names]
     rows = []

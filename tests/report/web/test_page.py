@@ -162,7 +162,7 @@ def test_a_scene_has_every_panel(example: Example) -> None:
     assert {"reference_view", "ground_truth", "occluded_ground_truth", "textureless_ground_truth", *stages} <= cotton
     assert {"paper/error", "best/error", "best/change", "external/SPO/disparity", "external/SPO/error"} <= cotton
     assert {"paper/confidence", "best/confidence", "paper/superpixels", "paper/lti"} <= cotton
-    for kind, count in (("mask", 6), ("outline", 1), ("grey", 1)):
+    for kind, count in (("mask", 7), ("outline", 1), ("grey", 1)):
         assert sum(shown["kind"] == kind for shown in panels["cotton"].values()) == count, kind
     assert not any("external" in key for key in panels["dots"])
     without = set(panels["picture"])

@@ -1,0 +1,101 @@
+"""Depth discontinuities for evaluation, and which of two surfaces an estimate took beside them for the other.
+
+The region, and fattening and thinning, follow the idea of the measures of the HCI 4D light field benchmark [1]_ for
+discontinuities and fine structures, with definitions that need nothing but the ground truth. Estimators never see them.
+
+References
+----------
+.. [1] Honauer et al.: A dataset and evaluation methodology for depth estimation on 4D light fields. ACCV 2016.
+   doi:10.1007/978-3-319-54187-7_2
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import ndimage
+
+from sepi.lightfield import BoolMap, FloatMap
+
+LEAST_DISCONTINUITY = 0.125
+"""Difference of neighbours in pixels per view step; with 9 x 9 views, half a pixel in the farthest ones."""
+
+REACH = 2
+"""Pixels to each side of a depth discontinuity that belong to it."""
+
+
+@dataclass(frozen=True)
+class Edges:
+    """What the ground truth says of the pixels beside depth discontinuities.
+
+    Attributes
+    ----------
+    region : ndarray, shape (H, W), bool
+        Pixels up to ``REACH`` beside a depth discontinuity.
+    middle : ndarray, shape (H, W), float32
+        There, the disparity half way between the nearest and the most distant surface within ``REACH``.
+    foreground : ndarray, shape (H, W), bool
+        Pixels of the region that are nearer than that; those with ground truth that are not are background.
+    """
+
+    region: BoolMap
+    middle: FloatMap
+    foreground: BoolMap
+
+
+def edges_of(ground_truth: FloatMap) -> Edges:
+    """The depth discontinuities of a disparity map.
+
+    Parameters
+    ----------
+    ground_truth : ndarray, shape (H, W), float32
+        Disparity in pixels per view step. A pixel that is not finite has no discontinuity beside it, and is in none.
+
+    Returns
+    -------
+    Edges
+    """
+    known = np.isfinite(ground_truth)
+    beside = np.zeros(ground_truth.shape, bool)
+    for axis in (0, 1):
+        values, marked = np.moveaxis(ground_truth, axis, 0), np.moveaxis(beside, axis, 0)
+        both = np.isfinite(values[1:]) & np.isfinite(values[:-1])
+        apart = np.abs(np.subtract(values[1:], values[:-1], out=np.zeros_like(values[1:]), where=both))
+        marked[1:] |= apart > LEAST_DISCONTINUITY
+        marked[:-1] |= apart > LEAST_DISCONTINUITY
+    region = ndimage.binary_dilation(beside, np.ones((3, 3), bool), REACH - 1) & known
+    side = 2 * REACH + 1
+    nearest = ndimage.maximum_filter(np.where(known, ground_truth, -np.inf), side, mode="nearest")
+    farthest = ndimage.minimum_filter(np.where(known, ground_truth, np.inf), side, mode="nearest")
+    middle = np.full(ground_truth.shape, np.nan, np.float32)
+    middle[region] = (nearest[region] + farthest[region]) / 2
+    return Edges(region, middle, region & (ground_truth > middle))
+
+
+def fattening_and_thinning(estimate: FloatMap, edges: Edges, chosen: BoolMap) -> tuple[float, float]:
+    """How often an estimate takes one side of a depth discontinuity for the other.
+
+    Parameters
+    ----------
+    estimate : ndarray, shape (H, W), float32
+        Disparity in pixels per view step; one that is not finite is on no side.
+    edges : Edges
+    chosen : ndarray, shape (H, W), bool
+        The pixels that are looked at.
+
+    Returns
+    -------
+    fattening : float
+        Percentage of the background's pixels whose estimate is nearer than the middle; NaN where there is none.
+    thinning : float
+        Percentage of the foreground's pixels whose estimate is not as near; NaN where there is none.
+    """
+    behind = chosen & edges.region & ~edges.foreground
+    before = chosen & edges.foreground
+    return _percentage(estimate[behind] > edges.middle[behind]), _percentage(estimate[before] < edges.middle[before])
+
+
+def _percentage(flags: BoolMap) -> float:
+    return 100 * float(flags.mean()) if flags.size else math.nan
