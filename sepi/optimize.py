@@ -61,15 +61,18 @@ LEAST_SMOOTHNESS = 1e-8
 class SecondOrderParameters(BaseDetailParameters, OcclusionMarginParameters):
     """Parameters of Gauss-Newton refinement and second-order smoothing."""
 
-    views: int | None = Field(None, ge=2, description="views that are compared, at least; null: all")
+    views: int | None = Field(None, ge=2, description="views that the last step compares, at least; null: all")
+    first_views: int | None = Field(
+        25, ge=2, description="views that all steps but the last compare, at least; null: all"
+    )
     refinements: int = Field(0, ge=0, le=20, description="Gauss-Newton steps before the first smoothing")
     refinement_radius: int = Field(3, ge=0, le=20, description="window of these steps, 2 r + 1 pixels")
-    solves: int = Field(2, ge=0, le=10, description="rounds of one Gauss-Newton step and one smoothing")
-    solve_radius: int = Field(2, ge=0, le=20, description="window of the steps of these rounds, 2 r + 1 pixels")
+    solves: int = Field(4, ge=0, le=10, description="rounds of one Gauss-Newton step and one smoothing")
+    solve_radius: int = Field(1, ge=0, le=20, description="window of the steps of these rounds, 2 r + 1 pixels")
     max_update: float = Field(0.05, gt=0, description="largest change by one Gauss-Newton step, pixels per view step")
-    strength: float = Field(5.0, ge=0, description="weight of the smoothness; the best-known tenth of pixels weighs 1")
+    strength: float = Field(7.0, ge=0, description="weight of the smoothness; the best-known tenth of pixels weighs 1")
     second_difference_threshold: float = Field(
-        0.05, gt=0, description="second difference of the depth that marks a discontinuity, pixels per view step"
+        0.03, gt=0, description="second difference of the depth that marks a discontinuity, pixels per view step"
     )
     smooth_colour: float = Field(
         0.1, gt=0, description="RGB distance at which smoothness falls, colours in 0..1; noise adds to it"
@@ -130,17 +133,18 @@ def second_order(
     from sepi.matching.gauss_newton import GaussNewton, windowed_step
 
     before = require_previous(previous)
-    compared = spread_views(light_field, parameters.views)
-    matching = GaussNewton(light_field, parameters, parameters.occlusion_margin, compared)
     disparity = before.disparity
     uniform = before.mask("textureless")
     reliability = np.where(uniform, 1, reliable(before.confidence, parameters)).astype(np.float32)
     total = parameters.refinements + parameters.solves
     for i in range(total):
         progress((i + 0.5) / (total + 1))
-        smooth = i >= parameters.refinements
-        if i <= parameters.refinements:
-            # later steps are too small to change it
+        smooth, last = i >= parameters.refinements, i == total - 1
+        if i == 0 or last:
+            views = spread_views(light_field, parameters.views if last else parameters.first_views)
+            matching = GaussNewton(light_field, parameters, parameters.occlusion_margin, views)
+        if i <= parameters.refinements or last:
+            # other steps are too small to change it
             mean = matching.mean(disparity)
         gradient, curvature = matching.gradient_and_hessian(mean, disparity)
         radius = parameters.solve_radius if smooth else parameters.refinement_radius
