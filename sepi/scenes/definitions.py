@@ -123,6 +123,43 @@ def _curved_occluders() -> list[Surface]:
     ]
 
 
+def _rack() -> list[Surface]:
+    ground = Surface([everywhere()], Plane(-1.4, across=0.5), noise(40, (0.42, 0.36, 0.3), 0.1))
+    # plates that stand one behind the other, each partly hidden by the next: three depths meet where outlines cross
+    plates = []
+    for i in range(7):
+        glaze = noise(41 + i, (0.78 - 0.05 * i, 0.76, 0.6 + 0.05 * i), 0.1 if i % 2 else 0.03)
+        outline = blob(0.2 + 0.1 * i, 0.42 + 0.02 * (i % 3), 0.15)
+        plates.append(Surface([outline], Plane(-0.9 + 0.3 * i, across=-0.5, down=0.2), glaze))
+    # rods before them, with gaps of one to five pixels of 192
+    rods, left = [], 0.05
+    for i in range(28):
+        rods.append(rectangle(left, 0.62, left + 0.016, 0.93))
+        left += 0.016 + 0.005 * (1 + i % 5)
+    wood = noise(48, (0.62, 0.5, 0.38), 0.1)
+    return [ground, *plates, *(Surface([rod], Plane(1.3, down=0.3), wood) for rod in rods)]
+
+
+def _pencils() -> list[Surface]:
+    wall = Surface([everywhere()], Plane(-1.6, down=0.8), noise(50, (0.55, 0.57, 0.6), 0.02))
+    sheet = polygon((0.05, 0.06), (0.6, 0.02), (0.66, 0.5), (0.1, 0.55))
+    pencils = []
+    for i in range(11):
+        foot, tip = (0.3 + 0.04 * i, 0.8), (0.06 + 0.088 * i, 0.1 + 0.05 * (i * i % 5))
+        # some are as dark as the pot, some as bright as the wall
+        tone = 0.2 + 0.07 * (i * 3 % 11)
+        plane = Plane(0.1 + 0.14 * (i * 4 % 11), down=0.5 - 0.1 * (i % 4))
+        paint = noise(51 + i, (tone, 0.8 * tone + 0.1, 0.6 * tone + 0.15), 0.04)
+        pencils.append(Surface([thread(foot, tip, 0.016 + 0.003 * (i % 3))], plane, paint))
+    pot = polygon((0.24, 0.66), (0.78, 0.66), (0.72, 0.97), (0.3, 0.97))
+    return [
+        wall,
+        Surface([sheet], Plane(-1.2), photograph("coffee", (1.0, 1.0, 1.0), seed=62)),
+        *sorted(pencils, key=lambda pencil: pencil.plane.at_centre),
+        Surface([pot], Plane(1.9), noise(63, (0.3, 0.42, 0.5), 0.12)),
+    ]
+
+
 DEFINITIONS: dict[str, Scene] = {
     "fronto_parallel": Scene(
         "one textured plane of disparity exactly 1",
@@ -140,6 +177,8 @@ DEFINITIONS: dict[str, Scene] = {
     "curved_occluders": Scene(
         "occluders with curved outlines and a disparity discontinuity of up to 4", _curved_occluders
     ),
+    "rack": Scene("plates that hide each other, behind rods with narrow gaps", _rack),
+    "pencils": Scene("crossing pencils before paper and a wall with next to no texture", _pencils, (0.006, 0.006)),
 }
 """The built-in scenes in their order."""
 
