@@ -36,11 +36,11 @@ from pydantic import Field
 
 from sepi.image.edges import CannyParameters, canny_edges, depth_discontinuities, edge_angle
 from sepi.image.isolated_pixels import join_isolated_pixels
-from sepi.image.mixed_pixels import MixtureParameters, reassign_mixed_pixels
+from sepi.image.mixed_pixels import MixtureParameters, mixture_evidence
 from sepi.image.noise import residual_variance
 from sepi.lightfield import BoolMap, FloatMap, LightField
 from sepi.matching.plane_sweep import SweepParameters, SweepResult, sweep
-from sepi.matching.surface_shares import SurfaceShareParameters, reassign_by_shares
+from sepi.matching.surface_shares import SurfaceShareParameters, reassign_at_steps
 from sepi.matching.view_subsets import SIDES, half_planes, halves_and_quarters, spread_views
 from sepi.matching.visibility_sweep import VisibleViewsParameters, depth_from_visible_views, occluded_in_any_view
 from sepi.stage import Choice, NoParameters, Progress, StageMaps, none, require_previous
@@ -170,8 +170,8 @@ def visibility(
     before = require_previous(previous)
     result = depth_from_visible_views(light_field, before.disparity, parameters, progress)
     colours = light_field.reference_view
-    disparity = reassign_by_shares(light_field, result.disparity, parameters)
-    disparity = reassign_mixed_pixels(disparity, colours, residual_variance(colours), parameters)
+    mixture = mixture_evidence(result.disparity, colours, residual_variance(colours), parameters)
+    disparity = reassign_at_steps(light_field, result.disparity, parameters, mixture)
     disparity = join_isolated_pixels(disparity, colours, parameters.occlusion_margin)
     return before.updated(
         disparity,

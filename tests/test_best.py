@@ -7,7 +7,7 @@ import pytest
 
 from sepi.evaluate import score
 from sepi.image.isolated_pixels import join_isolated_pixels
-from sepi.image.mixed_pixels import MixtureParameters, reassign_mixed_pixels
+from sepi.image.mixed_pixels import MixtureParameters, mixture_evidence
 from sepi.lightfield import DisparityRange, LightField
 from sepi.matching.base_detail import (
     DETAIL_UNIT,
@@ -104,22 +104,25 @@ def test_a_pixel_that_stands_alone_joins_the_neighbour_of_its_colour() -> None:
     np.testing.assert_array_equal(join_isolated_pixels(slope, colours, 0.15), slope)
 
 
-def test_mixed_pixels_go_to_the_surface_that_fills_them() -> None:
+def test_mixed_pixels_are_known_by_their_colour() -> None:
     """A depth map that is one pixel too wide at an edge: the pixel there is mostly background."""
-    guide = np.full((20, 20, 3), 0.2, np.float32)
-    guide[:, 10:] = 0.8
-    guide[:, 9] = 0.2 + 0.2 * 0.6
+    near, far = np.array([0.8, 0.6, 0.5], np.float32), np.array([0.2, 0.3, 0.4], np.float32)
+    guide = np.broadcast_to(far, (20, 20, 3)).copy()
+    guide[:, 10:] = near
+    guide[:, 9] = 0.2 * near + 0.8 * far
     wide = np.zeros((20, 20), np.float32)
     wide[:, 9:] = 1
-    found = reassign_mixed_pixels(wide, guide, 0.0, MixtureParameters())
-    expected = np.zeros((20, 20), np.float32)
-    expected[:, 10:] = 1
-    np.testing.assert_allclose(found, expected, atol=1e-6)
-    # mostly foreground, or no contrast to tell by: left as it is
-    guide[:, 9] = 0.2 + 0.8 * 0.6
-    np.testing.assert_array_equal(reassign_mixed_pixels(wide, guide, 0.0, MixtureParameters()), wide)
-    flat = np.full_like(guide, 0.5)
-    np.testing.assert_array_equal(reassign_mixed_pixels(wide, flat, 0.0, MixtureParameters()), wide)
+    found = mixture_evidence(wide, guide, 0.0, MixtureParameters())
+    assert (found[:, 9] > 0.9).all()
+    assert not np.delete(found, 9, axis=1).any()
+    # in a grey picture every colour lies between two others
+    grey = np.repeat(guide.mean(axis=2, keepdims=True), 3, axis=2)
+    assert 0.1 < mixture_evidence(wide, grey, 0.0, MixtureParameters())[:, 9].max() < 0.3
+    # mostly foreground, or no contrast to tell by, or nobody asks
+    assert not mixture_evidence(wide, guide, 0.0, MixtureParameters(alpha_threshold=0)).any()
+    guide[:, 9] = 0.8 * near + 0.2 * far
+    assert not mixture_evidence(wide, guide, 0.0, MixtureParameters()).any()
+    assert mixture_evidence(wide, np.full_like(guide, 0.5), 0.0, MixtureParameters()).max() < 1e-6
 
 
 def test_a_colour_beside_all_mixtures_is_none() -> None:
@@ -129,7 +132,7 @@ def test_a_colour_beside_all_mixtures_is_none() -> None:
     guide[:, 9] = (0.3, 0.2, 0.1)
     disparity = np.zeros((20, 20), np.float32)
     disparity[:, 9:] = 1
-    np.testing.assert_array_equal(reassign_mixed_pixels(disparity, guide, 0.0, MixtureParameters()), disparity)
+    assert mixture_evidence(disparity, guide, 0.0, MixtureParameters()).max() < 1e-3
 
 
 def test_uniform_is_what_the_noise_explains() -> None:

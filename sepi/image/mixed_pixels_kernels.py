@@ -1,4 +1,4 @@
-"""Compiled loops of the decision by colour mixture (:mod:`sepi.image.mixed_pixels`)."""
+"""Compiled loops of the evidence by colour mixture (:mod:`sepi.image.mixed_pixels`)."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ import numpy as np
 from numba import njit, prange
 
 _WIDTH = 1.0  # of the window's weights, pixels
-_MOST_APART = 0.15  # squared distance of a pixel's colour from all mixtures of both sides, in units of their variance
+_APART = 0.019  # squared distance of a colour from all mixtures of both sides at which it hardly counts, in variances
+_RAMP = 0.07  # share below the threshold from which on there is no doubt
 _LEAST_WEIGHT = 0.05  # of clean pixels of each side, in pixels right beside
 
 
@@ -25,14 +26,14 @@ def _clean(disparity: Any, y: int, x: int, middle: Any, near: Any) -> bool:
 
 
 @njit(parallel=True, cache=True)
-def reassigned_pixels(
+def mixture_evidence(
     disparity: Any, guide: Any, discontinuity: Any, radius: int, contrast: Any, threshold: Any, least_variance: Any
 ) -> Any:
-    """The map whose mixed pixels belong to the surface that fills most of them; shapes (H, W) and (H, W, 3)."""
+    """How surely little of the nearer surface is in a pixel, 0..1; shapes (H, W) and (H, W, 3)."""
     H, W = disparity.shape
-    out = disparity.copy()
+    out = np.zeros((H, W), np.float32)
     for y in prange(H):
-        sums = np.empty((2, 6))  # for each side: weight, disparity, RGB, squared RGB
+        sums = np.empty((2, 5))  # for each side: weight, RGB, squared RGB
         for x in range(W):
             d = disparity[y, x]
             lowest, highest = d, d
@@ -56,23 +57,23 @@ def reassigned_pixels(
                     w = math.exp(-((row - y) ** 2 + (column - x) ** 2) / (2 * _WIDTH**2))
                     own = sums[1 if q > middle else 0]
                     own[0] += w
-                    own[1] += w * q
                     for c in range(3):
-                        own[2 + c] += w * guide[row, column, c]
-                        own[5] += w * guide[row, column, c] ** 2
+                        own[1 + c] += w * guide[row, column, c]
+                        own[4] += w * guide[row, column, c] ** 2
             if sums[0, 0] < _LEAST_WEIGHT or sums[1, 0] < _LEAST_WEIGHT:
                 continue
             distance, projection, variance, apart = 0.0, 0.0, least_variance, 0.0
             for side in range(2):
-                variance += sums[side, 5] / sums[side, 0]
+                variance += sums[side, 4] / sums[side, 0]
             for c in range(3):
-                far, near = sums[0, 2 + c] / sums[0, 0], sums[1, 2 + c] / sums[1, 0]
+                far, near = sums[0, 1 + c] / sums[0, 0], sums[1, 1 + c] / sums[1, 0]
                 distance += (near - far) ** 2
                 projection += (guide[y, x, c] - far) * (near - far)
                 apart += (guide[y, x, c] - far) ** 2
                 variance -= far * far + near * near
             # what is left of the colour beside both: a surface darker towards its edge is no mixture
-            apart -= max(projection, 0.0) ** 2 / max(distance, 1e-12)
-            if distance > contrast * variance and projection < threshold * distance and apart < _MOST_APART * variance:
-                out[y, x] = sums[0, 1] / sums[0, 0]
+            distance = max(distance, 1e-12)
+            apart -= max(projection, 0.0) ** 2 / distance
+            little = min(max(threshold - projection / distance, 0.0) / _RAMP, 1.0)
+            out[y, x] = little * distance / (distance + contrast * variance) * math.exp(-apart / (_APART * variance))
     return out

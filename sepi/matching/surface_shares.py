@@ -5,6 +5,9 @@ rest. It moves with the nearer surface: along that disparity every view ``v`` sh
 of background, ``I_v = a F + (1 - a) B_v``. Views that are not hidden show what is behind, ``B_v``, so that ``a`` and
 ``F`` follow from all views together, without any window. Where ``a`` is more than a half the pixel is near, else far.
 
+Colours of the reference view alone tell something, too (:mod:`sepi.image.mixed_pixels`): to leave the nearer surface, a
+pixel needs the votes of both, weighed against each other.
+
 Matching costs cannot tell that, since a mixed pixel fits the nearer disparity, however small its share is: without it
 surfaces are one pixel too wide, and narrow gaps between them close.
 """
@@ -34,6 +37,15 @@ _LEAST_SCALE = 0.005
 _MOST_DARKENING = 1.25
 """Ratio of brightness, either way, up to which a view is taken for another exposure of the same."""
 
+_CERTAIN = 0.0075
+"""Difference of mean costs at which shares are rather sure that a pixel is the more distant surface's; 0..1."""
+
+_MIXTURE_WEIGHT = 4.6
+"""Of the colours' vote beside that of the shares, which is -1..1."""
+
+_MAJORITY = 0.36
+"""Sum of votes with which a pixel leaves the nearer surface."""
+
 BYTES_PER_PIXEL = 4
 """Of a pixel of a view: the z-buffer."""
 
@@ -42,14 +54,17 @@ class SurfaceShareParameters(OcclusionMarginParameters):
     """Parameters of the decision by shares."""
 
     share_evidence: float = Field(
-        0.007, ge=0, le=1, description="difference of mean costs, 0..1, that moves a pixel; 1 moves none"
+        0.006,
+        ge=0,
+        le=1,
+        description="difference of mean costs, 0..1, that moves a pixel to the nearer surface; 1: shares move none",
     )
     share_step: float = Field(
         0.3, gt=0, description="depth step beside which shares are looked at, pixels per view step"
     )
     share_radius: int = Field(2, ge=1, le=10, description="distance from the step within which they are, in pixels")
     share_scale: float = Field(
-        0.17,
+        0.2,
         gt=0,
         le=2,
         description="residual at which a view counts half, as part of the difference of both surfaces' colours",
@@ -57,7 +72,9 @@ class SurfaceShareParameters(OcclusionMarginParameters):
     share_views: int = Field(81, ge=2, description="views that are compared, at least")
 
 
-def reassign_by_shares(light_field: LightField, disparity: FloatMap, parameters: SurfaceShareParameters) -> FloatMap:
+def reassign_at_steps(
+    light_field: LightField, disparity: FloatMap, parameters: SurfaceShareParameters, mixture: FloatMap | None = None
+) -> FloatMap:
     """Disparity map whose pixels beside depth steps belong to the surface that fills most of them.
 
     Parameters
@@ -66,20 +83,28 @@ def reassign_by_shares(light_field: LightField, disparity: FloatMap, parameters:
     disparity : ndarray, shape (H, W), float32
         Pixels per view step.
     parameters : SurfaceShareParameters
+    mixture : ndarray, shape (H, W), float32, optional
+        How surely colours say that a pixel is not the nearer surface's, 0..1.
 
     Returns
     -------
     ndarray, shape (H, W), float32
     """
-    if parameters.share_evidence == 1:
+    by_shares = parameters.share_evidence < 1
+    if not by_shares and mixture is None:
         return disparity
     from sepi.matching.depth_step_kernels import rim_of
 
     rim: Rim = rim_of(disparity, parameters.share_radius, parameters.share_step)
     if not rim.inside.any():
         return disparity
-    evidence = _evidence(light_field, disparity, rim, parameters)
-    return np.where(evidence > parameters.share_evidence, np.where(rim.is_near, rim.far, rim.near), disparity)
+    evidence = _evidence(light_field, disparity, rim, parameters) if by_shares else np.zeros_like(disparity)
+    votes = np.tanh(evidence / np.float32(_CERTAIN))
+    if mixture is not None:
+        votes += np.float32(_MIXTURE_WEIGHT) * mixture
+    leaves = rim.is_near & rim.inside & (votes > _MAJORITY)
+    joins = ~rim.is_near & (evidence > parameters.share_evidence)
+    return np.where(leaves, rim.far, np.where(joins, rim.near, disparity))
 
 
 def _evidence(light_field: LightField, disparity: FloatMap, rim: Rim, parameters: SurfaceShareParameters) -> FloatMap:

@@ -14,7 +14,7 @@ from sepi.lightfield import LightField
 from sepi.matching import surface_shares_kernels as kernels
 from sepi.matching.depth_step_kernels import Rim, rim_of
 from sepi.matching.row_bands import band_memory
-from sepi.matching.surface_shares import SurfaceShareParameters, reassign_by_shares
+from sepi.matching.surface_shares import SurfaceShareParameters, reassign_at_steps
 from sepi.matching.visibility_kernels import z_buffers
 from sepi.scenes import render
 
@@ -37,14 +37,14 @@ def test_edges_are_found_again(name: str, change: str) -> None:
     changed = (cv2.dilate if change == "too wide" else cv2.erode)(truth, AROUND)
     before = wrong(changed, truth)
     assert before > 500
-    assert wrong(reassign_by_shares(scene, changed, USUAL), truth) < 0.35 * before
+    assert wrong(reassign_at_steps(scene, changed, USUAL), truth) < 0.35 * before
 
 
 @pytest.mark.parametrize("name", ["stripes", "curved_occluders", "dots", "slanted_plane", "pyramids"])
 def test_what_is_right_stays(name: str) -> None:
     scene = render(name, size=128)
     assert scene.ground_truth is not None
-    assert wrong(reassign_by_shares(scene, scene.ground_truth, USUAL), scene.ground_truth) < 0.01 * 128**2
+    assert wrong(reassign_at_steps(scene, scene.ground_truth, USUAL), scene.ground_truth) < 0.01 * 128**2
 
 
 def test_one_asks_for_more_than_there_can_be() -> None:
@@ -52,7 +52,23 @@ def test_one_asks_for_more_than_there_can_be() -> None:
     scene = render("stripes", size=64)
     assert scene.ground_truth is not None
     wide = cv2.dilate(scene.ground_truth, AROUND)
-    assert reassign_by_shares(scene, wide, SurfaceShareParameters(share_evidence=1)) is wide
+    assert reassign_at_steps(scene, wide, SurfaceShareParameters(share_evidence=1)) is wide
+
+
+def test_colours_have_a_vote() -> None:
+    """Where views tell nothing, colours decide; without doubt, the views decide."""
+    scene = render("stripes", size=64)
+    truth = scene.ground_truth
+    assert truth is not None
+    wide = cv2.dilate(truth, AROUND)
+    added = ((wide - truth) > 0.3).astype(np.float32)
+    alone = SurfaceShareParameters(share_evidence=1)
+    assert wrong(reassign_at_steps(scene, wide, alone, added), truth) < 0.1 * wrong(wide, truth)
+    np.testing.assert_array_equal(reassign_at_steps(scene, wide, alone, np.zeros_like(wide)), wide)
+    # colours that hint at half of it do not move what views say
+    by_views = reassign_at_steps(scene, wide, USUAL)
+    hinted = reassign_at_steps(scene, wide, USUAL, np.full_like(wide, 0.05))
+    assert wrong(hinted, by_views) < 0.1 * wrong(wide, by_views)
 
 
 def edge(rim: float, background: float = 0.0) -> tuple[LightField, npt.NDArray[np.float32]]:
@@ -85,7 +101,7 @@ def test_a_surface_darker_towards_its_edge_keeps_it(background: float) -> None:
     """Silhouettes of round things are darker: as shares of the bright surface they would be lost."""
     field, truth = edge(rim=0.55, background=background)
     inner = np.s_[4:-4]
-    assert wrong(reassign_by_shares(field, truth, USUAL)[inner], truth[inner]) == 0
+    assert wrong(reassign_at_steps(field, truth, USUAL)[inner], truth[inner]) == 0
 
 
 @pytest.mark.parametrize("background", [0.0, 0.1, 0.3])
@@ -95,7 +111,7 @@ def test_a_surface_one_pixel_too_wide_gets_its_edge_back(background: float) -> N
     wide = cv2.dilate(truth, AROUND)
     inner = np.s_[6:-6]
     assert wrong(wide[inner], truth[inner]) == 28
-    assert wrong(reassign_by_shares(field, wide, USUAL)[inner], truth[inner]) == 0
+    assert wrong(reassign_at_steps(field, wide, USUAL)[inner], truth[inner]) == 0
 
 
 @pytest.mark.parametrize("factor", [0.15, 1.15])
@@ -111,7 +127,7 @@ def test_dark_views_and_other_exposures_do_no_harm(factor: float) -> None:
         views = np.rint(views).astype(scene.views.dtype)
     changed = LightField(views, "changed")
     before = wrong(wide, scene.ground_truth)
-    assert wrong(reassign_by_shares(changed, wide, USUAL), scene.ground_truth) < 0.4 * before
+    assert wrong(reassign_at_steps(changed, wide, USUAL), scene.ground_truth) < 0.4 * before
 
 
 @pytest.mark.parametrize("geometry", GEOMETRIES)
@@ -123,15 +139,15 @@ def test_grey_bands_and_threads_change_nothing(geometry: str) -> None:
     grey = np.rint(scene.views[2:7, 2:7].mean(axis=4, keepdims=True)).astype(np.uint8)
     field = LightField(grey, "grey", **standing(geometry, (5, 5)))
     threefold = LightField(np.repeat(grey, 3, axis=4), "grey", **standing(geometry, (5, 5)))
-    expected = reassign_by_shares(field, wide, USUAL)
+    expected = reassign_at_steps(field, wide, USUAL)
     assert (expected != wide).any()
-    np.testing.assert_array_equal(reassign_by_shares(threefold, wide, USUAL), expected)
+    np.testing.assert_array_equal(reassign_at_steps(threefold, wide, USUAL), expected)
     with band_memory(1):
-        np.testing.assert_array_equal(reassign_by_shares(field, wide, USUAL), expected)
+        np.testing.assert_array_equal(reassign_at_steps(field, wide, USUAL), expected)
     threads = several_threads()
     numba.set_num_threads(1)
     try:
-        np.testing.assert_array_equal(reassign_by_shares(field, wide, USUAL), expected)
+        np.testing.assert_array_equal(reassign_at_steps(field, wide, USUAL), expected)
     finally:
         numba.set_num_threads(threads)
 
