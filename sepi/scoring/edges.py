@@ -15,7 +15,6 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import ndimage
 
 from sepi.lightfield import BoolMap, FloatMap
 
@@ -57,6 +56,9 @@ def edges_of(ground_truth: FloatMap) -> Edges:
     -------
     Edges
     """
+    # slow to import, and not needed for the tables
+    from scipy import ndimage
+
     known = np.isfinite(ground_truth)
     beside = np.zeros(ground_truth.shape, bool)
     for axis in (0, 1):

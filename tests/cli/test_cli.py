@@ -238,7 +238,9 @@ def test_evaluate_scores_a_result_against_its_scene(pyramids: Path, result: Path
     lines = called.stdout.splitlines()
     assert lines[0].split()[:3] == ["protocol", "region", "MSE"]
     assert [line.split()[:2] for line in lines[1:]] == [
-        [protocol, region] for protocol in ("paper", "benchmark") for region in ("all", "occluded", "textureless")
+        [protocol, region]
+        for protocol in ("paper", "benchmark")
+        for region in ("all", "occluded", "textureless", "discontinuities")
     ]
 
 
