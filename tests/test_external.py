@@ -163,7 +163,7 @@ class TestFile:
         assert without_nan(back["SPO"].evaluation.scores) == without_nan(external.evaluation.scores)
         np.testing.assert_array_equal(back["SPO"].disparity, estimate)
         np.testing.assert_array_equal(back["SPO"].evaluation.error, external.evaluation.error)
-        assert set(back["SPO"].evaluation.regions) == {"occluded", "textureless"}
+        assert set(back["SPO"].evaluation.regions) == {"occluded", "textureless", "discontinuities"}
         write_external(tmp_path / "b.h5", maps)
         assert (tmp_path / "a.h5").read_bytes() == (tmp_path / "b.h5").read_bytes()
 
