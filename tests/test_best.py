@@ -61,7 +61,9 @@ def test_gloss_does_not_move_faint_texture() -> None:
 
 
 # 100 x MSE of variant best on scenes that are edges for the most part
-EDGE_BOUNDS = {"fine_structures": 2.8, "stripes": 0.7, "curved_occluders": 1.8, "dots": 0.8}
+EDGE_BOUNDS = {
+    "fine_structures": 2.8, "stripes": 0.65, "curved_occluders": 1.8, "dots": 0.75, "rack": 11.5, "pencils": 3.3,
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", EDGE_BOUNDS)

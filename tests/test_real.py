@@ -62,7 +62,7 @@ def test_range_is_found_without_truth_or_parameters(hci: Path) -> None:
 
 
 # MSE x100, Q25 x100 and BadPix 0.07 % on the whole map
-BEST_BOUNDS = {"cotton": (0.25, 0.09, 0.7), "antinous": (1.3, 0.20, 3.6)}
+BEST_BOUNDS = {"cotton": (0.24, 0.09, 0.65), "antinous": (1.25, 0.18, 3.0)}
 
 
 @pytest.mark.parametrize("name", BEST_BOUNDS)

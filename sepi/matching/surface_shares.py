@@ -5,11 +5,11 @@ rest. It moves with the nearer surface: along that disparity every view ``v`` sh
 of background, ``I_v = a F + (1 - a) B_v``. Views that are not hidden show what is behind, ``B_v``, so that ``a`` and
 ``F`` follow from all views together, without any window. Where ``a`` is more than a half the pixel is near, else far.
 
-Colours of the reference view alone tell something, too (:mod:`sepi.image.mixed_pixels`): to leave the nearer surface, a
-pixel needs the votes of both, weighed against each other.
-
 Matching costs cannot tell that, since a mixed pixel fits the nearer disparity, however small its share is: without it
 surfaces are one pixel too wide, and narrow gaps between them close.
+
+The colours of the reference view alone tell something, too (:mod:`sepi.image.mixed_pixels`): whether a pixel leaves the
+nearer surface is voted on by both.
 """
 
 from __future__ import annotations
