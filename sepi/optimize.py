@@ -80,7 +80,8 @@ class SecondOrderParameters(BaseDetailParameters, OcclusionMarginParameters):
     reliable_confidence: float = Field(
         0.5, gt=0, le=1, description="confidence within two pixels from which discontinuities in the data are believed"
     )
-    rtol: float = Field(3e-4, gt=0, lt=1, description="relative residual at which the solver stops")
+    rtol: float = Field(3e-4, gt=0, lt=1, description="relative residual at which the last round's solver stops")
+    first_rtol: float = Field(3e-3, gt=0, lt=1, description="the same for all rounds before it")
     max_iterations: int = Field(200, ge=1, description="iterations after which the solver stops anyway")
 
     @model_validator(mode="after")
@@ -154,7 +155,10 @@ def second_order(
         if smooth:
             weight = np.minimum(curvature / max(float(np.percentile(curvature, 90)), 1e-9), 1) * reliability
             weight = np.where(uniform, np.float32(UNIFORM_WEIGHT), weight)
-            target = smooth_second_order(target, disparity, weight, reliability, light_field.reference_view, parameters)
+            rtol = parameters.rtol if last else parameters.first_rtol
+            target = smooth_second_order(
+                target, disparity, weight, reliability, light_field.reference_view, parameters, rtol
+            )
         disparity = target
     return before.updated(disparity, smooth_confidence(disparity, curvature))
 
@@ -193,9 +197,10 @@ def smooth_second_order(
     reliability: FloatMap,
     guide: FloatMap,
     parameters: SecondOrderParameters,
+    rtol: float,
 ) -> FloatMap:
     """Second-order smoothing of ``target``, whose discontinuities are looked for in ``shape``; all shapes (H, W), but
-    for the colours ``guide``, (H, W, 3).
+    for the colours ``guide``, (H, W, 3). The solver stops at the relative residual ``rtol``.
     """
     from sepi.regularization.second_order import second_difference_stencil, smoothness_weights, solve_smooth
 
@@ -203,7 +208,7 @@ def smooth_second_order(
     weights = smoothness_weights(shape, guide, reliability, parameters.second_difference_threshold, variance)
     weights = [parameters.strength * w + LEAST_SMOOTHNESS for w in weights]
     stencil = second_difference_stencil(weights, target.shape)
-    return solve_smooth(stencil, weight, target, parameters.rtol, parameters.max_iterations)
+    return solve_smooth(stencil, weight, target, rtol, parameters.max_iterations)
 
 
 CHOICES = {
