@@ -117,6 +117,7 @@ def score_regions(
     ground_truth: FloatMap,
     masks: Mapping[str, BoolMap] | None = None,
     protocols: Mapping[str, int] = PROTOCOLS,
+    edges: Edges | None = None,
 ) -> AllScores:
     """Scores of a disparity map by every protocol and over every region.
 
@@ -128,6 +129,8 @@ def score_regions(
         Those of :func:`region_masks`; without them the regions are the whole map and the discontinuities.
     protocols : mapping of str to int
         Protocol to the pixels left out on each side.
+    edges : Edges, optional
+        Those of the ground truth, which are found unless given.
 
     Returns
     -------
@@ -140,7 +143,7 @@ def score_regions(
     SepiError
         If shapes differ.
     """
-    edges = edges_of(ground_truth)
+    edges = edges or edges_of(ground_truth)
     regions: dict[str, BoolMap | None] = {WHOLE_MAP: None, **(masks or {DISCONTINUITIES: edges.region})}
     return {
         protocol: {name: score(estimate, ground_truth, border, mask, edges) for name, mask in regions.items()}
@@ -174,9 +177,10 @@ def evaluations_of(light_field: LightField, maps: Mapping[str, FloatMap]) -> dic
     masks = region_masks(light_field)
     sources = {name: "scene" if name in light_field.masks else "computed" for name in masks}
     sources[DISCONTINUITIES] = "computed"
+    edges = edges_of(light_field.ground_truth)
     return {
         name: Evaluation(
-            scores=score_regions(disparity, light_field.ground_truth, masks),
+            scores=score_regions(disparity, light_field.ground_truth, masks, edges=edges),
             error=_error(disparity, light_field.ground_truth),
             regions=masks,
             region_sources=sources,

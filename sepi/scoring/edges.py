@@ -82,7 +82,7 @@ def fattening_and_thinning(estimate: FloatMap, edges: Edges, chosen: BoolMap) ->
     Parameters
     ----------
     estimate : ndarray, shape (H, W), float32
-        Disparity in pixels per view step; one that is not finite is on no side.
+        Disparity in pixels per view step; NaN is on no side.
     edges : Edges
     chosen : ndarray, shape (H, W), bool
         The pixels that are looked at.
