@@ -9,7 +9,7 @@ import numpy as np
 from numba import njit, prange
 
 _WIDTH = 1.0  # of the window's weights, pixels
-_APART = 0.019  # squared distance of a colour from all mixtures of both sides at which it hardly counts, in variances
+_APART = 0.019  # squared distance of a colour from all mixtures at which it counts 1/e, in units of their variance
 _RAMP = 0.07  # share below the threshold from which on there is no doubt
 _LEAST_WEIGHT = 0.05  # of clean pixels of each side, in pixels right beside
 

@@ -75,14 +75,16 @@ def bytes_of_bands(light_field: LightField, stages: Iterable[Parameters], memory
 
 def _bytes_taken(light_field: LightField, stages: Iterable[Parameters]) -> tuple[int, int]:
     """What is held as a whole, and that with the narrowest bands."""
-    # here, since it loads what compiles
-    from sepi.matching.gauss_newton import BYTES_PER_PIXEL
-
     stages = list(stages)
     height, width = light_field.shape
     sweeps = [p.fewer(light_field, p.finest_sampling) for p in stages if isinstance(p, VisibilitySweepParameters)]
     volume = BYTES_PER_CANDIDATE * max(sweeps, default=0)
     whole = _LIBRARIES + light_field.views.nbytes + round((volume + _BYTES_OF_MAPS) * height * width)
     in_bands = any(isinstance(p, (BaseDetailParameters, OcclusionMarginParameters)) for p in stages)
+    if not in_bands:
+        return whole, whole
+    # here, since it loads what compiles
+    from sepi.matching.gauss_newton import BYTES_PER_PIXEL
+
     # the optimisation holds most of a pixel
-    return whole, whole + (least_band_bytes(light_field, BYTES_PER_PIXEL) if in_bands else 0)
+    return whole, whole + least_band_bytes(light_field, BYTES_PER_PIXEL)
