@@ -128,6 +128,12 @@ def parameters_of(stage):
     return lambda wildcards: known[wildcards[stage]]
 
 
+def code_of(stage):
+    """Function of wildcards: the digest of the code that a stage's choice runs."""
+    known = {name: code_digest(*stage_modules(stage, choice)) for name, choice in STAGES[stage].items()}
+    return lambda wildcards: known[choice_of(wildcards[stage])]
+
+
 def scene_of(wildcards):
     """The scene that a rule's wildcards name."""
     return SETTINGS.scene(wildcards.dataset, wildcards.scene)

@@ -18,7 +18,7 @@ rule initial:
     params:
         choice=choice_for("initial"),
         parameters=parameters_of("initial"),
-        code=code_digest(*stage_modules("initial")),
+        code=code_of("initial"),
     message:
         stage_message("initial", "initial depth")
     shell:

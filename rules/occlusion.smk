@@ -19,7 +19,7 @@ rule occlusion:
     params:
         choice=choice_for("occlusion"),
         parameters=parameters_of("occlusion"),
-        code=code_digest(*stage_modules("occlusion")),
+        code=code_of("occlusion"),
     message:
         stage_message("occlusion", "occlusion")
     shell:

@@ -19,7 +19,7 @@ rule optimize:
     params:
         choice=choice_for("optimize"),
         parameters=parameters_of("optimize"),
-        code=code_digest(*stage_modules("optimize")),
+        code=code_of("optimize"),
     message:
         stage_message("optimize", "global optimisation")
     shell:

@@ -19,7 +19,7 @@ rule textureless:
     params:
         choice=choice_for("textureless"),
         parameters=parameters_of("textureless"),
-        code=code_digest(*stage_modules("textureless")),
+        code=code_of("textureless"),
     message:
         stage_message("textureless", "textureless regions")
     shell:

@@ -34,6 +34,7 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import Field
 
+from sepi.compared.methods import choices_of
 from sepi.image.edges import CannyParameters, canny_edges, depth_discontinuities, edge_angle
 from sepi.image.isolated_pixels import join_isolated_pixels
 from sepi.image.mixed_pixels import MixtureParameters, mixture_evidence
@@ -277,6 +278,7 @@ CHOICES = {
     "wang": Choice(WangParameters, wang),
     "visibility": Choice(VisibilityParameters, visibility),
     "none": Choice(NoParameters, none),
+    **choices_of("occlusion"),
 }
 
 if __name__ == "__main__":

@@ -23,6 +23,7 @@ import cv2
 import numpy as np
 from pydantic import Field, model_validator
 
+from sepi.compared.methods import choices_of
 from sepi.image.noise import residual_variance
 from sepi.lightfield import FloatMap, LightField
 from sepi.matching.base_detail import BaseDetailParameters
@@ -215,6 +216,7 @@ CHOICES = {
     "wls": Choice(WlsParameters, wls),
     "second_order": Choice(SecondOrderParameters, second_order),
     "none": Choice(NoParameters, none),
+    **choices_of("optimize"),
 }
 
 if __name__ == "__main__":

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from sepi import initial, occlusion, optimize, textureless
+from sepi.compared import methods
 from sepi.errors import SepiError
 from sepi.lightfield import LightField
 from sepi.matching.memory_limit import bytes_of_bands, require_memory_of
@@ -189,10 +190,12 @@ VARIANT_ENTRIES: dict[str, dict[str, Any]] = {
     "best_no_planes": {"base": "best", "textureless": "none"},
     "best_no_smoothing": {"base": "best", "optimize": {"refinements": 3, "solves": 0}},
     "best_wls": {"base": "best", "optimize": "wls"},
+    **methods.VARIANT_ENTRIES,
 }
 """The built-in variants as :func:`variant_from` reads them: the paper's method, the other four columns of its table 4
 in their order, and the text's other occlusion stage; then the most accurate variant, a quick one, and the most accurate
-one with one part switched off or put back to the paper's."""
+one with one part switched off or put back to the paper's; then the compared methods
+(:mod:`sepi.compared`)."""
 
 DEFAULT_VARIANT = "best"
 """Variant of ``sepi depth``."""

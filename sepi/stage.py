@@ -49,6 +49,34 @@ class OcclusionMarginParameters(Parameters):
 
 
 @dataclass(frozen=True)
+class CostVolume:
+    """What each candidate disparity costs each pixel, for a later stage that chooses among all of them.
+
+    Attributes
+    ----------
+    disparities : ndarray, shape (K,), float32
+        The candidates, rising and uniform, pixels per view step.
+    costs : ndarray, shape (K, H, W), float16
+        Finite, less is better. Half precision, since every scene's file holds one; make costs range over about 0..1.
+
+    Raises
+    ------
+    SepiError
+        If the shapes or dtypes are not as above.
+    """
+
+    disparities: FloatMap
+    costs: npt.NDArray[np.float16]
+
+    def __post_init__(self) -> None:
+        if self.costs.ndim != 3 or self.costs.dtype != np.float16 or self.disparities.shape != self.costs.shape[:1]:
+            raise SepiError(
+                f"cost volume: expected (K,) disparities and (K, H, W) costs of float16, got {self.disparities.shape} "
+                f"and {self.costs.shape} of {self.costs.dtype}"
+            )
+
+
+@dataclass(frozen=True)
 class StageMaps:
     """What a stage hands on.
 
@@ -62,12 +90,15 @@ class StageMaps:
         Maps of this stage and of those before it (``occluded``, ``view_subset``, ``superpixels``, ...).
     subset_names : tuple of str
         What the values of the map ``view_subset`` stand for, from 0 on; empty without such a map.
+    cost_volume : CostVolume or None
+        Of a data cost that a later stage regularises; that stage hands on none.
     """
 
     disparity: FloatMap
     confidence: FloatMap
     extra: Mapping[str, npt.NDArray[Any]] = field(default_factory=dict)
     subset_names: tuple[str, ...] = ()
+    cost_volume: CostVolume | None = None
 
     def all(self) -> dict[str, npt.NDArray[Any]]:
         """Every map by name."""
@@ -82,6 +113,10 @@ class StageMaps:
     def updated(self, disparity: FloatMap, confidence: FloatMap, **extra: npt.NDArray[Any]) -> StageMaps:
         """These maps with a new disparity and confidence and further maps."""
         return replace(self, disparity=disparity, confidence=confidence, extra={**self.extra, **extra})
+
+    def without_costs(self) -> StageMaps:
+        """These maps without the cost volume: what is handed on where nobody will choose among its candidates."""
+        return replace(self, cost_volume=None)
 
 
 StageFunction = Callable[[LightField, StageMaps | None, Any, Progress], StageMaps]
@@ -121,6 +156,23 @@ def require_previous(previous: StageMaps | None) -> StageMaps:
     if previous is None:
         raise SepiError("this stage refines a depth map: the maps of the stage before it are missing")
     return previous
+
+
+def require_costs(previous: StageMaps | None) -> tuple[StageMaps, CostVolume]:
+    """The maps of the stage before and their cost volume, for a stage that chooses among its candidates.
+
+    Raises
+    ------
+    SepiError
+        If there is none.
+    """
+    before = require_previous(previous)
+    if before.cost_volume is None:
+        raise SepiError(
+            "this stage chooses among the candidates of a cost volume, and the stages before it hand on none; see "
+            "docs/compared.md for those that do"
+        )
+    return before, before.cost_volume
 
 
 def relative_confidence(confidence: FloatMap) -> FloatMap:

@@ -4,7 +4,8 @@ A file begins with a digest of all that follows it (in what HDF5 calls the user 
 that damage is told before anything is made of it: HDF5 itself may read other numbers, crash, or hang.
 
 A stage file holds ``disparity (H, W) float32`` in pixels per view step, ``confidence (H, W) float32`` in 0..1, the
-stage's own maps, and attributes that say what made them. Equal content gives equal bytes.
+stage's own maps, and attributes that say what made them; where a later stage is to choose among candidates, their costs
+``cost_volume (K, H, W) float16`` and ``candidates (K,) float32``, too. Equal content gives equal bytes.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ from sepi.camera import Camera
 from sepi.errors import SepiError, printable
 from sepi.io.files import atomic_path, reading
 from sepi.lightfield import RANGE_SOURCES, DisparityRange, LightField
-from sepi.stage import StageMaps
+from sepi.stage import CostVolume, StageMaps
 from sepi.validation import require_known
 
 Attribute = str | float | int | tuple[float, float]
@@ -41,6 +42,9 @@ _BLOCK = 512
 _MARK = b"sepi sha256 "
 # seconds in which an attribute must be read
 _PATIENCE = 1
+
+# datasets of a cost volume
+_COSTS, _CANDIDATES = "cost_volume", "candidates"
 
 UNITS = {"disparity": "pixels per view step", "confidence": "0..1", "depth": "metres"}
 
@@ -57,6 +61,11 @@ def write_stage(path: Path, maps: StageMaps, attributes: Mapping[str, Attribute]
                 dataset.attrs["units"] = UNITS[name]
             if name == "view_subset":
                 dataset.attrs["names"] = [_fixed(subset) for subset in maps.subset_names]
+        if maps.cost_volume is not None:
+            # half precision hardly compresses
+            file.create_dataset(_COSTS, data=maps.cost_volume.costs)
+            file.create_dataset(_CANDIDATES, data=maps.cost_volume.disparities)
+            file[_CANDIDATES].attrs["units"] = UNITS["disparity"]
         for key, value in attributes.items():
             file.attrs[key] = value
 
@@ -67,7 +76,8 @@ def read_stage(path: Path) -> StageMaps:
         maps = {name: read_dataset(path, file[name]) for name in file}
         subset = file.get("view_subset")
         names = () if subset is None else tuple(name.decode() for name in attribute(subset, "names"))
-        return StageMaps(maps.pop("disparity"), maps.pop("confidence"), maps, names)
+        volume = CostVolume(maps.pop(_CANDIDATES), maps.pop(_COSTS)) if _COSTS in maps else None
+        return StageMaps(maps.pop("disparity"), maps.pop("confidence"), maps, names, volume)
 
 
 def read_attributes(path: Path, check: bool = True) -> dict[str, Any]:

@@ -10,6 +10,8 @@ Snakemake sees the shell command of a rule, not the modules that the command imp
 - not what stands below ``if TYPE_CHECKING:``, which never runs;
 - not the ``__init__`` of a package on the way to a module: it is run, but nothing of it is used. It counts where a name
   is imported from the package itself;
+- not the methods below ``sepi.compared``, many of which a stage can run: only the one that it does run counts, which
+  :func:`stage_modules` names;
 - the syntax tree without docstrings: neither comments nor layout count;
 - not other libraries: a new version of numpy reruns nothing.
 
@@ -24,6 +26,10 @@ from collections.abc import Iterator
 from functools import cache
 from importlib.util import resolve_name
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from sepi.stage import Choice
 
 ROOT = Path(__file__).parents[2]
 
@@ -32,9 +38,15 @@ _DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
 _NOT_RUN = ("TYPE_CHECKING", "__name__ == '__main__'")
 
 
-def stage_modules(stage: str) -> tuple[str, ...]:
-    """Modules that decide, with what they import, what is in a stage's file: the stage, and the format of the file."""
-    return (f"sepi.{stage}", "sepi.io.hdf5", "sepi.io.provenance")
+# a package of methods of which a job runs one
+_ALTERNATIVES = "compared"
+
+
+def stage_modules(stage: str, choice: Choice) -> tuple[str, ...]:
+    """Modules that decide, with what they import, what is in a stage's file: the stage, the module of the choice that
+    it runs, and the format of the file.
+    """
+    return (f"sepi.{stage}", choice.run.__module__, "sepi.io.hdf5", "sepi.io.provenance")
 
 
 @cache
@@ -72,8 +84,13 @@ def imported_modules(*modules: str, root: Path = ROOT) -> set[str]:
         name = waiting.pop()
         if name not in found:
             found.add(name)
-            waiting.extend(_code_and_imports(name, root)[1])
+            followed = _code_and_imports(name, root)[1]
+            waiting.extend(other for other in followed if _is_alternative(name) or not _is_alternative(other))
     return found
+
+
+def _is_alternative(module: str) -> bool:
+    return _ALTERNATIVES in module.split(".")[1:2]
 
 
 @cache

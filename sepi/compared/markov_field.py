@@ -1,0 +1,67 @@
+"""The multi-label optimisation that several compared methods end with, a choice of the global optimisation.
+
+``markov_field`` takes the cost volume of the stage before and gives each pixel the candidate that minimises data costs
+and truncated linear smoothness, weaker across edges of the reference view. The methods' authors minimise such energies
+by graph cuts; here it is message passing (:mod:`sepi.regularization.message_passing`, which says why).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from pydantic import Field
+
+from sepi.lightfield import LightField
+from sepi.matching.cost_volumes import disparity_of, distinctness
+from sepi.regularization.message_passing import contrast_weights, labels_of_least_energy
+from sepi.stage import Choice, Parameters, Progress, StageMaps, require_costs
+
+
+class MarkovFieldParameters(Parameters):
+    """Parameters of the multi-label optimisation."""
+
+    smoothness: float = Field(0.02, ge=0, description="cost of a change by a hundredth of the disparity range")
+    truncation: float = Field(
+        0.1, gt=0, le=1, description="change from which a further one costs no more, part of the disparity range"
+    )
+    contrast: float = Field(
+        0.05, gt=0, description="mean difference of colours at which smoothness falls to 1/e, colours in 0..1"
+    )
+    iterations: int = Field(8, ge=1, le=100, description="passes of the messages, forth and back")
+
+
+def markov_field(
+    light_field: LightField, previous: StageMaps | None, parameters: MarkovFieldParameters, progress: Progress
+) -> StageMaps:
+    """Candidates of least energy.
+
+    Parameters
+    ----------
+    light_field : LightField
+    previous : StageMaps
+        With a cost volume.
+    parameters : MarkovFieldParameters
+    progress : callable
+
+    Returns
+    -------
+    StageMaps
+        Without the cost volume.
+
+    Raises
+    ------
+    SepiError
+        If there is no cost volume.
+    """
+    before, volume = require_costs(previous)
+    across, down = contrast_weights(light_field.reference_view, parameters.contrast)
+    intervals = len(volume.disparities) - 1
+    weight = np.float32(parameters.smoothness * 100 / intervals)
+    labels = labels_of_least_energy(
+        volume.costs, weight * across, weight * down, parameters.truncation * intervals, parameters.iterations
+    )
+    progress(1.0)
+    maps = before.updated(disparity_of(volume, labels), distinctness(volume, labels))
+    return maps.without_costs()
+
+
+CHOICES = {"optimize": {"markov_field": Choice(MarkovFieldParameters, markov_field)}}

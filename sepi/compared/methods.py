@@ -1,0 +1,32 @@
+"""The compared methods' choices of the stages, and their variants: the one list of them.
+
+A method's module defines ``CHOICES``, for each stage the choices that it adds, and ``VARIANT``, the entry that
+:func:`sepi.pipeline.variant_from` reads. The workflow runs a job again when the module of its choice changes, or one
+that this imports, not when another method does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import ModuleType
+from typing import Any
+
+from sepi.compared import guided_costs, markov_field
+from sepi.stage import Choice
+
+METHODS: dict[str, ModuleType] = {}
+"""Variant to the method's module, in the order of the tables."""
+
+_SHARED = (guided_costs, markov_field)
+
+VARIANT_ENTRIES: dict[str, dict[str, Any]] = {name: module.VARIANT for name, module in METHODS.items()}
+"""The variants, as the pipeline has its own."""
+
+
+def choices_of(stage: str) -> Mapping[str, Choice]:
+    """What the methods add to the choices of a stage."""
+    return {
+        name: choice
+        for module in (*METHODS.values(), *_SHARED)
+        for name, choice in module.CHOICES.get(stage, {}).items()
+    }

@@ -1,0 +1,40 @@
+"""Weighted median of a map in a window, its weights narrow in the guide's colours [1]_.
+
+It takes outliers and rough edges out of a disparity map and makes no value that was not there.
+
+References
+----------
+.. [1] Ma, He, Wei, Sun, Wu: Constant time weighted median filtering for stereo matching and beyond. ICCV 2013.
+   doi:10.1109/ICCV.2013.13
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sepi.lightfield import FloatMap
+
+
+def weighted_median(values: FloatMap, guide: FloatMap, radius: int, sigma: float, weight: FloatMap) -> FloatMap:
+    """The value in each window at which half of the weight lies below.
+
+    Parameters
+    ----------
+    values : ndarray, shape (H, W), float32
+    guide : ndarray, shape (H, W, 3), float32
+        Colours in 0..1.
+    radius : int
+        The window is ``2 radius + 1`` pixels wide; at the picture's border it is cut.
+    sigma : float
+        RGB distance at which a pixel's weight falls to ``exp(-1/2)``, colours in 0..1.
+    weight : ndarray, shape (H, W), float32
+        Of each pixel by itself, not negative: its confidence; ones where there is none. The pixel in the middle of a
+        window keeps its value where the window has no weight at all.
+
+    Returns
+    -------
+    ndarray, shape (H, W), float32
+    """
+    from sepi.image.weighted_median_kernels import weighted_medians
+
+    return np.asarray(weighted_medians(values, guide, radius, sigma, weight))

@@ -1,0 +1,58 @@
+"""From a cost volume to a map: the candidate of each pixel, a sub-candidate value, and how sure that is."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from sepi.lightfield import FloatMap
+from sepi.stage import CostVolume
+
+
+def least_costs(volume: CostVolume) -> npt.NDArray[np.int64]:
+    """Number of the candidate of least cost of each pixel; shape (H, W)."""
+    return np.asarray(np.argmin(volume.costs, axis=0))
+
+
+def disparity_of(volume: CostVolume, labels: npt.NDArray[np.int64]) -> FloatMap:
+    """Disparity of the chosen candidates, refined by the parabola through the costs of each and its two neighbours.
+
+    Parameters
+    ----------
+    volume : CostVolume
+    labels : ndarray, shape (H, W), int64
+        Numbers of candidates.
+
+    Returns
+    -------
+    ndarray, shape (H, W), float32
+        Pixels per view step. A candidate at an end of the range, or one that is no minimum, stays as it is.
+    """
+    below, here, above = _costs_round(volume, labels)
+    curvature = below - 2 * here + above
+    offset = np.where(curvature > 0, (below - above) / (2 * np.where(curvature > 0, curvature, 1)), 0)
+    inner = (labels > 0) & (labels < len(volume.disparities) - 1) & (here <= below) & (here <= above)
+    step = volume.disparities[1] - volume.disparities[0]
+    return np.asarray(volume.disparities[labels] + step * np.where(inner, offset, 0), np.float32)
+
+
+def distinctness(volume: CostVolume, labels: npt.NDArray[np.int64]) -> FloatMap:
+    """How far the chosen candidates' costs lie below the mean over all, as part of that mean; 0..1, (H, W), float32."""
+    mean = volume.costs.mean(axis=0, dtype=np.float32)
+    least = volume.costs.min(axis=0).astype(np.float32)
+    chosen = np.take_along_axis(volume.costs, labels[None], axis=0)[0].astype(np.float32)
+    # costs need not begin at 0
+    spread = np.maximum(mean - np.minimum(least, 0), np.float32(1e-6))
+    return np.asarray(np.clip((mean - chosen) / spread, 0, 1), np.float32)
+
+
+def _costs_round(
+    volume: CostVolume, labels: npt.NDArray[np.int64]
+) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+    """Costs of the candidate before the chosen one, of that, and of the one after it; those at the ends repeat."""
+    last = len(volume.disparities) - 1
+    numbers = (np.clip(labels + step, 0, last) for step in (-1, 0, 1))
+    below, here, above = (
+        np.take_along_axis(volume.costs, number[None], axis=0)[0].astype(np.float64) for number in numbers
+    )
+    return below, here, above

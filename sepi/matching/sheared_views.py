@@ -1,0 +1,90 @@
+"""All views sheared by a disparity: what each of them shows of every pixel of the reference view.
+
+A light field sheared by ``d`` holds, at pixel ``(y, x)`` of view ``(t, s)``, what that view shows at
+``(y, x) - d * baseline``. Where ``d`` is the pixel's disparity, all views show the same point there: its *angular
+patch* has one colour, and the mean over the views is the light field refocused at ``d`` [1]_.
+
+Samples between pixels come from cubic convolution [2]_, which keeps the detail that sub-pixel depth needs, or from
+bilinear interpolation. Beyond its border a view goes on as it ends.
+
+References
+----------
+.. [1] Ng, Levoy, Bredif, Duval, Horowitz, Hanrahan: Light field photography with a hand-held plenoptic camera.
+   Stanford Tech Report CTSR 2005-02.
+.. [2] Keys: Cubic convolution interpolation for digital image processing. IEEE TASSP 29(6), 1981.
+   doi:10.1109/TASSP.1981.1163711
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import numpy.typing as npt
+
+from sepi.lightfield import BoolMap, FloatMap, LightField, as_unit_float
+
+
+class ShearedViews:
+    """The views of a light field, to be sheared by one disparity after the other.
+
+    Parameters
+    ----------
+    light_field : LightField
+    views : ndarray, shape (T, S), bool, optional
+        The views to shear; all that are present, unless given.
+    cubic : bool
+        Cubic convolution; else bilinear interpolation.
+
+    Attributes
+    ----------
+    baselines : ndarray, shape (N, 2), float64
+        ``(down, across)`` from the reference view to each view, in view steps.
+    positions : ndarray, shape (N, 2), int64
+        Row and column ``(t, s)`` of each view in the grid.
+    reference : int
+        Number of the reference view among them; -1 if it is not one of them.
+    """
+
+    def __init__(self, light_field: LightField, views: BoolMap | None = None, *, cubic: bool = True) -> None:
+        chosen = light_field.present if views is None else views & light_field.present
+        self.positions = np.argwhere(chosen)
+        self.baselines = light_field.baselines[chosen]
+        found = np.flatnonzero((self.positions == light_field.reference_position).all(axis=1))
+        self.reference = int(found[0]) if found.size else -1
+        self._cubic = cubic
+        height, width = light_field.shape
+        self._colours = np.empty((len(self.positions), 3, height, width), np.float32)
+        for n, (t, s) in enumerate(self.positions):
+            self._colours[n] = as_unit_float(light_field.rgb_views[t, s]).transpose(2, 0, 1)
+        self._sheared = np.empty_like(self._colours)
+
+    def at(self, disparity: float) -> FloatMap:
+        """The views sheared by a disparity.
+
+        Parameters
+        ----------
+        disparity : float
+            Pixels per view step.
+
+        Returns
+        -------
+        ndarray, shape (N, 3, H, W), float32
+            Colours in 0..1 (cubic convolution overshoots a little). The array is made anew by the next call.
+        """
+        from sepi.matching.sheared_views_kernels import shear
+
+        shear(self._colours, -disparity * self.baselines, self._cubic, self._sheared)
+        return self._sheared
+
+    def over(self, disparities: FloatMap) -> Iterator[tuple[int, FloatMap]]:
+        """Number of each disparity, and the views sheared by it."""
+        for k, disparity in enumerate(disparities.tolist()):
+            yield k, self.at(disparity)
+
+
+def refocused(sheared: FloatMap, weights: npt.NDArray[np.float32] | None = None) -> FloatMap:
+    """Mean over sheared views ``(N, 3, H, W)``, with a weight for each if given; shape (3, H, W), float32."""
+    if weights is None:
+        return np.asarray(sheared.mean(axis=0, dtype=np.float32))
+    return np.asarray(np.tensordot(weights / weights.sum(), sheared, axes=1), np.float32)

@@ -1,0 +1,84 @@
+"""Labels of least energy on the pixel grid by sequential tree-reweighted message passing (TRW-S) [1]_.
+
+The energy is ``sum_p cost(p, l_p) + sum_pq w_pq min(|l_p - l_q|, truncation)`` over pixels and 4-connected neighbours:
+that of the graph cuts by which published methods regularise their cost volumes. TRW-S reaches energies as low as alpha
+expansion's or lower on such grids (compared in [2]_), tells a lower bound, has no order of labels that the result
+depends on, and needs no library: the maintained max-flow packages are either under the GPL, which would bind this
+package's users, or too slow for a graph of a million edges, a hundred times over.
+
+References
+----------
+.. [1] Kolmogorov: Convergent tree-reweighted message passing for energy minimization. IEEE TPAMI 28(10), 2006.
+   doi:10.1109/TPAMI.2006.200
+.. [2] Szeliski, Zabih, Scharstein, Veksler, Kolmogorov, Agarwala, Tappen, Rother: A comparative study of energy
+   minimization methods for Markov random fields. IEEE TPAMI 30(6), 2008. doi:10.1109/TPAMI.2007.70844
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from sepi.lightfield import FloatMap
+
+
+def contrast_weights(guide: FloatMap, scale: float) -> tuple[FloatMap, FloatMap]:
+    """Weights of the 4-connected edges, lower where the guide's colours change: ``exp(-|difference| / scale)``.
+
+    Parameters
+    ----------
+    guide : ndarray, shape (H, W, C), float32
+        Colours in 0..1.
+    scale : float
+        Mean absolute difference of the channels at which a weight is ``1/e``.
+
+    Returns
+    -------
+    across, down : ndarray, shape (H, W), float32
+        Of the edge to the next pixel in the row, and in the column; 0 at the last ones.
+    """
+    across, down = (np.zeros(guide.shape[:2], np.float32) for _ in range(2))
+    across[:, :-1] = np.exp(-np.abs(np.diff(guide, axis=1)).mean(axis=2) / np.float32(scale))
+    down[:-1] = np.exp(-np.abs(np.diff(guide, axis=0)).mean(axis=2) / np.float32(scale))
+    return across, down
+
+
+def labels_of_least_energy(
+    costs: npt.NDArray[np.floating], across: FloatMap, down: FloatMap, truncation: float, iterations: int
+) -> npt.NDArray[np.int64]:
+    """A label for each pixel that nearly minimises data cost and truncated linear smoothness.
+
+    Parameters
+    ----------
+    costs : ndarray, shape (K, H, W), float
+        Data cost of each label.
+    across, down : ndarray, shape (H, W), float32
+        Weights of the edges to the next pixel in the row and in the column, not negative.
+    truncation : float
+        Difference of labels from which a further one costs nothing more.
+    iterations : int
+        Passes forth and back; ten or so are enough for maps.
+
+    Returns
+    -------
+    ndarray, shape (H, W), int64
+        0..K-1.
+    """
+    from sepi.regularization.message_passing_kernels import decode, pass_messages
+
+    volume = np.ascontiguousarray(costs.transpose(1, 2, 0), np.float32)
+    messages = np.zeros((4, *volume.shape), np.float32)
+    for _ in range(iterations):
+        pass_messages(volume, across, down, np.float32(truncation), messages)
+    return np.asarray(decode(volume, across, down, np.float32(truncation), messages))
+
+
+def energy(
+    labels: npt.NDArray[np.int64], costs: npt.NDArray[np.floating], across: FloatMap, down: FloatMap, truncation: float
+) -> float:
+    """The energy of a labelling; arguments as for :func:`labels_of_least_energy`."""
+    data = np.take_along_axis(costs, labels[None], axis=0).sum(dtype=np.float64)
+    jumps_across = np.minimum(np.abs(np.diff(labels, axis=1)), truncation)
+    jumps_down = np.minimum(np.abs(np.diff(labels, axis=0)), truncation)
+    smoothness = (across[:, :-1] * jumps_across).sum(dtype=np.float64) + (down[:-1] * jumps_down).sum(dtype=np.float64)
+    return float(data + smoothness)
