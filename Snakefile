@@ -3,6 +3,7 @@
 #   snakemake all         tables, figures and maps of every configured dataset
 #   snakemake scenes      what is made of each scene, without the tables and the page that need all of them
 #   snakemake ablation    the five columns of the paper's table 4, Wang's occlusion stage, and the parts of variant best
+#   snakemake comparison  the methods that the paper compares with, computed on the same scenes
 #   snakemake -- FILE     one file: results/DATASET/SCENE/VARIANT/disparity.pfm
 #
 # docs/workflow.md explains targets, configuration and what makes a job run again.
@@ -21,6 +22,7 @@ include: "rules/export.smk"
 include: "rules/evaluate.smk"
 include: "rules/external.smk"
 include: "rules/report.smk"
+include: "rules/comparison.smk"
 
 
 # a few seconds each, whatever the number of scenes: not worth a submission to a cluster
@@ -31,6 +33,8 @@ localrules:
     parts_chart,
     graph,
     page,
+    comparison_tables,
+    comparison_page,
 
 
 # Tables and figures, and the maps of the most accurate variant, of the paper's, and of variants that the user added
@@ -55,9 +59,18 @@ rule scenes:
 rule ablation:
     input:
         ablation_files(),
-        result_files(VARIANTS),
+        result_files([name for name in VARIANTS if name not in METHODS]),
     message:
         "all ablations are made"
+
+
+# The compared methods on every scene: tables, page, pictures, and their maps
+rule comparison:
+    input:
+        comparison_files(),
+        result_files(METHODS),
+    message:
+        "all compared methods are computed"
 
 
 onstart:
@@ -67,7 +80,7 @@ onstart:
 onsuccess:
     note_run(well=True)
     print_warnings()
-    print_written([*report_files(), *ablation_files()], result_files(SETTINGS.variants))
+    print_written([*report_files(), *ablation_files(), *comparison_files()], result_files(SETTINGS.variants))
 
 
 # a job may have been killed, the clock set back, the disk be full

@@ -8,6 +8,7 @@ import time
 from pathlib import Path
 
 from sepi.command import WORKFLOW_PROCESS
+from sepi.compared.methods import METHODS
 from sepi.errors import SepiError
 from sepi.io.result_folder import RESULT_FILES
 from sepi.pipeline import HANDED_ON, STAGES, VARIANTS, choice_of
@@ -16,7 +17,7 @@ from sepi.validation import require_known
 from sepi.workflow.code_digest import ROOT, code_digest, stage_modules
 from sepi.workflow.candidates import candidates_factor, candidates_mb
 from sepi.workflow.config import load_settings
-from sepi.workflow.result_paths import PARTS_ENDING, RESULTS, key_of, scene_files
+from sepi.workflow.result_paths import COMPARISON_ENDING, PARTS_ENDING, RESULTS, key_of, scene_files
 from sepi.workflow.run_folder import note_run, say_if_full, say_so, take_over, tidy_up
 from sepi.workflow.run_log import show_progress
 
@@ -41,6 +42,7 @@ except OSError as error:
 VARIANT_LABELS = {name: variant.labels for name, variant in SETTINGS.variants.items()}
 SCENES_BY_DATASET = {name: SETTINGS.scenes_of(name) for name in SETTINGS.datasets}
 PLAN = Plan(RESULTS, SCENES_BY_DATASET, VARIANT_LABELS, list(SETTINGS.external))
+COMPARISON = PLAN.comparison()
 
 # the rules' patterns
 SCENE = scene_files("{dataset}", "{scene}")
@@ -62,7 +64,7 @@ wildcard_constraints:
     dataset="[^/]+",
     scene="[^/]+",
     variant="[^/]+",
-    which=f"|{PARTS_ENDING}",
+    which=f"|{PARTS_ENDING}|{COMPARISON_ENDING}",
 
 
 def stage_output(stage, ending):
@@ -115,6 +117,17 @@ def result_files(variants, scenes=SETTINGS.scenes):
         for variant in variants
         for name in RESULT_FILES
     ]
+
+
+def plan_of(which):
+    """The plan of one of the files of numbers or scores, and whether it is that of the parts of variant best."""
+    return COMPARISON if which == COMPARISON_ENDING else PLAN, which == PARTS_ENDING
+
+
+def scored_maps(wildcards):
+    """The stage files whose maps go into one of a scene's score files."""
+    plan, parts = plan_of(wildcards.which)
+    return plan.scored_files(wildcards.dataset, wildcards.scene, parts)
 
 
 def choice_for(stage):

@@ -5,7 +5,7 @@
 rule evaluate:
     input:
         light_field=SCENE.light_field,
-        maps=lambda wildcards: PLAN.scored_files(wildcards.dataset, wildcards.scene, parts=bool(wildcards.which)),
+        maps=scored_maps,
     output:
         scores=SCENE.scores("{which}"),
     log:

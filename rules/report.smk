@@ -1,5 +1,7 @@
 # What a reader looks at, below reports/: a page with everything, its numbers, tables, charts, and pictures of every scene.
 
+from dataclasses import replace
+
 from sepi.report.plan import PARTS_TABLES, TABLES, TEMPLATES
 from sepi.report.published import FOLDER as PUBLISHED
 
@@ -31,9 +33,21 @@ def ablation_files():
     return [*table_files(["table4_ablation", *PARTS_TABLES]), *figure_files(["ablation", "ablation_best"])]
 
 
-def plan_of_scene(wildcards):
-    """The plan for one scene alone, so that another scene in the configuration does not redraw it."""
-    return Plan(PLAN.results, {wildcards.dataset: [wildcards.scene]}, VARIANT_LABELS, PLAN.external).to_json()
+def measured_files(which):
+    """What one of the files of numbers is collected from."""
+    plan, parts = plan_of(which)
+    return plan.number_inputs(parts)
+
+
+def variants_in(which):
+    """The variants of one of the files of numbers."""
+    plan, parts = plan_of(which)
+    return plan.collected(parts)
+
+
+def plan_of_scene(wildcards, plan=PLAN):
+    """A plan for one scene alone, so that another scene in the configuration does not redraw it."""
+    return replace(plan, scenes={wildcards.dataset: [wildcards.scene]}).to_json()
 
 
 def pixels_of(wildcards):
@@ -45,7 +59,7 @@ def pixels_of(wildcards):
 # of best's parts have a file of their own (report_parts), since `all` does not run those variants.
 rule numbers:
     input:
-        measured=lambda wildcards: PLAN.number_inputs(parts=bool(wildcards.which)),
+        measured=lambda wildcards: measured_files(wildcards.which),
         published=sorted(PUBLISHED.glob("*.csv")),
     output:
         "reports/report{which}.json",
@@ -60,9 +74,9 @@ rule numbers:
         runtime=5 + sum(scene.minutes(0.1) for scene in SETTINGS.scenes.values()) // 5,
     params:
         # functions: braces in names are no wildcards
-        plan=lambda wildcards: PLAN.to_json(),
-        parameters=lambda wildcards: SETTINGS.variants_json(PLAN.parts if wildcards.which else PLAN.listed),
-        flags=lambda wildcards: "--parts" if wildcards.which else "",
+        plan=lambda wildcards: plan_of(wildcards.which)[0].to_json(),
+        parameters=lambda wildcards: SETTINGS.variants_json(variants_in(wildcards.which)),
+        flags=lambda wildcards: "--parts" if wildcards.which == PARTS_ENDING else "",
         code=code_digest("sepi.report.numbers"),
     message:
         "numbers of the report"
@@ -88,11 +102,12 @@ rule tables:
         "benchmarks/tables.tsv"
     threads: 1
     params:
+        folder="reports",
         code=code_digest("sepi.report.tables"),
     message:
         "tables"
     shell:
-        "exec python -m sepi.report.tables --numbers {input:q} --output reports 2> {log:q}"
+        "exec python -m sepi.report.tables --numbers {input:q} --output {params.folder} 2> {log:q}"
 
 
 # What each part of variant best gains and costs

@@ -52,7 +52,7 @@ def read_results(plan: Plan, dataset: str, scene: str) -> SceneResults:
         light_field=light_field,
         maps=maps,
         evaluations={variant: scored[key].evaluation for variant, key in keys.items()},
-        compared=plan.compared,
+        detailed=plan.detailed,
         external={
             method: (found.disparity, found.evaluation)
             for method, found in external.items()
@@ -64,7 +64,7 @@ def read_results(plan: Plan, dataset: str, scene: str) -> SceneResults:
 
 def write_scene(results: SceneResults, panels: Sequence[Panel], title: str, folder: Path) -> None:
     """Write every panel of a scene below ``folder``, and the sheet ``overview``, a row for each group."""
-    for variant in results.compared:
+    for variant in results.detailed:
         error = results.evaluations[variant].error
         if error is not None and np.isfinite(error).any():
             write_curves(folder / variant, results.final(variant).confidence, error)

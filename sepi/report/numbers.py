@@ -27,7 +27,7 @@ from sepi.io.external_maps import read_external
 from sepi.io.hdf5 import read_light_field, read_stage
 from sepi.io.scores import Scores, read_evaluations, read_scores, without_nan
 from sepi.matching.unknown import with_unknown
-from sepi.report.plan import PARTS_TABLES, TABLES, Plan
+from sepi.report.plan import Plan
 from sepi.report.runs import Runs, read_json
 from sepi.report.tables import BUILDERS
 from sepi.report.tabular.confidence import decile_errors, oracle, sparsification
@@ -97,7 +97,7 @@ def collect(plan: Plan, parameters: Parameters | None = None, parts: bool = Fals
     }
     numbers = without_nan(numbers)
     runs = Runs(numbers)
-    tables = {name: as_json(BUILDERS[name](runs)) for name in TABLES if (name in PARTS_TABLES) == parts}
+    tables = {name: as_json(BUILDERS[name](runs)) for name in plan.tables(parts)}
     return numbers | {"tables": tables}
 
 

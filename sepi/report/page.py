@@ -17,7 +17,6 @@ from matplotlib.colors import Colormap
 from sepi.command import SepiCommand
 from sepi.io.files import atomic_path
 from sepi.report import published
-from sepi.report.plan import TABLES
 from sepi.report.plots.pictures import error_scale, scale_colours
 from sepi.report.runs import Runs, read_json, read_numbers
 from sepi.report.web import page_data
@@ -90,7 +89,7 @@ def page_of(
     runs = Runs(numbers)
     first_title = page_data.first_scene(runs)
     shown = [scene for scene in scenes if f"{scene['dataset']}/{scene['scene']}" == first_title] or scenes
-    tables = {name: numbers["tables"][name] for name in TABLES if name in numbers["tables"]}
+    tables = {name: numbers["tables"][name] for name in runs.plan.tables() if name in numbers["tables"]}
     if parts is not None:
         tables |= {name: table for name, table in parts["tables"].items() if name not in tables}
     return (
@@ -99,6 +98,7 @@ def page_of(
         .render(
             title="sepi: light field depth by stitched epipolar plane images",
             numbers=numbers,
+            is_comparison=runs.plan.is_comparison,
             variants=page_data.shown_variants(runs, parts),
             tables=tables,
             headline=page_data.headline(runs),

@@ -8,6 +8,7 @@ from typing import Any, Literal
 
 import numpy.typing as npt
 
+from sepi.compared.methods import METHODS
 from sepi.evaluate import WHOLE_MAP
 from sepi.io.scores import Evaluation
 from sepi.lightfield import FloatMap, LightField
@@ -74,7 +75,7 @@ class SceneResults:
         Variant to stage to maps, in order.
     evaluations : mapping of str to Evaluation
         Of each variant's final map.
-    compared : list of str
+    detailed : list of str
         Variants of which every stage is on the page.
     external : mapping of str to (ndarray (H, W), Evaluation)
         Other methods' maps.
@@ -85,7 +86,7 @@ class SceneResults:
     light_field: LightField
     maps: Mapping[str, Mapping[str, StageMaps]]
     evaluations: Mapping[str, Evaluation]
-    compared: list[str]
+    detailed: list[str]
     external: Mapping[str, tuple[FloatMap, Evaluation]] = field(default_factory=dict)
     problems: Mapping[str, str] = field(default_factory=dict)
 
@@ -95,8 +96,8 @@ class SceneResults:
 
     @property
     def variants(self) -> list[str]:
-        """All variants, the compared ones first."""
-        return [*self.compared, *(name for name in self.maps if name not in self.compared)]
+        """All variants, those that are shown in detail first."""
+        return [*self.detailed, *(name for name in self.maps if name not in self.detailed)]
 
 
 def panels_of(results: SceneResults) -> list[Panel]:
@@ -112,7 +113,7 @@ def panels_of(results: SceneResults) -> list[Panel]:
 
 
 def first_final(panels: list[Panel]) -> str:
-    """Key of the first final map: that of the first compared variant."""
+    """Key of the first final map: that of the first variant shown in detail."""
     return next(panel.key for panel in panels if panel.kind == "disparity" and panel.confidence is not None)
 
 
@@ -134,20 +135,20 @@ def _scene_panels(results: SceneResults) -> Iterator[Panel]:
 
 
 def _stage_panels(results: SceneResults, variant: str) -> Iterator[Panel]:
-    """Disparity after every stage; of the variants that are not compared, the page has the final map alone."""
-    compared, stages = variant in results.compared, results.maps[variant]
+    """Disparity after every stage; of most variants the page has the final map alone."""
+    detailed, stages = variant in results.detailed, results.maps[variant]
     for number, (stage, found) in enumerate(stages.items(), start=1):
         final = number == len(stages)
         yield Panel(
             f"{variant}/{number}_{stage}",
             f"{variant}: final" if final else f"{variant} {number}: {stage}",
-            f"Stages of {variant}" if compared else "Other variants",
+            f"Stages of {variant}" if detailed else "Compared methods" if variant in METHODS else "Other variants",
             "disparity",
             found.disparity,
-            confidence=found.confidence if final and compared else None,
+            confidence=found.confidence if final and detailed else None,
             note=note_of(results.evaluations[variant]) if final else "",
-            precise=final and compared,
-            in_page=final or compared,
+            precise=final and detailed,
+            in_page=final or detailed,
         )
 
 
@@ -162,7 +163,7 @@ def _error_panels(results: SceneResults) -> Iterator[Panel]:
             "error",
             found.disparity,
             minus=ground_truth,
-            confidence=found.confidence if variant in results.compared else None,
+            confidence=found.confidence if variant in results.detailed else None,
             note=note_of(results.evaluations[variant]),
         )
 
@@ -200,7 +201,7 @@ def _change_panels(results: SceneResults) -> Iterator[Panel]:
 
 def _detail_panels(results: SceneResults, variant: str) -> Iterator[Panel]:
     """Confidence, and what a variant took for occluded and textureless, with the superpixels that it used."""
-    final, shown = results.final(variant), variant in results.compared
+    final, shown = results.final(variant), variant in results.detailed
     kinds: dict[str, tuple[str, Kind]] = {
         # what was detected need not be the region that is scored
         "occluded": ("occluded, detected", "mask"),

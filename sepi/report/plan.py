@@ -8,21 +8,26 @@ from __future__ import annotations
 import itertools
 import json
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
 from pydantic import AfterValidator
 from pydantic.dataclasses import dataclass
 
+from sepi.compared.methods import METHODS
 from sepi.errors import SepiError
-from sepi.pipeline import HANDED_ON, PARTS_OF_BEST
-from sepi.workflow.result_paths import PARTS_ENDING, SceneFiles, key_of, scene_files
+from sepi.pipeline import HANDED_ON, PARTS_OF_BEST, VARIANTS
+from sepi.workflow.result_paths import COMPARISON_ENDING, PARTS_ENDING, SceneFiles, key_of, scene_files
 
 MAIN_VARIANT = "paper"
 """The variant that does what the paper describes; its figures stand beside the published ones."""
 
 BEST_VARIANT = "best"
 """The most accurate variant, whose figures stand there too."""
+
+FAST_VARIANT = "fast"
+"""The quick variant, which stands beside them in the comparison."""
 
 TABLES = (
     "table1_mse",
@@ -36,6 +41,9 @@ TABLES = (
     "runtime",
 )
 """Names of the tables, in the order of the page."""
+
+COMPARISON_TABLES = ("methods", "table1_mse", "table2_q25", "table3_regions", "edges", "runtime")
+"""Tables of the comparison with the methods that are computed here, in the order of its page."""
 
 TEMPLATES = sorted(
     path for path in (Path(__file__).parent / "web" / "templates").iterdir() if path.suffix in (".j2", ".js", ".css")
@@ -64,18 +72,21 @@ class Plan:
         Variant to stage to the label of its choice (:func:`sepi.pipeline.choice_label`), in order.
     external : sequence of str
         External methods, in the order of the tables.
+    beside : sequence of str
+        Variants that stand beside the published figures, where these are not the best one and the paper's alone.
     """
 
     results: Path
     scenes: Mapping[str, Names]
     variants: Mapping[str, Mapping[str, str]]
     external: Names = ()
+    beside: Names = ()
 
     @classmethod
     def from_json(cls, results: Path, text: str) -> Plan:
         """Plan from JSON ``{"scenes": {DATASET: [SCENE]}, "variants": {VARIANT: {STAGE: CHOICE}}}``.
 
-        External methods, ``"external": [NAME]``, may be added.
+        External methods, ``"external": [NAME]``, and variants, ``"beside": [NAME]``, may be added.
 
         Raises
         ------
@@ -95,7 +106,25 @@ class Plan:
 
     def to_json(self) -> str:
         """The text that :meth:`from_json` reads; the results' folder is not part of it."""
-        return json.dumps({key: getattr(self, key) for key in ("scenes", "variants", "external")})
+        return json.dumps({key: getattr(self, key) for key in ("scenes", "variants", "external", "beside")})
+
+    def comparison(self) -> Plan:
+        """The plan of the comparison: this project's variants and the compared methods, computed on the same scenes."""
+        ours = [BEST_VARIANT, FAST_VARIANT, MAIN_VARIANT]
+        own = [name for name in self.variants if name not in VARIANTS]
+        names = [name for name in (*ours, *own, *METHODS) if name in self.variants]
+        return replace(self, variants={name: self.variants[name] for name in names}, beside=tuple(names))
+
+    @property
+    def is_comparison(self) -> bool:
+        """Whether this is the plan of the comparison, which has tables and score files of its own."""
+        return bool(self.beside)
+
+    def tables(self, parts: bool = False) -> tuple[str, ...]:
+        """Names of the tables that are made of one of the files of numbers, in the order of the page."""
+        if self.is_comparison:
+            return COMPARISON_TABLES
+        return tuple(name for name in TABLES if (name in PARTS_TABLES) == parts)
 
     @property
     def stages(self) -> list[str]:
@@ -121,7 +150,11 @@ class Plan:
 
     def scores_file(self, dataset: str, scene: str, parts: bool = False) -> Path:
         """The scores of a scene's maps; with ``parts``, of those that the ablation of the best variant needs."""
-        return self.files(dataset, scene).scores(PARTS_ENDING if parts else "")
+        return self.files(dataset, scene).scores(self.ending(parts))
+
+    def ending(self, parts: bool = False) -> str:
+        """What ends the names of the files of scores and numbers."""
+        return COMPARISON_ENDING if self.is_comparison else PARTS_ENDING if parts else ""
 
     def external_file(self, dataset: str, scene: str) -> Path:
         """The maps and scores of all external methods for a scene."""
@@ -164,6 +197,11 @@ class Plan:
     @property
     def compared(self) -> list[str]:
         """Variants that stand beside the published figures, where the plan has them."""
+        return list(self.beside) or self.detailed
+
+    @property
+    def detailed(self) -> list[str]:
+        """Variants of which every stage is on the page, where the plan has them."""
         return [variant for variant in (BEST_VARIANT, MAIN_VARIANT) if variant in self.variants]
 
     @property
@@ -173,8 +211,11 @@ class Plan:
 
     @property
     def listed(self) -> list[str]:
-        """All variants but those with one part of the best one switched off, which have a table of their own."""
-        return [variant for variant in self.variants if variant not in PARTS_OF_BEST or variant == BEST_VARIANT]
+        """All variants but those with one part of the best one switched off, which have a table of their own, and the
+        compared methods, which have a report of their own.
+        """
+        elsewhere = (set(PARTS_OF_BEST) | set(METHODS)) - {BEST_VARIANT, *self.compared}
+        return [variant for variant in self.variants if variant not in elsewhere]
 
     def collected(self, parts: bool) -> list[str]:
         """The variants of one of the two files of numbers."""

@@ -46,6 +46,8 @@ class Method:
         As the paper calls it; ``name`` is empty where the paper gives none.
     learning : str
         ``"none"``, ``"supervised"`` or ``"unsupervised"``.
+    variant : str
+        The variant that computes it; empty where none does.
     """
 
     key: str
@@ -53,6 +55,7 @@ class Method:
     authors: str
     name: str
     learning: str
+    variant: str
 
     @property
     def label(self) -> str:
@@ -94,6 +97,11 @@ def paper_scene(dataset: str, scene: str) -> str | None:
 def methods() -> dict[str, Method]:
     """Every method of tables 1 to 3, by key: the columns (a) to (k), then those of table 3 only."""
     return {row["key"]: Method(**row) for row in _rows("methods.csv")}
+
+
+def counterpart(variant: str) -> Method:
+    """The published method that a variant's figures are compared with: its own, or the paper's for all of ours."""
+    return next((one for one in methods().values() if one.variant == variant), methods()[PAPERS_METHOD])
 
 
 @cache

@@ -9,10 +9,10 @@ import click
 
 from sepi.command import SepiCommand
 from sepi.report import published
-from sepi.report.plan import TABLES
 from sepi.report.runs import Runs, read_numbers
 from sepi.report.tabular.ablation import ablation_table, parts_table
 from sepi.report.tabular.comparison import region_table, scene_table
+from sepi.report.tabular.computed_methods import computed_methods_table
 from sepi.report.tabular.confidence import confidence_table
 from sepi.report.tabular.edges import edge_table
 from sepi.report.tabular.latex import as_latex
@@ -22,6 +22,7 @@ from sepi.report.tabular.stages import runtime_table, stage_table
 from sepi.validation import require_known
 
 BUILDERS: dict[str, Callable[[Runs], Report]] = {
+    "methods": computed_methods_table,
     "table1_mse": lambda runs: scene_table(runs, "mse100", published.table1(), "Table 1: MSE x100"),
     "table2_q25": lambda runs: scene_table(runs, "q25", published.table2(), "Table 2: Q25 x100"),
     "table3_regions": region_table,
@@ -37,7 +38,7 @@ BUILDERS: dict[str, Callable[[Runs], Report]] = {
 
 @click.command(name="python -m sepi.report.tables", cls=SepiCommand)
 @click.option("--numbers", "path", type=click.Path(path_type=Path), required=True, help="From sepi.report.numbers.")
-@click.option("--table", "names", type=click.Choice(TABLES), multiple=True, help="Table to write; default: all.")
+@click.option("--table", "names", type=click.Choice([*BUILDERS]), multiple=True, help="Table to write; default: all.")
 @click.option("--output", type=click.Path(path_type=Path), required=True, help="Folder to write to.")
 def command(path: Path, names: tuple[str, ...], output: Path) -> None:
     """Write the tables of a report's numbers as CSV, Markdown and LaTeX."""

@@ -18,6 +18,10 @@ PARTS_ENDING = "_parts"
 """Ending of the files that belong to the ablation of the best variant alone."""
 
 
+COMPARISON_ENDING = "_comparison"
+"""Ending of the files that belong to the comparison with other methods alone."""
+
+
 @dataclass(frozen=True)
 class SceneFiles:
     """The files of one scene.
@@ -61,7 +65,7 @@ class SceneFiles:
         return self.stages / key / f"{stage_of(key)}.{ending}"
 
     def scores(self, which: str = "") -> Path:
-        """The scores of the maps; ``which`` is :data:`PARTS_ENDING` for those of the ablation of ``best`` alone."""
+        """The scores of the maps; ``which`` is :data:`PARTS_ENDING` or :data:`COMPARISON_ENDING` for those alone."""
         return self.folder / f"scores{which}.h5"
 
     def kept_scores(self, which: str = "") -> Path:

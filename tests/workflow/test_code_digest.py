@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from sepi.compared.methods import METHODS
 from sepi.pipeline import STAGES
 from sepi.workflow.code_digest import code_digest, imported_modules, stage_modules
 
@@ -112,7 +113,18 @@ NEVER |= {"io.readers.arrays", "io.readers.formats", "inspection.disparity_range
 def test_a_stage_is_run_again_for_what_can_change_its_maps_alone(stage: str) -> None:
     """One module too few, and results are stale; one too many, and a day of computing is done twice."""
     assert list(COVERED) == list(STAGES)
-    found = {name.removeprefix("sepi.") for name in imported_modules(*stage_modules(stage))}
+    choice = next(iter(STAGES[stage].values()))
+    found = {name.removeprefix("sepi.") for name in imported_modules(*stage_modules(stage, choice))}
     needed, needless = COVERED[stage]
     assert needed | {stage, "io.hdf5", "lightfield"} <= found
     assert not found & (needless | NEVER | (set(STAGES) - {stage}))
+    assert not any(name.startswith("compared") for name in found)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_compared_method_is_run_again_for_its_own_code_alone(method: str) -> None:
+    """A change in one of them must not cost a day of computing all the others, nor be missed."""
+    found = imported_modules(*stage_modules("initial", STAGES["initial"][method]))
+    compared = {name.removeprefix("sepi.compared.") for name in found if name.startswith("sepi.compared.")}
+    assert method in compared
+    assert not compared & (set(METHODS) - {method})

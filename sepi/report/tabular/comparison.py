@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from sepi.evaluate import REGIONS, WHOLE_MAP
 from sepi.report import published
+from sepi.report.plan import Plan
 from sepi.report.published import PAPERS_METHOD, SceneTable
 from sepi.report.runs import Runs
 from sepi.report.tabular import methods
@@ -50,7 +51,7 @@ def scene_table(runs: Runs, score: str, paper: SceneTable, title: str) -> Report
     return Report(
         title,
         f"{methods.PROTOCOL_NOTE} This code: variants {methods.own_names(plan)}; then each figure of these divided by "
-        f"the published one of the paper's method, {published.methods()[PAPERS_METHOD].label}. Other columns: as the "
+        f"the published one of {_counterparts(plan)}. Other columns: as the "
         f"paper prints them; empty where the scene was in the method's training set. {methods.LEARNED_NOTE} A scene "
         "without a figure of this code is not available or has no ground truth here; one without published figures is "
         "not in the paper. The average of the scenes available is empty where a method has no figure for one of them."
@@ -60,6 +61,12 @@ def scene_table(runs: Runs, score: str, paper: SceneTable, title: str) -> Report
         sections,
         "Marked: best and second best in a row, of this code and the published methods that are not learned",
     )
+
+
+def _counterparts(plan: Plan) -> str:
+    """Whose published figures ours are divided by, for the caption."""
+    papers = f"the paper's method, {published.methods()[PAPERS_METHOD].label}"
+    return f"the same method, for this project's own variants {papers}" if plan.is_comparison else papers
 
 
 def _is_shown(runs: Runs, dataset: str, method: Method, rows: Sequence[Record]) -> bool:
@@ -97,10 +104,11 @@ def _scene_records(runs: Runs, dataset: str, score: str, paper: SceneTable, comp
 
 
 def _figure(method: Method, figures: Record) -> Cell:
-    """Of a method; of a ratio, ours divided by the paper's."""
+    """Of a method; of a ratio, ours divided by the published one."""
     if method.kind != Kind.RATIO:
         return figures.get(method.key)
-    ours, paper = figures.get(f"ours{method.key.removeprefix('ratio')}"), figures.get(PAPERS_METHOD)
+    ours = figures.get(f"ours{method.key.removeprefix('ratio')}")
+    paper = figures.get(published.counterpart(method.name).key)
     return ours / paper if isinstance(ours, float) and isinstance(paper, float) and paper else None
 
 
