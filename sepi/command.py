@@ -28,6 +28,7 @@ from sepi.errors import SepiError, SepiWarning, one_line
 from sepi.io.files import atomic_path
 from sepi.io.hdf5 import read_light_field, read_stage, write_stage
 from sepi.io.provenance import entry, history_of, stage_attributes
+from sepi.matching.base_detail import kept_detail
 from sepi.memory import KERNELS, require_memory
 from sepi.stage import Choice, Progress, no_progress
 from sepi.threads import use_threads
@@ -225,7 +226,7 @@ def stage_command(stage: str, choices: Mapping[str, Choice]) -> click.Command:
                 f"{previous}: maps of {maps.disparity.shape} do not belong to {light_field_path} of {light_field.shape}"
             )
         require_memory(KERNELS)
-        with progress_bar(f"{light_field.name} {stage}") as progress:
+        with progress_bar(f"{light_field.name} {stage}") as progress, kept_detail():
             result = chosen.run(light_field, maps, settings, progress)
         history = [*history_of(previous), entry(stage, choice, settings, light_field)]
         write_stage(output, result, stage_attributes(light_field, history))

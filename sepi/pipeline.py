@@ -13,6 +13,7 @@ from sepi import initial, occlusion, optimize, textureless
 from sepi.compared import methods
 from sepi.errors import SepiError
 from sepi.lightfield import LightField
+from sepi.matching.base_detail import kept_detail
 from sepi.matching.memory_limit import bytes_of_bands, require_memory_of
 from sepi.matching.row_bands import band_memory
 from sepi.matching.unknown import with_unknown
@@ -297,7 +298,7 @@ def estimate_depth(
     require_memory_of(light_field, settings.values())
     maps: StageMaps | None = None
     limited = nullcontext() if memory is None else band_memory(bytes_of_bands(light_field, settings.values(), memory))
-    with limited:
+    with limited, kept_detail():
         for number, (stage, choice) in enumerate(chosen.choices.items()):
 
             def of_all(fraction: float, number: int = number) -> None:

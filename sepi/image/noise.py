@@ -40,4 +40,9 @@ def noise_level(image: FloatMap, region: BoolMap | None = None) -> float:
 
 def residual_variance(image: FloatMap) -> float:
     """Expected squared residual, summed over channels, between two views of the same surface: noise of both views."""
-    return float(2 * image.shape[2] * noise_level(image) ** 2)
+    return variance_of_residuals(noise_level(image), image.shape[2])
+
+
+def variance_of_residuals(noise: float, channels: int) -> float:
+    """The same of views with this noise and so many channels."""
+    return float(2 * channels * noise**2)

@@ -14,13 +14,16 @@ References
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from typing import Annotated, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 from pydantic import Field
 
-from sepi.image.noise import noise_level, residual_variance
+from sepi.image.noise import noise_level, variance_of_residuals
 from sepi.lightfield import BoolMap, FloatMap, LightField, full_scale
 from sepi.matching.row_bands import Rows
 from sepi.stage import Parameters
@@ -125,19 +128,17 @@ def base_detail_decomposition(
     from sepi.matching.base_detail_kernels import detail_of_views
 
     views, guide = light_field.rgb_views, light_field.reference_view
-    height, width = light_field.shape
-    rows = rows or Rows(0, height)
+    rows = rows or Rows(0, light_field.shape[0])
     present = light_field.present if present is None else present
     # as they are in memory: nothing is copied
     colours = views.transpose(0, 1, 4, 2, 3)
     unit = np.float32(1 / full_scale(views.dtype))
-    with_detail = parameters.detail_share > 0
-    # pages that nobody writes to take no memory
-    detail = np.zeros((*light_field.grid, rows.high - rows.low if with_detail else 0, width), np.int16)
-    if with_detail:
-        edge = float(np.hypot(parameters.base_sigma_colour, 3 * noise_level(guide)))
+    noise = noise_level(guide)
+    detail, missing = _detail_so_far(light_field, parameters, rows, present)
+    if detail.size and missing.any():
+        edge = float(np.hypot(parameters.base_sigma_colour, 3 * noise))
         radius, space = parameters.base_radius, parameters.base_sigma_space
-        detail_of_views(colours, unit, present, rows.low, radius, edge, space, np.float32(DETAIL_UNIT), detail)
+        detail_of_views(colours, unit, missing, rows.low, radius, edge, space, np.float32(DETAIL_UNIT), detail)
     return BaseDetail(
         colours,
         unit,
@@ -147,6 +148,50 @@ def base_detail_decomposition(
         present,
         *light_field.reference_position,
         light_field.baselines,
-        residual_variance(guide),
+        variance_of_residuals(noise, guide.shape[2]),
         guide,
     )
+
+
+class _Kept(NamedTuple):
+    """The detail of the views of one light field, and of which it is made so far."""
+
+    views: npt.NDArray[np.generic]
+    made_with: tuple[float, ...]
+    detail: npt.NDArray[np.int16]
+    made: BoolMap
+
+
+_kept: ContextVar[list[_Kept] | None] = ContextVar("_kept", default=None)
+
+
+@contextmanager
+def kept_detail() -> Iterator[None]:
+    """Inside, in this thread, the detail of a view is made once, however many stages and passes compare it.
+
+    That holds for whole views; what is made in bands of rows, since memory is short, is not kept.
+    """
+    token = _kept.set([])
+    try:
+        yield
+    finally:
+        _kept.reset(token)
+
+
+def _detail_so_far(
+    light_field: LightField, parameters: BaseDetailParameters, rows: Rows, present: BoolMap
+) -> tuple[npt.NDArray[np.int16], BoolMap]:
+    """Room for the detail of some rows, with what is made already, and the views of which it is yet to be made."""
+    height, width = light_field.shape
+    with_detail = parameters.detail_share > 0
+    # pages that nobody writes to take no memory
+    shape = (*light_field.grid, rows.high - rows.low if with_detail else 0, width)
+    kept = _kept.get()
+    if kept is None or not with_detail or rows != (0, height):
+        return np.zeros(shape, np.int16), present
+    made_with = (parameters.base_radius, parameters.base_sigma_colour, parameters.base_sigma_space)
+    if not kept or kept[0].views is not light_field.views or kept[0].made_with != made_with:
+        kept[:] = [_Kept(light_field.views, made_with, np.zeros(shape, np.int16), np.zeros(light_field.grid, bool))]
+    missing = present & ~kept[0].made
+    np.logical_or(kept[0].made, present, out=kept[0].made)
+    return kept[0].detail, missing
