@@ -59,7 +59,7 @@ rule scenes:
 rule ablation:
     input:
         ablation_files(),
-        result_files([name for name in VARIANTS if name not in METHODS]),
+        result_files([name for name in VARIANTS if name not in METHODS | LEARNED]),
     message:
         "all ablations are made"
 

@@ -8,7 +8,7 @@ import time
 from pathlib import Path
 
 from sepi.command import WORKFLOW_PROCESS
-from sepi.compared.methods import METHODS
+from sepi.compared.methods import LEARNED, METHODS
 from sepi.errors import SepiError
 from sepi.io.result_folder import RESULT_FILES
 from sepi.pipeline import HANDED_ON, STAGES, VARIANTS, choice_of
@@ -145,6 +145,11 @@ def code_of(stage):
     """Function of wildcards: the digest of the code that a stage's choice runs."""
     known = {name: code_digest(*stage_modules(stage, choice)) for name, choice in STAGES[stage].items()}
     return lambda wildcards: known[choice_of(wildcards[stage])]
+
+
+def files_of(stage):
+    """Function of wildcards: files that a stage's choice reads beside the light field, such as a network."""
+    return lambda wildcards: list(SETTINGS.parameters[stage][wildcards[stage]].files)
 
 
 def scene_of(wildcards):

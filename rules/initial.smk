@@ -2,6 +2,7 @@
 rule initial:
     input:
         light_field=SCENE.light_field,
+        files=files_of("initial"),
     output:
         maps=stage_output("initial", "h5"),
         timing=stage_output("initial", "time.json"),

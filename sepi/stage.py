@@ -35,6 +35,11 @@ class Parameters(BaseModel):
         """These parameters with what follows from a light field of known disparity range filled in."""
         return self
 
+    @property
+    def files(self) -> tuple[str, ...]:
+        """Files that the choice reads beside the light field."""
+        return ()
+
 
 class NoParameters(Parameters):
     """A choice that has nothing to set."""

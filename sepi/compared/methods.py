@@ -11,15 +11,26 @@ from collections.abc import Mapping
 from types import ModuleType
 from typing import Any
 
-from sepi.compared import guided_costs, markov_field
+from sepi.compared import acc, cae, guided_costs, markov_field, mishiba, oavc, occ, onnx_network, pobr, spo
 from sepi.stage import Choice
 
-METHODS: dict[str, ModuleType] = {}
+METHODS: dict[str, ModuleType] = {
+    "acc": acc,
+    "oavc": oavc,
+    "mishiba": mishiba,
+    "cae": cae,
+    "occ": occ,
+    "pobr": pobr,
+    "spo": spo,
+}
 """Variant to the method's module, in the order of the tables."""
+
+LEARNED: dict[str, ModuleType] = {"onnx": onnx_network}
+"""Variant to the module of methods that need what the package does not bring: no report has them unless asked to."""
 
 _SHARED = (guided_costs, markov_field)
 
-VARIANT_ENTRIES: dict[str, dict[str, Any]] = {name: module.VARIANT for name, module in METHODS.items()}
+VARIANT_ENTRIES: dict[str, dict[str, Any]] = {name: one.VARIANT for name, one in (METHODS | LEARNED).items()}
 """The variants, as the pipeline has its own."""
 
 
@@ -27,6 +38,6 @@ def choices_of(stage: str) -> Mapping[str, Choice]:
     """What the methods add to the choices of a stage."""
     return {
         name: choice
-        for module in (*METHODS.values(), *_SHARED)
+        for module in (*METHODS.values(), *LEARNED.values(), *_SHARED)
         for name, choice in module.CHOICES.get(stage, {}).items()
     }

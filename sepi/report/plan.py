@@ -15,7 +15,7 @@ from typing import Annotated
 from pydantic import AfterValidator
 from pydantic.dataclasses import dataclass
 
-from sepi.compared.methods import METHODS
+from sepi.compared.methods import LEARNED, METHODS
 from sepi.errors import SepiError
 from sepi.pipeline import HANDED_ON, PARTS_OF_BEST, VARIANTS
 from sepi.workflow.result_paths import COMPARISON_ENDING, PARTS_ENDING, SceneFiles, key_of, scene_files
@@ -214,7 +214,7 @@ class Plan:
         """All variants but those with one part of the best one switched off, which have a table of their own, and the
         compared methods, which have a report of their own.
         """
-        elsewhere = (set(PARTS_OF_BEST) | set(METHODS)) - {BEST_VARIANT, *self.compared}
+        elsewhere = {*PARTS_OF_BEST, *METHODS, *LEARNED} - {BEST_VARIANT, *self.compared}
         return [variant for variant in self.variants if variant not in elsewhere]
 
     def collected(self, parts: bool) -> list[str]:

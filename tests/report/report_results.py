@@ -33,7 +33,15 @@ VARIANTS = {
 }
 # error added to the ground truth after each stage; the scenes' own is added too
 STAGE_ERROR = {"initial": 0.4, "occlusion": 0.3, "textureless": 0.2, "optimize": 0.1}
-VARIANT_ERROR = {"paper": 0.0, "no_occlusion": 0.1, "wang": 0.2, "best": -0.05, "best_wls": 0.3}
+VARIANT_ERROR = {
+    "paper": 0.0,
+    "no_occlusion": 0.1,
+    "wang": 0.2,
+    "best": -0.05,
+    "best_wls": 0.3,
+    "fast": 0.05,
+    "spo": 0.1,
+}
 SCENE_ERROR = {"dots": 0.0, "flat": 0.1, "cotton": 0.0, "mine": 0.1, "picture": 0.0}
 # what is added to the ground truth of a scene in another method's map, or what is wrong with it; one method has the
 # name of a column that is there anyway, and is the most accurate of all

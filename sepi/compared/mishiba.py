@@ -1,0 +1,311 @@
+"""The fast method of Mishiba [1]_: one-bit features of few views, interpolated costs, weighted medians.
+
+``mishiba``, a choice of the initial depth, spares computation three times. Each view becomes a map of bits, so that all
+pairs of views are compared by counting; few views, chosen before any scene is seen, stand for all; and costs are
+computed for few pixels and candidates and interpolated between. ``median_descent``, a choice of the global
+optimisation, minimises absolute differences to these disparities and between neighbours by a weighted median filter.
+
+Equations, with views ``I_i`` in grey, ``i = 1..n``, and baselines ``b_i``:
+
+- bit of view ``i`` at ``x``: ``f_i(x) = 1`` where ``(I_i - G * I_i)(x) > 0``, else 0, with a Gaussian ``G``;
+- cost of candidate ``d`` at the reference pixel ``p``: ``C(p, d) = sum over i < j of |f_i - f_j|``, the bits taken at
+  ``p - d b``. With ``m`` ones among the ``n`` bits that is ``m (n - m)``: one count takes the place of
+  ``n (n - 1) / 2`` comparisons. Here it is divided by its largest value;
+- interpolated costs: on a lattice of pixels, costs are fitted as linear functions of the reference view's colours in
+  each window (guided filter); these functions, not the costs, are interpolated to all pixels;
+- disparity: least cost, and the parabola through it and its neighbours; confidence ``c = 1 - least / mean`` over the
+  candidates;
+- energy of the refinement, with the first disparities ``D0``:
+  ``E(D) = sum over p of c_p |D_p - D0_p| + sum over pairs of w_pq |D_p - D_q|`` with
+  ``w_pq = s / N exp(-|I_p - I_q|^2 / 2 sigma^2)``, ``N`` the neighbours of a pixel. With all other pixels held, the
+  best ``D_p`` is the weighted median of ``D0_p`` (weight ``c_p``) and of its neighbours ``D_q`` (weight ``w_pq``).
+  All pixels take that step at once, which approximates what graph cuts would find.
+
+The publication's abstract states the one-bit feature, the sum over all combinations of views by a fast algorithm, the
+choice of views offline, the interpolation of the cost volume, the energy of l1 data and smoothness terms, and its
+approximate solver by a fast weighted median filter. What follows was open, since no more could be confirmed:
+
+- the feature: the sign of the difference to a Gaussian mean, which no view's own brightness changes. It is
+  taken after the resampling (cubic convolution), so that shifts need not be whole pixels. Views that show a pixel
+  beyond their border have no bit there;
+- the views: the row and the column of the reference view. Their pairs have baselines in every direction, and few views
+  see past an occluder where the reference view does not. Where only the reference view and at most one other stand
+  there, all views are used; of a single row or column of views, all are;
+- the interpolation: between pixels with colours as guide, as a fast guided filter does [2]_, which is the aggregation
+  of the costs as well; between candidates by the parabola;
+- the candidates: one for each 0.3 pixels in the farthest view;
+- the energy: confidences as data weights, the window and the weights of neighbours. Noise of the reference view widens
+  the colour distance, as elsewhere in this package;
+- the fast weighted median: weights and disparities are integers, so that bisection finds it exactly, without sorting
+  and with the same result for any number of threads.
+
+References
+----------
+.. [1] Mishiba: Fast depth estimation for light field cameras. IEEE TIP 29, pp. 4232-4242, 2020.
+.. [2] He, Sun: Fast guided filter. arXiv:1505.00996, 2015.
+"""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+from pydantic import Field
+
+from sepi.image.guided_filter import GuidedFilter
+from sepi.image.noise import residual_variance
+from sepi.lightfield import BoolMap, FloatMap, LightField, as_unit_float
+from sepi.matching.candidates import CandidateParameters, CandidateRule, number_field
+from sepi.stage import Choice, Parameters, Progress, StageMaps, require_previous
+
+CANDIDATES = CandidateRule(usual=64, finest=0.3, coarsest=0.3)
+"""One for each 0.3 pixels in the farthest view: costs have a minimum of about a pixel's width there."""
+
+GREY = np.array([0.299, 0.587, 0.114], np.float32)
+"""Shares of red, green and blue in the grey value."""
+
+TIE = 1e-5
+"""Difference to the mean up to which a pixel is as bright as the mean but for rounding, grey values 0..1."""
+
+NO_COST = 1e-3
+"""What costs are raised by in the confidence, so that a surface without texture has none."""
+
+LEVELS = 1 << 16
+"""Integers over the range of the disparities in the medians."""
+
+FULL_WEIGHT = 1 << 20
+"""Integer that stands for a weight of 1; a window's weights add up to less than 2^31."""
+
+TABLE_ENTRIES = 512
+"""Of the weights by colour, up to a distance of four times the scale, where they are next to nothing."""
+
+
+class MishibaParameters(CandidateParameters):
+    """Parameters of the costs of one-bit features."""
+
+    rule: ClassVar[CandidateRule] = CANDIDATES
+
+    num_disparities: int | None = number_field(CANDIDATES, "docs/compared.md")
+    feature_sigma: float = Field(
+        1.0, gt=0, le=10, description="Gaussian of the mean that a pixel's bit is compared with, in pixels"
+    )
+    lattice_step: int = Field(
+        2, ge=1, le=8, description="distance of the pixels whose costs are computed; those between are interpolated"
+    )
+    radius: int = Field(
+        3, ge=1, le=50, description="window of 2 r + 1 lattice pixels whose costs are fitted with colours"
+    )
+    epsilon: float = Field(1e-4, gt=0, description="variance of colour above which edges are kept, colours in 0..1")
+
+
+class MedianDescentParameters(Parameters):
+    """Parameters of the refinement by weighted medians."""
+
+    smoothness: float = Field(
+        1.2, ge=0, le=100, description="weight of all neighbours of a pixel together, of its colour; its datum has 0..1"
+    )
+    sigma: float = Field(0.03, ge=1e-4, le=2, description="RGB distance at which a neighbour's weight falls, 0..1")
+    radius: int = Field(5, ge=1, le=15, description="neighbours of a pixel: 2 r + 1 squared, with gaps between")
+    gap: int = Field(2, ge=1, le=10, description="distance of neighbours from each other, in pixels")
+    passes: int = Field(8, ge=1, le=100, description="passes of the weighted median over all pixels")
+
+
+def mishiba(
+    light_field: LightField, previous: StageMaps | None, parameters: MishibaParameters, progress: Progress
+) -> StageMaps:
+    """Disparities of least cost of the one-bit features of few views.
+
+    Parameters
+    ----------
+    light_field : LightField
+        With a known disparity range.
+    previous : None
+        The first stage builds on nothing.
+    parameters : MishibaParameters
+    progress : callable
+
+    Returns
+    -------
+    StageMaps
+
+    Raises
+    ------
+    SepiError
+        If the disparity range is unknown.
+    """
+    disparities = parameters.candidates(light_field)
+    costs = lattice_costs(light_field, disparities, parameters)
+    progress(0.4)
+    labels, kept = least_interpolated(light_field.reference_view, costs, parameters, progress)
+    return StageMaps(*refined(disparities, labels, kept))
+
+
+def median_descent(
+    light_field: LightField, previous: StageMaps | None, parameters: MedianDescentParameters, progress: Progress
+) -> StageMaps:
+    """Disparities of little energy of absolute differences.
+
+    Parameters
+    ----------
+    light_field : LightField
+    previous : StageMaps
+        Its confidence weighs its disparity.
+    parameters : MedianDescentParameters
+    progress : callable
+
+    Returns
+    -------
+    StageMaps
+        With the confidence as it was, without a cost volume.
+    """
+    from sepi.compared.mishiba_kernels import median_pass
+
+    before = require_previous(previous)
+    guide = light_field.reference_view
+    low, high = float(before.disparity.min()), float(before.disparity.max())
+    unit = max(high - low, 1e-6) / (LEVELS - 1)
+    data = np.round((before.disparity.astype(np.float64) - low) / unit).astype(np.int32)
+    weights = np.round(before.confidence * FULL_WEIGHT).astype(np.int32)
+    table, per_entry = neighbour_weights(parameters, residual_variance(guide))
+    current = data
+    for i in range(parameters.passes):
+        current = median_pass(current, data, weights, guide, parameters.radius, parameters.gap, table, per_entry)
+        progress((i + 1) / parameters.passes)
+    disparity = (low + current * unit).astype(np.float32)
+    return before.updated(disparity, before.confidence).without_costs()
+
+
+def selected_views(light_field: LightField) -> BoolMap:
+    """The views in the row and in the column of the reference view; all where these are hardly any; shape (T, S)."""
+    t, s = light_field.reference_position
+    cross = np.zeros(light_field.grid, bool)
+    cross[t] = cross[:, s] = True
+    cross &= light_field.present
+    return cross if cross.sum() > 2 else light_field.present
+
+
+def details(light_field: LightField, views: BoolMap, sigma: float) -> FloatMap:
+    """Grey values less their Gaussian mean, whose signs are the features; shape (N, H, W), float32."""
+    result = np.empty((int(views.sum()), *light_field.shape), np.float32)
+    for n, (t, s) in enumerate(np.argwhere(views)):
+        grey = as_unit_float(light_field.rgb_views[t, s]) @ GREY
+        result[n] = grey - cv2.GaussianBlur(grey, (0, 0), sigma) - np.float32(TIE)
+    return result
+
+
+def lattice_costs(light_field: LightField, disparities: FloatMap, parameters: MishibaParameters) -> FloatMap:
+    """Costs of all candidates on the lattice; shape (K, ceil(H / step), ceil(W / step)), float32, 0..1."""
+    from sepi.compared.mishiba_kernels import pair_costs
+
+    views = selected_views(light_field)
+    offsets = -disparities[:, None, None].astype(np.float64) * light_field.baselines[views]
+    step = parameters.lattice_step
+    height, width = light_field.shape
+    costs = np.empty((len(disparities), -(-height // step), -(-width // step)), np.float32)
+    pair_costs(details(light_field, views, parameters.feature_sigma), offsets, step, costs)
+    return costs
+
+
+def least_interpolated(
+    guide: FloatMap, costs: FloatMap, parameters: MishibaParameters, progress: Progress
+) -> tuple[npt.NDArray[np.int64], FloatMap]:
+    """Candidates of least interpolated cost, and what :func:`sepi.compared.mishiba_kernels.keep_least` keeps.
+
+    Parameters
+    ----------
+    guide : ndarray, shape (H, W, 3), float32
+        Colours in 0..1.
+    costs : ndarray, shape (K, h, w), float32
+        On the lattice.
+    parameters : MishibaParameters
+    progress : callable
+
+    Returns
+    -------
+    labels : ndarray, shape (H, W), int64
+    kept : ndarray, shape (H, W, 5), float32
+    """
+    from sepi.compared.mishiba_kernels import keep_least
+
+    step = parameters.lattice_step
+    fit = LatticeFit(np.ascontiguousarray(guide[::step, ::step]), parameters.radius, parameters.epsilon)
+    labels = np.zeros(guide.shape[:2], np.int64)
+    kept = np.zeros((*guide.shape[:2], 5), np.float32)
+    for k, cost in enumerate(costs):
+        keep_least(k, *fit.functions(cost), guide, step, labels, kept)
+        progress(0.4 + 0.6 * (k + 1) / len(costs))
+    return labels, kept
+
+
+def refined(disparities: FloatMap, labels: npt.NDArray[np.int64], kept: FloatMap) -> tuple[FloatMap, FloatMap]:
+    """Disparity by the parabola round the least cost, and confidence; each (H, W), float32.
+
+    Parameters
+    ----------
+    disparities : ndarray, shape (K,), float32
+    labels, kept : ndarray
+        Of :func:`least_interpolated`.
+    """
+    least, below, above, _, total = np.moveaxis(kept, 2, 0)
+    curvature = below - 2 * least + above
+    inner = (labels > 0) & (labels < len(disparities) - 1) & (curvature > 0)
+    offset = np.where(inner, (below - above) / (2 * np.where(inner, curvature, 1)), 0)
+    disparity = disparities[labels] + (disparities[1] - disparities[0]) * offset
+    # fitted costs may fall a little below 0
+    least, mean = np.maximum(least, 0) + NO_COST, np.maximum(total / len(disparities), 0) + NO_COST
+    confidence = np.clip(1 - least / mean, 0, 1)
+    return disparity.astype(np.float32), confidence.astype(np.float32)
+
+
+class LatticeFit(GuidedFilter):
+    """A guided filter that hands out its linear functions of the guide's colours, to be used between its pixels."""
+
+    def __init__(self, guide: FloatMap, radius: int, epsilon: float) -> None:
+        super().__init__(guide, radius, epsilon)
+        self._origin = guide[0, 0] - self._guide[0, 0]
+
+    def functions(self, values: FloatMap) -> tuple[FloatMap, FloatMap]:
+        """Slopes (H, W, 3) and constants (H, W), float32: the filtered values are slopes times colours + constants."""
+        mean = self._box(values)
+        covariance = self._box(self._guide * values[..., None]) - self._mean * mean[..., None]
+        slopes = np.einsum("hwij,hwj->hwi", self._inverse, covariance)
+        constants = self._box(mean - (slopes * self._mean).sum(axis=2))
+        slopes = self._box(slopes)
+        return slopes, constants - slopes @ self._origin
+
+
+def neighbour_weights(parameters: MedianDescentParameters, noise: float) -> tuple[npt.NDArray[np.int32], float]:
+    """Weight of a neighbour by squared colour distance, as integers, and the width of an entry.
+
+    Parameters
+    ----------
+    parameters : MedianDescentParameters
+    noise : float
+        Expected squared colour distance by noise alone.
+
+    Returns
+    -------
+    table : ndarray, shape (TABLE_ENTRIES,), int32
+    per_entry : float
+    """
+    variance = parameters.sigma**2 + noise
+    per_entry = 16 * variance / TABLE_ENTRIES
+    squared = (np.arange(TABLE_ENTRIES) + 0.5) * per_entry
+    neighbours = (2 * parameters.radius + 1) ** 2 - 1
+    weights = parameters.smoothness / neighbours * np.exp(-squared / (2 * variance))
+    return np.round(FULL_WEIGHT * weights).astype(np.int32), per_entry
+
+
+CHOICES: dict[str, dict[str, Choice]] = {
+    "initial": {"mishiba": Choice(MishibaParameters, mishiba)},
+    "optimize": {"median_descent": Choice(MedianDescentParameters, median_descent)},
+}
+
+VARIANT: dict[str, Any] = {
+    "initial": "mishiba",
+    "occlusion": "none",
+    "textureless": "none",
+    "optimize": "median_descent",
+}

@@ -1,0 +1,226 @@
+"""The occlusion-aware vote cost [1]_: for each candidate disparity the views vote, and the most votes win.
+
+The mean difference of the views from the reference view, the usual cost, is small at the right candidate only where all
+views see the pixel; where something hides it from some of them, their colours are the occluder's, the mean is large at
+every candidate, and edges come out blurred or widened. Here a view has a vote for a candidate if what it shows
+there differs from the reference view by less than a small threshold. How far the others differ does not matter, so what
+an occluder shows is left out without that edges are looked for or views split into groups.
+
+With the ``N`` views other than the reference view, ``delta_n(p, d)`` the difference of view ``n``, sheared by ``d``,
+from the reference view at pixel ``p``, and ``tau(p)`` the threshold of the pixel:
+
+- votes: ``V(p, d)`` = number of ``n`` with ``delta_n(p, d) <= tau(p)``;
+- mean difference of those that vote, as part of the threshold: ``M(p, d)`` = mean of ``delta_n(p, d) / tau(p)`` over
+  them, 0 without any;
+- cost: ``C(p, d) = 1 - (V(p, d) - M(p, d)) / N``, in 0..1. A vote more or less counts for more than any difference of
+  the means, which decide between candidates of equal votes and between the candidates' fractions;
+- threshold: ``tau(p) = max(tau_0, min over d of delta_(q N)(p, d))``, where ``delta_(m)`` is the ``m``-th least of the
+  differences: the least threshold by which a share ``q`` of the views agree on one candidate.
+
+The costs are smoothed by an edge-preserving filter, each pixel takes the candidate of least cost, a parabola through
+its neighbours' costs gives the fraction, and a weighted median takes out what is left of outliers. There is no global
+optimisation, so wide regions without texture stay as they are.
+
+What was confirmed of the publication is that the cost counts the views whose difference from the reference view is
+less than a small threshold, and selects by the number. Left open, or not confirmed, was the rest, and chosen here:
+
+- the difference: mean absolute difference of the three channels;
+- how the threshold adapts, as above. An occluder with a straight edge leaves a pixel at least half of the views, so
+  ``q`` is one half: the threshold comes from views that see the pixel, and is as wide as noise, the resampling of fine
+  texture, and changes of brightness make the better half of them differ. One wide threshold for all pixels lets wrong
+  candidates have all votes where texture is weak; one narrow for all leaves no votes where it is strong or the light
+  field noisy. ``tau_0`` is one step of 8-bit colours, below which differences say nothing;
+- how number and mean difference make one cost, as above;
+- 128 candidates, uniform over the disparity range; views resampled by cubic convolution. Beyond its border a view goes
+  on as it ends, and such a sample votes like an occluded one: by chance;
+- the edge-preserving filter: the guided filter (:mod:`sepi.image.guided_filter`), in windows of 15 pixels;
+- the fraction of a candidate, by a parabola through the filtered costs. With it most pixels are more precise than the
+  publication's figures say theirs are;
+- the last step: a weighted median, its weights by the colours of the reference view
+  (:mod:`sepi.image.weighted_median`).
+
+Any set of views will do: one row, one column, positions off the grid.
+
+References
+----------
+.. [1] Han, Xiang, Wang, Huang: A novel occlusion-aware vote cost for light field depth estimation. IEEE TPAMI 44(11),
+   2022. doi:10.1109/TPAMI.2021.3105523
+"""
+
+from __future__ import annotations
+
+import math
+from typing import ClassVar
+
+import numpy as np
+from pydantic import Field
+
+from sepi.compared.guided_costs import GuidedCostsParameters, guided_costs
+from sepi.image.weighted_median import weighted_median
+from sepi.lightfield import FloatMap, LightField
+from sepi.matching.candidates import CandidateParameters, CandidateRule, number_field
+from sepi.matching.cost_volumes import disparity_of, distinctness, least_costs
+from sepi.matching.sheared_views import ShearedViews
+from sepi.stage import Choice, CostVolume, Progress, StageMaps
+
+CANDIDATES = CandidateRule(usual=128, finest=0.02, coarsest=0.5, volume_bytes=10**9)
+"""As many as fit a gigabyte at most, since the cost volume is kept."""
+
+
+class OavcParameters(CandidateParameters):
+    """Parameters of the vote cost."""
+
+    rule: ClassVar[CandidateRule] = CANDIDATES
+
+    num_disparities: int | None = number_field(CANDIDATES, "docs/compared.md")
+    agreeing_share: float = Field(
+        0.5,
+        gt=0,
+        le=1,
+        description="share of the views that must have a vote for some candidate; sets each pixel's threshold",
+    )
+    least_threshold: float = Field(
+        0.004,
+        ge=1e-6,
+        le=1,
+        description="least difference within which a view has a vote, mean of the channels, colours in 0..1",
+    )
+
+
+class GuidedMedianParameters(GuidedCostsParameters):
+    """Parameters of the filtered costs and of the median of the map."""
+
+    median_radius: int = Field(3, ge=0, le=50, description="median window of 2 r + 1 pixels; 0 takes no median")
+    median_sigma: float = Field(
+        0.05, gt=0, description="RGB distance at which a pixel's weight in the median falls, colours in 0..1"
+    )
+
+
+def oavc(
+    light_field: LightField, previous: StageMaps | None, parameters: OavcParameters, progress: Progress
+) -> StageMaps:
+    """Candidates of most votes.
+
+    Parameters
+    ----------
+    light_field : LightField
+        With a known disparity range.
+    previous : None
+    parameters : OavcParameters
+    progress : callable
+
+    Returns
+    -------
+    StageMaps
+        With the cost volume.
+    """
+    views, disparities = ShearedViews(light_field), parameters.candidates(light_field)
+    thresholds = vote_thresholds(
+        views, light_field.shape, disparities, parameters, lambda fraction: progress(fraction / 2)
+    )
+    volume = votes(views, disparities, thresholds, lambda fraction: progress((1 + fraction) / 2))
+    labels = least_costs(volume)
+    return StageMaps(disparity_of(volume, labels), distinctness(volume, labels), cost_volume=volume)
+
+
+def vote_thresholds(
+    views: ShearedViews, shape: tuple[int, int], disparities: FloatMap, parameters: OavcParameters, progress: Progress
+) -> FloatMap:
+    """The least thresholds by which the asked share of the views agree on a candidate.
+
+    Parameters
+    ----------
+    views : ShearedViews
+        The reference view among them.
+    shape : tuple of int
+        Height and width of a view, pixels.
+    disparities : ndarray, shape (K,), float32
+        Candidates, pixels per view step.
+    parameters : OavcParameters
+    progress : callable
+
+    Returns
+    -------
+    ndarray, shape (H, W), float32
+        Mean difference of the channels, colours in 0..1.
+    """
+    from sepi.compared.oavc_kernels import lower_thresholds
+
+    needed = max(1, math.ceil(parameters.agreeing_share * (len(views.positions) - 1)))
+    thresholds = np.full(shape, np.inf, np.float32)
+    for k, sheared in views.over(disparities):
+        lower_thresholds(sheared, views.reference, needed, thresholds)
+        progress((k + 1) / len(disparities))
+    return np.maximum(thresholds, np.float32(parameters.least_threshold))
+
+
+def votes(views: ShearedViews, disparities: FloatMap, thresholds: FloatMap, progress: Progress) -> CostVolume:
+    """The costs ``C``.
+
+    Parameters
+    ----------
+    views : ShearedViews
+        The reference view among them.
+    disparities : ndarray, shape (K,), float32
+        Candidates, pixels per view step.
+    thresholds : ndarray, shape (H, W), float32
+        Positive.
+    progress : callable
+
+    Returns
+    -------
+    CostVolume
+    """
+    from sepi.compared.oavc_kernels import vote_costs
+
+    costs = np.empty((len(disparities), *thresholds.shape), np.float16)
+    of_one = np.empty(thresholds.shape, np.float32)
+    for k, sheared in views.over(disparities):
+        vote_costs(sheared, views.reference, thresholds, of_one)
+        costs[k] = of_one
+        progress((k + 1) / len(disparities))
+    return CostVolume(disparities, costs)
+
+
+def guided_median(
+    light_field: LightField, previous: StageMaps | None, parameters: GuidedMedianParameters, progress: Progress
+) -> StageMaps:
+    """Candidates of least filtered cost, and the weighted median of their map.
+
+    Parameters
+    ----------
+    light_field : LightField
+    previous : StageMaps
+        With a cost volume.
+    parameters : GuidedMedianParameters
+    progress : callable
+
+    Returns
+    -------
+    StageMaps
+        Without the cost volume.
+
+    Raises
+    ------
+    SepiError
+        If there is no cost volume.
+    """
+    maps = guided_costs(light_field, previous, parameters, progress)
+    equal = np.ones_like(maps.disparity)
+    disparity = weighted_median(
+        maps.disparity, light_field.reference_view, parameters.median_radius, parameters.median_sigma, equal
+    )
+    return maps.updated(disparity, maps.confidence)
+
+
+CHOICES = {
+    "initial": {"oavc": Choice(OavcParameters, oavc)},
+    "optimize": {"guided_median": Choice(GuidedMedianParameters, guided_median)},
+}
+
+VARIANT = {
+    "initial": "oavc",
+    "occlusion": "none",
+    "textureless": "none",
+    "optimize": {"choice": "guided_median", "radius": 7, "epsilon": 1e-5},
+}

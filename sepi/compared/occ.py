@@ -1,0 +1,434 @@
+"""Occlusion-aware depth from angular patches that edges split in two [1]_, a method that this one is compared with.
+
+Where nothing is hidden, all views sheared by a pixel's disparity show it in one colour. Beside an occluder only about
+half of the views do, and the line between those and the others runs as the occluder's edge runs in the picture. So the
+*angular patch* of a pixel near an edge is split along the edge, and its better half decides. Where occlusions are
+predicted from the result, the final map is smoothed less. Three stages:
+
+*Initial*: for the views ``L_d`` sheared by candidate ``d``, with the mean ``m`` and the variance over the angular
+patch of pixel ``p``, the cost is correspondence and defocus, ``C_d + D_d``:
+``C_d(p) = sum_views (L_d - m)^2 / (N - 1)`` and ``D_d(p) = (m - L(p))^2`` with the reference view ``L``. The candidate
+of least cost wins.
+
+*Occlusion*: pixels near Canny edges take the orientation of the nearest one. The two halves ``j`` of their patches
+have means ``m_j`` and variances ``V_j``. With the half ``i`` of smaller variance, ``C_d = V_i`` and
+``D_d = (m_i - L(p))^2``. A candidate beyond the occluder's depth shows the halves in reversed colours; those with
+``|m_1 - q_1| + |m_2 - q_2| > |m_2 - q_1| + |m_1 - q_2| + delta`` are left out, where ``q_1`` and ``q_2`` are the mean
+colours of the two sides in the reference view. Occlusions are predicted by three cues at the disparity ``d0`` that is
+found, its gradient, the ratio of the variances, and the difference of the means:
+``P = N(f(|grad d0|)) N(f(max(V_1 / V_2, V_2 / V_1))) N(f(|m_1 - m_2|))``, where ``f`` saturates and ``N`` takes the
+mean away and divides by the standard deviation.
+
+*Optimisation*: the energy ``sum_p (1 - exp(-(d(p) - d0(p))^2 / (2 (1 - c(p))^2))) + smoothness sum_pq S(d(p) - d(q)) /
+(|L(p) - L(q)| + k |P(p) - P(q)|)`` with the confidence ``c`` of the initial depth and a robust function ``S``.
+
+What the publication leaves open, or could not be confirmed, and what is chosen here:
+
+- Which pixels are near an edge: an occluder's edge moves by the difference of the disparities times the distance of the
+  view, so ``edge_reach`` is a part of the largest such shift.
+- The edge's orientation: that of the structure tensor round the edge pixel, to a sixteenth of half a turn.
+- Views on the dividing line belong to both halves, as the reference view does. A half that keeps fewer than a quarter
+  of the other views (a row of views along the edge, a reference view in a corner of the grid) tells nothing: there the
+  patch stays whole.
+- Colours: costs are means over the three channels. There is no window in the picture.
+- The side colours ``q`` come from a window as wide as the grid of views. Where all candidates are left out, the depth
+  of the whole patch stays.
+- Depth between candidates: the parabola through the least cost and its neighbours.
+- The gradient is divided by depth in the publication, which a disparity, of a plane linear in the picture, has no need
+  of: it is divided by the range, after a median of 3 x 3 pixels. ``f`` saturates at the 95th percentile. Of ``N`` the
+  part above 0 is taken, for two cues that deny an occlusion would otherwise affirm one. ``P`` is 0 away from edges.
+- The confidence is ``1 - least / mean`` of the costs; disparities in the energy are parts of the range. The colour
+  difference has a floor, for nothing may be divided by 0.
+- ``S`` is the truncated linear function, and the energy is minimised by message passing instead of graph cuts
+  (:mod:`sepi.regularization.message_passing`). Occlusions are not predicted anew from the final map.
+
+References
+----------
+.. [1] Wang, Efros, Ramamoorthi: Occlusion-aware depth estimation using light-field cameras. ICCV 2015.
+   doi:10.1109/ICCV.2015.398. Extended: Depth estimation with occlusion modeling using light-field cameras. IEEE TPAMI
+   38(11), 2016. doi:10.1109/TPAMI.2016.2515615. The extension's clusters of colours for several occluders are not here.
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar, NamedTuple
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+from pydantic import Field
+
+from sepi.image.edges import CannyParameters, canny_edges, edge_angle
+from sepi.lightfield import BoolMap, FloatMap, LightField
+from sepi.matching.candidates import CandidateParameters, CandidateRule, number_field
+from sepi.matching.cost_volumes import disparity_of
+from sepi.matching.sheared_views import ShearedViews
+from sepi.regularization.message_passing import labels_of_least_energy
+from sepi.stage import Choice, CostVolume, Progress, StageMaps, require_previous
+
+CANDIDATES = CandidateRule(usual=101, finest=0.05, coarsest=0.5, volume_bytes=2**30)
+"""An eighth of a pixel or so in the farthest view of usual light fields."""
+
+LABELS = CandidateRule(usual=151, finest=0.02, coarsest=0.5, volume_bytes=2**28)
+"""Of the optimisation, which holds five numbers for each label and pixel."""
+
+ORIENTATIONS = 16
+"""Orientations of edges over half a turn."""
+
+LEAST_SHARE = 0.25
+"""Part of the other views that a half must hold."""
+
+ON_THE_LINE = 1 / 8
+"""Distance from the dividing line within which a view stands on it, part of the distance of the farthest view."""
+
+SATURATION = 95
+"""Percentile at which a cue saturates."""
+
+# of the variances, so that the ratio of two that are nearly 0 tells nothing
+_LEAST_VARIANCE = np.float32(1e-5)
+
+
+class OccParameters(CandidateParameters):
+    """Parameters of the costs of whole angular patches."""
+
+    rule: ClassVar[CandidateRule] = CANDIDATES
+
+    num_disparities: int | None = number_field(CANDIDATES, "docs/compared.md")
+
+
+class OccSplitParameters(OccParameters, CannyParameters):
+    """Parameters of the split patches."""
+
+    edge_reach: float = Field(
+        1.0,
+        ge=0,
+        le=1,
+        description="distance from an edge within which patches are split: part of the disparity range's width times "
+        "the distance of the farthest view",
+    )
+    colour_tolerance: float = Field(
+        0.02, ge=0, le=1, description="by how much the halves' colours may look reversed, colours in 0..1"
+    )
+
+
+class OccFieldParameters(CandidateParameters):
+    """Parameters of the optimisation."""
+
+    rule: ClassVar[CandidateRule] = LABELS
+
+    num_disparities: int | None = number_field(LABELS, "docs/compared.md")
+    smoothness: float = Field(
+        1.0, ge=0, description="cost of a jump between neighbours of one colour; that of any disparity is 1 at most"
+    )
+    truncation: float = Field(
+        0.03, gt=0, le=1, description="change from which a further one costs no more, part of the disparity range"
+    )
+    contrast: float = Field(
+        0.02, gt=0, description="mean difference of colours at which smoothness falls to a half, colours in 0..1"
+    )
+    occlusion_weight: float = Field(
+        0.1, ge=0, description="difference of colours that a change of the predicted occlusion by 1 counts as"
+    )
+    iterations: int = Field(8, ge=1, le=100, description="passes of the messages, forth and back")
+
+
+class Edges(NamedTuple):
+    """Pixels whose angular patches are split.
+
+    Attributes
+    ----------
+    near : ndarray, shape (H, W), bool
+    places : ndarray, shape (P, 3), int64
+        Row, column and number of the orientation of each; the normal of the edge has ``number pi / ORIENTATIONS`` from
+        ``+x`` towards ``+y``.
+    """
+
+    near: BoolMap
+    places: npt.NDArray[np.int64]
+
+
+class Found(NamedTuple):
+    """Disparity and confidence by costs ``(K, ...)``; both of shape (...), float32."""
+
+    disparity: FloatMap
+    confidence: FloatMap
+
+
+def occ(
+    light_field: LightField, previous: StageMaps | None, parameters: OccParameters, progress: Progress
+) -> StageMaps:
+    """Depth from whole angular patches.
+
+    Parameters
+    ----------
+    light_field : LightField
+        With a known disparity range.
+    previous : None
+        The first stage builds on nothing.
+    parameters : OccParameters
+    progress : callable
+
+    Returns
+    -------
+    StageMaps
+
+    Raises
+    ------
+    SepiError
+        If the disparity range is unknown.
+    """
+    from sepi.compared.occ_kernels import whole_patch_costs
+
+    disparities = parameters.candidates(light_field)
+    reference = _channels_first(light_field.reference_view)
+    costs = np.empty((len(disparities), *light_field.shape), np.float32)
+    for k, sheared in ShearedViews(light_field).over(disparities):
+        whole_patch_costs(sheared, reference, costs[k])
+        progress((k + 1) / len(disparities))
+    return StageMaps(*least_cost(disparities, costs))
+
+
+def occ_split(
+    light_field: LightField, previous: StageMaps | None, parameters: OccSplitParameters, progress: Progress
+) -> StageMaps:
+    """Depth of pixels near edges from the better halves of their angular patches, and predicted occlusions.
+
+    Parameters
+    ----------
+    light_field : LightField
+        With a known disparity range.
+    previous : StageMaps
+        Depth from whole patches.
+    parameters : OccSplitParameters
+    progress : callable
+
+    Returns
+    -------
+    StageMaps
+        Adds ``occlusion_candidates``, bool, pixels whose patches are split, and ``predicted_occlusion``, float32, 0 or
+        more.
+    """
+    from sepi.compared.occ_kernels import split_patch_costs
+
+    before = require_previous(previous)
+    view = light_field.reference_view
+    disparities = parameters.candidates(light_field)
+    width = float(disparities[-1] - disparities[0])
+    edges = edges_to_split(view, parameters, parameters.edge_reach * width * light_field.reach)
+    beside = colours_beside(view, edges, max(1, round(light_field.reach)))
+    views, reference = ShearedViews(light_field), _channels_first(view)
+    halves = halves_of_views(views.baselines)
+    costs = np.empty((len(disparities), len(edges.places)), np.float32)
+    cues, of_candidate = (np.zeros((len(edges.places), 3), np.float32) for _ in range(2))
+    least = np.full(len(edges.places), np.inf, np.float32)
+    tolerance = np.float32(parameters.colour_tolerance)
+    for k, sheared in views.over(disparities):
+        split_patch_costs(sheared, reference, edges.places, halves, beside, tolerance, costs[k], of_candidate)
+        better = costs[k] < least
+        least[better], cues[better] = costs[k][better], of_candidate[better]
+        progress((k + 1) / len(disparities))
+    found, known = least_cost(disparities, costs), np.isfinite(least)
+    disparity, confidence = before.disparity.copy(), before.confidence.copy()
+    disparity[edges.near] = np.where(known, found.disparity, disparity[edges.near])
+    confidence[edges.near] = np.where(known, found.confidence, confidence[edges.near])
+    predicted = np.zeros(light_field.shape, np.float32)
+    predicted[edges.near] = predicted_occlusion(slope(disparity)[edges.near] / np.float32(width), cues)
+    return before.updated(disparity, confidence, occlusion_candidates=edges.near, predicted_occlusion=predicted)
+
+
+def occ_field(
+    light_field: LightField, previous: StageMaps | None, parameters: OccFieldParameters, progress: Progress
+) -> StageMaps:
+    """Disparities of least energy.
+
+    Parameters
+    ----------
+    light_field : LightField
+        With a known disparity range.
+    previous : StageMaps
+        Depth, its confidence, and ``predicted_occlusion`` where there is one.
+    parameters : OccFieldParameters
+    progress : callable
+
+    Returns
+    -------
+    StageMaps
+    """
+    before = require_previous(previous)
+    volume = data_costs(before, parameters.candidates(light_field))
+    predicted = before.extra.get("predicted_occlusion", np.zeros(light_field.shape, np.float32))
+    intervals = len(volume.disparities) - 1
+    truncation = max(1.0, parameters.truncation * intervals)
+    across, down = smoothness_weights(light_field.reference_view, predicted, parameters)
+    labels = labels_of_least_energy(
+        volume.costs, across / truncation, down / truncation, truncation, parameters.iterations
+    )
+    progress(1.0)
+    return before.updated(disparity_of(volume, labels), before.confidence)
+
+
+def least_cost(disparities: FloatMap, costs: FloatMap) -> Found:
+    """Candidates of least cost, refined by a parabola, and how far their costs lie below the mean.
+
+    Parameters
+    ----------
+    disparities : ndarray, shape (K,), float32
+    costs : ndarray, shape (K, ...), float32
+        Infinite for a candidate that is left out.
+
+    Returns
+    -------
+    Found
+        No confidence where no candidate is left.
+    """
+    last = len(disparities) - 1
+    label = np.argmin(costs, axis=0)
+    below, here, above = (
+        np.take_along_axis(costs, np.clip(label + step, 0, last)[None], axis=0)[0] for step in (-1, 0, 1)
+    )
+    inner = (label > 0) & (label < last) & np.isfinite(below) & np.isfinite(above)
+    below, nearest, above = (np.where(inner, values, 0).astype(np.float64) for values in (below, here, above))
+    curvature = below - 2 * nearest + above
+    offset = np.where(curvature > 0, (below - above) / (2 * np.where(curvature > 0, curvature, 1)), 0)
+    step = disparities[1] - disparities[0]
+    kept = np.isfinite(costs)
+    mean = np.sum(costs, axis=0, where=kept) / np.maximum(1, np.sum(kept, axis=0))
+    certain = np.isfinite(here) & (mean > 0)
+    confidence = np.where(certain, 1 - np.where(certain, here, 0) / np.where(certain, mean, 1), 0)
+    return Found(
+        np.asarray(disparities[label] + step * offset, np.float32), np.clip(confidence, 0, 1).astype(np.float32)
+    )
+
+
+def edges_to_split(reference_view: FloatMap, parameters: CannyParameters, reach: float) -> Edges:
+    """Pixels within reach of a Canny edge, in pixels, each with the orientation of the nearest one."""
+    lines = canny_edges(reference_view, parameters)
+    turns = np.round(edge_angle(reference_view, parameters) * (ORIENTATIONS / np.pi)).astype(np.int64) % ORIENTATIONS
+    if not lines.any():
+        return Edges(lines, np.empty((0, 3), np.int64))
+    distance, nearest = cv2.distanceTransformWithLabels(
+        (~lines).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5, labelType=cv2.DIST_LABEL_PIXEL
+    )
+    turn_of = np.zeros(int(nearest.max()) + 1, np.int64)
+    turn_of[nearest[lines]] = turns[lines]
+    near = np.asarray(distance <= reach)
+    return Edges(near, np.column_stack([np.argwhere(near), turn_of[nearest[near]]]))
+
+
+def halves_of_views(baselines: npt.NDArray[np.float64]) -> BoolMap:
+    """Views of the two halves into which an edge of each orientation splits the angular patch.
+
+    Parameters
+    ----------
+    baselines : ndarray, shape (N, 2), float64
+        Of the views, down and across from the reference view, in view steps.
+
+    Returns
+    -------
+    ndarray, shape (ORIENTATIONS, 2, N), bool
+        The second half lies on the side to which the edge's normal points.
+    """
+    along = _normals() @ baselines.T
+    line = ON_THE_LINE * np.abs(baselines).max(initial=0)
+    halves = np.stack([along <= line, along >= -line], axis=1)
+    others = halves.sum(axis=2) - 1
+    halves[others < LEAST_SHARE * (len(baselines) - 1)] = True
+    return halves
+
+
+def colours_beside(reference_view: FloatMap, edges: Edges, radius: int) -> FloatMap:
+    """Mean colours of the two sides of the edge in a window round each pixel; shape (P, 2, 3), float32.
+
+    The second side is that to which the edge's normal points.
+    """
+    y, x = np.mgrid[-radius : radius + 1, -radius : radius + 1]
+    colours = np.zeros((len(edges.places), 2, 3), np.float32)
+    for number, (down, across) in enumerate(_normals()):
+        chosen = edges.places[:, 2] == number
+        rows, columns = edges.places[chosen, 0], edges.places[chosen, 1]
+        along = y * down + x * across
+        for side, window in enumerate((along < -0.5, along > 0.5)):
+            weights = window.astype(np.float32) / np.float32(window.sum())
+            means = cv2.filter2D(reference_view, cv2.CV_32F, weights, borderType=cv2.BORDER_REPLICATE)
+            colours[chosen, side] = means[rows, columns]
+    return colours
+
+
+def slope(disparity: FloatMap) -> FloatMap:
+    """Length of the gradient of a disparity map without its isolated outliers, per pixel; shape (H, W), float32."""
+    down, across = np.gradient(cv2.medianBlur(disparity, 3))
+    return np.asarray(np.hypot(down, across), np.float32)
+
+
+def predicted_occlusion(slopes: FloatMap, cues: FloatMap) -> FloatMap:
+    """How much speaks for an occlusion at each pixel whose patch was split.
+
+    Parameters
+    ----------
+    slopes : ndarray, shape (P,), float32
+        Of the disparity, part of the range per pixel.
+    cues : ndarray, shape (P, 3), float32
+        Variances of the two halves, and the difference of their means.
+
+    Returns
+    -------
+    ndarray, shape (P,), float32
+        0 or more.
+    """
+    one, other = cues[:, 0] + _LEAST_VARIANCE, cues[:, 1] + _LEAST_VARIANCE
+    ratio = np.maximum(one, other) / np.minimum(one, other)
+    return _above_mean(slopes) * _above_mean(ratio) * _above_mean(cues[:, 2])
+
+
+def data_costs(before: StageMaps, labels: FloatMap) -> CostVolume:
+    """What each disparity costs: little near the one found before, and that the more narrowly the surer it is."""
+    width = labels[-1] - labels[0]
+    # a tolerance below the distance of the labels would leave pixels between two of them without any
+    tolerance = np.maximum(1 - before.confidence, np.float32(1 / (len(labels) - 1)))
+    costs = np.empty((len(labels), *before.disparity.shape), np.float16)
+    for k, label in enumerate(labels):
+        costs[k] = 1 - np.exp(-0.5 * ((before.disparity - label) / (width * tolerance)) ** 2)
+    return CostVolume(labels, costs)
+
+
+def smoothness_weights(
+    view: FloatMap, predicted: FloatMap, parameters: OccFieldParameters
+) -> tuple[FloatMap, FloatMap]:
+    """Cost of a jump to the next pixel in the row, and in the column; (H, W), float32, 0 at the last ones."""
+    across, down = (np.zeros(predicted.shape, np.float32) for _ in range(2))
+    for axis, weights in ((0, down[:-1]), (1, across[:, :-1])):
+        colours = np.abs(np.diff(view, axis=axis)).mean(axis=2)
+        occlusions = np.abs(np.diff(predicted, axis=axis))
+        difference = colours + np.float32(parameters.occlusion_weight) * occlusions
+        weights[:] = parameters.smoothness * parameters.contrast / (difference + parameters.contrast)
+    return across, down
+
+
+def _above_mean(cue: FloatMap) -> FloatMap:
+    """A cue, saturated, by how many standard deviations it exceeds its mean."""
+    if not cue.size:
+        return cue
+    saturated = np.minimum(cue, np.percentile(cue, SATURATION))
+    deviation = float(saturated.std())
+    if deviation <= 0:
+        return np.zeros_like(cue)
+    return np.asarray(np.maximum(0, (saturated - saturated.mean()) / deviation), np.float32)
+
+
+def _normals() -> npt.NDArray[np.float64]:
+    """Normals of the orientations, ``(down, across)``; shape (ORIENTATIONS, 2)."""
+    angle = np.arange(ORIENTATIONS) * np.pi / ORIENTATIONS
+    return np.stack([np.sin(angle), np.cos(angle)], axis=1)
+
+
+def _channels_first(view: FloatMap) -> FloatMap:
+    return np.ascontiguousarray(view.transpose(2, 0, 1))
+
+
+CHOICES = {
+    "initial": {"occ": Choice(OccParameters, occ)},
+    "occlusion": {"occ": Choice(OccSplitParameters, occ_split)},
+    "optimize": {"occ": Choice(OccFieldParameters, occ_field)},
+}
+
+VARIANT = {"initial": "occ", "occlusion": "occ", "textureless": "none", "optimize": "occ"}

@@ -1,0 +1,287 @@
+"""Learned methods: a network in an ONNX file as the initial depth.
+
+``onnx`` runs any network that takes views of a light field and gives the disparity of its reference view, on the CPU by
+ONNX Runtime [1]_. The package brings no network and no weights; docs/compared.md says how to export one from PyTorch or
+TensorFlow. What networks expect differs, so the parameters say it:
+
+- ``inputs``: for each input of the network, in its order, which views it takes and how their axes lie, as
+  ``"VIEWS: AXES"``. Views are ``all``, ``row`` and ``column`` (through the reference view), ``diagonal`` (down to the
+  right), ``antidiagonal`` (down to the left; both are counted by ``t``), or ``each``: as many inputs as there are
+  views, row by row. Axes are written as for einops [2]_: ``t s y x c`` for rows and columns of views, rows and columns
+  of pixels and channels, ``1`` for an axis of length one, and several in brackets for their product;
+- ``scale`` and ``offset`` of the colours, which lie in 0..1 before, ``grey`` for one channel, ``reversed`` for axes of
+  views that the network counts from the other end;
+- ``disparity_scale`` and ``disparity_offset`` that make pixels per view step, nearer positive, of its output;
+- ``margin``: by how many pixels the output is smaller on each side (networks without padding); ``tile`` and
+  ``overlap``: a large picture goes through the network in pieces.
+
+A network tells no confidence: that of every pixel is 1.
+
+References
+----------
+.. [1] https://onnxruntime.ai
+.. [2] Rogozhnikov: Einops: clear and reliable tensor manipulations with Einstein-like notation. ICLR 2022.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal, Self
+
+import numpy as np
+import numpy.typing as npt
+from pydantic import Field, model_validator
+
+from sepi.errors import SepiError
+from sepi.lightfield import FloatMap, LightField, as_unit_float
+from sepi.stage import Choice, Parameters, Progress, StageMaps
+
+if TYPE_CHECKING:
+    import onnxruntime
+
+VIEWS = ("all", "row", "column", "diagonal", "antidiagonal", "each")
+"""Words for the views of an input."""
+
+_AXES = "t s y x c"
+# of ITU-R BT.601
+_GREY = np.array([0.299, 0.587, 0.114], np.float32)
+
+
+class OnnxParameters(Parameters):
+    """What a network is, and what it expects."""
+
+    model: str | None = Field(None, description="path of the ONNX file; it must be given")
+    inputs: tuple[str, ...] = Field(
+        ("all: 1 (t s c) y x",), min_length=1, description="'VIEWS: AXES' of each input (docs/compared.md)"
+    )
+    grid: tuple[int, int] | None = Field(
+        None, description="rows and columns of views that the network takes, round the reference view; null: all"
+    )
+    reversed: tuple[Literal["t", "s"], ...] = Field((), description="axes of views that it counts from the other end")
+    grey: bool = Field(False, description="whether it takes one channel, of brightness")
+    scale: float = Field(1.0, description="factor of the colours, which are 0..1")
+    offset: float = Field(0.0, description="added to them then")
+    output: str | None = Field(None, description="name of the output that is the disparity; null: the first")
+    disparity_scale: float = Field(1.0, description="factor that makes pixels per view step of its output")
+    disparity_offset: float = Field(0.0, description="added then, pixels per view step")
+    margin: int = Field(0, ge=0, le=200, description="by how much the output is smaller on each side, pixels")
+    tile: int | None = Field(None, ge=8, description="width of the pieces of the output, pixels; null: the whole")
+    overlap: int = Field(16, ge=0, description="by how much pieces reach into each other, pixels")
+
+    @model_validator(mode="after")
+    def _can_be_followed(self) -> Self:
+        for text in self.inputs:
+            views, _, axes = text.partition(":")
+            if views.strip() not in VIEWS or not re.fullmatch(r"[tsyxc1() ]+", axes):
+                raise ValueError(f"inputs: expected 'VIEWS: AXES' such as 'row: 1 s y x', got '{text}'")
+        if self.tile is not None and self.tile <= 2 * self.overlap:
+            raise ValueError(f"tile: expected more than twice the overlap of {self.overlap}")
+        return self
+
+    @property
+    def files(self) -> tuple[str, ...]:
+        """The network's file."""
+        return () if self.model is None else (self.model,)
+
+
+def onnx(
+    light_field: LightField, previous: StageMaps | None, parameters: OnnxParameters, progress: Progress
+) -> StageMaps:
+    """Depth by a network.
+
+    Parameters
+    ----------
+    light_field : LightField
+    previous : None
+        The first stage builds on nothing.
+    parameters : OnnxParameters
+    progress : callable
+
+    Returns
+    -------
+    StageMaps
+        ``disparity``, float32, and a ``confidence`` of 1 everywhere; shape (H, W).
+
+    Raises
+    ------
+    SepiError
+        If ONNX Runtime is not installed, the file is not a network, or the network does not take what it is given or
+        gives another shape than the parameters say.
+    """
+    session = _session(parameters)
+    views, reference = _chosen_views(light_field, parameters)
+    height, width = light_field.shape
+    disparity = np.empty((height, width), np.float32)
+    pieces = list(_pieces(height, width, parameters))
+    for number, (window, inner, target) in enumerate(pieces, start=1):
+        given = _arrays(views[:, :, window[0][:, None], window[1]], reference, parameters.inputs)
+        disparity[target] = _run(session, given, window, parameters)[inner]
+        progress(number / len(pieces))
+    disparity = disparity * np.float32(parameters.disparity_scale) + np.float32(parameters.disparity_offset)
+    return StageMaps(disparity, np.ones_like(disparity))
+
+
+def _session(parameters: OnnxParameters) -> onnxruntime.InferenceSession:
+    if parameters.model is None:
+        raise SepiError("initial.onnx.model: no network; name an ONNX file (docs/compared.md)")
+    if not Path(parameters.model).is_file():
+        raise SepiError(f"{parameters.model}: no such file")
+    try:
+        import einops  # noqa: F401
+        import onnxruntime
+    except ImportError as error:
+        raise SepiError(f"initial.onnx needs the package {error.name}; install sepi[onnx]") from error
+    options = onnxruntime.SessionOptions()
+    options.use_deterministic_compute = True
+    options.intra_op_num_threads = _threads()
+    # errors are told as exceptions
+    options.log_severity_level = 4
+    try:
+        return onnxruntime.InferenceSession(parameters.model, options, providers=["CPUExecutionProvider"])
+    except Exception as error:
+        raise SepiError(f"{parameters.model}: not a network that ONNX Runtime reads ({error})") from error
+
+
+def _threads() -> int:
+    import numba
+
+    return int(numba.get_num_threads())
+
+
+def _chosen_views(light_field: LightField, parameters: OnnxParameters) -> tuple[FloatMap, tuple[int, int]]:
+    """The views that the network takes, as it takes their colours, (t, s, H, W, c) float32, and which is the reference.
+
+    Raises
+    ------
+    SepiError
+        If some of them are not there.
+    """
+    rows, columns = parameters.grid or light_field.grid
+    t, s = light_field.reference_position
+    top, left = (t - rows // 2, s - columns // 2) if parameters.grid else (0, 0)
+    if min(top, left) < 0 or top + rows > light_field.grid[0] or left + columns > light_field.grid[1]:
+        raise SepiError(
+            f"{light_field.name}: the network takes {rows}x{columns} views round view {t},{s}, and the light field has "
+            f"{light_field.grid[0]}x{light_field.grid[1]}"
+        )
+    part = np.s_[top : top + rows, left : left + columns]
+    if not light_field.present[part].all():
+        raise SepiError(f"{light_field.name}: a network takes all views of its grid, and some are missing")
+    views = as_unit_float(light_field.rgb_views[part])
+    if parameters.grey:
+        views = (views @ _GREY)[..., None]
+    views = views * np.float32(parameters.scale) + np.float32(parameters.offset)
+    reference = [t - top, s - left]
+    for axis, (name, count) in enumerate((("t", rows), ("s", columns))):
+        if name in parameters.reversed:
+            views = np.flip(views, axis)
+            reference[axis] = count - 1 - reference[axis]
+    return views, (reference[0], reference[1])
+
+
+_Window = tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]
+_Part = tuple[slice, slice]
+
+
+def _pieces(height: int, width: int, parameters: OnnxParameters) -> Iterator[tuple[_Window, _Part, _Part]]:
+    """Pieces that cover the picture: rows and columns of views, the part of the output kept, and where it goes.
+
+    All have one size, since a network may have been exported for one; beyond its border a view goes on as it ends.
+    """
+    margin = parameters.margin
+    for (rows, inner_y, to_y), (columns, inner_x, to_x) in (
+        (down, across)
+        for down in _spans(height, margin, parameters.tile, parameters.overlap)
+        for across in _spans(width, margin, parameters.tile, parameters.overlap)
+    ):
+        yield (rows, columns), (inner_y, inner_x), (to_y, to_x)
+
+
+def _spans(
+    length: int, margin: int, tile: int | None, overlap: int
+) -> Iterator[tuple[npt.NDArray[np.intp], slice, slice]]:
+    """The pieces along one axis: indices of the views' pixels, the part of the output kept, and where it goes."""
+    if tile is None:
+        yield np.clip(np.arange(-margin, length + margin), 0, length - 1), np.s_[:length], np.s_[:length]
+        return
+    core = tile - 2 * overlap
+    for begin in range(0, length, core):
+        end = min(begin + core, length)
+        first = begin - overlap - margin
+        window = np.clip(np.arange(first, first + tile + 2 * margin), 0, length - 1)
+        yield window, np.s_[overlap : overlap + end - begin], np.s_[begin:end]
+
+
+def _run(
+    session: onnxruntime.InferenceSession, given: list[FloatMap], window: _Window, parameters: OnnxParameters
+) -> FloatMap:
+    """The network's output for a window of the views; its shape is checked."""
+    wanted = session.get_inputs()
+    if len(given) != len(wanted):
+        raise SepiError(
+            f"{parameters.model}: has {len(wanted)} inputs ({', '.join(one.name for one in wanted)}), and "
+            f"initial.onnx.inputs describes {len(given)}"
+        )
+    kinds = {"tensor(float16)": np.float16, "tensor(double)": np.float64}
+    named = {
+        one.name: np.ascontiguousarray(array, kinds.get(one.type, np.float32))
+        for one, array in zip(wanted, given, strict=True)
+    }
+    name = parameters.output or session.get_outputs()[0].name
+    try:
+        found = np.asarray(session.run([name], named)[0], np.float32)
+    except Exception as error:
+        shapes = ", ".join(f"{key} {array.shape}" for key, array in named.items())
+        raise SepiError(f"{parameters.model}: the network does not take {shapes} ({error})") from error
+    size = tuple(len(indices) - 2 * parameters.margin for indices in window)
+    squeezed = tuple(n for n in found.shape if n != 1)
+    if squeezed != tuple(n for n in size if n != 1):
+        raise SepiError(
+            f"{parameters.model}: output '{name}' of shape {found.shape} for views of {window[0].size}x"
+            f"{window[1].size} pixels; expected {size[0]}x{size[1]} (initial.onnx.margin is {parameters.margin})"
+        )
+    return found.reshape(size)
+
+
+def _arrays(views: FloatMap, reference: tuple[int, int], inputs: tuple[str, ...]) -> list[FloatMap]:
+    """What each input of the network is given, of views (t, s, y, x, c).
+
+    Raises
+    ------
+    SepiError
+        If the views have no such row, column or diagonal, or an axis is left out that is longer than one.
+    """
+    from einops import EinopsError, rearrange
+
+    found: list[FloatMap] = []
+    for text in inputs:
+        which, _, axes = text.partition(":")
+        named = set(re.findall("[tsyxc]", axes))
+        left = " ".join(axis if axis in named else "1" for axis in _AXES.split())
+        for selected in _selected(views, reference, which.strip()):
+            try:
+                found.append(rearrange(selected, f"{left} -> {axes.strip()}"))
+            except EinopsError as error:
+                lengths = dict(zip(_AXES.split(), selected.shape, strict=True))
+                raise SepiError(f"initial.onnx.inputs: '{text}' does not fit views with {lengths}") from error
+    return found
+
+
+def _selected(views: FloatMap, reference: tuple[int, int], which: str) -> list[FloatMap]:
+    """The views of an input, or of as many inputs as there are views; each (t, s, y, x, c)."""
+    (rows, columns), (t, s) = views.shape[:2], reference
+    if which in ("diagonal", "antidiagonal"):
+        if rows != columns:
+            raise SepiError(f"initial.onnx.inputs: {rows}x{columns} views have no diagonal")
+        order = np.arange(rows)
+        return [views[order, order if which == "diagonal" else order[::-1]][:, None]]
+    if which == "each":
+        return [views[i : i + 1, k : k + 1] for i in range(rows) for k in range(columns)]
+    return [{"all": views, "row": views[t : t + 1], "column": views[:, s : s + 1]}[which]]
+
+
+CHOICES = {"initial": {"onnx": Choice(OnnxParameters, onnx)}}
+
+VARIANT = {"initial": "onnx", "occlusion": "none", "textureless": "none", "optimize": "none"}

@@ -1,0 +1,320 @@
+"""The compared method of phase-shifted views: its shifts, costs and refinement, and what its publication claims."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numba
+import numpy as np
+import pytest
+from geometries import GEOMETRIES, standing
+from several_threads import several_threads
+
+from sepi.compared import acc
+from sepi.compared.acc import AccParameters, ConfidentLabelsParameters, confident_labels, phase_shift_costs
+from sepi.compared.acc_features import agreed, features_of, matched_disparities, mutual_matches
+from sepi.compared.acc_kernels import add_differences, turn_phases
+from sepi.compared.acc_phase_shift import PhaseShift
+from sepi.image.guided_filter import GuidedFilter
+from sepi.lightfield import DisparityRange, LightField
+from sepi.matching.cost_volumes import disparity_of, least_costs
+from sepi.pipeline import estimate_depth
+from sepi.scenes import render
+from sepi.stage import CostVolume, no_progress
+
+FEW = {"initial": {"num_disparities": 25}}
+
+
+def waves(height: int, width: int, down: float, across: float) -> np.ndarray:
+    """Three pictures of a few waves below the highest frequency, at ``(y + down, x + across)``; (3, H, W)."""
+    y, x = np.mgrid[:height, :width] + np.array([down, across])[:, None, None]
+    y, x = 2 * np.pi * y / height, 2 * np.pi * x / width
+    return np.stack([np.sin(3 * y + 2 * x), np.cos(7 * y - 5 * x) + 0.3, np.sin(11 * x) * np.cos(10 * y)])
+
+
+@pytest.mark.parametrize(("height", "width"), [(24, 30), (25, 31)], ids=["even", "odd"])
+def test_shift_of_a_band_limited_picture_is_exact(height: int, width: int) -> None:
+    """The phase shift theorem: the method's whole claim is that sub-pixel shifts lose nothing."""
+    offsets = np.array([[0, 0], [0.3, -1.7], [0.5, 0.5], [-3.25, 0.01], [40.1, -77.7]])
+    found = PhaseShift(waves(height, width, 0, 0).astype(np.float32), None).by(offsets)
+    for moved, (down, across) in zip(found, offsets, strict=True):
+        np.testing.assert_allclose(moved, waves(height, width, down, across), atol=1e-5)
+
+
+def test_shift_by_whole_pixels_is_exact_for_any_picture() -> None:
+    """Noise has the highest frequency, whose sign nobody knows."""
+    picture = np.random.default_rng(0).random((3, 24, 30), np.float32)
+    found = PhaseShift(picture, None).by(np.array([[1, -4], [-7, 0]], float))
+    np.testing.assert_allclose(found[0], np.roll(picture, (-1, 4), (1, 2)), atol=1e-5)
+    np.testing.assert_allclose(found[1], np.roll(picture, 7, 1), atol=1e-5)
+
+
+@pytest.mark.parametrize("size", [20, 64], ids=["smaller than the margin", "larger"])
+def test_pictures_go_on_as_their_mirror_image(size: int) -> None:
+    """Without a margin the opposite border would shine in, and no candidate would fit along the borders."""
+    picture = np.random.default_rng(1).random((1, size, size), np.float32)
+    mirrored = np.pad(picture[0], 9, mode="symmetric")
+    offsets = np.array([[9, 0], [0, -9], [-4, 9]])
+    for moved, (down, across) in zip(PhaseShift(picture, 9).by(offsets.astype(float)), offsets, strict=True):
+        expected = mirrored[9 + down :, 9 + across :][:size, :size]
+        np.testing.assert_allclose(moved[0, :size, :size], expected, atol=1e-5)
+
+
+def test_no_edge_shines_in_from_the_opposite_border() -> None:
+    """A picture dark at the left and bright at the right has no edge at its border, and rings at none."""
+    ramp = np.broadcast_to(np.linspace(0, 1, 64, dtype=np.float32), (1, 32, 64)).copy()
+    offset = np.array([[0.0, 0.5]])
+    error = [
+        np.abs(PhaseShift(ramp, farthest).by(offset)[0, 0, :32, :60] - ramp[0, :, :60] - 0.5 / 63).max()
+        for farthest in (None, 1)
+    ]
+    assert error[1] < 0.01 < 0.1 < error[0]
+
+
+def differences_twin(moved: np.ndarray, reference: np.ndarray, across: float, share: float) -> np.ndarray:
+    residual = np.pad(
+        moved[:, : reference.shape[1], : reference.shape[2]] - reference, ((0, 0), (1, 1), (1, 1)), "edge"
+    )
+    right = np.abs(residual[:, 1:-1, 2:] - residual[:, 1:-1, :-2]).mean(axis=0) / 2
+    below = np.abs(residual[:, 2:, 1:-1] - residual[:, :-2, 1:-1]).mean(axis=0) / 2
+    colour = np.minimum(np.abs(residual[:, 1:-1, 1:-1]).mean(axis=0), 0.3)
+    gradients = across * np.minimum(right, 0.2) + (1 - across) * np.minimum(below, 0.2)
+    return np.asarray(share * colour + (1 - share) * gradients)
+
+
+def test_kernels_equal_plain_twins() -> None:
+    """Every cost comes from these loops."""
+    random = np.random.default_rng(2)
+    moved, reference = random.random((4, 3, 14, 19), np.float32), random.random((3, 12, 17), np.float32)
+    out = np.ones((4, 12, 17), np.float32)
+    add_differences(moved, reference, 0.7, 0.4, 0.3, 0.2, out)
+    for found, one in zip(out, moved, strict=True):
+        np.testing.assert_allclose(found, 1 + differences_twin(one, reference, 0.7, 0.4), rtol=1e-5)
+    spectrum, rows, columns = (
+        (random.random(shape) + 1j * random.random(shape)).astype(np.complex64) for shape in ((3, 5, 4), (2, 5), (2, 7))
+    )
+    turned = np.empty((2, 3, 5, 4), np.complex64)
+    turn_phases(spectrum, rows, columns, turned)
+    expected = spectrum * rows[:, None, :, None] * columns[:, None, None, :4]
+    np.testing.assert_allclose(turned, expected, rtol=1e-5)
+
+
+def textured(disparity: float, noise: float, *, rows: int = 5, stripes: bool = False) -> LightField:
+    """A plane of texture up to 0.8 of the highest frequency, each of ``rows`` times 5 views sampled exactly."""
+    random, size = np.random.default_rng(3), 48
+    down, across = np.meshgrid(*[np.fft.fftfreq(size)] * 2, indexing="ij")
+    kept = (np.abs(down) < 0.4) & (np.abs(across) < 0.4) & ((down == 0) | (not stripes))
+    spectrum = np.fft.fft2(random.normal(size=(3, size, size))) * kept
+    spectrum *= 0.12 / np.fft.ifft2(spectrum).real.std()
+    views = np.empty((rows, 5, size, size, 3), np.float32)
+    for t, s in np.ndindex(rows, 5):
+        phase = np.exp(2j * np.pi * disparity * (down * (t - rows // 2) + across * (s - 2)))
+        views[t, s] = 0.5 + np.fft.ifft2(spectrum * phase).real.transpose(1, 2, 0)
+    views += random.normal(0, noise, views.shape).astype(np.float32)
+    return LightField(np.clip(views, -0.5, 1.5), "texture", disparity_range=DisparityRange(-0.3, 0.5, "given"))
+
+
+def errors(light_field: LightField, true: np.ndarray | float, **parameters: float) -> np.ndarray:
+    """Of the candidates of least cost, borders left out."""
+    chosen = AccParameters(num_disparities=41, **parameters)
+    disparities = chosen.candidates(light_field)
+    costs = phase_shift_costs(light_field, disparities, chosen, no_progress)
+    volume = CostVolume(disparities, costs.astype(np.float16))
+    return np.abs(disparity_of(volume, least_costs(volume)) - true)[8:-8, 8:-8]
+
+
+class Interpolated:
+    """Shifts by interpolation, in the place of the phase shift."""
+
+    cubic = True
+
+    def __init__(self, pictures: np.ndarray, farthest: float) -> None:
+        self.pictures = pictures
+
+    def by(self, offsets: np.ndarray) -> np.ndarray:
+        from sepi.matching.sheared_views_kernels import shear
+
+        out = np.empty((len(offsets), *self.pictures.shape), np.float32)
+        shear(np.broadcast_to(self.pictures, out.shape).copy(), offsets, self.cubic, out)
+        return out
+
+
+class Bilinear(Interpolated):
+    cubic = False
+
+
+def test_phase_shift_beats_interpolation_on_fine_texture(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What the publication claims first: sub-pixel depth without the blur of interpolation."""
+    scene = textured(0.137, 0)
+    phase = np.median(errors(scene, 0.137))
+    assert phase < 0.002
+    for shifts in (Interpolated, Bilinear):
+        monkeypatch.setattr(acc, "PhaseShift", shifts)
+        assert np.median(errors(scene, 0.137)) > 8 * phase
+
+
+def test_phase_shift_beats_interpolation_on_a_rendered_slope(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also where pictures are rendered and rounded to eight bits, with less to gain."""
+    scene = render("slanted_plane", size=64, views=5)
+    phase = np.median(errors(scene, scene.ground_truth))
+    for shifts, part in ((Interpolated, 0.87), (Bilinear, 0.75)):
+        monkeypatch.setattr(acc, "PhaseShift", shifts)
+        assert phase < part * np.median(errors(scene, scene.ground_truth))
+
+
+def test_gradients_along_the_movement_count_at_edges(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The publication's second claim: at an edge, a view that moves across it says most by the gradient across.
+
+    On texture without a direction equal shares do better, which is no failure of the code.
+    """
+    scene = textured(0.137, 0.06, rows=1, stripes=True)
+    only_gradients = {"colour_share": 0.0, "gradient_truncation": 0.1}
+    adaptive = np.median(errors(scene, 0.137, **only_gradients))
+    monkeypatch.setattr(acc, "across_share", lambda _: 0.5)
+    assert adaptive < 0.92 * np.median(errors(scene, 0.137, **only_gradients))
+    monkeypatch.setattr(acc, "across_share", lambda _: 0.0)
+    assert adaptive < 0.4 * np.median(errors(scene, 0.137, **only_gradients))
+
+
+def test_share_of_the_gradients_follows_the_baseline() -> None:
+    assert acc.across_share(np.array([0.0, -2.0])) == 1
+    assert acc.across_share(np.array([3.0, 0.0])) == 0
+    assert acc.across_share(np.array([-3.0, 1.0])) == 0.25
+    assert acc.across_share(np.zeros(2)) == 0.5
+
+
+def test_optimisation_fills_weak_texture() -> None:
+    """The publication's fourth claim: labels propagate into regions where no candidate fits better than another."""
+    scene = textured(0.137, 0)
+    views = scene.views.copy()
+    views[:, :, 14:34, 14:34] = 0.5
+    views += np.random.default_rng(4).normal(0, 0.005, views.shape).astype(np.float32)
+    maps = acc.acc(replace(scene, views=views), None, AccParameters(num_disparities=41), no_progress)
+    parameters = ConfidentLabelsParameters(reliable_deviation=0.03)
+    filled = confident_labels(replace(scene, views=views), maps, parameters, no_progress)
+    first, last = (np.abs(found.disparity - 0.137)[18:30, 18:30].mean() for found in (maps, filled))
+    assert last < 0.5 * first
+    assert filled.cost_volume is None
+
+
+def test_refinement_makes_a_slope_of_labels_continuous() -> None:
+    """Without it a map has steps as high as the disparity sampling."""
+    true = np.broadcast_to(np.linspace(-0.9, 0.9, 64, dtype=np.float32), (64, 64))
+    disparities = np.linspace(-1, 1, 21).astype(np.float32)
+    labels = disparities[np.abs(disparities[:, None, None] - true).argmin(axis=0)]
+    smooth = GuidedFilter(np.full((64, 64, 3), 0.5, np.float32), 3, 1e-4)
+    found = labels
+    for _ in range(4):
+        found = acc.refined(found, disparities, smooth)
+    inner = np.s_[8:-8, 8:-8]
+    assert np.abs(found - true)[inner].mean() < 0.5 * np.abs(labels - true)[inner].mean()
+
+
+def test_refinement_keeps_labels_and_steps() -> None:
+    """A step at an edge of the picture must stay one, and a constant map as it is."""
+    disparities = np.linspace(-1, 1, 21).astype(np.float32)
+    labels = np.full((40, 40), disparities[4])
+    labels[:, 20:] = disparities[15]
+    guide = np.full((40, 40, 3), 0.2, np.float32)
+    guide[:, 20:] = 0.8
+    found = acc.refined(labels, disparities, GuidedFilter(guide, 3, 1e-4))
+    np.testing.assert_allclose(found, labels, atol=0.01)
+
+
+def test_features_tell_the_disparity_of_their_pixels() -> None:
+    """They are weighted far above the costs: a wrong one is a wrong pixel."""
+    scene = render("pyramids", size=96, views=5)
+    rows, columns, found = matched_disparities(scene, *scene_range(scene))
+    assert len(found) > 30
+    assert len(np.unique(np.stack([rows, columns]), axis=1).T) == len(found)
+    error = np.abs(found - scene.ground_truth[rows, columns])
+    assert np.median(error) < 0.02
+    assert np.mean(error > 0.2) < 0.05
+
+
+def scene_range(scene: LightField) -> tuple[float, float]:
+    known = scene.require_disparity_range()
+    return known.minimum, known.maximum
+
+
+def test_views_vote_on_a_feature() -> None:
+    """One wrong match must not move a feature that the others agree on."""
+    found = np.array([[0.5, np.nan, 0.1], [0.6, np.nan, np.nan], [3.0, np.nan, np.nan], [0.55, np.nan, np.nan]])
+    disparity, support = agreed(found, np.array([1.0, 2, 1, 2]))
+    np.testing.assert_allclose(disparity[[0, 2]], [(0.5 + 4 * 0.6 + 4 * 0.55) / 9, 0.1])
+    np.testing.assert_array_equal(support, [3, 0, 1])
+    assert np.isnan(disparity[1])
+
+
+def test_pictures_without_features_match_nothing() -> None:
+    """Walls and tiny views are no error."""
+    for view in (np.full((40, 40, 3), 0.5, np.float32), np.zeros((2, 2, 3), np.float32)):
+        none = features_of(view)
+        assert len(none.points) == len(none.descriptors) == 0
+        assert len(mutual_matches(none.descriptors, none.descriptors)[0]) == 0
+
+
+def bad_cases() -> Iterator[tuple[str, LightField]]:
+    scene = render("pyramids", size=64, views=5)
+    known = scene.disparity_range
+    present = np.ones((5, 5), bool)
+    present[0], present[3, 3] = False, False
+    yield "row", LightField(scene.views[2:3], "row", disparity_range=known)
+    yield "column", LightField(scene.views[:, 2:3], "column", disparity_range=known)
+    yield "two views", LightField(scene.views[2:3, 1:3], "two", disparity_range=known)
+    yield "missing", replace(scene, present=present)
+    yield "grey", LightField(scene.views[..., :1], "grey", disparity_range=known)
+    yield "tiny", LightField(scene.views[:, :, :24, :24], "tiny", disparity_range=known)
+    yield "two pixels", LightField(scene.views[:, :, :2, :3], "two pixels", disparity_range=known)
+    yield "flat", LightField(np.full_like(scene.views, 90), "flat", disparity_range=known)
+    yield "far", scene.with_range(DisparityRange(-30, 30, "given"))
+
+
+CASES = dict(bad_cases())
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_bad_cases_give_finite_maps(case: str) -> None:
+    """Users have rigs of one row, dark views and small pictures; each pixel gets a depth within the range."""
+    scene = CASES[case]
+    maps = estimate_depth(scene, "acc", FEW)
+    low, high = scene_range(scene)
+    assert maps.disparity.shape == maps.confidence.shape == scene.shape
+    assert maps.disparity.dtype == maps.confidence.dtype == np.float32
+    assert low <= maps.disparity.min() <= maps.disparity.max() <= high
+    assert 0 <= maps.confidence.min() <= maps.confidence.max() <= 1
+
+
+@pytest.mark.parametrize("geometry", GEOMETRIES)
+def test_views_stand_where_their_baselines_say(geometry: str) -> None:
+    """Hand-held arrays and rigs with closer rows get the depth that a grid gets."""
+    scene = render("slanted_plane", size=64, views=5, **standing(geometry, (5, 5)))
+    assert np.median(errors(scene, scene.ground_truth)) < 0.012
+
+
+@pytest.mark.parametrize("stage", ["initial", "all"])
+def test_a_plane_gets_its_disparity(stage: str) -> None:
+    """The simplest scene: a tenth of a candidate by the costs, half a candidate by the labels."""
+    scene = textured(0.137, 0)
+    candidates = AccParameters(num_disparities=41)
+    step = 0.8 / 40
+    first = acc.acc(scene, None, candidates, no_progress)
+    assert first.cost_volume is not None
+    if stage == "initial":
+        assert np.abs(first.disparity - 0.137)[4:-4, 4:-4].max() < 0.1 * step
+    else:
+        found = confident_labels(scene, first, ConfidentLabelsParameters(), no_progress).disparity
+        assert np.abs(found - 0.137)[4:-4, 4:-4].max() < 0.5 * step
+
+
+def test_threads_do_not_change_the_bytes() -> None:
+    """Results must not depend on the machine."""
+    threads = several_threads()
+    scene = render("curved_occluders", size=64, views=3)
+    several = estimate_depth(scene, "acc", FEW)
+    numba.set_num_threads(1)
+    try:
+        one = estimate_depth(scene, "acc", FEW)
+    finally:
+        numba.set_num_threads(threads)
+    np.testing.assert_array_equal(one.disparity, several.disparity)
+    np.testing.assert_array_equal(one.confidence, several.confidence)

@@ -1,0 +1,193 @@
+"""Constrained angular entropy and defocus: what their authors claim of them, plain twins, and bad cases."""
+
+from dataclasses import replace
+from functools import cache
+
+import cv2
+import numpy as np
+import pytest
+
+from sepi.compared.cae import (
+    ConstrainedEntropyParameters,
+    cae,
+    constrained_defocus,
+    entropies_and_responses,
+    level_weights,
+)
+from sepi.compared.cae_kernels import PATCH, constrained_entropies, constrained_least_patch
+from sepi.lightfield import LightField
+from sepi.matching.sheared_views import ShearedViews
+from sepi.scenes import render
+from sepi.stage import no_progress
+
+PARAMETERS = ConstrainedEntropyParameters(num_disparities=31)
+
+
+@cache
+def scene(name: str, views: int = 7) -> LightField:
+    return render(name, size=64, views=views)
+
+
+def with_outliers(light_field: LightField) -> LightField:
+    """Every seventh pixel of all views but the reference view black or white."""
+    random = np.random.default_rng(0)
+    views = light_field.views.copy()
+    hit = random.random(views.shape[:4]) < 0.15
+    hit[light_field.reference_position] = False
+    views[hit] = 255 * random.integers(0, 2, (hit.sum(), 1))
+    return replace(light_field, views=views)
+
+
+def with_noise(light_field: LightField, sigma: float) -> LightField:
+    noise = 255 * np.random.default_rng(1).normal(0, sigma, light_field.views.shape)
+    return replace(light_field, views=np.clip(np.round(light_field.views + noise), 0, 255).astype(np.uint8))
+
+
+def mean_error(light_field: LightField, costs: np.ndarray, mask: np.ndarray | None = None) -> float:
+    """Mean absolute error of the candidates of least cost, pixels per view step."""
+    disparities = PARAMETERS.candidates(light_field)
+    error = np.abs(disparities[costs.argmin(axis=0)] - light_field.ground_truth)
+    return float(error[... if mask is None else mask].mean())
+
+
+def entropy_costs(light_field: LightField, sigma: float = PARAMETERS.colour_sigma) -> np.ndarray:
+    return entropies_and_responses(light_field, PARAMETERS.candidates(light_field), sigma, no_progress)[0]
+
+
+def variance_costs(light_field: LightField) -> np.ndarray:
+    views = ShearedViews(light_field).over(PARAMETERS.candidates(light_field))
+    return np.stack([sheared.var(axis=0).mean(axis=0) for _, sheared in views])
+
+
+@pytest.mark.parametrize("name", ["curved_occluders", "rack"])
+def test_entropy_withstands_occluders_and_variance_does_not(name: str) -> None:
+    """Behind occluders the depth would be theirs, or none at all."""
+    field = scene(name)
+    occluded = field.masks["occluded"]
+    by_entropy, by_variance = (mean_error(field, costs(field), occluded) for costs in (entropy_costs, variance_costs))
+    assert by_entropy < 0.5 * by_variance
+
+
+def test_the_constraint_withstands_outliers() -> None:
+    """Views of a wrong colour would decide: weights by colour leave them out, and the plain entropy counts them."""
+    field = with_outliers(scene("curved_occluders"))
+    occluded = field.masks["occluded"]
+    constrained, plain = (mean_error(field, entropy_costs(field, sigma), occluded) for sigma in (0.1, np.inf))
+    assert constrained < 0.85 * plain
+    assert constrained < 0.4 * mean_error(field, variance_costs(field), occluded)
+
+
+def test_constrained_sub_patches_withstand_occluders() -> None:
+    """The defocus of thin occluders would be that of the surface behind them, which fills most of each window."""
+    field = scene("curved_occluders")
+    disparities, occluded = PARAMETERS.candidates(field), field.masks["occluded"]
+    _, responses = entropies_and_responses(field, disparities, 0.1, no_progress)
+    plain = PARAMETERS.model_copy(update={"colour_sigma": 10.0, "colour_constraint": 0.0})
+    constrained, adaptive = (
+        mean_error(field, constrained_defocus(responses, field.reference_view, each), occluded)
+        for each in (PARAMETERS, plain)
+    )
+    window = mean_error(field, np.stack([cv2.blur(one, (3 * PATCH, 3 * PATCH)) for one in responses]), occluded)
+    assert constrained < 0.6 * adaptive
+    assert constrained < 0.75 * window
+
+
+def test_both_costs_together_withstand_noise_better_than_the_entropy() -> None:
+    """Under noise each view has a level of its own and entropies differ little; refocusing averages the noise."""
+    field = with_noise(scene("slanted_plane"), 0.03)
+    maps = cae(field, None, PARAMETERS, no_progress)
+    assert np.abs(maps.disparity - field.ground_truth).mean() < 0.5 * mean_error(field, entropy_costs(field))
+    assert maps.cost_volume is not None
+
+
+@pytest.mark.parametrize(("name", "bound"), [("fronto_parallel", 0.03), ("slanted_plane", 0.03)])
+def test_a_textured_plane_has_its_disparity(name: str, bound: float) -> None:
+    """Half a candidate would be 0.05 pixels and more: the parabola between candidates must be right."""
+    field = scene(name)
+    disparity = cae(field, None, ConstrainedEntropyParameters(), no_progress).disparity
+    assert np.abs(disparity - field.ground_truth)[8:-8, 8:-8].mean() < bound
+
+
+def entropy_twin(patch: np.ndarray, own: float, sigma: float) -> float:
+    levels, level = np.round(255 * np.clip(patch, 0, 1)), np.round(255 * own)
+    weights = np.exp(-(((levels - level) / 255 / sigma) ** 2) / 2)
+    weights[weights < 1e-3] = 0
+    if not weights.any():
+        return float(np.log(patch.size))
+    shares = np.array([weights[levels == each].sum() for each in np.unique(levels)]) / weights.sum()
+    shares = shares[shares > 0]
+    return float(-(shares * np.log(shares)).sum())
+
+
+@pytest.mark.parametrize("sigma", [0.01, 0.1, np.inf])
+def test_entropy_equals_a_plain_twin(sigma: float) -> None:
+    """Also of what resampling overshoots, and of pixels that no view is like."""
+    random = np.random.default_rng(2)
+    own = random.random((3, 5, 6)).astype(np.float32)
+    sheared = (own + random.normal(0, 0.05, (9, 3, 5, 6))).astype(np.float32)
+    own[:, 2, 3] = 0.0
+    sheared[:, :, 2, 3] = 0.9
+    found = np.empty_like(own)
+    constrained_entropies(sheared, own, level_weights(sigma), found)
+    for place in np.ndindex(own.shape):
+        expected = entropy_twin(sheared[(slice(None), *place)].astype(float), float(own[place]), sigma)
+        assert found[place] == pytest.approx(expected, abs=2e-5)
+
+
+def test_least_patch_equals_a_plain_twin() -> None:
+    """Also in views smaller than the neighbourhood."""
+    random = np.random.default_rng(3)
+    response, guide = random.random((9, 7, 4)).astype(np.float32), random.random((9, 7, 3)).astype(np.float32)
+    found = np.empty_like(response)
+    constrained_least_patch(response, guide, np.float32(0.3), np.float32(0.2), found)
+    reach = 3 * PATCH // 2
+    wide, colours = (
+        np.pad(a.astype(float), ((reach, reach), (reach, reach), (0, 0)), "edge") for a in (response, guide)
+    )
+    for y, x in np.ndindex(9, 7):
+        costs = []
+        for i, j in np.ndindex(3, 3):
+            part = np.s_[y + i * PATCH : y + (i + 1) * PATCH, x + j * PATCH : x + (j + 1) * PATCH]
+            weights = np.exp(-((colours[part] - guide[y, x]) ** 2).mean(axis=2) / (2 * 0.3**2))
+            mean = (weights[..., None] * wide[part]).sum(axis=(0, 1)) / weights.sum()
+            costs.append(mean + 0.2 * (1 - weights.mean()))
+        np.testing.assert_allclose(found[y, x], np.min(costs, axis=0), atol=1e-4)
+
+
+def cut(light_field: LightField, rows: slice, columns: slice) -> LightField:
+    return replace(light_field, views=light_field.views[rows, columns].copy(), present=None, masks={}, view=None)
+
+
+def bad_case(name: str) -> LightField:
+    field = render("pyramids", size=64, views=5)
+    if name == "row of views":
+        return cut(field, slice(2, 3), slice(None))
+    if name == "column of views":
+        return cut(field, slice(None), slice(2, 3))
+    if name == "two views":
+        return cut(field, slice(2, 3), slice(2, 4))
+    if name == "missing views":
+        present = np.random.default_rng(4).random((5, 5)) < 0.5
+        present[2, 2] = True
+        return replace(field, present=present)
+    if name == "grey":
+        return replace(field, views=field.views[..., :1].copy())
+    if name == "one colour":
+        return replace(field, views=np.full_like(field.views, 77))
+    tiny = {"small": 24, "smallest": 2}[name]
+    return replace(field, views=field.views[:, :, :tiny, :tiny].copy(), ground_truth=None, masks={})
+
+
+CASES = "row of views", "column of views", "two views", "missing views", "grey", "one colour", "small", "smallest"
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_bad_cases_give_finite_maps(name: str) -> None:
+    """Users bring light fields of any shape."""
+    field = bad_case(name)
+    maps = cae(field, None, ConstrainedEntropyParameters(num_disparities=9), no_progress)
+    known = field.require_disparity_range()
+    assert maps.disparity.shape == maps.confidence.shape == field.shape
+    assert maps.disparity.dtype == maps.confidence.dtype == np.float32
+    assert ((maps.disparity >= known.minimum) & (maps.disparity <= known.maximum)).all()
+    assert ((maps.confidence >= 0) & (maps.confidence <= 1)).all()

@@ -1,0 +1,352 @@
+"""The fast method of one-bit features: its costs, their interpolation, its weighted medians, and what it claims."""
+
+from dataclasses import replace
+from itertools import combinations
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from scipy.optimize import linprog
+
+from sepi.compared.mishiba import (
+    FULL_WEIGHT,
+    LatticeFit,
+    MedianDescentParameters,
+    MishibaParameters,
+    details,
+    lattice_costs,
+    least_interpolated,
+    median_descent,
+    mishiba,
+    neighbour_weights,
+    refined,
+    selected_views,
+)
+from sepi.compared.mishiba_kernels import keep_least, median_pass, pair_costs
+from sepi.image.guided_filter import GuidedFilter
+from sepi.lightfield import LightField
+from sepi.matching.sheared_views_kernels import shear
+from sepi.pipeline import estimate_depth
+from sepi.scenes import render
+from sepi.stage import StageMaps, no_progress
+
+PARAMETERS = MishibaParameters()
+
+
+def bits(light_field: LightField, views: npt.NDArray[np.bool_], disparity: float) -> npt.NDArray[np.bool_]:
+    """Features of the views sheared by a disparity, by a kernel that goes on beyond borders; (N, H, W)."""
+    maps = details(light_field, views, PARAMETERS.feature_sigma)[:, None]
+    sheared = np.empty_like(maps)
+    shear(maps, -disparity * light_field.baselines[views], True, sheared)
+    return sheared[:, 0] > 0
+
+
+def mean_error(maps: StageMaps, light_field: LightField, region: npt.NDArray[np.bool_] | None = None) -> float:
+    """Mean absolute error, pixels per view step."""
+    error = np.abs(maps.disparity - light_field.ground_truth)
+    return float(error[region].mean() if region is not None else error.mean())
+
+
+def error_of_costs(costs: npt.NDArray[np.floating], scene: LightField) -> float:
+    """Mean absolute error of other costs of the candidates of every pixel, treated like the method's own."""
+    dense = MishibaParameters(lattice_step=1, radius=6)
+    costs = costs.astype(np.float32)
+    disparities = PARAMETERS.candidates(scene)
+    maps = refined(disparities, *least_interpolated(scene.reference_view, costs, dense, no_progress))
+    return mean_error(StageMaps(*maps), scene)
+
+
+@pytest.mark.parametrize("step", [1, 2, 3])
+def test_counting_equals_the_sum_over_all_pairs_of_views(step: int) -> None:
+    """The method's first saving: were it no equality, the costs would be of something else than pairs of views."""
+    scene = render("pencils", size=64, views=3)
+    disparities = np.array([-0.7, 0.0, 0.43], np.float32)
+    offsets = -disparities[:, None, None].astype(float) * scene.baselines[scene.present]
+    found = np.empty((3, -(-64 // step), -(-64 // step)), np.float32)
+    pair_costs(details(scene, scene.present, 1.0), offsets, step, found)
+    for disparity, costs in zip(disparities.tolist(), found, strict=True):
+        of_view = bits(scene, scene.present, disparity)
+        pairs = np.mean([a != b for a, b in combinations(of_view, 2)], axis=0) * (9 * 8 / 2) / (4 * 5)
+        # one view step away is at most a pixel beyond the border
+        inner = (slice(1, -1), slice(1, -1))
+        expected = np.full((64, 64), np.nan)
+        expected[inner] = pairs[inner]
+        expected = expected[::step, ::step]
+        known = np.isfinite(expected)
+        np.testing.assert_allclose(costs[known], expected[known], atol=1e-6)
+
+
+def test_views_that_end_before_a_pixel_take_no_part() -> None:
+    """Else what lies beyond the border would be compared as if it had been seen, and surfaces there would bulge."""
+    generator = np.random.default_rng(0)
+    maps = generator.normal(size=(3, 8, 12)).astype(np.float32)
+    offsets = np.array([[[0, 0], [0, 3], [-2, 0]]], float)
+    found = np.empty((1, 8, 12), np.float32)
+    pair_costs(maps, offsets, 1, found)
+    for y, x in np.ndindex(8, 12):
+        seen = [maps[0, y, x] > 0]
+        seen += [maps[1, y, x + 3] > 0] if x + 3 < 12 else []
+        seen += [maps[2, y - 2, x] > 0] if y >= 2 else []
+        ones, n = sum(seen), len(seen)
+        expected = ones * (n - ones) / ((n // 2) * (n - n // 2)) if n > 1 else 1
+        assert found[0, y, x] == pytest.approx(expected), (y, x)
+
+
+def test_interpolated_costs_equal_a_plain_computation() -> None:
+    """Least cost, its neighbours and the sum decide disparity and confidence of every pixel."""
+    generator = np.random.default_rng(1)
+    step, height, width = 3, 10, 11
+    guide = generator.random((height, width, 3), np.float32)
+    slopes = generator.normal(size=(5, 4, 4, 3)).astype(np.float32)
+    constants = generator.normal(size=(5, 4, 4)).astype(np.float32)
+    labels, kept = np.zeros((height, width), np.int64), np.zeros((height, width, 5), np.float32)
+    for k in range(5):
+        keep_least(k, slopes[k], constants[k], guide, step, labels, kept)
+    y, x = np.arange(height) / step, np.arange(width) / step
+    tent = np.arange(4)
+    down, across = (np.maximum(0, 1 - np.abs(at[:, None].clip(0, 3) - tent)) for at in (y, x))
+    functions = np.concatenate([slopes, constants[..., None]], axis=3)
+    everywhere = np.einsum("yi,xj,kijc->kyxc", down, across, functions)
+    costs = (everywhere[..., :3] * guide).sum(axis=3) + everywhere[..., 3]
+    np.testing.assert_array_equal(labels, costs.argmin(axis=0))
+    np.testing.assert_allclose(kept[..., 0], costs.min(axis=0), rtol=1e-4, atol=1e-5)
+    np.testing.assert_allclose(kept[..., 4], costs.sum(axis=0), rtol=1e-4, atol=1e-5)
+    inner = (labels > 0) & (labels < 4)
+    for column, offset in ((1, -1), (2, 1)):
+        beside = np.take_along_axis(costs, np.clip(labels + offset, 0, 4)[None], axis=0)[0]
+        np.testing.assert_allclose(kept[inner, column], beside[inner], rtol=1e-4, atol=1e-5)
+
+
+def test_lattice_of_all_pixels_is_the_guided_filter() -> None:
+    """What is interpolated are the filter's own functions; otherwise edges would be lost between lattice pixels."""
+    scene = render("pencils", size=64, views=3)
+    costs = np.random.default_rng(2).random((64, 64), np.float32)
+    guide = scene.reference_view
+    slopes, constants = LatticeFit(guide, 3, 1e-3).functions(costs)
+    np.testing.assert_allclose((slopes * guide).sum(axis=2) + constants, GuidedFilter(guide, 3, 1e-3)(costs), atol=1e-4)
+
+
+def plain_median_pass(current, data, weights, guide, radius, gap, table, per_entry):
+    """The same by sorting."""
+    out = np.empty_like(current)
+    height, width = current.shape
+    for y, x in np.ndindex(height, width):
+        entries = [(data[y, x], weights[y, x])]
+        for j, i in np.ndindex(2 * radius + 1, 2 * radius + 1):
+            v, u = y + (j - radius) * gap, x + (i - radius) * gap
+            if (v, u) != (y, x) and 0 <= v < height and 0 <= u < width:
+                entry = int(((guide[v, u] - guide[y, x]) ** 2).sum() / per_entry)
+                entries.append((current[v, u], table[entry] if entry < len(table) else 0))
+        values, shares = np.array(sorted(entries), np.int64).T
+        out[y, x] = values[np.searchsorted(2 * np.cumsum(shares), shares.sum())]
+    return out
+
+
+@pytest.mark.parametrize(("radius", "gap"), [(1, 1), (2, 3)])
+def test_bisection_finds_the_weighted_median(radius: int, gap: int) -> None:
+    """The refined depth is nothing but these medians."""
+    generator = np.random.default_rng(3)
+    current, data = generator.integers(0, 1000, (2, 13, 11), np.int32)
+    weights = generator.integers(0, 50, (13, 11), np.int32)
+    guide = np.round(generator.random((13, 11, 3)) * 8).astype(np.float32) / 8
+    table = np.array([40, 20, 10], np.int32)
+    # no squared distance of such colours lies on the limit between two entries
+    arguments = (current, data, weights, guide, radius, gap, table, 0.3001)
+    np.testing.assert_array_equal(median_pass(*arguments), plain_median_pass(*arguments))
+
+
+def pairs_of(guide: npt.NDArray[np.float32], parameters: MedianDescentParameters) -> list[tuple[int, int, float]]:
+    """The neighbours of the energy and their weights."""
+    table, per_entry = neighbour_weights(parameters, 0.0)
+    height, width = guide.shape[:2]
+    found = []
+    reach = parameters.radius * parameters.gap
+    for y, x in np.ndindex(height, width):
+        for v in range(y, min(y + reach + 1, height), parameters.gap):
+            for u in range(x % parameters.gap, width, parameters.gap):
+                entry = int(((guide[v, u] - guide[y, x]) ** 2).sum() / per_entry)
+                if abs(u - x) <= reach and (v, u) > (y, x) and entry < len(table):
+                    found.append((y * width + x, v * width + u, float(table[entry] / FULL_WEIGHT)))
+    return found
+
+
+def test_passes_come_near_the_least_energy_that_there_is() -> None:
+    """The publication's claim: weighted medians solve approximately what it would take graph cuts to solve."""
+    generator = np.random.default_rng(4)
+    # a dark and a bright surface, with noise and outliers in the data
+    truth = np.where(np.arange(9)[None] + np.arange(9)[:, None] < 8, 0.2, 0.8)
+    guide = np.repeat(truth[..., None], 3, axis=2).astype(np.float32)
+    data = truth + generator.normal(0, 0.03, truth.shape)
+    data[generator.random(truth.shape) < 0.2] = 0.5
+    confidence = generator.uniform(0.2, 1, truth.shape).astype(np.float32)
+    parameters = MedianDescentParameters(radius=1, gap=1)
+    scene = replace(render("fronto_parallel", size=64, views=3), ground_truth=None, masks={})
+    views = np.broadcast_to((guide * 255).round().astype(np.uint8), (3, 3, 9, 9, 3)).copy()
+    light_field = replace(scene, views=views)
+    pairs = pairs_of(light_field.reference_view, parameters)
+
+    def energy(disparity: npt.NDArray[np.floating]) -> float:
+        flat = disparity.ravel().astype(float)
+        fidelity = float((confidence.ravel() * np.abs(flat - data.ravel())).sum())
+        return fidelity + sum(w * abs(flat[p] - flat[q]) for p, q, w in pairs)
+
+    # the energy is a linear programme: bounds above absolute differences are what is minimised
+    n, m = truth.size, len(pairs)
+    rows, right = [], []
+    for index, (p, q, offset) in enumerate(
+        [(i, None, float(data.ravel()[i])) for i in range(n)] + [(p, q, 0.0) for p, q, _ in pairs]
+    ):
+        for sign in (1, -1):
+            row = np.zeros(n + n + m)
+            row[p], row[n + index] = sign, -1
+            if q is not None:
+                row[q] = -sign
+            rows.append(row)
+            right.append(sign * offset)
+    price = np.concatenate([np.zeros(n), confidence.ravel(), [w for *_, w in pairs]])
+    least = linprog(price, np.array(rows), right, bounds=[(None, None)] * n + [(0, None)] * (n + m)).fun
+
+    first = StageMaps(data.astype(np.float32), confidence)
+    after = [
+        energy(median_descent(light_field, first, parameters.model_copy(update={"passes": k}), no_progress).disparity)
+        for k in (1, 8)
+    ]
+    start = energy(data)
+    print(start, after, least)
+    assert after[0] < 0.9 * start
+    assert after[1] <= after[0] + 1e-6
+    assert least - 1e-3 <= after[1] < 1.06 * least
+
+
+def test_one_bit_features_do_not_see_brightness() -> None:
+    """Views of another exposure, or darker towards the grid's corners, must not change the depth."""
+    scene = render("slanted_plane", size=96, views=5)
+    generator = np.random.default_rng(5)
+    gain, offset = generator.uniform(0.6, 0.9, (2, 5, 5, 1, 1, 1))
+    colours = scene.views.astype(np.float32) / 255
+    changed = replace(scene, views=(gain * colours + 0.1 * offset).astype(np.float32))
+    before, after = (mishiba(one, None, PARAMETERS, no_progress) for one in (scene, changed))
+    print(mean_error(before, scene), mean_error(after, scene))
+    assert mean_error(after, scene) < 1.1 * mean_error(before, scene) + 1e-3
+
+    # the same views and windows with the variance of the colours instead
+    views, disparities = selected_views(changed), PARAMETERS.candidates(changed)
+    maps = np.array([changed.views[t, s].transpose(2, 0, 1) for t, s in np.argwhere(views)])
+    sheared, costs = np.empty_like(maps), []
+    for disparity in disparities.tolist():
+        shear(maps, -disparity * changed.baselines[views], True, sheared)
+        costs.append(sheared.var(axis=0).sum(axis=0))
+    plain = error_of_costs(np.array(costs), changed)
+    print(plain)
+    assert plain > 3 * mean_error(after, scene)
+
+
+def test_all_pairs_see_more_through_noise_than_pairs_with_the_reference_view() -> None:
+    """Why all combinations of views are summed: the reference view's own noise spoils all of its pairs."""
+    scene = render("slanted_plane", size=96, views=5)
+    noise = np.random.default_rng(6).normal(0, 0.1, scene.views.shape)
+    noisy = replace(scene, views=(scene.views / 255 + noise).clip(0, 1).astype(np.float32))
+    views, disparities = selected_views(noisy), PARAMETERS.candidates(noisy)
+    reference = int(np.flatnonzero((np.argwhere(views) == noisy.reference_position).all(axis=1))[0])
+    every, own = [], []
+    for disparity in disparities.tolist():
+        of_view = bits(noisy, views, disparity)
+        ones = of_view.sum(axis=0)
+        every.append(ones * (len(of_view) - ones))
+        own.append((of_view != of_view[reference]).sum(axis=0))
+    errors = [error_of_costs(np.array(costs), noisy) for costs in (every, own)]
+    print(errors)
+    assert errors[0] < 0.8 * errors[1]
+
+
+def test_few_views_and_a_lattice_lose_little() -> None:
+    """The other savings: a quarter of the pixels and a third of the views must do nearly as well as all of them."""
+    scene = render("curved_occluders", size=96, views=9)
+    assert selected_views(scene).sum() == 17
+    usual = mean_error(mishiba(scene, None, PARAMETERS, no_progress), scene)
+    dense = MishibaParameters(lattice_step=1, radius=6)
+    every_pixel = mean_error(mishiba(scene, None, dense, no_progress), scene)
+    print(usual, every_pixel)
+    assert usual < 1.25 * every_pixel
+
+
+def test_views_of_row_and_column_see_past_an_occluder_as_well_as_all() -> None:
+    """Views chosen before a scene is seen must not be those that an occluder blinds."""
+    scene = render("fine_structures", size=96, views=9)
+    disparities = PARAMETERS.candidates(scene)
+    costs = {"cross": lattice_costs(scene, disparities, PARAMETERS)}
+    every = np.empty_like(costs["cross"])
+    offsets = -disparities[:, None, None].astype(float) * scene.baselines[scene.present]
+    pair_costs(details(scene, scene.present, 1.0), offsets, 2, every)
+    costs["all"] = every
+    errors = {}
+    for name, one in costs.items():
+        found = least_interpolated(scene.reference_view, one, PARAMETERS, no_progress)
+        errors[name] = mean_error(StageMaps(*refined(disparities, *found)), scene)
+    print(errors)
+    assert errors["cross"] < 1.1 * errors["all"]
+
+
+def test_medians_take_out_what_bulges_over_edges() -> None:
+    """Costs of a window fatten what is in front; the refinement is there to undo that."""
+    scene = render("curved_occluders", size=96, views=5)
+    first = mishiba(scene, None, PARAMETERS, no_progress)
+    after = median_descent(scene, first, MedianDescentParameters(), no_progress)
+    print(mean_error(first, scene), mean_error(after, scene))
+    assert mean_error(after, scene) < mean_error(first, scene)
+
+
+@pytest.mark.parametrize("views", [5, 9])
+def test_a_plane_gets_its_disparity(views: int) -> None:
+    """Sub-pixel depth comes from the parabola through costs that are counts of bits."""
+    scene = render("fronto_parallel", size=96, views=views)
+    error = np.abs(estimate_depth(scene, "mishiba").disparity - scene.ground_truth)
+    print(error.mean(), np.percentile(error, 99), error.max())
+    # in pixels of the farthest view
+    assert error.mean() * scene.reach < 0.02
+    assert np.percentile(error, 99) * scene.reach < 0.2
+
+
+BAD_CASES = {
+    "one row": lambda scene: replace(scene, views=scene.views[2:3].copy(), present=None, view=None),
+    "one column": lambda scene: replace(scene, views=scene.views[:, 2:3].copy(), present=None, view=None),
+    "two views": lambda scene: replace(scene, views=scene.views[2:3, 1:3].copy(), present=None, view=None),
+    "grey": lambda scene: replace(scene, views=scene.views[..., :1].copy()),
+    "uniform": lambda scene: replace(scene, views=np.full_like(scene.views, 90)),
+    "row spacing": lambda scene: replace(scene, row_spacing=0.5),
+    "corner": lambda scene: replace(scene, view=(0, 4)),
+}
+
+
+@pytest.mark.parametrize("case", BAD_CASES)
+def test_unusual_light_fields_give_finite_maps(case: str) -> None:
+    """Nothing that the package reads may crash the method, or fill its map with nonsense."""
+    scene = replace(render("pencils", size=64, views=5), ground_truth=None, masks={})
+    scene = replace(scene, views=scene.views[:, :, :24, :24].copy())
+    maps = estimate_depth(BAD_CASES[case](scene), "mishiba")
+    for one in (maps.disparity, maps.confidence):
+        assert one.shape == (24, 24)
+        assert one.dtype == np.float32
+        assert np.isfinite(one).all()
+    assert maps.confidence.min() >= 0
+    assert maps.confidence.max() <= (0.01 if case == "uniform" else 1)
+
+
+def test_all_views_take_part_where_row_and_column_are_missing() -> None:
+    """Views of another row and column still know the depth."""
+    scene = render("slanted_plane", size=64, views=5)
+    present = np.ones((5, 5), bool)
+    present[2], present[:, 2] = False, False
+    present[2, 2] = True
+    lacking = replace(scene, present=present)
+    np.testing.assert_array_equal(selected_views(lacking), present)
+    assert mean_error(estimate_depth(lacking, "mishiba"), scene) < 0.05
+
+
+def test_grey_is_three_equal_channels() -> None:
+    """The same picture gives the same map, however its file holds it."""
+    scene = render("pencils", size=64, views=3)
+    grey = replace(scene, views=scene.views[..., :1].copy())
+    colour = replace(scene, views=np.repeat(grey.views, 3, axis=4))
+    one, other = (estimate_depth(case, "mishiba").disparity for case in (grey, colour))
+    np.testing.assert_array_equal(one, other)

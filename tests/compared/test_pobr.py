@@ -1,0 +1,234 @@
+"""POBR: its labels, the border regions, what shrinkage and reinforcement do there, and light fields of other kinds."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from scipy.ndimage import gaussian_filter
+
+from sepi.compared.pobr import (
+    CHOICES,
+    PobrCostParameters,
+    PobrRegionParameters,
+    PobrSmoothingParameters,
+    label_deviation,
+    pobr_cost,
+    pobr_regions,
+    pobr_smoothing,
+    squared_gradient,
+    squared_steps,
+)
+from sepi.compared.pobr_kernels import mean_truncated_differences
+from sepi.image.superpixels import Superpixels, superpixels
+from sepi.lightfield import DisparityRange, LightField
+from sepi.matching.sheared_views import ShearedViews
+from sepi.pipeline import estimate_depth
+from sepi.scenes import render
+from sepi.stage import StageMaps, no_progress
+
+SIZE = 64
+
+
+@pytest.fixture(scope="module")
+def disc():
+    """A bright disc of disparity 2 before a dim textured wall of disparity -1, 7 x 7 views.
+
+    Both disparities are whole numbers: a view is a shifted copy, exact without interpolation.
+    """
+    generator = np.random.default_rng(3)
+    wall, near = (
+        np.clip(mean + gaussian_filter(generator.normal(0, 0.15, (3 * SIZE, 3 * SIZE, 3)), (1.5, 1.5, 0)), 0, 1)
+        for mean in (0.3, 0.7)
+    )
+    rows, columns = np.mgrid[:SIZE, :SIZE]
+    views = np.empty((7, 7, SIZE, SIZE, 3), np.float32)
+    for t in range(7):
+        for s in range(7):
+            down, across = t - 3, s - 3
+            y, x = rows + 2 * down, columns + 2 * across
+            covered = (y - SIZE / 2) ** 2 + (x - SIZE / 2) ** 2 < 14**2
+            shown = near[y + SIZE, x + SIZE], wall[rows - down + SIZE, columns - across + SIZE]
+            views[t, s] = np.where(covered[..., None], *shown)
+    covered = (rows - SIZE / 2) ** 2 + (columns - SIZE / 2) ** 2 < 14**2
+    truth = np.where(covered, 2, -1).astype(np.float32)
+    return LightField(views, "disc", disparity_range=DisparityRange(-1.5, 2.5, "given"), ground_truth=truth)
+
+
+@pytest.fixture(scope="module")
+def labels(disc):
+    return pobr_cost(disc, None, PobrCostParameters(num_disparities=41), no_progress)
+
+
+def regions_of(light_field, before, **values):
+    # superpixels of 8 pixels
+    number = light_field.shape[0] * light_field.shape[1] // 64
+    return pobr_regions(light_field, before, PobrRegionParameters(superpixels=number, **values), no_progress)
+
+
+def error_beside(light_field, disparity, reach=9):
+    """Mean squared error of the pixels of the wall that the disc hides in some view."""
+    rows, columns = np.mgrid[:SIZE, :SIZE]
+    distance = np.hypot(rows - SIZE / 2, columns - SIZE / 2)
+    beside = (distance >= 14) & (distance < 14 + reach)
+    return float(((disparity - light_field.ground_truth)[beside] ** 2).mean())
+
+
+def smoothed(light_field, maps):
+    return pobr_smoothing(light_field, maps, PobrSmoothingParameters(), no_progress).disparity
+
+
+def test_weights_over_border_regions_mend_what_the_occluder_did(disc, labels):
+    """The claim of the publication: with them least squares do far better; else the method does nothing."""
+    plain = error_beside(disc, smoothed(disc, labels))
+    mended = error_beside(disc, smoothed(disc, regions_of(disc, labels)))
+    assert plain > 0.5
+    assert mended < 0.6 * plain
+
+
+def test_border_regions_are_where_the_labels_are_wrong(disc, labels):
+    """Regions that miss the wrong labels mend nothing; regions everywhere take away what is right."""
+    regions = regions_of(disc, labels).mask("occluded")
+    wrong = np.abs(labels.disparity - disc.ground_truth) > 0.2
+    assert wrong.sum() > 100
+    assert regions[wrong].mean() > 0.7
+    assert regions.mean() < 0.5
+
+
+def test_a_plane_has_no_border_regions():
+    """A slanted surface taken for a border would lose its labels."""
+    light_field = render("slanted_plane", size=96, views=5)
+    truth = StageMaps(light_field.ground_truth, np.ones(light_field.shape, np.float32))
+    maps = regions_of(light_field, truth)
+    assert not maps.mask("occluded").any()
+    assert_array_equal(maps.confidence, 1)
+    assert_array_equal(maps.extra["edge_strength"], squared_gradient(light_field.reference_view))
+
+
+def test_only_the_weights_change_in_the_regions(disc, labels):
+    """The occlusion stage hands on the labels; a pixel outside the regions keeps its confidence."""
+    maps = regions_of(disc, labels, least_share=0.25)
+    inside = maps.mask("occluded")
+    relative = np.clip(labels.confidence / np.percentile(labels.confidence, 95), 0, 1)
+    assert_array_equal(maps.disparity, labels.disparity)
+    assert_allclose(maps.confidence[~inside], relative[~inside], rtol=1e-6)
+    # with tau_0 = 1000 hardly a superpixel deviates by so little more than tau_1 that it keeps more
+    assert_allclose(np.median(maps.confidence[inside] / relative[inside]), 0.25, rtol=1e-4)
+
+
+def test_edge_strength_falls_inside_superpixels_and_rises_between_them(disc, labels):
+    """Otherwise texture would stop what is filled in from beside, and the outline of the occluder would not."""
+    maps = regions_of(disc, labels)
+    segments = superpixels(disc.reference_view, 8, 10.0)
+    inside, regions = segments.interior(), maps.mask("occluded")
+    plain, changed = squared_gradient(disc.reference_view), maps.extra["edge_strength"]
+    # the Sobel operator reaches the border's other side at corners
+    inner = regions & inside & (squared_steps(disc.reference_view, segments) == 0)
+    assert_allclose(changed[inner], 0.1 * plain[inner], rtol=1e-5)
+    outline = regions & ~inside & (plain > np.percentile(plain, 95))
+    assert changed[outline].mean() > plain[outline].mean()
+
+
+def test_deviation_of_labels_is_that_of_each_superpixel():
+    """The regions are chosen by it."""
+    segments = Superpixels(np.array([[0, 0, 1], [0, 0, 1]]), np.array([4, 2]), np.zeros((2, 2)))
+    disparity = np.array([[0, 1, 5], [0, 1, 5]], np.float32)
+    assert_allclose(label_deviation(disparity, segments), [[0.5, 0.5, 0], [0.5, 0.5, 0]], atol=1e-6)
+
+
+def test_step_between_superpixels_counts_in_full():
+    """Half of it would count, as of any central difference, and a faint outline would not hold."""
+    segments = Superpixels(np.repeat([[0, 0, 0, 1, 1, 1]], 5, axis=0), np.array([15, 15]), np.zeros((2, 2)))
+    image = np.where(segments.labels[..., None] == 1, 0.75, 0.25).astype(np.float32).repeat(3, axis=2)
+    expected = np.zeros((5, 6))
+    expected[:, 2:4] = 3 * 0.5**2
+    assert_allclose(squared_steps(image, segments), expected, rtol=1e-6)
+
+
+def test_kernel_is_the_mean_truncated_difference():
+    """The compiled loop is the formula of the docstring."""
+    views = np.random.default_rng(0).random((4, 3, 5, 6), np.float32)
+    out = np.empty((5, 6), np.float32)
+    mean_truncated_differences(views, 2, 0.3, out)
+    difference = np.abs(np.delete(views, 2, axis=0) - views[2]).mean(axis=1)
+    assert_allclose(out, (np.minimum(difference, 0.3) / 0.3).mean(axis=0), rtol=1e-5)
+
+
+def test_smoothing_solves_its_energy(disc, labels):
+    """At the least energy no pixel gains by moving: the solver must not stop before."""
+    maps = regions_of(disc, labels)
+    solution = smoothed(disc, maps).astype(np.float64)
+    values = PobrSmoothingParameters()
+    edges, weight = maps.extra["edge_strength"].astype(np.float64), maps.confidence.astype(np.float64)
+    rng = np.random.default_rng(1)
+
+    def energy(disparity):
+        smooth = np.exp(-values.tau_2 * weight) / (edges + values.gradient_floor**2)
+        total = (np.maximum(weight, 3e-4) ** 2 * (disparity - maps.disparity) ** 2).sum()
+        for a, b in ((np.s_[:, 1:], np.s_[:, :-1]), (np.s_[1:], np.s_[:-1])):
+            total += values.alpha * ((smooth[a] + smooth[b]) * (disparity[a] - disparity[b]) ** 2).sum()
+        return total
+
+    # noise adds to the floor of the gradient; this view has next to none
+    least = energy(solution)
+    assert all(energy(solution + 0.01 * rng.normal(size=solution.shape)) > least for _ in range(5))
+    assert energy(labels.disparity) > 1.5 * least
+
+
+def test_fronto_parallel_plane_has_its_disparity():
+    """A textured plane is the easiest there is: within a hundredth of a pixel."""
+    light_field = render("fronto_parallel", size=SIZE, views=5)
+    result = estimate_depth(light_field, "pobr")
+    assert np.abs(result.disparity - light_field.ground_truth)[4:-4, 4:-4].max() < 0.01
+
+
+def one_row(light_field):
+    return replace(light_field, views=light_field.views[2:3], present=light_field.present[2:3])
+
+
+def one_column(light_field):
+    return replace(light_field, views=light_field.views[:, 2:3], present=light_field.present[:, 2:3])
+
+
+def two_views(light_field):
+    return replace(light_field, views=light_field.views[2:3, 1:3], present=light_field.present[2:3, 1:3])
+
+
+def with_missing(light_field):
+    present = light_field.present.copy()
+    present[0], present[3, 1] = False, False
+    return replace(light_field, present=present)
+
+
+def grey(light_field):
+    return replace(light_field, views=light_field.views[..., :1])
+
+
+@pytest.mark.parametrize("changed", [one_row, one_column, two_views, with_missing, grey])
+def test_light_fields_of_other_kinds(changed):
+    """Users have light fields that are no square grids of colour views; tiny pictures too."""
+    whole = render("dots", size=64, views=5)
+    light_field = changed(replace(whole, views=whole.views[:, :, 8:32, 8:32], ground_truth=None, masks={}))
+    result = estimate_depth(light_field, "pobr", {"initial": {"num_disparities": 9}})
+    assert result.disparity.shape == (24, 24)
+    assert np.isfinite(result.disparity).all()
+    assert (result.confidence >= 0).all()
+    assert (result.confidence <= 1).all()
+    assert result.disparity.min() >= light_field.disparity_range.minimum - 0.1
+    assert result.disparity.max() <= light_field.disparity_range.maximum + 0.1
+
+
+def test_views_sheared_at_the_true_disparity_cost_least(disc):
+    """The data cost of an unoccluded pixel is zero at its disparity."""
+    views, out = ShearedViews(disc), np.empty(disc.shape, np.float32)
+    mean_truncated_differences(views.at(2.0), views.reference, 0.1, out)
+    assert out[28:36, 28:36].max() < 1e-5
+
+
+def test_choices_are_those_of_three_stages():
+    """The variant names them."""
+    assert {stage: list(choices) for stage, choices in CHOICES.items()} == {
+        "initial": ["pobr"],
+        "occlusion": ["pobr"],
+        "optimize": ["pobr"],
+    }

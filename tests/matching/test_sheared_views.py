@@ -1,0 +1,174 @@
+"""The sheared views equal a plain NumPy twin, and show a plane's points where they are."""
+
+import numba
+import numpy as np
+import pytest
+from several_threads import several_threads
+
+from sepi.lightfield import LightField, as_unit_float
+from sepi.matching.sheared_views import ShearedViews, refocused
+from sepi.matching.sheared_views_kernels import shear
+from sepi.scenes import render
+
+
+def weight_twin(distance: float, cubic: bool) -> float:
+    """Weight of a pixel this far from the sample: Keys' kernel, or a triangle."""
+    x = abs(distance)
+    if not cubic:
+        return max(0.0, 1 - x)
+    if x <= 1:
+        return 1.5 * x**3 - 2.5 * x**2 + 1
+    return -0.5 * x**3 + 2.5 * x**2 - 4 * x + 2 if x < 2 else 0.0
+
+
+def matrix_twin(length: int, offset: float, cubic: bool) -> np.ndarray:
+    """What each pixel, those beyond the ends being the last ones, gives to each sample; (length, length)."""
+    matrix = np.zeros((length, length))
+    for to in range(length):
+        first = int(np.floor(to + offset)) - 1
+        for pixel in range(first, first + 4):
+            matrix[to, min(max(pixel, 0), length - 1)] += weight_twin(to + offset - pixel, cubic)
+    return matrix
+
+
+def sheared(views: np.ndarray, offsets: np.ndarray, cubic: bool = True) -> np.ndarray:
+    out = np.full_like(views, np.nan)
+    shear(views, offsets, cubic, out)
+    return out
+
+
+@pytest.fixture(scope="module")
+def random_views() -> np.ndarray:
+    return np.random.default_rng(0).random((7, 3, 11, 17), np.float32)
+
+
+OFFSETS = np.array([[0.3, -0.7], [-2.25, 1.5], [4.9, 0], [0, -5.1], [-0.001, 0.999], [30.4, -25.6], [-11, 17.0]])
+"""Small, of several pixels, along one axis, near whole numbers, and beyond the picture."""
+
+
+@pytest.mark.parametrize("cubic", [True, False], ids=["cubic", "bilinear"])
+def test_kernel_equals_a_plain_twin(random_views: np.ndarray, cubic: bool) -> None:
+    """Every cost of the methods that shear views comes from these samples, those near the borders too."""
+    found = sheared(random_views, OFFSETS, cubic)
+    for n, (down, across) in enumerate(OFFSETS):
+        rows, columns = matrix_twin(11, down, cubic), matrix_twin(17, across, cubic)
+        np.testing.assert_allclose(found[n], rows @ random_views[n].astype(float) @ columns.T, atol=2e-6)
+
+
+@pytest.mark.parametrize("cubic", [True, False], ids=["cubic", "bilinear"])
+def test_no_shift_gives_the_views_themselves(random_views: np.ndarray, cubic: bool) -> None:
+    """The reference view must not change with the candidate, or it would no longer be the reference."""
+    np.testing.assert_array_equal(sheared(random_views, np.zeros((7, 2)), cubic), random_views)
+
+
+@pytest.mark.parametrize("cubic", [True, False], ids=["cubic", "bilinear"])
+def test_whole_pixels_move_exactly(random_views: np.ndarray, cubic: bool) -> None:
+    """Interpolation has nothing to do there."""
+    offsets = np.array([[1, 0], [0, -1], [3, 2], [-4, 5], [-10, -16], [11, 0], [2, 40]], float)
+    found = sheared(random_views, offsets, cubic)
+    for n, (down, across) in enumerate(offsets.astype(int)):
+        rows, columns = np.clip(np.arange(11) + down, 0, 10), np.clip(np.arange(17) + across, 0, 16)
+        np.testing.assert_array_equal(found[n], random_views[n][:, rows][:, :, columns])
+
+
+def test_views_go_on_as_they_end(random_views: np.ndarray) -> None:
+    """Pixels that a view does not show compare with its last ones, and never with another side's or with memory."""
+    found = sheared(random_views, np.tile([0.0, 100.5], (7, 1)))
+    np.testing.assert_allclose(found, np.broadcast_to(random_views[..., -1:], found.shape), atol=1e-6)
+
+
+def test_cubic_keeps_more_detail_than_bilinear() -> None:
+    """What sub-pixel depth needs: a wave of six pixels, half a pixel on, loses less."""
+    x = np.arange(120)
+    wave = (0.5 + 0.5 * np.sin(x * np.pi / 3)).astype(np.float32)
+    views = np.broadcast_to(wave, (1, 1, 4, 120)).copy()
+    expected = 0.5 + 0.5 * np.sin((x + 0.5) * np.pi / 3)
+    inner = np.s_[0, 0, 0, 4:-4]
+    error = [
+        np.abs(sheared(views, np.array([[0, 0.5]]), cubic)[inner] - expected[4:-4]).max() for cubic in (True, False)
+    ]
+    assert error[0] < 0.5 * error[1]
+
+
+def test_threads_do_not_change_the_bytes(random_views: np.ndarray) -> None:
+    """Results must not depend on the machine."""
+    threads = several_threads()
+    several = sheared(random_views, OFFSETS)
+    numba.set_num_threads(1)
+    try:
+        np.testing.assert_array_equal(sheared(random_views, OFFSETS), several)
+    finally:
+        numba.set_num_threads(threads)
+
+
+@pytest.fixture(scope="module")
+def plane() -> LightField:
+    return render("fronto_parallel", size=64, views=5)
+
+
+def test_views_of_a_plane_agree_at_its_disparity(plane: LightField) -> None:
+    """A wrong sign or a swapped axis would make no candidate fit."""
+    true = float(plane.ground_truth[32, 32])
+    views = ShearedViews(plane)
+
+    def spread(disparity: float) -> float:
+        return float(views.at(disparity)[..., 8:-8, 8:-8].std(axis=0).mean())
+
+    assert spread(true) < 0.25 * min(spread(true - 0.5), spread(true + 0.5), spread(-true))
+
+
+def test_reference_and_baselines_belong_to_the_views(plane: LightField) -> None:
+    """Methods weight views by their baselines and leave the reference out."""
+    views = ShearedViews(plane)
+    assert len(views.positions) == 25
+    assert tuple(views.positions[views.reference]) == plane.reference_position
+    for (t, s), baseline in zip(views.positions, views.baselines, strict=True):
+        np.testing.assert_array_equal(baseline, plane.baselines[t, s])
+    np.testing.assert_array_equal(views.at(1.3)[views.reference], plane.reference_view.transpose(2, 0, 1))
+
+
+def test_missing_views_are_left_out(plane: LightField) -> None:
+    """They hold anything, and none of it may be compared."""
+    present = np.ones((5, 5), bool)
+    present[0, 1] = present[3, 4] = False
+    field = LightField(plane.views, "some", present=present, disparity_range=plane.disparity_range)
+    views = ShearedViews(field)
+    assert len(views.positions) == len(views.at(0.4)) == 23
+    assert not {(0, 1), (3, 4)} & {tuple(position) for position in views.positions.tolist()}
+
+
+def test_chosen_views_alone_are_sheared(plane: LightField) -> None:
+    """Where the reference is not among them, methods must be told."""
+    chosen = np.zeros((5, 5), bool)
+    chosen[0, :2] = True
+    views = ShearedViews(plane, chosen)
+    np.testing.assert_array_equal(views.positions, [[0, 0], [0, 1]])
+    assert views.reference == -1
+    expected = as_unit_float(plane.views[0, 1]).transpose(2, 0, 1)
+    np.testing.assert_array_equal(views.at(0)[1], expected)
+
+
+def test_over_gives_each_disparity_in_turn(plane: LightField) -> None:
+    """The number is where a method puts its costs."""
+    views, disparities = ShearedViews(plane), np.array([-0.3, 0, 0.8], np.float32)
+    for (k, found), expected in zip(views.over(disparities), range(3), strict=True):
+        assert k == expected
+        np.testing.assert_array_equal(found, ShearedViews(plane).at(float(disparities[k])))
+
+
+def test_refocused_is_the_mean_of_the_views() -> None:
+    """Defocus cues compare it with the reference view; weights need not sum to one."""
+    views = np.random.default_rng(1).random((4, 3, 5, 6), np.float32)
+    weights = np.array([1, 0, 2, 5], np.float32)
+    np.testing.assert_allclose(refocused(views), views.mean(axis=0), rtol=1e-6)
+    np.testing.assert_allclose(refocused(views, weights), np.average(views, axis=0, weights=weights), rtol=1e-5)
+    assert refocused(views).dtype == refocused(views, weights).dtype == np.float32
+
+
+def test_a_plane_refocused_at_its_disparity_is_sharp(plane: LightField) -> None:
+    """At another one it is blurred."""
+    views, inner = ShearedViews(plane), np.s_[:, 8:-8, 8:-8]
+    true = float(plane.ground_truth[32, 32])
+    reference = plane.reference_view.transpose(2, 0, 1)[inner]
+    error = [np.abs(refocused(views.at(d))[inner] - reference).mean() for d in (true, true + 0.5)]
+    assert error[0] < 0.25 * error[1]

@@ -1,0 +1,165 @@
+"""Message passing against exhaustive search, exact chains, weaker minimisers, and a plain NumPy twin."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+from sepi.regularization.message_passing import contrast_weights, energy, labels_of_least_energy
+from sepi.regularization.message_passing_kernels import pass_messages
+
+
+def problem(seed, labels, shape, strength=0.5):
+    """Random costs (K, H, W) and weights of the edges."""
+    random = np.random.default_rng(seed)
+    costs = random.random((labels, *shape)).astype(np.float32)
+    across, down = (strength * random.random((2, *shape))).astype(np.float32)
+    return costs, across, down
+
+
+def least_by_search(costs, across, down, truncation):
+    """Least energy over all labellings."""
+    count, *shape = costs.shape
+    labellings = itertools.product(range(count), repeat=shape[0] * shape[1])
+    return min(energy(np.reshape(one, shape), costs, across, down, truncation) for one in labellings)
+
+
+@pytest.mark.parametrize(("labels", "shape", "truncation"), [(2, (3, 3), 1), (3, (2, 3), 2), (4, (2, 2), 3)])
+def test_least_energy_is_that_of_all_labellings(labels, shape, truncation) -> None:
+    """Where the smoothness is linear, the bound that the messages climb is the least energy itself."""
+    for seed in range(6):
+        costs, across, down = problem(seed, labels, shape)
+        found = labels_of_least_energy(costs, across, down, truncation, 50)
+        expected = least_by_search(costs, across, down, truncation)
+        np.testing.assert_allclose(energy(found, costs, across, down, truncation), expected, rtol=1e-5)
+
+
+def test_truncated_energies_are_nearly_the_least() -> None:
+    """Truncation keeps the steps between surfaces; finding the least is then hard, but tiny grids must come close."""
+    gaps = []
+    for seed in range(8):
+        costs, across, down = problem(seed, 4, (2, 3))
+        found = labels_of_least_energy(costs, across, down, 1.5, 50)
+        gaps.append(energy(found, costs, across, down, 1.5) / least_by_search(costs, across, down, 1.5) - 1)
+    assert sum(gap < 1e-5 for gap in gaps) >= 7
+    assert max(gaps) < 0.05
+
+
+def chain_energy(costs, weights, truncation):
+    """Least energy of a chain by dynamic programming; ``costs`` (K, n), ``weights`` (n,)."""
+    count = np.arange(len(costs))
+    jumps = np.minimum(np.abs(count[:, None] - count), truncation)
+    best = costs[:, 0].astype(float)
+    for n in range(1, costs.shape[1]):
+        best = costs[:, n] + (best[:, None] + weights[n - 1] * jumps).min(axis=0)
+    return best.min()
+
+
+@pytest.mark.parametrize("truncation", [1.5, 7])
+@pytest.mark.parametrize("shape", [(1, 40), (40, 1)])
+def test_a_single_row_or_column_is_solved_exactly(shape, truncation) -> None:
+    """Without loops nothing is approximate: views one pixel high would tell on wrong edges of the grid."""
+    for seed in range(5):
+        costs, across, down = problem(seed, 8, shape)
+        weights = (across if shape[0] == 1 else down).ravel()
+        found = labels_of_least_energy(costs, across, down, truncation, 60)
+        expected = chain_energy(costs.reshape(8, -1), weights, truncation)
+        np.testing.assert_allclose(energy(found, costs, across, down, truncation), expected, rtol=1e-5)
+
+
+def test_without_weights_the_winner_takes_all() -> None:
+    costs, across, down = problem(0, 9, (11, 13), strength=0)
+    found = labels_of_least_energy(costs, across, down, 2, 3)
+    np.testing.assert_array_equal(found, costs.argmin(axis=0))
+
+
+def iterated_modes(costs, across, down, truncation, sweeps=20):
+    """Each pixel's best label given its neighbours', again and again."""
+    labels = costs.argmin(axis=0)
+    count = np.arange(len(costs))
+    height, width = labels.shape
+    for _ in range(sweeps):
+        for y, x in np.ndindex(height, width):
+            total = costs[:, y, x].astype(float)
+            for v, u, weight in (
+                (y, x - 1, across[y, x - 1]),
+                (y, x + 1, across[y, x]),
+                (y - 1, x, down[y - 1, x]),
+                (y + 1, x, down[y, x]),
+            ):
+                if 0 <= v < height and 0 <= u < width:
+                    total += weight * np.minimum(np.abs(count - labels[v, u]), truncation)
+            labels[y, x] = total.argmin()
+    return labels
+
+
+def test_noisy_steps_cost_less_than_by_weaker_minimisers() -> None:
+    """Compared methods would be charged with errors that are the minimiser's: it must be as good as their graph cuts.
+
+    Two surfaces with noise: nearer the truth, and of less energy than it.
+    """
+    random = np.random.default_rng(5)
+    truth = np.where(np.arange(24) < 12, 2, 9) * np.ones((20, 1), np.int64)
+    costs = (0.1 * np.abs(np.arange(12)[:, None, None] - truth) + random.normal(0, 0.4, (12, 20, 24))).astype(
+        np.float32
+    )
+    guide = np.repeat(truth[..., None] / 12, 3, axis=2).astype(np.float32)
+    across, down = (0.3 * weights for weights in contrast_weights(guide, 0.2))
+    found = labels_of_least_energy(costs, across, down, 3, 10)
+    modes = iterated_modes(costs, across, down, 3)
+    reached, winners, by_modes, true = (
+        energy(labels, costs, across, down, 3) for labels in (found, costs.argmin(axis=0), modes, truth)
+    )
+    assert by_modes < winners
+    assert reached < by_modes - 0.05 * abs(by_modes)
+    assert reached <= true
+    assert np.abs(found - truth).mean() < 0.5 * np.abs(modes - truth).mean()
+
+
+def message(belief, back, weight, truncation):
+    """Least over the sender's labels of its share, less what came over this edge, and the smoothness."""
+    share = belief / 2 - back
+    count = np.arange(belief.size)
+    out = (share[:, None] + weight * np.minimum(np.abs(count[:, None] - count), truncation)).min(axis=0)
+    return out - share.min()
+
+
+def pass_twin(costs, across, down, truncation, messages):
+    """One pass forth and back; ``messages`` (4, H, W, K) from the left, above, the right, below."""
+    height, width, _ = costs.shape
+    steps = {0: (0, -1), 1: (-1, 0), 2: (0, 1), 3: (1, 0)}
+    opposite = {0: 2, 1: 3, 2: 0, 3: 1}
+    pixels = list(np.ndindex(height, width))
+    for order, senders_sides in ((pixels, (2, 3)), (pixels[::-1], (0, 1))):
+        for y, x in order:
+            belief = costs[y, x] + messages[:, y, x].sum(axis=0)
+            for side in senders_sides:
+                v, u = y + steps[side][0], x + steps[side][1]
+                if 0 <= v < height and 0 <= u < width:
+                    weight = (across if side in (0, 2) else down)[min(y, v), min(x, u)]
+                    sent = message(belief, messages[side, y, x], weight, truncation)
+                    messages[opposite[side], v, u] = sent
+
+
+@pytest.mark.parametrize("truncation", [1.5, 2, 100])
+def test_a_pass_equals_a_plain_twin(truncation) -> None:
+    """The distance transform in linear time is the plain minimum over pairs of labels."""
+    costs, across, down = problem(7, 6, (5, 4))
+    volume = np.ascontiguousarray(costs.transpose(1, 2, 0))
+    found = np.zeros((4, *volume.shape), np.float32)
+    expected = np.zeros(found.shape)
+    for _ in range(3):
+        pass_messages(volume, across, down, np.float32(truncation), found)
+        pass_twin(volume.astype(float), across.astype(float), down.astype(float), truncation, expected)
+    np.testing.assert_allclose(found, expected, atol=1e-5)
+
+
+def test_weights_fall_across_edges_of_the_guide_and_are_zero_at_the_last_pixels() -> None:
+    """Depth may only step where the picture does."""
+    guide = np.zeros((4, 6, 3), np.float32)
+    guide[:, 3:] = 0.1
+    across, down = contrast_weights(guide, 0.05)
+    expected = np.ones((4, 6))
+    expected[:, 2], expected[:, -1] = np.exp(-2), 0
+    np.testing.assert_allclose(across, expected, rtol=1e-5)
+    np.testing.assert_array_equal(down, np.repeat([[1], [1], [1], [0]], 6, axis=1))
