@@ -28,9 +28,9 @@ approximate solver by a fast weighted median filter. What follows was open, sinc
 - the feature: the sign of the difference to a Gaussian mean, which no view's own brightness changes. It is
   taken after the resampling (cubic convolution), so that shifts need not be whole pixels. Views that show a pixel
   beyond their border have no bit there;
-- the views: the row and the column of the reference view. Their pairs have baselines in every direction, and few views
-  see past an occluder where the reference view does not. Where only the reference view and at most one other stand
-  there, all views are used; of a single row or column of views, all are;
+- the views: the row and the column of the reference view. Their pairs have baselines in every direction, and an
+  occluder hides fewer of them than of all views. Where only the reference view and at most one other stand there, all
+  views are used; of a single row or column of views, all are;
 - the interpolation: between pixels with colours as guide, as a fast guided filter does [2]_, which is the aggregation
   of the costs as well; between candidates by the parabola;
 - the candidates: one for each 0.3 pixels in the farthest view;

@@ -55,11 +55,11 @@ from typing import ClassVar, NamedTuple
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 from pydantic import Field
 
-from sepi.image.edges import CannyParameters, canny_edges, edge_angle
-from sepi.lightfield import BoolMap, FloatMap, LightField
+from sepi.compared.occ_patches import Edges, colours_beside, edges_to_split, halves_of_views
+from sepi.image.edges import CannyParameters
+from sepi.lightfield import FloatMap, LightField
 from sepi.matching.candidates import CandidateParameters, CandidateRule, number_field
 from sepi.matching.cost_volumes import disparity_of
 from sepi.matching.sheared_views import ShearedViews
@@ -71,15 +71,6 @@ CANDIDATES = CandidateRule(usual=101, finest=0.05, coarsest=0.5, volume_bytes=2*
 
 LABELS = CandidateRule(usual=151, finest=0.02, coarsest=0.5, volume_bytes=2**28)
 """Of the optimisation, which holds five numbers for each label and pixel."""
-
-ORIENTATIONS = 16
-"""Orientations of edges over half a turn."""
-
-LEAST_SHARE = 0.25
-"""Part of the other views that a half must hold."""
-
-ON_THE_LINE = 1 / 8
-"""Distance from the dividing line within which a view stands on it, part of the distance of the farthest view."""
 
 SATURATION = 95
 """Percentile at which a cue saturates."""
@@ -127,24 +118,9 @@ class OccFieldParameters(CandidateParameters):
         0.02, gt=0, description="mean difference of colours at which smoothness falls to a half, colours in 0..1"
     )
     occlusion_weight: float = Field(
-        0.1, ge=0, description="difference of colours that a change of the predicted occlusion by 1 counts as"
+        0.002, ge=0, description="difference of colours that a change of the predicted occlusion by 1 counts as"
     )
     iterations: int = Field(8, ge=1, le=100, description="passes of the messages, forth and back")
-
-
-class Edges(NamedTuple):
-    """Pixels whose angular patches are split.
-
-    Attributes
-    ----------
-    near : ndarray, shape (H, W), bool
-    places : ndarray, shape (P, 3), int64
-        Row, column and number of the orientation of each; the normal of the edge has ``number pi / ORIENTATIONS`` from
-        ``+x`` towards ``+y``.
-    """
-
-    near: BoolMap
-    places: npt.NDArray[np.int64]
 
 
 class Found(NamedTuple):
@@ -208,26 +184,13 @@ def occ_split(
         Adds ``occlusion_candidates``, bool, pixels whose patches are split, and ``predicted_occlusion``, float32, 0 or
         more.
     """
-    from sepi.compared.occ_kernels import split_patch_costs
-
     before = require_previous(previous)
     view = light_field.reference_view
     disparities = parameters.candidates(light_field)
     width = float(disparities[-1] - disparities[0])
     edges = edges_to_split(view, parameters, parameters.edge_reach * width * light_field.reach)
-    beside = colours_beside(view, edges, max(1, round(light_field.reach)))
-    views, reference = ShearedViews(light_field), _channels_first(view)
-    halves = halves_of_views(views.baselines)
-    costs = np.empty((len(disparities), len(edges.places)), np.float32)
-    cues, of_candidate = (np.zeros((len(edges.places), 3), np.float32) for _ in range(2))
-    least = np.full(len(edges.places), np.inf, np.float32)
-    tolerance = np.float32(parameters.colour_tolerance)
-    for k, sheared in views.over(disparities):
-        split_patch_costs(sheared, reference, edges.places, halves, beside, tolerance, costs[k], of_candidate)
-        better = costs[k] < least
-        least[better], cues[better] = costs[k][better], of_candidate[better]
-        progress((k + 1) / len(disparities))
-    found, known = least_cost(disparities, costs), np.isfinite(least)
+    costs, cues = split_costs(light_field, disparities, edges, parameters.colour_tolerance, progress)
+    found, known = least_cost(disparities, costs), np.isfinite(costs).any(axis=0)
     disparity, confidence = before.disparity.copy(), before.confidence.copy()
     disparity[edges.near] = np.where(known, found.disparity, disparity[edges.near])
     confidence[edges.near] = np.where(known, found.confidence, confidence[edges.near])
@@ -300,58 +263,44 @@ def least_cost(disparities: FloatMap, costs: FloatMap) -> Found:
     )
 
 
-def edges_to_split(reference_view: FloatMap, parameters: CannyParameters, reach: float) -> Edges:
-    """Pixels within reach of a Canny edge, in pixels, each with the orientation of the nearest one."""
-    lines = canny_edges(reference_view, parameters)
-    turns = np.round(edge_angle(reference_view, parameters) * (ORIENTATIONS / np.pi)).astype(np.int64) % ORIENTATIONS
-    if not lines.any():
-        return Edges(lines, np.empty((0, 3), np.int64))
-    distance, nearest = cv2.distanceTransformWithLabels(
-        (~lines).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5, labelType=cv2.DIST_LABEL_PIXEL
-    )
-    turn_of = np.zeros(int(nearest.max()) + 1, np.int64)
-    turn_of[nearest[lines]] = turns[lines]
-    near = np.asarray(distance <= reach)
-    return Edges(near, np.column_stack([np.argwhere(near), turn_of[nearest[near]]]))
-
-
-def halves_of_views(baselines: npt.NDArray[np.float64]) -> BoolMap:
-    """Views of the two halves into which an edge of each orientation splits the angular patch.
+def split_costs(
+    light_field: LightField, disparities: FloatMap, edges: Edges, tolerance: float, progress: Progress
+) -> tuple[FloatMap, FloatMap]:
+    """Costs of the better halves of split angular patches.
 
     Parameters
     ----------
-    baselines : ndarray, shape (N, 2), float64
-        Of the views, down and across from the reference view, in view steps.
+    light_field : LightField
+    disparities : ndarray, shape (K,), float32
+    edges : Edges
+        With P pixels.
+    tolerance : float
+        By how much the halves' colours may look reversed.
+    progress : callable
 
     Returns
     -------
-    ndarray, shape (ORIENTATIONS, 2, N), bool
-        The second half lies on the side to which the edge's normal points.
+    costs : ndarray, shape (K, P), float32
+        Infinite where the halves' colours are reversed.
+    cues : ndarray, shape (P, 3), float32
+        At the least cost: variances of the two halves, and the difference of their means; 0 where none is finite.
     """
-    along = _normals() @ baselines.T
-    line = ON_THE_LINE * np.abs(baselines).max(initial=0)
-    halves = np.stack([along <= line, along >= -line], axis=1)
-    others = halves.sum(axis=2) - 1
-    halves[others < LEAST_SHARE * (len(baselines) - 1)] = True
-    return halves
+    from sepi.compared.occ_kernels import split_patch_costs
 
-
-def colours_beside(reference_view: FloatMap, edges: Edges, radius: int) -> FloatMap:
-    """Mean colours of the two sides of the edge in a window round each pixel; shape (P, 2, 3), float32.
-
-    The second side is that to which the edge's normal points.
-    """
-    y, x = np.mgrid[-radius : radius + 1, -radius : radius + 1]
-    colours = np.zeros((len(edges.places), 2, 3), np.float32)
-    for number, (down, across) in enumerate(_normals()):
-        chosen = edges.places[:, 2] == number
-        rows, columns = edges.places[chosen, 0], edges.places[chosen, 1]
-        along = y * down + x * across
-        for side, window in enumerate((along < -0.5, along > 0.5)):
-            weights = window.astype(np.float32) / np.float32(window.sum())
-            means = cv2.filter2D(reference_view, cv2.CV_32F, weights, borderType=cv2.BORDER_REPLICATE)
-            colours[chosen, side] = means[rows, columns]
-    return colours
+    views, reference = ShearedViews(light_field), _channels_first(light_field.reference_view)
+    beside = colours_beside(light_field.reference_view, edges, max(1, round(light_field.reach)))
+    halves = halves_of_views(views.baselines)
+    costs = np.empty((len(disparities), len(edges.places)), np.float32)
+    cues, of_candidate = (np.zeros((len(edges.places), 3), np.float32) for _ in range(2))
+    least = np.full(len(edges.places), np.inf, np.float32)
+    for k, sheared in views.over(disparities):
+        split_patch_costs(
+            sheared, reference, edges.places, halves, beside, np.float32(tolerance), costs[k], of_candidate
+        )
+        better = costs[k] < least
+        least[better], cues[better] = costs[k][better], of_candidate[better]
+        progress((k + 1) / len(disparities))
+    return costs, cues
 
 
 def slope(disparity: FloatMap) -> FloatMap:
@@ -413,12 +362,6 @@ def _above_mean(cue: FloatMap) -> FloatMap:
     if deviation <= 0:
         return np.zeros_like(cue)
     return np.asarray(np.maximum(0, (saturated - saturated.mean()) / deviation), np.float32)
-
-
-def _normals() -> npt.NDArray[np.float64]:
-    """Normals of the orientations, ``(down, across)``; shape (ORIENTATIONS, 2)."""
-    angle = np.arange(ORIENTATIONS) * np.pi / ORIENTATIONS
-    return np.stack([np.sin(angle), np.cos(angle)], axis=1)
 
 
 def _channels_first(view: FloatMap) -> FloatMap:

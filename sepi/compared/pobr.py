@@ -1,8 +1,8 @@
-"""Superpixel regularisation over partially occluded border regions [1]_, "POBR".
+"""Superpixel regularisation over partially occluded boundary regions [1]_, "POBR".
 
 The method leaves the data cost simple and repairs what it does at occlusions afterwards, by weights. A label map and
 its *label confidence* come from plain photo-consistency. Beside a nearer surface the pixels are hidden in some of the
-views, and their labels mix both surfaces; these partially occluded border regions are found with superpixels of the
+views, and their labels mix both surfaces; these partially occluded boundary regions are found with superpixels of the
 reference view. There the label confidence and the *edge strength weights* are shrunk or reinforced, so that weighted
 least squares, which would otherwise smear the wrong labels, fill them in from beside, up to the edges of the view.
 
@@ -30,8 +30,8 @@ here:
 - the confidence: relative to the scene's best (95th percentile), squared as data weight;
 - how superpixels find the region: by the deviation of the labels in each, which [2]_ takes in a small window. SLIC
   superpixels, as many in large views as in small ones: small objects and small views need small ones;
-- the share ``q`` that a shrunk label keeps. With the authors' ``tau_0`` the exponential is a step, and would leave
-  nothing of thin structures, of which no label in their superpixels deviates by less;
+- the share ``q`` that a shrunk label keeps: with the authors' ``tau_0`` the exponential is a step that leaves nothing,
+  and where both surfaces of a superpixel are well known, as with thin structures, something must stay;
 - the operations on the edge strength, of which only the words "shrinkage" and "reinforcement" are known, the share
   ``a`` of texture and the floor ``f``, below which noise would hold back the smoothing.
 
@@ -98,12 +98,12 @@ class PobrCostParameters(CandidateParameters):
 
 
 class PobrRegionParameters(Parameters):
-    """Parameters of the partially occluded border regions and of what is done there."""
+    """Parameters of the partially occluded boundary regions and of what is done there."""
 
     superpixels: int = Field(2000, ge=1, description="number of superpixels")
     tau_0: float = Field(1000.0, ge=0, description="how sharply the label confidence falls beyond tau_1")
     tau_1: float = Field(
-        0.2, ge=0, description="deviation of a superpixel's labels that makes it a border region, pixels per view step"
+        0.2, ge=0, description="deviation of its labels that makes a superpixel such a region, pixels per view step"
     )
     least_share: float = Field(0.03, gt=0, le=1, description="q, share that a shrunk label confidence keeps")
 
@@ -163,7 +163,7 @@ def pobr_cost(
 def pobr_regions(
     light_field: LightField, previous: StageMaps | None, parameters: PobrRegionParameters, progress: Progress
 ) -> StageMaps:
-    """Label confidence and edge strength, manipulated over partially occluded border regions.
+    """Label confidence and edge strength, manipulated over partially occluded boundary regions.
 
     Parameters
     ----------

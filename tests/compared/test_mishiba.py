@@ -212,22 +212,18 @@ def test_passes_come_near_the_least_energy_that_there_is() -> None:
         for k in (1, 8)
     ]
     start = energy(data)
-    print(start, after, least)
     assert after[0] < 0.9 * start
     assert after[1] <= after[0] + 1e-6
-    assert least - 1e-3 <= after[1] < 1.06 * least
+    assert least - 1e-3 <= after[1] < 1.02 * least
 
 
 def test_one_bit_features_do_not_see_brightness() -> None:
     """Views of another exposure, or darker towards the grid's corners, must not change the depth."""
-    scene = render("slanted_plane", size=96, views=5)
-    generator = np.random.default_rng(5)
-    gain, offset = generator.uniform(0.6, 0.9, (2, 5, 5, 1, 1, 1))
-    colours = scene.views.astype(np.float32) / 255
-    changed = replace(scene, views=(gain * colours + 0.1 * offset).astype(np.float32))
-    before, after = (mishiba(one, None, PARAMETERS, no_progress) for one in (scene, changed))
-    print(mean_error(before, scene), mean_error(after, scene))
-    assert mean_error(after, scene) < 1.1 * mean_error(before, scene) + 1e-3
+    scene = render("fronto_parallel", size=96, views=5)
+    gain, offset = np.random.default_rng(5).uniform(0.4, 0.7, (2, 5, 5, 1, 1, 1))
+    changed = replace(scene, views=(gain * scene.views / 255 + 0.4 * offset).astype(np.float32))
+    before, after = (mean_error(mishiba(one, None, PARAMETERS, no_progress), scene) for one in (scene, changed))
+    assert after < 1.1 * before
 
     # the same views and windows with the variance of the colours instead
     views, disparities = selected_views(changed), PARAMETERS.candidates(changed)
@@ -237,8 +233,7 @@ def test_one_bit_features_do_not_see_brightness() -> None:
         shear(maps, -disparity * changed.baselines[views], True, sheared)
         costs.append(sheared.var(axis=0).sum(axis=0))
     plain = error_of_costs(np.array(costs), changed)
-    print(plain)
-    assert plain > 3 * mean_error(after, scene)
+    assert plain > 8 * after
 
 
 def test_all_pairs_see_more_through_noise_than_pairs_with_the_reference_view() -> None:
@@ -255,8 +250,7 @@ def test_all_pairs_see_more_through_noise_than_pairs_with_the_reference_view() -
         every.append(ones * (len(of_view) - ones))
         own.append((of_view != of_view[reference]).sum(axis=0))
     errors = [error_of_costs(np.array(costs), noisy) for costs in (every, own)]
-    print(errors)
-    assert errors[0] < 0.8 * errors[1]
+    assert errors[0] < 0.75 * errors[1]
 
 
 def test_few_views_and_a_lattice_lose_little() -> None:
@@ -266,8 +260,7 @@ def test_few_views_and_a_lattice_lose_little() -> None:
     usual = mean_error(mishiba(scene, None, PARAMETERS, no_progress), scene)
     dense = MishibaParameters(lattice_step=1, radius=6)
     every_pixel = mean_error(mishiba(scene, None, dense, no_progress), scene)
-    print(usual, every_pixel)
-    assert usual < 1.25 * every_pixel
+    assert usual < 1.1 * every_pixel
 
 
 def test_views_of_row_and_column_see_past_an_occluder_as_well_as_all() -> None:
@@ -283,8 +276,7 @@ def test_views_of_row_and_column_see_past_an_occluder_as_well_as_all() -> None:
     for name, one in costs.items():
         found = least_interpolated(scene.reference_view, one, PARAMETERS, no_progress)
         errors[name] = mean_error(StageMaps(*refined(disparities, *found)), scene)
-    print(errors)
-    assert errors["cross"] < 1.1 * errors["all"]
+    assert errors["cross"] < 0.85 * errors["all"]
 
 
 def test_medians_take_out_what_bulges_over_edges() -> None:
@@ -292,7 +284,6 @@ def test_medians_take_out_what_bulges_over_edges() -> None:
     scene = render("curved_occluders", size=96, views=5)
     first = mishiba(scene, None, PARAMETERS, no_progress)
     after = median_descent(scene, first, MedianDescentParameters(), no_progress)
-    print(mean_error(first, scene), mean_error(after, scene))
     assert mean_error(after, scene) < mean_error(first, scene)
 
 
@@ -301,7 +292,6 @@ def test_a_plane_gets_its_disparity(views: int) -> None:
     """Sub-pixel depth comes from the parabola through costs that are counts of bits."""
     scene = render("fronto_parallel", size=96, views=views)
     error = np.abs(estimate_depth(scene, "mishiba").disparity - scene.ground_truth)
-    print(error.mean(), np.percentile(error, 99), error.max())
     # in pixels of the farthest view
     assert error.mean() * scene.reach < 0.02
     assert np.percentile(error, 99) * scene.reach < 0.2

@@ -10,14 +10,9 @@ import pytest
 from geometries import GEOMETRIES, standing
 
 from sepi.compared.occ import (
-    LEAST_SHARE,
-    ORIENTATIONS,
     OccFieldParameters,
     OccParameters,
     OccSplitParameters,
-    colours_beside,
-    edges_to_split,
-    halves_of_views,
     least_cost,
     occ,
     occ_field,
@@ -26,6 +21,7 @@ from sepi.compared.occ import (
     smoothness_weights,
 )
 from sepi.compared.occ_kernels import split_patch_costs, whole_patch_costs
+from sepi.compared.occ_patches import LEAST_SHARE, ORIENTATIONS, Edges, colours_beside, edges_to_split, halves_of_views
 from sepi.evaluate import score
 from sepi.lightfield import BoolMap, DisparityRange, FloatMap, LightField
 from sepi.pipeline import estimate_depth
@@ -98,6 +94,26 @@ def test_split_patches_see_past_an_occluder(slope: float) -> None:
     assert after < 0.3 * before
 
 
+def test_patches_split_across_the_edge_see_no_more_than_whole_ones(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The method's claim: the dividing line of the patch runs as the edge does in the picture.
+
+    If this fails, the gain beside occluders comes from something else than the edge's orientation.
+    """
+
+    def turned(view: FloatMap, parameters: OccSplitParameters, reach: float) -> Edges:
+        edges = edges_to_split(view, parameters, reach)
+        places = edges.places.copy()
+        places[:, 2] = (places[:, 2] + ORIENTATIONS // 2) % ORIENTATIONS
+        return edges._replace(places=places)
+
+    monkeypatch.setattr("sepi.compared.occ.edges_to_split", turned)
+    light_field = bar(slope=0.6)
+    whole, split, _ = stages(light_field)
+    near = beside_bar(light_field)
+    before, after = (score(maps.disparity, truth_of(light_field), region=near)["mse100"] for maps in (whole, split))
+    assert after > 0.7 * before
+
+
 def test_stages_improve_on_each_other_at_occlusions() -> None:
     """If this fails, the splitting or the optimisation makes maps worse where the method is said to help."""
     light_field = render("stripes", size=96, views=5)
@@ -123,10 +139,11 @@ def test_a_plane_parallel_to_the_views_gets_its_disparity(geometry: str) -> None
     If this fails, candidates or the parabola between them are off, or views are taken to stand where they do not.
     """
     light_field = render("fronto_parallel", size=64, views=5, **standing(geometry, (5, 5)))
-    for maps in stages(light_field, 40):
+    # the plane lies half a candidate, 0.0256, from the labels of the optimisation
+    for maps, bound in zip(stages(light_field, 40), (0.003, 0.01, 0.0257), strict=True):
         error = np.abs(maps.disparity - truth_of(light_field))[6:-6, 6:-6]
-        assert np.median(error) < 0.006
-        assert np.percentile(error, 90) < 0.026  # half a candidate: one next to those left out is not refined
+        assert np.median(error) < bound
+        assert np.percentile(error, 95) < 0.04
 
 
 def test_reversed_colours_leave_a_candidate_out() -> None:
@@ -228,7 +245,7 @@ def test_smoothness_is_less_across_edges_and_predicted_occlusions() -> None:
     view, predicted = np.zeros((4, 6, 3), np.float32), np.zeros((4, 6), np.float32)
     view[:, 2:] = 0.5
     predicted[:, 4:] = 3
-    across, down = smoothness_weights(view, predicted, OccFieldParameters())
+    across, down = smoothness_weights(view, predicted, OccFieldParameters(occlusion_weight=0.1))
     assert np.all(across[:, [1, 3]] < 0.2 * across[:, [0]])
     np.testing.assert_array_equal(across[:, 5], 0)
     np.testing.assert_array_equal(down[3], 0)

@@ -1,4 +1,4 @@
-"""POBR: its labels, the border regions, what shrinkage and reinforcement do there, and light fields of other kinds."""
+"""POBR: its labels, the boundary regions, what is shrunk and reinforced there, and light fields of other kinds."""
 
 from dataclasses import replace
 

@@ -1,0 +1,199 @@
+"""The vote cost: what its publication says of it, its compiled loops, and light fields unlike the publication's."""
+
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+
+from sepi.compared import oavc
+from sepi.compared.oavc_kernels import lower_thresholds, vote_costs
+from sepi.lightfield import DisparityRange, FloatMap, LightField
+from sepi.matching.cost_volumes import least_costs
+from sepi.matching.sheared_views import ShearedViews
+from sepi.pipeline import estimate_depth
+from sepi.scenes import render
+from sepi.stage import CostVolume, StageMaps, no_progress
+
+PARAMETERS = oavc.OavcParameters(num_disparities=61)
+FILTER = oavc.GuidedMedianParameters(radius=7, epsilon=1e-5)
+FEW = {"initial": {"num_disparities": 31}}
+
+
+@cache
+def scene(name: str, noise: float = 0.0) -> LightField:
+    """A built-in scene, with noise of this standard deviation, colours in 0..1."""
+    light_field = render(name, size=96, views=5)
+    disturbed = light_field.views + np.random.default_rng(1).normal(0, noise * 255, light_field.views.shape)
+    return replace(light_field, views=np.clip(disturbed, 0, 255).round().astype(np.uint8))
+
+
+@cache
+def mean_costs(name: str) -> CostVolume:
+    """The usual cost: the mean difference of all views from the reference view."""
+    light_field = scene(name)
+    views, disparities = ShearedViews(light_field), PARAMETERS.candidates(light_field)
+    costs = np.empty((len(disparities), *light_field.shape), np.float16)
+    for k, sheared in views.over(disparities):
+        costs[k] = np.abs(sheared - sheared[views.reference]).mean(axis=(0, 1))
+    return CostVolume(disparities, costs)
+
+
+@cache
+def voted(name: str, noise: float = 0.0, threshold: float | None = None) -> CostVolume:
+    """The vote cost, with one threshold for all pixels if given."""
+    light_field = scene(name, noise)
+    if threshold is None:
+        volume = oavc.oavc(light_field, None, PARAMETERS, no_progress).cost_volume
+        assert volume is not None
+        return volume
+    thresholds = np.full(light_field.shape, threshold, np.float32)
+    return oavc.votes(ShearedViews(light_field), PARAMETERS.candidates(light_field), thresholds, no_progress)
+
+
+def errors(light_field: LightField, volume: CostVolume) -> FloatMap:
+    """How far the candidate of least cost is from the truth, pixels per view step."""
+    assert light_field.ground_truth is not None
+    return np.asarray(np.abs(volume.disparities[least_costs(volume)] - light_field.ground_truth))
+
+
+def filtered_errors(light_field: LightField, volume: CostVolume) -> FloatMap:
+    """The same of the final map."""
+    nothing = np.zeros(light_field.shape, np.float32)
+    before = StageMaps(nothing, nothing, cost_volume=volume)
+    assert light_field.ground_truth is not None
+    maps = oavc.guided_median(light_field, before, FILTER, no_progress)
+    return np.asarray(np.abs(maps.disparity - light_field.ground_truth))
+
+
+def sheared_example() -> FloatMap:
+    """Five views of 6x9 pixels of which some agree; the third is the reference view."""
+    random = np.random.default_rng(2)
+    views = np.repeat(random.uniform(0, 1, (1, 3, 6, 9)), 5, axis=0)
+    return (views + random.normal(0, 0.03, views.shape)).astype(np.float32)
+
+
+def deviations(sheared: FloatMap, reference: int) -> FloatMap:
+    """Of the views other than the reference view."""
+    return np.delete(np.abs(sheared - sheared[reference]).mean(axis=1), reference, axis=0)
+
+
+@pytest.mark.parametrize(
+    ("name", "part"), [("curved_occluders", 0.7), ("fine_structures", 0.7), ("stripes", 0.35), ("pencils", 0.75)]
+)
+def test_votes_find_occluded_pixels_that_the_mean_does_not(name: str, part: float) -> None:
+    """The publication's claim: an occluder's colours do not count, so that edges are kept without looking for them."""
+    light_field = scene(name)
+    occluded = light_field.masks["occluded"]
+    bad = (errors(light_field, voted(name)) > 0.1)[occluded].mean()
+    assert bad < part * (errors(light_field, mean_costs(name)) > 0.1)[occluded].mean()
+
+
+@pytest.mark.parametrize(("name", "part"), [("curved_occluders", 0.5), ("fine_structures", 0.5), ("pencils", 0.35)])
+def test_filtered_votes_are_better_at_occlusions_than_filtered_means(name: str, part: float) -> None:
+    """The filter must not take back at edges what the votes gain."""
+    light_field = scene(name)
+    occluded = light_field.masks["occluded"]
+    bad = (filtered_errors(light_field, voted(name)) > 0.1)[occluded].mean()
+    assert bad < part * (filtered_errors(light_field, mean_costs(name)) > 0.1)[occluded].mean()
+
+
+@pytest.mark.parametrize(("noise", "wrong"), [(0.0, 0.03), (0.02, 0.004), (0.02, 0.01), (0.05, 0.004), (0.05, 0.01)])
+def test_thresholds_adapt_to_the_noise(noise: float, wrong: float) -> None:
+    """With one threshold for all light fields, the wrong one for this gives more bad pixels."""
+    light_field = scene("slanted_plane", noise)
+    adapted = (errors(light_field, voted("slanted_plane", noise)) > 0.1).mean()
+    assert adapted < 0.7 * (errors(light_field, voted("slanted_plane", noise, wrong)) > 0.1).mean()
+
+
+def test_a_plane_is_exact() -> None:
+    """A textured plane that no candidate hits: where it is wrong, all scenes are."""
+    light_field = render("fronto_parallel", size=96, views=5).with_range(DisparityRange(0.013, 1.971, "given"))
+    assert light_field.ground_truth is not None
+    maps = estimate_depth(light_field, "oavc", {"initial": {"num_disparities": 61}})
+    error = np.abs(maps.disparity - light_field.ground_truth)[8:-8, 8:-8]
+    # candidates are 0.033 apart
+    assert error.max() < 0.01
+    assert np.median(error) < 0.005
+
+
+@pytest.mark.parametrize("needed", [1, 2, 4])
+def test_thresholds_are_those_by_which_the_share_agrees(needed: int) -> None:
+    """Else other views than the unoccluded ones decide."""
+    first, second = sheared_example(), sheared_example()[[1, 0, 2, 4, 3]] * np.float32(0.98)
+    thresholds = np.full(first.shape[2:], np.inf, np.float32)
+    expected = thresholds.copy()
+    for sheared in (first, second):
+        lower_thresholds(sheared, 2, needed, thresholds)
+        expected = np.minimum(expected, np.sort(deviations(sheared, 2), axis=0)[needed - 1])
+    np.testing.assert_allclose(thresholds, expected, rtol=1e-4, atol=1e-7)
+
+
+@pytest.mark.parametrize("threshold", [0.01, 0.03, 1.0])
+def test_costs_are_votes_less_their_mean_difference(threshold: float) -> None:
+    """Pixels without a vote, with some and with all."""
+    sheared = sheared_example()
+    out = np.empty(sheared.shape[2:], np.float32)
+    vote_costs(sheared, 2, np.full(out.shape, threshold, np.float32), out)
+    difference = deviations(sheared, 2) / threshold
+    votes = (difference <= 1).sum(axis=0)
+    mean = np.where(difference <= 1, difference, 0).sum(axis=0) / np.maximum(votes, 1)
+    np.testing.assert_allclose(out, 1 - (votes - mean) / 4, atol=1e-5)
+    assert out.min() >= 0
+    assert out.max() <= 1
+
+
+def test_a_vote_counts_for_more_than_any_mean_difference() -> None:
+    """Three views that barely agree beat two that agree entirely."""
+    sheared = np.zeros((5, 3, 1, 2), np.float32)
+    sheared[:, :, 0, 0] = np.array([0.0099, 0.0099, 0, 0.0099, 0.9])[:, None]
+    sheared[:, :, 0, 1] = np.array([0, 0, 0, 0.9, 0.9])[:, None]
+    out = np.empty((1, 2), np.float32)
+    vote_costs(sheared, 2, np.full((1, 2), 0.01, np.float32), out)
+    assert out[0, 1] == pytest.approx(0.5)
+    assert out[0, 0] < out[0, 1]
+
+
+@cache
+def small(case: str) -> LightField:
+    """A light field of 24x24 pixels that is not as usual."""
+    whole = render("pyramids", size=64, views=5)
+    views = whole.views[:, :, 20:44, 20:44]
+    field = replace(whole, views=views.copy(), ground_truth=None, masks={})
+    present = np.ones(field.grid, bool)
+    present[0], present[:, 4] = False, False
+    changes: dict[str, dict[str, Any]] = {
+        "row": {"views": views[2:3].copy(), "present": np.ones((1, 5), bool)},
+        "column": {"views": views[:, 2:3].copy(), "present": np.ones((5, 1), bool)},
+        "two views": {"views": views[2:3, 2:4].copy(), "present": np.ones((1, 2), bool)},
+        "missing views": {"present": present},
+        "grey": {"views": views[..., :1].copy()},
+        "closer rows": {"row_spacing": 0.43},
+        "nothing to see": {"views": np.full_like(views, 90)},
+    }
+    return replace(field, **changes[case])
+
+
+@pytest.mark.parametrize(
+    "case", ["row", "column", "two views", "missing views", "grey", "closer rows", "nothing to see"]
+)
+def test_any_views_will_do(case: str) -> None:
+    """Cameras in a row, dark or damaged views, grey cameras: a map, finite and within the range."""
+    light_field = small(case)
+    maps = estimate_depth(light_field, "oavc", FEW)
+    known = light_field.require_disparity_range()
+    assert np.isfinite(maps.disparity).all()
+    assert maps.disparity.min() >= known.minimum - 1e-6
+    assert maps.disparity.max() <= known.maximum + 1e-6
+    assert np.isfinite(maps.confidence).all()
+    assert maps.confidence.min() >= 0
+    assert maps.confidence.max() <= 1
+
+
+def test_grey_is_as_good_as_three_equal_channels() -> None:
+    grey = small("grey")
+    three = replace(grey, views=np.repeat(grey.views, 3, axis=4))
+    np.testing.assert_array_equal(
+        estimate_depth(grey, "oavc", FEW).disparity, estimate_depth(three, "oavc", FEW).disparity
+    )

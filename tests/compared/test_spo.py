@@ -1,0 +1,236 @@
+"""Lines whose sides differ most: what the method claims of them, its loop against NumPy, and awkward light fields."""
+
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+import pytest
+from geometries import GEOMETRIES, standing
+
+from sepi.compared.guided_costs import GuidedCostsParameters, guided_costs
+from sepi.compared.spo import SpoParameters, column_weights, peak_weight, side_distances, spo, views_of_directions
+from sepi.compared.spo_kernels import half_distances
+from sepi.lightfield import BoolMap, DisparityRange, FloatMap, LightField
+from sepi.matching.sheared_views import ShearedViews
+from sepi.pipeline import estimate_depth
+from sepi.scenes import render
+from sepi.stage import CostVolume, StageMaps, no_progress
+
+WRONG = 0.1
+"""Error of a wrong pixel, pixels per view step."""
+
+
+def truth_of(light_field: LightField) -> FloatMap:
+    """Ground truth."""
+    assert light_field.ground_truth is not None
+    return light_field.ground_truth
+
+
+def filtered(light_field: LightField, maps: StageMaps) -> FloatMap:
+    """Disparity after the filter of the variant."""
+    return guided_costs(light_field, maps, GuidedCostsParameters(radius=9), no_progress).disparity
+
+
+def varying(light_field: LightField, parameters: SpoParameters) -> StageMaps:
+    """The plain cost in the operator's place: how much the colours of a line vary over the same views."""
+    disparities = parameters.candidates(light_field)
+    costs = np.zeros((len(disparities), *light_field.shape), np.float32)
+    for views, _ in views_of_directions(light_field):
+        for k, sheared in ShearedViews(light_field, views).over(disparities):
+            costs[k] += sheared.var(axis=0).mean(axis=0)
+    costs -= costs.min(axis=0)
+    volume = CostVolume(disparities, (costs / costs.max()).astype(np.float16))
+    plain = disparities[costs.argmin(axis=0)]
+    return StageMaps(plain, np.ones_like(plain), cost_volume=volume)
+
+
+def wrong(light_field: LightField, disparity: FloatMap, where: BoolMap) -> float:
+    """Share of wrong pixels."""
+    return float((np.abs(disparity - truth_of(light_field)) > WRONG)[where].mean())
+
+
+def near_occluders(light_field: LightField) -> BoolMap:
+    """Pixels that some view does not see, and those beside them."""
+    return cv2.dilate(light_field.masks["occluded"].astype(np.uint8), np.ones((3, 3))) > 0
+
+
+def noisy(light_field: LightField, sigma: float) -> LightField:
+    """The views with noise of this standard deviation, colours in 0..1."""
+    noise = np.random.default_rng(0).normal(0, 255 * sigma, light_field.views.shape)
+    return replace(light_field, views=np.clip(light_field.views.astype(np.float64) + noise, 0, 255).astype(np.uint8))
+
+
+@pytest.mark.parametrize("scene", ["curved_occluders", "fine_structures"])
+def test_a_line_beside_an_occluder_keeps_its_depth(scene: str) -> None:
+    """The claim of the method: an occluder takes views from a line, but its sides still differ.
+
+    If this fails, depth next to edges is no better than without the method.
+    """
+    light_field = render(scene, size=96, views=7)
+    parameters = SpoParameters(num_disparities=48)
+    near = near_occluders(light_field)
+    ours = wrong(light_field, filtered(light_field, spo(light_field, None, parameters, no_progress)), near)
+    plain = wrong(light_field, filtered(light_field, varying(light_field, parameters)), near)
+    print(ours, plain)
+    assert ours < 0.08
+    assert ours < 0.3 * plain
+
+
+def test_noise_changes_both_sides_alike() -> None:
+    """Noise of 3 % of the full scale: the other claim of the method, which holds where bins are not far narrower.
+
+    If this fails, depth from noisy views is no better than that of the plain cost.
+    """
+    light_field = noisy(render("curved_occluders", size=96, views=7), 0.03)
+    parameters = SpoParameters(num_disparities=48)
+    everywhere = np.ones(light_field.shape, bool)
+    ours = wrong(light_field, filtered(light_field, spo(light_field, None, parameters, no_progress)), everywhere)
+    plain = wrong(light_field, filtered(light_field, varying(light_field, parameters)), everywhere)
+    print(ours, plain)
+    assert ours < 0.7 * plain
+
+
+def test_the_direction_with_the_texture_decides() -> None:
+    """Of upright stripes only the EPIs along rows know the depth.
+
+    If this fails, the direction that sees nothing adds its guesses to the one that knows.
+    """
+    stripes = np.repeat(np.random.default_rng(2).random((1, 52, 3), np.float32), 48, axis=0)
+    stripes = cv2.GaussianBlur(stripes, (0, 0), 1.0)
+    # disparity 1: view s is the picture moved by s - 2 pixels
+    row = np.stack([stripes[:, s : 48 + s] for s in range(5)])
+    light_field = LightField(np.stack([row] * 5), "stripes", disparity_range=DisparityRange(-2, 2, "given"))
+    parameters = SpoParameters(num_disparities=41)
+    disparities = parameters.candidates(light_field)
+    along, down = (
+        peak_weight(
+            side_distances(light_field, views, disparities, parameters, down=down, progress=no_progress),
+            parameters.peak,
+        )
+        for views, down in views_of_directions(light_field)
+    )
+    beside = np.zeros(light_field.shape, bool)
+    beside[6:-6, 6:-6] = True
+    print(np.median(along[beside]), np.median(down[beside]))
+    assert np.median(along[beside]) > 3 * np.median(down[beside])
+    found = filtered(light_field, spo(light_field, None, parameters, no_progress))
+    print(np.percentile(np.abs(found - 1)[beside], 99))
+    assert np.percentile(np.abs(found - 1)[beside], 99) < WRONG
+
+
+@pytest.mark.parametrize("geometry", GEOMETRIES)
+def test_a_plane_parallel_to_the_views_gets_its_disparity(geometry: str) -> None:
+    """Its disparity lies in the middle between two of 40 candidates, 0.05 apart.
+
+    If this fails, candidates or the parabola between them are off, or views are taken to stand where they do not.
+    """
+    light_field = render("fronto_parallel", size=64, views=5, **standing(geometry, (5, 5)))
+    maps = estimate_depth(light_field, "spo", {"initial": {"num_disparities": 40}})
+    error = np.abs(maps.disparity - truth_of(light_field))[6:-6, 6:-6]
+    print(np.median(error), np.percentile(error, 99))
+    assert np.median(error) < 0.01
+    assert np.percentile(error, 99) < 0.05
+
+
+def twin_of_half_distances(lines: FloatMap, weights: FloatMap, bins: int) -> npt.NDArray[np.float64]:
+    """Histograms of the halves, pixel by pixel."""
+    views, channels, height, width = lines.shape
+    numbers = np.clip((lines * np.float32(bins)).astype(int), 0, bins - 1)
+    found = np.zeros((height, width))
+    for y, x in np.ndindex(height, width):
+        for c in range(channels):
+            left, right = np.zeros((2, bins))
+            for k, weight in enumerate(weights / weights.sum() / views):
+                np.add.at(left, numbers[:, c, y, max(x - 1 - k, 0)], weight)
+                np.add.at(right, numbers[:, c, y, min(x + 1 + k, width - 1)], weight)
+            filled = left + right > 0
+            found[y, x] += ((left - right) ** 2)[filled] @ (1 / (left + right)[filled]) / 2 / channels
+    return found
+
+
+@pytest.mark.parametrize(("scale", "bins", "width"), [(0.8, 64, 11), (0.4, 5, 7), (2.0, 2, 3)])
+def test_distances_equal_a_plain_twin(scale: float, bins: int, width: int) -> None:
+    """If this fails, the distances are not those of the equations, such as at the border or where colours overshoot."""
+    rng = np.random.default_rng(4)
+    lines = (0.5 + 0.3 * rng.standard_normal((5, 3, 4, width))).astype(np.float32)
+    lines[1:3] = lines[:1]
+    weights = column_weights(scale)
+    found = np.full((4, width), np.nan, np.float32)
+    half_distances(lines, weights, bins, found)
+    assert np.allclose(found, twin_of_half_distances(lines, weights, bins), atol=1e-6)
+
+
+def test_distances_are_the_same_for_any_number_of_threads() -> None:
+    """If this fails, two runs on the same scene differ."""
+    import numba
+
+    lines = np.random.default_rng(5).random((5, 3, 16, 20), np.float32)
+    found = np.empty((2, 16, 20), np.float32)
+    threads = numba.get_num_threads()
+    half_distances(lines, column_weights(0.8), 64, found[0])
+    numba.set_num_threads(1)
+    half_distances(lines, column_weights(0.8), 64, found[1])
+    numba.set_num_threads(threads)
+    assert np.array_equal(*found)
+
+
+def grid_of(rows: int, columns: int, *, channels: int = 3, flat: bool = False) -> LightField:
+    """Small random views of one plane of disparity 0."""
+    picture = np.full((24, 24, channels), 0.5) if flat else np.random.default_rng(6).random((24, 24, channels))
+    views = np.broadcast_to(picture, (rows, columns, 24, 24, channels)).astype(np.float32)
+    return LightField(views, "small", disparity_range=DisparityRange(-1, 1, "given"))
+
+
+def without_cross(light_field: LightField) -> LightField:
+    """The light field without the other views of the reference view's row and column."""
+    present = np.ones(light_field.grid, bool)
+    t, s = light_field.reference_position
+    present[t], present[:, s] = False, False
+    present[t, s] = True
+    return replace(light_field, present=present)
+
+
+AWKWARD = {
+    "one row": grid_of(1, 5),
+    "one column": grid_of(5, 1),
+    "two views": grid_of(1, 2),
+    "grey": grid_of(3, 3, channels=1),
+    "corners only": without_cross(grid_of(3, 3)),
+    "one colour": grid_of(3, 3, flat=True),
+}
+
+
+@pytest.mark.parametrize("case", AWKWARD)
+def test_awkward_light_fields_give_finite_maps(case: str) -> None:
+    """If this fails, a light field that other methods can do ends in an error or in holes."""
+    light_field = AWKWARD[case]
+    maps = estimate_depth(light_field, "spo", {"initial": {"num_disparities": 11}})
+    for values in (maps.disparity, maps.confidence):
+        assert values.shape == light_field.shape
+        assert np.isfinite(values).all()
+    assert maps.confidence.min() >= 0 <= maps.confidence.max() <= 1
+    if case != "one colour":
+        assert np.median(np.abs(maps.disparity)) < WRONG
+
+
+def test_grey_views_give_what_equal_channels_give() -> None:
+    """If this fails, a grey light field has another depth than the same one saved in colour."""
+    grey = grid_of(3, 3, channels=1)
+    parameters = SpoParameters(num_disparities=11)
+    coloured = replace(grey, views=np.repeat(grey.views, 3, axis=4))
+    first, second = (spo(one, None, parameters, no_progress) for one in (grey, coloured))
+    assert np.array_equal(first.disparity, second.disparity)
+
+
+def test_missing_views_are_not_looked_at() -> None:
+    """If this fails, what a missing view's pixels hold by chance changes the depth."""
+    light_field = render("fronto_parallel", size=64, views=5)
+    present = light_field.present.copy()
+    present[2, 0] = present[1, 2] = False
+    views = light_field.views.copy()
+    parameters = SpoParameters(num_disparities=21)
+    first = spo(replace(light_field, present=present), None, parameters, no_progress)
+    views[~present] = 0
+    second = spo(replace(light_field, views=views, present=present), None, parameters, no_progress)
+    assert np.array_equal(first.disparity, second.disparity)
