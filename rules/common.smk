@@ -176,6 +176,35 @@ def threads_for(wildcards):
     return min(1 + scene_of(wildcards).samples // 8_000_000, 8)
 
 
+def stage_memory_for(stage, bytes_per_sample, bytes_per_pixel):
+    """Function of wildcards: memory of a stage's job in MB, as usual for the stage or as its choice needs.
+
+    A cost volume of more than the usual number of candidates adds to it.
+    """
+
+    def memory(wildcards, attempt):
+        scene, parameters = scene_of(wildcards), SETTINGS.parameters[stage][wildcards[stage]]
+        usual = scene.memory_mb(bytes_per_sample, bytes_per_pixel)
+        own = scene.memory_mb(parameters.needs.bytes_per_sample, parameters.needs.bytes_per_pixel)
+        return attempt * (max(usual, own) + candidates_mb(scene, *sweep_of(stage, wildcards)))
+
+    return memory
+
+
+def stage_minutes_for(stage, seconds_per_megasample):
+    """Function of wildcards: time of a stage's job in minutes, as usual for the stage or as its choice needs.
+
+    A job that goes through more than the usual number of candidates takes longer.
+    """
+
+    def minutes(wildcards, attempt):
+        scene, parameters = scene_of(wildcards), SETTINGS.parameters[stage][wildcards[stage]]
+        seconds = max(seconds_per_megasample, parameters.needs.seconds_per_megasample)
+        return attempt * scene.minutes(candidates_factor(scene, *sweep_of(stage, wildcards)) * seconds)
+
+    return minutes
+
+
 def memory_for(*needs, **more):
     """Function of wildcards: memory of a job in MB (:meth:`sepi.workflow.datasets.Scene.memory_mb`).
 
@@ -193,27 +222,6 @@ def minutes_for(*seconds, **more):
 
     def minutes(wildcards, attempt):
         return attempt * scene_of(wildcards).minutes(*seconds, **more)
-
-    return minutes
-
-
-def sweep_memory_for(stage, **needs):
-    """Function of wildcards: memory of a job in MB that may hold a cost volume; of the usual size in ``needs``."""
-
-    def memory(wildcards, attempt):
-        scene = scene_of(wildcards)
-        return attempt * (scene.memory_mb(**needs) + candidates_mb(scene, *sweep_of(stage, wildcards)))
-
-    return memory
-
-
-def sweep_minutes_for(stage, seconds_per_megasample, **more):
-    """Function of wildcards: time of a job in minutes that may go through candidates; through the usual number as given."""
-
-    def minutes(wildcards, attempt):
-        scene = scene_of(wildcards)
-        factor = candidates_factor(scene, *sweep_of(stage, wildcards))
-        return attempt * scene.minutes(factor * seconds_per_megasample, **more)
 
     return minutes
 

@@ -14,8 +14,8 @@ rule initial:
         GROUP
     threads: threads_for
     resources:
-        mem_mb=sweep_memory_for("initial", bytes_per_sample=13, bytes_per_pixel=1300),
-        runtime=sweep_minutes_for("initial", 0.2),
+        mem_mb=stage_memory_for("initial", bytes_per_sample=13, bytes_per_pixel=1300),
+        runtime=stage_minutes_for("initial", 0.2),
     params:
         choice=choice_for("initial"),
         parameters=parameters_of("initial"),

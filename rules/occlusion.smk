@@ -14,8 +14,8 @@ rule occlusion:
         GROUP
     threads: threads_for
     resources:
-        mem_mb=sweep_memory_for("occlusion", bytes_per_sample=18, bytes_per_pixel=1400),
-        runtime=sweep_minutes_for("occlusion", 0.4),
+        mem_mb=stage_memory_for("occlusion", bytes_per_sample=18, bytes_per_pixel=1400),
+        runtime=stage_minutes_for("occlusion", 0.4),
     params:
         choice=choice_for("occlusion"),
         parameters=parameters_of("occlusion"),

@@ -14,8 +14,8 @@ rule optimize:
         GROUP
     threads: threads_for
     resources:
-        mem_mb=memory_for(bytes_per_sample=30, bytes_per_pixel=1500),
-        runtime=minutes_for(0.35),
+        mem_mb=stage_memory_for("optimize", bytes_per_sample=30, bytes_per_pixel=1500),
+        runtime=stage_minutes_for("optimize", 0.35),
     params:
         choice=choice_for("optimize"),
         parameters=parameters_of("optimize"),

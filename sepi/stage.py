@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any, Self
+from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -26,10 +26,32 @@ def no_progress(_: float) -> None:
     """For callers who do not watch."""
 
 
+class Needs(NamedTuple):
+    """What a choice takes that takes more than its stage usually does, by the size of the light field.
+
+    Attributes
+    ----------
+    bytes_per_sample, bytes_per_pixel : float
+        Memory for each pixel of each view, and for each pixel of one view.
+    bytes_per_candidate : float
+        Memory for each pixel of one view and each candidate beyond the usual number of them.
+    seconds_per_megasample : float
+        Time on one core for a million pixels of all views, with the usual number of candidates.
+    """
+
+    bytes_per_sample: float = 0.0
+    bytes_per_pixel: float = 0.0
+    bytes_per_candidate: float = 0.0
+    seconds_per_megasample: float = 0.0
+
+
 class Parameters(BaseModel):
     """Parameters of one choice of a stage: frozen, unknown keys refused, each with a default and a description."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+    needs: ClassVar[Needs] = Needs()
+    """What the workflow asks a cluster for beyond the usual."""
 
     def settled(self, light_field: LightField) -> Self:
         """These parameters with what follows from a light field of known disparity range filled in."""

@@ -56,7 +56,7 @@ from sepi.lightfield import FloatMap, LightField, as_unit_float
 from sepi.matching.candidates import CandidateParameters, CandidateRule, number_field
 from sepi.matching.cost_volumes import disparity_of, distinctness, least_costs
 from sepi.regularization.message_passing import labels_of_least_energy
-from sepi.stage import Choice, CostVolume, Parameters, Progress, StageMaps, require_costs
+from sepi.stage import Choice, CostVolume, Needs, Parameters, Progress, StageMaps, require_costs
 
 CANDIDATES = CandidateRule(usual=75, finest=0.02, coarsest=0.5, volume_bytes=2**28)
 
@@ -71,6 +71,9 @@ class AccParameters(CandidateParameters):
     """Parameters of the data cost."""
 
     rule: ClassVar[CandidateRule] = CANDIDATES
+    needs: ClassVar[Needs] = Needs(
+        bytes_per_sample=60, bytes_per_pixel=1300, bytes_per_candidate=8, seconds_per_megasample=4
+    )
 
     num_disparities: int | None = number_field(CANDIDATES, "docs/compared.md")
     colour_share: float = Field(0.5, ge=0, le=1, description="share of the colours in the cost, the rest is gradients'")

@@ -54,7 +54,7 @@ from sepi.lightfield import FloatMap, LightField
 from sepi.matching.candidates import CandidateParameters, CandidateRule, number_field
 from sepi.matching.cost_volumes import disparity_of, distinctness, least_costs
 from sepi.matching.sheared_views import ShearedViews, refocused
-from sepi.stage import Choice, CostVolume, Progress, StageMaps
+from sepi.stage import Choice, CostVolume, Needs, Progress, StageMaps
 
 CANDIDATES = CandidateRule(usual=75, finest=0.02, coarsest=0.5, volume_bytes=2**28)
 """The authors' number, for light fields like theirs."""
@@ -70,6 +70,9 @@ class ConstrainedEntropyParameters(CandidateParameters):
     """Parameters of the constrained angular entropy and defocus."""
 
     rule: ClassVar[CandidateRule] = CANDIDATES
+    needs: ClassVar[Needs] = Needs(
+        bytes_per_sample=31, bytes_per_pixel=1500, bytes_per_candidate=8, seconds_per_megasample=2.5
+    )
 
     num_disparities: int | None = number_field(CANDIDATES, "docs/compared.md")
     colour_sigma: float = Field(

@@ -7,17 +7,21 @@ by graph cuts; here it is message passing (:mod:`sepi.regularization.message_pas
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 import numpy as np
 from pydantic import Field
 
 from sepi.lightfield import LightField
 from sepi.matching.cost_volumes import disparity_of, distinctness
 from sepi.regularization.message_passing import contrast_weights, labels_of_least_energy
-from sepi.stage import Choice, Parameters, Progress, StageMaps, require_costs
+from sepi.stage import Choice, Needs, Parameters, Progress, StageMaps, require_costs
 
 
 class MarkovFieldParameters(Parameters):
     """Parameters of the multi-label optimisation."""
+
+    needs: ClassVar[Needs] = Needs(bytes_per_sample=6, bytes_per_pixel=4000, seconds_per_megasample=0.6)
 
     smoothness: float = Field(0.02, ge=0, description="cost of a change by a hundredth of the disparity range")
     truncation: float = Field(

@@ -61,7 +61,7 @@ from sepi.lightfield import FloatMap, LightField
 from sepi.matching.candidates import CandidateParameters, CandidateRule, number_field
 from sepi.matching.cost_volumes import disparity_of, distinctness, least_costs
 from sepi.matching.sheared_views import ShearedViews
-from sepi.stage import Choice, CostVolume, Progress, StageMaps
+from sepi.stage import Choice, CostVolume, Needs, Progress, StageMaps
 
 CANDIDATES = CandidateRule(usual=128, finest=0.02, coarsest=0.5, volume_bytes=10**9)
 """As many as fit a gigabyte at most, since the cost volume is kept."""
@@ -71,6 +71,9 @@ class OavcParameters(CandidateParameters):
     """Parameters of the vote cost."""
 
     rule: ClassVar[CandidateRule] = CANDIDATES
+    needs: ClassVar[Needs] = Needs(
+        bytes_per_sample=31, bytes_per_pixel=1300, bytes_per_candidate=8, seconds_per_megasample=3
+    )
 
     num_disparities: int | None = number_field(CANDIDATES, "docs/compared.md")
     agreeing_share: float = Field(

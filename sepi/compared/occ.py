@@ -24,6 +24,9 @@ mean away and divides by the standard deviation.
 
 What the publication leaves open, or could not be confirmed, and what is chosen here:
 
+- The product of the cues, the energy's exact form and what the confidence is could not be confirmed. All weights and
+  tolerances were chosen here. That of ``P`` is small: ``P`` is large at occlusions, but also round islands of wrong
+  depths, and with more weight these stay.
 - Which pixels are near an edge: an occluder's edge moves by the difference of the disparities times the distance of the
   view, so ``edge_reach`` is a part of the largest such shift.
 - The edge's orientation: that of the structure tensor round the edge pixel, to a sixteenth of half a turn.
@@ -64,7 +67,7 @@ from sepi.matching.candidates import CandidateParameters, CandidateRule, number_
 from sepi.matching.cost_volumes import disparity_of
 from sepi.matching.sheared_views import ShearedViews
 from sepi.regularization.message_passing import labels_of_least_energy
-from sepi.stage import Choice, CostVolume, Progress, StageMaps, require_previous
+from sepi.stage import Choice, CostVolume, Needs, Progress, StageMaps, require_previous
 
 CANDIDATES = CandidateRule(usual=101, finest=0.05, coarsest=0.5, volume_bytes=2**30)
 """An eighth of a pixel or so in the farthest view of usual light fields."""
@@ -83,6 +86,9 @@ class OccParameters(CandidateParameters):
     """Parameters of the costs of whole angular patches."""
 
     rule: ClassVar[CandidateRule] = CANDIDATES
+    needs: ClassVar[Needs] = Needs(
+        bytes_per_sample=31, bytes_per_pixel=2400, bytes_per_candidate=16, seconds_per_megasample=2
+    )
 
     num_disparities: int | None = number_field(CANDIDATES, "docs/compared.md")
 

@@ -61,7 +61,7 @@ from sepi.matching.candidates import CandidateParameters, CandidateRule, number_
 from sepi.matching.cost_volumes import disparity_of, distinctness, least_costs
 from sepi.matching.sheared_views import ShearedViews
 from sepi.regularization.wls import energy_system, solve
-from sepi.stage import Choice, CostVolume, Parameters, Progress, StageMaps, relative_confidence, require_previous
+from sepi.stage import Choice, CostVolume, Needs, Parameters, Progress, StageMaps, relative_confidence, require_previous
 
 CANDIDATES = CandidateRule(usual=101, finest=0.02, coarsest=0.5)
 
@@ -88,6 +88,9 @@ class PobrCostParameters(CandidateParameters):
     """Parameters of the photo-consistency."""
 
     rule: ClassVar[CandidateRule] = CANDIDATES
+    needs: ClassVar[Needs] = Needs(
+        bytes_per_sample=31, bytes_per_pixel=1500, bytes_per_candidate=8, seconds_per_megasample=1.5
+    )
 
     num_disparities: int | None = number_field(CANDIDATES, "docs/compared.md")
     truncation: float = Field(

@@ -51,7 +51,7 @@ from sepi.lightfield import BoolMap, FloatMap, LightField
 from sepi.matching.candidates import CandidateParameters, CandidateRule, number_field
 from sepi.matching.cost_volumes import disparity_of, least_costs
 from sepi.matching.sheared_views import ShearedViews
-from sepi.stage import Choice, CostVolume, Progress, StageMaps, relative_confidence
+from sepi.stage import Choice, CostVolume, Needs, Progress, StageMaps, relative_confidence
 
 CANDIDATES = CandidateRule(usual=128, finest=0.02, coarsest=0.5, volume_bytes=2**29)
 
@@ -66,6 +66,9 @@ class SpoParameters(CandidateParameters):
     """Parameters of the spinning parallelogram operator."""
 
     rule: ClassVar[CandidateRule] = CANDIDATES
+    needs: ClassVar[Needs] = Needs(
+        bytes_per_sample=9, bytes_per_pixel=2400, bytes_per_candidate=8, seconds_per_megasample=1.5
+    )
 
     num_disparities: int | None = number_field(CANDIDATES, "docs/compared.md")
     scale: float = Field(

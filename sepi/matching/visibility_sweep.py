@@ -22,7 +22,7 @@ from sepi.matching.candidates import CandidateParameters, CandidateRule, number_
 from sepi.matching.row_bands import Band, row_bands
 from sepi.matching.semi_global import SmallPenalty, SmoothedResult, SmoothingParameters, smooth_and_choose
 from sepi.matching.view_subsets import spread_views
-from sepi.stage import OcclusionMarginParameters, Progress
+from sepi.stage import Needs, OcclusionMarginParameters, Progress
 
 if TYPE_CHECKING:
     from sepi.matching.visibility_kernels import Visibility
@@ -45,6 +45,7 @@ class VisibilitySweepParameters(CandidateParameters, BaseDetailParameters, Smoot
     """Parameters of a visibility sweep and of the choice among its candidates."""
 
     rule: ClassVar[CandidateRule] = CANDIDATES
+    needs: ClassVar[Needs] = Needs(bytes_per_candidate=BYTES_PER_CANDIDATE)
 
     num_disparities: int | None = number_field(CANDIDATES, "docs/best.md")
     first_views: int = Field(

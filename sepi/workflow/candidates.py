@@ -8,7 +8,6 @@ from pathlib import Path
 from sepi.errors import SepiError
 from sepi.io.hdf5 import read_attributes
 from sepi.matching.candidates import CandidateParameters
-from sepi.matching.visibility_sweep import BYTES_PER_CANDIDATE, VisibilitySweepParameters
 from sepi.stage import Parameters
 from sepi.workflow.datasets import Scene
 
@@ -24,10 +23,11 @@ def candidates_mb(scene: Scene, light_field: Path, parameters: Parameters) -> in
     parameters : Parameters
         Of the job's choice; most choices hold no cost volume.
     """
-    if not isinstance(parameters, VisibilitySweepParameters):
+    each = parameters.needs.bytes_per_candidate
+    if not isinstance(parameters, CandidateParameters) or not each:
         return 0
     more = max(0, _number(scene, light_field, parameters) - parameters.rule.usual)
-    return round(more * BYTES_PER_CANDIDATE * scene.height * scene.width / 2**20)
+    return round(more * each * scene.height * scene.width / 2**20)
 
 
 def candidates_factor(scene: Scene, light_field: Path, parameters: Parameters) -> float:

@@ -25,7 +25,9 @@ FEW = {"initial": {"num_disparities": 31}}
 def scene(name: str, noise: float = 0.0) -> LightField:
     """A built-in scene, with noise of this standard deviation, colours in 0..1."""
     light_field = render(name, size=96, views=5)
-    disturbed = light_field.views + np.random.default_rng(1).normal(0, noise * 255, light_field.views.shape)
+    disturbed = light_field.views.astype(np.float64) + np.random.default_rng(1).normal(
+        0, noise * 255, light_field.views.shape
+    )
     return replace(light_field, views=np.clip(disturbed, 0, 255).round().astype(np.uint8))
 
 
