@@ -3,7 +3,8 @@
 Compiled code is kept on disk, beside the package or in ``NUMBA_CACHE_DIR``, so this is done once in an environment.
 Without it the first jobs of a workflow compile what they need, several of them the same at the same time. Here every
 stage of enough variants runs on a tiny light field, in two processes, since one compiles one function at a time.
-Kernels for 16-bit and float views are compiled when they are first needed.
+Kernels for 16-bit and float views are compiled when they are first needed, those of the compared methods with
+``--comparison``.
 """
 
 from __future__ import annotations
@@ -19,6 +20,9 @@ from sepi.threads import use_threads
 
 SHARES: tuple[tuple[str, ...], ...] = (("paper", "no_sepi", "wang"), ("best", "best_no_detail"))
 """Variants that together call every kernel; those of one share have few kernels in common with the other's."""
+
+COMPARED: tuple[tuple[str, ...], ...] = (("acc", "mishiba", "oavc", "pobr"), ("cae", "occ", "spo"))
+"""The compared methods, whose kernels are compiled only when asked for: `snakemake all` runs none of them."""
 
 _SCENE, _SIZE, _VIEWS = "curved_occluders", 64, 3
 
@@ -45,12 +49,14 @@ def compile_kernels(variants: tuple[str, ...]) -> None:
 
 
 @click.command(name="python -m sepi.cli.warm_up", cls=SepiCommand)
-def command() -> None:
+@click.option("--comparison", is_flag=True, help="Those of the compared methods, too.")
+def command(comparison: bool) -> None:
     """Compile the kernels, so that the first run need not."""
     started = time.perf_counter()
+    shares = (*SHARES, *COMPARED) if comparison else SHARES
     with ProcessPoolExecutor(len(SHARES), get_context("spawn")) as processes:
         # taken from the iterator, so that an error in a process is one here
-        list(processes.map(compile_kernels, SHARES))
+        list(processes.map(compile_kernels, shares))
     click.echo(f"kernels ready after {time.perf_counter() - started:.0f} s")
 
 

@@ -72,7 +72,7 @@ class AccParameters(CandidateParameters):
 
     rule: ClassVar[CandidateRule] = CANDIDATES
     needs: ClassVar[Needs] = Needs(
-        bytes_per_sample=60, bytes_per_pixel=1300, bytes_per_candidate=8, seconds_per_megasample=4
+        bytes_per_sample=14, bytes_per_pixel=1300, bytes_per_candidate=8, seconds_per_megasample=4
     )
 
     num_disparities: int | None = number_field(CANDIDATES, "docs/compared.md")
@@ -96,6 +96,8 @@ class AccParameters(CandidateParameters):
 
 class ConfidentLabelsParameters(Parameters):
     """Parameters of the multi-label optimisation and the refinement."""
+
+    needs: ClassVar[Needs] = Needs(bytes_per_sample=6, bytes_per_pixel=3000, seconds_per_megasample=1)
 
     reliable_deviation: float = Field(
         0.003, ge=0, description="standard deviation over the candidates from which a pixel's least cost counts"

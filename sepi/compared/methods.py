@@ -15,15 +15,15 @@ from sepi.compared import acc, cae, guided_costs, markov_field, mishiba, oavc, o
 from sepi.stage import Choice
 
 METHODS: dict[str, ModuleType] = {
-    "acc": acc,
     "oavc": oavc,
-    "mishiba": mishiba,
     "cae": cae,
-    "occ": occ,
     "pobr": pobr,
     "spo": spo,
+    "mishiba": mishiba,
+    "acc": acc,
+    "occ": occ,
 }
-"""Variant to the method's module, in the order of the tables."""
+"""Variant to the method's module, in the order of the paper's tables."""
 
 LEARNED: dict[str, ModuleType] = {"onnx": onnx_network}
 """Variant to the module of methods that need what the package does not bring: no report has them unless asked to."""

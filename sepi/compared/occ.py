@@ -112,6 +112,9 @@ class OccFieldParameters(CandidateParameters):
     """Parameters of the optimisation."""
 
     rule: ClassVar[CandidateRule] = LABELS
+    needs: ClassVar[Needs] = Needs(
+        bytes_per_sample=6, bytes_per_pixel=5000, bytes_per_candidate=32, seconds_per_megasample=0.6
+    )
 
     num_disparities: int | None = number_field(LABELS, "docs/compared.md")
     smoothness: float = Field(

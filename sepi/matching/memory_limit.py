@@ -2,7 +2,7 @@
 
 The views, the maps and the cost volumes of variant ``best`` are held as a whole; what is made of all views at once is
 made in bands of rows (:mod:`sepi.matching.row_bands`), narrower ones where there is less memory. The results
-are the same.
+are the same. The compared methods hold everything as a whole.
 """
 
 from __future__ import annotations
@@ -79,7 +79,9 @@ def _bytes_taken(light_field: LightField, stages: Iterable[Parameters]) -> tuple
     height, width = light_field.shape
     sweeps = [p.fewer(light_field, p.finest_sampling) for p in stages if isinstance(p, VisibilitySweepParameters)]
     volume = BYTES_PER_CANDIDATE * max(sweeps, default=0)
-    whole = _LIBRARIES + light_field.views.nbytes + round((volume + _BYTES_OF_MAPS) * height * width)
+    pixels, samples = height * width, height * width * int(light_field.present.sum())
+    own = max((p.needs.bytes_per_sample * samples + p.needs.bytes_per_pixel * pixels for p in stages), default=0)
+    whole = _LIBRARIES + light_field.views.nbytes + round(max((volume + _BYTES_OF_MAPS) * pixels, own))
     in_bands = any(isinstance(p, (BaseDetailParameters, OcclusionMarginParameters)) for p in stages)
     if not in_bands:
         return whole, whole

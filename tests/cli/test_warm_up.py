@@ -7,7 +7,8 @@ from pathlib import Path
 
 from click.testing import CliRunner
 
-from sepi.cli.warm_up import command
+from sepi.cli.warm_up import COMPARED, command
+from sepi.compared.methods import METHODS
 
 # every kernel with code kept on disk that was not called; those that only other kernels call are part of these
 _UNCALLED = """
@@ -15,8 +16,8 @@ import importlib, pkgutil, sys
 import sepi
 from numba.core.caching import FunctionCache
 from numba.core.registry import CPUDispatcher
-from sepi.cli.warm_up import SHARES, compile_kernels
-for share in SHARES:
+from sepi.cli.warm_up import COMPARED, SHARES, compile_kernels
+for share in (*SHARES, *COMPARED):
     compile_kernels(share)
 for module in pkgutil.walk_packages(sepi.__path__, "sepi."):
     if module.name.rpartition(".")[2] != "__main__" and not module.name.startswith("bench"):
@@ -47,6 +48,10 @@ def test_every_kernel_is_compiled() -> None:
     uncalled, count = done.stdout.split("\n")[:2]
     assert uncalled == ""
     assert int(count) > 20
+
+
+def test_every_compared_method_is_in_a_share() -> None:
+    assert {variant for share in COMPARED for variant in share} == set(METHODS)
 
 
 def test_the_command_compiles_all_shares() -> None:

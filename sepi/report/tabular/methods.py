@@ -101,7 +101,8 @@ def has_column(runs: Runs, dataset: str, method: str) -> bool:
 
 def own_names(plan: Plan) -> str:
     """The variants whose figures are compared, for a caption."""
-    return " and ".join(f"`{variant}`" for variant in plan.compared)
+    *names, last = (f"`{variant}`" for variant in plan.compared)
+    return f"{', '.join(names)} and {last}" if names else last
 
 
 def datasets_of(plan: Plan) -> list[str]:
