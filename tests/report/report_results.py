@@ -89,7 +89,7 @@ def with_results(made: Plan) -> Plan:
                 timing = made.stage_file(dataset, name, variant, stage, "time.json")
                 timing.write_text(json.dumps({"seconds": 1.5, "peak_memory_mb": 200 + 10 * len(stage)}))
         folder = made.files(dataset, name).stages
-        for parts in (False, True):
+        for parts in (False,) if made.is_comparison else (False, True):
             files = made.scored_files(dataset, name, parts)
             disparity = {map_name(folder, file): read_stage(file).disparity for file in files}
             scored = score_maps(scene, disparity, {})[0]

@@ -19,6 +19,7 @@ import pytest
 from pydantic import ValidationError
 from workflow_copy import SIZE, SLOW_WRITING, TINY, Workflow, copy_of_the_project, edited, files_below, wait_for
 
+from sepi.compared.methods import METHODS
 from sepi.io.files import is_temporary
 from sepi.io.hdf5 import read_attributes, read_stage
 from sepi.io.scores import read_scores
@@ -340,6 +341,29 @@ class TestReport:
         text = (finished.folder / "provenance.html").read_text()
         for word in ("Tables", "Charts", "Scenes", "table1_mse.csv", "MSE x100 with single parts of the method"):
             assert word in text
+
+
+class TestComparison:
+    def test_the_compared_methods_are_computed_beside_what_is_there(self, finished: Workflow, tmp_path: Path) -> None:
+        """Ours are not computed again, a second run has nothing to do, and a change in one method is nothing to others."""
+        shutil.copytree(finished.folder, tmp_path / "run", symlinks=True)
+        one_scene = {key: value for key, value in finished.config.items() if key != "hci_root"}
+        done = replace(finished, folder=tmp_path / "run", config=one_scene)
+        assert done.stage_plan("comparison") == {"initial": 7, "occlusion": 2, "optimize": 7}
+        result = done.run("comparison")
+        assert result.returncode == 0, result.stdout
+        with (done.folder / "reports/comparison/methods.csv").open(newline="") as file:
+            rows = list(csv.DictReader(file))
+        assert [row["variant"] for row in rows] == ["best", "fast", "paper", *METHODS]
+        assert all(0 < float(row["mse100"]) < 100 for row in rows)
+        assert (done.folder / "reports/comparison/index.html").stat().st_size > 100_000
+        assert (done.folder / "reports/comparison/maps/builtin/dots/spo/error.png").is_file()
+        assert (done.folder / "results/builtin/dots/oavc/disparity.pfm").is_file()
+        assert done.plan("comparison") == {}
+        changed = done.with_config(stages=done.config["stages"] | {"initial": {"spo": {"bins": 32}}})
+        assert changed.stage_plan("comparison") == {"initial": 1, "optimize": 1}
+        with edited(done.tree / "sepi" / "compared" / "oavc.py", "\nCHOICES", "\n_MORE = 1\n\nCHOICES"):
+            assert done.stage_plan("comparison") == {"initial": 1, "optimize": 1}
 
 
 class TestTargets:
