@@ -277,8 +277,8 @@ CHOICES = {
     "half_sepi": Choice(HalfSepiParameters, half_sepi),
     "wang": Choice(WangParameters, wang),
     "visibility": Choice(VisibilityParameters, visibility),
-    "none": Choice(NoParameters, none),
     **choices_of("occlusion"),
+    "none": Choice(NoParameters, none),
 }
 
 if __name__ == "__main__":

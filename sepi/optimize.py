@@ -215,8 +215,8 @@ def smooth_second_order(
 CHOICES = {
     "wls": Choice(WlsParameters, wls),
     "second_order": Choice(SecondOrderParameters, second_order),
-    "none": Choice(NoParameters, none),
     **choices_of("optimize"),
+    "none": Choice(NoParameters, none),
 }
 
 if __name__ == "__main__":

@@ -11,6 +11,8 @@ import inspect
 from collections.abc import Mapping
 from typing import Any
 
+from sepi.compared.guided_costs import GuidedCostsParameters
+from sepi.compared.occ import OccParameters
 from sepi.image.edges import CannyParameters
 from sepi.matching.base_detail import BaseDetailParameters
 from sepi.matching.plane_sweep import SweepParameters
@@ -32,6 +34,8 @@ GROUPS: dict[str, type[Parameters]] = {
     "base_detail_sweep": VisibilitySweepParameters,
     "semi_global_smoothing": SmoothingParameters,
     "occluders": OcclusionMarginParameters,
+    "guided_costs": GuidedCostsParameters,
+    "angular_patches": OccParameters,
 }
 """Name of a group to the model that declares it."""
 

@@ -345,7 +345,7 @@ class TestReport:
 
 class TestComparison:
     def test_the_compared_methods_are_computed_beside_what_is_there(self, finished: Workflow, tmp_path: Path) -> None:
-        """Ours are not computed again, a second run has nothing to do, and a change in one method is nothing to others."""
+        """Ours are not computed again, a second run has nothing to do, a change in one method touches no other."""
         shutil.copytree(finished.folder, tmp_path / "run", symlinks=True)
         one_scene = {key: value for key, value in finished.config.items() if key != "hci_root"}
         done = replace(finished, folder=tmp_path / "run", config=one_scene)
