@@ -1,14 +1,14 @@
 """A learned method's network: who has one gets its map, whatever order and range its inputs have."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import onnx
 import pytest
-from onnx import TensorProto, helper, numpy_helper
+from onnx import helper
+from small_networks import convolution, network
 
 from sepi.errors import SepiError
 from sepi.lightfield import LightField
@@ -21,21 +21,6 @@ SIZE, VIEWS = 64, 3
 @pytest.fixture(scope="module")
 def light_field() -> LightField:
     return render("slanted_plane", size=SIZE, views=VIEWS)
-
-
-def network(path: Path, inputs: Sequence[tuple[str, Sequence[Any]]], nodes: Sequence[Any], weights: Any = ()) -> Path:
-    """Write a network with these inputs and nodes, the last of which gives ``out``."""
-    given = [helper.make_tensor_value_info(name, TensorProto.FLOAT, shape) for name, shape in inputs]
-    out = helper.make_tensor_value_info("out", TensorProto.FLOAT, None)
-    graph = helper.make_graph(nodes, "small", given, [out], [numpy_helper.from_array(w, n) for n, w in weights])
-    onnx.save(helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)], ir_version=8), path)
-    return path
-
-
-def convolution(path: Path, channels: int, kernel: Any, shape: Sequence[Any] = ("b", "c", "y", "x")) -> Path:
-    """A network of one convolution without padding: its output is smaller than its input."""
-    node = helper.make_node("Conv", ["views", "kernel"], ["out"])
-    return network(path, [("views", shape)], [node], [("kernel", np.asarray(kernel, np.float32))])
 
 
 def estimated(light_field: LightField, path: Path | None, **parameters: Any) -> Any:
@@ -52,7 +37,7 @@ def unit(light_field: LightField) -> Any:
 def test_the_axes_of_all_views_are_as_written(tmp_path: Path, light_field: LightField) -> None:
     """Views in another order than a network learned give a map that looks right and is not."""
     kernel = np.arange(VIEWS * VIEWS * 3).reshape(1, -1, 1, 1)
-    made = estimated(light_field, convolution(tmp_path / "net.onnx", 27, kernel), inputs=("all: 1 (t s c) y x",))
+    made = estimated(light_field, convolution(tmp_path / "net.onnx", kernel), inputs=("all: 1 (t s c) y x",))
     expected = np.einsum("tsyxc,tsc->yx", unit(light_field), kernel.reshape(VIEWS, VIEWS, 3))
     np.testing.assert_allclose(made, expected, rtol=1e-5)
 
@@ -60,7 +45,7 @@ def test_the_axes_of_all_views_are_as_written(tmp_path: Path, light_field: Light
 def test_colours_disparity_and_order_are_turned_as_asked(tmp_path: Path, light_field: LightField) -> None:
     """A network for 0..255 and far-is-positive gives nonsense for 0..1 and near-is-positive."""
     kernel = np.arange(9).reshape(1, 9, 1, 1)
-    path = convolution(tmp_path / "net.onnx", 9, kernel)
+    path = convolution(tmp_path / "net.onnx", kernel)
     made = estimated(
         light_field, path, inputs=("all: 1 (s t) y x",), grey=True, scale=255.0, offset=-10.0, reversed=("t",),
         disparity_scale=-0.5, disparity_offset=2.0,
@@ -98,7 +83,7 @@ def test_an_input_takes_its_views(
 
 def test_a_row_goes_through_the_reference_view(tmp_path: Path, light_field: LightField) -> None:
     """Another reference view has another row, and the map is of that view."""
-    path = convolution(tmp_path / "net.onnx", 3, np.array([1, 2, 4]).reshape(1, 3, 1, 1))
+    path = convolution(tmp_path / "net.onnx", np.array([1, 2, 4]).reshape(1, 3, 1, 1))
     made = estimated(light_field.seen_from((2, 0)), path, inputs=("row: 1 s y x",), grey=True)
     grey = unit(light_field) @ np.array([0.299, 0.587, 0.114], np.float32)
     np.testing.assert_allclose(made, np.tensordot([1.0, 2, 4], grey[2], 1), rtol=1e-5)
@@ -109,7 +94,7 @@ def test_pieces_make_the_same_map(tmp_path: Path, light_field: LightField, tile:
     """A picture that does not fit goes through in tiles without a seam, and one without padding cuts no border."""
     kernel = np.random.default_rng(0).random((1, 27, 5, 3)).astype(np.float32)
     kernel = np.concatenate([kernel, np.zeros((1, 27, 5, 2), np.float32)], axis=3)
-    path = convolution(tmp_path / "net.onnx", 27, kernel)
+    path = convolution(tmp_path / "net.onnx", kernel)
     made = estimated(light_field, path, margin=2, tile=tile, overlap=2)
     padded = np.pad(unit(light_field), [(0, 0), (0, 0), (2, 2), (2, 2), (0, 0)], mode="edge")
     stack = padded.transpose(0, 1, 4, 2, 3).reshape(27, SIZE + 4, SIZE + 4)
@@ -120,7 +105,7 @@ def test_pieces_make_the_same_map(tmp_path: Path, light_field: LightField, tile:
 def test_the_views_round_the_reference_view_are_taken(tmp_path: Path) -> None:
     """A network for 3x3 views, a light field of 5x5."""
     wide = render("slanted_plane", size=SIZE, views=5)
-    path = convolution(tmp_path / "net.onnx", 27, np.ones((1, 27, 1, 1)))
+    path = convolution(tmp_path / "net.onnx", np.ones((1, 27, 1, 1)))
     made = estimated(wide, path, grid=(3, 3))
     np.testing.assert_allclose(made, unit(wide)[1:4, 1:4].sum(axis=(0, 1, 4)), rtol=1e-5)
 
@@ -139,7 +124,7 @@ def test_the_views_round_the_reference_view_are_taken(tmp_path: Path) -> None:
 def test_what_does_not_fit_is_told_in_one_line(
     tmp_path: Path, light_field: LightField, parameters: dict[str, Any], message: str
 ) -> None:
-    path = convolution(tmp_path / "net.onnx", 27, np.ones((1, 27, 1, 1)), (1, 27, "y", "x"))
+    path = convolution(tmp_path / "net.onnx", np.ones((1, 27, 1, 1)), (1, 27, "y", "x"))
     with pytest.raises(SepiError, match=message) as told:
         estimated(light_field, path, **parameters)
     assert "\n" not in str(told.value)
@@ -164,6 +149,6 @@ def test_parameters_that_cannot_be_followed_are_refused(parameters: dict[str, An
 def test_missing_views_are_told(tmp_path: Path, light_field: LightField) -> None:
     present = np.ones((VIEWS, VIEWS), bool)
     present[0, 0] = False
-    path = convolution(tmp_path / "net.onnx", 27, np.ones((1, 27, 1, 1)))
+    path = convolution(tmp_path / "net.onnx", np.ones((1, 27, 1, 1)))
     with pytest.raises(SepiError, match="some are missing"):
         estimated(replace(light_field, present=present), path)

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 import pytest
 from pydantic import ValidationError
+from small_networks import convolution
 from workflow_copy import SIZE, SLOW_WRITING, TINY, Workflow, copy_of_the_project, edited, files_below, wait_for
 
 from sepi.compared.methods import METHODS
@@ -364,6 +365,22 @@ class TestComparison:
         assert changed.stage_plan("comparison") == {"initial": 1, "optimize": 1}
         with edited(done.tree / "sepi" / "compared" / "oavc.py", "\nCHOICES", "\n_MORE = 1\n\nCHOICES"):
             assert done.stage_plan("comparison") == {"initial": 1, "optimize": 1}
+
+
+class TestNetwork:
+    def test_a_network_of_ones_own_is_a_variant(self, finished: Workflow, tmp_path: Path) -> None:
+        """Its map is made from the file that the configuration names, and again when that file changes."""
+        path = convolution(tmp_path / "net.onnx", np.full((1, 25, 1, 1), 0.04))
+        inputs = {"choice": "onnx", "model": str(path), "inputs": ["all: 1 (t s) y x"], "grey": True, "grid": [5, 5]}
+        variant = {"initial": inputs, "occlusion": "none", "textureless": "none", "optimize": "none"}
+        mine = replace(finished, folder=tmp_path / "run").with_config(variants={"mine": variant})
+        shutil.copytree(finished.folder / "results", tmp_path / "run/results", symlinks=True)
+        target = "results/builtin/dots/mine/result.h5"
+        result = mine.run(target)
+        assert result.returncode == 0, result.stdout
+        assert mine.plan(target) == {}
+        convolution(path, np.full((1, 25, 1, 1), 0.02))
+        assert mine.stage_plan(target) == {"initial": 1}
 
 
 class TestTargets:
