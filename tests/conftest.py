@@ -31,6 +31,9 @@ _TOGETHER = {
     **dict.fromkeys(["test_kills", "test_machine"], "faults"),
 }
 
+# files whose tests of a variant, the last word of their names, share its map of a whole light field
+_BY_VARIANT = ("test_missing_views",)
+
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Mark tests by the fixtures that they use, and put those first that take long."""
@@ -57,7 +60,10 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
 
     class Scheduler(LoadScopeScheduling):
         def _split_scope(self, nodeid: str) -> str:
-            return _TOGETHER.get(Path(nodeid.partition("::")[0]).stem, nodeid)
+            file = Path(nodeid.partition("::")[0]).stem
+            if file in _BY_VARIANT:
+                return f"{file} {nodeid.rpartition('-')[2].rpartition('[')[2]}"
+            return _TOGETHER.get(file, nodeid)
 
     config.option.loadscopereorder = False
     return Scheduler(config, log)

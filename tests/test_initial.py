@@ -93,7 +93,10 @@ def test_structure_tensor_follows_a_parallax_of_pixels(disparity):
 
 def test_sepi_beats_the_single_epi_where_the_paper_says_so():
     light_field = render("curved_occluders", size=96)
-    errors = {c: np.mean((depth(light_field, c).disparity - light_field.ground_truth) ** 2) for c in CHOICES}
+    errors = {
+        c: np.mean((depth(light_field, c).disparity - light_field.ground_truth) ** 2)
+        for c in ("sepi", "structure_tensor")
+    }
     assert errors["sepi"] < 0.5 * errors["structure_tensor"]
 
 

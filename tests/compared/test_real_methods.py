@@ -16,18 +16,18 @@ from sepi.evaluate import score
 from sepi.lightfield import LightField
 from sepi.pipeline import estimate_depth
 
-SIZE = 144
+SIZE = 96
 # first row and column of the part
 CORNERS = {"cotton": (60, 120), "antinous": (120, 200)}
 # MSE x100 and Q25 x100 that a method must stay below, a tenth above what was seen
 BOUNDS: dict[str, dict[str, tuple[float, float]]] = {
-    "oavc": {"cotton": (1.1, 0.17), "antinous": (11.0, 0.79)},
-    "cae": {"cotton": (2.7, 0.18), "antinous": (56.0, 0.78)},
-    "pobr": {"cotton": (15.0, 0.16), "antinous": (58.0, 0.57)},
-    "spo": {"cotton": (2.6, 0.73), "antinous": (9.9, 1.1)},
-    "mishiba": {"cotton": (1.4, 0.4), "antinous": (8.1, 0.8)},
-    "acc": {"cotton": (23.0, 0.89), "antinous": (69.0, 1.2)},
-    "occ": {"cotton": (2.6, 0.43), "antinous": (18.0, 1.2)},
+    "oavc": {"cotton": (1.1, 0.096), "antinous": (28.0, 0.84)},
+    "cae": {"cotton": (2.9, 0.072), "antinous": (34.0, 0.77)},
+    "pobr": {"cotton": (16.0, 0.09), "antinous": (26.0, 0.5)},
+    "spo": {"cotton": (2.9, 0.63), "antinous": (30.0, 1.4)},
+    "mishiba": {"cotton": (1.3, 0.28), "antinous": (30.0, 0.95)},
+    "acc": {"cotton": (19.0, 1.0), "antinous": (27.0, 1.1)},
+    "occ": {"cotton": (5.2, 0.42), "antinous": (21.0, 0.93)},
 }
 
 

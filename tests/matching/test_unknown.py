@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
+from sepi.compared.methods import LEARNED
 from sepi.io.readers.options import ReadOptions
 from sepi.lightfield import DisparityRange, LightField
 from sepi.matching.unknown import held_by_few, unknown_pixels, with_unknown
@@ -149,7 +150,7 @@ def test_missing_views_hold_nothing() -> None:
 # --- in the final maps
 
 
-@pytest.mark.parametrize("variant", VARIANTS)
+@pytest.mark.parametrize("variant", [name for name in VARIANTS if name not in LEARNED])
 def test_every_variant_tells_what_is_unknown_and_changes_no_depth(variant: str) -> None:
     scene = light_field(np.where(DISC, texture(), 0))
     few = {} if variant == "no_sepi" else {"initial": {"num_disparities": 11}}
