@@ -138,6 +138,8 @@ def second_order(
     disparity = before.disparity
     uniform = before.mask("textureless")
     reliability = np.where(uniform, 1, reliable(before.confidence, parameters)).astype(np.float32)
+    guide = light_field.reference_view
+    colour_variance = parameters.smooth_colour**2 + 4 * residual_variance(guide)
     total = parameters.refinements + parameters.solves
     for i in range(total):
         progress((i + 0.5) / (total + 1))
@@ -158,7 +160,7 @@ def second_order(
             weight = np.where(uniform, np.float32(UNIFORM_WEIGHT), weight)
             rtol = parameters.rtol if last else parameters.first_rtol
             target = smooth_second_order(
-                target, disparity, weight, reliability, light_field.reference_view, parameters, rtol
+                target, disparity, weight, reliability, guide, colour_variance, parameters, rtol
             )
         disparity = target
     return before.updated(disparity, smooth_confidence(disparity, curvature))
@@ -197,16 +199,18 @@ def smooth_second_order(
     weight: FloatMap,
     reliability: FloatMap,
     guide: FloatMap,
+    colour_variance: float,
     parameters: SecondOrderParameters,
     rtol: float,
 ) -> FloatMap:
     """Second-order smoothing of ``target``, whose discontinuities are looked for in ``shape``; all shapes (H, W), but
-    for the colours ``guide``, (H, W, 3). The solver stops at the relative residual ``rtol``.
+    for the colours ``guide``, (H, W, 3), at whose squared difference ``colour_variance`` smoothness falls. The solver
+    stops at the relative residual ``rtol``.
     """
     from sepi.regularization.second_order import second_difference_stencil, smoothness_weights, solve_smooth
 
-    variance = parameters.smooth_colour**2 + 4 * residual_variance(guide)
-    weights = smoothness_weights(shape, guide, reliability, parameters.second_difference_threshold, variance)
+    threshold = parameters.second_difference_threshold
+    weights = smoothness_weights(shape, guide, reliability, threshold, colour_variance)
     weights = [parameters.strength * w + LEAST_SMOOTHNESS for w in weights]
     stencil = second_difference_stencil(weights, target.shape)
     return solve_smooth(stencil, weight, target, rtol, parameters.max_iterations)

@@ -17,6 +17,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
+from dataclasses import dataclass
 from typing import Annotated, NamedTuple
 
 import numpy as np
@@ -133,7 +134,7 @@ def base_detail_decomposition(
     # as they are in memory: nothing is copied
     colours = views.transpose(0, 1, 4, 2, 3)
     unit = np.float32(1 / full_scale(views.dtype))
-    noise = noise_level(guide)
+    noise = reference_noise(light_field)
     detail, missing = _detail_so_far(light_field, parameters, rows, present)
     if detail.size and missing.any():
         edge = float(np.hypot(parameters.base_sigma_colour, 3 * noise))
@@ -153,16 +154,18 @@ def base_detail_decomposition(
     )
 
 
-class _Kept(NamedTuple):
-    """The detail of the views of one light field, and of which it is made so far."""
+@dataclass
+class _Kept:
+    """What is made of one light field so far: its noise, and the detail of some of its views."""
 
-    views: npt.NDArray[np.generic]
-    made_with: tuple[float, ...]
-    detail: npt.NDArray[np.int16]
-    made: BoolMap
+    light_field: LightField | None = None
+    noise: float = 0.0
+    made_with: tuple[float, ...] = ()
+    detail: npt.NDArray[np.int16] | None = None
+    made: BoolMap | None = None
 
 
-_kept: ContextVar[list[_Kept] | None] = ContextVar("_kept", default=None)
+_kept: ContextVar[_Kept | None] = ContextVar("_kept", default=None)
 
 
 @contextmanager
@@ -171,11 +174,18 @@ def kept_detail() -> Iterator[None]:
 
     That holds for whole views; what is made in bands of rows, since memory is short, is not kept.
     """
-    token = _kept.set([])
+    token = _kept.set(_Kept())
     try:
         yield
     finally:
         _kept.reset(token)
+
+
+def forget_detail() -> None:
+    """Give back what :func:`kept_detail` keeps, which is made again if it is asked for."""
+    kept = _kept.get()
+    if kept is not None:
+        kept.detail = kept.made = None
 
 
 def _detail_so_far(
@@ -190,8 +200,20 @@ def _detail_so_far(
     if kept is None or not with_detail or rows != (0, height):
         return np.zeros(shape, np.int16), present
     made_with = (parameters.base_radius, parameters.base_sigma_colour, parameters.base_sigma_space)
-    if not kept or kept[0].views is not light_field.views or kept[0].made_with != made_with:
-        kept[:] = [_Kept(light_field.views, made_with, np.zeros(shape, np.int16), np.zeros(light_field.grid, bool))]
-    missing = present & ~kept[0].made
-    np.logical_or(kept[0].made, present, out=kept[0].made)
-    return kept[0].detail, missing
+    if kept.detail is None or kept.made is None or kept.made_with != made_with:
+        kept.made_with = made_with
+        kept.detail, kept.made = np.zeros(shape, np.int16), np.zeros(light_field.grid, bool)
+    missing = present & ~kept.made
+    kept.made |= present
+    return kept.detail, missing
+
+
+def reference_noise(light_field: LightField) -> float:
+    """Noise of the reference view (:func:`sepi.image.noise.noise_level`); inside :func:`kept_detail` found once."""
+    kept = _kept.get()
+    if kept is None:
+        return noise_level(light_field.reference_view)
+    if kept.light_field is not light_field:
+        # what was kept of another goes
+        _kept.set(kept := _Kept(light_field, noise_level(light_field.reference_view)))
+    return kept.noise

@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 
 from sepi.lightfield import BoolMap, FloatMap, LightField
-from sepi.matching.base_detail import BaseDetailParameters, base_detail_decomposition
+from sepi.matching.base_detail import BaseDetailParameters, base_detail_decomposition, forget_detail
 from sepi.matching.gauss_newton_kernels import Seeing, SplineViews, mean_of_views, normal_equations
 from sepi.matching.row_bands import Band, Rows, row_bands
 from sepi.matching.spline_kernels import MARGIN, REACH, SPLINE_UNIT, spline_coefficients, view_splines
@@ -135,6 +135,9 @@ def spline_views(
         views.colours, views.colour_unit, views.detail, views.detail_unit, wider.low, present, rows.low,
         splines,
     )  # fmt: skip
+    if (present == light_field.present).all():
+        # the splines of all views take its place
+        forget_detail()
     others = present.copy()
     others[light_field.reference_position] = False
     own = np.zeros((height, width, 4), np.float32)

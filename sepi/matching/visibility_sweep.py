@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 from pydantic import Field
 
-from sepi.image.noise import residual_variance
+from sepi.image.noise import variance_of_residuals
 from sepi.lightfield import BoolMap, FloatMap, LightField
-from sepi.matching.base_detail import BaseDetailParameters, ColourScale, base_detail_decomposition
+from sepi.matching.base_detail import BaseDetailParameters, ColourScale, base_detail_decomposition, reference_noise
 from sepi.matching.candidates import CandidateParameters, CandidateRule, number_field
 from sepi.matching.row_bands import Band, row_bands
 from sepi.matching.semi_global import SmallPenalty, SmoothedResult, SmoothingParameters, smooth_and_choose
@@ -206,7 +206,8 @@ def _sweep(
     # not held by a name: it goes as soon as it has been used
     volume = [cost]
     del cost
-    result = smooth_and_choose(volume.pop(), disparities, guide, residual_variance(guide), parameters)
+    noise = variance_of_residuals(reference_noise(light_field), guide.shape[2])
+    result = smooth_and_choose(volume.pop(), disparities, guide, noise, parameters)
     progress(1.0)
     return result
 

@@ -1,12 +1,14 @@
 """The detail of the views equals a plain NumPy twin, and OpenCV's filter nearly so."""
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
 
 from sepi.image.noise import noise_level
 from sepi.lightfield import LightField, as_unit_float
-from sepi.matching.base_detail import DETAIL_UNIT, BaseDetailParameters, base_detail_decomposition
+from sepi.matching.base_detail import DETAIL_UNIT, BaseDetailParameters, base_detail_decomposition, kept_detail
 from sepi.matching.row_bands import Rows
 from sepi.scenes import render
 
@@ -64,3 +66,24 @@ def test_some_rows_of_some_views_are_those_of_the_whole() -> None:
     assert part.low == 13
     np.testing.assert_array_equal(part.detail[present], whole[present][:, 13:50])
     assert not part.detail[~present].any()
+
+
+def test_what_is_kept_of_views_changes_nothing() -> None:
+    """A view's detail that was made for other views, parameters or light fields would give a wrong map."""
+    first, second = (replace(render(name, size=64, views=5), masks={}) for name in ("dots", "stripes"))
+    few, all_views = np.zeros((5, 5), bool), np.ones((5, 5), bool)
+    few[::2, ::2] = True
+    asked = [
+        (field, BaseDetailParameters(base_radius=radius), views)
+        for field in (first, second, first)
+        for radius, views in ((4, few), (4, all_views), (3, few), (4, few))
+    ]
+    alone = [base_detail_decomposition(field, parameters, None, views) for field, parameters, views in asked]
+    with kept_detail():
+        for (field, parameters, views), expected in zip(asked, alone, strict=True):
+            found = base_detail_decomposition(field, parameters, None, views)
+            np.testing.assert_array_equal(found.detail[views], expected.detail[views])
+            assert found.noise == expected.noise
+            # of some rows, as in bands: not kept
+            band = base_detail_decomposition(field, parameters, Rows(8, 40), views)
+            np.testing.assert_array_equal(band.detail[views], expected.detail[views][:, 8:40])
