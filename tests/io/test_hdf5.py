@@ -14,10 +14,11 @@ from hdf5_edits import changed
 
 from sepi.errors import SepiError
 from sepi.io.external_maps import read_external
-from sepi.io.hdf5 import write_light_field
+from sepi.io.hdf5 import read_stage, write_light_field, write_stage
 from sepi.io.scores import read_evaluations
 from sepi.lightfield import DisparityRange, LightField
 from sepi.reading import read_light_field
+from sepi.stage import CostVolume, StageMaps
 
 
 def cut(path: Path) -> None:
@@ -171,3 +172,24 @@ def test_values_of_variable_length_are_refused(tmp_path: Path) -> None:
     with h5py.File(tmp_path / "a.h5", "w") as file:
         file["LF"] = ["text"]
     assert "'LF' are of variable length" in reading_error(tmp_path / "a.h5")
+
+
+def test_a_cost_volume_comes_back(tmp_path: Path) -> None:
+    """The next job chooses among these candidates; another precision or order would give another map."""
+    random = np.random.default_rng(3)
+    costs = CostVolume(np.linspace(-1, 2, 7, dtype=np.float32), random.random((7, 5, 6)).astype(np.float16))
+    disparity, confidence = random.random((2, 5, 6), np.float32)
+    attributes = {"stage": "initial", "choice": "spo", "parameters": "{}", "made_from": "[]"}
+    write_stage(tmp_path / "initial.h5", StageMaps(disparity, confidence, cost_volume=costs), attributes)
+    back = read_stage(tmp_path / "initial.h5")
+    assert back.cost_volume is not None
+    np.testing.assert_array_equal(back.cost_volume.costs, costs.costs)
+    np.testing.assert_array_equal(back.cost_volume.disparities, costs.disparities)
+    assert (back.cost_volume.costs.dtype, set(back.all())) == (np.float16, {"disparity", "confidence"})
+    assert back.without_costs().cost_volume is None
+
+
+def test_costs_of_another_kind_are_refused() -> None:
+    for costs in (np.zeros((3, 4, 5), np.float32), np.zeros((2, 4, 5), np.float16), np.zeros((3, 4), np.float16)):
+        with pytest.raises(SepiError, match="cost volume: expected"):
+            CostVolume(np.zeros(3, np.float32), costs)
