@@ -115,4 +115,4 @@ def detail_of_views(
                     _add_neighbour(here, there, falloff, nearness, total, weights)
             for x in range(W):
                 value = (a[3, radius + x] - total[x] / weights[x]) / detail_unit
-                out[t, s, y, x] = np.int16(math.floor(value + np.float32(0.5)))
+                out[t, s, y, x] = np.int32(np.rint(value))

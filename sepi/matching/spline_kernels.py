@@ -23,8 +23,8 @@ EXACT = {"nnan", "ninf", "nsz"}
 SPLINE_UNIT = np.float32(1 / 3400)
 """Unit of the spline coefficients, stored as int16; a checkerboard of -0.5 and 1.5 has some of +-9.5."""
 
-REACH = 12
-"""How far the coefficients' convolution reaches; beyond it is less than 1e-6."""
+REACH = 8
+"""How far the coefficients' convolution reaches; beyond it is less than a tenth of what rounding to int16 does."""
 
 _FILTER = np.array([math.sqrt(3) * (math.sqrt(3) - 2) ** abs(k) for k in range(-REACH, REACH + 1)], np.float32)
 
@@ -140,4 +140,4 @@ def view_splines(
             for c in range(channels):
                 _coefficient_row(rows[c, i - first : i - first + 2 * REACH + 1], padded, row)
                 for x in range(row.size):
-                    out[t, s, i, x, c] = np.int16(math.floor(row[x] + np.float32(0.5)))
+                    out[t, s, i, x, c] = np.int32(np.rint(row[x]))
