@@ -21,6 +21,7 @@ from typing import Self
 
 import cv2
 import numpy as np
+import numpy.typing as npt
 from pydantic import Field, model_validator
 
 from sepi.compared.methods import choices_of
@@ -133,12 +134,14 @@ def second_order(
         ``confidence`` is that of :func:`smooth_confidence`.
     """
     from sepi.matching.gauss_newton import GaussNewton, windowed_step
+    from sepi.regularization.second_order import colour_changes
 
     before = require_previous(previous)
     disparity = before.disparity
     uniform = before.mask("textureless")
     reliability = np.where(uniform, 1, reliable(before.confidence, parameters)).astype(np.float32)
     guide = light_field.reference_view
+    colours = colour_changes(guide)
     colour_variance = parameters.smooth_colour**2 + 4 * residual_variance(guide)
     total = parameters.refinements + parameters.solves
     for i in range(total):
@@ -160,7 +163,7 @@ def second_order(
             weight = np.where(uniform, np.float32(UNIFORM_WEIGHT), weight)
             rtol = parameters.rtol if last else parameters.first_rtol
             target = smooth_second_order(
-                target, disparity, weight, reliability, guide, colour_variance, parameters, rtol
+                target, disparity, weight, reliability, colours, colour_variance, parameters, rtol
             )
         disparity = target
     return before.updated(disparity, smooth_confidence(disparity, curvature))
@@ -198,19 +201,19 @@ def smooth_second_order(
     shape: FloatMap,
     weight: FloatMap,
     reliability: FloatMap,
-    guide: FloatMap,
+    colours: list[npt.NDArray[np.float64]],
     colour_variance: float,
     parameters: SecondOrderParameters,
     rtol: float,
 ) -> FloatMap:
     """Second-order smoothing of ``target``, whose discontinuities are looked for in ``shape``; all shapes (H, W), but
-    for the colours ``guide``, (H, W, 3), at whose squared difference ``colour_variance`` smoothness falls. The solver
-    stops at the relative residual ``rtol``.
+    for ``colours``, the colour changes at whose ``colour_variance`` smoothness falls. The solver stops at the relative
+    residual ``rtol``.
     """
     from sepi.regularization.second_order import second_difference_stencil, smoothness_weights, solve_smooth
 
     threshold = parameters.second_difference_threshold
-    weights = smoothness_weights(shape, guide, reliability, threshold, colour_variance)
+    weights = smoothness_weights(shape, colours, reliability, threshold, colour_variance)
     weights = [parameters.strength * w + LEAST_SMOOTHNESS for w in weights]
     stencil = second_difference_stencil(weights, target.shape)
     return solve_smooth(stencil, weight, target, rtol, parameters.max_iterations)

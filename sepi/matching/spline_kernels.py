@@ -24,9 +24,14 @@ SPLINE_UNIT = np.float32(1 / 3400)
 """Unit of the spline coefficients, stored as int16; a checkerboard of -0.5 and 1.5 has some of +-9.5."""
 
 REACH = 8
-"""How far the coefficients' convolution reaches; beyond it is less than a tenth of what rounding to int16 does."""
+"""How far the convolution of the views' coefficients reaches; beyond it is a tenth of what rounding to int16 does."""
 
-_FILTER = np.array([math.sqrt(3) * (math.sqrt(3) - 2) ** abs(k) for k in range(-REACH, REACH + 1)], np.float32)
+_FULL_REACH = 12
+"""The same where nothing is rounded: beyond it is less than 1e-6."""
+
+_FILTER = np.array(
+    [math.sqrt(3) * (math.sqrt(3) - 2) ** abs(k) for k in range(-_FULL_REACH, _FULL_REACH + 1)], np.float32
+)
 
 MARGIN = 2
 """Coefficients beyond each side of a view."""
@@ -55,25 +60,26 @@ def _coefficient_row(rows: Any, padded: Any, out: Any) -> None:
 
     Parameters
     ----------
-    rows : ndarray, shape (2 REACH + 1, W), float32
-        The row in the middle, and those round it.
-    padded : ndarray, shape (W + 2 MARGIN + 2 REACH,), float32
+    rows : ndarray, shape (2 reach + 1, W), float32
+        The row in the middle, and those round it, as far as the convolution reaches.
+    padded : ndarray, shape (W + 2 MARGIN + 2 reach,), float32
         Scratch.
     out : ndarray, shape (W + 2 MARGIN,), float32
         Filled.
     """
-    W = rows.shape[1]
-    side = MARGIN + REACH
+    taps, W = rows.shape
+    side = MARGIN + taps // 2
+    weights = _FILTER[_FULL_REACH - taps // 2 :]
     inner = padded[side : side + W]
     inner[:] = 0
-    for k in range(2 * REACH + 1):
-        _add_weighted(rows[k], _FILTER[k], inner)
+    for k in range(taps):
+        _add_weighted(rows[k], weights[k], inner)
     for x in range(side):
         padded[side - 1 - x] = inner[_mirrored(-1 - x, W)]
         padded[side + W + x] = inner[_mirrored(W + x, W)]
     out[:] = 0
-    for k in range(2 * REACH + 1):
-        _add_weighted(padded[k : k + out.size], _FILTER[k], out)
+    for k in range(taps):
+        _add_weighted(padded[k : k + out.size], weights[k], out)
 
 
 @njit(inline="always")
@@ -86,13 +92,13 @@ def _load(row: Any, unit: Any, out: Any) -> None:
 def spline_coefficients(image: Any) -> Any:
     """Cubic spline coefficients of an image (H, W), float32."""
     H, W = image.shape
-    rows = np.empty((H + 2 * REACH, W), np.float32)
-    for i in range(H + 2 * REACH):
-        rows[i] = image[_mirrored(i - REACH, H)]
+    rows = np.empty((H + 2 * _FULL_REACH, W), np.float32)
+    for i in range(H + 2 * _FULL_REACH):
+        rows[i] = image[_mirrored(i - _FULL_REACH, H)]
     out = np.empty((H, W), np.float32)
-    padded, row = np.empty(W + 2 * (MARGIN + REACH), np.float32), np.empty(W + 2 * MARGIN, np.float32)
+    padded, row = np.empty(W + 2 * (MARGIN + _FULL_REACH), np.float32), np.empty(W + 2 * MARGIN, np.float32)
     for y in range(H):
-        _coefficient_row(rows[y : y + 2 * REACH + 1], padded, row)
+        _coefficient_row(rows[y : y + 2 * _FULL_REACH + 1], padded, row)
         out[y] = row[MARGIN : MARGIN + W]
     return out
 

@@ -40,8 +40,33 @@ LEAST_SINGLE_RTOL = 1e-5
 _SECOND, _MIXED = (1.0, -2.0, 1.0), (1.0, -1.0, -1.0, 1.0)
 
 
+def colour_changes(guide: FloatMap) -> list[FloatArray]:
+    """Squared RGB distances within the second differences along x, along y and across.
+
+    Parameters
+    ----------
+    guide : ndarray, shape (H, W, 3), float32
+        Colours, 0..1.
+
+    Returns
+    -------
+    list of ndarray
+        Of shapes (H, W - 2), (H - 2, W) and (H - 1, W - 1).
+    """
+
+    def distance(one: Corner, other: Corner) -> FloatArray:
+        difference = guide[one] - guide[other]
+        return np.asarray(np.einsum("hwc,hwc->hw", difference, difference), np.float64)
+
+    return [
+        distance(_ALONG_X[0], _ALONG_X[1]) + distance(_ALONG_X[2], _ALONG_X[1]),
+        distance(_ALONG_Y[0], _ALONG_Y[1]) + distance(_ALONG_Y[2], _ALONG_Y[1]),
+        distance(_ACROSS[0], _ACROSS[3]) + distance(_ACROSS[1], _ACROSS[2]),
+    ]
+
+
 def smoothness_weights(
-    disparity: FloatMap, guide: FloatMap, reliability: FloatMap, threshold: float, colour_variance: float
+    disparity: FloatMap, colours: list[FloatArray], reliability: FloatMap, threshold: float, colour_variance: float
 ) -> list[FloatArray]:
     """Weights of the second differences along x, along y and across, 0..1.
 
@@ -49,8 +74,8 @@ def smoothness_weights(
     ----------
     disparity : ndarray, shape (H, W), float32
         The data.
-    guide : ndarray, shape (H, W, 3), float32
-        Colours, 0..1.
+    colours : list of ndarray
+        From :func:`colour_changes`.
     reliability : ndarray, shape (H, W), float32
         0..1: how far a second difference of the data is believed.
     threshold : float
@@ -64,19 +89,16 @@ def smoothness_weights(
         Of shapes (H, W - 2), (H - 2, W) and (H - 1, W - 1).
     """
 
-    def weight(
-        corners: tuple[Corner, ...], factors: tuple[float, ...], pairs: tuple[tuple[int, int], ...]
-    ) -> FloatArray:
+    def weight(corners: tuple[Corner, ...], factors: tuple[float, ...], colour: FloatArray) -> FloatArray:
         difference = np.asarray(sum(f * disparity[p].astype(np.float64) for f, p in zip(factors, corners, strict=True)))
         trust = np.minimum.reduce([reliability[p] for p in corners])
-        colour = sum(((guide[corners[a]] - guide[corners[b]]) ** 2).sum(axis=2) for a, b in pairs)
-        exponent = (difference / threshold) ** 2 * trust + 2 * np.asarray(colour, np.float64) / colour_variance
+        exponent = (difference / threshold) ** 2 * trust + 2 * colour / colour_variance
         return np.asarray(np.exp(-np.minimum(exponent, 30)))
 
     return [
-        weight(_ALONG_X, _SECOND, ((0, 1), (2, 1))),
-        weight(_ALONG_Y, _SECOND, ((0, 1), (2, 1))),
-        weight(_ACROSS, _MIXED, ((0, 3), (1, 2))),
+        weight(_ALONG_X, _SECOND, colours[0]),
+        weight(_ALONG_Y, _SECOND, colours[1]),
+        weight(_ACROSS, _MIXED, colours[2]),
     ]
 
 

@@ -16,6 +16,7 @@ from sepi.matching.visibility_kernels import z_buffers
 from sepi.optimize import SecondOrderParameters, second_order
 from sepi.regularization.second_order import (
     LEAST_SINGLE_RTOL,
+    colour_changes,
     second_difference_stencil,
     smoothness_weights,
     solve_smooth,
@@ -161,7 +162,9 @@ def plane(shape=(20, 24)):
 
 def weights_of(disparity, reliability=1.0):
     guide = np.zeros((*disparity.shape, 3), np.float32)
-    return smoothness_weights(disparity, guide, np.full(disparity.shape, reliability, np.float32), 0.1, 0.01)
+    return smoothness_weights(
+        disparity, colour_changes(guide), np.full(disparity.shape, reliability, np.float32), 0.1, 0.01
+    )
 
 
 def test_planes_cost_nothing() -> None:
