@@ -27,7 +27,7 @@ _PATH = click.Path(path_type=Path)
 @click.option("--to", "kind", type=click.Choice(["colmap", "nerfstudio"]), default="colmap", show_default=True)
 @click.option("-o", "--output", type=_PATH, help="Folder to make; ./NAME-colmap after INPUT's name unless given.")
 @click.option(
-    "--min-confidence", type=float, default=0.5, show_default=True, metavar="X", help="No points of less sure pixels."
+    "--min-confidence", type=float, metavar="X", help="No points of less sure pixels; else of the surer half."
 )
 @click.option(
     "--points", type=click.IntRange(min=0), default=10000, show_default=True, metavar="N", help="At most N points."
@@ -39,7 +39,7 @@ def poses(
     result_path: Path,
     kind: str,
     output: Path | None,
-    min_confidence: float,
+    min_confidence: float | None,
     points: int,
     geometry: Geometry | None,
     reading: Reading,

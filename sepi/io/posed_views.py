@@ -18,8 +18,8 @@ from sepi.lightfield import BoolMap, FloatMap, LightField, as_unit_float
 
 Colours = npt.NDArray[np.uint8]
 
-MIN_CONFIDENCE = 0.5
 MAX_POINTS = 10000
+"""Most points unless told; each has a track through all the views that see it."""
 
 
 @dataclass(frozen=True)
@@ -101,7 +101,7 @@ def posed_views(
     *,
     unknown: BoolMap | None = None,
     camera: Camera | None = None,
-    min_confidence: float = MIN_CONFIDENCE,
+    min_confidence: float | None = None,
     max_points: int = MAX_POINTS,
 ) -> PosedViews:
     """Prepare a light field and the disparity map of its reference view for other programs.
@@ -117,8 +117,8 @@ def posed_views(
         Pixels without depth.
     camera : Camera, optional
         The light field's own unless given, or a nominal one where it has none.
-    min_confidence : float
-        Less sure pixels have no point.
+    min_confidence : float, optional
+        Less sure pixels have no point; the surer half of all pixels with a depth has one unless given.
     max_points : int
         Every so-many-th row and column has points, so that they are no more than this.
 
@@ -130,7 +130,7 @@ def posed_views(
     for name, values in {"disparity": disparity, "confidence": confidence, "unknown": unknown}.items():
         if values is not None and values.shape != light_field.shape:
             raise SepiError(f"{light_field.name}: {name} is {values.shape}, the views {light_field.shape}")
-    if not 0 <= min_confidence <= 1:
+    if min_confidence is not None and not 0 <= min_confidence <= 1:
         raise SepiError(f"{light_field.name}: expected a least confidence within 0..1, got {min_confidence:g}")
     if max_points < 0:
         raise SepiError(f"{light_field.name}: expected 0 points or more, got {max_points}")
@@ -141,8 +141,6 @@ def posed_views(
     used = own or nominal_camera(disparity, known)
     depth = used.depth(disparity)
     known &= np.isfinite(depth) & (depth > 0)
-    # comparison with NaN is false: unknown confidence is none
-    sure = known if confidence is None else known & (confidence >= min_confidence)
     return PosedViews(
         light_field=light_field,
         camera=used,
@@ -150,8 +148,17 @@ def posed_views(
         poses=camera_poses(light_field, used),
         disparity=disparity,
         known=known,
-        chosen=_thinned(sure, max_points),
+        chosen=_thinned(_sure(known, confidence, min_confidence), max_points),
     )
+
+
+def _sure(known: BoolMap, confidence: FloatMap | None, least: float | None) -> BoolMap:
+    """The known pixels that are sure enough."""
+    if confidence is None or not known.any():
+        return known
+    # unknown confidence is none
+    sureness = np.nan_to_num(confidence, nan=-1.0)
+    return known & (sureness >= (np.median(sureness[known]) if least is None else least))
 
 
 def _thinned(sure: BoolMap, most: int) -> BoolMap:
