@@ -21,10 +21,17 @@ if TYPE_CHECKING:
 _PATH = click.Path(path_type=Path)
 
 
-@click.command(cls=SepiCommand, short_help="Write views, camera poses and depth for COLMAP or nerfstudio.")
+@click.command(cls=SepiCommand, short_help="Write camera poses and depth for COLMAP or nerfstudio.")
 @click.argument("light_field_path", metavar="INPUT", type=_PATH)
 @click.argument("result_path", metavar="RESULT", type=_PATH)
-@click.option("--to", "kind", type=click.Choice(["colmap", "nerfstudio"]), default="colmap", show_default=True)
+@click.option(
+    "--to",
+    "kind",
+    type=click.Choice(["colmap", "nerfstudio"]),
+    default="colmap",
+    show_default=True,
+    help="Program to write for.",
+)
 @click.option("-o", "--output", type=_PATH, help="Folder to make; ./NAME-colmap after INPUT's name unless given.")
 @click.option(
     "--min-confidence", type=float, metavar="X", help="No points of less sure pixels; else of the surer half."
