@@ -23,11 +23,11 @@ _PATH = click.Path(path_type=Path)
 def compare(a: Path, b: Path, ground_truth: Path | None, output: Path, reading: Reading) -> None:
     """Show the disparity maps A and B side by side on a page.
 
-    A and B are maps of any program: PFM, HDF5 with a dataset 'disparity', NumPy (.npy), 'disparity_16bit.png', or a
-    folder that 'sepi depth' wrote. GROUND_TRUTH is such a map, too; give the SCENE itself, a light field, to see its
-    view beside the maps, and to have regions scored. The page is one file and needs no network: a slider wipes between
-    any two of the maps, their differences and their errors; numbers and close-ups follow the cursor; a point cloud
-    turns.
+    A and B are maps of any program: PFM, HDF5 with a dataset 'disparity', NumPy (.npy), TIFF of floats,
+    'disparity_16bit.png', or a folder that 'sepi depth' wrote. GROUND_TRUTH is such a map, too; give the SCENE itself,
+    a light field, to see its view beside the maps, and to have regions scored. The page is one file and needs no
+    network: a slider wipes between any two of the maps, their differences and their errors; numbers and close-ups
+    follow the cursor; a point cloud turns.
 
     \b
     Examples:

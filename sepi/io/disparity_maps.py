@@ -9,14 +9,16 @@ import numpy as np
 
 from sepi.errors import SepiError
 from sepi.io.hdf5 import has_dataset, open_hdf5, read_dataset
-from sepi.io.images import png_texts, read_picture
+from sepi.io.images import picture_header, png_texts, read_picture
 from sepi.io.pfm import read_pfm
 from sepi.io.readers.numpy_files import read_array
 from sepi.lightfield import FloatMap
 
 _HDF5 = (".h5", ".hdf5")
 
-SUFFIXES: tuple[str, ...] = (".pfm", ".npy", ".png", *_HDF5)
+_TIFF = (".tif", ".tiff")
+
+SUFFIXES: tuple[str, ...] = (".pfm", ".npy", ".png", *_TIFF, *_HDF5)
 """Ends of names of the files that are read, in small letters."""
 
 _DATASET = "disparity"
@@ -32,7 +34,10 @@ def map_file(path: Path) -> Path:
 
 
 def is_disparity(path: Path) -> bool:
-    """Whether ``path`` is one disparity map rather than a light field; of a PNG, whether its text chunks say so."""
+    """Whether ``path`` is one disparity map rather than a light field.
+
+    Of a PNG, whether its text chunks say so; of a TIFF, whether it is grey, of floats.
+    """
     if path.is_dir():
         return map_file(path).is_file()
     suffix = path.suffix.lower()
@@ -40,6 +45,8 @@ def is_disparity(path: Path) -> bool:
         return has_dataset(path, _DATASET)
     if suffix == ".png":
         return {_SCALE, _OFFSET} <= set(png_texts(path))
+    if suffix in _TIFF:
+        return _is_float_tiff(path)
     return suffix in SUFFIXES
 
 
@@ -50,8 +57,9 @@ def read_disparity(path: Path, *, scale: float | None = None, offset: float = 0.
     ----------
     path : Path
         A one-channel PFM; a NumPy file (``.npy``) with an array of numbers of shape (H, W); an HDF5 file with such a
-        dataset ``disparity``; a grey PNG of 8 or 16 bit; or a folder that ``sepi depth`` wrote. A PNG with the text
-        chunks ``scale`` and ``offset``, as ``disparity_16bit.png`` has them, holds what these say, 0 being unknown.
+        dataset ``disparity``; a grey TIFF of 32-bit floats; a grey PNG of 8 or 16 bit; or a folder that ``sepi depth``
+        wrote. A PNG with the text chunks ``scale`` and ``offset``, as ``disparity_16bit.png`` has them, holds what
+        these say, 0 being unknown.
     scale, offset : float
         What the file holds is multiplied by ``scale`` (1 unless given), then ``offset`` is added: -1 turns a map of
         opposite sign. A PNG without these text chunks needs a scale; its values are levels, and none means unknown.
@@ -83,6 +91,8 @@ def _read(path: Path, scaled: bool) -> FloatMap:
         return read_pfm(path)
     if suffix == ".png":
         return _read_png(path, scaled)
+    if suffix in _TIFF:
+        return _read_tiff(path)
     if suffix == ".npy":
         values = read_array(path)
     elif suffix in _HDF5:
@@ -93,6 +103,21 @@ def _read(path: Path, scaled: bool) -> FloatMap:
     if values.ndim != 2 or values.dtype.kind not in "fiu":
         raise SepiError(f"{path}: expected an array of numbers of shape (H, W), got {values.dtype} {values.shape}")
     return np.asarray(values, np.float32)
+
+
+def _is_float_tiff(path: Path) -> bool:
+    try:
+        header = picture_header(path)
+    except SepiError:
+        return False
+    return header.kind == "TIFF" and header.grey and header.pixel_bytes == 4
+
+
+def _read_tiff(path: Path) -> FloatMap:
+    values = read_picture(path, any_floats=True)
+    if values.dtype != np.float32 or values.shape[2] != 1:
+        raise _no_map(path)
+    return np.asarray(values[:, :, 0], np.float32)
 
 
 def _read_png(path: Path, scaled: bool) -> FloatMap:
@@ -125,4 +150,5 @@ def _number(path: Path, key: str, text: str) -> float:
 
 
 def _no_map(path: Path) -> SepiError:
-    return SepiError(f"{path}: expected a disparity map as .pfm, .h5 or .npy, or as grey .png of 8 or 16 bit")
+    kinds = "as .pfm, .h5 or .npy, or as grey .png of 8 or 16 bit, or as grey .tiff of 32-bit floats"
+    return SepiError(f"{path}: expected a disparity map {kinds}")

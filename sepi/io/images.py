@@ -32,8 +32,14 @@ _MAX_BYTES = 2**32
 _HELD_AS = {"1": "L", "L": "L", "LA": "LA", "P": "RGB", "RGB": "RGB", "RGBA": "RGBA", "I;16": "I;16"}
 
 
-def read_picture(path: Path) -> Pixels:
+def read_picture(path: Path, *, any_floats: bool = False) -> Pixels:
     """Read a PNG, JPEG, TIFF, BMP, WebP, PGM or PPM; its content tells which, not its name.
+
+    Parameters
+    ----------
+    path : Path
+    any_floats : bool
+        Whether float pixels may be any numbers, NaN and infinity among them, rather than brightness in 0..1.
 
     Returns
     -------
@@ -49,10 +55,10 @@ def read_picture(path: Path) -> Pixels:
         float32, or has float pixels that are not finite or far outside 0..1.
     """
     with _no_warnings():
-        return _read(path)
+        return _read(path, any_floats)
 
 
-def _read(path: Path) -> Pixels:
+def _read(path: Path, any_floats: bool = False) -> Pixels:
     with _opened(path) as file:
         header = read_header(path, file, whole=True)
         file.seek(0)
@@ -60,7 +66,7 @@ def _read(path: Path) -> Pixels:
     image = _decoded(path, data, header)
     if header.white:
         image = _stretched(path, image, header.white)
-    if image.dtype == np.float32 and not (image.min() >= LOWEST and image.max() <= HIGHEST):
+    if image.dtype == np.float32 and not any_floats and not (image.min() >= LOWEST and image.max() <= HIGHEST):
         what = f"{image.min():g} to {image.max():g}" if np.isfinite(image).all() else "NaN or infinite ones"
         raise SepiError(f"{path}: float pixels must be finite and within 0..1, got {what}; divide by white's value")
     return image

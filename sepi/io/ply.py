@@ -3,17 +3,33 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
+import numpy.typing as npt
 
 from sepi.io.files import atomic_path
-from sepi.io.point_cloud import PointCloud
 
 _POINT = np.dtype([("position", "<f4", 3), ("colour", "u1", 3)])
 _PROPERTIES = (*(f"float {axis}" for axis in "xyz"), *(f"uchar {colour}" for colour in ("red", "green", "blue")))
 
 
-def write_ply(path: Path, cloud: PointCloud) -> None:
+class Cloud(Protocol):
+    """Coloured points, such as :class:`sepi.io.point_cloud.PointCloud`."""
+
+    @property
+    def positions(self) -> npt.NDArray[np.floating]:
+        """Coordinates, shape (N, 3)."""
+
+    @property
+    def colours(self) -> npt.NDArray[np.uint8]:
+        """RGB, shape (N, 3)."""
+
+    def comments(self) -> tuple[str, ...]:
+        """What the numbers are, for the file's header."""
+
+
+def write_ply(path: Path, cloud: Cloud) -> None:
     """Write coloured points as a binary little-endian PLY, whole or not at all; equal points give equal bytes."""
     points = np.empty(len(cloud.positions), _POINT)
     points["position"], points["colour"] = cloud.positions, cloud.colours

@@ -116,6 +116,15 @@ def tiff_files(folder: Path) -> list[bytes]:
     return found
 
 
+def tiff_map_files(folder: Path) -> list[bytes]:
+    """Floats of any size, plain and packed, either byte order."""
+    found = []
+    for options in ({}, {"byteorder": ">"}, {"compression": "zlib"}):
+        tifffile.imwrite(folder / "a.tif", MAP, **options)
+        found.append((folder / "a.tif").read_bytes())
+    return found
+
+
 def pfm_files(folder: Path) -> list[bytes]:
     """Little and big-endian."""
     write_pfm(folder / "a.pfm", MAP)

@@ -89,6 +89,7 @@ TARGETS: dict[str, Target] = {
     "pfm": Target("a.pfm", seeds.pfm_files, _each(_map, _map_with_scale)),
     "map-npy": Target("a.npy", seeds.npy_map_files, _each(_map, _map_with_scale)),
     "map-png": Target("a.png", texts.map_png_files, _each(_map, _map_with_scale), wrappings=PNG),
+    "map-tiff": Target("a.tif", seeds.tiff_map_files, _each(_map, _map_with_scale)),
     "map-hdf5": _hdf5(seeds.hdf5_map_files, _map),
     "hci-parameters": Target("parameters.cfg", texts.parameter_files, texts.read_parent, seeds.hci_pictures),
     "hci-mask": Target("mask_occluded.png", seeds.mask_files, texts.read_parent, seeds.hci_folder, wrappings=PNG),

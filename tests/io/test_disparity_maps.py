@@ -6,6 +6,7 @@ import cv2
 import h5py
 import numpy as np
 import pytest
+import tifffile
 from click.testing import CliRunner
 from PIL import Image, PngImagePlugin
 
@@ -154,3 +155,21 @@ def test_evaluate_takes_png_maps(result: Path, disparity: np.ndarray, tmp_path: 
     called = CliRunner().invoke(main, ["evaluate", str(tmp_path / "levels.png"), str(result)])
     assert called.exit_code == 1
     assert "give a scale" in called.stderr
+
+
+def test_tiff_of_floats_is_a_map_and_of_levels_is_none(tmp_path: Path, disparity: np.ndarray) -> None:
+    """Levels mean nothing without a scale; taken as disparity they would be scored."""
+    disparity[0, 0] = np.inf
+    tifffile.imwrite(tmp_path / "zlib.tif", disparity, compression="zlib")
+    cv2.imwrite(str(tmp_path / "opencv.tiff"), disparity)
+    Image.fromarray(disparity).save(tmp_path / "PILLOW.TIF")
+    for name in ("zlib.tif", "opencv.tiff", "PILLOW.TIF"):
+        assert is_disparity(tmp_path / name)
+        np.testing.assert_array_equal(read_disparity(tmp_path / name), disparity)
+        np.testing.assert_array_equal(read_disparity(tmp_path / name, scale=-2), -2 * disparity)
+    colours = np.zeros((*SHAPE, 3), np.float32)
+    for name, values in (("levels.tif", np.ones(SHAPE, np.uint16)), ("colours.tif", colours)):
+        tifffile.imwrite(tmp_path / name, values, photometric="rgb" if values.ndim == 3 else "minisblack")
+        assert not is_disparity(tmp_path / name)
+        with pytest.raises(SepiError, match=rf"{name}: expected a disparity map"):
+            read_disparity(tmp_path / name)

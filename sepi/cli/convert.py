@@ -1,0 +1,70 @@
+"""The command ``sepi convert``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from sepi.cli.input_options import Geometry, camera_flags
+from sepi.command import SepiCommand
+from sepi.errors import SepiError
+
+if TYPE_CHECKING:
+    from sepi.lightfield import FloatMap
+
+_PATH = click.Path(path_type=Path)
+_MAPS = {"disparity": "pixels per view step", "depth": "metres", "confidence": "0 to 1"}
+# by these names programs know depth, and a grey picture
+_CHANNELS = {"depth": "Z"}
+_GREY = "Y"
+
+
+@click.command(cls=SepiCommand, short_help="Write a finished map as OpenEXR or TIFF.")
+@click.argument("result_path", metavar="RESULT", type=_PATH)
+@click.argument("output", metavar="FILE", type=_PATH)
+@click.option("--map", "name", type=click.Choice(list(_MAPS)), help="Map to write; in .exr all of them unless given.")
+@camera_flags
+def convert(result_path: Path, output: Path, name: str | None, geometry: Geometry | None) -> None:
+    """Write maps of RESULT as FILE, a picture of 32-bit floats: OpenEXR (.exr) or TIFF (.tif, .tiff).
+
+    RESULT is a folder that 'sepi depth' wrote, or its result.h5. OpenEXR holds the channels disparity (pixels per view
+    step), confidence, and, where the camera is known, Z (depth, metres); one map alone, chosen with --map, is the grey
+    channel Y, which OpenCV reads. TIFF holds one map, the disparity unless --map names another. OpenEXR needs the
+    package of that name: pip install 'sepi[exr]'.
+
+    \b
+    Examples:
+      sepi convert cotton-depth cotton.exr
+      sepi convert cotton-depth depth.tiff --map depth
+    """
+    from sepi.io.float_pictures import EXR, TIFF, write_exr, write_tiff
+
+    suffix = output.suffix.lower()
+    if suffix not in (*EXR, *TIFF):
+        raise SepiError(f"{output}: expected a name that ends with .exr, .tif or .tiff, the format of the file")
+    maps = _maps(result_path, geometry)
+    if name is None and suffix in TIFF:
+        name = "disparity"
+    if name is not None and name not in maps:
+        raise SepiError(f"{result_path}: no depth, as the camera is not known; give --focal-length and the others")
+    written = maps if name is None else {name: maps[name]}
+    comment = ", ".join(f"{key}: {_MAPS[key]}" for key in written)
+    if name is None:
+        write_exr(output, {_CHANNELS.get(key, key): values for key, values in maps.items()}, comment)
+    elif suffix in EXR:
+        write_exr(output, {_GREY: maps[name]}, comment)
+    else:
+        write_tiff(output, maps[name], comment)
+    click.echo(f"written: {output} ({comment})")
+
+
+def _maps(path: Path, geometry: Geometry | None) -> dict[str, FloatMap]:
+    """Maps of a result by their names; depth where the camera is known."""
+    from sepi.io.result_folder import read_result
+
+    result = read_result(path)
+    camera = result.camera if geometry is None else geometry(shape=result.disparity.shape)
+    depth = {} if camera is None else {"depth": camera.depth(result.disparity)}
+    return {"disparity": result.disparity, **depth, "confidence": result.confidence}

@@ -1,0 +1,118 @@
+"""Light fields as models of COLMAP [1]_, whose poses are exact: no feature is matched, no camera adjusted.
+
+Structure from motion rarely works on light fields, whose views stand too close together; their poses are known.
+
+The folder is COLMAP's workspace::
+
+    images/view_04_04.png                                     each view, RGB of 8 bit
+    sparse/cameras.txt, images.txt, points3D.txt              the model as text
+    stereo/depth_maps/view_04_04.png.geometric.bin            depth of each view, 0 where it is not known
+
+Each view has a camera of its own, a ``PINHOLE`` with its principal point, and no rotation. Points are those of the
+reference view, with a track: the pixel at which each view sees them, unless something nearer hides them.
+
+References
+----------
+.. [1] COLMAP's documentation, "Output Format", https://colmap.github.io/format.html: poses go from the world to the
+       camera, whose axes point right, down and forward; depth maps begin with ``width&height&channels&``. The middle of
+       a picture's first pixel is (0.5, 0.5).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from sepi.io.files import atomic_folder, atomic_path
+from sepi.io.images import write_png
+from sepi.io.posed_views import PosedViews
+from sepi.lightfield import FloatMap
+from sepi.stage import Progress, no_progress
+
+Flags = npt.NDArray[np.bool_]
+"""Which of the views sees which of the points, (N, P)."""
+
+_CAMERAS = "#   CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]"
+_IMAGES = "#   IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME\n#   POINTS2D[] as (X, Y, POINT3D_ID)"
+_POINTS = "#   POINT3D_ID, X, Y, Z, R, G, B, ERROR, TRACK[] as (IMAGE_ID, POINT2D_IDX)"
+
+
+def write_colmap(folder: str | Path, posed: PosedViews, progress: Progress = no_progress) -> None:
+    """Write views, poses, points and depth as a COLMAP workspace; equal content gives equal bytes.
+
+    Parameters
+    ----------
+    folder : str or Path
+        Made; an empty one may exist.
+    posed : PosedViews
+        From :func:`sepi.io.posed_views.posed_views`.
+    progress : callable
+        Told the fraction that is done.
+
+    Raises
+    ------
+    SepiError
+        If the folder exists and is not empty, or cannot be written.
+    """
+    with atomic_folder(Path(folder)) as temporary:
+        sees = np.zeros((len(posed.poses), int(posed.chosen.sum())), bool)
+        for view, name in enumerate(posed.names):
+            carried = posed.carried(view)
+            sees[view] = posed.sees(view, carried)
+            write_png(temporary / "images" / f"{name}.png", posed.picture(view))
+            write_depth(temporary / "stereo/depth_maps" / f"{name}.png.geometric.bin", posed.depth(carried))
+            progress((view + 1) / len(posed.poses))
+        for name, lines in {
+            "cameras.txt": _cameras(posed),
+            "images.txt": _images(posed, sees),
+            "points3D.txt": _points(posed, sees),
+        }.items():
+            with atomic_path(temporary / "sparse" / name) as path, path.open("w", encoding="ascii") as file:
+                file.writelines(f"{line}\n" for line in lines)
+
+
+def write_depth(path: Path, depth: FloatMap) -> None:
+    """Write a depth map (H, W) in COLMAP's binary format."""
+    height, width = depth.shape
+    with atomic_path(path) as temporary:
+        temporary.write_bytes(f"{width}&{height}&1&".encode("ascii") + depth.astype("<f4").tobytes())
+
+
+def _cameras(posed: PosedViews) -> Iterator[str]:
+    height, width = posed.poses.shape
+    focal = posed.poses.focal_px
+    yield "# Camera list with one line of data per camera:"
+    yield _CAMERAS
+    for number, (x, y) in enumerate(posed.poses.from_corner.tolist(), 1):
+        yield f"{number} PINHOLE {width} {height} {focal!r} {focal!r} {x!r} {y!r}"
+
+
+def _images(posed: PosedViews, sees: Flags) -> Iterator[str]:
+    numbers = np.arange(1, sees.shape[1] + 1)
+    points = posed.points
+    yield "# Image list with two lines of data per image:"
+    yield _IMAGES
+    yield f"# units: {posed.units}"
+    for view, name in enumerate(posed.names):
+        # without rotation the translation is minus the camera's place; adding zero makes -0 a 0
+        x, y, z = (0.0 - posed.poses.centres[view]).tolist()
+        yield f"{view + 1} 1 0 0 0 {x!r} {y!r} {z!r} {view + 1} {name}.png"
+        there = posed.poses.project(points[sees[view]], view) + 0.5
+        yield " ".join(
+            f"{column!r} {row!r} {number}"
+            for (row, column), number in zip(there.tolist(), numbers[sees[view]].tolist(), strict=True)
+        )
+
+
+def _points(posed: PosedViews, sees: Flags) -> Iterator[str]:
+    # a point's number among those that a view sees
+    places = np.cumsum(sees, axis=1) - 1
+    yield "# 3D point list with one line of data per point:"
+    yield _POINTS
+    for point, ((x, y, z), (r, g, b)) in enumerate(zip(posed.points.tolist(), posed.colours.tolist(), strict=True)):
+        views = np.flatnonzero(sees[:, point])
+        track = " ".join(f"{view + 1} {places[view, point]}" for view in views.tolist())
+        yield f"{point + 1} {x!r} {y!r} {z!r} {r} {g} {b} 0 {track}"

@@ -1,0 +1,86 @@
+"""Maps as pictures of 32-bit floats: OpenEXR, which compositing programs read, and TIFF."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Mapping
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+
+from sepi.errors import SepiError
+from sepi.io.files import atomic_path
+from sepi.lightfield import FloatMap
+
+EXR = (".exr",)
+TIFF = (".tif", ".tiff")
+"""Ends of names, in small letters."""
+
+
+def open_exr(path: Path) -> ModuleType:
+    """The package that reads and writes OpenEXR, for a file.
+
+    Raises
+    ------
+    SepiError
+        If it is not installed.
+    """
+    try:
+        return importlib.import_module("OpenEXR")
+    except ImportError as error:
+        advice = "pip install 'sepi[exr]'"
+        raise SepiError(f"{path}: OpenEXR needs a package that is not installed; {advice}") from error
+
+
+def write_exr(path: Path, channels: Mapping[str, FloatMap], comment: str) -> None:
+    """Write maps as channels of one OpenEXR file, compressed without loss; equal content gives equal bytes.
+
+    Parameters
+    ----------
+    path : Path
+    channels : mapping of str to ndarray, shape (H, W), float32
+        Name to map, all of one shape; NaN and infinity stay. Programs know the names ``Z`` (depth) and ``Y`` (grey).
+    comment : str
+        What the numbers are.
+
+    Raises
+    ------
+    SepiError
+        If the package OpenEXR is not installed, or the file cannot be written.
+    """
+    exr = open_exr(path)
+    header = {"compression": exr.ZIP_COMPRESSION, "type": exr.scanlineimage, "comments": comment}
+    pixels = {name: np.ascontiguousarray(values, np.float32) for name, values in channels.items()}
+    with atomic_path(path) as temporary, exr.File(header, pixels) as file:
+        file.write(str(temporary))
+
+
+def write_tiff(path: Path, values: FloatMap, comment: str) -> None:
+    """Write a map (H, W) as a grey TIFF of 32-bit floats, compressed without loss; equal content gives equal bytes.
+
+    Parameters
+    ----------
+    path : Path
+    values : ndarray, shape (H, W), float32
+        NaN and infinity stay.
+    comment : str
+        What the numbers are; the picture's description.
+
+    Raises
+    ------
+    SepiError
+        If the file cannot be written.
+    """
+    import tifffile
+
+    with atomic_path(path) as temporary:
+        tifffile.imwrite(
+            temporary,
+            np.ascontiguousarray(values, np.float32),
+            photometric="minisblack",
+            compression="zlib",
+            description=comment,
+            software="sepi",
+            metadata=None,
+        )

@@ -1,0 +1,116 @@
+"""Light fields as data sets of nerfstudio [1]_; instant-ngp [2]_ reads the same file.
+
+::
+
+    transforms.json              cameras: `w h fl_x fl_y cx cy` of each view, camera-to-world matrices
+    images/view_04_04.png        each view, RGB of 8 bit
+    depths/view_04_04.npy        depth of each view in millimetres, float32; 0 where it is not known
+    points.ply                   coloured points, for methods that begin with some
+
+A camera's axes point right, up and back. The world's z points up; y points the way that the cameras look, and the
+origin is the reference view's camera. Principal points are counted from the corner of the picture.
+
+References
+----------
+.. [1] "Data conventions", https://docs.nerf.studio/quickstart/data_conventions.html: the axes; depth of 16 or 32 bit in
+       millimetres, zero being unknown, for every frame or for none.
+.. [2] ``src/nerf_loader.cu`` of https://github.com/NVlabs/instant-ngp: principal points of single frames need `w` and
+       `h` beside them; it ignores this depth.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from sepi.io.camera_poses import Points
+from sepi.io.files import atomic_folder, atomic_path
+from sepi.io.images import write_png
+from sepi.io.ply import write_ply
+from sepi.io.posed_views import PosedViews
+from sepi.stage import Progress, no_progress
+
+_MILLIMETRES = 1000
+_CLOUD = "points.ply"
+
+
+@dataclass(frozen=True)
+class _WorldCloud:
+    """The points in the axes of the world."""
+
+    positions: Points
+    colours: npt.NDArray[np.uint8]
+    units: str
+
+    def comments(self) -> tuple[str, ...]:
+        """What the numbers are."""
+        return "x right, y the way that the cameras look, z up", f"{self.units}; origin: camera of the reference view"
+
+
+def write_nerfstudio(folder: str | Path, posed: PosedViews, progress: Progress = no_progress) -> None:
+    """Write views, poses, points and depth as a data set of nerfstudio; equal content gives equal bytes.
+
+    Parameters
+    ----------
+    folder : str or Path
+        Made; an empty one may exist.
+    posed : PosedViews
+        From :func:`sepi.io.posed_views.posed_views`.
+    progress : callable
+        Told the fraction that is done.
+
+    Raises
+    ------
+    SepiError
+        If the folder exists and is not empty, or cannot be written.
+    """
+    with atomic_folder(Path(folder)) as temporary:
+        for view, name in enumerate(posed.names):
+            depth = posed.depth(posed.carried(view)) * np.float32(_MILLIMETRES)
+            write_png(temporary / "images" / f"{name}.png", posed.picture(view))
+            with atomic_path(temporary / "depths" / f"{name}.npy") as path, path.open("wb") as file:
+                np.save(file, depth.astype("<f4"), allow_pickle=False)
+            progress((view + 1) / len(posed.poses))
+        if posed.chosen.any():
+            write_ply(temporary / _CLOUD, _WorldCloud(_world(posed.points), posed.colours, posed.units))
+        with atomic_path(temporary / "transforms.json") as path:
+            path.write_text(json.dumps(_transforms(posed), indent=1) + "\n", encoding="ascii")
+
+
+def _transforms(posed: PosedViews) -> dict[str, Any]:
+    height, width = posed.poses.shape
+    focal = posed.poses.focal_px
+    frames = [
+        {
+            "file_path": f"images/{name}.png",
+            "depth_file_path": f"depths/{name}.npy",
+            "w": width,
+            "h": height,
+            "fl_x": focal,
+            "fl_y": focal,
+            "cx": x,
+            "cy": y,
+            "transform_matrix": _camera_to_world(centre),
+        }
+        for name, (x, y), centre in zip(
+            posed.names, posed.poses.from_corner.tolist(), _world(posed.poses.centres).tolist(), strict=True
+        )
+    ]
+    cloud = {"ply_file_path": _CLOUD} if posed.chosen.any() else {}
+    return {"camera_model": "OPENCV", "units": posed.units, **cloud, "frames": frames}
+
+
+def _world(points: Points) -> Points:
+    """Points of axes right, down, forward in axes right, forward, up."""
+    return np.column_stack([points[:, 0], points[:, 2], 0.0 - points[:, 1]])
+
+
+def _camera_to_world(centre: list[float]) -> list[list[float]]:
+    """Columns: the camera's right, up and back in the world, and its place."""
+    x, y, z = centre
+    return [[1.0, 0.0, 0.0, x], [0.0, 0.0, -1.0, y], [0.0, 1.0, 0.0, z], [0.0, 0.0, 0.0, 1.0]]

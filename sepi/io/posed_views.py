@@ -1,0 +1,171 @@
+"""Views with camera poses, depth and points: what the data sets for other programs are made of.
+
+:mod:`sepi.io.colmap` and :mod:`sepi.io.nerfstudio` write them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from sepi.camera import Camera
+from sepi.errors import SepiError
+from sepi.io.camera_poses import CameraPoses, Points, camera_poses, nominal_camera
+from sepi.io.carried_maps import carried_disparity, seen
+from sepi.lightfield import BoolMap, FloatMap, LightField, as_unit_float
+
+Colours = npt.NDArray[np.uint8]
+
+MAX_POINTS = 10000
+"""Most points unless told; each has a track through all the views that see it."""
+
+
+@dataclass(frozen=True)
+class PosedViews:
+    """A light field as single pictures with cameras, and what is known of the scene.
+
+    Attributes
+    ----------
+    light_field : LightField
+    camera : Camera
+        The one that was given, the light field's own, or a nominal one.
+    metric : bool
+        Whether positions and depth are in metres; False with a nominal camera.
+    poses : CameraPoses
+    disparity : ndarray, shape (H, W), float32
+        Of the reference view, pixels per view step.
+    known : ndarray, shape (H, W), bool
+        Pixels of the reference view that have a depth.
+    chosen : ndarray, shape (H, W), bool
+        Pixels of the reference view that have a point.
+    """
+
+    light_field: LightField
+    camera: Camera
+    metric: bool
+    poses: CameraPoses
+    disparity: FloatMap
+    known: BoolMap
+    chosen: BoolMap
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Name of each view, without the end of a file's name, such as ``view_04_04``: its row and column."""
+        digits = max(2, *(len(str(size - 1)) for size in self.light_field.grid))
+        return tuple(f"view_{t:0{digits}d}_{s:0{digits}d}" for t, s in self.poses.positions.tolist())
+
+    @property
+    def units(self) -> str:
+        """Units of positions and depth, in a few words."""
+        return "metres" if self.metric else "nominal units, not to scale: the camera is not known"
+
+    @property
+    def points(self) -> Points:
+        """The points (P, 3): x right, y down, z forward, from the reference view's camera."""
+        depth = self.camera.scale / (self.disparity[self.chosen].astype(np.float64) + self.camera.offset)
+        return self.poses.points_at(np.argwhere(self.chosen).astype(np.float64), depth)
+
+    @property
+    def colours(self) -> Colours:
+        """Colours of the points, (P, 3) RGB."""
+        return self.picture(self.poses.reference)[self.chosen]
+
+    def picture(self, view: int) -> Colours:
+        """A view as (H, W, 3) RGB of 8 bit, which all programs read."""
+        t, s = self.poses.positions[view]
+        pixels = self.light_field.rgb_views[t, s]
+        if pixels.dtype == np.uint8:
+            return np.asarray(pixels, np.uint8)
+        return np.rint(255 * np.clip(as_unit_float(pixels), 0, 1)).astype(np.uint8)
+
+    def carried(self, view: int) -> FloatMap:
+        """Disparity as a view sees it, (H, W) float32; NaN where it is not known."""
+        return carried_disparity(self.disparity, self.known, self.poses.baselines[view])
+
+    def depth(self, carried: FloatMap) -> FloatMap:
+        """Depth of a view, (H, W) float32, from its :meth:`carried` disparity; 0 where it is not known."""
+        depth = self.camera.depth(carried)
+        return np.where(np.isfinite(depth) & ~np.isnan(carried), depth, np.float32(0))
+
+    def sees(self, view: int, carried: FloatMap) -> npt.NDArray[np.bool_]:
+        """Which of the points a view sees, (P,), given its :meth:`carried` disparity."""
+        return seen(carried, self.disparity, self.chosen, self.poses.baselines[view])
+
+
+def posed_views(
+    light_field: LightField,
+    disparity: FloatMap,
+    confidence: FloatMap | None = None,
+    *,
+    unknown: BoolMap | None = None,
+    camera: Camera | None = None,
+    min_confidence: float | None = None,
+    max_points: int = MAX_POINTS,
+) -> PosedViews:
+    """Prepare a light field and the disparity map of its reference view for other programs.
+
+    Parameters
+    ----------
+    light_field : LightField
+    disparity : ndarray, shape (H, W), float32
+        Of its reference view, pixels per view step.
+    confidence : ndarray, shape (H, W), float32, optional
+        0..1; full unless given.
+    unknown : ndarray, shape (H, W), bool, optional
+        Pixels without depth.
+    camera : Camera, optional
+        The light field's own unless given, or a nominal one where it has none.
+    min_confidence : float, optional
+        Less sure pixels have no point; the surer half of all pixels with a depth has one unless given.
+    max_points : int
+        Every so-many-th row and column has points, so that they are no more than this.
+
+    Raises
+    ------
+    SepiError
+        If a map is not of the light field's shape, or a number is out of bounds.
+    """
+    for name, values in {"disparity": disparity, "confidence": confidence, "unknown": unknown}.items():
+        if values is not None and values.shape != light_field.shape:
+            raise SepiError(f"{light_field.name}: {name} is {values.shape}, the views {light_field.shape}")
+    if min_confidence is not None and not 0 <= min_confidence <= 1:
+        raise SepiError(f"{light_field.name}: expected a least confidence within 0..1, got {min_confidence:g}")
+    if max_points < 0:
+        raise SepiError(f"{light_field.name}: expected 0 points or more, got {max_points}")
+    known = np.isfinite(disparity)
+    if unknown is not None:
+        known &= ~unknown
+    own = camera or light_field.camera
+    used = own or nominal_camera(disparity, known)
+    depth = used.depth(disparity)
+    known &= np.isfinite(depth) & (depth > 0)
+    return PosedViews(
+        light_field=light_field,
+        camera=used,
+        metric=own is not None,
+        poses=camera_poses(light_field, used),
+        disparity=disparity,
+        known=known,
+        chosen=_thinned(_sure(known, confidence, min_confidence), max_points),
+    )
+
+
+def _sure(known: BoolMap, confidence: FloatMap | None, least: float | None) -> BoolMap:
+    """The known pixels that are sure enough."""
+    if confidence is None or not known.any():
+        return known
+    # unknown confidence is none
+    sureness = np.nan_to_num(confidence, nan=-1.0)
+    return known & (sureness >= (np.median(sureness[known]) if least is None else least))
+
+
+def _thinned(sure: BoolMap, most: int) -> BoolMap:
+    """At most so many of the pixels: those of every n-th row and column, with the least n that does."""
+    step = 1
+    while sure[step // 2 :: step, step // 2 :: step].sum() > most:
+        step += 1
+    chosen = np.zeros_like(sure)
+    chosen[step // 2 :: step, step // 2 :: step] = sure[step // 2 :: step, step // 2 :: step]
+    return chosen

@@ -1,0 +1,235 @@
+"""`sepi poses` and `sepi convert`: what they write and print, and one clear line when something is wrong."""
+
+import json
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+import tifffile
+from click.testing import CliRunner, Result
+from error_lines import error_of
+from geometries import ROW_SPACING, jittered
+
+from sepi.camera import Camera
+from sepi.cli.main import main
+from sepi.io.hdf5 import write_light_field
+from sepi.io.provenance import result_attributes
+from sepi.io.result_folder import write_result
+from sepi.lightfield import LightField
+from sepi.scenes import render
+from sepi.stage import StageMaps
+
+CAMERA = Camera(scale=30.0, offset=6.0, focal_px=90.0)
+FLAGS = ("--focal-length", 35, "--baseline", 2, "--focus-distance", 3, "--sensor-size", 24)
+
+
+def call(*words: object) -> Result:
+    return CliRunner().invoke(main, [str(word) for word in words])
+
+
+def put(light_field: LightField) -> None:
+    """A light field as ``scene.h5`` and a result of it as ``maps``, in the current folder."""
+    write_light_field(Path("scene.h5"), light_field)
+    size = light_field.shape
+    disparity = np.random.default_rng(0).uniform(-1, 1, size).astype(np.float32)
+    disparity[0, 0] = np.nan
+    confidence = np.random.default_rng(1).random(size, np.float32)
+    unknown = np.zeros(size, bool)
+    unknown[-9:] = True
+    maps = StageMaps(disparity, np.where(unknown, np.float32(0), confidence), {"unknown": unknown})
+    write_result("maps", light_field, maps, result_attributes(light_field, "best", []))
+
+
+@pytest.fixture
+def scene(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> LightField:
+    """A light field with a camera, and its result, in the current folder."""
+    monkeypatch.chdir(tmp_path)
+    light_field = replace(render("pyramids", size=64, views=3), camera=CAMERA)
+    put(light_field)
+    return light_field
+
+
+def files_in(folder: str) -> set[str]:
+    return {str(path.relative_to(folder)) for path in Path(folder).rglob("*") if path.is_file()}
+
+
+# --- poses
+
+
+@pytest.mark.usefixtures("scene")
+def test_poses_writes_a_model_of_colmap_unless_told() -> None:
+    called = call("poses", "scene.h5", "maps")
+    assert called.exit_code == 0, called.output
+    assert called.stderr == ""
+    names = {f"view_{t:02}_{s:02}.png" for t in range(3) for s in range(3)}
+    assert files_in("scene-colmap") == {
+        *(f"images/{name}" for name in names),
+        *(f"stereo/depth_maps/{name}.geometric.bin" for name in names),
+        *(f"sparse/{name}.txt" for name in ("cameras", "images", "points3D")),
+    }
+    points = [line for line in Path("scene-colmap/sparse/points3D.txt").read_text().splitlines() if line[0] != "#"]
+    # the surer half of what is known
+    assert len(points) == pytest.approx(64 * 55 / 2, abs=2)
+    assert called.stdout == f"written: scene-colmap/ (9 views, {len(points)} points, metres)\n"
+
+
+@pytest.mark.usefixtures("scene")
+def test_poses_writes_for_nerfstudio() -> None:
+    called = call("poses", "scene.h5", "maps", "--to", "nerfstudio", "-o", "set", "--points", 50)
+    assert called.exit_code == 0, called.output
+    content = json.loads(Path("set/transforms.json").read_text())
+    assert len(content["frames"]) == 9
+    assert files_in("set") == {
+        "transforms.json",
+        "points.ply",
+        *(frame[key] for frame in content["frames"] for key in ("file_path", "depth_file_path")),
+    }
+    # as the result has it, in millimetres, and 0 where that says nothing
+    depth = np.load("set/depths/view_01_01.npy")
+    assert (depth[-9:] == 0).all()
+    assert depth[0, 0] == 0
+    expected = CAMERA.depth(np.load("maps/disparity.npy"))[1:-9]
+    np.testing.assert_allclose(depth[1:-9], 1000 * expected, rtol=1e-6)
+
+
+def test_poses_without_a_camera_are_told_to_be_nominal(scene: LightField) -> None:
+    """Whoever takes these numbers for metres builds on sand."""
+    put(replace(scene, camera=None))
+    called = call("poses", "scene.h5", "maps")
+    assert called.exit_code == 0, called.output
+    first, last = called.stdout.splitlines()
+    assert first.startswith("the camera is not known: a nominal one is taken")
+    assert "neither in metres nor to scale" in first
+    assert last.endswith("nominal units)")
+    assert "# units: nominal units" in Path("scene-colmap/sparse/images.txt").read_text()
+    known = call("poses", "scene.h5", "maps", "-o", "known", *FLAGS)
+    assert known.stdout.endswith("metres)\n")
+    # 35 / 24 * 64 pixels
+    assert " 93.33333333333333 " in Path("known/sparse/cameras.txt").read_text()
+
+
+def test_poses_stand_where_the_views_of_the_result_stood(scene: LightField) -> None:
+    """Rows closer together, which 'sepi depth' found out or was told; views off the grid; the result's own view."""
+    for known in ({"row_spacing": ROW_SPACING}, {"positions": jittered((3, 3)), "view": (0, 2)}):
+        moved = replace(scene, ground_truth=None, masks={}, **known)
+        put(moved)
+        folder = f"at-{moved.reference_position[0]}"
+        called = call("poses", "scene.h5", "maps", "--to", "nerfstudio", "-o", folder)
+        assert called.exit_code == 0, called.output
+        frames = json.loads(Path(folder, "transforms.json").read_text())["frames"]
+        places = np.array([frame["transform_matrix"] for frame in frames])[:, :3, 3]
+        down, across = moved.baselines.reshape(-1, 2).T * 30 / 90
+        np.testing.assert_allclose(places, np.column_stack([across, 0 * across, -down]), atol=1e-12)
+
+
+def test_row_spacing_of_the_result_holds_where_the_files_do_not_say_it(scene: LightField) -> None:
+    """It may have been given by a flag, or found out; found out again it might come out otherwise."""
+    put(replace(scene, row_spacing=ROW_SPACING))
+    write_light_field(Path("scene.h5"), scene)
+    assert call("poses", "scene.h5", "maps", "--to", "nerfstudio", "-o", "set").exit_code == 0
+    frames = json.loads(Path("set/transforms.json").read_text())["frames"]
+    assert frames[0]["transform_matrix"][2][3] == pytest.approx(ROW_SPACING * 30 / 90)
+
+
+def test_a_result_of_another_light_field_is_refused(scene: LightField) -> None:
+    """Depth on pictures that it does not belong to looks like depth."""
+    write_light_field(Path("other.h5"), replace(scene, views=scene.views[:, ::-1].copy()))
+    write_light_field(Path("grid.h5"), replace(scene, views=scene.views[:2], present=None, ground_truth=None, masks={}))
+    for path, more in (
+        ("other.h5", ("--view", "0,0")),
+        ("grid.h5", ()),
+        ("scene.h5", ("--order", "flip-rows", "--view", "0,1")),
+        ("scene.h5", ("--row-spacing", "0.5")),
+    ):
+        line = error_of(call("poses", path, "maps", "-o", "out", *more))
+        assert "maps: is not of" in line
+        assert not Path("out").exists()
+
+
+@pytest.mark.usefixtures("scene")
+def test_poses_replaces_nothing() -> None:
+    Path("out").mkdir()
+    Path("out/notes.txt").write_text("mine")
+    assert "out: exists already" in error_of(call("poses", "scene.h5", "maps", "-o", "out"))
+    assert files_in("out") == {"notes.txt"}
+
+
+# --- convert
+
+
+@pytest.mark.usefixtures("scene")
+@pytest.mark.parametrize("name", ["map.tif", "map.TIFF"])
+def test_tiff_is_read_by_other_programs(name: str) -> None:
+    called = call("convert", "maps", name)
+    assert called.stdout == f"written: {name} (disparity: pixels per view step)\n", called.output
+    disparity = np.load("maps/disparity.npy")
+    for values in (tifffile.imread(name), cv2.imread(name, cv2.IMREAD_UNCHANGED)):
+        assert values.dtype == np.float32
+        np.testing.assert_array_equal(values, disparity)
+    call("convert", "maps", "depth.tif", "--map", "depth")
+    np.testing.assert_array_equal(tifffile.imread("depth.tif"), CAMERA.depth(disparity))
+    with tifffile.TiffFile("depth.tif") as file:
+        assert file.pages[0].description == "depth: metres"
+    before = Path("depth.tif").read_bytes()
+    call("convert", "maps", "depth.tif", "--map", "depth")
+    assert Path("depth.tif").read_bytes() == before
+
+
+@pytest.mark.usefixtures("scene")
+def test_exr_has_the_channels_that_compositing_programs_know() -> None:
+    exr = pytest.importorskip("OpenEXR")
+    for _ in range(2):
+        called = call("convert", "maps", "all.exr")
+        assert called.exit_code == 0, called.output
+        Path("first.exr").write_bytes(Path("all.exr").read_bytes())
+    assert Path("first.exr").read_bytes() == Path("all.exr").read_bytes()
+    disparity = np.load("maps/disparity.npy")
+    with exr.File("all.exr") as file:
+        channels = {name: channel.pixels for name, channel in file.channels().items()}
+        assert file.header()["comments"] == "disparity: pixels per view step, depth: metres, confidence: 0 to 1"
+    assert set(channels) == {"Z", "disparity", "confidence"}
+    assert {pixels.dtype for pixels in channels.values()} == {np.dtype("f4")}
+    np.testing.assert_array_equal(channels["disparity"], disparity)
+    np.testing.assert_array_equal(channels["Z"], CAMERA.depth(disparity))
+    call("convert", "maps", "one.exr", "--map", "disparity")
+    with exr.File("one.exr") as file:
+        assert set(file.channels()) == {"Y"}
+        np.testing.assert_array_equal(file.channels()["Y"].pixels, disparity)
+
+
+@pytest.mark.usefixtures("scene")
+def test_exr_without_its_package_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "OpenEXR", None)
+    line = error_of(call("convert", "maps", "all.exr"))
+    assert "all.exr: OpenEXR needs a package that is not installed; pip install 'sepi[exr]'" in line
+    assert not Path("all.exr").exists()
+
+
+def test_convert_says_what_is_wrong(scene: LightField) -> None:
+    assert "ends with .exr, .tif or .tiff" in error_of(call("convert", "maps", "map.jpg"))
+    put(replace(scene, camera=None))
+    assert "maps: no depth" in error_of(call("convert", "maps", "depth.tif", "--map", "depth"))
+    assert call("convert", "maps", "depth.tif", "--map", "depth", *FLAGS).exit_code == 0
+    assert "gone" in error_of(call("convert", "gone", "depth.tif"))
+
+
+@pytest.mark.usefixtures("scene")
+def test_tiff_maps_are_scored_as_the_result_is() -> None:
+    """A map that went to another program and back, or came from one."""
+    call("convert", "maps", "map.tif")
+    scores = [call("evaluate", path, "scene.h5", "--json").stdout for path in ("map.tif", "maps/disparity.pfm")]
+    assert scores[0] == scores[1]
+    assert json.loads(scores[0])
+    # as ground truth, too: no error at all
+    assert call("evaluate", "maps", "map.tif").stdout.splitlines()[1].split()[:3] == ["paper", "all", "0.000"]
+
+
+@pytest.mark.parametrize("command", ["poses", "convert"])
+def test_each_command_has_help(command: str) -> None:
+    called = call(command, "--help")
+    assert called.exit_code == 0
+    assert called.stdout.startswith("Usage:")
+    assert command in call("--help").stdout

@@ -1,0 +1,276 @@
+"""Data sets for COLMAP and nerfstudio, read back by their documented conventions alone: all must fit together."""
+
+import json
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import cv2
+import numpy as np
+import pytest
+from geometries import GEOMETRIES, standing
+from plyfile import PlyData
+
+from sepi.camera import Camera
+from sepi.errors import SepiError
+from sepi.io.colmap import write_colmap
+from sepi.io.nerfstudio import write_nerfstudio
+from sepi.io.posed_views import PosedViews, posed_views
+from sepi.lightfield import LightField
+from sepi.scenes import render
+
+CAMERA = Camera(scale=30.0, offset=6.0, focal_px=90.0)
+WRITERS = {"colmap": write_colmap, "nerfstudio": write_nerfstudio}
+
+
+def scene_of(geometry: str = "grid", **known: Any) -> LightField:
+    scene = render("curved_occluders", size=64, views=3, **standing(geometry, (3, 3)))
+    present = np.ones((3, 3), bool)
+    present[0, 2] = False
+    fields = {name: getattr(scene, name) for name in ("views", "name", "row_spacing", "positions", "ground_truth")}
+    return LightField(**{**fields, "present": present, "camera": CAMERA, **known})
+
+
+def posed_of(scene: LightField, **options: Any) -> PosedViews:
+    return posed_views(scene, np.asarray(scene.ground_truth), **{"max_points": 300, **options})
+
+
+class Image(NamedTuple):
+    """An image of a COLMAP model: how it sees the world, and its keypoints."""
+
+    name: str
+    matrix: np.ndarray
+    rotation: np.ndarray
+    translation: np.ndarray
+    keypoints: np.ndarray
+    points: np.ndarray
+
+    def sees(self, world: np.ndarray) -> np.ndarray:
+        """Pixels (x, y) of points (P, 3), the middle of the first pixel being (0.5, 0.5)."""
+        local = world @ self.rotation.T + self.translation
+        seen = local @ self.matrix.T
+        return seen[:, :2] / seen[:, 2:]
+
+
+def lines_of(path: Path) -> list[list[str]]:
+    return [line.split() for line in path.read_text().splitlines() if not line.startswith("#")]
+
+
+def rotation(w: float, x: float, y: float, z: float) -> np.ndarray:
+    """Rotation matrix of a unit quaternion in Hamilton's convention."""
+    turn = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.eye(3) + 2 * w * turn + 2 * turn @ turn
+
+
+def read_model(folder: Path) -> tuple[dict[int, Image], dict[int, np.ndarray], dict[int, list[tuple[int, int]]]]:
+    """Images by their numbers, points by theirs, and the points' tracks, as COLMAP's documentation has the files."""
+    cameras = {}
+    for number, model, width, height, *numbers in lines_of(folder / "cameras.txt"):
+        assert (model, width, height) == ("PINHOLE", "64", "64")
+        fx, fy, cx, cy = map(float, numbers)
+        cameras[number] = np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]])
+    lines = lines_of(folder / "images.txt")
+    images = {}
+    for head, body in zip(lines[::2], lines[1::2], strict=True):
+        quaternion, translation = np.array(head[1:5], float), np.array(head[5:8], float)
+        points = np.array(body, float).reshape(-1, 3)
+        images[int(head[0])] = Image(
+            head[9], cameras[head[8]], rotation(*quaternion), translation, points[:, :2], points[:, 2].astype(int)
+        )
+    found = {int(line[0]): np.array(line[1:4], float) for line in lines_of(folder / "points3D.txt")}
+    tracks = {
+        int(line[0]): [(int(image), int(place)) for image, place in zip(line[8::2], line[9::2], strict=True)]
+        for line in lines_of(folder / "points3D.txt")
+    }
+    return images, found, tracks
+
+
+def read_depth(path: Path) -> np.ndarray:
+    """A depth map of COLMAP: its size as text, then floats row by row."""
+    width, height, channels, numbers = path.read_bytes().split(b"&", 3)
+    assert channels == b"1"
+    return np.frombuffer(numbers, "<f4").reshape(int(height), int(width))
+
+
+# --- COLMAP
+
+
+@pytest.mark.parametrize("geometry", GEOMETRIES)
+@pytest.mark.parametrize("view", [None, (2, 0)])
+def test_colmap_model_sees_points_where_the_views_show_them(
+    tmp_path: Path, geometry: str, view: tuple[int, int] | None
+) -> None:
+    """A model whose keypoints are off by half a pixel looks right and spoils what is made from it."""
+    scene = scene_of(geometry, view=view)
+    posed = posed_of(scene)
+    write_colmap(tmp_path / "model", posed)
+    images, points, tracks = read_model(tmp_path / "model/sparse")
+    places = {f"view_{t:02}_{s:02}.png": (t, s) for t, s in np.argwhere(scene.present)}
+    assert [image.name for image in images.values()] == list(places)
+    pixels = np.argwhere(posed.chosen)
+    assert len(points) == len(pixels) > 100
+    for image in images.values():
+        world = np.array([points[point] for point in image.points])
+        np.testing.assert_allclose(image.sees(world), image.keypoints, rtol=0, atol=1e-9)
+        y, x = pixels[image.points - 1].T
+        disparity = posed.disparity[y, x].astype(float)
+        down, across = scene.baselines[places[image.name]]
+        expected = np.column_stack([x - disparity * across, y - disparity * down]) + 0.5
+        np.testing.assert_allclose(image.keypoints, expected, rtol=0, atol=1e-9)
+    for point, track in tracks.items():
+        for number, place in track:
+            assert images[number].points[place] == point
+    assert sum(map(len, tracks.values())) == sum(len(image.points) for image in images.values())
+
+
+def test_tracks_leave_out_views_in_which_a_point_is_hidden(tmp_path: Path) -> None:
+    """Whoever looks for the point there finds something nearer."""
+    disparity = np.zeros((8, 12), np.float32)
+    disparity[2:6, 5:8] = 2
+    views = np.random.default_rng(0).integers(0, 256, (1, 3, 8, 12, 3), np.uint8)
+    posed = posed_views(LightField(views=views, name="square", camera=CAMERA), disparity)
+    write_colmap(tmp_path / "model", posed)
+    tracks = [line[8::2] for line in lines_of(tmp_path / "model/sparse/points3D.txt")]
+    there = {tuple(place): track for place, track in zip(np.argwhere(posed.chosen).tolist(), tracks, strict=True)}
+    assert there[3, 6] == ["1", "2", "3"]
+    assert there[3, 3] == ["1", "2"]  # the square moves two pixels to the left in the view on the right
+    assert there[3, 9] == ["2", "3"]
+    assert there[0, 3] == ["1", "2", "3"]
+
+
+def test_colmap_depth_is_that_of_the_camera(tmp_path: Path) -> None:
+    posed = posed_of(scene_of())
+    write_colmap(tmp_path / "model", posed)
+    folder = tmp_path / "model/stereo/depth_maps"
+    depth = read_depth(folder / "view_01_01.png.geometric.bin")
+    np.testing.assert_array_equal(depth, CAMERA.depth(posed.disparity))
+    np.testing.assert_allclose(depth, 30 / (posed.disparity.astype(float) + 6), rtol=1e-6)
+    for name in posed.names:
+        picture = cv2.imread(str(tmp_path / f"model/images/{name}.png"), cv2.IMREAD_UNCHANGED)
+        t, s = map(int, name.split("_")[1:])
+        np.testing.assert_array_equal(picture[:, :, ::-1], posed.light_field.views[t, s])
+        other = read_depth(folder / f"{name}.png.geometric.bin")
+        assert (other > 0).mean() > 0.7
+        assert other.max() <= depth.max()
+
+
+def test_colmap_itself_reads_the_model(tmp_path: Path) -> None:
+    """What COLMAP's own library makes of it: poses, cameras, tracks, and depth."""
+    pycolmap = pytest.importorskip("pycolmap")
+    posed = posed_of(scene_of("closer rows"))
+    write_colmap(tmp_path / "model", posed)
+    model = pycolmap.Reconstruction(tmp_path / "model/sparse")
+    assert (model.num_images(), model.num_points3D()) == (8, len(posed.points))
+    for point in model.points3D.values():
+        for element in point.track.elements:
+            image = model.images[element.image_id]
+            there = image.points2D[element.point2D_idx].xy
+            np.testing.assert_allclose(image.project_point(point.xyz), there, rtol=0, atol=1e-9)
+    image = model.find_image_with_name("view_02_01.png")
+    np.testing.assert_allclose(image.projection_center(), [0, 0.43 * 30 / 90, 0], atol=1e-12)
+    depth = pycolmap.DepthMap()
+    depth.read(str(tmp_path / "model/stereo/depth_maps/view_01_01.png.geometric.bin"))
+    np.testing.assert_array_equal(depth.to_array(), CAMERA.depth(posed.disparity))
+
+
+# --- nerfstudio
+
+
+def nerf_pixels(frame: dict[str, Any], world: np.ndarray) -> np.ndarray:
+    """Pixels (x, y) at which a frame's camera sees points: it looks along its -z, and its y points up."""
+    matrix = np.array(frame["transform_matrix"])
+    np.testing.assert_array_equal(matrix[3], [0, 0, 0, 1])
+    np.testing.assert_allclose(matrix[:3, :3] @ matrix[:3, :3].T, np.eye(3), atol=1e-12)
+    assert np.linalg.det(matrix[:3, :3]) == pytest.approx(1)
+    right, up, back = ((world - matrix[:3, 3]) @ matrix[:3, :3]).T
+    return np.column_stack([frame["cx"] + frame["fl_x"] * right / -back, frame["cy"] - frame["fl_y"] * up / -back])
+
+
+def nerf_world(frame: dict[str, Any], depth: np.ndarray) -> np.ndarray:
+    """Points of all pixels of a frame from its depth."""
+    y, x = np.indices(depth.shape).reshape(2, -1) + 0.5
+    rays = [(x - frame["cx"]) / frame["fl_x"], -(y - frame["cy"]) / frame["fl_y"], -np.ones(x.size)]
+    matrix = np.array(frame["transform_matrix"])
+    return (np.column_stack(rays) * depth.reshape(-1, 1)) @ matrix[:3, :3].T + matrix[:3, 3]
+
+
+@pytest.mark.parametrize("geometry", GEOMETRIES)
+@pytest.mark.parametrize("camera", [CAMERA, None])
+def test_nerfstudio_frames_fit_together(tmp_path: Path, geometry: str, camera: Camera | None) -> None:
+    """Depth of the reference view, taken to the other frames by their cameras, must come out where disparity says."""
+    scene = scene_of(geometry, camera=camera)
+    posed = posed_of(scene)
+    write_nerfstudio(tmp_path / "set", posed)
+    content = json.loads((tmp_path / "set/transforms.json").read_text())
+    assert content["units"].split()[0] == ("metres" if camera else "nominal")
+    frames = content["frames"]
+    assert [frame["file_path"] for frame in frames] == [f"images/{name}.png" for name in posed.names]
+    reference = next(frame for frame in frames if "01_01" in frame["file_path"])
+    depth = np.load(tmp_path / "set" / reference["depth_file_path"]) / 1000
+    if camera:
+        np.testing.assert_allclose(depth, camera.depth(posed.disparity), rtol=1e-6)
+    world = nerf_world(reference, depth.astype(float))
+    pixels = np.indices(depth.shape).reshape(2, -1).T
+    for frame, (t, s) in zip(frames, np.argwhere(scene.present), strict=True):
+        expected = pixels - posed.disparity.astype(float).reshape(-1, 1) * scene.baselines[t, s]
+        np.testing.assert_allclose(nerf_pixels(frame, world)[:, ::-1] - 0.5, expected, rtol=0, atol=1e-4)
+        assert (frame["w"], frame["h"]) == (64, 64)
+        # every frame has depth, or nerfstudio refuses all
+        other = np.load(tmp_path / "set" / frame["depth_file_path"])
+        assert other.dtype == np.dtype("<f4")
+        assert (other > 0).mean() > 0.7
+        assert cv2.imread(str(tmp_path / "set" / frame["file_path"]), cv2.IMREAD_UNCHANGED).shape == (64, 64, 3)
+
+
+def test_nerfstudio_points_lie_in_the_same_world(tmp_path: Path) -> None:
+    """Splats that begin elsewhere than the cameras look never find their place."""
+    posed = posed_of(scene_of())
+    write_nerfstudio(tmp_path / "set", posed)
+    content = json.loads((tmp_path / "set/transforms.json").read_text())
+    vertex = PlyData.read(str(tmp_path / "set" / content["ply_file_path"]))["vertex"].data
+    world = np.column_stack([vertex[axis] for axis in "xyz"]).astype(float)
+    (frame,) = [frame for frame in content["frames"] if "01_01" in frame["file_path"]]
+    here = nerf_pixels(frame, world)[:, ::-1] - 0.5
+    np.testing.assert_allclose(here, np.argwhere(posed.chosen), rtol=0, atol=1e-3)
+    colours = np.column_stack([vertex[name] for name in ("red", "green", "blue")])
+    np.testing.assert_array_equal(colours, posed.light_field.views[1, 1][posed.chosen])
+    # z points up: what is at the top of the picture is high in the world
+    assert np.corrcoef(world[:, 2], here[:, 0])[0, 1] < -0.9
+
+
+def test_no_points_are_no_file_of_points(tmp_path: Path) -> None:
+    write_nerfstudio(tmp_path / "set", posed_of(scene_of(), max_points=0))
+    assert "ply_file_path" not in json.loads((tmp_path / "set/transforms.json").read_text())
+    assert not (tmp_path / "set/points.ply").exists()
+
+
+# --- both
+
+
+@pytest.mark.parametrize("kind", WRITERS)
+def test_equal_content_gives_equal_bytes(tmp_path: Path, kind: str) -> None:
+    posed = posed_of(scene_of())
+    for name in ("a", "b"):
+        WRITERS[kind](tmp_path / name, posed)
+    files = sorted(path.relative_to(tmp_path / "a") for path in (tmp_path / "a").rglob("*") if path.is_file())
+    assert len(files) > 16
+    for file in files:
+        assert (tmp_path / "a" / file).read_bytes() == (tmp_path / "b" / file).read_bytes(), file
+
+
+@pytest.mark.parametrize("kind", WRITERS)
+def test_a_folder_is_whole_or_absent_and_nothing_is_replaced(
+    tmp_path: Path, kind: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    posed = posed_of(scene_of())
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine/notes.txt").write_text("mine")
+    with pytest.raises(SepiError, match="mine: exists already"):
+        WRITERS[kind](tmp_path / "mine", posed)
+
+    def fail(path: Path, *_: object) -> None:
+        raise SepiError(f"{path}: no space")
+
+    monkeypatch.setattr(f"sepi.io.{kind}.write_png", fail)
+    with pytest.raises(SepiError, match="no space"):
+        WRITERS[kind](tmp_path / "out", posed)
+    assert [path.name for path in tmp_path.iterdir()] == ["mine"]
