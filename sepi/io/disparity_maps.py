@@ -65,6 +65,18 @@ def read_disparity(path: Path, *, scale: float | None = None, offset: float = 0.
     ------
     SepiError
         If there is no such file, it is damaged or no such map, or a PNG does not say what its levels mean.
+
+    Examples
+    --------
+    Another program's map, whose disparities are larger for what is farther, in pixels between the outermost of nine
+    views:
+
+    >>> from pathlib import Path
+    >>> import numpy as np
+    >>> from sepi.io.disparity_maps import read_disparity
+    >>> np.save("other.npy", np.array([[-8.0, -2.0, 4.0]]))
+    >>> read_disparity(Path("other.npy"), scale=-1 / 8).tolist()
+    [[1.0, 0.25, -0.5]]
     """
     path = map_file(path)
     if not path.is_file():

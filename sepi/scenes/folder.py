@@ -39,6 +39,18 @@ def write_hci(light_field: LightField, folder: Path) -> None:
     ------
     SepiError
         If rows are another distance apart than columns, views stand off the grid, or the folder cannot be written.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import sepi
+    >>> from sepi.scenes import render, write_hci
+    >>> write_hci(render("dots", size=64, views=3), Path("scenes/dots"))
+    >>> sorted(path.name for path in Path("scenes/dots").iterdir())[:3]
+    ['gt_disp_lowres.pfm', 'input_Cam000.png', 'input_Cam001.png']
+    >>> light_field = sepi.read_light_field("scenes/dots")
+    >>> light_field.disparity_range.source, light_field.camera is not None
+    ('parameters', True)
     """
     if light_field.row_spacing != 1 or light_field.positions is not None:
         raise SepiError(f"{light_field.name}: the layout of the HCI benchmark needs views on a grid of even spacing")
