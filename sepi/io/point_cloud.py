@@ -100,8 +100,8 @@ def point_cloud(
 
     With a camera ``(f, offset)`` pixel ``(y, x)`` of depth ``Z`` becomes ``X = (x - cx - n offset) Z / f`` and
     ``Y = (y - cy - m offset) Z / f`` metres, for a view ``n`` view steps to the right of the centre view and ``m``
-    below it, and the middle ``(cx, cy)`` of the picture; the cloud's axes are ``(X, -Y, -Z)``. Without, x and y are pixels
-    from the middle, and z is the disparity, stretched to a third of the picture's width.
+    below it, and the middle ``(cx, cy)`` of the picture; the cloud's axes are ``(X, -Y, -Z)``. Without, x and y are
+    pixels from the middle, and z is the disparity, stretched to a third of the picture's width.
 
     Parameters
     ----------
