@@ -2,11 +2,19 @@
 
 Examples
 --------
+A built-in scene stands for light fields of your own; :func:`sepi.read_light_field` takes a folder of any known format.
+
+>>> from pathlib import Path
 >>> import sepi
->>> light_field = sepi.read_light_field("cotton")  # doctest: +SKIP
->>> maps = sepi.estimate_depth(light_field)  # doctest: +SKIP
->>> maps.disparity  # (H, W) float32, pixels per view step  # doctest: +SKIP
->>> sepi.write_result("cotton-depth", light_field, maps)  # doctest: +SKIP
+>>> from sepi.scenes import render, write_hci
+>>> write_hci(render("pyramids", size=64, views=3), Path("pyramids"))
+>>> light_field = sepi.read_light_field("pyramids")
+>>> maps = sepi.estimate_depth(light_field)
+>>> maps.disparity.shape, maps.disparity.dtype.name  # pixels per view step
+((64, 64), 'float32')
+>>> files = sepi.write_result("pyramids-depth", light_field, maps)
+>>> "disparity.pfm" in files
+True
 """
 
 from __future__ import annotations
@@ -15,35 +23,53 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from sepi.camera import Camera
     from sepi.errors import SepiError, SepiWarning
     from sepi.io.readers.options import ReadOptions
-    from sepi.io.result_folder import write_result
+    from sepi.io.result_folder import read_result, write_result
     from sepi.lightfield import DisparityRange, LightField
     from sepi.pipeline import estimate_depth
     from sepi.reading import read_light_field
+    from sepi.stage import StageMaps
 
     __version__: str
+    """Version of the installed package; ``"unknown"`` in a source tree that was never installed.
+
+    Examples
+    --------
+    Say it where you report a result: maps of two versions may differ.
+
+    >>> import sepi
+    >>> f"sepi {sepi.__version__}"  # doctest: +ELLIPSIS
+    'sepi ...'
+    """
 
 __all__ = [
+    "Camera",
     "DisparityRange",
     "LightField",
     "ReadOptions",
     "SepiError",
     "SepiWarning",
+    "StageMaps",
     "__version__",
     "estimate_depth",
     "read_light_field",
+    "read_result",
     "write_result",
 ]
 
 _HOME = {
+    "Camera": "sepi.camera",
     "DisparityRange": "sepi.lightfield",
     "LightField": "sepi.lightfield",
     "ReadOptions": "sepi.io.readers.options",
     "SepiError": "sepi.errors",
     "SepiWarning": "sepi.errors",
+    "StageMaps": "sepi.stage",
     "estimate_depth": "sepi.pipeline",
     "read_light_field": "sepi.reading",
+    "read_result": "sepi.io.result_folder",
     "write_result": "sepi.io.result_folder",
 }
 

@@ -8,6 +8,19 @@ class SepiError(Exception):
     ----------
     message : str
         Text of users and files may be in it; the error's own text is one line that a terminal can show.
+
+    Examples
+    --------
+    What a program that works through many light fields catches: any other exception is a bug.
+
+    >>> import sepi
+    >>> for name in ("cotton", "antinous"):
+    ...     try:
+    ...         sepi.read_light_field(name)
+    ...     except sepi.SepiError as error:
+    ...         print("left out:", error)
+    left out: cotton: no such file or folder
+    left out: antinous: no such file or folder
     """
 
     def __init__(self, message: str) -> None:
@@ -21,6 +34,25 @@ class SepiWarning(UserWarning):
     ----------
     message : str
         As that of an error.
+
+    Examples
+    --------
+    A light field whose rows of views run the wrong way is read, with a warning:
+
+    >>> import warnings
+    >>> from pathlib import Path
+    >>> import sepi
+    >>> from sepi.scenes import render, write_hci
+    >>> write_hci(render("pyramids", size=96, views=5), Path("scene"))
+    >>> with warnings.catch_warnings(record=True) as told:
+    ...     warnings.simplefilter("always", sepi.SepiWarning)
+    ...     light_field = sepi.read_light_field("scene", options=sepi.ReadOptions(order="flip-rows"))
+    >>> [warning.category.__name__ for warning in told]
+    ['SepiWarning']
+
+    To end with an error in place of it:
+
+    >>> warnings.simplefilter("error", sepi.SepiWarning)
     """
 
     def __init__(self, message: str) -> None:

@@ -46,6 +46,21 @@ class DisparityRange:
     source : str
         Where the range came from: ``"parameters"`` (the scene's own file), ``"given"`` (flag or config) or
         ``"estimated"`` (from the views).
+
+    Raises
+    ------
+    SepiError
+        If a bound is not finite, or ``minimum`` not below ``maximum``.
+
+    Examples
+    --------
+    >>> from sepi import DisparityRange
+    >>> known = DisparityRange(-1.5, 1.5, "given")
+    >>> known.candidates(4).tolist()
+    [-1.5, -0.5, 0.5, 1.5]
+    >>> DisparityRange(2, -2, "given")  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    sepi.errors.SepiError: disparity range (given): expected two finite numbers MIN < MAX ..., got 2 and -2
     """
 
     minimum: float
@@ -60,7 +75,18 @@ class DisparityRange:
             )
 
     def candidates(self, count: int) -> FloatMap:
-        """``count`` candidates, uniform in disparity, both ends included; shape ``(count,)`` float32."""
+        """Candidate disparities, uniform, both ends included.
+
+        Parameters
+        ----------
+        count : int
+            How many, at least 2.
+
+        Returns
+        -------
+        ndarray, shape (count,), float32
+            Pixels per view step, rising.
+        """
         return np.linspace(self.minimum, self.maximum, count).astype(np.float32)
 
 
@@ -104,6 +130,24 @@ class LightField:
     SepiError
         If a shape or dtype is not as above, floats are not finite or far outside 0..1, the row spacing is no positive
         number, or the reference view lies outside the grid or is missing.
+
+    Examples
+    --------
+    From an array: here 3 x 4 grey views of 48 x 64 pixels, the first of which was never taken.
+
+    >>> import numpy as np
+    >>> from sepi import LightField
+    >>> views = np.random.default_rng(0).random((3, 4, 48, 64, 1)).astype(np.float32)
+    >>> present = np.ones((3, 4), bool)
+    >>> present[0, 0] = False
+    >>> light_field = LightField(views, "noise", present=present)
+    >>> light_field.grid, light_field.shape, light_field.reference_position
+    ((3, 4), (48, 64), (1, 2))
+
+    A pixel of disparity 2 is seen in the view below and to the left two pixels higher and two to the right:
+
+    >>> (-2 * light_field.baselines[2, 1]).tolist()
+    [-2.0, 2.0]
     """
 
     views: npt.NDArray[np.generic]
@@ -231,6 +275,10 @@ class LightField:
     def require_disparity_range(self) -> DisparityRange:
         """The disparity range.
 
+        Returns
+        -------
+        DisparityRange
+
         Raises
         ------
         SepiError
@@ -241,16 +289,44 @@ class LightField:
         return self.disparity_range
 
     def with_range(self, disparity_range: DisparityRange) -> LightField:
-        """The same light field with another disparity range."""
+        """The same light field with another disparity range.
+
+        Parameters
+        ----------
+        disparity_range : DisparityRange
+            Takes the place of its own, if it has one.
+
+        Returns
+        -------
+        LightField
+            Shares its arrays with this one.
+        """
         return replace(self, disparity_range=disparity_range)
 
     def seen_from(self, view: tuple[int, int]) -> LightField:
         """The same light field with another reference view; ground truth and masks, which belong to a view, go.
 
+        Parameters
+        ----------
+        view : tuple of int
+            Grid position ``(t, s)``, counted from 0.
+
+        Returns
+        -------
+        LightField
+            Shares its views with this one; itself where it has this reference view already.
+
         Raises
         ------
         SepiError
             If there is no such view.
+
+        Examples
+        --------
+        >>> from sepi.scenes import render
+        >>> corner = render("dots", size=64, views=3).seen_from((0, 0))
+        >>> corner.from_centre, corner.ground_truth is None
+        ((-1.0, -1.0), True)
         """
         if view == self.reference_position:
             return self
@@ -269,7 +345,24 @@ def _require_unit(name: str, values: npt.NDArray[np.generic]) -> None:
 
 
 def as_unit_float(values: npt.NDArray[np.generic]) -> FloatMap:
-    """Pixel values as float32 in 0..1, rows contiguous; integers are divided by the largest value of their type."""
+    """Pixel values as float32 in 0..1, rows contiguous; integers are divided by the largest value of their type.
+
+    Parameters
+    ----------
+    values : ndarray, of any shape, uint8, uint16 or float
+        Floats are taken as they are.
+
+    Returns
+    -------
+    ndarray, of the same shape, float32
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from sepi.lightfield import as_unit_float
+    >>> [round(value, 3) for value in as_unit_float(np.array([0, 51, 255], np.uint8)).tolist()]
+    [0.0, 0.2, 1.0]
+    """
     values = np.ascontiguousarray(values)
     if np.issubdtype(values.dtype, np.integer):
         largest = np.iinfo(values.dtype).max  # type: ignore[type-var]

@@ -89,7 +89,7 @@ class WangParameters(OcclusionParameters):
 def half_sepi(
     light_field: LightField, previous: StageMaps | None, parameters: HalfSepiParameters, progress: Progress
 ) -> StageMaps:
-    """Depth from half-SEPIs at occluded pixels.
+    """Depth from half-SEPIs at occluded pixels (section IV-B of [1]_).
 
     Parameters
     ----------
@@ -99,12 +99,38 @@ def half_sepi(
         Initial depth.
     parameters : HalfSepiParameters
     progress : callable
+        Called with the fraction done, 0..1.
 
     Returns
     -------
     StageMaps
         Adds ``occlusion_candidates`` and ``occluded``, bool, and ``view_subset``, uint8, the subset kept, a number
         of ``subset_names``: all views, a half, or a quarter.
+
+    Raises
+    ------
+    SepiError
+        If there are no maps to refine, or the disparity range is unknown.
+
+    References
+    ----------
+    .. [1] Zhou, Shi, Liu, Jin, Zhang, Hou: Light Field Depth Estimation via Stitched Epipolar Plane Images.
+       arXiv:2203.15201.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from sepi import initial, occlusion
+    >>> from sepi.scenes import render
+    >>> from sepi.stage import no_progress
+    >>> light_field = render("pencils", size=96, views=5)
+    >>> before = initial.sepi(light_field, None, initial.CHOICES["sepi"].parameters(), no_progress)
+    >>> parameters = occlusion.CHOICES["half_sepi"].parameters()
+    >>> after = occlusion.half_sepi(light_field, before, parameters, no_progress)
+    >>> hidden = light_field.masks["occluded"]
+    >>> errors = [np.abs(maps.disparity - light_field.ground_truth)[hidden].mean() for maps in (before, after)]
+    >>> bool(errors[1] < errors[0])
+    True
     """
     from sepi.image.mean_shift import patch_modes
 
@@ -136,9 +162,46 @@ def half_sepi(
 def wang(
     light_field: LightField, previous: StageMaps | None, parameters: WangParameters, progress: Progress
 ) -> StageMaps:
-    """Depth from the half of the angular patch, split along the edge, with the smaller cost.
+    """Depth from the half of the angular patch, split along the edge, with the smaller cost [1]_.
 
-    Arguments and result as for ``half_sepi``; ``subset_names`` are those of half planes.
+    Parameters
+    ----------
+    light_field : LightField
+        With a known disparity range.
+    previous : StageMaps
+        Initial depth.
+    parameters : WangParameters
+    progress : callable
+        Called with the fraction done, 0..1.
+
+    Returns
+    -------
+    StageMaps
+        Adds ``occlusion_candidates`` and ``occluded``, bool, and ``view_subset``, uint8, the subset kept, a number
+        of ``subset_names``: all views, or a half plane.
+
+    Raises
+    ------
+    SepiError
+        If there are no maps to refine, or the disparity range is unknown.
+
+    References
+    ----------
+    .. [1] Wang, Efros, Ramamoorthi: Occlusion-aware depth estimation using light-field cameras. ICCV 2015.
+       doi:10.1109/ICCV.2015.398
+
+    Examples
+    --------
+    >>> from sepi import initial, occlusion
+    >>> from sepi.scenes import render
+    >>> from sepi.stage import no_progress
+    >>> light_field = render("curved_occluders", size=96, views=5)
+    >>> before = initial.sepi(light_field, None, initial.CHOICES["sepi"].parameters(), no_progress)
+    >>> after = occlusion.wang(light_field, before, occlusion.CHOICES["wang"].parameters(directions=4), no_progress)
+    >>> len(after.subset_names), after.subset_names[0]  # all views, and the two sides of four orientations
+    (9, 'full')
+    >>> bool(after.mask("occluded").any())
+    True
     """
     before = require_previous(previous)
     candidates = occlusion_candidates(light_field.reference_view, before.disparity, parameters)
@@ -159,14 +222,41 @@ def wang(
 def visibility(
     light_field: LightField, previous: StageMaps | None, parameters: VisibilityParameters, progress: Progress
 ) -> StageMaps:
-    """Depth from the views that see each pixel, as the map so far tells.
+    """Depth from the views that see each pixel, as the map so far tells: the second stage of variant ``best``.
 
-    Arguments as for ``half_sepi``.
+    Parameters
+    ----------
+    light_field : LightField
+        With a known disparity range.
+    previous : StageMaps
+        Initial depth.
+    parameters : VisibilityParameters
+    progress : callable
+        Called with the fraction done, 0..1.
 
     Returns
     -------
     StageMaps
         Adds ``occluded``, bool: pixels that something nearer occludes in some view.
+
+    Raises
+    ------
+    SepiError
+        If there are no maps to refine, or the disparity range is unknown.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from sepi import initial, occlusion
+    >>> from sepi.scenes import render
+    >>> from sepi.stage import no_progress
+    >>> light_field = render("curved_occluders", size=96, views=5)
+    >>> before = initial.semi_global(light_field, None, initial.CHOICES["semi_global"].parameters(), no_progress)
+    >>> parameters = occlusion.CHOICES["visibility"].parameters()
+    >>> after = occlusion.visibility(light_field, before, parameters, no_progress)
+    >>> errors = [np.abs(maps.disparity - light_field.ground_truth).mean() for maps in (before, after)]
+    >>> bool(errors[1] < errors[0])
+    True
     """
     before = require_previous(previous)
     result = depth_from_visible_views(light_field, before.disparity, parameters, progress)

@@ -37,7 +37,8 @@ def read_light_field(
     disparity_range : tuple of float, optional
         ``(minimum, maximum)`` in pixels per view step, in place of the scene's own.
     file_format : str, optional
-        A key of ``sepi.io.readers.formats.FORMATS``; found by looking unless given.
+        Word of a format: ``"hci"``, ``"images"``, ``"eslf"``, ``"matlab"``, ``"numpy"``, ``"hci-2013"``, ``"openlf"``
+        or ``"sepi"``; found by looking unless given.
     options : ReadOptions, optional
         What the files do not say: grid, name pattern, axes, order, views to leave out, reference view, row spacing.
     check_order : bool
@@ -56,6 +57,22 @@ def read_light_field(
         the grid of the views cannot be told, or there is nothing to match in the views.
     MemoryError
         If a limit on the process's address space leaves too little to look at them.
+
+    Examples
+    --------
+    An array whose grid of views comes last, as some programs store it: sizes tell the axes, ``sepi.ReadOptions`` could
+    name them.
+
+    >>> import numpy as np
+    >>> import sepi
+    >>> from sepi.scenes import render
+    >>> views = render("pyramids", size=96, views=5).views  # (T, S, H, W, C)
+    >>> np.save("pyramids.npy", views.transpose(2, 3, 0, 1, 4))
+    >>> light_field = sepi.read_light_field("pyramids.npy", disparity_range=(-1.5, 1.5))
+    >>> light_field.grid, light_field.shape, light_field.disparity_range.source
+    ((5, 5), (96, 96), 'given')
+    >>> bool((light_field.views == views).all())
+    True
     """
     path = Path(path)
     options = options or ReadOptions()

@@ -23,7 +23,27 @@ Progress = Callable[[float], None]
 
 
 def no_progress(_: float) -> None:
-    """For callers who do not watch."""
+    """For callers who do not watch.
+
+    Parameters
+    ----------
+    _ : float
+        The fraction done, 0..1.
+
+    Examples
+    --------
+    A stage called by itself, once unwatched and once with what it tells collected:
+
+    >>> from sepi import initial
+    >>> from sepi.scenes import render
+    >>> from sepi.stage import no_progress
+    >>> light_field, parameters = render("dots", size=64, views=3), initial.CHOICES["sepi"].parameters()
+    >>> maps = initial.sepi(light_field, None, parameters, no_progress)
+    >>> told = []
+    >>> maps = initial.sepi(light_field, None, parameters, told.append)
+    >>> told == sorted(told), told[-1]
+    (True, 1.0)
+    """
 
 
 class Needs(NamedTuple):
@@ -46,7 +66,29 @@ class Needs(NamedTuple):
 
 
 class Parameters(BaseModel):
-    """Parameters of one choice of a stage: frozen, unknown keys refused, each with a default and a description."""
+    """Parameters of one choice of a stage: frozen, unknown keys refused, each with a default and a description.
+
+    A model of pydantic. Each field takes a default, bounds, and a description that names its unit: ``config.yaml`` and
+    the command line are made of these.
+
+    Raises
+    ------
+    pydantic.ValidationError
+        If a field is unknown or a value not allowed; what users write goes through
+        :func:`sepi.pipeline.stage_parameters`, which tells it as a :class:`sepi.SepiError` of one line.
+
+    Examples
+    --------
+    >>> from pydantic import Field
+    >>> from sepi.stage import Parameters
+    >>> class BlurParameters(Parameters):
+    ...     radius: int = Field(2, ge=1, description="half width of the window, pixels")
+    >>> BlurParameters(radius=3)
+    BlurParameters(radius=3)
+    >>> BlurParameters(radius=0)  # doctest: +IGNORE_EXCEPTION_DETAIL
+    Traceback (most recent call last):
+    ValidationError: 1 validation error for BlurParameters
+    """
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
@@ -54,7 +96,18 @@ class Parameters(BaseModel):
     """What the workflow asks a cluster for beyond the usual."""
 
     def settled(self, light_field: LightField) -> Self:
-        """These parameters with what follows from a light field of known disparity range filled in."""
+        """These parameters with what follows from a light field filled in, to be told and kept with the maps.
+
+        Parameters
+        ----------
+        light_field : LightField
+            Of known disparity range.
+
+        Returns
+        -------
+        model of the same class
+            A sweep's has the number of candidates in it.
+        """
         return self
 
     @property
@@ -90,6 +143,17 @@ class CostVolume:
     ------
     SepiError
         If the shapes or dtypes are not as above.
+
+    Examples
+    --------
+    Costs of three candidates at 2 x 2 pixels, and the disparities of least cost:
+
+    >>> import numpy as np
+    >>> from sepi.stage import CostVolume
+    >>> costs = np.array([[[0.1, 0.9], [0.9, 0.9]], [[0.9, 0.1], [0.9, 0.1]], [[0.9, 0.9], [0.1, 0.9]]])
+    >>> volume = CostVolume(np.array([-1, 0, 1], np.float32), costs.astype(np.float16))
+    >>> volume.disparities[volume.costs.argmin(axis=0)].tolist()
+    [[-1.0, 0.0], [1.0, 0.0]]
     """
 
     disparities: FloatMap
@@ -105,7 +169,7 @@ class CostVolume:
 
 @dataclass(frozen=True)
 class StageMaps:
-    """What a stage hands on.
+    """What a stage hands on, and :func:`sepi.estimate_depth` returns: disparity, confidence, and further maps by name.
 
     Attributes
     ----------
@@ -119,6 +183,27 @@ class StageMaps:
         What the values of the map ``view_subset`` stand for, from 0 on; empty without such a map.
     cost_volume : CostVolume or None
         Of a data cost that a later stage regularises; that stage hands on none.
+
+    Examples
+    --------
+    >>> import sepi
+    >>> from sepi.scenes import render
+    >>> light_field = render("curved_occluders", size=64, views=3)
+    >>> maps = sepi.estimate_depth(light_field, "paper")
+    >>> list(maps.all())[:5]
+    ['disparity', 'confidence', 'occlusion_candidates', 'occluded', 'view_subset']
+    >>> maps.subset_names[:5]
+    ('full', 'left', 'right', 'up', 'down')
+    >>> used = maps.extra["view_subset"]  # which views each pixel's depth was made from
+    >>> bool((used[maps.mask("occluded")] != maps.subset_names.index("full")).all())
+    True
+
+    A map from elsewhere, to be written or refined like one of this package:
+
+    >>> import numpy as np
+    >>> other = sepi.StageMaps(light_field.ground_truth, np.ones(light_field.shape, np.float32))
+    >>> len(sepi.write_result("other", light_field, other))
+    7
     """
 
     disparity: FloatMap
@@ -128,21 +213,55 @@ class StageMaps:
     cost_volume: CostVolume | None = None
 
     def all(self) -> dict[str, npt.NDArray[Any]]:
-        """Every map by name."""
+        """Every map by name.
+
+        Returns
+        -------
+        dict of str to ndarray, shape (H, W)
+            ``disparity`` and ``confidence`` first, then ``extra``.
+        """
         return {"disparity": self.disparity, "confidence": self.confidence, **self.extra}
 
     def mask(self, name: str) -> BoolMap:
-        """A boolean map of an earlier stage; empty where that stage was switched off."""
+        """A boolean map of an earlier stage.
+
+        Parameters
+        ----------
+        name : str
+            ``"occluded"``, ``"textureless"``, ``"unknown"``, ...
+
+        Returns
+        -------
+        ndarray, shape (H, W), bool
+            All False where there is none, as that stage was switched off.
+        """
         if name in self.extra:
             return self.extra[name].astype(bool)
         return np.zeros(self.disparity.shape, bool)
 
     def updated(self, disparity: FloatMap, confidence: FloatMap, **extra: npt.NDArray[Any]) -> StageMaps:
-        """These maps with a new disparity and confidence and further maps."""
+        """These maps with a new disparity and confidence and further maps: what a stage returns.
+
+        Parameters
+        ----------
+        disparity, confidence : ndarray, shape (H, W), float32
+            Pixels per view step; 0..1.
+        **extra : ndarray, shape (H, W)
+            Maps to add, or to put in place of those of the same name.
+
+        Returns
+        -------
+        StageMaps
+        """
         return replace(self, disparity=disparity, confidence=confidence, extra={**self.extra, **extra})
 
     def without_costs(self) -> StageMaps:
-        """These maps without the cost volume: what is handed on where nobody will choose among its candidates."""
+        """These maps without the cost volume: what is handed on where nobody will choose among its candidates.
+
+        Returns
+        -------
+        StageMaps
+        """
         return replace(self, cost_volume=None)
 
 
@@ -156,9 +275,34 @@ class Choice:
     Attributes
     ----------
     parameters : type
-        Model of its parameters.
+        Model of its parameters, a subclass of :class:`Parameters`.
     run : callable
-        The stage function.
+        The stage function ``(light_field, previous, parameters, progress) -> StageMaps``, where ``previous`` is what
+        the stage before handed on (None for the first), and ``progress`` takes the fraction done, 0..1. It changes
+        none of its arguments, reads no ground truth and writes no file.
+
+    Examples
+    --------
+    A choice of one's own for the last stage, a median filter, beside the built-in ones:
+
+    >>> import cv2
+    >>> from pydantic import Field
+    >>> from sepi import estimate_depth
+    >>> from sepi.pipeline import STAGES, VARIANT_ENTRIES, variant_from
+    >>> from sepi.scenes import render
+    >>> from sepi.stage import Choice, Parameters, require_previous
+    >>> class MedianParameters(Parameters):
+    ...     size: int = Field(3, ge=3, le=5, description="side of the window, pixels; odd")
+    >>> def median(light_field, previous, parameters, progress):
+    ...     before = require_previous(previous)
+    ...     return before.updated(cv2.medianBlur(before.disparity, parameters.size), before.confidence)
+    >>> STAGES["optimize"]["median"] = Choice(MedianParameters, median)
+    >>> entries = {"mine": {"base": "paper", "optimize": {"choice": "median", "size": 5}}}
+    >>> variant = variant_from("mine", {**VARIANT_ENTRIES, **entries}, "my variants")
+    >>> light_field = render("dots", size=64, views=3)
+    >>> estimate_depth(light_field, variant).disparity.shape
+    (64, 64)
+    >>> del STAGES["optimize"]["median"]
     """
 
     parameters: type[Parameters]
@@ -175,10 +319,31 @@ def none(
 def require_previous(previous: StageMaps | None) -> StageMaps:
     """The maps of the stage before, for a stage that cannot be the first.
 
+    Parameters
+    ----------
+    previous : StageMaps or None
+        As the stage function got them.
+
+    Returns
+    -------
+    StageMaps
+
     Raises
     ------
     SepiError
         If there are none.
+
+    Examples
+    --------
+    The first line of a stage function that refines a map:
+
+    >>> from sepi.stage import require_previous
+    >>> def unsure(light_field, previous, parameters, progress):
+    ...     before = require_previous(previous)
+    ...     return before.updated(before.disparity, 0.5 * before.confidence)
+    >>> unsure(None, None, None, None)
+    Traceback (most recent call last):
+    sepi.errors.SepiError: this stage refines a depth map: the maps of the stage before it are missing
     """
     if previous is None:
         raise SepiError("this stage refines a depth map: the maps of the stage before it are missing")
@@ -188,10 +353,37 @@ def require_previous(previous: StageMaps | None) -> StageMaps:
 def require_costs(previous: StageMaps | None) -> tuple[StageMaps, CostVolume]:
     """The maps of the stage before and their cost volume, for a stage that chooses among its candidates.
 
+    Parameters
+    ----------
+    previous : StageMaps or None
+        As the stage function got them.
+
+    Returns
+    -------
+    before : StageMaps
+    volume : CostVolume
+        That of ``before``.
+
     Raises
     ------
     SepiError
         If there is none.
+
+    Examples
+    --------
+    A stage that takes the candidate of least cost at each pixel, and hands on no costs:
+
+    >>> import numpy as np
+    >>> from sepi.matching.cost_volumes import disparity_of, least_costs
+    >>> from sepi.stage import CostVolume, StageMaps, require_costs
+    >>> def cheapest(light_field, previous, parameters, progress):
+    ...     before, volume = require_costs(previous)
+    ...     disparity = disparity_of(volume, least_costs(volume))
+    ...     return before.updated(disparity, before.confidence).without_costs()
+    >>> volume = CostVolume(np.arange(3, dtype=np.float32), np.float16([[[0.9]], [[0.1]], [[0.9]]]))
+    >>> before = StageMaps(np.zeros((1, 1), np.float32), np.ones((1, 1), np.float32), cost_volume=volume)
+    >>> cheapest(None, before, None, None).disparity.tolist()
+    [[1.0]]
     """
     before = require_previous(previous)
     if before.cost_volume is None:

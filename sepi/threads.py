@@ -12,9 +12,24 @@ def available_cores() -> int:
 
 
 def use_threads(count: int) -> None:
-    """Let numba and OpenCV use at most ``count`` threads, and never more than :func:`available_cores`.
+    """Let numba and OpenCV use at most so many threads, and never more than this process has cores.
 
     Neither is imported for that, since not every job needs them: what is not there yet is told when it starts.
+
+    Parameters
+    ----------
+    count : int
+        Threads, at least 1.
+
+    Examples
+    --------
+    Programs that work on many light fields in several processes give each of them one thread:
+
+    >>> from sepi.threads import use_threads
+    >>> use_threads(1)
+    >>> import cv2
+    >>> cv2.getNumThreads()
+    1
     """
     count = min(count, available_cores())
     if "numba" in sys.modules:

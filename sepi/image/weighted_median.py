@@ -16,11 +16,12 @@ from sepi.lightfield import FloatMap
 
 
 def weighted_median(values: FloatMap, guide: FloatMap, radius: int, sigma: float, weight: FloatMap) -> FloatMap:
-    """The value in each window at which half of the weight lies below.
+    """The value in each window at which half of the weight lies below [1]_.
 
     Parameters
     ----------
     values : ndarray, shape (H, W), float32
+        A disparity map, or another.
     guide : ndarray, shape (H, W, 3), float32
         Colours in 0..1.
     radius : int
@@ -34,6 +35,24 @@ def weighted_median(values: FloatMap, guide: FloatMap, radius: int, sigma: float
     Returns
     -------
     ndarray, shape (H, W), float32
+
+    References
+    ----------
+    .. [1] Ma, He, Wei, Sun, Wu: Constant time weighted median filtering for stereo matching and beyond. ICCV 2013.
+       doi:10.1109/ICCV.2013.13
+
+    Examples
+    --------
+    An edge of the map that lies two pixels beside that of the picture is drawn to it:
+
+    >>> import numpy as np
+    >>> from sepi.image.weighted_median import weighted_median
+    >>> guide = np.zeros((9, 12, 3), np.float32)
+    >>> guide[:, 6:] = 1
+    >>> fattened = np.zeros((9, 12), np.float32)
+    >>> fattened[:, 4:] = 2
+    >>> weighted_median(fattened, guide, radius=4, sigma=0.1, weight=np.ones((9, 12), np.float32))[4].tolist()
+    [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0]
     """
     from sepi.image.weighted_median_kernels import weighted_medians
 

@@ -98,6 +98,24 @@ def estimate_range(light_field: LightField) -> DisparityRange:
     ------
     SepiError
         If too few pixels can be matched (no texture, or no disparity within 128 pixels per view step).
+
+    Examples
+    --------
+    Before matching is done stage by stage; :func:`sepi.estimate_depth` does it by itself where no range is known.
+
+    >>> import numpy as np
+    >>> from sepi.inspection.disparity_range import estimate_range
+    >>> from sepi.scenes import render
+    >>> light_field = render("rack", size=96, views=5)
+    >>> found = estimate_range(light_field)
+    >>> truth = light_field.ground_truth
+    >>> bool(found.minimum < truth.min() and truth.max() < found.maximum)
+    True
+    >>> bool(found.maximum - found.minimum < 1.3 * np.ptp(truth))
+    True
+    >>> light_field = light_field.with_range(found)
+    >>> light_field.disparity_range.source
+    'estimated'
     """
     factor = math.ceil(math.sqrt(math.prod(light_field.shape) / _MOST_PIXELS))
     views = _Views(light_field, factor)

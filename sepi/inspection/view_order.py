@@ -39,7 +39,7 @@ _GRID = np.arange(6).reshape(2, 3)
 
 @dataclass(frozen=True)
 class OrderCheck:
-    """How well each order of the views fits.
+    """How well each order of the views fits: the result of :func:`check_order`.
 
     Attributes
     ----------
@@ -55,6 +55,18 @@ class OrderCheck:
         Order in which the light field was read.
     regions, agreeing : int
         Regions of the picture where one surface is seen to hide another, and those that agree on the sign.
+
+    Examples
+    --------
+    >>> from sepi.inspection.view_order import OrderCheck, check_order
+    >>> from sepi.scenes import render
+    >>> found = check_order(render("pyramids", size=96, views=5))
+    >>> isinstance(found, OrderCheck), found.best, found.clear
+    (True, 'as-given', True)
+    >>> found.fits["as-given"] < 0.5 * found.fits["transpose"]
+    True
+    >>> found.sign_clear  # hardly anything hides anything here
+    False
     """
 
     fits: Mapping[str, float]
@@ -66,7 +78,13 @@ class OrderCheck:
     agreeing: int = 0
 
     def verdict(self) -> str:
-        """One line for the user."""
+        """One line for the user.
+
+        Returns
+        -------
+        str
+            Whether the order is right, which one is, or that the views do not tell.
+        """
         if not self.clear:
             return (
                 "cannot tell: no order fits clearly better than the others (too little texture, or too little movement "
@@ -83,7 +101,13 @@ class OrderCheck:
         )
 
     def warning(self) -> str | None:
-        """What to read the light field with instead; None unless another order is clearly better."""
+        """What to read the light field with instead.
+
+        Returns
+        -------
+        str or None
+            None unless another order is clearly better.
+        """
         if not self.clear or self.best == self.read_in:
             return None
         fault = _FAULTS[self.best] if self.read_in == AS_GIVEN else f"--order {self.read_in} does not fit"
@@ -101,11 +125,26 @@ def check_order(light_field: LightField, read_in: str = AS_GIVEN) -> OrderCheck:
     light_field : LightField
         Its disparity range, ground truth and reference view are not looked at.
     read_in : str
-        Order in which it was read; the orders of the result are to take its place.
+        Order in which it was read, one of :data:`sepi.io.readers.options.ORDERS`; the orders of the result are to take
+        its place.
 
     Returns
     -------
     OrderCheck
+
+    Examples
+    --------
+    A light field whose rows of views were stored the other way round:
+
+    >>> from sepi import LightField
+    >>> from sepi.inspection.view_order import check_order
+    >>> from sepi.scenes import render
+    >>> light_field = render("pyramids", size=96, views=5)
+    >>> found = check_order(LightField(light_field.views[::-1].copy(), "upside down"))
+    >>> found.best
+    'flip-rows'
+    >>> print(found.warning())  # doctest: +ELLIPSIS
+    the rows of views run the other way: read it with --order flip-rows...
     """
     trial = best_trial(Views(light_field))
     if trial is None:

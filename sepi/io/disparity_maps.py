@@ -50,12 +50,12 @@ def is_disparity(path: Path) -> bool:
     return suffix in SUFFIXES
 
 
-def read_disparity(path: Path, *, scale: float | None = None, offset: float = 0.0) -> FloatMap:
+def read_disparity(path: str | Path, *, scale: float | None = None, offset: float = 0.0) -> FloatMap:
     """Read one disparity map.
 
     Parameters
     ----------
-    path : Path
+    path : str or Path
         A one-channel PFM; a NumPy file (``.npy``) with an array of numbers of shape (H, W); an HDF5 file with such a
         dataset ``disparity``; a grey TIFF of 32-bit floats; a grey PNG of 8 or 16 bit; or a folder that ``sepi depth``
         wrote. A PNG with the text chunks ``scale`` and ``offset``, as ``disparity_16bit.png`` has them, holds what
@@ -73,7 +73,20 @@ def read_disparity(path: Path, *, scale: float | None = None, offset: float = 0.
     ------
     SepiError
         If there is no such file, it is damaged or no such map, or a PNG does not say what its levels mean.
+
+    Examples
+    --------
+    Another program's map, whose disparities are larger for what is farther, in pixels between the outermost of nine
+    views:
+
+    >>> from pathlib import Path
+    >>> import numpy as np
+    >>> from sepi.io.disparity_maps import read_disparity
+    >>> np.save("other.npy", np.array([[-8.0, -2.0, 4.0]]))
+    >>> read_disparity(Path("other.npy"), scale=-1 / 8).tolist()
+    [[1.0, 0.25, -0.5]]
     """
+    path = Path(path)
     path = map_file(path)
     if not path.is_file():
         raise SepiError(f"{path}: no such file")

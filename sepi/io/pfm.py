@@ -15,14 +15,35 @@ from sepi.lightfield import FloatMap
 _HEADER = re.compile(rb"\A(P[fF])\s+(\d{1,9})\s+(\d{1,9})\s+([-+]?[0-9.]+(?:[eE][-+]?\d+)?)\s")
 
 
-def read_pfm(path: Path) -> FloatMap:
-    """Read a one-channel PFM.
+def read_pfm(path: str | Path) -> FloatMap:
+    """Read a one-channel PFM, of either byte order.
+
+    Parameters
+    ----------
+    path : str or Path
 
     Returns
     -------
     ndarray, shape (H, W), float32
-        Top row first.
+        Top row first, as stored otherwise: the scale of the header tells the byte order alone.
+
+    Raises
+    ------
+    SepiError
+        If the file is missing, none, of three channels, or damaged.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import numpy as np
+    >>> from sepi.io.pfm import read_pfm
+    >>> rows = np.array([[3.0, 4.0], [1.0, 2.0]])  # a file begins with the bottom row
+    >>> big_endian = b"Pf\\n2 2\\n1.0\\n" + rows.astype(">f4").tobytes()
+    >>> size = Path("map.pfm").write_bytes(big_endian)
+    >>> read_pfm(Path("map.pfm")).tolist()
+    [[1.0, 2.0], [3.0, 4.0]]
     """
+    path = Path(path)
     with reading(path, "one-channel PFM"):
         data = path.read_bytes()
         header = _HEADER.match(data[:256])
@@ -39,8 +60,31 @@ def read_pfm(path: Path) -> FloatMap:
         return values[::-1].astype(np.float32)
 
 
-def write_pfm(path: Path, values: FloatMap) -> None:
-    """Write ``values`` of shape (H, W) as a one-channel little-endian PFM, whole or not at all."""
+def write_pfm(path: str | Path, values: FloatMap) -> None:
+    """Write a map as a one-channel little-endian PFM, whole or not at all.
+
+    Parameters
+    ----------
+    path : str or Path
+        Its folder is made where it does not exist.
+    values : ndarray, shape (H, W), float32
+        Top row first.
+
+    Raises
+    ------
+    SepiError
+        If the file cannot be written.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import numpy as np
+    >>> from sepi.io.pfm import read_pfm, write_pfm
+    >>> write_pfm(Path("maps/cotton.pfm"), np.array([[0.25, np.nan]], np.float32))
+    >>> read_pfm(Path("maps/cotton.pfm")).tolist()
+    [[0.25, nan]]
+    """
+    path = Path(path)
     height, width = values.shape
     with atomic_path(path) as temporary:
         temporary.write_bytes(f"Pf\n{width} {height}\n-1\n".encode() + values[::-1].astype("<f4").tobytes())

@@ -29,8 +29,34 @@ class Cloud(Protocol):
         """What the numbers are, for the file's header."""
 
 
-def write_ply(path: Path, cloud: Cloud) -> None:
-    """Write coloured points as a binary little-endian PLY, whole or not at all; equal points give equal bytes."""
+def write_ply(path: str | Path, cloud: Cloud) -> None:
+    """Write coloured points as a binary little-endian PLY, whole or not at all; equal points give equal bytes.
+
+    Parameters
+    ----------
+    path : str or Path
+        MeshLab, CloudCompare, Blender and others open it; a comment in its header names the units.
+    cloud : Cloud
+        Such as a :class:`~sepi.io.point_cloud.PointCloud`.
+
+    Raises
+    ------
+    SepiError
+        If the file cannot be written.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from sepi.io.ply import write_ply
+    >>> from sepi.io.point_cloud import point_cloud
+    >>> from sepi.scenes import render
+    >>> light_field = render("pyramids", size=64, views=2)
+    >>> picture = light_field.views[light_field.reference_position]
+    >>> write_ply(Path("pyramids.ply"), point_cloud(picture, light_field.ground_truth))
+    >>> Path("pyramids.ply").read_bytes().splitlines()[4]
+    b'element vertex 4096'
+    """
+    path = Path(path)
     points = np.empty(len(cloud.positions), _POINT)
     points["position"], points["colour"] = cloud.positions, cloud.colours
     header = [

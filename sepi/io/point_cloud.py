@@ -52,6 +52,16 @@ class PointCloud:
         Whether positions are in metres; otherwise x and y are pixels and z is ``stretch`` times the disparity.
     stretch : float
         Pixels per unit of disparity of a relief; 1 for a metric cloud.
+
+    Examples
+    --------
+    A cloud put together by hand, of one red point two metres before the camera:
+
+    >>> import numpy as np
+    >>> from sepi.io.point_cloud import PointCloud
+    >>> cloud = PointCloud(np.float32([[0, 0, -2]]), np.uint8([[255, 0, 0]]), metric=True)
+    >>> cloud.comments()
+    ('x right, y up, z towards the viewer', 'metres; origin: camera of the view')
     """
 
     positions: Positions
@@ -60,7 +70,13 @@ class PointCloud:
     stretch: float = 1.0
 
     def comments(self) -> tuple[str, ...]:
-        """What the numbers are, for the file's header."""
+        """What the numbers are, for the file's header.
+
+        Returns
+        -------
+        tuple of str
+            Axes, and units.
+        """
         if self.metric:
             units = "metres; origin: camera of the view"
         else:
@@ -81,6 +97,11 @@ def point_cloud(
     unknown: BoolMap | None = None,
 ) -> PointCloud:
     """Point cloud of one view; pixels without a finite disparity, and those at or beyond infinity, have no point.
+
+    With a camera ``(f, offset)`` pixel ``(y, x)`` of depth ``Z`` becomes ``X = (x - cx - n offset) Z / f`` and
+    ``Y = (y - cy - m offset) Z / f`` metres, for a view ``n`` view steps to the right of the centre view and ``m``
+    below it, and the middle ``(cx, cy)`` of the picture; the cloud's axes are ``(X, -Y, -Z)``. Without, x and y are
+    pixels from the middle, and z is the disparity, stretched to a third of the picture's width.
 
     Parameters
     ----------
@@ -103,11 +124,34 @@ def point_cloud(
     unknown : ndarray, shape (H, W), bool, optional
         Pixels to leave out.
 
+    Returns
+    -------
+    PointCloud
+        In the order of the pixels, row by row.
+
     Raises
     ------
     SepiError
         If the maps are not of the picture's size, a number is out of bounds, ``max_depth`` is given without a camera,
         or ``min_confidence`` without a confidence.
+
+    Examples
+    --------
+    >>> import sepi
+    >>> from sepi.io.point_cloud import point_cloud
+    >>> from sepi.scenes import render
+    >>> light_field = render("fronto_parallel", size=64, views=3)
+    >>> picture = light_field.views[light_field.reference_position]
+    >>> camera = sepi.Camera(scale=8.0, offset=1.0, focal_px=800.0)
+    >>> cloud = point_cloud(picture, light_field.ground_truth, camera=camera)
+    >>> cloud.positions.shape, cloud.colours.shape, cloud.metric
+    ((4096, 3), (4096, 3), True)
+    >>> float(cloud.positions[0, 2])  # a plane of disparity 1 is 8 / (1 + 1) metres away
+    -4.0
+    >>> maps = sepi.estimate_depth(light_field)
+    >>> sure = point_cloud(picture, maps.disparity, maps.confidence, camera=camera, min_confidence=0.5, step=2)
+    >>> len(sure.positions) <= 32 * 32
+    True
     """
     for name, values in {"disparity": disparity, "confidence": confidence, "unknown": unknown}.items():
         if values is not None and values.shape != picture.shape[:2]:

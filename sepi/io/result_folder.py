@@ -75,6 +75,18 @@ class Result:
         Where it is known.
     from_centre : (float, float)
         Baseline (down, across) from the grid's centre view to the view, in view steps.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import sepi
+    >>> from sepi.io.result_folder import Result
+    >>> from sepi.scenes import render
+    >>> light_field = render("dots", size=64, views=3)
+    >>> files = sepi.write_result("dots-depth", light_field, sepi.estimate_depth(light_field))
+    >>> result = sepi.read_result("dots-depth")
+    >>> isinstance(result, Result), result.scene, result.picture.shape, result.camera
+    (True, 'dots', (64, 64, 3), None)
     """
 
     scene: str
@@ -94,8 +106,9 @@ def write_result(
     Disparity as ``disparity.pfm``, ``disparity.npy`` and ``disparity_16bit.png`` (numbers) and ``disparity.png``
     (colours, from far, dark blue, to near, yellow; grey where the mask ``unknown`` is set), ``confidence.png`` from
     black (0) to white (1), ``mask_NAME.png`` of each boolean map, ``points.ply`` without what is unknown, ``depth.pfm``
-    in metres where the light field has a camera, and ``result.h5``
-    with everything: all maps, the view itself, the camera and ``attributes``. Equal content gives equal bytes.
+    in metres where the light field has a camera, and ``result.h5`` with
+    everything: all maps, the view itself, the camera and ``attributes``. docs/outputs.md describes them. Equal
+    content gives equal bytes.
 
     A new folder appears whole or not at all; in an existing one the files are replaced when all are written, masks,
     depth and run time of an earlier run that this one does not make are removed, and other files are left alone.
@@ -121,6 +134,28 @@ def write_result(
     SepiError
         If the maps are not of the light field's shape or the confidence not within 0..1, or the folder is a file, holds
         a light field, or cannot be written.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import sepi
+    >>> from sepi.scenes import render
+    >>> light_field = render("dots", size=64, views=3)
+    >>> maps = sepi.estimate_depth(light_field)
+    >>> for name in sepi.write_result("dots-depth", light_field, maps, {"scene": "dots", "made_by": "a test"}):
+    ...     print(name)
+    disparity.pfm
+    disparity.npy
+    disparity_16bit.png
+    disparity.png
+    confidence.png
+    points.ply
+    mask_occluded.png
+    mask_textureless.png
+    mask_unknown.png
+    result.h5
+    >>> bool((np.load("dots-depth/disparity.npy") == maps.disparity).all())
+    True
     """
     _require_sound(light_field, maps)
     folder = Path(folder)
@@ -153,14 +188,35 @@ def require_target(folder: Path) -> None:
         raise SepiError(f"{folder}: holds the views of a light field; choose another folder for the result")
 
 
-def read_result(path: Path) -> Result:
+def read_result(path: str | Path) -> Result:
     """Read back what a result says about its view.
 
     Parameters
     ----------
-    path : Path
+    path : str or Path
         Folder written by :func:`write_result`, or its ``result.h5``.
+
+    Returns
+    -------
+    Result
+
+    Raises
+    ------
+    SepiError
+        If there is none, or it is damaged.
+
+    Examples
+    --------
+    >>> import sepi
+    >>> from sepi.scenes import render
+    >>> light_field = render("dots", size=64, views=3)
+    >>> maps = sepi.estimate_depth(light_field)
+    >>> files = sepi.write_result("dots-depth", light_field, maps)
+    >>> result = sepi.read_result("dots-depth")
+    >>> bool((result.disparity == maps.disparity).all()), int(result.unknown.sum())
+    (True, 0)
     """
+    path = Path(path)
     path = path / RESULT if path.is_dir() else path
     with open_hdf5(path, "result of 'sepi depth'") as file:
         picture, disparity, confidence = (
@@ -188,7 +244,30 @@ def read_result(path: Path) -> Result:
 
 
 def colour_code(values: FloatMap, unknown: BoolMap | None = None) -> npt.NDArray[np.uint8]:
-    """A map (H, W) in perceptually uniform colours, (H, W, 3) RGB; grey where unknown, black where not finite."""
+    """A map in perceptually uniform colours, from dark blue (least) to yellow (greatest).
+
+    Parameters
+    ----------
+    values : ndarray, shape (H, W), float32
+        Disparity, or anything else. The colours span its values but for half a percent at either end.
+    unknown : ndarray, shape (H, W), bool, optional
+        Pixels to be shown grey, which take no part of the colour scale.
+
+    Returns
+    -------
+    ndarray, shape (H, W, 3), uint8
+        RGB; black where a value is not finite.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from sepi.io.result_folder import colour_code
+    >>> picture = colour_code(np.array([[0, 1, np.nan, 9]], np.float32), np.array([[False, False, False, True]]))
+    >>> picture[0, 0].tolist(), picture[0, 1].tolist()  # dark blue, yellow
+    ([68, 1, 84], [253, 231, 37])
+    >>> picture[0, 2].tolist(), picture[0, 3].tolist()
+    ([0, 0, 0], [128, 128, 128])
+    """
     finite = np.isfinite(values)
     # what is unknown takes no part of the scale
     counted = finite if unknown is None else finite & ~unknown

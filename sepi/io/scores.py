@@ -33,7 +33,7 @@ AllScores = dict[str, dict[str, Scores]]
 
 @dataclass(frozen=True)
 class Evaluation:
-    """Scores of one disparity map.
+    """Scores of one disparity map, its error, and where it was scored: see :func:`sepi.evaluate.evaluation_of`.
 
     Attributes
     ----------
@@ -44,7 +44,20 @@ class Evaluation:
     regions : mapping of str to ndarray, shape (H, W), bool
         The masks that the scores of a region were taken over.
     region_sources : mapping of str to str
-        ``"scene"`` (the scene brought the mask) or ``"computed"`` (by ``sepi.scoring.regions``).
+        ``"scene"`` (the scene brought the mask) or ``"computed"`` (by :mod:`sepi.scoring.regions`).
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from sepi.evaluate import evaluation_of
+    >>> from sepi.io.scores import Evaluation
+    >>> from sepi.scenes import render
+    >>> light_field = render("dots", size=64, views=3)
+    >>> found = evaluation_of(light_field, light_field.ground_truth + np.float32(0.5))
+    >>> isinstance(found, Evaluation), round(found.scores["paper"]["occluded"]["mse100"], 3)
+    (True, 25.0)
+    >>> round(float(found.error.mean()), 3), found.region_sources["occluded"]
+    (0.5, 'scene')
     """
 
     scores: Mapping[str, Mapping[str, Scores]] = field(default_factory=dict)

@@ -10,7 +10,26 @@ from sepi.stage import CostVolume
 
 
 def least_costs(volume: CostVolume) -> npt.NDArray[np.int64]:
-    """Number of the candidate of least cost of each pixel; shape (H, W)."""
+    """Number of the candidate of least cost of each pixel.
+
+    Parameters
+    ----------
+    volume : CostVolume
+
+    Returns
+    -------
+    ndarray, shape (H, W), int64
+        Index into ``volume.disparities``; the first of equal ones.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from sepi.matching.cost_volumes import least_costs
+    >>> from sepi.stage import CostVolume
+    >>> volume = CostVolume(np.arange(3, dtype=np.float32), np.float16([[[0.9, 0.5]], [[0.1, 0.5]], [[0.9, 0.5]]]))
+    >>> least_costs(volume).tolist()
+    [[1, 0]]
+    """
     return np.asarray(np.argmin(volume.costs, axis=0))
 
 
@@ -27,6 +46,18 @@ def disparity_of(volume: CostVolume, labels: npt.NDArray[np.int64]) -> FloatMap:
     -------
     ndarray, shape (H, W), float32
         Pixels per view step. A candidate at an end of the range, or one that is no minimum, stays as it is.
+
+    Examples
+    --------
+    Costs that fall to a minimum at 1.25, between two candidates:
+
+    >>> import numpy as np
+    >>> from sepi.matching.cost_volumes import disparity_of, least_costs
+    >>> from sepi.stage import CostVolume
+    >>> candidates = np.arange(3, dtype=np.float32)
+    >>> volume = CostVolume(candidates, ((candidates - 1.25) ** 2).astype(np.float16)[:, None, None])
+    >>> disparity_of(volume, least_costs(volume)).tolist()
+    [[1.25]]
     """
     below, here, above = _costs_round(volume, labels)
     curvature = below - 2 * here + above
@@ -37,7 +68,28 @@ def disparity_of(volume: CostVolume, labels: npt.NDArray[np.int64]) -> FloatMap:
 
 
 def distinctness(volume: CostVolume, labels: npt.NDArray[np.int64]) -> FloatMap:
-    """How far the chosen candidates' costs lie below the mean over all, as part of that mean; 0..1, (H, W), float32."""
+    """How far the chosen candidates' costs lie below the mean over all: a confidence.
+
+    Parameters
+    ----------
+    volume : CostVolume
+    labels : ndarray, shape (H, W), int64
+        Numbers of candidates.
+
+    Returns
+    -------
+    ndarray, shape (H, W), float32
+        As part of the mean, 0..1: 1 for a perfect match that stands alone, 0 where all candidates cost the same.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from sepi.matching.cost_volumes import distinctness, least_costs
+    >>> from sepi.stage import CostVolume
+    >>> volume = CostVolume(np.arange(3, dtype=np.float32), np.float16([[[0.75, 0.5]], [[0, 0.5]], [[0.75, 0.5]]]))
+    >>> distinctness(volume, least_costs(volume)).tolist()
+    [[1.0, 0.0]]
+    """
     mean = volume.costs.mean(axis=0, dtype=np.float32)
     least = volume.costs.min(axis=0).astype(np.float32)
     chosen = np.take_along_axis(volume.costs, labels[None], axis=0)[0].astype(np.float32)

@@ -26,7 +26,7 @@ from sepi.lightfield import FloatMap, LightField, as_unit_float
 
 @dataclass(frozen=True)
 class StitchedEpi:
-    """A SEPI for one pixel of the reference view and one candidate disparity.
+    """A SEPI through one row of the reference view for one candidate disparity.
 
     The rows keep their own samples; ``offsets`` says how far each is shifted. Only drawing resamples them, so samples
     along the line are as exact as the views.
@@ -43,6 +43,22 @@ class StitchedEpi:
         Whether the corresponding EPI lies inside its view and the view is present.
     disparity : float
         Candidate, pixels per view step.
+
+    Examples
+    --------
+    In the SEPI of the true disparity, the line through a pixel has one colour:
+
+    >>> from sepi.matching.stitched_epi import StitchedEpi, stitched_epi
+    >>> from sepi.scenes import render
+    >>> light_field = render("fronto_parallel", size=64, views=3)  # of disparity 1
+    >>> right, wrong = (stitched_epi(light_field, 32, disparity) for disparity in (1.0, 0.5))
+    >>> isinstance(right, StitchedEpi), right.image().shape
+    (True, (9, 64, 3))
+    >>> samples, valid = right.along_line(32)
+    >>> samples.shape, bool(valid.all()), bool(samples.std(axis=0).max() < 1e-6)
+    ((9, 3), True, True)
+    >>> bool(wrong.along_line(32)[0].std(axis=0).max() > 0.01)
+    True
     """
 
     rows: FloatMap
@@ -52,7 +68,12 @@ class StitchedEpi:
     disparity: float
 
     def along_line(self, x: int) -> tuple[FloatMap, np.ndarray]:
-        """Samples on the line of the candidate's slope through column ``x`` of the centre row.
+        """Samples on the line of the candidate's slope through one column of the reference view's row.
+
+        Parameters
+        ----------
+        x : int
+            Column of the reference view.
 
         Returns
         -------
@@ -72,7 +93,13 @@ class StitchedEpi:
         return samples.astype(np.float32), valid
 
     def image(self) -> FloatMap:
-        """The SEPI as a picture, shape (T * S, W, C): shifted rows resampled to whole pixels, zero outside."""
+        """The SEPI as a picture.
+
+        Returns
+        -------
+        ndarray, shape (T * S, W, C), float32
+            Shifted rows resampled to whole pixels; zero outside.
+        """
         width = self.rows.shape[1]
         picture = np.zeros_like(self.rows)
         for number, (row, offset) in enumerate(zip(self.rows, self.offsets, strict=True)):
@@ -85,7 +112,7 @@ class StitchedEpi:
 
 
 def stitched_epi(light_field: LightField, y: int, disparity: float) -> StitchedEpi:
-    """Build the SEPI through row ``y`` of the reference view for one candidate (Eq. 1-2).
+    """Build the SEPI through one row of the reference view for one candidate (section III, Eq. 1-2 of [1]_).
 
     Parameters
     ----------
@@ -103,6 +130,22 @@ def stitched_epi(light_field: LightField, y: int, disparity: float) -> StitchedE
     ------
     SepiError
         If the row lies outside the reference view.
+
+    References
+    ----------
+    .. [1] Zhou, Shi, Liu, Jin, Zhang, Hou: Light Field Depth Estimation via Stitched Epipolar Plane Images.
+       arXiv:2203.15201.
+
+    Examples
+    --------
+    >>> from sepi.matching.stitched_epi import stitched_epi
+    >>> from sepi.scenes import render
+    >>> light_field = render("fronto_parallel", size=64, views=3)
+    >>> epi = stitched_epi(light_field, y=32, disparity=1.0)
+    >>> epi.rows.shape  # nine views, stitched row below row
+    (9, 64, 3)
+    >>> epi.offsets.astype(int).tolist()  # the EPIs of three rows of views, shifted against each other
+    [3, 3, 3, 0, 0, 0, -3, -3, -3]
     """
     (T, S), (H, W) = light_field.grid, light_field.shape
     if not 0 <= y < H:

@@ -76,7 +76,10 @@ def with_unknown(light_field: LightField, maps: StageMaps) -> StageMaps:
 
 
 def unknown_pixels(light_field: LightField, disparity: FloatMap) -> BoolMap:
-    """Pixels that no view knows anything about.
+    """Pixels that no view knows anything about: black, overexposed, in a lens's dark corner, or held by few views.
+
+    :func:`sepi.estimate_depth` gives them as the mask ``unknown``; this is for the maps of other programs.
+    docs/outputs.md says what counts.
 
     Parameters
     ----------
@@ -87,6 +90,18 @@ def unknown_pixels(light_field: LightField, disparity: FloatMap) -> BoolMap:
     Returns
     -------
     ndarray, shape (H, W), bool
+
+    Examples
+    --------
+    A light field whose left third is black in every view:
+
+    >>> from sepi.matching.unknown import unknown_pixels
+    >>> from sepi.scenes import render
+    >>> light_field = render("fronto_parallel", size=96, views=3)
+    >>> light_field.views[:, :, :, :32] = 0
+    >>> unknown = unknown_pixels(light_field, light_field.ground_truth)
+    >>> bool(unknown[:, :24].all()), bool(unknown[1:-1, 40:-1].any())
+    (True, False)
     """
     return without_signal(light_field, disparity) | held_by_few(light_field, disparity)
 

@@ -3,6 +3,8 @@
 Examples
 --------
 >>> from sepi.scenes import SCENES, render
+>>> SCENES["fronto_parallel"]
+'one textured plane of disparity exactly 1'
 >>> light_field = render("fronto_parallel", size=64, views=3)
 >>> float(light_field.ground_truth[10, 20])
 1.0

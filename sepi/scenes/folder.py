@@ -21,7 +21,7 @@ FOCUS_DISTANCE_M = 4.25
 BASELINE_MM_AT_512 = 25.0
 
 
-def write_hci(light_field: LightField, folder: Path) -> None:
+def write_hci(light_field: LightField, folder: str | Path) -> None:
     """Write a built-in scene as an HCI 4D benchmark folder, whole or not at all.
 
     The folder holds ``input_CamNNN.png`` (number ``S * t + s``), ``parameters.cfg``, and where they are known
@@ -32,14 +32,27 @@ def write_hci(light_field: LightField, folder: Path) -> None:
     light_field : LightField
         As :func:`sepi.scenes.render` makes it: all views present, uint8 RGB, with a disparity range; rows as far apart
         as columns, which is all that the layout can say.
-    folder : Path
+    folder : str or Path
         Must not exist yet, or be empty.
 
     Raises
     ------
     SepiError
         If rows are another distance apart than columns, views stand off the grid, or the folder cannot be written.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import sepi
+    >>> from sepi.scenes import render, write_hci
+    >>> write_hci(render("dots", size=64, views=3), Path("scenes/dots"))
+    >>> sorted(path.name for path in Path("scenes/dots").iterdir())[:3]
+    ['gt_disp_lowres.pfm', 'input_Cam000.png', 'input_Cam001.png']
+    >>> light_field = sepi.read_light_field("scenes/dots")
+    >>> light_field.disparity_range.source, light_field.camera is not None
+    ('parameters', True)
     """
+    folder = Path(folder)
     if light_field.row_spacing != 1 or light_field.positions is not None:
         raise SepiError(f"{light_field.name}: the layout of the HCI benchmark needs views on a grid of even spacing")
     with atomic_folder(folder) as temporary:

@@ -57,6 +57,22 @@ def render(
     SepiError
         If there is no such scene, size or views is out of bounds, or row spacing or positions are none of a light
         field.
+
+    Examples
+    --------
+    >>> from sepi.scenes import render
+    >>> light_field = render("pyramids", size=64, views=3)
+    >>> light_field.views.shape, light_field.views.dtype.name
+    ((3, 3, 64, 64, 3), 'uint8')
+    >>> light_field.ground_truth.shape, sorted(light_field.masks)
+    ((64, 64), ['occluded', 'textureless'])
+
+    A plane of disparity 1 moves by one pixel from view to view:
+
+    >>> light_field = render("fronto_parallel", size=64, views=3)
+    >>> left, right = light_field.views[1, 1], light_field.views[1, 2]
+    >>> bool((left[:, 1:] == right[:, :-1]).all())
+    True
     """
     # brings the compiler with it
     from sepi.scenes.rendering import drawing, occluded, render_view, visible

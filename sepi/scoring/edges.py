@@ -37,6 +37,14 @@ class Edges:
         There, the disparity half way between the nearest and the most distant surface within ``REACH``.
     foreground : ndarray, shape (H, W), bool
         Pixels of the region that are nearer than that; those with ground truth that are not are background.
+
+    Examples
+    --------
+    >>> from sepi.scenes import render
+    >>> from sepi.scoring.edges import Edges, edges_of
+    >>> edges = edges_of(render("fronto_parallel", size=64, views=2).ground_truth)
+    >>> isinstance(edges, Edges), int(edges.region.sum())  # one plane has no discontinuity
+    (True, 0)
     """
 
     region: BoolMap
@@ -55,6 +63,18 @@ def edges_of(ground_truth: FloatMap) -> Edges:
     Returns
     -------
     Edges
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from sepi.scoring.edges import edges_of
+    >>> truth = np.zeros((3, 8), np.float32)
+    >>> truth[:, 4:] = 1
+    >>> edges = edges_of(truth)
+    >>> edges.region[0].astype(int).tolist(), edges.foreground[0].astype(int).tolist()
+    ([0, 0, 1, 1, 1, 1, 0, 0], [0, 0, 0, 0, 1, 1, 0, 0])
+    >>> edges.middle[0, 2:6].tolist()
+    [0.5, 0.5, 0.5, 0.5]
     """
     # slow to import, and not needed for the tables
     from scipy import ndimage
@@ -84,6 +104,7 @@ def fattening_and_thinning(estimate: FloatMap, edges: Edges, chosen: BoolMap) ->
     estimate : ndarray, shape (H, W), float32
         Disparity in pixels per view step; NaN is on no side.
     edges : Edges
+        Those of the ground truth.
     chosen : ndarray, shape (H, W), bool
         The pixels that are looked at.
 
@@ -93,6 +114,19 @@ def fattening_and_thinning(estimate: FloatMap, edges: Edges, chosen: BoolMap) ->
         Percentage of the background's pixels whose estimate is nearer than the middle; NaN where there is none.
     thinning : float
         Percentage of the foreground's pixels whose estimate is not as near; NaN where there is none.
+
+    Examples
+    --------
+    An estimate whose edge lies a pixel too far out: half of the background beside it is fattened.
+
+    >>> import numpy as np
+    >>> from sepi.scoring.edges import edges_of, fattening_and_thinning
+    >>> truth = np.zeros((3, 8), np.float32)
+    >>> truth[:, 4:] = 1
+    >>> estimate = np.zeros((3, 8), np.float32)
+    >>> estimate[:, 3:] = 1
+    >>> fattening_and_thinning(estimate, edges_of(truth), np.ones(truth.shape, bool))
+    (50.0, 0.0)
     """
     behind = chosen & edges.region & ~edges.foreground
     before = chosen & edges.foreground

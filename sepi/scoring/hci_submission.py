@@ -54,12 +54,25 @@ _MOST_LINES = 10
 
 
 class Entry(NamedTuple):
-    """One scene of a submission."""
+    """One scene of a submission.
+
+    Attributes
+    ----------
+    disparity : Path
+        PFM file of 512 x 512 pixels.
+    seconds : float
+        Run time.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from sepi.scoring.hci_submission import Entry
+    >>> Entry(Path("cotton-depth/disparity.pfm"), 7.7).seconds
+    7.7
+    """
 
     disparity: Path
-    """PFM file."""
     seconds: float
-    """Run time."""
 
 
 def entry_of(folder: Path, runtimes: Mapping[str, float]) -> tuple[str, Entry]:
@@ -92,12 +105,12 @@ def entry_of(folder: Path, runtimes: Mapping[str, float]) -> tuple[str, Entry]:
     return scene, Entry(disparity, runtimes[scene] if scene in runtimes else _read_seconds(runtime))
 
 
-def write_submission(path: Path, entries: Mapping[str, Entry], *, partial: bool = False) -> None:
+def write_submission(path: str | Path, entries: Mapping[str, Entry], *, partial: bool = False) -> None:
     """Write a submission, whole or not at all; equal content gives equal bytes.
 
     Parameters
     ----------
-    path : Path
+    path : str or Path
         Zip archive to write.
     entries : mapping of str to Entry
         By scene.
@@ -108,7 +121,20 @@ def write_submission(path: Path, entries: Mapping[str, Entry], *, partial: bool 
     ------
     SepiError
         If the submission has a problem, as :func:`problems_of` finds it, or cannot be written.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from zipfile import ZipFile
+    >>> import numpy as np
+    >>> from sepi.io.pfm import write_pfm
+    >>> from sepi.scoring.hci_submission import Entry, write_submission
+    >>> write_pfm(Path("disparity.pfm"), np.zeros((512, 512), np.float32))
+    >>> write_submission(Path("submission.zip"), {"cotton": Entry(Path("disparity.pfm"), 7.7)}, partial=True)
+    >>> ZipFile("submission.zip").namelist()
+    ['disp_maps/cotton.pfm', 'runtimes/cotton.txt']
     """
+    path = Path(path)
     files: dict[str, bytes] = {}
     for scene, entry in entries.items():
         files[f"{MAPS}/{scene}.pfm"] = entry.disparity.read_bytes()
@@ -126,12 +152,12 @@ def write_submission(path: Path, entries: Mapping[str, Entry], *, partial: bool 
             raise SepiError(f"{path}: not written: {problems[0]}{more}")
 
 
-def problems_of(path: Path, *, partial: bool = False) -> list[str]:
+def problems_of(path: str | Path, *, partial: bool = False) -> list[str]:
     """What is wrong with a submission.
 
     Parameters
     ----------
-    path : Path
+    path : str or Path
         Zip archive, or a folder with the same content.
     partial : bool
         Take fewer than all scenes.
@@ -145,7 +171,22 @@ def problems_of(path: Path, *, partial: bool = False) -> list[str]:
     ------
     SepiError
         If there is nothing at ``path``, or it cannot be read.
+
+    Examples
+    --------
+    A map of one scene, too small, and without its run time:
+
+    >>> from pathlib import Path
+    >>> import numpy as np
+    >>> from sepi.io.pfm import write_pfm
+    >>> from sepi.scoring.hci_submission import problems_of
+    >>> write_pfm(Path("mine/disp_maps/dino.pfm"), np.zeros((384, 512), np.float32))
+    >>> for problem in problems_of(Path("mine"), partial=True):
+    ...     print(problem)
+    disp_maps/dino.pfm: 512x384 pixels; expected 512x512
+    runtimes/: no such folder with files of the benchmark's scenes
     """
+    path = Path(path)
     try:
         if path.is_dir():
             # files and folders down to the second level

@@ -53,6 +53,18 @@ def occluded(
     -------
     ndarray, shape (H, W), bool
         A pixel that falls outside a view counts as seen by it.
+
+    Examples
+    --------
+    A bar before a plane hides a strip of it from the view to its right, and from no other:
+
+    >>> import numpy as np
+    >>> from sepi.scoring.regions import occluded
+    >>> disparity = np.zeros((5, 12), np.float32)
+    >>> disparity[:, 6:9] = 2
+    >>> baselines = np.array([[(0, 0), (0, 1)]], float)
+    >>> occluded(disparity, baselines)[0].astype(int).tolist()
+    [0, 0, 0, 0, 1, 1, 0, 0, 0, 0, 0, 0]
     """
     reach = np.abs(baselines).max(axis=2).ravel()
     # far views hide most: looking at them first ends the search early; those that stand where the reference view does
@@ -70,7 +82,8 @@ def textureless(reference_view: FloatMap) -> BoolMap:
     """Pixels of the reference view round which the image hardly changes.
 
     The energy is the squared gradient, averaged over the channels and over a window of ``WINDOW`` pixels; its root is
-    compared with ``ENERGY_THRESHOLD``. Patches and holes under ``MIN_AREA`` are removed.
+    compared with ``ENERGY_THRESHOLD`` (0.005 of the full range per pixel). Patches and holes under ``MIN_AREA`` (225
+    pixels) are removed.
 
     Parameters
     ----------
@@ -80,6 +93,16 @@ def textureless(reference_view: FloatMap) -> BoolMap:
     Returns
     -------
     ndarray, shape (H, W), bool
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from sepi.scoring.regions import textureless
+    >>> view = np.full((64, 64, 3), 0.5, np.float32)
+    >>> view[:, 32:] += np.random.default_rng(0).normal(0, 0.1, (64, 32, 3)).astype(np.float32)
+    >>> flat = textureless(view)
+    >>> bool(flat[:, :28].all()), bool(flat[:, 32:].any())
+    (True, False)
     """
     energy = np.zeros(reference_view.shape[:2], np.float32)
     for channel in range(reference_view.shape[2]):

@@ -4,6 +4,20 @@ Readers find a grid of views in the files, the *given* grid. What :class:`ReadOp
 light field's grid: ``central`` cuts out its middle, ``order`` flips and transposes it, ``exclude`` leaves views out.
 Positions that a user gives (``exclude``, ``view``) are always those in the light field's own grid, as ``sepi info``
 counts them.
+
+Examples
+--------
+What the orders do to a grid of 2 x 3 views:
+
+>>> import numpy as np
+>>> from sepi.io.readers.options import ORDERS
+>>> list(ORDERS)[:5]
+['as-given', 'flip-rows', 'flip-columns', 'flip-both', 'transpose']
+>>> views = np.arange(6).reshape(2, 3)
+>>> ORDERS["flip-rows"](views).tolist()
+[[3, 4, 5], [0, 1, 2]]
+>>> ORDERS["transpose"](views).tolist()
+[[0, 3], [1, 4], [2, 5]]
 """
 
 from __future__ import annotations
@@ -65,6 +79,27 @@ class ReadOptions:
         the next.
     follow_links : bool
         Read views that are links to files outside their folder.
+
+    Examples
+    --------
+    Pictures named by column and row, of which the corner ones are left out:
+
+    >>> from pathlib import Path
+    >>> import cv2
+    >>> import sepi
+    >>> from sepi.scenes import render
+    >>> light_field = render("pyramids", size=96, views=3)
+    >>> Path("pictures").mkdir()
+    >>> for t in range(3):
+    ...     for s in range(3):
+    ...         written = cv2.imwrite(f"pictures/x{s}_y{t}.png", light_field.views[t, s, :, :, ::-1])
+    >>> corners = ("0,0", "0,2", "2,0", "2,2")
+    >>> options = sepi.ReadOptions(pattern="x{column}_y{row}.png", exclude=corners)
+    >>> cross = sepi.read_light_field("pictures", options=options)
+    >>> cross.present.astype(int).tolist()
+    [[0, 1, 0], [1, 1, 1], [0, 1, 0]]
+    >>> bool((cross.views[0, 1] == light_field.views[0, 1]).all())
+    True
     """
 
     grid: tuple[int, int] | None = None

@@ -34,6 +34,21 @@ class Curves:
         Subsets of the views, as :func:`sepi.matching.view_subsets.halves_and_quarters` names them.
     costs : ndarray, shape (N, K), float32
         Aggregated mean of the robust photo-consistency (Eq. 3), 0..1; 1 where no view of the subset sees the pixel.
+
+    Examples
+    --------
+    A pixel with an occluder on its right is hidden from views to the right, and seen well by those to the left:
+
+    >>> from sepi import initial
+    >>> from sepi.report.probes.curves import Curves, cost_curves
+    >>> from sepi.scenes import render
+    >>> light_field = render("curved_occluders", size=96, views=5)
+    >>> found = cost_curves(light_field, 24, 6, initial.CHOICES["sepi"].parameters(num_disparities=61))
+    >>> isinstance(found, Curves), found.names[:5]
+    (True, ('full', 'left', 'right', 'up', 'down'))
+    >>> lowest = {name: found.minimum(name)[1] for name in ("full", "left", "right")}
+    >>> lowest["left"] < lowest["full"] < lowest["right"]
+    True
     """
 
     disparities: FloatMap
@@ -41,9 +56,21 @@ class Curves:
     costs: FloatMap
 
     def minimum(self, name: str = "full") -> tuple[float, float]:
-        """Disparity at a subset's lowest cost, refined below the candidate step by a parabola, and that cost (Eq. 4).
+        """Where a subset's cost is lowest (Eq. 4).
 
         As the sweep takes it: the first of equal minima; no parabola at the ends or through a perfect match.
+
+        Parameters
+        ----------
+        name : str
+            Of the subset.
+
+        Returns
+        -------
+        disparity : float
+            Refined below the candidate step by a parabola; pixels per view step.
+        cost : float
+            The lowest, 0..1.
         """
         costs = self.costs[self.names.index(name)].astype(np.float64)
         best = int(costs.argmin())
@@ -56,12 +83,20 @@ class Curves:
         return float(self.disparities[best]) + offset * step, float(costs[best])
 
     def best_subset(self) -> str:
-        """Name of the subset with the lowest cost of all; the first of equal ones."""
+        """The subset of views that sees the pixel best.
+
+        Returns
+        -------
+        str
+            Name of that with the lowest cost of all; the first of equal ones.
+        """
         return self.names[int(self.costs.min(axis=1).argmin())]
 
 
 def cost_curves(light_field: LightField, y: int, x: int, parameters: SweepParameters) -> Curves:
-    """Cost of every candidate at one pixel, as :func:`sepi.matching.plane_sweep.sweep` minimises it.
+    """Cost of every candidate at one pixel, as the initial depth (:func:`sepi.initial.sepi`) minimises it.
+
+    Eq. 3 of [1]_, aggregated over the window of the sweep.
 
     Parameters
     ----------
@@ -79,6 +114,24 @@ def cost_curves(light_field: LightField, y: int, x: int, parameters: SweepParame
     ------
     SepiError
         If the pixel lies outside the reference view or the disparity range is unknown.
+
+    References
+    ----------
+    .. [1] Zhou, Shi, Liu, Jin, Zhang, Hou: Light Field Depth Estimation via Stitched Epipolar Plane Images.
+       arXiv:2203.15201.
+
+    Examples
+    --------
+    >>> from sepi import initial
+    >>> from sepi.report.probes.curves import cost_curves
+    >>> from sepi.scenes import render
+    >>> light_field = render("fronto_parallel", size=64, views=3)
+    >>> found = cost_curves(light_field, 32, 32, initial.CHOICES["sepi"].parameters(num_disparities=41))
+    >>> found.disparities.shape, found.costs.shape  # all views, four halves and four quarters
+    ((41,), (9, 41))
+    >>> disparity, cost = found.minimum("full")
+    >>> round(disparity, 2), cost < 0.01
+    (1.0, True)
     """
     require_inside(light_field, y, x)
     (t0, s0), (H, W) = light_field.reference_position, light_field.shape
