@@ -15,6 +15,7 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from sepi.applications.refocusing import all_in_focus, refocus
     from sepi.errors import SepiError, SepiWarning
     from sepi.io.readers.options import ReadOptions
     from sepi.io.result_folder import write_result
@@ -31,8 +32,10 @@ __all__ = [
     "SepiError",
     "SepiWarning",
     "__version__",
+    "all_in_focus",
     "estimate_depth",
     "read_light_field",
+    "refocus",
     "write_result",
 ]
 
@@ -42,8 +45,10 @@ _HOME = {
     "ReadOptions": "sepi.io.readers.options",
     "SepiError": "sepi.errors",
     "SepiWarning": "sepi.errors",
+    "all_in_focus": "sepi.applications.refocusing",
     "estimate_depth": "sepi.pipeline",
     "read_light_field": "sepi.reading",
+    "refocus": "sepi.applications.refocusing",
     "write_result": "sepi.io.result_folder",
 }
 

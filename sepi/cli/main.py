@@ -15,6 +15,7 @@ from sepi.cli.compare import compare
 from sepi.cli.evaluate import evaluate
 from sepi.cli.info import check, info, range_text, size_text
 from sepi.cli.input_options import Geometry, Reading, camera_flags, reading_flags
+from sepi.cli.refocus import refocus
 from sepi.cli.results import check_submission, points, submission
 from sepi.command import SepiGroup, progress_bar
 from sepi.errors import SepiError
@@ -178,7 +179,7 @@ def scenes(names: tuple[str, ...], output: Path, size: int, views: int, only_lis
         click.echo(f"written: {output / name}/")
 
 
-for command in (info, check, evaluate, compare, points, submission, check_submission):
+for command in (info, check, evaluate, compare, points, refocus, submission, check_submission):
     main.add_command(command)
 
 
