@@ -2,8 +2,9 @@
 
 The views of a light field are samples of one large lens, the *synthetic aperture*. Sheared by a disparity, they show
 its points at the same place, and their mean is the photograph that the lens would have taken, focused there [1]_:
-:func:`refocus`. It needs no map. With the map of the reference view, each pixel can be focused at its own disparity:
-:func:`all_in_focus`, the reference view with the light of all views that see its points, and so with less noise.
+:func:`refocus`. It needs no map; with one, the gaps between the views are filled. And with a map, each pixel can be
+focused at its own disparity: :func:`all_in_focus`, the reference view with the light of all views that see its points,
+and so with less noise.
 
 References
 ----------
@@ -15,6 +16,7 @@ from __future__ import annotations
 
 import math
 
+import cv2
 import numpy as np
 
 from sepi.errors import SepiError
@@ -32,23 +34,35 @@ COLOUR_SCALE = 0.0316
 ROUNDS = 2
 """Times that the mean of the views is made: the first expects the reference view's colour, the next the first mean."""
 
+# sides in pixels of the windows by which holes are filled, one after the other; together they reach 16 pixels
+_FILL = (3, 3, 5, 9, 17)
+
 BEYOND = 0.005
 """Part of a map's pixels beyond each end of a focal stack, so that a few wrong ones do not stretch it."""
 
 
 def refocus(
-    light_field: LightField, disparity: float, *, aperture: float | None = None, progress: Progress = no_progress
+    light_field: LightField,
+    disparity: float,
+    maps: StageMaps | FloatMap | None = None,
+    *,
+    aperture: float | None = None,
+    progress: Progress = no_progress,
 ) -> FloatMap:
     """The picture of the synthetic aperture, focused at one disparity.
 
     What lies nearer or farther is out of focus: the more so, the larger the aperture. Where neighbouring views see it
-    more than about a pixel apart, it shows as many sharp copies instead of a blur, since there are no views between.
+    more than about a pixel apart, it would show as many sharp copies instead of a blur. A map tells how far apart they
+    are, and each view is taken for all those that could stand round it, half way to its neighbours.
 
     Parameters
     ----------
     light_field : LightField
     disparity : float
         Pixels per view step. Points of this disparity are sharp.
+    maps : StageMaps, or ndarray of shape (H, W), float32, optional
+        Maps of the reference view, or its disparity in pixels per view step, to fill in the views between the views;
+        the mean of the views alone unless given.
     aperture : float, optional
         Radius of the aperture in view steps, round the reference view: the views in that disc are used. All views
         unless given.
@@ -64,7 +78,8 @@ def refocus(
     Raises
     ------
     SepiError
-        If the disparity is not finite, or the aperture no positive number or too small for any view but one.
+        If the disparity is not finite, the map does not have the views' shape, or the aperture is no positive number or
+        too small for any view but one.
 
     Examples
     --------
@@ -77,6 +92,7 @@ def refocus(
     """
     if not math.isfinite(disparity):
         raise SepiError(f"{light_field.name}: disparity to focus at must be a finite number, got {disparity}")
+    surfaces = None if maps is None else _surfaces(_disparity_of(light_field, maps))
     height, width = light_field.shape
     moved = disparity * light_field.baselines
     # of others no pixel is left
@@ -88,8 +104,10 @@ def refocus(
         one_row = np.zeros_like(chosen)
         one_row[t] = chosen[t]
         if one_row.any():
-            views = ShearedViews(light_field, one_row)
-            for sheared, (down, across) in zip(views.at(disparity), moved[one_row], strict=True):
+            views = ShearedViews(light_field, one_row).at(disparity)
+            if surfaces is not None:
+                views = _filled_between(light_field, one_row, views, surfaces, disparity)
+            for sheared, (down, across) in zip(views, moved[one_row], strict=True):
                 inside = _held(down, height), _held(across, width)
                 sums[:, *inside] += sheared[:, *inside]
                 counts[inside] += 1
@@ -136,21 +154,14 @@ def all_in_focus(
         If the map does not have the views' shape, or the aperture is no positive number or too small for any view but
         one.
     """
-    disparity = np.asarray(maps.disparity if isinstance(maps, StageMaps) else maps, np.float32)
-    if disparity.shape != light_field.shape:
-        raise SepiError(
-            f"{light_field.name}: the map must have the views' shape (H, W) = {light_field.shape}, got "
-            f"{disparity.shape}"
-        )
+    disparity = _disparity_of(light_field, maps)
     others = views_within(light_field, aperture)
     others[light_field.reference_position] = False
-    known = np.isfinite(disparity)
     reference = as_unit_float(light_field.views[light_field.reference_position])
-    if not known.any():
+    surfaces = _surfaces(disparity)
+    if surfaces is None:
         return np.clip(reference, 0, 1)
-    # what is not finite hides nothing, and is hidden by nothing
-    surfaces = np.where(known, disparity, disparity[known].min()).astype(np.float32)
-    disparity = np.where(known, disparity, np.float32(np.nan))
+    disparity = np.where(np.isfinite(disparity), disparity, np.float32(np.nan))
     channels = reference.shape[2]
     noise = variance_of_residuals(noise_level(light_field.reference_view), channels)
     scale2 = np.float32(COLOUR_SCALE**2 * channels / 3 + noise)
@@ -226,6 +237,74 @@ def evenly_spaced(low: float, high: float, count: int) -> list[float]:
     if count == 1 or high <= low:
         return [(low + high) / 2]
     return [float(value) for value in np.linspace(high, low, count)]
+
+
+def _disparity_of(light_field: LightField, maps: StageMaps | FloatMap) -> FloatMap:
+    """The disparity of maps, which must have the views' shape."""
+    disparity = np.asarray(maps.disparity if isinstance(maps, StageMaps) else maps, np.float32)
+    if disparity.shape != light_field.shape:
+        raise SepiError(
+            f"{light_field.name}: the map must have the views' shape (H, W) = {light_field.shape}, got "
+            f"{disparity.shape}"
+        )
+    return disparity
+
+
+def _surfaces(disparity: FloatMap) -> FloatMap | None:
+    """A map in which what is not finite hides nothing: it is as far as the farthest; None if nothing is finite."""
+    known = np.isfinite(disparity)
+    return np.where(known, disparity, disparity[known].min()).astype(np.float32) if known.any() else None
+
+
+def _cell(light_field: LightField) -> FloatMap:
+    """Height and width in view steps of what a view stands for: the usual distance to its neighbours; 0 without any."""
+    baselines, present = light_field.baselines, light_field.present
+    found = []
+    for axis in (0, 1):
+        steps = np.diff(baselines[..., axis], axis=axis)
+        both = np.logical_and(*(np.take(present, range(k, present.shape[axis] - 1 + k), axis) for k in (0, 1)))
+        found.append(float(np.median(np.abs(steps[both]))) if both.any() else 0.0)
+    return np.array(found, np.float32)
+
+
+def _filled_between(
+    light_field: LightField, chosen: BoolMap, views: FloatMap, surfaces: FloatMap, focus: float
+) -> FloatMap:
+    """Sheared views ``(N, 3, H, W)`` of one row of the grid, each with the views round it."""
+    from sepi.applications.refocusing_kernels import fill_between
+    from sepi.matching.visibility_kernels import z_buffers
+
+    height, width = light_field.shape
+    baselines, cell = light_field.baselines, _cell(light_field)
+    (t,) = np.flatnonzero(chosen.any(axis=1)).tolist()
+    nearest = z_buffers(surfaces, chosen[t : t + 1], baselines[t : t + 1], 0, height)[0]
+    filled = np.empty_like(views)
+    for n, s in enumerate(np.flatnonzero(chosen[t]).tolist()):
+        seen = _without_holes(nearest[s], focus)
+        down, across = focus * baselines[t, s]
+        rows = np.clip(np.rint(np.arange(height) - down), 0, height - 1).astype(int)
+        columns = np.clip(np.rint(np.arange(width) - across), 0, width - 1).astype(int)
+        here = np.ascontiguousarray(seen[np.ix_(rows, columns)])
+        fill_between(views[n], here, np.float32(focus), cell, np.float32(OCCLUSION_MARGIN), filled[n])
+    return filled
+
+
+def _without_holes(nearest: FloatMap, otherwise: float) -> FloatMap:
+    """A z-buffer whose holes, which show what the reference view does not see, have the farthest surface beside them.
+
+    What is farther inside than holes usually reach gets the disparity ``otherwise``.
+    """
+    from sepi.matching.visibility_kernels import EMPTY
+
+    empty = nearest == EMPTY
+    found = np.where(empty, np.float32(np.inf), nearest)
+    if empty.any():
+        for side in _FILL:
+            window = np.ones((side, side), np.uint8)
+            # beyond the border nothing is known
+            beside = cv2.erode(found, window, borderType=cv2.BORDER_CONSTANT, borderValue=(np.inf,))
+            found = np.where(empty, beside, found)
+    return np.where(np.isinf(found), np.float32(otherwise), found).astype(np.float32)
 
 
 def _held(moved: float, length: int) -> slice:

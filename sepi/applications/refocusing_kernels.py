@@ -8,6 +8,9 @@ from typing import Any
 import numpy as np
 from numba import njit, prange
 
+WIDEST = np.float32(17)
+"""Pixels of a box at most: views whose pictures of a point are farther apart show it more than once."""
+
 
 @njit(inline="always")
 def _cubic_weights(f: Any, out: Any) -> None:
@@ -84,3 +87,87 @@ def add_view(
             for c in range(C):
                 sums[y, x, c] += weight * found[c]
             weights[y, x] += weight
+
+
+@njit(inline="always")
+def _covered(dy: int, dx: int, height: Any, width: Any) -> Any:
+    """Share that falls on a pixel this far away of a box that is at least a pixel high and wide."""
+    half, zero, one = np.float32(0.5), np.float32(0), np.float32(1)
+    down = min(one, max(zero, half * height + half - abs(dy)))
+    across = min(one, max(zero, half * width + half - abs(dx)))
+    return down * across / (height * width)
+
+
+@njit(inline="always")
+def _box(disparity: Any, focus: Any, cell: Any) -> Any:
+    """Height and width of the box over which a point moves while the camera moves through its cell."""
+    one, off = np.float32(1), abs(disparity - focus)
+    return min(WIDEST, max(one, off * cell[0])), min(WIDEST, max(one, off * cell[1]))
+
+
+@njit(inline="always")
+def _add_box(sheared: Any, surfaces: Any, focus: Any, cell: Any, margin: Any, place: Any, sums: Any) -> None:
+    """Sums over the pixels whose light falls on one pixel; ``place``: its row and column, and how far boxes reach.
+
+    ``sums (2, C + 1)``: colours and shares of what is nearer, and of all else.
+    """
+    C, H, W = sheared.shape
+    y, x, rows, columns = place
+    own = surfaces[y, x]
+    height, width = _box(own, focus, cell)
+    for i in range(max(0, y - rows), min(H, y + rows + 1)):
+        for j in range(max(0, x - columns), min(W, x + columns + 1)):
+            other = surfaces[i, j]
+            a, b = _box(other, focus, cell)
+            if other < own - margin:
+                # what is behind shows where the pixel's own surface moves away
+                a, b = height, width
+            share = _covered(i - y, j - x, a, b)
+            if share > 0:
+                total = sums[0] if other > own + margin else sums[1]
+                for c in range(C):
+                    total[c] += share * sheared[c, i, j]
+                total[C] += share
+
+
+@njit(parallel=True, cache=True)
+def fill_between(sheared: Any, surfaces: Any, focus: Any, cell: Any, margin: Any, out: Any) -> None:
+    """One sheared view as the mean of all the views that could be taken in its cell of the aperture.
+
+    While the camera moves through the cell, each point moves over a box: its disparity's distance from the focus, times
+    the cell. Nearer points cover a pixel for the share of the cell in which they are before it.
+
+    Parameters
+    ----------
+    sheared : ndarray, shape (C, H, W), float32
+        The view, sheared by the disparity ``focus``.
+    surfaces : ndarray, shape (H, W), float32
+        Disparities of what it shows, finite, pixels per view step.
+    focus : float32
+        Pixels per view step.
+    cell : ndarray, shape (2,), float32
+        Height and width of the cell in view steps.
+    margin : float32
+        By how much one surface must be nearer to stand before another, pixels per view step.
+    out : ndarray, shape (C, H, W), float32
+        Filled.
+    """
+    C, H, W = sheared.shape
+    one, half = np.float32(1), np.float32(0.5)
+    tallest, widest = one, one
+    for y in range(H):
+        for x in range(W):
+            height, width = _box(surfaces[y, x], focus, cell)
+            tallest, widest = max(tallest, height), max(widest, width)
+    rows, columns = math.ceil(half * tallest - half), math.ceil(half * widest - half)
+    for y in prange(H):
+        sums = np.empty((2, C + 1), np.float32)
+        for x in range(W):
+            sums[:] = 0
+            _add_box(sheared, surfaces, focus, cell, margin, (y, x, rows, columns), sums)
+            near, rest = sums[0], sums[1]
+            hidden = min(one, near[C])
+            for c in range(C):
+                out[c, y, x] = (one - hidden) * rest[c] / rest[C]
+                if near[C] > 0:
+                    out[c, y, x] += hidden * near[c] / near[C]

@@ -106,7 +106,7 @@ def refocus(
     focus.csv          disparity of each picture, and its depth in metres where the camera is known
 
     Without RESULT no map is computed: the stack goes through the range of disparities that INPUT states or its views
-    tell, and there is no all_in_focus.png.
+    tell, the gaps between the views show where it is out of focus, and there is no all_in_focus.png.
 
     \b
     Examples:
@@ -139,7 +139,10 @@ def refocus(
         sharp = None
         if result is not None:
             sharp = all_in_focus(light_field, result.disparity, progress=lambda fraction: progress(share * fraction))
-        pictures = _stack(light_field, foci, aperture, lambda fraction: progress(share + (1 - share) * fraction))
+        surfaces = None if result is None else result.disparity
+        pictures = _stack(
+            light_field, foci, surfaces, aperture, lambda fraction: progress(share + (1 - share) * fraction)
+        )
         files = write_refocused(folder, foci, pictures, sharp, light_field.views.dtype, animated=animation)
     click.echo(f"focused at: {_listed(foci)}")
     if result is None:
@@ -211,7 +214,11 @@ def _depth(camera: Camera, disparity: float) -> float:
 
 
 def _stack(
-    light_field: LightField, foci: Sequence[Focus], aperture: float | None, progress: Progress
+    light_field: LightField,
+    foci: Sequence[Focus],
+    surfaces: FloatMap | None,
+    aperture: float | None,
+    progress: Progress,
 ) -> Iterator[FloatMap]:
     """The picture of each focus, made when it is asked for."""
     from sepi.applications import refocusing
@@ -221,7 +228,7 @@ def _stack(
         def part(fraction: float, done: int = number) -> None:
             progress((done + fraction) / len(foci))
 
-        yield refocusing.refocus(light_field, focus.disparity, aperture=aperture, progress=part)
+        yield refocusing.refocus(light_field, focus.disparity, surfaces, aperture=aperture, progress=part)
 
 
 def _listed(foci: Sequence[Focus]) -> str:

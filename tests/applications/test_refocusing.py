@@ -12,7 +12,7 @@ from several_threads import several_threads
 
 from sepi.applications import refocusing
 from sepi.applications.refocusing import all_in_focus, evenly_spaced, focal_stack, refocus, views_within
-from sepi.applications.refocusing_kernels import add_view
+from sepi.applications.refocusing_kernels import WIDEST, add_view, fill_between
 from sepi.errors import SepiError
 from sepi.lightfield import FloatMap, LightField
 from sepi.scenes import render
@@ -105,14 +105,17 @@ def test_a_constant_picture_stays_constant(kind: str) -> None:
     disparity = np.random.default_rng(0).uniform(-2, 2, (16, 18)).astype(np.float32)
     np.testing.assert_array_equal(all_in_focus(light_field, disparity), expected)
     for value in (0.0, 0.37, -1.9):
-        found = refocus(light_field, value)
-        np.testing.assert_allclose(found, expected, atol=1e-6)
-        np.testing.assert_array_equal(np.rint(found * 65535), np.rint(expected * 65535))
+        for maps in (None, disparity):
+            found = refocus(light_field, value, maps)
+            np.testing.assert_allclose(found, expected, atol=1e-6)
+            np.testing.assert_array_equal(np.rint(found * 65535), np.rint(expected * 65535))
 
 
 def test_far_beyond_the_picture_the_reference_view_is_alone() -> None:
     """A disparity with a slipped decimal point gives a picture, and no crash."""
     light_field = random_field()
+    constant = LightField(np.full((3, 3, 40, 50, 1), 77, np.uint8), "constant")
+    assert np.ptp(refocus(constant, 1e30, np.zeros((40, 50), np.float32))) < 1e-5
     for value in (1e30, -1e9, 50.0):
         np.testing.assert_allclose(refocus(light_field, value), light_field.reference_view, atol=1e-6)
 
@@ -153,6 +156,98 @@ def test_kernel_equals_a_plain_twin(channels: int) -> None:
         np.testing.assert_allclose(weights - 1, expected[1], atol=1e-5)
         seen += np.count_nonzero(expected[1])
     assert 0 < seen < 4 * disparity.size
+
+
+def box_twin(disparity: float, focus: float, cell: np.ndarray) -> tuple[float, float]:
+    height, width = np.clip(abs(disparity - focus) * cell.astype(float), 1, float(WIDEST))
+    return height, width
+
+
+def covered_twin(distance: int, length: float) -> float:
+    """Share that a pixel holds of a line of this length round another pixel's middle."""
+    low, high = max(-length / 2, distance - 0.5), min(length / 2, distance + 0.5)
+    return max(0.0, high - low) / length
+
+
+def filled_twin(sheared: np.ndarray, surfaces: np.ndarray, focus: float, cell: np.ndarray, margin: float) -> np.ndarray:
+    """Every pixel from every other one."""
+    filled = np.zeros(sheared.shape)
+    for y, x in np.ndindex(*surfaces.shape):
+        own = surfaces[y, x]
+        near, rest = np.zeros(4), np.zeros(4)
+        for i, j in np.ndindex(*surfaces.shape):
+            other = surfaces[i, j]
+            height, width = box_twin(own if other < own - margin else other, focus, cell)
+            share = covered_twin(i - y, height) * covered_twin(j - x, width)
+            total = near if other > own + margin else rest
+            total += share * np.append(sheared[:, i, j], 1)
+        hidden = min(1.0, near[3])
+        filled[:, y, x] = (1 - hidden) * rest[:3] / rest[3]
+        if near[3]:
+            filled[:, y, x] += hidden * near[:3] / near[3]
+    return filled
+
+
+@pytest.mark.parametrize("cell", [(1.0, 1.0), (0.43, 1.3), (0.0, 2.0)])
+def test_filling_equals_a_plain_twin(cell: tuple[float, float]) -> None:
+    """Out of focus, every pixel of a picture with a map is made so, beside outlines and borders too."""
+    random = np.random.default_rng(5)
+    sheared = random.random((3, 10, 12), np.float32)
+    surfaces = random.choice(np.array([-2.5, -0.3, -0.25, 0.7, 3.1], np.float32), (10, 12))
+    for focus in (-0.3, 3.1, 30.0):
+        out = np.full_like(sheared, np.nan)
+        fill_between(sheared, surfaces, np.float32(focus), np.array(cell, np.float32), np.float32(0.15), out)
+        expected = filled_twin(sheared, surfaces, focus, np.array(cell), 0.15)
+        np.testing.assert_allclose(out, expected, atol=2e-6)
+
+
+def test_in_focus_nothing_is_filled() -> None:
+    """What is sharp stays as sharp as without a map, to the last bit."""
+    plane = render("fronto_parallel", size=64, views=3)
+    np.testing.assert_array_equal(refocus(plane, 1.2, truth_of(plane)), refocus(plane, 1.2))
+
+
+@pytest.fixture(scope="module")
+def lens() -> LightField:
+    """What takes the place of a real lens: views twice as close together, over the aperture of 5 x 5."""
+    places = (np.arange(11) - 5) * 5 / 11
+    positions = np.stack(np.meshgrid(places, places, indexing="ij"), axis=2)
+    return render("curved_occluders", size=80, views=11, positions=positions)
+
+
+@pytest.mark.parametrize("focus", [-2.5, 1.9])
+def test_with_a_map_the_blur_is_that_of_a_lens(lens: LightField, focus: float) -> None:
+    """Without, the background behind a portrait is a comb of copies."""
+    few = render("curved_occluders", size=80, views=5)
+    expected = refocus(lens, focus, truth_of(few))
+    assert psnr(refocus(few, focus, truth_of(few)), expected) > psnr(refocus(few, focus), expected) + 3
+
+
+@pytest.mark.parametrize("geometry", GEOMETRIES)
+def test_gaps_are_as_wide_as_the_views_stand_apart(geometry: str) -> None:
+    """Rows that are closer together leave smaller gaps: of a flat picture, the blur would be too large."""
+    field = random_field((4, 3), **standing(geometry, (4, 3)))
+    expected = (0.43, 1.0) if geometry == "closer rows" else (1.0, 1.0)
+    np.testing.assert_allclose(refocusing._cell(field), expected, atol=0.25 if geometry == "off the grid" else 1e-6)
+    present = np.zeros((4, 3), bool)
+    present[2, :2] = True
+    row = random_field((4, 3), present=present, view=(2, 1))
+    np.testing.assert_allclose(refocusing._cell(row), (0, 1))
+
+
+def test_holes_show_the_farthest_beside_them() -> None:
+    """What comes into sight behind an object belongs to the background."""
+    from sepi.matching.visibility_kernels import EMPTY
+
+    nearest = np.full((9, 60), -0.5, np.float32)
+    nearest[:, 30:] = 2
+    nearest[:, 25:30] = EMPTY
+    expected = np.where(nearest == EMPTY, np.float32(-0.5), nearest)
+    np.testing.assert_array_equal(refocusing._without_holes(nearest, 9), expected)
+    nearest[:, :59] = EMPTY
+    found = refocusing._without_holes(nearest, 9)
+    assert (found[:, 43:] == 2).all()
+    assert (found[:, :43] == 9).all()
 
 
 @pytest.fixture(scope="module")
@@ -254,6 +349,8 @@ def test_pixels_of_unknown_disparity_stay_as_they_are() -> None:
     np.testing.assert_array_equal(found[45:], whole[45:])
     nothing = np.full(light_field.shape, np.nan, np.float32)
     np.testing.assert_array_equal(all_in_focus(light_field, nothing), light_field.reference_view)
+    np.testing.assert_array_equal(refocus(light_field, 0.3, nothing), refocus(light_field, 0.3))
+    assert np.isfinite(refocus(light_field, 0.3, disparity)).all()
 
 
 def test_maps_are_taken_as_a_whole() -> None:
@@ -271,7 +368,8 @@ def test_any_number_of_threads_gives_the_same_bytes() -> None:
     try:
         for count in (1, threads):
             numba.set_num_threads(count)
-            found.append((all_in_focus(light_field, truth_of(light_field)), refocus(light_field, 0.3)))
+            truth = truth_of(light_field)
+            found.append((all_in_focus(light_field, truth), refocus(light_field, 0.3), refocus(light_field, 2, truth)))
     finally:
         numba.set_num_threads(threads)
     for one, several in zip(*found, strict=True):
@@ -328,6 +426,7 @@ def test_a_stack_goes_from_near_to_far() -> None:
         ),
         (lambda field: all_in_focus(field, np.zeros((9, 10), np.float32)), r"\(9, 11\), got \(9, 10\)"),
         (lambda field: all_in_focus(field, np.zeros((9, 11), np.float32), aperture=-1), "radius above 0"),
+        (lambda field: refocus(field, 0.0, np.zeros((4, 11), np.float32)), r"\(9, 11\), got \(4, 11\)"),
         (lambda _: focal_stack(np.full((3, 3), np.nan, np.float32), 3), "no pixel of known disparity"),
     ],
 )
