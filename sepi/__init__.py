@@ -23,6 +23,7 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from sepi.applications.refocusing import all_in_focus, refocus
     from sepi.camera import Camera
     from sepi.errors import SepiError, SepiWarning
     from sepi.io.readers.options import ReadOptions
@@ -53,9 +54,11 @@ __all__ = [
     "SepiWarning",
     "StageMaps",
     "__version__",
+    "all_in_focus",
     "estimate_depth",
     "read_light_field",
     "read_result",
+    "refocus",
     "write_result",
 ]
 
@@ -70,6 +73,8 @@ _HOME = {
     "estimate_depth": "sepi.pipeline",
     "read_light_field": "sepi.reading",
     "read_result": "sepi.io.result_folder",
+    "all_in_focus": "sepi.applications.refocusing",
+    "refocus": "sepi.applications.refocusing",
     "write_result": "sepi.io.result_folder",
 }
 

@@ -146,6 +146,7 @@ def score_regions(
     masks: Mapping[str, BoolMap] | None = None,
     protocols: Mapping[str, int] = PROTOCOLS,
     edges: Edges | None = None,
+    within: BoolMap | None = None,
 ) -> AllScores:
     """Scores of a disparity map by every protocol and over every region.
 
@@ -159,6 +160,9 @@ def score_regions(
         Protocol to the pixels left out on each side.
     edges : Edges, optional
         Those of the ground truth, which are found unless given.
+    within : ndarray, shape (H, W), bool, optional
+        The pixels that count in every region, such as those of a crop (:func:`sepi.scoring.crops.in_frame`); all
+        unless given.
 
     Returns
     -------
@@ -189,6 +193,8 @@ def score_regions(
     """
     edges = edges or edges_of(ground_truth)
     regions: dict[str, BoolMap | None] = {WHOLE_MAP: None, **(masks or {DISCONTINUITIES: edges.region})}
+    if within is not None:
+        regions = {name: within if mask is None else within & mask for name, mask in regions.items()}
     return {
         protocol: {name: score(estimate, ground_truth, border, mask, edges) for name, mask in regions.items()}
         for protocol, border in protocols.items()

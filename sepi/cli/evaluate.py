@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from sepi.cli.input_options import Reading, reading_flags
+from sepi.cli.input_options import Pair, Reading, reading_flags
 from sepi.cli.scene_argument import read_ground_truth
 from sepi.command import SepiCommand
 from sepi.errors import SepiError
@@ -24,9 +25,22 @@ _PATH = click.Path(path_type=Path)
 @click.argument("estimate", type=_PATH)
 @click.argument("ground_truth", metavar="GROUND_TRUTH|SCENE", type=_PATH)
 @click.option("--border", type=click.IntRange(min=0), help="Score with this many pixels left out on each side only.")
+@click.option(
+    "--offset",
+    type=Pair("ROW,COLUMN", ","),
+    metavar="ROW,COLUMN",
+    help="ESTIMATE is a crop: where its top left pixel lies in the ground truth, counted from 0.",
+)
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 @reading_flags
-def evaluate(estimate: Path, ground_truth: Path, border: int | None, as_json: bool, reading: Reading) -> None:
+def evaluate(
+    estimate: Path,
+    ground_truth: Path,
+    border: int | None,
+    offset: tuple[int, int] | None,
+    as_json: bool,
+    reading: Reading,
+) -> None:
     """Score the disparity map ESTIMATE against ground truth.
 
     ESTIMATE is a PFM, an HDF5 file with a dataset 'disparity', a NumPy file (.npy), a 'disparity_16bit.png', or a
@@ -34,30 +48,66 @@ def evaluate(estimate: Path, ground_truth: Path, border: int | None, as_json: bo
     to have its occluded and textureless regions scored too. Give the flags of 'sepi depth' that say how to read the
     SCENE here, too. A folder that 'sepi depth' wrote knows which view it belongs to.
 
-    Both protocols are used: 'paper' scores the whole map, 'benchmark' leaves out 15 pixels on each side.
+    Both protocols are used: 'paper' scores the whole map, 'benchmark' leaves out 15 pixels on each side. With --offset,
+    the crop's pixels are scored, and borders are counted from the edges of the ground truth, not from the crop's.
 
     \b
     Examples:
       sepi evaluate cotton-depth cotton
       sepi evaluate estimate.pfm gt_disp_lowres.pfm --border 15 --json
+      sepi evaluate inner_482x482.pfm cotton --offset 15,15
     """
     from sepi.evaluate import PROTOCOLS, region_masks, score_regions
     from sepi.io.disparity_maps import read_disparity
+    from sepi.io.files import naming
     from sepi.io.scores import without_nan
+    from sepi.scoring.crops import in_frame
 
     disparity = read_disparity(estimate)
     values, light_field = read_ground_truth(ground_truth, estimate, reading)
     if values is None:
         view = "" if light_field is None else ",".join(map(str, light_field.reference_position))
         raise SepiError(f"{ground_truth}: no ground truth for view {view}")
-    if values.shape != disparity.shape:
+    crop = None if offset is None else _Crop(offset, (disparity.shape[0], disparity.shape[1]), values.shape)
+    inside = None
+    if crop is not None:
+        with naming(estimate):
+            disparity, inside = in_frame(disparity, crop.offset, crop.whole)
+    elif values.shape != disparity.shape:
         raise SepiError(
             f"{ground_truth}: ground truth is {values.shape}, the estimate {disparity.shape} (height, width)"
+            + ("; --offset tells where a crop lies" if _fits(disparity.shape, values.shape) else "")
         )
     masks = None if light_field is None else region_masks(light_field)
     protocols = PROTOCOLS if border is None else {f"border {border}": border}
-    scores = score_regions(disparity, values, masks, protocols)
-    click.echo(json.dumps(without_nan(scores), indent=2, sort_keys=True) if as_json else score_table(scores))
+    scores = score_regions(disparity, values, masks, protocols, within=inside)
+    if as_json:
+        told = without_nan(scores) | ({} if crop is None else {"crop": asdict(crop)})
+        click.echo(json.dumps(told, indent=2, sort_keys=True))
+    else:
+        click.echo(score_table(scores) if crop is None else f"{crop.described}\n{score_table(scores)}")
+
+
+@dataclass(frozen=True)
+class _Crop:
+    """The part of the ground truth that is scored: row and column of its top left pixel, and heights and widths."""
+
+    offset: tuple[int, int]
+    shape: tuple[int, int]
+    whole: tuple[int, int]
+
+    @property
+    def described(self) -> str:
+        """One line."""
+        (row, column), (height, width) = self.offset, self.shape
+        return (
+            f"crop: rows {row} to {row + height - 1}, columns {column} to {column + width - 1} of "
+            f"{self.whole[0]}x{self.whole[1]} (height x width); borders are counted from the edges of the whole"
+        )
+
+
+def _fits(shape: tuple[int, ...], whole: tuple[int, ...]) -> bool:
+    return all(length <= most for length, most in zip(shape, whole, strict=True))
 
 
 def score_table(scores: AllScores) -> str:

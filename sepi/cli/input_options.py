@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from sepi.lightfield import LightField
 
 
-class _Pair(click.ParamType[tuple[int, int]]):
+class Pair(click.ParamType[tuple[int, int]]):
     """Two whole numbers with a sign between them, such as 9x9 or 4,4."""
 
     def __init__(self, name: str, separators: str) -> None:
@@ -71,7 +71,7 @@ _FLAGS = (
         help="hci, hci-2013, images, eslf, matlab, numpy, openlf or sepi; found by looking unless given.",
     ),
     click.option(
-        "--grid", type=_Pair("ROWSxCOLUMNS", "xX×"), metavar="ROWSxCOLUMNS", help="Grid of views in the files."
+        "--grid", type=Pair("ROWSxCOLUMNS", "xX×"), metavar="ROWSxCOLUMNS", help="Grid of views in the files."
     ),
     click.option(
         "--pattern",
@@ -89,7 +89,7 @@ _FLAGS = (
     ),
     click.option(
         "--view",
-        type=_Pair("ROW,COLUMN", ","),
+        type=Pair("ROW,COLUMN", ","),
         metavar="ROW,COLUMN",
         help="View whose depth is made; the centre unless given.",
     ),

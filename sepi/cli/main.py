@@ -17,6 +17,7 @@ from sepi.cli.evaluate import evaluate
 from sepi.cli.info import check, info, range_text, size_text
 from sepi.cli.input_options import Geometry, Reading, camera_flags, reading_flags
 from sepi.cli.poses import poses
+from sepi.cli.refocus import refocus
 from sepi.cli.results import check_submission, points, submission
 from sepi.command import SepiGroup, progress_bar
 from sepi.errors import SepiError
@@ -180,7 +181,9 @@ def scenes(names: tuple[str, ...], output: Path, size: int, views: int, only_lis
         click.echo(f"written: {output / name}/")
 
 
-for command in (info, check, evaluate, compare, points, poses, convert, submission, check_submission):
+for command in (
+    info, check, evaluate, compare, refocus, points, poses, convert, submission, check_submission,
+):  # fmt: skip
     main.add_command(command)
 
 

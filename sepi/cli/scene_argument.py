@@ -1,4 +1,4 @@
-"""The argument GROUND_TRUTH|SCENE of the commands that score maps: a map, or a light field from the maps' view."""
+"""Light fields that finished maps belong to: GROUND_TRUTH|SCENE of the commands that score maps, INPUT of refocus."""
 
 from __future__ import annotations
 
@@ -50,15 +50,29 @@ def read_ground_truth(path: Path, estimate: Path, reading: Reading) -> tuple[Flo
         values = read_disparity(path)
         require_one_view(estimate, path)
         return values, None
-    belongs = view_of(estimate)
+    light_field = read_light_field_of(path, estimate, reading, check_order=False)
+    return light_field.ground_truth, light_field
+
+
+def read_light_field_of(path: Path, result: Path | None, reading: Reading, check_order: bool = True) -> LightField:
+    """The light field that a map belongs to, seen from the map's view where the map says which that is.
+
+    ``check_order`` as :func:`sepi.read_light_field` has it.
+
+    Raises
+    ------
+    SepiError
+        If it cannot be read, or is read as another view than the map's.
+    """
+    belongs = None if result is None else view_of(result)
     if belongs is not None and reading.options.view is None:
         reading = replace(reading, options=replace(reading.options, view=belongs[0]))
-    light_field = reading.read(path, check_order=False)
+    light_field = reading.read(path, check_order=check_order)
     if belongs is not None and belongs != (light_field.reference_position, light_field.grid):
         (t, s), (rows, columns) = belongs
         raise SepiError(
-            f"{estimate}: depth of view {t},{s} of {rows}x{columns} views, but {path} is read as view "
+            f"{result}: depth of view {t},{s} of {rows}x{columns} views, but {path} is read as view "
             f"{','.join(map(str, light_field.reference_position))} of {light_field.grid[0]}x{light_field.grid[1]}; "
             "give the flags here that 'sepi depth' had"
         )
-    return light_field.ground_truth, light_field
+    return light_field

@@ -106,7 +106,14 @@ COVERED = {
     ),
 }
 NEVER = {"pipeline", "command", "evaluate", "reading", "workflow.config", "workflow.datasets", "cli.main", "scenes"}
-NEVER |= {"io.readers.arrays", "io.readers.formats", "inspection.disparity_range", "report.numbers"}
+NEVER |= {
+    "applications.refocusing",
+    "applications.refocusing_kernels",
+    "io.readers.arrays",
+    "io.readers.formats",
+    "inspection.disparity_range",
+    "report.numbers",
+}
 
 
 @pytest.mark.parametrize("stage", COVERED)

@@ -1,0 +1,347 @@
+"""Pictures focused after the fact: at one disparity, or everywhere.
+
+The views of a light field are samples of one large lens, the *synthetic aperture*. Sheared by a disparity, they show
+its points at the same place, and their mean is the photograph that the lens would have taken, focused there [1]_:
+:func:`refocus`. It needs no map; with one, the gaps between the views are filled. And with a map, each pixel can be
+focused at its own disparity: :func:`all_in_focus`, the reference view with the light of all views that see its points,
+and so with less noise.
+
+References
+----------
+.. [1] Ng, Levoy, Bredif, Duval, Horowitz, Hanrahan: Light field photography with a hand-held plenoptic camera.
+   Stanford Tech Report CTSR 2005-02.
+"""
+
+from __future__ import annotations
+
+import math
+
+import cv2
+import numpy as np
+
+from sepi.errors import SepiError
+from sepi.image.noise import noise_level, variance_of_residuals
+from sepi.lightfield import BoolMap, FloatMap, LightField, as_unit_float
+from sepi.matching.sheared_views import ShearedViews
+from sepi.stage import Progress, StageMaps, no_progress
+
+OCCLUSION_MARGIN = 0.15
+"""By how much an occluder must be nearer, pixels per view step; that of the stages."""
+
+COLOUR_SCALE = 0.0316
+"""RGB distance from the expected colour at which a view counts a quarter, in 0..1; noise comes on top."""
+
+ROUNDS = 2
+"""Times that the mean of the views is made: the first expects the reference view's colour, the next the first mean."""
+
+# sides in pixels of the windows by which holes are filled, one after the other; together they reach 16 pixels
+_FILL = (3, 3, 5, 9, 17)
+
+BEYOND = 0.005
+"""Part of a map's pixels beyond each end of a focal stack, so that a few wrong ones do not stretch it."""
+
+
+def refocus(
+    light_field: LightField,
+    disparity: float,
+    maps: StageMaps | FloatMap | None = None,
+    *,
+    aperture: float | None = None,
+    progress: Progress = no_progress,
+) -> FloatMap:
+    """The picture of the synthetic aperture, focused at one disparity.
+
+    What lies nearer or farther is out of focus: the more so, the larger the aperture. Where neighbouring views see it
+    more than about a pixel apart, it would show as many sharp copies instead of a blur. A map tells how far apart they
+    are, and each view is taken for all those that could stand round it, half way to its neighbours.
+
+    Parameters
+    ----------
+    light_field : LightField
+    disparity : float
+        Pixels per view step. Points of this disparity are sharp.
+    maps : StageMaps, or ndarray of shape (H, W), float32, optional
+        Maps of the reference view, or its disparity in pixels per view step, to fill in the views between the views;
+        the mean of the views alone unless given.
+    aperture : float, optional
+        Radius of the aperture in view steps, round the reference view: the views in that disc are used. All views
+        unless given.
+    progress : callable
+        Called with the fraction done.
+
+    Returns
+    -------
+    ndarray, shape (H, W, C), float32
+        Colours in 0..1, as the reference view sees the scene, C as the views have it. A pixel that some views do not
+        hold is the mean of those that do.
+
+    Raises
+    ------
+    SepiError
+        If the disparity is not finite, the map does not have the views' shape, or the aperture is no positive number or
+        too small for any view but one.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import sepi
+    >>> from sepi.scenes import render
+    >>> light_field = render("fronto_parallel", size=64, views=3)
+    >>> picture = sepi.refocus(light_field, 1.0)
+    >>> bool(np.abs(picture - light_field.reference_view)[8:-8, 8:-8].max() < 0.01)
+    True
+    """
+    if not math.isfinite(disparity):
+        raise SepiError(f"{light_field.name}: disparity to focus at must be a finite number, got {disparity}")
+    surfaces = None if maps is None else _surfaces(_disparity_of(light_field, maps))
+    height, width = light_field.shape
+    moved = disparity * light_field.baselines
+    # of others no pixel is left
+    held = (np.abs(moved) <= (height - 1, width - 1)).all(axis=2)
+    chosen = views_within(light_field, aperture) & held
+    sums, counts = np.zeros((3, height, width), np.float32), np.zeros((height, width), np.float32)
+    # a row of views at a time: all at once take much memory
+    for t in range(light_field.grid[0]):
+        one_row = np.zeros_like(chosen)
+        one_row[t] = chosen[t]
+        if one_row.any():
+            views = ShearedViews(light_field, one_row).at(disparity)
+            if surfaces is not None:
+                views = _filled_between(light_field, one_row, views, surfaces, disparity)
+            for sheared, (down, across) in zip(views, moved[one_row], strict=True):
+                inside = _held(down, height), _held(across, width)
+                sums[:, *inside] += sheared[:, *inside]
+                counts[inside] += 1
+        progress((t + 1) / light_field.grid[0])
+    picture = np.clip(sums / counts, 0, 1).transpose(1, 2, 0)
+    return np.ascontiguousarray(picture[..., : light_field.views.shape[4]])
+
+
+def all_in_focus(
+    light_field: LightField,
+    maps: StageMaps | FloatMap,
+    *,
+    aperture: float | None = None,
+    occlusion_margin: float = OCCLUSION_MARGIN,
+    progress: Progress = no_progress,
+) -> FloatMap:
+    """The reference view, each pixel the mean of the views that see its point.
+
+    Views in which a nearer pixel of the map hides the point are left out, and views count the less, the more their
+    colour differs from that of the others: where the map is wrong, the reference view's own colour stays. N views that
+    see a point lower its noise to about 1 / sqrt(N).
+
+    Parameters
+    ----------
+    light_field : LightField
+    maps : StageMaps, or ndarray of shape (H, W), float32
+        Maps of the reference view, or its disparity in pixels per view step. Where that is not finite, the reference
+        view is taken as it is.
+    aperture : float, optional
+        Radius in view steps of the views that are used; all unless given.
+    occlusion_margin : float
+        By how much an occluder must be nearer, pixels per view step.
+    progress : callable
+        Called with the fraction done.
+
+    Returns
+    -------
+    ndarray, shape (H, W, C), float32
+        Colours in 0..1, C as the views have it.
+
+    Raises
+    ------
+    SepiError
+        If the map does not have the views' shape, or the aperture is no positive number or too small for any view but
+        one.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import sepi
+    >>> from sepi.scenes import render
+    >>> light_field = render("fronto_parallel", size=64, views=3)
+    >>> noise = np.random.default_rng(0).normal(0, 10, light_field.views.shape)
+    >>> noisy = sepi.LightField((light_field.views + noise).clip(0, 255).astype(np.uint8), "noisy")
+    >>> picture = sepi.all_in_focus(noisy, light_field.ground_truth)
+    >>> def error(picture):
+    ...     return float(abs(picture - light_field.reference_view).mean())
+    >>> error(picture) < error(noisy.reference_view) / 2
+    True
+    """
+    disparity = _disparity_of(light_field, maps)
+    others = views_within(light_field, aperture)
+    others[light_field.reference_position] = False
+    reference = as_unit_float(light_field.views[light_field.reference_position])
+    surfaces = _surfaces(disparity)
+    if surfaces is None:
+        return np.clip(reference, 0, 1)
+    disparity = np.where(np.isfinite(disparity), disparity, np.float32(np.nan))
+    channels = reference.shape[2]
+    noise = variance_of_residuals(noise_level(light_field.reference_view), channels)
+    scale2 = np.float32(COLOUR_SCALE**2 * channels / 3 + noise)
+    centre = reference
+    for number in range(ROUNDS):
+        sums = reference - centre
+        weights = np.square(scale2 / (scale2 + np.square(sums).sum(axis=2)))
+        sums *= weights[..., None]
+        for t in np.flatnonzero(others.any(axis=1)).tolist():
+            _add_row(
+                light_field, t, others[t], (disparity, surfaces), occlusion_margin, (centre, scale2, sums, weights)
+            )
+            progress((number + (t + 1) / light_field.grid[0]) / ROUNDS)
+        centre = centre + sums / weights[..., None]
+    return np.clip(centre, 0, 1)
+
+
+def views_within(light_field: LightField, aperture: float | None) -> BoolMap:
+    """The views in an aperture of this radius in view steps round the reference view; shape (T, S). All for None.
+
+    Raises
+    ------
+    SepiError
+        If the radius is no positive number, or no view but the reference view is so near.
+    """
+    if aperture is None:
+        return light_field.present.copy()
+    if not aperture > 0:
+        raise SepiError(f"{light_field.name}: aperture must be a radius above 0 in view steps, got {aperture:g}")
+    distance = np.hypot(*np.moveaxis(light_field.baselines, 2, 0))
+    chosen = light_field.present & (distance <= aperture)
+    if chosen.sum() < 2:
+        others = light_field.present.copy()
+        others[light_field.reference_position] = False
+        raise SepiError(
+            f"{light_field.name}: an aperture of {aperture:g} view steps holds no view but the reference view; the "
+            f"nearest other is {distance[others].min():g} away"
+        )
+    return np.asarray(chosen, bool)
+
+
+def focal_stack(disparity: FloatMap, count: int, unknown: BoolMap | None = None) -> list[float]:
+    """Disparities to focus at, from the nearest to the farthest surface of a map.
+
+    Parameters
+    ----------
+    disparity : ndarray, shape (H, W), float32
+        Pixels per view step.
+    count : int
+        How many; 1: the middle.
+    unknown : ndarray, shape (H, W), bool, optional
+        Pixels that do not count.
+
+    Returns
+    -------
+    list of float
+        Falling in even steps, the ends being the map's but for a few pixels; fewer where the map is constant.
+
+    Raises
+    ------
+    SepiError
+        If no pixel is finite and known.
+    """
+    counted = np.isfinite(disparity) if unknown is None else np.isfinite(disparity) & ~unknown
+    if not counted.any():
+        raise SepiError("the map has no pixel of known disparity to focus at")
+    low, high = np.quantile(disparity[counted].astype(np.float64), (BEYOND, 1 - BEYOND)).tolist()
+    return evenly_spaced(low, high, count)
+
+
+def evenly_spaced(low: float, high: float, count: int) -> list[float]:
+    """``count`` disparities from ``high`` down to ``low``; the middle if one, and one if both are the same."""
+    if count == 1 or high <= low:
+        return [(low + high) / 2]
+    return [float(value) for value in np.linspace(high, low, count)]
+
+
+def _disparity_of(light_field: LightField, maps: StageMaps | FloatMap) -> FloatMap:
+    """The disparity of maps, which must have the views' shape."""
+    disparity = np.asarray(maps.disparity if isinstance(maps, StageMaps) else maps, np.float32)
+    if disparity.shape != light_field.shape:
+        raise SepiError(
+            f"{light_field.name}: the map must have the views' shape (H, W) = {light_field.shape}, got "
+            f"{disparity.shape}"
+        )
+    return disparity
+
+
+def _surfaces(disparity: FloatMap) -> FloatMap | None:
+    """A map in which what is not finite hides nothing: it is as far as the farthest; None if nothing is finite."""
+    known = np.isfinite(disparity)
+    return np.where(known, disparity, disparity[known].min()).astype(np.float32) if known.any() else None
+
+
+def _cell(light_field: LightField) -> FloatMap:
+    """Height and width in view steps of what a view stands for: the usual distance to its neighbours; 0 without any."""
+    baselines, present = light_field.baselines, light_field.present
+    found = []
+    for axis in (0, 1):
+        steps = np.diff(baselines[..., axis], axis=axis)
+        both = np.logical_and(*(np.take(present, range(k, present.shape[axis] - 1 + k), axis) for k in (0, 1)))
+        found.append(float(np.median(np.abs(steps[both]))) if both.any() else 0.0)
+    return np.array(found, np.float32)
+
+
+def _filled_between(
+    light_field: LightField, chosen: BoolMap, views: FloatMap, surfaces: FloatMap, focus: float
+) -> FloatMap:
+    """Sheared views ``(N, 3, H, W)`` of one row of the grid, each with the views round it."""
+    from sepi.applications.refocusing_kernels import fill_between
+    from sepi.matching.visibility_kernels import z_buffers
+
+    height, width = light_field.shape
+    baselines, cell = light_field.baselines, _cell(light_field)
+    (t,) = np.flatnonzero(chosen.any(axis=1)).tolist()
+    nearest = z_buffers(surfaces, chosen[t : t + 1], baselines[t : t + 1], 0, height)[0]
+    filled = np.empty_like(views)
+    for n, s in enumerate(np.flatnonzero(chosen[t]).tolist()):
+        seen = _without_holes(nearest[s], focus)
+        down, across = focus * baselines[t, s]
+        rows = np.clip(np.rint(np.arange(height) - down), 0, height - 1).astype(int)
+        columns = np.clip(np.rint(np.arange(width) - across), 0, width - 1).astype(int)
+        here = np.ascontiguousarray(seen[np.ix_(rows, columns)])
+        fill_between(views[n], here, np.float32(focus), cell, np.float32(OCCLUSION_MARGIN), filled[n])
+    return filled
+
+
+def _without_holes(nearest: FloatMap, otherwise: float) -> FloatMap:
+    """A z-buffer whose holes, which show what the reference view does not see, have the farthest surface beside them.
+
+    What is farther inside than holes usually reach gets the disparity ``otherwise``.
+    """
+    from sepi.matching.visibility_kernels import EMPTY
+
+    empty = nearest == EMPTY
+    found = np.where(empty, np.float32(np.inf), nearest)
+    if empty.any():
+        for side in _FILL:
+            window = np.ones((side, side), np.uint8)
+            # beyond the border nothing is known
+            beside = cv2.erode(found, window, borderType=cv2.BORDER_CONSTANT, borderValue=(np.inf,))
+            found = np.where(empty, beside, found)
+    return np.where(np.isinf(found), np.float32(otherwise), found).astype(np.float32)
+
+
+def _held(moved: float, length: int) -> slice:
+    """Pixels of a line that a view holds when its pixel ``p - moved`` is read for the pixel ``p``."""
+    return slice(max(0, math.ceil(moved)), min(length, math.floor(length - 1 + moved) + 1))
+
+
+def _add_row(
+    light_field: LightField,
+    t: int,
+    chosen: BoolMap,
+    disparities: tuple[FloatMap, FloatMap],
+    margin: float,
+    mean: tuple[FloatMap, np.float32, FloatMap, FloatMap],
+) -> None:
+    """Add the chosen views of one row of the grid to a mean: its expected colours, squared scale, sums and weights."""
+    from sepi.applications.refocusing_kernels import add_view
+    from sepi.matching.visibility_kernels import z_buffers
+
+    disparity, surfaces = disparities
+    baselines = light_field.baselines[t : t + 1]
+    nearest = z_buffers(surfaces, chosen[None], baselines, 0, light_field.shape[0])[0]
+    for s in np.flatnonzero(chosen).tolist():
+        view = as_unit_float(light_field.views[t, s])
+        add_view(view, baselines[0, s], disparity, nearest[s], np.float32(margin), *mean)

@@ -1,0 +1,177 @@
+"""The folder of refocused pictures, and the index that says where each is focused. docs/outputs.md describes them."""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Collection, Iterable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from sepi.errors import SepiError
+from sepi.io.files import atomic_files, atomic_folder, atomic_path
+from sepi.io.images import write_png
+from sepi.lightfield import FloatMap, full_scale
+
+INDEX = "focus.csv"
+"""Name of the index: a row for each picture."""
+
+COLUMNS = ("file", "disparity", "depth_m", "x", "y")
+"""Columns of the index; empty: not known, or does not apply."""
+
+ALL_IN_FOCUS = "all_in_focus.png"
+
+ANIMATION = "focus.webp"
+"""The focal stack from the nearest to the farthest picture and back, for ever."""
+
+# of a picture of the animation
+_MILLISECONDS = 120
+_QUALITY = 85
+
+_MADE = re.compile(rf"focus_\d+\.png|{re.escape(ALL_IN_FOCUS)}|{re.escape(ANIMATION)}")
+
+
+@dataclass(frozen=True)
+class Focus:
+    """Where a picture is focused.
+
+    Attributes
+    ----------
+    disparity : float
+        Pixels per view step.
+    depth : float or None
+        Metres, infinite at and beyond infinity; None where the camera is not known.
+    at : (int, int) or None
+        Column and row ``(x, y)`` of the pixel whose surface it is, where it was chosen so.
+    """
+
+    disparity: float
+    depth: float | None = None
+    at: tuple[int, int] | None = None
+
+
+def stack_names(count: int) -> list[str]:
+    """Names of the pictures of a focal stack: ``focus_01.png`` and so on."""
+    digits = max(2, len(str(count)))
+    return [f"focus_{number:0{digits}}.png" for number in range(1, count + 1)]
+
+
+def write_refocused(
+    folder: Path,
+    foci: Sequence[Focus],
+    pictures: Iterable[FloatMap],
+    sharp: FloatMap | None,
+    dtype: npt.DTypeLike,
+    *,
+    animated: bool = False,
+) -> tuple[str, ...]:
+    """Write a focal stack, the picture in focus everywhere, and their index.
+
+    A new folder appears whole or not at all; in an existing one the files are replaced when all are written, pictures
+    that an earlier index names and this one does not are removed, and other files are left alone. Equal content gives
+    equal bytes.
+
+    Parameters
+    ----------
+    folder : Path
+        Made where it does not exist.
+    foci : sequence of Focus
+        Of each picture of the stack.
+    pictures : iterable of ndarray, shape (H, W, C), float32
+        In 0..1; taken one after the other.
+    sharp : ndarray, shape (H, W, C), float32, or None
+        The picture in focus everywhere.
+    dtype : dtype
+        Of the views: uint8 gives pictures of 8 bit, all others of 16 bit.
+    animated : bool
+        Write the stack as an animation, too.
+
+    Returns
+    -------
+    tuple of str
+        Names of the files written.
+
+    Raises
+    ------
+    SepiError
+        If the folder is a file or cannot be written, or an animation cannot be written with this Pillow.
+    """
+    # the folder itself may be a link to where there is room
+    target = folder.resolve()
+    existing = target.is_dir() and any(target.iterdir())
+    before = _earlier_files(target / INDEX)
+    with atomic_files(target) if existing else atomic_folder(target) as temporary:
+        rows = [] if sharp is None else [[ALL_IN_FOCUS, "", "", "", ""]]
+        if sharp is not None:
+            write_png(temporary / ALL_IN_FOCUS, _levels(sharp, dtype))
+        frames = []
+        for name, focus, picture in zip(stack_names(len(foci)), foci, pictures, strict=True):
+            write_png(temporary / name, _levels(picture, dtype))
+            rows.append([name, *_described(focus)])
+            if animated:
+                frames.append(_levels(picture, np.uint8))
+        if animated:
+            _write_animation(temporary / ANIMATION, frames)
+            rows.append([ANIMATION, "", "", "", ""])
+        _write_index(temporary / INDEX, rows)
+    names = [row[0] for row in rows]
+    _remove_others(target, before, names)
+    return (*names, INDEX)
+
+
+def _levels(picture: FloatMap, dtype: npt.DTypeLike) -> npt.NDArray[Any]:
+    """A picture (H, W, C) in 0..1 as PNG holds it: (H, W) if grey, of 8 bit for uint8, else of 16 bit."""
+    held = np.uint8 if np.dtype(dtype) == np.uint8 else np.uint16
+    levels = np.rint(picture.astype(np.float64) * full_scale(held)).astype(held)
+    return levels[..., 0] if levels.shape[2] == 1 else levels
+
+
+def _described(focus: Focus) -> list[str]:
+    x, y = ("", "") if focus.at is None else focus.at
+    depth = "" if focus.depth is None else f"{focus.depth:.6g}"
+    return [f"{focus.disparity:.6g}", depth, f"{x}", f"{y}"]
+
+
+def _write_index(path: Path, rows: Sequence[Sequence[str]]) -> None:
+    with atomic_path(path) as temporary, temporary.open("w", encoding="ascii", newline="") as file:
+        csv.writer(file, lineterminator="\n").writerows([COLUMNS, *rows])
+
+
+def _write_animation(path: Path, frames: Sequence[npt.NDArray[Any]]) -> None:
+    from PIL import Image, features
+
+    if not features.check("webp"):
+        raise SepiError(f"{path}: this Pillow was built without WebP, which the animation is written as")
+    first, *more = (Image.fromarray(frame).convert("RGB") for frame in [*frames, *frames[-2:0:-1]])
+    with atomic_path(path) as temporary:
+        first.save(
+            temporary, "WEBP", save_all=True, append_images=more, duration=_MILLISECONDS, loop=0, quality=_QUALITY
+        )
+
+
+def _earlier_files(index: Path) -> list[str]:
+    """Pictures that an index of this module names; none without one."""
+    # a user's own file of this name is left alone, whatever it holds
+    with suppress(OSError, UnicodeDecodeError, csv.Error):
+        with index.open(encoding="ascii", newline="") as file:
+            rows = list(csv.reader(file))
+        if rows and tuple(rows[0]) == COLUMNS:
+            return [row[0] for row in rows[1:] if row and _MADE.fullmatch(row[0])]
+    return []
+
+
+def _remove_others(folder: Path, before: Collection[str], made: Collection[str]) -> None:
+    """Remove what an earlier run wrote and this one does not make."""
+    for name in before:
+        if name not in made:
+            try:
+                (folder / name).unlink(missing_ok=True)
+            except OSError as error:
+                raise SepiError(
+                    f"{folder / name}: an earlier run's file cannot be removed ({error.strerror})"
+                ) from error

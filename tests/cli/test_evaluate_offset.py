@@ -1,0 +1,132 @@
+"""`sepi evaluate --offset`: the map of a crop is scored as the whole map is over the crop's pixels."""
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+from error_lines import error_of
+
+from sepi.cli.main import main
+from sepi.errors import SepiError
+from sepi.evaluate import PROTOCOLS, region_masks, score, score_regions
+from sepi.io.pfm import write_pfm
+from sepi.lightfield import LightField
+from sepi.scenes import render, write_hci
+from sepi.scoring.crops import in_frame
+
+OFFSET, SIZE = (9, 17), (40, 33)
+PLACE = np.s_[9:49, 17:50]
+
+
+@pytest.fixture(scope="module")
+def light_field() -> LightField:
+    return render("curved_occluders", size=64, views=3)
+
+
+@pytest.fixture(scope="module")
+def estimate(light_field: LightField) -> np.ndarray:
+    """A map with errors of its own at every pixel, depth discontinuities included, and a pixel without a value."""
+    assert light_field.ground_truth is not None
+    random = np.random.default_rng(3)
+    values = np.roll(light_field.ground_truth, 1, axis=1) + random.normal(0, 0.05, (64, 64)).astype(np.float32)
+    values[20, 20] = np.nan
+    return np.asarray(values, np.float32)
+
+
+@pytest.fixture
+def files(light_field: LightField, estimate: np.ndarray, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The scene, its ground truth alone, the whole map and that of a crop, in the current folder."""
+    monkeypatch.chdir(tmp_path)
+    write_hci(light_field, Path("scene"))
+    assert light_field.ground_truth is not None
+    write_pfm(Path("truth.pfm"), light_field.ground_truth)
+    write_pfm(Path("whole.pfm"), estimate)
+    np.save("crop.npy", estimate[PLACE])
+    return tmp_path
+
+
+def evaluate(*words: object) -> Result:
+    return CliRunner().invoke(main, ["evaluate", *map(str, words)])
+
+
+def same(one: dict[str, Any], other: dict[str, Any]) -> bool:
+    return all(one[name] == other[name] or (math.isnan(one[name]) and math.isnan(other[name])) for name in one)
+
+
+def test_a_crop_scores_as_the_whole_map_does_over_its_pixels(light_field: LightField, estimate: np.ndarray) -> None:
+    """To the last bit, in every region and protocol: else numbers of maps with and without margins do not compare."""
+    truth = light_field.ground_truth
+    assert truth is not None
+    whole, inside = in_frame(estimate[PLACE], OFFSET, truth.shape)
+    assert np.count_nonzero(inside) == SIZE[0] * SIZE[1]
+    masks = region_masks(light_field)
+    found = score_regions(whole, truth, masks, within=inside)
+    for protocol, border in PROTOCOLS.items():
+        assert same(found[protocol]["all"], score(estimate, truth, border, inside))
+        for name, mask in masks.items():
+            assert same(found[protocol][name], score(estimate, truth, border, inside & mask))
+    assert found["paper"]["all"]["pixels"] == SIZE[0] * SIZE[1]
+    assert found["paper"]["all"]["non_finite"] == 1
+    # 15 pixels of the whole picture's border, of which the crop leaves out 9 rows and 17 columns already
+    assert found["benchmark"]["all"]["pixels"] == (49 - 15) * (49 - 17)
+    assert found["paper"]["discontinuities"]["pixels"] > 50
+
+
+@pytest.mark.parametrize("truth", ["scene", "truth.pfm"])
+def test_the_command_says_which_part_it_scored(files: Path, estimate: np.ndarray, truth: str) -> None:
+    """In the text and in the JSON, so that a score of a part is not taken for one of the whole."""
+    called = evaluate("crop.npy", truth, "--offset", "9,17")
+    assert called.exit_code == 0, called.output
+    first, head = called.stdout.splitlines()[:2]
+    assert first.startswith("crop: rows 9 to 48, columns 17 to 49 of 64x64")
+    assert head.split()[:2] == ["protocol", "region"]
+    told = json.loads(evaluate("crop.npy", truth, "--offset", "9,17", "--json").stdout)
+    assert told["crop"] == {"offset": [9, 17], "shape": [40, 33], "whole": [64, 64]}
+    assert told["paper"]["all"]["pixels"] == SIZE[0] * SIZE[1]
+    assert ("occluded" in told["paper"]) == (truth == "scene")
+    # of any other place the scores are those of a map that does not fit
+    wrong = json.loads(evaluate("crop.npy", truth, "--offset", "9,12", "--json").stdout)
+    assert wrong["paper"]["all"]["mse100"] > 3 * told["paper"]["all"]["mse100"]
+
+
+def test_a_border_is_that_of_the_whole_picture(files: Path) -> None:
+    told = json.loads(evaluate("crop.npy", "truth.pfm", "--offset", "9,17", "--border", 20, "--json").stdout)
+    assert told["border 20"]["all"]["pixels"] == (44 - 20) * (44 - 20)
+
+
+def test_the_whole_map_at_offset_zero_is_the_whole_map(files: Path) -> None:
+    """And without --offset nothing is said of a crop."""
+    plain = json.loads(evaluate("whole.pfm", "scene", "--json").stdout)
+    told = json.loads(evaluate("whole.pfm", "scene", "--offset", "0,0", "--json").stdout)
+    assert told.pop("crop")["shape"] == [64, 64]
+    assert told == plain
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("crop.npy", "--offset", "25,17"), "crop.npy: a map of (40, 33) at offset 25,17 does not lie inside the gr"),
+        (("crop.npy", "--offset", "9,32"), "does not lie inside the ground truth of (64, 64) (height, width)"),
+        (("large.npy", "--offset", "0,0"), "large.npy: a map of (65, 64) at offset 0,0 does not lie inside"),
+        (("crop.npy",), "ground truth is (64, 64), the estimate (40, 33) (height, width); --offset tells where a crop"),
+    ],
+)
+def test_a_crop_that_does_not_fit_is_one_line(files: Path, words: tuple[str, ...], message: str) -> None:
+    np.save("large.npy", np.zeros((65, 64), np.float32))
+    assert message in error_of(evaluate(words[0], "scene", *words[1:]))
+
+
+@pytest.mark.parametrize("text", ["9", "9x17", "-1,0", "1.5,2"])
+def test_an_offset_is_two_whole_numbers(files: Path, text: str) -> None:
+    called = evaluate("crop.npy", "scene", "--offset", text)
+    assert called.exit_code == 2
+    assert "expected ROW,COLUMN" in called.stderr
+
+
+def test_a_negative_offset_is_refused_in_python_too() -> None:
+    with pytest.raises(SepiError, match="at offset -1,0 does not lie inside"):
+        in_frame(np.zeros((4, 4), np.float32), (-1, 0), (8, 8))
