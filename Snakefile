@@ -64,16 +64,12 @@ rule comparison:
 
 
 onstart:
-    note_run(well=False)
+    run_begins()
 
 
 onsuccess:
-    note_run(well=True)
-    print_warnings()
-    print_written([*report_files(), *ablation_files(), *comparison_files()], result_files(SETTINGS.variants))
+    run_ended_well()
 
 
-# a job may have been killed, the clock set back, the disk be full
 onerror:
-    tidy_up(MADE)
-    say_if_full(Path())
+    run_failed()

@@ -20,7 +20,7 @@ from sepi.workflow.result_paths import COMPARISON_ENDING, PARTS_ENDING, RESULTS,
 
 # where a module's `prefix` puts things, and whether this is a module at all, while the rules are read
 MODIFIER = workflow.modifier
-IS_MODULE = not MODIFIER.is_main_snakefile()
+IS_MODULE = MODIFIER.base_snakefile is not None
 
 # jobs are run by the Python that runs Snakemake, whether or not its environment is activated, with the package whose code
 # the digests are made of; jobs of a workflow that has this one as a module keep their own. They end with Snakemake, whatever

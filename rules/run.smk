@@ -46,6 +46,24 @@ def print_written(tables, maps):
             print(f"{title} written:", *dict.fromkeys(files), sep="\n  ", flush=True)
 
 
+def run_begins():
+    """Note that what is made now is to be looked at, should the run be killed."""
+    note_run(well=False)
+
+
+def run_ended_well():
+    """Note that nothing is left to look at; tell of warnings, and what was made."""
+    note_run(well=True)
+    print_warnings()
+    print_written([*report_files(), *ablation_files(), *comparison_files()], result_files(SETTINGS.variants))
+
+
+def run_failed():
+    """Put away what a job left: it may have been killed, the clock set back, the disk be full."""
+    tidy_up(MADE)
+    say_if_full(Path())
+
+
 # where all that is made is
 MADE = [Path(placed(RESULTS)), Path(placed("reports"))]
 
@@ -54,8 +72,8 @@ if workflow.is_main_process and not workflow.output_settings.dryrun:
     if take_over(Path(workflow.overwrite_workdir or "."), MADE):
         say_so()
     if IS_MODULE:
-        # Snakemake calls no handlers of a module, and the workflow that has it may not either
-        note_run(well=False)
+        # not every version of Snakemake calls handlers of a module, and the workflow that has it may not either
+        run_begins()
 
 
 # a progress bar, or a line for each job; a dry run is as Snakemake shows it, and so is another workflow's run

@@ -183,7 +183,7 @@ rule short:
     shell:
         "touch {output}"
 """
-    killed = beside("sepi: {}", ("onsuccess:\n    sepi.onsuccess()\n", rules))
+    killed = beside("sepi: {}", ("onsuccess:\n    sepi.run_ended_well()\n", rules))
     command = [sys.executable, "-m", "snakemake", "--cores", "1"]
     quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
     process = subprocess.Popen(
