@@ -9,10 +9,12 @@
 # docs/workflow.md explains targets, configuration and what makes a job run again.
 
 
-configfile: f"{workflow.basedir}/config.yaml"
+configfile: f"{workflow.current_basedir}/config.yaml"
 
 
+include: "rules/package.smk"
 include: "rules/common.smk"
+include: "rules/targets.smk"
 include: "rules/ingest.smk"
 include: "rules/initial.smk"
 include: "rules/occlusion.smk"
@@ -23,23 +25,11 @@ include: "rules/evaluate.smk"
 include: "rules/external.smk"
 include: "rules/report.smk"
 include: "rules/comparison.smk"
-
-
-# a few seconds each, whatever the number of scenes: not worth a submission to a cluster
-localrules:
-    tables,
-    parts_table,
-    charts,
-    parts_chart,
-    graph,
-    page,
-    comparison_tables,
-    comparison_page,
+include: "rules/run.smk"
 
 
 # Tables and figures, and the maps of the most accurate variant, of the paper's, and of variants that the user added
 rule all:
-    default_target: True
     input:
         report_files(),
         result_files(LISTED_MAPS),
@@ -74,16 +64,12 @@ rule comparison:
 
 
 onstart:
-    note_run(well=False)
+    run_begins()
 
 
 onsuccess:
-    note_run(well=True)
-    print_warnings()
-    print_written([*report_files(), *ablation_files(), *comparison_files()], result_files(SETTINGS.variants))
+    run_ended_well()
 
 
-# a job may have been killed, the clock set back, the disk be full
 onerror:
-    tidy_up(MADE)
-    say_if_full(Path())
+    run_failed()

@@ -4,7 +4,6 @@ import json
 import os
 import re
 import sys
-import time
 from pathlib import Path
 
 from sepi.command import WORKFLOW_PROCESS
@@ -18,18 +17,28 @@ from sepi.workflow.code_digest import ROOT, code_digest, stage_modules
 from sepi.workflow.candidates import candidates_factor, candidates_mb
 from sepi.workflow.config import load_settings
 from sepi.workflow.result_paths import COMPARISON_ENDING, PARTS_ENDING, RESULTS, key_of, scene_files
-from sepi.workflow.run_folder import note_run, say_if_full, say_so, take_over, tidy_up
-from sepi.workflow.run_log import show_progress
 
-STARTED = time.time()
+# where a module's `prefix` puts things, and whether this is a module at all, while the rules are read
+MODIFIER = workflow.modifier
+IS_MODULE = MODIFIER.base_snakefile is not None
 
-# jobs call `python`: the one that runs Snakemake, whether or not its environment is activated, and with the package
-# whose code the digests are made of
-for name, folder in {"PATH": Path(sys.executable).parent, "PYTHONPATH": ROOT}.items():
-    os.environ[name] = os.pathsep.join([str(folder), *filter(None, [os.environ.get(name)])])
-# ... and end with it, whatever ends it: what a job that nobody waits for goes on to write would meet the next run's. For
-# this they take the place of their shell (`exec`)
-os.environ[WORKFLOW_PROCESS] = str(os.getpid())
+# jobs are run by the Python that runs Snakemake, whether or not its environment is activated, with the package whose code
+# the digests are made of; jobs of a workflow that has this one as a module keep their own. They end with Snakemake, whatever
+# ends it: what a job that nobody waits for goes on to write would meet the next run's. For this they take the place of
+# their shell (`exec`)
+os.environ.update(
+    {
+        "SEPI_PYTHON": sys.executable,
+        "SEPI_PYTHONPATH": os.pathsep.join([str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])]),
+        WORKFLOW_PROCESS: str(os.getpid()),
+    }
+)
+
+
+def command(words):
+    """The shell command that runs a module of the package."""
+    return f'PYTHONPATH="$SEPI_PYTHONPATH" exec "$SEPI_PYTHON" -m {words}'
+
 
 try:
     SETTINGS = load_settings(config)
@@ -44,8 +53,33 @@ SCENES_BY_DATASET = {name: SETTINGS.scenes_of(name) for name in SETTINGS.dataset
 PLAN = Plan(RESULTS, SCENES_BY_DATASET, VARIANT_LABELS, list(SETTINGS.external))
 COMPARISON = PLAN.comparison()
 
+
+def placed(path):
+    """Where a file or folder that the rules name is: the prefix of a module is put before it."""
+    return MODIFIER.path_modifier.replace_prefix(f"{path}/").rstrip("/")
+
+
+def own_file(path):
+    """A user's file as an input: it is where the user says, whatever the prefix of a module."""
+    return str(path) if placed(path) == str(path) else os.path.abspath(path)
+
+
+def source_file(name):
+    """A file of this workflow; of a module that lies elsewhere, Snakemake's copy, which each run may make anew."""
+    path = os.path.normpath(os.path.join(FOLDER, name))
+    return path if os.path.isfile(path) else ancient(workflow.source_path(f"../{name}"))
+
+
+# the Snakefile, and what it includes
+FOLDER = os.path.dirname(str(workflow.current_basedir))
+INCLUDED = re.findall(r'^include: "(.+)"$', Path(source_file("Snakefile")).read_text(), re.MULTILINE)
+RULE_FILES = [source_file(name) for name in ["Snakefile", *INCLUDED]]
+
+
 # the rules' patterns
 SCENE = scene_files("{dataset}", "{scene}")
+# ... and what commands are told that find files by themselves
+PLACED_SCENE = scene_files("{dataset}", "{scene}", Path(placed(RESULTS)))
 LABELS = {stage: f"{{{stage}}}" for stage in STAGES}
 
 
@@ -149,7 +183,7 @@ def code_of(stage):
 
 def files_of(stage):
     """Function of wildcards: files that a stage's choice reads beside the light field, such as a network."""
-    return lambda wildcards: list(SETTINGS.parameters[stage][wildcards[stage]].files)
+    return lambda wildcards: list(map(own_file, SETTINGS.parameters[stage][wildcards[stage]].files))
 
 
 def scene_of(wildcards):
@@ -228,55 +262,5 @@ def minutes_for(*seconds, **more):
 
 def sweep_of(stage, wildcards):
     """A scene's light field, and the parameters of the choice that a stage makes of it."""
-    light_field = scene_files(wildcards.dataset, wildcards.scene).light_field
+    light_field = scene_files(wildcards.dataset, wildcards.scene, Path(placed(RESULTS))).light_field
     return light_field, SETTINGS.parameters[stage][wildcards[stage]]
-
-
-def is_new(file):
-    """Whether this run wrote a file."""
-    return Path(file).exists() and Path(file).stat().st_mtime >= STARTED
-
-
-def print_warnings():
-    """Show what the readers of light fields and of external maps warned of in this run, from their logs."""
-    missing = {}
-    for dataset, scene in SETTINGS.scenes:
-        for rule in ("ingest", "external"):
-            log = Path(f"logs/{dataset}/{scene}/{rule}.log")
-            for line in log.read_text().splitlines() if is_new(log) else ():
-                absent = re.match(r"sepi: warning: external (.+), scene .+: no such file$", line)
-                if absent:
-                    missing.setdefault(absent[1], []).append(f"{dataset}/{scene}")
-                elif line.startswith("sepi: warning:"):
-                    print(line, flush=True)
-    # a method rarely has maps of all scenes: one line for each method
-    for method, scenes in missing.items():
-        others = f" and {len(scenes) - 3} others" if len(scenes) > 4 else ""
-        named = ", ".join(scenes[:3] if others else scenes)
-        print(f"sepi: warning: external {method}: no map of {named}{others}", flush=True)
-
-
-def print_written(tables, maps):
-    """Name the tables and the folders of maps that this run wrote."""
-    new = [file for file in [*tables, *maps] if is_new(file)]
-    groups = {
-        "Tables and figures": [file for file in new if file in tables],
-        "Maps": list(dict.fromkeys(f"{Path(file).parent}/" for file in new if file in maps)),
-    }
-    for title, files in groups.items():
-        if files:
-            print(f"{title} written:", *dict.fromkeys(files), sep="\n  ", flush=True)
-
-
-# where all that is made is
-MADE = [Path(RESULTS), Path("reports")]
-
-# a run that was killed does not stop the next one
-if workflow.is_main_process and not workflow.output_settings.dryrun:
-    if take_over(Path(workflow.overwrite_workdir or "."), MADE):
-        say_so()
-
-
-# a progress bar, or a line for each job; a dry run is as Snakemake shows it
-if workflow.is_main_process and not (workflow.output_settings.dryrun or workflow.output_settings.verbose):
-    show_progress(logger)

@@ -1,17 +1,6 @@
 # The compared methods, computed on every scene beside this project's variants and the published figures: below
 # reports/comparison/ the same page, tables and pictures as below reports/, of another set of variants.
 
-from sepi.report.plan import COMPARISON_TABLES
-
-COMPARISON_REPORT = "reports/comparison"
-
-
-def comparison_files():
-    """The page of the comparison, its numbers and tables, and pictures of every scene."""
-    tables = [f"{COMPARISON_REPORT}/{table}.{ending}" for table in COMPARISON_TABLES for ending in ("csv", "md", "tex")]
-    pictures = [f"{COMPARISON_REPORT}/maps/{dataset}/{scene}" for dataset, scene in SETTINGS.scenes]
-    return [f"{COMPARISON_REPORT}/index.html", f"reports/report{COMPARISON_ENDING}.json", *tables, *pictures]
-
 
 use rule tables as comparison_tables with:
     input:
@@ -27,8 +16,9 @@ use rule tables as comparison_tables with:
         "logs/comparison_tables.log",
     benchmark:
         "benchmarks/comparison_tables.tsv"
+    localrule: True
     params:
-        folder=COMPARISON_REPORT,
+        folder=folder_of_output,
         code=code_digest("sepi.report.tables"),
     message:
         "tables of the compared methods"
@@ -51,6 +41,7 @@ use rule maps as comparison_maps with:
     benchmark:
         "benchmarks/{dataset}/{scene}/comparison_maps.tsv"
     params:
+        results=results_folder,
         plan=lambda wildcards: plan_of_scene(wildcards, COMPARISON),
         pixels=pixels_of,
         code=lambda wildcards: code_digest("sepi.report.figures"),
@@ -70,8 +61,9 @@ use rule page as comparison_page with:
         "logs/comparison_page.log",
     benchmark:
         "benchmarks/comparison_page.tsv"
+    localrule: True
     params:
-        parts="",
+        parts=[],
         code=code_digest("sepi.report.page"),
     message:
         "page of the compared methods"

@@ -19,11 +19,13 @@ rule evaluate:
         mem_mb=lambda wildcards, input, attempt: memory_for(4, 200 + 50 * len(input.maps))(wildcards, attempt),
         runtime=lambda wildcards, input, attempt: minutes_for(0.05, 0.15 * len(input.maps))(wildcards, attempt),
     params:
-        stages=str(SCENE.stages),
-        kept=str(SCENE.kept_scores("{which}")),
+        stages=str(PLACED_SCENE.stages),
+        kept=str(PLACED_SCENE.kept_scores("{which}")),
         code=lambda wildcards: code_digest("sepi.evaluate"),
     message:
         "{wildcards.dataset}/{wildcards.scene}: scores"
     shell:
-        "exec python -m sepi.evaluate --light-field {input.light_field:q} --stages {params.stages:q} --code {params.code} "
-        "--kept {params.kept:q} --output {output.scores:q} {input.maps:q} 2> {log:q}"
+        command(
+            "sepi.evaluate --light-field {input.light_field:q} --stages {params.stages:q} --code {params.code} "
+            "--kept {params.kept:q} --output {output.scores:q} {input.maps:q} 2> {log:q}"
+        )

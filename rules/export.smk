@@ -19,10 +19,12 @@ rule export:
         mem_mb=memory_for(bytes_per_sample=4, bytes_per_pixel=300),
         runtime=minutes_for(0.05),
     params:
-        folder=str(SCENE.variant("{variant}")),
+        folder=folder_of_output,
         code=code_digest("sepi.export"),
     message:
         "{wildcards.dataset}/{wildcards.scene}: maps of variant {wildcards.variant}"
     shell:
-        "exec python -m sepi.export --light-field {input.light_field:q} --maps {input.maps:q} "
-        "--variant {wildcards.variant:q} --output {params.folder:q} 2> {log:q}"
+        command(
+            "sepi.export --light-field {input.light_field:q} --maps {input.maps:q} "
+            "--variant {wildcards.variant:q} --output {params.folder:q} 2> {log:q}"
+        )

@@ -2,12 +2,6 @@
 # wrong stops nothing: its problem is in the output and in the log.
 
 
-def external_inputs(wildcards):
-    """The maps that are there: one that appears later is a new input, and the scene's maps are read again."""
-    files = SETTINGS.external_files(wildcards.dataset, wildcards.scene)
-    return [str(file) for file in files.values() if os.path.isfile(file) and os.access(file, os.R_OK)]
-
-
 rule external:
     input:
         light_field=SCENE.light_field,
@@ -31,5 +25,7 @@ rule external:
     message:
         "{wildcards.dataset}/{wildcards.scene}: maps of external methods"
     shell:
-        "exec python -m sepi.external --light-field {input.light_field:q} --maps {params.maps:q} "
-        "--scene {params.scene:q} --output {output.maps:q} 2> {log:q}"
+        command(
+            "sepi.external --light-field {input.light_field:q} --maps {params.maps:q} "
+            "--scene {params.scene:q} --output {output.maps:q} 2> {log:q}"
+        )

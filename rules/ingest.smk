@@ -2,7 +2,7 @@
 # A scene's pictures are the inputs: a changed or new one is read again.
 rule ingest:
     input:
-        files=lambda wildcards: scene_of(wildcards).files,
+        files=lambda wildcards: list(map(own_file, scene_of(wildcards).files)),
     output:
         light_field=SCENE.light_field,
     log:
@@ -22,5 +22,7 @@ rule ingest:
     message:
         "{wildcards.dataset}/{wildcards.scene}: reading the light field"
     shell:
-        "exec python -m sepi.ingest {params.source:q} {params.disparity_range:q} --threads {threads} "
-        "--output {output.light_field:q} 2> {log:q}"
+        command(
+            "sepi.ingest {params.source:q} {params.disparity_range:q} --threads {threads} "
+            "--output {output.light_field:q} 2> {log:q}"
+        )

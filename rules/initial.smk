@@ -23,4 +23,4 @@ rule initial:
     message:
         stage_message("initial", "initial depth")
     shell:
-        "exec python -m sepi.initial --light-field {input.light_field:q} " + STAGE_FLAGS
+        command("sepi.initial --light-field {input.light_field:q} " + STAGE_FLAGS)

@@ -23,4 +23,4 @@ rule occlusion:
     message:
         stage_message("occlusion", "occlusion")
     shell:
-        "exec python -m sepi.occlusion --light-field {input.light_field:q} --previous {input.previous:q} " + STAGE_FLAGS
+        command("sepi.occlusion --light-field {input.light_field:q} --previous {input.previous:q} " + STAGE_FLAGS)

@@ -23,4 +23,4 @@ rule optimize:
     message:
         stage_message("optimize", "global optimisation")
     shell:
-        "exec python -m sepi.optimize --light-field {input.light_field:q} --previous {input.previous:q} " + STAGE_FLAGS
+        command("sepi.optimize --light-field {input.light_field:q} --previous {input.previous:q} " + STAGE_FLAGS)

@@ -1,59 +1,5 @@
 # What a reader looks at, below reports/: a page with everything, its numbers, tables, charts, and pictures of every scene.
 
-from dataclasses import replace
-
-from sepi.report.plan import PARTS_TABLES, TABLES, TEMPLATES
-from sepi.report.published import FOLDER as PUBLISHED
-
-MAIN_TABLES = [table for table in TABLES if table not in PARTS_TABLES]
-PARTS = "reports/report_parts.json" if SETTINGS.report.parts_of_best else []
-
-
-def table_files(tables):
-    """Each of the tables as CSV, Markdown and LaTeX."""
-    return [f"reports/{table}.{ending}" for table in tables for ending in ("csv", "md", "tex")]
-
-
-def figure_files(names):
-    """Each of the charts as PNG and PDF."""
-    return [f"reports/figures/{name}.{ending}" for name in names for ending in ("png", "pdf")]
-
-
-def report_files():
-    """The page, its numbers, every table and chart but those of the parts of ``best``, and pictures of every scene."""
-    pictures = [f"reports/maps/{dataset}/{scene}" for dataset, scene in SETTINGS.scenes]
-    charts = figure_files(["ablation", "time_and_memory"])
-    parts = ablation_files() if PARTS else []
-    tables = table_files(MAIN_TABLES)
-    return list(dict.fromkeys(["reports/index.html", "reports/report.json", *tables, *charts, *parts, *pictures]))
-
-
-def ablation_files():
-    """The paper's table 4, and the ablation of ``best``."""
-    return [*table_files(["table4_ablation", *PARTS_TABLES]), *figure_files(["ablation", "ablation_best"])]
-
-
-def measured_files(which):
-    """What one of the files of numbers is collected from."""
-    plan, parts = plan_of(which)
-    return plan.number_inputs(parts)
-
-
-def variants_in(which):
-    """The variants of one of the files of numbers."""
-    plan, parts = plan_of(which)
-    return plan.collected(parts)
-
-
-def plan_of_scene(wildcards, plan=PLAN):
-    """A plan for one scene alone, so that another scene in the configuration does not redraw it."""
-    return replace(plan, scenes={wildcards.dataset: [wildcards.scene]}).to_json()
-
-
-def pixels_of(wildcards):
-    """The pixels of a scene that the configuration asks for, as JSON."""
-    return json.dumps(SETTINGS.report.pixels.get(f"{wildcards.dataset}/{wildcards.scene}", []))
-
 
 # Every number of the report in one file: scores, times, facts about the scenes, and the tables made of them. The numbers
 # of best's parts have a file of their own (report_parts), since `all` does not run those variants.
@@ -73,6 +19,7 @@ rule numbers:
         mem_mb=500 + max(scene.samples for scene in SETTINGS.scenes.values()) * 8 // 2**20,
         runtime=5 + sum(scene.minutes(0.1) for scene in SETTINGS.scenes.values()) // 5,
     params:
+        results=results_folder,
         # functions: braces in names are no wildcards
         plan=lambda wildcards: plan_of(wildcards.which)[0].to_json(),
         parameters=lambda wildcards: SETTINGS.variants_json(variants_in(wildcards.which)),
@@ -81,8 +28,10 @@ rule numbers:
     message:
         "numbers of the report"
     shell:
-        "exec python -m sepi.report.numbers --results {RESULTS} --plan {params.plan:q} --parameters {params.parameters:q} "
-        "{params.flags} --output {output:q} 2> {log:q}"
+        command(
+            "sepi.report.numbers --results {params.results:q} --plan {params.plan:q} "
+            "--parameters {params.parameters:q} {params.flags} --output {output:q} 2> {log:q}"
+        )
 
 
 # Tables 1 to 4, the scores after each stage and at depth discontinuities, the run times, the confidence evaluation
@@ -100,14 +49,15 @@ rule tables:
         "logs/tables.log",
     benchmark:
         "benchmarks/tables.tsv"
+    localrule: True
     threads: 1
     params:
-        folder="reports",
+        folder=folder_of_output,
         code=code_digest("sepi.report.tables"),
     message:
         "tables"
     shell:
-        "exec python -m sepi.report.tables --numbers {input:q} --output {params.folder} 2> {log:q}"
+        command("sepi.report.tables --numbers {input:q} --output {params.folder:q} 2> {log:q}")
 
 
 # What each part of variant best gains and costs
@@ -125,13 +75,15 @@ rule parts_table:
         "logs/parts_table.log",
     benchmark:
         "benchmarks/parts_table.tsv"
+    localrule: True
     threads: 1
     params:
+        folder=folder_of_output,
         code=code_digest("sepi.report.tables"),
     message:
         "table of the parts of best"
     shell:
-        "exec python -m sepi.report.tables --numbers {input:q} --output reports 2> {log:q}"
+        command("sepi.report.tables --numbers {input:q} --output {params.folder:q} 2> {log:q}")
 
 
 # Charts of the numbers, for a paper
@@ -147,14 +99,18 @@ rule charts:
         "logs/charts.log",
     benchmark:
         "benchmarks/charts.tsv"
+    localrule: True
     threads: 1
     params:
+        folder=folder_of_output,
         code=code_digest("sepi.report.charts"),
     message:
         "charts"
     shell:
-        "exec python -m sepi.report.charts --numbers {input:q} --chart ablation --chart time_and_memory "
-        "--output reports/figures 2> {log:q}"
+        command(
+            "sepi.report.charts --numbers {input:q} --chart ablation --chart time_and_memory "
+            "--output {params.folder:q} 2> {log:q}"
+        )
 
 
 # Chart of the parts of variant best
@@ -171,13 +127,15 @@ rule parts_chart:
         "logs/parts_chart.log",
     benchmark:
         "benchmarks/parts_chart.tsv"
+    localrule: True
     threads: 1
     params:
+        folder=folder_of_output,
         code=code_digest("sepi.report.charts"),
     message:
         "chart of the parts of best"
     shell:
-        "exec python -m sepi.report.charts --numbers {input:q} --chart ablation_best --output reports/figures 2> {log:q}"
+        command("sepi.report.charts --numbers {input:q} --chart ablation_best --output {params.folder:q} 2> {log:q}")
 
 
 # Pictures of a scene: reference view, ground truth, each stage and variant, errors, masks, external methods' maps, and all
@@ -205,15 +163,18 @@ rule maps:
         mem_mb=memory_for(bytes_per_sample=4, bytes_per_pixel=1000),
         runtime=minutes_for(0.05, 15),
     params:
+        results=results_folder,
         plan=plan_of_scene,
         pixels=pixels_of,
         code=lambda wildcards: code_digest("sepi.report.figures"),
     message:
         "{wildcards.dataset}/{wildcards.scene}: pictures"
     shell:
-        "exec python -m sepi.report.figures --results {RESULTS} --plan {params.plan:q} "
-        "--dataset {wildcards.dataset:q} --scene {wildcards.scene:q} --pixels {params.pixels:q} "
-        "--output {output.folder:q} --page {output.page:q} 2> {log:q}"
+        command(
+            "sepi.report.figures --results {params.results:q} --plan {params.plan:q} "
+            "--dataset {wildcards.dataset:q} --scene {wildcards.scene:q} --pixels {params.pixels:q} "
+            "--output {output.folder:q} --page {output.page:q} 2> {log:q}"
+        )
 
 
 # Everything that is made of a scene by itself, with an empty file to ask for
@@ -236,13 +197,15 @@ rule scene:
 # The rules themselves, as Snakemake draws them
 rule graph:
     input:
-        [workflow.main_snakefile, *sorted(Path(workflow.basedir, "rules").glob("*.smk"))],
+        snakefile=RULE_FILES[0],
+        rules=RULE_FILES[1:],
     output:
         "reports/page/rules.svg",
     log:
         "logs/graph.log",
     benchmark:
         "benchmarks/graph.tsv"
+    localrule: True
     threads: 1
     params:
         flags="--external" if SETTINGS.external else "",
@@ -250,7 +213,10 @@ rule graph:
     message:
         "rule graph"
     shell:
-        "exec python -m sepi.report.graph --snakefile {input[0]:q} {params.flags} --output {output:q} 2> {log:q}"
+        command(
+            "sepi.report.graph --snakefile {input.snakefile:q} {params.flags} --output {output:q} "
+            "{input.rules:q} 2> {log:q}"
+        )
 
 
 # The page: all numbers, tables and scenes in one file
@@ -267,14 +233,17 @@ rule page:
         "logs/page.log",
     benchmark:
         "benchmarks/page.tsv"
+    localrule: True
     threads: 1
     resources:
         mem_mb=1000,
     params:
-        parts=f"--parts {PARTS}" if PARTS else "",
+        parts=lambda wildcards, input: ["--parts", input.parts] if PARTS else [],
         code=code_digest("sepi.report.page"),
     message:
         "page of the report"
     shell:
-        "exec python -m sepi.report.page --numbers {input.numbers:q} {params.parts} --graph {input.graph:q} "
-        "--output {output:q} {input.scenes:q} 2> {log:q}"
+        command(
+            "sepi.report.page --numbers {input.numbers:q} {params.parts:q} --graph {input.graph:q} "
+            "--output {output:q} {input.scenes:q} 2> {log:q}"
+        )

@@ -23,5 +23,4 @@ rule textureless:
     message:
         stage_message("textureless", "textureless regions")
     shell:
-        "exec python -m sepi.textureless --light-field {input.light_field:q} --previous {input.previous:q} "
-        + STAGE_FLAGS
+        command("sepi.textureless --light-field {input.light_field:q} --previous {input.previous:q} " + STAGE_FLAGS)

@@ -27,6 +27,7 @@ _TOGETHER = {
     **dict.fromkeys(["test_page_cloud", "test_page_pixels", "test_page_viewer"], "page"),
     "test_pipeline": "types",
     "test_workflow": "workflow",
+    "test_module": "module",
     "test_slurm": "slurm",
     **dict.fromkeys(["test_kills", "test_machine"], "faults"),
 }

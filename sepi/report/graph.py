@@ -30,15 +30,17 @@ Edges = Iterable[tuple[str, str]]
 _WIDTH, _HEIGHT, _ACROSS, _DOWN, _PASSING = 118, 32, 22, 30, 30
 
 
-def rule_edges(snakefile: Path, external: bool = False) -> list[tuple[str, str]]:
+def rule_edges(snakefile: Path, external: bool = False, rules: Iterable[Path] = ()) -> list[tuple[str, str]]:
     """Edges between the rules that ``snakemake all`` runs, sorted.
 
     Parameters
     ----------
     snakefile : Path
-        Its rules lie in the folder ``rules`` beside it.
+        It includes files of a folder ``rules``.
     external : bool
         Whether maps of external methods are configured, which adds a rule.
+    rules : iterable of Path
+        These files, wherever they are; without them, those in the folder beside the Snakefile.
 
     Raises
     ------
@@ -50,7 +52,10 @@ def rule_edges(snakefile: Path, external: bool = False) -> list[tuple[str, str]]
     with tempfile.TemporaryDirectory() as folder:
         copy = Path(folder)
         shutil.copy(snakefile, copy / "Snakefile")
-        shutil.copytree(snakefile.parent / "rules", copy / "rules")
+        (copy / "rules").mkdir()
+        for path in rules or (snakefile.parent / "rules").glob("*.smk"):
+            # Snakemake's copies of what lies elsewhere may be called NAME@REVISION
+            shutil.copy(path, copy / "rules" / path.name.partition("@")[0])
         config = {"builtin": {"scenes": ["dots"]}, "external": {"other": "maps"} if external else {}}
         (copy / "config.yaml").write_text(json.dumps(config))
         run = subprocess.run(
@@ -148,10 +153,11 @@ def _line(upper: tuple[float, float], lower: tuple[float, float], passes: bool) 
 @click.option("--snakefile", type=click.Path(path_type=Path), required=True, help="The workflow.")
 @click.option("--external", is_flag=True, help="Maps of external methods are configured.")
 @click.option("--output", type=click.Path(path_type=Path), required=True, help="SVG file to write.")
-def command(snakefile: Path, external: bool, output: Path) -> None:
-    """Draw the rules that 'snakemake all' runs."""
+@click.argument("rules", nargs=-1, type=click.Path(path_type=Path))
+def command(snakefile: Path, external: bool, output: Path, rules: tuple[Path, ...]) -> None:
+    """Draw the rules that 'snakemake all' runs; RULES are the files that the Snakefile includes."""
     try:
-        picture = drawn(rule_edges(snakefile, external))
+        picture = drawn(rule_edges(snakefile, external, rules))
     except SepiError as error:
         # the page is worth more than its graph
         warnings.warn(str(error), SepiWarning, stacklevel=1)

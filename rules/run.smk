@@ -1,0 +1,81 @@
+# What a run as a whole does beside its jobs: it takes its folder over from one that was killed, shows how far it is, and says
+# at its end what it wrote.
+
+import time
+
+from sepi.workflow.run_folder import note_run, say_if_full, say_so, take_over, tidy_up
+from sepi.workflow.run_log import show_progress
+
+STARTED = time.time()
+
+
+def is_new(file):
+    """Whether this run wrote a file."""
+    return Path(file).exists() and Path(file).stat().st_mtime >= STARTED
+
+
+def print_warnings():
+    """Show what the readers of light fields and of external maps warned of in this run, from their logs."""
+    missing = {}
+    for dataset, scene in SETTINGS.scenes:
+        for command in ("ingest", "external"):
+            log = Path(placed(f"logs/{dataset}/{scene}/{command}.log"))
+            for line in log.read_text().splitlines() if is_new(log) else ():
+                absent = re.match(r"sepi: warning: external (.+), scene .+: no such file$", line)
+                if absent:
+                    missing.setdefault(absent[1], []).append(f"{dataset}/{scene}")
+                elif line.startswith("sepi: warning:"):
+                    print(line, flush=True)
+    # a method rarely has maps of all scenes: one line for each method
+    for method, scenes in missing.items():
+        others = f" and {len(scenes) - 3} others" if len(scenes) > 4 else ""
+        named = ", ".join(scenes[:3] if others else scenes)
+        print(f"sepi: warning: external {method}: no map of {named}{others}", flush=True)
+
+
+def print_written(tables, maps):
+    """Name the tables and the folders of maps that this run wrote."""
+    tables, maps = list(map(placed, tables)), list(map(placed, maps))
+    new = [file for file in [*tables, *maps] if is_new(file)]
+    groups = {
+        "Tables and figures": [file for file in new if file in tables],
+        "Maps": list(dict.fromkeys(f"{Path(file).parent}/" for file in new if file in maps)),
+    }
+    for title, files in groups.items():
+        if files:
+            print(f"{title} written:", *dict.fromkeys(files), sep="\n  ", flush=True)
+
+
+def run_begins():
+    """Note that what is made now is to be looked at, should the run be killed."""
+    note_run(well=False)
+
+
+def run_ended_well():
+    """Note that nothing is left to look at; tell of warnings, and what was made."""
+    note_run(well=True)
+    print_warnings()
+    print_written([*report_files(), *ablation_files(), *comparison_files()], result_files(SETTINGS.variants))
+
+
+def run_failed():
+    """Put away what a job left: it may have been killed, the clock set back, the disk be full."""
+    tidy_up(MADE)
+    say_if_full(Path())
+
+
+# where all that is made is
+MADE = [Path(placed(RESULTS)), Path(placed("reports"))]
+
+# a run that was killed does not stop the next one
+if workflow.is_main_process and not workflow.output_settings.dryrun:
+    if take_over(Path(workflow.overwrite_workdir or "."), MADE):
+        say_so()
+    if IS_MODULE:
+        # not every version of Snakemake calls handlers of a module, and the workflow that has it may not either
+        run_begins()
+
+
+# a progress bar, or a line for each job; a dry run is as Snakemake shows it, and so is another workflow's run
+if workflow.is_main_process and not (IS_MODULE or workflow.output_settings.dryrun or workflow.output_settings.verbose):
+    show_progress(logger)

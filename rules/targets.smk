@@ -1,0 +1,79 @@
+# What the page, the tables and the pictures consist of, and what they are made of.
+
+from dataclasses import replace
+
+from sepi.report.plan import COMPARISON_TABLES, PARTS_TABLES, TABLES, TEMPLATES
+from sepi.report.published import FOLDER as PUBLISHED
+
+MAIN_TABLES = [table for table in TABLES if table not in PARTS_TABLES]
+PARTS = "reports/report_parts.json" if SETTINGS.report.parts_of_best else []
+COMPARISON_REPORT = "reports/comparison"
+
+
+def table_files(tables):
+    """Each of the tables as CSV, Markdown and LaTeX."""
+    return [f"reports/{table}.{ending}" for table in tables for ending in ("csv", "md", "tex")]
+
+
+def figure_files(names):
+    """Each of the charts as PNG and PDF."""
+    return [f"reports/figures/{name}.{ending}" for name in names for ending in ("png", "pdf")]
+
+
+def report_files():
+    """The page, its numbers, every table and chart but those of the parts of ``best``, and pictures of every scene."""
+    pictures = [f"reports/maps/{dataset}/{scene}" for dataset, scene in SETTINGS.scenes]
+    charts = figure_files(["ablation", "time_and_memory"])
+    parts = ablation_files() if PARTS else []
+    tables = table_files(MAIN_TABLES)
+    return list(dict.fromkeys(["reports/index.html", "reports/report.json", *tables, *charts, *parts, *pictures]))
+
+
+def ablation_files():
+    """The paper's table 4, and the ablation of ``best``."""
+    return [*table_files(["table4_ablation", *PARTS_TABLES]), *figure_files(["ablation", "ablation_best"])]
+
+
+def measured_files(which):
+    """What one of the files of numbers is collected from."""
+    plan, parts = plan_of(which)
+    return plan.number_inputs(parts)
+
+
+def variants_in(which):
+    """The variants of one of the files of numbers."""
+    plan, parts = plan_of(which)
+    return plan.collected(parts)
+
+
+def plan_of_scene(wildcards, plan=PLAN):
+    """A plan for one scene alone, so that another scene in the configuration does not redraw it."""
+    return replace(plan, scenes={wildcards.dataset: [wildcards.scene]}).to_json()
+
+
+def pixels_of(wildcards):
+    """The pixels of a scene that the configuration asks for, as JSON."""
+    return json.dumps(SETTINGS.report.pixels.get(f"{wildcards.dataset}/{wildcards.scene}", []))
+
+
+def comparison_files():
+    """The page of the comparison, its numbers and tables, and pictures of every scene."""
+    tables = [f"{COMPARISON_REPORT}/{table}.{ending}" for table in COMPARISON_TABLES for ending in ("csv", "md", "tex")]
+    pictures = [f"{COMPARISON_REPORT}/maps/{dataset}/{scene}" for dataset, scene in SETTINGS.scenes]
+    return [f"{COMPARISON_REPORT}/index.html", f"reports/report{COMPARISON_ENDING}.json", *tables, *pictures]
+
+
+def external_inputs(wildcards):
+    """The maps that are there: one that appears later is a new input, and the scene's maps are read again."""
+    files = SETTINGS.external_files(wildcards.dataset, wildcards.scene)
+    return [own_file(file) for file in files.values() if os.path.isfile(file) and os.access(file, os.R_OK)]
+
+
+def folder_of_output(wildcards, output):
+    """The folder that a job's files go into."""
+    return os.path.dirname(output[0])
+
+
+def results_folder(wildcards):
+    """The folder that commands look for results in."""
+    return placed(RESULTS)

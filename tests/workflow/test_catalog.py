@@ -1,0 +1,57 @@
+"""What the Snakemake workflow catalog looks at: its file, the instructions, and Snakemake's own linter."""
+
+import os
+import re
+import subprocess
+import sys
+
+import pytest
+import yaml
+from workflow_copy import REPOSITORY
+
+from sepi.workflow.config import Config, load_settings
+
+# each job is a command of the package that the rules themselves import: it is there where Snakemake runs
+ALLOWED = {"Specify a conda environment or container for each rule."}
+
+
+@pytest.mark.workflow
+def test_snakemakes_linter_finds_nothing_else() -> None:
+    """It finds what makes a workflow hard to read or to run elsewhere; the catalog shows what it says."""
+    result = subprocess.run(
+        [sys.executable, "-m", "snakemake", "--lint", "--", "all"],
+        cwd=REPOSITORY,
+        env=os.environ | {"PYTHONPATH": str(REPOSITORY)},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        check=False,
+    )
+    checked = set(re.findall(r"^Lints for rule (\w+)", result.stdout, re.MULTILINE))
+    assert {"ingest", "optimize", "page"} <= checked, result.stdout
+    assert set(re.findall(r"^ +\* (.+):$", result.stdout, re.MULTILINE)) == ALLOWED, result.stdout
+
+
+def test_the_catalogs_file_has_what_it_reads() -> None:
+    """A key of another name is taken for one that is absent."""
+    usage = yaml.safe_load((REPOSITORY / ".snakemake-workflow-catalog.yml").read_text())["usage"]
+    assert set(usage) == {"mandatory-flags", "software-stack-deployment", "report"}
+    assert set(usage["mandatory-flags"]) == {"desc", "flags"}
+    assert set(usage["software-stack-deployment"]) == {"conda", "apptainer", "apptainer+conda"}
+    assert usage["report"] is True
+
+
+def test_the_instructions_name_every_key() -> None:
+    """The catalog's page shows this text alone, and the example in it is copied from there."""
+    text = (REPOSITORY / "config/README.md").read_text()
+    assert [key for key in Config.model_fields if f"`{key}`" not in text] == []
+    values = yaml.safe_load(text.split("```yaml\n")[1].split("```")[0])
+    assert set(values) <= set(Config.model_fields)
+    assert set(values["light_fields"]["lego"]) == {"path", "grid"}
+
+
+def test_a_deployed_workflow_begins_with_the_defaults() -> None:
+    """Snakedeploy copies the folder `config` and reads `config/config.yaml` from it."""
+    copied = REPOSITORY / "config/config.yaml"
+    assert copied.resolve() == (REPOSITORY / "config.yaml").resolve()
+    assert load_settings(yaml.safe_load(copied.read_text())).scenes == load_settings({}).scenes

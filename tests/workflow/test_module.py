@@ -1,0 +1,256 @@
+"""The workflow as a module of another one: the example in docs/workflow.md, word for word, and what may go wrong."""
+
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import tomllib
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+from workflow_copy import REPOSITORY, copy_of_the_project, wait_for
+
+from sepi.io.files import is_temporary
+from sepi.scenes import render
+
+pytestmark = pytest.mark.workflow
+
+DOCUMENT = REPOSITORY / "docs/workflow.md"
+QUICK = "depth/results/own/flowers/quick"
+
+
+def block(language: str) -> str:
+    """The only block in a language in the section of the document."""
+    section = DOCUMENT.read_text().split("## As a module of another workflow")[1].split("\n## ")[0]
+    (found,) = re.findall(rf"```{language}\n(.+?)```", section, re.DOTALL)
+    return str(found)
+
+
+@dataclass(frozen=True)
+class User:
+    """Another workflow in a folder of its own, beside a checkout of this one."""
+
+    folder: Path
+
+    def write(self, snakefile: str, config: str) -> None:
+        self.folder.mkdir(exist_ok=True)
+        (self.folder / "Snakefile").write_text(snakefile)
+        (self.folder / "config.yaml").write_text(config)
+
+    @property
+    def environment(self) -> dict[str, str]:
+        """As outside any run of this workflow."""
+        kept = {name: value for name, value in os.environ.items() if not name.startswith("SEPI_")}
+        return kept | {"PYTHONPATH": str(REPOSITORY)}
+
+    def run(self, *words: str, python: str = "-m snakemake") -> subprocess.CompletedProcess[str]:
+        """Snakemake as the user calls it; stdout holds its messages too."""
+        return subprocess.run(
+            [sys.executable, *python.split(" ", 1), "--cores", "1", *words],
+            cwd=self.folder,
+            env=self.environment,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            check=False,
+            timeout=300,
+        )
+
+    def told(self, *words: str, python: str = "-m snakemake") -> str:
+        """The one line with which this workflow ends a run that it cannot do."""
+        result = self.run(*words, python=python)
+        assert result.returncode == 1, result.stdout
+        assert "Traceback" not in result.stdout
+        (line,) = (line for line in result.stdout.splitlines() if line.startswith("sepi: "))
+        return line
+
+
+@pytest.fixture(scope="module")
+def user(tmp_path_factory: pytest.TempPathFactory) -> User:
+    """The document's example and its light field, not yet run."""
+    root = tmp_path_factory.mktemp("module")
+    copy_of_the_project(root / "sepi")
+    found = User(root / "mine")
+    found.write(block("python"), block("yaml"))
+    np.save(found.folder / "flowers.npy", render("dots", size=64, views=5).views)
+    return found
+
+
+@pytest.fixture(scope="module")
+def finished(user: User) -> User:
+    """The same after a run."""
+    result = user.run()
+    assert result.returncode == 0, result.stdout
+    (user.folder / "stdout").write_text(result.stdout)
+    return user
+
+
+@pytest.fixture
+def beside(user: User, tmp_path: Path) -> Callable[..., User]:
+    """Makes another workflow with a copy of the example's Snakefile, changed, and a configuration."""
+
+    def make(config: str, *changes: tuple[str, str]) -> User:
+        text = block("python").replace('"../sepi/Snakefile"', repr(str(user.folder.parent / "sepi/Snakefile")))
+        for old, new in changes:
+            assert old in text
+            text = text.replace(old, new)
+        made = User(tmp_path / "other")
+        made.write(text, config)
+        return made
+
+    return make
+
+
+def test_the_documents_example_runs_as_it_stands(finished: User) -> None:
+    """Who copies it gets a map by this workflow, and their own rule reads it."""
+    disparity = np.load(finished.folder / QUICK / "disparity.npy")
+    assert disparity.shape == (64, 64)
+    assert float((finished.folder / "nearest.txt").read_text()) == pytest.approx(float(disparity.max()))
+    stdout = (finished.folder / "stdout").read_text()
+    assert f"Maps written:\n  {QUICK}/\n" in stdout
+    assert "localrules" not in stdout
+    assert sorted(path.name for path in finished.folder.iterdir()) == sorted(
+        [".snakemake", "Snakefile", "config.yaml", "depth", "flowers.npy", "nearest.txt", "stdout"]
+    )
+
+
+def test_again_does_nothing(finished: User) -> None:
+    """Every run of a workflow that goes on from the maps would compute them anew."""
+    result = finished.run("--dry-run", "nearest", f"{QUICK}/result.h5")
+    assert result.returncode == 0, result.stdout
+    assert "Nothing to be done" in result.stdout
+
+
+def test_tables_and_page_go_below_the_prefix(finished: User) -> None:
+    """All of it is planned, from the light field that is there, and with what the user's configuration asks for."""
+    result = finished.run("--dry-run", "sepi_all")
+    assert result.returncode == 0, result.stdout
+    table = dict(re.findall(r"^(\w+) +(\d+)$", result.stdout.split("Job stats:")[1], re.MULTILINE))
+    assert "sepi_ingest" not in table
+    assert {"sepi_numbers", "sepi_page", "sepi_maps", "sepi_graph", "sepi_all"} <= set(table)
+    assert re.search(r"Missing output files: depth/reports/index.html", result.stdout)
+    assert " reports/" not in result.stdout
+
+
+def test_a_wrong_key_is_one_line_and_nothing_runs(beside: Callable[..., User]) -> None:
+    wrong = beside("sepi: {builtn: {size: 64}}")
+    assert "unknown 'builtn'; did you mean 'builtin'?" in wrong.told()
+    assert not (wrong.folder / "depth").exists()
+
+
+def test_without_prefix_and_names_of_its_own(beside: Callable[..., User]) -> None:
+    """The other way to write it: the user's first rule is what `snakemake` makes, and sees nothing of this one."""
+    shown = """rule shown:
+    input:
+        "results/builtin/dots/lightfield.h5",
+    output:
+        "shown.txt",
+    shell:
+        "env > {output}"
+"""
+    plain = beside(
+        "samples: [a]",
+        ("module sepi:", f"{shown}\n\nmodule sepi:"),
+        ('config["sepi"]', '{"builtin": {"scenes": ["dots"], "size": 64}}'),
+        ('    prefix:\n        "depth"\n', ""),
+        ("use rule * from sepi as sepi_*", "use rule * from sepi exclude all"),
+        ("    default_target: True\n", ""),
+    )
+    result = plain.run()
+    assert result.returncode == 0, result.stdout
+    seen = dict(line.partition("=")[::2] for line in (plain.folder / "shown.txt").read_text().splitlines())
+    assert seen["PYTHONPATH"] == str(REPOSITORY)
+    assert seen["PATH"] == os.environ["PATH"]
+
+
+def test_a_killed_run_is_put_away(beside: Callable[..., User]) -> None:
+    """Its lock would stop every further run of the user's workflow, and what it had begun to write would stay."""
+    rules = """rule stuck:
+    output:
+        "stuck.txt",
+    shell:
+        "touch begun; sleep 300"
+
+
+rule short:
+    output:
+        "short.txt",
+    shell:
+        "touch {output}"
+"""
+    killed = beside("sepi: {}", ("onsuccess:\n    sepi.run_ended_well()\n", rules))
+    command = [sys.executable, "-m", "snakemake", "--cores", "1"]
+    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    process = subprocess.Popen(
+        [*command, "stuck"], cwd=killed.folder, env=killed.environment, start_new_session=True, **quiet
+    )
+    wait_for((killed.folder / "begun").exists, seconds=120)
+    begun = killed.folder / "depth/results/.map-0123456789ab.pfm"
+    assert is_temporary(begun)
+    begun.parent.mkdir(parents=True)
+    begun.touch()
+    os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
+    result = killed.run("short")
+    assert result.returncode == 0, result.stdout
+    assert "sepi: the last run here was killed" in result.stdout
+    assert not begun.exists()
+
+
+class TestFromElsewhere:
+    """A Snakefile that Snakemake fetches, as it does from GitHub: without the package beside it."""
+
+    @pytest.fixture
+    def repository(self, tmp_path: Path) -> Path:
+        """A repository with the Snakefile and the rules alone, in a folder, as Snakemake reads local repositories."""
+        inside = tmp_path / "repository" / "sepi"
+        shutil.copytree(REPOSITORY / "rules", inside / "rules")
+        shutil.copy2(REPOSITORY / "Snakefile", inside)
+        return inside.parent
+
+    def fetching(self, repository: Path, beside: Callable[..., User]) -> User:
+        """A workflow that takes its module from the repository as it is now."""
+        git = ["git", "-C", str(repository), "-c", "user.name=nobody", "-c", "user.email=nobody@example.org"]
+        for words in (["init", "--quiet"], ["add", "--all"], ["commit", "--quiet", "--message=all"], ["tag", "v1"]):
+            subprocess.run([*git, *words], check=True)
+        source = f'"git+file://{repository}/sepi/Snakefile@v1"'
+        made = beside("sepi: {}")
+        text = (made.folder / "Snakefile").read_text()
+        made.write(re.sub(r"snakefile:\s+\S+", f"snakefile: {source}", text), "sepi: {}")
+        return made
+
+    def test_the_graph_is_of_this_workflow(self, repository: Path, beside: Callable[..., User]) -> None:
+        """The page shows its own rules, not those of the workflow that has it, and they are not drawn in every run."""
+        fetched, target = self.fetching(repository, beside), "depth/reports/page/rules.svg"
+        result = fetched.run(target)
+        assert result.returncode == 0, result.stdout
+        names = re.findall(r"<text[^>]*>(\w+)</text>", (fetched.folder / target).read_text())
+        assert {"ingest", "page", "all"} <= set(names)
+        assert "nearest" not in names
+        assert "Nothing to be done" in fetched.run("-n", target).stdout
+
+    def test_another_version_is_told(self, repository: Path, beside: Callable[..., User]) -> None:
+        """Rules of one version with commands of another would fail in the middle, or compute something else."""
+        rules = repository / "sepi/rules/package.smk"
+        rules.write_text(re.sub(r"^VERSION = .+$", 'VERSION = "99.1"', rules.read_text(), flags=re.MULTILINE))
+        line = self.fetching(repository, beside).told()
+        assert "/repository/sepi is of version 99.1, the installed package of version " in line
+        assert "pip install sepi==99.1" in line
+
+    def test_a_missing_package_is_told(self, repository: Path, beside: Callable[..., User]) -> None:
+        """The first thing that someone meets who takes the module from GitHub."""
+        without = "import sys; sys.modules['sepi'] = None; from snakemake.cli import main; main()"
+        line = self.fetching(repository, beside).told(python=f"-c {without}")
+        assert "the Python package is not installed where Snakemake runs; pip install sepi==" in line
+
+
+def test_the_rules_are_of_the_packages_version() -> None:
+    """A release whose rules name another version would refuse to run."""
+    project = tomllib.loads((REPOSITORY / "pyproject.toml").read_text())["project"]
+    (stated,) = re.findall(r'^VERSION = "(.+)"$', (REPOSITORY / "rules/package.smk").read_text(), re.MULTILINE)
+    assert stated == project["version"]
