@@ -77,6 +77,10 @@ CLAIMS: dict[str, list[str]] = {
         "list(failed) == ['broken'] and 'broken/input_Cam000.png' in failed['broken']",
         "not Path(workplace.name).exists()",
     ],
+    "plot_13_every_view": [
+        "agree.min() > 0.75 and agree[2, 2] == 1",
+        "np.max(1 - agree - hidden) < 0.03",
+    ],
 }
 
 _RUN = """
