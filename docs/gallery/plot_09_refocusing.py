@@ -42,12 +42,14 @@ plt.show()
 # --------------
 #
 # ``aperture`` is the lens's radius in view steps. A small one has more depth
-# of field, as on a camera.
+# of field, as on a camera. With the map, the gaps between the views are
+# filled, too: what is out of focus is blurred evenly, without a trace of the
+# grid of views.
 
 figure, axes = plt.subplots(1, 2, figsize=(6, 3.4), layout="constrained")
 disparity = float(maps.disparity[clicks["the pot"]])
 for axis, aperture in zip(axes, (1.5, 5.7), strict=True):
-    axis.imshow(sepi.refocus(light_field, disparity, aperture=aperture))
+    axis.imshow(sepi.refocus(light_field, disparity, maps, aperture=aperture))
     axis.set_title(f"aperture {aperture}")
     axis.set_axis_off()
 plt.show()
