@@ -49,9 +49,42 @@ STAGES: dict[str, dict[str, Choice]] = {
 HANDED_ON = "none"
 """The choice of a stage that hands on the maps of the stage before: it is no job and has no file."""
 
+# choices that callers added, as stage and name
+_ADDED: set[tuple[str, str]] = set()
+
 _BASE, _CHOICE = "base", "choice"
 # a folder's name holds 255 bytes
 _LONGEST_LABEL = 120
+
+
+def add_choice(stage: str, name: str, choice: Choice) -> None:
+    """Add a choice of your own to a stage, for this process: variants may name it from then on.
+
+    Adding it again replaces it, as in a notebook whose cell runs twice. For a method that the command line and the
+    workflow should know, too, see docs/compared.md.
+
+    Parameters
+    ----------
+    stage : str
+        A key of :data:`STAGES`.
+    name : str
+        Letters, digits and ``_``; none of the stage's own choices.
+    choice : Choice
+        Its parameters and its function.
+
+    Raises
+    ------
+    SepiError
+        If there is no such stage, the name is no such name, or the stage has a choice of this name that the package
+        brought.
+    """
+    require_known("stages", [stage], STAGES)
+    if not re.fullmatch(r"\w+", name, re.ASCII):
+        raise SepiError(f"stage {stage}: a choice's name has letters, digits and '_' only, got {name!r}")
+    if name in STAGES[stage] and (stage, name) not in _ADDED:
+        raise SepiError(f"stage {stage}: '{name}' is a choice that the package brings; take another name")
+    STAGES[stage][name] = choice
+    _ADDED.add((stage, name))
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,110 @@
+"""The gallery's examples run, each as a script in a process of its own, and what their text says is so."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+GALLERY = Path(__file__).parents[2] / "docs" / "gallery"
+
+# what the text of each example says, in the example's own names
+CLAIMS: dict[str, list[str]] = {
+    "plot_01_first_depth_map": [
+        "np.median(error) < 0.005",
+        "np.mean(error > 0.07) < 0.02",
+        # near things move to the left from the first view of a row to the last, the far lawn to the right
+        "truth[32, 72] > 1 and truth[64, 64] < -1",
+        "'disparity.pfm' in names",
+    ],
+    "plot_02_sepis_and_cost_curves": [
+        "spread['right candidate'] < 0.2 * spread['wrong candidate']",
+        "abs(found - true) < 0.01",
+        "lowest < 0.2 * np.median(curves.costs[0])",
+    ],
+    "plot_03_occlusion": [
+        "cost_at_truth['right'] < 0.5 * cost_at_truth['full'] < 0.5 * cost_at_truth['left']",
+        "all(abs(curves.minimum(name)[0] - true) < 0.05 for name in ('full', 'left', 'right'))",
+        "mse['best'] < mse['paper'] < 2 / 3 * mse['no_occlusion']",
+        "maps.subset_names[maps.extra['view_subset'][y, x]].startswith('right')",
+    ],
+    "plot_04_textureless_regions": [
+        # the last curve is the wall's: flat
+        "np.ptp(curves.costs[0]) < 0.15",
+        "np.median(lti[bare]) < 0.3 * np.median(lti[~bare])",
+        "mse['best'] < mse['paper'] < mse['no_textureless']",
+    ],
+    "plot_05_confidence": [
+        "(curves['oracle'] <= curves['by confidence'] + 1e-9).all()",
+        "curves['by confidence'].mean() < 0.5 * error.mean()",
+        "error[kept].mean() < 0.7 * error.mean() and abs(kept.mean() - 0.75) < 0.01",
+        "not maps.extra['unknown'].any()",
+    ],
+    "plot_06_missing_views": [
+        "bad['star'] < 1.1 * bad['all']",
+        "bad['star'] < bad['cross'] < bad['row']",
+        "bad['black, told'] < 0.7 * bad['black, not told']",
+    ],
+    "plot_07_another_view": [
+        "corner.views is light_field.views",
+        "same.mean() > 0.7 and nearer.mean() > 0.1",
+        "(~same & ~nearer).mean() < 0.02",
+    ],
+    "plot_08_point_cloud": [
+        "np.median(error_mm) < 1.5",
+        "abs(measured - true) < 0.3",
+        "cloud.metric and cloud.positions[:, 2].max() < 0",
+    ],
+    "plot_09_refocusing": [
+        "noise['all in focus'] < 0.3 * noise['centre view']",
+        "maps.disparity[clicks['the pot']] > 1.5 and maps.disparity[clicks['the paper']] < -1",
+    ],
+    "plot_10_comparing_methods": [
+        "scores['best']['all']['mse100'] < scores['paper']['all']['mse100'] < scores['mishiba']['all']['mse100']",
+        # the scores need not agree on an order
+        "scores['paper']['all']['badpix007'] > scores['mishiba']['all']['badpix007']",
+        "scores['best']['discontinuities']['fattening'] < 0.5 * scores['paper']['discontinuities']['fattening']",
+    ],
+    "plot_11_a_stage_of_your_own": [
+        "bad['fill'] < 0.5 * min(bad['first map'], bad['wls'])",
+        "mse['fill'] > mse['first map'] > mse['wls']",
+        "refused.startswith('optimize.fill.window: ')",
+        "abs(maps['fill'].extra['filled'].mean() - 0.1) < 0.01",
+    ],
+    "plot_12_many_light_fields": [
+        "list(done) == ['dots', 'pyramids', 'wall'] and same",
+        "list(failed) == ['broken'] and 'broken/input_Cam000.png' in failed['broken']",
+        "not Path(workplace.name).exists()",
+    ],
+    "plot_13_every_view": [
+        "agree.min() > 0.75 and agree[2, 2] == 1",
+        "np.max(1 - agree - hidden) < 0.03",
+    ],
+}
+
+_RUN = """
+import runpy, sys
+names = runpy.run_path(sys.argv[1], run_name="__main__")
+wrong = [claim for claim in sys.argv[2:] if not eval(claim, dict(names))]
+sys.exit("not so: " + "; ".join(wrong) if wrong else 0)
+"""
+
+
+def test_every_example_is_checked() -> None:
+    """A new example that nobody runs would break unseen."""
+    assert sorted(path.stem for path in GALLERY.glob("plot_*.py")) == sorted(CLAIMS)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", CLAIMS)
+def test_example_runs_and_shows_what_it_says(name: str, tmp_path: Path) -> None:
+    """Someone who downloads the script gets an error or a warning, or pictures that do not show what the text says."""
+    environment = os.environ | dict.fromkeys(("NUMBA_NUM_THREADS", "OMP_NUM_THREADS"), "1") | {"MPLBACKEND": "agg"}
+    # pyplot.show() says so where there is a display that it cannot use
+    warnings = ["-W", "error", "-W", "ignore:FigureCanvasAgg is non-interactive"]
+    command = [sys.executable, *warnings, "-c", _RUN, str(GALLERY / f"{name}.py"), *CLAIMS[name]]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, env=environment, check=False)
+    assert done.returncode == 0, done.stderr
+    assert not done.stderr
+    assert not list(tmp_path.iterdir()), "an example leaves files behind"
