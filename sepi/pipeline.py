@@ -77,6 +77,23 @@ def add_choice(stage: str, name: str, choice: Choice) -> None:
     SepiError
         If there is no such stage, the name is no such name, or the stage has a choice of this name that the package
         brought.
+
+    Examples
+    --------
+    >>> import sepi
+    >>> from sepi.pipeline import Variant, add_choice
+    >>> from sepi.scenes import render
+    >>> from sepi.stage import Choice, Parameters, require_previous
+    >>> def mirrored(light_field, previous, parameters, progress):
+    ...     before = require_previous(previous)
+    ...     return before.updated(before.disparity[:, ::-1], before.confidence[:, ::-1])
+    >>> add_choice("optimize", "mirrored", Choice(Parameters, mirrored))
+    >>> light_field = render("slanted_plane", size=64, views=3)
+    >>> usual, mine = (
+    ...     sepi.estimate_depth(light_field, Variant("sepi", "none", "none", last)) for last in ("none", "mirrored")
+    ... )
+    >>> bool((mine.disparity == usual.disparity[:, ::-1]).all())
+    True
     """
     require_known("stages", [stage], STAGES)
     if not re.fullmatch(r"\w+", name, re.ASCII):

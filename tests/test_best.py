@@ -16,8 +16,8 @@ from sepi.matching.base_detail import (
 )
 from sepi.pipeline import PARTS_OF_BEST, VARIANTS, estimate_depth
 from sepi.regularization.uniform_regions import UniformPlanesParameters, ransac_plane, uniform_regions
-from sepi.report.tabular.confidence import decile_errors, oracle, sparsification
 from sepi.scenes import render
+from sepi.scoring.confidence import decile_errors, oracle, sparsification
 
 
 @pytest.mark.parametrize(

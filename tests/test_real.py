@@ -14,7 +14,7 @@ from sepi.lightfield import DisparityRange, LightField, as_unit_float
 from sepi.matching.plane_sweep import SweepParameters, sweep
 from sepi.pipeline import VARIANTS
 from sepi.reading import read_light_field
-from sepi.report.tabular.confidence import decile_errors
+from sepi.scoring.confidence import decile_errors
 
 # MSE x100 and Q25 x100 on the whole map, as the paper prints them for its own method
 BOUNDS = {"cotton": (1.20, 0.34), "antinous": (12.84, 1.12)}

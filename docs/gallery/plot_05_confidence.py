@@ -11,8 +11,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import sepi
-from sepi.report.tabular.confidence import oracle, sparsification
 from sepi.scenes import render
+from sepi.scoring.confidence import oracle, sparsification
 
 light_field = render("dots", size=128, views=7)
 maps = sepi.estimate_depth(light_field)

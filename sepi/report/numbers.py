@@ -30,8 +30,8 @@ from sepi.matching.unknown import with_unknown
 from sepi.report.plan import Plan
 from sepi.report.runs import Runs, read_json
 from sepi.report.tables import BUILDERS
-from sepi.report.tabular.confidence import decile_errors, oracle, sparsification
 from sepi.report.tabular.layout import as_json, write
+from sepi.scoring.confidence import decile_errors, oracle, sparsification
 from sepi.validation import require_known
 from sepi.workflow.machine import this_machine
 from sepi.workflow.result_paths import stage_of

@@ -1,0 +1,115 @@
+"""What a confidence is worth: errors by decile of confidence, and sparsification curves [1]_.
+
+References
+----------
+.. [1] Ilg et al.: Uncertainty estimates and multi-hypotheses networks for optical flow. ECCV 2018.
+   doi:10.1007/978-3-030-01234-2_40
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from sepi.lightfield import FloatMap
+
+DECILES = 10
+
+STEPS = 100
+"""Points of a sparsification curve."""
+
+FloatArray = npt.NDArray[np.float64]
+
+
+def decile_errors(confidence: FloatMap, error: FloatMap) -> tuple[FloatArray, FloatArray]:
+    """Errors of the tenths of the pixels, from the most confident to the least.
+
+    Parameters
+    ----------
+    confidence, error : ndarray, shape (H, W), float32
+        Pixels whose error is not finite are left out.
+
+    Returns
+    -------
+    squared, absolute : ndarray, shape (10,), float64
+        Mean squared and mean absolute error of each tenth, times 100; NaN where there is no pixel.
+    """
+    ordered = _by_confidence(confidence, error)
+    tenths = np.array_split(ordered, DECILES)
+    return (
+        np.array([100 * np.mean(tenth**2) if tenth.size else np.nan for tenth in tenths]),
+        np.array([100 * np.mean(np.abs(tenth)) if tenth.size else np.nan for tenth in tenths]),
+    )
+
+
+def sparsification(confidence: FloatMap, error: FloatMap) -> FloatArray:
+    """Mean absolute error of the pixels that stay when the least confident are taken away [1]_.
+
+    Parameters
+    ----------
+    confidence, error : ndarray, shape (H, W), float32
+        0..1; estimate minus ground truth in pixels per view step, :attr:`sepi.io.scores.Evaluation.error`. Pixels
+        whose error is not finite are left out.
+
+    Returns
+    -------
+    ndarray, shape (100,), float64
+        Times 100; with 0, 1, ... 99 % of the pixels taken away. NaN where no error is finite.
+
+    References
+    ----------
+    .. [1] Ilg et al.: Uncertainty estimates and multi-hypotheses networks for optical flow. ECCV 2018.
+       doi:10.1007/978-3-030-01234-2_40
+
+    Examples
+    --------
+    A confidence is worth something if the curve falls:
+
+    >>> import sepi
+    >>> from sepi.evaluate import evaluation_of
+    >>> from sepi.scoring.confidence import sparsification
+    >>> from sepi.scenes import render
+    >>> light_field = render("curved_occluders", size=96, views=5)
+    >>> maps = sepi.estimate_depth(light_field)
+    >>> curve = sparsification(maps.confidence, evaluation_of(light_field, maps.disparity).error)
+    >>> curve.shape, bool(curve[50] < 0.2 * curve[0])
+    ((100,), True)
+    """
+    sums = np.cumsum(np.abs(_by_confidence(confidence, error)))
+    if sums.size == 0:
+        return np.full(STEPS, np.nan)
+    kept = np.maximum(1, np.rint(sums.size * (1 - np.arange(STEPS) / STEPS))).astype(np.int64)
+    return np.asarray(100 * sums[kept - 1] / kept)
+
+
+def oracle(error: FloatMap) -> FloatArray:
+    """The curve of :func:`sparsification` for a confidence that knows the errors: none can lie lower.
+
+    Parameters
+    ----------
+    error : ndarray, shape (H, W), float32
+        Estimate minus ground truth in pixels per view step.
+
+    Returns
+    -------
+    ndarray, shape (100,), float64
+        Times 100; with 0, 1, ... 99 % of the pixels taken away. NaN where no error is finite.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from sepi.scoring.confidence import oracle, sparsification
+    >>> error = np.array([[0.0, 0.1], [0.2, 0.3]], np.float32)
+    >>> [round(value, 3) for value in oracle(error)[[0, 25, 50, 75]].tolist()]
+    [15.0, 10.0, 5.0, 0.0]
+    >>> ignorant = sparsification(np.ones((2, 2), np.float32), error)  # in the order of the pixels
+    >>> bool((oracle(error) <= ignorant).all())
+    True
+    """
+    return sparsification(-np.abs(error), error)
+
+
+def _by_confidence(confidence: FloatMap, error: FloatMap) -> FloatArray:
+    known = np.isfinite(error)
+    order = np.argsort(-confidence[known], kind="stable")
+    return np.asarray(error[known][order], np.float64)
