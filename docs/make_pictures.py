@@ -24,7 +24,7 @@ def drawings(size: int) -> dict[str, Callable[[], Draw]]:
         "points-in-views": lambda: geometry.points_in_views,
         "corresponding-epis": lambda: stitching.corresponding_epis(stitching.example(size)),
         "stitched-epi": lambda: stitching.stitched_picture(stitching.example(size)),
-        "stages-paper": lambda: stages.drawing("curved_occluders", "paper", size),
+        "stages-paper": lambda: stages.drawing("wall", "paper", size),
         "stages-best": lambda: stages.drawing("wall", "best", size),
     }
     for name, make in failures.DRAWINGS.items():

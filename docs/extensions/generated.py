@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -127,8 +128,13 @@ def _bounds(field: FieldInfo) -> str:
 
 def _sentence(field: FieldInfo) -> str:
     # words such as {lego: {path: ...}} and <= are text, not markup
-    text = (field.description or "").replace("|", "\\|")
-    return text.replace("{", "\\{").replace("<", "\\<").replace("_", "\\_").replace("*", "\\*")
+    text = re.sub(r"([|{<_*])", r"\\\1", field.description or "")
+    return re.sub(r"docs/([\w/\\]+)\.md", _page_link, text)
+
+
+def _page_link(found: re.Match[str]) -> str:
+    page = found[1].replace("\\", "")
+    return f"[{page.rpartition('/')[2]}](../{page}.md)"
 
 
 def _plain(value: Any) -> str:

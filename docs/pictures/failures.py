@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -59,7 +60,7 @@ def said_of_order(size: int) -> str:
     lines = []
     for name in ("as-given", "flip-columns", "flip-both"):
         found = check_order(_ordered(sound, name))
-        lines.append(f"{name + ':':14} {found.verdict()}")
+        lines.append(textwrap.fill(f"{name}: {found.verdict()}", 84, subsequent_indent="    "))
     return "\n".join(lines) + "\n"
 
 

@@ -44,6 +44,13 @@ def error_panel(light_field: LightField, disparity: FloatMap) -> Titled:
     return f"error; {share:.1f} % off by > 0.1", error_picture(error)
 
 
+def squared_error_panel(light_field: LightField, disparity: FloatMap) -> Titled:
+    """The same with the mean squared error, which the paper's tables have."""
+    assert light_field.ground_truth is not None
+    score = 100 * float(np.mean((disparity - light_field.ground_truth) ** 2))
+    return f"error; MSE x100 {score:.2f}", error_panel(light_field, disparity)[1]
+
+
 def sheet_of(rows: Sequence[Sequence[Titled]]) -> Draw:
     """All pictures on one sheet, a row below the other."""
 

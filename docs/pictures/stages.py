@@ -1,8 +1,8 @@
-"""The maps after each stage, of a scene with occluders and of one with a bare wall."""
+"""The maps after each stage."""
 
 from __future__ import annotations
 
-from pictures.maps import Titled, error_panel, map_panel, sheet_of, truth_panel, view_panel
+from pictures.maps import Titled, map_panel, sheet_of, squared_error_panel, truth_panel, view_panel
 from pictures.style import Draw
 from sepi.lightfield import LightField
 from sepi.pipeline import HANDED_ON, STAGES, Variant, estimate_depth, variant_named
@@ -31,5 +31,5 @@ def drawing(scene: str, variant: str, size: int) -> Draw:
     below: list[Titled] = [truth_panel(light_field)]
     for stage, maps in stages.items():
         above.append(map_panel(light_field, maps.disparity, WORDS[stage]))
-        below.append(error_panel(light_field, maps.disparity))
+        below.append(squared_error_panel(light_field, maps.disparity))
     return sheet_of([above, below])
