@@ -38,8 +38,9 @@ def _ordered(light_field: LightField, order: str) -> LightField:
 
 
 def _row(sound: LightField, disturbed: LightField, words: str) -> list[Titled]:
-    disparity = estimate_depth(disturbed).disparity
-    return [view_panel(disturbed, words), map_panel(sound, disparity, "map"), error_panel(sound, disparity)]
+    maps = estimate_depth(disturbed)
+    title = f"map; mean confidence {float(maps.confidence.mean()):.2f}"
+    return [view_panel(disturbed, words), map_panel(sound, maps.disparity, title), error_panel(sound, maps.disparity)]
 
 
 def order(size: int) -> Draw:
