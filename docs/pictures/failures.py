@@ -61,7 +61,7 @@ def said_of_order(size: int) -> str:
     lines = []
     for name in ("as-given", "flip-columns", "flip-both"):
         found = check_order(_ordered(sound, name))
-        lines.append(textwrap.fill(f"{name}: {found.verdict()}", 84, subsequent_indent="    "))
+        lines.append(textwrap.fill(f"{name}: {found.verdict()}", 72, subsequent_indent="    "))
     return "\n".join(lines) + "\n"
 
 
