@@ -5,6 +5,8 @@
 # make fuzz   environment, then an hour (SECONDS=3600) of files made to trip the readers, led by what code they reach
 # make coverage  the whole test suite, and the share of lines and branches that it runs
 # make lint   style, format, types and imports
+# make docs   environment, then the site of docs/, to build/docs/index.html: minutes, of which a second time few
+# make docs-links  whether the addresses in it answer; needs the network
 # make bench  environment, then times, memory and growth of the pipeline, to reports/
 # make clean  remove results and everything else that was made, but for the environment
 
@@ -16,7 +18,7 @@ READY := .venv/ready
 
 COMPARED := .venv/compared
 
-.PHONY: all check test faults fuzz coverage lint bench clean
+.PHONY: all check test faults fuzz coverage lint docs docs-links demo bench clean
 .DEFAULT_GOAL := all
 
 all: $(READY)
@@ -58,11 +60,32 @@ lint: $(READY)
 	$(BIN)/lint-imports --no-logo --no-cache
 	$(BIN)/snakefmt --line-length 120 --check Snakefile rules
 
+# warnings are errors; what nothing changed of is not made again
+SITE := $(BIN)/python -m sphinx -W --keep-going --quiet -d build/docs-read -t demo
+docs: $(READY) docs/_made/said-of-order.txt demo
+	$(ONE_THREAD) $(SITE) -b html docs build/docs
+	mkdir -p build/docs/demo
+	cp build/demo/reports/index.html build/docs/demo/
+	@echo "build/docs/index.html"
+
+docs-links: $(READY) docs/_made/said-of-order.txt
+	$(SITE) -t quick -b linkcheck docs build/docs-links
+
+# drawings and what the pages quote; this file is the last
+docs/_made/said-of-order.txt: $(READY) docs/make_pictures.py $(wildcard docs/pictures/*.py) $(shell find sepi -name '*.py')
+	$(BIN)/python docs/make_pictures.py docs/_made
+
+# the report of two small scenes, which the site shows
+demo: $(READY)
+	$(BIN)/snakemake --directory build/demo \
+		--config 'builtin={size: 96, scenes: [pyramids, curved_occluders]}' -- reports/index.html
+
 bench: $(READY)
 	$(BIN)/python -m bench run
 
 clean:
 	find reports -mindepth 1 ! -name README.md -delete
+	rm -rf docs/_made docs/examples docs/reference/api docs/reference/api.md
 	rm -rf results logs benchmarks build *.egg-info .snakemake .pytest_cache .mypy_cache .ruff_cache .hypothesis
 
 # pinned versions, then the package itself in place and its kernels compiled; again only when one of these files changes

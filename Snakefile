@@ -6,7 +6,7 @@
 #   snakemake comparison  the methods that the paper compares with, computed on the same scenes
 #   snakemake -- FILE     one file: results/DATASET/SCENE/VARIANT/disparity.pfm
 #
-# docs/workflow.md explains targets, configuration and what makes a job run again.
+# docs/reproduce/workflow.md explains targets, configuration and what makes a job run again.
 
 
 configfile: f"{workflow.current_basedir}/config.yaml"

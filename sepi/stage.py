@@ -389,7 +389,7 @@ def require_costs(previous: StageMaps | None) -> tuple[StageMaps, CostVolume]:
     if before.cost_volume is None:
         raise SepiError(
             "this stage chooses among the candidates of a cost volume, and the stages before it hand on none; see "
-            "docs/compared.md for those that do"
+            "docs/reproduce/compared.md for those that do"
         )
     return before, before.cost_volume
 

@@ -23,7 +23,7 @@ _RANGE_SOURCES = {
     "estimated": "estimated from the views",
 }
 
-_as_json = click.option("--json", "as_json", is_flag=True, help="Print one JSON object; see docs/formats.md.")
+_as_json = click.option("--json", "as_json", is_flag=True, help="Print one JSON object; see docs/reference/formats.md.")
 
 
 @click.command(cls=SepiCommand, short_help="Show what is known about the light field INPUT.")

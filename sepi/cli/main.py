@@ -97,8 +97,8 @@ def depth(
 
     Variants: best (the most accurate), fast (half its time), paper (the method as published), no_sepi, no_occlusion,
     no_textureless, no_occlusion_no_textureless (parts of it switched off), wang (another treatment of occlusion);
-    best_no_detail and others that docs/best.md lists (parts of best switched off); acc, cae, mishiba, oavc, occ, pobr,
-    spo (other authors' methods), onnx (a network of yours), which docs/compared.md explains.
+    best_no_detail and others that docs/method/best.md lists (parts of best switched off); acc, cae, mishiba, oavc, occ,
+    pobr, spo (other authors' methods), onnx (a network of yours), which docs/reproduce/compared.md explains.
 
     \b
     Examples:

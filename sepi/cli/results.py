@@ -36,7 +36,7 @@ def points(
     """Write the coloured point cloud of RESULT as a PLY file.
 
     RESULT is a folder that 'sepi depth' wrote, or its result.h5. Points are in metres where the scene's files or the
-    flags give the camera; otherwise they are a relief with x and y in pixels. docs/outputs.md describes both.
+    flags give the camera; otherwise they are a relief with x and y in pixels. docs/reference/outputs.md describes both.
 
     \b
     Examples:

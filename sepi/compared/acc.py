@@ -75,7 +75,7 @@ class AccParameters(CandidateParameters):
         bytes_per_sample=14, bytes_per_pixel=1300, bytes_per_candidate=8, seconds_per_megasample=4
     )
 
-    num_disparities: int | None = number_field(CANDIDATES, "docs/compared.md")
+    num_disparities: int | None = number_field(CANDIDATES, "docs/reproduce/compared.md")
     colour_share: float = Field(0.5, ge=0, le=1, description="share of the colours in the cost, the rest is gradients'")
     colour_truncation: float = Field(
         0.05, gt=0, description="difference from which a further one costs nothing more, colours in 0..1"

@@ -74,7 +74,7 @@ class ConstrainedEntropyParameters(CandidateParameters):
         bytes_per_sample=31, bytes_per_pixel=1500, bytes_per_candidate=8, seconds_per_megasample=2.5
     )
 
-    num_disparities: int | None = number_field(CANDIDATES, "docs/compared.md")
+    num_disparities: int | None = number_field(CANDIDATES, "docs/reproduce/compared.md")
     colour_sigma: float = Field(
         0.1,
         ge=1e-3,

@@ -87,7 +87,7 @@ class MishibaParameters(CandidateParameters):
 
     rule: ClassVar[CandidateRule] = CANDIDATES
 
-    num_disparities: int | None = number_field(CANDIDATES, "docs/compared.md")
+    num_disparities: int | None = number_field(CANDIDATES, "docs/reproduce/compared.md")
     feature_sigma: float = Field(
         1.0, gt=0, le=10, description="Gaussian of the mean that a pixel's bit is compared with, in pixels"
     )

@@ -75,7 +75,7 @@ class OavcParameters(CandidateParameters):
         bytes_per_sample=31, bytes_per_pixel=1300, bytes_per_candidate=8, seconds_per_megasample=3
     )
 
-    num_disparities: int | None = number_field(CANDIDATES, "docs/compared.md")
+    num_disparities: int | None = number_field(CANDIDATES, "docs/reproduce/compared.md")
     agreeing_share: float = Field(
         0.5,
         gt=0,

@@ -90,7 +90,7 @@ class OccParameters(CandidateParameters):
         bytes_per_sample=31, bytes_per_pixel=2400, bytes_per_candidate=16, seconds_per_megasample=2
     )
 
-    num_disparities: int | None = number_field(CANDIDATES, "docs/compared.md")
+    num_disparities: int | None = number_field(CANDIDATES, "docs/reproduce/compared.md")
 
 
 class OccSplitParameters(OccParameters, CannyParameters):
@@ -116,7 +116,7 @@ class OccFieldParameters(CandidateParameters):
         bytes_per_sample=6, bytes_per_pixel=5000, bytes_per_candidate=32, seconds_per_megasample=0.6
     )
 
-    num_disparities: int | None = number_field(LABELS, "docs/compared.md")
+    num_disparities: int | None = number_field(LABELS, "docs/reproduce/compared.md")
     smoothness: float = Field(
         1.0, ge=0, description="cost of a jump between neighbours of one colour; that of any disparity is 1 at most"
     )

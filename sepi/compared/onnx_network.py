@@ -1,8 +1,8 @@
 """Learned methods: a network in an ONNX file as the initial depth.
 
 ``onnx`` runs any network that takes views of a light field and gives the disparity of its reference view, on the CPU by
-ONNX Runtime [1]_. The package brings no network and no weights; docs/compared.md says how to export one from PyTorch or
-TensorFlow. What networks expect differs, so the parameters say it:
+ONNX Runtime [1]_. The package brings no network and no weights; docs/reproduce/compared.md says how to export one from
+PyTorch or TensorFlow. What networks expect differs, so the parameters say it:
 
 - ``inputs``: for each input of the network, in its order, which views it takes and how their axes lie, as
   ``"VIEWS: AXES"``. Views are ``all``, ``row`` and ``column`` (through the reference view), ``diagonal`` (down to the
@@ -54,7 +54,7 @@ class OnnxParameters(Parameters):
 
     model: str | None = Field(None, description="path of the ONNX file; it must be given")
     inputs: tuple[str, ...] = Field(
-        ("all: 1 (t s c) y x",), min_length=1, description="'VIEWS: AXES' of each input (docs/compared.md)"
+        ("all: 1 (t s c) y x",), min_length=1, description="'VIEWS: AXES' of each input (docs/reproduce/compared.md)"
     )
     grid: tuple[int, int] | None = Field(
         None, description="rows and columns of views that the network takes, round the reference view; null: all"
@@ -125,7 +125,7 @@ def onnx(
 
 def _session(parameters: OnnxParameters) -> onnxruntime.InferenceSession:
     if parameters.model is None:
-        raise SepiError("initial.onnx.model: no network; name an ONNX file (docs/compared.md)")
+        raise SepiError("initial.onnx.model: no network; name an ONNX file (docs/reproduce/compared.md)")
     if not Path(parameters.model).is_file():
         raise SepiError(f"{parameters.model}: no such file")
     try:

@@ -92,7 +92,7 @@ class PobrCostParameters(CandidateParameters):
         bytes_per_sample=31, bytes_per_pixel=1500, bytes_per_candidate=8, seconds_per_megasample=1.5
     )
 
-    num_disparities: int | None = number_field(CANDIDATES, "docs/compared.md")
+    num_disparities: int | None = number_field(CANDIDATES, "docs/reproduce/compared.md")
     truncation: float = Field(
         0.1, gt=0, le=1, description="t, colour difference from which a further one costs no more, colours in 0..1"
     )

@@ -70,7 +70,7 @@ class SpoParameters(CandidateParameters):
         bytes_per_sample=9, bytes_per_pixel=2400, bytes_per_candidate=8, seconds_per_megasample=1.5
     )
 
-    num_disparities: int | None = number_field(CANDIDATES, "docs/compared.md")
+    num_disparities: int | None = number_field(CANDIDATES, "docs/reproduce/compared.md")
     scale: float = Field(
         0.8, ge=0.35, le=10, description="of the Gaussian whose derivative weighs the sides of a line, pixels"
     )

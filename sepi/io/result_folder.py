@@ -1,6 +1,6 @@
 """The folder of final maps: numbers for programs, pictures and points for people.
 
-docs/outputs.md describes the files.
+docs/reference/outputs.md describes the files.
 """
 
 from __future__ import annotations

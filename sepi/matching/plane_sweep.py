@@ -36,7 +36,7 @@ class SweepParameters(CandidateParameters):
 
     rule: ClassVar[CandidateRule] = CANDIDATES
 
-    num_disparities: int | None = number_field(CANDIDATES, "docs/method.md")
+    num_disparities: int | None = number_field(CANDIDATES, "docs/method/paper.md")
     scale: float = Field(
         0.0165,
         ge=1e-6,

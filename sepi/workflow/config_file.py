@@ -23,7 +23,7 @@ from sepi.workflow.parameters import GROUPS, SHARED, choices_with, default_value
 def default_yaml() -> str:
     """The text of ``config.yaml``: every key with its default, and a comment with its meaning, unit and bounds."""
     lines = [
-        "# Configuration of the workflow (docs/workflow.md). Every key may be left out: these are the defaults.",
+        "# Configuration of the workflow (docs/reproduce/workflow.md). Every key may be left out; these are defaults.",
         "# To change a value: edit it here, or give a file of your own (--configfile FILE), or --config KEY=VALUE.",
         "# This file is made from the code: python -m sepi.workflow.config_file > config.yaml",
         "",

@@ -103,7 +103,7 @@ def test_every_solver_gives_the_exact_solution() -> None:
 
 
 def test_choices_are_changed_one_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The table of docs/method.md: a row for each change, scored by itself."""
+    """The table of docs/method/paper.md: a row for each change, scored by itself."""
     monkeypatch.setattr(choices, "opened", lambda name: render(name, size=64, views=3))
     some = {"as chosen": ("", {}), "no window": ("initial", {"window_radius": 0}), "again": ("", {})}
     monkeypatch.setattr(choices, "ALTERNATIVES", some)

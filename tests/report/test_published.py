@@ -9,7 +9,7 @@ from sepi.report.published import SceneTable
 
 TABLES = {"table 1": published.table1(), "table 2": published.table2()}
 
-# averages that do not follow from the paper's own rows: (table, dataset, method); see docs/published.md
+# averages that do not follow from the paper's own rows: (table, dataset, method); see docs/reproduce/published.md
 STRATIFIED_ONLY = {
     ("table 2", "hci", "wang_distgdisp"),
     ("table 2", "hci", "tsai"),
@@ -53,7 +53,7 @@ def test_averages_follow_from_the_rows_except_where_documented() -> None:
 
 
 def test_the_odd_averages_are_those_of_the_last_four_scenes() -> None:
-    """docs/published.md explains the four averages; this is the arithmetic."""
+    """docs/reproduce/published.md explains the four averages; this is the arithmetic."""
     for name, dataset, method in STRATIFIED_ONLY:
         last_four = column(TABLES[name], dataset, method)[-4:]
         assert abs(fmean(last_four) - TABLES[name].averages[dataset][method]) <= 0.005 + 1e-9

@@ -1,0 +1,1 @@
+"""The drawings of these pages, made by the package itself: ``python docs/make_pictures.py docs/_made``."""

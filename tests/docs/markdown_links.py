@@ -1,0 +1,55 @@
+"""The links and headings of Markdown files, as a forge resolves them."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Iterator
+from itertools import pairwise
+from pathlib import Path
+
+from markdown_it import MarkdownIt
+from markdown_it.token import Token
+
+_PARSER = MarkdownIt("commonmark").enable("table")
+
+
+def _tokens(text: str) -> Iterator[Token]:
+    for token in _PARSER.parse(text):
+        yield token
+        yield from token.children or ()
+
+
+def links(text: str) -> list[str]:
+    """Where the links and pictures of a file lead, but for addresses on the web."""
+    found = [
+        str(t.attrs.get("href") or t.attrs.get("src") or "") for t in _tokens(text) if t.type in ("link_open", "image")
+    ]
+    return [link for link in found if link and "://" not in link and not link.startswith("mailto:")]
+
+
+def anchors(text: str) -> set[str]:
+    """What may stand behind ``#`` in a link to this file: its headings in lower case, without signs."""
+    tokens = _PARSER.parse(text)
+    seen: Counter[str] = Counter()
+    found = set()
+    for heading, content in pairwise(tokens):
+        if heading.type == "heading_open":
+            words = "".join(t.content for t in content.children or () if t.type in ("text", "code_inline"))
+            name = re.sub(r"[^\w\- ]", "", words.lower()).replace(" ", "-")
+            found.add(f"{name}-{seen[name]}" if seen[name] else name)
+            seen[name] += 1
+    return found
+
+
+def broken_links(file: Path, made: frozenset[Path]) -> list[str]:
+    """The links of ``file`` to files or headings that are not there, but for files ``made`` with the site."""
+    broken = []
+    for link in links(file.read_text(encoding="utf-8")):
+        path, _, anchor = link.partition("#")
+        target = (file.parent / path).resolve() if path else file
+        if target in made:
+            continue
+        if not target.exists() or (anchor and anchor not in anchors(target.read_text(encoding="utf-8"))):
+            broken.append(link)
+    return broken

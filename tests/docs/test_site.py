@@ -1,0 +1,162 @@
+"""The documentation: its links, its pages, its drawings, and the site that is made of it."""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+from markdown_links import anchors, broken_links, links
+
+REPOSITORY = Path(__file__).parents[2]
+DOCS = REPOSITORY / "docs"
+sys.path.insert(0, str(DOCS))
+
+import make_pictures  # noqa: E402
+from extensions.figures_in_tables import kept_together  # noqa: E402
+from pictures.style import INKS, write_drawing  # noqa: E402
+
+GENERATED = ("examples", "reference/api", "_made", "gallery")
+MADE = frozenset({DOCS / "reference" / "api.md"})
+SMALL = 64
+# no map is computed for these
+QUICK = ("corresponding-epis", "grid-of-views", "points-in-views", "seen-from-above", "stitched-epi")
+
+
+def _pages() -> list[Path]:
+    found = [page for page in sorted(DOCS.rglob("*.md")) if page not in MADE]
+    return [page for page in found if not page.relative_to(DOCS).as_posix().startswith(GENERATED)]
+
+
+PLAIN = [REPOSITORY / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "reports/README.md")]
+FILES = {str(path.relative_to(REPOSITORY)): path for path in [*PLAIN, *_pages()]}
+
+
+@pytest.mark.parametrize("file", FILES)
+def test_links_resolve(file: str) -> None:
+    """A reader of a checkout, or on a forge, who follows a link finds no such page or heading."""
+    assert broken_links(FILES[file], MADE) == []
+
+
+def test_broken_links_are_found(tmp_path: Path) -> None:
+    """The test above would be silent."""
+    page = tmp_path / "page.md"
+    page.write_text("# A `b`: c\n\n[x](other.md) [y](#a-b-c) [z](#nothing) [w](https://nowhere.example)\n")
+    assert broken_links(page, frozenset()) == ["other.md", "#nothing"]
+
+
+def test_links_and_anchors_of_markdown() -> None:
+    """Links in code would be followed, or headings that repeat be mixed up."""
+    text = "## Same\n\n## Same\n\n    [no](code.md)\n\n| a |\n|---|\n| [yes](table.md) ![p](p.png) |\n"
+    assert links(text) == ["table.md", "p.png"]
+    assert anchors(text) == {"same", "same-1"}
+
+
+def test_named_pages_exist() -> None:
+    """A message, comment or docstring sends the reader to docs/NAME.md, which is gone."""
+    gone = []
+    for path in [
+        *REPOSITORY.glob("*"),
+        *(p for name in ("sepi", "bench", "rules", "profiles") for p in (REPOSITORY / name).rglob("*")),
+    ]:
+        if path.suffix in (".py", ".md", ".smk", ".yaml", ".toml") or path.name in ("Snakefile", "Makefile"):
+            for name in re.findall(r"docs/[\w/]+\.md", path.read_text(encoding="utf-8")):
+                if not (REPOSITORY / name).exists():
+                    gone.append(f"{path.relative_to(REPOSITORY)}: {name}")
+    assert gone == []
+
+
+def test_every_page_is_in_the_contents() -> None:
+    """A page that nobody finds in the navigation."""
+    listed = {"index"}
+    for page in _pages():
+        folder = page.parent.relative_to(DOCS)
+        for block in re.findall(r"```\{toctree\}\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL):
+            names = [line for line in block.splitlines() if line and not line.startswith(":")]
+            listed |= {(folder / name).as_posix() for name in names}
+    pages = {page.relative_to(DOCS).with_suffix("").as_posix() for page in _pages()}
+    assert pages - listed == set()
+    assert listed - pages <= {"examples/index", "reference/api"}
+
+
+def test_every_drawing_is_shown() -> None:
+    """A picture takes its time to be made and is on no page, or a page names one that nothing makes."""
+    shown = {
+        name for page in _pages() for name in re.findall(r"```\{drawing\} (\S+)", page.read_text(encoding="utf-8"))
+    }
+    assert shown == set(make_pictures.drawings(SMALL))
+
+
+def _draw(name: str, folder: Path) -> None:
+    write_drawing(folder, name, make_pictures.drawings(SMALL)[name]())
+    sizes = set()
+    for ink in INKS:
+        drawing = ElementTree.parse(folder / f"{name}-{ink.name}.svg").getroot()
+        assert len(drawing.findall(".//{http://www.w3.org/2000/svg}path")) > 3
+        sizes.add((drawing.get("width"), drawing.get("height")))
+    # the page does not jump when it goes dark
+    assert len(sizes) == 1
+
+
+@pytest.mark.parametrize("name", QUICK)
+def test_drawing(name: str, tmp_path: Path) -> None:
+    """`make docs` ends at this drawing."""
+    _draw(name, tmp_path)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", sorted(set(make_pictures.drawings(SMALL)) - set(QUICK)))
+def test_drawing_of_maps(name: str, tmp_path: Path) -> None:
+    """`make docs` ends at this drawing."""
+    _draw(name, tmp_path)
+
+
+def test_drawings_repeat(tmp_path: Path) -> None:
+    """Every build of the site would differ from the last."""
+    for folder in ("a", "b"):
+        (tmp_path / folder).mkdir()
+        write_drawing(tmp_path / folder, "grid-of-views", make_pictures.drawings(SMALL)["grid-of-views"]())
+    first, second = (sorted(p.read_bytes() for p in (tmp_path / folder).iterdir()) for folder in ("a", "b"))
+    assert first == second
+    assert first[0] != first[1]
+
+
+def test_figures_of_a_cell_stay_together() -> None:
+    """Columns of three figures with strokes between are torn into a line for each."""
+    assert kept_together("a / b 1 / 2\n| 0.5 / 1 / - | a / b |") == "a / b 1 / 2\n| 0.5\xa0/\xa01\xa0/\xa0- | a / b |"
+
+
+@pytest.mark.slow
+def test_site(tmp_path: Path) -> None:
+    """`make docs` fails: a warning of Sphinx, a reference that leads nowhere, a generated page that is not made.
+
+    All but the pictures and the run of the gallery, which take minutes; drawings are stood in for by empty ones.
+    """
+    tree = tmp_path / "tree"
+    ignored = shutil.ignore_patterns("_made", "examples", "api", "api.md", "__pycache__")
+    shutil.copytree(DOCS, tree / "docs", ignore=ignored)
+    for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "config.yaml"):
+        shutil.copy(REPOSITORY / name, tree)
+    made = tree / "docs" / "_made"
+    made.mkdir()
+    for name in make_pictures.drawings(SMALL):
+        for ink in INKS:
+            (made / f"{name}-{ink.name}.svg").write_text(
+                '<svg xmlns="http://www.w3.org/2000/svg" width="9" height="9"/>'
+            )
+    (made / "said-of-order.txt").write_text("as-given\n")
+    words = ["-m", "sphinx", "-W", "--keep-going", "--quiet", "-t", "quick", "-b", "html", "docs", "site"]
+    paths = {"PYTHONPATH": str(REPOSITORY)}
+    done = subprocess.run([sys.executable, *words], cwd=tree, env=os.environ | paths, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    for page, words_of_it in (
+        ("reference/api/sepi.estimate_depth", 'id="sepi.estimate_depth"'),
+        ("reference/configuration", "num_disparities"),
+        ("reference/command_line", "--disparity-range"),
+        # a link to a file outside docs/ leads to the page that shows it
+        ("develop/architecture", 'href="contributing.html"'),
+    ):
+        assert words_of_it in (tree / "site" / f"{page}.html").read_text(encoding="utf-8"), page
