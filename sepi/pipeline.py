@@ -61,7 +61,7 @@ def add_choice(stage: str, name: str, choice: Choice) -> None:
     """Add a choice of your own to a stage, for this process: variants may name it from then on.
 
     Adding it again replaces it, as in a notebook whose cell runs twice. For a method that the command line and the
-    workflow should know, too, see docs/compared.md.
+    workflow should know, too, see docs/reproduce/compared.md.
 
     Parameters
     ----------

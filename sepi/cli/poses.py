@@ -56,7 +56,7 @@ def poses(
     RESULT is the folder that 'sepi depth' wrote for INPUT, or its result.h5; give the flags here that 'sepi depth' had.
     Poses are exact, so nothing has to be matched. Each view has a principal point of its own: programs that ignore it
     see another scene. Depth of the other views is RESULT's, carried over; 0 where it does not say. Positions are in
-    metres where the camera is known. docs/outputs.md describes the files.
+    metres where the camera is known. docs/reference/outputs.md describes the files.
 
     \b
     Examples:

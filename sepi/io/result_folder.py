@@ -107,7 +107,7 @@ def write_result(
     (colours, from far, dark blue, to near, yellow; grey where the mask ``unknown`` is set), ``confidence.png`` from
     black (0) to white (1), ``mask_NAME.png`` of each boolean map, ``points.ply`` without what is unknown, ``depth.pfm``
     in metres where the light field has a camera, and ``result.h5`` with
-    everything: all maps, the view itself, the camera and ``attributes``. docs/outputs.md describes them. Equal
+    everything: all maps, the view itself, the camera and ``attributes``. docs/reference/outputs.md describes them. Equal
     content gives equal bytes.
 
     A new folder appears whole or not at all; in an existing one the files are replaced when all are written, masks,

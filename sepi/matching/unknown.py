@@ -79,7 +79,7 @@ def unknown_pixels(light_field: LightField, disparity: FloatMap) -> BoolMap:
     """Pixels that no view knows anything about: black, overexposed, in a lens's dark corner, or held by few views.
 
     :func:`sepi.estimate_depth` gives them as the mask ``unknown``; this is for the maps of other programs.
-    docs/outputs.md says what counts.
+    docs/reference/outputs.md says what counts.
 
     Parameters
     ----------

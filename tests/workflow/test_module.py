@@ -1,4 +1,4 @@
-"""The workflow as a module of another one: the example in docs/workflow.md, word for word, and what may go wrong."""
+"""The workflow as a module of another one: the example in docs/reproduce/workflow.md, word for word, and what may go wrong."""
 
 import os
 import re
@@ -20,7 +20,7 @@ from sepi.scenes import render
 
 pytestmark = pytest.mark.workflow
 
-DOCUMENT = REPOSITORY / "docs/workflow.md"
+DOCUMENT = REPOSITORY / "docs/reproduce/workflow.md"
 QUICK = "depth/results/own/flowers/quick"
 
 
