@@ -15,6 +15,7 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from sepi.applications.all_views import AllViews, estimate_all_views
     from sepi.errors import SepiError, SepiWarning
     from sepi.io.readers.options import ReadOptions
     from sepi.io.result_folder import write_result
@@ -25,23 +26,27 @@ if TYPE_CHECKING:
     __version__: str
 
 __all__ = [
+    "AllViews",
     "DisparityRange",
     "LightField",
     "ReadOptions",
     "SepiError",
     "SepiWarning",
     "__version__",
+    "estimate_all_views",
     "estimate_depth",
     "read_light_field",
     "write_result",
 ]
 
 _HOME = {
+    "AllViews": "sepi.applications.all_views",
     "DisparityRange": "sepi.lightfield",
     "LightField": "sepi.lightfield",
     "ReadOptions": "sepi.io.readers.options",
     "SepiError": "sepi.errors",
     "SepiWarning": "sepi.errors",
+    "estimate_all_views": "sepi.applications.all_views",
     "estimate_depth": "sepi.pipeline",
     "read_light_field": "sepi.reading",
     "write_result": "sepi.io.result_folder",

@@ -1,0 +1,1 @@
+"""What one makes of finished maps."""
