@@ -83,11 +83,12 @@ def measured(light_field: LightField, variant: str) -> dict[str, str]:
     """A row of the table."""
     shape = (*light_field.grid, *light_field.shape)
     size, baselines = light_field.shape[0], light_field.baselines
-    truth = np.stack([true_disparity(light_field.name, size=size, baseline=b) for b in baselines.reshape(-1, 2)])
+    each = baselines.reshape(-1, 2)
+    truth = np.stack([true_disparity(light_field.name, size=size, baseline=(v, u)) for v, u in each])
     started = time.perf_counter()
     maps = estimate_depth(light_field, variant)
     once = time.perf_counter() - started
-    moved = np.stack([moved_pixels(maps.disparity, baseline) for baseline in baselines.reshape(-1, 2)])
+    moved = np.stack([moved_pixels(maps.disparity, baseline) for baseline in each])
     row = {"scene": light_field.name, **_columns("moved pixels", scores(moved, truth, 0))}
     for name, edge_views in (("carried", 0), ("edges", EDGE_VIEWS)):
         started = time.perf_counter()
