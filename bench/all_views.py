@@ -98,17 +98,17 @@ def measured(light_field: LightField, variant: str) -> dict[str, str]:
     few = [t * shape[1] + s for t, s in _BY_THEMSELVES if t < shape[0] and s < shape[1]]
     alone = [estimate_depth(light_field.seen_from((n // shape[1], n % shape[1])), variant).disparity for n in few]
     own = scores(np.stack(alone), truth[few], 0)
-    row["few by themselves"] = f"{own.mse.mean():.2f} | {own.bad.mean():.2f}"
-    row["few, edges"] = f"{found.mse[few].mean():.2f} | {found.bad[few].mean():.2f}"
+    row["few by themselves"] = f"{own.mse.mean():.2f} / {own.bad.mean():.2f}"
+    row["few, edges"] = f"{found.mse[few].mean():.2f} / {found.bad[few].mean():.2f}"
     mean, bad = disagreement(ours, baselines)
-    row["disagreement"] = f"{mean:.4f} | {bad:.2f}"
+    row["disagreement"] = f"{mean:.4f} / {bad:.2f}"
     return row
 
 
 def _columns(name: str, found: Scores) -> dict[str, str]:
     return {
-        f"{name}: mean": f"{found.mse.mean():.2f} | {found.bad.mean():.2f}",
-        f"{name}: worst": f"{found.mse.max():.2f} | {found.bad.max():.2f}",
+        f"{name}: mean": f"{found.mse.mean():.2f} / {found.bad.mean():.2f}",
+        f"{name}: worst": f"{found.mse.max():.2f} / {found.bad.max():.2f}",
     }
 
 
@@ -119,7 +119,7 @@ def _columns(name: str, found: Scores) -> dict[str, str]:
 @click.option("--variant", type=click.Choice(list(VARIANTS)), default=DEFAULT_VARIANT, show_default=True)
 @click.option("--threads", type=click.IntRange(min=1), default=1, show_default=True)
 def main(names: tuple[str, ...], size: int, views: int, variant: str, threads: int) -> None:
-    """Print MSE x100 | BadPix 0.07 of all views of built-in scenes, in all ways, and times as estimates of one view."""
+    """Print MSE x100 / BadPix 0.07 of all views of built-in scenes, in all ways, and times as estimates of one view."""
     use_threads(threads)
     # what is compiled at first is none of the times
     measured(render("pyramids", size=64, views=3), variant)

@@ -18,6 +18,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import cv2
 import numpy as np
 import numpy.typing as npt
 
@@ -257,7 +258,29 @@ def _with_own_edges(light_field: LightField, view: ViewMaps, edge_views: int) ->
     from sepi.image.noise import residual_variance
     from sepi.matching.surface_shares import SurfaceShareParameters, reassign_at_steps
 
-    own = light_field.seen_from(view.position)
+    own, parameters = light_field.seen_from(view.position), SurfaceShareParameters(share_views=edge_views)
     colours = own.reference_view
     mixture = mixture_evidence(view.disparity, colours, residual_variance(colours), MixtureParameters())
-    return reassign_at_steps(own, view.disparity, SurfaceShareParameters(share_views=edge_views), mixture)
+    decided = reassign_at_steps(own, view.disparity, parameters, mixture)
+    # a slope is no step, however steep: a pixel there would leave its surface
+    beside = np.ones((2 * parameters.share_radius + 1,) * 2, np.uint8)
+    return np.where(cv2.dilate(torn_pixels(view.disparity).astype(np.uint8), beside) > 0, decided, view.disparity)
+
+
+def torn_pixels(disparity: FloatMap) -> BoolMap:
+    """Pixels at whose side the surface comes apart, beyond what slopes explain; shape (H, W), bool."""
+    from sepi.applications.all_views_kernels import corner_disparities
+
+    top_left, top_right, bottom_right, bottom_left = np.moveaxis(
+        corner_disparities(disparity, np.float32(TOLERANCE)), 2, 0
+    )
+    torn = np.zeros(disparity.shape, bool)
+    for first, second in ((top_right, top_left), (bottom_right, bottom_left)):
+        apart = np.abs(first[:, :-1] - second[:, 1:]) > TOLERANCE
+        torn[:, :-1] |= apart
+        torn[:, 1:] |= apart
+    for first, second in ((bottom_left, top_left), (bottom_right, top_right)):
+        apart = np.abs(first[:-1] - second[1:]) > TOLERANCE
+        torn[:-1] |= apart
+        torn[1:] |= apart
+    return torn
