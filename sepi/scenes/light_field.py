@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 import zlib
 from dataclasses import replace
+from functools import lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -13,6 +15,9 @@ from sepi.errors import SepiError
 from sepi.lightfield import DisparityRange, FloatMap, LightField
 from sepi.scenes.definitions import DEFINITIONS
 from sepi.validation import require_known
+
+if TYPE_CHECKING:
+    from sepi.scenes.rendering import Drawing
 
 SMALLEST, LARGEST = 64, 1024
 MOST_VIEWS = 17
@@ -112,11 +117,19 @@ def true_disparity(name: str, *, size: int = 192, baseline: tuple[float, float] 
     SepiError
         If there is no such scene or size is out of bounds.
     """
-    from sepi.scenes.rendering import drawing, visible
+    from sepi.scenes.rendering import visible
 
     _require_scene(name, size)
-    disparity, _ = visible(drawing(DEFINITIONS[name].surfaces(), size), size, *map(float, baseline))
+    disparity, _ = visible(_drawn(name, size), size, *map(float, baseline))
     return disparity.astype(np.float32)
+
+
+@lru_cache(maxsize=1)
+def _drawn(name: str, size: int) -> Drawing:
+    """A scene's surfaces, kept from view to view: their textures take longer than a view."""
+    from sepi.scenes.rendering import drawing
+
+    return drawing(DEFINITIONS[name].surfaces(), size)
 
 
 def _require_scene(name: str, size: int) -> None:
