@@ -23,6 +23,7 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from sepi.applications.all_views import AllViews, estimate_all_views
     from sepi.applications.refocusing import all_in_focus, refocus
     from sepi.camera import Camera
     from sepi.errors import SepiError, SepiWarning
@@ -46,6 +47,7 @@ if TYPE_CHECKING:
     """
 
 __all__ = [
+    "AllViews",
     "Camera",
     "DisparityRange",
     "LightField",
@@ -55,6 +57,7 @@ __all__ = [
     "StageMaps",
     "__version__",
     "all_in_focus",
+    "estimate_all_views",
     "estimate_depth",
     "read_light_field",
     "read_result",
@@ -63,6 +66,7 @@ __all__ = [
 ]
 
 _HOME = {
+    "AllViews": "sepi.applications.all_views",
     "Camera": "sepi.camera",
     "DisparityRange": "sepi.lightfield",
     "LightField": "sepi.lightfield",
@@ -70,10 +74,11 @@ _HOME = {
     "SepiError": "sepi.errors",
     "SepiWarning": "sepi.errors",
     "StageMaps": "sepi.stage",
+    "all_in_focus": "sepi.applications.refocusing",
+    "estimate_all_views": "sepi.applications.all_views",
     "estimate_depth": "sepi.pipeline",
     "read_light_field": "sepi.reading",
     "read_result": "sepi.io.result_folder",
-    "all_in_focus": "sepi.applications.refocusing",
     "refocus": "sepi.applications.refocusing",
     "write_result": "sepi.io.result_folder",
 }

@@ -1,1 +1,1 @@
-"""What is made of a light field and its finished map: pictures focused after the fact."""
+"""What one makes of finished maps."""

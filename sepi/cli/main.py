@@ -75,6 +75,7 @@ def main() -> None:
     help="Set a parameter, STAGE.CHOICE.NAME=VALUE; repeatable. config.yaml lists them.",
 )
 @click.option("--timing", is_flag=True, help="Also write runtime.txt: seconds, as a benchmark submission needs.")
+@click.option("--all-views", is_flag=True, help="Also write all_views.h5: a map for each view, which takes longer.")
 @camera_flags
 @reading_flags
 def depth(
@@ -86,6 +87,7 @@ def depth(
     memory: int | None,
     settings: tuple[str, ...],
     timing: bool,
+    all_views: bool,
     geometry: Geometry | None,
     reading: Reading,
 ) -> None:
@@ -93,7 +95,8 @@ def depth(
 
     INPUT is a folder of views, a Lytro picture (*_eslf.png), an array (.mat, .npy, .npz) or an HDF5 file; 'sepi info'
     shows how it is read, 'sepi check' whether its views are in the right order. Writes the disparity as numbers and in
-    colour, confidence, masks and a point cloud; depth in metres where the camera is known.
+    colour, confidence, masks and a point cloud; depth in metres where the camera is known. With --all-views a map for
+    every view, too, made from those of a few: docs/depth/all_views.md.
 
     Variants: best (the most accurate), fast (half its time), paper (the method as published), no_sepi, no_occlusion,
     no_textureless, no_occlusion_no_textureless (parts of it switched off), wang (another treatment of occlusion);
@@ -104,13 +107,14 @@ def depth(
     Examples:
       sepi depth cotton
       sepi depth cotton -o maps --disparity-range -2 2
+      sepi depth cotton --all-views
       sepi depth flowers_eslf.png --central 7
       sepi depth views --grid 5x5 --exclude 0,0 --exclude 0,4
       sepi depth cotton --variant paper --set initial.sepi.num_disparities=91
     """
     from sepi.inspection.disparity_range import settle_range
     from sepi.io.files import atomic_path
-    from sepi.io.result_folder import RUNTIME, require_target, write_result
+    from sepi.io.result_folder import ALL_VIEWS, RUNTIME, require_target, write_result
     from sepi.matching.unknown import UNKNOWN
     from sepi.pipeline import HANDED_ON, estimate_depth, stage_parameters, variant_named
 
@@ -136,10 +140,19 @@ def depth(
     with progress_bar(light_field.name) as progress:
         maps = estimate_depth(light_field, chosen, parameters, progress, memory and memory * 2**20)
     seconds = time.perf_counter() - started
-    files = write_result(folder, light_field, maps, result_attributes(light_field, variant, history))
+    made_by = result_attributes(light_field, variant, history)
+    files = write_result(folder, light_field, maps, made_by)
     if timing:
         with atomic_path(folder / RUNTIME) as temporary:
             temporary.write_text(f"{seconds:.3f}\n", encoding="ascii")
+    if all_views:
+        from sepi.applications.all_views import maps_of_all_views
+        from sepi.io.all_views import write_all_views
+
+        with progress_bar(f"{light_field.name}, all views") as progress:
+            views = maps_of_all_views(light_field, maps, chosen, parameters, progress, memory and memory * 2**20)
+            write_all_views(folder / ALL_VIEWS, light_field, ((view.position, view.maps) for view in views), made_by)
+        files = (*files, ALL_VIEWS)
     click.echo(f"{light_field.name}: {size_text(light_field)}")
     click.echo(f"disparity range: {range_text(light_field.require_disparity_range())}{_candidates(history)}")
     unknown = float(maps.mask(UNKNOWN).mean())

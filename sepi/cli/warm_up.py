@@ -31,10 +31,11 @@ def compile_kernels(variants: tuple[str, ...]) -> None:
     """Call every kernel that these variants use, and those that reading and evaluating use, as their jobs do."""
     from dataclasses import replace
 
+    from sepi.applications.all_views import estimate_all_views
     from sepi.evaluate import evaluation_of
     from sepi.inspection.disparity_range import estimate_range
     from sepi.inspection.view_order import check_order
-    from sepi.pipeline import estimate_depth
+    from sepi.pipeline import DEFAULT_VARIANT, estimate_depth
     from sepi.scenes import render
 
     # one thread: compiling is all there is to do
@@ -46,6 +47,8 @@ def compile_kernels(variants: tuple[str, ...]) -> None:
     evaluation_of(bare, maps.disparity)
     check_order(bare)
     estimate_range(bare)
+    if DEFAULT_VARIANT in variants:
+        estimate_all_views(light_field, maps)
 
 
 @click.command(name="python -m sepi.cli.warm_up", cls=SepiCommand)

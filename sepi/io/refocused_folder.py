@@ -1,4 +1,7 @@
-"""The folder of refocused pictures, and the index that says where each is focused. docs/reference/outputs.md describes them."""
+"""The folder of refocused pictures, and the index that says where each is focused.
+
+docs/reference/outputs.md describes them.
+"""
 
 from __future__ import annotations
 

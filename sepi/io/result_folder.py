@@ -43,6 +43,9 @@ RESULT_FILES = (
 RUNTIME = "runtime.txt"
 """Seconds that the command took, which it writes on request."""
 
+ALL_VIEWS = "all_views.h5"
+"""Maps of all views, which the command writes on request (:mod:`sepi.io.all_views`)."""
+
 _DEPTH = "depth.pfm"
 
 # masks that have a meaning here
@@ -107,11 +110,12 @@ def write_result(
     (colours, from far, dark blue, to near, yellow; grey where the mask ``unknown`` is set), ``confidence.png`` from
     black (0) to white (1), ``mask_NAME.png`` of each boolean map, ``points.ply`` without what is unknown, ``depth.pfm``
     in metres where the light field has a camera, and ``result.h5`` with
-    everything: all maps, the view itself, the camera and ``attributes``. docs/reference/outputs.md describes them. Equal
-    content gives equal bytes.
+    everything: all maps, the view itself, the camera and ``attributes``. docs/reference/outputs.md describes them.
+    Equal content gives equal bytes.
 
-    A new folder appears whole or not at all; in an existing one the files are replaced when all are written, masks,
-    depth and run time of an earlier run that this one does not make are removed, and other files are left alone.
+    A new folder appears whole or not at all; in an existing one the files are replaced when all are written, what an
+    earlier run wrote and this one does not make (masks, depth, run time, maps of all views) is removed, and other files
+    are left alone.
 
     Parameters
     ----------
@@ -329,7 +333,7 @@ def _write_files(
 
 def _remove_others(folder: Path, made: Collection[str]) -> None:
     """Remove what an earlier run wrote and this one does not make."""
-    known = [path for path in (folder / _DEPTH, folder / RUNTIME) if path.is_file()]
+    known = [path for path in (folder / _DEPTH, folder / RUNTIME, folder / ALL_VIEWS) if path.is_file()]
     for path in known + [path for path in folder.glob("mask_*.png") if png_texts(path) == _MASK_TEXT]:
         if path.name not in made:
             try:

@@ -12,6 +12,6 @@ Examples
 
 from sepi.scenes.definitions import SCENES
 from sepi.scenes.folder import write_hci
-from sepi.scenes.light_field import render
+from sepi.scenes.light_field import render, true_disparity
 
-__all__ = ["SCENES", "render", "write_hci"]
+__all__ = ["SCENES", "render", "true_disparity", "write_hci"]

@@ -5,14 +5,19 @@ from __future__ import annotations
 import math
 import zlib
 from dataclasses import replace
+from functools import lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
 from sepi.errors import SepiError
-from sepi.lightfield import DisparityRange, LightField
+from sepi.lightfield import DisparityRange, FloatMap, LightField
 from sepi.scenes.definitions import DEFINITIONS
 from sepi.validation import require_known
+
+if TYPE_CHECKING:
+    from sepi.scenes.rendering import Drawing
 
 SMALLEST, LARGEST = 64, 1024
 MOST_VIEWS = 17
@@ -77,10 +82,8 @@ def render(
     # brings the compiler with it
     from sepi.scenes.rendering import drawing, occluded, render_view, visible
 
-    require_known("built-in scenes", [name], DEFINITIONS)
-    for what, value, least, most in (("size", size, SMALLEST, LARGEST), ("views", views, 2, MOST_VIEWS)):
-        if type(value) is not int or not least <= value <= most:
-            raise SepiError(f"scene {name}: {what} must be a whole number from {least} to {most}, got {value!r}")
+    _require_scene(name, size)
+    _require_whole(name, "views", views, 2, MOST_VIEWS)
     surfaces = DEFINITIONS[name].surfaces()
     scene = drawing(surfaces, size)
     disparity, owner = visible(scene, size)
@@ -104,6 +107,55 @@ def render(
         light_field.views[t, s] = np.round(np.clip(picture, 0, 1) * 255)
     masks = {"occluded": occluded(scene, disparity, baselines), **light_field.masks}
     return replace(light_field, masks=masks)
+
+
+def true_disparity(name: str, *, size: int = 192, baseline: tuple[float, float] = (0.0, 0.0)) -> FloatMap:
+    """Exact disparity of a built-in scene in any view.
+
+    Parameters
+    ----------
+    name : str
+        A key of ``sepi.scenes.SCENES``.
+    size : int
+        Width and height of each view in pixels, as in :func:`render`.
+    baseline : (float, float)
+        Of the view from the centre view, ``(down, across)`` in view steps: an entry of the ``baselines`` of the light
+        field that :func:`render` makes.
+
+    Returns
+    -------
+    ndarray, shape (size, size), float32
+        Disparity of the nearest surface at each pixel centre, pixels per view step; at a baseline of zero the
+        ``ground_truth`` of the light field.
+
+    Raises
+    ------
+    SepiError
+        If there is no such scene or size is out of bounds.
+    """
+    from sepi.scenes.rendering import visible
+
+    _require_scene(name, size)
+    disparity, _ = visible(_drawn(name, size), size, *map(float, baseline))
+    return disparity.astype(np.float32)
+
+
+@lru_cache(maxsize=1)
+def _drawn(name: str, size: int) -> Drawing:
+    """A scene's surfaces, kept from view to view: their textures take longer than a view."""
+    from sepi.scenes.rendering import drawing
+
+    return drawing(DEFINITIONS[name].surfaces(), size)
+
+
+def _require_scene(name: str, size: int) -> None:
+    require_known("built-in scenes", [name], DEFINITIONS)
+    _require_whole(name, "size", size, SMALLEST, LARGEST)
+
+
+def _require_whole(name: str, what: str, value: int, least: int, most: int) -> None:
+    if type(value) is not int or not least <= value <= most:
+        raise SepiError(f"scene {name}: {what} must be a whole number from {least} to {most}, got {value!r}")
 
 
 def _range_around(disparity: npt.NDArray[np.float64]) -> DisparityRange:

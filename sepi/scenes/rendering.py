@@ -72,11 +72,15 @@ def render_view(scene: Drawing, size: int, v: float, u: float) -> FloatMap:
     return picture
 
 
-def visible(scene: Drawing, size: int) -> tuple[FloatArray, IntArray]:
-    """Disparity and index of the surface at each pixel centre of the centre view, each of shape (size, size)."""
+def visible(scene: Drawing, size: int, v: float = 0.0, u: float = 0.0) -> tuple[FloatArray, IntArray]:
+    """Disparity and index of the surface at each pixel centre of a view, each of shape (size, size).
+
+    The view is that ``v`` steps below and ``u`` steps to the right of the centre.
+    """
     disparity = np.empty((size, size))
     owner = np.empty((size, size), np.int64)
-    nearest(scene.first_edge, scene.planes, scene.edges, disparity, owner)
+    edges, planes = _seen_from(scene, v, u)
+    nearest(scene.first_edge, planes, edges, disparity, owner)
     return disparity, owner
 
 

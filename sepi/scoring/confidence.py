@@ -48,8 +48,8 @@ def sparsification(confidence: FloatMap, error: FloatMap) -> FloatArray:
     Parameters
     ----------
     confidence, error : ndarray, shape (H, W), float32
-        0..1; estimate minus ground truth in pixels per view step, ``error`` of :class:`sepi.io.scores.Evaluation`. Pixels
-        whose error is not finite are left out.
+        0..1; estimate minus ground truth in pixels per view step, ``error`` of
+        :class:`sepi.io.scores.Evaluation`. Pixels whose error is not finite are left out.
 
     Returns
     -------

@@ -26,7 +26,7 @@ def light_field(**known: object) -> LightField:
 
 
 def pixels_and_points(poses: CameraPoses, camera: Camera, disparity: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """All pixels of the reference view, (P, 2), and their points, at depths by the formula of docs/reference/outputs.md."""
+    """All pixels of the reference view, (P, 2), and their points, at depths by the formula of the documentation."""
     pixels = np.argwhere(np.ones(disparity.shape, bool)).astype(np.float64)
     depth = camera.scale / (disparity.astype(np.float64).ravel() + camera.offset)
     return pixels, poses.points_at(pixels, depth)

@@ -14,7 +14,7 @@ from sepi.errors import SepiError
 from sepi.io.pfm import read_pfm
 from sepi.lightfield import LightField
 from sepi.reading import read_light_field
-from sepi.scenes import SCENES, render, rendering, write_hci
+from sepi.scenes import SCENES, render, rendering, true_disparity, write_hci
 from sepi.scenes.definitions import DEFINITIONS
 from sepi.scenes.surfaces import Plane, Surface, blob, everywhere, rectangle
 from sepi.scenes.textures import PERIOD, noise, photograph, shading
@@ -311,3 +311,22 @@ def test_existing_folder_is_not_overwritten(tmp_path: Path) -> None:
     with pytest.raises(SepiError, match="exists already"):
         write_hci(render("fronto_parallel", size=64, views=2), tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == ["notes.txt"]
+
+
+def test_truth_of_another_view_is_where_the_centre_views_points_are_seen() -> None:
+    """Maps of other views would be scored against the truth of another place."""
+    light_field = scene("curved_occluders")
+    np.testing.assert_array_equal(true_disparity("curved_occluders", size=SIZE), light_field.ground_truth)
+    truth = light_field.ground_truth.astype(float)
+    y, x = np.nonzero(~light_field.masks["occluded"])
+    for t, s in ((0, 0), (1, 4), (3, 2)):
+        down, across = light_field.baselines[t, s]
+        there = true_disparity("curved_occluders", size=SIZE, baseline=(down, across))
+        at = np.rint([y - truth[y, x] * down, x - truth[y, x] * across]).astype(int)
+        inside = ((at >= 0) & (at < SIZE)).all(axis=0)
+        error = np.abs(there[tuple(at[:, inside])] - truth[y, x][inside])
+        # rounding to a pixel: a slope of 0.8 over the picture, and outlines
+        assert np.median(error) < 0.01
+        assert (error > 0.1).mean() < 0.05
+        moved_wrongly = np.rint([y + truth[y, x] * down, x + truth[y, x] * across]).astype(int).clip(0, SIZE - 1)
+        assert (np.abs(there[tuple(moved_wrongly)] - truth[y, x]) > 0.1).mean() > 0.08

@@ -1,4 +1,4 @@
-"""The workflow as a module of another one: the example in docs/reproduce/workflow.md, word for word, and what may go wrong."""
+"""The workflow as a module of another one: the documentation's example, word for word, and what may go wrong."""
 
 import os
 import re

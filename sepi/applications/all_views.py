@@ -1,0 +1,286 @@
+"""Disparity of every view of a light field, by maps that agree with each other.
+
+A few maps tell what nearly all views see: that of the reference view, and those of the views that stand farthest from
+it in each diagonal direction, which see round the surfaces that hide something from it. Each of them is carried to a
+view as a surface (:mod:`sepi.applications.all_views_kernels`), and where they differ they vote: for a surface are the
+maps that show it, against it those that see through it to what is behind, as in the fusion of [1]_. What no map shows
+takes the disparity of the farther of the surfaces beside it. At last each view decides which side its pixels at depth
+steps belong to (:mod:`sepi.matching.surface_shares`), for a carried outline is only known to a pixel.
+
+References
+----------
+.. [1] Merrell et al.: Real-Time Visibility-Based Fusion of Depth Maps. ICCV 2007. doi:10.1109/ICCV.2007.4408984
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from sepi.errors import SepiError
+from sepi.lightfield import BoolMap, FloatMap, LightField
+from sepi.pipeline import DEFAULT_VARIANT, Variant, estimate_depth
+from sepi.stage import Progress, StageMaps, no_progress
+
+if TYPE_CHECKING:
+    from sepi.applications.all_views_kernels import Sources
+
+TOLERANCE = 0.1
+"""Disparities that differ by no more are of one surface, pixels per view step."""
+
+MOST_STRETCHED = 2.0
+"""A surface that a view sees so many times larger than the map's view did is left to maps that saw it better."""
+
+LEAST_WEIGHT = 0.05
+"""Vote of a map where its confidence is 0, beside 1: beside depth steps all are small, and there they differ."""
+
+EDGE_VIEWS = 25
+"""Views that each view is compared with at its depth steps, at least."""
+
+_AT_ONCE = 8  # views that are made at a time: so many maps are held beside the sources
+_CORNERS = ((-1, -1), (-1, 1), (1, -1), (1, 1))
+
+
+class ViewMaps(NamedTuple):
+    """The maps of one view.
+
+    Attributes
+    ----------
+    position : tuple of int
+        Row and column of the view in the grid.
+    disparity, confidence : ndarray, shape (H, W), float32
+        Pixels per view step; 0..1.
+    extended : ndarray, shape (H, W), bool
+        No map shows anything there: the background beside it was extended. The confidence is 0.
+    """
+
+    position: tuple[int, int]
+    disparity: FloatMap
+    confidence: FloatMap
+    extended: BoolMap
+
+    @property
+    def maps(self) -> dict[str, npt.NDArray[Any]]:
+        """Every map by name."""
+        return {"disparity": self.disparity, "confidence": self.confidence, "extended": self.extended}
+
+
+@dataclass(frozen=True)
+class AllViews:
+    """The maps of every view.
+
+    Attributes
+    ----------
+    disparity : ndarray, shape (T, S, H, W), float32
+        Pixels per view step, positive nearer, as of the reference view; NaN in missing views.
+    confidence : ndarray, shape (T, S, H, W), float32
+        0..1; 0 in missing views.
+    extended : ndarray, shape (T, S, H, W), bool
+        Pixels that none of the maps tells about; see :class:`ViewMaps`.
+    """
+
+    disparity: FloatMap
+    confidence: FloatMap
+    extended: BoolMap
+
+
+def estimate_all_views(
+    light_field: LightField,
+    maps: StageMaps | None = None,
+    variant: str | Variant = DEFAULT_VARIANT,
+    parameters: Mapping[str, Mapping[str, Any]] | None = None,
+    progress: Progress = no_progress,
+    memory: int | None = None,
+    edge_views: int = EDGE_VIEWS,
+) -> AllViews:
+    """Disparity of every view.
+
+    Parameters
+    ----------
+    light_field : LightField
+        Where its disparity range is unknown, it is estimated from the views.
+    maps : StageMaps, optional
+        Of the reference view; computed unless given. Its disparity and confidence stay as they are.
+    variant, parameters, progress, memory
+        As of :func:`sepi.pipeline.estimate_depth`, which makes the maps of up to five views. ``memory`` does not count
+        what is returned.
+    edge_views : int
+        Views that each view is compared with at its depth steps, at least; 0: none, outlines stay as they were carried.
+        That takes a fraction of the time.
+
+    Returns
+    -------
+    AllViews
+
+    Raises
+    ------
+    SepiError
+        If ``maps`` are not of the light field's shape, or as of :func:`sepi.pipeline.estimate_depth`.
+    MemoryError
+        If a limit on the process's address space cannot be enough.
+    """
+    shape = (*light_field.grid, *light_field.shape)
+    result = AllViews(np.full(shape, np.nan, np.float32), np.zeros(shape, np.float32), np.zeros(shape, bool))
+    for view in maps_of_all_views(light_field, maps, variant, parameters, progress, memory, edge_views):
+        result.disparity[view.position] = view.disparity
+        result.confidence[view.position] = view.confidence
+        result.extended[view.position] = view.extended
+    return result
+
+
+def maps_of_all_views(
+    light_field: LightField,
+    maps: StageMaps | None = None,
+    variant: str | Variant = DEFAULT_VARIANT,
+    parameters: Mapping[str, Mapping[str, Any]] | None = None,
+    progress: Progress = no_progress,
+    memory: int | None = None,
+    edge_views: int = EDGE_VIEWS,
+) -> Iterator[ViewMaps]:
+    """The maps of one view after the other, row by row of the grid; missing views are left out.
+
+    Arguments and errors as for :func:`estimate_all_views`; only a few views' maps are held at a time.
+
+    Yields
+    ------
+    ViewMaps
+    """
+    if maps is not None and maps.disparity.shape != light_field.shape:
+        raise SepiError(
+            f"{light_field.name}: maps must have the views' shape {light_field.shape}, got {maps.disparity.shape}"
+        )
+    if light_field.disparity_range is None:
+        from sepi.inspection.disparity_range import estimate_range
+
+        # once, so that all maps are searched for alike
+        light_field = light_field.with_range(estimate_range(light_field))
+    anchors = anchor_views(light_field)
+    places = np.argwhere(light_field.present)
+    # a view's share takes about a tenth of an estimate
+    total = len(anchors) + 0.1 * len(places)
+    found = []
+    for number, position in enumerate(anchors):
+
+        def of_all(fraction: float, number: int = number) -> None:
+            progress((number + fraction) / total)
+
+        known = maps if number == 0 else None
+        found.append(known or estimate_depth(light_field.seen_from(position), variant, parameters, of_all, memory))
+        of_all(1.0)
+    sources = _sources(found, np.array([light_field.baselines[position] for position in anchors]))
+    for begin in range(0, len(places), _AT_ONCE):
+        for number, view in enumerate(_fused(light_field, sources, places[begin : begin + _AT_ONCE])):
+            if view.position == light_field.reference_position:
+                yield view._replace(disparity=found[0].disparity, confidence=found[0].confidence)
+            else:
+                yield view._replace(disparity=_with_own_edges(light_field, view, edge_views))
+            progress((len(anchors) + 0.1 * (begin + number + 1)) / total)
+
+
+def anchor_views(light_field: LightField) -> list[tuple[int, int]]:
+    """The views whose maps are estimated: the reference view, and the farthest in each diagonal direction.
+
+    Parameters
+    ----------
+    light_field : LightField
+
+    Returns
+    -------
+    list of (int, int)
+        Rows and columns in the grid, the reference view first; five of a whole grid, three of one row of views.
+    """
+    places, baselines = np.argwhere(light_field.present), light_field.baselines[light_field.present]
+    farthest = [places[np.argmax(baselines @ corner)] for corner in _CORNERS]
+    found = [light_field.reference_position, *((int(t), int(s)) for t, s in farthest)]
+    return list(dict.fromkeys(found))
+
+
+def carried_map(disparity: FloatMap, baseline: tuple[float, float]) -> FloatMap:
+    """A disparity map as another view sees its surfaces.
+
+    Parameters
+    ----------
+    disparity : ndarray, shape (H, W), float32
+        Pixels per view step.
+    baseline : (float, float)
+        From the map's view to the other, down and across, in view steps.
+
+    Returns
+    -------
+    ndarray, shape (H, W), float32
+        NaN where the other view sees no surface of the map.
+    """
+    from sepi.applications.all_views_kernels import EMPTY, carry, corner_disparities
+
+    nearest, believed = np.empty_like(disparity), np.empty_like(disparity)
+    corners = corner_disparities(disparity, np.float32(TOLERANCE))
+    down, across = map(float, baseline)
+    carry(disparity, np.ones_like(disparity), corners, down, across, MOST_STRETCHED, nearest, believed)
+    nearest[nearest == EMPTY] = np.nan
+    return nearest
+
+
+def _sources(found: list[StageMaps], baselines: npt.NDArray[np.float64]) -> Sources:
+    """The maps that are carried, with the surfaces that their pixels are parts of."""
+    from sepi.applications.all_views_kernels import Sources, corner_disparities
+
+    return Sources(
+        np.stack([maps.disparity for maps in found]),
+        np.stack([maps.confidence for maps in found]),
+        np.stack([corner_disparities(maps.disparity, np.float32(TOLERANCE)) for maps in found]),
+        baselines,
+    )
+
+
+def _fused(light_field: LightField, sources: Sources, places: npt.NDArray[np.int64]) -> list[ViewMaps]:
+    """What the carried maps say of some views."""
+    from sepi.applications.all_views_kernels import Rules, maps_of_views
+
+    shape = (len(places), *light_field.shape)
+    disparity, confidence, extended = np.empty(shape, np.float32), np.empty(shape, np.float32), np.empty(shape, bool)
+    rules = Rules(MOST_STRETCHED, np.float32(TOLERANCE), np.float32(LEAST_WEIGHT))
+    baselines = np.ascontiguousarray(light_field.baselines[tuple(places.T)])
+    maps_of_views(sources, rules, baselines, disparity, confidence, extended)
+    positions = [(int(t), int(s)) for t, s in places]
+    return [ViewMaps(*of_view) for of_view in zip(positions, disparity, confidence, extended, strict=True)]
+
+
+def _with_own_edges(light_field: LightField, view: ViewMaps, edge_views: int) -> FloatMap:
+    """A view's disparity, the pixels at its depth steps being given to the surface that fills most of them there."""
+    if edge_views == 0:
+        return view.disparity
+    from sepi.image.mixed_pixels import MixtureParameters, mixture_evidence
+    from sepi.image.noise import residual_variance
+    from sepi.matching.surface_shares import SurfaceShareParameters, reassign_at_steps
+
+    own, parameters = light_field.seen_from(view.position), SurfaceShareParameters(share_views=edge_views)
+    colours = own.reference_view
+    mixture = mixture_evidence(view.disparity, colours, residual_variance(colours), MixtureParameters())
+    decided = reassign_at_steps(own, view.disparity, parameters, mixture)
+    # a slope is no step, however steep: a pixel there would leave its surface
+    beside = np.ones((2 * parameters.share_radius + 1,) * 2, np.uint8)
+    return np.where(cv2.dilate(torn_pixels(view.disparity).astype(np.uint8), beside) > 0, decided, view.disparity)
+
+
+def torn_pixels(disparity: FloatMap) -> BoolMap:
+    """Pixels at whose side the surface comes apart, beyond what slopes explain; shape (H, W), bool."""
+    from sepi.applications.all_views_kernels import corner_disparities
+
+    top_left, top_right, bottom_right, bottom_left = np.moveaxis(
+        corner_disparities(disparity, np.float32(TOLERANCE)), 2, 0
+    )
+    torn = np.zeros(disparity.shape, bool)
+    for first, second in ((top_right, top_left), (bottom_right, bottom_left)):
+        apart = np.abs(first[:, :-1] - second[:, 1:]) > TOLERANCE
+        torn[:, :-1] |= apart
+        torn[:, 1:] |= apart
+    for first, second in ((bottom_left, top_left), (bottom_right, top_right)):
+        apart = np.abs(first[:-1] - second[1:]) > TOLERANCE
+        torn[:-1] |= apart
+        torn[1:] |= apart
+    return torn

@@ -1,0 +1,331 @@
+"""Maps of all views: each must be of its own view's pixels, and all of them of the same surfaces."""
+
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import cv2
+import h5py
+import numba
+import numpy as np
+import numpy.typing as npt
+import pytest
+from click.testing import CliRunner
+from geometries import standing
+from several_threads import several_threads
+
+import sepi
+from bench.all_views import disagreement, moved_pixels
+from sepi.applications import all_views_kernels as kernels
+from sepi.applications.all_views import TOLERANCE, AllViews, anchor_views, carried_map, estimate_all_views
+from sepi.cli.main import main
+from sepi.errors import SepiError
+from sepi.lightfield import FloatMap, LightField
+from sepi.scenes import render, true_disparity, write_hci
+from sepi.stage import StageMaps
+
+SIZE, VIEWS = 96, 5
+LAYERS = "stripes"
+"""Upright stripes before a plane: two layers, with gaps that each view opens elsewhere."""
+
+
+@cache
+def layers() -> LightField:
+    return render(LAYERS, size=SIZE, views=VIEWS)
+
+
+@cache
+def layers_found() -> AllViews:
+    return estimate_all_views(layers(), variant="fast")
+
+
+def truth_of(light_field: LightField) -> FloatMap:
+    size = light_field.shape[0]
+    views = [true_disparity(light_field.name, size=size, baseline=b) for b in light_field.baselines.reshape(-1, 2)]
+    return np.stack(views).reshape(*light_field.grid, size, size)
+
+
+# --- carrying one map -------------------------------------------------------------------------------------------------
+
+
+def plain_corners(disparity: FloatMap, tolerance: float) -> npt.NDArray[np.float64]:
+    """``corner_disparities`` as plain NumPy: every pixel's plane at its corners, averaged over those that agree."""
+    d = disparity.astype(np.float64)
+
+    def slope(axis: int) -> npt.NDArray[np.float64]:
+        steps = np.diff(d, axis=axis)
+        ends = [(0, 0), (0, 0)]
+        ends[axis] = (1, 0)
+        before = np.pad(steps, ends, constant_values=np.inf)
+        ends[axis] = (0, 1)
+        after = np.pad(steps, ends, constant_values=np.inf)
+        return np.where(np.abs(before) <= np.abs(after), before, after)
+
+    down, across = slope(0), slope(1)
+    H, W = d.shape
+    corners = np.empty((H, W, 4))
+    for y, x, (n, (cy, cx)) in (
+        (y, x, c)
+        for y in range(H)
+        for x in range(W)
+        for c in enumerate([(-0.5, -0.5), (-0.5, 0.5), (0.5, 0.5), (0.5, -0.5)])
+    ):
+        own = d[y, x] + cy * down[y, x] + cx * across[y, x]
+        around = [(y + i, x + j) for i in {0, int(2 * cy)} for j in {0, int(2 * cx)}]
+        values = [
+            d[i, j] + (y + cy - i) * down[i, j] + (x + cx - j) * across[i, j]
+            for i, j in around
+            if 0 <= i < H and 0 <= j < W
+        ]
+        corners[y, x, n] = np.mean([value for value in values if abs(value - own) <= tolerance])
+    return corners
+
+
+def plain_carry(disparity: FloatMap, corners: npt.NDArray[np.float64], v: float, u: float, stretch: float) -> FloatMap:
+    """``carry`` as plain NumPy: each triangle is asked at every pixel of the view."""
+    H, W = disparity.shape
+    nearest = np.full((H, W), kernels.EMPTY)
+    row, column = np.mgrid[:H, :W]
+    for y, x in np.ndindex(H, W):
+        points = [(y, x, float(disparity[y, x]))]
+        points += [
+            (y + i, x + j, float(corners[y, x, n]))
+            for n, (i, j) in enumerate([(-0.5, -0.5), (-0.5, 0.5), (0.5, 0.5), (0.5, -0.5)])
+        ]
+        seen = [np.array([py - d * v, px - d * u, d]) for py, px, d in points]
+        for n in range(4):
+            a, b, c = seen[0], seen[1 + (n - 1) % 4], seen[1 + n]
+            matrix = np.array([[b[1] - a[1], c[1] - a[1]], [b[0] - a[0], c[0] - a[0]]])
+            area = np.linalg.det(matrix)
+            if not 5e-4 < area <= 0.5 * stretch:
+                continue
+            parts = np.linalg.solve(matrix, np.stack([column - a[1], row - a[0]]).reshape(2, -1)).reshape(2, H, W)
+            inside = (parts.min(axis=0) >= -1e-3) & (parts.sum(axis=0) <= 1 + 1e-3)
+            d = a[2] + parts[0] * (b[2] - a[2]) + parts[1] * (c[2] - a[2])
+            nearest = np.where(inside & (d > nearest), d, nearest)
+    return nearest.astype(np.float32)
+
+
+def bumpy_map() -> FloatMap:
+    """A slanted surface with a step and noise, so that pixels are joined, cut and hidden."""
+    y, x = np.mgrid[:13, :15]
+    rng = np.random.default_rng(4)
+    return (0.03 * y - 0.05 * x + 1.1 * (x > 6) + 0.02 * rng.standard_normal(y.shape)).astype(np.float32)
+
+
+def test_corners_are_what_plain_numpy_makes_of_them() -> None:
+    """Otherwise slanted surfaces would tear, or depth steps be bridged, when they are carried."""
+    disparity = bumpy_map()
+    found = kernels.corner_disparities(disparity, np.float32(TOLERANCE))
+    np.testing.assert_allclose(found, plain_corners(disparity, TOLERANCE), atol=1e-5)
+
+
+@pytest.mark.parametrize(("v", "u"), [(0.0, 0.0), (1.3, -2.4), (-3.0, 2.0)])
+def test_carried_surfaces_are_what_plain_numpy_draws(v: float, u: float) -> None:
+    """Otherwise views would show surfaces where they are not."""
+    disparity = bumpy_map()
+    corners = kernels.corner_disparities(disparity, np.float32(TOLERANCE))
+    nearest, believed = np.empty_like(disparity), np.empty_like(disparity)
+    kernels.carry(disparity, np.ones_like(disparity), corners, v, u, 2.0, nearest, believed)
+    np.testing.assert_allclose(nearest, plain_carry(disparity, corners, v, u, 2.0), atol=1e-4)
+    np.testing.assert_array_equal(believed, nearest != kernels.EMPTY)
+
+
+def test_a_map_carried_nowhere_stays_as_it_is() -> None:
+    """Otherwise the maps would change where nothing is to be done."""
+    disparity = bumpy_map()
+    np.testing.assert_allclose(carried_map(disparity, (0, 0)), disparity, atol=1e-6)
+
+
+@pytest.mark.parametrize("baseline", [(0.0, 4.0), (-3.0, 0.5), (2.6, -3.7)])
+def test_a_slanted_plane_is_carried_exactly(baseline: tuple[float, float]) -> None:
+    """Otherwise slanted surfaces would get holes, or stairs, in the other views."""
+    found = carried_map(true_disparity("slanted_plane", size=SIZE), baseline)
+    truth = true_disparity("slanted_plane", size=SIZE, baseline=baseline)
+    seen = np.isfinite(found)
+    assert np.abs(found - truth)[seen].max() < 1e-4
+    # seen is what the map's own view holds, without a hole
+    at = np.indices(truth.shape) + truth * np.array(baseline)[:, None, None]
+    beyond = np.maximum(-0.5 - at, at - (SIZE - 0.5)).max(axis=0)
+    assert seen[beyond < -0.01].all()
+    assert not seen[beyond > 0.01].any()
+
+
+def test_gaps_open_and_hidden_surfaces_stay_hidden() -> None:
+    """Otherwise the background would show through what is before it."""
+    truth = truth_of(layers())
+    found = carried_map(truth[2, 2], (0, 2))
+    seen = np.isfinite(found)
+    # outlines are known to a pixel
+    around = np.ones((3, 3), np.uint8)
+    plain = seen & (cv2.dilate(truth[2, 4], around) - cv2.erode(truth[2, 4], around) < 0.3)
+    assert plain.mean() > 0.5
+    assert np.abs(found - truth[2, 4])[plain].mean() < 0.01
+    assert 0.05 < (~seen).mean() < 0.25
+    # a foreground that moves uncovers background, and the borders what comes in
+    assert (truth[2, 4][:, 4:-4] < 0)[~seen[:, 4:-4]].mean() > 0.9
+
+
+# --- all views --------------------------------------------------------------------------------------------------------
+
+
+def test_a_plane_parallel_to_the_views_is_the_same_in_all_of_them() -> None:
+    """The simplest scene: any error here is one of the carrying or the fusion."""
+    light_field = render("fronto_parallel", size=64, views=3)
+    found = estimate_all_views(light_field, variant="fast")
+    assert found.disparity.shape == (3, 3, 64, 64)
+    assert found.disparity.dtype == found.confidence.dtype == np.float32
+    error = np.abs(found.disparity - 1)
+    assert error.mean() < 0.01
+    assert error.max() < 0.15
+    assert not found.extended.any()
+    assert found.confidence.min() >= 0
+    assert found.confidence.max() <= 1
+
+
+def test_every_view_of_two_layers_is_close_to_the_truth() -> None:
+    """Other views' maps are of no use if they are much worse than the reference view's."""
+    error = np.abs(layers_found().disparity - truth_of(layers()))
+    of_views = error.mean(axis=(2, 3))
+    assert of_views.mean() < 0.05
+    assert of_views.max() < 0.08
+    assert (error > 0.07).mean() < 0.07
+
+
+def test_gaps_are_filled_by_views_that_see_into_them() -> None:
+    """What the reference view does not see must be better than a guess from what is beside it."""
+    truth, baselines = truth_of(layers()), layers().baselines
+    found = layers_found()
+    reference = found.disparity[2, 2]
+    ours, guessed, pixels = 0.0, 0.0, 0
+    for position in ((0, 0), (0, 3), (1, 4), (3, 0), (4, 4)):
+        gap = np.isnan(carried_map(reference, tuple(baselines[position])))
+        pixels += int(gap.sum())
+        ours += float(np.abs(found.disparity[position] - truth[position])[gap].sum())
+        naive = moved_pixels(reference, baselines[position])
+        guessed += float(np.abs(naive - truth[position])[gap].sum())
+    assert pixels > 1000
+    assert ours < 0.5 * guessed
+
+
+def test_views_agree_with_each_other() -> None:
+    """Otherwise point clouds of two views, or pictures made from them, would not fit together."""
+    mean, bad = disagreement(layers_found().disparity, layers().baselines)
+    assert mean < 0.05
+    assert bad < 6
+
+
+def test_the_reference_views_map_is_the_one_that_is_given() -> None:
+    """`sepi depth --all-views` must not tell two things about one view."""
+    light_field = render("pyramids", size=64, views=3)
+    maps = sepi.estimate_depth(light_field, "fast")
+    found = sepi.estimate_all_views(light_field, maps, "fast", edge_views=0)
+    np.testing.assert_array_equal(found.disparity[1, 1], maps.disparity)
+    np.testing.assert_array_equal(found.confidence[1, 1], maps.confidence)
+
+
+def test_maps_of_another_shape_are_refused() -> None:
+    """They would be of another light field."""
+    flat = np.zeros((8, 8), np.float32)
+    with pytest.raises(SepiError, match=r"maps must have the views' shape \(96, 96\), got \(8, 8\)"):
+        estimate_all_views(layers(), StageMaps(flat, flat))
+
+
+@pytest.mark.parametrize("geometry", ["closer rows", "off the grid", "corner", "one row", "missing", "grey"])
+def test_any_arrangement_of_views(geometry: str) -> None:
+    """Views that stand otherwise, or are missing, must not move surfaces to where they are not."""
+    size, views = 64, 3
+    where = standing(geometry, (views, views)) if geometry in ("closer rows", "off the grid") else {}
+    light_field = render("curved_occluders", size=size, views=views, **where)
+    truth, present = truth_of(light_field), np.ones((views, views), bool)
+    if geometry == "corner":
+        light_field = light_field.seen_from((2, 0))
+    if geometry == "one row":
+        truth, present = truth[1:2], present[1:2]
+        light_field = replace(light_field, views=light_field.views[1:2], present=present)
+    if geometry == "missing":
+        present[0, 0] = present[2, 1] = False
+        light_field = replace(light_field, present=present)
+    if geometry == "grey":
+        light_field = replace(light_field, views=light_field.views[..., 1:2])
+    found = estimate_all_views(light_field, variant="fast")
+    assert np.isnan(found.disparity[~present]).all()
+    assert (found.confidence[~present] == 0).all()
+    assert np.isfinite(found.disparity[present]).all()
+    # tiny pictures of a scene with steps of 4: moved the wrong way, they would be wrong nearly everywhere
+    assert np.median(np.abs(found.disparity - truth)[present]) < 0.03
+
+
+def test_anchors_see_round_things_from_all_sides() -> None:
+    """Without them nobody sees what the reference view does not."""
+    light_field = layers()
+    assert anchor_views(light_field) == [(2, 2), (0, 0), (0, 4), (4, 0), (4, 4)]
+    assert anchor_views(light_field.seen_from((0, 0))) == [(0, 0), (0, 4), (4, 0), (4, 4)]
+    row = replace(light_field, views=light_field.views[:1], present=None)
+    assert anchor_views(row) == [(0, 2), (0, 0), (0, 4)]
+
+
+def test_threads_do_not_change_the_maps() -> None:
+    """Equal input must give equal bytes on any machine."""
+    light_field = render("curved_occluders", size=64, views=3)
+    maps = sepi.estimate_depth(light_field, "fast")
+    before = numba.get_num_threads()
+    found = []
+    try:
+        for threads in (1, several_threads()):
+            numba.set_num_threads(threads)
+            found.append(estimate_all_views(light_field, maps, "fast"))
+    finally:
+        numba.set_num_threads(before)
+    np.testing.assert_array_equal(found[0].disparity, found[1].disparity)
+    np.testing.assert_array_equal(found[0].confidence, found[1].confidence)
+
+
+# --- the command ------------------------------------------------------------------------------------------------------
+
+
+def test_the_command_writes_a_map_of_every_view(tmp_path: Path) -> None:
+    """What users call: the file beside the usual ones, which stay the same to the byte, and gone when not asked for."""
+    scene = tmp_path / "pyramids"
+    write_hci(render("pyramids", size=64, views=3), scene)
+    words = ["depth", str(scene), "--variant", "fast", "--threads", "1", "-o"]
+    for folder, more in (("plain", []), ("all", ["--all-views"]), ("again", ["--all-views"])):
+        done = CliRunner().invoke(main, [*words, str(tmp_path / folder), *more])
+        assert done.exit_code == 0, done.output
+        assert ("all_views.h5" in done.output) == bool(more)
+    plain = {path.name: path.read_bytes() for path in (tmp_path / "plain").iterdir()}
+    both = {path.name: path.read_bytes() for path in (tmp_path / "all").iterdir()}
+    again = (tmp_path / "again" / "all_views.h5").read_bytes()
+    assert both.pop("all_views.h5") == again
+    assert both == plain
+    with h5py.File(tmp_path / "all" / "all_views.h5") as file:
+        assert {name: file[name].shape for name in file} == {
+            "disparity": (3, 3, 64, 64),
+            "confidence": (3, 3, 64, 64),
+            "extended": (3, 3, 64, 64),
+            "present": (3, 3),
+            "baselines": (3, 3, 2),
+        }
+        assert file["disparity"].attrs["units"] == "pixels per view step"
+        assert file.attrs["variant"] == "fast"
+        np.testing.assert_array_equal(file["disparity"][1, 1], np.load(tmp_path / "all" / "disparity.npy"))
+        for t, s in np.ndindex(3, 3):
+            truth = true_disparity("pyramids", size=64, baseline=(t - 1, s - 1))
+            assert np.median(np.abs(file["disparity"][t, s] - truth)) < 0.03
+    CliRunner().invoke(main, [*words, str(tmp_path / "all")])
+    assert not (tmp_path / "all" / "all_views.h5").exists()
+
+
+def test_missing_views_are_nan_in_the_file(tmp_path: Path) -> None:
+    """A map of 0 would look like one that was made."""
+    scene = tmp_path / "views"
+    write_hci(render("pyramids", size=64, views=3), scene)
+    folder = tmp_path / "maps"
+    words = ["depth", str(scene), "--variant", "fast", "-o", str(folder), "--all-views", "--exclude", "0,2"]
+    done = CliRunner().invoke(main, words)
+    assert done.exit_code == 0, done.output
+    with h5py.File(folder / "all_views.h5") as file:
+        assert np.isnan(file["disparity"][0, 2]).all()
+        assert np.isnan(file["baselines"][0, 2]).all()
+        assert np.isfinite(file["disparity"][()]).sum() == 8 * 64 * 64
+        assert file["present"][()].sum() == 8
