@@ -82,6 +82,16 @@ class AllViews:
         0..1; 0 in missing views.
     extended : ndarray, shape (T, S, H, W), bool
         Pixels that none of the maps tells about; see :class:`ViewMaps`.
+
+    Examples
+    --------
+    A point stays at its disparity, and moves by it from one view to the next:
+
+    >>> import sepi
+    >>> from sepi.scenes import render
+    >>> every = sepi.estimate_all_views(render("fronto_parallel", size=64, views=3))
+    >>> isinstance(every, sepi.AllViews), bool(abs(every.disparity - 1).mean() < 0.01)
+    (True, True)
     """
 
     disparity: FloatMap
@@ -106,9 +116,14 @@ def estimate_all_views(
         Where its disparity range is unknown, it is estimated from the views.
     maps : StageMaps, optional
         Of the reference view; computed unless given. Its disparity and confidence stay as they are.
-    variant, parameters, progress, memory
-        As of :func:`sepi.pipeline.estimate_depth`, which makes the maps of up to five views. ``memory`` does not count
-        what is returned.
+    variant : str or Variant
+        As of :func:`sepi.estimate_depth`, which makes the maps of up to five views.
+    parameters : mapping, optional
+        As there.
+    progress : callable
+        Called with the fraction done.
+    memory : int, optional
+        Bytes, as there; what is returned does not count.
     edge_views : int
         Views that each view is compared with at its depth steps, at least; 0: none, outlines stay as they were carried.
         That takes a fraction of the time.
@@ -116,6 +131,7 @@ def estimate_all_views(
     Returns
     -------
     AllViews
+        The maps of every view.
 
     Raises
     ------
@@ -123,6 +139,19 @@ def estimate_all_views(
         If ``maps`` are not of the light field's shape, or as of :func:`sepi.pipeline.estimate_depth`.
     MemoryError
         If a limit on the process's address space cannot be enough.
+
+    Examples
+    --------
+    >>> import sepi
+    >>> from sepi.scenes import render, true_disparity
+    >>> light_field = render("slanted_plane", size=64, views=3)
+    >>> maps = sepi.estimate_depth(light_field)
+    >>> every = sepi.estimate_all_views(light_field, maps)
+    >>> every.disparity.shape, bool((every.disparity[1, 1] == maps.disparity).all())
+    ((3, 3, 64, 64), True)
+    >>> corner = true_disparity("slanted_plane", size=64, baseline=(-1, -1))
+    >>> bool(abs(every.disparity[0, 0] - corner).mean() < 0.02)
+    True
     """
     shape = (*light_field.grid, *light_field.shape)
     result = AllViews(np.full(shape, np.nan, np.float32), np.zeros(shape, np.float32), np.zeros(shape, bool))

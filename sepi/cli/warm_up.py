@@ -32,6 +32,7 @@ def compile_kernels(variants: tuple[str, ...]) -> None:
     from dataclasses import replace
 
     from sepi.applications.all_views import estimate_all_views
+    from sepi.applications.refocusing import all_in_focus, refocus
     from sepi.evaluate import evaluation_of
     from sepi.inspection.disparity_range import estimate_range
     from sepi.inspection.view_order import check_order
@@ -49,6 +50,8 @@ def compile_kernels(variants: tuple[str, ...]) -> None:
     estimate_range(bare)
     if DEFAULT_VARIANT in variants:
         estimate_all_views(light_field, maps)
+        all_in_focus(light_field, maps)
+        refocus(light_field, 0.0, maps)
 
 
 @click.command(name="python -m sepi.cli.warm_up", cls=SepiCommand)

@@ -132,6 +132,16 @@ def true_disparity(name: str, *, size: int = 192, baseline: tuple[float, float] 
     ------
     SepiError
         If there is no such scene or size is out of bounds.
+
+    Examples
+    --------
+    >>> from sepi.scenes import render, true_disparity
+    >>> light_field = render("dots", size=64, views=3)
+    >>> bool((true_disparity("dots", size=64) == light_field.ground_truth).all())
+    True
+    >>> corner = true_disparity("dots", size=64, baseline=light_field.baselines[0, 2])
+    >>> corner.shape, bool((corner == light_field.ground_truth).all())
+    ((64, 64), False)
     """
     from sepi.scenes.rendering import visible
 
