@@ -56,7 +56,7 @@ def test_links_and_anchors_of_markdown() -> None:
 
 
 def test_named_pages_exist() -> None:
-    """A message, comment or docstring sends the reader to docs/NAME.md, which is gone."""
+    """A message, comment or docstring sends the reader to docs/NAME.md, which is gone; one page is generated."""
     gone = []
     for path in [
         *REPOSITORY.glob("*"),
@@ -64,7 +64,7 @@ def test_named_pages_exist() -> None:
     ]:
         if path.suffix in (".py", ".md", ".smk", ".yaml", ".toml") or path.name in ("Snakefile", "Makefile"):
             for name in re.findall(r"docs/[\w/]+\.md", path.read_text(encoding="utf-8")):
-                if not (REPOSITORY / name).exists():
+                if name != "docs/reference/api.md" and not (REPOSITORY / name).exists():
                     gone.append(f"{path.relative_to(REPOSITORY)}: {name}")
     assert gone == []
 
