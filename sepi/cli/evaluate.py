@@ -43,8 +43,8 @@ def evaluate(
 ) -> None:
     """Score the disparity map ESTIMATE against ground truth.
 
-    ESTIMATE is a PFM, an HDF5 file with a dataset 'disparity', a NumPy file (.npy), a 'disparity_16bit.png', or a
-    folder that 'sepi depth' wrote. GROUND_TRUTH is such a file; give the SCENE itself, a light field with ground truth,
+    ESTIMATE is a PFM, an HDF5 file with a dataset 'disparity', a NumPy file (.npy), a TIFF of floats, a
+    'disparity_16bit.png', or a folder that 'sepi depth' wrote. GROUND_TRUTH is such a file; give the SCENE itself, a light field with ground truth,
     to have its occluded and textureless regions scored too. Give the flags of 'sepi depth' that say how to read the
     SCENE here, too. A folder that 'sepi depth' wrote knows which view it belongs to.
 
