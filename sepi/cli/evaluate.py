@@ -44,9 +44,9 @@ def evaluate(
     """Score the disparity map ESTIMATE against ground truth.
 
     ESTIMATE is a PFM, an HDF5 file with a dataset 'disparity', a NumPy file (.npy), a TIFF of floats, a
-    'disparity_16bit.png', or a folder that 'sepi depth' wrote. GROUND_TRUTH is such a file; give the SCENE itself, a light field with ground truth,
-    to have its occluded and textureless regions scored too. Give the flags of 'sepi depth' that say how to read the
-    SCENE here, too. A folder that 'sepi depth' wrote knows which view it belongs to.
+    'disparity_16bit.png', or a folder that 'sepi depth' wrote. GROUND_TRUTH is such a file; give the SCENE itself, a
+    light field with ground truth, to have its occluded and textureless regions scored too. Give the flags of 'sepi
+    depth' that say how to read the SCENE here, too. A folder that 'sepi depth' wrote knows which view it belongs to.
 
     Both protocols are used: 'paper' scores the whole map, 'benchmark' leaves out 15 pixels on each side. With --offset,
     the crop's pixels are scored, and borders are counted from the edges of the ground truth, not from the crop's.
