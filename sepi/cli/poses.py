@@ -63,9 +63,9 @@ def poses(
       sepi poses cotton cotton-depth
       sepi poses cotton cotton-depth --to nerfstudio -o cotton-nerf
     """
+    from sepi.applications.posed_views import posed_views
     from sepi.io.colmap import write_colmap
     from sepi.io.nerfstudio import write_nerfstudio
-    from sepi.io.posed_views import posed_views
     from sepi.io.result_folder import read_result
 
     result = read_result(result_path)

@@ -22,15 +22,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
 from sepi.io.files import atomic_folder, atomic_path
 from sepi.io.images import write_png
-from sepi.io.posed_views import PosedViews
 from sepi.lightfield import FloatMap
 from sepi.stage import Progress, no_progress
+
+if TYPE_CHECKING:
+    from sepi.applications.posed_views import PosedViews
 
 Flags = npt.NDArray[np.bool_]
 """Which of the views sees which of the points, (N, P)."""
@@ -48,7 +51,7 @@ def write_colmap(folder: str | Path, posed: PosedViews, progress: Progress = no_
     folder : str or Path
         Made; an empty one may exist.
     posed : PosedViews
-        From :func:`sepi.io.posed_views.posed_views`.
+        From :func:`sepi.applications.posed_views.posed_views`.
     progress : callable
         Told the fraction that is done.
 

@@ -23,17 +23,19 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
-from sepi.io.camera_poses import Points
 from sepi.io.files import atomic_folder, atomic_path
 from sepi.io.images import write_png
 from sepi.io.ply import write_ply
-from sepi.io.posed_views import PosedViews
 from sepi.stage import Progress, no_progress
+
+if TYPE_CHECKING:
+    from sepi.applications.camera_poses import Points
+    from sepi.applications.posed_views import PosedViews
 
 _MILLIMETRES = 1000
 _CLOUD = "points.ply"
@@ -60,7 +62,7 @@ def write_nerfstudio(folder: str | Path, posed: PosedViews, progress: Progress =
     folder : str or Path
         Made; an empty one may exist.
     posed : PosedViews
-        From :func:`sepi.io.posed_views.posed_views`.
+        From :func:`sepi.applications.posed_views.posed_views`.
     progress : callable
         Told the fraction that is done.
 

@@ -10,11 +10,11 @@ import pytest
 from geometries import GEOMETRIES, standing
 from plyfile import PlyData
 
+from sepi.applications.posed_views import PosedViews, posed_views
 from sepi.camera import Camera
 from sepi.errors import SepiError
 from sepi.io.colmap import write_colmap
 from sepi.io.nerfstudio import write_nerfstudio
-from sepi.io.posed_views import PosedViews, posed_views
 from sepi.lightfield import LightField
 from sepi.scenes import render
 

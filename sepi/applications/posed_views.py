@@ -10,10 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from sepi.applications.camera_poses import CameraPoses, Points, camera_poses, nominal_camera
+from sepi.applications.carried_maps import carried_disparity, seen
 from sepi.camera import Camera
 from sepi.errors import SepiError
-from sepi.io.camera_poses import CameraPoses, Points, camera_poses, nominal_camera
-from sepi.io.carried_maps import carried_disparity, seen
 from sepi.lightfield import BoolMap, FloatMap, LightField, as_unit_float
 
 Colours = npt.NDArray[np.uint8]

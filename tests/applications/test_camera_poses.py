@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from geometries import GEOMETRIES, standing
 
+from sepi.applications.camera_poses import CameraPoses, camera_poses, nominal_camera
+from sepi.applications.carried_maps import carried_disparity, seen
+from sepi.applications.posed_views import posed_views
 from sepi.camera import Camera, camera_from
 from sepi.errors import SepiError
-from sepi.io.camera_poses import CameraPoses, camera_poses, nominal_camera
-from sepi.io.carried_maps import carried_disparity, seen
-from sepi.io.posed_views import posed_views
 from sepi.lightfield import LightField
 from sepi.scenes import SCENES, render
 
