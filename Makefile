@@ -24,9 +24,11 @@ COMPARED := .venv/compared
 all: $(READY)
 	$(BIN)/snakemake all
 
-# a worker of pytest for each core, and one thread in each; of numba's threads tests/conftest.py takes care
+# a worker of pytest for each core and one more, since tests of clusters and of killed runs wait most of the time; one thread
+# in each; of numba's threads tests/conftest.py takes care
+WORKERS = $(shell $(PYTHON) -c 'import os; print((os.cpu_count() or 1) + 1)')
 ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
-TESTS := $(ONE_THREAD) $(BIN)/python -m pytest --numprocesses auto
+TESTS := $(ONE_THREAD) $(BIN)/python -m pytest --numprocesses $(WORKERS)
 
 check: $(COMPARED)
 	$(TESTS) -m "not real and not workflow and not browser and not slow"
@@ -50,7 +52,7 @@ coverage: export COVERAGE_FILE := $(CURDIR)/build/coverage/data
 coverage: $(COMPARED)
 	rm -rf build/coverage
 	mkdir -p build/coverage
-	$(ONE_THREAD) $(BIN)/coverage run -m pytest --numprocesses auto; status=$$?; \
+	$(ONE_THREAD) $(BIN)/coverage run -m pytest --numprocesses $(WORKERS); status=$$?; \
 	$(BIN)/coverage combine --quiet && $(BIN)/coverage report --skip-covered --skip-empty; exit $$status
 
 lint: $(READY)
