@@ -1,4 +1,4 @@
-"""What is published agrees with itself: version, archives, the README's examples, and the files for GitHub and Docker."""
+"""What is published agrees with itself: version, archives, the README's examples, files for GitHub and Docker."""
 
 import re
 import shlex
@@ -8,6 +8,7 @@ import sys
 import tarfile
 import tomllib
 import zipfile
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -33,6 +34,7 @@ def loaded(path: Path) -> dict[Any, Any]:
     return content
 
 
+@cache
 def phony_targets() -> set[str]:
     """What can be asked of make."""
     done = subprocess.run(
@@ -48,9 +50,8 @@ def phony_targets() -> set[str]:
 def test_version_is_one() -> None:
     """A result, a citation and the changelog name another version than the one that is installed."""
     citation = loaded(ROOT / "CITATION.cff")
-    heading = re.search(
-        r"^## (\S+) \((unreleased|\d{4}-\d\d-\d\d)\)$", (ROOT / "CHANGELOG.md").read_text(), re.MULTILINE
-    )
+    changelog = (ROOT / "CHANGELOG.md").read_text()
+    heading = re.search(r"^## (\S+) \((unreleased|\d{4}-\d\d-\d\d)\)$", changelog, flags=re.MULTILINE)
     assert heading is not None
     version, day = heading.groups()
     assert {version, citation["version"], package_version()} == {PROJECT["version"]}
@@ -154,15 +155,10 @@ def test_right_tag_is_taken() -> None:
 
 def test_only_allowed_pythons_are_tried(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A stand-in for a Python that is not there (pyenv has such) stops the check, or one that is too old is tried."""
-    told = {
-        "python3.9": "echo 3.9.1",
-        "python3.12": "echo 3.12.1",
-        "python3.13": "exit 127",
-        "python3.12-config": "echo 3.12.1",
-    }
-    for name, script in told.items():
-        (tmp_path / name).write_text(f"#!/bin/sh\n{script}\n")
-        (tmp_path / name).chmod(0o755)
+    pythons = {"3.9": "echo 3.9.1", "3.12": "echo 3.12.1", "3.13": "exit 127", "3.12-config": "echo 3.12.1"}
+    for name, script in pythons.items():
+        (tmp_path / f"python{name}").write_text(f"#!/bin/sh\n{script}\n")
+        (tmp_path / f"python{name}").chmod(0o755)
     monkeypatch.setenv("PATH", str(tmp_path))
     monkeypatch.setenv("PYENV_ROOT", str(tmp_path / "none"))
     assert check_release.find_pythons(SpecifierSet(">=3.11")) == {"3.12": tmp_path / "python3.12"}
@@ -219,12 +215,10 @@ def test_image_is_made_of_what_docker_is_given() -> None:
     """`docker build` stops at a file that is not there, or that .dockerignore keeps from it."""
     given = {line[1:] for line in (ROOT / ".dockerignore").read_text().splitlines() if line.startswith("!")}
     dockerfile = (ROOT / "Dockerfile").read_text()
-    copied = [
-        name for names in re.findall(r"^COPY (.*) \S+$", dockerfile, flags=re.MULTILINE) for name in names.split()
-    ]
-    mounted = re.findall(r"type=bind,source=([^,]+)", dockerfile)
-    assert {"rules", "requirements.lock"} <= {*copied, *mounted}
-    assert {*copied, *mounted} - {"."} <= given
+    copied = " ".join(re.findall(r"^COPY (.*) \S+$", dockerfile, flags=re.MULTILINE)).split()
+    needed = {name for name in copied if not name.startswith("--")} - {"."}
+    needed |= set(re.findall(r"type=bind,source=([^,]+)", dockerfile))
+    assert {"rules", "requirements.lock"} <= needed <= given
     assert all((ROOT / name).exists() for name in given)
     # what the wheel is built of
     assert {"pyproject.toml", "sepi", PROJECT["readme"], *PROJECT["license-files"]} <= given
