@@ -21,8 +21,9 @@ COPY rules /opt/sepi/rules
 COPY profiles /opt/sepi/profiles
 
 # Home and compiled kernels in a folder that any user may write to: `--user` can be one that the image does not know.
-# Kernels fit the processor that they were compiled on; on another kind the first run compiles them again.
-ENV HOME=/home/sepi NUMBA_CACHE_DIR=/home/sepi/kernels
+# Such a user has no name either, which Snakemake asks for. Kernels fit the processor that they were compiled on; on another
+# kind the first run compiles them again.
+ENV HOME=/home/sepi USER=sepi NUMBA_CACHE_DIR=/home/sepi/kernels
 RUN useradd --uid 1000 --create-home sepi \
     && python -m sepi.cli.warm_up \
     && chmod -R a+rwX /home/sepi
