@@ -111,6 +111,7 @@ release: dist
 # Old libraries warn of what is deprecated in new ones that they did not know: no failure here. Kernels are kept apart, since
 # those of another numba take each other's place
 OLDEST := build/oldest
+oldest: export NUMBA_CACHE_DIR := $(CURDIR)/build/oldest-kernels
 oldest: $(TOOLS)/ready
 	rm -rf $(OLDEST)
 	$(UV) venv --quiet --python 3.11 $(OLDEST)
@@ -118,7 +119,8 @@ oldest: $(TOOLS)/ready
 		--output-file $(OLDEST)/versions.txt pyproject.toml
 	$(UV) pip install --quiet --python $(OLDEST)/bin/python --requirement $(OLDEST)/versions.txt
 	$(UV) pip install --quiet --python $(OLDEST)/bin/python --no-deps --editable .
-	NUMBA_CACHE_DIR=$(CURDIR)/build/oldest-kernels $(ONE_THREAD) $(OLDEST)/bin/python -m pytest --numprocesses auto \
+	$(OLDEST)/bin/python -m sepi.cli.warm_up --comparison
+	$(ONE_THREAD) $(OLDEST)/bin/python -m pytest --numprocesses auto \
 		-W default::DeprecationWarning -W default::PendingDeprecationWarning -m "$(QUICK)"
 
 clean:
