@@ -309,7 +309,8 @@ def test_evaluate_reads_every_kind_of_map(pyramids: Path, result: Path, tmp_path
         ("text.h5", "map.pfm", "text.h5: not a readable HDF5 file"),
         ("other.h5", "map.pfm", "other.h5: not a readable HDF5 file"),
         ("picture.png", "map.pfm", "picture.png: a PNG without the text chunks 'scale' and 'offset'"),
-        ("text.tif", "map.pfm", "text.tif: expected a disparity map as .pfm, .h5 or .npy"),
+        ("text.tif", "map.pfm", "text.tif: not a PNG, JPEG, TIFF"),
+        ("text.txt", "map.pfm", "text.txt: expected a disparity map as .pfm, .h5 or .npy"),
         ("text.png", "map.pfm", "text.png: not a PNG"),
         ("map.pfm", "plain.h5", "plain.h5: no ground truth for view 1,1"),
     ],
@@ -328,7 +329,7 @@ def test_bad_maps_are_one_line(
     data = Path("damaged.h5").read_bytes()
     Path("damaged.h5").write_bytes(data[:100] + bytes(700) + data[800:])
     write_png(Path("picture.png"), np.zeros((4, 4), np.uint8))
-    for name in ("text.npy", "text.pfm", "text.h5", "text.png", "text.tif"):
+    for name in ("text.npy", "text.pfm", "text.h5", "text.png", "text.tif", "text.txt"):
         Path(name).write_text("hello")
     np.save("cube.npy", np.zeros((2, 3, 4)))
     np.save("words.npy", np.array([["a", "b"]]))
