@@ -99,6 +99,10 @@ if list((DOCS / "gallery").glob("plot_*.py")):
         "plot_gallery": not tags.has("quick"),  # noqa: F821
         "abort_on_example_error": True,
         "image_scrapers": ("matplotlib",),
+        "image_srcset": ["2x"],
+        "reset_modules": ("extensions.gallery_reset.reset",),
+        "capture_repr": (),
+        "remove_config_comments": True,
     }
 else:
     # contents and a card of index.md name it
