@@ -19,9 +19,10 @@ from bench import tables
 from sepi.applications.all_views import EDGE_VIEWS, carried_map, estimate_all_views
 from sepi.command import SepiCommand
 from sepi.lightfield import FloatMap, LightField
-from sepi.pipeline import DEFAULT_VARIANT, VARIANTS, estimate_depth
+from sepi.pipeline import estimate_depth
 from sepi.scenes import SCENES, render, true_disparity
 from sepi.threads import use_threads
+from sepi.variants import DEFAULT_VARIANT, VARIANTS
 
 BAD = 0.07
 """Error from which a pixel is bad, pixels per view step."""

@@ -12,16 +12,17 @@ import h5py
 from bench import floor, plain, solvers
 from bench.measure import Case, Figures, Prepared, command
 from bench.scene import VARIANT, Scene, inputs, sweep_values
-from sepi.evaluate import score
 from sepi.inspection.disparity_range import estimate_range
 from sepi.inspection.view_order import check_order
 from sepi.io.hdf5 import read_light_field, read_stage
 from sepi.io.result_folder import write_result
 from sepi.lightfield import LightField
 from sepi.matching.view_subsets import halves_and_quarters
-from sepi.pipeline import HANDED_ON, STAGES, estimate_depth, stage_parameters, variant_named
+from sepi.pipeline import estimate_depth
 from sepi.reading import read_light_field as read_any
+from sepi.scoring.scores import score
 from sepi.stage import Parameters, StageMaps, no_progress
+from sepi.variants import HANDED_ON, STAGES, stage_parameters, variant_named
 
 GROWTH = {"size": (128, 256, 512, 1024), "views": (3, 5, 7, 9, 13, 17), "num_disparities": (46, 91, 181, 362)}
 SMALL_GROWTH = {"size": (64, 128), "views": (3,), "num_disparities": (11, 21)}

@@ -15,13 +15,13 @@ from tabulate import tabulate
 
 from sepi.command import SepiCommand
 from sepi.errors import SepiError
-from sepi.evaluate import score
 from sepi.inspection.disparity_range import settle_range
 from sepi.lightfield import LightField
-from sepi.pipeline import STAGES, variant_named
 from sepi.reading import read_light_field
 from sepi.scenes import SCENES, render
+from sepi.scoring.scores import score
 from sepi.stage import StageMaps, no_progress
+from sepi.variants import STAGES, variant_named
 
 ALTERNATIVES: dict[str, tuple[str, dict[str, Any]]] = {
     "as chosen": ("", {}),

@@ -10,7 +10,7 @@ from sepi.command import WORKFLOW_PROCESS
 from sepi.compared.methods import LEARNED, METHODS
 from sepi.errors import SepiError
 from sepi.io.result_folder import RESULT_FILES
-from sepi.pipeline import HANDED_ON, STAGES, VARIANTS, choice_of
+from sepi.variants import HANDED_ON, STAGES, VARIANTS, choice_of
 from sepi.report.plan import Plan
 from sepi.validation import require_known
 from sepi.workflow.code_digest import ROOT, code_digest, stage_modules

@@ -75,7 +75,7 @@ class Parameters(BaseModel):
     ------
     pydantic.ValidationError
         If a field is unknown or a value not allowed; what users write goes through
-        :func:`sepi.pipeline.stage_parameters`, which tells it as a :class:`sepi.SepiError` of one line.
+        :func:`sepi.variants.stage_parameters`, which tells it as a :class:`sepi.SepiError` of one line.
 
     Examples
     --------
@@ -288,7 +288,7 @@ class Choice:
     >>> import cv2
     >>> from pydantic import Field
     >>> from sepi import estimate_depth
-    >>> from sepi.pipeline import STAGES, VARIANT_ENTRIES, variant_from
+    >>> from sepi.variants import STAGES, VARIANT_ENTRIES, variant_from
     >>> from sepi.scenes import render
     >>> from sepi.stage import Choice, Parameters, require_previous
     >>> class MedianParameters(Parameters):

@@ -181,7 +181,7 @@ def uniform_planes(
     --------
     >>> import numpy as np
     >>> from sepi import estimate_depth, textureless
-    >>> from sepi.pipeline import Variant
+    >>> from sepi.variants import Variant
     >>> from sepi.scenes import render
     >>> from sepi.stage import no_progress
     >>> light_field = render("wall", size=96, views=5)

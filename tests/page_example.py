@@ -20,7 +20,6 @@ from sepi.io.pfm import write_pfm
 from sepi.io.provenance import entry, scene_attributes, stage_attributes
 from sepi.io.scores import map_name, write_scores
 from sepi.lightfield import FloatMap, LightField
-from sepi.pipeline import STAGES, VARIANTS, stage_parameters
 from sepi.report import numbers
 from sepi.report.figures import page_json, read_results
 from sepi.report.graph import drawn
@@ -31,6 +30,7 @@ from sepi.report.probes.pixels import InterestingPixel
 from sepi.report.probes.scene_probes import scene_probes
 from sepi.scenes import render
 from sepi.stage import StageMaps, no_progress
+from sepi.variants import STAGES, VARIANTS, stage_parameters
 
 SIZE, VIEWS = 64, 5
 COTTON, DOTS, PICTURE = ("hci", "cotton"), ("builtin", "dots"), ("own", "picture")

@@ -7,12 +7,12 @@ process (``conftest.py`` sees to it), so nothing is computed twice where tests r
 from functools import cache
 from pathlib import Path
 
-from sepi.evaluate import score
 from sepi.inspection.disparity_range import settle_range
 from sepi.lightfield import LightField
-from sepi.pipeline import STAGES, VARIANTS, choice_of
 from sepi.reading import read_light_field
+from sepi.scoring.scores import score
 from sepi.stage import StageMaps, no_progress
+from sepi.variants import STAGES, VARIANTS, choice_of
 from sepi.workflow.parameters import stage_settings
 
 SETTINGS = stage_settings({}, VARIANTS)

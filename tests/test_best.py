@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sepi.evaluate import score
 from sepi.image.isolated_pixels import join_isolated_pixels
 from sepi.image.mixed_pixels import MixtureParameters, mixture_evidence
 from sepi.lightfield import DisparityRange, LightField
@@ -14,10 +13,12 @@ from sepi.matching.base_detail import (
     BaseDetailParameters,
     base_detail_decomposition,
 )
-from sepi.pipeline import PARTS_OF_BEST, VARIANTS, estimate_depth
+from sepi.pipeline import estimate_depth
 from sepi.regularization.uniform_regions import UniformPlanesParameters, ransac_plane, uniform_regions
 from sepi.scenes import render
 from sepi.scoring.confidence import decile_errors, oracle, sparsification
+from sepi.scoring.scores import score
+from sepi.variants import PARTS_OF_BEST, VARIANTS
 
 
 @pytest.mark.parametrize(

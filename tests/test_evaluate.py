@@ -10,11 +10,12 @@ from click.testing import CliRunner
 from geometries import grid_baselines
 
 from sepi.errors import SepiError
-from sepi.evaluate import EDGE_SCORES, command, evaluation_of, score
+from sepi.evaluate import command, evaluation_of
 from sepi.io.hdf5 import write_light_field, write_stage
 from sepi.io.scores import read_evaluations, read_scores
 from sepi.lightfield import DisparityRange, LightField
 from sepi.scoring import regions
+from sepi.scoring.scores import EDGE_SCORES, score
 from sepi.stage import StageMaps
 
 STAGE_ATTRIBUTES = {"stage": "initial", "choice": "sepi", "parameters": "{}", "made_from": "[]", "version": "0"}

@@ -9,11 +9,12 @@ from sepi.compared.methods import LEARNED
 from sepi.inspection.disparity_range import estimate_range
 from sepi.inspection.view_order import check_order
 from sepi.lightfield import LightField
-from sepi.pipeline import STAGES, estimate_depth
+from sepi.pipeline import estimate_depth
 from sepi.reading import read_light_field
 from sepi.scenes import render
 from sepi.scoring.regions import textureless
 from sepi.stage import CostVolume, StageMaps, no_progress
+from sepi.variants import STAGES
 
 SCENE = render("curved_occluders", size=64, views=5)
 KINDS = {"uint8": np.uint8, "uint16": np.uint16, "float32": np.float32}

@@ -8,11 +8,12 @@ import pytest
 
 from sepi.compared.methods import LEARNED
 from sepi.errors import SepiError
-from sepi.evaluate import score
 from sepi.inspection.disparity_range import estimate_range
 from sepi.lightfield import LightField
-from sepi.pipeline import VARIANTS, estimate_depth
+from sepi.pipeline import estimate_depth
 from sepi.scenes import render
+from sepi.scoring.scores import score
+from sepi.variants import VARIANTS
 
 T, S = np.mgrid[:9, :9]
 SHAPES = {

@@ -4,12 +4,13 @@ import numpy as np
 import pytest
 from pydantic import Field
 
-from sepi import pipeline
+from sepi import variants
 from sepi.errors import SepiError
 from sepi.lightfield import LightField
-from sepi.pipeline import Variant, add_choice, estimate_depth
+from sepi.pipeline import estimate_depth
 from sepi.scenes import render
 from sepi.stage import Choice, Parameters, Progress, StageMaps, require_previous
+from sepi.variants import Variant, add_choice
 
 
 class ShiftParameters(Parameters):
@@ -25,9 +26,9 @@ def shift(
 
 @pytest.fixture(autouse=True)
 def stages_of_this_test(monkeypatch: pytest.MonkeyPatch) -> None:
-    for stage, choices in pipeline.STAGES.items():
-        monkeypatch.setitem(pipeline.STAGES, stage, dict(choices))
-    monkeypatch.setattr(pipeline, "_ADDED", set())
+    for stage, choices in variants.STAGES.items():
+        monkeypatch.setitem(variants.STAGES, stage, dict(choices))
+    monkeypatch.setattr(variants, "_ADDED", set())
 
 
 def test_added_choice_runs_with_its_parameters() -> None:
@@ -48,7 +49,7 @@ def test_adding_again_replaces() -> None:
     add_choice("optimize", "shift", Choice(ShiftParameters, shift))
     second = Choice(ShiftParameters, shift)
     add_choice("optimize", "shift", second)
-    assert pipeline.STAGES["optimize"]["shift"] is second
+    assert variants.STAGES["optimize"]["shift"] is second
 
 
 @pytest.mark.parametrize(

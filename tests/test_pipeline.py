@@ -13,8 +13,8 @@ import pytest
 import sepi
 from sepi.inspection.disparity_range import estimate_range
 from sepi.lightfield import DisparityRange, LightField
-from sepi.pipeline import VARIANTS, Variant, choice_label, choice_of, stage_parameters
 from sepi.scenes import render, write_hci
+from sepi.variants import VARIANTS, Variant, choice_label, choice_of, stage_parameters
 
 CANDIDATES = {"initial": {"num_disparities": 21}, "occlusion": {"num_disparities": 21}}
 

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from real_scenes import final_maps, final_scores, maps_after, scene
 
-from sepi.evaluate import score
 from sepi.io.readers.options import ReadOptions
 from sepi.lightfield import DisparityRange, LightField, as_unit_float
 from sepi.matching.plane_sweep import SweepParameters, sweep
-from sepi.pipeline import VARIANTS
 from sepi.reading import read_light_field
 from sepi.scoring.confidence import decile_errors
+from sepi.scoring.scores import score
+from sepi.variants import VARIANTS
 
 # MSE x100 and Q25 x100 on the whole map, as the paper prints them for its own method
 BOUNDS = {"cotton": (1.20, 0.34), "antinous": (12.84, 1.12)}

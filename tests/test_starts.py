@@ -29,6 +29,7 @@ MODULES = (
     "sepi.ingest",
     "sepi.export",
     "sepi.pipeline",
+    "sepi.variants",
     # what every start of the workflow loads
     "sepi.workflow.config",
     "sepi.workflow.code_digest",

@@ -15,7 +15,7 @@ from typing import Any
 
 import yaml
 
-from sepi.pipeline import STAGES
+from sepi.variants import STAGES
 
 REPOSITORY = Path(__file__).parents[1]
 SIZE = 64

@@ -6,7 +6,7 @@ from typing import Any
 
 import matplotlib as mpl
 
-from sepi.pipeline import STAGES
+from sepi.variants import STAGES
 
 _BUILT_IN = {stage: dict(choices) for stage, choices in STAGES.items()}
 

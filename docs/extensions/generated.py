@@ -13,7 +13,7 @@ from pydantic.fields import FieldInfo
 from sphinx.application import Sphinx
 
 from sepi.io.files import atomic_path
-from sepi.pipeline import STAGES
+from sepi.variants import STAGES
 from sepi.workflow.config import Config
 from sepi.workflow.parameters import GROUPS, SHARED, choices_with, fields_of, shared_by
 

@@ -14,11 +14,11 @@ import numpy as np
 from matplotlib.colors import ListedColormap
 
 import sepi
-from sepi.evaluate import score
 from sepi.matching.plane_sweep import SweepParameters
 from sepi.matching.stitched_epi import stitched_epi
 from sepi.report.probes.curves import cost_curves
 from sepi.scenes import render
+from sepi.scoring.scores import score
 
 light_field = render("rack", size=128, views=9)
 y, x = 83, 114

@@ -12,10 +12,10 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import sepi
-from sepi.evaluate import score
 from sepi.matching.plane_sweep import SweepParameters
 from sepi.report.probes.curves import cost_curves
 from sepi.scenes import render
+from sepi.scoring.scores import score
 
 light_field = render("wall", size=128, views=7)
 truth = light_field.ground_truth

@@ -14,8 +14,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import sepi
-from sepi.evaluate import score
 from sepi.scenes import render
+from sepi.scoring.scores import score
 
 light_field = render("pencils", size=128, views=9)
 truth = light_field.ground_truth

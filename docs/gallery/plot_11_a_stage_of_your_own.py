@@ -16,10 +16,10 @@ from pydantic import Field
 from scipy import ndimage
 
 import sepi
-from sepi.evaluate import score
-from sepi.pipeline import Variant, add_choice
 from sepi.scenes import render
+from sepi.scoring.scores import score
 from sepi.stage import Choice, Parameters
+from sepi.variants import Variant, add_choice
 
 # %%
 # The idea

@@ -15,8 +15,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import sepi
-from sepi.evaluate import score
 from sepi.scenes import render, write_hci
+from sepi.scoring.scores import score
 from sepi.threads import use_threads
 
 # %%

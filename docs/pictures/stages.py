@@ -5,9 +5,10 @@ from __future__ import annotations
 from pictures.maps import Titled, map_panel, sheet_of, squared_error_panel, truth_panel, view_panel
 from pictures.style import Draw
 from sepi.lightfield import LightField
-from sepi.pipeline import HANDED_ON, STAGES, Variant, estimate_depth, variant_named
+from sepi.pipeline import estimate_depth
 from sepi.scenes import render
 from sepi.stage import StageMaps
+from sepi.variants import HANDED_ON, STAGES, Variant, variant_named
 
 WORDS = {"initial": "initial", "occlusion": "occlusion", "textureless": "textureless", "optimize": "optimised"}
 

@@ -24,8 +24,9 @@ import numpy.typing as npt
 
 from sepi.errors import SepiError
 from sepi.lightfield import BoolMap, FloatMap, LightField
-from sepi.pipeline import DEFAULT_VARIANT, Variant, estimate_depth
+from sepi.pipeline import estimate_depth
 from sepi.stage import Progress, StageMaps, no_progress
+from sepi.variants import DEFAULT_VARIANT, Variant
 
 if TYPE_CHECKING:
     from sepi.applications.all_views_kernels import Sources

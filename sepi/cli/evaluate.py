@@ -57,11 +57,11 @@ def evaluate(
       sepi evaluate estimate.pfm gt_disp_lowres.pfm --border 15 --json
       sepi evaluate inner_482x482.pfm cotton --offset 15,15
     """
-    from sepi.evaluate import PROTOCOLS, region_masks, score_regions
     from sepi.io.disparity_maps import read_disparity
     from sepi.io.files import naming
     from sepi.io.scores import without_nan
     from sepi.scoring.crops import in_frame
+    from sepi.scoring.scores import PROTOCOLS, region_masks, score_regions
 
     disparity = read_disparity(estimate)
     values, light_field = read_ground_truth(ground_truth, estimate, reading)
@@ -114,7 +114,7 @@ def score_table(scores: AllScores) -> str:
     """Scores as aligned columns."""
     from tabulate import tabulate
 
-    from sepi.evaluate import COUNTS, EDGE_SCORES, SCORES
+    from sepi.scoring.scores import COUNTS, EDGE_SCORES, SCORES
 
     heads = SCORES | EDGE_SCORES | COUNTS
     rows = [

@@ -27,7 +27,7 @@ from sepi.validation import require_known
 
 # Modules that are slow to import, such as the stages, are imported in the commands that need them.
 if TYPE_CHECKING:
-    from sepi.pipeline import Variant
+    from sepi.variants import Variant
 
 _PATH = click.Path(path_type=Path)
 
@@ -116,7 +116,8 @@ def depth(
     from sepi.io.files import atomic_path
     from sepi.io.result_folder import ALL_VIEWS, RUNTIME, require_target, write_result
     from sepi.matching.unknown import UNKNOWN
-    from sepi.pipeline import HANDED_ON, estimate_depth, stage_parameters, variant_named
+    from sepi.pipeline import estimate_depth
+    from sepi.variants import HANDED_ON, stage_parameters, variant_named
 
     started = time.perf_counter()
     use_threads(threads or available_cores())

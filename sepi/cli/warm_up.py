@@ -36,8 +36,9 @@ def compile_kernels(variants: tuple[str, ...]) -> None:
     from sepi.evaluate import evaluation_of
     from sepi.inspection.disparity_range import estimate_range
     from sepi.inspection.view_order import check_order
-    from sepi.pipeline import DEFAULT_VARIANT, estimate_depth
+    from sepi.pipeline import estimate_depth
     from sepi.scenes import render
+    from sepi.variants import DEFAULT_VARIANT
 
     # one thread: compiling is all there is to do
     use_threads(1)

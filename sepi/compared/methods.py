@@ -1,7 +1,7 @@
 """The compared methods' choices of the stages, and their variants: the one list of them.
 
 A method's module defines ``CHOICES``, for each stage the choices that it adds, and ``VARIANT``, the entry that
-:func:`sepi.pipeline.variant_from` reads. The workflow runs a job again when the module of its choice changes, or one
+:func:`sepi.variants.variant_from` reads. The workflow runs a job again when the module of its choice changes, or one
 that this imports, not when another method does.
 """
 

@@ -22,7 +22,6 @@ import psutil
 
 from sepi.command import SepiCommand
 from sepi.errors import SepiError
-from sepi.evaluate import COUNTS, EDGE_SCORES, PROTOCOLS, SCORED_REGIONS, SCORES
 from sepi.io.external_maps import read_external
 from sepi.io.hdf5 import read_light_field, read_stage
 from sepi.io.scores import Scores, read_evaluations, read_scores, without_nan
@@ -32,6 +31,7 @@ from sepi.report.runs import Runs, read_json
 from sepi.report.tables import BUILDERS
 from sepi.report.tabular.layout import as_json, write
 from sepi.scoring.confidence import decile_errors, oracle, sparsification
+from sepi.scoring.scores import COUNTS, EDGE_SCORES, PROTOCOLS, SCORED_REGIONS, SCORES
 from sepi.validation import require_known
 from sepi.workflow.machine import this_machine
 from sepi.workflow.result_paths import stage_of

@@ -9,11 +9,11 @@ from typing import Any, Literal
 import numpy.typing as npt
 
 from sepi.compared.methods import METHODS
-from sepi.evaluate import WHOLE_MAP
 from sepi.io.scores import Evaluation
 from sepi.lightfield import FloatMap, LightField
 from sepi.matching.unknown import UNKNOWN
 from sepi.report.plan import BEST_VARIANT, MAIN_VARIANT
+from sepi.scoring.scores import WHOLE_MAP
 from sepi.stage import StageMaps
 
 Kind = Literal["picture", "disparity", "error", "change", "confidence", "grey", "mask", "outline"]

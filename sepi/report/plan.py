@@ -17,7 +17,7 @@ from pydantic.dataclasses import dataclass
 
 from sepi.compared.methods import LEARNED, METHODS
 from sepi.errors import SepiError
-from sepi.pipeline import HANDED_ON, PARTS_OF_BEST, VARIANTS
+from sepi.variants import HANDED_ON, PARTS_OF_BEST, VARIANTS
 from sepi.workflow.result_paths import COMPARISON_ENDING, PARTS_ENDING, SceneFiles, key_of, scene_files
 
 MAIN_VARIANT = "paper"
@@ -69,7 +69,7 @@ class Plan:
     scenes : mapping of str to sequence of str
         Dataset to its scenes, in the order of the tables.
     variants : mapping of str to mapping
-        Variant to stage to the label of its choice (:func:`sepi.pipeline.choice_label`), in order.
+        Variant to stage to the label of its choice (:func:`sepi.variants.choice_label`), in order.
     external : sequence of str
         External methods, in the order of the tables.
     beside : sequence of str

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-from sepi.evaluate import REGIONS, WHOLE_MAP
+from sepi.scoring.scores import REGIONS, WHOLE_MAP
 
 FOLDER = Path(__file__).parent / "published"
 """Where the data files are."""
@@ -29,7 +29,7 @@ DATASETS: dict[str, str] = {"hci": "HCI 4D light field benchmark", "hci_2013": "
 """Datasets of the paper, under the names that this project gives them."""
 
 RegionTable = dict[str, dict[str, float]]
-"""Method or variant to region of :data:`sepi.evaluate.REGIONS` to average 100 x MSE; no key where none is printed."""
+"""Method or variant to region of :data:`sepi.scoring.scores.REGIONS` to average 100 x MSE; no key where none stands."""
 
 
 @dataclass(frozen=True)

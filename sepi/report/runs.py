@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import Any
 
 from sepi.errors import SepiError
-from sepi.evaluate import WHOLE_MAP
 from sepi.io.scores import AllScores
 from sepi.report.plan import MAIN_VARIANT, Plan
+from sepi.scoring.scores import WHOLE_MAP
 
 Numbers = Mapping[str, Any]
 """What :func:`sepi.report.numbers.collect` found, as JSON has it."""

@@ -20,10 +20,10 @@ from sepi.io.external_maps import ExternalSource
 from sepi.io.readers.formats import FORMATS
 from sepi.io.readers.options import ORDERS
 from sepi.lightfield import DisparityRange
-from sepi.pipeline import VARIANT_ENTRIES, VARIANTS, Variant, variant_from
 from sepi.scenes import SCENES
 from sepi.stage import Parameters
 from sepi.validation import require_known, validated
+from sepi.variants import VARIANT_ENTRIES, VARIANTS, Variant, variant_from
 from sepi.workflow.datasets import LONGEST_NAME, Scene, own_scene, require_plain_path, scenes_in
 from sepi.workflow.parameters import default_values, stage_settings
 

@@ -15,7 +15,7 @@ import yaml
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from sepi.pipeline import STAGES
+from sepi.variants import STAGES
 from sepi.workflow.config import Config
 from sepi.workflow.parameters import GROUPS, SHARED, choices_with, default_values, shared_by
 

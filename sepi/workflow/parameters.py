@@ -19,9 +19,9 @@ from sepi.matching.plane_sweep import SweepParameters
 from sepi.matching.semi_global import SmoothingParameters
 from sepi.matching.visibility_sweep import VisibilitySweepParameters
 from sepi.occlusion import OcclusionParameters
-from sepi.pipeline import STAGES, Variant
 from sepi.stage import OcclusionMarginParameters, Parameters
 from sepi.validation import require_known, validated
+from sepi.variants import STAGES, Variant
 
 SHARED = "shared"
 """The key beside the stages."""

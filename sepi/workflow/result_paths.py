@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from sepi.pipeline import HANDED_ON, STAGES
+from sepi.variants import HANDED_ON, STAGES
 
 RESULTS = Path("results")
 """Folder of the results, in the folder that the workflow runs in."""

@@ -12,11 +12,11 @@ from error_lines import error_of
 
 from sepi.cli.main import main
 from sepi.errors import SepiError
-from sepi.evaluate import PROTOCOLS, region_masks, score, score_regions
 from sepi.io.pfm import write_pfm
 from sepi.lightfield import LightField
 from sepi.scenes import render, write_hci
 from sepi.scoring.crops import in_frame
+from sepi.scoring.scores import PROTOCOLS, region_masks, score, score_regions
 
 OFFSET, SIZE = (9, 17), (40, 33)
 PLACE = np.s_[9:49, 17:50]

@@ -19,8 +19,8 @@ from one_node import one_node_slurm, queue, why_not
 from workflow_copy import SIZE, SLOW_WRITING, TINY, Workflow, copy_of_the_project, edited, files_below, wait_for
 
 from sepi.compared.methods import LEARNED, METHODS
-from sepi.pipeline import VARIANTS
 from sepi.scenes import render, write_hci
+from sepi.variants import VARIANTS
 
 pytestmark = [pytest.mark.workflow, pytest.mark.slow]
 

@@ -22,10 +22,10 @@ from sepi.compared.occ import (
 )
 from sepi.compared.occ_kernels import split_patch_costs, whole_patch_costs
 from sepi.compared.occ_patches import LEAST_SHARE, ORIENTATIONS, Edges, colours_beside, edges_to_split, halves_of_views
-from sepi.evaluate import score
 from sepi.lightfield import BoolMap, DisparityRange, FloatMap, LightField
 from sepi.pipeline import estimate_depth
 from sepi.scenes import render
+from sepi.scoring.scores import score
 from sepi.stage import StageMaps, no_progress
 
 Array = npt.NDArray[np.float64]

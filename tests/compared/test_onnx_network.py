@@ -12,8 +12,9 @@ from small_networks import convolution, network
 
 from sepi.errors import SepiError
 from sepi.lightfield import LightField
-from sepi.pipeline import Variant, estimate_depth
+from sepi.pipeline import estimate_depth
 from sepi.scenes import render
+from sepi.variants import Variant
 
 SIZE, VIEWS = 64, 3
 

@@ -12,9 +12,9 @@ import pytest
 from real_scenes import scene
 
 from sepi.compared.methods import METHODS
-from sepi.evaluate import score
 from sepi.lightfield import LightField
 from sepi.pipeline import estimate_depth
+from sepi.scoring.scores import score
 
 SIZE = 96
 # first row and column of the part

@@ -31,7 +31,7 @@ from numpy_docstrings import (
 )
 
 import sepi
-from sepi.pipeline import STAGES
+from sepi.variants import STAGES
 
 NAMES = listed_names()
 CONSTANTS = [name for name in NAMES if is_constant(name)]

@@ -20,9 +20,9 @@ from sepi.io.images import write_png
 from sepi.io.readers.formats import read
 from sepi.io.readers.options import ReadOptions
 from sepi.io.readers.view_names import parse_view_numbers
-from sepi.pipeline import stage_parameters, variant_named
 from sepi.report.plan import Plan
 from sepi.scoring.hci_submission import _read_seconds
+from sepi.variants import stage_parameters, variant_named
 from sepi.workflow.config import load_settings
 
 # more views, flags or settings than these are not made of one text

@@ -12,8 +12,8 @@ from sepi.matching.plane_sweep import CANDIDATES as PAPER
 from sepi.matching.plane_sweep import SweepParameters
 from sepi.matching.visibility_sweep import CANDIDATES as BEST
 from sepi.matching.visibility_sweep import FirstDepthParameters
-from sepi.pipeline import STAGES
 from sepi.scenes import SCENES, render
+from sepi.variants import STAGES
 
 PIXELS = 512 * 512
 

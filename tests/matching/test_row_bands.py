@@ -13,8 +13,9 @@ from sepi.lightfield import DisparityRange, LightField
 from sepi.matching import row_bands as module
 from sepi.matching.memory_limit import bytes_of_bands
 from sepi.matching.row_bands import FEWEST_ROWS, band_memory, row_bands
-from sepi.pipeline import estimate_depth, stage_parameters, variant_named
+from sepi.pipeline import estimate_depth
 from sepi.scenes import render
+from sepi.variants import stage_parameters, variant_named
 
 
 def test_bands_cover_the_picture_and_what_it_is_seen_in() -> None:

@@ -10,9 +10,10 @@ from sepi.compared.methods import LEARNED
 from sepi.io.readers.options import ReadOptions
 from sepi.lightfield import DisparityRange, LightField
 from sepi.matching.unknown import held_by_few, unknown_pixels, with_unknown
-from sepi.pipeline import VARIANTS, estimate_depth
+from sepi.pipeline import estimate_depth
 from sepi.reading import read_light_field
 from sepi.stage import StageMaps
+from sepi.variants import VARIANTS
 
 H, W = 72, 96
 Y, X = np.mgrid[:H, :W]

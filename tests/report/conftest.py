@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 from report_results import EXTERNAL, SCENES, VARIANTS, numbers_of, with_results
 
-from sepi import pipeline
+from sepi import variants as built_in
 from sepi.report.plan import Plan
 
 
@@ -24,7 +24,7 @@ def found(plan: Plan) -> dict[str, Any]:
 @pytest.fixture(scope="session")
 def external(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     """Numbers of four scenes with best, the paper's variant, and maps of three other methods."""
-    variants = {"paper": VARIANTS["paper"], "best": pipeline.VARIANTS["best"].choices}
+    variants = {"paper": VARIANTS["paper"], "best": built_in.VARIANTS["best"].choices}
     scenes = {"builtin": ["dots"], "hci": ["cotton", "mine", "picture"]}
     return numbers_of(with_results(Plan(tmp_path_factory.mktemp("external"), scenes, variants, tuple(EXTERNAL))))
 
@@ -32,5 +32,5 @@ def external(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
 @pytest.fixture(scope="session")
 def complete(tmp_path_factory: pytest.TempPathFactory) -> Plan:
     """Results of one scene with best, one of its parts, and maps of other methods."""
-    variants = {name: pipeline.VARIANTS[name].choices for name in ("paper", "best", "best_wls")}
+    variants = {name: built_in.VARIANTS[name].choices for name in ("paper", "best", "best_wls")}
     return with_results(Plan(tmp_path_factory.mktemp("complete"), {"hci": ["cotton"]}, variants, ("SPO", "zhou")))

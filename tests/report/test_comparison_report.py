@@ -9,7 +9,7 @@ import pytest
 from click.testing import CliRunner
 from report_results import SCENES, VARIANTS, cells_of, csv_rows, numbers_of, only, with_results
 
-from sepi import pipeline
+from sepi import variants as built_in
 from sepi.compared.methods import LEARNED, METHODS
 from sepi.report import numbers, published, tables
 from sepi.report.page import page_of
@@ -17,7 +17,7 @@ from sepi.report.plan import COMPARISON_TABLES, Plan
 
 
 def choices(*names: str) -> Mapping[str, Mapping[str, str]]:
-    return {name: pipeline.VARIANTS[name].labels for name in names}
+    return {name: built_in.VARIANTS[name].labels for name in names}
 
 
 @pytest.fixture(scope="module")
@@ -50,7 +50,7 @@ def test_a_users_own_variant_is_compared_too() -> None:
 
 def test_all_does_not_run_the_compared_methods() -> None:
     """They would take many times as long as all the rest."""
-    plan = Plan(Path("results"), SCENES, choices(*pipeline.VARIANTS))
+    plan = Plan(Path("results"), SCENES, choices(*built_in.VARIANTS))
     assert not set(plan.listed) & {*METHODS, *LEARNED}
     assert not set(plan.compared) & {*METHODS, *LEARNED}
     assert set(METHODS) < set(plan.comparison().listed)
@@ -81,7 +81,7 @@ def test_time_and_memory_are_of_the_stages_that_run(compared: dict[str, Any]) ->
     """Four stages of 1.5 s; spo has two or three."""
     found = {row["variant"]: row for row in csv_rows(compared, "methods") if row["scene"] == "cotton"}
     assert float(found["paper"]["seconds"]) == 6
-    stages = [choice for choice in pipeline.VARIANTS["spo"].choices.values() if choice != "none"]
+    stages = [choice for choice in built_in.VARIANTS["spo"].choices.values() if choice != "none"]
     assert float(found["spo"]["seconds"]) == 1.5 * len(stages)
 
 

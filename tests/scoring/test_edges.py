@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sepi.evaluate import score
 from sepi.reading import read_light_field
 from sepi.report.tabular.edges import edge_budget
 from sepi.scoring.edges import LEAST_DISCONTINUITY, REACH, edges_of, fattening_and_thinning
+from sepi.scoring.scores import score
 
 SQUARE = np.zeros((30, 40), np.float32)
 SQUARE[10:20, 12:28] = 1

@@ -14,10 +14,10 @@ import yaml
 from sepi.errors import SepiError
 from sepi.io.images import write_png
 from sepi.io.readers.formats import FORMATS
-from sepi.pipeline import STAGES, VARIANTS
 from sepi.renamed import RENAMED
 from sepi.scenes import SCENES
 from sepi.stage import Parameters
+from sepi.variants import STAGES, VARIANTS
 from sepi.workflow.config import Config, Settings, load_settings
 from sepi.workflow.config_file import default_yaml
 from sepi.workflow.parameters import GROUPS

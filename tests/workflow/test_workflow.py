@@ -24,9 +24,9 @@ from sepi.compared.methods import LEARNED, METHODS
 from sepi.io.files import is_temporary
 from sepi.io.hdf5 import read_attributes, read_stage
 from sepi.io.scores import read_scores
-from sepi.pipeline import STAGES, VARIANTS
 from sepi.reading import read_light_field
 from sepi.scenes import render, write_hci
+from sepi.variants import STAGES, VARIANTS
 from sepi.workflow.parameters import GROUPS, SHARED
 
 pytestmark = pytest.mark.workflow

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from sepi.evaluate import REGIONS, SCORES, WHOLE_MAP
-from sepi.pipeline import PARTS_OF_BEST
 from sepi.report import published
 from sepi.report.plan import BEST_VARIANT
 from sepi.report.runs import Runs
 from sepi.report.tabular import methods
 from sepi.report.tabular.layout import Column, Kind, Record, Report, line, printed, section, short
+from sepi.scoring.scores import REGIONS, SCORES, WHOLE_MAP
+from sepi.variants import PARTS_OF_BEST
 
 _SCORES = ("mse100", "q25", "badpix007")
 

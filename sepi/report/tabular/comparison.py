@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from sepi.evaluate import REGIONS, WHOLE_MAP
 from sepi.report import published
 from sepi.report.plan import Plan
 from sepi.report.published import PAPERS_METHOD, SceneTable
@@ -12,6 +11,7 @@ from sepi.report.runs import Runs
 from sepi.report.tabular import methods
 from sepi.report.tabular.layout import Cell, Column, Kind, Record, Report, line, ranks, section
 from sepi.report.tabular.methods import Method
+from sepi.scoring.scores import REGIONS, WHOLE_MAP
 
 
 def scene_table(runs: Runs, score: str, paper: SceneTable, title: str) -> Report:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from sepi.evaluate import SCORES, WHOLE_MAP
 from sepi.report import published
 from sepi.report.runs import Runs
 from sepi.report.tabular.layout import Cell, Column, Kind, Record, Report, line, printed, ranks, section
 from sepi.report.tabular.methods import PROTOCOL_NOTE
+from sepi.scoring.scores import SCORES, WHOLE_MAP
 
 _PUBLISHED = {"mse100": published.table1, "q25": published.table2}
 

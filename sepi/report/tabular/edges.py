@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 
-from sepi.evaluate import DISCONTINUITIES, EDGE_SCORES, SCORES, WHOLE_MAP
 from sepi.io.scores import Scores
 from sepi.report.runs import Runs
 from sepi.report.tabular.layout import Column, Kind, Record, Report, line, section
 from sepi.report.tabular.methods import PROTOCOL_NOTE, has_column
 from sepi.scoring.edges import LEAST_DISCONTINUITY, REACH
+from sepi.scoring.scores import DISCONTINUITIES, EDGE_SCORES, SCORES, WHOLE_MAP
 
 _BESIDE = ("mse100", "badpix007")
 

@@ -6,12 +6,12 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from sepi.evaluate import PROTOCOLS, WHOLE_MAP
 from sepi.external import NO_FILE
 from sepi.report import published
 from sepi.report.plan import MAIN_VARIANT, Plan
 from sepi.report.runs import Runs
 from sepi.report.tabular.layout import Cell, Kind, printed
+from sepi.scoring.scores import PROTOCOLS, WHOLE_MAP
 
 SCENE, AVERAGE, PRINTED_AVERAGE = "scene", "average", "average printed"
 """What a row is, as the CSV files say it."""

@@ -7,12 +7,12 @@ from __future__ import annotations
 
 from dataclasses import asdict
 
-from sepi.evaluate import COUNTS, PROTOCOLS, REGIONS, SCORES, WHOLE_MAP
 from sepi.report import published
 from sepi.report.plan import MAIN_VARIANT
 from sepi.report.runs import Runs, Timing
 from sepi.report.tabular.layout import Cell, Column, Kind, Record, Report, line, printed, section
 from sepi.report.tabular.methods import REGIONS_NOTE, has_column
+from sepi.scoring.scores import COUNTS, PROTOCOLS, REGIONS, SCORES, WHOLE_MAP
 
 _PARTS = [region for region in REGIONS if region != WHOLE_MAP]
 

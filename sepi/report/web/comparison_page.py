@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from sepi.evaluate import COUNTS, EDGE_SCORES, SCORES, region_masks, score_regions
 from sepi.io.scores import AllScores
 from sepi.lightfield import FloatMap, LightField
 from sepi.report.page import SCRIPTS, colour_scales, embedded_scenes, environment
 from sepi.report.panels import Panel
 from sepi.report.tabular.layout import BEST, Column, Entry, Kind, Line, Section, entry
 from sepi.report.web.viewer import viewer_json
+from sepi.scoring.scores import COUNTS, EDGE_SCORES, SCORES, region_masks, score_regions
 
 # part of the pixels beyond each end of the colour scale, so that a few wrong ones do not use it up
 _BEYOND = 0.005

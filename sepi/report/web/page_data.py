@@ -7,10 +7,10 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from sepi.evaluate import REGIONS, WHOLE_MAP
 from sepi.report import published
 from sepi.report.runs import Numbers, Runs
 from sepi.report.tabular.methods import datasets_of, mean
+from sepi.scoring.scores import REGIONS, WHOLE_MAP
 
 
 def headline(runs: Runs) -> list[dict[str, Any]]:

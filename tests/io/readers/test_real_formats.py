@@ -11,12 +11,12 @@ from click.testing import CliRunner
 from real_scenes import final_scores, scene
 
 from sepi.cli.main import main
-from sepi.evaluate import score
 from sepi.io.hdf5 import write_light_field
 from sepi.io.pfm import read_pfm
 from sepi.lightfield import LightField
 from sepi.pipeline import estimate_depth
 from sepi.reading import read_light_field
+from sepi.scoring.scores import score
 
 SCENES = ["cotton", "antinous"]
 

@@ -5,8 +5,8 @@ from typing import Any
 import pytest
 from report_results import csv_rows, markdown, numbers_of, only
 
-from sepi.evaluate import SCORED_REGIONS
 from sepi.report.plan import Plan
+from sepi.scoring.scores import SCORED_REGIONS
 
 
 def test_ours_and_other_methods_stand_in_the_table_of_edges(complete: Plan, external: dict[str, Any]) -> None:

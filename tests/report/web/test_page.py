@@ -16,7 +16,6 @@ from click.testing import CliRunner
 from page_example import COTTON, DOTS, EDGES, PICTURE, SIZE, Example
 
 from sepi.errors import SepiError
-from sepi.evaluate import REGIONS
 from sepi.io.scores import Evaluation
 from sepi.lightfield import FloatMap, LightField
 from sepi.report import charts, figures, page, published
@@ -27,6 +26,7 @@ from sepi.report.panels import Kind, Panel, SceneResults, note_of, panels_of
 from sepi.report.runs import Runs
 from sepi.report.web import page_data
 from sepi.report.web.viewer import CONFIDENCE, OTHER, PRECISE, STEPS, viewer_json
+from sepi.scoring.scores import REGIONS
 
 LARGEST_PAGE = 20_000_000
 """Bytes that a page of ten scenes of 512x512 may have."""

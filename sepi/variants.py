@@ -1,0 +1,365 @@
+"""The stages in order, their choices, and the variants: a choice for each stage.
+
+Variant ``best`` is what ``sepi depth`` uses, ``fast`` takes half its time, ``paper`` is the method as published; the
+others are rows of the ablations, and the methods that the paper compares with.
+
+Examples
+--------
+>>> from sepi.variants import STAGES, VARIANT_ENTRIES, VARIANTS
+>>> {"best", "fast", "paper", "spo"} <= set(VARIANTS)
+True
+>>> VARIANTS["paper"].choices
+{'initial': 'sepi', 'occlusion': 'half_sepi', 'textureless': 'lti', 'optimize': 'wls'}
+>>> VARIANT_ENTRIES["no_sepi"]  # as users write theirs
+{'base': 'paper', 'initial': 'structure_tensor'}
+>>> list(STAGES["textureless"])  # what a variant may choose there
+['lti', 'uniform_planes', 'none']
+>>> STAGES["occlusion"]["half_sepi"].parameters.model_fields["side_reach"].description
+'how far away the nearer surface is looked for, pixels'
+"""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from sepi import initial, occlusion, optimize, textureless
+from sepi.compared import methods
+from sepi.errors import SepiError
+from sepi.stage import Choice, Parameters
+from sepi.validation import require_known, validated
+
+STAGES: dict[str, dict[str, Choice]] = {
+    "initial": initial.CHOICES,
+    "occlusion": occlusion.CHOICES,
+    "textureless": textureless.CHOICES,
+    "optimize": optimize.CHOICES,
+}
+"""Stage to its choices, in the order in which the stages run."""
+
+HANDED_ON = "none"
+"""The choice of a stage that hands on the maps of the stage before: it is no job and has no file."""
+
+# choices that callers added, as stage and name
+_ADDED: set[tuple[str, str]] = set()
+
+_BASE, _CHOICE = "base", "choice"
+# a folder's name holds 255 bytes
+_LONGEST_LABEL = 120
+
+
+def add_choice(stage: str, name: str, choice: Choice) -> None:
+    """Add a choice of your own to a stage, for this process: variants may name it from then on.
+
+    Adding it again replaces it, as in a notebook whose cell runs twice. For a method that the command line and the
+    workflow should know, too, see docs/reproduce/compared.md.
+
+    Parameters
+    ----------
+    stage : str
+        A key of :data:`STAGES`.
+    name : str
+        Letters, digits and ``_``; none of the stage's own choices.
+    choice : Choice
+        Its parameters and its function.
+
+    Raises
+    ------
+    SepiError
+        If there is no such stage, the name is no such name, or the stage has a choice of this name that the package
+        brought.
+
+    Examples
+    --------
+    >>> import sepi
+    >>> from sepi.variants import Variant, add_choice
+    >>> from sepi.scenes import render
+    >>> from sepi.stage import Choice, Parameters, require_previous
+    >>> def mirrored(light_field, previous, parameters, progress):
+    ...     before = require_previous(previous)
+    ...     return before.updated(before.disparity[:, ::-1], before.confidence[:, ::-1])
+    >>> add_choice("optimize", "mirrored", Choice(Parameters, mirrored))
+    >>> light_field = render("slanted_plane", size=64, views=3)
+    >>> usual, mine = (
+    ...     sepi.estimate_depth(light_field, Variant("sepi", "none", "none", last)) for last in ("none", "mirrored")
+    ... )
+    >>> bool((mine.disparity == usual.disparity[:, ::-1]).all())
+    True
+    """
+    require_known("stages", [stage], STAGES)
+    if not re.fullmatch(r"\w+", name, re.ASCII):
+        raise SepiError(f"stage {stage}: a choice's name has letters, digits and '_' only, got {name!r}")
+    if name in STAGES[stage] and (stage, name) not in _ADDED:
+        raise SepiError(f"stage {stage}: '{name}' is a choice that the package brings; take another name")
+    STAGES[stage][name] = choice
+    _ADDED.add((stage, name))
+
+
+@dataclass(frozen=True)
+class Variant:
+    """One choice for each stage, and what it overrides of the choices' parameters.
+
+    Attributes
+    ----------
+    initial, occlusion, textureless, optimize : str
+        The stages' choices.
+    overrides : mapping of str to mapping
+        Stage to field to value.
+
+    Raises
+    ------
+    SepiError
+        If one is not a choice of its stage, or a field or value is not one of the choice's.
+
+    Examples
+    --------
+    The paper's method, but for its initial depth, and with fewer candidates:
+
+    >>> from sepi import estimate_depth
+    >>> from sepi.variants import Variant
+    >>> from sepi.scenes import render
+    >>> variant = Variant(
+    ...     initial="structure_tensor", occlusion="half_sepi", textureless="none", optimize="wls",
+    ...     overrides={"occlusion": {"num_disparities": 45}},
+    ... )
+    >>> variant.labels["occlusion"]
+    'half_sepi+num_disparities=45'
+    >>> estimate_depth(render("dots", size=64, views=5), variant).disparity.shape
+    (64, 64)
+    """
+
+    initial: str
+    occlusion: str
+    textureless: str
+    optimize: str
+    overrides: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for stage, choice in self.choices.items():
+            require_known(f"variant, stage {stage}", [choice], STAGES[stage])
+        require_known("variant, overrides", self.overrides, STAGES)
+        stage_parameters(self)
+
+    @property
+    def choices(self) -> dict[str, str]:
+        """Stage to choice, in the order of the stages."""
+        return {stage: getattr(self, stage) for stage in STAGES}
+
+    @property
+    def labels(self) -> dict[str, str]:
+        """Stage to what names its choice together with its overrides: ``"visibility+alpha_threshold=0"``."""
+        return {stage: choice_label(choice, self.overrides.get(stage, {})) for stage, choice in self.choices.items()}
+
+
+def choice_label(choice: str, overrides: Mapping[str, Any]) -> str:
+    """What names a choice and its overrides, in tables and as a folder: ``"visibility+alpha_threshold=0"``.
+
+    Equal overrides give equal labels, in whatever order and however the numbers are written. A label that would be too
+    long for a folder, or holds anything but letters, digits and ``_ . - + =``, ends with a digest instead.
+    """
+    parts = [choice, *(f"{name}={_written(overrides[name])}" for name in sorted(overrides))]
+    label = "+".join(parts)
+    if len(label) <= _LONGEST_LABEL and re.fullmatch(r"[\w.+=-]+", label, re.ASCII):
+        return label
+    return f"{choice}+{hashlib.sha256(label.encode()).hexdigest()[:12]}"
+
+
+def _written(value: Any) -> str:
+    """A value as briefly as it can be read back; 0.0 and 0 are the same."""
+    if isinstance(value, float):
+        return repr(value).removesuffix(".0").replace("e+", "e")
+    return str(value)
+
+
+def choice_of(label: str) -> str:
+    """The choice that :func:`choice_label` names."""
+    return label.partition("+")[0]
+
+
+def variant_from(name: str, entries: Mapping[str, Any], where: str, users: tuple[str, ...] = ()) -> Variant:
+    """The variant that an entry such as ``{"base": "best", "occlusion": {"alpha_threshold": 0}}`` describes.
+
+    For each stage an entry has a choice, ``"visibility"``, or a choice and what to override,
+    ``{"choice": "visibility", "alpha_threshold": 0}``. With ``base`` it starts from another variant: stages that it
+    leaves out are that variant's, and overrides without a choice are made on top of that variant's.
+
+    Parameters
+    ----------
+    name : str
+        Of the variant.
+    entries : mapping of str to mapping
+        Its entry and those that may be its base.
+    where : str
+        Where the entries stand, for messages.
+    users : tuple of str
+        The variants that are built on this one; callers leave it empty.
+
+    Returns
+    -------
+    Variant
+
+    Raises
+    ------
+    SepiError
+        If the entry is no such mapping, misses a stage, names what does not exist, or is built on itself.
+
+    Examples
+    --------
+    >>> from sepi.variants import VARIANT_ENTRIES, variant_from
+    >>> entries = {**VARIANT_ENTRIES, "smoother": {"base": "best", "optimize": {"strength": 12.0}}}
+    >>> variant = variant_from("smoother", entries, "my variants")
+    >>> variant.choices["initial"], variant.overrides
+    ('semi_global', {'optimize': {'strength': 12.0}})
+    >>> entries["smoother"]["optimize"]["strenght"] = 12.0
+    >>> variant_from("smoother", entries, "my variants")  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    sepi.errors.SepiError: my variants.smoother.optimize: unknown 'strenght'; did you mean 'strength'? ...
+    """
+    entry, here = entries[name], f"{where}.{name}"
+    if not isinstance(entry, Mapping):
+        raise SepiError(f"{here}: expected a choice for each stage, or a base and what differs, got {entry!r}")
+    require_known(here, entry, (_BASE, *STAGES))
+    base = None
+    if _BASE in entry:
+        require_known(f"{here}.{_BASE}", [entry[_BASE]], entries)
+        if entry[_BASE] in (name, *users):
+            raise SepiError(f"{here}.{_BASE}: the variant would be built on itself")
+        base = variant_from(entry[_BASE], entries, where, (name, *users))
+    chosen = {stage: _chosen(stage, entry.get(stage, {}), base, here) for stage in STAGES}
+    overrides = {stage: values for stage, (_, values) in chosen.items() if values}
+    return Variant(**{stage: choice for stage, (choice, _) in chosen.items()}, overrides=overrides)
+
+
+def _chosen(stage: str, given: Any, base: Variant | None, where: str) -> tuple[str, dict[str, Any]]:
+    """A stage's choice and what is overridden."""
+    values = {_CHOICE: given} if isinstance(given, str) else given
+    if not isinstance(values, Mapping):
+        raise SepiError(f"{where}.{stage}: expected a choice, or parameters of one, got {given!r}")
+    own = {key: value for key, value in values.items() if key != _CHOICE}
+    if _CHOICE in values:
+        choice = values[_CHOICE]
+        require_known(f"{where}.{stage}", [choice], STAGES[stage])
+    elif base is not None:
+        choice, own = base.choices[stage], {**base.overrides.get(stage, {}), **own}
+    else:
+        raise SepiError(f"{where}: no choice for stage '{stage}' (one of {', '.join(STAGES[stage])})")
+    checked = validated(STAGES[stage][choice].parameters, own, f"{where}.{stage}")
+    # as the model holds them: where a number is a float, 0 is 0.0
+    return choice, {key: getattr(checked, key) for key in own}
+
+
+VARIANT_ENTRIES: dict[str, dict[str, Any]] = {
+    "paper": {"initial": "sepi", "occlusion": "half_sepi", "textureless": "lti", "optimize": "wls"},
+    "no_sepi": {"base": "paper", "initial": "structure_tensor"},
+    "no_occlusion": {"base": "paper", "occlusion": "none"},
+    "no_textureless": {"base": "paper", "textureless": "none"},
+    "no_occlusion_no_textureless": {"base": "paper", "occlusion": "none", "textureless": "none"},
+    "wang": {"base": "paper", "occlusion": "wang"},
+    "best": {
+        "initial": "semi_global",
+        "occlusion": "visibility",
+        "textureless": "uniform_planes",
+        "optimize": "second_order",
+    },
+    # few views and candidates, and no more rounds than needed
+    "fast": {
+        "initial": {"choice": "semi_global", "first_views": 9, "first_sampling": 3},
+        "occlusion": {"choice": "visibility", "passes": 1, "views": 25, "sampling": 2},
+        "textureless": {"choice": "uniform_planes", "views": 9},
+        "optimize": {"choice": "second_order", "views": 25, "solves": 1},
+    },
+    "best_paper_initial": {"base": "best", "initial": "sepi"},
+    # colours alone must tell surfaces apart: their scale is narrower than beside the detail
+    "best_no_detail": {
+        "base": "best",
+        "initial": {"detail_share": 0},
+        "occlusion": {"detail_share": 0, "colour_scale": 0.0164},
+        "optimize": {"detail_share": 0, "colour_scale": 0.0164},
+    },
+    "best_half_sepi": {"base": "best", "occlusion": "half_sepi"},
+    "best_no_shares": {"base": "best", "occlusion": {"share_evidence": 1}},
+    "best_no_mixture": {"base": "best", "occlusion": {"alpha_threshold": 0}},
+    "best_no_planes": {"base": "best", "textureless": "none"},
+    "best_no_smoothing": {"base": "best", "optimize": {"refinements": 3, "solves": 0}},
+    "best_wls": {"base": "best", "optimize": "wls"},
+    **methods.VARIANT_ENTRIES,
+}
+"""The built-in variants as :func:`variant_from` reads them: the paper's method, the other four columns of its table 4
+in their order, and the text's other occlusion stage; then the most accurate variant, a quick one, and the most accurate
+one with one part switched off or put back to the paper's; then the compared methods
+(:mod:`sepi.compared`)."""
+
+DEFAULT_VARIANT = "best"
+"""Variant of ``sepi depth``."""
+
+PARTS_OF_BEST: dict[str, str] = {
+    "best": "all parts",
+    "best_paper_initial": "the paper's initial depth",
+    "best_no_detail": "colours alone, no detail",
+    "best_half_sepi": "half-SEPIs, no visibility",
+    "best_no_shares": "edges not decided by shares of the views",
+    "best_no_mixture": "edges not decided by colours of the reference view",
+    "best_no_planes": "no planes in uniform regions",
+    "best_no_smoothing": "Gauss-Newton, no smoothing",
+    "best_wls": "the paper's global optimisation",
+}
+"""Rows of the ablation of ``best``, and what they leave out or put back."""
+
+
+def variant_named(name: str) -> Variant:
+    """A built-in variant.
+
+    Raises
+    ------
+    SepiError
+        If there is none of this name.
+    """
+    require_known("variant", [name], VARIANTS)
+    return VARIANTS[name]
+
+
+def stage_parameters(
+    variant: Variant, parameters: Mapping[str, Mapping[str, Any]] | None = None
+) -> dict[str, Parameters]:
+    """Parameters of each stage of a variant: the defaults, but for what the variant and then the caller override.
+
+    Parameters
+    ----------
+    variant : Variant
+    parameters : mapping of str to mapping, optional
+        Stage to field to value.
+
+    Returns
+    -------
+    dict of str to Parameters
+        By stage, in the order of the stages.
+
+    Raises
+    ------
+    SepiError
+        If a stage or a field is unknown or a value is not allowed; the message names it.
+
+    Examples
+    --------
+    >>> from sepi.variants import VARIANTS, stage_parameters
+    >>> settings = stage_parameters(VARIANTS["paper"], {"initial": {"num_disparities": 91}})
+    >>> settings["initial"].num_disparities, settings["initial"].window_radius
+    (91, 3)
+    """
+    given = parameters or {}
+    require_known("parameters", given, STAGES)
+    return {
+        stage: validated(
+            STAGES[stage][choice].parameters,
+            {**variant.overrides.get(stage, {}), **given.get(stage, {})},
+            f"{stage}.{choice}",
+        )
+        for stage, choice in variant.choices.items()
+    }
+
+
+VARIANTS = {name: variant_from(name, VARIANT_ENTRIES, "variants") for name in VARIANT_ENTRIES}
+"""Name to built-in variant."""
