@@ -177,8 +177,7 @@ def parameters_of(stage):
 
 def code_of(stage):
     """Function of wildcards: the digest of the code that a stage's choice runs."""
-    known = {name: code_digest(*stage_modules(stage, choice)) for name, choice in STAGES[stage].items()}
-    return lambda wildcards: known[choice_of(wildcards[stage])]
+    return lambda wildcards: code_digest(*stage_modules(stage, STAGES[stage][choice_of(wildcards[stage])]))
 
 
 def files_of(stage):

@@ -24,6 +24,7 @@ from typing import IO, Any
 
 import click
 
+from sepi.compared.methods import StageChoices
 from sepi.errors import SepiError, SepiWarning, one_line
 from sepi.io.files import atomic_path
 from sepi.io.hdf5 import read_light_field, read_stage, write_stage
@@ -190,13 +191,14 @@ def write_timing(path: Path, started: float, threads: int) -> None:
         temporary.write_text(json.dumps(timing) + "\n", encoding="utf-8")
 
 
-def stage_command(stage: str, choices: Mapping[str, Choice]) -> click.Command:
-    """The command ``python -m sepi.STAGE`` of a stage with these choices.
+def stage_command(stage: str, own: Mapping[str, Choice]) -> click.Command:
+    """The command ``python -m sepi.STAGE`` of a stage with its own choices and those of the compared methods.
 
     It reads a light field and the maps of the stage before, runs one choice, and writes one stage file, whole or not at
     all.
     """
     existing = click.Path(path_type=Path)
+    choices = StageChoices(stage, own)
 
     @click.command(name=f"python -m sepi.{stage}", cls=SepiCommand, help=f"Run the stage '{stage}' on one light field.")
     @click.option("--light-field", "light_field_path", type=existing, required=True, help="HDF5 file from ingest.")

@@ -17,7 +17,6 @@ References
 
 from __future__ import annotations
 
-from sepi.compared.methods import choices_of
 from sepi.lightfield import LightField
 from sepi.matching.plane_sweep import SweepParameters, sweep
 from sepi.matching.structure_tensor import StructureTensorParameters, structure_tensor_depth
@@ -176,7 +175,6 @@ CHOICES = {
     "sepi": Choice(SweepParameters, sepi),
     "semi_global": Choice(FirstDepthParameters, semi_global),
     "structure_tensor": Choice(StructureTensorParameters, structure_tensor),
-    **choices_of("initial"),
 }
 
 if __name__ == "__main__":

@@ -34,7 +34,6 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import Field
 
-from sepi.compared.methods import choices_of
 from sepi.image.edges import CannyParameters, canny_edges, depth_discontinuities, edge_angle
 from sepi.image.isolated_pixels import join_isolated_pixels
 from sepi.image.mixed_pixels import MixtureParameters, mixture_evidence
@@ -367,7 +366,6 @@ CHOICES = {
     "half_sepi": Choice(HalfSepiParameters, half_sepi),
     "wang": Choice(WangParameters, wang),
     "visibility": Choice(VisibilityParameters, visibility),
-    **choices_of("occlusion"),
     "none": Choice(NoParameters, none),
 }
 

@@ -24,7 +24,6 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import Field, model_validator
 
-from sepi.compared.methods import choices_of
 from sepi.image.noise import residual_variance
 from sepi.lightfield import FloatMap, LightField
 from sepi.matching.base_detail import BaseDetailParameters
@@ -273,7 +272,6 @@ def smooth_second_order(
 CHOICES = {
     "wls": Choice(WlsParameters, wls),
     "second_order": Choice(SecondOrderParameters, second_order),
-    **choices_of("optimize"),
     "none": Choice(NoParameters, none),
 }
 

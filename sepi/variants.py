@@ -22,21 +22,22 @@ from __future__ import annotations
 
 import hashlib
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import cache
 from typing import Any
 
 from sepi import initial, occlusion, optimize, textureless
-from sepi.compared import methods
+from sepi.compared.methods import LEARNED, METHODS, StageChoices
 from sepi.errors import SepiError
 from sepi.stage import Choice, Parameters
 from sepi.validation import require_known, validated
 
-STAGES: dict[str, dict[str, Choice]] = {
-    "initial": initial.CHOICES,
-    "occlusion": occlusion.CHOICES,
-    "textureless": textureless.CHOICES,
-    "optimize": optimize.CHOICES,
+STAGES: dict[str, StageChoices] = {
+    "initial": StageChoices("initial", initial.CHOICES),
+    "occlusion": StageChoices("occlusion", occlusion.CHOICES),
+    "textureless": StageChoices("textureless", textureless.CHOICES),
+    "optimize": StageChoices("optimize", optimize.CHOICES),
 }
 """Stage to its choices, in the order in which the stages run."""
 
@@ -285,7 +286,8 @@ VARIANT_ENTRIES: dict[str, dict[str, Any]] = {
     "best_no_planes": {"base": "best", "textureless": "none"},
     "best_no_smoothing": {"base": "best", "optimize": {"refinements": 3, "solves": 0}},
     "best_wls": {"base": "best", "optimize": "wls"},
-    **methods.VARIANT_ENTRIES,
+    **METHODS,
+    **LEARNED,
 }
 """The built-in variants as :func:`variant_from` reads them: the paper's method, the other four columns of its table 4
 in their order, and the text's other occlusion stage; then the most accurate variant, a quick one, and the most accurate
@@ -361,5 +363,23 @@ def stage_parameters(
     }
 
 
-VARIANTS = {name: variant_from(name, VARIANT_ENTRIES, "variants") for name in VARIANT_ENTRIES}
+class _BuiltIn(Mapping[str, Variant]):
+    """Made when looked up: a compared method's loads its module."""
+
+    def __getitem__(self, name: str) -> Variant:
+        return _built_in(name)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(VARIANT_ENTRIES)
+
+    def __len__(self) -> int:
+        return len(VARIANT_ENTRIES)
+
+
+@cache
+def _built_in(name: str) -> Variant:
+    return variant_from(name, VARIANT_ENTRIES, "variants")
+
+
+VARIANTS: Mapping[str, Variant] = _BuiltIn()
 """Name to built-in variant."""

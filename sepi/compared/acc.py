@@ -26,7 +26,7 @@ What the publication leaves open, or could not be confirmed, and what was chosen
 - All numbers: the share ``a``, truncations, the size of windows and filters, and the weights. Truncations are of the
   size of what occlusion and texture change; costs are brought to 0..1; weights count in hundredths of the range.
 - The edge-preserving filter: the guided filter.
-- Graph cuts: message passing on the same energy (:mod:`sepi.regularization.message_passing`, which says why).
+- Graph cuts: message passing on the same energy (:mod:`sepi.compared.message_passing`, which says why).
 - Which pixels are unreliable: the standard deviation of their costs over the candidates is below a threshold.
 - Features: mutual nearest neighbours with Lowe's ratio test and a median in the place of the robust regression.
 - The costs of the refinement: the squared distance, at most that of two labels. With a limit of one label, 0 at a
@@ -50,12 +50,12 @@ from pydantic import Field
 
 from sepi.compared.acc_features import matched_disparities
 from sepi.compared.acc_phase_shift import PhaseShift
-from sepi.image.guided_filter import GuidedFilter
-from sepi.image.weighted_median import weighted_median
+from sepi.compared.cost_volumes import disparity_of, distinctness, least_costs
+from sepi.compared.guided_filter import GuidedFilter
+from sepi.compared.message_passing import labels_of_least_energy
+from sepi.compared.weighted_median import weighted_median
 from sepi.lightfield import FloatMap, LightField, as_unit_float
 from sepi.matching.candidates import CandidateParameters, CandidateRule, number_field
-from sepi.matching.cost_volumes import disparity_of, distinctness, least_costs
-from sepi.regularization.message_passing import labels_of_least_energy
 from sepi.stage import Choice, CostVolume, Needs, Parameters, Progress, StageMaps, require_costs
 
 CANDIDATES = CandidateRule(usual=75, finest=0.02, coarsest=0.5, volume_bytes=2**28)
@@ -286,5 +286,3 @@ CHOICES = {
     "initial": {"acc": Choice(AccParameters, acc)},
     "optimize": {"confident_labels": Choice(ConfidentLabelsParameters, confident_labels)},
 }
-
-VARIANT = {"initial": "acc", "occlusion": "none", "textureless": "none", "optimize": "confident_labels"}

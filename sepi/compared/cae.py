@@ -49,10 +49,10 @@ from typing import Any, ClassVar
 import numpy as np
 from pydantic import Field
 
-from sepi.image.guided_filter import GuidedFilter
+from sepi.compared.cost_volumes import disparity_of, distinctness, least_costs
+from sepi.compared.guided_filter import GuidedFilter
 from sepi.lightfield import FloatMap, LightField
 from sepi.matching.candidates import CandidateParameters, CandidateRule, number_field
-from sepi.matching.cost_volumes import disparity_of, distinctness, least_costs
 from sepi.matching.sheared_views import ShearedViews, refocused
 from sepi.stage import Choice, CostVolume, Needs, Progress, StageMaps
 
@@ -198,10 +198,3 @@ def _normalised(costs: FloatMap) -> FloatMap:
 
 
 CHOICES: dict[str, Any] = {"initial": {"cae": Choice(ConstrainedEntropyParameters, cae)}}
-
-VARIANT: dict[str, Any] = {
-    "initial": "cae",
-    "occlusion": "none",
-    "textureless": "none",
-    "optimize": {"choice": "markov_field", "smoothness": 0.005, "truncation": 0.2},
-}

@@ -1,6 +1,6 @@
 """Filtering of the cost volume with the reference view as guide [1]_, a choice of the global optimisation.
 
-Each candidate's costs are smoothed by a guided filter (:mod:`sepi.image.guided_filter`), then each pixel takes its
+Each candidate's costs are smoothed by a guided filter (:mod:`sepi.compared.guided_filter`), then each pixel takes its
 least.
 
 References
@@ -14,9 +14,9 @@ from __future__ import annotations
 import numpy as np
 from pydantic import Field
 
-from sepi.image.guided_filter import GuidedFilter
+from sepi.compared.cost_volumes import disparity_of, distinctness, least_costs
+from sepi.compared.guided_filter import GuidedFilter
 from sepi.lightfield import LightField
-from sepi.matching.cost_volumes import disparity_of, distinctness, least_costs
 from sepi.stage import Choice, CostVolume, Parameters, Progress, StageMaps, require_costs
 
 

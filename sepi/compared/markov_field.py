@@ -2,7 +2,7 @@
 
 ``markov_field`` takes the cost volume of the stage before and gives each pixel the candidate that minimises data costs
 and truncated linear smoothness, weaker across edges of the reference view. The methods' authors minimise such energies
-by graph cuts; here it is message passing (:mod:`sepi.regularization.message_passing`, which says why).
+by graph cuts; here it is message passing (:mod:`sepi.compared.message_passing`, which says why).
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ from typing import ClassVar
 import numpy as np
 from pydantic import Field
 
+from sepi.compared.cost_volumes import disparity_of, distinctness
+from sepi.compared.message_passing import contrast_weights, labels_of_least_energy
 from sepi.lightfield import LightField
-from sepi.matching.cost_volumes import disparity_of, distinctness
-from sepi.regularization.message_passing import contrast_weights, labels_of_least_energy
 from sepi.stage import Choice, Needs, Parameters, Progress, StageMaps, require_costs
 
 

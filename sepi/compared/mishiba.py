@@ -47,14 +47,14 @@ References
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import cv2
 import numpy as np
 import numpy.typing as npt
 from pydantic import Field
 
-from sepi.image.guided_filter import GuidedFilter
+from sepi.compared.guided_filter import GuidedFilter
 from sepi.image.noise import residual_variance
 from sepi.lightfield import BoolMap, FloatMap, LightField, as_unit_float
 from sepi.matching.candidates import CandidateParameters, CandidateRule, number_field
@@ -301,11 +301,4 @@ def neighbour_weights(parameters: MedianDescentParameters, noise: float) -> tupl
 CHOICES: dict[str, dict[str, Choice]] = {
     "initial": {"mishiba": Choice(MishibaParameters, mishiba)},
     "optimize": {"median_descent": Choice(MedianDescentParameters, median_descent)},
-}
-
-VARIANT: dict[str, Any] = {
-    "initial": "mishiba",
-    "occlusion": "none",
-    "textureless": "none",
-    "optimize": "median_descent",
 }

@@ -33,11 +33,11 @@ less than a small threshold, and selects by the number. Left open, or not confir
 - how number and mean difference make one cost, as above;
 - 128 candidates, uniform over the disparity range; views resampled by cubic convolution. Beyond its border a view goes
   on as it ends, and such a sample votes like an occluded one: by chance;
-- the edge-preserving filter: the guided filter (:mod:`sepi.image.guided_filter`), in windows of 15 pixels;
+- the edge-preserving filter: the guided filter (:mod:`sepi.compared.guided_filter`), in windows of 15 pixels;
 - the fraction of a candidate, by a parabola through the filtered costs. With it most pixels are more precise than the
   publication's figures say theirs are;
 - the last step: a weighted median, its weights by the colours of the reference view
-  (:mod:`sepi.image.weighted_median`).
+  (:mod:`sepi.compared.weighted_median`).
 
 Any set of views will do: one row, one column, positions off the grid.
 
@@ -55,11 +55,11 @@ from typing import ClassVar
 import numpy as np
 from pydantic import Field
 
+from sepi.compared.cost_volumes import disparity_of, distinctness, least_costs
 from sepi.compared.guided_costs import GuidedCostsParameters, guided_costs
-from sepi.image.weighted_median import weighted_median
+from sepi.compared.weighted_median import weighted_median
 from sepi.lightfield import FloatMap, LightField
 from sepi.matching.candidates import CandidateParameters, CandidateRule, number_field
-from sepi.matching.cost_volumes import disparity_of, distinctness, least_costs
 from sepi.matching.sheared_views import ShearedViews
 from sepi.stage import Choice, CostVolume, Needs, Progress, StageMaps
 
@@ -219,11 +219,4 @@ def guided_median(
 CHOICES = {
     "initial": {"oavc": Choice(OavcParameters, oavc)},
     "optimize": {"guided_median": Choice(GuidedMedianParameters, guided_median)},
-}
-
-VARIANT = {
-    "initial": "oavc",
-    "occlusion": "none",
-    "textureless": "none",
-    "optimize": {"choice": "guided_median", "radius": 7, "epsilon": 1e-5},
 }

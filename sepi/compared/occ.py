@@ -43,7 +43,7 @@ What the publication leaves open, or could not be confirmed, and what is chosen 
 - The confidence is ``1 - least / mean`` of the costs; disparities in the energy are parts of the range. The colour
   difference has a floor, for nothing may be divided by 0.
 - ``S`` is the truncated linear function, and the energy is minimised by message passing instead of graph cuts
-  (:mod:`sepi.regularization.message_passing`). Occlusions are not predicted anew from the final map.
+  (:mod:`sepi.compared.message_passing`). Occlusions are not predicted anew from the final map.
 
 References
 ----------
@@ -60,13 +60,13 @@ import cv2
 import numpy as np
 from pydantic import Field
 
+from sepi.compared.cost_volumes import disparity_of
+from sepi.compared.message_passing import labels_of_least_energy
 from sepi.compared.occ_patches import Edges, colours_beside, edges_to_split, halves_of_views
 from sepi.image.edges import CannyParameters
 from sepi.lightfield import FloatMap, LightField
 from sepi.matching.candidates import CandidateParameters, CandidateRule, number_field
-from sepi.matching.cost_volumes import disparity_of
 from sepi.matching.sheared_views import ShearedViews
-from sepi.regularization.message_passing import labels_of_least_energy
 from sepi.stage import Choice, CostVolume, Needs, Progress, StageMaps, require_previous
 
 CANDIDATES = CandidateRule(usual=101, finest=0.05, coarsest=0.5, volume_bytes=2**30)
@@ -382,5 +382,3 @@ CHOICES = {
     "occlusion": {"occ": Choice(OccSplitParameters, occ_split)},
     "optimize": {"occ": Choice(OccFieldParameters, occ_field)},
 }
-
-VARIANT = {"initial": "occ", "occlusion": "occ", "textureless": "none", "optimize": "occ"}

@@ -283,5 +283,3 @@ def _selected(views: FloatMap, reference: tuple[int, int], which: str) -> list[F
 
 
 CHOICES = {"initial": {"onnx": Choice(OnnxParameters, onnx)}}
-
-VARIANT = {"initial": "onnx", "occlusion": "none", "textureless": "none", "optimize": "none"}

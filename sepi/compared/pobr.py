@@ -53,12 +53,12 @@ import cv2
 import numpy as np
 from pydantic import Field
 
-from sepi.image.guided_filter import GuidedFilter
+from sepi.compared.cost_volumes import disparity_of, distinctness, least_costs
+from sepi.compared.guided_filter import GuidedFilter
 from sepi.image.noise import noise_level
 from sepi.image.superpixels import Superpixels, superpixels
 from sepi.lightfield import FloatMap, LightField
 from sepi.matching.candidates import CandidateParameters, CandidateRule, number_field
-from sepi.matching.cost_volumes import disparity_of, distinctness, least_costs
 from sepi.matching.sheared_views import ShearedViews
 from sepi.regularization.wls import energy_system, solve
 from sepi.stage import Choice, CostVolume, Needs, Parameters, Progress, StageMaps, relative_confidence, require_previous
@@ -260,5 +260,3 @@ CHOICES = {
     "occlusion": {"pobr": Choice(PobrRegionParameters, pobr_regions)},
     "optimize": {"pobr": Choice(PobrSmoothingParameters, pobr_smoothing)},
 }
-
-VARIANT = {"initial": "pobr", "occlusion": "pobr", "textureless": "none", "optimize": "pobr"}

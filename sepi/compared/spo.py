@@ -47,9 +47,9 @@ from typing import ClassVar
 import numpy as np
 from pydantic import Field
 
+from sepi.compared.cost_volumes import disparity_of, least_costs
 from sepi.lightfield import BoolMap, FloatMap, LightField
 from sepi.matching.candidates import CandidateParameters, CandidateRule, number_field
-from sepi.matching.cost_volumes import disparity_of, least_costs
 from sepi.matching.sheared_views import ShearedViews
 from sepi.stage import Choice, CostVolume, Needs, Progress, StageMaps, relative_confidence
 
@@ -203,10 +203,3 @@ def _costs(disparities: FloatMap, merged: FloatMap) -> CostVolume:
 
 
 CHOICES = {"initial": {"spo": Choice(SpoParameters, spo)}}
-
-VARIANT = {
-    "initial": "spo",
-    "occlusion": "none",
-    "textureless": "none",
-    "optimize": {"choice": "guided_costs", "radius": 9},
-}

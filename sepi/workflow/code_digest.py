@@ -10,8 +10,6 @@ Snakemake sees the shell command of a rule, not the modules that the command imp
 - not what stands below ``if TYPE_CHECKING:``, which never runs;
 - not the ``__init__`` of a package on the way to a module: it is run, but nothing of it is used. It counts where a name
   is imported from the package itself;
-- not the methods below ``sepi.compared``, many of which a stage can run: only the one that it does run counts, which
-  :func:`stage_modules` names;
 - the syntax tree without docstrings: neither comments nor layout count;
 - not other libraries: a new version of numpy reruns nothing.
 
@@ -36,10 +34,6 @@ ROOT = Path(__file__).parents[2]
 _DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
 # blocks of a module that are not run when it is imported
 _NOT_RUN = ("TYPE_CHECKING", "__name__ == '__main__'")
-
-
-# a package of methods of which a job runs one
-_ALTERNATIVES = "compared"
 
 
 def stage_modules(stage: str, choice: Choice) -> tuple[str, ...]:
@@ -84,13 +78,8 @@ def imported_modules(*modules: str, root: Path = ROOT) -> set[str]:
         name = waiting.pop()
         if name not in found:
             found.add(name)
-            followed = _code_and_imports(name, root)[1]
-            waiting.extend(other for other in followed if _is_alternative(name) or not _is_alternative(other))
+            waiting.extend(_code_and_imports(name, root)[1])
     return found
-
-
-def _is_alternative(module: str) -> bool:
-    return _ALTERNATIVES in module.split(".")[1:2]
 
 
 @cache

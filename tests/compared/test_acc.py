@@ -14,9 +14,9 @@ from sepi.compared.acc import AccParameters, ConfidentLabelsParameters, confiden
 from sepi.compared.acc_features import agreed, features_of, matched_disparities, mutual_matches
 from sepi.compared.acc_kernels import add_differences, turn_phases
 from sepi.compared.acc_phase_shift import PhaseShift
-from sepi.image.guided_filter import GuidedFilter
+from sepi.compared.cost_volumes import disparity_of, least_costs
+from sepi.compared.guided_filter import GuidedFilter
 from sepi.lightfield import DisparityRange, LightField
-from sepi.matching.cost_volumes import disparity_of, least_costs
 from sepi.pipeline import estimate_depth
 from sepi.scenes import render
 from sepi.stage import CostVolume, no_progress

@@ -8,6 +8,7 @@ import numpy.typing as npt
 import pytest
 from scipy.optimize import linprog
 
+from sepi.compared.guided_filter import GuidedFilter
 from sepi.compared.mishiba import (
     FULL_WEIGHT,
     LatticeFit,
@@ -23,7 +24,6 @@ from sepi.compared.mishiba import (
     selected_views,
 )
 from sepi.compared.mishiba_kernels import keep_least, median_pass, pair_costs
-from sepi.image.guided_filter import GuidedFilter
 from sepi.lightfield import LightField
 from sepi.matching.sheared_views_kernels import shear
 from sepi.pipeline import estimate_depth

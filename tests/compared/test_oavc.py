@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from sepi.compared import oavc
+from sepi.compared.cost_volumes import least_costs
 from sepi.compared.oavc_kernels import lower_thresholds, vote_costs
 from sepi.lightfield import DisparityRange, FloatMap, LightField
-from sepi.matching.cost_volumes import least_costs
 from sepi.matching.sheared_views import ShearedViews
 from sepi.pipeline import estimate_depth
 from sepi.scenes import render

@@ -46,7 +46,7 @@ def weighted_median(values: FloatMap, guide: FloatMap, radius: int, sigma: float
     An edge of the map that lies two pixels beside that of the picture is drawn to it:
 
     >>> import numpy as np
-    >>> from sepi.image.weighted_median import weighted_median
+    >>> from sepi.compared.weighted_median import weighted_median
     >>> guide = np.zeros((9, 12, 3), np.float32)
     >>> guide[:, 6:] = 1
     >>> fattened = np.zeros((9, 12), np.float32)
@@ -54,6 +54,6 @@ def weighted_median(values: FloatMap, guide: FloatMap, radius: int, sigma: float
     >>> weighted_median(fattened, guide, radius=4, sigma=0.1, weight=np.ones((9, 12), np.float32))[4].tolist()
     [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0]
     """
-    from sepi.image.weighted_median_kernels import weighted_medians
+    from sepi.compared.weighted_median_kernels import weighted_medians
 
     return np.asarray(weighted_medians(values, guide, radius, sigma, weight))

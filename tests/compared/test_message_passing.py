@@ -5,8 +5,8 @@ import itertools
 import numpy as np
 import pytest
 
-from sepi.regularization.message_passing import contrast_weights, energy, labels_of_least_energy
-from sepi.regularization.message_passing_kernels import pass_messages
+from sepi.compared.message_passing import contrast_weights, energy, labels_of_least_energy
+from sepi.compared.message_passing_kernels import pass_messages
 
 
 def problem(seed, labels, shape, strength=0.5):

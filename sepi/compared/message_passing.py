@@ -64,7 +64,7 @@ def labels_of_least_energy(
     ndarray, shape (H, W), int64
         0..K-1.
     """
-    from sepi.regularization.message_passing_kernels import decode, pass_messages
+    from sepi.compared.message_passing_kernels import decode, pass_messages
 
     volume = np.ascontiguousarray(costs.transpose(1, 2, 0), np.float32)
     messages = np.zeros((4, *volume.shape), np.float32)

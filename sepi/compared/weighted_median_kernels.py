@@ -11,7 +11,7 @@ from numba import njit, prange
 
 @njit(cache=True, parallel=True)
 def weighted_medians(values: Any, guide: Any, radius: int, sigma: float, weight: Any) -> Any:
-    """As :func:`sepi.image.weighted_median.weighted_median`."""
+    """As :func:`sepi.compared.weighted_median.weighted_median`."""
     H, W = values.shape
     out = np.empty((H, W), np.float32)
     factor = np.float32(-0.5 / sigma**2)
