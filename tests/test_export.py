@@ -9,9 +9,9 @@ from click.testing import CliRunner
 from sepi import export
 from sepi.cli.main import main
 from sepi.io.hdf5 import read_light_field, read_stage, write_light_field, write_stage
-from sepi.io.provenance import entry, stage_attributes
+from sepi.io.provenance import stage_attributes
 from sepi.lightfield import DisparityRange, LightField
-from sepi.stage import no_progress
+from sepi.stage import entry, no_progress
 from sepi.variants import STAGES, stage_parameters, variant_named
 
 

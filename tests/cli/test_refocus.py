@@ -218,7 +218,7 @@ def test_a_result_knows_its_view(scene: LightField) -> None:
     own, centre = (np.abs(picture - scene.views[view]).mean() for view in ((0, 1), (1, 1)))
     assert own < 0.5 * centre
     message = error_of(refocus("lf.h5", "side", "--view", "1,1"))
-    assert "side: depth of view 0,1 of 3x3 views, but lf.h5 is read as view 1,1" in message
+    assert "side: depth of view 0,1 of 3x3 views, not of view 1,1 of 3x3, as lf.h5 is read here" in message
 
 
 def test_the_camera_may_come_from_the_result_or_the_flags(scene: LightField) -> None:
