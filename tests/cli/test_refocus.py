@@ -175,9 +175,21 @@ def test_an_index_of_others_removes_nothing(scene: LightField, own: str) -> None
     Path("out").mkdir()
     Path("out/focus.csv").write_text(own, encoding="utf-8")
     before = Path("lf.h5").read_bytes()
-    assert refocus("lf.h5", "--steps", 1, "-o", "out").exit_code == 0
+    called = refocus("lf.h5", "--steps", 1, "-o", "out")
     assert Path("lf.h5").read_bytes() == before
-    assert set(everything_in("out")) == {"focus_01.png", "focus.csv"}
+    if own.startswith("file,disparity"):
+        assert called.exit_code == 0
+        assert set(everything_in("out")) == {"focus_01.png", "focus.csv"}
+    else:
+        assert "out: focus.csv there was not written by 'sepi refocus'" in error_of(called)
+
+
+def test_pictures_of_others_are_not_replaced(scene: LightField) -> None:
+    """Other programs' stacks have such names, too."""
+    Path("out").mkdir()
+    Path("out/focus_02.png").write_text("mine")
+    assert "out: focus_02.png there was not written" in error_of(refocus("lf.h5", "--steps", 2, "-o", "out"))
+    assert everything_in("out") == {"focus_02.png": b"mine"}
 
 
 def test_equal_input_gives_equal_bytes_for_any_number_of_threads(scene: LightField) -> None:
