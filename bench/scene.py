@@ -11,12 +11,12 @@ import numpy as np
 
 from sepi.inspection.disparity_range import settle_range
 from sepi.io.hdf5 import read_light_field, read_stage, write_light_field, write_stage
-from sepi.io.provenance import entry, stage_attributes
+from sepi.io.provenance import stage_attributes
 from sepi.lightfield import LightField
 from sepi.reading import read_light_field as read_any
 from sepi.scenes import SCENES, render
 from sepi.scenes.folder import write_hci
-from sepi.stage import Parameters, StageMaps, no_progress
+from sepi.stage import Parameters, StageMaps, entry, no_progress
 from sepi.variants import STAGES, stage_parameters, variant_named
 
 VARIANT = "paper"

@@ -28,10 +28,10 @@ from sepi.compared.methods import StageChoices
 from sepi.errors import SepiError, SepiWarning, one_line
 from sepi.io.files import atomic_path
 from sepi.io.hdf5 import read_light_field, read_stage, write_stage
-from sepi.io.provenance import entry, history_of, stage_attributes
+from sepi.io.provenance import history_of, stage_attributes
 from sepi.matching.base_detail import kept_detail
 from sepi.memory import KERNELS, require_memory
-from sepi.stage import Choice, Progress, no_progress
+from sepi.stage import Choice, Progress, entry, no_progress
 from sepi.threads import use_threads
 from sepi.validation import validated
 

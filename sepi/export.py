@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import click
 
 from sepi.command import SepiCommand
 from sepi.io.hdf5 import read_light_field, read_stage
-from sepi.io.provenance import history_of, result_attributes
-from sepi.io.result_folder import write_result
+from sepi.io.provenance import history_of
+from sepi.io.result_folder import remove_result, write_result
 from sepi.matching.unknown import with_unknown
+from sepi.stage import MadeBy
 
 _PATH = click.Path(path_type=Path)
 
@@ -23,8 +25,11 @@ _PATH = click.Path(path_type=Path)
 def main(light_field_path: Path, maps: Path, variant: str, output: Path) -> None:
     """Write disparity.pfm, result.h5 and pictures from a stage file, with what no view knows marked."""
     light_field = read_light_field(light_field_path)
-    attributes = result_attributes(light_field, variant, history_of(maps))
-    write_result(output, light_field, with_unknown(light_field, read_stage(maps)), attributes)
+    made_by = MadeBy(variant, tuple(history_of(maps)), light_field.require_disparity_range())
+    # the folder is the workflow's own, which has removed what says so
+    remove_result(output)
+    finished = replace(with_unknown(light_field, read_stage(maps)), made_by=made_by)
+    write_result(output, light_field, finished, force=True)
 
 
 if __name__ == "__main__":

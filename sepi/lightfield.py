@@ -124,6 +124,8 @@ class LightField:
     arranged : bool
         False: the views stand in one row, in their order, and their grid is yet to be found; nothing can be matched
         before, and the centre of the row may be missing.
+    reading : str
+        How the source was read where flags or options say so, as JSON: what reads it in the same way again.
 
     Raises
     ------
@@ -163,6 +165,7 @@ class LightField:
     camera: Camera | None = None
     notes: tuple[str, ...] = ()
     arranged: bool = True
+    reading: str = ""
 
     def __post_init__(self) -> None:
         v = self.views

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from contextlib import nullcontext
+from dataclasses import replace
 from typing import Any
 
 from sepi.lightfield import LightField
@@ -11,8 +12,8 @@ from sepi.matching.base_detail import kept_detail
 from sepi.matching.memory_limit import bytes_of_bands, require_memory_of
 from sepi.matching.row_bands import band_memory
 from sepi.matching.unknown import with_unknown
-from sepi.stage import Progress, StageMaps, no_progress
-from sepi.variants import DEFAULT_VARIANT, STAGES, Variant, stage_parameters, variant_named
+from sepi.stage import MadeBy, Progress, StageMaps, entry, no_progress
+from sepi.variants import DEFAULT_VARIANT, HANDED_ON, STAGES, VARIANTS, Variant, stage_parameters, variant_named
 
 
 def estimate_depth(
@@ -87,4 +88,11 @@ def estimate_depth(
             maps = STAGES[stage][choice].run(light_field, maps, settings[stage], of_all)
             of_all(1.0)
     assert maps is not None  # there are stages
-    return with_unknown(light_field, maps)
+    name = variant if isinstance(variant, str) else next((key for key, one in VARIANTS.items() if one == variant), "")
+    history = tuple(
+        entry(stage, choice, settings[stage], light_field)
+        for stage, choice in chosen.choices.items()
+        if choice != HANDED_ON
+    )
+    made_by = MadeBy(name, history, light_field.require_disparity_range())
+    return replace(with_unknown(light_field, maps), made_by=made_by)

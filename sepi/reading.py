@@ -5,11 +5,13 @@ to be in the wrong order.
 from __future__ import annotations
 
 import warnings
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from sepi.errors import SepiError, SepiWarning
+from sepi.io.origin import reading_record
 from sepi.io.readers.camera_positions import with_row_spacing
 from sepi.io.readers.formats import read
 from sepi.io.readers.options import ReadOptions, in_grid
@@ -89,6 +91,10 @@ def read_light_field(
         from sepi.inspection.row_spacing import settle_row_spacing
 
         light_field = settle_row_spacing(light_field)
+    record = reading_record(options, file_format)
+    if record:
+        # a file of this package may be of other files that were read otherwise
+        light_field = replace(light_field, source=str(path), reading=record)
     if disparity_range is not None:
         light_field = light_field.with_range(DisparityRange(*disparity_range, "given"))
     found = [_depth_warning(light_field)]

@@ -16,7 +16,7 @@ import numpy.typing as npt
 from pydantic import BaseModel, ConfigDict, Field
 
 from sepi.errors import SepiError
-from sepi.lightfield import BoolMap, FloatMap, LightField
+from sepi.lightfield import BoolMap, DisparityRange, FloatMap, LightField
 
 Progress = Callable[[float], None]
 """Called with the fraction done, 0..1."""
@@ -167,6 +167,27 @@ class CostVolume:
             )
 
 
+Entry = dict[str, Any]
+"""What one stage did: ``stage``, ``choice`` and ``parameters``."""
+
+
+def entry(stage: str, choice: str, parameters: Parameters, light_field: LightField) -> Entry:
+    """The entry of a stage that ran with these parameters on a light field of known disparity range."""
+    settled = parameters.settled(light_field)
+    return {"stage": stage, "choice": choice, "parameters": settled.model_dump(mode="json")}
+
+
+@dataclass(frozen=True)
+class MadeBy:
+    """What made finished maps: the variant, empty where it has no name; the stages that did anything, in order; and the
+    range of disparities that was searched.
+    """
+
+    variant: str
+    history: tuple[Entry, ...]
+    disparity_range: DisparityRange
+
+
 @dataclass(frozen=True)
 class StageMaps:
     """What a stage hands on, and :func:`sepi.estimate_depth` returns: disparity, confidence, and further maps by name.
@@ -183,6 +204,8 @@ class StageMaps:
         What the values of the map ``view_subset`` stand for, from 0 on; empty without such a map.
     cost_volume : CostVolume or None
         Of a data cost that a later stage regularises; that stage hands on none.
+    made_by : MadeBy or None
+        What :func:`sepi.estimate_depth` made them with, for whoever keeps them.
 
     Examples
     --------
@@ -211,6 +234,7 @@ class StageMaps:
     extra: Mapping[str, npt.NDArray[Any]] = field(default_factory=dict)
     subset_names: tuple[str, ...] = ()
     cost_volume: CostVolume | None = None
+    made_by: MadeBy | None = None
 
     def all(self) -> dict[str, npt.NDArray[Any]]:
         """Every map by name.

@@ -17,7 +17,7 @@ from sepi.external import ExternalSource, external_maps
 from sepi.io.external_maps import ExternalMap, write_external
 from sepi.io.hdf5 import read_light_field, read_stage, write_light_field, write_stage
 from sepi.io.pfm import write_pfm
-from sepi.io.provenance import entry, scene_attributes, stage_attributes
+from sepi.io.provenance import scene_attributes, stage_attributes
 from sepi.io.scores import map_name, write_scores
 from sepi.lightfield import FloatMap, LightField
 from sepi.report import numbers
@@ -29,7 +29,7 @@ from sepi.report.plan import MAIN_VARIANT, Plan
 from sepi.report.probes.pixels import InterestingPixel
 from sepi.report.probes.scene_probes import scene_probes
 from sepi.scenes import render
-from sepi.stage import StageMaps, no_progress
+from sepi.stage import StageMaps, entry, no_progress
 from sepi.variants import STAGES, VARIANTS, stage_parameters
 
 SIZE, VIEWS = 64, 5

@@ -45,8 +45,8 @@ def evaluate(
 
     ESTIMATE is a PFM, an HDF5 file with a dataset 'disparity', a NumPy file (.npy), a TIFF of floats, a
     'disparity_16bit.png', or a folder that 'sepi depth' wrote. GROUND_TRUTH is such a file; give the SCENE itself, a
-    light field with ground truth, to have its occluded and textureless regions scored too. Give the flags of 'sepi
-    depth' that say how to read the SCENE here, too. A folder that 'sepi depth' wrote knows which view it belongs to.
+    light field with ground truth, to have its occluded and textureless regions scored too. A folder that 'sepi depth'
+    wrote knows which view of which light field it belongs to, and how that was read.
 
     Both protocols are used: 'paper' scores the whole map, 'benchmark' leaves out 15 pixels on each side. With --offset,
     the crop's pixels are scored, and borders are counted from the edges of the ground truth, not from the crop's.

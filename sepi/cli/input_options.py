@@ -49,6 +49,14 @@ class _Positive(click.ParamType[float]):
         return number
 
 
+def default_folder(path: Path, kind: str) -> Path:
+    """Where a command writes what it makes of an input unless told: ``./NAME-kind``."""
+    from sepi.io.files import name_of
+
+    name = name_of(path)
+    return Path(f"{name if path.is_dir() else name.stem}-{kind}")
+
+
 @dataclass(frozen=True)
 class Reading:
     """How the flags say to read a light field."""

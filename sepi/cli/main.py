@@ -15,18 +15,19 @@ from sepi.cli.compare import compare
 from sepi.cli.convert import convert
 from sepi.cli.evaluate import evaluate
 from sepi.cli.info import check, info, range_text, size_text
-from sepi.cli.input_options import Geometry, Reading, camera_flags, reading_flags
+from sepi.cli.input_options import Geometry, Reading, camera_flags, default_folder, reading_flags
 from sepi.cli.poses import poses
 from sepi.cli.refocus import refocus
 from sepi.cli.results import check_submission, points, submission
 from sepi.command import SepiGroup, progress_bar
 from sepi.errors import SepiError
-from sepi.io.provenance import Entry, entry, package_version, result_attributes
+from sepi.io.provenance import package_version, result_attributes
 from sepi.threads import available_cores, use_threads
 from sepi.validation import require_known
 
 # Modules that are slow to import, such as the stages, are imported in the commands that need them.
 if TYPE_CHECKING:
+    from sepi.stage import MadeBy
     from sepi.variants import Variant
 
 _PATH = click.Path(path_type=Path)
@@ -74,6 +75,7 @@ def main() -> None:
     metavar="KEY=VALUE",
     help="Set a parameter, STAGE.CHOICE.NAME=VALUE; repeatable. config.yaml lists them.",
 )
+@click.option("--force", is_flag=True, help="Write to a folder with other files or another light field's result, too.")
 @click.option("--timing", is_flag=True, help="Also write runtime.txt: seconds, as a benchmark submission needs.")
 @click.option("--all-views", is_flag=True, help="Also write all_views.h5: a map for each view, which takes longer.")
 @camera_flags
@@ -86,6 +88,7 @@ def depth(
     threads: int | None,
     memory: int | None,
     settings: tuple[str, ...],
+    force: bool,
     timing: bool,
     all_views: bool,
     geometry: Geometry | None,
@@ -113,49 +116,41 @@ def depth(
       sepi depth cotton --variant paper --set initial.sepi.num_disparities=91
     """
     from sepi.inspection.disparity_range import settle_range
-    from sepi.io.files import atomic_path
-    from sepi.io.result_folder import ALL_VIEWS, RUNTIME, require_target, write_result
+    from sepi.io.result_folder import ALL_VIEWS, require_own, require_target, write_result
     from sepi.matching.unknown import UNKNOWN
     from sepi.pipeline import estimate_depth
-    from sepi.variants import HANDED_ON, stage_parameters, variant_named
+    from sepi.variants import stage_parameters, variant_named
 
     started = time.perf_counter()
     use_threads(threads or available_cores())
     chosen = variant_named(variant)
     parameters = _parameters(settings, variant, chosen)
-    of_stages = stage_parameters(chosen, parameters)
-    whole = light_field_path.resolve()
-    folder = output or Path(f"{whole.name if whole.is_dir() else whole.stem}-depth")
+    stage_parameters(chosen, parameters)
+    folder = output or default_folder(light_field_path, "depth")
     require_target(folder)
-    if whole == folder.resolve():
+    if light_field_path.resolve() == folder.resolve():
         raise SepiError(f"{folder}: is the light field itself; choose another folder for the result")
     light_field = reading.read(light_field_path, disparity_range=disparity_range)
+    require_own(folder, light_field, force=force)
     if geometry is not None:
         light_field = replace(light_field, camera=geometry(shape=light_field.shape))
     light_field = settle_range(light_field)
-    history = [
-        entry(stage, chosen.choices[stage], values, light_field)
-        for stage, values in of_stages.items()
-        if chosen.choices[stage] != HANDED_ON
-    ]
     with progress_bar(light_field.name) as progress:
-        maps = estimate_depth(light_field, chosen, parameters, progress, memory and memory * 2**20)
-    seconds = time.perf_counter() - started
-    made_by = result_attributes(light_field, variant, history)
-    files = write_result(folder, light_field, maps, made_by)
-    if timing:
-        with atomic_path(folder / RUNTIME) as temporary:
-            temporary.write_text(f"{seconds:.3f}\n", encoding="ascii")
+        maps = estimate_depth(light_field, variant, parameters, progress, memory and memory * 2**20)
+    seconds = time.perf_counter() - started if timing else None
+    beside = (ALL_VIEWS,) if all_views else ()
+    files = write_result(folder, light_field, maps, force=force, seconds=seconds, beside=beside)
     if all_views:
         from sepi.applications.all_views import maps_of_all_views
         from sepi.io.all_views import write_all_views
 
+        made_by = result_attributes(light_field, maps)
         with progress_bar(f"{light_field.name}, all views") as progress:
             views = maps_of_all_views(light_field, maps, chosen, parameters, progress, memory and memory * 2**20)
             write_all_views(folder / ALL_VIEWS, light_field, ((view.position, view.maps) for view in views), made_by)
         files = (*files, ALL_VIEWS)
     click.echo(f"{light_field.name}: {size_text(light_field)}")
-    click.echo(f"disparity range: {range_text(light_field.require_disparity_range())}{_candidates(history)}")
+    click.echo(f"disparity range: {range_text(light_field.require_disparity_range())}{_candidates(maps.made_by)}")
     unknown = float(maps.mask(UNKNOWN).mean())
     if unknown:
         click.echo(f"unknown: {100 * unknown:.2g} % of the pixels; no view knows anything about them")
@@ -201,8 +196,9 @@ for command in (
     main.add_command(command)
 
 
-def _candidates(history: list[Entry]) -> str:
+def _candidates(made_by: MadeBy | None) -> str:
     """How many candidates there are in the range; nothing where no stage has any."""
+    history = () if made_by is None else made_by.history
     known = [step["parameters"]["num_disparities"] for step in history if "num_disparities" in step["parameters"]]
     return f", {' and '.join(map(str, dict.fromkeys(known)))} candidates" if known else ""
 

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from sepi.cli.input_options import Geometry, Reading, camera_flags, reading_flags
-from sepi.cli.scene_argument import read_light_field_of, view_of
+from sepi.cli.input_options import Geometry, Reading, camera_flags, default_folder, reading_flags
+from sepi.cli.scene_argument import read_light_field_of
 from sepi.command import SepiCommand, progress_bar
 from sepi.errors import SepiError
 from sepi.stage import Progress
@@ -98,7 +98,7 @@ def refocus(
     """Focus the light field INPUT after the fact.
 
     RESULT is the map of INPUT: a folder that 'sepi depth' wrote, or a disparity map of another program (PFM, HDF5,
-    .npy, 'disparity_16bit.png'). Give the flags of 'sepi depth' that say how to read INPUT here, too. Writes
+    .npy, 'disparity_16bit.png'). The folder knows how INPUT was read. Writes
 
     \b
     all_in_focus.png   every pixel from all the views that see it: as sharp as the view, less noise
@@ -119,10 +119,9 @@ def refocus(
     from sepi.io.result_folder import require_target
 
     use_threads(threads or available_cores())
-    whole = light_field_path.resolve()
-    folder = output or Path(f"{whole.name if whole.is_dir() else whole.stem}-refocused")
+    folder = output or default_folder(light_field_path, "refocused")
     require_target(folder)
-    if whole == folder.resolve():
+    if light_field_path.resolve() == folder.resolve():
         raise SepiError(f"{folder}: is the light field itself; choose another folder for the pictures")
     if pixels and result_path is None:
         raise SepiError("--at: needs RESULT, the map that tells how near a pixel is; 'sepi depth INPUT' makes it")
@@ -153,6 +152,7 @@ def refocus(
 def _read_result(path: Path, light_field_path: Path, light_field: LightField) -> _Result:
     """The map to focus by, which must be of the views' size."""
     from sepi.io.disparity_maps import read_disparity
+    from sepi.io.origin import read_origin
     from sepi.io.result_folder import read_result
 
     disparity = read_disparity(path)
@@ -160,7 +160,7 @@ def _read_result(path: Path, light_field_path: Path, light_field: LightField) ->
         raise SepiError(
             f"{path}: is {disparity.shape}, but the views of {light_field_path} are {light_field.shape} (height, width)"
         )
-    if view_of(path) is None:
+    if read_origin(path) is None:
         return _Result(path, disparity, None, None)
     stored = read_result(path)
     return _Result(path, disparity, stored.unknown if stored.unknown.shape == disparity.shape else None, stored.camera)

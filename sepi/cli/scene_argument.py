@@ -1,8 +1,10 @@
-"""Light fields that finished maps belong to: GROUND_TRUTH|SCENE of the commands that score maps, INPUT of refocus."""
+"""Light fields that finished maps belong to: GROUND_TRUTH|SCENE of the commands that score maps, INPUT of refocus and
+poses.
+"""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,30 +12,19 @@ from sepi.cli.input_options import Reading
 from sepi.errors import SepiError
 
 if TYPE_CHECKING:
+    from sepi.io.origin import Origin
     from sepi.lightfield import FloatMap, LightField
 
-
-def view_of(path: Path) -> tuple[tuple[int, int], tuple[int, int]] | None:
-    """Position of the view that a map belongs to, and size of the view grid; None for a map that does not say."""
-    from sepi.io.files import reading
-    from sepi.io.hdf5 import read_attributes
-
-    path = path / "result.h5" if path.is_dir() else path
-    if path.suffix not in (".h5", ".hdf5") or not path.is_file():
-        return None
-    attributes = read_attributes(path)
-    if not {"view_position", "grid"} <= set(attributes):
-        return None
-    with reading(path, "result of 'sepi depth'"):
-        (t, s), (rows, columns) = (map(int, attributes[name]) for name in ("view_position", "grid"))
-    return (t, s), (rows, columns)
+_BARE = "a map alone, such as its disparity.pfm, is taken for one of any light field"
 
 
 def require_one_view(estimate: Path, other: Path) -> None:
     """Raise if two maps say that they belong to different views."""
-    views = view_of(estimate), view_of(other)
-    if None not in views and views[0] != views[1]:
-        raise SepiError(f"{other}: depth of another view than {estimate}; compare maps of one view")
+    from sepi.io.origin import read_origin
+
+    one, two = read_origin(estimate), read_origin(other)
+    if one is not None and two is not None and one.differs(two):
+        raise SepiError(f"{other}: depth of another view than {estimate}; compare maps of one view ({_BARE})")
 
 
 def read_ground_truth(path: Path, estimate: Path, reading: Reading) -> tuple[FloatMap | None, LightField | None]:
@@ -42,7 +33,7 @@ def read_ground_truth(path: Path, estimate: Path, reading: Reading) -> tuple[Flo
     Raises
     ------
     SepiError
-        If it cannot be read, or belongs to another view.
+        If it cannot be read, or belongs to another view or light field.
     """
     from sepi.io.disparity_maps import is_disparity, read_disparity
 
@@ -54,25 +45,76 @@ def read_ground_truth(path: Path, estimate: Path, reading: Reading) -> tuple[Flo
     return light_field.ground_truth, light_field
 
 
-def read_light_field_of(path: Path, result: Path | None, reading: Reading, check_order: bool = True) -> LightField:
-    """The light field that a map belongs to, seen from the map's view where the map says which that is.
+def read_light_field_of(
+    path: Path, result: Path | None, reading: Reading, *, check_order: bool = True, bare: bool = True
+) -> LightField:
+    """The light field that a map belongs to, seen from the map's view and read as the map says, where it does.
 
-    ``check_order`` as :func:`sepi.read_light_field` has it.
+    It is read as it was for the result, but for what the flags say; or by the flags alone, where that is no longer
+    needed, as the views lie in their places by now.
+
+    Parameters
+    ----------
+    path : Path
+    result : Path or None
+        The map.
+    reading : Reading
+        Flags.
+    check_order : bool
+        As :func:`sepi.read_light_field` has it, where the map does not say which light field it is of.
+    bare : bool
+        Whether the caller takes maps that do not say.
 
     Raises
     ------
     SepiError
-        If it cannot be read, or is read as another view than the map's.
+        If it cannot be read, or is not the very light field that the map says.
     """
-    belongs = None if result is None else view_of(result)
-    if belongs is not None and reading.options.view is None:
-        reading = replace(reading, options=replace(reading.options, view=belongs[0]))
-    light_field = reading.read(path, check_order=check_order)
-    if belongs is not None and belongs != (light_field.reference_position, light_field.grid):
-        (t, s), (rows, columns) = belongs
-        raise SepiError(
-            f"{result}: depth of view {t},{s} of {rows}x{columns} views, but {path} is read as view "
-            f"{','.join(map(str, light_field.reference_position))} of {light_field.grid[0]}x{light_field.grid[1]}; "
-            "give the flags here that 'sepi depth' had"
+    from sepi.io.origin import read_origin
+
+    origin = None if result is None else read_origin(result)
+    if origin is None:
+        return reading.read(path, check_order=check_order)
+    failures: list[SepiError] = []
+    for one in dict.fromkeys((_as_it_was(origin, reading), _as_it_is(origin, reading))):
+        try:
+            light_field = one.read(path, check_order=False)
+        except SepiError as error:
+            failures.append(error)
+            continue
+        difference = origin.difference(light_field)
+        if difference is None:
+            return light_field
+        advice = "give the one that it was made from, and no flags that 'sepi depth' did not have"
+        failures.append(
+            SepiError(f"{result}: {difference}, as {path} is read here; {advice}{f' ({_BARE})' if bare else ''}")
         )
-    return light_field
+    raise failures[0]
+
+
+def _as_it_was(origin: Origin, reading: Reading) -> Reading:
+    """The flags, and what a result says where they say nothing."""
+    from sepi.io.readers.options import ReadOptions
+
+    given, usual = reading.options, ReadOptions()
+    changed = {
+        field.name: getattr(origin.options, field.name)
+        for field in fields(ReadOptions)
+        if getattr(given, field.name) == getattr(usual, field.name)
+    }
+    known = Reading(reading.file_format or origin.file_format, replace(given, **changed))
+    return _as_it_is(origin, known)
+
+
+def _as_it_is(origin: Origin, reading: Reading) -> Reading:
+    """The flags, and the view and row spacing of a result where they name none."""
+    options = reading.options
+    return replace(
+        reading,
+        options=replace(
+            options,
+            view=options.view or origin.view,
+            # found out from the views, perhaps
+            row_spacing=options.row_spacing or origin.row_spacing,
+        ),
+    )

@@ -6,6 +6,7 @@ They are written under a temporary name in the same folder, then renamed.
 from __future__ import annotations
 
 import atexit
+import os
 import re
 import secrets
 import shutil
@@ -20,6 +21,11 @@ from sepi.errors import SepiError, one_line, printable
 _unfinished: set[Path] = set()
 _TOKEN_BYTES = 6
 _TEMPORARY = re.compile(rf"\..+-[0-9a-f]{{{2 * _TOKEN_BYTES}}}(\.[^.]*)?")
+
+
+def name_of(path: Path) -> Path:
+    """The name by which a path was given, be it that of a link; of ``.`` and the like the name of the folder."""
+    return Path(Path(os.path.abspath(path)).name)
 
 
 def is_temporary(path: Path) -> bool:
@@ -88,13 +94,14 @@ def atomic_path(path: Path) -> Iterator[Path]:
 def atomic_folder(path: Path, replace: bool = False) -> Iterator[Path]:
     """Give a temporary folder beside ``path`` to fill; rename it on success, remove it on any failure.
 
-    With ``replace``, it takes the place of a folder that is there.
+    With ``replace``, it takes the place of a folder that is there. A link leads to where there is room.
 
     Raises
     ------
     SepiError
         If ``path`` exists and is not an empty folder, or cannot be made or written to, or the disk is full.
     """
+    path = Path(os.path.realpath(path)) if path.is_symlink() else path
     if path.exists() and not (path.is_dir() and (replace or not any(path.iterdir()))):
         raise SepiError(f"{path}: exists already; remove it or choose a folder that does not exist")
     with _temporary_beside(path, "", path) as temporary:

@@ -127,6 +127,8 @@ def write_light_field(path: str | Path, light_field: LightField) -> None:
         file.attrs["reach"] = light_field.reach
         file.attrs["name"] = _fixed(light_field.name)
         file.attrs["source"] = _fixed(light_field.source)
+        if light_field.reading:
+            file.attrs["reading"] = _fixed(light_field.reading)
         if known is not None:
             file.attrs["disparity_range"] = (known.minimum, known.maximum)
             file.attrs["disparity_range_source"] = _fixed(known.source)
@@ -185,6 +187,7 @@ def read_light_field(path: Path) -> LightField:
             disparity_range=known,
             ground_truth=None if ground_truth is None else ground_truth.astype(np.float32),
             masks={name: read_dataset(path, mask).astype(bool) for name, mask in members(file.get("masks", {}))},
+            reading=_text(file, "reading") if "reading" in file.attrs else "",
         )
 
 

@@ -1,7 +1,6 @@
 """What made a file: the attributes of stage files and results.
 
-An *entry* is a dictionary of ``stage``, ``choice`` and ``parameters``; the entries of the stages that led to a map, in
-order, are its history.
+The entries (:func:`sepi.stage.entry`) of the stages that led to a map, in order, are its history.
 """
 
 from __future__ import annotations
@@ -10,14 +9,12 @@ import json
 from collections.abc import Sequence
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
 
 from sepi.errors import SepiError
 from sepi.io.hdf5 import Attribute, read_attributes
+from sepi.io.origin import origin_attributes
 from sepi.lightfield import LightField
-from sepi.stage import Parameters
-
-Entry = dict[str, Any]
+from sepi.stage import Entry, StageMaps
 
 
 def package_version() -> str:
@@ -26,12 +23,6 @@ def package_version() -> str:
         return version("sepi")
     except PackageNotFoundError:
         return "unknown"
-
-
-def entry(stage: str, choice: str, parameters: Parameters, light_field: LightField) -> Entry:
-    """The entry of a stage that ran with these parameters on a light field of known disparity range."""
-    settled = parameters.settled(light_field)
-    return {"stage": stage, "choice": choice, "parameters": settled.model_dump(mode="json")}
 
 
 def stage_attributes(light_field: LightField, history: Sequence[Entry]) -> dict[str, Attribute]:
@@ -54,13 +45,14 @@ def stage_attributes(light_field: LightField, history: Sequence[Entry]) -> dict[
     }
 
 
-def result_attributes(light_field: LightField, variant: str, history: Sequence[Entry]) -> dict[str, Attribute]:
-    """Attributes of a variant's result: ``made_from`` holds the whole history."""
-    return {
-        **scene_attributes(light_field),
-        "variant": variant,
-        "made_from": json.dumps(list(history), sort_keys=True),
-    }
+def result_attributes(light_field: LightField, maps: StageMaps) -> dict[str, Attribute]:
+    """Attributes of finished maps: of which light field, and what made them, as far as they say."""
+    made_by, range_of = maps.made_by, light_field
+    made: dict[str, Attribute] = {}
+    if made_by is not None:
+        range_of = light_field.with_range(made_by.disparity_range)
+        made = {"variant": made_by.variant, "made_from": json.dumps(made_by.history, sort_keys=True)}
+    return {**scene_attributes(range_of), **made, **origin_attributes(light_field)}
 
 
 def history_of(path: Path | None) -> list[Entry]:
@@ -76,13 +68,15 @@ def history_of(path: Path | None) -> list[Entry]:
 
 
 def scene_attributes(light_field: LightField) -> dict[str, Attribute]:
-    """Attributes that tell which light field a file is about, and its disparity range, which must be known."""
-    known = light_field.require_disparity_range()
+    """Attributes that tell which light field a file is about, and its disparity range, where that is known."""
+    known = light_field.disparity_range
+    searched: dict[str, Attribute] = {}
+    if known is not None:
+        searched = {"disparity_range": (known.minimum, known.maximum), "disparity_range_source": known.source}
     return {
         "scene": light_field.name,
         "source": light_field.source,
-        "disparity_range": (known.minimum, known.maximum),
-        "disparity_range_source": known.source,
+        **searched,
         "row_spacing": light_field.row_spacing,
         "positions": "grid" if light_field.positions is None else "given",
         "version": package_version(),

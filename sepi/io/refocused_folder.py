@@ -6,6 +6,7 @@ docs/reference/outputs.md describes them.
 from __future__ import annotations
 
 import csv
+import os
 import re
 from collections.abc import Collection, Iterable, Sequence
 from contextlib import suppress
@@ -75,8 +76,8 @@ def write_refocused(
 ) -> tuple[str, ...]:
     """Write a focal stack, the picture in focus everywhere, and their index.
 
-    A new folder appears whole or not at all; in an existing one the files are replaced when all are written, pictures
-    that an earlier index names and this one does not are removed, and other files are left alone. Equal content gives
+    A new folder appears whole or not at all; in an existing one the files that an earlier index names are replaced when
+    all are written, or removed where this one does not name them, and other files are left alone. Equal content gives
     equal bytes.
 
     Parameters
@@ -102,12 +103,22 @@ def write_refocused(
     Raises
     ------
     SepiError
-        If the folder is a file or cannot be written, or an animation cannot be written with this Pillow.
+        If the folder is a file, cannot be written or holds others' files of these names, or an animation cannot be
+        written with this Pillow.
     """
     # the folder itself may be a link to where there is room
     target = folder.resolve()
     existing = target.is_dir() and any(target.iterdir())
     before = _earlier_files(target / INDEX)
+    made = [
+        *([] if sharp is None else [ALL_IN_FOCUS]),
+        *stack_names(len(foci)),
+        *([ANIMATION] if animated else []),
+        INDEX,
+    ]
+    others = [name for name in made if name not in before and os.path.lexists(target / name)]
+    if others:
+        raise SepiError(f"{folder}: {others[0]} there was not written by 'sepi refocus'; choose another folder")
     with atomic_files(target) if existing else atomic_folder(target) as temporary:
         rows = [] if sharp is None else [[ALL_IN_FOCUS, "", "", "", ""]]
         if sharp is not None:
@@ -122,9 +133,8 @@ def write_refocused(
             _write_animation(temporary / ANIMATION, frames)
             rows.append([ANIMATION, "", "", "", ""])
         _write_index(temporary / INDEX, rows)
-    names = [row[0] for row in rows]
-    _remove_others(target, before, names)
-    return (*names, INDEX)
+    _remove_others(target, before, made)
+    return tuple(made)
 
 
 def _levels(picture: FloatMap, dtype: npt.DTypeLike) -> npt.NDArray[Any]:
@@ -158,13 +168,13 @@ def _write_animation(path: Path, frames: Sequence[npt.NDArray[Any]]) -> None:
 
 
 def _earlier_files(index: Path) -> list[str]:
-    """Pictures that an index of this module names; none without one."""
+    """An index of this module and the pictures that it names; nothing without one."""
     # a user's own file of this name is left alone, whatever it holds
     with suppress(OSError, UnicodeDecodeError, csv.Error):
         with index.open(encoding="ascii", newline="") as file:
             rows = list(csv.reader(file))
         if rows and tuple(rows[0]) == COLUMNS:
-            return [row[0] for row in rows[1:] if row and _MADE.fullmatch(row[0])]
+            return [INDEX, *(row[0] for row in rows[1:] if row and _MADE.fullmatch(row[0]))]
     return []
 
 

@@ -8,7 +8,8 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Collection, Mapping
-from dataclasses import astuple, dataclass
+from contextlib import nullcontext, suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -20,14 +21,14 @@ from sepi.camera import Camera
 from sepi.errors import SepiError
 from sepi.io.files import atomic_files, atomic_folder, atomic_path
 from sepi.io.hdf5 import Attribute, attribute, open_hdf5, read_camera, read_dataset, write_stage
-from sepi.io.images import png_texts, write_png
+from sepi.io.images import write_png
+from sepi.io.origin import RESULT, read_origin
 from sepi.io.pfm import write_pfm
 from sepi.io.ply import write_ply
 from sepi.io.point_cloud import point_cloud
+from sepi.io.provenance import result_attributes
 from sepi.lightfield import BoolMap, FloatMap, LightField
 from sepi.stage import StageMaps
-
-RESULT = "result.h5"
 
 RESULT_FILES = (
     "disparity.pfm",
@@ -41,7 +42,7 @@ RESULT_FILES = (
 """What :func:`write_result` always writes; ``depth.pfm`` and ``mask_NAME.png`` come with what it is given."""
 
 RUNTIME = "runtime.txt"
-"""Seconds that the command took, which it writes on request."""
+"""Seconds that it took, where that is told."""
 
 ALL_VIEWS = "all_views.h5"
 """Maps of all views, which the command writes on request (:mod:`sepi.io.all_views`)."""
@@ -56,8 +57,10 @@ _GREY = 128
 # part of the pixels beyond each end of the colour scale, so that a few wrong pixels do not use it up
 _BEYOND = 0.005
 
-# says which masks are this module's, so that those of an earlier run can be told from a user's own
+_MASK_NAME = r"[\w-]+"
 _MASK_TEXT = {"Software": "sepi", "Description": "mask: 255 inside, 0 outside"}
+# files that a message names
+_LISTED = 3
 
 
 @dataclass(frozen=True)
@@ -102,20 +105,26 @@ class Result:
 
 
 def write_result(
-    folder: str | Path, light_field: LightField, maps: StageMaps, attributes: Mapping[str, Attribute] | None = None
+    folder: str | Path,
+    light_field: LightField,
+    maps: StageMaps,
+    attributes: Mapping[str, Attribute] | None = None,
+    *,
+    force: bool = False,
+    seconds: float | None = None,
+    beside: tuple[str, ...] = (),
 ) -> tuple[str, ...]:
-    """Write the maps of a light field.
+    """Write the maps of a light field, as ``sepi depth`` does.
 
     Disparity as ``disparity.pfm``, ``disparity.npy`` and ``disparity_16bit.png`` (numbers) and ``disparity.png``
     (colours, from far, dark blue, to near, yellow; grey where the mask ``unknown`` is set), ``confidence.png`` from
     black (0) to white (1), ``mask_NAME.png`` of each boolean map, ``points.ply`` without what is unknown, ``depth.pfm``
-    in metres where the light field has a camera, and ``result.h5`` with
-    everything: all maps, the view itself, the camera and ``attributes``. docs/reference/outputs.md describes them.
+    in metres where the light field has a camera, and ``result.h5`` with everything: all maps, the view itself, the
+    camera, what made the maps, and which light field they are of. docs/reference/outputs.md describes them.
     Equal content gives equal bytes.
 
-    A new folder appears whole or not at all; in an existing one the files are replaced when all are written, what an
-    earlier run wrote and this one does not make (masks, depth, run time, maps of all views) is removed, and other files
-    are left alone.
+    A new folder appears whole or not at all; in an existing one the files are replaced when all are written, and what
+    an earlier result wrote and this one does not make (masks, depth, run time, maps of all views) is removed.
 
     Parameters
     ----------
@@ -126,7 +135,14 @@ def write_result(
     maps : StageMaps
         Of the light field's shape.
     attributes : mapping, optional
-        What made the maps.
+        More to be kept in ``result.h5``, or other values of what is kept there anyway.
+    force : bool
+        Write into a folder that holds files of others or the result of another light field, too. What has the name of a
+        file of the result is replaced, and all else of others left alone.
+    seconds : float, optional
+        How long it took, for ``runtime.txt``.
+    beside : tuple of str
+        Names of files of a result that the caller writes on top of these.
 
     Returns
     -------
@@ -137,7 +153,7 @@ def write_result(
     ------
     SepiError
         If the maps are not of the light field's shape or the confidence not within 0..1, or the folder is a file, holds
-        a light field, or cannot be written.
+        the views of a light field, files of others or another light field's result, or cannot be written.
 
     Examples
     --------
@@ -146,7 +162,7 @@ def write_result(
     >>> from sepi.scenes import render
     >>> light_field = render("dots", size=64, views=3)
     >>> maps = sepi.estimate_depth(light_field)
-    >>> for name in sepi.write_result("dots-depth", light_field, maps, {"scene": "dots", "made_by": "a test"}):
+    >>> for name in sepi.write_result("dots-depth", light_field, maps, {"made_by": "a test"}):
     ...     print(name)
     disparity.pfm
     disparity.npy
@@ -163,15 +179,51 @@ def write_result(
     """
     _require_sound(light_field, maps)
     folder = Path(folder)
-    attributes = attributes or {"scene": light_field.name, "source": light_field.source}
-    require_target(folder)
+    earlier = require_own(folder, light_field, force=force)
     # the folder itself may be a link to where there is room
     target = folder.resolve()
     existing = target.is_dir() and any(target.iterdir())
+    attributes = {**result_attributes(light_field, maps), **(attributes or {})}
     with atomic_files(target) if existing else atomic_folder(target) as temporary:
-        names = _write_files(temporary, light_field, maps, attributes)
-    _remove_others(target, names)
+        names = _write_files(temporary, light_field, maps, attributes, seconds, beside)
+    _remove(target, earlier.difference(names))
     return names
+
+
+def require_own(folder: Path, light_field: LightField, *, force: bool = False) -> frozenset[str]:
+    """Raise unless a result of this light field may be written to ``folder``; what an earlier one wrote there.
+
+    Raises
+    ------
+    SepiError
+        As :func:`require_target`; and unless ``force``, if the folder holds anything but an earlier result of this
+        light field, or beside it a file that would be taken for one of the result's.
+    """
+    require_target(folder)
+    there = sorted(path.name for path in folder.iterdir() if path.name[0] != ".") if folder.is_dir() else []
+    origin = None
+    # a damaged one is replaced as well
+    with suppress(SepiError) if force else nullcontext():
+        origin = read_origin(folder)
+    # who made the file may have had another file in mind than one of this folder
+    files = frozenset() if origin is None else frozenset(filter(_is_results, origin.files or RESULT_FILES))
+    others = [name for name in there if name not in files and (origin is None or _is_results(name))]
+    if force:
+        return files
+    advice = "choose another folder, or overwrite it with --force (in Python force=True)"
+    if others:
+        listed = ", ".join(others[:_LISTED]) + (", ..." if len(others) > _LISTED else "")
+        raise SepiError(f"{folder}: holds files that no earlier result wrote ({listed}); {advice}")
+    if origin is not None and not origin.is_of(light_field):
+        other = origin.source or origin.scene
+        raise SepiError(f"{folder}: holds the result of another light field ({other}); {advice}")
+    return files
+
+
+def remove_result(folder: Path) -> None:
+    """Remove all that has the name of a file of a result, from a folder that is known to hold nothing else."""
+    if folder.is_dir():
+        _remove(folder, [path.name for path in folder.iterdir() if _is_results(path.name)])
 
 
 def require_target(folder: Path) -> None:
@@ -292,7 +344,7 @@ def _require_sound(light_field: LightField, maps: StageMaps) -> None:
             raise SepiError(
                 f"{light_field.name}: maps must have the views' shape {light_field.shape}, got {name} of {values.shape}"
             )
-        if values.dtype == bool and not re.fullmatch(r"[\w-]+", name):
+        if values.dtype == bool and not re.fullmatch(_MASK_NAME, name):
             raise SepiError(f"{light_field.name}: map '{name}': expected a name of letters, digits, '-' and '_'")
     if ((maps.confidence < 0) | (maps.confidence > 1)).any():
         raise SepiError(
@@ -302,19 +354,22 @@ def _require_sound(light_field: LightField, maps: StageMaps) -> None:
 
 
 def _write_files(
-    folder: Path, light_field: LightField, maps: StageMaps, attributes: Mapping[str, Attribute]
+    folder: Path,
+    light_field: LightField,
+    maps: StageMaps,
+    attributes: Mapping[str, Attribute],
+    seconds: float | None,
+    beside: tuple[str, ...],
 ) -> tuple[str, ...]:
     camera, view = light_field.camera, light_field.views[light_field.reference_position]
     masks = {f"mask_{name}.png": values for name, values in maps.extra.items() if values.dtype == bool}
     more: dict[str, npt.NDArray[Any]] = {"view": view}
-    known: dict[str, Any] = {
-        "view_position": light_field.reference_position,
-        "grid": light_field.grid,
-        "from_centre": light_field.from_centre,
-    }
     if camera is not None:
-        more["depth"], known["camera"] = camera.depth(maps.disparity), astuple(camera)
+        more["depth"] = camera.depth(maps.disparity)
         write_pfm(folder / _DEPTH, more["depth"])
+    if seconds is not None:
+        with atomic_path(folder / RUNTIME) as temporary:
+            temporary.write_text(f"{seconds:.3f}\n", encoding="ascii")
     write_pfm(folder / "disparity.pfm", maps.disparity)
     with atomic_path(folder / "disparity.npy") as temporary, temporary.open("wb") as file:
         np.save(file, maps.disparity.astype("<f4"), allow_pickle=False)
@@ -326,20 +381,25 @@ def _write_files(
     write_ply(folder / "points.ply", cloud)
     for name, mask in masks.items():
         write_png(folder / name, mask, _MASK_TEXT)
+    given = [*([] if camera is None else [_DEPTH]), *([] if seconds is None else [RUNTIME])]
+    names = (*RESULT_FILES[:-1], *given, *masks, RESULT)
     everything = maps.updated(maps.disparity, maps.confidence, **more)
-    write_stage(folder / RESULT, everything, {**attributes, **known})
-    return (*RESULT_FILES[:-1], *([] if camera is None else [_DEPTH]), *masks, RESULT)
+    # of these a later result is sure that they are not a user's own
+    write_stage(folder / RESULT, everything, {**attributes, "files": " ".join(sorted((*names, *beside)))})
+    return names
 
 
-def _remove_others(folder: Path, made: Collection[str]) -> None:
-    """Remove what an earlier run wrote and this one does not make."""
-    known = [path for path in (folder / _DEPTH, folder / RUNTIME, folder / ALL_VIEWS) if path.is_file()]
-    for path in known + [path for path in folder.glob("mask_*.png") if png_texts(path) == _MASK_TEXT]:
-        if path.name not in made:
-            try:
-                path.unlink()
-            except OSError as error:
-                raise SepiError(f"{path}: an earlier run's file cannot be removed ({error.strerror})") from error
+def _is_results(name: str) -> bool:
+    """Whether a result may have a file of this name."""
+    return name in (*RESULT_FILES, _DEPTH, RUNTIME, ALL_VIEWS) or bool(re.fullmatch(rf"mask_{_MASK_NAME}\.png", name))
+
+
+def _remove(folder: Path, names: Collection[str]) -> None:
+    for name in names:
+        try:
+            (folder / name).unlink(missing_ok=True)
+        except OSError as error:
+            raise SepiError(f"{folder / name}: an earlier run's file cannot be removed ({error.strerror})") from error
 
 
 def _write_16bit(path: Path, disparity: FloatMap) -> None:

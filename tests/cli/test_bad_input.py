@@ -21,9 +21,9 @@ from error_lines import error_of, reading_error
 from hdf5_edits import changed
 
 from sepi.cli.main import main
-from sepi.cli.scene_argument import view_of
 from sepi.errors import SepiError
 from sepi.io.hdf5 import write_light_field
+from sepi.io.origin import read_origin
 from sepi.io.pfm import write_pfm
 from sepi.lightfield import LightField
 from sepi.report.runs import read_numbers
@@ -492,7 +492,7 @@ def test_a_result_of_another_program_that_says_nonsense_of_its_view(tmp_path: Pa
         file["disparity"] = np.zeros((4, 5), np.float32)
         file.attrs["view_position"], file.attrs["grid"] = [], [3, 3]
     with pytest.raises(SepiError, match=r"result\.h5: not a result of 'sepi depth', or damaged"):
-        view_of(tmp_path / "result.h5")
+        read_origin(tmp_path / "result.h5")
 
 
 def test_values_that_lie_too_deep_in_each_other_are_one_line(tmp_path: Path) -> None:

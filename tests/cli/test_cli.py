@@ -6,6 +6,7 @@ import re
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import h5py
@@ -108,6 +109,28 @@ def test_no_ground_truth_reaches_the_estimate(scene: Path) -> None:
         (scene / name).unlink()
     call("depth", scene, "-o", "without", *FAST)
     assert everything_in(Path("with")) == everything_in(Path("without"))
+
+
+def test_depth_writes_over_nothing_of_others(scene: Path) -> None:
+    """Two folders 'views' of two scenes have one name for the result; told before that is computed."""
+    for folder in ("a", "b"):
+        write_hci(render("dots" if folder == "a" else "pyramids", size=64, views=3), Path(folder, "views"))
+        Path(folder, "views", "parameters.cfg").unlink()
+    assert call("depth", "a/views", *FAST).exit_code == 0
+    before = everything_in(Path("views-depth"))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("sepi.pipeline.estimate_depth", None)
+        line = error_of(call("depth", "b/views", *FAST))
+        assert "views-depth: holds the result of another light field (a/views); choose another folder" in line
+        Path("own").mkdir()
+        Path("own/depth.pfm").write_text("mine")
+        assert "own: holds files that no earlier result wrote (depth.pfm)" in error_of(
+            call("depth", "a/views", "-o", "own", *FAST)
+        )
+    assert everything_in(Path("views-depth")) == before
+    assert everything_in(Path("own")) == {"depth.pfm": b"mine"}
+    assert call("depth", "b/views", "--force", *FAST).exit_code == 0
+    assert read_attributes(Path("views-depth/result.h5"))["source"] == "b/views"
 
 
 def test_depth_again_replaces_its_own_files_with_equal_ones(scene: Path) -> None:
@@ -498,13 +521,24 @@ def test_each_command_has_help(command: str) -> None:
     assert command in call("--help").stdout
 
 
-def test_python_writes_what_the_command_writes(scene: Path, result: Path) -> None:
-    light_field = sepi.read_light_field(scene, options=sepi.ReadOptions(view=(1, 1)))
-    maps = sepi.estimate_depth(light_field, "best", {"initial": {"num_disparities": 21}})
-    sepi.write_result("out", light_field, maps)
-    written, by_command = everything_in(Path("out")), everything_in(result)
-    assert set(written) == set(by_command)
-    assert {name for name in written if written[name] != by_command[name]} == {"result.h5"}
+@pytest.mark.parametrize("variant", ["best", "no_occlusion_no_textureless"])
+def test_python_writes_what_the_command_writes(scene: Path, variant: str) -> None:
+    """The same bytes, of views whose positions matter and whose range is not known."""
+    light_field = read_light_field(scene)
+    positions = np.moveaxis(np.indices((3, 3)), 0, 2) * (0.9, 1)
+    write_light_field(
+        Path("lf.h5"), replace(light_field, positions=positions, disparity_range=None, ground_truth=None, masks={})
+    )
+    fewer = () if variant == "best" else ("--set", "initial.sepi.num_disparities=21")
+    words = ("depth", "lf.h5", "-o", "by command", "--exclude", "0,0", "--variant", variant)
+    assert call(*words, *(FAST if variant == "best" else fewer)).exit_code == 0
+    read = sepi.read_light_field("lf.h5", options=sepi.ReadOptions(exclude=("0,0",)))
+    maps = sepi.estimate_depth(read, variant, {"initial": {"num_disparities": 21}})
+    sepi.write_result("out", read, maps)
+    assert everything_in(Path("out")) == everything_in(Path("by command"))
+
+
+def test_a_light_field_that_is_no_array_is_refused() -> None:
     with pytest.raises(sepi.SepiError, match=r"mine: views must be an array of shape \(T, S, H, W, C\), got a list"):
         sepi.LightField([[1, 2]], "mine")  # type: ignore[arg-type]
 

@@ -12,13 +12,16 @@ import tifffile
 from click.testing import CliRunner, Result
 from error_lines import error_of
 from geometries import ROW_SPACING, jittered
+from hdf5_edits import changed
 
 from sepi.camera import Camera
 from sepi.cli.main import main
 from sepi.io.hdf5 import write_light_field
-from sepi.io.provenance import result_attributes
+from sepi.io.images import read_picture
+from sepi.io.readers.options import ReadOptions
 from sepi.io.result_folder import write_result
 from sepi.lightfield import LightField
+from sepi.reading import read_light_field
 from sepi.scenes import render
 from sepi.stage import StageMaps
 
@@ -40,7 +43,7 @@ def put(light_field: LightField) -> None:
     unknown = np.zeros(size, bool)
     unknown[-9:] = True
     maps = StageMaps(disparity, np.where(unknown, np.float32(0), confidence), {"unknown": unknown})
-    write_result("maps", light_field, maps, result_attributes(light_field, "best", []))
+    write_result("maps", light_field, maps)
 
 
 @pytest.fixture
@@ -136,17 +139,96 @@ def test_row_spacing_of_the_result_holds_where_the_files_do_not_say_it(scene: Li
 
 def test_a_result_of_another_light_field_is_refused(scene: LightField) -> None:
     """Depth on pictures that it does not belong to looks like depth."""
+    bare = replace(scene, ground_truth=None, masks={})
     write_light_field(Path("other.h5"), replace(scene, views=scene.views[:, ::-1].copy()))
-    write_light_field(Path("grid.h5"), replace(scene, views=scene.views[:2], present=None, ground_truth=None, masks={}))
-    for path, more in (
-        ("other.h5", ("--view", "0,0")),
-        ("grid.h5", ()),
-        ("scene.h5", ("--order", "flip-rows", "--view", "0,1")),
-        ("scene.h5", ("--row-spacing", "0.5")),
+    write_light_field(Path("grid.h5"), replace(bare, views=scene.views[:2], present=None))
+    write_light_field(Path("moved.h5"), replace(bare, positions=jittered((3, 3))))
+    for path, more, expected in (
+        ("other.h5", ("--view", "0,0"), "depth of view 1,1 of 3x3 views, not of view 0,0 of 3x3, as other.h5 is read"),
+        ("grid.h5", (), "not of view 1,1 of 2x3"),
+        ("other.h5", (), "depth of another light field, or of its views in another order"),
+        ("moved.h5", (), "depth of another light field"),
+        ("scene.h5", ("--order", "flip-rows"), "in another order"),
+        ("scene.h5", ("--row-spacing", "0.5"), "made with rows of views 1 steps apart, not 0.5"),
     ):
         line = error_of(call("poses", path, "maps", "-o", "out", *more))
-        assert "maps: is not of" in line
+        assert "sepi: maps: " in line
+        assert expected in line
         assert not Path("out").exists()
+
+
+@pytest.fixture
+def turned(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> LightField:
+    """Views whose rows are counted from below, without two of them, as turned.npy; the result of them read so, maps."""
+    monkeypatch.chdir(tmp_path)
+    np.save("turned.npy", render("pyramids", size=64, views=3).views[::-1])
+    options = ReadOptions(order="flip-rows", exclude=("0,0", "2,1"), row_spacing=0.5)
+    light_field = read_light_field("turned.npy", options=options)
+    maps = StageMaps(np.zeros((64, 64), np.float32), np.ones((64, 64), np.float32))
+    write_result("maps", light_field, maps)
+    return light_field
+
+
+def test_a_result_is_used_with_the_light_field_as_it_was_read(turned: LightField) -> None:
+    """The centre view of a grid of odd sides is the same in most orders: poses were wrong, and nobody was told."""
+    called = call("poses", "turned.npy", "maps", "--to", "nerfstudio", "-o", "set")
+    assert called.exit_code == 0, called.output
+    assert (len(files_in("set/images")), Path("set/images/view_00_00.png").exists()) == (7, False)
+    np.testing.assert_array_equal(read_picture(Path("set/images/view_00_01.png")), turned.views[0, 1])
+    raw = np.load("turned.npy")
+    # a file of the light field in order needs none of it, one of the files that it came from needs it as they do
+    for file in ("ordered.h5", "raw.h5"):
+        write_light_field(Path(file), turned if file == "ordered.h5" else replace(turned, views=raw, present=None))
+        assert call("poses", file, "maps", "--to", "nerfstudio", "-o", file[:3]).exit_code == 0
+        assert Path(file[:3], "transforms.json").read_bytes() == Path("set/transforms.json").read_bytes()
+    assert "in another order" in error_of(call("poses", "turned.npy", "maps", "--order", "flip-columns", "-o", "out"))
+    assert not Path("out").exists()
+
+
+@pytest.mark.parametrize("command", ["refocus", "evaluate", "compare"])
+def test_every_command_binds_a_result_to_its_light_field(turned: LightField, command: str) -> None:
+    """Pyramids' map focused or scored dots without a word."""
+    write_light_field(Path("dots.h5"), render("dots", size=64, views=3))
+    truth = np.zeros((64, 64), np.float32)
+    write_light_field(Path("own.h5"), replace(turned, reading="", row_spacing=1.0, ground_truth=truth))
+    words = {"refocus": ("--steps", "1", "-o", "out"), "evaluate": (), "compare": ("-o", "out")}[command]
+
+    def bound(path: str, result: str) -> Result:
+        order = {"refocus": (path, result), "evaluate": (result, path), "compare": (result, result, path)}
+        return call(command, *order[command], *words)
+
+    refused = error_of(bound("dots.h5", "maps"))
+    assert "depth of another light field" in refused
+    assert "disparity.pfm" in refused
+    assert not Path("out").exists()
+    assert bound("own.h5", "maps").exit_code == 0
+    assert bound("dots.h5", "maps/disparity.pfm").exit_code == 0
+
+
+def test_nonsense_of_how_a_light_field_was_read_is_one_line(turned: LightField) -> None:
+    for text in ("[1]", '{"grid": "wide"}', '{"order": 3}', "{"):
+        with changed(Path("maps/result.h5")) as file:
+            file.attrs["reading"] = text
+        assert "maps/result.h5: damaged: it does not say how" in error_of(call("poses", "turned.npy", "maps"))
+
+
+@pytest.mark.usefixtures("scene")
+def test_names_are_those_that_were_given(tmp_path: Path) -> None:
+    """A link names what is made of it, not what it leads to; and it may be where there is room."""
+    Path("scene.h5").rename("data_0042.h5")
+    Path("cotton.h5").symlink_to("data_0042.h5")
+    assert call("poses", "cotton.h5", "maps").exit_code == 0
+    assert call("refocus", "cotton.h5", "maps", "--steps", 1).exit_code == 0
+    assert {"cotton-colmap", "cotton-refocused"} <= {path.name for path in tmp_path.iterdir()}
+    for link, there in (("full", True), ("dangling", False)):
+        target = tmp_path / f"disk-{link}"
+        if there:
+            target.mkdir()
+        Path(link).symlink_to(target)
+        called = call("poses", "cotton.h5", "maps", "-o", link)
+        assert called.exit_code == 0, called.output
+        assert Path(link).is_symlink()
+        assert (target / "images").is_dir()
 
 
 @pytest.mark.usefixtures("scene")

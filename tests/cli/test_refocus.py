@@ -175,9 +175,21 @@ def test_an_index_of_others_removes_nothing(scene: LightField, own: str) -> None
     Path("out").mkdir()
     Path("out/focus.csv").write_text(own, encoding="utf-8")
     before = Path("lf.h5").read_bytes()
-    assert refocus("lf.h5", "--steps", 1, "-o", "out").exit_code == 0
+    called = refocus("lf.h5", "--steps", 1, "-o", "out")
     assert Path("lf.h5").read_bytes() == before
-    assert set(everything_in("out")) == {"focus_01.png", "focus.csv"}
+    if own.startswith("file,disparity"):
+        assert called.exit_code == 0
+        assert set(everything_in("out")) == {"focus_01.png", "focus.csv"}
+    else:
+        assert "out: focus.csv there was not written by 'sepi refocus'" in error_of(called)
+
+
+def test_pictures_of_others_are_not_replaced(scene: LightField) -> None:
+    """Other programs' stacks have such names, too."""
+    Path("out").mkdir()
+    Path("out/focus_02.png").write_text("mine")
+    assert "out: focus_02.png there was not written" in error_of(refocus("lf.h5", "--steps", 2, "-o", "out"))
+    assert everything_in("out") == {"focus_02.png": b"mine"}
 
 
 def test_equal_input_gives_equal_bytes_for_any_number_of_threads(scene: LightField) -> None:
@@ -218,7 +230,7 @@ def test_a_result_knows_its_view(scene: LightField) -> None:
     own, centre = (np.abs(picture - scene.views[view]).mean() for view in ((0, 1), (1, 1)))
     assert own < 0.5 * centre
     message = error_of(refocus("lf.h5", "side", "--view", "1,1"))
-    assert "side: depth of view 0,1 of 3x3 views, but lf.h5 is read as view 1,1" in message
+    assert "side: depth of view 0,1 of 3x3 views, not of view 1,1 of 3x3, as lf.h5 is read here" in message
 
 
 def test_the_camera_may_come_from_the_result_or_the_flags(scene: LightField) -> None:

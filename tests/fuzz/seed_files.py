@@ -254,13 +254,13 @@ def stage_files(folder: Path) -> list[bytes]:
 
 
 def result_files(folder: Path) -> list[bytes]:
-    """With and without a camera."""
+    """With and without a camera; as its files lie, and read otherwise."""
 
     def write(path: Path, light_field: LightField) -> None:
-        write_result(path.parent / "result", light_field, MAPS, {"scene": "toy"})
+        write_result(path.parent / "result", light_field, MAPS, force=True)
         (path.parent / "result" / "result.h5").replace(path)
 
-    fields = LIGHT_FIELD, LightField(VIEWS, "toy")
+    fields = LIGHT_FIELD, LightField(VIEWS, "toy", reading='{"exclude": ["0,0"], "order": "flip-rows"}')
     return [_undigested(folder, lambda path, one=one: write(path, one)) for one in fields]
 
 

@@ -8,13 +8,13 @@ import texts
 from executions import Target
 from mutations import MAT, PNG
 
-from sepi.cli.scene_argument import view_of
 from sepi.errors import SepiError
 from sepi.io.disparity_maps import is_disparity, read_disparity
 from sepi.io.external_maps import read_external
 from sepi.io.hdf5 import read_light_field as read_own
 from sepi.io.hdf5 import read_stage
 from sepi.io.images import picture_header, png_texts, read_picture
+from sepi.io.origin import read_origin
 from sepi.io.provenance import history_of
 from sepi.io.readers.formats import format_of, read
 from sepi.io.readers.options import ReadOptions
@@ -103,8 +103,8 @@ TARGETS: dict[str, Target] = {
     "eslf": Target("a_eslf.png", texts.lenslet_files, _light_field, wrappings=PNG),
     "looked-at": Target("a.npy", texts.larger_npy_files, read_light_field),
     "own-light-field": _hdf5(seeds.own_light_field_files, read_own, _light_field),
-    "stage": _hdf5(seeds.stage_files, read_stage, history_of, view_of),
-    "result": _hdf5(seeds.result_files, read_result, view_of, _map),
+    "stage": _hdf5(seeds.stage_files, read_stage, history_of, read_origin),
+    "result": _hdf5(seeds.result_files, read_result, read_origin, _map),
     "scores": _hdf5(seeds.score_files, read_evaluations, read_scores),
     "external-maps": _hdf5(seeds.external_files, read_external, lambda path: read_external(path, with_maps=False)),
     "submission": Target("a.zip", seeds.submission_files, _submission, wrappings=(seeds.SUBMISSION,)),

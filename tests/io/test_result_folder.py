@@ -12,7 +12,6 @@ from PIL import Image
 
 from sepi.camera import Camera
 from sepi.errors import SepiError
-from sepi.io.provenance import result_attributes
 from sepi.io.result_folder import RESULT_FILES, colour_code, read_result, write_result
 from sepi.lightfield import DisparityRange, LightField
 from sepi.stage import StageMaps
@@ -150,10 +149,10 @@ def test_result_holds_the_view_that_the_maps_belong_to(
 def test_result_says_where_the_views_stood(tmp_path: Path, light_field: LightField, maps: StageMaps) -> None:
     """Clouds of other views are moved by this; a reader of the disparity must know what its view step is."""
     closer = replace(light_field, view=(0, 4), row_spacing=0.5, disparity_range=DisparityRange(-2, 3, "given"))
-    write_result(tmp_path / "closer", closer, maps, result_attributes(closer, "best", []))
+    write_result(tmp_path / "closer", closer, maps)
     positions = np.moveaxis(np.indices((3, 5)), 0, 2) * 0.9
     moved = replace(closer, row_spacing=1.0, positions=positions)
-    write_result(tmp_path / "moved", moved, maps, result_attributes(moved, "best", []))
+    write_result(tmp_path / "moved", moved, maps)
     for name, expected in (("closer", (0.5, "grid", -0.5, 2)), ("moved", (1, "given", -0.9, 1.8))):
         with h5py.File(tmp_path / name / "result.h5") as file:
             spacing, kind, place = (file.attrs[key] for key in ("row_spacing", "positions", "from_centre"))
@@ -172,20 +171,74 @@ def test_equal_results_give_equal_bytes(tmp_path: Path, light_field: LightField,
 
 
 def test_files_of_an_earlier_run_do_not_outlive_it(tmp_path: Path, light_field: LightField, maps: StageMaps) -> None:
-    """A mask of a stage that is now switched off, or depth of a camera no longer given, would be taken for this run's;
-    a user's own files stay, masks among them.
+    """A mask of a stage that is now switched off, depth of a camera no longer given, a time or maps of all views would
+    be taken for this run's; a user's own file stays.
     """
-    write_result(tmp_path, light_field, maps, {})
-    (tmp_path / "runtime.txt").write_text("1.5\n")
-    own = {"notes.txt": b"mine", "mask_broken.png": b"\x89PNG"}
-    for name, data in own.items():
-        (tmp_path / name).write_bytes(data)
-    assert cv2.imwrite(str(tmp_path / "mask_mine.png"), np.zeros(SHAPE, np.uint8))
-    again = write_result(tmp_path, replace(light_field, camera=None), replace(maps, extra={}), {})
+    write_result(tmp_path, light_field, maps, seconds=1.5, beside=("all_views.h5",))
+    assert (tmp_path / "runtime.txt").read_text() == "1.500\n"
+    for name in ("all_views.h5", "notes.txt"):
+        (tmp_path / name).write_bytes(b"mine")
+    again = write_result(tmp_path, replace(light_field, camera=None), replace(maps, extra={}))
     assert sorted(again) == sorted(RESULT_FILES)
-    assert names_in(tmp_path) == sorted([*RESULT_FILES, *own, "mask_mine.png"])
-    for name, data in own.items():
-        assert (tmp_path / name).read_bytes() == data
+    assert names_in(tmp_path) == sorted([*RESULT_FILES, "notes.txt"])
+    assert (tmp_path / "notes.txt").read_bytes() == b"mine"
+
+
+@pytest.mark.parametrize("earlier", [False, True])
+@pytest.mark.parametrize("name", ["depth.pfm", "runtime.txt", "all_views.h5", "confidence.png", "mask_mine.png"])
+def test_a_file_of_someone_else_is_neither_removed_nor_replaced(
+    tmp_path: Path, light_field: LightField, maps: StageMaps, name: str, earlier: bool
+) -> None:
+    """Ground truth, or another program's map, was gone without a word; also where an earlier result claims others."""
+    bare, no_masks = replace(light_field, camera=None), replace(maps, extra={})
+    if earlier:
+        write_result(tmp_path, bare, no_masks, {"files": "../out/notes.txt"})
+    (tmp_path / name).write_text("mine")
+    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    if not (earlier and name in RESULT_FILES):
+        with pytest.raises(SepiError, match=rf"no earlier result wrote \({name}\); .*--force"):
+            write_result(tmp_path, bare, no_masks)
+        assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
+    # what is not made this time stays also by force
+    written = write_result(tmp_path, bare, no_masks, force=True)
+    assert ((tmp_path / name).read_bytes() == b"mine") == (name not in written)
+
+
+def test_a_list_of_files_does_not_lead_out_of_the_folder(
+    tmp_path: Path, light_field: LightField, maps: StageMaps
+) -> None:
+    """A result may come from anyone."""
+    (tmp_path / "precious").write_text("mine")
+    listed = " ".join((*RESULT_FILES, "depth.pfm", "mask_occluded.png"))
+    write_result(tmp_path / "out", light_field, maps)
+    (tmp_path / "out" / "notes.txt").write_text("mine")
+    with changed(tmp_path / "out" / "result.h5") as file:
+        file.attrs["files"] = f"{listed} ../precious notes.txt"
+    write_result(tmp_path / "out", light_field, maps)
+    assert (tmp_path / "precious").exists()
+    assert (tmp_path / "out" / "notes.txt").exists()
+
+
+def test_another_light_fields_result_is_not_overwritten(
+    tmp_path: Path, light_field: LightField, maps: StageMaps
+) -> None:
+    """Two folders 'views' both write to 'views-depth'; one read otherwise, or changed since, is the same."""
+    one, other = (replace(light_field, source=f"{folder}/views", name="views") for folder in "ab")
+    other = replace(other, views=light_field.views // 2)
+    write_result(tmp_path, one, maps)
+    with pytest.raises(SepiError, match=r"holds the result of another light field \(a/views\); .*force=True"):
+        write_result(tmp_path, other, maps)
+    assert read_result(tmp_path).picture.max() == one.views[1, 2].max()
+    for same in (
+        replace(one, source="elsewhere"),
+        replace(one, source="elsewhere", view=(0, 0)),
+        replace(one, views=other.views),
+    ):
+        write_result(tmp_path, one, maps, force=True)
+        write_result(tmp_path, same, maps)
+    write_result(tmp_path, other, maps, force=True)
+    (tmp_path / "result.h5").write_bytes(b"nothing")
+    write_result(tmp_path, other, maps, force=True)
 
 
 def test_links_in_the_folder_are_replaced_and_not_followed(
@@ -196,7 +249,7 @@ def test_links_in_the_folder_are_replaced_and_not_followed(
     (tmp_path / "precious").write_text("mine")
     for name in names:
         (tmp_path / "out" / name).symlink_to(tmp_path / "precious")
-    write_result(tmp_path / "out", light_field, maps, {})
+    write_result(tmp_path / "out", light_field, maps, {}, force=True)
     assert (tmp_path / "precious").read_text() == "mine"
     for name in names:
         assert not (tmp_path / "out" / name).is_symlink()
@@ -211,7 +264,7 @@ def test_the_folder_may_be_a_link_to_where_there_is_room(
     if filled:
         (tmp_path / "disk/notes.txt").write_text("mine")
     (tmp_path / "out").symlink_to(tmp_path / "disk")
-    write_result(tmp_path / "out", light_field, maps, {})
+    write_result(tmp_path / "out", light_field, maps, {}, force=filled)
     assert (tmp_path / "out").is_symlink()
     assert set(RESULT_FILES) < set(names_in(tmp_path / "disk"))
 

@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from sepi.errors import SepiError
+from sepi.io.files import name_of
 from sepi.io.images import SUFFIXES, read_picture
 from sepi.io.readers.options import ReadOptions, arrange_numbers
 from sepi.io.readers.view_files import MAX_VIEWS
@@ -69,7 +70,7 @@ def read(path: Path, options: ReadOptions) -> LightField:
     if any(cropped):
         notes.append(f"{cropped[0]} pixel rows and {cropped[1]} columns beyond the last whole lenslet were left out")
     light_field = LightField(
-        views=views, name=path.resolve().stem, source=str(path), present=present, view=options.view, notes=tuple(notes)
+        views=views, name=name_of(path).stem, source=str(path), present=present, view=options.view, notes=tuple(notes)
     )
     return replace(light_field, notes=(*notes, *_dark_notes(light_field)))
 

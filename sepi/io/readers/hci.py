@@ -23,7 +23,7 @@ from pydantic import BaseModel, PositiveInt
 
 from sepi.camera import camera_from
 from sepi.errors import SepiError
-from sepi.io.files import naming, reading
+from sepi.io.files import name_of, naming, reading
 from sepi.io.images import picture_header, read_picture
 from sepi.io.pfm import read_pfm
 from sepi.io.readers.options import ReadOptions, position_of
@@ -102,7 +102,7 @@ def read(path: Path, options: ReadOptions) -> LightField:
     read_truth = with_truth is not None and options.view in (None, with_truth) and _has_truth(path)
     return LightField(
         views=views,
-        name=parameters.scene or path.resolve().name,
+        name=parameters.scene or str(name_of(path)),
         source=str(path),
         present=present,
         view=with_truth if read_truth else options.view,

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sepi.errors import SepiError
-from sepi.io.files import reading
+from sepi.io.files import name_of, reading
 from sepi.io.images import SUFFIXES
 from sepi.io.readers.camera_positions import off_grid, positions_from_cameras
 from sepi.io.readers.folder_layout import Layout, Numbers, widened
@@ -69,7 +69,7 @@ def read(path: Path, options: ReadOptions) -> LightField:
     unmatched = [name for name in named.unmatched if _is_picture(name)]
     light_field = LightField(
         views=pixels,
-        name=path.resolve().name,
+        name=str(name_of(path)),
         source=str(path),
         present=present,
         view=options.view,

@@ -1,0 +1,177 @@
+"""Which light field a result was made from, how that was read, and whether another one is the same."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import astuple, dataclass, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from pydantic import TypeAdapter, ValidationError
+
+from sepi.errors import SepiError
+from sepi.io.hdf5 import Attribute, attribute, open_hdf5, read_dataset
+from sepi.io.readers.options import ReadOptions
+from sepi.lightfield import LightField
+
+RESULT = "result.h5"
+
+_FORMAT = "format"
+# a result tells its view anyway; links are followed by leave of who calls, not of who made a file
+_NOT_KEPT = ("view", "follow_links")
+
+
+@dataclass(frozen=True)
+class Origin:
+    """What a result says of the light field that it was made from.
+
+    Attributes
+    ----------
+    scene, source : str
+        Name and path; empty where the result does not say.
+    view, grid : (int, int)
+        Position of the view that the maps belong to; rows and columns of views.
+    row_spacing : float or None
+        Distance of rows in view steps; None where positions of the views were known, or the result does not say.
+    options : ReadOptions
+        What reads the source so that it is this light field.
+    file_format : str or None
+        Word of the format, where it was given.
+    digest : str
+        :func:`digest_of` the light field; empty in results of earlier versions.
+    picture : ndarray, shape (H, W, C), or None
+        The view.
+    files : tuple of str
+        Names of the files that were written with it; empty in results of earlier versions.
+    """
+
+    scene: str
+    source: str
+    view: tuple[int, int]
+    grid: tuple[int, int]
+    row_spacing: float | None
+    options: ReadOptions
+    file_format: str | None
+    digest: str
+    picture: npt.NDArray[np.generic] | None
+    files: tuple[str, ...]
+
+    def is_of(self, light_field: LightField) -> bool:
+        """Whether it is a result of this light field, perhaps as another view, read otherwise, or since changed."""
+        where = light_field.source
+        return (
+            (where != "" and (self.source, self.scene) == (where, light_field.name))
+            or self._shows(light_field)
+            or self.digest == digest_of(light_field)
+        )
+
+    def difference(self, light_field: LightField) -> str | None:
+        """What is other in a light field that should be the very one that the result was made from; None: nothing."""
+        (t, s), (rows, columns) = light_field.reference_position, light_field.grid
+        if (self.view, self.grid) != ((t, s), (rows, columns)):
+            (t0, s0), (own_rows, own_columns) = self.view, self.grid
+            return f"depth of view {t0},{s0} of {own_rows}x{own_columns} views, not of view {t},{s} of {rows}x{columns}"
+        if self.digest != digest_of(light_field) if self.digest else not self._shows(light_field):
+            return "depth of another light field, or of its views in another order or without some of them"
+        if self.row_spacing is not None and not np.isclose(self.row_spacing, light_field.row_spacing):
+            return f"made with rows of views {self.row_spacing:g} steps apart, not {light_field.row_spacing:g}"
+        return None
+
+    def differs(self, other: Origin) -> bool:
+        """Whether another result is of another view, so that its map cannot be held against this one's."""
+        if self.picture is None or other.picture is None:
+            return (self.view, self.grid) != (other.view, other.grid)
+        return not np.array_equal(self.picture, other.picture)
+
+    def _shows(self, light_field: LightField) -> bool:
+        return self.picture is not None and np.array_equal(
+            self.picture, light_field.views[light_field.reference_position]
+        )
+
+
+def origin_attributes(light_field: LightField) -> dict[str, Attribute]:
+    """What a file of maps says of the light field that they were made from, as :func:`read_origin` reads it."""
+    camera = light_field.camera
+    return {
+        "view_position": light_field.reference_position,
+        "grid": light_field.grid,
+        "from_centre": light_field.from_centre,
+        "light_field": digest_of(light_field),
+        **({"reading": light_field.reading} if light_field.reading else {}),
+        **({} if camera is None else {"camera": astuple(camera)}),
+    }
+
+
+def read_origin(path: Path) -> Origin | None:
+    """What a result says of its light field; None for a file that does not say.
+
+    Parameters
+    ----------
+    path : Path
+        Folder of a result, or an HDF5 file.
+
+    Raises
+    ------
+    SepiError
+        If the file is damaged, or what it says is nonsense.
+    """
+    path = path / RESULT if path.is_dir() else path
+    if path.suffix not in (".h5", ".hdf5") or not path.is_file():
+        return None
+    with open_hdf5(path, "result of 'sepi depth'") as file:
+        known = {name: attribute(file, name) for name in file.attrs}
+        if not {"view_position", "grid"} <= set(known):
+            return None
+        (t, s), (rows, columns) = (map(int, known[name]) for name in ("view_position", "grid"))
+        options, file_format = _reading(path, str(known.get("reading", "")))
+        on_grid = known.get("positions") == "grid"
+        return Origin(
+            scene=str(known.get("scene", "")),
+            source=str(known.get("source", "")),
+            view=(t, s),
+            grid=(rows, columns),
+            row_spacing=float(known["row_spacing"]) if on_grid else None,
+            options=options,
+            file_format=file_format,
+            digest=str(known.get("light_field", "")),
+            picture=read_dataset(path, file["view"]) if "view" in file else None,
+            files=tuple(str(known.get("files", "")).split()),
+        )
+
+
+def digest_of(light_field: LightField) -> str:
+    """Digest of the views in their places; of nothing that other flags may give to the same views."""
+    present, positions = light_field.present, light_field.positions
+    total = hashlib.sha256(f"{light_field.views.shape} {light_field.views.dtype}".encode())
+    total.update(present.tobytes())
+    for t, s in np.argwhere(present).tolist():
+        total.update(np.ascontiguousarray(light_field.views[t, s]).data.cast("B"))
+    if positions is not None:
+        total.update(positions[present].tobytes())
+    return total.hexdigest()
+
+
+def reading_record(options: ReadOptions, file_format: str | None) -> str:
+    """What is not as a reader finds it by itself, as JSON; empty where all is."""
+    own = {field.name: getattr(options, field.name) for field in fields(options) if field.name not in _NOT_KEPT}
+    given: dict[str, Any] = {name: value for name, value in own.items() if value != getattr(ReadOptions(), name)}
+    if file_format is not None:
+        given[_FORMAT] = file_format
+    return json.dumps(given, sort_keys=True) if given else ""
+
+
+def _reading(path: Path, record: str) -> tuple[ReadOptions, str | None]:
+    """What :func:`reading_record` made a record of."""
+    try:
+        given = json.loads(record or "{}")
+        file_format = given.pop(_FORMAT, None)
+        for name in _NOT_KEPT:
+            given.pop(name, None)
+        options = TypeAdapter(ReadOptions).validate_json(json.dumps(given), strict=True)
+        TypeAdapter(str | None).validate_python(file_format)
+    except (ValueError, AttributeError, TypeError, RecursionError, ValidationError) as error:
+        raise SepiError(f"{path}: damaged: it does not say how its light field was read ({record[:40]!r})") from error
+    return options, file_format
