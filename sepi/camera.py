@@ -19,13 +19,13 @@ References
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from sepi.errors import SepiError
+from sepi.validation import is_finite
 
 Map = npt.NDArray[np.float32]
 
@@ -72,8 +72,8 @@ class Camera:
     focal_px: float
 
     def __post_init__(self) -> None:
-        positive = all(math.isfinite(value) and value > 0 for value in (self.scale, self.focal_px))
-        if not (positive and math.isfinite(self.offset)):
+        positive = all(is_finite(value) and value > 0 for value in (self.scale, self.focal_px))
+        if not (positive and is_finite(self.offset)):
             raise SepiError(
                 "camera: expected focal length, baseline, focus distance and sensor size to be positive numbers"
             )

@@ -15,12 +15,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from types import NoneType
 
 import numpy as np
 import numpy.typing as npt
 
 from sepi.camera import Camera
 from sepi.errors import SepiError, one_line
+from sepi.validation import described, is_finite, require_type, whole_pair
 
 FloatMap = npt.NDArray[np.float32]
 BoolMap = npt.NDArray[np.bool_]
@@ -30,6 +32,12 @@ RANGE_SOURCES = ("parameters", "given", "estimated")
 
 LOWEST, HIGHEST = -0.5, 1.5
 """As far beyond 0..1 as float views may go, for what resampling overshoots."""
+
+_LARGEST_ODD_GRID = 1000
+"""Views of a grid with more rows and columns than a view has pixels: more, and its axes are taken for others."""
+
+_GENEROUS = 10
+"""So many times farther than views show anything a range may reach: generous ones cost time and do no harm."""
 
 MIN_SIZE = 2
 """Least height and width of a view in pixels: what a sample between pixels needs."""
@@ -68,10 +76,10 @@ class DisparityRange:
     source: str
 
     def __post_init__(self) -> None:
-        if not (np.isfinite(self.minimum) and np.isfinite(self.maximum) and self.minimum < self.maximum):
+        if not (is_finite(self.minimum) and is_finite(self.maximum) and self.minimum < self.maximum):
             raise SepiError(
                 f"disparity range ({self.source}): expected two finite numbers MIN < MAX in pixels per view step, "
-                f"got {self.minimum:g} and {self.maximum:g}"
+                f"got {described(self.minimum)} and {described(self.maximum)}"
             )
 
     def candidates(self, count: int) -> FloatMap:
@@ -169,6 +177,17 @@ class LightField:
 
     def __post_init__(self) -> None:
         v = self.views
+        require_type("name of the light field", self.name, str, "text")
+        require_type(f"{self.name}: source", self.source, str, "text")
+        require_type(
+            f"{self.name}: disparity_range", self.disparity_range, (DisparityRange, NoneType), "a DisparityRange"
+        )
+        require_type(f"{self.name}: camera", self.camera, (Camera, NoneType), "a Camera")
+        for what, array in self._arrays().items():
+            require_type(f"{self.name}: {what}", array, np.ndarray, "an array")
+        if self.view is not None:
+            position = whole_pair(f"{self.name}: view", self.view, "two whole numbers (t, s)")
+            object.__setattr__(self, "view", position)
         for key in ("name", "source"):
             # names of files need not be text, or one line of it; what is not cannot be printed or stored
             object.__setattr__(self, key, _shown(getattr(self, key)))
@@ -177,6 +196,11 @@ class LightField:
             raise SepiError(f"{self.name}: views must be an array of shape (T, S, H, W, C), got a {type(v).__name__}")
         if v.ndim != 5 or v.shape[4] not in (1, 3) or 0 in v.shape:
             raise SepiError(f"{self.name}: views must have shape (T, S, H, W, C) with C = 1 or 3, got {v.shape}")
+        if v.shape[0] > v.shape[2] and v.shape[1] > v.shape[3] and v.shape[0] * v.shape[1] > _LARGEST_ODD_GRID:
+            raise SepiError(
+                f"{self.name}: views must have shape (T, S, H, W, C), got a grid of {v.shape[0]}x{v.shape[1]} views of "
+                f"{v.shape[3]}x{v.shape[2]} pixels; views.transpose(2, 3, 0, 1, 4) puts (H, W, T, S, C) right"
+            )
         if v.shape[0] * v.shape[1] < 2:
             raise SepiError(f"{self.name}: depth needs at least two views, got a grid of {v.shape[0]}x{v.shape[1]}")
         if min(v.shape[2:4]) < MIN_SIZE:
@@ -204,20 +228,47 @@ class LightField:
             raise SepiError(f"{self.name}: depth needs at least two views, only the {which} {t},{s} is present")
         if v.dtype == np.float32:
             _require_unit(self.name, v[self.present])
-        if not (np.isfinite(self.row_spacing) and self.row_spacing > 0):
-            raise SepiError(f"{self.name}: row_spacing must be a positive number, got {self.row_spacing:g}")
+        if not (is_finite(self.row_spacing) and self.row_spacing > 0):
+            raise SepiError(f"{self.name}: row_spacing must be a positive number, got {described(self.row_spacing)}")
         if self.positions is not None and (
-            self.positions.shape != (*v.shape[:2], 2) or not np.isfinite(self.positions[self.present]).all()
+            self.positions.shape != (*v.shape[:2], 2)
+            or self.positions.dtype.kind not in "fiu"
+            or not np.isfinite(self.positions[self.present]).all()
         ):
             raise SepiError(
                 f"{self.name}: positions must be finite, of shape (T, S, 2) = {(*v.shape[:2], 2)}, got "
                 f"{self.positions.shape}"
             )
+        if self.positions is not None and len(np.unique(self.positions[self.present], axis=0)) < self.present.sum():
+            raise SepiError(f"{self.name}: positions must differ, got the same for several views")
+        for name, mask in self.masks.items():
+            if mask.dtype != bool:
+                raise SepiError(f"{self.name}: masks must be bool, got {name} of {mask.dtype}")
         for what, array in {"ground_truth": self.ground_truth, **self.masks}.items():
             if array is not None and array.shape != self.shape:
                 raise SepiError(
                     f"{self.name}: {what} must have the views' shape (H, W) = {self.shape}, got {array.shape}"
                 )
+
+        if self.disparity_range is not None and self.arranged:
+            self._require_seen(self.disparity_range)
+
+    def _arrays(self) -> dict[str, object]:
+        require_type(f"{self.name}: masks", self.masks, Mapping, "names with arrays")
+        named = {"present": self.present, "positions": self.positions, "ground_truth": self.ground_truth, **self.masks}
+        return {what: array for what, array in named.items() if array is not None}
+
+    def _require_seen(self, known: DisparityRange) -> None:
+        """Raise for disparities at which every other view shows nothing of what the reference view shows."""
+        others = self.present.copy()
+        others[self.reference_position] = False
+        moved = np.abs(self.baselines[others]) / self.shape
+        farthest = 1 / float(moved.max(axis=1).min())
+        if max(abs(known.minimum), abs(known.maximum)) > _GENEROUS * farthest:
+            raise SepiError(
+                f"{self.name}: disparity range ({known.source}): {known.minimum:g} to {known.maximum:g} pixels per "
+                f"view step; from {farthest:g} on no other view shows what the reference view does"
+            )
 
     @property
     def reference_position(self) -> tuple[int, int]:
@@ -331,6 +382,7 @@ class LightField:
         >>> corner.from_centre, corner.ground_truth is None
         ((-1.0, -1.0), True)
         """
+        view = whole_pair(f"{self.name}: view", view, "two whole numbers (t, s)")
         if view == self.reference_position:
             return self
         return replace(self, view=view, ground_truth=None, masks={})

@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import difflib
 import json
+import math
+import operator
 from collections.abc import Iterable, Mapping
+from numbers import Real
 from typing import Any, TypeVar
 
+import numpy as np
 from pydantic import BaseModel, ValidationError
 
 from sepi.errors import SepiError
@@ -29,6 +33,41 @@ def require_known(where: str, names: Iterable[str], known: Iterable[str]) -> Non
     raise SepiError(f"{where}: unknown '{unknown}'; {hint}known: {', '.join(allowed) or 'nothing can be set here'}")
 
 
+def require_type(where: str, value: object, kind: type | tuple[type, ...], expected: str) -> None:
+    """Raise unless ``value`` is of this type: what is wrong, in the words of what was ``expected``."""
+    if not isinstance(value, kind):
+        raise SepiError(f"{where}: expected {expected}, got {described(value)}")
+
+
+def is_finite(value: object) -> bool:
+    """Whether a value is a finite real number, of Python or NumPy."""
+    return isinstance(value, Real) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def whole_pair(where: str, value: Any, expected: str) -> tuple[int, int]:
+    """Two whole numbers, as a tuple whatever held them; an error that says what was ``expected`` otherwise."""
+    try:
+        first, second = map(operator.index, value)
+    except (TypeError, ValueError) as error:
+        raise SepiError(f"{where}: expected {expected}, got {described(value)}") from error
+    return first, second
+
+
+def described(value: object) -> str:
+    """A value for a message: itself where that is short, else what it is."""
+    if isinstance(value, Real) and not isinstance(value, bool):
+        return f"{value:g}"
+    short = repr(value)
+    return short if len(short) <= 40 and not isinstance(value, np.ndarray) else f"a {type(value).__name__}"
+
+
+def _plain(value: object) -> Any:
+    """A NumPy number as Python's, for JSON."""
+    if isinstance(value, np.generic):
+        return value.item()
+    raise TypeError
+
+
 def validated(model: type[Model], values: Mapping[str, Any], where: str) -> Model:
     """Check ``values`` against ``model``.
 
@@ -49,13 +88,13 @@ def validated(model: type[Model], values: Mapping[str, Any], where: str) -> Mode
     _require_fields(model, values, where)
     for key, value in values.items():
         try:
-            json.dumps(value)
+            json.dumps(value, default=_plain)
         except TypeError as error:
             # YAML can name Python objects
             raise SepiError(f"{where}.{key}: expected numbers, text, lists or keys with values, got {value}") from error
     try:
         # by way of JSON, because strict models take a JSON list for a tuple but not a Python list
-        return model.model_validate_json(json.dumps(dict(values), allow_nan=False))
+        return model.model_validate_json(json.dumps(dict(values), allow_nan=False, default=_plain))
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         key = ".".join([where, *map(str, first["loc"])])

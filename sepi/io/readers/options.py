@@ -25,12 +25,13 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from types import NoneType
 
 import numpy as np
 import numpy.typing as npt
 
 from sepi.errors import SepiError
-from sepi.validation import require_known
+from sepi.validation import described, is_finite, require_known, require_type, whole_pair
 
 Numbers = npt.NDArray[np.int64]
 
@@ -112,6 +113,20 @@ class ReadOptions:
     view: tuple[int, int] | None = None
     row_spacing: float | None = None
     follow_links: bool = False
+
+    def __post_init__(self) -> None:
+        for name, example in (("grid", "(5, 7)"), ("view", "(2, 3)")):
+            if (value := getattr(self, name)) is not None:
+                object.__setattr__(self, name, whole_pair(f"options: {name}", value, f"two whole numbers {example}"))
+        for name in ("pattern", "axes", "variable"):
+            require_type(f"options: {name}", getattr(self, name), (str, NoneType), "text")
+        require_type("options: central", self.central, (int, np.integer, NoneType), "a whole number")
+        require_type("options: exclude", self.exclude, (tuple, list), 'positions and names such as ("0,0", "a.png")')
+        for view in self.exclude:
+            require_type("options: exclude", view, str, 'positions "T,S" or names of files')
+        object.__setattr__(self, "exclude", tuple(self.exclude))
+        if self.row_spacing is not None and not is_finite(self.row_spacing):
+            raise SepiError(f"options: row_spacing: expected a number, got {described(self.row_spacing)}")
 
 
 def arrange_numbers(
