@@ -13,7 +13,7 @@ from sepi.io.result_folder import RESULT_FILES
 from sepi.variants import HANDED_ON, STAGES, VARIANTS, choice_of
 from sepi.report.plan import Plan
 from sepi.validation import require_known
-from sepi.workflow.code_digest import ROOT, code_digest, stage_modules
+from sepi.workflow.code_digest import ROOT, code_digest, ingest_modules, stage_modules
 from sepi.workflow.candidates import candidates_factor, candidates_mb
 from sepi.workflow.config import load_settings
 from sepi.workflow.result_paths import COMPARISON_ENDING, PARTS_ENDING, RESULTS, key_of, scene_files
@@ -42,6 +42,9 @@ def command(words):
 
 try:
     SETTINGS = load_settings(config)
+    # Snakemake would wrap what is wrong with a name in a dozen lines
+    for word in sys.argv[1:] if workflow.is_main_process and not IS_MODULE else ():
+        SETTINGS.require_target(word)
 except SepiError as error:
     sys.exit(f"sepi: {error}")
 except OSError as error:

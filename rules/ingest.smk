@@ -18,7 +18,7 @@ rule ingest:
     params:
         source=ingest_source,
         disparity_range=ingest_range,
-        code=code_digest("sepi.ingest"),
+        code=lambda wildcards: code_digest(*ingest_modules(scene_of(wildcards).reader)),
     message:
         "{wildcards.dataset}/{wildcards.scene}: reading the light field"
     shell:

@@ -3,7 +3,7 @@
 
 import time
 
-from sepi.workflow.run_folder import note_run, say_if_full, say_so, take_over, tidy_up
+from sepi.workflow.run_folder import note_run, put_away, say_if_full, say_so, take_over
 from sepi.workflow.run_log import show_progress
 
 STARTED = time.time()
@@ -60,7 +60,7 @@ def run_ended_well():
 
 def run_failed():
     """Put away what a job left: it may have been killed, the clock set back, the disk be full."""
-    tidy_up(MADE)
+    put_away(MADE)
     say_if_full(Path())
 
 

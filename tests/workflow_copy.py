@@ -7,11 +7,13 @@ import signal
 import subprocess
 import sys
 import time
+from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
+from unittest import mock
 
 import yaml
 
@@ -85,13 +87,53 @@ class Workflow:
         )
 
     def plan(self, *targets: str) -> dict[str, int]:
-        """Rule to number of jobs that a run would have, but for those that only collect."""
+        """Rule to number of jobs that a run would have; asked in this process where the package is the tests' own."""
+        if self.tree == REPOSITORY:
+            return self._planned_here(targets)
         result = self.run(*targets, flags=("--dry-run",))
         assert result.returncode == 0, result.stdout
         if "Nothing to be done" in result.stdout:
             return {}
         table = result.stdout.split("Job stats:")[1].split("total")[0]
         return {rule: int(count) for rule, count in re.findall(r"^(\w+) +(\d+)$", table, re.MULTILINE)}
+
+    @contextmanager
+    def _read(self) -> Iterator[Any]:
+        """Snakemake's own object for the workflow, for a dry run."""
+        from snakemake.api import SnakemakeApi
+        from snakemake.settings.types import ConfigSettings, OutputSettings, Quietness, ResourceSettings
+
+        self.folder.mkdir(exist_ok=True)
+        before = Path.cwd()
+        output = OutputSettings(quiet={Quietness.ALL}, dryrun=True)
+        # what the rules set for their jobs ends with them
+        with mock.patch.dict(os.environ), SnakemakeApi(output) as api:
+            try:
+                yield api.workflow(
+                    ResourceSettings(cores=2),
+                    ConfigSettings(config=self.config),
+                    snakefile=self.tree / "Snakefile",
+                    workdir=self.folder,
+                )
+            finally:
+                os.chdir(before)
+
+    def read(self) -> Any:
+        """The rules, and the functions and settings of their files ("globals"), as Snakemake reads them."""
+        with self._read() as workflow:
+            return workflow._workflow
+
+    def _planned_here(self, targets: tuple[str, ...]) -> dict[str, int]:
+        from snakemake.settings.types import DAGSettings, ExecutionSettings, SchedulingSettings
+
+        with self._read() as workflow:
+            workflow.dag(DAGSettings(targets=set(targets))).execute_workflow(
+                executor="dryrun",
+                execution_settings=ExecutionSettings(),
+                scheduling_settings=SchedulingSettings(scheduler="greedy"),
+            )
+            jobs = workflow._workflow.dag.needrun_jobs(exclude_finished=False)
+            return dict(Counter(job.rule.name for job in jobs))
 
     def stage_plan(self, *targets: str) -> dict[str, int]:
         """The plan without what comes after the stages (scores, tables, maps)."""

@@ -98,14 +98,19 @@ def check(context: click.Context, light_field_path: Path, reading: Reading, as_j
 
     Software does not agree on whether rows of views go up or down, columns left or right, or which of the two comes
     first; in a wrong order depth is inside out or nonsense. The views tell: all eight orders are tried, and the flag
-    is named that sets INPUT right. Exits with 1 where another order clearly fits better.
+    is named that sets INPUT right. Exits with 1 where another order clearly fits better, with 2 where INPUT cannot be
+    read.
     """
     from sepi.inspection.row_spacing import settle_row_spacing
     from sepi.inspection.view_order import check_order
 
-    light_field = reading.read(light_field_path, check_order=False)
-    if reading.options.row_spacing is None:
-        light_field = settle_row_spacing(light_field)
+    try:
+        light_field = reading.read(light_field_path, check_order=False)
+        if reading.options.row_spacing is None:
+            light_field = settle_row_spacing(light_field)
+    except SepiError as error:
+        click.echo(f"sepi: {error}", err=True)
+        context.exit(2)
     found = check_order(light_field, reading.options.order)
     if as_json:
         known = {

@@ -10,7 +10,10 @@ Snakemake sees the shell command of a rule, not the modules that the command imp
 - not what stands below ``if TYPE_CHECKING:``, which never runs;
 - not the ``__init__`` of a package on the way to a module: it is run, but nothing of it is used. It counts where a name
   is imported from the package itself;
-- the syntax tree without docstrings: neither comments nor layout count;
+- not the readers of the formats and the built-in scenes, of which a job runs one: only that one counts, which
+  :func:`ingest_modules` names;
+- the syntax tree without docstrings, texts of help and descriptions of parameters: neither these nor comments nor
+  layout count, and every version of Python gives the same digest;
 - not other libraries: a new version of numpy reruns nothing.
 
 No stage imports another stage, so a change in one leaves the others' digests as they are.
@@ -24,7 +27,7 @@ from collections.abc import Iterator
 from functools import cache
 from importlib.util import resolve_name
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from sepi.stage import Choice
@@ -36,11 +39,25 @@ _DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
 _NOT_RUN = ("TYPE_CHECKING", "__name__ == '__main__'")
 
 
+# packages and modules of which a job runs one
+_ALTERNATIVES = (
+    "scenes",
+    *(f"io.readers.{name}" for name in ("eslf", "hci", "hci_2013", "image_folder", "matlab", "numpy_files", "open_lf")),
+)
+# what is told to people alone
+_TOLD = ("help", "description")
+
+
 def stage_modules(stage: str, choice: Choice) -> tuple[str, ...]:
     """Modules that decide, with what they import, what is in a stage's file: the stage, the module of the choice that
     it runs, and the format of the file.
     """
     return (f"sepi.{stage}", choice.run.__module__, "sepi.io.hdf5", "sepi.io.provenance")
+
+
+def ingest_modules(reader: str) -> tuple[str, ...]:
+    """Modules that decide what is in a light field's file: ingest, and the module that reads or renders the views."""
+    return ("sepi.ingest", reader)
 
 
 @cache
@@ -78,8 +95,14 @@ def imported_modules(*modules: str, root: Path = ROOT) -> set[str]:
         name = waiting.pop()
         if name not in found:
             found.add(name)
-            waiting.extend(_code_and_imports(name, root)[1])
+            followed = _code_and_imports(name, root)[1]
+            waiting.extend(other for other in followed if _is_alternative(name) or not _is_alternative(other))
     return found
+
+
+def _is_alternative(module: str) -> bool:
+    inner = f"{module.partition('.')[2]}."
+    return any(inner.startswith(f"{known}.") for known in _ALTERNATIVES)
 
 
 @cache
@@ -103,7 +126,21 @@ def _code_and_imports(module: str, root: Path) -> tuple[str, frozenset[str]]:
             imports.update(_imported(node, package, root))
         elif isinstance(node, _DOCUMENTED) and ast.get_docstring(node, clean=False) is not None:
             node.body = node.body[1:]
-    return ast.dump(tree), frozenset(name for name in imports if name.split(".")[0] == module.split(".")[0])
+        elif isinstance(node, ast.Call):
+            node.keywords = [keyword for keyword in node.keywords if keyword.arg not in _TOLD]
+    return _dumped(tree), frozenset(name for name in imports if name.split(".")[0] == module.split(".")[0])
+
+
+def _dumped(node: Any) -> str:
+    """A syntax tree as text; versions of Python differ in the empty fields that they have, and ``ast.dump`` in more."""
+    if isinstance(node, list):
+        return f"[{', '.join(map(_dumped, node))}]"
+    if isinstance(node, ast.Constant):
+        return repr(node.value)
+    if not isinstance(node, ast.AST):
+        return repr(node)
+    fields = [(name, value) for name, value in ast.iter_fields(node) if value is not None and value != []]
+    return f"{type(node).__name__}({', '.join(f'{name}={_dumped(value)}' for name, value in fields)})"
 
 
 def _imported(node: ast.Import | ast.ImportFrom, package: str, root: Path) -> Iterator[str]:

@@ -26,9 +26,10 @@ from sepi.validation import require_known, validated
 from sepi.variants import VARIANT_ENTRIES, VARIANTS, Variant, variant_from
 from sepi.workflow.datasets import LONGEST_NAME, Scene, own_scene, require_plain_path, scenes_in
 from sepi.workflow.parameters import default_values, stage_settings
+from sepi.workflow.result_paths import RESULTS
 
 # names of folders, panels and columns of tables that stand beside those of variants
-_RESERVED = ("stages", "external", "ground_truth", "reference_view", "dataset", "scene", "row", "region")
+_RESERVED = ("stages", "complete", "external", "ground_truth", "reference_view", "dataset", "scene", "row", "region")
 # the built-in scenes have 9x9 views
 _BUILTIN_VIEWS = 81
 # keys whose values are text even where they look like numbers
@@ -196,6 +197,20 @@ class Settings:
             require_known("dataset", [dataset], self.datasets)
             require_known(f"scene of dataset '{dataset}'", [name], self.scenes_of(dataset))
         return self.scenes[dataset, name]
+
+    def require_target(self, path: str) -> None:
+        """Check the names in a file that a user asks for, if it lies among the results.
+
+        Raises
+        ------
+        SepiError
+            If there is no such dataset, scene or variant; the message suggests the nearest.
+        """
+        folder, *names = Path(path).parts or ("",)
+        if folder == str(RESULTS) and len(names) > 2:
+            self.scene(names[0], names[1])
+            if len(names) == 4 and names[2] != "stages":
+                require_known(f"{path}: variant", [names[2]], self.variants)
 
     def parameters_json(self, stage: str, label: str) -> str:
         """Parameters of a stage's choice as JSON with sorted keys."""

@@ -8,10 +8,13 @@ import re
 from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 from sepi.errors import SepiError
-from sepi.io.readers import hci_2013
+from sepi.io.images import SUFFIXES
+from sepi.io.readers import hci, hci_2013
+from sepi.io.readers.formats import format_of
 from sepi.io.readers.sizes import size_of
 
 VIEW_PATTERN = "input_Cam*.png"
@@ -21,6 +24,9 @@ LONGEST_NAME = 80
 
 # what a scene's folder may hold besides views, and ingest reads
 _OTHER_PATTERNS = ("parameters.cfg", "gt_disp_lowres.pfm", "*mask*.png")
+# ... and of a folder of pictures in any layout
+_BESIDE_PICTURES = (hci.PARAMETERS, hci.TRUTH)
+_FORMAT_OF = {"hci": "hci", "hci_2013": "hci-2013"}
 # a scene's name is a folder name below results/ and a word on the command line
 _NAME = re.compile(rf"[A-Za-z0-9][A-Za-z0-9_.+-]{{0,{LONGEST_NAME - 1}}}")
 _REPLACED = re.compile("<[a-z][a-z0-9_]*>|[{}]+")
@@ -75,6 +81,18 @@ class Scene:
     def samples(self) -> int:
         """Number of pixels of all views together."""
         return self.views * self.height * self.width
+
+    @property
+    def reader(self) -> str:
+        """The module that reads the views, or renders them."""
+        if self.source is None:
+            return "sepi.scenes"
+        given = dict(pairwise(self.flags)).get("--format", _FORMAT_OF.get(self.dataset))
+        try:
+            return format_of(self.source, given).read.__module__
+        except SepiError:
+            # ingest will say what is wrong
+            return format_of.__module__
 
     def memory_mb(self, bytes_per_sample: float, bytes_per_pixel: float = 0, copies: int = 2) -> int:
         """Memory of a job on this scene in MB.
@@ -165,6 +183,9 @@ def own_scene(name: str, source: Path, flags: tuple[str, ...], where: str) -> Sc
     source = source.resolve()
     inside = [path for path in sorted(source.iterdir()) if path.is_file()] if source.is_dir() else [source]
     files = tuple(path for path in inside if not path.name.startswith("."))
+    # notes beside pictures are no part of the light field
+    read = tuple(path for path in files if path.suffix.lower() in SUFFIXES or path.name in _BESIDE_PICTURES)
+    files = read if source.is_dir() and read else files
     return Scene("own", name, source, files, *size_of(files), flags=flags)
 
 

@@ -25,7 +25,7 @@ _STATE = Path(".snakemake")
 _NEARLY_FULL = 100_000_000
 # second line of the file that each run holds
 _WELL = "ended well"
-# the operating system's lock is held for as long as this is open: until the process ends
+# the operating system's lock is held for as long as this is open, until the process ends: shared with runs of --nolock
 _held: list[TextIO] = []
 
 
@@ -60,12 +60,13 @@ def take_over(folder: Path, made: Iterable[Path]) -> bool:
     except OSError:
         # what is wrong with the folder, Snakemake says
         return False
+    _held.append(run)
     try:
         fcntl.flock(run, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except OSError:
-        run.close()
+        # not alone, but others shall know of this one
+        _share(run)
         return False
-    _held.append(run)
     run.seek(0)
     before, machine = run.read().splitlines(), platform.node()
     locks = [path for path in (state / "locks").glob("*.lock") if path.is_file()]
@@ -80,7 +81,30 @@ def take_over(folder: Path, made: Iterable[Path]) -> bool:
         if _WELL not in before or any(_is_to_come(state / name, now) for name in ("metadata", "run_of_sepi")):
             tidy_up(made)
         note_run(well=True)
+    _share(run)
     return killed
+
+
+def _share(run: TextIO) -> None:
+    """Let other runs hold the folder, too; no one else may then put files away."""
+    import fcntl
+
+    try:
+        fcntl.flock(run, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except OSError:
+        _held.remove(run)
+        run.close()
+
+
+def put_away(made: Iterable[Path]) -> None:
+    """Tidy up after a run that failed, unless another one goes on in the folder, or may."""
+    for run in list(_held):
+        import fcntl
+
+        with suppress(OSError):
+            fcntl.flock(run, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            tidy_up(made)
+        _share(run)
 
 
 def note_run(well: bool) -> None:

@@ -513,6 +513,13 @@ def test_program_runs_and_fails_without_traceback(pyramids: Path, tmp_path: Path
     assert run("--version", cwd=tmp_path).stdout == f"sepi {sepi.__version__}\n"
 
 
+def test_check_tells_a_wrong_order_from_what_cannot_be_read(tmp_path: Path) -> None:
+    """A script that goes through a folder asks its exit code."""
+    called = call("check", tmp_path / "absent")
+    assert called.exit_code == 2
+    assert "no such file or folder" in called.output
+
+
 @pytest.mark.parametrize("command", ["depth", "evaluate", "info", "check", "scenes", "points", "submission"])
 def test_each_command_has_help(command: str) -> None:
     called = call(command, "--help")

@@ -5,13 +5,14 @@ from pathlib import Path
 import pytest
 
 from sepi.compared.methods import METHODS
+from sepi.io.readers.formats import FORMATS
 from sepi.variants import STAGES
-from sepi.workflow.code_digest import code_digest, imported_modules, stage_modules
+from sepi.workflow.code_digest import code_digest, imported_modules, ingest_modules, stage_modules
 
 FILES = {
     "pkg/__init__.py": "from pkg import extra\n",
     "pkg/one.py": '"""One."""\n\nimport numpy\n\nfrom pkg import shared\nfrom pkg.io import reader\n\n\n'
-    'def f(x):\n    """Twice."""\n    return 2 * x  # doubled\n',
+    'def f(x):\n    """Twice."""\n    return 2 * x  # doubled\n\n\ng = option("--n", help=f"Number {1:{2}d}.")\n',
     "pkg/two.py": "from pkg.shared import value\nfrom .io.files import path\n",
     "pkg/shared.py": "value = 1\n",
     "pkg/extra.py": "extra = 1\n",
@@ -66,6 +67,8 @@ def test_imports_are_followed(tree: Path) -> None:
     [
         ("pkg/one.py", "2 * x", "3 * x", {"one"}),
         ("pkg/one.py", "# doubled", "# two times", set()),
+        ("pkg/one.py", "Number ", "Count ", set()),
+        ("pkg/one.py", "--n", "--m", {"one"}),
         ("pkg/one.py", "Twice.", "Two times.", set()),
         ("pkg/one.py", '"""One."""', '"""The first."""', set()),
         ("pkg/one.py", "2 * x", "(\n        2 * x\n    )", set()),
@@ -79,6 +82,26 @@ def test_imports_are_followed(tree: Path) -> None:
 )
 def test_what_changes_a_digest(tree: Path, file: str, old: str, new: str, changed: set[str]) -> None:
     assert changed_by(tree, file, old, new) == changed
+
+
+def test_every_version_of_python_gives_the_same(tree: Path) -> None:
+    """Another environment would make everything again."""
+    assert [code_digest(f"pkg.{name}", root=tree) for name in ("one", "deep")] == [
+        "312b952a5c632cca",
+        "005d5b49c3c126dc",
+    ]
+
+
+def test_a_light_field_is_read_again_for_its_own_reader_alone() -> None:
+    """A word in another format's reader must not cost all maps."""
+    readers = {known.read.__module__ for known in FORMATS.values()} - {FORMATS["sepi"].read.__module__}
+    for reader in (*readers, "sepi.scenes"):
+        found = imported_modules(*ingest_modules(reader))
+        assert {reader, "sepi.io.hdf5", "sepi.inspection.disparity_range"} <= found
+    assert not imported_modules(*ingest_modules("sepi.io.readers.numpy_files")) & (
+        readers - {"sepi.io.readers.numpy_files"}
+    )
+    assert not any(name.startswith("sepi.scenes") for name in imported_modules("sepi.ingest"))
 
 
 def test_a_module_that_does_not_exist_is_an_error(tree: Path) -> None:

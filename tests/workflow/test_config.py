@@ -122,6 +122,8 @@ def test_defaults_run_every_builtin_scene_and_variant() -> None:
         ),
         ({"variants": {"paper": {"base": "best"}}}, "config.variants.paper: a built-in variant has a fixed meaning"),
         ({"variants": {"region": {"base": "wang"}}}, "config.variants.region: a variant's name must be letters"),
+        # its folder would lie where the file does that says that the scene is complete
+        ({"variants": {"complete": {"base": "wang"}}}, "config.variants.complete: a variant's name must be letters"),
         ({"variants": {"a/b": {"base": "wang"}}}, "config.variants.a/b: a variant's name must be letters"),
         (
             {"stages": {"shared": {"plane_sweeps": {}}}},
@@ -340,10 +342,13 @@ class TestOwnLightFields:
 
     def test_every_picture_of_a_folder_is_an_input(self, tmp_path: Path) -> None:
         folder = make_scene(tmp_path / "flowers", views=4)
-        (folder / ".hidden").touch()
+        for name in (".hidden", "notes.txt", "parameters.cfg"):
+            (folder / name).touch()
         (folder / "below").mkdir()
         scene = load_settings({"light_fields": {"a": {"path": str(folder)}}}).scene("own", "a")
-        assert [path.name for path in scene.files] == [f"input_Cam00{number}.png" for number in range(4)]
+        # notes are no part of the light field: whoever writes them need not wait for all maps
+        pictures = [f"input_Cam00{number}.png" for number in range(4)]
+        assert [path.name for path in scene.files] == [*pictures, "parameters.cfg"]
         assert (scene.views, scene.height, scene.width) == (4, 30, 40)
 
     @pytest.mark.parametrize(

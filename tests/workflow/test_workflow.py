@@ -409,8 +409,11 @@ class TestTargets:
     )
     def test_an_unknown_name_in_a_target_is_named(self, workflow: Workflow, target: str, expected: str) -> None:
         result = workflow.run(target, flags=("--dry-run",))
-        assert result.returncode != 0
-        assert expected in result.stdout
+        assert result.returncode == 1
+        (line,) = result.stdout.splitlines()[-1:]
+        assert line.startswith("sepi: ")
+        assert expected in line
+        assert "Exception" not in result.stdout
 
 
 class TestConfiguration:

@@ -1,0 +1,122 @@
+"""The rules, as Snakemake reads them: what would leave stale results, or jobs that a cluster ends, without a word."""
+
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+from snakemake.iocontainers import Wildcards
+from workflow_copy import REPOSITORY, TINY, Workflow
+
+from sepi.report.plan import TEMPLATES
+from sepi.report.published import FOLDER as PUBLISHED
+from sepi.variants import HANDED_ON, STAGES
+from sepi.workflow.code_digest import code_digest, ingest_modules, stage_modules
+from sepi.workflow.datasets import Scene
+
+pytestmark = pytest.mark.workflow
+
+BEST = {
+    "initial": "semi_global",
+    "occlusion": "visibility",
+    "textureless": "uniform_planes",
+    "optimize": "second_order",
+}
+
+
+def scene(**labels: str) -> Wildcards:
+    names = {"dataset": "builtin", "scene": "dots", "which": "", "variant": "best", **BEST, **labels}
+    return Wildcards(fromdict=names)
+
+
+@pytest.fixture(scope="module")
+def read(tmp_path_factory: pytest.TempPathFactory) -> Any:
+    """The workflow with maps of another method, of which one is there."""
+    root = tmp_path_factory.mktemp("rules")
+    (root / "maps").mkdir()
+    (root / "maps/dots.pfm").touch()
+    maps = {"there": str(root / "maps"), "absent": str(root / "nowhere")}
+    return Workflow(REPOSITORY, root / "run", TINY | {"external": maps}).read()
+
+
+def of_size(size: int, folder: Path, **more: Any) -> dict[str, Any]:
+    """The functions of the rules' files, for a built-in scene of this size."""
+    config = {"builtin": {"scenes": ["dots"], "size": size}, **more}
+    found: dict[str, Any] = Workflow(REPOSITORY, folder / "run", config).read().globals
+    return found
+
+
+def test_every_job_is_made_again_for_its_own_code(read: Any) -> None:
+    """A rule without the digest of its command would keep what earlier code made."""
+    checked = set()
+    for rule in read.rules:
+        command = re.search(r"-m (sepi[\w.]*)", rule.shellcmd or "")
+        if command is None:
+            continue
+        checked.add(rule.name)
+        code = dict(rule.params.items()).get("code")
+        for name, chosen in STAGES.get(rule.name, {"": None}).items():
+            if name == HANDED_ON:
+                continue
+            modules = (command[1],) if chosen is None else stage_modules(rule.name, chosen)
+            if rule.name == "ingest":
+                modules = ingest_modules("sepi.scenes")
+            given = code(scene(**{rule.name: name})) if callable(code) else code
+            assert given == code_digest(*modules), f"{rule.name} {name}"
+        if "--code" in rule.shellcmd:
+            assert "--code {params.code}" in rule.shellcmd
+    assert {
+        "ingest",
+        *STAGES,
+        "evaluate",
+        "export",
+        "external",
+        "numbers",
+        "tables",
+        "maps",
+        "page",
+        "graph",
+    } <= checked
+
+
+def test_every_file_that_a_job_reads_is_an_input(read: Any) -> None:
+    """A published figure that was mended, a map of another method, a template of the page: none would be seen."""
+    rules = {rule.name: rule for rule in read.rules}
+    (there,) = rules["external"].input.maps(scene())
+    assert there.endswith("maps/dots.pfm")
+    assert {Path(file) for file in rules["numbers"].input.published} == set(PUBLISHED.glob("*.csv"))
+    for page in ("page", "comparison_page"):
+        assert {Path(file) for file in rules[page].input.templates} == set(TEMPLATES)
+
+
+def test_what_a_cluster_ended_is_tried_with_twice_as_much(read: Any) -> None:
+    found = read.globals
+    for stage in ("initial", "occlusion", "optimize"):
+        for ask in (found["stage_memory_for"](stage, 13, 1300), found["stage_minutes_for"](stage, 30)):
+            assert ask(scene(), attempt=2) == 2 * ask(scene(), attempt=1) > 0
+    for ask in (found["memory_for"](12), found["minutes_for"](1)):
+        assert ask(scene(), attempt=2) == 2 * ask(scene(), attempt=1) > 0
+
+
+def test_threads_follow_the_size_of_the_scene(tmp_path: Path) -> None:
+    """Of one thread alone, a benchmark scene takes three times as long."""
+    assert [of_size(size, tmp_path)["threads_for"](scene()) for size in (64, 512, 1024)] == [1, 3, 8]
+
+
+def test_many_candidates_ask_for_memory_and_time(tmp_path: Path) -> None:
+    """Those of a wide range; a cluster would end the job."""
+    asked = []
+    for number in (91, 911):
+        values = {"shared": {"base_detail_sweep": {"num_disparities": number}}}
+        found = of_size(512, tmp_path, stages=values)
+        memory, minutes = found["stage_memory_for"]("initial", 13, 1300), found["stage_minutes_for"]("initial", 0.2)
+        asked.append((memory(scene(), attempt=1), minutes(scene(), attempt=1)))
+    (little, short), (much, long) = asked
+    assert much - little >= 800 * 4 * 512 * 512 / 2**20
+    assert long > 2 * short
+
+
+def test_minutes_are_several_times_what_was_measured() -> None:
+    """Of a benchmark scene, 30 s for a million samples: 11 minutes on the machine of the measurement."""
+    benchmark = Scene("hci", "cotton", None, (), 81, 512, 512)
+    assert 20 < benchmark.minutes(30) < 60
