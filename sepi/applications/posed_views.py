@@ -89,6 +89,20 @@ class PosedViews:
         depth = self.camera.depth(carried)
         return np.where(np.isfinite(depth) & ~np.isnan(carried), depth, np.float32(0))
 
+    def normals(self, view: int, carried: FloatMap) -> FloatMap:
+        """Unit normals of a view's surfaces in its camera's axes, towards it, (3, H, W) float32; 0 without depth.
+
+        Inverse depth, and so disparity, is linear on a plane: its slopes tell the normal exactly.
+        """
+        down, across = (_slopes(carried, axis) for axis in (0, 1))
+        x, y = self.poses.principal_points[view]
+        row, column = np.indices(carried.shape)
+        ahead = carried + self.camera.offset - across * (column - x) - down * (row - y)
+        facing = -np.stack([self.poses.focal_px * across, self.poses.focal_px * down, ahead])
+        known = (self.depth(carried) > 0) & np.isfinite(facing).all(axis=0)
+        length = np.linalg.norm(facing, axis=0)
+        return np.where(known, facing / np.where(known, length, 1), 0).astype(np.float32)
+
     def sees(self, view: int, carried: FloatMap) -> npt.NDArray[np.bool_]:
         """Which of the points a view sees, (P,), given its :meth:`carried` disparity."""
         return seen(carried, self.disparity, self.chosen, self.poses.baselines[view])
@@ -150,6 +164,16 @@ def posed_views(
         known=known,
         chosen=_thinned(_sure(known, confidence, min_confidence), max_points),
     )
+
+
+def _slopes(disparity: FloatMap, axis: int) -> npt.NDArray[np.float64]:
+    """Change of disparity from pixel to pixel along an axis, to the neighbour that differs less; 0 without any."""
+    steps = np.diff(disparity.astype(np.float64), axis=axis)
+    ends = np.full((1, steps.shape[1]) if axis == 0 else (steps.shape[0], 1), np.nan)
+    before, after = np.concatenate([ends, steps], axis), np.concatenate([steps, ends], axis)
+    # what is not known differs without end
+    size_before, size_after = (np.nan_to_num(np.abs(slope), nan=np.inf) for slope in (before, after))
+    return np.nan_to_num(np.where(size_before <= size_after, before, after))
 
 
 def _sure(known: BoolMap, confidence: FloatMap | None, least: float | None) -> BoolMap:

@@ -5,8 +5,11 @@ Structure from motion rarely works on light fields, whose views stand too close 
 The folder is COLMAP's workspace::
 
     images/view_04_04.png                                     each view, RGB of 8 bit
-    sparse/cameras.txt, images.txt, points3D.txt              the model as text
+    sparse/0/cameras.txt, images.txt, points3D.txt            the model as text, where other programs look for it
+    sparse/cameras.txt, images.txt, points3D.txt              the same, where stereo_fusion does
     stereo/depth_maps/view_04_04.png.geometric.bin            depth of each view, 0 where it is not known
+    stereo/normal_maps/view_04_04.png.geometric.bin           the way that surfaces face, 0 where it is not known
+    stereo/fusion.cfg                                         the views, for stereo_fusion
 
 Each view has a camera of its own, a ``PINHOLE`` with its principal point, and no rotation. Points are those of the
 reference view, with a track: the pixel at which each view sees them, unless something nearer hides them.
@@ -20,6 +23,7 @@ References
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -66,22 +70,32 @@ def write_colmap(folder: str | Path, posed: PosedViews, progress: Progress = no_
             carried = posed.carried(view)
             sees[view] = posed.sees(view, carried)
             write_png(temporary / "images" / f"{name}.png", posed.picture(view))
-            write_depth(temporary / "stereo/depth_maps" / f"{name}.png.geometric.bin", posed.depth(carried))
+            stereo = f"{name}.png.geometric.bin"
+            write_depth(temporary / "stereo/depth_maps" / stereo, posed.depth(carried))
+            _write_maps(temporary / "stereo/normal_maps" / stereo, posed.normals(view, carried))
             progress((view + 1) / len(posed.poses))
         for name, lines in {
-            "cameras.txt": _cameras(posed),
-            "images.txt": _images(posed, sees),
-            "points3D.txt": _points(posed, sees),
+            "sparse/0/cameras.txt": _cameras(posed),
+            "sparse/0/images.txt": _images(posed, sees),
+            "sparse/0/points3D.txt": _points(posed, sees),
+            "stereo/fusion.cfg": (f"{name}.png" for name in posed.names),
         }.items():
-            with atomic_path(temporary / "sparse" / name) as path, path.open("w", encoding="ascii") as file:
+            with atomic_path(temporary / name) as path, path.open("w", encoding="ascii") as file:
                 file.writelines(f"{line}\n" for line in lines)
+        for path in (temporary / "sparse/0").iterdir():
+            shutil.copyfile(path, temporary / "sparse" / path.name)
 
 
 def write_depth(path: Path, depth: FloatMap) -> None:
     """Write a depth map (H, W) in COLMAP's binary format."""
-    height, width = depth.shape
+    _write_maps(path, depth[None])
+
+
+def _write_maps(path: Path, maps: FloatMap) -> None:
+    """Write maps (C, H, W), one after the other, in COLMAP's binary format."""
+    channels, height, width = maps.shape
     with atomic_path(path) as temporary:
-        temporary.write_bytes(f"{width}&{height}&1&".encode("ascii") + depth.astype("<f4").tobytes())
+        temporary.write_bytes(f"{width}&{height}&{channels}&".encode("ascii") + maps.astype("<f4").tobytes())
 
 
 def _cameras(posed: PosedViews) -> Iterator[str]:

@@ -71,7 +71,9 @@ def test_poses_writes_a_model_of_colmap_unless_told() -> None:
     assert files_in("scene-colmap") == {
         *(f"images/{name}" for name in names),
         *(f"stereo/depth_maps/{name}.geometric.bin" for name in names),
-        *(f"sparse/{name}.txt" for name in ("cameras", "images", "points3D")),
+        *(f"stereo/normal_maps/{name}.geometric.bin" for name in names),
+        "stereo/fusion.cfg",
+        *(f"sparse/{folder}{name}.txt" for folder in ("", "0/") for name in ("cameras", "images", "points3D")),
     }
     points = [line for line in Path("scene-colmap/sparse/points3D.txt").read_text().splitlines() if line[0] != "#"]
     # the surer half of what is known

@@ -19,6 +19,7 @@ from sepi.lightfield import LightField
 from sepi.scenes import render
 
 CAMERA = Camera(scale=30.0, offset=6.0, focal_px=90.0)
+NORMALS = "model/stereo/normal_maps/view_01_01.png.geometric.bin"
 WRITERS = {"colmap": write_colmap, "nerfstudio": write_nerfstudio}
 
 
@@ -103,7 +104,7 @@ def test_colmap_model_sees_points_where_the_views_show_them(
     scene = scene_of(geometry, view=view)
     posed = posed_of(scene)
     write_colmap(tmp_path / "model", posed)
-    images, points, tracks = read_model(tmp_path / "model/sparse")
+    images, points, tracks = read_model(tmp_path / "model/sparse/0")
     places = {f"view_{t:02}_{s:02}.png": (t, s) for t, s in np.argwhere(scene.present)}
     assert [image.name for image in images.values()] == list(places)
     pixels = np.argwhere(posed.chosen)
@@ -153,12 +154,36 @@ def test_colmap_depth_is_that_of_the_camera(tmp_path: Path) -> None:
         assert other.max() <= depth.max()
 
 
+def test_colmap_fuses_the_workspace(tmp_path: Path) -> None:
+    """Users fuse to a dense cloud as their next step; of a slanted plane it must be one, facing the cameras."""
+    pycolmap = pytest.importorskip("pycolmap")
+    scene = render("slanted_plane", size=64, views=3)
+    write_colmap(tmp_path / "model", posed_of(LightField(scene.views, "plane", ground_truth=scene.ground_truth)))
+    options = pycolmap.StereoFusionOptions()
+    options.num_threads = 1
+    (tmp_path / "fused").mkdir()
+    cloud = pycolmap.stereo_fusion(tmp_path / "fused", tmp_path / "model", options=options)
+    points = np.array([point.xyz for point in cloud.points3D.values()])
+    assert len(points) > 1000
+    plane, residuals, *_ = np.linalg.lstsq(np.column_stack([points[:, :2], np.ones(len(points))]), points[:, 2])
+    assert np.sqrt(residuals[0] / len(points)) < 0.003
+    *size, data = (tmp_path / NORMALS).read_bytes().split(b"&", 3)
+    assert size == [b"64", b"64", b"3"]
+    normals = np.frombuffer(data, "<f4").reshape(3, 64, 64)
+    expected = np.array([plane[0], plane[1], -1]) / np.linalg.norm([plane[0], plane[1], -1])
+    np.testing.assert_allclose(np.median(normals, axis=(1, 2)), expected, atol=0.01)
+    for name in ("cameras", "images", "points3D"):
+        assert (tmp_path / f"model/sparse/{name}.txt").read_bytes() == (
+            tmp_path / f"model/sparse/0/{name}.txt"
+        ).read_bytes()
+
+
 def test_colmap_itself_reads_the_model(tmp_path: Path) -> None:
     """What COLMAP's own library makes of it: poses, cameras, tracks, and depth."""
     pycolmap = pytest.importorskip("pycolmap")
     posed = posed_of(scene_of("closer rows"))
     write_colmap(tmp_path / "model", posed)
-    model = pycolmap.Reconstruction(tmp_path / "model/sparse")
+    model = pycolmap.Reconstruction(tmp_path / "model/sparse/0")
     assert (model.num_images(), model.num_points3D()) == (8, len(posed.points))
     for point in model.points3D.values():
         for element in point.track.elements:
