@@ -1,6 +1,7 @@
 # make        environment, then `snakemake all` on the built-in scenes
 # make check  environment, then the fast part of the tests: for every save
-# make test   environment, then the whole test suite, on all cores
+# make test   environment, then every test of what a user would notice, on all cores
+# make test-system  environment, then kills, Slurm, full disks, memory limits, kernels compiled anew, archives
 # make faults  environment, then a hundred kills of the workflow and thousands of damaged files: half an hour
 # make fuzz   environment, then an hour (SECONDS=3600) of files made to trip the readers, led by what code they reach
 # make coverage  the whole test suite, and the share of lines and branches that it runs
@@ -24,7 +25,7 @@ COMPARED := .venv/compared
 
 LINTS := lint-style lint-types lint-imports lint-rules lint-project
 
-.PHONY: all check test faults fuzz coverage lint $(LINTS) actionlint docs docs-links demo bench dist release oldest clean
+.PHONY: all check test test-system faults fuzz coverage lint $(LINTS) actionlint docs docs-links demo bench dist release oldest clean
 .DEFAULT_GOAL := all
 
 all: $(READY)
@@ -35,17 +36,21 @@ all: $(READY)
 WORKERS = $(shell $(PYTHON) -c 'import os; print((os.cpu_count() or 1) + 1)')
 ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 TESTS := $(ONE_THREAD) $(BIN)/python -m pytest --numprocesses $(WORKERS)
-QUICK := not real and not workflow and not browser and not slow
+QUICK := not real and not workflow and not browser and not slow and not system and not faults
 
 check: $(COMPARED)
 	$(TESTS) -m "$(QUICK)"
 
 test: $(COMPARED)
-	$(TESTS)
+	$(TESTS) -m "not system and not faults"
 
-# what `make test` does a few times, a hundred times
+test-system: $(COMPARED)
+	$(TESTS) -m "system and not faults"
+
+# what `make test` and `make test-system` do a few times, a hundred times; and what they leave to this
 faults: $(READY)
-	$(ONE_THREAD) SEPI_FAULTS=100 $(BIN)/python -m pytest tests/faults tests/fuzz tests/io/test_damage.py
+	$(ONE_THREAD) SEPI_FAULTS=100 $(BIN)/python -m pytest tests/fuzz tests/io/test_damage.py
+	$(ONE_THREAD) SEPI_FAULTS=100 $(BIN)/python -m pytest -m faults
 
 # not among the pinned versions: nothing else needs it
 SECONDS ?= 3600

@@ -12,6 +12,8 @@ from sepi.threads import available_cores
 if TYPE_CHECKING:
     from page_example import Example
 
+pytest_plugins = ("cpu_budget",)
+
 # beside a checkout, unless the environment names another place
 DATA = Path(os.environ.get("SEPI_DATA", Path(__file__).parents[2] / "shared" / "data"))
 

@@ -106,6 +106,7 @@ def files_of(tree: Path, folder: str = ".") -> set[str]:
     return {name for name in names if not name.startswith(("out/", "build/", "sepi.egg-info/"))}
 
 
+@pytest.mark.system
 def test_source_archive_holds_all_that_git_knows(tree: Path) -> None:
     """Who unpacks it has no Snakefile, rule, test or document that a checkout has; MANIFEST.in lists them."""
     with tarfile.open(build(tree, "sdist")) as archive:
@@ -114,6 +115,7 @@ def test_source_archive_holds_all_that_git_knows(tree: Path) -> None:
     assert names - made == files_of(tree)
 
 
+@pytest.mark.system
 def test_wheel_holds_the_whole_package(tree: Path) -> None:
     """Installed from the index, the report has no templates or published figures: ``package-data`` lists them."""
     with zipfile.ZipFile(build(tree, "wheel")) as wheel:

@@ -200,6 +200,7 @@ def test_machine_names_no_host_and_no_user() -> None:
     assert not {"node", "host", "user", "path"} & set(machine)
 
 
+@pytest.mark.system
 @pytest.mark.slow
 def test_small_run_measures_everything(tmp_path: Path) -> None:
     """The command of `make bench`, on a tiny scene: files to read, to compute with, and to look at."""

@@ -107,6 +107,7 @@ def is_ingest_of(workflow: Workflow, scene: str, process: psutil.Process) -> boo
     return False
 
 
+@pytest.mark.system
 def test_a_scene_is_one_submission_with_the_bytes_of_a_local_run(
     slurm: None, workflow: Workflow, expected: dict[str, str]
 ) -> None:
@@ -118,6 +119,7 @@ def test_a_scene_is_one_submission_with_the_bytes_of_a_local_run(
     assert "Nothing to be done" in on_slurm(workflow, *TARGETS).stdout
 
 
+@pytest.mark.faults
 def test_every_variant_has_the_bytes_of_a_local_run(slurm: None, workflow: Workflow, local: Workflow) -> None:
     """A cluster's jobs get other numbers of threads, and an environment of their own."""
     here = replace(local, folder=local.folder.with_name("local-variants"))
@@ -129,6 +131,7 @@ def test_every_variant_has_the_bytes_of_a_local_run(slurm: None, workflow: Workf
     assert digests(there) == digests(here)
 
 
+@pytest.mark.faults
 def test_killed_jobs_are_told_and_made_again(slurm: None, workflow: Workflow, expected: dict[str, str]) -> None:
     """By the system, where memory is short: one of a scene's jobs, or the process on the node that runs them all."""
     wounded = replace(workflow, folder=workflow.folder.with_name("wounded"))
@@ -145,6 +148,7 @@ def test_killed_jobs_are_told_and_made_again(slurm: None, workflow: Workflow, ex
     assert digests(wounded) == expected
 
 
+@pytest.mark.faults
 def test_several_scenes_are_one_submission_if_asked(slurm: None, workflow: Workflow) -> None:
     both = replace(workflow, folder=workflow.folder.with_name("both"))
     result = on_slurm(both, *TARGETS, more=("--group-components", "scene=2"))
@@ -152,6 +156,7 @@ def test_several_scenes_are_one_submission_if_asked(slurm: None, workflow: Workf
     assert len(re.findall("has been submitted with SLURM jobid", result.stdout)) == 1
 
 
+@pytest.mark.system
 def test_a_failing_job_is_told_within_a_minute(slurm: None, workflow: Workflow) -> None:
     """Otherwise one waits for a run that cannot end well; the other scene is made all the same."""
     picture = Path(workflow.config["hci_root"]) / "one" / "input_Cam004.png"
@@ -172,6 +177,7 @@ def test_a_failing_job_is_told_within_a_minute(slurm: None, workflow: Workflow) 
     assert mended.returncode == 0, mended.stdout
 
 
+@pytest.mark.faults
 def test_a_killed_run_goes_on_where_it_was(slurm: None, workflow: Workflow, expected: dict[str, str]) -> None:
     """What was submitted is still in the queue; taken from it as documented, nothing of it disturbs the next run."""
     killed = replace(workflow, folder=workflow.folder.with_name("killed"))

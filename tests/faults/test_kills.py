@@ -54,6 +54,7 @@ def killed_runs(workflow: Workflow, target: str, kills: int) -> Iterator[str]:
         yield kind if process.returncode else "nothing"
 
 
+@pytest.mark.faults
 def test_killed_at_any_moment(undisturbed: Workflow) -> None:
     """However often; and the documented way to go on is to start again."""
     random.seed(KILLS)
@@ -77,6 +78,7 @@ def test_killed_at_any_moment(undisturbed: Workflow) -> None:
         disturbed = replace(disturbed, folder=disturbed.folder.with_name(f"disturbed-{runs}"))
 
 
+@pytest.mark.system
 @pytest.mark.skipif(sys.platform != "linux", reason="only Linux tells a process that its parent is gone")
 def test_a_job_ends_with_its_workflow(undisturbed: Workflow) -> None:
     """Otherwise it goes on beside the next run, and both write the same files."""
@@ -94,6 +96,7 @@ def test_a_job_ends_with_its_workflow(undisturbed: Workflow) -> None:
         wait_for(lambda: not unfinished(), seconds=15)
 
 
+@pytest.mark.faults
 def test_a_terminal_that_closes(undisturbed: Workflow) -> None:
     """SIGHUP and SIGTERM end a run as Ctrl-C does: nothing half written, and the next one goes on."""
     expected = made(undisturbed)
@@ -107,6 +110,7 @@ def test_a_terminal_that_closes(undisturbed: Workflow) -> None:
         healed(closed, expected, PART)
 
 
+@pytest.mark.faults
 def test_the_same_on_one_thread_and_on_four(undisturbed: Workflow) -> None:
     """More cores must not be another result."""
     for cores in (1, 4):

@@ -58,7 +58,9 @@ def kilobytes_of(workflow: Workflow) -> int:
     return sum(-(-path.stat().st_size // 4096) * 4 for path in files_below(workflow.folder))
 
 
-@pytest.mark.parametrize("percent", [30, 80])
+@pytest.mark.parametrize(
+    "percent", [pytest.param(30, marks=pytest.mark.system), pytest.param(80, marks=pytest.mark.faults)]
+)
 def test_a_disk_that_is_full(undisturbed: Workflow, percent: int) -> None:
     """Half of a file under its own name would be taken for the whole by the next run."""
     full = replace(undisturbed, folder=undisturbed.folder.with_name(f"full-{percent}"))
@@ -74,6 +76,7 @@ def test_a_disk_that_is_full(undisturbed: Workflow, percent: int) -> None:
         healed(full, expected)
 
 
+@pytest.mark.faults
 def test_folders_that_turn_read_only(undisturbed: Workflow) -> None:
     """As a share does of which the rights are changed."""
     expected = made(undisturbed)
@@ -101,6 +104,7 @@ def test_folders_that_turn_read_only(undisturbed: Workflow) -> None:
     healed(closed, expected, PART)
 
 
+@pytest.mark.faults
 def test_jobs_that_get_too_little_memory(undisturbed: Workflow, tmp_path: Path) -> None:
     """One line says so, not a traceback from inside a library; and with more memory the run goes on."""
     write_hci(render("curved_occluders", size=3 * SIZE, views=9), tmp_path / "scenes" / "box")
@@ -124,6 +128,7 @@ def test_jobs_that_get_too_little_memory(undisturbed: Workflow, tmp_path: Path) 
     assert again.returncode == 0, again.stdout
 
 
+@pytest.mark.faults
 def test_a_clock_that_is_set_back_during_a_run(undisturbed: Workflow) -> None:
     """What is made then is older than what it is made of, which Snakemake refuses until the old time has come again."""
     expected = made(undisturbed)
@@ -136,6 +141,7 @@ def test_a_clock_that_is_set_back_during_a_run(undisturbed: Workflow) -> None:
     healed(back, expected, PART)
 
 
+@pytest.mark.faults
 @pytest.mark.parametrize("seconds", [-DAY, DAY])
 def test_a_clock_that_is_set_between_two_runs(undisturbed: Workflow, seconds: int) -> None:
     """Half of the work was done on a day that is yet to come, or long ago."""

@@ -80,8 +80,9 @@ def test_a_limit_on_memory_leaves_the_rest_to_the_bands() -> None:
     assert bytes_of_bands(field, list(stage_parameters(variant_named("paper")).values()), 600 * megabyte) > few
 
 
+@pytest.mark.system
 @pytest.mark.slow
-@pytest.mark.parametrize("limit", [500, 800])
+@pytest.mark.parametrize("limit", [500, pytest.param(800, marks=pytest.mark.faults)])
 def test_an_estimate_stays_within_its_memory(limit: int) -> None:
     """What somebody says that the machine has is what the process takes, libraries and light field included."""
     code = """
