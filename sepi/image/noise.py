@@ -40,17 +40,17 @@ def noise_level(image: FloatMap, region: BoolMap | None = None) -> float:
     response = np.abs(cv2.filter2D(np.ascontiguousarray(image), cv2.CV_32F, _MASK))
     if region is None:
         region = _with_signal(image)
-    response = response[region]
+    response = response.reshape(image.shape)[region]
     if not response.size:
         return 0.0
     return float(np.median(response).item() * _MEDIAN_TO_SIGMA / 6)
 
 
 def _with_signal(image: FloatMap) -> BoolMap:
-    """Samples (H, W, C) whose 3x3 neighbourhood is neither cut off nor flat; all where these are few."""
+    """Samples (H, W, C) whose 3x3 neighbourhood is neither cut off as a whole nor flat; all where these are few."""
     box = np.ones((3, 3), np.uint8)
     lowest, highest = (change(image, box).reshape(image.shape) for change in (cv2.erode, cv2.dilate))
-    found = (lowest > BLACK) & (highest < SATURATED) & (lowest < highest)
+    found = (highest > BLACK) & (lowest < SATURATED) & (lowest < highest)
     return np.asarray(found if found.mean() >= _LEAST_SHARE else np.ones_like(found))
 
 
