@@ -193,6 +193,7 @@ def second_order(
     guide = light_field.reference_view
     colours = colour_changes(guide)
     colour_variance = parameters.smooth_colour**2 + 4 * residual_variance(guide)
+    lowest, highest = light_field.require_disparity_range().candidates(2)
     total = parameters.refinements + parameters.solves
     for i in range(total):
         progress((i + 0.5) / (total + 1))
@@ -207,7 +208,7 @@ def second_order(
         radius = parameters.solve_radius if smooth else parameters.refinement_radius
         step, curvature = windowed_step(gradient, curvature, radius, parameters.max_update)
         # where no view knows anything, a step would follow the noise
-        target = disparity + np.where(uniform, np.float32(0), step)
+        target = np.clip(disparity + np.where(uniform, np.float32(0), step), lowest, highest)
         if smooth:
             weight = np.minimum(curvature / max(float(np.percentile(curvature, 90)), 1e-9), 1) * reliability
             weight = np.where(uniform, np.float32(UNIFORM_WEIGHT), weight)
@@ -215,7 +216,7 @@ def second_order(
             target = smooth_second_order(
                 target, disparity, weight, reliability, colours, colour_variance, parameters, rtol
             )
-        disparity = target
+        disparity = np.clip(target, lowest, highest)
     return before.updated(disparity, smooth_confidence(disparity, curvature))
 
 

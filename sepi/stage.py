@@ -18,6 +18,9 @@ from pydantic import BaseModel, ConfigDict, Field
 from sepi.errors import SepiError
 from sepi.lightfield import BoolMap, DisparityRange, FloatMap, LightField
 
+REACH = 4.0
+"""View steps from the reference view to the farthest, along an axis, in what a stage function sees: of 9x9 views."""
+
 Progress = Callable[[float], None]
 """Called with the fraction done, 0..1."""
 
@@ -300,10 +303,10 @@ class Choice:
     ----------
     parameters : type
         Model of its parameters, a subclass of :class:`Parameters`.
-    run : callable
+    function : callable
         The stage function ``(light_field, previous, parameters, progress) -> StageMaps``, where ``previous`` is what
         the stage before handed on (None for the first), and ``progress`` takes the fraction done, 0..1. It changes
-        none of its arguments, reads no ground truth and writes no file.
+        none of its arguments, reads no ground truth and writes no file. View steps are such as :meth:`run` makes them.
 
     Examples
     --------
@@ -330,7 +333,52 @@ class Choice:
     """
 
     parameters: type[Parameters]
-    run: StageFunction
+    function: StageFunction
+
+    def run(
+        self, light_field: LightField, previous: StageMaps | None, parameters: Parameters, progress: Progress
+    ) -> StageMaps:
+        """Run the stage function in view steps of which the farthest view is :data:`REACH` away.
+
+        What a threshold in pixels per view step means depends on how far the views stand apart; so the maps of a light
+        field whose positions are told in another unit are the same, but for that unit.
+
+        Parameters
+        ----------
+        light_field : LightField
+        previous : StageMaps or None
+            As the light field has its view steps; so are the maps that are returned.
+        parameters : Parameters
+        progress : callable
+
+        Returns
+        -------
+        StageMaps
+        """
+        factor = REACH / light_field.reach if light_field.reach > 0 else 1.0
+        if factor == 1:
+            return self.function(light_field, previous, parameters, progress)
+        given = None if previous is None else _rescaled(previous, 1 / factor)
+        found = self.function(_respaced(light_field, factor), given, parameters, progress)
+        # handed on: rounded no further
+        return previous if previous is not None and found is given else _rescaled(found, factor)
+
+
+def _respaced(light_field: LightField, factor: float) -> LightField:
+    """The same views with so many times as many view steps between them; ground truth, which no stage reads, goes."""
+    known = light_field.disparity_range
+    if known is not None:
+        known = replace(known, minimum=known.minimum / factor, maximum=known.maximum / factor)
+    positions = light_field.baselines * factor
+    return replace(light_field, positions=positions, disparity_range=known, ground_truth=None)
+
+
+def _rescaled(maps: StageMaps, factor: float) -> StageMaps:
+    """Maps with so many times the disparity."""
+    unit, volume = np.float32(factor), maps.cost_volume
+    if volume is not None:
+        volume = replace(volume, disparities=volume.disparities * unit)
+    return replace(maps, disparity=maps.disparity * unit, cost_volume=volume)
 
 
 def none(

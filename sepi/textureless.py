@@ -126,7 +126,8 @@ def lti(
     agreement = slope_agreement(before.disparity, parameters.agreement_radius, parameters.agreement_difference)
     # where no candidate inside the range was best, neighbours agree about its end only
     lowest, highest = light_field.require_disparity_range().candidates(2)
-    at_end = (before.disparity <= lowest) | (before.disparity >= highest)
+    rounding = 1e-6 * (highest - lowest + abs(highest) + abs(lowest))
+    at_end = (before.disparity <= lowest + rounding) | (before.disparity >= highest - rounding)
     agreement = np.where(at_end, np.float32(0), agreement)
     agrees = agreement > parameters.texture_agreement
     texture = canny_edges(light_field.reference_view, parameters) | (confidence > parameters.texture_confidence)

@@ -36,6 +36,7 @@ from pydantic import Field, model_validator
 
 from sepi.errors import SepiError
 from sepi.lightfield import FloatMap, LightField, as_unit_float
+from sepi.matching.view_subsets import grid_steps
 from sepi.stage import Choice, Parameters, Progress, StageMaps
 
 if TYPE_CHECKING:
@@ -120,6 +121,8 @@ def onnx(
         disparity[target] = _run(session, given, window, parameters)[inner]
         progress(number / len(pieces))
     disparity = disparity * np.float32(parameters.disparity_scale) + np.float32(parameters.disparity_offset)
+    # a network counts from one column of views to the next
+    disparity /= np.float32(grid_steps(light_field)[1])
     return StageMaps(disparity, np.ones_like(disparity))
 
 

@@ -213,7 +213,10 @@ def reference_noise(light_field: LightField) -> float:
     kept = _kept.get()
     if kept is None:
         return noise_level(light_field.reference_view)
-    if kept.light_field is not light_field:
+    known = kept.light_field
+    # each stage is given the same views anew
+    same = known is not None and known.views is light_field.views
+    if not same or known.reference_position != light_field.reference_position:
         # what was kept of another goes
         _kept.set(kept := _Kept(light_field, noise_level(light_field.reference_view)))
     return kept.noise

@@ -156,14 +156,15 @@ def _add_view(
             # the last row has none below: seen from the one above
             top, below = H - 2, np.float32(1)
         left = across[here]
-        # run of pixels whose sample lies inside the view
-        first, last = max(begin, -left), min(end, W - 1 - left)
+        # run of pixels whose sample lies inside the view: on its last column where nothing beyond it has a weight
+        whole = fx[here] == 0
+        first, last = max(begin, -left), min(end, W - left if whole else W - 1 - left)
         if top < 0 or top > H - 2 or last <= first:
             continue
         n, i, j = top - low, first + left, last + left + 1
         w = _weights(below, fx[here])
         out = cost[here, first - begin : last - begin]
-        if k < K and across[k] == left and y + down[k] == top:
+        if k < K and across[k] == left and y + down[k] == top and (fx[k] == 0) == whole:
             v = _weights(fy[k], fx[k])
             _add_two(
                 out, cost[k, first - begin : last - begin], _channels(pixels, n, i, j), _channels(pixels, n + 1, i, j),
@@ -199,7 +200,8 @@ def cost_row(views: ViewStack, candidates: Candidates, run: Run, cost: Any) -> N
     rows = 2
     for r in range(candidates.down.shape[0]):
         rows = max(rows, abs(candidates.down[r, last] - candidates.down[r, 0]) + 2)
-    pixels = np.empty((3, min(H, rows), W), np.float32)
+    pixels = np.empty((3, min(H, rows), W + 1), np.float32)
+    pixels[:, :, W] = 0
     for t in range(T):
         for s in range(S):
             g = views.groups[t, s]
@@ -242,9 +244,9 @@ def _count_views(views: ViewStack, candidates: Candidates, run: Run, counts: Any
             number = counts[x - run.begin, g * K : (g + 1) * K]
             for u in range(U):
                 if some[g, u]:
-                    left, of_column = candidates.across[u], having[g, u]
+                    left, fx, of_column = candidates.across[u], candidates.fx[u], having[g, u]
                     for k in range(K):
-                        inside = x + left[k] >= 0 and x + left[k] < W - 1
+                        inside = x + left[k] >= 0 and x + left[k] < (W if fx[k] == 0 else W - 1)
                         number[k] += of_column[k] if inside else np.float32(0)
 
 

@@ -50,7 +50,9 @@ def band_memory(number: int) -> Iterator[None]:
         _bytes.reset(token)
 
 
-def row_bands(light_field: LightField, present: BoolMap, reach: float, bytes_per_pixel: int) -> list[Band]:
+def row_bands(
+    light_field: LightField, present: BoolMap, reach: float, bytes_per_pixel: int, beside: int = 0
+) -> list[Band]:
     """The bands in which a light field is gone through.
 
     Parameters
@@ -62,6 +64,8 @@ def row_bands(light_field: LightField, present: BoolMap, reach: float, bytes_per
         Largest absolute disparity, pixels per view step.
     bytes_per_pixel : int
         What is held of each pixel of each view of a band.
+    beside : int
+        Rows above and below a band that are looked at with it.
 
     Returns
     -------
@@ -69,7 +73,7 @@ def row_bands(light_field: LightField, present: BoolMap, reach: float, bytes_per
         From the top to the bottom; one if all fits.
     """
     height, width = light_field.shape
-    moved = _rows_moved(light_field, present, reach)
+    moved = _rows_moved(light_field, present, reach) + beside
     fitting = _bytes.get() // max(1, bytes_per_pixel * width * int(present.sum()))
     number = 1 if fitting >= height else math.ceil(height / max(FEWEST_ROWS, fitting - 2 * moved))
     ends = [round(height * i / number) for i in range(number + 1)]

@@ -85,7 +85,7 @@ class StitchedEpi:
         position = x - self.disparity * self.positions - self.offsets
         left = np.floor(position).astype(int)
         width = self.rows.shape[1]
-        valid = self.inside & (left >= 0) & (left + 1 < width)
+        valid = self.inside & (position >= 0) & (position <= width - 1)
         left = np.clip(left, 0, width - 2)
         weight = (position - left)[:, None]
         number = np.arange(len(self.rows))

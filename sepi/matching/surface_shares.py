@@ -125,13 +125,15 @@ def _evidence(light_field: LightField, disparity: FloatMap, rim: Rim, parameters
     # how far from a pixel the pieces of background lie that views show with it
     step = float((rim.near - rim.far).max())
     moved = math.ceil(step * float(np.abs(views.baselines).max())) + 2
+    rows_moved = math.ceil(step * float(np.abs(views.baselines[:, 0]).max())) + 1
+    farthest = float(np.abs(disparity).max())
     evidence = np.zeros_like(disparity)
     height = light_field.shape[0]
-    for begin, end, rows in row_bands(light_field, present, float(np.abs(disparity).max()) + step, BYTES_PER_PIXEL):
+    for begin, end, rows in row_bands(light_field, present, farthest, BYTES_PER_PIXEL, rows_moved):
         nearest = z_buffers(widened, present, light_field.baselines, *rows)
         views = views._replace(nearest=nearest, low=rows.low)
         background = kernels.background_of(
-            views, layer, distance <= moved, margin, max(0, begin - moved), min(height, end + moved)
+            views, layer, distance <= moved, margin, max(0, begin - rows_moved), min(height, end + rows_moved)
         )
         kernels.evidence_of_shares(
             views, rim, background, disparity, guide, clean, margin, scales2, begin, end, evidence

@@ -326,6 +326,9 @@ def _cost_alone(views: RimViews, guide: Any, d: Any, y: int, x: int, margin: Any
     """Mean robust residual of a pixel that moves with ``d``, over views that see it; ``colour`` is scratch."""
     total, n = 0.0, 0
     for view in range(len(views.places)):
+        if views.baselines[view, 0] == 0 and views.baselines[view, 1] == 0:
+            # the reference view itself always fits
+            continue
         seen, row, column, fy, fx = _sees(views, view, d, y, x, margin)
         if seen:
             _sample(views, view, row, column, fy, fx, colour)
@@ -333,8 +336,7 @@ def _cost_alone(views: RimViews, guide: Any, d: Any, y: int, x: int, margin: Any
                 residual = (colour[c] - guide[y, x, c]) ** 2
                 total += residual / (residual + scale2)
             n += 1
-    # the reference view itself always fits
-    return total / (3 * (n - 1)) if n > FEWEST_VIEWS else _UNKNOWN
+    return total / (3 * n) if n >= FEWEST_VIEWS else _UNKNOWN
 
 
 @njit(parallel=True, cache=True)

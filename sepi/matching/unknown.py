@@ -16,7 +16,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from sepi.image.noise import noise_level
+from sepi.image.noise import SATURATED, noise_level
 from sepi.lightfield import BoolMap, FloatMap, LightField, as_unit_float, full_scale
 from sepi.stage import StageMaps
 
@@ -28,9 +28,6 @@ BLACK = 0.01
 
 LENS_CORNER = 0.05
 """...and where a region holds a corner of the picture, which stray light may have lifted."""
-
-SATURATED = 254 / 255
-"""As bright as can be told."""
 
 LEAST_SHARE = 2e-3
 """Part of the picture below which a region without a signal belongs to what surrounds it..."""

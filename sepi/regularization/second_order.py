@@ -167,6 +167,9 @@ def solve_smooth(
 
     from sepi.regularization.second_order_kernels import MARGIN, product
 
+    if not weight.any():
+        # nothing holds any surface
+        return data
     w = weight.astype(np.float64) + 1e-9
     start = data.astype(np.float64)
     # smoothness does not know constants: without the mean, the rtol does not depend on where zero lies

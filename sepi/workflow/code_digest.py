@@ -52,7 +52,7 @@ def stage_modules(stage: str, choice: Choice) -> tuple[str, ...]:
     """Modules that decide, with what they import, what is in a stage's file: the stage, the module of the choice that
     it runs, and the format of the file.
     """
-    return (f"sepi.{stage}", choice.run.__module__, "sepi.io.hdf5", "sepi.io.provenance")
+    return (f"sepi.{stage}", choice.function.__module__, "sepi.io.hdf5", "sepi.io.provenance")
 
 
 def ingest_modules(reader: str) -> tuple[str, ...]:

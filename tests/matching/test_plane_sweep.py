@@ -50,7 +50,7 @@ def twin(light_field, parameters, groups, subset):
             for k, d in enumerate(candidates.astype(float)):
                 down, across = light_field.baselines[t, s]
                 y, x = rows - d * down, columns - d * across
-                inside = (y >= 0) & (y <= H - 1) & (x >= 0) & (np.floor(x) + 1 <= W - 1)
+                inside = (y >= 0) & (y <= H - 1) & (x >= 0) & (x <= W - 1)
                 sample = np.stack([map_coordinates(c, [y, x], order=1) for c in np.moveaxis(views[t, s], 2, 0)], axis=2)
                 squared = ((sample - centre) ** 2).sum(axis=2)
                 sums[k] += np.where(inside, squared / (squared + parameters.scale**2 + noise), 0)
@@ -257,6 +257,11 @@ def test_noise_level_is_the_noise_put_in():
     for sigma in (0.01, 0.08):
         noisy = (image + generator.normal(0, sigma, image.shape)).astype(np.float32)
         assert noise_level(noisy) == pytest.approx(sigma, rel=0.1)
+        for level in (0.0, 0.5, 1.0):
+            # a mask painted in, a black background, what is overexposed: most of the picture
+            noisy[20:80, 3:97] = level
+            assert noise_level(noisy) == pytest.approx(sigma, rel=0.1)
+    assert noise_level(np.zeros_like(image)) == 0
 
 
 def test_kernels_are_compiled_once():
