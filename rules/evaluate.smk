@@ -1,7 +1,6 @@
 # Scores of a scene's disparity maps, after every stage of every variant (paper, section V): both protocols, all regions.
-# One job for a scene, in which only maps that changed are scored again: what was found before is kept beside the output, in
-# a file that only this job knows. (An output marked by update() would count as up to date after a job that failed.) A scene
-# without ground truth gets a score file that says so. The parts of variant best have a file of their own, as in the report.
+# One job for a scene: the regions, which are found once for all its maps, take longer than the scores. A scene without ground
+# truth gets a score file that says so. The parts of variant best have a file of their own, as in the report.
 rule evaluate:
     input:
         light_field=SCENE.light_field,
@@ -20,12 +19,11 @@ rule evaluate:
         runtime=lambda wildcards, input, attempt: minutes_for(0.05, 0.15 * len(input.maps))(wildcards, attempt),
     params:
         stages=str(PLACED_SCENE.stages),
-        kept=str(PLACED_SCENE.kept_scores("{which}")),
         code=lambda wildcards: code_digest("sepi.evaluate"),
     message:
         "{wildcards.dataset}/{wildcards.scene}: scores"
     shell:
         command(
-            "sepi.evaluate --light-field {input.light_field:q} --stages {params.stages:q} --code {params.code} "
-            "--kept {params.kept:q} --output {output.scores:q} {input.maps:q} 2> {log:q}"
+            "sepi.evaluate --light-field {input.light_field:q} --stages {params.stages:q} "
+            "--output {output.scores:q} {input.maps:q} 2> {log:q}"
         )

@@ -12,7 +12,7 @@ import numpy as np
 
 from sepi.camera import Camera
 from sepi.errors import SepiWarning
-from sepi.evaluate import score_maps
+from sepi.evaluate import evaluations_of
 from sepi.external import ExternalSource, external_maps
 from sepi.io.external_maps import ExternalMap, write_external
 from sepi.io.hdf5 import read_light_field, read_stage, write_light_field, write_stage
@@ -150,7 +150,7 @@ def write_plan_scores(plan: Plan, scene: tuple[str, str], light_field: LightFiel
     """The score file of a scene, from its stage files."""
     folder = plan.files(*scene).stages
     maps = {map_name(folder, file): read_stage(file).disparity for file in plan.scored_files(*scene)}
-    write_scores(plan.scores_file(*scene), score_maps(light_field, maps, {})[0], scene_attributes(light_field))
+    write_scores(plan.scores_file(*scene), evaluations_of(light_field, maps), scene_attributes(light_field))
 
 
 def methods_maps(plan: Plan, light_field: LightField) -> Mapping[str, ExternalMap]:

@@ -1,6 +1,5 @@
 """Scores: by hand, against a plain twin, with unknown pixels, and as the command that the workflow calls."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import h5py
@@ -153,7 +152,7 @@ def test_wrong_shape_is_a_clear_error() -> None:
 
 
 def run_command(
-    folder: Path, light_field: LightField, maps: dict[str, np.ndarray], output: str = "scores.h5", code: str = "1"
+    folder: Path, light_field: LightField, maps: dict[str, np.ndarray], output: str = "scores.h5"
 ) -> tuple[Path, str]:
     """Score these maps as the workflow does; the score file, and what the command said."""
     write_light_field(folder / "lightfield.h5", light_field)
@@ -162,9 +161,7 @@ def run_command(
         write_stage(stages / name / "stage.h5", StageMaps(disparity, np.ones_like(disparity)), STAGE_ATTRIBUTES)
     files = [stages / name / "stage.h5" for name in maps]
     options = ["--light-field", folder / "lightfield.h5", "--stages", stages, "--output", folder / output]
-    # what an earlier call for the same output found
-    options += ["--kept", folder / f"{output}.kept.h5"]
-    words = [str(word) for word in [*options, "--code", code, *files]]
+    words = [str(word) for word in [*options, *files]]
     result = CliRunner().invoke(command, words, catch_exceptions=False)
     assert result.exit_code == 0, result.output
     return folder / output, result.stderr
@@ -187,58 +184,14 @@ def test_command_writes_what_evaluate_finds(tmp_path: Path) -> None:
         for protocol, cells in evaluation_of(light_field, estimate).scores.items():
             for region, scores in cells.items():
                 assert written[name][protocol][region] == pytest.approx(scores, nan_ok=True)
-        found = back[name].evaluation
+        found = back[name]
         assert found.error is not None
         np.testing.assert_array_equal(found.error, estimate - ground_truth)
         assert found.region_sources == dict.fromkeys(["occluded", "textureless", "discontinuities"], "computed")
         assert found.regions.keys() == found.region_sources.keys()
     assert path.read_bytes() == run_command(tmp_path, light_field, maps, "again.h5")[0].read_bytes()
-
-
-TRUTH = np.random.default_rng(5).normal(size=(40, 40)).astype(np.float32)
-MAPS = {name: noisy(TRUTH, seed) for seed, name in enumerate(["sepi", "sepi/none/lti", "semi_global"])}
-OTHER = noisy(TRUTH, 9)
-
-
-class TestOnlyWhatChangedIsScoredAnew:
-    """A scene has one score file: a change in one variant must not cost the scores of all, nor leave old ones."""
-
-    @pytest.mark.parametrize(
-        ("maps", "told"),
-        [
-            (MAPS, "0 of 3 maps scored anew"),
-            (MAPS | {"sepi/none/lti": OTHER}, "1 of 3 maps scored anew: sepi/none/lti"),
-            ({"wang": OTHER, "semi_global": MAPS["semi_global"]}, "1 of 2 maps scored anew: wang"),
-        ],
-        ids=["nothing", "a map", "another map and fewer"],
-    )
-    def test_changed_maps(self, tmp_path: Path, maps: dict[str, np.ndarray], told: str) -> None:
-        run_command(tmp_path, scene(TRUTH), MAPS)
-        path, found = run_command(tmp_path, scene(TRUTH), maps)
-        assert told in found
-        assert path.read_bytes() == run_command(tmp_path, scene(TRUTH), maps, "fresh.h5")[0].read_bytes()
-
-    @pytest.mark.parametrize("what", ["ground_truth", "mask", "picture", "code"])
-    def test_what_changes_all_scores(self, tmp_path: Path, what: str) -> None:
-        run_command(tmp_path, scene(TRUTH), MAPS)
-        light_field = scene(TRUTH)
-        if what == "ground_truth":
-            light_field = scene(TRUTH + np.float32(0.1))
-        elif what == "mask":
-            light_field = scene(TRUTH, {"occluded": np.eye(40, dtype=bool)})
-        elif what == "picture":
-            light_field = replace(light_field, views=light_field.views // 2)
-        path, told = run_command(tmp_path, light_field, MAPS, code="2" if what == "code" else "1")
-        assert "3 of 3 maps scored anew" in told
-        fresh, _ = run_command(tmp_path, light_field, MAPS, "fresh.h5", code="2" if what == "code" else "1")
-        assert path.read_bytes() == fresh.read_bytes()
-
-    def test_a_file_that_cannot_be_read_is_made_anew(self, tmp_path: Path) -> None:
-        """Left by an older version, or damaged."""
-        (tmp_path / "scores.h5.kept.h5").write_bytes(b"something else")
-        path, told = run_command(tmp_path, scene(TRUTH), MAPS)
-        assert "3 of 3 maps scored anew" in told
-        assert list(read_scores(path)) == list(MAPS)
+    # nothing is kept beside the scores: a job that is forced scores anew
+    assert {file.name for file in tmp_path.iterdir()} == {"lightfield.h5", "stages", "scores.h5", "again.h5"}
 
 
 def test_command_says_that_there_is_no_truth(tmp_path: Path) -> None:
@@ -246,7 +199,7 @@ def test_command_says_that_there_is_no_truth(tmp_path: Path) -> None:
     path, told = run_command(tmp_path, scene(None), {"sepi": np.zeros((40, 40), np.float32)})
     assert "no ground truth, no scores" in told
     assert read_scores(path) == {"sepi": {}}
-    assert read_evaluations(path)["sepi"].evaluation.error is None
+    assert read_evaluations(path)["sepi"].error is None
     with h5py.File(path) as file:
         assert not file.attrs["ground_truth"]
         assert file.attrs["scene"] == "noise"

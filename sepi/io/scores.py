@@ -66,21 +66,6 @@ class Evaluation:
     region_sources: Mapping[str, str] = field(default_factory=dict)
 
 
-@dataclass(frozen=True)
-class Scored:
-    """The evaluation of one map, and a fingerprint of what it was made from.
-
-    Attributes
-    ----------
-    digest : str
-        Digest of all that decides the scores; a map with the same digest need not be evaluated again.
-    evaluation : Evaluation
-    """
-
-    digest: str
-    evaluation: Evaluation
-
-
 def map_name(stages: Path, file: Path) -> str:
     """Name of the map in a stage file: its folder within the folder of a scene's stage files.
 
@@ -94,27 +79,26 @@ def map_name(stages: Path, file: Path) -> str:
     return file.parent.relative_to(stages).as_posix()
 
 
-def write_scores(path: Path, maps: Mapping[str, Scored], attributes: Mapping[str, Attribute]) -> None:
+def write_scores(path: Path, maps: Mapping[str, Evaluation], attributes: Mapping[str, Attribute]) -> None:
     """Write the evaluations of a scene's maps, by name, and the attributes of the scene.
 
     Equal content gives equal bytes. A name is a path such as ``"sepi/half_sepi"``.
     """
     with create_hdf5(path) as file:
-        file.attrs["ground_truth"] = any(scored.evaluation.error is not None for scored in maps.values())
+        file.attrs["ground_truth"] = any(found.error is not None for found in maps.values())
         for key, value in attributes.items():
             file.attrs[key] = value
         groups = file.create_group(_MAPS, track_order=True)
         first: h5py.Group | None = None
-        for name, scored in maps.items():
+        for name, evaluation in maps.items():
             # HDF5 would take a slash for a group of groups; no label of a choice has a colon
             group = groups.create_group(name.replace("/", ":"))
-            group.attrs["digest"] = scored.digest
             if first is None:
-                put_evaluation(group, scored.evaluation)
+                put_evaluation(group, evaluation)
                 first = group
             else:
-                put_evaluation(group, replace(scored.evaluation, regions={}))
-                for region in sorted(scored.evaluation.regions):
+                put_evaluation(group, replace(evaluation, regions={}))
+                for region in sorted(evaluation.regions):
                     group[f"regions/{region}"] = first[f"regions/{region}"]
 
 
@@ -130,7 +114,7 @@ def read_scores(path: Path, names: Collection[str] | None = None) -> dict[str, A
         return {name: scores_in(group) for name, group in _groups(path, file, names).items()}
 
 
-def read_evaluations(path: Path, names: Collection[str] | None = None) -> dict[str, Scored]:
+def read_evaluations(path: Path, names: Collection[str] | None = None) -> dict[str, Evaluation]:
     """Everything that a score file holds of these maps, or of all.
 
     Raises
@@ -139,8 +123,7 @@ def read_evaluations(path: Path, names: Collection[str] | None = None) -> dict[s
         As :func:`read_scores`.
     """
     with open_hdf5(path, _KIND) as file:
-        groups = _groups(path, file, names)
-        return {name: Scored(str(attribute(group, "digest")), evaluation_in(group)) for name, group in groups.items()}
+        return {name: evaluation_in(group) for name, group in _groups(path, file, names).items()}
 
 
 def put_evaluation(group: h5py.Group, evaluation: Evaluation) -> None:

@@ -51,7 +51,7 @@ def read_results(plan: Plan, dataset: str, scene: str) -> SceneResults:
     return SceneResults(
         light_field=light_field,
         maps=maps,
-        evaluations={variant: scored[key].evaluation for variant, key in keys.items()},
+        evaluations={variant: scored[key] for variant, key in keys.items()},
         detailed=plan.detailed,
         external={
             method: (found.disparity, found.evaluation)

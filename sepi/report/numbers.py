@@ -193,7 +193,7 @@ def _confidence(plan: Plan, dataset: str, scene: str) -> dict[str, dict[str, lis
     keys = {variant: plan.stage_key(variant, last) for variant in plan.compared}
     scored = read_evaluations(plan.scores_file(dataset, scene), list(keys.values()))
     for variant, key in keys.items():
-        error = scored[key].evaluation.error
+        error = scored[key].error
         if error is not None:
             maps = read_stage(plan.stage_file(dataset, scene, variant, last))
             light_field = read_light_field(plan.light_field_file(dataset, scene))

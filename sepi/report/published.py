@@ -28,6 +28,9 @@ PAPERS_METHOD = "zhou"
 DATASETS: dict[str, str] = {"hci": "HCI 4D light field benchmark", "hci_2013": "HCI Blender (2013)"}
 """Datasets of the paper, under the names that this project gives them."""
 
+# folders of the archive of 2013 whose names are not those that the paper prints
+_ARCHIVE_NAMES = {("hci_2013", "monasroom"): "Monas"}
+
 RegionTable = dict[str, dict[str, float]]
 """Method or variant to region of :data:`sepi.scoring.scores.REGIONS` to average 100 x MSE; no key where none stands."""
 
@@ -90,7 +93,8 @@ def paper_scene(dataset: str, scene: str) -> str | None:
     Only datasets named as in :data:`DATASETS` are looked up, so that a built-in scene called ``dots`` is not taken
     for the benchmark's; within them, capitals do not matter.
     """
-    return {name.lower(): name for name in table1().scenes(dataset)}.get(scene.lower())
+    named = {name.lower(): name for name in table1().scenes(dataset)}
+    return named.get(scene.lower(), _ARCHIVE_NAMES.get((dataset, scene.lower())))
 
 
 @cache

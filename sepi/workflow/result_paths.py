@@ -68,10 +68,6 @@ class SceneFiles:
         """The scores of the maps; ``which`` is :data:`PARTS_ENDING` or :data:`COMPARISON_ENDING` for those alone."""
         return self.folder / f"scores{which}.h5"
 
-    def kept_scores(self, which: str = "") -> Path:
-        """The scores that the next run takes over."""
-        return self.folder / f"scores{which}.kept.h5"
-
     def variant(self, name: str) -> Path:
         """The folder of a variant's final maps."""
         return self.folder / name

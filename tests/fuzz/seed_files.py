@@ -22,7 +22,7 @@ from sepi.io.external_maps import ExternalMap, write_external
 from sepi.io.hdf5 import write_light_field, write_stage
 from sepi.io.pfm import write_pfm
 from sepi.io.result_folder import write_result
-from sepi.io.scores import Evaluation, Scored, write_scores
+from sepi.io.scores import Evaluation, write_scores
 from sepi.lightfield import DisparityRange, LightField
 from sepi.scoring.hci_submission import SHAPE as SUBMITTED
 from sepi.stage import StageMaps
@@ -266,7 +266,7 @@ def result_files(folder: Path) -> list[bytes]:
 
 def score_files(folder: Path) -> list[bytes]:
     """Scores of two maps."""
-    scored = {name: Scored("digest", EVALUATION) for name in ("a", "a/b")}
+    scored = dict.fromkeys(("a", "a/b"), EVALUATION)
     return [_undigested(folder, lambda path: write_scores(path, scored, {"scene": "toy"}))]
 
 

@@ -12,7 +12,7 @@ import pytest
 from sepi.errors import SepiError
 from sepi.io.hdf5 import read_attributes, read_light_field, read_stage, write_light_field, write_stage
 from sepi.io.result_folder import read_result, write_result
-from sepi.io.scores import Evaluation, Scored, read_evaluations, write_scores
+from sepi.io.scores import Evaluation, read_evaluations, write_scores
 from sepi.lightfield import DisparityRange, LightField
 from sepi.stage import StageMaps
 
@@ -24,7 +24,7 @@ MASK = np.eye(*SHAPE, dtype=bool)
 VIEWS = np.random.default_rng(0).integers(0, 256, (2, 3, *SHAPE, 3), np.uint8)
 LIGHT_FIELD = LightField(VIEWS, "toy", "somewhere", disparity_range=DisparityRange(-1, 2, "given"))
 MAPS = StageMaps(VALUES, abs(VALUES) / 2, {"occluded": MASK})
-SCORES = {"a": Scored("digest", Evaluation({"paper": {"all": {"mse": 1.5}}}, VALUES, {"all": MASK}, {"all": "scene"}))}
+SCORES = {"a": Evaluation({"paper": {"all": {"mse": 1.5}}}, VALUES, {"all": MASK}, {"all": "scene"})}
 
 
 def stage_file(folder: Path) -> Path:

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 
-from sepi.evaluate import evaluation_of, score_maps
+from sepi.evaluate import evaluation_of, evaluations_of
 from sepi.external import NO_FILE
 from sepi.io.external_maps import ExternalMap, write_external
 from sepi.io.hdf5 import read_stage, write_light_field, write_stage
@@ -92,7 +92,7 @@ def with_results(made: Plan) -> Plan:
         for parts in (False,) if made.is_comparison else (False, True):
             files = made.scored_files(dataset, name, parts)
             disparity = {map_name(folder, file): read_stage(file).disparity for file in files}
-            scored = score_maps(scene, disparity, {})[0]
+            scored = evaluations_of(scene, disparity)
             write_scores(made.scores_file(dataset, name, parts), scored, {"scene": name})
         if made.external:
             maps = {method: external_map(scene, EXTERNAL[method][name]) for method in made.external}
