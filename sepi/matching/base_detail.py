@@ -215,8 +215,11 @@ def reference_noise(light_field: LightField) -> float:
         return noise_level(light_field.reference_view)
     known = kept.light_field
     # each stage is given the same views anew
-    same = known is not None and known.views is light_field.views
-    if not same or known.reference_position != light_field.reference_position:
+    if (
+        known is None
+        or known.views is not light_field.views
+        or known.reference_position != light_field.reference_position
+    ):
         # what was kept of another goes
         _kept.set(kept := _Kept(light_field, noise_level(light_field.reference_view)))
     return kept.noise
