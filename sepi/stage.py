@@ -307,6 +307,8 @@ class Choice:
         The stage function ``(light_field, previous, parameters, progress) -> StageMaps``, where ``previous`` is what
         the stage before handed on (None for the first), and ``progress`` takes the fraction done, 0..1. It changes
         none of its arguments, reads no ground truth and writes no file. View steps are such as :meth:`run` makes them.
+    own_steps : bool
+        Whether it is given the light field's own view steps, as choices that callers add are.
 
     Examples
     --------
@@ -334,6 +336,7 @@ class Choice:
 
     parameters: type[Parameters]
     function: StageFunction
+    own_steps: bool = False
 
     def run(
         self, light_field: LightField, previous: StageMaps | None, parameters: Parameters, progress: Progress
@@ -355,7 +358,7 @@ class Choice:
         -------
         StageMaps
         """
-        factor = REACH / light_field.reach if light_field.reach > 0 else 1.0
+        factor = 1.0 if self.own_steps or light_field.reach == 0 else REACH / light_field.reach
         if factor == 1:
             return self.function(light_field, previous, parameters, progress)
         given = None if previous is None else _rescaled(previous, 1 / factor)

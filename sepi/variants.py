@@ -23,7 +23,7 @@ from __future__ import annotations
 import hashlib
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import Any
 
@@ -95,7 +95,7 @@ def add_choice(stage: str, name: str, choice: Choice) -> None:
         raise SepiError(f"stage {stage}: a choice's name has letters, digits and '_' only, got {name!r}")
     if name in STAGES[stage] and (stage, name) not in _ADDED:
         raise SepiError(f"stage {stage}: '{name}' is a choice that the package brings; take another name")
-    STAGES[stage][name] = choice
+    STAGES[stage][name] = replace(choice, own_steps=True)
     _ADDED.add((stage, name))
 
 

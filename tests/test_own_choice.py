@@ -1,5 +1,7 @@
 """A stage's choice that a caller adds."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 from pydantic import Field
@@ -47,9 +49,9 @@ def test_added_choice_runs_with_its_parameters() -> None:
 def test_adding_again_replaces() -> None:
     """A notebook's cell that runs twice fails, or keeps the function of the first run."""
     add_choice("optimize", "shift", Choice(ShiftParameters, shift))
-    second = Choice(ShiftParameters, shift)
-    add_choice("optimize", "shift", second)
-    assert variants.STAGES["optimize"]["shift"] is second
+    second = partial(shift)
+    add_choice("optimize", "shift", Choice(ShiftParameters, second))
+    assert variants.STAGES["optimize"]["shift"].function is second
 
 
 @pytest.mark.parametrize(
