@@ -325,3 +325,28 @@ def test_brightness_is_told_view_by_view() -> None:
     brightness, residual = kernels.brightness_of_views(rim_views, still, field.reference_view, still == 0)
     np.testing.assert_allclose(brightness, factors[0], rtol=0.02)
     assert (residual < 0.01).all()
+
+
+@pytest.mark.parametrize("grid", [(1, 9), (9, 9)])
+def test_bands_hold_every_row_that_is_looked_at(grid: tuple[int, int], monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where memory is short, compiled code would read beside its arrays, and who knows what."""
+    whole = render("pencils", size=96)
+    rows = slice(4, 5) if grid[0] == 1 else slice(None)
+    light_field = LightField(whole.views[rows], "rows", disparity_range=whole.disparity_range)
+    background_of, asked = kernels.background_of, []
+
+    def checked(views, layer, wanted, margin, begin, end):
+        y, x = np.nonzero(wanted[begin:end])
+        d = layer[begin:end][y, x]
+        for down, across in views.baselines:
+            row, column = y + begin - d * down, x - d * across
+            inside = (row >= 0) & (row < 95) & (column >= 0) & (column < 95)
+            number = (row[inside] + 0.5).astype(int) - views.low
+            asked.append(bool((number >= 0).all() and (number < views.nearest.shape[2]).all()))
+        return background_of(views, layer, wanted, margin, begin, end)
+
+    monkeypatch.setattr(kernels, "background_of", checked)
+    with band_memory(1):
+        reassign_at_steps(light_field, whole.ground_truth, SurfaceShareParameters())
+    assert asked
+    assert all(asked)

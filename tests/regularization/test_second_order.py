@@ -235,3 +235,11 @@ def test_refinement_of_zero_motion_is_exactly_zero() -> None:
     before = StageMaps(np.zeros((48, 48), np.float32), np.ones((48, 48), np.float32))
     result = second_order(light_field, before, SecondOrderParameters(), no_progress)
     assert np.abs(result.disparity).max() < 1e-6
+
+
+def test_pixels_that_nothing_holds_stay_as_they_are() -> None:
+    """A picture of 2x2 pixels whose views tell nothing: rounding would leave the solver no direction, and NaN."""
+    data = np.array([[0.01447258, -0.1234202], [-0.00083831, -0.13873109]], np.float32)
+    stencil = second_difference_stencil([np.zeros((2, 0)), np.zeros((0, 2)), np.full((1, 1), 1.04)], (2, 2))
+    found = solve_smooth(stencil, np.zeros((2, 2), np.float32), data, 3e-3, 200)
+    np.testing.assert_array_equal(found, data)
