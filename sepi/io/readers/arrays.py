@@ -34,8 +34,8 @@ def light_field_from_array(array: Array, path: Path, options: ReadOptions, *, ax
 
     Parameters
     ----------
-    array : ndarray of 4 or 5 axes, uint8, uint16, float32 or float64
-        Integers span their whole range; floats 0..1, or 0 to 255 or 65535 as integers of 8 or 16 bit do.
+    array : ndarray of 4 or 5 axes, integers or floats
+        uint8 and uint16 span their whole range; floats 0..1. Others are 0 to 255 or 65535, as 8 or 16 bit.
     path : Path
         Where it comes from: name and source of the light field.
     options : ReadOptions
@@ -123,8 +123,8 @@ def rearrange(light_field: LightField, options: ReadOptions) -> LightField:
 
 
 def _require_pixel_type(source: str, kind: np.dtype[Any]) -> None:
-    if (kind.kind, kind.itemsize) not in (("u", 1), ("u", 2), ("f", 4), ("f", 8)):
-        raise SepiError(f"{source}: values of type {kind}; expected uint8, uint16, or float32 or float64 within 0..1")
+    if kind.kind not in "iuf" or kind.itemsize > 8:
+        raise SepiError(f"{source}: values of type {kind}; expected integers such as uint8, or floats within 0..1")
 
 
 def _checked_axes(source: str, array: Array, text: str) -> str:

@@ -13,8 +13,8 @@ from sepi.errors import SepiError
 from sepi.io.readers.options import Numbers
 from sepi.lightfield import HIGHEST, LOWEST
 
-# integers that floats may stand for, and the least brightest value of floats that are not whole: below that it is
-# rather 1 that is exceeded
+# integers that values of other types may stand for, and the least brightest value of floats that are not whole: below
+# that it is rather 1 that is exceeded
 _INTEGERS = (np.uint8, np.uint16)
 _LEAST_BRIGHTEST = 16
 
@@ -45,7 +45,7 @@ def scale_of(source: str, stack: npt.NDArray[np.generic], numbers: Numbers) -> S
     ----------
     source : str
         For messages.
-    stack : ndarray, shape (T, S, H, W, C), uint8, uint16, float32 or float64
+    stack : ndarray, shape (T, S, H, W, C), integers or floats
         Views of the given grid, in any byte order.
     numbers : ndarray, int64
         Number ``t * S + s`` in that grid of the views that are used, by their own positions; -1 for none.
@@ -53,9 +53,10 @@ def scale_of(source: str, stack: npt.NDArray[np.generic], numbers: Numbers) -> S
     Raises
     ------
     SepiError
-        If a view that is used holds some floats that are not finite, or floats beyond every scale.
+        If a view that is used holds some floats that are not finite, or values beyond every scale.
     """
-    if stack.dtype.kind == "u":
+    floats = stack.dtype.kind == "f"
+    if stack.dtype.kind == "u" and stack.dtype.itemsize <= 2:
         return Scale(np.dtype(f"u{stack.dtype.itemsize}"))
     ranges, whole = {}, True
     for t, s in np.argwhere(numbers >= 0).tolist():
@@ -63,27 +64,29 @@ def scale_of(source: str, stack: npt.NDArray[np.generic], numbers: Numbers) -> S
         values = _range_of(source, (t, s), view)
         if values is not None:
             ranges[t, s] = values
-            whole = whole and bool((view == np.rint(view)).all())
+            whole = whole and (not floats or bool((view == np.rint(view)).all()))
     low = min((low for low, _ in ranges.values()), default=0.0)
     high = max((high for _, high in ranges.values()), default=0.0)
-    if low >= LOWEST and high <= HIGHEST:
+    if floats and low >= LOWEST and high <= HIGHEST:
         return Scale(np.dtype(np.float32))
     for kind in _INTEGERS:
         white, dtype = np.iinfo(kind).max, np.dtype(kind)
         if low >= 0 and high <= white and (whole or high >= _LEAST_BRIGHTEST):
-            note = f"floats from {low:g} to {high:g} taken as {8 * dtype.itemsize} bit, white being {white}"
+            word = "floats" if floats else stack.dtype.name
+            note = f"{word} from {low:g} to {high:g} taken as {8 * dtype.itemsize} bit, white being {white}"
             return Scale(dtype if whole else np.dtype(np.float32), 1.0 if whole else float(white), (note,))
+    least, most = (LOWEST, HIGHEST) if floats else (0, np.iinfo(_INTEGERS[-1]).max)
     position, (low, high) = next(
-        (position, values) for position, values in ranges.items() if values[0] < LOWEST or values[1] > HIGHEST
+        (position, values) for position, values in ranges.items() if values[0] < least or values[1] > most
     )
     raise SepiError(
-        f"{source}: view {position[0]},{position[1]} has values from {low:g} to {high:g}; floats are expected within "
-        "0..1, 0..255 or 0..65535, so divide them by their full scale, or store uint8 or uint16"
+        f"{source}: view {position[0]},{position[1]} has values from {low:g} to {high:g}; expected within "
+        f"{'0..1, ' if floats else ''}0..255 or 0..65535, so divide them by their full scale, or store uint8 or uint16"
     )
 
 
 def _range_of(source: str, position: tuple[int, int], view: npt.NDArray[np.generic]) -> tuple[float, float] | None:
-    """The least and the greatest value of a view of floats; None where it is NaN throughout."""
+    """The least and the greatest value of a view; None where it is NaN throughout."""
     with np.errstate(invalid="ignore"):
         low, high = float(view.min()), float(view.max())
     if math.isfinite(low) and math.isfinite(high):
