@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,6 +19,8 @@ from sepi.lightfield import HIGHEST, LOWEST
 _INTEGERS = (np.uint8, np.uint16)
 _LEAST_BRIGHTEST = 16
 
+_Ranges = Mapping[tuple[int, int], tuple[float, float]]
+
 
 @dataclass(frozen=True)
 class Scale:
@@ -28,7 +31,7 @@ class Scale:
     dtype : dtype
         uint8, uint16 or float32.
     divisor : float
-        Value that stands for 1; 1 for integers.
+        What values are divided by: for floats the value that stands for 1.
     notes : tuple of str
         What was assumed.
     """
@@ -38,7 +41,7 @@ class Scale:
     notes: tuple[str, ...] = ()
 
 
-def scale_of(source: str, stack: npt.NDArray[np.generic], numbers: Numbers) -> Scale:
+def scale_of(source: str, stack: npt.NDArray[np.generic], numbers: Numbers, white: float | None = None) -> Scale:
     """The scale of views.
 
     Parameters
@@ -49,6 +52,8 @@ def scale_of(source: str, stack: npt.NDArray[np.generic], numbers: Numbers) -> S
         Views of the given grid, in any byte order.
     numbers : ndarray, int64
         Number ``t * S + s`` in that grid of the views that are used, by their own positions; -1 for none.
+    white : float, optional
+        Value that stands for white; found out unless given.
 
     Raises
     ------
@@ -56,7 +61,7 @@ def scale_of(source: str, stack: npt.NDArray[np.generic], numbers: Numbers) -> S
         If a view that is used holds some floats that are not finite, or values beyond every scale.
     """
     floats = stack.dtype.kind == "f"
-    if stack.dtype.kind == "u" and stack.dtype.itemsize <= 2:
+    if white is None and stack.dtype.kind == "u" and stack.dtype.itemsize <= 2:
         return Scale(np.dtype(f"u{stack.dtype.itemsize}"))
     ranges, whole = {}, True
     for t, s in np.argwhere(numbers >= 0).tolist():
@@ -65,6 +70,8 @@ def scale_of(source: str, stack: npt.NDArray[np.generic], numbers: Numbers) -> S
         if values is not None:
             ranges[t, s] = values
             whole = whole and (not floats or bool((view == np.rint(view)).all()))
+    if white is not None:
+        return _given(source, stack.dtype, ranges, white)
     low = min((low for low, _ in ranges.values()), default=0.0)
     high = max((high for _, high in ranges.values()), default=0.0)
     if floats and low >= LOWEST and high <= HIGHEST:
@@ -75,14 +82,29 @@ def scale_of(source: str, stack: npt.NDArray[np.generic], numbers: Numbers) -> S
             word = "floats" if floats else stack.dtype.name
             note = f"{word} from {low:g} to {high:g} taken as {8 * dtype.itemsize} bit, white being {white}"
             return Scale(dtype if whole else np.dtype(np.float32), 1.0 if whole else float(white), (note,))
-    least, most = (LOWEST, HIGHEST) if floats else (0, np.iinfo(_INTEGERS[-1]).max)
-    position, (low, high) = next(
-        (position, values) for position, values in ranges.items() if values[0] < least or values[1] > most
+    bounds = (LOWEST, HIGHEST) if floats else (0, np.iinfo(_INTEGERS[-1]).max)
+    expected = f"{'0..1, ' if floats else ''}0..255 or 0..65535; --white says what white is elsewhere"
+    raise _beyond(source, ranges, bounds, expected)
+
+
+def _given(source: str, kind: np.dtype[Any], ranges: _Ranges, white: float) -> Scale:
+    """Narrow integers over their whole range, as pictures of few bits are stored; others as parts of white."""
+    whole = kind.kind in "iu"
+    bounds = (0.0, white) if whole else (LOWEST * white, HIGHEST * white)
+    if any(low < bounds[0] or high > bounds[1] for low, high in ranges.values()):
+        raise _beyond(source, ranges, bounds, f"{bounds[0]:g} to {bounds[1]:g}, white being {white:g}")
+    if whole and kind.itemsize <= 2:
+        dtype = np.dtype(f"u{kind.itemsize}")
+        return Scale(dtype, white / np.iinfo(dtype).max)
+    return Scale(np.dtype(np.float32), white)
+
+
+def _beyond(source: str, ranges: _Ranges, bounds: tuple[float, float], expected: str) -> SepiError:
+    """The error that names the first view with values beyond some bounds."""
+    (t, s), (low, high) = next(
+        (position, values) for position, values in ranges.items() if values[0] < bounds[0] or values[1] > bounds[1]
     )
-    raise SepiError(
-        f"{source}: view {position[0]},{position[1]} has values from {low:g} to {high:g}; expected within "
-        f"{'0..1, ' if floats else ''}0..255 or 0..65535, so divide them by their full scale, or store uint8 or uint16"
-    )
+    return SepiError(f"{source}: view {t},{s} has values from {low:g} to {high:g}; expected within {expected}")
 
 
 def _range_of(source: str, position: tuple[int, int], view: npt.NDArray[np.generic]) -> tuple[float, float] | None:

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 from sepi.errors import SepiError
 from sepi.io.hdf5 import write_light_field
+from sepi.io.images import write_png
 from sepi.io.readers.arrays import light_field_from_array
 from sepi.io.readers.formats import FORMATS, read
 from sepi.io.readers.options import ReadOptions
@@ -208,6 +209,34 @@ def test_values_of_no_scale_are_refused(views: np.ndarray) -> None:
     message = refused(views)
     assert "view 0,0" in message
     assert "0..255 or 0..65535" in message
+
+
+@pytest.mark.parametrize("kind", ["u2", "i2", "i4", "f4", "f8"])
+def test_white_that_is_given_is_the_full_scale(kind: str) -> None:
+    """10 bits in wider numbers are nearly black otherwise."""
+    views = (RGB * 4.0).astype(kind)
+    light_field = taken(views, white=1023)
+    full = 65535 if light_field.views.dtype == np.uint16 else 1
+    assert full == (65535 if kind in ("u2", "i2") else 1)
+    np.testing.assert_allclose(light_field.views / full, views / 1023, atol=1e-5)
+    if kind != "f4":
+        assert "view 0,0 has values" in refused(views * 2, white=1023)
+
+
+def test_white_of_pictures_and_own_files(tmp_path: Path) -> None:
+    """A flag that did nothing in some formats would leave their maps wrong without a word."""
+    views = RGB.astype(np.uint16) * 4
+    write_light_field(tmp_path / "own.h5", LightField(views, "own"))
+    (tmp_path / "pictures").mkdir()
+    for t, s in np.ndindex(T, S):
+        write_png(tmp_path / "pictures" / f"{t}_{s}.png", views[t, s])
+    expected = taken(views, white=1023).views
+    for name in ("own.h5", "pictures"):
+        np.testing.assert_array_equal(read(tmp_path / name, ReadOptions(white=1023)).views, expected)
+    with pytest.raises(SepiError, match=r"own\.h5: view 0,0 has values from .* within 0 to 100, white being 100"):
+        read(tmp_path / "own.h5", ReadOptions(white=100))
+    with pytest.raises(SepiError, match="options: white: expected a number above 0, got 0"):
+        ReadOptions(white=0)
 
 
 def test_views_left_out_do_not_change_the_scale() -> None:
