@@ -42,7 +42,8 @@ def read_light_field(
         Word of a format: ``"hci"``, ``"images"``, ``"eslf"``, ``"matlab"``, ``"numpy"``, ``"hci-2013"``, ``"openlf"``
         or ``"sepi"``; found by looking unless given.
     options : ReadOptions, optional
-        What the files do not say: grid, name pattern, axes, order, views to leave out, reference view, row spacing.
+        What the files do not say: grid, name pattern, axes, order, views to leave out, reference view, row spacing,
+        white.
     check_order : bool
         Look at the views: warn (:class:`SepiWarning`) where another order of them clearly fits better, and find how far
         their rows are apart where nothing says so.
@@ -114,7 +115,7 @@ def _depth_warning(light_field: LightField) -> str | None:
     if brightest >= _NARROW:
         return None
     bits = brightest.bit_length()
-    advice = f"if the files hold {bits} bits, multiply them by {2 ** (16 - bits)}"
+    advice = f"if the files hold {bits} bits, give --white {2**bits - 1}"
     return f"its brightest pixel is {brightest} of 65535; {advice}"
 
 

@@ -107,6 +107,9 @@ _FLAGS = (
         metavar="F",
         help="Distance of rows of views in steps of columns, if they differ.",
     ),
+    click.option(
+        "--white", type=_Positive("W"), metavar="W", help="Value of white: 1023 in files of 10 bits, 4095 of 12."
+    ),
     click.option("--follow-links", is_flag=True, help="Read views that are links out of their folder."),
 )
 
@@ -122,7 +125,7 @@ def reading_flags(command: Callable[..., Any]) -> Callable[..., Any]:
     def with_reading(*args: Any, file_format: str | None, follow_links: bool, **values: Any) -> Any:
         from sepi.io.readers.options import ReadOptions
 
-        names = ("grid", "pattern", "axes", "variable", "central", "order", "exclude", "view", "row_spacing")
+        names = ("grid", "pattern", "axes", "variable", "central", "order", "exclude", "view", "row_spacing", "white")
         options = ReadOptions(**{name: values.pop(name) for name in names}, follow_links=follow_links)
         return command(*args, reading=Reading(file_format, options), **values)
 

@@ -52,7 +52,7 @@ class Builtin(_Keys):
 
 _Count = Annotated[int, Field(ge=1)]
 _Index = Annotated[int, Field(ge=0)]
-_Spacing = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+_Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 
 
 class OwnLightField(_Keys):
@@ -68,7 +68,8 @@ class OwnLightField(_Keys):
     order: str | None = None
     exclude: list[str] = []
     view: tuple[_Index, _Index] | None = None
-    row_spacing: _Spacing | None = None
+    row_spacing: _Positive | None = None
+    white: _Positive | None = None
     follow_links: bool = False
 
     @property
@@ -117,7 +118,7 @@ class Config(_Keys):
         {},
         description="Dataset 'own': light fields of any format that 'sepi depth' reads, by a name of yours, such as "
         "{lego: {path: /data/lego, grid: [17, 17]}}. Beside path: format, grid, pattern, axes, variable, central, "
-        "order, exclude, view, row_spacing, follow_links, which mean what the flags of 'sepi depth' mean.",
+        "order, exclude, view, row_spacing, white, follow_links, which mean what the flags of 'sepi depth' mean.",
     )
     external: dict[str, dict[str, Any]] = Field(
         {},

@@ -137,7 +137,7 @@ CONFIG = """builtin: {scenes: [dots, pyramids], size: 96}
 hci_root: hci
 hci_2013_root: archive
 light_fields:
-  lego: {path: own.npy, grid: [2, 3], axes: TSHWC, order: flip-rows, exclude: ["0,0"], view: [1, 1], row_spacing: 1.5}
+  lego: {path: own.npy, grid: [2, 3], axes: TSHWC, order: flip-rows, exclude: ["0,0"], row_spacing: 1.5, white: 1e3}
 external: {SPO: 'maps', OTHER: {path: 'maps/{scene}.pfm', scale: -1, offset: 0.5}}
 disparity_range: {builtin/dots: [-1.5, 1e-1]}
 report: {pixels: {builtin/dots: [[1, 2]]}, parts_of_best: true}

@@ -330,11 +330,12 @@ class TestOwnLightFields:
             "exclude": ["0,0", "4,4"],
             "view": [2, 3],
             "row_spacing": 0.5,
+            "white": 1023,
             "follow_links": True,
         }
         settings = load_settings({"light_fields": {"lego": entry}, "disparity_range": {"own/lego": [-1, 2]}})
         scene = settings.scene("own", "lego")
-        words = "--format matlab --grid 9x9 --central 5 --order flip-rows --view 2,3 --row-spacing 0.5"
+        words = "--format matlab --grid 9x9 --central 5 --order flip-rows --view 2,3 --row-spacing 0.5 --white 1023.0"
         assert scene.flags == (*words.split(), "--exclude", "0,0", "--exclude", "4,4", "--follow-links")
         assert scene.files == (tmp_path / "lego.mat",)
         assert scene.disparity_range == (-1, 2)

@@ -34,12 +34,12 @@ def light_field_from_array(array: Array, path: Path, options: ReadOptions, *, ax
 
     Parameters
     ----------
-    array : ndarray of 4 or 5 axes, uint8, uint16, float32 or float64
-        Integers span their whole range; floats 0..1, or 0 to 255 or 65535 as integers of 8 or 16 bit do.
+    array : ndarray of 4 or 5 axes, integers or floats
+        uint8 and uint16 span their whole range; floats 0..1. Others are 0 to 255 or 65535, as 8 or 16 bit.
     path : Path
         Where it comes from: name and source of the light field.
     options : ReadOptions
-        ``axes``, ``grid``, ``central``, ``order``, ``exclude`` and ``view`` are used.
+        ``axes``, ``grid``, ``central``, ``order``, ``exclude``, ``view`` and ``white`` are used.
     axes : str, optional
         Order of the axes where the format fixes it, as ``options.axes`` gives it elsewhere; guessed from the shape
         where neither is given.
@@ -65,7 +65,7 @@ def light_field_from_array(array: Array, path: Path, options: ReadOptions, *, ax
     if not arranged:
         options = unarranged(options)
     numbers = arrange_numbers(source, stack.shape[:2], options)
-    scale = scale_of(source, stack, numbers)
+    scale = scale_of(source, stack, numbers, options.white)
     views: Array = np.zeros((*numbers.shape, *stack.shape[2:]), scale.dtype)
     # those left out are not even looked at
     unknown = _fill(views, stack, numbers, scale)
@@ -122,9 +122,19 @@ def rearrange(light_field: LightField, options: ReadOptions) -> LightField:
     )
 
 
+def with_white(light_field: LightField, path: Path, white: float) -> LightField:
+    """A light field whose views have another value for white than their type says."""
+    present = light_field.present
+    numbers = np.where(present, np.arange(present.size).reshape(present.shape), -1)
+    scale = scale_of(str(path), light_field.views, numbers, white)
+    views: Array = np.zeros(light_field.views.shape, scale.dtype)
+    _fill(views, light_field.views, numbers, scale)
+    return replace(light_field, views=views)
+
+
 def _require_pixel_type(source: str, kind: np.dtype[Any]) -> None:
-    if (kind.kind, kind.itemsize) not in (("u", 1), ("u", 2), ("f", 4), ("f", 8)):
-        raise SepiError(f"{source}: values of type {kind}; expected uint8, uint16, or float32 or float64 within 0..1")
+    if kind.kind not in "iuf" or kind.itemsize > 8:
+        raise SepiError(f"{source}: values of type {kind}; expected integers such as uint8, or floats within 0..1")
 
 
 def _checked_axes(source: str, array: Array, text: str) -> str:
@@ -221,8 +231,11 @@ def _fill(views: Array, stack: Array, numbers: Numbers, scale: Scale) -> list[tu
         view = stack[divmod(int(numbers[t, s]), stack.shape[1])]
         if view.dtype.kind == "f" and np.isnan(view).all():
             unknown.append((t, s))
+        elif scale.divisor == 1:
+            views[t, s] = view
         else:
-            views[t, s] = view if scale.divisor == 1 else view / scale.divisor
+            values = view / scale.divisor
+            views[t, s] = np.rint(values) if scale.dtype.kind == "u" else values
     return unknown
 
 

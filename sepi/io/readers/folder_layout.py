@@ -125,7 +125,9 @@ def _by_row_and_column(folder: Path, named: ViewNumbers, numbers: Numbers, optio
             f"{grid[0]}x{grid[1]} grid that --grid gives does not hold"
         )
     notes = []
-    if options.pattern is None:
+    if named.said:
+        notes = [f"the names say row and column{_like(named)}"]
+    elif options.pattern is None:
         like = f"as in '{named.pattern}'" if named.pattern else f"({next(iter(numbers))})"
         notes = [f"names are taken for row and column, in that order {like}; --order transpose if the other way"]
     if top not in (0, 1) or left not in (0, 1):

@@ -12,7 +12,7 @@ from sepi.io.files import naming
 from sepi.io.hdf5 import has_dataset, read_light_field
 from sepi.io.images import SUFFIXES
 from sepi.io.readers import eslf, hci, hci_2013, image_folder, matlab, numpy_files, open_lf
-from sepi.io.readers.arrays import rearrange
+from sepi.io.readers.arrays import rearrange, with_white
 from sepi.io.readers.options import ReadOptions
 from sepi.lightfield import LightField
 from sepi.validation import require_known
@@ -33,6 +33,8 @@ class Format:
         other or do not fit the options.
     options : tuple of str
         What of :class:`ReadOptions` only some formats have a use for, and this one does.
+    scales : bool
+        Whether it reads values of any scale, and asks the options for their white.
     """
 
     name: str
@@ -40,6 +42,7 @@ class Format:
     matches: Callable[[Path], bool]
     read: Callable[[Path, ReadOptions], LightField]
     options: tuple[str, ...] = ()
+    scales: bool = False
 
 
 # light fields that a message names, and levels of folders in which it looks for them
@@ -59,11 +62,11 @@ FORMATS = {
     ),
     "eslf": Format("Lytro lenslet picture", "NAME_eslf.png", eslf.matches, eslf.read, ("grid",)),
     # before the other kinds of HDF5: MATLAB's is told by its header or ending
-    "matlab": Format("MATLAB file", ".mat with an array such as LF", matlab.matches, matlab.read, _ARRAY_OPTIONS),
-    "numpy": Format("NumPy file", ".npy or .npz", numpy_files.matches, numpy_files.read, _ARRAY_OPTIONS),
+    "matlab": Format("MATLAB file", ".mat with an array such as LF", matlab.matches, matlab.read, _ARRAY_OPTIONS, True),
+    "numpy": Format("NumPy file", ".npy or .npz", numpy_files.matches, numpy_files.read, _ARRAY_OPTIONS, True),
     # before the other kinds with something called LF
-    "openlf": Format("OpenLF HDF5", "with a group LF", open_lf.matches, open_lf.read),
-    "hci-2013": Format("HCI 2013 HDF5", "with LF (T, S, H, W, 3)", hci_2013.matches, hci_2013.read),
+    "openlf": Format("OpenLF HDF5", "with a group LF", open_lf.matches, open_lf.read, scales=True),
+    "hci-2013": Format("HCI 2013 HDF5", "with LF (T, S, H, W, 3)", hci_2013.matches, hci_2013.read, scales=True),
     # last, so that it gets what is too damaged to tell
     "sepi": Format(
         "sepi HDF5",
@@ -127,6 +130,8 @@ def read(path: Path, options: ReadOptions, file_format: str | None = None) -> Li
     _require_used(path, known, options)
     with naming(path):
         light_field = known.read(path, options)
+        if options.white is not None and not known.scales:
+            light_field = with_white(light_field, path, options.white)
         seen = options.view if light_field.arranged else None
         return light_field if seen is None else light_field.seen_from(seen)
 

@@ -155,7 +155,13 @@ def _read_parameters(path: Path) -> _Parameters:
     """Keys of all sections together."""
     parser = configparser.ConfigParser(interpolation=None)
     with reading(path, "text file with '[section]' and 'key = value'"):
-        parser.read_string(path.read_text(encoding="utf-8"), source=path.name)
+        data = path.read_bytes()
+        try:
+            text = data.decode("utf-8-sig")
+        except UnicodeDecodeError:
+            # editors of other systems write comments so
+            text = data.decode("latin-1")
+        parser.read_string(text, source=path.name)
     values = {key: value for section in parser.sections() for key, value in parser.items(section)}
     used = {key: values[key] for key in _Parameters.model_fields if key in values}
     return validated(_Parameters, used, f"{path}: parameters")

@@ -78,6 +78,8 @@ class ReadOptions:
     row_spacing : float, optional
         Distance from one row of views to the next in the light field's grid, as a multiple of that from one column to
         the next.
+    white : float, optional
+        Value that stands for white where it is not the highest of the type: 1023 in files of 10 bits.
     follow_links : bool
         Read views that are links to files outside their folder.
 
@@ -112,6 +114,7 @@ class ReadOptions:
     exclude: tuple[str, ...] = ()
     view: tuple[int, int] | None = None
     row_spacing: float | None = None
+    white: float | None = None
     follow_links: bool = False
 
     def __post_init__(self) -> None:
@@ -127,6 +130,8 @@ class ReadOptions:
         object.__setattr__(self, "exclude", tuple(self.exclude))
         if self.row_spacing is not None and not is_finite(self.row_spacing):
             raise SepiError(f"options: row_spacing: expected a number, got {described(self.row_spacing)}")
+        if self.white is not None and not (is_finite(self.white) and self.white > 0):
+            raise SepiError(f"options: white: expected a number above 0, got {described(self.white)}")
 
 
 def arrange_numbers(

@@ -23,6 +23,9 @@ _FINEST = 10**_FINE
 _RIVAL = 0.5
 # part of a grid that a suggested pattern must fill
 _WELL_FILLED = 0.5
+# last word before a number, and what says which number it is
+_WORD = re.compile(r"([A-Z]?[a-z]+|[A-Z]+)[ _.=(\[-]*$")
+_AXES = {"x": "column", "c": "column", "col": "column", "column": "column", "y": "row", "r": "row", "row": "row"}
 # in place of a decimal number; no name has it
 _MARK = "/"
 
@@ -54,7 +57,9 @@ class ViewNumbers:
     decimals : dict of str to tuple of float
         Name to the decimal numbers in it.
     pattern : str
-        Where the names hold other numbers that differ and count nothing: which of them are taken.
+        Where the names hold other numbers that differ and count nothing, or say which is the row: which are taken.
+    said : bool
+        Whether the names say which number is the row and which the column.
     """
 
     numbers: dict[str, tuple[int, ...]]
@@ -63,6 +68,7 @@ class ViewNumbers:
     kind: Kind = Kind.COUNT
     decimals: dict[str, tuple[float, ...]] = field(default_factory=dict)
     pattern: str = ""
+    said: bool = False
 
 
 def parse_view_numbers(source: str, names: Iterable[str], pattern: str) -> ViewNumbers:
@@ -131,8 +137,9 @@ def infer_view_numbers(source: str, names: Iterable[str]) -> ViewNumbers:
             f"{source}: no number in the names counts the views ({', '.join(names[:3])}); give --pattern, such as "
             f"{EXAMPLES}"
         )
-    numbers = {name: group.numbers_of(name, counted.columns) or () for name in group.names}
-    numbers_of: Callable[[str], tuple[int, ...] | None] = functools.partial(group.numbers_of, columns=counted.columns)
+    columns, said = group.row_first(counted.columns)
+    numbers = {name: group.numbers_of(name, columns) or () for name in group.names}
+    numbers_of: Callable[[str], tuple[int, ...] | None] = functools.partial(group.numbers_of, columns=columns)
     if counted.kind is Kind.SORT:
         ranks = {key: rank for rank, key in enumerate(sorted(set(numbers.values())))}
         numbers = {name: (ranks[key],) for name, key in numbers.items()}
@@ -145,7 +152,8 @@ def infer_view_numbers(source: str, names: Iterable[str]) -> ViewNumbers:
         tuple(name for name in names if name not in kept),
         counted.kind,
         {name: group.decimals_of(name) for name in group.names},
-        group.pattern(counted.columns) if counted.kind is not Kind.SORT and group.varies_beside(counted) else "",
+        group.pattern(columns) if said or (counted.kind is not Kind.SORT and group.varies_beside(counted)) else "",
+        said,
     )
 
 
@@ -232,6 +240,12 @@ class _Group:
         decimals = zip(self._cut(name).decimals, self._decimal_hyphens, strict=True)
         return tuple(-float(text) if _is_minus(signs, hyphen) else float(text) for (signs, text), hyphen in decimals)
 
+    def row_first(self, columns: tuple[int, ...]) -> tuple[tuple[int, ...], bool]:
+        """Row and column in that order, and whether the words before them say so: ``x3_y7``, ``c3r7``."""
+        words = [_WORD.search(self._texts[at]) for at in columns]
+        said = [_AXES.get(word[1].lower(), "") if word else "" for word in words]
+        return (columns[::-1] if said == ["column", "row"] else columns), sorted(said) == ["column", "row"]
+
     def varies_beside(self, counted: Counting) -> bool:
         """Whether other numbers differ, too."""
         known = {self.columns[at] for at in counted.columns}
@@ -255,7 +269,7 @@ class _Group:
         pairs = sorted(combinations(numbers, 2), key=lambda pair: (-pair[1], -pair[0]))
         for fixed in (False, True):
             for columns in (*pairs, *((at,) for at in numbers)):
-                pattern = self.pattern(columns, fixed)
+                pattern = self.pattern(self.row_first(columns)[0], fixed)
                 if _works(pattern, self.names):
                     return f"'{pattern}'"
         return EXAMPLES

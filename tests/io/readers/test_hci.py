@@ -15,6 +15,7 @@ from sepi.errors import SepiError
 from sepi.io.pfm import write_pfm
 from sepi.lightfield import DisparityRange
 from sepi.reading import read_light_field
+from sepi.scenes import render, write_hci
 
 CONFIG = """[intrinsics]
 image_resolution_x_px = 16
@@ -307,3 +308,12 @@ def test_real_scene_with_a_view_missing(hci: Path, tmp_path: Path) -> None:
     assert light_field.ground_truth is not None
     (tmp_path / "cotton/input_Cam040.png").unlink()
     assert "the centre view (t, s) = (4, 4) is missing" in reading_error(tmp_path / "cotton")
+
+
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "latin-1"])
+def test_parameters_saved_by_an_editor_of_another_system_are_read(tmp_path: Path, encoding: str) -> None:
+    """A byte order mark, or an umlaut in a comment, is no damage."""
+    write_hci(render("dots", size=64, views=3), tmp_path / "scene")
+    file = tmp_path / "scene" / "parameters.cfg"
+    file.write_text(file.read_text(encoding="utf-8") + "# Größe in Pixeln\n", encoding=encoding)
+    assert read_light_field(tmp_path / "scene", check_order=False).disparity_range is not None

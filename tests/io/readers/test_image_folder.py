@@ -348,18 +348,31 @@ def test_views_stand_where_their_names_say(tmp_path: Path, case: str) -> None:
     assert places_of(light_field) == expected
     assert note in " ".join(light_field.notes)
     # what the user said is no assumption
-    assert ("in that order" in " ".join(light_field.notes)) == (
+    notes = " ".join(light_field.notes)
+    told = "in that order" in notes or "the names say row and column" in notes
+    assert told == (
         options.pattern is None
         and "numbered" not in light_field.notes[0]
         and "count no views" not in light_field.notes[0]
     )
-    assert light_field.arranged == (
-        options.grid is not None or "in that order" in " ".join(light_field.notes) or "{row}" in (options.pattern or "")
-    )
+    assert light_field.arranged == (options.grid is not None or told or "{row}" in (options.pattern or ""))
     assert light_field.name == "my scene"
     assert light_field.source == str(folder)
     if options.view and light_field.arranged:
         assert light_field.reference_position == options.view
+
+
+@pytest.mark.parametrize(
+    "form", ["cam_x{s}_y{t}.png", "c{s}r{t}.png", "ViewX{s}Y{t}.png", "Col_{s}-Row_{t}.png", "row{t}_column{s}.png"]
+)
+def test_names_say_which_number_is_the_column(tmp_path: Path, form: str) -> None:
+    """The column taken for the row transposes the grid: depth is nonsense."""
+    folder = put(tmp_path / "scene", [form.format(t=t, s=s) for t, s in itertools.product(range(2), range(3))])
+    light_field = read(folder, ReadOptions())
+    assert places_of(light_field) == grid_of(2, 3)
+    pattern = form.format(t="{row}", s="{column}")
+    assert light_field.notes == (f"the names say row and column, as in '{pattern}'",)
+    assert places_of(read(folder, ReadOptions(pattern=pattern))) == grid_of(2, 3)
 
 
 @pytest.mark.parametrize("ending", ["png", "PNG", "bmp", "tif", "tiff", "ppm", "pnm", "webp"])
