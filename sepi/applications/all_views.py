@@ -230,7 +230,7 @@ def anchor_views(light_field: LightField) -> list[tuple[int, int]]:
     return list(dict.fromkeys(found))
 
 
-def carried_map(disparity: FloatMap, baseline: tuple[float, float]) -> FloatMap:
+def carried_map(disparity: FloatMap, baseline: tuple[float, float], known: BoolMap | None = None) -> FloatMap:
     """A disparity map as another view sees its surfaces.
 
     Parameters
@@ -239,6 +239,8 @@ def carried_map(disparity: FloatMap, baseline: tuple[float, float]) -> FloatMap:
         Pixels per view step.
     baseline : (float, float)
         From the map's view to the other, down and across, in view steps.
+    known : ndarray, shape (H, W), bool, optional
+        Pixels that count, whose disparity is finite; all unless given.
 
     Returns
     -------
@@ -248,10 +250,14 @@ def carried_map(disparity: FloatMap, baseline: tuple[float, float]) -> FloatMap:
     from sepi.applications.all_views_kernels import EMPTY, carry, corner_disparities
 
     nearest, believed = np.empty_like(disparity), np.empty_like(disparity)
+    counted = np.ones_like(disparity) if known is None else known.astype(np.float32)
+    if known is not None:
+        # compiled code knows no NaN; behind all else, what is unknown hides nothing
+        disparity = np.where(known, disparity, disparity[known].min(initial=0) - np.float32(1))
     corners = corner_disparities(disparity, np.float32(TOLERANCE))
     down, across = map(float, baseline)
-    carry(disparity, np.ones_like(disparity), corners, down, across, MOST_STRETCHED, nearest, believed)
-    nearest[nearest == EMPTY] = np.nan
+    carry(disparity, counted, corners, down, across, MOST_STRETCHED, nearest, believed)
+    nearest[(nearest == EMPTY) | (believed == 0)] = np.nan
     return nearest
 
 

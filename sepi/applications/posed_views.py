@@ -5,21 +5,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
+from sepi.applications.all_views import carried_map
 from sepi.applications.camera_poses import CameraPoses, Points, camera_poses, nominal_camera
-from sepi.applications.carried_maps import carried_disparity, seen
 from sepi.camera import Camera
 from sepi.errors import SepiError
 from sepi.lightfield import BoolMap, FloatMap, LightField, as_unit_float
 
 Colours = npt.NDArray[np.uint8]
 
+Surfaces = Callable[[tuple[int, int]], FloatMap]
+"""Gives the disparity of the view at a grid position, (H, W) float32, NaN where it is unknown."""
+
 MAX_POINTS = 10000
 """Most points unless told; each has a track through all the views that see it."""
+
+# surfaces apart by more than this many pixels between the two views are different ones
+_APART = 1.0
 
 
 @dataclass(frozen=True)
@@ -40,6 +47,8 @@ class PosedViews:
         Pixels of the reference view that have a depth.
     chosen : ndarray, shape (H, W), bool
         Pixels of the reference view that have a point.
+    surfaces : callable or None
+        Disparity of the other views; the reference view's, carried to them, where there is none.
     """
 
     light_field: LightField
@@ -49,6 +58,7 @@ class PosedViews:
     disparity: FloatMap
     known: BoolMap
     chosen: BoolMap
+    surfaces: Surfaces | None = None
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -82,7 +92,13 @@ class PosedViews:
 
     def carried(self, view: int) -> FloatMap:
         """Disparity as a view sees it, (H, W) float32; NaN where it is not known."""
-        return carried_disparity(self.disparity, self.known, self.poses.baselines[view])
+        if view == self.poses.reference:
+            return np.where(self.known, self.disparity, np.float32(np.nan))
+        if self.surfaces is None:
+            down, across = self.poses.baselines[view].tolist()
+            return carried_map(self.disparity, (down, across), self.known)
+        t, s = self.poses.positions[view].tolist()
+        return self.surfaces((t, s))
 
     def depth(self, carried: FloatMap) -> FloatMap:
         """Depth of a view, (H, W) float32, from its :meth:`carried` disparity; 0 where it is not known."""
@@ -104,8 +120,17 @@ class PosedViews:
         return np.where(known, facing / np.where(known, length, 1), 0).astype(np.float32)
 
     def sees(self, view: int, carried: FloatMap) -> npt.NDArray[np.bool_]:
-        """Which of the points a view sees, (P,), given its :meth:`carried` disparity."""
-        return seen(carried, self.disparity, self.chosen, self.poses.baselines[view])
+        """Which of the points a view sees, (P,), given its :meth:`carried` disparity: those that it holds and that
+        nothing nearer hides.
+        """
+        baseline, disparity = self.poses.baselines[view], self.disparity[self.chosen].astype(np.float64)
+        there = np.argwhere(self.chosen) - disparity[:, None] * baseline
+        inside = ((there > -0.5) & (there < np.array(carried.shape) - 0.5)).all(axis=1)
+        # of what lies outside no whole number need exist
+        rows, columns = np.rint(np.where(inside[:, None], there, 0)).astype(np.int64).T
+        # comparison with NaN is false: where nothing is known, nothing is seen
+        nearer = (carried[rows, columns] - disparity) * float(np.abs(baseline).max())
+        return np.asarray(inside & (nearer <= _APART), bool)
 
 
 def posed_views(
@@ -117,6 +142,7 @@ def posed_views(
     camera: Camera | None = None,
     min_confidence: float | None = None,
     max_points: int = MAX_POINTS,
+    surfaces: Surfaces | None = None,
 ) -> PosedViews:
     """Prepare a light field and the disparity map of its reference view for other programs.
 
@@ -135,6 +161,8 @@ def posed_views(
         Less sure pixels have no point; the surer half of all pixels with a depth has one unless given.
     max_points : int
         Every so-many-th row and column has points, so that they are no more than this.
+    surfaces : callable, optional
+        Disparity of the other views; the map is carried to them unless given.
 
     Raises
     ------
@@ -163,6 +191,7 @@ def posed_views(
         disparity=disparity,
         known=known,
         chosen=_thinned(_sure(known, confidence, min_confidence), max_points),
+        surfaces=surfaces,
     )
 
 

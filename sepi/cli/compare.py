@@ -35,12 +35,13 @@ def compare(a: Path, b: Path, ground_truth: Path | None, output: Path, reading: 
       sepi compare before.pfm after.pfm gt_disp_lowres.pfm -o page.html
     """
     from sepi.cli.evaluate import score_table
-    from sepi.io.disparity_maps import read_disparity
+    from sepi.io.all_views import read_disparity_at
     from sepi.io.files import atomic_path
     from sepi.report.web.comparison_page import Comparison, comparison_page
 
-    maps = read_disparity(a), read_disparity(b)
-    require_one_view(a, b)
+    view = reading.options.view
+    maps = read_disparity_at(a, view), read_disparity_at(b, view)
+    require_one_view(a, b, reading)
     values, light_field = (None, None) if ground_truth is None else read_ground_truth(ground_truth, a, reading)
     for path, other in ((b, maps[1]), (ground_truth, values), (ground_truth, light_field)):
         if other is not None and other.shape != maps[0].shape:

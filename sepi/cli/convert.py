@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from sepi.cli.input_options import Geometry, camera_flags
+from sepi.cli.input_options import Geometry, camera_flags, view_of_result
 from sepi.command import SepiCommand
 from sepi.errors import SepiError
 
@@ -19,33 +19,39 @@ _MAPS = {"disparity": "pixels per view step", "depth": "metres", "confidence": "
 # by these names programs know depth, and a grey picture
 _CHANNELS = {"depth": "Z"}
 _GREY = "Y"
+_PFM = ".pfm"
 
 
-@click.command(cls=SepiCommand, short_help="Write a finished map as OpenEXR or TIFF.")
+@click.command(cls=SepiCommand, short_help="Write a finished map as OpenEXR, TIFF or PFM.")
 @click.argument("result_path", metavar="RESULT", type=_PATH)
 @click.argument("output", metavar="FILE", type=_PATH)
 @click.option("--map", "name", type=click.Choice(list(_MAPS)), help="Map to write; in .exr all of them unless given.")
+@view_of_result
 @camera_flags
-def convert(result_path: Path, output: Path, name: str | None, geometry: Geometry | None) -> None:
-    """Write maps of RESULT as FILE, a picture of 32-bit floats: OpenEXR (.exr) or TIFF (.tif, .tiff).
+def convert(
+    result_path: Path, output: Path, name: str | None, view: tuple[int, int] | None, geometry: Geometry | None
+) -> None:
+    """Write maps of RESULT as FILE, a picture of 32-bit floats: OpenEXR (.exr), TIFF (.tif, .tiff) or PFM (.pfm).
 
-    RESULT is a folder that 'sepi depth' wrote, or its result.h5. OpenEXR holds the channels disparity (pixels per view
-    step), confidence, and, where the camera is known, Z (depth, metres); one map alone, chosen with --map, is the grey
-    channel Y, which OpenCV reads. TIFF holds one map, the disparity unless --map names another. OpenEXR needs the
-    package of that name: pip install 'sepi[exr]'.
+    RESULT is a folder that 'sepi depth' wrote, its result.h5 or its all_views.h5. OpenEXR holds the channels disparity
+    (pixels per view step), confidence, and, where the camera is known, Z (depth, metres); one map alone, chosen with
+    --map, is the grey channel Y, which OpenCV reads. TIFF and PFM hold one map, the disparity unless --map names
+    another. OpenEXR needs the package of that name: pip install 'sepi[exr]'.
 
     \b
     Examples:
       sepi convert cotton-depth cotton.exr
       sepi convert cotton-depth depth.tiff --map depth
+      sepi convert cotton-depth corner.pfm --view 0,0
     """
     from sepi.io.float_pictures import EXR, TIFF, write_exr, write_tiff
+    from sepi.io.pfm import write_pfm
 
     suffix = output.suffix.lower()
-    if suffix not in (*EXR, *TIFF):
-        raise SepiError(f"{output}: expected a name that ends with .exr, .tif or .tiff, the format of the file")
-    maps = _maps(result_path, geometry)
-    if name is None and suffix in TIFF:
+    if suffix not in (*EXR, *TIFF, _PFM):
+        raise SepiError(f"{output}: expected a name that ends with .exr, .tif, .tiff or .pfm, the format of the file")
+    maps = _maps(result_path, view, geometry)
+    if name is None and suffix not in EXR:
         name = "disparity"
     if name is not None and name not in maps:
         raise SepiError(f"{result_path}: no depth, as the camera is not known; give --focal-length and the others")
@@ -55,16 +61,18 @@ def convert(result_path: Path, output: Path, name: str | None, geometry: Geometr
         write_exr(output, {_CHANNELS.get(key, key): values for key, values in maps.items()}, comment)
     elif suffix in EXR:
         write_exr(output, {_GREY: maps[name]}, comment)
+    elif suffix == _PFM:
+        write_pfm(output, maps[name])
     else:
         write_tiff(output, maps[name], comment)
     click.echo(f"written: {output} ({comment})")
 
 
-def _maps(path: Path, geometry: Geometry | None) -> dict[str, FloatMap]:
+def _maps(path: Path, view: tuple[int, int] | None, geometry: Geometry | None) -> dict[str, FloatMap]:
     """Maps of a result by their names; depth where the camera is known."""
-    from sepi.io.result_folder import read_result
+    from sepi.io.all_views import read_result_at
 
-    result = read_result(path)
+    result = read_result_at(path, view)
     camera = result.camera if geometry is None else geometry(shape=result.disparity.shape)
     depth = {} if camera is None else {"depth": camera.depth(result.disparity)}
     return {"disparity": result.disparity, **depth, "confidence": result.confidence}

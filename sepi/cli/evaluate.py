@@ -57,13 +57,13 @@ def evaluate(
       sepi evaluate estimate.pfm gt_disp_lowres.pfm --border 15 --json
       sepi evaluate inner_482x482.pfm cotton --offset 15,15
     """
-    from sepi.io.disparity_maps import read_disparity
+    from sepi.io.all_views import read_disparity_at
     from sepi.io.files import naming
     from sepi.io.scores import without_nan
     from sepi.scoring.crops import in_frame
     from sepi.scoring.scores import PROTOCOLS, region_masks, score_regions
 
-    disparity = read_disparity(estimate)
+    disparity = read_disparity_at(estimate, reading.options.view)
     values, light_field = read_ground_truth(ground_truth, estimate, reading)
     if values is None:
         view = "" if light_field is None else ",".join(map(str, light_field.reference_position))

@@ -114,6 +114,13 @@ _FLAGS = (
 )
 
 
+view_of_result = click.option(
+    "--view",
+    type=Pair("ROW,COLUMN", ","),
+    metavar="ROW,COLUMN",
+    help="View to take, where 'sepi depth --all-views' made maps of all; that of the result unless given.",
+)
+
 Geometry = Callable[..., "Camera"]
 """Makes the camera of views of a ``shape``."""
 

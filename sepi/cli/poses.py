@@ -47,8 +47,9 @@ def poses(
 
     RESULT is the folder that 'sepi depth' wrote for INPUT, or its result.h5; it knows how INPUT was read.
     Poses are exact, so nothing has to be matched. Each view has a principal point of its own: programs that ignore it
-    see another scene. Depth of the other views is RESULT's, carried over; 0 where it does not say. Positions are in
-    metres where the camera is known. docs/reference/outputs.md describes the files.
+    see another scene. Depth of the other views is that of 'sepi depth --all-views', else RESULT's, carried over; 0
+    where it is not known. Positions are in metres where the camera is known. docs/reference/outputs.md describes the
+    files.
 
     \b
     Examples:
@@ -56,12 +57,12 @@ def poses(
       sepi poses cotton cotton-depth --to nerfstudio -o cotton-nerf
     """
     from sepi.applications.posed_views import posed_views
+    from sepi.io.all_views import read_result_at, surfaces_of
     from sepi.io.colmap import write_colmap
     from sepi.io.nerfstudio import write_nerfstudio
-    from sepi.io.result_folder import read_result
 
-    result = read_result(result_path)
     light_field = read_light_field_of(light_field_path, result_path, reading, bare=False)
+    result = read_result_at(result_path, reading.options.view)
     folder = output or default_folder(light_field_path, kind)
     posed = posed_views(
         light_field,
@@ -71,6 +72,7 @@ def poses(
         camera=result.camera if geometry is None else geometry(shape=light_field.shape),
         min_confidence=min_confidence,
         max_points=points,
+        surfaces=surfaces_of(result_path),
     )
     with progress_bar(light_field.name) as progress:
         {"colmap": write_colmap, "nerfstudio": write_nerfstudio}[kind](folder, posed, progress)

@@ -126,7 +126,7 @@ def refocus(
     if pixels and result_path is None:
         raise SepiError("--at: needs RESULT, the map that tells how near a pixel is; 'sepi depth INPUT' makes it")
     light_field = read_light_field_of(light_field_path, result_path, reading)
-    result = None if result_path is None else _read_result(result_path, light_field_path, light_field)
+    result = None if result_path is None else _read_result(result_path, light_field_path, light_field, reading)
     camera = light_field.camera or (result.camera if result else None)
     if geometry is not None:
         camera = geometry(shape=light_field.shape)
@@ -149,20 +149,19 @@ def refocus(
     click.echo(f"written to {folder}/: {' '.join(files)}")
 
 
-def _read_result(path: Path, light_field_path: Path, light_field: LightField) -> _Result:
+def _read_result(path: Path, light_field_path: Path, light_field: LightField, reading: Reading) -> _Result:
     """The map to focus by, which must be of the views' size."""
-    from sepi.io.disparity_maps import read_disparity
-    from sepi.io.origin import read_origin
-    from sepi.io.result_folder import read_result
+    from sepi.io.all_views import read_disparity_at, read_origin_at, read_result_at
 
-    disparity = read_disparity(path)
+    view = reading.options.view
+    disparity = read_disparity_at(path, view)
     if disparity.shape != light_field.shape:
         raise SepiError(
             f"{path}: is {disparity.shape}, but the views of {light_field_path} are {light_field.shape} (height, width)"
         )
-    if read_origin(path) is None:
+    if read_origin_at(path, view) is None:
         return _Result(path, disparity, None, None)
-    stored = read_result(path)
+    stored = read_result_at(path, view)
     return _Result(path, disparity, stored.unknown if stored.unknown.shape == disparity.shape else None, stored.camera)
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import click
 
-from sepi.cli.input_options import Geometry, camera_flags
+from sepi.cli.input_options import Geometry, camera_flags, view_of_result
 from sepi.command import SepiCommand
 from sepi.errors import SepiError
 
@@ -18,11 +18,14 @@ _PARTIAL = click.option("--partial", is_flag=True, help="Take fewer than the ben
 
 @click.command(cls=SepiCommand, short_help="Write the point cloud of a finished disparity map.")
 @click.argument("result_path", metavar="RESULT", type=_PATH)
-@click.option("-o", "--output", type=_PATH, help="PLY file to write; points.ply beside the result unless given.")
+@click.option(
+    "-o", "--output", type=_PATH, help="PLY file to write; points.ply beside the result, or points_ROW_COLUMN.ply."
+)
 @click.option("--min-confidence", type=float, default=0.0, metavar="X", help="Leave out less sure pixels; 0 to 1.")
 @click.option("--max-depth", type=float, metavar="M", help="Leave out points more distant than this many metres.")
 @click.option("--step", type=click.IntRange(min=1), default=1, metavar="N", help="Use every Nth row and column only.")
 @click.option("--keep-unknown", is_flag=True, help="Keep pixels that no view knows anything about.")
+@view_of_result
 @camera_flags
 def points(
     result_path: Path,
@@ -31,23 +34,25 @@ def points(
     max_depth: float | None,
     step: int,
     keep_unknown: bool,
+    view: tuple[int, int] | None,
     geometry: Geometry | None,
 ) -> None:
     """Write the coloured point cloud of RESULT as a PLY file.
 
-    RESULT is a folder that 'sepi depth' wrote, or its result.h5. Points are in metres where the scene's files or the
-    flags give the camera; otherwise they are a relief with x and y in pixels. docs/reference/outputs.md describes both.
+    RESULT is a folder that 'sepi depth' wrote, its result.h5 or its all_views.h5. Points are in metres where the
+    scene's files or the flags give the camera; otherwise they are a relief with x and y in pixels.
+    docs/reference/outputs.md describes both.
 
     \b
     Examples:
       sepi points cotton-depth --min-confidence 0.5 --max-depth 6
       sepi points views-depth -o views.ply --focal-length 50 --baseline 10 --focus-distance 2 --sensor-size 36
     """
+    from sepi.io.all_views import read_result_at
     from sepi.io.ply import write_ply
     from sepi.io.point_cloud import point_cloud
-    from sepi.io.result_folder import read_result
 
-    result = read_result(result_path)
+    result = read_result_at(result_path, view)
     cloud = point_cloud(
         result.picture,
         result.disparity,
@@ -62,7 +67,8 @@ def points(
     if not len(cloud.positions):
         tried = "lower --min-confidence, raise --max-depth or give --keep-unknown"
         raise SepiError(f"{result_path}: no point is left; {tried}")
-    path = output or (result_path if result_path.is_dir() else result_path.parent) / "points.ply"
+    name = "_".join(["points", *map(str, view or ())]) + ".ply"
+    path = output or (result_path if result_path.is_dir() else result_path.parent) / name
     if path.suffix.lower() != ".ply":
         raise SepiError(f"{path}: expected a name that ends with .ply, the format of the file")
     write_ply(path, cloud)

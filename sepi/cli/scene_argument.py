@@ -18,11 +18,11 @@ if TYPE_CHECKING:
 _BARE = "a map alone, such as its disparity.pfm, is taken for one of any light field"
 
 
-def require_one_view(estimate: Path, other: Path) -> None:
+def require_one_view(estimate: Path, other: Path, reading: Reading) -> None:
     """Raise if two maps say that they belong to different views."""
-    from sepi.io.origin import read_origin
+    from sepi.io.all_views import read_origin_at
 
-    one, two = read_origin(estimate), read_origin(other)
+    one, two = (read_origin_at(path, reading.options.view) for path in (estimate, other))
     if one is not None and two is not None and one.differs(two):
         raise SepiError(f"{other}: depth of another view than {estimate}; compare maps of one view ({_BARE})")
 
@@ -35,11 +35,12 @@ def read_ground_truth(path: Path, estimate: Path, reading: Reading) -> tuple[Flo
     SepiError
         If it cannot be read, or belongs to another view or light field.
     """
-    from sepi.io.disparity_maps import is_disparity, read_disparity
+    from sepi.io.all_views import read_disparity_at
+    from sepi.io.disparity_maps import is_disparity
 
     if is_disparity(path):
-        values = read_disparity(path)
-        require_one_view(estimate, path)
+        values = read_disparity_at(path, reading.options.view)
+        require_one_view(estimate, path, reading)
         return values, None
     light_field = read_light_field_of(path, estimate, reading, check_order=False)
     return light_field.ground_truth, light_field
@@ -70,9 +71,9 @@ def read_light_field_of(
     SepiError
         If it cannot be read, or is not the very light field that the map says.
     """
-    from sepi.io.origin import read_origin
+    from sepi.io.all_views import read_origin_at
 
-    origin = None if result is None else read_origin(result)
+    origin = None if result is None else read_origin_at(result, reading.options.view)
     if origin is None:
         return reading.read(path, check_order=check_order)
     failures: list[SepiError] = []

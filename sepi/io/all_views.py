@@ -1,8 +1,11 @@
-"""The file of the maps of all views, written one view after the other: all of them may be more than memory holds."""
+"""The file of the maps of all views, written and read one view after the other: all of them may be more than memory
+holds.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,22 +13,32 @@ import h5py
 import numpy as np
 import numpy.typing as npt
 
-from sepi.io.hdf5 import UNITS, Attribute, create_hdf5
-from sepi.lightfield import LightField
+from sepi.errors import SepiError
+from sepi.io.disparity_maps import read_disparity
+from sepi.io.hdf5 import UNITS, Attribute, attribute, create_hdf5, has_dataset, open_hdf5, read_camera, read_dataset
+from sepi.io.origin import Origin, read_origin
+from sepi.io.result_folder import ALL_VIEWS, Result, read_result
+from sepi.lightfield import FloatMap, LightField
 
+View = tuple[int, int]
+
+_KIND = "file of maps of all views, of this version of 'sepi depth --all-views'"
+# of the datasets the one that no other file has
+_MARK = "extended"
 _MISSING = {"disparity": np.nan}
 
 
 def write_all_views(
     path: Path,
     light_field: LightField,
-    views: Iterable[tuple[tuple[int, int], Mapping[str, npt.NDArray[Any]]]],
+    views: Iterable[tuple[View, Mapping[str, npt.NDArray[Any]]]],
     attributes: Mapping[str, Attribute],
 ) -> None:
     """Write the maps of all views, whole or not at all; equal content gives equal bytes.
 
-    The file holds a dataset ``(T, S, H, W)`` for each name, and what tells where the views stand: ``present (T, S)``
-    bool, and ``baselines (T, S, 2)``, down and across from the reference view in view steps, NaN for missing views.
+    The file holds a dataset ``(T, S, H, W)`` for each name, the views' pictures ``picture (T, S, H, W, C)``, and what
+    tells where the views stand: ``present (T, S)`` bool, and ``baselines (T, S, 2)``, down and across from the
+    reference view in view steps, NaN for missing views.
 
     Parameters
     ----------
@@ -53,18 +66,102 @@ def write_all_views(
             file.attrs[key] = value
         file.attrs["view_position"] = light_field.reference_position
         for position, maps in views:
-            for name, values in maps.items():
-                _dataset(file, name, (*light_field.grid, *light_field.shape), values.dtype)[position] = values
+            for name, values in {**maps, "picture": light_field.views[position]}.items():
+                _dataset(file, name, light_field.grid, values)[position] = values
 
 
-def _dataset(file: h5py.File, name: str, shape: tuple[int, ...], dtype: npt.DTypeLike) -> h5py.Dataset:
-    """The dataset of this name, made where it is not there yet; missing views take no room in it."""
+def read_result_at(path: Path, view: View | None = None) -> Result:
+    """What a result says about one of the views.
+
+    Parameters
+    ----------
+    path : Path
+        Folder of a result, its ``result.h5``, or a file of maps of all views.
+    view : (int, int), optional
+        Row and column in the grid; that of the result unless given. What is unknown of another one are the pixels that
+        no map shows, and those without any confidence.
+
+    Raises
+    ------
+    SepiError
+        If there is no map of this view, or the file is damaged.
+    """
+    file_path = _file_of(path, view)
+    if file_path is None:
+        result, origin = read_result(path), read_origin(path)
+        if view is not None and (origin is None or origin.view != view):
+            own = "" if origin is None else " {},{}".format(*origin.view)
+            raise SepiError(f"{path}: holds the map of view{own} alone; 'sepi depth --all-views' makes those of all")
+        return result
+    with open_hdf5(file_path, _KIND) as file:
+        position = _position(file_path, file, view)
+        down, across = (read_dataset(file_path, file["baselines"]) + attribute(file, "from_centre"))[position].tolist()
+        disparity, confidence, extended, picture = (
+            read_dataset(file_path, file[name], position) for name in ("disparity", "confidence", _MARK, "picture")
+        )
+        return Result(
+            scene=str(attribute(file, "scene")),
+            picture=picture,
+            disparity=disparity.astype(np.float32),
+            confidence=confidence.astype(np.float32),
+            unknown=extended.astype(bool) | (confidence == 0),
+            camera=read_camera(file),
+            from_centre=(down, across),
+        )
+
+
+def read_disparity_at(path: Path, view: View | None) -> FloatMap:
+    """A disparity map, (H, W) float32: that of a view where the file has maps of all views, else the one it holds."""
+    return read_disparity(path) if _file_of(path, view) is None else read_result_at(path, view).disparity
+
+
+def read_origin_at(path: Path, view: View | None) -> Origin | None:
+    """What a file says of the light field of its map, or of the map of a view where it has those of all views."""
+    file_path = _file_of(path, view)
+    origin = read_origin(file_path or path)
+    if origin is None or file_path is None:
+        return origin
+    return replace(origin, view=view or origin.view, picture=read_result_at(path, view).picture)
+
+
+def surfaces_of(path: Path) -> Callable[[View], FloatMap] | None:
+    """What gives the disparity of a view, (H, W) float32, NaN where it is unknown; None without maps of all views."""
+    file_path = _file_of(path, (0, 0))
+    if file_path is None:
+        return None
+
+    def surface(view: View) -> FloatMap:
+        result = read_result_at(file_path, view)
+        return np.where(result.unknown, np.float32(np.nan), result.disparity)
+
+    return surface
+
+
+def _file_of(path: Path, view: View | None) -> Path | None:
+    """The file of maps of all views that is meant; None: the map of a result's own view, or of another program."""
+    path = path / ALL_VIEWS if path.is_dir() and view is not None else path
+    # of a damaged one is told when it is read
+    return path if has_dataset(path, _MARK, if_damaged=True) else None
+
+
+def _position(path: Path, file: h5py.File, view: View | None) -> View:
+    """Row and column of a view that is there; the reference view's unless given."""
+    t, s = map(int, attribute(file, "view_position")) if view is None else view
+    present = read_dataset(path, file["present"])
+    rows, columns = present.shape
+    if not (0 <= t < rows and 0 <= s < columns and present[t, s]):
+        raise SepiError(f"{path}: has no view {t},{s}; there are {present.sum()} of {rows}x{columns}, counted from 0")
+    return t, s
+
+
+def _dataset(file: h5py.File, name: str, grid: tuple[int, int], values: npt.NDArray[Any]) -> h5py.Dataset:
+    """The dataset for such values of each view, made where it is not there yet; missing views take no room in it."""
     if name not in file:
         # as in stage files: masks shrink to almost nothing, float maps hardly
-        packed = {"compression": "gzip", "compression_opts": 1} if np.dtype(dtype).itemsize < 4 else {}
-        chunks = (1, 1, *shape[2:])
-        file.create_dataset(name, shape, dtype, chunks=chunks, fillvalue=_MISSING.get(name), **packed)
-        file[name].attrs["axes"] = "t s y x"
+        packed = {"compression": "gzip", "compression_opts": 1} if values.dtype.itemsize < 4 else {}
+        shape, chunks = (*grid, *values.shape), (1, 1, *values.shape)
+        file.create_dataset(name, shape, values.dtype, chunks=chunks, fillvalue=_MISSING.get(name), **packed)
+        file[name].attrs["axes"] = "t s y x" if values.ndim == 2 else "t s y x channel"
         if name in UNITS:
             file[name].attrs["units"] = UNITS[name]
     return file[name]

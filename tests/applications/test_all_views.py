@@ -1,5 +1,6 @@
 """Maps of all views: each must be of its own view's pixels, and all of them of the same surfaces."""
 
+import json
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -11,15 +12,22 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from click.testing import CliRunner
+from error_lines import error_of
 from geometries import standing
 from several_threads import several_threads
 
 import sepi
 from bench.all_views import disagreement, moved_pixels
 from sepi.applications import all_views_kernels as kernels
-from sepi.applications.all_views import TOLERANCE, AllViews, anchor_views, carried_map, estimate_all_views
+from sepi.applications.all_views import TOLERANCE, AllViews, ViewMaps, anchor_views, carried_map, estimate_all_views
+from sepi.camera import Camera
 from sepi.cli.main import main
 from sepi.errors import SepiError
+from sepi.io.all_views import write_all_views
+from sepi.io.hdf5 import read_attributes, write_light_field
+from sepi.io.pfm import read_pfm, write_pfm
+from sepi.io.provenance import result_attributes
+from sepi.io.result_folder import write_result
 from sepi.lightfield import FloatMap, LightField
 from sepi.scenes import render, true_disparity, write_hci
 from sepi.stage import StageMaps
@@ -297,7 +305,13 @@ def test_the_command_writes_a_map_of_every_view(tmp_path: Path) -> None:
     both = {path.name: path.read_bytes() for path in (tmp_path / "all").iterdir()}
     again = (tmp_path / "again" / "all_views.h5").read_bytes()
     assert both.pop("all_views.h5") == again
+    # result.h5 lists the files that were written with it
+    for files in (plain, both):
+        del files["result.h5"]
     assert both == plain
+    one, other = (read_attributes(tmp_path / name / "result.h5") for name in ("plain", "all"))
+    assert other.pop("files") == "all_views.h5 " + one.pop("files")
+    assert list(map(str, other.values())) == list(map(str, one.values()))
     with h5py.File(tmp_path / "all" / "all_views.h5") as file:
         assert {name: file[name].shape for name in file} == {
             "disparity": (3, 3, 64, 64),
@@ -305,6 +319,7 @@ def test_the_command_writes_a_map_of_every_view(tmp_path: Path) -> None:
             "extended": (3, 3, 64, 64),
             "present": (3, 3),
             "baselines": (3, 3, 2),
+            "picture": (3, 3, 64, 64, 3),
         }
         assert file["disparity"].attrs["units"] == "pixels per view step"
         assert file.attrs["variant"] == "fast"
@@ -329,3 +344,96 @@ def test_missing_views_are_nan_in_the_file(tmp_path: Path) -> None:
         assert np.isnan(file["baselines"][0, 2]).all()
         assert np.isfinite(file["disparity"][()]).sum() == 8 * 64 * 64
         assert file["present"][()].sum() == 8
+
+
+# --- what is made of them ---------------------------------------------------------------------------------------------
+
+CAMERA = Camera(scale=30.0, offset=6.0, focal_px=90.0)
+
+
+@cache
+def small() -> tuple[LightField, FloatMap]:
+    """A light field with a camera and without view 0,2, and the truth of all its views."""
+    scene = replace(render(LAYERS, size=64, views=3), camera=CAMERA, present=np.arange(9).reshape(3, 3) != 2)
+    return scene, truth_of(scene)
+
+
+@pytest.fixture
+def exact(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> FloatMap:
+    """A light field ``scene.h5``, ``maps`` with the truth of all its views, and ``corner``, that of view
+    2,0 alone, in the current folder; the truth.
+    """
+    monkeypatch.chdir(tmp_path)
+    scene, truth = small()
+    sure = np.full(scene.shape, 0.9, np.float32)
+    nothing = np.zeros(scene.shape, bool)
+    nothing[5, 6] = True
+    write_light_field("scene.h5", scene)
+    write_light_field("other.h5", replace(scene, views=scene.views[:, ::-1], present=scene.present[:, ::-1]))
+    for name, light_field in (("maps", scene), ("corner", scene.seen_from((2, 0)))):
+        maps = StageMaps(truth[light_field.reference_position], sure, {"unknown": nothing & (name == "corner")})
+        write_result(name, light_field, maps)
+    views = [ViewMaps((t, s), truth[t, s], sure, nothing) for t, s in np.argwhere(scene.present).tolist()]
+    attributes = result_attributes(scene, StageMaps(truth[1, 1], sure))
+    write_all_views(Path("maps/all_views.h5"), scene, ((view.position, view.maps) for view in views), attributes)
+    return truth
+
+
+def call(*words: str) -> str:
+    done = CliRunner().invoke(main, words)
+    assert done.exit_code == 0, done.output
+    return done.stdout
+
+
+def test_a_view_of_all_makes_what_a_result_of_that_view_makes(exact: FloatMap) -> None:
+    """Metres, points and maps of any view: all but the reference view's were out of reach."""
+    call("points", "corner", "-o", "corner.ply")
+    call("points", "maps", "--view", "2,0")
+    assert Path("maps/points_2_0.ply").read_bytes() == Path("corner.ply").read_bytes()
+    call("convert", "maps/all_views.h5", "view.pfm", "--view", "2,0")
+    np.testing.assert_array_equal(read_pfm(Path("view.pfm")), exact[2, 0])
+    call("convert", "maps", "metres.pfm", "--view", "2,0", "--map", "depth")
+    np.testing.assert_array_equal(read_pfm(Path("metres.pfm")), CAMERA.depth(exact[2, 0]))
+    call("refocus", "scene.h5", "maps", "--view", "2,0", "--disparity", "1", "-o", "one")
+    call("refocus", "scene.h5", "corner", "--disparity", "1", "-o", "two")
+    assert Path("one/all_in_focus.png").read_bytes() == Path("two/all_in_focus.png").read_bytes()
+
+
+def test_a_view_of_all_is_scored_against_its_own_truth(exact: FloatMap) -> None:
+    write_pfm("truth.pfm", exact[2, 0])
+    for estimate in ("maps", "maps/all_views.h5"):
+        scores = json.loads(call("evaluate", estimate, "truth.pfm", "--view", "2,0", "--json"))
+        assert scores["paper"]["all"]["mse100"] == 0
+    # the reference view's, with the regions of the light field
+    assert json.loads(call("evaluate", "maps/all_views.h5", "scene.h5", "--json"))["paper"]["all"]["mse100"] == 0
+    assert "written" in call("compare", "maps", "corner", "--view", "2,0")
+
+
+@pytest.mark.parametrize("kind", ["colmap", "nerfstudio"])
+def test_poses_have_the_depth_of_every_view(exact: FloatMap, kind: str) -> None:
+    """Carried from one view, depth ends where that view sees nothing: behind things, and at borders."""
+    call("poses", "scene.h5", "maps", "--to", kind, "-o", "out")
+    for t, s in ((0, 0), (2, 0), (1, 2)):
+        name = f"view_{t:02}_{s:02}"
+        if kind == "nerfstudio":
+            depth = np.load(f"out/depths/{name}.npy") / 1000
+        else:
+            content = Path(f"out/stereo/depth_maps/{name}.png.geometric.bin").read_bytes()
+            depth = np.frombuffer(content.split(b"&", 3)[3], "<f4").reshape(64, 64)
+        expected = CAMERA.depth(exact[t, s])
+        expected[5, 6] = 0
+        np.testing.assert_allclose(depth, expected, rtol=1e-6)
+
+
+@pytest.mark.usefixtures("exact")
+def test_maps_of_all_views_belong_to_their_light_field() -> None:
+    """Another one's pictures with these depths would look right."""
+    for words, complaint in {
+        "points maps --view 0,2": "all_views.h5: has no view 0,2; there are 8 of 3x3",
+        "points maps --view 3,0": "all_views.h5: has no view 3,0",
+        "convert corner x.pfm --view 0,0": "corner: holds the map of view 2,0 alone",
+        "poses other.h5 maps/all_views.h5": "depth of another light field",
+        "evaluate maps/all_views.h5 other.h5": "depth of another light field",
+        "evaluate maps/all_views.h5 corner/result.h5": "depth of another view",
+    }.items():
+        assert complaint in error_of(CliRunner().invoke(main, words.split()))

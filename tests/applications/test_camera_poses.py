@@ -1,4 +1,4 @@
-"""Cameras of the views, and the reference view's map carried to them: they must see what the light field shows."""
+"""Cameras of the views, and maps seen by them: they must see what the light field shows."""
 
 from dataclasses import replace
 
@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from geometries import GEOMETRIES, standing
 
+from sepi.applications.all_views import carried_map
 from sepi.applications.camera_poses import CameraPoses, camera_poses, nominal_camera
-from sepi.applications.carried_maps import carried_disparity, seen
 from sepi.applications.posed_views import posed_views
 from sepi.camera import Camera, camera_from
 from sepi.errors import SepiError
@@ -120,43 +120,28 @@ def test_carried_map_has_the_nearer_surface_in_front_and_nothing_where_nothing_w
     """A square two pixels nearer moves two to the left in the view on the right; what it uncovers is not known."""
     disparity = np.zeros((5, 9), np.float32)
     disparity[1:4, 4:7] = 2
-    known = np.ones(disparity.shape, bool)
+    views = np.zeros((1, 3, 5, 9, 3), np.uint8)
+    posed = posed_views(LightField(views=views, name="square"), disparity)
     expected = np.zeros((5, 9), np.float32)
     expected[1:4, 2:5] = 2
     expected[1:4, 5:7] = np.nan
-    carried = carried_disparity(disparity, known, np.array([0.0, 1.0]))
+    carried = posed.carried(2)
     np.testing.assert_array_equal(carried, expected)
     # and of the background at columns 2 and 3 this view sees nothing
     hidden = np.zeros(disparity.shape, bool)
     hidden[1:4, 2:4] = True
-    visible = seen(carried, disparity, known, np.array([0.0, 1.0]))
-    np.testing.assert_array_equal(visible.reshape(disparity.shape), ~hidden)
+    np.testing.assert_array_equal(posed.sees(2, carried).reshape(disparity.shape), ~hidden)
 
 
-def test_nothing_shines_through_a_stretched_surface() -> None:
-    """Between pixels that part, the wall behind a slanted surface would appear as a line of wrong depth."""
-    disparity = np.full((8, 40), -3, np.float32)
-    disparity[:, 6:24] = np.linspace(0, -2, 18, dtype=np.float32)
+def test_what_is_unknown_is_carried_nowhere_and_spoils_nothing_beside_it() -> None:
+    """NaN in a user's map would be drawn as depth, or tear its neighbours; a guess would hide what is behind."""
+    disparity = np.zeros((9, 12), np.float32)
     known = np.ones(disparity.shape, bool)
-    baseline = np.array([0.0, 4.0])
-    carried = carried_disparity(disparity, known, baseline)
-    front = np.flatnonzero(carried[0] > -2.5)
-    inside = carried[:, front[0] : front[-1] + 1]
-    cracks = np.isnan(inside[0])
-    assert cracks.sum() > 5  # it is stretched
-    assert not (inside < -2.5).any()
-    # and the wall goes to pixels where they are
-    wall = np.where(known, np.float32(-3), 0)
-    behind = carried_disparity(wall, known & (disparity == -3), baseline)[0, front[0] : front[-1] + 1]
-    assert (behind[cracks] == -3).any()
-
-
-def test_carried_map_of_the_reference_view_is_its_own() -> None:
-    disparity = np.random.default_rng(4).normal(size=SHAPE).astype(np.float32)
-    known = np.random.default_rng(5).random(SHAPE) > 0.3
-    disparity[0, 0], known[0, 0] = np.nan, False
-    carried = carried_disparity(disparity, known, np.zeros(2))
-    np.testing.assert_array_equal(carried, np.where(known, disparity, np.nan))
+    known[3:6, 4:7] = False
+    for guess in (np.nan, np.inf, -np.inf, 3.0):
+        there = np.where(known, disparity, np.float32(guess))
+        np.testing.assert_array_equal(carried_map(there, (0, 1), known), np.where(known, 0, np.nan))
+    assert np.isnan(carried_map(there, (0, 1), np.zeros(known.shape, bool))).all()
 
 
 @pytest.mark.parametrize("geometry", GEOMETRIES)

@@ -293,7 +293,7 @@ def test_exr_without_its_package_says_what_to_install(monkeypatch: pytest.Monkey
 
 
 def test_convert_says_what_is_wrong(scene: LightField) -> None:
-    assert "ends with .exr, .tif or .tiff" in error_of(call("convert", "maps", "map.jpg"))
+    assert "ends with .exr, .tif, .tiff or .pfm" in error_of(call("convert", "maps", "map.jpg"))
     put(replace(scene, camera=None))
     assert "maps: no depth" in error_of(call("convert", "maps", "depth.tif", "--map", "depth"))
     assert call("convert", "maps", "depth.tif", "--map", "depth", *FLAGS).exit_code == 0
