@@ -19,6 +19,7 @@ import numpy.typing as npt
 from sepi.errors import SepiError
 from sepi.io.files import atomic_path, reading
 from sepi.io.picture_headers import Header, plain_png, read_header
+from sepi.io.tiff import plain_pixels, unturned
 from sepi.lightfield import HIGHEST, LOWEST, BoolMap
 from sepi.threads import available_cores
 
@@ -46,7 +47,7 @@ def read_picture(path: Path, *, any_floats: bool = False) -> Pixels:
     ndarray, shape (H, W, C), uint8, uint16 or float32
         C is 1 for grey, 3 for RGB; transparency is left out. Pixels are as stored: neither turned as a camera's
         orientation says nor changed in brightness, but integers that end at another white, as in some PGM, span their
-        whole range.
+        whole range, and where white is zero, as in some TIFF, black becomes it.
 
     Raises
     ------
@@ -193,9 +194,13 @@ def _decoded(path: Path, data: bytes, header: Header) -> Pixels:
     usual = _by_pillow(path, data, header)
     if usual is not None:
         return usual
-    if header.kind == "PNG":
-        with reading(path, header.kind):
+    with reading(path, header.kind):
+        if header.plain:
+            return plain_pixels(data)
+        if header.kind == "PNG":
             data = plain_png(data)
+        elif header.kind == "TIFF":
+            data = unturned(data)
     # OpenCV wants something behind the last digit of a PNM
     data += b"\n" if header.white else b""
     try:

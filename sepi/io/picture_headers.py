@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import io
 import logging
+import math
 import re
 import zlib
 from collections.abc import Callable
@@ -20,6 +21,7 @@ from typing import IO
 
 from sepi.errors import SepiError
 from sepi.io.files import reading
+from sepi.io.tiff import is_plain
 
 MAX_PIXELS = 2**28
 """More pixels than any camera's picture has."""
@@ -50,6 +52,8 @@ class Header:
         Whether it has no colours; where the file does not say, False.
     white : int
         PNM: the value of white; else 0.
+    plain : bool
+        TIFF: whether tifffile reads its pixels.
     mixed_alpha : bool
         Whether decoding mixes transparency into the colours.
     """
@@ -60,6 +64,7 @@ class Header:
     pixel_bytes: int = 3
     grey: bool = False
     white: int = 0
+    plain: bool = False
     mixed_alpha: bool = False
 
 
@@ -191,19 +196,28 @@ def _tiff(file: IO[bytes], size: int, whole: bool) -> Header:
     with tifffile.TiffFile(file) as pictures:
         page = pictures.pages[0].aspage()
     bits, samples, photometric = page.bitspersample, page.samplesperpixel, page.photometric
-    if page.dtype not in ("u1", "u2", "f4") or bits != 8 * page.dtype.itemsize:
-        form = {"f": " float", "i": " signed"}.get("" if page.dtype is None else page.dtype.kind, "")
-        raise SepiError(f"a TIFF of {bits} bit{form} samples; expected 8 or 16 bit without sign, or 32 bit float")
+    plain = is_plain(page)
+    rarer = "" if plain else ", or save it uncompressed"
+    kind, size_of_one = (page.dtype.kind, page.dtype.itemsize) if page.dtype is not None else ("", 0)
+    known = ("u1", "u2", "i1", "i2", "f2", "f4") if plain else ("u1", "u2", "f4")
+    if f"{kind}{size_of_one}" not in known or bits != 8 * size_of_one:
+        form = {"f": " float", "i": " signed"}.get(kind, "")
+        raise SepiError(f"a TIFF of {bits} bit{form} samples; expected 8 or 16 bit, or 32 bit float{rarer}")
     if samples not in (1, 3, 4):
         raise SepiError(f"a TIFF of {samples} samples a pixel; expected grey, RGB or RGBA")
-    if samples > 1 and page.planarconfig != tifffile.PLANARCONFIG.CONTIG:
-        raise SepiError("a TIFF with its colours apart (planar); save it interleaved (contiguous)")
-    if photometric not in ((0, 1, 2, 3, 6) if bits == 8 else (1, 2)):
-        raise SepiError("a TIFF that is neither grey with black as zero nor RGB; save it as one of these")
+    if samples > 1 and page.planarconfig != tifffile.PLANARCONFIG.CONTIG and not plain:
+        raise SepiError(f"a TIFF with its colours apart (planar); save it interleaved (contiguous){rarer}")
+    if photometric not in ((0, 1, 2, 3, 6) if bits == 8 else (0, 1, 2) if plain and kind != "f" else (1, 2)):
+        raise SepiError(f"a TIFF that is neither grey with black as zero nor RGB; save it as one of these{rarer}")
     height, width, counts = page.imagelength, page.imagewidth, page.databytecounts
     if not all(isinstance(number, int) for number in (height, width, page.tilelength, page.tilewidth)):
         # several of them: a product with one would be a list as long as the other says
         raise SepiError("damaged TIFF: its height and width are not one number each")
+    if page.imagedepth != 1:
+        raise SepiError("a TIFF of a volume; save each of its pictures as one")
+    if 0 in counts or len(counts) < math.prod(page.chunked):
+        # a decoder would take what is missing for black
+        raise SepiError("damaged TIFF: parts of its pixels are missing")
     if max(start + count for start, count in zip(page.dataoffsets, counts, strict=True)) > size:
         raise SepiError(f"damaged TIFF: the file is cut off after {size} bytes")
     if page.compression == tifffile.COMPRESSION.NONE and sum(counts) < width * height * samples * bits // 8:
@@ -216,7 +230,11 @@ def _tiff(file: IO[bytes], size: int, whole: bool) -> Header:
         width,
         pixel_bytes=samples * bits // 8,
         grey=samples == 1 and photometric in (0, 1),
-        mixed_alpha=bits == 8 and samples == 4 and page.extrasamples[:1] == (tifffile.EXTRASAMPLE.UNASSALPHA,),
+        plain=plain,
+        mixed_alpha=not plain
+        and bits == 8
+        and samples == 4
+        and page.extrasamples[:1] == (tifffile.EXTRASAMPLE.UNASSALPHA,),
     )
 
 

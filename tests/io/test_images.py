@@ -7,6 +7,7 @@ import struct
 import warnings
 import zlib
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import cv2
@@ -89,6 +90,7 @@ EXACT: dict[str, tuple[str, Callable[[Path], object], np.ndarray]] = {
     "tiff RGB 16": ("a.tiff", by_tifffile(RGB16), RGB16),
     "tiff RGB float": ("a.tif", by_tifffile(RGBF), RGBF),
     "tiff RGBA 8 opaque": ("a.tif", by_tifffile(alpha(RGB8, 255), extrasamples=["unassalpha"]), RGB8),
+    "tiff RGBA 8 transparent": ("a.tif", by_tifffile(alpha(RGB8), extrasamples=["unassalpha"]), RGB8),
     "tiff RGBA 16": ("a.tif", by_tifffile(alpha(RGB16), extrasamples=["unassalpha"]), RGB16),
     "tiff RGBA float": ("a.tif", by_tifffile(alpha(RGBF), extrasamples=["unassalpha"]), RGBF),
     "tiff RGBA 8 of OpenCV": ("a.tif", by_opencv(alpha(RGB8)), RGB8),
@@ -99,6 +101,21 @@ EXACT: dict[str, tuple[str, Callable[[Path], object], np.ndarray]] = {
     "tiff deflated": ("a.tif", by_tifffile(RGB16, compression="zlib", predictor=True), RGB16),
     "tiff in tiles": ("a.tif", by_tifffile(RGB16, tile=(32, 32)), RGB16),
     "tiff in strips": ("a.tif", by_tifffile(RGB8, rowsperstrip=7), RGB8),
+    "tiff in planes": ("a.tif", by_tifffile(RGB16.transpose(2, 0, 1), planarconfig="separate"), RGB16),
+    "tiff in planes and tiles": (
+        "a.tif",
+        by_tifffile(RGB8.transpose(2, 0, 1), planarconfig="separate", tile=(32, 32), compression="zlib"),
+        RGB8,
+    ),
+    "tiff of half floats": ("a.tif", by_tifffile(RGBF.astype(np.float16)), RGBF.astype(np.float16).astype(np.float32)),
+    "tiff with a sign": ("a.tif", by_tifffile((GREY16 // 2).astype(np.int16), byteorder=">"), GREY16 // 2),
+    "tiff with white as zero": ("a.tif", by_tifffile(GREY16, photometric="miniswhite"), 65535 - GREY16),
+    "tiff packed with white as zero": (
+        "a.tif",
+        by_tifffile(GREY8, photometric="miniswhite", compression="zlib"),
+        255 - GREY8,
+    ),
+    "tiff packbits": ("a.tif", by_pillow(RGB8, compression="packbits"), RGB8),
     "webp": ("a.webp", by_pillow(RGB8, lossless=True), RGB8),
     "webp RGBA": ("a.webp", by_pillow(alpha(RGB8), lossless=True, exact=True), RGB8),
     "pgm": ("a.pgm", by_pillow(GREY8), GREY8),
@@ -146,12 +163,32 @@ def test_jpeg_with_a_thumbnail_and_bytes_after_its_end_is_whole(tmp_path: Path) 
     assert read_picture(tmp_path / "a.jpg").shape == (40, 50, 3)
 
 
-def test_camera_orientation_does_not_turn_a_view(tmp_path: Path) -> None:
-    """A view on its side does not match its neighbours."""
+def turned(value: int, **options: object) -> Callable[[Path], object]:
     exif = Image.Exif()
-    exif[0x0112] = 6
-    by_pillow(smooth(), exif=exif)(tmp_path / "a.jpg")
-    assert read_picture(tmp_path / "a.jpg").shape == (40, 50, 3)
+    exif[0x0112] = value
+    return lambda path: by_pillow(smooth(), exif=exif, **options)(path)
+
+
+ORIENTED: dict[str, tuple[str, Callable[[int], Callable[[Path], object]]]] = {
+    "JPEG": ("a.jpg", partial(turned, quality=100, subsampling=0)),
+    "PNG": ("a.png", turned),
+    "WebP": ("a.webp", partial(turned, lossless=True)),
+    "TIFF": ("a.tif", lambda value: by_tifffile(smooth(), extratags=[(274, "H", 1, value)])),
+    "TIFF big endian": ("a.tif", lambda value: by_tifffile(smooth(), extratags=[(274, "H", 1, value)], byteorder=">")),
+    "TIFF LZW": ("a.tif", partial(turned, compression="tiff_lzw")),
+    "TIFF JPEG": ("a.tif", partial(turned, compression="jpeg", quality=100)),
+}
+
+
+@pytest.mark.parametrize("value", [2, 3, 6])
+@pytest.mark.parametrize("case", ORIENTED)
+def test_camera_orientation_does_not_turn_a_view(tmp_path: Path, case: str, value: int) -> None:
+    """A view on its side does not match its neighbours, and where all are mirrored, near is far."""
+    name, write = ORIENTED[case]
+    write(value)(tmp_path / name)
+    read = read_picture(tmp_path / name)
+    assert read.shape == (40, 50, 3)
+    assert np.abs(read.astype(int) - smooth()).max() <= (10 if "JPEG" in case else 0)
 
 
 WHOLE: dict[str, Callable[[Path], object]] = {
@@ -271,11 +308,12 @@ BAD: dict[str, tuple[bytes, str]] = {
     "plain TIFF larger than its file": (tiff(compression=1, width=100, height=100), "bytes of pixels"),
     "TIFF with pixels beyond its end": (tiff(start=10**6), "cut off"),
     "TIFF of 12 bit": (tiff(bits=12), "12 bit"),
-    "TIFF of signed numbers": (tiff(bits=16, form=2), "signed"),
+    "TIFF of signed numbers, packed": (tiff(bits=16, form=2, compression=5), "signed"),
+    "TIFF whose pixels are missing": (tiff(size=0), "missing"),
     "TIFF of 64 bit": (tiff(bits=64, form=3), "64 bit float"),
     "TIFF of 1 bit": (tiff(bits=1), "1 bit"),
     "TIFF of two samples": (tiff(samples=2), "2 samples"),
-    "TIFF of 16 bit with white as zero": (tiff(bits=16, photometric=0), "black as zero"),
+    "TIFF of 16 bit with white as zero, packed": (tiff(bits=16, photometric=0, compression=5), "black as zero"),
     "TIFF in CMYK": (tiff(samples=4, photometric=5), "nor RGB"),
     "huge BMP": (bmp(2**31 - 1, 2**31 - 1), "2147483647x2147483647"),
     "huge BMP upside down": (bmp(2**30, -(2**31)), "1073741824x2147483648"),
@@ -326,15 +364,21 @@ def test_sound_header_beside_a_bad_one(tmp_path: Path) -> None:
         assert read_picture(tmp_path / "a").shape[:2] == shape[:2]
 
 
+def lzw_planes(path: Path) -> None:
+    """A TIFF in planes that says that it is packed by LZW."""
+    by_tifffile(np.moveaxis(RGB16, 2, 0), planarconfig="separate")(path)
+    data = path.read_bytes()
+    packed = struct.pack("<HHIH", 259, 3, 1, 5)
+    assert data.count(packed[:-2] + b"\1\0") == 1
+    path.write_bytes(data.replace(packed[:-2] + b"\1\0", packed))
+
+
 UNREAD: dict[str, tuple[Callable[[Path], object], str]] = {
-    "planes apart": (
-        by_tifffile(np.moveaxis(RGB16, 2, 0), photometric="rgb", planarconfig="separate"),
-        "save it interleaved",
-    ),
-    "half floats": (by_tifffile(RGBF.astype(np.float16)), "16 bit float"),
+    "planes apart, packed": (lzw_planes, "save it interleaved"),
     "64 bit floats": (by_tifffile(RGBF.astype(np.float64)), "64 bit float"),
     "32 bit integers": (by_tifffile(GREY16.astype(np.uint32)), "32 bit"),
-    "transparent": (by_tifffile(alpha(RGB8), extrasamples=["unassalpha"]), "without alpha"),
+    "transparent, packed": (by_pillow(alpha(RGB8), compression="tiff_lzw"), "without alpha"),
+    "below zero": (by_tifffile(-(GREY16 // 2).astype(np.int16) - 1), "a pixel of -32"),
     "not a number": (by_tifffile(np.where(RGBF > 0.5, np.float32(np.nan), RGBF)), "NaN"),
     "one pixel infinite": (by_tifffile(np.where(RGBF > 0.99, np.float32(np.inf), RGBF)), "infinite"),
     "0 to 255": (by_tifffile(RGBF * 255), "within 0..1"),

@@ -49,6 +49,9 @@ class Format:
 _LISTED = 5
 _DEPTH = 1
 
+# what Lytro's cameras and programs write
+_RAW = frozenset({".lfr", ".lfp", ".raw"})
+
 _ARRAY_OPTIONS = ("grid", "axes", "variable")
 
 FORMATS = {
@@ -149,10 +152,18 @@ def _what_else(path: Path) -> str:
     """What a path that is no light field seems to be, for who gave the wrong one of several."""
     if _is_result(path):
         return "holds a disparity map, not a light field"
-    if path.is_file():
-        picture = path.suffix.lower() in SUFFIXES
-        return "a single picture; give the folder of all views" if picture else "not a light field of a known format"
+    if any(map(_is_raw, [path, *path.glob("*")])):
+        return (
+            "raw data of a Lytro camera, not yet views; decode it with the Light Field Toolbox (MATLAB) or PlenoptiCam "
+            "(Python), and give what they write"
+        )
+    if path.is_file() and path.suffix.lower() in SUFFIXES:
+        return "a single picture; give the folder of all views"
     return "not a light field of a known format"
+
+
+def _is_raw(path: Path) -> bool:
+    return path.suffix.lower() in _RAW and path.is_file()
 
 
 def _is_result(path: Path) -> bool:

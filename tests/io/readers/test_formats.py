@@ -48,6 +48,15 @@ def test_file_of_no_known_format(tmp_path: Path) -> None:
     assert "not a light field of a known format" in reading_error(tmp_path / "notes.txt", format_of)
 
 
+def test_raw_file_of_a_lytro_says_what_decodes_it(tmp_path: Path) -> None:
+    (tmp_path / "IMG_0001.LFR").write_bytes(b"\x89LFP\r\n\x1a\n" + bytes(64))
+    for path in (tmp_path / "IMG_0001.LFR", tmp_path):
+        message = reading_error(path, format_of)
+        assert message.startswith(f"{path}: raw data of a Lytro camera")
+        assert "Light Field Toolbox" in message
+        assert "PlenoptiCam" in message
+
+
 def test_a_result_is_not_taken_for_a_light_field(tmp_path: Path) -> None:
     flat = np.zeros((12, 16), np.float32)
     write_result(tmp_path / "out", LightField(VIEWS, "toy"), StageMaps(flat, flat), {})
