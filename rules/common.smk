@@ -215,14 +215,14 @@ def threads_for(wildcards):
 def stage_memory_for(stage, bytes_per_sample, bytes_per_pixel):
     """Function of wildcards: memory of a stage's job in MB, as usual for the stage or as its choice needs.
 
-    A cost volume of more than the usual number of candidates adds to it.
+    More than the usual number of candidates adds to it.
     """
 
     def memory(wildcards, attempt):
         scene, parameters = scene_of(wildcards), SETTINGS.parameters[stage][wildcards[stage]]
         usual = scene.memory_mb(bytes_per_sample, bytes_per_pixel)
         own = scene.memory_mb(parameters.needs.bytes_per_sample, parameters.needs.bytes_per_pixel)
-        return attempt * (max(usual, own) + candidates_mb(scene, *sweep_of(stage, wildcards)))
+        return attempt * (max(usual, own) + candidates_mb(scene, *sweep_of(stage, wildcards), threads_for(wildcards)))
 
     return memory
 

@@ -22,6 +22,8 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
+from sepi.kernel_cache import provide_kernel_cache
+
 if TYPE_CHECKING:
     from sepi.applications.all_views import AllViews, estimate_all_views
     from sepi.applications.refocusing import all_in_focus, refocus
@@ -82,6 +84,8 @@ _HOME = {
     "refocus": "sepi.applications.refocusing",
     "write_result": "sepi.io.result_folder",
 }
+
+provide_kernel_cache()
 
 
 def __getattr__(name: str) -> Any:

@@ -29,6 +29,7 @@ from sepi.errors import SepiError, SepiWarning, one_line
 from sepi.io.files import atomic_path
 from sepi.io.hdf5 import read_light_field, read_stage, write_stage
 from sepi.io.provenance import history_of, stage_attributes
+from sepi.kernel_cache import tell_kernel_cache
 from sepi.matching.base_detail import kept_detail
 from sepi.memory import KERNELS, require_memory
 from sepi.stage import Choice, Progress, entry, no_progress
@@ -228,6 +229,7 @@ def stage_command(stage: str, own: Mapping[str, Choice]) -> click.Command:
                 f"{previous}: maps of {maps.disparity.shape} do not belong to {light_field_path} of {light_field.shape}"
             )
         require_memory(KERNELS)
+        tell_kernel_cache()
         with progress_bar(f"{light_field.name} {stage}") as progress, kept_detail():
             result = chosen.run(light_field, maps, settings, progress)
         history = [*history_of(previous), entry(stage, choice, settings, light_field)]

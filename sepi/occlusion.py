@@ -74,6 +74,11 @@ class HalfSepiParameters(OcclusionParameters):
         0.03, ge=0, le=2, description="further gain asked for where no nearer surface is found on the hidden side"
     )
 
+    @property
+    def groups(self) -> int:
+        """Those between the dividing lines of the halves, and those on them."""
+        return 8
+
 
 class VisibilityParameters(VisibleViewsParameters, MixtureParameters, SurfaceShareParameters):
     """Parameters of the views chosen one by one, and of the mixed pixels."""
@@ -83,6 +88,11 @@ class WangParameters(OcclusionParameters):
     """Parameters of the angular-patch split."""
 
     directions: int = Field(8, ge=2, le=32, multiple_of=2, description="edge orientations over half a turn")
+
+    @property
+    def groups(self) -> int:
+        """Sectors between the edges."""
+        return 2 * self.directions
 
 
 def half_sepi(

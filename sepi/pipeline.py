@@ -7,6 +7,7 @@ from contextlib import nullcontext
 from dataclasses import replace
 from typing import Any
 
+from sepi.kernel_cache import tell_kernel_cache
 from sepi.lightfield import LightField
 from sepi.matching.base_detail import kept_detail
 from sepi.matching.memory_limit import bytes_of_bands, require_memory_of
@@ -77,6 +78,7 @@ def estimate_depth(
 
         light_field = light_field.with_range(estimate_range(light_field))
     require_memory_of(light_field, settings.values())
+    tell_kernel_cache()
     maps: StageMaps | None = None
     limited = nullcontext() if memory is None else band_memory(bytes_of_bands(light_field, settings.values(), memory))
     with limited, kept_detail():

@@ -15,6 +15,7 @@ from sepi.io.origin import reading_record
 from sepi.io.readers.camera_positions import with_row_spacing
 from sepi.io.readers.formats import read
 from sepi.io.readers.options import ReadOptions, in_grid
+from sepi.kernel_cache import tell_kernel_cache
 from sepi.lightfield import DisparityRange, LightField
 from sepi.memory import KERNELS, require_memory
 
@@ -81,6 +82,7 @@ def read_light_field(
     options = options or ReadOptions()
     light_field = read(path, options, file_format)
     require_memory(KERNELS)
+    tell_kernel_cache()
     if not light_field.arranged:
         from sepi.inspection.arrangement import arrange
 

@@ -11,6 +11,15 @@ def available_cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
+def threads_used() -> int:
+    """Threads of a compiled loop: as :func:`use_threads` said, else what numba takes by itself."""
+    if "numba" in sys.modules:
+        import numba
+
+        return int(numba.get_num_threads())
+    return int(os.environ.get("NUMBA_NUM_THREADS", available_cores()))
+
+
 def use_threads(count: int) -> None:
     """Let numba and OpenCV use at most so many threads, and never more than this process has cores.
 

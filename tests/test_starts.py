@@ -1,6 +1,7 @@
 """What a command loads before it does anything: a job of the workflow is often shorter than an import."""
 
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -78,6 +79,35 @@ def test_a_stage_without_kernels_does_not_wait_for_numba(tmp_path: Path) -> None
     program = f"{imports}\nstage_command('optimize', CHOICES)({words!r}, standalone_mode=False)"
     assert loaded(program) == {"scipy"}
     assert (tmp_path / "optimize.h5").is_file()
+
+
+@pytest.mark.parametrize("squatted", [False, True])
+def test_kernels_where_neither_package_nor_home_can_be_written(tmp_path: Path, squatted: bool) -> None:
+    """As in a container; numba would refuse every function, also if another's folder has the temporary name."""
+    shutil.copytree(Path(__file__).parents[1] / "sepi", tmp_path / "sepi", ignore=shutil.ignore_patterns("__pycache__"))
+    for folder in ("", "matching", "image"):
+        # a file holds for root, too
+        (tmp_path / "sepi" / folder / "__pycache__").touch()
+    usual = tmp_path / f"sepi-kernels-{os.getuid()}"
+    if squatted:
+        usual.mkdir()
+        usual.chmod(0o777)
+    program = (
+        f"import warnings, {'numba, sepi' if squatted else 'sepi, numba'}, sepi.matching.spline_kernels\n"
+        "from sepi.kernel_cache import tell_kernel_cache\n"
+        "print(numba.config.CACHE_DIR)\n"
+        "warnings.showwarning = lambda message, *_: print(message)\n"
+        "tell_kernel_cache(), tell_kernel_cache()\n"
+    )
+    nowhere = {"HOME": "/dev/null/home", "TMPDIR": str(tmp_path), "PYTHONPATH": str(tmp_path)}
+    free = {name: value for name, value in os.environ.items() if name not in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME")}
+    words = [sys.executable, "-B", "-c", program]
+    done = subprocess.run(words, env=free | nowhere, capture_output=True, text=True, check=False, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    folder, told = done.stdout.splitlines()
+    assert (Path(folder) == usual) is not squatted
+    assert Path(folder).stat().st_mode & 0o077 == 0
+    assert f"compiled code is kept in {folder}; set NUMBA_CACHE_DIR" in told
 
 
 # what a scheduler does, or a container

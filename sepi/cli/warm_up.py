@@ -16,6 +16,7 @@ from multiprocessing import get_context
 import click
 
 from sepi.command import SepiCommand
+from sepi.kernel_cache import tell_kernel_cache
 from sepi.threads import use_threads
 
 SHARES: tuple[tuple[str, ...], ...] = (("paper", "no_sepi", "wang"), ("best", "best_no_detail"))
@@ -60,6 +61,7 @@ def compile_kernels(variants: tuple[str, ...]) -> None:
 def command(comparison: bool) -> None:
     """Compile the kernels, so that the first run need not."""
     started = time.perf_counter()
+    tell_kernel_cache()
     shares = (*SHARES, *COMPARED) if comparison else SHARES
     with ProcessPoolExecutor(len(SHARES), get_context("spawn")) as processes:
         # taken from the iterator, so that an error in a process is one here

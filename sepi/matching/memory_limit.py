@@ -1,8 +1,8 @@
 """A limit on the memory of an estimate: what is taken whatever happens, and what that leaves for the bands.
 
-The views, the maps and the cost volumes of variant ``best`` are held as a whole; what is made of all views at once is
-made in bands of rows (:mod:`sepi.matching.row_bands`), narrower ones where there is less memory. The results
-are the same. The compared methods hold everything as a whole.
+The views, the maps, the cost volumes of variant ``best`` and the rows of costs of each thread of a plane sweep are held
+as a whole; what is made of all views at once is made in bands of rows (:mod:`sepi.matching.row_bands`), narrower ones
+where there is less memory. The results are the same. The compared methods hold everything as a whole.
 """
 
 from __future__ import annotations
@@ -12,10 +12,12 @@ from collections.abc import Iterable
 from sepi.errors import SepiError
 from sepi.lightfield import LightField
 from sepi.matching.base_detail import BaseDetailParameters
+from sepi.matching.plane_sweep import SweepParameters
 from sepi.matching.row_bands import least_band_bytes
 from sepi.matching.visibility_sweep import BYTES_PER_CANDIDATE, VisibilitySweepParameters
 from sepi.memory import MORE_KERNELS, require_memory
 from sepi.stage import OcclusionMarginParameters, Parameters
+from sepi.threads import threads_used
 
 _LIBRARIES = 300 * 2**20
 """Python with what it imports, and what is allocated for the moment."""
@@ -79,9 +81,11 @@ def _bytes_taken(light_field: LightField, stages: Iterable[Parameters]) -> tuple
     height, width = light_field.shape
     sweeps = [p.fewer(light_field, p.finest_sampling) for p in stages if isinstance(p, VisibilitySweepParameters)]
     volume = BYTES_PER_CANDIDATE * max(sweeps, default=0)
+    rings = [p.sweep_bytes(light_field, threads_used()) for p in stages if isinstance(p, SweepParameters)]
     pixels, samples = height * width, height * width * int(light_field.present.sum())
     own = max((p.needs.bytes_per_sample * samples + p.needs.bytes_per_pixel * pixels for p in stages), default=0)
-    whole = _LIBRARIES + light_field.views.nbytes + round(max((volume + _BYTES_OF_MAPS) * pixels, own))
+    ours = _BYTES_OF_MAPS * pixels + max(volume * pixels, *rings, 0)
+    whole = _LIBRARIES + light_field.views.nbytes + round(max(ours, own))
     in_bands = any(isinstance(p, (BaseDetailParameters, OcclusionMarginParameters)) for p in stages)
     if not in_bands:
         return whole, whole

@@ -14,6 +14,7 @@ References
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -29,6 +30,9 @@ from sepi.stage import Progress, no_progress
 
 CANDIDATES = CandidateRule(usual=181, finest=0.02, coarsest=0.5)
 """The paper's number, for light fields like the paper's."""
+
+TILE_WIDTH = 512
+"""Columns done at a time: bounds what a thread holds, whatever the width of the picture, and keeps it in the cache."""
 
 
 class SweepParameters(CandidateParameters):
@@ -52,6 +56,28 @@ class SweepParameters(CandidateParameters):
         le=10,
         description="colour distance at which a window pixel's weight falls; RGB distance, colours in 0..1",
     )
+
+    @property
+    def groups(self) -> int:
+        """Groups of views whose costs are summed apart, at most."""
+        return 1
+
+    def sweep_bytes(self, light_field: LightField, threads: int) -> int:
+        """What :func:`sweep` takes beside views and maps: the views by channel, and what each thread holds."""
+        height, width = light_field.shape
+        busy = min(threads, -(-height // _rows_at_a_stretch(height, threads)))
+        views = light_field.views.dtype.itemsize * 3 * math.prod(light_field.views.shape[:4])
+        return views + busy * self.thread_bytes(self.number(light_field), width)
+
+    def thread_bytes(self, number: int, width: int) -> int:
+        """What a thread of :func:`sweep` holds with so many candidates, of pictures so wide.
+
+        Those are the costs and the numbers of samples in the rows of a window, and the costs of one row more, of every
+        candidate and group; and the weights of the windows of a row.
+        """
+        size, columns = 2 * self.window_radius + 1, min(width, TILE_WIDTH)
+        of_rows = (2 * size + 1) * (columns + 2 * self.window_radius) * self.groups * number
+        return 4 * (of_rows + size * size * columns)
 
 
 @dataclass(frozen=True)
@@ -142,7 +168,7 @@ def sweep(
     strip = height * get_num_threads()
     for begin in range(0, H, strip):
         end = min(H, begin + strip)
-        sweep_plane_rows(views, candidates, window, mask, begin, end, height, maps)
+        sweep_plane_rows(views, candidates, window, mask, begin, end, height, TILE_WIDTH, maps)
         progress(end / H)
     return result
 

@@ -34,9 +34,6 @@ the first run would give other last digits than later ones.
 SHORTEST_GAP = 128
 """Columns between pixels of the mask that are done rather than skipped: starting anew costs as much."""
 
-TILE_WIDTH = 512
-"""Columns done at a time: bounds what a thread holds, whatever the width of the picture, and keeps it in the cache."""
-
 
 class Run(NamedTuple):
     """Columns ``begin..end`` of row ``y``."""
@@ -484,13 +481,13 @@ def _sweep_tile(
 @njit(cache=True, parallel=True)
 def sweep_plane_rows(
     views: ViewStack, candidates: Candidates, window: Window, mask: Any, begin: int, end: int, height: int,
-    maps: BestMaps,
+    width: int, maps: BestMaps,
 ) -> None:  # fmt: skip
-    """Sweep the rows ``begin..end`` of the ``mask (H, W)``, so many of them, ``height``, at a stretch."""
+    """Sweep the rows ``begin..end`` of the ``mask (H, W)`` in tiles of at most ``height`` rows, ``width`` columns."""
     W = views.colours.shape[4]
     margin = math.ceil(candidates.reach) + window.radius + 1
     for task in prange((end - begin + height - 1) // height):
         top = begin + task * height
-        for left in range(0, W, TILE_WIDTH):
-            tile = Tile(top, min(end, top + height), left, min(W, left + TILE_WIDTH), margin)
+        for left in range(0, W, width):
+            tile = Tile(top, min(end, top + height), left, min(W, left + width), margin)
             _sweep_tile(views, candidates, window, mask, tile, maps)

@@ -8,12 +8,13 @@ from pathlib import Path
 from sepi.errors import SepiError
 from sepi.io.hdf5 import read_attributes
 from sepi.matching.candidates import CandidateParameters
+from sepi.matching.plane_sweep import SweepParameters
 from sepi.stage import Parameters
 from sepi.workflow.datasets import Scene
 
 
-def candidates_mb(scene: Scene, light_field: Path, parameters: Parameters) -> int:
-    """Memory in MB that a cost volume takes beyond one of the usual number of candidates.
+def candidates_mb(scene: Scene, light_field: Path, parameters: Parameters, threads: int = 1) -> int:
+    """Memory in MB that a sweep takes beyond one of the usual number of candidates: a cost volume, or rows of costs.
 
     Parameters
     ----------
@@ -21,8 +22,14 @@ def candidates_mb(scene: Scene, light_field: Path, parameters: Parameters) -> in
     light_field : Path
         What ingest writes of it; until then only a number that is set can be told.
     parameters : Parameters
-        Of the job's choice; most choices hold no cost volume.
+        Of the job's choice.
+    threads : int
+        Each of a plane sweep has rows of its own.
     """
+    if isinstance(parameters, SweepParameters):
+        usual = type(parameters)().thread_bytes(parameters.rule.usual, scene.width)
+        own = parameters.thread_bytes(_number(scene, light_field, parameters), scene.width)
+        return round(threads * max(0, own - usual) / 2**20)
     each = parameters.needs.bytes_per_candidate
     if not isinstance(parameters, CandidateParameters) or not each:
         return 0

@@ -15,8 +15,8 @@ from several_threads import several_threads
 from sepi.errors import SepiError
 from sepi.image.noise import noise_level, residual_variance
 from sepi.lightfield import DisparityRange, LightField
-from sepi.matching.plane_sweep import SweepParameters, planar, sampled_candidates, sweep
-from sepi.matching.plane_sweep_kernels import SHORTEST_GAP, TILE_WIDTH, Run, cost_row
+from sepi.matching.plane_sweep import TILE_WIDTH, SweepParameters, planar, sampled_candidates, sweep
+from sepi.matching.plane_sweep_kernels import SHORTEST_GAP, Run, cost_row
 from sepi.matching.stitched_epi import line_cost, stitched_epi
 from sepi.matching.sweep_arrays import ViewStack
 from sepi.matching.view_subsets import halves_and_quarters

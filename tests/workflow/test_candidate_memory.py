@@ -8,6 +8,7 @@ from sepi.io.hdf5 import write_light_field
 from sepi.lightfield import DisparityRange, LightField
 from sepi.matching.plane_sweep import SweepParameters
 from sepi.matching.visibility_sweep import FirstDepthParameters
+from sepi.occlusion import HalfSepiParameters
 from sepi.workflow.candidates import candidates_mb
 from sepi.workflow.datasets import Scene
 
@@ -25,7 +26,10 @@ def test_a_wide_range_asks_for_its_cost_volume(tmp_path: Path) -> None:
     light_field = written(tmp_path / "lf.h5", 100)
     # 100 px to views 2 steps away, 0.4 px apart there
     assert candidates_mb(SCENE, light_field, FirstDepthParameters()) == round(410 * 8 * 300 * 400 / 2**20)
-    assert candidates_mb(SCENE, light_field, SweepParameters()) == 0
+    # 0.5 px apart; each thread has the rows of a window, their numbers of samples, and one row more
+    rows = (401 - 181) * (2 * 7 + 1) * 4 * (400 + 6)
+    assert candidates_mb(SCENE, light_field, SweepParameters(), threads=3) == round(3 * rows / 2**20)
+    assert candidates_mb(SCENE, light_field, HalfSepiParameters(), threads=3) == round(3 * 8 * rows / 2**20)
 
 
 def test_usual_narrow_and_yet_unread_ones_ask_for_no_more(tmp_path: Path) -> None:
