@@ -27,14 +27,14 @@ def ablation_table(runs: Runs) -> Report:
         for name, kind, means in _rows(runs, dataset):
             for region in REGIONS:
                 figures = {variant: mean.value for variant, mean in means[region].items()}
-                over = max((mean.count for mean in means[region].values()), default=0)
+                over = max((mean.scenes for mean in means[region].values()), default=0)
                 scene = methods.average_label(over) if kind == methods.AVERAGE else name
                 records.append({"dataset": dataset, "scene": scene, "row": kind, "region": region, **figures})
             # the regions of a variant in one cell, as the paper has them; a figure published without these stands alone
             cells = {v: [means[r][v] for r in REGIONS if v in means[r]] for v in variants}
             texts = {v: "/".join(filter(None, (short(mean.value) for mean in cells[v]))) for v in variants}
             scenes = len(runs.scored(dataset)) if kind == methods.AVERAGE else 1
-            notes = {v: methods.count_note([mean.count for mean in found], scenes) for v, found in cells.items()}
+            notes = {v: methods.count_note([mean.scenes for mean in found], scenes) for v, found in cells.items()}
             source = Kind.PUBLISHED if kind == methods.PRINTED_AVERAGE else Kind.OURS
             lines.append(line(columns, {"scene": name, **texts}, source, kind, notes=notes))
         if lines:

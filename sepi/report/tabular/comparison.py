@@ -100,7 +100,7 @@ def _scene_records(
     if own_names:
         available = [figures for name, _, figures, _ in found if name in own_names]
         means = {m.key: _average(m, [figures.get(m.key) for figures in available]) for m in compared}
-        notes = {key: methods.count_note([mean.count], len(available)) for key, mean in means.items()}
+        notes = {key: methods.count_note([mean.scenes], len(available)) for key, mean in means.items()}
         figures = {key: mean.value for key, mean in means.items()}
         found.append((methods.average_label(len(available)), methods.AVERAGE, figures, notes))
     if dataset in paper.averages:
@@ -125,7 +125,7 @@ def _figure(method: Method, figures: Record) -> Cell:
 def _average(method: Method, figures: Sequence[Cell]) -> Mean:
     """Mean; of other methods None where a figure is missing: an average over other scenes would not compare."""
     mean = methods.mean(figures)
-    return mean if method.kind == Kind.OURS or mean.count == len(figures) else Mean(None, 0)
+    return mean if method.kind == Kind.OURS or mean.scenes == len(figures) else Mean(None, 0)
 
 
 def region_table(runs: Runs) -> Report:
@@ -145,7 +145,7 @@ def region_table(runs: Runs) -> Report:
     for m in rows:
         record: dict[str, Cell] = {"name": m.head, "method": m.key, "learning": m.learning}
         record |= {key: figures[key][m.key] for key in cells}
-        record |= {counts[key]: means[key][m.key].count or None for key in cells}
+        record |= {counts[key]: means[key][m.key].scenes or None for key in cells}
         notes = {key: _region_note(runs, m, means[key][m.key], dataset) for key, (dataset, _) in cells.items()}
         records.append(record)
         lines.append(line(columns, record, m.kind, marks={key: marks[key].get(m.key) for key in cells}, notes=notes))
@@ -175,7 +175,7 @@ def _region_average(runs: Runs, method: Method, dataset: str, region: str) -> Me
 def _region_note(runs: Runs, method: Method, mean: Mean, dataset: str) -> str:
     """Over how many scenes an average is, where that is not what the caption says."""
     scenes = runs.scored(dataset) if method.is_here else published.table1().scenes(dataset)
-    return methods.count_note([mean.count], len(scenes))
+    return methods.count_note([mean.scenes], len(scenes))
 
 
 def _own_figure(runs: Runs, method: Method, dataset: str, scenes: Sequence[str], score: str, region: str) -> Mean:

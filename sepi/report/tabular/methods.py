@@ -130,7 +130,7 @@ class Mean(NamedTuple):
     """A mean, and how many figures it is of."""
 
     value: Cell
-    count: int
+    scenes: int
 
 
 def mean(figures: Iterable[Cell]) -> Mean:

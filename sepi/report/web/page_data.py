@@ -29,7 +29,7 @@ def headline(runs: Runs) -> list[dict[str, Any]]:
         }
         return {
             "ours": {variant: [_known(mean) for mean in means] for variant, means in found.items()},
-            "notes": {v: count_note([mean.count for mean in means], len(scenes)) for v, means in found.items()},
+            "notes": {v: count_note([mean.scenes for mean in means], len(scenes)) for v, means in found.items()},
         }
 
     rows: list[dict[str, Any]] = []
@@ -112,9 +112,9 @@ def ablation_bars(runs: Runs) -> list[BarGroup]:
         theirs = published.table4().get(dataset, {})
         for region in REGIONS:
             means = {v: average(runs, dataset, scenes, "mse100", region, v) for v in runs.plan.listed}
-            most = max((mean.count for mean in means.values()), default=0)
+            most = max((mean.scenes for mean in means.values()), default=0)
             rows = [
-                Bar(v, _known(mean), theirs.get(v, {}).get(region), count_note([mean.count], most))
+                Bar(v, _known(mean), theirs.get(v, {}).get(region), count_note([mean.scenes], most))
                 for v, mean in means.items()
             ]
             title = "whole map" if region == WHOLE_MAP else region
@@ -187,14 +187,15 @@ def total_seconds(*reports: Numbers) -> float:
 
 
 def parameter_rows(numbers: Numbers) -> list[tuple[str, list[tuple[str, Any]]]]:
-    """Stage and choice, and its parameters."""
+    """Stage and choice, and its parameters; more than once where scenes were made with different ones."""
     return [
         (
             f"{stage}: {choice}",
             [(name, "by range and grid" if value is None else value) for name, value in values.items()],
         )
         for stage, choices in numbers["parameters"].items()
-        for choice, values in choices.items()
+        for choice, found in choices.items()
+        for values in found
     ]
 
 
@@ -211,4 +212,4 @@ def first_scene(runs: Runs) -> str:
 
 
 def _known(mean: Mean) -> float | None:
-    return mean.value if mean.count and isinstance(mean.value, float) else None
+    return mean.value if mean.scenes and isinstance(mean.value, float) else None
