@@ -18,11 +18,11 @@ from sepi.command import SepiGroup
 from sepi.errors import SepiError
 from sepi.io.files import atomic_path
 from sepi.io.readers.options import AS_GIVEN, ReadOptions
+from sepi.machine import this_machine
 from sepi.reading import read_light_field
 from sepi.scenes import SCENES, render
 from sepi.threads import use_threads
 from sepi.variants import VARIANTS
-from sepi.workflow.machine import this_machine
 
 _PATH = click.Path(path_type=Path)
 

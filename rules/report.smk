@@ -22,7 +22,6 @@ rule numbers:
         results=results_folder,
         # functions: braces in names are no wildcards
         plan=lambda wildcards: plan_of(wildcards.which)[0].to_json(),
-        parameters=lambda wildcards: SETTINGS.variants_json(variants_in(wildcards.which)),
         flags=lambda wildcards: "--parts" if wildcards.which == PARTS_ENDING else "",
         code=code_digest("sepi.report.numbers"),
     message:
@@ -30,7 +29,7 @@ rule numbers:
     shell:
         command(
             "sepi.report.numbers --results {params.results:q} --plan {params.plan:q} "
-            "--parameters {params.parameters:q} {params.flags} --output {output:q} 2> {log:q}"
+            "{params.flags} --output {output:q} 2> {log:q}"
         )
 
 

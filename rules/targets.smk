@@ -40,12 +40,6 @@ def measured_files(which):
     return plan.number_inputs(parts)
 
 
-def variants_in(which):
-    """The variants of one of the files of numbers."""
-    plan, parts = plan_of(which)
-    return plan.collected(parts)
-
-
 def plan_of_scene(wildcards, plan=PLAN):
     """A plan for one scene alone, so that another scene in the configuration does not redraw it."""
     return replace(plan, scenes={wildcards.dataset: [wildcards.scene]}).to_json()

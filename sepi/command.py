@@ -30,6 +30,7 @@ from sepi.io.files import atomic_path
 from sepi.io.hdf5 import read_light_field, read_stage, write_stage
 from sepi.io.provenance import history_of, stage_attributes
 from sepi.kernel_cache import tell_kernel_cache
+from sepi.machine import this_machine
 from sepi.matching.base_detail import kept_detail
 from sepi.memory import KERNELS, require_memory
 from sepi.stage import Choice, Progress, entry, no_progress
@@ -181,12 +182,14 @@ def megabytes(maxrss: int) -> float:
     return maxrss / (2**20 if sys.platform == "darwin" else 2**10)
 
 
-def write_timing(path: Path, started: float, threads: int) -> None:
-    """Write as JSON the seconds since ``started`` (of ``time.perf_counter``), the peak memory and the threads."""
+def write_timing(path: Path, started: float, threads: int, **more: Any) -> None:
+    """Write as JSON seconds since ``started`` (of ``time.perf_counter``), peak memory, machine, and what is given."""
     timing = {
         "seconds": round(time.perf_counter() - started, 3),
         "peak_memory_mb": round(peak_memory_mb(), 1),
         "threads": threads,
+        "machine": this_machine(),
+        **more,
     }
     with atomic_path(path) as temporary:
         temporary.write_text(json.dumps(timing) + "\n", encoding="utf-8")
@@ -208,7 +211,7 @@ def stage_command(stage: str, own: Mapping[str, Choice]) -> click.Command:
     @click.option("--parameters", default="{}", show_default=True, help="JSON object; the rest has its default.")
     @click.option("--threads", type=click.IntRange(min=1), default=1, show_default=True, help="Threads to use.")
     @click.option("--output", type=existing, required=True, help="Stage file to write.")
-    @click.option("--timing", type=existing, help="JSON file to write: seconds and peak memory.")
+    @click.option("--timing", type=existing, help="JSON file to write: what it took, and where.")
     def command(
         light_field_path: Path,
         previous: Path | None,
@@ -235,7 +238,7 @@ def stage_command(stage: str, own: Mapping[str, Choice]) -> click.Command:
         history = [*history_of(previous), entry(stage, choice, settings, light_field)]
         write_stage(output, result, stage_attributes(light_field, history))
         if timing is not None:
-            write_timing(timing, started, threads)
+            write_timing(timing, started, threads, parameters=settings.model_dump(mode="json"))
 
     return command
 

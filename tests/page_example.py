@@ -20,6 +20,7 @@ from sepi.io.pfm import write_pfm
 from sepi.io.provenance import scene_attributes, stage_attributes
 from sepi.io.scores import map_name, write_scores
 from sepi.lightfield import FloatMap, LightField
+from sepi.machine import this_machine
 from sepi.report import numbers
 from sepi.report.figures import page_json, read_results
 from sepi.report.graph import drawn
@@ -110,11 +111,7 @@ def make_example(folder: Path) -> Example:
     plan = Plan(folder / "results", {dataset: [name] for dataset, name in pairs}, variants, ("SPO", "wrong_size"))
     for scene in pairs:
         write_results(plan, scene)
-    parameters = {
-        stage: {word: choice.parameters().model_dump(mode="json") for word, choice in choices.items()}
-        for stage, choices in STAGES.items()
-    }
-    found = json.loads(numbers.as_text(numbers.collect(plan, parameters)))
+    found = json.loads(numbers.as_text(numbers.collect(plan)))
     scenes = [scene_json(plan, scene) for scene in pairs]
     page = folder / "index.html"
     page.write_text(page_of(found, scenes, drawn(EDGES)), encoding="utf-8")
@@ -142,7 +139,8 @@ def run_stages(plan: Plan, scene: tuple[str, str], light_field: LightField, vari
         steps.append(entry(stage, choice, settings[stage], light_field))
         attributes = stage_attributes(light_field, steps)
         write_stage(plan.stage_file(*scene, variant, stage), maps, attributes)
-        timing = {"seconds": 1.5 + number, "peak_memory_mb": 200 + 10 * number}
+        timing = {"seconds": 1.5 + number, "peak_memory_mb": 200 + 10 * number, "machine": this_machine()}
+        timing["parameters"] = settings[stage].model_dump(mode="json")
         plan.stage_file(*scene, variant, stage, "time.json").write_text(json.dumps(timing))
 
 

@@ -39,10 +39,11 @@ def write_bars(folder: Path, name: str, groups: Sequence[BarGroup]) -> None:
             if not np.isnan(values).all():
                 bars = axis.barh(positions + shift, values, 0.38, color=colour)
                 axis.bar_label(bars, ["" if np.isnan(value) else f"{value:.2f}" for value in values], fontsize=6)
-        axis.set_yticks(positions, [row.variant for row in group.rows], fontsize=7)
+        names = [f"{row.variant} ({row.note})" if row.note else row.variant for row in group.rows]
+        axis.set_yticks(positions, names, fontsize=7)
         axis.invert_yaxis()
         axis.margins(x=0.15)
-        count = f", {group.scenes} scenes" if group.scenes > 1 else ""
+        count = f", {group.over}" if group.over else ""
         axis.set_title(f"{group.dataset}, {group.region}{count}", fontsize=8, parse_math=False)
         axis.tick_params(axis="x", labelsize=7)
         axis.set_xlabel("MSE x100", fontsize=7)

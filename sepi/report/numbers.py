@@ -6,22 +6,19 @@ The tables, and the page that shows them, are made from this file and from nothi
 from __future__ import annotations
 
 import hashlib
+import itertools
 import json
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from dataclasses import asdict
 from datetime import datetime
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
 import click
 import numpy as np
 import numpy.typing as npt
-import psutil
 
 from sepi.command import SepiCommand
-from sepi.errors import SepiError
 from sepi.io.external_maps import read_external
 from sepi.io.hdf5 import read_light_field, read_stage
 from sepi.io.scores import Scores, read_evaluations, read_scores, without_nan
@@ -33,36 +30,16 @@ from sepi.report.tabular.layout import as_json, write
 from sepi.scoring.confidence import decile_errors, oracle, sparsification
 from sepi.scoring.scores import COUNTS, EDGE_SCORES, PROTOCOLS, SCORED_REGIONS, SCORES
 from sepi.validation import require_known
-from sepi.workflow.machine import this_machine
 from sepi.workflow.result_paths import stage_of
 
-LIBRARIES = (
-    "numpy",
-    "scipy",
-    "scikit-image",
-    "opencv-python-headless",
-    "h5py",
-    "numba",
-    "pyamg",
-    "pydantic",
-    "matplotlib",
-    "snakemake",
-)
-"""Distributions whose versions are told."""
 
-Parameters = Mapping[str, Mapping[str, Mapping[str, Any]]]
-"""Stage to choice to parameter to value."""
-
-
-def collect(plan: Plan, parameters: Parameters | None = None, parts: bool = False) -> dict[str, Any]:
+def collect(plan: Plan, parts: bool = False) -> dict[str, Any]:
     """The numbers of a report, read from ``plan.number_inputs(parts)``.
 
     Parameters
     ----------
     plan : Plan
         Scenes, variants and external methods.
-    parameters : mapping, optional
-        Stage to choice to what the workflow ran it with; choices that no variant uses are left out.
     parts : bool
         Collect what the ablation of the best variant needs, instead of what all other tables need.
 
@@ -70,7 +47,8 @@ def collect(plan: Plan, parameters: Parameters | None = None, parts: bool = Fals
     -------
     dict
         As JSON has it: text, numbers, None (also for NaN), lists and dictionaries. ``made``: date of the newest
-        result, versions, machine; ``protocols``: name to border; ``plan``; ``parameters``; ``scenes``: a list, each
+        result, and the machines that the stages ran on, with their versions; ``protocols``: name to border; ``plan``;
+        ``parameters``: stage to choice to what it ran with, a list, as scenes may differ; ``scenes``: a list, each
         with ``dataset``, ``scene``, ``light_field``, ``stages`` (path of choices to ``stage``, ``scores``,
         ``seconds``, ``peak_memory_mb``), ``confidence`` (variant to errors) and ``external`` (method to ``problem``,
         ``source``, ``sha256``, ``scores``); ``tables``: name to :func:`sepi.report.tabular.layout.as_json`. With
@@ -81,18 +59,12 @@ def collect(plan: Plan, parameters: Parameters | None = None, parts: bool = Fals
     SepiError
         If a file is missing or not what it should be.
     """
+    machines, parameters = _made_by(plan, parts)
     numbers: dict[str, Any] = {
-        "made": made_here(plan.number_inputs(parts)),
+        "made": {"date": _newest(plan.number_inputs(parts)), "machines": machines},
         "protocols": dict(PROTOCOLS),
         "plan": json.loads(plan.to_json()),
-        "parameters": {
-            stage: {
-                choice: (parameters or {})[stage][choice]
-                for choice in dict.fromkeys(plan.variants[variant][stage] for variant in plan.collected(parts))
-                if choice in (parameters or {}).get(stage, {})
-            }
-            for stage in plan.stages
-        },
+        "parameters": parameters,
         "scenes": [_scene(plan, dataset, scene, parts) for dataset, scene in plan.pairs],
     }
     numbers = without_nan(numbers)
@@ -101,27 +73,30 @@ def collect(plan: Plan, parameters: Parameters | None = None, parts: bool = Fals
     return numbers | {"tables": tables}
 
 
-def made_here(files: Sequence[Path]) -> dict[str, Any]:
-    """When the newest of the files was made, and with what they were collected; no names of hosts or users."""
-    # not the time of day: equal results give equal numbers
+def _newest(files: Sequence[Path]) -> str:
+    """When the newest of the files was made; not the time of day: equal results give equal numbers."""
     newest = max((file.stat().st_mtime for file in files if file.is_file()), default=0.0)
-    machine = this_machine()
-    libraries = {}
-    for name in LIBRARIES:
-        with suppress(PackageNotFoundError):
-            libraries[name] = version(name)
-    return {
-        "date": datetime.fromtimestamp(newest).astimezone().isoformat(timespec="seconds"),
-        "version": machine["sepi"],
-        "python": machine["python"],
-        "machine": {
-            "processor": machine["processor"],
-            "cores": machine["cores"],
-            "memory_gb": round(psutil.virtual_memory().total / 2**30, 1),
-            "system": machine["system"],
-        },
-        "libraries": libraries,
-    }
+    return datetime.fromtimestamp(newest).astimezone().isoformat(timespec="seconds")
+
+
+def _made_by(plan: Plan, parts: bool) -> tuple[list[Any], dict[str, dict[str, list[Any]]]]:
+    """What the stages themselves say: the machines that they ran on, and by stage and choice their parameters."""
+    machines: list[Any] = []
+    parameters: dict[str, dict[str, list[Any]]] = {stage: {} for stage in plan.stages}
+    for (dataset, scene), variant, stage in itertools.product(plan.pairs, plan.collected(parts), plan.stages):
+        if plan.runs_stage(variant, stage):
+            timing = _timing(plan.stage_file(dataset, scene, variant, stage, "time.json"), stage)
+            ran_with = parameters[stage].setdefault(plan.variants[variant][stage], [])
+            for known, value in ((machines, timing["machine"]), (ran_with, timing["parameters"])):
+                if value not in known:
+                    known.append(value)
+    return machines, parameters
+
+
+def _timing(path: Path, stage: str) -> dict[str, Any]:
+    """What a stage took, where, and with which parameters."""
+    keys = {"seconds", "peak_memory_mb", "machine", "parameters"}
+    return read_json(path, keys, "the time of a stage", f"sepi.{stage}")
 
 
 def as_text(value: Any) -> str:
@@ -176,7 +151,7 @@ def _stages(plan: Plan, dataset: str, scene: str, parts: bool) -> dict[str, Any]
     scores = read_scores(plan.scores_file(dataset, scene, parts), last if parts else files.keys())
     found = {}
     for key, path in files.items():
-        took = read_json(path, {"seconds", "peak_memory_mb"}, "the time of a stage", f"sepi.{stage_of(key)}")
+        took = _timing(path, stage_of(key))
         found[key] = {
             "stage": stage_of(key),
             "scores": _ordered(scores[key]) if key in scores else None,
@@ -239,17 +214,12 @@ def _digest(values: npt.NDArray[Any]) -> str:
 @click.command(name="python -m sepi.report.numbers", cls=SepiCommand)
 @click.option("--results", type=click.Path(path_type=Path), required=True, help="Folder of the results.")
 @click.option("--plan", "plan_text", required=True, help="JSON: scenes per dataset, choices per variant and stage.")
-@click.option("--parameters", default="{}", show_default=True, help="JSON: parameters per stage and choice.")
 @click.option("--parts", is_flag=True, help="What the ablation of the best variant needs, and nothing else.")
 @click.option("--output", type=click.Path(path_type=Path), required=True, help="JSON file to write.")
-def command(results: Path, plan_text: str, parameters: str, parts: bool, output: Path) -> None:
+def command(results: Path, plan_text: str, parts: bool, output: Path) -> None:
     """Collect all numbers of the report in one JSON file."""
     plan = Plan.from_json(results, plan_text)
-    try:
-        values = json.loads(parameters)
-    except (ValueError, RecursionError) as error:
-        raise SepiError(f"--parameters: expected JSON of parameters per stage and choice ({error})") from error
-    write(output, as_text(collect(plan, values, parts)))
+    write(output, as_text(collect(plan, parts)))
 
 
 if __name__ == "__main__":

@@ -6,7 +6,7 @@ import json
 import math
 import os
 import re
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -216,18 +216,6 @@ class Settings:
     def parameters_json(self, stage: str, label: str) -> str:
         """Parameters of a stage's choice as JSON with sorted keys."""
         return json.dumps(self.parameters[stage][label].model_dump(mode="json"), sort_keys=True)
-
-    def variants_json(self, variants: Iterable[str]) -> str:
-        """Stage to label to parameters as JSON, of the choices that some of these variants use."""
-        used = {pair for name in variants for pair in self.variants[name].labels.items()}
-        return json.dumps(
-            {
-                stage: {
-                    label: values.model_dump(mode="json") for label, values in found.items() if (stage, label) in used
-                }
-                for stage, found in self.parameters.items()
-            }
-        )
 
     def external_files(self, dataset: str, name: str) -> dict[str, Path]:
         """Method to the file of its map of a scene, whether or not it is there.

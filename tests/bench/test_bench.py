@@ -20,10 +20,10 @@ from bench.measure import Case, Measurement, Prepared, Result, command, measured
 from bench.plain import WARPS, Warp, by_opencv, plain_sweep
 from bench.solvers import SOLVERS
 from sepi.errors import SepiError
+from sepi.machine import this_machine
 from sepi.matching.plane_sweep import SweepParameters, sweep
 from sepi.regularization.wls import energy_system
 from sepi.scenes import render
-from sepi.workflow.machine import this_machine
 
 
 def holding(megabytes: int) -> Prepared:

@@ -52,6 +52,9 @@ EXTERNAL: dict[str, dict[str, float | str]] = {
 }
 
 
+MACHINE = {"processor": "of a cluster", "cores": 64, "python": "3.12.1", "sepi": "0.0.1", "numpy": "1.26.4"}
+
+
 def light_field(name: str) -> LightField:
     random = np.random.default_rng(len(name))
     views = random.integers(0, 256, (3, 3, SIZE, SIZE, 3), np.uint8)
@@ -87,7 +90,8 @@ def with_results(made: Plan) -> Plan:
                 step = {"stage": stage, "choice": made.variants[variant][stage], "parameters": "{}", "made_from": "[]"}
                 write_stage(made.stage_file(dataset, name, variant, stage), maps, step)
                 timing = made.stage_file(dataset, name, variant, stage, "time.json")
-                timing.write_text(json.dumps({"seconds": 1.5, "peak_memory_mb": 200 + 10 * len(stage)}))
+                took = {"seconds": 1.5, "peak_memory_mb": 200 + 10 * len(stage)}
+                timing.write_text(json.dumps({**took, "machine": MACHINE, "parameters": {"words": len(stage)}}))
         folder = made.files(dataset, name).stages
         for parts in (False,) if made.is_comparison else (False, True):
             files = made.scored_files(dataset, name, parts)

@@ -1,6 +1,7 @@
 """The numbers of a report: all that its inputs say, and nothing from elsewhere."""
 
 import hashlib
+import json
 import re
 from pathlib import Path
 from typing import Any
@@ -8,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from report_results import SIZE, cells_of, light_field, linked
+from report_results import MACHINE, SIZE, cells_of, light_field, linked
 
 from sepi.errors import SepiError
 from sepi.io.scores import read_evaluations, write_scores
@@ -59,14 +60,20 @@ def test_a_map_without_scores_is_named(plan: Plan, tmp_path: Path) -> None:
         collect(there)
 
 
-def test_numbers_say_what_they_are_of(complete: Plan) -> None:
-    found = collect(complete, {"initial": {"sepi": {"num_disparities": 9}, "structure_tensor": {"radius": 1}}})
+def test_numbers_say_what_they_are_of(complete: Plan, tmp_path: Path) -> None:
+    """Versions and parameters are those that the maps were made with, wherever and whenever they are collected."""
+    there = linked(complete, tmp_path)
+    path = there.stage_file("hci", "cotton", "paper", "optimize", "time.json")
+    changed = json.loads(path.read_text()) | {"machine": {**MACHINE, "sepi": "0.0.2"}, "parameters": {"words": 1}}
+    path.unlink()
+    path.write_text(json.dumps(changed))
+    found = collect(there)
     assert re.fullmatch(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d[+-]\d\d:\d\d", found["made"]["date"])
-    assert found["made"]["libraries"]["numpy"] == np.__version__
-    assert found["made"]["machine"]["cores"] > 0
+    assert found["made"]["machines"] == [MACHINE, {**MACHINE, "sepi": "0.0.2"}]
     assert found["protocols"] == {"paper": 0, "benchmark": 15}
     assert found["plan"]["external"] == ["SPO", "zhou"]
-    assert found["parameters"]["initial"] == {"sepi": {"num_disparities": 9}}
+    assert found["parameters"]["initial"]["sepi"] == [{"words": 7}]
+    assert found["parameters"]["optimize"]["wls"] == [{"words": 1}]
     (scene,) = found["scenes"]
     known = light_field("cotton")
     assert known.ground_truth is not None

@@ -10,6 +10,9 @@ from sepi.report.tabular.layout import Column, Kind, Record, Report, line, print
 from sepi.scoring.scores import REGIONS, SCORES, WHOLE_MAP
 from sepi.variants import PARTS_OF_BEST
 
+_Means = dict[str, dict[str, methods.Mean]]
+"""Region to variant to figure; of a published one no count is known."""
+
 _SCORES = ("mse100", "q25", "badpix007")
 
 
@@ -21,13 +24,19 @@ def ablation_table(runs: Runs) -> Report:
     sections = []
     for dataset in methods.datasets_of(runs.plan):
         lines = []
-        for name, kind, figures in _rows(runs, dataset):
-            heads = {"dataset": dataset, "scene": name, "row": kind}
-            records += [{**heads, "region": region, **figures[region]} for region in REGIONS]
+        for name, kind, means in _rows(runs, dataset):
+            for region in REGIONS:
+                figures = {variant: mean.value for variant, mean in means[region].items()}
+                over = max((mean.scenes for mean in means[region].values()), default=0)
+                scene = methods.average_label(over) if kind == methods.AVERAGE else name
+                records.append({"dataset": dataset, "scene": scene, "row": kind, "region": region, **figures})
             # the regions of a variant in one cell, as the paper has them; a figure published without these stands alone
-            texts = {v: "/".join(filter(None, (short(figures[r].get(v)) for r in REGIONS))) for v in variants}
+            cells = {v: [means[r][v] for r in REGIONS if v in means[r]] for v in variants}
+            texts = {v: "/".join(filter(None, (short(mean.value) for mean in cells[v]))) for v in variants}
+            scenes = len(runs.scored(dataset)) if kind == methods.AVERAGE else 1
+            notes = {v: methods.count_note([mean.scenes for mean in found], scenes) for v, found in cells.items()}
             source = Kind.PUBLISHED if kind == methods.PRINTED_AVERAGE else Kind.OURS
-            lines.append(line(columns, {"scene": name, **texts}, source, kind))
+            lines.append(line(columns, {"scene": name, **texts}, source, kind, notes=notes))
         if lines:
             sections.append(section(methods.dataset_title(dataset), columns, lines))
     return Report(
@@ -41,21 +50,21 @@ def ablation_table(runs: Runs) -> Report:
     )
 
 
-def _rows(runs: Runs, dataset: str) -> list[tuple[str, str, dict[str, Record]]]:
-    """Name, kind, and figures by region and variant: of the scenes, their average, and the paper's."""
+def _rows(runs: Runs, dataset: str) -> list[tuple[str, str, _Means]]:
+    """Name, kind, and figures: of the scenes, their average, and the paper's."""
     scenes = runs.scored(dataset)
     rows = [(scene, methods.SCENE, _averages(runs, dataset, [scene])) for scene in scenes]
     if scenes:
         rows.append((methods.average_label(len(scenes)), methods.AVERAGE, _averages(runs, dataset, scenes)))
     paper = published.table4().get(dataset)
     if paper is not None:
-        theirs: dict[str, Record] = {r: {v: printed(paper[v].get(r)) for v in paper} for r in REGIONS}
+        theirs = {r: {v: methods.Mean(printed(paper[v].get(r)), 0) for v in paper} for r in REGIONS}
         rows.append((methods.printed_label(dataset), methods.PRINTED_AVERAGE, theirs))
     return rows
 
 
-def _averages(runs: Runs, dataset: str, scenes: list[str]) -> dict[str, Record]:
-    def average(region: str, variant: str) -> float:
+def _averages(runs: Runs, dataset: str, scenes: list[str]) -> _Means:
+    def average(region: str, variant: str) -> methods.Mean:
         return methods.average(runs, dataset, scenes, "mse100", region, variant)
 
     return {region: {variant: average(region, variant) for variant in runs.plan.listed} for region in REGIONS}

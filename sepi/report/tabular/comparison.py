@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import itertools
+from collections.abc import Mapping, Sequence
 
 from sepi.report import published
 from sepi.report.plan import Plan
@@ -10,7 +11,7 @@ from sepi.report.published import PAPERS_METHOD, SceneTable
 from sepi.report.runs import Runs
 from sepi.report.tabular import methods
 from sepi.report.tabular.layout import Cell, Column, Kind, Record, Report, line, ranks, section
-from sepi.report.tabular.methods import Method
+from sepi.report.tabular.methods import Mean, Method
 from sepi.scoring.scores import REGIONS, WHOLE_MAP
 
 
@@ -35,17 +36,13 @@ def scene_table(runs: Runs, score: str, paper: SceneTable, title: str) -> Report
     sections = []
     for dataset in methods.datasets_of(plan):
         rows = _scene_records(runs, dataset, score, paper, compared)
-        shown = [method for method in compared if _is_shown(runs, dataset, method, rows)]
+        shown = [method for method in compared if _is_shown(runs, dataset, method, [row for row, _ in rows])]
         columns = {"scene": Column("scene", Kind.TEXT), **{m.key: Column(m.head, m.kind) for m in shown}}
-        own_names = _own_names(runs, dataset)
         lines = []
-        for row in rows:
+        for row, notes in rows:
             marks = ranks({method.key: row.get(method.key) for method in shown if method.learning == "none"})
-            scene = own_names.get(str(row["scene"]))
-            external = [method for method in shown if scene and method.kind == Kind.EXTERNAL]
-            notes = {method.key: methods.unknown_note(runs, dataset, scene or "", method.name) for method in external}
             lines.append(line(columns, row, kind=str(row["row"]), marks=marks, notes=notes))
-        records += rows
+        records += [row for row, _ in rows]
         if lines:
             sections.append(section(methods.dataset_title(dataset), columns, lines))
     return Report(
@@ -81,25 +78,38 @@ def _own_names(runs: Runs, dataset: str) -> dict[str, str]:
     return {published.paper_scene(dataset, scene) or scene: scene for scene in runs.scored(dataset)}
 
 
-def _scene_records(runs: Runs, dataset: str, score: str, paper: SceneTable, compared: Sequence[Method]) -> list[Record]:
-    """The paper's scenes in its order, those it does not have, the average of those available, and the paper's."""
+def _scene_records(
+    runs: Runs, dataset: str, score: str, paper: SceneTable, compared: Sequence[Method]
+) -> list[tuple[Record, Mapping[str, str]]]:
+    """The paper's scenes in its order, those it does not have, the average of those available, and the paper's.
+
+    Each with what must be known of its figures, by method.
+    """
     own_names = _own_names(runs, dataset)
-    found: list[tuple[str, str, dict[str, Cell]]] = []
+    external = [method for method in compared if method.kind == Kind.EXTERNAL]
+    found: list[tuple[str, str, dict[str, Cell], dict[str, str]]] = []
     for name in dict.fromkeys([*paper.scenes(dataset), *own_names]):
         figures: dict[str, Cell] = {**paper.cells.get((dataset, name), {})}
+        notes: dict[str, str] = {}
         if name in own_names:
-            scenes = [own_names[name]]
-            figures |= {m.key: _own_figure(runs, m, dataset, scenes, score, WHOLE_MAP) for m in compared if m.is_here}
-        found.append((name, methods.SCENE, figures))
+            scene = own_names[name]
+            here = [method for method in compared if method.is_here]
+            figures |= {m.key: _own_figure(runs, m, dataset, [scene], score, WHOLE_MAP).value for m in here}
+            notes = {m.key: methods.unknown_note(runs, dataset, scene, m.name) for m in external}
+        found.append((name, methods.SCENE, figures, notes))
     if own_names:
-        available = [figures for name, _, figures in found if name in own_names]
+        available = [figures for name, _, figures, _ in found if name in own_names]
         means = {m.key: _average(m, [figures.get(m.key) for figures in available]) for m in compared}
-        found.append((methods.average_label(len(available)), methods.AVERAGE, means))
+        notes = {key: methods.count_note([mean.scenes], len(available)) for key, mean in means.items()}
+        figures = {key: mean.value for key, mean in means.items()}
+        found.append((methods.average_label(len(available)), methods.AVERAGE, figures, notes))
     if dataset in paper.averages:
-        found.append((methods.printed_label(dataset), methods.PRINTED_AVERAGE, {**paper.averages[dataset]}))
+        every = len(paper.scenes(dataset))
+        notes = {m.key: methods.count_note([paper.averaged(dataset, m.key)], every) for m in compared}
+        found.append((methods.printed_label(dataset), methods.PRINTED_AVERAGE, {**paper.averages[dataset]}, notes))
     return [
-        {"dataset": dataset, "scene": name, "row": kind, **{m.key: m.shown(_figure(m, figures)) for m in compared}}
-        for name, kind, figures in found
+        ({"dataset": dataset, "scene": name, "row": kind} | {m.key: m.shown(_figure(m, row)) for m in compared}, notes)
+        for name, kind, row, notes in found
     ]
 
 
@@ -112,12 +122,10 @@ def _figure(method: Method, figures: Record) -> Cell:
     return ours / paper if isinstance(ours, float) and isinstance(paper, float) and paper else None
 
 
-def _average(method: Method, figures: Sequence[Cell]) -> Cell:
+def _average(method: Method, figures: Sequence[Cell]) -> Mean:
     """Mean; of other methods None where a figure is missing: an average over other scenes would not compare."""
-    known = [figure for figure in figures if isinstance(figure, float)]
-    if method.kind == Kind.OURS:
-        return methods.mean(known)
-    return sum(known) / len(known) if known and len(known) == len(figures) else None
+    mean = methods.mean(figures)
+    return mean if method.kind == Kind.OURS or mean.scenes == len(figures) else Mean(None, 0)
 
 
 def region_table(runs: Runs) -> Report:
@@ -127,24 +135,28 @@ def region_table(runs: Runs) -> Report:
     cells = {f"{dataset}_{region}": (dataset, region) for dataset in datasets for region in REGIONS[1:]}
     in_paper = {key for figures in published.table3().values() for key in figures}
     rows = [m for m in methods.compared_methods(plan) if m.is_here or m.key in in_paper]
-    figures = {key: {m.key: m.shown(_region_average(runs, m, *cell)) for m in rows} for key, cell in cells.items()}
+    means = {key: {m.key: _region_average(runs, m, *cell) for m in rows} for key, cell in cells.items()}
+    figures = {key: {m.key: m.shown(means[key][m.key].value) for m in rows} for key in cells}
     marks = {key: ranks({m.key: figures[key][m.key] for m in _ranked(runs, rows, cells[key][0])}) for key in cells}
     columns = {"name": Column("method", Kind.TEXT), **{key: Column(", ".join(cell)) for key, cell in cells.items()}}
-    records = [
-        {"name": m.head, "method": m.key, "learning": m.learning, **{key: figures[key][m.key] for key in cells}}
-        for m in rows
-    ]
-    lines = [
-        line(columns, record, m.kind, marks={key: marks[key].get(m.key) for key in cells})
-        for m, record in zip(rows, records, strict=True)
-    ]
+    counts = {key: f"{key}_scenes" for key in cells}
+    records: list[Record] = []
+    lines = []
+    for m in rows:
+        record: dict[str, Cell] = {"name": m.head, "method": m.key, "learning": m.learning}
+        record |= {key: figures[key][m.key] for key in cells}
+        record |= {counts[key]: means[key][m.key].scenes or None for key in cells}
+        notes = {key: _region_note(runs, m, means[key][m.key], dataset) for key, (dataset, _) in cells.items()}
+        records.append(record)
+        lines.append(line(columns, record, m.kind, marks={key: marks[key].get(m.key) for key in cells}, notes=notes))
     available = "; ".join(f"{dataset}: {', '.join(runs.scored(dataset)) or 'none'}" for dataset in datasets)
     return Report(
         "Table 3: MSE x100 in occluded and textureless regions",
         f"{methods.PROTOCOL_NOTE} This code: variants {methods.own_names(plan)}, average of the scenes available that "
-        f"have such a region ({available}). Other rows: as the paper prints them, over all scenes of the dataset. "
+        f"have such a region ({available}). Other rows: as the paper prints them, over all scenes of the dataset "
+        "where none or fewer are named. "
         f"{methods.REGIONS_NOTE} {methods.LEARNED_NOTE}" + (f" {methods.EXTERNAL_NOTE}" if plan.external else ""),
-        ["method", "learning", *cells],
+        ["method", "learning", *itertools.chain(*counts.items())],
         records,
         [section("", columns, lines)],
         "Marked: best and second best in a column, of the published methods that are not learned, and of this code "
@@ -152,17 +164,24 @@ def region_table(runs: Runs) -> Report:
     )
 
 
-def _region_average(runs: Runs, method: Method, dataset: str, region: str) -> Cell:
-    """The published average, or that over the scenes available."""
+def _region_average(runs: Runs, method: Method, dataset: str, region: str) -> Mean:
+    """The published average, over the scenes that the paper has figures of; or that over the scenes available."""
     if method.is_here:
         return _own_figure(runs, method, dataset, runs.scored(dataset), "mse100", region)
-    return published.table3().get(dataset, {}).get(method.key, {}).get(region)
+    figure = published.table3().get(dataset, {}).get(method.key, {}).get(region)
+    return Mean(figure, 0 if figure is None else published.table1().averaged(dataset, method.key))
 
 
-def _own_figure(runs: Runs, method: Method, dataset: str, scenes: Sequence[str], score: str, region: str) -> Cell:
+def _region_note(runs: Runs, method: Method, mean: Mean, dataset: str) -> str:
+    """Over how many scenes an average is, where that is not what the caption says."""
+    scenes = runs.scored(dataset) if method.is_here else published.table1().scenes(dataset)
+    return methods.count_note([mean.scenes], len(scenes))
+
+
+def _own_figure(runs: Runs, method: Method, dataset: str, scenes: Sequence[str], score: str, region: str) -> Mean:
     """Average of what was scored here; where another method's map is missing, the problem, or how many are there."""
     if not scenes:
-        return None
+        return Mean(None, 0)
     if method.kind == Kind.OURS:
         return methods.average(runs, dataset, scenes, score, region, method.name)
     found = [runs.external_scores(dataset, scene, method.name) for scene in scenes]
@@ -170,7 +189,8 @@ def _own_figure(runs: Runs, method: Method, dataset: str, scenes: Sequence[str],
     if len(known) == len(scenes):
         return methods.mean(known)
     problems = {runs.external_problem(dataset, scene, method.name) for scene in scenes}
-    return problems.pop() if not known and len(problems) == 1 else f"{len(known)} of {len(scenes)} scenes"
+    alike = not known and len(problems) == 1
+    return Mean(problems.pop() if alike else f"{len(known)} of {len(scenes)} scenes", 0)
 
 
 def _ranked(runs: Runs, rows: Sequence[Method], dataset: str) -> list[Method]:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from sepi.external import NO_FILE
 from sepi.report import published
@@ -125,12 +126,26 @@ def printed_label(dataset: str) -> str:
     return f"Average as printed ({len(published.table1().scenes(dataset))} scenes)"
 
 
-def mean(values: Iterable[float]) -> float:
+class Mean(NamedTuple):
+    """A mean, and how many figures it is of."""
+
+    value: Cell
+    scenes: int
+
+
+def mean(figures: Iterable[Cell]) -> Mean:
     """Mean of the scores that exist; NaN where none does (a scene may have no such region)."""
-    known = [value for value in values if not math.isnan(value)]
-    return sum(known) / len(known) if known else math.nan
+    known = [figure for figure in figures if isinstance(figure, float) and not math.isnan(figure)]
+    return Mean(sum(known) / len(known) if known else math.nan, len(known))
 
 
-def average(runs: Runs, dataset: str, scenes: Iterable[str], score: str, region: str, variant: str) -> float:
+def average(runs: Runs, dataset: str, scenes: Iterable[str], score: str, region: str, variant: str) -> Mean:
     """Mean of a score over some scenes, of those that have such a region."""
     return mean(runs.final(dataset, scene, score, region, variant) for scene in scenes)
+
+
+def count_note(counts: Sequence[int], scenes: int) -> str:
+    """Over how many scenes the figures of a cell are, where those of one are over fewer than its row says."""
+    if all(count in (0, scenes) for count in counts):
+        return ""
+    return f"{'/'.join(map(str, counts))} scene{'s' * (list(counts) != [1])}"

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from sepi.report import published
 from sepi.report.runs import Numbers, Runs
-from sepi.report.tabular.methods import datasets_of, mean
+from sepi.report.tabular.methods import Mean, average, count_note, datasets_of
 from sepi.scoring.scores import REGIONS, WHOLE_MAP
 
 
@@ -19,16 +18,18 @@ def headline(runs: Runs) -> list[dict[str, Any]]:
     Returns
     -------
     list of dict
-        ``scene``; ``published``: MSE x100 and Q25 x100; ``ours``: variant to the same two.
+        ``scene``; ``published``: MSE x100 and Q25 x100; ``ours``: variant to the same two; ``notes``: variant to over
+        how many scenes they are, where over fewer than the row says.
     """
 
-    def ours(dataset: str, scenes: Sequence[str]) -> dict[str, list[float | None]]:
-        return {
-            variant: [
-                _mean(runs.final(dataset, scene, score, variant=variant) for scene in scenes)
-                for score in ("mse100", "q25")
-            ]
+    def ours(dataset: str, scenes: Sequence[str]) -> dict[str, Any]:
+        found = {
+            variant: [average(runs, dataset, scenes, score, WHOLE_MAP, variant) for score in ("mse100", "q25")]
             for variant in runs.plan.compared
+        }
+        return {
+            "ours": {variant: [_known(mean) for mean in means] for variant, means in found.items()},
+            "notes": {v: count_note([mean.scenes for mean in means], len(scenes)) for v, means in found.items()},
         }
 
     rows: list[dict[str, Any]] = []
@@ -38,12 +39,12 @@ def headline(runs: Runs) -> list[dict[str, Any]]:
             if name is not None:
                 tables = (published.table1(), published.table2())
                 theirs = [table.cells[dataset, name].get(published.PAPERS_METHOD) for table in tables]
-                rows.append({"scene": f"{dataset}/{scene}", "published": theirs, "ours": ours(dataset, [scene])})
+                rows.append({"scene": f"{dataset}/{scene}", "published": theirs, **ours(dataset, [scene])})
     for dataset in runs.plan.scenes:
         others = [scene for scene in runs.scored(dataset) if published.paper_scene(dataset, scene) is None]
         if others:
             title = f"{dataset}, average of {len(others)}" if len(others) > 1 else f"{dataset}/{others[0]}"
-            rows.append({"scene": title, "published": [None, None], "ours": ours(dataset, others)})
+            rows.append({"scene": title, "published": [None, None], **ours(dataset, others)})
     return rows
 
 
@@ -58,11 +59,12 @@ def missing_scenes(runs: Runs) -> dict[str, list[str]]:
 
 @dataclass(frozen=True)
 class Bar:
-    """MSE x100 of a variant; None where there is no figure."""
+    """MSE x100 of a variant; None where there is no figure. A note where ours is over fewer scenes than its group's."""
 
     variant: str
     ours: float | None
     published: float | None = None
+    note: str = ""
 
 
 @dataclass(frozen=True)
@@ -73,15 +75,23 @@ class BarGroup:
     ----------
     dataset, region : str
         What they are about.
-    scenes : int
-        How many scenes our figures are averages of.
+    scenes, available : int
+        How many scenes our figures are averages of, and how many there are: not all have every region.
     rows : list of Bar
     """
 
     dataset: str
     region: str
     scenes: int
+    available: int
     rows: list[Bar]
+
+    @property
+    def over(self) -> str:
+        """Which scenes our figures are averages of; empty where it is the one that there is, or none."""
+        if self.scenes in (0, self.available):
+            return f"{self.scenes} scenes" if self.scenes > 1 else ""
+        return f"{self.scenes} of {self.available} scenes"
 
     @property
     def figures(self) -> list[float]:
@@ -101,15 +111,14 @@ def ablation_bars(runs: Runs) -> list[BarGroup]:
         scenes = runs.scored(dataset)
         theirs = published.table4().get(dataset, {})
         for region in REGIONS:
+            means = {v: average(runs, dataset, scenes, "mse100", region, v) for v in runs.plan.listed}
+            most = max((mean.scenes for mean in means.values()), default=0)
             rows = [
-                Bar(
-                    variant,
-                    _mean(runs.final(dataset, scene, "mse100", region, variant) for scene in scenes),
-                    theirs.get(variant, {}).get(region),
-                )
-                for variant in runs.plan.listed
+                Bar(v, _known(mean), theirs.get(v, {}).get(region), count_note([mean.scenes], most))
+                for v, mean in means.items()
             ]
-            groups.append(BarGroup(dataset, "whole map" if region == WHOLE_MAP else region, len(scenes), rows))
+            title = "whole map" if region == WHOLE_MAP else region
+            groups.append(BarGroup(dataset, title, most, len(scenes), rows))
     return [group for group in groups if group.figures]
 
 
@@ -121,6 +130,7 @@ def part_bars(parts: Runs) -> list[BarGroup]:
         BarGroup(
             f"{dataset}/{scene}",
             "whole map",
+            1,
             1,
             [Bar(variant, parts.final(dataset, scene, "mse100", variant=variant)) for variant in names],
         )
@@ -177,14 +187,15 @@ def total_seconds(*reports: Numbers) -> float:
 
 
 def parameter_rows(numbers: Numbers) -> list[tuple[str, list[tuple[str, Any]]]]:
-    """Stage and choice, and its parameters."""
+    """Stage and choice, and its parameters; more than once where scenes were made with different ones."""
     return [
         (
             f"{stage}: {choice}",
             [(name, "by range and grid" if value is None else value) for name, value in values.items()],
         )
         for stage, choices in numbers["parameters"].items()
-        for choice, values in choices.items()
+        for choice, found in choices.items()
+        for values in found
     ]
 
 
@@ -200,6 +211,5 @@ def first_scene(runs: Runs) -> str:
     return "/".join(known[0] if known else runs.plan.pairs[-1])
 
 
-def _mean(values: Iterable[float]) -> float | None:
-    found = mean(values)
-    return None if math.isnan(found) else found
+def _known(mean: Mean) -> float | None:
+    return mean.value if mean.scenes and isinstance(mean.value, float) else None

@@ -20,6 +20,8 @@ def test_ablation_table(found: dict[str, Any]) -> None:
     assert "| cotton | 1.00/1.00/1.00 | 4.00/4.00/4.00 | 9.00/9.00/9.00 |" in page
     assert "| Average as printed (24 scenes) | 4.34/20.62/3.90 | 8.11/36.15/3.97 | 13.12 |" in page
     assert "| flat | 4.00/n/a/4.00 |" in page
+    assert "| Average of 2 scenes available | 2.50/1.00/2.50 (2/1/2 scenes) |" in page
+    assert only(rows, scene="Average of 1 scene available")["region"] == "occluded"
 
 
 def test_best_has_an_ablation_of_its_own(complete: Plan) -> None:

@@ -1,6 +1,7 @@
 """The page of the report: what it holds, how large it is, and the figures beside its tables."""
 
 import base64
+import copy
 import json
 import re
 from dataclasses import replace
@@ -223,7 +224,7 @@ def test_the_page_says_what_it_is_about(example: Example) -> None:
     """Datasets, variants, protocols, versions, machine, date, and total time; inputs with checksums, parameters."""
     text = re.sub(r"<wbr>", "", example.page.read_text(encoding="utf-8"))
     made = example.numbers["made"]
-    for expected in (made["version"], made["date"], made["machine"]["processor"], made["libraries"]["numpy"]):
+    for expected in (made["date"], *(made["machines"][0][key] for key in ("sepi", "processor", "numpy"))):
         assert str(expected) in text
     for scene in example.numbers["scenes"]:
         assert scene["light_field"]["sha256"] in text
@@ -346,7 +347,7 @@ def test_ablation_bars(runs: Runs, example: Example) -> None:
     assert {region for _, region in groups} == {"whole map", *REGIONS[1:]}
     whole = groups["hci", "whole map"]
     bars = {bar.variant: bar for bar in whole.rows}
-    assert whole.scenes == 1
+    assert (whole.scenes, whole.over) == (1, "")
     assert bars["paper"].published == published.table4()["hci"]["paper"]["all"] == 4.34
     assert bars["best"].published is None
     assert bars["paper"].ours == score_of(example, COTTON, "paper")
@@ -356,6 +357,23 @@ def test_ablation_bars(runs: Runs, example: Example) -> None:
     assert groups["hci_2013", "whole map"].scenes == 0
     assert all(bar.ours is None for bar in groups["hci_2013", "whole map"].rows)
     assert not [key for key in groups if key[0] == PICTURE[0]], "a dataset without truth has no bars"
+
+
+def test_averages_name_the_scenes_that_have_no_such_region(runs: Runs) -> None:
+    """One scene's figure is not shown as the average of all."""
+    numbers = copy.deepcopy(dict(runs.numbers))
+    (dots,) = [scene for scene in numbers["scenes"] if scene["scene"] == "dots"]
+    numbers["plan"]["scenes"]["builtin"] = ["dots", "wall"]
+    wall = copy.deepcopy(dots) | {"scene": "wall"}
+    numbers["scenes"].append(wall)
+    for stage in wall["stages"].values():
+        stage["scores"]["paper"]["occluded"]["mse100"] = None
+    changed = Runs(numbers)
+    groups = {group.region: group for group in page_data.ablation_bars(changed) if group.dataset == "builtin"}
+    assert (groups["whole map"].over, groups["occluded"].over) == ("2 scenes", "1 of 2 scenes")
+    for stage in wall["stages"].values():
+        stage["scores"]["paper"]["all"]["mse100"] = None
+    assert page_data.headline(Runs(numbers))[-1]["notes"]["paper"] == "1/2 scenes"
 
 
 def test_times(runs: Runs, example: Example) -> None:

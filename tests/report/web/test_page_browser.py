@@ -283,7 +283,7 @@ def test_no_name_breaks_the_page_or_runs_as_code(browser: Any, example: Example,
     attack = "<img src=x onerror=hacked()></script><script>hacked()</script> &amp; \"q\" 'r' ${x} {{ 7*7 }} \\u003c"
     names = {"cotton": f"c {attack}", "SPO": f"m {attack}", "asked for": f"l {attack}", "wrong_size": f"w {attack}"}
     numbers = renamed(example.numbers, names)
-    numbers["parameters"]["initial"][attack] = {attack: attack}
+    numbers["parameters"]["initial"][attack] = [{attack: attack}]
     scenes = renamed(example.scenes, names)
     page_file = tmp_path / "index.html"
     page_file.write_text(page_of(numbers, scenes, drawn([*EDGES, ("page", "<b&\"'")])), encoding="utf-8")

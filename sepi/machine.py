@@ -1,0 +1,55 @@
+"""What maps and their times were made with: processor, cores, versions of libraries; no names of hosts or users."""
+
+from __future__ import annotations
+
+import platform
+from contextlib import suppress
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+import psutil
+
+from sepi.io.provenance import package_version
+from sepi.threads import available_cores
+
+LIBRARIES = (
+    "numpy",
+    "scipy",
+    "scikit-image",
+    "opencv-python-headless",
+    "h5py",
+    "numba",
+    "pyamg",
+    "pydantic",
+    "matplotlib",
+    "snakemake",
+)
+"""Distributions whose versions are told, where they are installed."""
+
+
+def this_machine() -> dict[str, Any]:
+    """Processor, cores that may be used, memory in GiB, and versions."""
+    libraries = {}
+    for name in LIBRARIES:
+        with suppress(PackageNotFoundError):
+            libraries[name] = version(name)
+    return {
+        "processor": _processor(),
+        "cores": available_cores(),
+        "memory_gb": round(psutil.virtual_memory().total / 2**30, 1),
+        "system": platform.system(),
+        "python": platform.python_version(),
+        "sepi": package_version(),
+        **libraries,
+    }
+
+
+def _processor() -> str:
+    try:
+        for line in Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():
+            if line.startswith("model name"):
+                return line.partition(":")[2].strip()
+    except OSError:
+        pass
+    return platform.processor() or platform.machine()
