@@ -140,7 +140,7 @@ class Config(_Keys):
         "off; 'oavc' to 'occ' are the compared methods, 'onnx' is a network of yours (docs/reproduce/compared.md). "
         "These have fixed meanings; add variants of your own beside them.",
     )
-    stages: dict[str, dict[str, dict[str, Any] | None]] = Field(
+    stages: dict[str, dict[str, dict[str, Any] | None] | None] = Field(
         default_factory=default_values,
         description="Parameters of each stage, by choice. Those below shared hold for every choice that has them, but "
         "for one that has its own value below its stage.",
@@ -245,7 +245,9 @@ def load_settings(values: Mapping[str, Any]) -> Settings:
         One line that names the first key, scene, variant, stage or choice that is wrong, and what would be right.
     """
     try:
-        spelled = {key: _with_numbers(value) for key, value in _with_paths(values).items()}
+        # a key with nothing below it is left out
+        given = {key: value for key, value in _with_paths(values).items() if value is not None}
+        spelled = {key: _with_numbers(value) for key, value in given.items()}
     except RecursionError as error:
         raise SepiError("config: a key holds itself (by & and *), or values lie too deep in each other") from error
     config = validated(Config, spelled, "config")
@@ -323,7 +325,10 @@ def _variant(name: str, entries: Mapping[str, Any]) -> Variant:
     variant = variant_from(name, entries, "config.variants")
     where = f"config.variants.{name}"
     if name in VARIANTS and variant != VARIANTS[name]:
-        raise SepiError(f"{where}: a built-in variant has a fixed meaning; give yours another name")
+        raise SepiError(
+            f"{where}: a built-in variant has a fixed meaning, of which a configuration of another version may say "
+            f"otherwise; leave the entry out, or give yours another name"
+        )
     if not name.isidentifier() or name in _RESERVED or len(name.encode()) > LONGEST_NAME:
         raise SepiError(
             f"{where}: a variant's name must be letters, digits and _, at most {LONGEST_NAME}, and none of "

@@ -1,13 +1,16 @@
 """The commented file ``config.yaml``, made from the models: every key with its default, unit and meaning.
 
+What lies below a key is commented out: a copy of the file that is kept follows the defaults of later versions.
+
 ``python -m sepi.workflow.config_file`` prints it.
 """
 
 from __future__ import annotations
 
 import json
+import re
 import textwrap
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import click
@@ -21,10 +24,14 @@ from sepi.workflow.parameters import GROUPS, SHARED, choices_with, default_value
 
 
 def default_yaml() -> str:
-    """The text of ``config.yaml``: every key with its default, and a comment with its meaning, unit and bounds."""
+    """The text of ``config.yaml``: every key with its default, and a comment with its meaning, unit and bounds.
+
+    A line ``#NAME: VALUE`` is what holds without it; prose has a space after the ``#``.
+    """
     lines = [
         "# Configuration of the workflow (docs/reproduce/workflow.md). Every key may be left out; these are defaults.",
-        "# To change a value: edit it here, or give a file of your own (--configfile FILE), or --config KEY=VALUE.",
+        "# To change a value, here or in your own file (--configfile FILE): take the # from its line and from those",
+        "# that it lies below. Or give --config KEY=VALUE.",
         "# This file is made from the code: python -m sepi.workflow.config_file > config.yaml",
         "",
     ]
@@ -32,15 +39,19 @@ def default_yaml() -> str:
         lines += _comment(field, "")
         default = field.get_default(call_default_factory=True)
         if key in ("builtin", "report"):
-            lines += [f"{key}:", *_fields(type(default), "  ", default.model_dump())]
+            lines += [f"{key}:", *_without_effect(_fields(type(default), "  ", default.model_dump()))]
         elif key == "variants":
-            lines += ["variants:", *(f"  {name}: {_flow(entry)}" for name, entry in default.items())]
+            lines += ["variants:", *_without_effect(f"  {name}: {_flow(entry)}" for name, entry in default.items())]
         elif key == "stages":
-            lines += ["stages:", *_stage_lines()]
+            lines += ["stages:", *_without_effect(_stage_lines())]
         else:
             lines.append(f"{key}: {_flow(default)}")
         lines.append("")
     return "\n".join(lines)
+
+
+def _without_effect(lines: Iterable[str]) -> list[str]:
+    return [re.sub(r"^( *)(?=[^ #])", r"\1#", line) for line in lines]
 
 
 def _stage_lines() -> list[str]:

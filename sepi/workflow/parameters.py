@@ -39,7 +39,7 @@ GROUPS: dict[str, type[Parameters]] = {
 }
 """Name of a group to the model that declares it."""
 
-Values = Mapping[str, Mapping[str, Mapping[str, Any] | None]]
+Values = Mapping[str, Mapping[str, Mapping[str, Any] | None] | None]
 """Stage to choice to field to value, and the groups beside the stages."""
 
 
@@ -99,14 +99,14 @@ def stage_settings(values: Values, variants: Mapping[str, Variant]) -> dict[str,
     """
     where = "config.stages"
     require_known(where, values, [SHARED, *STAGES])
-    shared = values.get(SHARED, {})
+    shared = values.get(SHARED) or {}
     require_known(f"{where}.{SHARED}", shared, GROUPS)
     for group, settings in shared.items():
         require_known(f"{where}.{SHARED}.{group}", settings or {}, fields_of(group))
         validated(GROUPS[group], settings or {}, f"{where}.{SHARED}.{group}")
     found: dict[str, dict[str, Parameters]] = {}
     for stage, choices in STAGES.items():
-        own = values.get(stage, {})
+        own = values.get(stage) or {}
         require_known(f"{where}.{stage}", own, choices)
         defaults = {name: _with_shared(choice.parameters, own.get(name), shared) for name, choice in choices.items()}
         found[stage] = {

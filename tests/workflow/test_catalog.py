@@ -9,7 +9,7 @@ import pytest
 import yaml
 from workflow_copy import REPOSITORY
 
-from sepi.workflow.config import Config, load_settings
+from sepi.workflow.config import Config
 
 # each job is a command of the package that the rules themselves import: it is there where Snakemake runs
 ALLOWED = {"Specify a conda environment or container for each rule."}
@@ -48,10 +48,3 @@ def test_the_instructions_name_every_key() -> None:
     values = yaml.safe_load(text.split("```yaml\n")[1].split("```")[0])
     assert set(values) <= set(Config.model_fields)
     assert set(values["light_fields"]["lego"]) == {"path", "grid"}
-
-
-def test_a_deployed_workflow_begins_with_the_defaults() -> None:
-    """Snakedeploy copies the folder `config` and reads `config/config.yaml` from it."""
-    copied = REPOSITORY / "config/config.yaml"
-    assert copied.resolve() == (REPOSITORY / "config.yaml").resolve()
-    assert load_settings(yaml.safe_load(copied.read_text())).scenes == load_settings({}).scenes

@@ -2,6 +2,7 @@
 
 import inspect
 import json
+import re
 from collections import Counter
 from pathlib import Path
 from typing import Any
@@ -23,7 +24,7 @@ from sepi.workflow.config_file import default_yaml
 from sepi.workflow.parameters import GROUPS
 from sepi.workflow.result_paths import key_of
 
-CONFIG = Path(__file__).parents[2] / "config.yaml"
+REPOSITORY = Path(__file__).parents[2]
 
 
 def message_of(values: dict[str, Any]) -> str:
@@ -41,23 +42,32 @@ def make_scene(folder: Path, views: int = 9, width: int = 40, height: int = 30) 
     return folder
 
 
-def test_config_yaml_is_what_the_code_has() -> None:
-    """A default changed in the code but not in config.yaml would be overridden by the stale one."""
-    assert CONFIG.read_text() == default_yaml(), "run: python -m sepi.workflow.config_file > config.yaml"
+@pytest.mark.parametrize("file", ["config.yaml", "config/config.yaml"])
+def test_config_yaml_is_what_the_code_has(file: str) -> None:
+    """Else it would tell of defaults that are none; the second is what Snakedeploy copies, link or not as Git likes."""
+    path = REPOSITORY / file
+    assert not path.is_symlink()
+    assert path.read_text() == default_yaml(), f"run: python -m sepi.workflow.config_file > {file}"
 
 
-def test_config_yaml_sets_the_defaults() -> None:
-    assert load_settings(yaml.safe_load(CONFIG.read_text())) == load_settings({})
+def test_a_kept_copy_of_config_yaml_follows_the_defaults() -> None:
+    """It must not freeze those of its version: a built-in variant that is changed later would even stop it."""
+    text = default_yaml()
+    assert not any(yaml.safe_load(text).values())
+    assert load_settings(yaml.safe_load(text)) == load_settings({})
+    # what is said of them is true, and may be set by taking the # away
+    said = load_settings(yaml.safe_load(re.sub(r"^( *)#(?! )", r"\1", text, flags=re.MULTILINE)))
+    assert said == load_settings({})
 
 
 def test_config_yaml_names_every_parameter_with_its_meaning() -> None:
-    lines = [line.strip() for line in CONFIG.read_text().splitlines()]
+    lines = [line.strip().removeprefix("#") for line in default_yaml().splitlines()]
     for choices in STAGES.values():
         for choice in choices.values():
             for name, field in choice.parameters.model_fields.items():
                 assert field.description, f"{name} has no description"
                 found = [number for number, line in enumerate(lines) if line.startswith(f"{name}: ")]
-                assert any(lines[number - 1].startswith("# ") for number in found), f"{name} has no comment"
+                assert any(lines[number - 1].startswith(" ") for number in found), f"{name} has no comment"
 
 
 def test_defaults_run_every_builtin_scene_and_variant() -> None:
@@ -77,7 +87,7 @@ def test_defaults_run_every_builtin_scene_and_variant() -> None:
         ({"builtin": {"size": 3}}, "config.builtin.size: input should be greater than or equal to 64, got 3"),
         ({"builtin": {"scenes": ["dotz"]}}, "config.builtin.scenes: unknown 'dotz'; did you mean 'dots'?"),
         ({"builtin": {"scenes": []}}, "config: no scene to run on; name some in builtin.scenes or light_fields"),
-        ({"builtin": None}, "config.builtin: input should be an object, got None"),
+        ({"builtin": 3}, "config.builtin: input should be an object, got 3"),
         ({"hci_root": "/nowhere"}, "config.hci_root: no folder '/nowhere'"),
         ({"stages": {"initail": {}}}, "config.stages: unknown 'initail'; did you mean 'initial'?"),
         ({"stages": {"initial": {"sapi": {}}}}, "config.stages.initial: unknown 'sapi'; did you mean 'sepi'?"),
@@ -170,9 +180,10 @@ def test_numbers_left_as_text_are_numbers() -> None:
     assert settings.scene("builtin", "dots").disparity_range == (-2, 0.1)
 
 
-def test_an_empty_choice_keeps_its_defaults() -> None:
+def test_a_key_with_nothing_below_keeps_its_defaults() -> None:
     """``half_sepi:`` with nothing below it is null in YAML."""
-    assert load_settings({"stages": {"occlusion": {"half_sepi": None}}}) == load_settings({})
+    stages = {"shared": None, "initial": None, "occlusion": {"half_sepi": None}}
+    assert load_settings({"builtin": None, "report": None, "stages": stages}) == load_settings({})
 
 
 def test_own_variants_come_beside_the_builtin_ones() -> None:
