@@ -76,7 +76,7 @@ _FLAGS = (
         "--format",
         "file_format",
         metavar="FORMAT",
-        help="hci, hci-2013, images, eslf, matlab, numpy, openlf or sepi; found by looking unless given.",
+        help="hci, hci-2013, images, eslf, matlab, numpy, openlf, hdf5 or sepi; found by looking unless given.",
     ),
     click.option(
         "--grid", type=Pair("ROWSxCOLUMNS", "xX×"), metavar="ROWSxCOLUMNS", help="Grid of views in the files."
@@ -89,7 +89,7 @@ _FLAGS = (
         "--axes",
         help="Axes of an array in order, such as HWTSC: T S (view row, column; N for both in one), H W and C (colour).",
     ),
-    click.option("--variable", help="Name of the array in a .mat or .npz file with several."),
+    click.option("--variable", help="Name of the array in a .mat, .npz or HDF5 file with several."),
     click.option("--central", type=click.IntRange(min=1), metavar="N", help="Use only the N x N views in the middle."),
     click.option("--order", default="as-given", help="Order of the views: a name that 'sepi check' tells."),
     click.option(

@@ -42,7 +42,10 @@ _NOT_RUN = ("TYPE_CHECKING", "__name__ == '__main__'")
 # packages and modules of which a job runs one
 _ALTERNATIVES = (
     "scenes",
-    *(f"io.readers.{name}" for name in ("eslf", "hci", "hci_2013", "image_folder", "matlab", "numpy_files", "open_lf")),
+    *(
+        f"io.readers.{name}"
+        for name in ("eslf", "hci", "hci_2013", "hdf5_arrays", "image_folder", "matlab", "numpy_files", "open_lf")
+    ),
 )
 # what is told to people alone
 _TOLD = ("help", "description")

@@ -203,6 +203,11 @@ def hci_2013_files(folder: Path) -> list[bytes]:
     return [hdf5(folder, plain), hdf5(folder, packed), hdf5(folder, described), hdf5(folder, packed, libver="latest")]
 
 
+def hdf5_array_files(folder: Path) -> list[bytes]:
+    """At the top, and in a group."""
+    return [hdf5(folder, lambda file, name=name: file.create_dataset(name, data=VIEWS)) for name in ("x", "group/x")]
+
+
 def open_lf_files(folder: Path) -> list[bytes]:
     """In colours with baselines, and grey."""
     picture = VIEWS.transpose(0, 2, 1, 3, 4).reshape(2 * H, 3 * W, 3)

@@ -96,6 +96,7 @@ TARGETS: dict[str, Target] = {
     "hci-truth": Target("gt_disp_lowres.pfm", seeds.pfm_files, texts.read_parent, seeds.hci_folder),
     "hci-2013": _hdf5(seeds.hci_2013_files, _light_field),
     "openlf": _hdf5(seeds.open_lf_files, _light_field),
+    "hdf5": _hdf5(seeds.hdf5_array_files, _light_field),
     "mat-5": Target("a.mat", seeds.mat_5_files, _light_field, wrappings=MAT),
     "mat-7.3": _hdf5(seeds.mat_7_3_files, _light_field, name="a.mat"),
     "npy": Target("a.npy", seeds.npy_files, _light_field),

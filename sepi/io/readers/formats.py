@@ -11,7 +11,7 @@ from sepi.errors import SepiError
 from sepi.io.files import naming
 from sepi.io.hdf5 import has_dataset, read_light_field
 from sepi.io.images import SUFFIXES
-from sepi.io.readers import eslf, hci, hci_2013, image_folder, matlab, numpy_files, open_lf
+from sepi.io.readers import eslf, hci, hci_2013, hdf5_arrays, image_folder, matlab, numpy_files, open_lf
 from sepi.io.readers.arrays import rearrange, with_white
 from sepi.io.readers.options import ReadOptions
 from sepi.lightfield import LightField
@@ -70,6 +70,10 @@ FORMATS = {
     # before the other kinds with something called LF
     "openlf": Format("OpenLF HDF5", "with a group LF", open_lf.matches, open_lf.read, scales=True),
     "hci-2013": Format("HCI 2013 HDF5", "with LF (T, S, H, W, 3)", hci_2013.matches, hci_2013.read, scales=True),
+    # behind those whose arrays have names of their own
+    "hdf5": Format(
+        "HDF5 file", "with an array of all views", hdf5_arrays.matches, hdf5_arrays.read, _ARRAY_OPTIONS, True
+    ),
     # last, so that it gets what is too damaged to tell
     "sepi": Format(
         "sepi HDF5",

@@ -30,7 +30,7 @@ from sepi.errors import SepiError
 from sepi.io.files import reading
 from sepi.io.hdf5 import DEFLATE_RATIO, attribute, open_hdf5, read_dataset
 from sepi.io.readers.arrays import Array
-from sepi.io.readers.named_arrays import Shapes, light_field_from_arrays
+from sepi.io.readers.named_arrays import Shapes, datasets_in, light_field_from_arrays
 from sepi.io.readers.options import ReadOptions
 from sepi.lightfield import LightField
 
@@ -91,7 +91,8 @@ def array_shapes(path: Path) -> Shapes:
             return {name: (shape, np.dtype(kind)) for name, shape, kind in whosmat(path) if name in names}
     if h5py.is_hdf5(path):
         with open_hdf5(path) as file:
-            arrays = {name: file[name] for name in file if _is_numbers(file.get(name))}
+            # structures are groups
+            arrays = datasets_in(file, _is_numbers)
             turn = {name: -1 if _is_turned(path, array) else 1 for name, array in arrays.items()}
             return {name: (array.shape[:: turn[name]], array.dtype) for name, array in arrays.items()}
     what = "is damaged" if head.startswith(_TEXT_7_3) else "is not a MATLAB file of version 5 or 7.3"

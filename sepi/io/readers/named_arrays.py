@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 
 from sepi.errors import SepiError, printable
@@ -54,6 +55,14 @@ def light_field_from_arrays(
     light_field = light_field_from_array(np.stack([load(name) for name in names], axis=-1), path, options)
     note = f"the arrays {', '.join(map(printable, names))} are taken as red, green and blue"
     return replace(light_field, notes=(note, *light_field.notes))
+
+
+def datasets_in(file: h5py.File, wanted: Callable[[object], bool]) -> dict[str, h5py.Dataset]:
+    """Datasets of some sort by their paths: those in groups only where none outside of them has 4 or 5 axes."""
+    found = {name: file[name] for name in file if wanted(file.get(name))}
+    if not any(array.ndim in (4, 5) for array in found.values()):
+        file.visititems(lambda name, entry: found.update({name: entry}) if wanted(entry) else None)
+    return found
 
 
 def _channels_from(red: str) -> Iterator[tuple[str, ...]]:

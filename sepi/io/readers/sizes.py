@@ -13,6 +13,7 @@ from sepi.errors import SepiError
 from sepi.io.hdf5 import DEFLATE_RATIO, open_hdf5
 from sepi.io.images import SUFFIXES, picture_header
 from sepi.io.readers import eslf, matlab, numpy_files, open_lf
+from sepi.io.readers.named_arrays import datasets_in
 
 # what is taken where no header tells: a view of the benchmark
 _USUAL_SIDE = 512
@@ -94,7 +95,7 @@ def _arrays(path: Path) -> list[tuple[tuple[int, ...], int]]:
         else:
             # the size alone, of many: whoever reads the views checks the file
             with open_hdf5(path, check=False) as file:
-                entries = (entry for entry in map(file.get, file) if isinstance(entry, h5py.Dataset))
+                entries = datasets_in(file, lambda entry: isinstance(entry, h5py.Dataset)).values()
                 arrays = [(entry.shape or (), entry.dtype) for entry in entries]
     except SepiError:
         return []

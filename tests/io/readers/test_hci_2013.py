@@ -121,7 +121,7 @@ def test_attributes_that_are_no_numbers_are_named(tmp_path: Path, value: object)
     assert "attribute 'focalLength'" in refused(write(tmp_path / "a.h5", focalLength=value))
 
 
-@pytest.mark.parametrize("views", [LF[..., 0], LF[0, 0], np.concatenate([LF, LF], axis=4), LF.astype(np.int32)])
+@pytest.mark.parametrize("views", [LF[..., 0], LF[0, 0], np.concatenate([LF, LF], axis=4)])
 def test_views_of_another_layout_are_refused(tmp_path: Path, views: np.ndarray) -> None:
     message = refused(write(tmp_path / "a.h5", views=views))
     assert "expected" in message

@@ -14,6 +14,7 @@ import scipy.io
 from sepi.errors import SepiError
 from sepi.io.readers.formats import format_of, read
 from sepi.io.readers.options import ReadOptions
+from sepi.io.readers.sizes import size_of
 from sepi.lightfield import LightField
 
 RNG = np.random.default_rng(3)
@@ -139,6 +140,28 @@ def test_other_classes_are_passed_over(tmp_path: Path) -> None:
         file["mask"].attrs["MATLAB_class"] = np.bytes_("logical")
         file["gone"] = h5py.SoftLink("/nowhere")
     np.testing.assert_array_equal(taken(tmp_path / "mixed73.mat").views, LF)
+
+
+def test_structures_of_version_7_3_hold_the_light_field(tmp_path: Path) -> None:
+    """Toolboxes save all that they know in one structure."""
+    save_7_3(tmp_path / "a.mat", {"struct/lf/views": LF, "struct/time": np.ones((1, 1))})
+    np.testing.assert_array_equal(taken(tmp_path / "a.mat").views, LF)
+    np.testing.assert_array_equal(taken(tmp_path / "a.mat", variable="struct/lf/views").views, LF)
+
+
+@pytest.mark.parametrize("name", ["lightfield", "data/views"])
+def test_hdf5_of_other_programs_with_one_array(tmp_path: Path, name: str) -> None:
+    """Names are each program's own; only MATLAB's axes are in reverse."""
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file[name] = LF
+        file["calibration"] = np.ones((3, 3))
+    assert format_of(tmp_path / "a.h5").name == "HDF5 file"
+    np.testing.assert_array_equal(read(tmp_path / "a.h5", ReadOptions()).views, LF)
+    assert size_of([tmp_path / "a.h5"]) == (6, 8, 10, 3)
+    with h5py.File(tmp_path / "a.h5", "a") as file:
+        file[f"{name}2"] = LF[::-1]
+    assert "choose one with --variable" in refused(tmp_path / "a.h5")
+    np.testing.assert_array_equal(read(tmp_path / "a.h5", ReadOptions(variable=f"{name}2")).views, LF[::-1])
 
 
 def test_other_programs_hdf5_is_as_they_show_it(tmp_path: Path) -> None:
