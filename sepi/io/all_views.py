@@ -93,21 +93,7 @@ def read_result_at(path: Path, view: View | None = None) -> Result:
             own = "" if origin is None else " {},{}".format(*origin.view)
             raise SepiError(f"{path}: holds the map of view{own} alone; 'sepi depth --all-views' makes those of all")
         return result
-    with open_hdf5(file_path, _KIND) as file:
-        position = _position(file_path, file, view)
-        down, across = (read_dataset(file_path, file["baselines"]) + attribute(file, "from_centre"))[position].tolist()
-        disparity, confidence, extended, picture = (
-            read_dataset(file_path, file[name], position) for name in ("disparity", "confidence", _MARK, "picture")
-        )
-        return Result(
-            scene=str(attribute(file, "scene")),
-            picture=picture,
-            disparity=disparity.astype(np.float32),
-            confidence=confidence.astype(np.float32),
-            unknown=extended.astype(bool) | (confidence == 0),
-            camera=read_camera(file),
-            from_centre=(down, across),
-        )
+    return _read_view(file_path, view)
 
 
 def read_disparity_at(path: Path, view: View | None) -> FloatMap:
@@ -130,8 +116,12 @@ def surfaces_of(path: Path) -> Callable[[View], FloatMap] | None:
     if file_path is None:
         return None
 
+    # checked once, not for each view
+    with open_hdf5(file_path, _KIND):
+        pass
+
     def surface(view: View) -> FloatMap:
-        result = read_result_at(file_path, view)
+        result = _read_view(file_path, view, check=False)
         return np.where(result.unknown, np.float32(np.nan), result.disparity)
 
     return surface
@@ -142,6 +132,25 @@ def _file_of(path: Path, view: View | None) -> Path | None:
     path = path / ALL_VIEWS if path.is_dir() and view is not None else path
     # of a damaged one is told when it is read
     return path if has_dataset(path, _MARK, if_damaged=True) else None
+
+
+def _read_view(file_path: Path, view: View | None, check: bool = True) -> Result:
+    """The maps of a view; unchecked, without reading the whole file for its digest."""
+    with open_hdf5(file_path, _KIND, check) as file:
+        position = _position(file_path, file, view)
+        down, across = (read_dataset(file_path, file["baselines"]) + attribute(file, "from_centre"))[position].tolist()
+        disparity, confidence, extended, picture = (
+            read_dataset(file_path, file[name], position) for name in ("disparity", "confidence", _MARK, "picture")
+        )
+        return Result(
+            scene=str(attribute(file, "scene")),
+            picture=picture,
+            disparity=disparity.astype(np.float32),
+            confidence=confidence.astype(np.float32),
+            unknown=extended.astype(bool) | (confidence == 0),
+            camera=read_camera(file),
+            from_centre=(down, across),
+        )
 
 
 def _position(path: Path, file: h5py.File, view: View | None) -> View:
