@@ -129,3 +129,10 @@ def _require_contrast(path: Path, light_field: LightField) -> None:
             f"{path}: view {','.join(map(str, light_field.reference_position))} is all {colour}; depth needs views "
             "that show something"
         )
+    views = light_field.views
+    places = np.argwhere(light_field.present)
+    if all(np.array_equal(views[t, s], views[light_field.reference_position]) for t, s in places):
+        raise SepiError(
+            f"{path}: all {len(places)} views are the same picture; depth needs views of different places, so look "
+            "whether one was copied over the others"
+        )

@@ -15,6 +15,7 @@ from sepi.errors import SepiError
 from sepi.io.images import SUFFIXES
 from sepi.io.readers import hci, hci_2013
 from sepi.io.readers.formats import format_of
+from sepi.io.readers.row_folders import view_files
 from sepi.io.readers.sizes import size_of
 
 VIEW_PATTERN = "input_Cam*.png"
@@ -181,7 +182,7 @@ def own_scene(name: str, source: Path, flags: tuple[str, ...], where: str) -> Sc
     if not os.path.exists(source):
         raise SepiError(f"{where}: no file or folder '{source}'")
     source = source.resolve()
-    inside = [path for path in sorted(source.iterdir()) if path.is_file()] if source.is_dir() else [source]
+    inside = [path for path in view_files(source) if path.is_file()] if source.is_dir() else [source]
     files = tuple(path for path in inside if not path.name.startswith("."))
     # notes beside pictures are no part of the light field
     read = tuple(path for path in files if path.suffix.lower() in SUFFIXES or path.name in _BESIDE_PICTURES)

@@ -292,6 +292,11 @@ CASES: dict[str, tuple[Spoil, str, tuple[str, ...]]] = {
     # what the views show
     "all black": (lambda: pictures(views=np.zeros_like(VIEWS)), "in", ("in", "black")),
     "of one colour": (lambda: pictures(views=np.full_like(VIEWS, 90)), "in", ("in", "one colour")),
+    "copies of one view": (
+        lambda: pictures(views=np.broadcast_to(VIEWS[1, 1], VIEWS.shape)),
+        "in",
+        ("in", "all 9 views are the same picture"),
+    ),
     # arrays
     "npy cut off": (lambda: cut(npy()), "in.npy", ("in.npy",)),
     "npy of text": (lambda: Path("in.npy").write_text("hello"), "in.npy", ("in.npy", "not a NumPy file")),

@@ -14,6 +14,7 @@ from sepi.io.images import SUFFIXES
 from sepi.io.readers import eslf, hci, hci_2013, hdf5_arrays, image_folder, matlab, numpy_files, open_lf
 from sepi.io.readers.arrays import rearrange, with_white
 from sepi.io.readers.options import ReadOptions
+from sepi.io.readers.row_folders import has_rows
 from sepi.lightfield import LightField
 from sepi.validation import require_known
 
@@ -112,7 +113,8 @@ def format_of(path: Path, file_format: str | None = None) -> Format:
     if inner:
         found = f", such as {inner[0]}" if len(inner) == 1 else f": {', '.join(map(str, inner[:_LISTED]))}"
         more = ", ..." if len(inner) > _LISTED else ""
-        raise SepiError(f"{path}: a folder of light fields; give one of them{found}{more}")
+        rows = "; if they are the rows of one, pass --format images" if _may_be_rows(path) else ""
+        raise SepiError(f"{path}: a folder of light fields; give one of them{found}{more}{rows}")
     expected = ", ".join(f"{known.name} ({known.description})" for known in FORMATS.values())
     raise SepiError(f"{path}: {_what_else(path)}; expected {expected}")
 
@@ -180,6 +182,13 @@ def _is_empty(path: Path) -> bool:
         return path.is_file() and path.stat().st_size == 0
     except OSError:
         return True
+
+
+def _may_be_rows(folder: Path) -> bool:
+    try:
+        return has_rows(folder, surely=False)
+    except OSError:
+        return False
 
 
 def _inside(folder: Path, depth: int = _DEPTH) -> Iterator[Path]:

@@ -1,7 +1,7 @@
 """Folders with one picture for each view, under any names that count or sort them.
 
-Names give row and column, ``view_03_07.png``, or number the views through, ``img_034.jpg``. They may also say where the
-cameras stood, ``out_00_01_-703.002197_468.153625.png``.
+Names give row and column, ``view_03_07.png`` or ``row_3/col_7.png``, or number the views through, ``img_034.jpg``. They
+may also say where the cameras stood, ``out_00_01_-703.002197_468.153625.png``.
 """
 
 from __future__ import annotations
@@ -16,12 +16,13 @@ import numpy as np
 import numpy.typing as npt
 
 from sepi.errors import SepiError
-from sepi.io.files import name_of, reading
+from sepi.io.files import name_of
 from sepi.io.images import SUFFIXES
 from sepi.io.readers.camera_positions import off_grid, positions_from_cameras
 from sepi.io.readers.folder_layout import Layout, Numbers, widened
 from sepi.io.readers.odd_pictures import odd_pictures
 from sepi.io.readers.options import ReadOptions, is_position, unarranged
+from sepi.io.readers.row_folders import files_in, has_rows, numbered, view_files
 from sepi.io.readers.view_files import read_grid
 from sepi.io.readers.view_names import ViewNumbers, infer_view_numbers, parse_view_numbers, sorted_view_numbers
 from sepi.lightfield import LightField
@@ -31,13 +32,11 @@ _ON_GRID = 1e-3
 
 
 def matches(path: Path) -> bool:
-    """Whether ``path`` is a folder with at least two pictures that have numbers in their names."""
+    """Whether ``path`` is a folder with at least two pictures that have numbers in their names, or a folder of rows."""
     try:
-        names = [file.stem for file in _files(path) if file.suffix.lower() in SUFFIXES]
+        return len(numbered(files_in(path))) >= 2 or has_rows(path, surely=True)
     except OSError:
         return False
-    # several lenslet pictures are several light fields
-    return sum(any("0" <= sign <= "9" for sign in name) and "eslf" not in name.lower() for name in names) >= 2
 
 
 def read(path: Path, options: ReadOptions) -> LightField:
@@ -51,8 +50,7 @@ def read(path: Path, options: ReadOptions) -> LightField:
     """
     if not path.is_dir():
         raise SepiError(f"{path}: not a folder of views")
-    with reading(path, "folder of views"):
-        files = [file.name for file in _files(path)]
+    files = [file.relative_to(path).as_posix() for file in view_files(path)]
     excluded = {name for name in options.exclude if name in files and not is_position(name)}
     considered = [name for name in files if name not in excluded and (options.pattern or _is_picture(name))]
     named, odd = _views(path, considered, options)
@@ -99,7 +97,8 @@ def _views(folder: Path, names: Sequence[str], options: ReadOptions) -> tuple[Vi
 
 
 def _odd(folder: Path, names: Iterable[str]) -> dict[str, str]:
-    return {path.name: why for path, why in odd_pictures([folder / name for name in names]).items()}
+    odd = odd_pictures([folder / name for name in names])
+    return {path.relative_to(folder).as_posix(): why for path, why in odd.items()}
 
 
 def _named(folder: Path, names: Sequence[str], options: ReadOptions) -> ViewNumbers:
@@ -155,15 +154,6 @@ def _with_positions(
                 notes=(*light_field.notes, f"camera positions from the names; {apart}{where}"),
             )
     return light_field
-
-
-def _files(folder: Path) -> list[Path]:
-    """Files and links that lead to no folder; hidden ones are not views."""
-    return sorted(
-        file
-        for file in folder.iterdir()
-        if not file.name.startswith(".") and (file.is_file() or (file.is_symlink() and not file.is_dir()))
-    )
 
 
 def _left_out(names: Sequence[str], singular: str, plural: str) -> list[str]:

@@ -48,7 +48,8 @@ def read_grid(
     if grid[0] * grid[1] > MAX_VIEWS:
         raise SepiError(f"{folder}: a grid of {grid[0]}x{grid[1]} views; expected at most {MAX_VIEWS} views")
     # what is no view may be excluded, too
-    names = {path.name: -1 for path in folder.iterdir()} | {path.name: number for number, path in files.items()}
+    names = {name: -1 for name in options.exclude if (folder / name).exists()}
+    names |= {path.relative_to(folder).as_posix(): number for number, path in files.items()}
     numbers = arrange_numbers(str(folder), grid, options, names)
     present = np.isin(numbers, list(files))
     positions = np.flatnonzero(present)

@@ -27,7 +27,7 @@ _WELL_FILLED = 0.5
 _WORD = re.compile(r"([A-Z]?[a-z]+|[A-Z]+)[ _.=(\[-]*$")
 _AXES = {"x": "column", "c": "column", "col": "column", "column": "column", "y": "row", "r": "row", "row": "row"}
 # in place of a decimal number; no name has it
-_MARK = "/"
+_MARK = "\0"
 
 _DECIMAL = r"(?P<decimal>[+-]*+(?<![0-9.])[0-9]++\.[0-9]++(?![0-9.]))|"
 _INTEGER = r"(?P<integer>[+-]*+[0-9]++)"
@@ -366,11 +366,13 @@ def _compiled(source: str, pattern: str) -> re.Pattern[str]:
         fields not in (["{column}", "{row}"], ["{number}"])
         or touching
         or len(pattern) > 255
-        or set("/\\") & set(pattern)
+        or pattern.count("/") > 1
+        or pattern.startswith(("/", "."))
+        or "\\" in pattern
     ):
         raise SepiError(
-            f"{source}: pattern '{pattern[:255]}': expected the name of a file in the folder, with {{row}} and "
-            f"{{column}} once each and something between them, or {{number}} once; such as {EXAMPLES}"
+            f"{source}: pattern '{pattern[:255]}': expected the name of a file in the folder, or ROW/NAME, with "
+            f"{{row}} and {{column}} once each and something between them, or {{number}} once; such as {EXAMPLES}"
         )
     segments = [""]
     for part in parts:

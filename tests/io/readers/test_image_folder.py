@@ -23,6 +23,7 @@ from sepi.io.readers.view_names import infer_view_numbers, parse_view_numbers
 from sepi.lightfield import LightField
 from sepi.reading import read_light_field
 from sepi.scenes import render
+from sepi.workflow.datasets import own_scene
 
 
 def pixels(place: int) -> np.ndarray:
@@ -692,6 +693,52 @@ def test_link_out_of_the_folder_is_followed_when_asked_for(tmp_path: Path) -> No
     folder = put(tmp_path / "f", PLACES)
     outside(folder)
     assert places_of(read(folder, ReadOptions(follow_links=True))) == grid_of(3, 3)
+
+
+ROWS: dict[str, tuple[list[str], ReadOptions, list[list[int]]]] = {
+    "words": (by_place("row_{}/col_{}.png", range(3), range(4)), ReadOptions(), grid_of(3, 4)),
+    "numbers": (by_place("{}/{}.png", range(3), range(3)), ReadOptions(), grid_of(3, 3)),
+    "ten rows": (by_place("a_row{}/v{:02}.png", range(1, 11), range(2)), ReadOptions(), grid_of(10, 2)),
+    "row in both": (by_place("r{0}/r{0}_c{1}.png", range(3), range(2)), ReadOptions(), grid_of(3, 2)),
+    "a view left out": (
+        by_place("{}/{}.png", range(2), range(3)),
+        ReadOptions(exclude=("1/2.png",)),
+        [[0, 1, 2], [3, 4, -1]],
+    ),
+    "columns": (
+        by_place("col_{}/row_{}.png", range(2), range(3)),
+        ReadOptions(pattern="col_{column}/row_{row}.png"),
+        [[0, 3], [1, 4], [2, 5]],
+    ),
+}
+
+
+@pytest.mark.parametrize("case", ROWS)
+def test_folder_of_rows_is_a_grid(tmp_path: Path, case: str) -> None:
+    """Whoever is told to give one of the folders gets depth from one row."""
+    names, options, expected = ROWS[case]
+    for name in names:
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+    light_field = read(put(tmp_path, names), options)
+    assert places_of(light_field) == expected
+    assert [scene.views for scene in [own_scene("toy", tmp_path, (), "here")]] == [len(names)]
+
+
+SCENES = {
+    "numbered through": by_place("{}/{}.png", range(3), range(9)),
+    "rows and columns": by_place("{}/v_{}_0.png", range(3), range(2)) + by_place("{}/v_{}_1.png", range(3), range(2)),
+    "other words": by_place("scene_{}/{}.png", range(3), range(3)),
+}
+
+
+@pytest.mark.parametrize("case", SCENES)
+def test_folder_of_light_fields_is_no_grid(tmp_path: Path, case: str) -> None:
+    for name in SCENES[case]:
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+    put(tmp_path, SCENES[case])
+    with pytest.raises(SepiError, match="a folder of light fields; give one of them") as caught:
+        format_of(tmp_path)
+    assert ("--format images" in str(caught.value)) == (case == "numbered through")
 
 
 def test_folders_that_are_no_light_field_are_not_taken_for_one(tmp_path: Path) -> None:
