@@ -76,6 +76,10 @@ class DisparityRange:
     source: str
 
     def __post_init__(self) -> None:
+        if self.source not in RANGE_SOURCES:
+            raise SepiError(
+                f"disparity range: expected a source of {', '.join(RANGE_SOURCES)}, got {described(self.source)}"
+            )
         if not (is_finite(self.minimum) and is_finite(self.maximum) and self.minimum < self.maximum):
             raise SepiError(
                 f"disparity range ({self.source}): expected two finite numbers MIN < MAX in pixels per view step, "
@@ -191,6 +195,9 @@ class LightField:
         for key in ("name", "source"):
             # names of files need not be text, or one line of it; what is not cannot be printed or stored
             object.__setattr__(self, key, _shown(getattr(self, key)))
+        require_type(f"{self.name}: notes", self.notes, (tuple, list), "a tuple of texts")
+        for note in self.notes:
+            require_type(f"{self.name}: notes", note, str, "a tuple of texts")
         object.__setattr__(self, "notes", tuple(map(_shown, self.notes)))
         if not isinstance(v, np.ndarray):
             raise SepiError(f"{self.name}: views must be an array of shape (T, S, H, W, C), got a {type(v).__name__}")
@@ -250,6 +257,10 @@ class LightField:
                     f"{self.name}: {what} must have the views' shape (H, W) = {self.shape}, got {array.shape}"
                 )
 
+        if self.ground_truth is not None:
+            if self.ground_truth.dtype.kind not in "fiu":
+                raise SepiError(f"{self.name}: ground_truth must be float32, got {self.ground_truth.dtype}")
+            object.__setattr__(self, "ground_truth", self.ground_truth.astype(np.float32, copy=False))
         if self.disparity_range is not None and self.arranged:
             self._require_seen(self.disparity_range)
 
@@ -423,6 +434,11 @@ def as_unit_float(values: npt.NDArray[np.generic]) -> FloatMap:
         largest = np.iinfo(values.dtype).max  # type: ignore[type-var]
         return np.asarray(values.astype(np.float32) / np.float32(largest), np.float32)
     return values.astype(np.float32)
+
+
+def require_light_field(value: object) -> None:
+    """Raise for what is no light field, such as the path of one."""
+    require_type("light field", value, LightField, "a LightField, as sepi.read_light_field makes it")
 
 
 def full_scale(dtype: npt.DTypeLike) -> float:
