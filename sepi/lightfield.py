@@ -22,7 +22,7 @@ import numpy.typing as npt
 
 from sepi.camera import Camera
 from sepi.errors import SepiError, one_line
-from sepi.validation import described, is_finite, require_type, whole_pair
+from sepi.validation import described, is_finite, require_known, require_type, whole_pair
 
 FloatMap = npt.NDArray[np.float32]
 BoolMap = npt.NDArray[np.bool_]
@@ -76,10 +76,6 @@ class DisparityRange:
     source: str
 
     def __post_init__(self) -> None:
-        if self.source not in RANGE_SOURCES:
-            raise SepiError(
-                f"disparity range: expected a source of {', '.join(RANGE_SOURCES)}, got {described(self.source)}"
-            )
         if not (is_finite(self.minimum) and is_finite(self.maximum) and self.minimum < self.maximum):
             raise SepiError(
                 f"disparity range ({self.source}): expected two finite numbers MIN < MAX in pixels per view step, "
@@ -261,8 +257,10 @@ class LightField:
             if self.ground_truth.dtype.kind not in "fiu":
                 raise SepiError(f"{self.name}: ground_truth must be float32, got {self.ground_truth.dtype}")
             object.__setattr__(self, "ground_truth", self.ground_truth.astype(np.float32, copy=False))
-        if self.disparity_range is not None and self.arranged:
-            self._require_seen(self.disparity_range)
+        if self.disparity_range is not None:
+            require_known(f"{self.name}: source of the disparity range", [self.disparity_range.source], RANGE_SOURCES)
+            if self.arranged:
+                self._require_seen(self.disparity_range)
 
     def _arrays(self) -> dict[str, object]:
         require_type(f"{self.name}: masks", self.masks, Mapping, "names with arrays")

@@ -72,7 +72,10 @@ WRONG: dict[str, tuple[Callable[[], object], str]] = {
     "text as notes": (field(notes="abc"), "mine: notes: expected a tuple of texts, got 'abc'"),
     "numbers as notes": (field(notes=(1,)), "mine: notes: expected a tuple of texts, got 1"),
     "ground truth of text": (field(ground_truth=np.full((64, 64), "a")), "mine: ground_truth must be float32"),
-    "source of a range": (lambda: sepi.DisparityRange(0, 1, "mine"), "expected a source of .*given.*, got 'mine'"),
+    "source of a range": (
+        field(disparity_range=sepi.DisparityRange(0, 1, "mine")),
+        "mine: source of the disparity range: unknown 'mine'; known: parameters, given, estimated",
+    ),
     "camera of texts": (camera(focal_length_mm="a"), "camera: expected positive numbers, got focal length 'a' mm"),
     "camera's shape": (camera(shape=64), "camera: shape: expected height and width of a view, got 64"),
     "no path": (read(None), "light field: expected the path of a file or folder, got None"),
