@@ -20,12 +20,13 @@ References
 from __future__ import annotations
 
 from dataclasses import dataclass
+from numbers import Real
 
 import numpy as np
 import numpy.typing as npt
 
 from sepi.errors import SepiError
-from sepi.validation import is_finite
+from sepi.validation import described, is_finite, whole_pair
 
 Map = npt.NDArray[np.float32]
 
@@ -145,11 +146,13 @@ def camera_from(
     >>> round(float(camera.depth(light_field.ground_truth).mean()), 3)  # 2 / (1 + 0.5)
     1.333
     """
-    if not all(value > 0 for value in (focal_length_mm, baseline_mm, focus_distance_m, sensor_size_mm)):
+    numbers = (focal_length_mm, baseline_mm, focus_distance_m, sensor_size_mm)
+    if not all(isinstance(value, Real) and value > 0 for value in numbers):
+        focal_length, baseline, distance, size = map(described, numbers)
         raise SepiError(
-            f"camera: expected positive numbers, got focal length {focal_length_mm:g} mm, baseline {baseline_mm:g} mm, "
-            f"focus distance {focus_distance_m:g} m, sensor size {sensor_size_mm:g} mm"
+            f"camera: expected positive numbers, got focal length {focal_length} mm, baseline {baseline} mm, "
+            f"focus distance {distance} m, sensor size {size} mm"
         )
-    focal_px = focal_length_mm / sensor_size_mm * max(shape)
+    focal_px = focal_length_mm / sensor_size_mm * max(whole_pair("camera: shape", shape, "height and width of a view"))
     scale = baseline_mm / 1000 * focal_px
     return Camera(scale, scale / focus_distance_m, focal_px)

@@ -22,7 +22,7 @@ import numpy.typing as npt
 
 from sepi.camera import Camera
 from sepi.errors import SepiError, one_line
-from sepi.validation import described, is_finite, require_type, whole_pair
+from sepi.validation import described, is_finite, require_known, require_type, whole_pair
 
 FloatMap = npt.NDArray[np.float32]
 BoolMap = npt.NDArray[np.bool_]
@@ -191,6 +191,9 @@ class LightField:
         for key in ("name", "source"):
             # names of files need not be text, or one line of it; what is not cannot be printed or stored
             object.__setattr__(self, key, _shown(getattr(self, key)))
+        require_type(f"{self.name}: notes", self.notes, (tuple, list), "a tuple of texts")
+        for note in self.notes:
+            require_type(f"{self.name}: notes", note, str, "a tuple of texts")
         object.__setattr__(self, "notes", tuple(map(_shown, self.notes)))
         if not isinstance(v, np.ndarray):
             raise SepiError(f"{self.name}: views must be an array of shape (T, S, H, W, C), got a {type(v).__name__}")
@@ -250,8 +253,14 @@ class LightField:
                     f"{self.name}: {what} must have the views' shape (H, W) = {self.shape}, got {array.shape}"
                 )
 
-        if self.disparity_range is not None and self.arranged:
-            self._require_seen(self.disparity_range)
+        if self.ground_truth is not None:
+            if self.ground_truth.dtype.kind not in "fiu":
+                raise SepiError(f"{self.name}: ground_truth must be float32, got {self.ground_truth.dtype}")
+            object.__setattr__(self, "ground_truth", self.ground_truth.astype(np.float32, copy=False))
+        if self.disparity_range is not None:
+            require_known(f"{self.name}: source of the disparity range", [self.disparity_range.source], RANGE_SOURCES)
+            if self.arranged:
+                self._require_seen(self.disparity_range)
 
     def _arrays(self) -> dict[str, object]:
         require_type(f"{self.name}: masks", self.masks, Mapping, "names with arrays")
@@ -423,6 +432,11 @@ def as_unit_float(values: npt.NDArray[np.generic]) -> FloatMap:
         largest = np.iinfo(values.dtype).max  # type: ignore[type-var]
         return np.asarray(values.astype(np.float32) / np.float32(largest), np.float32)
     return values.astype(np.float32)
+
+
+def require_light_field(value: object) -> None:
+    """Raise for what is no light field, such as the path of one."""
+    require_type("light field", value, LightField, "a LightField, as sepi.read_light_field makes it")
 
 
 def full_scale(dtype: npt.DTypeLike) -> float:

@@ -5,15 +5,18 @@ from __future__ import annotations
 from collections.abc import Mapping
 from contextlib import nullcontext
 from dataclasses import replace
+from numbers import Real
+from types import NoneType
 from typing import Any
 
 from sepi.kernel_cache import tell_kernel_cache
-from sepi.lightfield import LightField
+from sepi.lightfield import LightField, require_light_field
 from sepi.matching.base_detail import kept_detail
 from sepi.matching.memory_limit import bytes_of_bands, require_memory_of
 from sepi.matching.row_bands import band_memory
 from sepi.matching.unknown import with_unknown
 from sepi.stage import MadeBy, Progress, StageMaps, entry, no_progress
+from sepi.validation import require_type
 from sepi.variants import DEFAULT_VARIANT, HANDED_ON, STAGES, VARIANTS, Variant, stage_parameters, variant_named
 
 
@@ -71,6 +74,9 @@ def estimate_depth(
     >>> sorted(maps.extra)[:4]
     ['lti', 'occluded', 'occlusion_candidates', 'superpixels']
     """
+    require_light_field(light_field)
+    require_type("variant", variant, (str, Variant), "the name of a variant or a Variant")
+    require_type("memory", memory, (Real, NoneType), "a number of bytes")
     chosen = variant_named(variant) if isinstance(variant, str) else variant
     settings = stage_parameters(chosen, parameters)
     if light_field.disparity_range is None:

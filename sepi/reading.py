@@ -4,9 +4,11 @@ to be in the wrong order.
 
 from __future__ import annotations
 
+import os
 import warnings
 from dataclasses import replace
 from pathlib import Path
+from types import NoneType
 
 import numpy as np
 
@@ -18,6 +20,7 @@ from sepi.io.readers.options import ReadOptions, in_grid
 from sepi.kernel_cache import tell_kernel_cache
 from sepi.lightfield import DisparityRange, LightField
 from sepi.memory import KERNELS, require_memory
+from sepi.validation import described, require_type
 
 # 16-bit views darker than this, a sixteenth of the full scale, hold fewer bits or next to no light
 _NARROW = 4096
@@ -78,8 +81,11 @@ def read_light_field(
     >>> bool((light_field.views == views).all())
     True
     """
+    require_type("light field", path, (str, os.PathLike), "the path of a file or folder")
     path = Path(path)
+    require_type(f"{path}: options", options, (ReadOptions, NoneType), "sepi.ReadOptions")
     options = options or ReadOptions()
+    given = None if disparity_range is None else _given_range(path, disparity_range)
     light_field = read(path, options, file_format)
     require_memory(KERNELS)
     tell_kernel_cache()
@@ -98,8 +104,8 @@ def read_light_field(
     if record:
         # a file of this package may be of other files that were read otherwise
         light_field = replace(light_field, source=str(path), reading=record)
-    if disparity_range is not None:
-        light_field = light_field.with_range(DisparityRange(*disparity_range, "given"))
+    if given is not None:
+        light_field = light_field.with_range(given)
     found = [_depth_warning(light_field)]
     if check_order:
         from sepi.inspection.view_order import check_order as checked_order
@@ -108,6 +114,16 @@ def read_light_field(
     for warning in filter(None, found):
         warnings.warn(f"{path}: {warning}", SepiWarning, stacklevel=2)
     return light_field
+
+
+def _given_range(path: Path, bounds: tuple[float, float]) -> DisparityRange:
+    try:
+        minimum, maximum = bounds
+    except (TypeError, ValueError) as error:
+        raise SepiError(
+            f"{path}: disparity_range: expected (minimum, maximum) in pixels per view step, got {described(bounds)}"
+        ) from error
+    return DisparityRange(minimum, maximum, "given")
 
 
 def _depth_warning(light_field: LightField) -> str | None:

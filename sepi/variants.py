@@ -31,7 +31,7 @@ from sepi import initial, occlusion, optimize, textureless
 from sepi.compared.methods import LEARNED, METHODS, StageChoices
 from sepi.errors import SepiError
 from sepi.stage import Choice, Parameters
-from sepi.validation import require_known, validated
+from sepi.validation import require_known, require_type, validated
 
 STAGES: dict[str, StageChoices] = {
     "initial": StageChoices("initial", initial.CHOICES),
@@ -352,7 +352,10 @@ def stage_parameters(
     (91, 3)
     """
     given = parameters or {}
+    require_type("parameters", given, Mapping, "stages with their parameters")
     require_known("parameters", given, STAGES)
+    for stage, own in given.items():
+        require_type(f"parameters: {stage}", own, Mapping, "parameters with their values")
     return {
         stage: validated(
             STAGES[stage][choice].parameters,

@@ -9,10 +9,36 @@ import numpy as np
 import pytest
 
 import sepi
+from sepi.camera import camera_from
 from sepi.scenes import render
 from sepi.variants import VARIANTS, stage_parameters
 
 VIEWS = np.zeros((3, 3, 64, 64, 3), np.uint8)
+
+
+SCENE = render("dots", size=64, views=3)
+ONES = np.ones((64, 64), np.float32)
+
+
+def camera(**more: Any) -> Callable[[], object]:
+    numbers = {"focal_length_mm": 1, "baseline_mm": 1, "focus_distance_m": 1, "sensor_size_mm": 1, "shape": (64, 64)}
+    return lambda: camera_from(**{**numbers, **more})
+
+
+def read(path: Any = "anywhere", **more: Any) -> Callable[[], object]:
+    return lambda: sepi.read_light_field(path, **more)
+
+
+def depth(*arguments: Any, **more: Any) -> Callable[[], object]:
+    return lambda: sepi.estimate_depth(*arguments, **more)
+
+
+def write(disparity: Any = ONES, confidence: Any = ONES, **extra: Any) -> Callable[[], object]:
+    return lambda: sepi.write_result("unwritten", SCENE, sepi.StageMaps(disparity, confidence, extra))
+
+
+def written(*arguments: Any) -> Callable[[], object]:
+    return lambda: sepi.write_result(*arguments)
 
 
 def field(**more: Any) -> Callable[[], object]:
@@ -43,6 +69,37 @@ WRONG: dict[str, tuple[Callable[[], object], str]] = {
         "mine: masks must be bool, got sky of uint8",
     ),
     "spacing of text": (field(row_spacing="a"), "mine: row_spacing must be a positive number, got 'a'"),
+    "text as notes": (field(notes="abc"), "mine: notes: expected a tuple of texts, got 'abc'"),
+    "numbers as notes": (field(notes=(1,)), "mine: notes: expected a tuple of texts, got 1"),
+    "ground truth of text": (field(ground_truth=np.full((64, 64), "a")), "mine: ground_truth must be float32"),
+    "source of a range": (
+        field(disparity_range=sepi.DisparityRange(0, 1, "mine")),
+        "mine: source of the disparity range: unknown 'mine'; known: parameters, given, estimated",
+    ),
+    "camera of texts": (camera(focal_length_mm="a"), "camera: expected positive numbers, got focal length 'a' mm"),
+    "camera's shape": (camera(shape=64), "camera: shape: expected height and width of a view, got 64"),
+    "no path": (read(None), "light field: expected the path of a file or folder, got None"),
+    "options as mapping": (read(options={"view": (0, 0)}), "anywhere: options: expected sepi.ReadOptions"),
+    "range of three": (read(disparity_range=(1, 2, 3)), r"disparity_range: expected \(minimum, maximum\)"),
+    "range of one": (read(disparity_range=3), r"disparity_range: expected \(minimum, maximum\) .* got 3"),
+    "depth of a path": (depth("dots"), "light field: expected a LightField, .*, got 'dots'"),
+    "depth by no variant": (depth(SCENE, None), "variant: expected the name of a variant or a Variant, got None"),
+    "parameters as number": (depth(SCENE, "paper", {"initial": 3}), "parameters: initial: expected parameters"),
+    "parameters as list": (depth(SCENE, "paper", [1]), "parameters: expected stages"),
+    "memory as text": (depth(SCENE, memory="1"), "memory: expected a number of bytes, got '1'"),
+    "views of an array": (lambda: sepi.estimate_all_views(VIEWS), "light field: expected a LightField"),  # type: ignore[arg-type]
+    "focus on text": (lambda: sepi.refocus(SCENE, "a"), "dots: disparity to focus at .* got 'a'"),  # type: ignore[arg-type]
+    "result of an array": (written("unwritten", VIEWS, None), "light field: expected a LightField"),
+    "result of a map": (written("unwritten", SCENE, ONES), "dots: maps: expected StageMaps"),
+    "result nowhere": (written(None, SCENE, sepi.StageMaps(ONES, ONES)), "folder of the result: expected a path"),
+    "attributes as list": (
+        written("unwritten", SCENE, sepi.StageMaps(ONES, ONES), [1]),
+        r"unwritten: attributes: expected names with values, got \[1\]",
+    ),
+    "maps as lists": (write([[1]]), "dots: map 'disparity': expected an array"),
+    "complex maps": (write(ONES.astype(complex)), "dots: map 'disparity': expected numbers, got complex128"),
+    "confidence without numbers": (write(ONES, ONES * np.nan), "dots: confidence must lie within 0..1, got NaN"),
+    "numbers of unknown": (write(unknown=ONES.astype(np.uint8)), "dots: map 'unknown': expected bool, got uint8"),
     "options: grid": (lambda: sepi.ReadOptions(grid="5x5"), "options: grid: expected two whole"),  # type: ignore[arg-type]
     "options: exclude": (lambda: sepi.ReadOptions(exclude=((0, 0),)), "options: exclude: "),  # type: ignore[arg-type]
     "options: central": (lambda: sepi.ReadOptions(central="3"), "options: central: "),  # type: ignore[arg-type]
@@ -51,15 +108,26 @@ WRONG: dict[str, tuple[Callable[[], object], str]] = {
 
 
 @pytest.mark.parametrize("wrong", WRONG)
-def test_a_wrong_argument_is_told_in_one_line(wrong: str) -> None:
+def test_a_wrong_argument_is_told_in_one_line(wrong: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
     make, message = WRONG[wrong]
     with pytest.raises(sepi.SepiError, match=message):
         make()
+    assert not list(tmp_path.iterdir())
 
 
 def test_lists_and_numbers_of_numpy_are_what_they_look_like() -> None:
     light_field = render("dots", size=64, views=3)
     assert replace(light_field, view=[0, 2]).reference_position == (0, 2)  # type: ignore[arg-type]
     assert sepi.ReadOptions(view=np.array([0, 2])).view == (0, 2)  # type: ignore[arg-type]
+    assert replace(SCENE, ground_truth=np.zeros((64, 64))).ground_truth.dtype == np.float32  # type: ignore[union-attr]
     settings = stage_parameters(VARIANTS["paper"], {"initial": {"num_disparities": np.int64(31)}})
     assert settings["initial"].num_disparities == 31  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize("kind", [float, int])
+def test_maps_of_other_numbers_are_written_as_float32(kind: type, tmp_path: Path) -> None:
+    sepi.write_result(tmp_path / "maps", SCENE, sepi.StageMaps(ONES.astype(kind), ONES.astype(kind)))
+    result = sepi.read_result(tmp_path / "maps")
+    assert result.disparity.dtype == result.confidence.dtype == np.float32
+    assert np.load(tmp_path / "maps/disparity.npy").dtype == np.float32

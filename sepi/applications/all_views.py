@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from types import NoneType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import cv2
@@ -23,9 +24,10 @@ import numpy as np
 import numpy.typing as npt
 
 from sepi.errors import SepiError
-from sepi.lightfield import BoolMap, FloatMap, LightField
+from sepi.lightfield import BoolMap, FloatMap, LightField, require_light_field
 from sepi.pipeline import estimate_depth
 from sepi.stage import Progress, StageMaps, no_progress
+from sepi.validation import require_type
 from sepi.variants import DEFAULT_VARIANT, Variant
 
 if TYPE_CHECKING:
@@ -154,6 +156,8 @@ def estimate_all_views(
     >>> bool(abs(every.disparity[0, 0] - corner).mean() < 0.02)
     True
     """
+    require_light_field(light_field)
+    require_type(f"{light_field.name}: maps", maps, (StageMaps, NoneType), "StageMaps")
     shape = (*light_field.grid, *light_field.shape)
     result = AllViews(np.full(shape, np.nan, np.float32), np.zeros(shape, np.float32), np.zeros(shape, bool))
     for view in maps_of_all_views(light_field, maps, variant, parameters, progress, memory, edge_views):

@@ -21,9 +21,10 @@ import numpy as np
 
 from sepi.errors import SepiError
 from sepi.image.noise import noise_level, variance_of_residuals
-from sepi.lightfield import BoolMap, FloatMap, LightField, as_unit_float
+from sepi.lightfield import BoolMap, FloatMap, LightField, as_unit_float, require_light_field
 from sepi.matching.sheared_views import ShearedViews
 from sepi.stage import Progress, StageMaps, no_progress
+from sepi.validation import described, is_finite
 
 OCCLUSION_MARGIN = 0.15
 """By how much an occluder must be nearer, pixels per view step; that of the stages."""
@@ -91,8 +92,11 @@ def refocus(
     >>> bool(np.abs(picture - light_field.reference_view)[8:-8, 8:-8].max() < 0.01)
     True
     """
-    if not math.isfinite(disparity):
-        raise SepiError(f"{light_field.name}: disparity to focus at must be a finite number, got {disparity}")
+    require_light_field(light_field)
+    if not is_finite(disparity):
+        raise SepiError(
+            f"{light_field.name}: disparity to focus at must be a finite number, got {described(disparity)}"
+        )
     surfaces = None if maps is None else _surfaces(_disparity_of(light_field, maps))
     height, width = light_field.shape
     moved = disparity * light_field.baselines

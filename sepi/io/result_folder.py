@@ -11,6 +11,7 @@ from collections.abc import Collection, Mapping
 from contextlib import nullcontext, suppress
 from dataclasses import dataclass
 from pathlib import Path
+from types import NoneType
 from typing import Any
 
 import cv2
@@ -27,8 +28,9 @@ from sepi.io.pfm import write_pfm
 from sepi.io.ply import write_ply
 from sepi.io.point_cloud import point_cloud
 from sepi.io.provenance import result_attributes
-from sepi.lightfield import BoolMap, FloatMap, LightField
+from sepi.lightfield import BoolMap, FloatMap, LightField, require_light_field
 from sepi.stage import StageMaps
+from sepi.validation import require_type
 
 RESULT_FILES = (
     "disparity.pfm",
@@ -177,7 +179,11 @@ def write_result(
     >>> bool((np.load("dots-depth/disparity.npy") == maps.disparity).all())
     True
     """
-    _require_sound(light_field, maps)
+    require_light_field(light_field)
+    require_type(f"{light_field.name}: maps", maps, StageMaps, "StageMaps")
+    require_type("folder of the result", folder, (str, os.PathLike), "a path")
+    require_type(f"{folder}: attributes", attributes, (Mapping, NoneType), "names with values")
+    maps = _sound(light_field, maps)
     folder = Path(folder)
     earlier = require_own(folder, light_field, force=force)
     # the folder itself may be a link to where there is room
@@ -338,19 +344,29 @@ def colour_code(values: FloatMap, unknown: BoolMap | None = None) -> npt.NDArray
     return colours
 
 
-def _require_sound(light_field: LightField, maps: StageMaps) -> None:
+def _sound(light_field: LightField, maps: StageMaps) -> StageMaps:
+    """Maps that can be written, disparity and confidence of float32 whatever numbers they were."""
     for name, values in maps.all().items():
+        require_type(f"{light_field.name}: map '{name}'", values, np.ndarray, "an array")
+        kinds = {"disparity": "fiu", "confidence": "fiu", _UNKNOWN: "b"}.get(name, "bfiu")
+        if values.dtype.kind not in kinds:
+            expected = "bool" if kinds == "b" else "numbers"
+            raise SepiError(f"{light_field.name}: map '{name}': expected {expected}, got {values.dtype}")
         if values.shape != light_field.shape:
             raise SepiError(
                 f"{light_field.name}: maps must have the views' shape {light_field.shape}, got {name} of {values.shape}"
             )
         if values.dtype == bool and not re.fullmatch(_MASK_NAME, name):
             raise SepiError(f"{light_field.name}: map '{name}': expected a name of letters, digits, '-' and '_'")
+    if np.isnan(maps.confidence).all():
+        raise SepiError(f"{light_field.name}: confidence must lie within 0..1, got NaN everywhere")
     if ((maps.confidence < 0) | (maps.confidence > 1)).any():
         raise SepiError(
             f"{light_field.name}: confidence must lie within 0..1, got {np.nanmin(maps.confidence):g} to "
             f"{np.nanmax(maps.confidence):g}"
         )
+    disparity, confidence = (values.astype(np.float32, copy=False) for values in (maps.disparity, maps.confidence))
+    return maps.updated(disparity, confidence)
 
 
 def _write_files(
