@@ -82,6 +82,12 @@ class OwnLightField(_Keys):
         return (*flags, "--follow-links") if self.follow_links else tuple(flags)
 
 
+PAGES = ("reports/index.html", "reports/comparison/index.html")
+
+MOST_ON_PAGE = 50
+"""Scenes that a page has unless it is asked for: 100 MB, which a browser still opens."""
+
+
 class Report(_Keys):
     """Keys of ``report``."""
 
@@ -89,6 +95,10 @@ class Report(_Keys):
         {},
         description="pixels to look into beside those chosen automatically, such as {hci/cotton: [[200, 310]]}: row "
         "and column",
+    )
+    page: bool | None = Field(
+        None,
+        description=f"whether there is a page; null: for up to {MOST_ON_PAGE} scenes, each of which adds up to 2 MB",
     )
     parts_of_best: bool = Field(
         False,
@@ -206,11 +216,19 @@ class Settings:
         SepiError
             If there is no such dataset, scene or variant; the message suggests the nearest.
         """
+        if path in PAGES and not self.has_page:
+            why = "is false" if self.report.page is False else f"is null, and there are over {MOST_ON_PAGE} scenes"
+            raise SepiError(f"{path}: not made: report.page {why}; true asks for it")
         folder, *names = Path(path).parts or ("",)
         if folder == str(RESULTS) and len(names) > 2:
             self.scene(names[0], names[1])
             if len(names) == 4 and names[2] != "stages":
                 require_known(f"{path}: variant", [names[2]], self.variants)
+
+    @property
+    def has_page(self) -> bool:
+        """Whether the report has a page."""
+        return len(self.scenes) <= MOST_ON_PAGE if self.report.page is None else self.report.page
 
     def parameters_json(self, stage: str, label: str) -> str:
         """Parameters of a stage's choice as JSON with sorted keys."""
