@@ -36,7 +36,7 @@ def page_flags(wildcards, output):
 
 
 def report_files():
-    """Page if there is one, numbers, every table and chart but those of the parts of ``best``, pictures of every scene."""
+    """Page if there is one, numbers, all tables and charts but those of the parts of ``best``, pictures of every scene."""
     pictures = [f"reports/maps/{dataset}/{scene}" for dataset, scene in SETTINGS.scenes]
     charts = figure_files(["ablation", "time_and_memory"])
     parts = ablation_files() if PARTS else []

@@ -33,7 +33,7 @@ _RESERVED = ("stages", "complete", "external", "ground_truth", "reference_view",
 # the built-in scenes have 9x9 views
 _BUILTIN_VIEWS = 81
 # keys whose values are text even where they look like numbers
-_TEXTS = ("path", "pattern", "variable", "exclude")
+_TEXTS = ("path", "pattern", "variable", "include", "exclude")
 _WORDS = {"true": True, "false": False, "null": None}
 
 
@@ -53,6 +53,14 @@ class Builtin(_Keys):
 _Count = Annotated[int, Field(ge=1)]
 _Index = Annotated[int, Field(ge=0)]
 _Spacing = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+
+
+class Root(_Keys):
+    """A folder of scenes, and patterns of the names of those to take and to leave out."""
+
+    path: str
+    include: list[str] = []
+    exclude: list[str] = []
 
 
 class OwnLightField(_Keys):
@@ -113,15 +121,16 @@ class Config(_Keys):
         Builtin(),
         description="Dataset 'builtin': light fields that the package renders itself, with exact ground truth.",
     )
-    hci_root: str | None = Field(
+    hci_root: Root | None = Field(
         None,
         description="Dataset 'hci': a folder of HCI 4D benchmark scenes; every folder in it with input_Cam*.png is a "
-        "scene, also below category folders such as training/. null for none.",
+        "scene, also below category folders such as training/. {path: FOLDER, include: [...], exclude: [...]} takes "
+        "some of them by patterns of their names, such as 'c*'. null for none.",
     )
-    hci_2013_root: str | None = Field(
+    hci_2013_root: Root | None = Field(
         None,
-        description="Dataset 'hci_2013': a folder with HDF5 files of the HCI archive of 2013 (Wanner et al.). "
-        "null for none.",
+        description="Dataset 'hci_2013': a folder with HDF5 files of the HCI archive of 2013 (Wanner et al.), as "
+        "hci_root. null for none.",
     )
     light_fields: dict[str, dict[str, Any]] = Field(
         {},
@@ -284,7 +293,9 @@ def load_settings(values: Mapping[str, Any]) -> Settings:
 
 
 def _with_paths(values: Mapping[str, Any]) -> Mapping[str, Any]:
-    """A method's path alone under ``external`` as ``{path: ...}``."""
+    """The path alone of a method under ``external``, or of a folder of scenes, as ``{path: ...}``."""
+    roots = {key: values[key] for key in ("hci_root", "hci_2013_root") if isinstance(values.get(key), str)}
+    values = {**values, **{key: {"path": root} if root else None for key, root in roots.items()}}
     external = values.get("external")
     if not isinstance(external, Mapping):
         return values
@@ -321,7 +332,8 @@ def _scenes(config: Config) -> dict[str, Scene]:
     scenes = [Scene("builtin", name, None, (), _BUILTIN_VIEWS, size, size) for name in config.builtin.scenes]
     for dataset, root in (("hci", config.hci_root), ("hci_2013", config.hci_2013_root)):
         if root:
-            scenes += scenes_in(Path(root).expanduser(), dataset, f"config.{dataset}_root")
+            folder = Path(root.path).expanduser()
+            scenes += scenes_in(folder, dataset, f"config.{dataset}_root", root.include, root.exclude)
     for name, values in config.light_fields.items():
         where = f"config.light_fields.{name}"
         own = validated(OwnLightField, values, where)
