@@ -28,6 +28,7 @@ use rule maps as comparison_maps with:
     input:
         lambda wildcards: COMPARISON.map_inputs(wildcards.dataset, wildcards.scene),
     output:
+        **page_of_scene("reports/comparison"),
         folder=report(
             directory("reports/comparison/maps/{dataset}/{scene}"),
             patterns=["{name,overview}.png"],
@@ -35,7 +36,6 @@ use rule maps as comparison_maps with:
             category="Comparison",
             subcategory="{dataset}/{scene}",
         ),
-        page="reports/comparison/page/{dataset}/{scene}.json",
     log:
         "logs/{dataset}/{scene}/comparison_maps.log",
     benchmark:
@@ -44,6 +44,7 @@ use rule maps as comparison_maps with:
         results=results_folder,
         plan=lambda wildcards: plan_of_scene(wildcards, COMPARISON),
         pixels=pixels_of,
+        page=page_flags,
         code=lambda wildcards: code_digest("sepi.report.figures"),
     message:
         "{wildcards.dataset}/{wildcards.scene}: pictures of the compared methods"

@@ -143,6 +143,7 @@ rule maps:
     input:
         lambda wildcards: PLAN.map_inputs(wildcards.dataset, wildcards.scene),
     output:
+        **page_of_scene("reports"),
         folder=report(
             directory("reports/maps/{dataset}/{scene}"),
             patterns=["{name,overview}.png"],
@@ -150,7 +151,6 @@ rule maps:
             category="Scenes",
             subcategory="{dataset}/{scene}",
         ),
-        page="reports/page/{dataset}/{scene}.json",
     log:
         "logs/{dataset}/{scene}/maps.log",
     benchmark:
@@ -165,6 +165,7 @@ rule maps:
         results=results_folder,
         plan=plan_of_scene,
         pixels=pixels_of,
+        page=page_flags,
         code=lambda wildcards: code_digest("sepi.report.figures"),
     message:
         "{wildcards.dataset}/{wildcards.scene}: pictures"
@@ -172,7 +173,7 @@ rule maps:
         command(
             "sepi.report.figures --results {params.results:q} --plan {params.plan:q} "
             "--dataset {wildcards.dataset:q} --scene {wildcards.scene:q} --pixels {params.pixels:q} "
-            "--output {output.folder:q} --page {output.page:q} 2> {log:q}"
+            "--output {output.folder:q} {params.page:q} 2> {log:q}"
         )
 
 

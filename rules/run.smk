@@ -55,6 +55,8 @@ def run_ended_well():
     """Note that nothing is left to look at; tell of warnings, and what was made."""
     note_run(well=True)
     print_warnings()
+    if SETTINGS.report.page is None and not SETTINGS.has_page:
+        print(f"sepi: no page of {len(SETTINGS.scenes)} scenes; report.page: true asks for one", flush=True)
     print_written([*report_files(), *ablation_files(), *comparison_files()], result_files(SETTINGS.variants))
 
 

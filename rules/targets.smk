@@ -20,13 +20,28 @@ def figure_files(names):
     return [f"reports/figures/{name}.{ending}" for name in names for ending in ("png", "pdf")]
 
 
+def pages(folder):
+    """The page below a folder of the report, if there is to be one."""
+    return [f"{folder}/index.html"] if SETTINGS.has_page else []
+
+
+def page_of_scene(folder):
+    """What the page needs of a scene, as an output of the rule that draws its pictures; nothing without a page."""
+    return {"page": f"{folder}/page/{{dataset}}/{{scene}}.json"} if SETTINGS.has_page else {}
+
+
+def page_flags(wildcards, output):
+    """The page's part of a scene, as words for the command that draws its pictures."""
+    return ["--page", output.page] if SETTINGS.has_page else []
+
+
 def report_files():
-    """The page, its numbers, every table and chart but those of the parts of ``best``, and pictures of every scene."""
+    """Page if there is one, numbers, all tables and charts but those of the parts of ``best``, pictures of every scene."""
     pictures = [f"reports/maps/{dataset}/{scene}" for dataset, scene in SETTINGS.scenes]
     charts = figure_files(["ablation", "time_and_memory"])
     parts = ablation_files() if PARTS else []
     tables = table_files(MAIN_TABLES)
-    return list(dict.fromkeys(["reports/index.html", "reports/report.json", *tables, *charts, *parts, *pictures]))
+    return list(dict.fromkeys([*pages("reports"), "reports/report.json", *tables, *charts, *parts, *pictures]))
 
 
 def ablation_files():
@@ -54,7 +69,7 @@ def comparison_files():
     """The page of the comparison, its numbers and tables, and pictures of every scene."""
     tables = [f"{COMPARISON_REPORT}/{table}.{ending}" for table in COMPARISON_TABLES for ending in ("csv", "md", "tex")]
     pictures = [f"{COMPARISON_REPORT}/maps/{dataset}/{scene}" for dataset, scene in SETTINGS.scenes]
-    return [f"{COMPARISON_REPORT}/index.html", f"reports/report{COMPARISON_ENDING}.json", *tables, *pictures]
+    return [*pages(COMPARISON_REPORT), f"reports/report{COMPARISON_ENDING}.json", *tables, *pictures]
 
 
 def external_inputs(wildcards):

@@ -33,7 +33,7 @@ _RESERVED = ("stages", "complete", "external", "ground_truth", "reference_view",
 # the built-in scenes have 9x9 views
 _BUILTIN_VIEWS = 81
 # keys whose values are text even where they look like numbers
-_TEXTS = ("path", "pattern", "variable", "exclude")
+_TEXTS = ("path", "pattern", "variable", "include", "exclude")
 _WORDS = {"true": True, "false": False, "null": None}
 
 
@@ -53,6 +53,14 @@ class Builtin(_Keys):
 _Count = Annotated[int, Field(ge=1)]
 _Index = Annotated[int, Field(ge=0)]
 _Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+
+
+class Root(_Keys):
+    """A folder of scenes, and patterns of the names of those to take and to leave out."""
+
+    path: str
+    include: list[str] = []
+    exclude: list[str] = []
 
 
 class OwnLightField(_Keys):
@@ -83,6 +91,12 @@ class OwnLightField(_Keys):
         return (*flags, "--follow-links") if self.follow_links else tuple(flags)
 
 
+PAGES = ("reports/index.html", "reports/comparison/index.html")
+
+MOST_ON_PAGE = 50
+"""Scenes that a page has unless it is asked for: 100 MB, which a browser still opens."""
+
+
 class Report(_Keys):
     """Keys of ``report``."""
 
@@ -90,6 +104,10 @@ class Report(_Keys):
         {},
         description="pixels to look into beside those chosen automatically, such as {hci/cotton: [[200, 310]]}: row "
         "and column",
+    )
+    page: bool | None = Field(
+        None,
+        description=f"whether there is a page; null: for up to {MOST_ON_PAGE} scenes, each of which adds up to 2 MB",
     )
     parts_of_best: bool = Field(
         False,
@@ -104,15 +122,16 @@ class Config(_Keys):
         Builtin(),
         description="Dataset 'builtin': light fields that the package renders itself, with exact ground truth.",
     )
-    hci_root: str | None = Field(
+    hci_root: Root | None = Field(
         None,
         description="Dataset 'hci': a folder of HCI 4D benchmark scenes; every folder in it with input_Cam*.png is a "
-        "scene, also below category folders such as training/. null for none.",
+        "scene, also below category folders such as training/. {path: FOLDER, include: [...], exclude: [...]} takes "
+        "some of them by patterns of their names, such as 'c*'. null for none.",
     )
-    hci_2013_root: str | None = Field(
+    hci_2013_root: Root | None = Field(
         None,
-        description="Dataset 'hci_2013': a folder with HDF5 files of the HCI archive of 2013 (Wanner et al.). "
-        "null for none.",
+        description="Dataset 'hci_2013': a folder with HDF5 files of the HCI archive of 2013 (Wanner et al.), as "
+        "hci_root. null for none.",
     )
     light_fields: dict[str, dict[str, Any]] = Field(
         {},
@@ -207,11 +226,19 @@ class Settings:
         SepiError
             If there is no such dataset, scene or variant; the message suggests the nearest.
         """
+        if path in PAGES and not self.has_page:
+            why = "is false" if self.report.page is False else f"is null, and there are over {MOST_ON_PAGE} scenes"
+            raise SepiError(f"{path}: not made: report.page {why}; true asks for it")
         folder, *names = Path(path).parts or ("",)
         if folder == str(RESULTS) and len(names) > 2:
             self.scene(names[0], names[1])
             if len(names) == 4 and names[2] != "stages":
                 require_known(f"{path}: variant", [names[2]], self.variants)
+
+    @property
+    def has_page(self) -> bool:
+        """Whether the report has a page."""
+        return len(self.scenes) <= MOST_ON_PAGE if self.report.page is None else self.report.page
 
     def parameters_json(self, stage: str, label: str) -> str:
         """Parameters of a stage's choice as JSON with sorted keys."""
@@ -269,7 +296,9 @@ def load_settings(values: Mapping[str, Any]) -> Settings:
 
 
 def _with_paths(values: Mapping[str, Any]) -> Mapping[str, Any]:
-    """A method's path alone under ``external`` as ``{path: ...}``."""
+    """The path alone of a method under ``external``, or of a folder of scenes, as ``{path: ...}``."""
+    roots = {key: values[key] for key in ("hci_root", "hci_2013_root") if isinstance(values.get(key), str)}
+    values = {**values, **{key: {"path": root} if root else None for key, root in roots.items()}}
     external = values.get("external")
     if not isinstance(external, Mapping):
         return values
@@ -306,7 +335,8 @@ def _scenes(config: Config) -> dict[str, Scene]:
     scenes = [Scene("builtin", name, None, (), _BUILTIN_VIEWS, size, size) for name in config.builtin.scenes]
     for dataset, root in (("hci", config.hci_root), ("hci_2013", config.hci_2013_root)):
         if root:
-            scenes += scenes_in(Path(root).expanduser(), dataset, f"config.{dataset}_root")
+            folder = Path(root.path).expanduser()
+            scenes += scenes_in(folder, dataset, f"config.{dataset}_root", root.include, root.exclude)
     for name, values in config.light_fields.items():
         where = f"config.light_fields.{name}"
         own = validated(OwnLightField, values, where)

@@ -6,8 +6,9 @@ import math
 import os
 import re
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from fnmatch import fnmatchcase
 from itertools import pairwise
 from pathlib import Path
 
@@ -134,7 +135,9 @@ def require_plain_path(path: str, where: str) -> None:
         raise SepiError(f"{where}: Snakemake would replace '{found[0]}' in '{path}'; rename it, or link to it")
 
 
-def scenes_in(root: Path, dataset: str, where: str) -> list[Scene]:
+def scenes_in(
+    root: Path, dataset: str, where: str, include: Sequence[str] = (), exclude: Sequence[str] = ()
+) -> list[Scene]:
     """Every light field of a dataset below a folder, by name.
 
     A scene of ``hci`` is a folder with ``input_Cam*.png``; ``root`` may be one itself, or hold scenes or categories of
@@ -149,11 +152,14 @@ def scenes_in(root: Path, dataset: str, where: str) -> list[Scene]:
         ``"hci"`` or ``"hci_2013"``.
     where : str
         The key that named ``root``, for messages.
+    include, exclude : sequence of str
+        Patterns (:mod:`fnmatch`) of names: of those to take, all unless given, and of those to leave out.
 
     Raises
     ------
     SepiError
-        If there is no such folder, no scene in it, two scenes of one name, or a name that is no plain word.
+        If there is no such folder, no scene in it, none that a pattern is of or none left, two scenes of one name, or a
+        name that is no plain word.
     """
     find, expected = _FINDERS[dataset]
     # os.path: a name that is too long names nothing, and is no error there
@@ -162,12 +168,23 @@ def scenes_in(root: Path, dataset: str, where: str) -> list[Scene]:
     scenes = list(find(root.resolve()))
     if not scenes:
         raise SepiError(f"{where}: no scene in '{root}' (expected {expected})")
+    for key, patterns in (("include", include), ("exclude", exclude)):
+        for pattern in patterns:
+            if not any(_matches(scene, [pattern]) for scene in scenes):
+                raise SepiError(f"{where}.{key}: no scene in '{root}' is called '{pattern}'")
+    scenes = [scene for scene in scenes if _matches(scene, include or ["*"]) and not _matches(scene, exclude)]
+    if not scenes:
+        raise SepiError(f"{where}: include and exclude leave no scene of '{root}'")
     for name, count in Counter(scene.name for scene in scenes).items():
         _require_plain(name, where)
         if count > 1:
             both = " and ".join(str(scene.source) for scene in scenes if scene.name == name)
             raise SepiError(f"{where}: two scenes are called '{name}': {both}")
     return sorted(scenes, key=lambda scene: scene.name)
+
+
+def _matches(scene: Scene, patterns: Sequence[str]) -> bool:
+    return any(fnmatchcase(scene.name, pattern) for pattern in patterns)
 
 
 def own_scene(name: str, source: Path, flags: tuple[str, ...], where: str) -> Scene:

@@ -303,6 +303,20 @@ class TestFolderOfScenes:
         make_scene(tmp_path / "b" / "cotton")
         assert "two scenes are called 'cotton'" in message_of({"hci_root": str(tmp_path)})
 
+    def test_scenes_are_taken_and_left_out_by_patterns(self, tmp_path: Path) -> None:
+        """One damaged scene of a folder that others share must not stop every table."""
+        for name in ("cotton", "boxes", "001"):
+            make_scene(tmp_path / name)
+
+        def root(**patterns: list[str]) -> dict[str, Any]:
+            return {"hci_root": {"path": str(tmp_path), **patterns}}
+
+        assert load_settings(root(exclude=["c*"])).scenes_of("hci") == ["001", "boxes"]
+        assert load_settings(root(include=["b*", "001"], exclude=["boxes"])).scenes_of("hci") == ["001"]
+        wrong = message_of(root(exclude=["coton"]))
+        assert wrong == f"config.hci_root.exclude: no scene in '{tmp_path}' is called 'coton'"
+        assert "include and exclude leave no scene" in message_of(root(exclude=["*"]))
+
     def test_a_name_that_is_no_plain_word_is_refused(self, tmp_path: Path) -> None:
         make_scene(tmp_path / "my {scene}")
         assert "'my {scene}'" in message_of({"hci_root": str(tmp_path)})

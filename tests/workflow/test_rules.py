@@ -1,6 +1,7 @@
 """The rules, as Snakemake reads them: what would leave stale results, or jobs that a cluster ends, without a word."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -8,10 +9,12 @@ import pytest
 from snakemake.iocontainers import Wildcards
 from workflow_copy import REPOSITORY, TINY, Workflow
 
+from sepi.errors import SepiError
 from sepi.report.plan import TEMPLATES
 from sepi.report.published import FOLDER as PUBLISHED
 from sepi.variants import HANDED_ON, STAGES
 from sepi.workflow.code_digest import code_digest, ingest_modules, stage_modules
+from sepi.workflow.config import MOST_ON_PAGE, Report
 from sepi.workflow.datasets import Scene
 
 pytestmark = pytest.mark.workflow
@@ -87,6 +90,21 @@ def test_every_file_that_a_job_reads_is_an_input(read: Any) -> None:
     assert {Path(file) for file in rules["numbers"].input.published} == set(PUBLISHED.glob("*.csv"))
     for page in ("page", "comparison_page"):
         assert {Path(file) for file in rules[page].input.templates} == set(TEMPLATES)
+
+
+def test_the_page_can_be_left_out_and_is_by_itself_where_there_are_too_many_scenes(tmp_path: Path) -> None:
+    """Nothing of it is made then, and whoever asks for it is told in one line."""
+    for values, expected in (({}, True), ({"page": False}, False)):
+        found = of_size(64, tmp_path, report=values)
+        pages = [*found["report_files"](), *found["comparison_files"]()]
+        assert ("reports/index.html" in pages, "reports/comparison/index.html" in pages) == (expected, expected)
+        assert bool(found["page_of_scene"]("reports")) == expected
+    with pytest.raises(SepiError, match=r"^reports/index.html: not made: report.page is false; true asks for it$"):
+        found["SETTINGS"].require_target("reports/index.html")
+    scenes = {("own", str(number)): None for number in range(MOST_ON_PAGE)}
+    many = replace(found["SETTINGS"], scenes=scenes, report=Report())
+    assert many.has_page
+    assert not replace(many, scenes=scenes | {("own", "one"): None}).has_page
 
 
 def test_what_a_cluster_ended_is_tried_with_twice_as_much(read: Any) -> None:
