@@ -40,10 +40,11 @@ def measured_files(which):
     return plan.number_inputs(parts)
 
 
-def variants_in(which):
-    """The variants of one of the files of numbers."""
+def plan_text(which):
+    """What one of the files of numbers is about, as JSON: the plan, and the parameters of its variants."""
     plan, parts = plan_of(which)
-    return plan.collected(parts)
+    parameters = json.loads(SETTINGS.variants_json(plan.collected(parts)))
+    return json.dumps({"plan": json.loads(plan.to_json()), "parameters": parameters})
 
 
 def plan_of_scene(wildcards, plan=PLAN):

@@ -21,7 +21,6 @@ import numpy.typing as npt
 import psutil
 
 from sepi.command import SepiCommand
-from sepi.errors import SepiError
 from sepi.io.external_maps import read_external
 from sepi.io.hdf5 import read_light_field, read_stage
 from sepi.io.scores import Scores, read_evaluations, read_scores, without_nan
@@ -238,18 +237,14 @@ def _digest(values: npt.NDArray[Any]) -> str:
 
 @click.command(name="python -m sepi.report.numbers", cls=SepiCommand)
 @click.option("--results", type=click.Path(path_type=Path), required=True, help="Folder of the results.")
-@click.option("--plan", "plan_text", required=True, help="JSON: scenes per dataset, choices per variant and stage.")
-@click.option("--parameters", default="{}", show_default=True, help="JSON: parameters per stage and choice.")
+@click.option("--plan", "path", type=click.Path(path_type=Path), required=True, help="JSON file: plan and parameters.")
 @click.option("--parts", is_flag=True, help="What the ablation of the best variant needs, and nothing else.")
 @click.option("--output", type=click.Path(path_type=Path), required=True, help="JSON file to write.")
-def command(results: Path, plan_text: str, parameters: str, parts: bool, output: Path) -> None:
+def command(results: Path, path: Path, parts: bool, output: Path) -> None:
     """Collect all numbers of the report in one JSON file."""
-    plan = Plan.from_json(results, plan_text)
-    try:
-        values = json.loads(parameters)
-    except (ValueError, RecursionError) as error:
-        raise SepiError(f"--parameters: expected JSON of parameters per stage and choice ({error})") from error
-    write(output, as_text(collect(plan, values, parts)))
+    about = read_json(path, {"plan", "parameters"}, "the plan of a report", "snakemake")
+    plan = Plan.from_json(results, json.dumps(about["plan"]))
+    write(output, as_text(collect(plan, about["parameters"], parts)))
 
 
 if __name__ == "__main__":
