@@ -65,6 +65,7 @@ use rule page as comparison_page with:
     localrule: True
     params:
         parts=[],
+        scenes=placed("reports/comparison/page"),
         code=code_digest("sepi.report.page"),
     message:
         "page of the compared methods"

@@ -1,10 +1,28 @@
 # What a reader looks at, below reports/: a page with everything, its numbers, tables, charts, and pictures of every scene.
 
 
+# Which scenes and variants the numbers are of. With thousands of scenes this is too long for a command line, and
+# so for a rule with one
+rule plan:
+    input:
+        source_file("rules/plan.json.j2"),
+    output:
+        "reports/page/plan{which}.json",
+    localrule: True
+    params:
+        # functions: braces in names are no wildcards
+        text=lambda wildcards: plan_of(wildcards.which)[0].to_json(),
+    message:
+        "plan of the report"
+    template_engine:
+        "jinja2"
+
+
 # Every number of the report in one file: scores, times, facts about the scenes, and the tables made of them. The numbers
 # of best's parts have a file of their own (report_parts), since `all` does not run those variants.
 rule numbers:
     input:
+        plan="reports/page/plan{which}.json",
         measured=lambda wildcards: measured_files(wildcards.which),
         published=sorted(PUBLISHED.glob("*.csv")),
     output:
@@ -20,15 +38,13 @@ rule numbers:
         runtime=5 + sum(scene.minutes(0.1) for scene in SETTINGS.scenes.values()) // 5,
     params:
         results=results_folder,
-        # functions: braces in names are no wildcards
-        plan=lambda wildcards: plan_of(wildcards.which)[0].to_json(),
         flags=lambda wildcards: "--parts" if wildcards.which == PARTS_ENDING else "",
         code=code_digest("sepi.report.numbers"),
     message:
         "numbers of the report"
     shell:
         command(
-            "sepi.report.numbers --results {params.results:q} --plan {params.plan:q} "
+            "sepi.report.numbers --results {params.results:q} --plan {input.plan:q} "
             "{params.flags} --output {output:q} 2> {log:q}"
         )
 
@@ -239,11 +255,12 @@ rule page:
         mem_mb=1000,
     params:
         parts=lambda wildcards, input: ["--parts", input.parts] if PARTS else [],
+        scenes=placed("reports/page"),
         code=code_digest("sepi.report.page"),
     message:
         "page of the report"
     shell:
         command(
             "sepi.report.page --numbers {input.numbers:q} {params.parts:q} --graph {input.graph:q} "
-            "--output {output:q} {input.scenes:q} 2> {log:q}"
+            "--scenes {params.scenes:q} --output {output:q} 2> {log:q}"
         )

@@ -89,7 +89,7 @@ class Workflow:
     def plan(self, *targets: str) -> dict[str, int]:
         """Rule to number of jobs that a run would have; asked in this process where the package is the tests' own."""
         if self.tree == REPOSITORY:
-            return self._planned_here(targets)
+            return dict(Counter(job.rule.name for job in self.jobs(*targets)))
         result = self.run(*targets, flags=("--dry-run",))
         assert result.returncode == 0, result.stdout
         if "Nothing to be done" in result.stdout:
@@ -123,7 +123,8 @@ class Workflow:
         with self._read() as workflow:
             return workflow._workflow
 
-    def _planned_here(self, targets: tuple[str, ...]) -> dict[str, int]:
+    def jobs(self, *targets: str) -> list[Any]:
+        """The jobs that a run would have, as Snakemake plans them in this process."""
         from snakemake.settings.types import DAGSettings, ExecutionSettings, SchedulingSettings
 
         with self._read() as workflow:
@@ -132,8 +133,7 @@ class Workflow:
                 execution_settings=ExecutionSettings(),
                 scheduling_settings=SchedulingSettings(scheduler="greedy"),
             )
-            jobs = workflow._workflow.dag.needrun_jobs(exclude_finished=False)
-            return dict(Counter(job.rule.name for job in jobs))
+            return list(workflow._workflow.dag.needrun_jobs(exclude_finished=False))
 
     def stage_plan(self, *targets: str) -> dict[str, int]:
         """The plan without what comes after the stages (scores, tables, maps)."""

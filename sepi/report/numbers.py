@@ -213,12 +213,20 @@ def _digest(values: npt.NDArray[Any]) -> str:
 
 @click.command(name="python -m sepi.report.numbers", cls=SepiCommand)
 @click.option("--results", type=click.Path(path_type=Path), required=True, help="Folder of the results.")
-@click.option("--plan", "plan_text", required=True, help="JSON: scenes per dataset, choices per variant and stage.")
+@click.option(
+    "--plan",
+    "path",
+    type=click.Path(path_type=Path),
+    required=True,
+    help="JSON file: scenes per dataset, choices per variant and stage.",
+)
 @click.option("--parts", is_flag=True, help="What the ablation of the best variant needs, and nothing else.")
 @click.option("--output", type=click.Path(path_type=Path), required=True, help="JSON file to write.")
-def command(results: Path, plan_text: str, parts: bool, output: Path) -> None:
+def command(results: Path, path: Path, parts: bool, output: Path) -> None:
     """Collect all numbers of the report in one JSON file."""
-    plan = Plan.from_json(results, plan_text)
+    plan = Plan.from_json(
+        results, json.dumps(read_json(path, {"scenes", "variants"}, "the plan of a report", "snakemake"))
+    )
     write(output, as_text(collect(plan, parts)))
 
 

@@ -146,14 +146,13 @@ _FILE = click.Path(path_type=Path)
 @click.option("--parts", "parts_path", type=_FILE, help="Numbers of the best variant's parts (JSON).")
 @click.option("--graph", "graph_path", type=_FILE, required=True, help="Rule graph (SVG).")
 @click.option("--output", type=_FILE, required=True, help="Page to write.")
-@click.argument("scenes", nargs=-1, type=_FILE)
-def command(
-    numbers_path: Path, parts_path: Path | None, graph_path: Path, output: Path, scenes: tuple[Path, ...]
-) -> None:
-    """Write the page of a report, with the SCENES that sepi.report.figures prepared, in this order."""
+@click.option("--scenes", type=_FILE, required=True, help="Folder of DATASET/SCENE.json, from sepi.report.figures.")
+def command(numbers_path: Path, parts_path: Path | None, graph_path: Path, output: Path, scenes: Path) -> None:
+    """Write the page of a report, with the scenes of its numbers."""
+    numbers = read_numbers(numbers_path)
     html = page_of(
-        read_numbers(numbers_path),
-        [read_scene(path) for path in scenes],
+        numbers,
+        [read_scene(scenes / dataset / f"{scene}.json") for dataset, scene in Runs(numbers).plan.pairs],
         graph_path.read_text(encoding="utf-8"),
         None if parts_path is None else read_numbers(parts_path),
     )

@@ -41,7 +41,9 @@ def test_a_missing_or_broken_file_is_one_line(
     path.unlink()
     if content is not None:
         path.write_bytes(content)
-    arguments = ["--results", str(there.results), "--plan", there.to_json(), "--output", str(tmp_path / "out.json")]
+    about = tmp_path / "plan.json"
+    about.write_text(there.to_json())
+    arguments = ["--results", str(there.results), "--plan", str(about), "--output", str(tmp_path / "out.json")]
     result = CliRunner().invoke(numbers.command, arguments)
     assert result.exit_code == 1
     assert result.output.startswith(f"sepi: {path}: ")

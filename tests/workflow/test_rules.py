@@ -138,3 +138,18 @@ def test_minutes_are_several_times_what_was_measured() -> None:
     """Of a benchmark scene, 30 s for a million samples: 11 minutes on the machine of the measurement."""
     benchmark = Scene("hci", "cotton", None, (), 81, 512, 512)
     assert 20 < benchmark.minutes(30) < 60
+
+
+def test_no_command_grows_with_the_number_of_scenes(tmp_path: Path) -> None:
+    """The system takes 128 kB for one: thousands of light fields would end with `Argument list too long`."""
+    report = {"plan", "numbers", "tables", "charts", "page"}
+    one, three = (
+        {
+            job.rule.name: job.shellcmd
+            for job in Workflow(REPOSITORY, tmp_path / "run", {"builtin": {"scenes": names}}).jobs("all")
+            if job.rule.name in report
+        }
+        for names in (["dots"], ["dots", "wall", "stripes"])
+    )
+    assert one.keys() == report
+    assert one == three

@@ -251,20 +251,20 @@ def numbers_file(folder: Path, content: Any) -> Path:
     return path
 
 
-def run_page(folder: Path, example: Example, *scenes: Path, numbers: Path | None = None) -> Any:
+def run_page(folder: Path, example: Example, numbers: Path | None = None) -> Any:
     graph = folder / "rules.svg"
     graph.write_text(drawn(EDGES))
     numbers = numbers or numbers_file(folder, example.numbers)
-    words = ["--numbers", numbers, "--graph", graph, "--output", folder / "index.html", *scenes]
+    words = ["--numbers", numbers, "--graph", graph, "--output", folder / "index.html", "--scenes", folder]
     return CliRunner().invoke(page.command, list(map(str, words)), catch_exceptions=False)
 
 
 def test_the_command_writes_the_same_page(example: Example, tmp_path: Path) -> None:
-    paths = []
     for scene in example.scenes:
-        paths.append(tmp_path / f"{scene['scene']}.json")
-        paths[-1].write_text(json.dumps(scene))
-    result = run_page(tmp_path, example, *paths)
+        path = tmp_path / scene["dataset"] / f"{scene['scene']}.json"
+        path.parent.mkdir(exist_ok=True)
+        path.write_text(json.dumps(scene))
+    result = run_page(tmp_path, example)
     assert (result.exit_code, result.output) == (0, "")
     assert (tmp_path / "index.html").read_bytes() == example.page.read_bytes()
 
@@ -276,10 +276,12 @@ def test_the_command_writes_the_same_page(example: Example, tmp_path: Path) -> N
 def test_what_is_no_scene_is_named(content: str | None, message: str, example: Example, tmp_path: Path) -> None:
     """And an earlier page stays as it was."""
     (tmp_path / "index.html").write_text("earlier")
-    scene = tmp_path / "scene.json"
+    first = example.scenes[0]
+    scene = tmp_path / first["dataset"] / f"{first['scene']}.json"
+    scene.parent.mkdir()
     if content is not None:
         scene.write_text(content)
-    result = run_page(tmp_path, example, scene)
+    result = run_page(tmp_path, example)
     assert result.exit_code == 1
     assert message in result.stderr
     assert result.stderr.startswith(f"sepi: {scene}: ")
