@@ -1,6 +1,7 @@
 """The workflow, killed at random moments: the next run makes what an undisturbed one does.
 
-``SEPI_FAULTS`` says how many kills; `make faults` asks for a hundred.
+`make test-system` looks whether a job ends with its workflow, `make faults` does the rest. ``SEPI_FAULTS`` says how
+many kills; `make faults` asks for a hundred.
 """
 
 import os

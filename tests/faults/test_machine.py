@@ -1,4 +1,7 @@
-"""The workflow on a machine with faults: a clear line, nothing half written, and the next run heals."""
+"""The workflow on a machine with faults: a clear line, nothing half written, and the next run heals.
+
+`make test-system` fills a disk, `make faults` does the rest.
+"""
 
 import os
 import re
