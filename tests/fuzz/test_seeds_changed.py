@@ -15,7 +15,7 @@ from mutations import mutated
 from targets import TARGETS
 
 # executions of each target; `make faults` asks for more
-EXECUTIONS = 4 * int(os.environ.get("SEPI_FAULTS", "20"))
+EXECUTIONS = 4 * int(os.environ["SEPI_FAULTS"]) if "SEPI_FAULTS" in os.environ else 30
 
 # what of their seeds the targets refuse: those that are sound for one of several readers alone, or that are not read
 PARTLY_REFUSED = ("tiff", "map-png", "json", "json-flags", "settings", "config")
