@@ -69,7 +69,7 @@ class StageChoices(MutableMapping[str, Choice]):
 
     def __init__(self, stage: str, own: Mapping[str, Choice]) -> None:
         self._stage = stage
-        names = sorted([*own, *MODULES[stage]], key=lambda name: name == "none")
+        names = sorted([*own, *MODULES.get(stage, ())], key=lambda name: name == "none")
         self._found: dict[str, Choice | None] = {name: own.get(name) for name in names}
 
     def __getitem__(self, name: str) -> Choice:
