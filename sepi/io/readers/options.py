@@ -83,6 +83,11 @@ class ReadOptions:
     follow_links : bool
         Read views that are links to files outside their folder.
 
+    Raises
+    ------
+    SepiError
+        If a value is of another type, or a number that it cannot be.
+
     Examples
     --------
     Pictures named by column and row, of which the corner ones are left out:
