@@ -73,10 +73,11 @@ def source_file(name):
     return path if os.path.isfile(path) else ancient(workflow.source_path(f"../{name}"))
 
 
-# the Snakefile, and what it includes
+# the Snakefile, what it includes, and what that reads
 FOLDER = os.path.dirname(str(workflow.current_basedir))
 INCLUDED = re.findall(r'^include: "(.+)"$', Path(source_file("Snakefile")).read_text(), re.MULTILINE)
-RULE_FILES = [source_file(name) for name in ["Snakefile", *INCLUDED]]
+PLAN_TEMPLATE = "rules/plan.json.j2"
+RULE_FILES = [source_file(name) for name in ["Snakefile", *INCLUDED, PLAN_TEMPLATE]]
 
 
 # the rules' patterns

@@ -65,7 +65,7 @@ use rule page as comparison_page with:
     localrule: True
     params:
         parts=[],
-        scenes=placed("reports/comparison/page"),
+        scenes=folder_of_scenes,
         code=code_digest("sepi.report.page"),
     message:
         "page of the compared methods"

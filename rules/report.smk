@@ -5,9 +5,11 @@
 # so for a rule with one
 rule plan:
     input:
-        source_file("rules/plan.json.j2"),
+        source_file(PLAN_TEMPLATE),
     output:
         "reports/page/plan{which}.json",
+    log:
+        "logs/plan{which}.log",
     localrule: True
     params:
         # functions: braces in names are no wildcards
@@ -255,7 +257,7 @@ rule page:
         mem_mb=1000,
     params:
         parts=lambda wildcards, input: ["--parts", input.parts] if PARTS else [],
-        scenes=placed("reports/page"),
+        scenes=folder_of_scenes,
         code=code_digest("sepi.report.page"),
     message:
         "page of the report"

@@ -83,6 +83,11 @@ def folder_of_output(wildcards, output):
     return os.path.dirname(output[0])
 
 
+def folder_of_scenes(wildcards, output):
+    """The folder beside a page that has a file for each of its scenes."""
+    return os.path.join(os.path.dirname(output[0]), "page")
+
+
 def results_folder(wildcards):
     """The folder that commands look for results in."""
     return placed(RESULTS)

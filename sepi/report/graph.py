@@ -53,7 +53,7 @@ def rule_edges(snakefile: Path, external: bool = False, rules: Iterable[Path] = 
         copy = Path(folder)
         shutil.copy(snakefile, copy / "Snakefile")
         (copy / "rules").mkdir()
-        for path in rules or (snakefile.parent / "rules").glob("*.smk"):
+        for path in rules or (snakefile.parent / "rules").glob("*.*"):
             # Snakemake's copies of what lies elsewhere may be called NAME@REVISION
             shutil.copy(path, copy / "rules" / path.name.partition("@")[0])
         config = {"builtin": {"scenes": ["dots"]}, "external": {"other": "maps"} if external else {}}
