@@ -100,7 +100,7 @@ def _candidate_cost(
         down, across = -disparity * (t - t0), -disparity * (s - s0)
         residual = warp(views[t, s], down, across) - light_field.reference_view
         squared = np.einsum("yxc,yxc->yx", residual, residual)
-        inside = (y + down >= 0) & (y + down <= H - 1) & (x + across >= 0) & (np.floor(x + across) < W - 1)
+        inside = (y + down >= 0) & (y + down <= H - 1) & (x + across >= 0) & (x + across <= W - 1)
         total += np.where(inside, squared / (squared + scale2), 0)
         number += inside
     return total, number

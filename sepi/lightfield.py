@@ -36,7 +36,7 @@ LOWEST, HIGHEST = -0.5, 1.5
 _LARGEST_ODD_GRID = 1000
 """Views of a grid with more rows and columns than a view has pixels: more, and its axes are taken for others."""
 
-_GENEROUS = 10
+_GENEROUS = 100
 """So many times farther than views show anything a range may reach: generous ones cost time and do no harm."""
 
 MIN_SIZE = 2
@@ -259,16 +259,21 @@ class LightField:
             object.__setattr__(self, "ground_truth", self.ground_truth.astype(np.float32, copy=False))
         if self.disparity_range is not None:
             require_known(f"{self.name}: source of the disparity range", [self.disparity_range.source], RANGE_SOURCES)
-            if self.arranged:
-                self._require_seen(self.disparity_range)
 
     def _arrays(self) -> dict[str, object]:
         require_type(f"{self.name}: masks", self.masks, Mapping, "names with arrays")
         named = {"present": self.present, "positions": self.positions, "ground_truth": self.ground_truth, **self.masks}
         return {what: array for what, array in named.items() if array is not None}
 
-    def _require_seen(self, known: DisparityRange) -> None:
-        """Raise for disparities at which every other view shows nothing of what the reference view shows."""
+    def require_seen_range(self) -> None:
+        """Raise for a range far beyond the disparities at which any other view shows what the reference view shows.
+
+        Raises
+        ------
+        SepiError
+            If it is, or the range is unknown.
+        """
+        known = self.require_disparity_range()
         others = self.present.copy()
         others[self.reference_position] = False
         moved = np.abs(self.baselines[others]) / self.shape

@@ -83,6 +83,7 @@ def estimate_depth(
         from sepi.inspection.disparity_range import estimate_range
 
         light_field = light_field.with_range(estimate_range(light_field))
+    light_field.require_seen_range()
     require_memory_of(light_field, settings.values())
     tell_kernel_cache()
     maps: StageMaps | None = None

@@ -53,7 +53,10 @@ WRONG: dict[str, tuple[Callable[[], object], str]] = {
     "equal positions": (field(positions=np.zeros((3, 3, 2))), "mine: positions must differ"),
     "positions of text": (field(positions=np.full((3, 3, 2), "a")), "mine: positions must be finite"),
     "list of positions": (field(positions=[[0, 0]]), "mine: positions: expected an array"),
-    "far range": (field(disparity_range=sepi.DisparityRange(-1e6, 1e6, "given")), "mine: disparity range .*from 64 on"),
+    "far range": (
+        depth(SCENE.with_range(sepi.DisparityRange(-1e6, 1e6, "given"))),
+        "dots: disparity range .*from 64 on",
+    ),
     "range as tuple": (
         field(disparity_range=(-1, 1)),
         r"mine: disparity_range: expected a DisparityRange, got \(-1, 1\)",

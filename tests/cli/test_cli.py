@@ -387,6 +387,7 @@ def test_info_of_a_light_field_about_which_little_is_known(tmp_path: Path) -> No
     present[0, 1] = present[2, 0] = False
     views = np.full((3, 2, 8, 9, 1), 7, np.uint16)
     views[:, :, 4, 4] = 9
+    views[0, 0, 2, 2] = 8
     write_light_field(tmp_path / "dark.h5", LightField(views, "dark", present=present, notes=("made up",)))
     called = call("info", tmp_path / "dark.h5")
     assert called.exit_code == 0
@@ -427,6 +428,7 @@ def test_info_as_json_has_what_its_text_has(pyramids: Path, tmp_path: Path) -> N
     present[0, 1] = False
     views = np.full((3, 2, 8, 9, 1), 7, np.uint16)
     views[:, :, 4, 4] = 9
+    views[0, 0, 2, 2] = 8
     positions = np.arange(12.0).reshape(3, 2, 2)
     dark = LightField(views, "dark", present=present, notes=("made up",), positions=positions)
     with pytest.MonkeyPatch.context() as patch:
