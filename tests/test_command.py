@@ -42,8 +42,10 @@ def failing(
     raise SepiError(f"{light_field.name}: too dark\nby far")
 
 
-FIRST = stage_command("first", {"constant": Choice(Shift, constant), "failing": Choice(NoParameters, failing)})
-SECOND = stage_command("second", {"constant": Choice(Shift, constant)})
+FIRST = stage_command(
+    "first", {"constant": Choice(Shift, constant, own_steps=True), "failing": Choice(NoParameters, failing)}
+)
+SECOND = stage_command("second", {"constant": Choice(Shift, constant, own_steps=True)})
 
 
 @pytest.fixture
@@ -164,7 +166,7 @@ def write_slowly(path, maps, attributes):
         time.sleep(60)
 
 command.write_stage = write_slowly
-command.stage_command("slow", {"slow": Choice(NoParameters, slow)})()
+command.stage_command("slow", {"slow": Choice(NoParameters, slow, own_steps=True)})()
 """
 
 
