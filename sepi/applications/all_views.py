@@ -262,7 +262,9 @@ def carried_map(disparity: FloatMap, baseline: tuple[float, float], known: BoolM
     down, across = map(float, baseline)
     carry(disparity, counted, corners, down, across, MOST_STRETCHED, nearest, believed)
     nearest[(nearest == EMPTY) | (believed == 0)] = np.nan
-    return nearest
+    # surfaces go on to the border of their last pixel, but no surface is farther or nearer than the map has one
+    seen = disparity if known is None else disparity[known]
+    return np.clip(nearest, seen.min(), seen.max()) if seen.size else nearest
 
 
 def _sources(found: list[StageMaps], baselines: npt.NDArray[np.float64]) -> Sources:
