@@ -242,8 +242,8 @@ class LightField:
                 f"{self.name}: positions must be finite, of shape (T, S, 2) = {(*v.shape[:2], 2)}, got "
                 f"{self.positions.shape}"
             )
-        if self.positions is not None and len(np.unique(self.positions[self.present], axis=0)) < self.present.sum():
-            raise SepiError(f"{self.name}: positions must differ, got the same for several views")
+        if self.positions is not None and len(np.unique(self.positions[self.present], axis=0)) == 1:
+            raise SepiError(f"{self.name}: positions must differ, got the same for all views")
         for name, mask in self.masks.items():
             if mask.dtype != bool:
                 raise SepiError(f"{self.name}: masks must be bool, got {name} of {mask.dtype}")

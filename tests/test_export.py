@@ -17,13 +17,13 @@ from sepi.variants import STAGES, stage_parameters, variant_named
 
 @pytest.fixture
 def light_field(tmp_path: Path) -> Path:
-    """A textured disc before black."""
+    """A textured disc before black, one pixel per step."""
     y, x = np.mgrid[:48, :56]
     disc = (y - 24) ** 2 + (x - 26) ** 2 < 15**2
-    colours = np.random.default_rng(0).integers(60, 256, (48, 56, 3), np.uint8) * disc[..., None]
-    views = np.ascontiguousarray(np.broadcast_to(colours, (3, 3, *colours.shape)), np.uint8)
+    colours = np.random.default_rng(0).integers(60, 256, (48, 56, 3), np.uint8) * disc[..., None].astype(np.uint8)
+    views = np.stack([[np.roll(colours, (1 - t, 1 - s), (0, 1)) for s in range(3)] for t in range(3)])
     path = tmp_path / "disc.h5"
-    write_light_field(path, LightField(views, "disc", "made", disparity_range=DisparityRange(-1, 1, "given")))
+    write_light_field(path, LightField(views, "disc", "made", disparity_range=DisparityRange(0, 2, "given")))
     return path
 
 

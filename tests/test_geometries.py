@@ -4,6 +4,7 @@ from dataclasses import replace
 from functools import cache
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 from geometries import ROW_SPACING, jittered, standing
 
@@ -22,28 +23,30 @@ def scene(geometry: str) -> LightField:
     return render(SCENE, size=SIZE, views=VIEWS, **standing(geometry, (VIEWS, VIEWS)))
 
 
-def error(light_field: LightField, variant: str) -> float:
+def errors(light_field: LightField, variant: str) -> npt.NDArray[np.float32]:
     assert light_field.ground_truth is not None
-    return float(np.abs(estimate_depth(light_field, variant).disparity - light_field.ground_truth).mean())
+    return np.abs(estimate_depth(light_field, variant).disparity - light_field.ground_truth)
 
 
 @cache
-def error_on_the_grid(variant: str) -> float:
-    return error(scene("grid"), variant)
+def mean_on_the_grid(variant: str) -> float:
+    return float(errors(scene("grid"), variant).mean())
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("variant", ["paper", "best", "wang", "no_sepi", "best_half_sepi"])
-@pytest.mark.parametrize(("geometry", "worse"), [("closer rows", 3.0), ("off the grid", 1.15)])
+@pytest.mark.parametrize(("geometry", "worse"), [("closer rows", 10), ("off the grid", 1.4)])
 def test_depth_is_as_good_as_on_the_grid(variant: str, geometry: str, worse: float) -> None:
     """Who knows where the cameras stood must get what an even grid gives; each stage has to use it.
 
-    Taken for a grid, the same views give a depth that is so many times worse.
+    Taken for a grid, the same views give a depth that is so many times worse in the median: some variants guess at
+    many pixels, and may guess well by chance.
     """
     right = scene(geometry)
-    found = error(right, variant)
-    assert found < 1.3 * error_on_the_grid(variant)
-    assert error(replace(right, row_spacing=1.0, positions=None), variant) > worse * found
+    found = errors(right, variant)
+    assert found.mean() < 1.3 * mean_on_the_grid(variant)
+    as_grid = errors(replace(right, row_spacing=1.0, positions=None), variant)
+    assert np.median(as_grid) > worse * np.median(found)
 
 
 @pytest.mark.parametrize("row_spacing", [0.43, 1.0, 5.0])

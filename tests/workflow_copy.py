@@ -30,9 +30,11 @@ TINY = {
     },
 }
 
-# in place of what renames a finished file: as many seconds later as the environment says
+# in place of what renames a finished file: as many seconds later as the environment says, and not while a file is there
 SLOW_WRITING = """import os, time
         time.sleep(float(os.environ.get("SLEEP", "0")))
+        while os.path.exists(os.environ.get("HOLD", "")):
+            time.sleep(0.05)
         temporary.replace(path)"""
 # what makes maps
 _STAGE_RULES = ("ingest", *STAGES)

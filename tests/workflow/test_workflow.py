@@ -518,10 +518,15 @@ def test_two_runs_at_once_do_not_meet(workflow: Workflow, tmp_path: Path) -> Non
     slow = Workflow(copy_of_the_project(tmp_path / "tree"), tmp_path / "run", TINY)
     target = "results/builtin/dots/lightfield.h5"
     with edited(slow.tree / "sepi" / "io" / "files.py", "temporary.replace(path)", SLOW_WRITING):
-        first = slow.start(target, SLEEP="8")
-        wait_for(lambda: list((slow.folder / "results").rglob(".lightfield-*.h5")))
-        second = slow.run(target)
+        hold = tmp_path / "hold"
+        hold.touch()
+        first = slow.start(target, HOLD=str(hold))
+        try:
+            wait_for(lambda: list((slow.folder / "results").rglob(".lightfield-*.h5")))
+            second = slow.run(target)
+        finally:
+            hold.unlink()
         assert second.returncode != 0
-        assert "Directory cannot be locked" in second.stdout
         assert first.wait(timeout=60) == 0
+        assert "Directory cannot be locked" in second.stdout
         assert slow.plan(target) == {}

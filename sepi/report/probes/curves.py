@@ -154,9 +154,9 @@ def cost_curves(light_field: LightField, y: int, x: int, parameters: SweepParame
         if (t, s) == (t0, s0):
             continue
         top, left = rows + down[t, s][:, None], columns + across[t, s][:, None]
-        # as the sweep counts: a sample on the last row needs none below, one on the last column does not count
+        # as the sweep counts: a sample on the last row or column needs none beyond it
         inside_y = (top >= 0) & ((top < H - 1) | ((top == H - 1) & (fy[t, s] == 0)[:, None]))
-        inside_x = (left >= 0) & (left < W - 1)
+        inside_x = (left >= 0) & ((left < W - 1) | ((left == W - 1) & (fx[t, s] == 0)[:, None]))
         squared = _squared_residuals(light_field.rgb_views[t, s], reference_view, top, left, fy[t, s], fx[t, s])
         residual = squared / (squared + scale2)
         if not (inside_y.all() and inside_x.all()):
