@@ -309,9 +309,10 @@ def test_what_an_earlier_scene_began_is_not_shown(page: Any) -> None:
     page.evaluate(
         """() => {
           const quick = Sepi.unpack;
+          const held = new Promise((done) => { window.release = done; });
           Sepi.unpack = async (...given) => {
             const late = window.slow;
-            if (late) await new Promise((done) => setTimeout(done, 400));
+            if (late) await held;
             const found = await quick(...given);
             if (late) window.late = true;
             return found;
@@ -329,6 +330,7 @@ def test_what_an_earlier_scene_began_is_not_shown(page: Any) -> None:
     page.evaluate("window.slow = false")
     page.select_option("#scene", label=PICTURE_TITLE)
     page.wait_for_function("() => Sepi.viewer.shown")
+    page.evaluate("window.release()")
     page.wait_for_function("() => window.late")
     settled(page)
     assert page.evaluate("Sepi.viewer.scene.scene") == "picture"
