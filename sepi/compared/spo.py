@@ -24,8 +24,10 @@ What the publication leaves open, or could not be confirmed, and what was chosen
 - The numbers: the scale ``a``, the bins, the ``s`` of the confidence. The parallelogram ends three scales from its
   line, in whole columns; no weight beyond is more than about 5 % of the largest.
 - The confidence's formula; that it also weighs pixels against each other in the filter follows from the sum above.
-- Colours: one histogram for each of the channels, and the mean of their distances. Bins have hard borders:
-  noise of several bins parts the halves whatever the candidate, which ends the method's robustness to it.
+- Colours: one histogram for each of the channels, and the mean of their distances. A colour counts for the two bins
+  between whose middles it lies: with hard borders, a surface of nearly one colour falls into this bin or the next by
+  noise, and halves differ whatever the candidate. Noise of several bins still parts them, which ends the method's
+  robustness to it.
 - Samples between pixels come from cubic convolution.
 - The border: beyond it a view goes on as it ends, and so do the columns.
 - The number of candidates, and the parabola that refines the winner below their sampling.

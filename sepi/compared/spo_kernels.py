@@ -16,24 +16,33 @@ EXACT = {"nnan", "ninf", "nsz"}
 
 
 @njit(inline="always")
-def _quantise(lines: Any, y: int, bins: int, out: Any) -> None:
-    """Bins of one EPI, those of all channels numbered through: ``out[x, n * C + c]`` of ``lines[n, c, y, x]``."""
+def _quantise(lines: Any, y: int, bins: int, numbers: Any, shares: Any) -> None:
+    """Bins of one EPI, those of all channels numbered through: ``numbers[x, n * C + c]`` of ``lines[n, c, y, x]``.
+
+    It is the lower one of two; ``shares`` is what counts for the upper one.
+    """
     N, C, _, W = lines.shape
-    scale, last = np.float32(bins), np.int32(bins - 1)
+    scale, most = np.float32(bins), np.float32(bins - 1)
     for n in range(N):
         for c in range(C):
             row, first = lines[n, c, y], np.int32(c * bins)
             for x in range(W):
-                out[x, n * C + c] = first + min(max(np.int32(row[x] * scale), np.int32(0)), last)
+                place = min(max(row[x] * scale - np.float32(0.5), np.float32(0)), most)
+                lower = min(np.int32(place), np.int32(bins - 2))
+                numbers[x, n * C + c] = first + lower
+                shares[x, n * C + c] = place - np.float32(lower)
 
 
 @njit(inline="always")
-def _count(numbers: Any, previous: Any, column: Any) -> None:
-    """Histogram of a column of these bins, in place of one of the bins ``previous``."""
+def _count(numbers: Any, shares: Any, previous: Any, column: Any) -> None:
+    """Histogram of a column of these bins and shares, in place of one of the bins ``previous``."""
     for i in range(len(previous)):
-        column[np.uint64(previous[i])] = np.float32(0)
+        lower = np.uint64(previous[i])
+        column[lower] = column[lower + np.uint64(1)] = np.float32(0)
     for i in range(len(numbers)):
-        column[np.uint64(numbers[i])] += np.float32(1)
+        lower = np.uint64(numbers[i])
+        column[lower] += np.float32(1) - shares[i]
+        column[lower + np.uint64(1)] += shares[i]
 
 
 @njit(inline="always")
@@ -79,7 +88,8 @@ def half_distances(lines: Any, weights: Any, bins: int, out: Any) -> None:
     ----------
     lines : ndarray, shape (N, C, H, W), float32
         EPIs sheared by a candidate disparity, so that its lines are columns: row ``y`` of view ``n`` is row ``n`` of
-        EPI ``y``. Colours in 0..1; what overshoots counts for the first or the last bin. Columns beyond the ends are
+        EPI ``y``. Colours in 0..1, each of which counts for the two bins between whose middles it lies; what lies
+        beyond the middle of the first or last bin counts for that. Columns beyond the ends are
         like the last ones.
     weights : ndarray, shape (R,), float32
         Of the columns at distances 1..R from the line.
@@ -93,12 +103,13 @@ def half_distances(lines: Any, weights: Any, bins: int, out: Any) -> None:
     size = 2 * R + 1
     shares = (weights / (weights.sum() * N)).astype(np.float32)
     for y in prange(H):
-        numbers = np.empty((W, N * C), np.int32)
-        _quantise(lines, y, bins, numbers)
+        numbers, upper = np.empty((W, N * C), np.int32), np.empty((W, N * C), np.float32)
+        _quantise(lines, y, bins, numbers, upper)
         ring = np.zeros((size, C * bins), np.float32)
         left, right = np.empty(C * bins, np.float32), np.empty(C * bins, np.float32)
         for x in range(-R, W + R):
-            _count(numbers[min(max(x, 0), W - 1)], numbers[min(max(x - size, 0), W - 1)], ring[x % size])
+            here, left_behind = min(max(x, 0), W - 1), min(max(x - size, 0), W - 1)
+            _count(numbers[here], upper[here], numbers[left_behind], ring[x % size])
             centre = x - R
             if centre >= 0:
                 _halves(ring, centre, shares, left, right)

@@ -91,32 +91,54 @@ def test_noise_changes_both_sides_alike() -> None:
     assert ours < 0.7 * plain
 
 
+def moved_views(picture: npt.ArrayLike) -> LightField:
+    """5x5 views of a picture, 2 pixels wider on each side, of disparity 1."""
+    picture = np.asarray(picture, np.float32)
+    height, width = picture.shape[:2]
+    places = range(4, -1, -1)
+    views = [[picture[t : height - 4 + t, s : width - 4 + s] for s in places] for t in places]
+    return LightField(np.array(views)[::-1, ::-1], "moved", disparity_range=DisparityRange(-2, 2, "given"))
+
+
+def test_a_surface_of_nearly_one_colour_keeps_its_depth() -> None:
+    """Half a per cent of the full scale is all that its texture spans, less than a bin.
+
+    If this fails, faint walls get a depth by chance, the more so with few bins.
+    """
+    generator = np.random.default_rng(0)
+    texture = cv2.GaussianBlur(generator.standard_normal((52, 52, 3)).astype(np.float32), (0, 0), 1.5)
+    middle_of_a_bin = 32.5 / 64
+    light_field = moved_views(middle_of_a_bin + 0.001 * texture / texture.std())
+    noise = generator.normal(0, 0.0003, light_field.views.shape)
+    light_field = replace(light_field, views=(light_field.views.astype(np.float64) + noise).astype(np.float32))
+    found = filtered(light_field, spo(light_field, None, SpoParameters(num_disparities=41), no_progress))
+    assert (np.abs(found - 1) < WRONG)[6:-6, 6:-6].mean() > 0.99
+
+
 def test_the_direction_with_the_texture_decides() -> None:
     """Of upright stripes only the EPIs along rows know the depth.
 
     If this fails, the direction that sees nothing adds its guesses to the one that knows.
     """
-    stripes = np.repeat(np.random.default_rng(2).random((1, 52, 3), np.float32), 48, axis=0)
-    stripes = cv2.GaussianBlur(stripes, (0, 0), 1.0)
-    # disparity 1: view s is the picture moved by s - 2 pixels
-    row = np.stack([stripes[:, s : 48 + s] for s in range(5)])
-    light_field = LightField(np.stack([row] * 5), "stripes", disparity_range=DisparityRange(-2, 2, "given"))
     parameters = SpoParameters(num_disparities=41)
-    disparities = parameters.candidates(light_field)
-    along, down = (
-        peak_weight(
-            side_distances(light_field, views, disparities, parameters, down=down, progress=no_progress),
-            parameters.peak,
+    beside = slice(6, -6), slice(6, -6)
+    far_off = []
+    for seed in range(4):
+        stripes = np.repeat(np.random.default_rng(seed).random((1, 52, 3), np.float32), 52, axis=0)
+        light_field = moved_views(cv2.GaussianBlur(stripes, (0, 0), 1.0))
+        disparities = parameters.candidates(light_field)
+        along, down = (
+            peak_weight(
+                side_distances(light_field, views, disparities, parameters, down=down, progress=no_progress),
+                parameters.peak,
+            )[beside]
+            for views, down in views_of_directions(light_field)
         )
-        for views, down in views_of_directions(light_field)
-    )
-    beside = np.zeros(light_field.shape, bool)
-    beside[6:-6, 6:-6] = True
-    print(np.median(along[beside]), np.median(down[beside]))
-    assert np.median(along[beside]) > 3 * np.median(down[beside])
-    found = filtered(light_field, spo(light_field, None, parameters, no_progress))
-    print(np.percentile(np.abs(found - 1)[beside], 99))
-    assert np.percentile(np.abs(found - 1)[beside], 99) < WRONG
+        assert np.median(along) > 3 * np.median(down)
+        found = filtered(light_field, spo(light_field, None, parameters, no_progress))
+        far_off.append(np.abs(found - 1)[beside] > WRONG)
+    # a stripe whose neighbours are alike has the same colours on both sides of the right line
+    assert np.mean(far_off) < 0.01
 
 
 @pytest.mark.parametrize("geometry", GEOMETRIES)
@@ -136,14 +158,16 @@ def test_a_plane_parallel_to_the_views_gets_its_disparity(geometry: str) -> None
 def twin_of_half_distances(lines: FloatMap, weights: FloatMap, bins: int) -> npt.NDArray[np.float64]:
     """Histograms of the halves, pixel by pixel."""
     views, channels, height, width = lines.shape
-    numbers = np.clip((lines * np.float32(bins)).astype(int), 0, bins - 1)
+    places = np.clip(lines * np.float32(bins) - np.float32(0.5), 0, bins - 1)
+    # what a colour is farther from the middle of a bin than the bins are wide, it does not count for
+    counts = np.clip(1 - np.abs(places[..., None] - np.arange(bins)), 0, 1)
     found = np.zeros((height, width))
     for y, x in np.ndindex(height, width):
         for c in range(channels):
             left, right = np.zeros((2, bins))
             for k, weight in enumerate(weights / weights.sum() / views):
-                np.add.at(left, numbers[:, c, y, max(x - 1 - k, 0)], weight)
-                np.add.at(right, numbers[:, c, y, min(x + 1 + k, width - 1)], weight)
+                left += weight * counts[:, c, y, max(x - 1 - k, 0)].sum(axis=0)
+                right += weight * counts[:, c, y, min(x + 1 + k, width - 1)].sum(axis=0)
             filled = left + right > 0
             found[y, x] += ((left - right) ** 2)[filled] @ (1 / (left + right)[filled]) / 2 / channels
     return found
