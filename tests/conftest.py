@@ -34,8 +34,8 @@ _TOGETHER = {
     **dict.fromkeys(["test_kills", "test_machine"], "faults"),
 }
 
-# files whose tests of a variant, the last word of their names, share its map of a whole light field
-_BY_VARIANT = ("test_missing_views",)
+# files whose tests of one variant or light field, the last word of their names, share what takes long to make
+_BY_LAST_WORD = ("test_missing_views", "test_real_sets")
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -64,7 +64,7 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
     class Scheduler(LoadScopeScheduling):
         def _split_scope(self, nodeid: str) -> str:
             file = Path(nodeid.partition("::")[0]).stem
-            if file in _BY_VARIANT:
+            if file in _BY_LAST_WORD:
                 return f"{file} {nodeid.rpartition('-')[2].rpartition('[')[2]}"
             return _TOGETHER.get(file, nodeid)
 

@@ -1,7 +1,5 @@
 """Grey light fields: grey is three equal channels, so a light field gives the same maps as grey and as RGB."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -9,8 +7,6 @@ from sepi.compared.methods import LEARNED
 from sepi.inspection.disparity_range import estimate_range
 from sepi.inspection.view_order import check_order
 from sepi.lightfield import LightField
-from sepi.pipeline import estimate_depth
-from sepi.reading import read_light_field
 from sepi.scenes import render
 from sepi.scoring.regions import textureless
 from sepi.stage import CostVolume, StageMaps, no_progress
@@ -63,16 +59,3 @@ def test_grey_views_have_superpixels_of_their_picture() -> None:
     labels = lti.run(grey, maps, lti.parameters(), no_progress).extra["superpixels"]
     blank = LightField(np.full_like(grey.views, 128), "blank", disparity_range=grey.disparity_range, view=grey.view)
     assert (labels != lti.run(blank, maps, lti.parameters(), no_progress).extra["superpixels"]).mean() > 0.1
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("variant", ["paper", "best"])
-def test_cotton_in_grey_is_nearly_as_good(hci: Path, variant: str) -> None:
-    """What colours add is little: a grey light field within 10 % of the squared error, for both variants."""
-    cotton = read_light_field(hci / "cotton")
-    brightness = cotton.views @ np.array([0.299, 0.587, 0.114])
-    grey = LightField(np.rint(brightness[..., None]).astype(np.uint8), "grey", disparity_range=cotton.disparity_range)
-    errors = [
-        np.mean((estimate_depth(field, variant).disparity - cotton.ground_truth) ** 2) for field in (grey, cotton)
-    ]
-    assert errors[0] <= 1.1 * errors[1]

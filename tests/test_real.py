@@ -11,6 +11,7 @@ from real_scenes import final_maps, final_scores, maps_after, scene
 from sepi.io.readers.options import ReadOptions
 from sepi.lightfield import DisparityRange, LightField, as_unit_float
 from sepi.matching.plane_sweep import SweepParameters, sweep
+from sepi.pipeline import estimate_depth
 from sepi.reading import read_light_field
 from sepi.scoring.confidence import decile_errors
 from sepi.scoring.scores import score
@@ -94,6 +95,16 @@ def test_error_falls_with_confidence(hci: Path, name: str) -> None:
     final = final_maps(hci / name, "best")
     for errors in decile_errors(final.confidence, final.disparity - scene(hci / name).ground_truth):
         assert np.all(np.diff(errors) > 0), errors
+
+
+@pytest.mark.parametrize("variant", ["paper", "best"])
+def test_cotton_in_grey_is_nearly_as_good(hci: Path, variant: str) -> None:
+    """What colours add is little: a grey light field within 10 % of the squared error, for both variants."""
+    cotton = scene(hci / "cotton")
+    brightness = cotton.views @ np.array([0.299, 0.587, 0.114])
+    grey = LightField(np.rint(brightness[..., None]).astype(np.uint8), "grey", disparity_range=cotton.disparity_range)
+    found = score(estimate_depth(grey, variant).disparity, cotton.ground_truth)
+    assert found["mse100"] <= 1.1 * final_scores(hci / "cotton", variant)["mse100"]
 
 
 def test_views_match_better_where_their_cameras_really_stood(real_data: Path) -> None:

@@ -4,6 +4,7 @@ The ranges were measured by block matching and by eye, and are those of 99 % of 
 """
 
 import warnings
+from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
@@ -48,10 +49,17 @@ SETS = {
 }
 
 
-def known_set(real_data: Path, name: str, options: ReadOptions | None = None) -> LightField:
+def path_of(real_data: Path, name: str) -> Path:
     path = real_data / "real" / SETS[name].folder
     if not path.exists():
         pytest.skip(f"{path} is absent")
+    return path
+
+
+@cache
+def known_set(path: Path, name: str) -> LightField:
+    """The light field as it is read with what is known of it."""
+    options = ReadOptions(order=SETS[name].order, row_spacing=0.396 if name == "t_rex" else None)
     return read_light_field(path, options=options, check_order=False)
 
 
@@ -61,7 +69,7 @@ def test_the_views_are_put_where_they_belong(real_data: Path, name: str) -> None
     known = SETS[name]
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        light_field = read_light_field(known_set(real_data, name).source)
+        light_field = read_light_field(path_of(real_data, name))
     assert light_field.grid == known.grid
     assert light_field.present.sum() == known.views
     # of the gantry's camera positions, and of steps of 35 and 14 pixels; a Lytro's shifted views are no other spacing
@@ -79,9 +87,7 @@ def test_the_views_are_put_where_they_belong(real_data: Path, name: str) -> None
 @pytest.mark.parametrize("name", ["legoknights3", "t_rex", "mansion51"])
 def test_near_and_far_are_told(real_data: Path, name: str) -> None:
     """A row of fifty views moves little from one to the next: what hides what shows between distant ones."""
-    spacing = 0.396 if name == "t_rex" else None
-    light_field = known_set(real_data, name, ReadOptions(order=SETS[name].order, row_spacing=spacing))
-    found = check_order(light_field, SETS[name].order)
+    found = check_order(known_set(path_of(real_data, name), name), SETS[name].order)
     assert found.sign_clear
     assert found.verdict() == "the views are in the right order"
 
@@ -90,8 +96,7 @@ def test_near_and_far_are_told(real_data: Path, name: str) -> None:
 def test_the_range_holds_the_scene_and_little_more(real_data: Path, name: str) -> None:
     """Too narrow, it cuts off the nearest or most distant surface; too wide, it costs time and accuracy."""
     known = SETS[name]
-    spacing = 0.396 if name == "t_rex" else None
-    found = estimate_range(known_set(real_data, name, ReadOptions(order=known.order, row_spacing=spacing)))
+    found = estimate_range(known_set(path_of(real_data, name), name))
     assert found.minimum <= known.low
     assert found.maximum >= known.high
     assert found.maximum - found.minimum <= 1.5 * (known.high - known.low)

@@ -1,5 +1,6 @@
 """The check of the views' order: what it names must set the views right, and it must not cry wolf."""
 
+from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
 
@@ -22,6 +23,8 @@ TURNED = {
     "transpose-flip-rows": "transpose-flip-columns",
 }
 TURNED |= {second: first for first, second in TURNED.items()}
+SOME_ORDERS = ("flip-both", "flip-rows", "transpose-flip-columns")
+"""Inside out, one axis, and axes exchanged: for real views that take long; cotton and the built-in scenes have all."""
 
 
 @cache
@@ -231,17 +234,16 @@ def test_a_large_parallax_is_found() -> None:
         assert found.best in (word, TURNED[word])
 
 
-@pytest.mark.parametrize("name", ["cotton", "antinous"])
-def test_real_scenes_in_every_order(hci: Path, name: str) -> None:
-    files = sorted((hci / name).glob("input_Cam*.png"))
-    pictures = np.stack([cv2.imread(str(path))[:, :, ::-1] for path in files])
-    every_order_is_named(grey_field(pictures.reshape(9, 9, *pictures.shape[1:])))
+@pytest.mark.parametrize(("name", "orders"), [("cotton", ORDERS), ("antinous", SOME_ORDERS)])
+def test_real_scenes_in_any_order(hci: Path, name: str, orders: Iterable[str]) -> None:
+    light_field = read_light_field(hci / name, check_order=False)
+    orders_are_named(grey_field(light_field.views), orders)
 
 
-def test_a_lytro_picture_in_every_order(real_data: Path) -> None:
+def test_a_lytro_picture_in_any_order(real_data: Path) -> None:
     folder = real_data / "lytro" / "2067"
     rows = [[cv2.imread(str(folder / f"2067_{t:02}_{s:02}.png")) for s in range(1, 10)] for t in range(1, 10)]
-    every_order_is_named(grey_field(np.array(rows)[..., ::-1]))
+    orders_are_named(grey_field(np.array(rows)[..., ::-1]), SOME_ORDERS)
 
 
 @pytest.mark.parametrize("kind", ["noise of 10/255", "half size"])
@@ -249,7 +251,8 @@ def test_near_and_far_are_told_in_noise_and_in_small_pictures(hci: Path, kind: s
     """One axis of views is too few where texture is faint: depth inside out would go unnoticed."""
     from bench.disturbed import DISTURBANCES
 
-    every_order_is_named(DISTURBANCES[kind].change(read_light_field(hci / "cotton", check_order=False)))
+    light_field = DISTURBANCES[kind].change(read_light_field(hci / "cotton", check_order=False))
+    orders_are_named(light_field, SOME_ORDERS)
 
 
 def test_a_glance_may_say_that_all_is_well_but_not_that_it_is_not(hci: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -269,9 +272,9 @@ def test_a_glance_may_say_that_all_is_well_but_not_that_it_is_not(hci: Path, mon
     assert looks == [Look.GLANCE, Look.AXES]
 
 
-def every_order_is_named(light_field: LightField) -> None:
+def orders_are_named(light_field: LightField, orders: Iterable[str]) -> None:
     assert check_order(light_field).warning() is None
-    for word in ORDERS:
+    for word in orders:
         found = check_order(misread(light_field, word))
         assert found.clear
         assert found.sign_clear

@@ -24,11 +24,13 @@ SCENES = ["cotton", "antinous"]
 @pytest.mark.parametrize("name", SCENES)
 def test_every_format_gives_the_same_light_field(hci: Path, name: str, tmp_path: Path) -> None:
     """A map must not change because the views were stored otherwise, and no reader may doubt the order of the views."""
-    folder = scene(hci / name)
+    whole, part = scene(hci / name), np.s_[130:390, 120:392]
+    assert whole.ground_truth is not None
+    folder = replace(whole, views=whole.views[:, :, *part], ground_truth=whole.ground_truth[part], masks={})
     np.save(tmp_path / "array.npy", folder.views)
     scipy.io.savemat(tmp_path / "matlab.mat", {"LF": folder.views})
     write_light_field(tmp_path / "own.h5", folder)
-    crop = (slice(None), slice(None), slice(200, 248), slice(200, 264))
+    crop = np.s_[:, :, 70:118, 80:144]
     expected = small_map(folder, folder.views[crop])
     for source in ("array.npy", "matlab.mat", "own.h5"):
         # a warning is an error in the tests
