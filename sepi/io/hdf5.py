@@ -30,9 +30,9 @@ from sepi.camera import Camera
 from sepi.errors import SepiError, printable
 from sepi.io import apart
 from sepi.io.files import PatientFile, atomic_path, reading
-from sepi.lightfield import RANGE_SOURCES, DisparityRange, LightField
+from sepi.lightfield import RANGE_SOURCES, DisparityRange, LightField, require_light_field
 from sepi.stage import CostVolume, StageMaps
-from sepi.validation import require_known
+from sepi.validation import require_known, require_path
 
 Attribute = str | float | int | tuple[float, float]
 
@@ -128,7 +128,8 @@ def write_light_field(path: str | Path, light_field: LightField) -> None:
     >>> bool((again.views == light_field.views).all()), again.baselines[0, 1].tolist()
     (True, [-0.75, -0.5])
     """
-    path = Path(path)
+    path = require_path("light field to write", path)
+    require_light_field(light_field)
     known = light_field.disparity_range
     with create_hdf5(path) as file:
         # gzip would cost 1.8 s and save half of 64 MB for a benchmark scene: not worth it for an intermediate file
