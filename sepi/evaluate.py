@@ -15,13 +15,14 @@ from sepi.command import SepiCommand
 from sepi.io.hdf5 import read_light_field, read_stage
 from sepi.io.provenance import scene_attributes
 from sepi.io.scores import Evaluation, map_name, write_scores
-from sepi.lightfield import FloatMap, LightField
+from sepi.lightfield import FloatMap, LightField, require_light_field
 from sepi.scoring.edges import edges_of
 from sepi.scoring.scores import (
     DISCONTINUITIES,
     region_masks,
     score_regions,
 )
+from sepi.validation import require_map, require_type
 
 
 def evaluation_of(light_field: LightField, disparity: FloatMap) -> Evaluation:
@@ -93,6 +94,10 @@ def evaluations_of(light_field: LightField, maps: Mapping[str, FloatMap]) -> dic
     >>> mse["best"] < 0.8 * mse["best_no_planes"]
     True
     """
+    require_light_field(light_field)
+    require_type(f"{light_field.name}: maps", maps, Mapping, "names with their maps")
+    for name, disparity in maps.items():
+        require_map(f"{light_field.name}: disparity{name and f' of {name}'}", disparity, light_field.shape)
     if light_field.ground_truth is None or not maps:
         return {name: Evaluation() for name in maps}
     masks = region_masks(light_field)

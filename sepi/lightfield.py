@@ -178,7 +178,8 @@ class LightField:
     def __post_init__(self) -> None:
         v = self.views
         require_type("name of the light field", self.name, str, "text")
-        require_type(f"{self.name}: source", self.source, str, "text")
+        for key in ("source", "reading"):
+            require_type(f"{self.name}: {key}", getattr(self, key), str, "text")
         require_type(
             f"{self.name}: disparity_range", self.disparity_range, (DisparityRange, NoneType), "a DisparityRange"
         )

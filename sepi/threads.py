@@ -4,6 +4,10 @@ from __future__ import annotations
 
 import os
 import sys
+from numbers import Integral
+
+from sepi.errors import SepiError
+from sepi.validation import require_type
 
 
 def available_cores() -> int:
@@ -30,6 +34,11 @@ def use_threads(count: int) -> None:
     count : int
         Threads, at least 1.
 
+    Raises
+    ------
+    SepiError
+        If it is no such number.
+
     Examples
     --------
     Programs that work on many light fields in several processes give each of them one thread:
@@ -40,7 +49,10 @@ def use_threads(count: int) -> None:
     >>> cv2.getNumThreads()
     1
     """
-    count = min(count, available_cores())
+    require_type("threads", count, Integral, "a whole number from 1 on")
+    if count < 1:
+        raise SepiError(f"threads: expected a whole number from 1 on, got {count}")
+    count = min(int(count), available_cores())
     if "numba" in sys.modules:
         import numba
 

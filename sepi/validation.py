@@ -6,8 +6,10 @@ import difflib
 import json
 import math
 import operator
+import os
 from collections.abc import Iterable, Mapping
 from numbers import Real
+from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
@@ -37,6 +39,21 @@ def require_type(where: str, value: object, kind: type | tuple[type, ...], expec
     """Raise unless ``value`` is of this type: what is wrong, in the words of what was ``expected``."""
     if not isinstance(value, kind):
         raise SepiError(f"{where}: expected {expected}, got {described(value)}")
+
+
+def require_path(where: str, value: object) -> Path:
+    """A path, whatever held it."""
+    require_type(where, value, (str, os.PathLike), "a path")
+    return Path(value)  # type: ignore[arg-type]
+
+
+def require_map(where: str, values: object, shape: tuple[int, ...] | None = None) -> None:
+    """Raise unless ``values`` are an array (H, W) of real numbers, of this shape if there is one."""
+    require_type(where, values, np.ndarray, "an array of numbers of shape (H, W)")
+    assert isinstance(values, np.ndarray)
+    if values.dtype.kind not in "fiu" or values.ndim != 2 or shape not in (None, values.shape):
+        expected = "(H, W)" if shape is None else f"(H, W) = {shape}"
+        raise SepiError(f"{where}: expected an array of numbers of shape {expected}, got {values.dtype} {values.shape}")
 
 
 def is_finite(value: object) -> bool:

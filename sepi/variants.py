@@ -351,6 +351,7 @@ def stage_parameters(
     >>> settings["initial"].num_disparities, settings["initial"].window_radius
     (91, 3)
     """
+    require_type("variant", variant, Variant, "a Variant")
     given = parameters or {}
     require_type("parameters", given, Mapping, "stages with their parameters")
     require_known("parameters", given, STAGES)

@@ -10,7 +10,25 @@ import pytest
 
 import sepi
 from sepi.camera import camera_from
-from sepi.scenes import render
+from sepi.evaluate import evaluation_of, evaluations_of
+from sepi.inspection.disparity_range import estimate_range
+from sepi.inspection.view_order import check_order
+from sepi.io.disparity_maps import read_disparity
+from sepi.io.hdf5 import write_light_field
+from sepi.io.pfm import read_pfm, write_pfm
+from sepi.io.ply import write_ply
+from sepi.io.point_cloud import point_cloud
+from sepi.io.result_folder import colour_code
+from sepi.matching.sheared_views import ShearedViews
+from sepi.matching.stitched_epi import stitched_epi
+from sepi.matching.unknown import unknown_pixels
+from sepi.scenes import render, write_hci
+from sepi.scoring.confidence import oracle, sparsification
+from sepi.scoring.edges import edges_of
+from sepi.scoring.hci_submission import problems_of, write_submission
+from sepi.scoring.regions import occluded, textureless
+from sepi.scoring.scores import region_masks, score, score_regions
+from sepi.threads import use_threads
 from sepi.variants import VARIANTS, stage_parameters
 
 VIEWS = np.zeros((3, 3, 64, 64, 3), np.uint8)
@@ -37,8 +55,12 @@ def write(disparity: Any = ONES, confidence: Any = ONES, **extra: Any) -> Callab
     return lambda: sepi.write_result("unwritten", SCENE, sepi.StageMaps(disparity, confidence, extra))
 
 
-def written(*arguments: Any) -> Callable[[], object]:
-    return lambda: sepi.write_result(*arguments)
+def written(*arguments: Any, **more: Any) -> Callable[[], object]:
+    return lambda: sepi.write_result(*arguments, **more)
+
+
+def call(function: Callable[..., object], *arguments: Any, **more: Any) -> Callable[[], object]:
+    return lambda: function(*arguments, **more)
 
 
 def field(**more: Any) -> Callable[[], object]:
@@ -103,6 +125,56 @@ WRONG: dict[str, tuple[Callable[[], object], str]] = {
     "complex maps": (write(ONES.astype(complex)), "dots: map 'disparity': expected numbers, got complex128"),
     "confidence without numbers": (write(ONES, ONES * np.nan), "dots: confidence must lie within 0..1, got NaN"),
     "numbers of unknown": (write(unknown=ONES.astype(np.uint8)), "dots: map 'unknown': expected bool, got uint8"),
+    "text as seconds": (written("unwritten", SCENE, sepi.StageMaps(ONES, ONES), seconds="a"), "unwritten: seconds: "),
+    "focus everywhere on an array": (call(sepi.all_in_focus, VIEWS, ONES), "light field: expected a LightField"),
+    "focus everywhere by text": (call(sepi.all_in_focus, SCENE, "a"), "dots: map: expected an array of numbers"),
+    "focus everywhere by complex": (call(sepi.all_in_focus, SCENE, ONES.astype(complex)), "dots: map: .* complex128"),
+    "aperture of text": (call(sepi.refocus, SCENE, 0, aperture="a"), "dots: aperture: expected a radius"),
+    "size of text": (call(render, "dots", size="a"), "size must be a whole number"),
+    "scene of an array": (call(write_hci, VIEWS, "unwritten"), "light field: expected a LightField"),
+    "scene to nowhere": (call(write_hci, SCENE, None), "folder of the light field: expected a path, got None"),
+    "light field of an array": (call(write_light_field, "unwritten", VIEWS), "light field: expected a LightField"),
+    "light field to nowhere": (call(write_light_field, None, SCENE), "light field to write: expected a path"),
+    "result from nowhere": (call(sepi.read_result, None), "result: expected a path, got None"),
+    "map from nowhere": (call(read_disparity, 3), "disparity map: expected a path, got 3"),
+    "scale of text": (call(read_disparity, Path(__file__), scale="a"), "scale: expected a finite number, got 'a'"),
+    "no number as scale": (
+        call(read_disparity, Path(__file__), scale=np.nan),
+        "scale: expected a finite number, got nan",
+    ),
+    "PFM of colours": (call(write_pfm, "unwritten", VIEWS[0, 0]), r"unwritten: expected .* \(H, W\), got uint8"),
+    "PFM from nowhere": (call(read_pfm, None), "PFM to read: expected a path"),
+    "points of a map": (call(write_ply, "unwritten", ONES), "unwritten: positions: expected an array"),
+    "points of text": (call(point_cloud, VIEWS[0, 0], "a"), "point cloud: disparity: expected an array"),
+    "colours of text": (call(colour_code, "a"), "map to colour: expected an array"),
+    "unknown in an array": (call(unknown_pixels, VIEWS, ONES), "light field: expected a LightField"),
+    "unknown by a small map": (
+        call(unknown_pixels, SCENE, ONES[:5]),
+        r"dots: disparity: .*\(64, 64\), got float32 \(5",
+    ),
+    "threads of text": (call(use_threads, "a"), "threads: expected a whole number from 1 on, got 'a'"),
+    "no threads": (call(use_threads, 0), "threads: expected a whole number from 1 on, got 0"),
+    "sheared array": (call(ShearedViews, VIEWS), "light field: expected a LightField"),
+    "row of text": (call(stitched_epi, SCENE, "a", 0), "dots: row: expected a whole number"),
+    "stitched by text": (call(stitched_epi, SCENE, 3, "a"), "dots: disparity must be a finite number"),
+    "range of an array": (call(estimate_range, VIEWS), "light field: expected a LightField"),
+    "order of an array": (call(check_order, VIEWS), "light field: expected a LightField"),
+    "unknown order": (call(check_order, SCENE, "a"), "order: unknown 'a'; known: as-given"),
+    "score of text": (call(score, "a", ONES), "estimate: expected an array"),
+    "score by text": (call(score_regions, ONES, "a"), "ground_truth: expected an array"),
+    "regions of an array": (call(region_masks, VIEWS), "light field: expected a LightField"),
+    "evaluation of an array": (call(evaluation_of, VIEWS, ONES), "light field: expected a LightField"),
+    "evaluation of a small map": (call(evaluation_of, SCENE, ONES[:5]), "dots: disparity: expected an array"),
+    "evaluations of one map": (call(evaluations_of, SCENE, ONES), "dots: maps: expected names with their maps"),
+    "edges of text": (call(edges_of, "a"), "ground truth: expected an array"),
+    "hidden by text": (call(occluded, "a", SCENE.baselines), "ground truth: expected an array"),
+    "texture of text": (call(textureless, "a"), "reference view: expected an array"),
+    "confidence of text": (call(sparsification, "a", ONES), "confidence: expected an array"),
+    "best confidence of text": (call(oracle, "a"), "error: expected an array"),
+    "submission of numbers": (call(write_submission, "unwritten", 3), "unwritten: entries: expected scenes"),
+    "submission from nowhere": (call(problems_of, None), "submission: expected a path"),
+    "parameters of no variant": (call(stage_parameters, None), "variant: expected a Variant, got None"),
+    "number as reading": (field(reading=3), "mine: reading: expected text, got 3"),
     "options: grid": (lambda: sepi.ReadOptions(grid="5x5"), "options: grid: expected two whole"),  # type: ignore[arg-type]
     "options: exclude": (lambda: sepi.ReadOptions(exclude=((0, 0),)), "options: exclude: "),  # type: ignore[arg-type]
     "options: central": (lambda: sepi.ReadOptions(central="3"), "options: central: "),  # type: ignore[arg-type]

@@ -145,7 +145,7 @@ def test_no_ground_truth_no_scores() -> None:
 
 
 def test_wrong_shape_is_a_clear_error() -> None:
-    with pytest.raises(SepiError, match=r"ground_truth .*\(40, 39\), got \(40, 40\)"):
+    with pytest.raises(SepiError, match=r"disparity: .*\(40, 40\), got float32 \(40, 39\)"):
         evaluation_of(scene(np.zeros((40, 40), np.float32)), np.zeros((40, 39), np.float32))
     with pytest.raises(SepiError, match=r"ground_truth .*\(2, 2\), got \(2, 3\)"):
         score(np.zeros((2, 2), np.float32), np.zeros((2, 3), np.float32))

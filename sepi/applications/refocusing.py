@@ -15,6 +15,7 @@ References
 from __future__ import annotations
 
 import math
+from numbers import Real
 
 import cv2
 import numpy as np
@@ -24,7 +25,7 @@ from sepi.image.noise import noise_level, variance_of_residuals
 from sepi.lightfield import BoolMap, FloatMap, LightField, as_unit_float, require_light_field
 from sepi.matching.sheared_views import ShearedViews
 from sepi.stage import Progress, StageMaps, no_progress
-from sepi.validation import described, is_finite
+from sepi.validation import described, is_finite, require_map, require_type
 
 OCCLUSION_MARGIN = 0.15
 """By how much an occluder must be nearer, pixels per view step; that of the stages."""
@@ -173,6 +174,7 @@ def all_in_focus(
     >>> error(picture) < error(noisy.reference_view) / 2
     True
     """
+    require_light_field(light_field)
     disparity = _disparity_of(light_field, maps)
     others = views_within(light_field, aperture)
     others[light_field.reference_position] = False
@@ -208,6 +210,7 @@ def views_within(light_field: LightField, aperture: float | None) -> BoolMap:
     """
     if aperture is None:
         return light_field.present.copy()
+    require_type(f"{light_field.name}: aperture", aperture, Real, "a radius above 0 in view steps")
     if not aperture > 0:
         raise SepiError(f"{light_field.name}: aperture must be a radius above 0 in view steps, got {aperture:g}")
     distance = np.hypot(*np.moveaxis(light_field.baselines, 2, 0))
@@ -260,13 +263,9 @@ def evenly_spaced(low: float, high: float, count: int) -> list[float]:
 
 def _disparity_of(light_field: LightField, maps: StageMaps | FloatMap) -> FloatMap:
     """The disparity of maps, which must have the views' shape."""
-    disparity = np.asarray(maps.disparity if isinstance(maps, StageMaps) else maps, np.float32)
-    if disparity.shape != light_field.shape:
-        raise SepiError(
-            f"{light_field.name}: the map must have the views' shape (H, W) = {light_field.shape}, got "
-            f"{disparity.shape}"
-        )
-    return disparity
+    disparity = maps.disparity if isinstance(maps, StageMaps) else maps
+    require_map(f"{light_field.name}: map", disparity, light_field.shape)
+    return np.asarray(disparity, np.float32)
 
 
 def _surfaces(disparity: FloatMap) -> FloatMap | None:

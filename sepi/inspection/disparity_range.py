@@ -18,7 +18,7 @@ import numpy as np
 
 from sepi.errors import SepiError
 from sepi.inspection.dark_corners import dark_corners
-from sepi.lightfield import BoolMap, DisparityRange, FloatMap, LightField, as_unit_float
+from sepi.lightfield import BoolMap, DisparityRange, FloatMap, LightField, as_unit_float, require_light_field
 
 # Search: pixels per view step to each side at first, and if surfaces lie beyond; views up to this many steps away at
 # first, and if surfaces move by more than so many pixels
@@ -117,6 +117,7 @@ def estimate_range(light_field: LightField) -> DisparityRange:
     >>> light_field.disparity_range.source
     'estimated'
     """
+    require_light_field(light_field)
     factor = math.ceil(math.sqrt(math.prod(light_field.shape) / _MOST_PIXELS))
     views = _Views(light_field, factor)
     low, high, sampling = _searched(views)

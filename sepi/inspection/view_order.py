@@ -15,7 +15,8 @@ import numpy as np
 from sepi.inspection.disparity_sign import Evidence, Look, occlusion_evidence
 from sepi.inspection.view_layouts import Views, best_trial
 from sepi.io.readers.options import AS_GIVEN, ORDERS
-from sepi.lightfield import LightField
+from sepi.lightfield import LightField, require_light_field
+from sepi.validation import require_known
 
 # What the sign needs: regions of the picture where one surface is seen to hide another, the mean of what they say
 # (-2 to 2), and how many standard errors that is; and what it takes to say that near and far are exchanged
@@ -146,6 +147,8 @@ def check_order(light_field: LightField, read_in: str = AS_GIVEN) -> OrderCheck:
     >>> print(found.warning())  # doctest: +ELLIPSIS
     the rows of views run the other way: read it with --order flip-rows...
     """
+    require_light_field(light_field)
+    require_known("order", [read_in], ORDERS)
     trial = best_trial(Views(light_field))
     if trial is None:
         return OrderCheck(dict.fromkeys(ORDERS, 1.0), read_in, clear=False, sign_clear=False, read_in=read_in)

@@ -13,6 +13,7 @@ from sepi.io.images import picture_header, png_texts, read_picture
 from sepi.io.pfm import read_pfm
 from sepi.io.readers.numpy_files import read_array
 from sepi.lightfield import FloatMap
+from sepi.validation import described, is_finite, require_path
 
 _HDF5 = (".h5", ".hdf5")
 
@@ -86,10 +87,12 @@ def read_disparity(path: str | Path, *, scale: float | None = None, offset: floa
     >>> read_disparity(Path("other.npy"), scale=-1 / 8).tolist()
     [[1.0, 0.25, -0.5]]
     """
-    path = Path(path)
-    path = map_file(path)
+    path = map_file(require_path("disparity map", path))
     if not path.is_file():
         raise SepiError(f"{path}: no such file")
+    for name, value in (("scale", 1 if scale is None else scale), ("offset", offset)):
+        if not is_finite(value):
+            raise SepiError(f"{path}: {name}: expected a finite number, got {described(value)}")
     # numbers beyond float32 become infinite, and count as unknown
     with np.errstate(over="ignore", invalid="ignore"):
         values = _read(path, scaled=scale is not None)

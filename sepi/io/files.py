@@ -6,6 +6,7 @@ They are written under a temporary name in the same folder, then renamed.
 from __future__ import annotations
 
 import atexit
+import io
 import os
 import re
 import secrets
@@ -13,6 +14,7 @@ import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Any
 
 from sepi.errors import SepiError, one_line, printable
 
@@ -161,3 +163,29 @@ def remove_temporary(temporary: Path) -> None:
 def _remove_unfinished() -> None:
     for temporary in list(_unfinished):
         remove_temporary(temporary)
+
+
+class PatientFile(io.FileIO):
+    """A file that keeps the first failure to itself: HDF5 crashes the program on a full disk."""
+
+    failure: OSError | None = None
+
+    def write(self, data: Any) -> int:
+        """Write all of ``data``."""
+        left = memoryview(data).cast("B")
+        size = len(left)
+        try:
+            while left:
+                left = left[super().write(left) :]
+        except OSError as error:
+            self.failure = self.failure or error
+            self.seek(len(left), io.SEEK_CUR)
+        return size
+
+    def truncate(self, size: int | None = None) -> int:
+        """Set the file's size."""
+        try:
+            return super().truncate(size)
+        except OSError as error:
+            self.failure = self.failure or error
+            return self.tell() if size is None else size

@@ -1,7 +1,9 @@
 """All HDF5 reading and writing: light fields and stage files.
 
 A file begins with a digest of all that follows it (in what HDF5 calls the user block, which other programs skip), so
-that damage is told before anything is made of it: HDF5 itself may read other numbers, crash, or hang.
+that damage is told before anything is made of it: HDF5 itself may read other numbers, crash, or hang. Where it does not
+fit, another process looks whether all that was written is there yet, by digests of groups and datasets: then another
+program only added attributes.
 
 A stage file holds ``disparity (H, W) float32`` in pixels per view step, ``confidence (H, W) float32`` in 0..1, the
 stage's own maps, and attributes that say what made them; where a later stage is to choose among candidates, their costs
@@ -12,11 +14,10 @@ from __future__ import annotations
 
 import hashlib
 import io
-import os
-import signal
-import warnings
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+import json
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import astuple
 from pathlib import Path
 from typing import Any
@@ -27,10 +28,11 @@ import numpy.typing as npt
 
 from sepi.camera import Camera
 from sepi.errors import SepiError, printable
-from sepi.io.files import atomic_path, reading
-from sepi.lightfield import RANGE_SOURCES, DisparityRange, LightField
+from sepi.io import apart
+from sepi.io.files import PatientFile, atomic_path, reading
+from sepi.lightfield import RANGE_SOURCES, DisparityRange, LightField, require_light_field
 from sepi.stage import CostVolume, StageMaps
-from sepi.validation import require_known
+from sepi.validation import require_known, require_path
 
 Attribute = str | float | int | tuple[float, float]
 
@@ -40,8 +42,18 @@ DEFLATE_RATIO = 1100
 # the user block: HDF5 wants a power of two, 512 at least
 _BLOCK = 512
 _MARK = b"sepi sha256 "
-# seconds in which an attribute must be read
+# attribute of a group or dataset: digest of it and of what is below it, and its other attributes that are ours
+_OWN = "sepi_sha256"
+# seconds of processor that an attribute may take, and a file but for what its size adds
 _PATIENCE = 1
+_BYTES_A_SECOND = 10_000_000
+# bytes of a dataset that are read at once for its digest
+_PART = 16_000_000
+# a file's time tells a later change when it is so many seconds old, as disks keep times no finer
+_SETTLED = 2
+
+# whether files are sound, by device, number, size and time
+_sound: dict[tuple[int, int, int, int], bool] = {}
 
 # datasets of a cost volume
 _COSTS, _CANDIDATES = "cost_volume", "candidates"
@@ -83,7 +95,7 @@ def read_stage(path: Path) -> StageMaps:
 def read_attributes(path: Path, check: bool = True) -> dict[str, Any]:
     """Attributes of an HDF5 file; unchecked, without reading the whole file for its digest."""
     with open_hdf5(path, check=check) as file:
-        return {name: attribute(file, name) for name in file.attrs}
+        return {name: attribute(file, name) for name in own_attributes(file)}
 
 
 def write_light_field(path: str | Path, light_field: LightField) -> None:
@@ -116,7 +128,8 @@ def write_light_field(path: str | Path, light_field: LightField) -> None:
     >>> bool((again.views == light_field.views).all()), again.baselines[0, 1].tolist()
     (True, [-0.75, -0.5])
     """
-    path = Path(path)
+    path = require_path("light field to write", path)
+    require_light_field(light_field)
     known = light_field.disparity_range
     with create_hdf5(path) as file:
         # gzip would cost 1.8 s and save half of 64 MB for a benchmark scene: not worth it for an intermediate file
@@ -205,6 +218,13 @@ def members(group: h5py.Group | Mapping[str, Any]) -> list[tuple[str, Any]]:
     return list(group.items())
 
 
+def own_attributes(holder: h5py.Group | h5py.Dataset) -> list[str]:
+    """Names of the attributes; in a file of this package, of those that it was written with."""
+    if _has_digest(holder) and _OWN in holder.attrs:
+        return list(json.loads(holder.attrs[_OWN].partition(b" ")[2]))
+    return [name for name in holder.attrs if name != _OWN]
+
+
 def attribute(holder: h5py.Group | h5py.Dataset, key: str) -> Any:
     """The value of an attribute; text of fixed length as text, too.
 
@@ -215,8 +235,9 @@ def attribute(holder: h5py.Group | h5py.Dataset, key: str) -> Any:
     SepiError
         If HDF5 hangs on it, or crashes, as it does on text of variable length in damaged files.
     """
-    doubtful = holder.attrs.get_id(key).dtype.hasobject and not _has_digest(Path(holder.file.filename))
-    if doubtful and not _comes_back(lambda: holder.attrs[key]):
+    # those of our own were looked at when the file was opened
+    doubtful = holder.attrs.get_id(key).dtype.hasobject and not (_has_digest(holder) and key in own_attributes(holder))
+    if doubtful and apart.outcome(lambda: holder.attrs[key], _PATIENCE) is None:
         raise SepiError(f"damaged HDF5 file: its attribute '{printable(key)}' cannot be read")
     value = holder.attrs[key]
     return value.decode("utf-8", "replace") if isinstance(value, bytes) else value
@@ -231,6 +252,11 @@ def read_dataset(path: Path, dataset: h5py.Dataset, part: Any = ...) -> npt.NDAr
         If ``dataset`` is none, lies in another file, or claims more values than it can have: no memory is taken on the
         word of its shape.
     """
+    _require_held(path, dataset)
+    return np.asarray(dataset[part])
+
+
+def _require_held(path: Path, dataset: Any) -> None:
     name = printable(str(dataset.name).lstrip("/"))
     if not isinstance(dataset, h5py.Dataset) or dataset.shape is None:
         raise SepiError(f"{path}: damaged HDF5 file: '{name}' is no array")
@@ -243,7 +269,6 @@ def read_dataset(path: Path, dataset: h5py.Dataset, part: Any = ...) -> npt.NDAr
     # what is not compressed is stored as it is, but for chunks never written
     if held > path.stat().st_size or dataset.nbytes > held * (DEFLATE_RATIO if dataset.chunks else 1):
         raise SepiError(f"{path}: damaged HDF5 file: '{name}' of shape {dataset.shape} cannot lie in {held} bytes")
-    return np.asarray(dataset[part])
 
 
 @contextmanager
@@ -265,36 +290,70 @@ def open_hdf5(path: Path, kind: str = "readable HDF5 file", check: bool = True) 
 
 
 def _require_sound(path: Path) -> None:
-    """Refuse a file of this package that is not as it was written."""
+    """Refuse a file of this package that does not hold what was written, once looked at by this process."""
+    status = path.stat()
+    now = (status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns)
+    sound = _sound.get(now)
+    if sound is None:
+        sound = _is_as_written(path) or _was_added_to(path)
+        if status.st_mtime < time.time() - _SETTLED:
+            _sound[now] = sound
+    if not sound:
+        raise SepiError(f"{path}: damaged, or changed by another program; remove it and make it again")
+
+
+def _is_as_written(path: Path) -> bool:
+    """Whether the digest of a file is that of its bytes; others than those of this package have none."""
     with path.open("rb") as file:
         block = file.read(_BLOCK)
-        if block.startswith(_MARK) and block != _block(file):
-            raise SepiError(f"{path}: damaged, or changed by another program; remove it and make it again")
+        return not block.startswith(_MARK) or block == _block(file)
 
 
-def _has_digest(path: Path) -> bool:
-    """Whether a file that was opened begins with a digest, which was looked at then."""
-    with path.open("rb") as file:
+def _was_added_to(path: Path) -> bool:
+    """Whether a file has attributes beside those that were written, and all else is what was written."""
+
+    def found() -> bool:
+        with h5py.File(path, "r") as file:
+            known: dict[Any, bytes] = {}
+            whole = file.attrs[_OWN] == _record(file, known, path)
+            return whole and any(len(entry.attrs) > len(own_attributes(entry)) + 1 for entry in known)
+
+    return apart.CAN_TRY and apart.outcome(found, _PATIENCE + path.stat().st_size / _BYTES_A_SECOND) is True
+
+
+def _record(entry: h5py.Group | h5py.Dataset, known: dict[Any, bytes], path: Path | None = None) -> bytes:
+    """What tells a group or dataset from a changed one: in the file at ``path``, or for a file that is being written.
+
+    ``known`` are those of entries before: they may have several names.
+    """
+    if entry in known:
+        return known[entry]
+    names = sorted(entry.attrs) if path is None else own_attributes(entry)
+    total = hashlib.sha256()
+    for name in names:
+        value = np.asarray(entry.attrs[name])
+        total.update(repr((name, value.dtype.str, value.tolist())).encode())
+    if isinstance(entry, h5py.Group):
+        for name, member in members(entry):
+            total.update(repr((name, _record(member, known, path))).encode())
+    else:
+        if path is not None:
+            _require_held(path, entry)
+        total.update(repr((entry.dtype.str, entry.shape)).encode())
+        # a part of what is packed would be unpacked with all that is packed with it
+        rows = max(1, len(entry) if entry.chunks else _PART * len(entry) // max(1, entry.nbytes))
+        for start in range(0, len(entry), rows):
+            total.update(entry[start : start + rows])
+    known[entry] = _fixed(f"{total.hexdigest()} {json.dumps(names)}")
+    if path is None:
+        entry.attrs[_OWN] = known[entry]
+    return known[entry]
+
+
+def _has_digest(holder: h5py.Group | h5py.Dataset) -> bool:
+    """Whether the file, which was opened, begins with a digest, which was looked at then."""
+    with Path(holder.file.filename).open("rb") as file:
         return file.read(len(_MARK)) == _MARK
-
-
-def _comes_back(read: Callable[[], object]) -> bool:
-    """Whether a call ends, well or with an exception; tried in another process, which takes a few milliseconds."""
-    if not hasattr(os, "fork"):
-        # not on this system: the call has to be risked
-        return True
-    with warnings.catch_warnings(action="ignore"):
-        # of threads, which Python warns of: nothing that they may hold is used here but HDF5's lock, which h5py minds
-        child = os.fork()
-    if child == 0:
-        try:
-            signal.signal(signal.SIGALRM, signal.SIG_DFL)
-            signal.alarm(_PATIENCE)
-            with suppress(Exception):
-                read()
-        finally:
-            os._exit(0)
-    return os.waitpid(child, 0)[1] == 0
 
 
 def _block(file: io.BufferedReader | io.BufferedRandom) -> bytes:
@@ -307,9 +366,13 @@ def _block(file: io.BufferedReader | io.BufferedRandom) -> bytes:
 def create_hdf5(path: Path) -> Iterator[h5py.File]:
     """Write an HDF5 file, whole or not at all."""
     with atomic_path(path) as temporary:
-        with _Disk(temporary, "w+") as disk:
+        with PatientFile(temporary, "w+") as disk:
             with h5py.File(disk, "w", userblock_size=_BLOCK) as file:
                 yield file
+                # what cannot be written cannot be read for its digest either
+                file.flush()
+                if disk.failure is None:
+                    _record(file, {})
             if disk.failure is not None:
                 raise disk.failure
         with temporary.open("r+b") as written:
@@ -329,29 +392,3 @@ def _text(file: h5py.File, key: str) -> str:
     if not isinstance(kind, h5py.h5t.TypeStringID) or kind.is_variable_str():
         raise SepiError(f"not a light field of this package: attribute '{key}' is no text of fixed length")
     return "\0".join(value.decode("utf-8", "replace") for value in np.ravel(file.attrs[key]).tolist())
-
-
-class _Disk(io.FileIO):
-    """A file that keeps the first failure to itself: HDF5 crashes the program on a full disk."""
-
-    failure: OSError | None = None
-
-    def write(self, data: Any) -> int:
-        """Write all of ``data``."""
-        left = memoryview(data).cast("B")
-        size = len(left)
-        try:
-            while left:
-                left = left[super().write(left) :]
-        except OSError as error:
-            self.failure = self.failure or error
-            self.seek(len(left), io.SEEK_CUR)
-        return size
-
-    def truncate(self, size: int | None = None) -> int:
-        """Set the file's size."""
-        try:
-            return super().truncate(size)
-        except OSError as error:
-            self.failure = self.failure or error
-            return self.tell() if size is None else size

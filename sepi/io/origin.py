@@ -13,7 +13,7 @@ import numpy.typing as npt
 from pydantic import TypeAdapter, ValidationError
 
 from sepi.errors import SepiError
-from sepi.io.hdf5 import Attribute, attribute, open_hdf5, read_dataset
+from sepi.io.hdf5 import Attribute, attribute, open_hdf5, own_attributes, read_dataset
 from sepi.io.readers.options import ReadOptions
 from sepi.lightfield import LightField
 
@@ -122,7 +122,7 @@ def read_origin(path: Path) -> Origin | None:
     if path.suffix not in (".h5", ".hdf5") or not path.is_file():
         return None
     with open_hdf5(path, "result of 'sepi depth'") as file:
-        known = {name: attribute(file, name) for name in file.attrs}
+        known = {name: attribute(file, name) for name in own_attributes(file)}
         if not {"view_position", "grid"} <= set(known):
             return None
         (t, s), (rows, columns) = (map(int, known[name]) for name in ("view_position", "grid"))

@@ -10,6 +10,7 @@ import numpy as np
 from sepi.errors import SepiError
 from sepi.io.files import atomic_path, reading
 from sepi.lightfield import FloatMap
+from sepi.validation import require_map, require_path
 
 # magic, width, height, scale (its sign gives the byte order), each ended by one white space
 _HEADER = re.compile(rb"\A(P[fF])\s+(\d{1,9})\s+(\d{1,9})\s+([-+]?[0-9.]+(?:[eE][-+]?\d+)?)\s")
@@ -43,7 +44,7 @@ def read_pfm(path: str | Path) -> FloatMap:
     >>> read_pfm(Path("map.pfm")).tolist()
     [[1.0, 2.0], [3.0, 4.0]]
     """
-    path = Path(path)
+    path = require_path("PFM to read", path)
     with reading(path, "one-channel PFM"):
         data = path.read_bytes()
         header = _HEADER.match(data[:256])
@@ -84,7 +85,8 @@ def write_pfm(path: str | Path, values: FloatMap) -> None:
     >>> read_pfm(Path("maps/cotton.pfm")).tolist()
     [[0.25, nan]]
     """
-    path = Path(path)
+    path = require_path("PFM to write", path)
+    require_map(str(path), values)
     height, width = values.shape
     with atomic_path(path) as temporary:
         temporary.write_bytes(f"Pf\n{width} {height}\n-1\n".encode() + values[::-1].astype("<f4").tobytes())

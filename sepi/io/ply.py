@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sepi.io.files import atomic_path
+from sepi.validation import require_path, require_type
 
 _POINT = np.dtype([("position", "<f4", 3), ("colour", "u1", 3)])
 _PROPERTIES = (*(f"float {axis}" for axis in "xyz"), *(f"uchar {colour}" for colour in ("red", "green", "blue")))
@@ -56,7 +57,9 @@ def write_ply(path: str | Path, cloud: Cloud) -> None:
     >>> Path("pyramids.ply").read_bytes().splitlines()[4]
     b'element vertex 4096'
     """
-    path = Path(path)
+    path = require_path("PLY to write", path)
+    for name in ("positions", "colours"):
+        require_type(f"{path}: {name}", getattr(cloud, name, None), np.ndarray, "an array of the points")
     points = np.empty(len(cloud.positions), _POINT)
     points["position"], points["colour"] = cloud.positions, cloud.colours
     header = [

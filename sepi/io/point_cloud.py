@@ -20,6 +20,7 @@ range is a third of the picture's width. Shape and proportions are then not thos
 from __future__ import annotations
 
 from dataclasses import dataclass
+from types import NoneType
 from typing import Any
 
 import numpy as np
@@ -28,6 +29,7 @@ import numpy.typing as npt
 from sepi.camera import Camera
 from sepi.errors import SepiError
 from sepi.lightfield import BoolMap, FloatMap
+from sepi.validation import require_map, require_type
 
 Positions = npt.NDArray[np.float32]
 Colours = npt.NDArray[np.uint8]
@@ -153,7 +155,10 @@ def point_cloud(
     >>> len(sure.positions) <= 32 * 32
     True
     """
+    require_type("point cloud: picture", picture, np.ndarray, "a view")
+    require_map("point cloud: disparity", disparity)
     for name, values in {"disparity": disparity, "confidence": confidence, "unknown": unknown}.items():
+        require_type(f"point cloud: {name}", values, (np.ndarray, NoneType), "an array")
         if values is not None and values.shape != picture.shape[:2]:
             raise SepiError(f"point cloud: {name} is {values.shape}, the view {picture.shape[:2]} (height, width)")
     if step < 1:

@@ -30,7 +30,7 @@ from sepi.io.point_cloud import point_cloud
 from sepi.io.provenance import result_attributes
 from sepi.lightfield import BoolMap, FloatMap, LightField, require_light_field
 from sepi.stage import StageMaps
-from sepi.validation import require_type
+from sepi.validation import described, is_finite, require_map, require_path, require_type
 
 RESULT_FILES = (
     "disparity.pfm",
@@ -181,10 +181,11 @@ def write_result(
     """
     require_light_field(light_field)
     require_type(f"{light_field.name}: maps", maps, StageMaps, "StageMaps")
-    require_type("folder of the result", folder, (str, os.PathLike), "a path")
+    folder = require_path("folder of the result", folder)
     require_type(f"{folder}: attributes", attributes, (Mapping, NoneType), "names with values")
+    if not (seconds is None or is_finite(seconds)):
+        raise SepiError(f"{folder}: seconds: expected a number, got {described(seconds)}")
     maps = _sound(light_field, maps)
-    folder = Path(folder)
     earlier = require_own(folder, light_field, force=force)
     # the folder itself may be a link to where there is room
     target = folder.resolve()
@@ -278,7 +279,7 @@ def read_result(path: str | Path) -> Result:
     >>> bool((result.disparity == maps.disparity).all()), int(result.unknown.sum())
     (True, 0)
     """
-    path = Path(path)
+    path = require_path("result", path)
     path = path / RESULT if path.is_dir() else path
     with open_hdf5(path, "result of 'sepi depth'") as file:
         picture, disparity, confidence = (
@@ -330,6 +331,7 @@ def colour_code(values: FloatMap, unknown: BoolMap | None = None) -> npt.NDArray
     >>> picture[0, 2].tolist(), picture[0, 3].tolist()
     ([0, 0, 0], [128, 128, 128])
     """
+    require_map("map to colour", values)
     finite = np.isfinite(values)
     # what is unknown takes no part of the scale
     counted = finite if unknown is None else finite & ~unknown

@@ -18,7 +18,7 @@ import h5py
 import numpy as np
 
 from sepi.errors import SepiError
-from sepi.io.hdf5 import UNITS, Attribute, attribute, create_hdf5, members, open_hdf5, read_dataset
+from sepi.io.hdf5 import UNITS, Attribute, attribute, create_hdf5, members, open_hdf5, own_attributes, read_dataset
 from sepi.lightfield import BoolMap, FloatMap
 
 _MAPS = "maps"
@@ -143,7 +143,8 @@ def scores_in(group: h5py.Group) -> AllScores:
     """The scores alone of what :func:`put_evaluation` wrote: protocol to region to scores."""
     return {
         protocol: {
-            region: {key: attribute(cell, key).item() for key in cell.attrs} for region, cell in members(regions)
+            region: {key: attribute(cell, key).item() for key in own_attributes(cell)}
+            for region, cell in members(regions)
         }
         for protocol, regions in members(group.get("scores", {}))
     }

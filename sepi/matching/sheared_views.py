@@ -22,7 +22,7 @@ from collections.abc import Iterator
 import numpy as np
 import numpy.typing as npt
 
-from sepi.lightfield import BoolMap, FloatMap, LightField, as_unit_float
+from sepi.lightfield import BoolMap, FloatMap, LightField, as_unit_float, require_light_field
 
 
 class ShearedViews:
@@ -72,6 +72,7 @@ class ShearedViews:
     """
 
     def __init__(self, light_field: LightField, views: BoolMap | None = None, *, cubic: bool = True) -> None:
+        require_light_field(light_field)
         chosen = light_field.present if views is None else views & light_field.present
         self.positions = np.argwhere(chosen)
         self.baselines = light_field.baselines[chosen]

@@ -17,11 +17,13 @@ References
 from __future__ import annotations
 
 from dataclasses import dataclass
+from numbers import Integral
 
 import numpy as np
 
 from sepi.errors import SepiError
-from sepi.lightfield import FloatMap, LightField, as_unit_float
+from sepi.lightfield import FloatMap, LightField, as_unit_float, require_light_field
+from sepi.validation import described, is_finite, require_type
 
 
 @dataclass(frozen=True)
@@ -147,9 +149,13 @@ def stitched_epi(light_field: LightField, y: int, disparity: float) -> StitchedE
     >>> epi.offsets.astype(int).tolist()  # the EPIs of three rows of views, shifted against each other
     [3, 3, 3, 0, 0, 0, -3, -3, -3]
     """
+    require_light_field(light_field)
     (T, S), (H, W) = light_field.grid, light_field.shape
+    require_type(f"{light_field.name}: row", y, Integral, "a whole number")
     if not 0 <= y < H:
         raise SepiError(f"{light_field.name}: row {y} lies outside the reference view (0..{H - 1})")
+    if not is_finite(disparity):
+        raise SepiError(f"{light_field.name}: disparity must be a finite number, got {described(disparity)}")
     down, across = np.moveaxis(light_field.baselines, 2, 0)
     j = np.repeat(np.arange(T)[:, None] - light_field.reference_position[0], S, axis=1)
     offsets, positions = -disparity * S * j, S * j + across

@@ -17,8 +17,9 @@ import numpy as np
 import numpy.typing as npt
 
 from sepi.image.noise import SATURATED, noise_level
-from sepi.lightfield import BoolMap, FloatMap, LightField, as_unit_float, full_scale
+from sepi.lightfield import BoolMap, FloatMap, LightField, as_unit_float, full_scale, require_light_field
 from sepi.stage import StageMaps
+from sepi.validation import require_map
 
 UNKNOWN = "unknown"
 """Name of the map."""
@@ -100,6 +101,8 @@ def unknown_pixels(light_field: LightField, disparity: FloatMap) -> BoolMap:
     >>> bool(unknown[:, :24].all()), bool(unknown[1:-1, 40:-1].any())
     (True, False)
     """
+    require_light_field(light_field)
+    require_map(f"{light_field.name}: disparity", disparity, light_field.shape)
     return without_signal(light_field, disparity) | held_by_few(light_field, disparity)
 
 

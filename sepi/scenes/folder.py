@@ -11,7 +11,8 @@ from sepi.errors import SepiError
 from sepi.io.files import atomic_folder
 from sepi.io.images import write_png
 from sepi.io.pfm import write_pfm
-from sepi.lightfield import LightField
+from sepi.lightfield import LightField, require_light_field
+from sepi.validation import require_path
 
 # A made-up camera with the benchmark's numbers. A disparity of d pixels is then a depth of 36.57 / (d + 8.605) metres,
 # finite for every disparity of the scenes; the baseline shrinks with the picture to keep that so.
@@ -52,7 +53,8 @@ def write_hci(light_field: LightField, folder: str | Path) -> None:
     >>> light_field.disparity_range.source, light_field.camera is not None
     ('parameters', True)
     """
-    folder = Path(folder)
+    require_light_field(light_field)
+    folder = require_path("folder of the light field", folder)
     if light_field.row_spacing != 1 or light_field.positions is not None:
         raise SepiError(f"{light_field.name}: the layout of the HCI benchmark needs views on a grid of even spacing")
     with atomic_folder(folder) as temporary:

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sepi.lightfield import FloatMap
+from sepi.validation import require_type
 
 DECILES = 10
 
@@ -75,6 +76,8 @@ def sparsification(confidence: FloatMap, error: FloatMap) -> FloatArray:
     >>> curve.shape, bool(curve[50] < 0.2 * curve[0])
     ((100,), True)
     """
+    for name, values in (("confidence", confidence), ("error", error)):
+        require_type(name, values, np.ndarray, "an array of numbers")
     sums = np.cumsum(np.abs(_by_confidence(confidence, error)))
     if sums.size == 0:
         return np.full(STEPS, np.nan)
@@ -106,6 +109,7 @@ def oracle(error: FloatMap) -> FloatArray:
     >>> bool((oracle(error) <= ignorant).all())
     True
     """
+    require_type("error", error, np.ndarray, "an array of numbers")
     return sparsification(-np.abs(error), error)
 
 

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sepi.lightfield import BoolMap, FloatMap
+from sepi.validation import require_map
 
 LEAST_DISCONTINUITY = 0.125
 """Difference of neighbours in pixels per view step; with 9 x 9 views, half a pixel in the farthest ones."""
@@ -77,6 +78,7 @@ def edges_of(ground_truth: FloatMap) -> Edges:
     [0.5, 0.5, 0.5, 0.5]
     """
     # slow to import, and not needed for the tables
+    require_map("ground truth", ground_truth)
     from scipy import ndimage
 
     known = np.isfinite(ground_truth)

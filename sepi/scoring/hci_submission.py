@@ -29,7 +29,7 @@ from sepi.errors import SepiError
 from sepi.io.files import atomic_path
 from sepi.io.pfm import read_pfm
 from sepi.io.result_folder import RUNTIME, read_result
-from sepi.validation import require_known
+from sepi.validation import require_known, require_path, require_type
 
 SCENES = (
     *("backgammon", "dots", "pyramids", "stripes"),
@@ -134,7 +134,8 @@ def write_submission(path: str | Path, entries: Mapping[str, Entry], *, partial:
     >>> ZipFile("submission.zip").namelist()
     ['disp_maps/cotton.pfm', 'runtimes/cotton.txt']
     """
-    path = Path(path)
+    path = require_path("submission", path)
+    require_type(f"{path}: entries", entries, Mapping, "scenes with their entries")
     files: dict[str, bytes] = {}
     for scene, entry in entries.items():
         files[f"{MAPS}/{scene}.pfm"] = entry.disparity.read_bytes()
@@ -186,7 +187,7 @@ def problems_of(path: str | Path, *, partial: bool = False) -> list[str]:
     disp_maps/dino.pfm: 512x384 pixels; expected 512x512
     runtimes/: no such folder with files of the benchmark's scenes
     """
-    path = Path(path)
+    path = require_path("submission", path)
     try:
         if path.is_dir():
             # files and folders down to the second level

@@ -13,6 +13,7 @@ import numpy.typing as npt
 from scipy import ndimage
 
 from sepi.lightfield import BoolMap, FloatMap
+from sepi.validation import require_map, require_type
 
 WINDOW = 7
 """Side in pixels of the window that gradient energy is averaged over."""
@@ -66,6 +67,7 @@ def occluded(
     >>> occluded(disparity, baselines)[0].astype(int).tolist()
     [0, 0, 0, 0, 1, 1, 0, 0, 0, 0, 0, 0]
     """
+    require_map("ground truth", ground_truth)
     reach = np.abs(baselines).max(axis=2).ravel()
     # far views hide most: looking at them first ends the search early; those that stand where the reference view does
     # hide nothing
@@ -104,6 +106,7 @@ def textureless(reference_view: FloatMap) -> BoolMap:
     >>> bool(flat[:, :28].all()), bool(flat[:, 32:].any())
     (True, False)
     """
+    require_type("reference view", reference_view, np.ndarray, "an array of shape (H, W, C)")
     energy = np.zeros(reference_view.shape[:2], np.float32)
     for channel in range(reference_view.shape[2]):
         plane = np.ascontiguousarray(reference_view[:, :, channel], np.float32)

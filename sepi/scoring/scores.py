@@ -21,8 +21,9 @@ import numpy as np
 
 from sepi.errors import SepiError
 from sepi.io.scores import AllScores, Scores
-from sepi.lightfield import BoolMap, FloatMap, LightField
+from sepi.lightfield import BoolMap, FloatMap, LightField, require_light_field
 from sepi.scoring.edges import Edges, edges_of, fattening_and_thinning
+from sepi.validation import require_map, require_type
 
 PROTOCOLS: dict[str, int] = {"paper": 0, "benchmark": 15}
 """Protocol to the pixels left out on each side."""
@@ -110,6 +111,7 @@ def score(
     >>> round(score(estimate, truth, border=1)["mse100"], 3)
     0.04
     """
+    require_map("estimate", estimate)
     _require_shape("ground_truth", ground_truth, estimate)
     chosen = np.isfinite(ground_truth)
     if region is not None:
@@ -179,6 +181,7 @@ def score_regions(
     >>> scores["benchmark"]["all"]["pixels"]  # without the border of 15 pixels
     1156
     """
+    require_map("ground_truth", ground_truth)
     edges = edges or edges_of(ground_truth)
     regions: dict[str, BoolMap | None] = {WHOLE_MAP: None, **(masks or {DISCONTINUITIES: edges.region})}
     if within is not None:
@@ -218,6 +221,7 @@ def region_masks(light_field: LightField) -> dict[str, BoolMap]:
     >>> masks["textureless"].shape, masks["textureless"].dtype.name
     ((64, 64), 'bool')
     """
+    require_light_field(light_field)
     if light_field.ground_truth is None:
         raise SepiError(f"{light_field.name}: regions for evaluation need ground truth, and this scene has none")
     names = ("occluded", "textureless")
@@ -241,6 +245,7 @@ def _within(border: int, shape: tuple[int, ...]) -> BoolMap:
 
 
 def _require_shape(what: str, values: FloatMap | BoolMap, estimate: FloatMap) -> None:
+    require_type(what, values, np.ndarray, "an array of shape (H, W)")
     if values.shape != estimate.shape:
         raise SepiError(f"{what} must have the estimate's shape (H, W) = {estimate.shape}, got {values.shape}")
 
