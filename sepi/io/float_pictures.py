@@ -57,12 +57,12 @@ def write_exr(path: Path, channels: Mapping[str, FloatMap], comment: str) -> Non
 
 
 def write_tiff(path: Path, values: FloatMap, comment: str) -> None:
-    """Write a map (H, W) as a grey TIFF of 32-bit floats, compressed without loss; equal content gives equal bytes.
+    """Write a TIFF of 32-bit floats, compressed without loss; equal content gives equal bytes.
 
     Parameters
     ----------
     path : Path
-    values : ndarray, shape (H, W), float32
+    values : ndarray, shape (H, W) or (H, W, 3), float32
         NaN and infinity stay.
     comment : str
         What the numbers are; the picture's description.
@@ -78,7 +78,7 @@ def write_tiff(path: Path, values: FloatMap, comment: str) -> None:
         tifffile.imwrite(
             temporary,
             np.ascontiguousarray(values, np.float32),
-            photometric="minisblack",
+            photometric="minisblack" if values.ndim == 2 else "rgb",
             compression="zlib",
             description=comment,
             software="sepi",

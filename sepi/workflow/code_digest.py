@@ -44,7 +44,17 @@ _ALTERNATIVES = (
     "scenes",
     *(
         f"io.readers.{name}"
-        for name in ("eslf", "hci", "hci_2013", "hdf5_arrays", "image_folder", "matlab", "numpy_files", "open_lf")
+        for name in (
+            "eslf",
+            "exported",
+            "hci",
+            "hci_2013",
+            "hdf5_arrays",
+            "image_folder",
+            "matlab",
+            "numpy_files",
+            "open_lf",
+        )
     ),
 )
 # what is told to people alone

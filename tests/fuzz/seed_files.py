@@ -18,6 +18,7 @@ from mutations import zip_of
 from PIL import Image
 
 from sepi.camera import Camera
+from sepi.io.exported import MANIFEST, write_exported
 from sepi.io.external_maps import ExternalMap, write_external
 from sepi.io.hdf5 import write_light_field, write_stage
 from sepi.io.pfm import write_pfm
@@ -308,6 +309,20 @@ def hci_folder(folder: Path) -> None:
     """A benchmark folder without ground truth."""
     hci_pictures(folder)
     (folder / "parameters.cfg").write_text(PARAMETERS, encoding="ascii")
+
+
+def manifest_files(folder: Path) -> list[bytes]:
+    """What an exported folder says of itself, much and little."""
+    found = []
+    for one in (LIGHT_FIELD, LightField(VIEWS, "toy")):
+        write_exported(folder, one, force=True)
+        found.append((folder / MANIFEST).read_bytes())
+    return found
+
+
+def exported_pictures(folder: Path) -> None:
+    """The views of an exported folder, with what belongs to them."""
+    write_exported(folder, LIGHT_FIELD)
 
 
 def mask_files(_: Path) -> list[bytes]:

@@ -94,6 +94,7 @@ TARGETS: dict[str, Target] = {
     "hci-parameters": Target("parameters.cfg", texts.parameter_files, texts.read_parent, seeds.hci_pictures),
     "hci-mask": Target("mask_occluded.png", seeds.mask_files, texts.read_parent, seeds.hci_folder, wrappings=PNG),
     "hci-truth": Target("gt_disp_lowres.pfm", seeds.pfm_files, texts.read_parent, seeds.hci_folder),
+    "exported": Target("light_field.json", seeds.manifest_files, texts.read_parent, seeds.exported_pictures),
     "hci-2013": _hdf5(seeds.hci_2013_files, _light_field),
     "openlf": _hdf5(seeds.open_lf_files, _light_field),
     "hdf5": _hdf5(seeds.hdf5_array_files, _light_field),

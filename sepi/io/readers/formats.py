@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
 
@@ -11,7 +11,7 @@ from sepi.errors import SepiError
 from sepi.io.files import naming
 from sepi.io.hdf5 import has_dataset, read_light_field
 from sepi.io.images import SUFFIXES
-from sepi.io.readers import eslf, hci, hci_2013, hdf5_arrays, image_folder, matlab, numpy_files, open_lf
+from sepi.io.readers import eslf, exported, hci, hci_2013, hdf5_arrays, image_folder, matlab, numpy_files, open_lf
 from sepi.io.readers.arrays import rearrange, with_white
 from sepi.io.readers.options import ReadOptions
 from sepi.io.readers.row_folders import has_rows
@@ -56,6 +56,10 @@ _RAW = frozenset({".lfr", ".lfp", ".raw"})
 _ARRAY_OPTIONS = ("grid", "axes", "variable")
 
 FORMATS = {
+    # before the other folders: its pictures may have any names
+    "exported": Format(
+        "exported folder", "written by 'sepi export'", exported.matches, exported.read, ("follow_links",)
+    ),
     "hci": Format("HCI folder", "input_Cam000.png, ...", hci.matches, hci.read, ("grid", "follow_links")),
     "images": Format(
         "folder of views",
@@ -80,10 +84,15 @@ FORMATS = {
         "sepi HDF5",
         "written by this package",
         lambda path: has_dataset(path, "views", if_damaged=True),
-        lambda path, options: rearrange(read_light_field(path), options),
+        lambda path, options: rearrange(_own(path), options),
     ),
 }
 """Word for ``--format`` to format; the first that matches reads."""
+
+
+def _own(path: Path) -> LightField:
+    light_field = read_light_field(path)
+    return light_field if light_field.source else replace(light_field, source=str(path))
 
 
 def format_of(path: Path, file_format: str | None = None) -> Format:
