@@ -157,11 +157,12 @@ def npz_files(folder: Path) -> list[bytes]:
 
 
 def mat_5_files(folder: Path) -> list[bytes]:
-    """Packed, plain, beside text and cells."""
+    """Packed, plain, beside text and cells, in structures."""
     found = []
     for packed, arrays in (
         (True, {"LF": VIEWS}),
         (False, {"LF": VIEWS[..., 0] / 255}),
+        *((packed, {"a": {"name": "text", "b": {"LF": VIEWS}, "c": 1.5}}) for packed in (True, False)),
         (False, {"name": "text", "cells": np.array([1, "a"], object), "LF": VIEWS.astype(np.uint16), "m": MAP}),
     ):
         scipy.io.savemat(folder / "a.mat", arrays, do_compression=packed)
