@@ -54,6 +54,7 @@ _ALTERNATIVES = (
             "matlab",
             "numpy_files",
             "open_lf",
+            "tiff_stack",
         )
     ),
 )

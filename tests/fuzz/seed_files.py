@@ -117,6 +117,20 @@ def tiff_files(folder: Path) -> list[bytes]:
     return found
 
 
+def tiff_stack_files(folder: Path) -> list[bytes]:
+    """Counted along two axes and not, in colours and grey, packed and plain."""
+    found = []
+    for image, options in (
+        (VIEWS, {"photometric": "rgb"}),
+        (VIEWS.reshape(6, H, W, 3), {"photometric": "rgb", "metadata": None, "compression": "zlib"}),
+        (VIEWS.transpose(0, 1, 4, 2, 3), {"imagej": True, "metadata": {"axes": "TZCYX"}}),
+        (VIEWS[..., 0].reshape(6, H, W), {"ome": True, "metadata": {"axes": "ZYX"}}),
+    ):
+        tifffile.imwrite(folder / "a.tif", image, **options)
+        found.append((folder / "a.tif").read_bytes())
+    return found
+
+
 def tiff_map_files(folder: Path) -> list[bytes]:
     """Floats of any size, plain and packed, either byte order."""
     found = []

@@ -83,6 +83,7 @@ TARGETS: dict[str, Target] = {
     "png": Target("a.png", seeds.png_files, _picture, wrappings=PNG),
     "jpeg": _pictures_of(seeds.jpeg_files, "jpg"),
     "tiff": _pictures_of(seeds.tiff_files, "tif"),
+    "tiff-stack": Target("a.tif", seeds.tiff_stack_files, _light_field),
     "bmp": _pictures_of(seeds.bmp_files, "bmp"),
     "webp": _pictures_of(seeds.webp_files, "webp"),
     "pnm": _pictures_of(seeds.pnm_files, "pgm"),

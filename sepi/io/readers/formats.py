@@ -11,7 +11,18 @@ from sepi.errors import SepiError
 from sepi.io.files import naming
 from sepi.io.hdf5 import has_dataset, read_light_field
 from sepi.io.images import SUFFIXES
-from sepi.io.readers import eslf, exported, hci, hci_2013, hdf5_arrays, image_folder, matlab, numpy_files, open_lf
+from sepi.io.readers import (
+    eslf,
+    exported,
+    hci,
+    hci_2013,
+    hdf5_arrays,
+    image_folder,
+    matlab,
+    numpy_files,
+    open_lf,
+    tiff_stack,
+)
 from sepi.io.readers.arrays import rearrange, with_white
 from sepi.io.readers.options import ReadOptions
 from sepi.io.readers.row_folders import has_rows
@@ -69,6 +80,7 @@ FORMATS = {
         ("grid", "pattern", "follow_links"),
     ),
     "eslf": Format("Lytro lenslet picture", "NAME_eslf.png", eslf.matches, eslf.read, ("grid",)),
+    "tiff-stack": Format("TIFF stack", "a page for each view", tiff_stack.matches, tiff_stack.read, ("grid",), True),
     # before the other kinds of HDF5: MATLAB's is told by its header or ending
     "matlab": Format("MATLAB file", ".mat with an array such as LF", matlab.matches, matlab.read, _ARRAY_OPTIONS, True),
     "numpy": Format("NumPy file", ".npy or .npz", numpy_files.matches, numpy_files.read, _ARRAY_OPTIONS, True),

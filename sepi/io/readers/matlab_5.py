@@ -127,13 +127,13 @@ def _fields(order: str, data: memoryview, name: str) -> Iterator[tuple[str, npt.
                 which = f"({element + 1})" if len(values) > len(fields) else ""
                 yield from _fields(order, memoryview(value.data), f"{name}{which}/{fields[field]}")
     elif _is_real(flags):
-        _, dimensions, _, values = parts[: _BEFORE + 1]
+        _, dimensions, _, numbers = parts[: _BEFORE + 1]
         shape = np.frombuffer(dimensions.data, order + "i4").tolist()
-        stored = np.dtype(order + _TYPES[values.kind])
-        if math.prod(shape) * stored.itemsize != values.length:
-            raise ValueError(f"{name} of {values.length} bytes for {shape}")
+        stored = np.dtype(order + _TYPES[numbers.kind])
+        if math.prod(shape) * stored.itemsize != numbers.length:
+            raise ValueError(f"{name} of {numbers.length} bytes for {shape}")
         # MATLAB saves doubles that are small whole numbers as bytes
-        array = np.frombuffer(values.data, stored).reshape(shape, order="F")
+        array = np.frombuffer(numbers.data, stored).reshape(shape, order="F")
         yield name, array.astype(_CLASSES[flags & 0xFF], copy=False)
 
 
