@@ -2,35 +2,18 @@
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Mapping
 from pathlib import Path
-from types import ModuleType
 
 import numpy as np
 
-from sepi.errors import SepiError
-from sepi.io.files import atomic_path
+from sepi.io.exr import open_exr
+from sepi.io.files import atomic_path, naming
 from sepi.lightfield import FloatMap
 
 EXR = (".exr",)
 TIFF = (".tif", ".tiff")
 """Ends of names, in small letters."""
-
-
-def open_exr(path: Path) -> ModuleType:
-    """The package that reads and writes OpenEXR, for a file.
-
-    Raises
-    ------
-    SepiError
-        If it is not installed.
-    """
-    try:
-        return importlib.import_module("OpenEXR")
-    except ImportError as error:
-        advice = "pip install 'sepi[exr]'"
-        raise SepiError(f"{path}: OpenEXR needs a package that is not installed; {advice}") from error
 
 
 def write_exr(path: Path, channels: Mapping[str, FloatMap], comment: str) -> None:
@@ -49,7 +32,8 @@ def write_exr(path: Path, channels: Mapping[str, FloatMap], comment: str) -> Non
     SepiError
         If the package OpenEXR is not installed, or the file cannot be written.
     """
-    exr = open_exr(path)
+    with naming(path):
+        exr = open_exr()
     header = {"compression": exr.ZIP_COMPRESSION, "type": exr.scanlineimage, "comments": comment}
     pixels = {name: np.ascontiguousarray(values, np.float32) for name, values in channels.items()}
     with atomic_path(path) as temporary, exr.File(header, pixels) as file:

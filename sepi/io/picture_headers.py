@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import IO, TYPE_CHECKING
 
 from sepi.errors import SepiError
+from sepi.io.exr import SIGNATURE, exr_form
 from sepi.io.files import reading
 from sepi.io.tiff import is_plain
 
@@ -49,7 +50,7 @@ class Header:
     Attributes
     ----------
     kind : str
-        ``"PNG"``, ``"JPEG"``, ``"BMP"``, ``"TIFF"``, ``"WebP"`` or ``"PNM"``.
+        ``"PNG"``, ``"JPEG"``, ``"BMP"``, ``"TIFF"``, ``"OpenEXR"``, ``"WebP"`` or ``"PNM"``.
     height, width : int
         In pixels.
     pixel_bytes : int
@@ -97,7 +98,7 @@ def read_header(path: Path, file: IO[bytes], *, whole: bool = False) -> Header:
     start = file.read(8)
     kind = next((kind for kind, (signatures, _) in _KINDS.items() if start.startswith(signatures)), None)
     if kind is None:
-        raise SepiError(f"{path}: not a PNG, JPEG, TIFF, BMP, WebP, PGM or PPM picture")
+        raise SepiError(f"{path}: not a PNG, JPEG, TIFF, OpenEXR, BMP, WebP, PGM or PPM picture")
     file.seek(0)
     with reading(path, kind):
         header = _KINDS[kind][1](file, size, whole)
@@ -274,10 +275,16 @@ def _pnm(file: IO[bytes], size: int, whole: bool) -> Header:
     return Header("PNM", height, width, (1 if grey else 3) * depth, grey, white)
 
 
+def _exr(file: IO[bytes], size: int, whole: bool) -> Header:
+    height, width, names = exr_form(file.name)
+    return Header("OpenEXR", height, width, 4 * len(names), len(names) == 1)
+
+
 _KINDS: dict[str, tuple[bytes | tuple[bytes, ...], Callable[[IO[bytes], int, bool], Header]]] = {
     "PNG": (b"\x89PNG\r\n\x1a\n", _png),
     "JPEG": (b"\xff\xd8\xff", _jpeg),
     "TIFF": (TIFF_SIGNATURES, _tiff),
+    "OpenEXR": (SIGNATURE, _exr),
     "BMP": (b"BM", _bmp),
     "WebP": (b"RIFF", _webp),
     "PNM": ((b"P2", b"P3", b"P5", b"P6"), _pnm),

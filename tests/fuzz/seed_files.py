@@ -12,6 +12,7 @@ from typing import Any
 import cv2
 import h5py
 import numpy as np
+import OpenEXR
 import scipy.io
 import tifffile
 from mutations import zip_of
@@ -128,6 +129,18 @@ def tiff_stack_files(folder: Path) -> list[bytes]:
     ):
         tifffile.imwrite(folder / "a.tif", image, **options)
         found.append((folder / "a.tif").read_bytes())
+    return found
+
+
+def exr_files(folder: Path) -> list[bytes]:
+    """Half and float, grey, in colours, in a layer, packed in several ways."""
+    path, colours = folder / "a.exr", (VIEW / 255).astype(np.float32)
+    found = []
+    for packing in (OpenEXR.ZIP_COMPRESSION, OpenEXR.PIZ_COMPRESSION, OpenEXR.NO_COMPRESSION):
+        for channels in ({"RGB": colours}, {"a.RGB": colours.astype(np.float16)}, {"Y": colours[..., 0].copy()}):
+            with OpenEXR.File({"compression": packing, "type": OpenEXR.scanlineimage}, channels) as file:
+                file.write(str(path))
+            found.append(path.read_bytes())
     return found
 
 

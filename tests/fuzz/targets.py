@@ -84,6 +84,7 @@ TARGETS: dict[str, Target] = {
     "jpeg": _pictures_of(seeds.jpeg_files, "jpg"),
     "tiff": _pictures_of(seeds.tiff_files, "tif"),
     "tiff-stack": Target("a.tif", seeds.tiff_stack_files, _light_field),
+    "exr": _pictures_of(seeds.exr_files, "exr"),
     "bmp": _pictures_of(seeds.bmp_files, "bmp"),
     "webp": _pictures_of(seeds.webp_files, "webp"),
     "pnm": _pictures_of(seeds.pnm_files, "pgm"),

@@ -69,15 +69,16 @@ _ARRAY_OPTIONS = ("grid", "axes", "variable")
 FORMATS = {
     # before the other folders: its pictures may have any names
     "exported": Format(
-        "exported folder", "written by 'sepi export'", exported.matches, exported.read, ("follow_links",)
+        "exported folder", "written by 'sepi export'", exported.matches, exported.read, ("follow_links",), True
     ),
-    "hci": Format("HCI folder", "input_Cam000.png, ...", hci.matches, hci.read, ("grid", "follow_links")),
+    "hci": Format("HCI folder", "input_Cam000.png, ...", hci.matches, hci.read, ("grid", "follow_links"), True),
     "images": Format(
         "folder of views",
         "a numbered picture for each",
         image_folder.matches,
         image_folder.read,
         ("grid", "pattern", "follow_links"),
+        True,
     ),
     "eslf": Format("Lytro lenslet picture", "NAME_eslf.png", eslf.matches, eslf.read, ("grid",)),
     "tiff-stack": Format("TIFF stack", "a page for each view", tiff_stack.matches, tiff_stack.read, ("grid",), True),
@@ -161,7 +162,8 @@ def read(path: Path, options: ReadOptions, file_format: str | None = None) -> Li
     with naming(path):
         light_field = known.read(path, options)
         if options.white is not None and not known.scales:
-            light_field = with_white(light_field, path, options.white)
+            views = with_white(light_field.views, light_field.present, path, options.white)
+            light_field = replace(light_field, views=views)
         seen = options.view if light_field.arranged else None
         return light_field if seen is None else light_field.seen_from(seen)
 
