@@ -28,7 +28,7 @@ HDF5 = (".h5", ".hdf5")
 """Ends of names, in small letters, of what is one file."""
 
 # of other formats of light fields, and of maps
-_OTHERS = SUFFIXES | {".mat", ".npy", ".npz", ".pfm", ".json", ".exr"}
+_OTHERS = SUFFIXES | {".mat", ".npy", ".npz", ".pfm", ".json"}
 _TRUTH = "gt_disp_lowres.pfm"
 _VIEW = re.compile(r"row_\d+_col_\d+\.(png|tif)")
 
@@ -97,7 +97,7 @@ def _write_folder(folder: Path, light_field: LightField) -> set[str]:
         view = light_field.views[t, s]
         pixels = view[..., 0] if view.shape[2] == 1 else view
         if suffix == "tif":
-            write_tiff(folder / name, pixels.astype(np.float32), f"view {t},{s} of {light_field.name}")
+            write_tiff(folder / name, pixels.astype(np.float32), f"view {t},{s}")
         else:
             write_png(folder / name, pixels.astype(view.dtype.newbyteorder("=")))
     if light_field.ground_truth is not None:

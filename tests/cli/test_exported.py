@@ -39,7 +39,12 @@ def corrected() -> tuple[object, ...]:
 def placed() -> tuple[object, ...]:
     """Grey views of floats that stand off the grid, with ground truth, masks, and a camera at no focus distance."""
     grey = (VIEWS.views[..., :1] / 255).astype(np.float32)
-    known = {"positions": jittered((3, 3)), "camera": Camera(30.0, -1 / 3, 90.0), "disparity_range": None}
+    known = {
+        "positions": jittered((3, 3)),
+        "camera": Camera(30.0, -1 / 3, 90.0),
+        "name": "Büste",
+        "disparity_range": None,
+    }
     write_light_field(Path("placed.h5"), replace(VIEWS, views=grey, **known))
     return ("placed.h5",)
 
