@@ -132,6 +132,8 @@ class LightField:
     arranged : bool
         False: the views stand in one row, in their order, and their grid is yet to be found; nothing can be matched
         before, and the centre of the row may be missing.
+    settled : bool
+        True: ``row_spacing`` is known, be it one; it is not looked for in the views.
     reading : str
         How the source was read where flags or options say so, as JSON: what reads it in the same way again.
 
@@ -173,6 +175,7 @@ class LightField:
     camera: Camera | None = None
     notes: tuple[str, ...] = ()
     arranged: bool = True
+    settled: bool = False
     reading: str = ""
 
     def __post_init__(self) -> None:

@@ -43,8 +43,8 @@ def read_light_field(
     disparity_range : tuple of float, optional
         ``(minimum, maximum)`` in pixels per view step, in place of the scene's own.
     file_format : str, optional
-        Word of a format: ``"hci"``, ``"images"``, ``"eslf"``, ``"matlab"``, ``"numpy"``, ``"hci-2013"``, ``"openlf"``,
-        ``"hdf5"`` or ``"sepi"``; found by looking unless given.
+        Word of a format: ``"exported"``, ``"hci"``, ``"images"``, ``"eslf"``, ``"tiff-stack"``, ``"matlab"``,
+        ``"numpy"``, ``"hci-2013"``, ``"openlf"``, ``"hdf5"`` or ``"sepi"``; found by looking unless given.
     options : ReadOptions, optional
         What the files do not say: grid, name pattern, axes, order, views to leave out, reference view, row spacing,
         white.

@@ -76,7 +76,8 @@ _FLAGS = (
         "--format",
         "file_format",
         metavar="FORMAT",
-        help="hci, hci-2013, images, eslf, matlab, numpy, openlf, hdf5 or sepi; found by looking unless given.",
+        help="exported, hci, hci-2013, images, eslf, tiff-stack, matlab, numpy, openlf, hdf5 or sepi; found by looking "
+        "unless given.",
     ),
     click.option(
         "--grid", type=Pair("ROWSxCOLUMNS", "xX×"), metavar="ROWSxCOLUMNS", help="Grid of views in the files."

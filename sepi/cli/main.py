@@ -14,6 +14,7 @@ import click
 from sepi.cli.compare import compare
 from sepi.cli.convert import convert
 from sepi.cli.evaluate import evaluate
+from sepi.cli.export import export
 from sepi.cli.info import check, info, range_text, size_text
 from sepi.cli.input_options import Geometry, Reading, camera_flags, default_folder, reading_flags
 from sepi.cli.poses import poses
@@ -191,7 +192,7 @@ def scenes(names: tuple[str, ...], output: Path, size: int, views: int, only_lis
 
 
 for command in (
-    info, check, evaluate, compare, refocus, points, poses, convert, submission, check_submission,
+    info, check, export, evaluate, compare, refocus, points, poses, convert, submission, check_submission,
 ):  # fmt: skip
     main.add_command(command)
 

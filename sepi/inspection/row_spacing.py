@@ -58,7 +58,7 @@ def settle_row_spacing(light_field: LightField) -> LightField:
 
     Nothing is done where a spacing or positions of the views are known already.
     """
-    if light_field.positions is not None or light_field.row_spacing != 1:
+    if light_field.settled or light_field.positions is not None or light_field.row_spacing != 1:
         return light_field
     spacing = estimate_row_spacing(Views(light_field))
     if spacing is None:

@@ -2,35 +2,18 @@
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Mapping
 from pathlib import Path
-from types import ModuleType
 
 import numpy as np
 
-from sepi.errors import SepiError
-from sepi.io.files import atomic_path
+from sepi.io.exr import open_exr
+from sepi.io.files import atomic_path, naming
 from sepi.lightfield import FloatMap
 
 EXR = (".exr",)
 TIFF = (".tif", ".tiff")
 """Ends of names, in small letters."""
-
-
-def open_exr(path: Path) -> ModuleType:
-    """The package that reads and writes OpenEXR, for a file.
-
-    Raises
-    ------
-    SepiError
-        If it is not installed.
-    """
-    try:
-        return importlib.import_module("OpenEXR")
-    except ImportError as error:
-        advice = "pip install 'sepi[exr]'"
-        raise SepiError(f"{path}: OpenEXR needs a package that is not installed; {advice}") from error
 
 
 def write_exr(path: Path, channels: Mapping[str, FloatMap], comment: str) -> None:
@@ -49,7 +32,8 @@ def write_exr(path: Path, channels: Mapping[str, FloatMap], comment: str) -> Non
     SepiError
         If the package OpenEXR is not installed, or the file cannot be written.
     """
-    exr = open_exr(path)
+    with naming(path):
+        exr = open_exr()
     header = {"compression": exr.ZIP_COMPRESSION, "type": exr.scanlineimage, "comments": comment}
     pixels = {name: np.ascontiguousarray(values, np.float32) for name, values in channels.items()}
     with atomic_path(path) as temporary, exr.File(header, pixels) as file:
@@ -57,12 +41,12 @@ def write_exr(path: Path, channels: Mapping[str, FloatMap], comment: str) -> Non
 
 
 def write_tiff(path: Path, values: FloatMap, comment: str) -> None:
-    """Write a map (H, W) as a grey TIFF of 32-bit floats, compressed without loss; equal content gives equal bytes.
+    """Write a TIFF of 32-bit floats, compressed without loss; equal content gives equal bytes.
 
     Parameters
     ----------
     path : Path
-    values : ndarray, shape (H, W), float32
+    values : ndarray, shape (H, W) or (H, W, 3), float32
         NaN and infinity stay.
     comment : str
         What the numbers are; the picture's description.
@@ -78,7 +62,7 @@ def write_tiff(path: Path, values: FloatMap, comment: str) -> None:
         tifffile.imwrite(
             temporary,
             np.ascontiguousarray(values, np.float32),
-            photometric="minisblack",
+            photometric="minisblack" if values.ndim == 2 else "rgb",
             compression="zlib",
             description=comment,
             software="sepi",

@@ -194,6 +194,7 @@ def read_light_field(path: Path) -> LightField:
             present=arrays["present"].astype(bool),
             view=None if view is None else (int(view[0]), int(view[1])),
             row_spacing=float(attribute(file, "row_spacing")) if "row_spacing" in file.attrs else 1.0,
+            settled="row_spacing" in file.attrs,
             positions=None if positions is None else positions.astype(np.float64),
             camera=read_camera(file),
             notes=tuple(_text(file, "notes").split("\0")) if "notes" in file.attrs else (),

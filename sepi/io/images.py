@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sepi.errors import SepiError
+from sepi.io.exr import exr_pixels
 from sepi.io.files import atomic_path, reading
 from sepi.io.picture_headers import Header, plain_png, read_header
 from sepi.io.tiff import plain_pixels, unturned
@@ -25,7 +26,7 @@ from sepi.threads import available_cores
 
 Pixels = npt.NDArray[np.integer[Any] | np.floating[Any]]
 
-SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp", ".pgm", ".ppm", ".pnm"})
+SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".tif", ".tiff", ".exr", ".bmp", ".webp", ".pgm", ".ppm", ".pnm"})
 """Ends of names, in small letters, of the pictures that can be read."""
 
 _MAX_BYTES = 2**32
@@ -34,7 +35,7 @@ _HELD_AS = {"1": "L", "L": "L", "LA": "LA", "P": "RGB", "RGB": "RGB", "RGBA": "R
 
 
 def read_picture(path: Path, *, any_floats: bool = False) -> Pixels:
-    """Read a PNG, JPEG, TIFF, BMP, WebP, PGM or PPM; its content tells which, not its name.
+    """Read a PNG, JPEG, TIFF, OpenEXR, BMP, WebP, PGM or PPM; its content tells which, not its name.
 
     Parameters
     ----------
@@ -69,11 +70,17 @@ def _read(path: Path, any_floats: bool = False) -> Pixels:
         image = _stretched(path, image, header.white)
     if image.dtype == np.float32 and not any_floats and not (image.min() >= LOWEST and image.max() <= HIGHEST):
         what = f"{image.min():g} to {image.max():g}" if np.isfinite(image).all() else "NaN or infinite ones"
-        raise SepiError(f"{path}: float pixels must be finite and within 0..1, got {what}; divide by white's value")
+        raise SepiError(f"{path}: float pixels must be finite and within 0..1, got {what}; --white says what white is")
     return image
 
 
-def read_views(paths: Sequence[Path], positions: Sequence[int] | None = None, count: int | None = None) -> Pixels:
+def read_views(
+    paths: Sequence[Path],
+    positions: Sequence[int] | None = None,
+    count: int | None = None,
+    *,
+    any_floats: bool = False,
+) -> Pixels:
     """Read pictures that must be alike, several at a time.
 
     Parameters
@@ -83,6 +90,8 @@ def read_views(paths: Sequence[Path], positions: Sequence[int] | None = None, co
         Index of each in the result; one after the other unless given.
     count : int, optional
         Length of the result; as many as ``paths`` unless given.
+    any_floats : bool
+        As in :func:`read_picture`.
 
     Returns
     -------
@@ -95,14 +104,14 @@ def read_views(paths: Sequence[Path], positions: Sequence[int] | None = None, co
         If a file cannot be read, or is not of the same size, depth and number of channels as the first, or they take
         more memory together than there is.
     """
-    first = read_picture(paths[0])
+    first = read_picture(paths[0], any_floats=any_floats)
     positions = range(len(paths)) if positions is None else positions
     count = len(paths) if count is None else count
     _require_memory(paths[0].parent, first, count)
     views = np.zeros((count, *first.shape), first.dtype)
 
     def fill(index: int) -> None:
-        image = _read(paths[index])
+        image = _read(paths[index], any_floats)
         if image.shape != first.shape or image.dtype != first.dtype:
             raise SepiError(
                 f"{paths[index]}: {_described(image)}, but {paths[0].name} is {_described(first)}; "
@@ -195,6 +204,8 @@ def _decoded(path: Path, data: bytes, header: Header) -> Pixels:
     if usual is not None:
         return usual
     with reading(path, header.kind):
+        if header.kind == "OpenEXR":
+            return exr_pixels(str(path))
         if header.plain:
             return plain_pixels(data)
         if header.kind == "PNG":

@@ -17,14 +17,21 @@ import zlib
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO
+from typing import IO, TYPE_CHECKING
 
 from sepi.errors import SepiError
+from sepi.io.exr import SIGNATURE, exr_form
 from sepi.io.files import reading
 from sepi.io.tiff import is_plain
 
+if TYPE_CHECKING:
+    from tifffile import TiffFile, TiffPage
+
 MAX_PIXELS = 2**28
 """More pixels than any camera's picture has."""
+
+TIFF_SIGNATURES = (b"II*\0", b"II+\0", b"MM\0*", b"MM\0+")
+"""First bytes of a TIFF."""
 
 # more than any of the compressions reaches on pictures of 8 bit; small pictures of one colour may shrink further
 _PIXELS_PER_BYTE = 1100
@@ -43,7 +50,7 @@ class Header:
     Attributes
     ----------
     kind : str
-        ``"PNG"``, ``"JPEG"``, ``"BMP"``, ``"TIFF"``, ``"WebP"`` or ``"PNM"``.
+        ``"PNG"``, ``"JPEG"``, ``"BMP"``, ``"TIFF"``, ``"OpenEXR"``, ``"WebP"`` or ``"PNM"``.
     height, width : int
         In pixels.
     pixel_bytes : int
@@ -91,7 +98,7 @@ def read_header(path: Path, file: IO[bytes], *, whole: bool = False) -> Header:
     start = file.read(8)
     kind = next((kind for kind, (signatures, _) in _KINDS.items() if start.startswith(signatures)), None)
     if kind is None:
-        raise SepiError(f"{path}: not a PNG, JPEG, TIFF, BMP, WebP, PGM or PPM picture")
+        raise SepiError(f"{path}: not a PNG, JPEG, TIFF, OpenEXR, BMP, WebP, PGM or PPM picture")
     file.seek(0)
     with reading(path, kind):
         header = _KINDS[kind][1](file, size, whole)
@@ -188,13 +195,24 @@ def _webp(file: IO[bytes], size: int, whole: bool) -> Header:
 
 
 def _tiff(file: IO[bytes], size: int, whole: bool) -> Header:
-    """The first picture of the file; forms that would be decoded to other values than it holds are refused."""
+    """The first picture of the file."""
+    with open_tiff(file) as pictures:
+        return tiff_page(pictures.pages[0].aspage(), size)
+
+
+def open_tiff(file: IO[bytes]) -> TiffFile:
+    """A file as tifffile reads it, without a word on the terminal."""
     import tifffile
 
     # what it complains of is raised here
     logging.getLogger("tifffile").addHandler(logging.NullHandler())
-    with tifffile.TiffFile(file) as pictures:
-        page = pictures.pages[0].aspage()
+    return tifffile.TiffFile(file)
+
+
+def tiff_page(page: TiffPage, size: int) -> Header:
+    """A page of a TIFF of ``size`` bytes; forms that would be decoded to other values than it holds are refused."""
+    import tifffile
+
     bits, samples, photometric = page.bitspersample, page.samplesperpixel, page.photometric
     plain = is_plain(page)
     rarer = "" if plain else ", or save it uncompressed"
@@ -257,10 +275,16 @@ def _pnm(file: IO[bytes], size: int, whole: bool) -> Header:
     return Header("PNM", height, width, (1 if grey else 3) * depth, grey, white)
 
 
+def _exr(file: IO[bytes], size: int, whole: bool) -> Header:
+    height, width, names = exr_form(file.name)
+    return Header("OpenEXR", height, width, 4 * len(names), len(names) == 1)
+
+
 _KINDS: dict[str, tuple[bytes | tuple[bytes, ...], Callable[[IO[bytes], int, bool], Header]]] = {
     "PNG": (b"\x89PNG\r\n\x1a\n", _png),
     "JPEG": (b"\xff\xd8\xff", _jpeg),
-    "TIFF": ((b"II*\0", b"II+\0", b"MM\0*", b"MM\0+"), _tiff),
+    "TIFF": (TIFF_SIGNATURES, _tiff),
+    "OpenEXR": (SIGNATURE, _exr),
     "BMP": (b"BM", _bmp),
     "WebP": (b"RIFF", _webp),
     "PNM": ((b"P2", b"P3", b"P5", b"P6"), _pnm),

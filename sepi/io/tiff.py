@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import io
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from sepi.errors import SepiError
+
+if TYPE_CHECKING:
+    from tifffile import TiffPage
 
 # those that tifffile unpacks by itself, and no more than their files say
 _COMPRESSIONS = (1, 8, 32946, 32773)
@@ -22,7 +25,15 @@ def is_plain(page: Any) -> bool:
 
 
 def plain_pixels(data: bytes) -> npt.NDArray[Any]:
-    """Pixels of the first picture of a TIFF that is plain and whole.
+    """Pixels of the first picture of a TIFF that is plain and whole, as :func:`page_pixels` has them."""
+    import tifffile
+
+    with tifffile.TiffFile(io.BytesIO(data)) as pictures:
+        return page_pixels(pictures.pages[0].aspage())
+
+
+def page_pixels(page: TiffPage) -> npt.NDArray[Any]:
+    """Pixels of a page that is plain and whole, of an open file.
 
     Returns
     -------
@@ -36,10 +47,7 @@ def plain_pixels(data: bytes) -> npt.NDArray[Any]:
     """
     import tifffile
 
-    with tifffile.TiffFile(io.BytesIO(data)) as pictures:
-        page = pictures.pages[0].aspage()
-        stored = page.asarray(squeeze=False, maxworkers=1)
-        white_is_zero = page.photometric == tifffile.PHOTOMETRIC.MINISWHITE
+    stored = page.asarray(squeeze=False, maxworkers=1)
     # planes, depth, height, width, samples: colours are either of the ends
     values = np.moveaxis(stored[:, 0, :, :, 0], 0, 2) if len(stored) > 1 else stored[0, 0]
     values = values[:, :, : 3 if values.shape[2] > 2 else 1]
@@ -47,7 +55,7 @@ def plain_pixels(data: bytes) -> npt.NDArray[Any]:
     if kind == "i" and values.min() < 0:
         raise SepiError(f"a TIFF with a sign, and a pixel of {values.min()}; expected none below 0")
     values = values.astype(np.float32 if kind == "f" else f"u{size}")
-    if white_is_zero:
+    if page.photometric == tifffile.PHOTOMETRIC.MINISWHITE:
         # of numbers with a sign, white is the largest of them
         values = np.iinfo(stored.dtype).max - values
     return np.ascontiguousarray(values)

@@ -44,7 +44,18 @@ _ALTERNATIVES = (
     "scenes",
     *(
         f"io.readers.{name}"
-        for name in ("eslf", "hci", "hci_2013", "hdf5_arrays", "image_folder", "matlab", "numpy_files", "open_lf")
+        for name in (
+            "eslf",
+            "exported",
+            "hci",
+            "hci_2013",
+            "hdf5_arrays",
+            "image_folder",
+            "matlab",
+            "numpy_files",
+            "open_lf",
+            "tiff_stack",
+        )
     ),
 )
 # what is told to people alone

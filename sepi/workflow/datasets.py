@@ -14,7 +14,7 @@ from pathlib import Path
 
 from sepi.errors import SepiError
 from sepi.io.images import SUFFIXES
-from sepi.io.readers import hci, hci_2013
+from sepi.io.readers import exported, hci, hci_2013
 from sepi.io.readers.formats import format_of
 from sepi.io.readers.row_folders import view_files
 from sepi.io.readers.sizes import size_of
@@ -27,7 +27,7 @@ LONGEST_NAME = 80
 # what a scene's folder may hold besides views, and ingest reads
 _OTHER_PATTERNS = ("parameters.cfg", "gt_disp_lowres.pfm", "*mask*.png")
 # ... and of a folder of pictures in any layout
-_BESIDE_PICTURES = (hci.PARAMETERS, hci.TRUTH)
+_BESIDE_PICTURES = (hci.PARAMETERS, hci.TRUTH, exported.MANIFEST)
 _FORMAT_OF = {"hci": "hci", "hci_2013": "hci-2013"}
 # a scene's name is a folder name below results/ and a word on the command line
 _NAME = re.compile(rf"[A-Za-z0-9][A-Za-z0-9_.+-]{{0,{LONGEST_NAME - 1}}}")

@@ -12,12 +12,14 @@ from typing import Any
 import cv2
 import h5py
 import numpy as np
+import OpenEXR
 import scipy.io
 import tifffile
 from mutations import zip_of
 from PIL import Image
 
 from sepi.camera import Camera
+from sepi.io.exported import MANIFEST, write_exported
 from sepi.io.external_maps import ExternalMap, write_external
 from sepi.io.hdf5 import write_light_field, write_stage
 from sepi.io.pfm import write_pfm
@@ -116,6 +118,32 @@ def tiff_files(folder: Path) -> list[bytes]:
     return found
 
 
+def tiff_stack_files(folder: Path) -> list[bytes]:
+    """Counted along two axes and not, in colours and grey, packed and plain."""
+    found = []
+    for image, options in (
+        (VIEWS, {"photometric": "rgb"}),
+        (VIEWS.reshape(6, H, W, 3), {"photometric": "rgb", "metadata": None, "compression": "zlib"}),
+        (VIEWS.transpose(0, 1, 4, 2, 3), {"imagej": True, "metadata": {"axes": "TZCYX"}}),
+        (VIEWS[..., 0].reshape(6, H, W), {"ome": True, "metadata": {"axes": "ZYX"}}),
+    ):
+        tifffile.imwrite(folder / "a.tif", image, **options)
+        found.append((folder / "a.tif").read_bytes())
+    return found
+
+
+def exr_files(folder: Path) -> list[bytes]:
+    """Half and float, grey, in colours, in a layer, packed in several ways."""
+    path, colours = folder / "a.exr", (VIEW / 255).astype(np.float32)
+    found = []
+    for packing in (OpenEXR.ZIP_COMPRESSION, OpenEXR.PIZ_COMPRESSION, OpenEXR.NO_COMPRESSION):
+        for channels in ({"RGB": colours}, {"a.RGB": colours.astype(np.float16)}, {"Y": colours[..., 0].copy()}):
+            with OpenEXR.File({"compression": packing, "type": OpenEXR.scanlineimage}, channels) as file:
+                file.write(str(path))
+            found.append(path.read_bytes())
+    return found
+
+
 def tiff_map_files(folder: Path) -> list[bytes]:
     """Floats of any size, plain and packed, either byte order."""
     found = []
@@ -156,11 +184,12 @@ def npz_files(folder: Path) -> list[bytes]:
 
 
 def mat_5_files(folder: Path) -> list[bytes]:
-    """Packed, plain, beside text and cells."""
+    """Packed, plain, beside text and cells, in structures."""
     found = []
     for packed, arrays in (
         (True, {"LF": VIEWS}),
         (False, {"LF": VIEWS[..., 0] / 255}),
+        *((packed, {"a": {"name": "text", "b": {"LF": VIEWS}, "c": 1.5}}) for packed in (True, False)),
         (False, {"name": "text", "cells": np.array([1, "a"], object), "LF": VIEWS.astype(np.uint16), "m": MAP}),
     ):
         scipy.io.savemat(folder / "a.mat", arrays, do_compression=packed)
@@ -308,6 +337,20 @@ def hci_folder(folder: Path) -> None:
     """A benchmark folder without ground truth."""
     hci_pictures(folder)
     (folder / "parameters.cfg").write_text(PARAMETERS, encoding="ascii")
+
+
+def manifest_files(folder: Path) -> list[bytes]:
+    """What an exported folder says of itself, much and little."""
+    found = []
+    for one in (LIGHT_FIELD, LightField(VIEWS, "toy")):
+        write_exported(folder, one, force=True)
+        found.append((folder / MANIFEST).read_bytes())
+    return found
+
+
+def exported_pictures(folder: Path) -> None:
+    """The views of an exported folder, with what belongs to them."""
+    write_exported(folder, LIGHT_FIELD)
 
 
 def mask_files(_: Path) -> list[bytes]:

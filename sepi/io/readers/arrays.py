@@ -122,14 +122,13 @@ def rearrange(light_field: LightField, options: ReadOptions) -> LightField:
     )
 
 
-def with_white(light_field: LightField, path: Path, white: float) -> LightField:
-    """A light field whose views have another value for white than their type says."""
-    present = light_field.present
+def with_white(views: Array, present: BoolMap, path: Path, white: float) -> Array:
+    """Views (T, S, H, W, C) that have another value for white than their type says."""
     numbers = np.where(present, np.arange(present.size).reshape(present.shape), -1)
-    scale = scale_of(str(path), light_field.views, numbers, white)
-    views: Array = np.zeros(light_field.views.shape, scale.dtype)
-    _fill(views, light_field.views, numbers, scale)
-    return replace(light_field, views=views)
+    scale = scale_of(str(path), views, numbers, white)
+    scaled: Array = np.zeros(views.shape, scale.dtype)
+    _fill(scaled, views, numbers, scale)
+    return scaled
 
 
 def _require_pixel_type(source: str, kind: np.dtype[Any]) -> None:

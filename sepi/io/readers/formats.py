@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
 
@@ -11,7 +11,18 @@ from sepi.errors import SepiError
 from sepi.io.files import naming
 from sepi.io.hdf5 import has_dataset, read_light_field
 from sepi.io.images import SUFFIXES
-from sepi.io.readers import eslf, hci, hci_2013, hdf5_arrays, image_folder, matlab, numpy_files, open_lf
+from sepi.io.readers import (
+    eslf,
+    exported,
+    hci,
+    hci_2013,
+    hdf5_arrays,
+    image_folder,
+    matlab,
+    numpy_files,
+    open_lf,
+    tiff_stack,
+)
 from sepi.io.readers.arrays import rearrange, with_white
 from sepi.io.readers.options import ReadOptions
 from sepi.io.readers.row_folders import has_rows
@@ -56,15 +67,21 @@ _RAW = frozenset({".lfr", ".lfp", ".raw"})
 _ARRAY_OPTIONS = ("grid", "axes", "variable")
 
 FORMATS = {
-    "hci": Format("HCI folder", "input_Cam000.png, ...", hci.matches, hci.read, ("grid", "follow_links")),
+    # before the other folders: its pictures may have any names
+    "exported": Format(
+        "exported folder", "written by 'sepi export'", exported.matches, exported.read, ("follow_links",), True
+    ),
+    "hci": Format("HCI folder", "input_Cam000.png, ...", hci.matches, hci.read, ("grid", "follow_links"), True),
     "images": Format(
         "folder of views",
         "a numbered picture for each",
         image_folder.matches,
         image_folder.read,
         ("grid", "pattern", "follow_links"),
+        True,
     ),
     "eslf": Format("Lytro lenslet picture", "NAME_eslf.png", eslf.matches, eslf.read, ("grid",)),
+    "tiff-stack": Format("TIFF stack", "a page for each view", tiff_stack.matches, tiff_stack.read, ("grid",), True),
     # before the other kinds of HDF5: MATLAB's is told by its header or ending
     "matlab": Format("MATLAB file", ".mat with an array such as LF", matlab.matches, matlab.read, _ARRAY_OPTIONS, True),
     "numpy": Format("NumPy file", ".npy or .npz", numpy_files.matches, numpy_files.read, _ARRAY_OPTIONS, True),
@@ -80,10 +97,15 @@ FORMATS = {
         "sepi HDF5",
         "written by this package",
         lambda path: has_dataset(path, "views", if_damaged=True),
-        lambda path, options: rearrange(read_light_field(path), options),
+        lambda path, options: rearrange(_own(path), options),
     ),
 }
 """Word for ``--format`` to format; the first that matches reads."""
+
+
+def _own(path: Path) -> LightField:
+    light_field = read_light_field(path)
+    return light_field if light_field.source else replace(light_field, source=str(path))
 
 
 def format_of(path: Path, file_format: str | None = None) -> Format:
@@ -140,7 +162,8 @@ def read(path: Path, options: ReadOptions, file_format: str | None = None) -> Li
     with naming(path):
         light_field = known.read(path, options)
         if options.white is not None and not known.scales:
-            light_field = with_white(light_field, path, options.white)
+            views = with_white(light_field.views, light_field.present, path, options.white)
+            light_field = replace(light_field, views=views)
         seen = options.view if light_field.arranged else None
         return light_field if seen is None else light_field.seen_from(seen)
 

@@ -75,7 +75,8 @@ def _channels_from(red: str) -> Iterator[tuple[str, ...]]:
 def _arrays_of(path: Path, arrays: Shapes, requested: str | None) -> tuple[str, ...]:
     """Name of the array that is the light field, of those in a file, or names of its red, green and blue one.
 
-    Without the user's choice it is the only array of numbers of 4 or 5 axes, or ``LF`` or three channels among several.
+    Without the user's choice it is the only array of numbers of 4 or 5 axes, or among several the only ``LF``, or three
+    channels.
     """
     shapes = {name: shape for name, (shape, kind) in arrays.items() if kind.kind in "iuf" or name == requested}
     if requested is not None:
@@ -84,8 +85,9 @@ def _arrays_of(path: Path, arrays: Shapes, requested: str | None) -> tuple[str, 
     fitting = [name for name, shape in shapes.items() if len(shape) in (4, 5)]
     if len(fitting) == 1:
         return (fitting[0],)
-    if "LF" in fitting:
-        return ("LF",)
+    called = [name for name in fitting if name.rpartition("/")[2] == "LF"]
+    if len(called) == 1:
+        return (called[0],)
     triples = [names for name in fitting for names in _channels_from(name) if set(names) <= set(fitting)]
     triples = [names for names in triples if len({arrays[name] for name in names}) == 1 and len(shapes[names[0]]) == 4]
     if len(triples) == 1:

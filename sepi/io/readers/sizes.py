@@ -12,7 +12,7 @@ import h5py
 from sepi.errors import SepiError
 from sepi.io.hdf5 import DEFLATE_RATIO, open_hdf5
 from sepi.io.images import SUFFIXES, picture_header
-from sepi.io.readers import eslf, matlab, numpy_files, open_lf
+from sepi.io.readers import eslf, matlab, numpy_files, open_lf, tiff_stack
 from sepi.io.readers.named_arrays import datasets_in
 
 # what is taken where no header tells: a view of the benchmark
@@ -43,15 +43,19 @@ class Size(NamedTuple):
 def size_of(files: Sequence[Path]) -> Size:
     """Size of the light field that these files hold together; no values are read.
 
-    Several pictures are a view each; a single one is a lenslet picture, of which the usual views are read. Of other
-    files it is the largest array in them, and its two longest axes those of a view. Where nothing tells, the largest
-    file is taken for what it would be unpacked; damaged ones are left to the reader, which will say so.
+    Several pictures are a view each; a single one is a stack of them, or a lenslet picture, of which the usual views
+    are read. Of other files it is the largest array in them, and its two longest axes those of a view. Where nothing
+    tells, the largest file is taken for what it would be unpacked; damaged ones are left to the reader, which will say
+    so.
     """
     pictures = [path for path in files if path.suffix.lower() in SUFFIXES]
     try:
         if len(pictures) > 1:
             header = picture_header(pictures[0])
             return Size(len(pictures), header.height, header.width, header.pixel_bytes)
+        if pictures and tiff_stack.matches(pictures[0]):
+            pages = tiff_stack.headers(pictures[0])
+            return Size(len(pages), pages[0].height, pages[0].width, pages[0].pixel_bytes)
         if pictures:
             return _of_lenslets(pictures[0])
     except SepiError:

@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from sepi.errors import SepiError
-from sepi.io.images import Pixels, read_views
+from sepi.io.images import read_views
+from sepi.io.readers.arrays import Array, with_white
 from sepi.io.readers.options import Numbers, ReadOptions, arrange_numbers
 from sepi.lightfield import BoolMap
 
@@ -18,7 +19,7 @@ MAX_VIEWS = 10_000
 
 def read_grid(
     folder: Path, files: Mapping[int, Path], grid: tuple[int, int], options: ReadOptions
-) -> tuple[Pixels, BoolMap, Numbers]:
+) -> tuple[Array, BoolMap, Numbers]:
     """Read the views of a grid and put them in their positions; those left out are not even opened.
 
     Parameters
@@ -58,8 +59,11 @@ def read_grid(
         raise SepiError(f"{folder}: no view is left")
     if not options.follow_links:
         _require_within(folder, paths)
-    views = read_views(paths, [int(position) for position in positions], numbers.size)
-    return views.reshape(*numbers.shape, *views.shape[1:]), present, numbers
+    white = options.white
+    places = [int(position) for position in positions]
+    views: Array = read_views(paths, places, numbers.size, any_floats=white is not None)
+    views = views.reshape(*numbers.shape, *views.shape[1:])
+    return views if white is None else with_white(views, present, folder, white), present, numbers
 
 
 def _require_within(folder: Path, paths: Iterable[Path]) -> None:

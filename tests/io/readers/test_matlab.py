@@ -142,11 +142,55 @@ def test_other_classes_are_passed_over(tmp_path: Path) -> None:
     np.testing.assert_array_equal(taken(tmp_path / "mixed73.mat").views, LF)
 
 
-def test_structures_of_version_7_3_hold_the_light_field(tmp_path: Path) -> None:
+def in_structures(arrays: dict[str, np.ndarray]) -> dict[str, object]:
+    """Arrays by paths, as structures of version 5 are written."""
+    found: dict[str, object] = {}
+    for path, array in arrays.items():
+        *above, name = path.split("/")
+        inner = found
+        for group in above:
+            inner = inner.setdefault(group, {})
+        inner[name] = array
+    return found
+
+
+@pytest.mark.parametrize("kind", SAVERS)
+def test_structures_hold_the_light_field(tmp_path: Path, kind: str) -> None:
     """Toolboxes save all that they know in one structure."""
-    save_7_3(tmp_path / "a.mat", {"struct/lf/views": LF, "struct/time": np.ones((1, 1))})
-    np.testing.assert_array_equal(taken(tmp_path / "a.mat").views, LF)
-    np.testing.assert_array_equal(taken(tmp_path / "a.mat", variable="struct/lf/views").views, LF)
+    path = tmp_path / "a.mat"
+
+    def put(arrays: dict[str, np.ndarray]) -> None:
+        SAVERS[kind](path, arrays if "7.3" in kind else in_structures(arrays))
+
+    small = {"scene/time": np.ones((1, 1)), "scene/lf/dark": np.zeros((8, 10), np.uint8), "matrix": np.eye(3)}
+    put({**small, "scene/lf/views": LF / 255})
+    np.testing.assert_array_equal(taken(path).views, (LF / 255).astype(np.float32))
+    assert size_of([path]) == (6, 8, 10, 24)
+    other = LF[::-1, ..., 0].astype(np.uint16) * 257
+    put({**small, "scene/lf/views": LF, "scene/lf/right": other})
+    np.testing.assert_array_equal(taken(path, variable="scene/lf/right").views[..., 0], other)
+    listed = refused(path)
+    assert "choose one with --variable" in listed
+    assert {"scene/lf/views 2x3x8x10x3", "scene/lf/right 2x3x8x10"} == set(listed.split("--variable: ")[1].split(", "))
+    put({**small, "scene/LF": LF, "scene/GT": other})
+    np.testing.assert_array_equal(taken(path).views, LF)
+
+
+def test_structures_of_version_5_hold_anything(tmp_path: Path) -> None:
+    """Text, cells, empty and complex values, and several structures in one."""
+    scene = {"text": "words", "cell": np.array([1, "a"], object), "none": np.zeros((0, 0)), "z": LF[..., 0] * 1j}
+    for compressed in (False, True):
+        scipy.io.savemat(tmp_path / "a.mat", {"scene": {**scene, "v": LF, "end": 1.5}}, do_compression=compressed)
+        np.testing.assert_array_equal(taken(tmp_path / "a.mat").views, LF)
+    several = np.zeros((1, 2), [("v", object), ("n", object)])
+    several[0, 0], several[0, 1] = (LF, 1), (LF[::-1], "b")
+    scipy.io.savemat(tmp_path / "a.mat", {"scenes": several})
+    assert "--variable: scenes(1)/v 2x3x8x10x3, scenes(2)/v 2x3x8x10x3" in refused(tmp_path / "a.mat")
+    np.testing.assert_array_equal(taken(tmp_path / "a.mat", variable="scenes(2)/v").views, LF[::-1])
+    content = (tmp_path / "a.mat").read_bytes()
+    dims = struct.pack("<5i", *LF.shape)
+    (tmp_path / "a.mat").write_bytes(content.replace(dims, struct.pack("<5i", 9, *LF.shape[1:])))
+    assert "damaged" in refused(tmp_path / "a.mat", variable="scenes(2)/v")
 
 
 @pytest.mark.parametrize("name", ["lightfield", "data/views"])

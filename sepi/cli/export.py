@@ -1,0 +1,70 @@
+"""``sepi export``: a light field, read as the flags say, in files that need none of them.
+
+Not to be taken for the stage :mod:`sepi.export`, which writes finished maps.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import click
+
+from sepi.cli.info import range_text, size_text
+from sepi.cli.input_options import Geometry, Reading, camera_flags, reading_flags
+from sepi.command import SepiCommand
+from sepi.errors import SepiError
+
+_PATH = click.Path(path_type=Path)
+
+
+@click.command(cls=SepiCommand, short_help="Save the light field INPUT as it was read, for reading without flags.")
+@click.argument("light_field_path", metavar="INPUT", type=_PATH)
+@click.argument("output", metavar="OUT", type=_PATH)
+@click.option(
+    "--disparity-range",
+    nargs=2,
+    type=float,
+    metavar="MIN MAX",
+    help="Disparities to search, pixels per view step; the scene's own or an estimate unless given.",
+)
+@click.option("--force", is_flag=True, help="Write where something is already, too.")
+@camera_flags
+@reading_flags
+def export(
+    light_field_path: Path,
+    output: Path,
+    disparity_range: tuple[float, float] | None,
+    force: bool,
+    geometry: Geometry | None,
+    reading: Reading,
+) -> None:
+    """Save the light field INPUT, read as the flags say, as OUT: every command reads that without flags.
+
+    OUT is one HDF5 file, if its name ends with .h5, or a folder with a picture for each view, named by row and column:
+    PNG of 8 or 16 bit, TIFF where views are floats. Both keep where the views stand, the disparity range, the camera,
+    the view whose depth is made, ground truth and masks; the folder in light_field.json, which may be edited
+    (docs/reference/formats.md).
+
+    \b
+    Examples:
+      sepi export pictures lego.h5 --order flip-columns --exclude 0,0 --row-spacing 2
+      sepi export LF.mat lego --axes HWTSC --disparity-range -2 2
+      sepi depth lego
+    """
+    from sepi.inspection.disparity_range import settle_range
+    from sepi.io.exported import require_room, write_exported
+
+    if output.resolve() == light_field_path.resolve():
+        raise SepiError(f"{output}: is the light field itself; choose another name")
+    require_room(output, force=force)
+    light_field = reading.read(light_field_path, disparity_range=disparity_range)
+    if geometry is not None:
+        light_field = replace(light_field, camera=geometry(shape=light_field.shape))
+    # what was assumed is settled by now, and flags are of no more use
+    note = f"exported from {light_field_path}"
+    light_field = replace(settle_range(light_field), source="", reading="", notes=(note,))
+    write_exported(output, light_field, force=force)
+    click.echo(f"{light_field.name}: {size_text(light_field)}")
+    click.echo(f"disparity range: {range_text(light_field.require_disparity_range())}")
+    click.echo(f"written: {output}{'/' if output.is_dir() else ''}")

@@ -1,0 +1,141 @@
+"""A light field as a folder of pictures with all that is known about it beside them, in ``light_field.json``.
+
+Views are PNG of 8 or 16 bit, or TIFF of floats: nothing is lost. The file names each by its place in the grid, so that
+neither what else lies in the folder nor what the pictures are called has a say.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from contextlib import suppress
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+
+from sepi.errors import SepiError
+from sepi.io.files import atomic_files, atomic_folder, atomic_path
+from sepi.io.float_pictures import write_tiff
+from sepi.io.hdf5 import write_light_field
+from sepi.io.images import SUFFIXES, write_png
+from sepi.io.pfm import write_pfm
+from sepi.io.readers.exported import MANIFEST, read_manifest
+from sepi.io.result_folder import require_target
+from sepi.lightfield import LightField
+
+HDF5 = (".h5", ".hdf5")
+"""Ends of names, in small letters, of what is one file."""
+
+# of other formats of light fields, and of maps
+_OTHERS = SUFFIXES | {".mat", ".npy", ".npz", ".pfm", ".json"}
+_TRUTH = "gt_disp_lowres.pfm"
+_VIEW = re.compile(r"row_\d+_col_\d+\.(png|tif)")
+
+
+def require_room(path: Path, *, force: bool = False) -> None:
+    """Raise unless a light field may be written to ``path``; for telling before it is read.
+
+    Raises
+    ------
+    SepiError
+        If the name is that of another kind of file, something is there already and not ``force``, or it cannot be
+        written.
+    """
+    suffix = path.suffix.lower()
+    if suffix in HDF5:
+        if path.exists() and not force:
+            raise SepiError(f"{path}: exists already; choose another name, or replace it with --force")
+        return
+    if suffix in _OTHERS and not path.is_dir():
+        raise SepiError(f"{path}: expected a name that ends with .h5, for one file, or that of a folder, for pictures")
+    require_target(path)
+    there = sorted(file.name for file in path.iterdir() if file.name[0] != ".") if path.is_dir() else []
+    if there and not force:
+        what = "a light field that was exported" if MANIFEST in there else f"files already ({there[0]}, ...)"
+        raise SepiError(f"{path}: holds {what}; choose another folder, or write into it with --force")
+
+
+def write_exported(path: Path, light_field: LightField, *, force: bool = False) -> None:
+    """Write a light field as one HDF5 file or as a folder of views; reading gives it back unchanged without options.
+
+    Parameters
+    ----------
+    path : Path
+        A name that ends with ``.h5`` or ``.hdf5``, or that of a folder.
+    light_field : LightField
+    force : bool
+        Write where something is already, too. What an earlier export wrote there is replaced or removed, and all else
+        of others left alone, but for files of the very names.
+
+    Raises
+    ------
+    SepiError
+        As :func:`require_room`, or if something cannot be written.
+    """
+    require_room(path, force=force)
+    if path.suffix.lower() in HDF5:
+        write_light_field(path, light_field)
+        return
+    # the folder itself may be a link to where there is room
+    target = path.resolve()
+    existing = target.is_dir() and any(target.iterdir())
+    before = _earlier_files(target) if existing else set()
+    with atomic_files(target) if existing else atomic_folder(target) as temporary:
+        made = _write_folder(temporary, light_field)
+    for name in before - made:
+        with suppress(OSError):
+            (target / name).unlink(missing_ok=True)
+
+
+def _write_folder(folder: Path, light_field: LightField) -> set[str]:
+    digits = max(2, len(str(max(light_field.grid) - 1)))
+    suffix = "tif" if light_field.views.dtype == np.float32 else "png"
+    names: list[list[str | None]] = [[None] * light_field.grid[1] for _ in range(light_field.grid[0])]
+    for t, s in np.argwhere(light_field.present).tolist():
+        names[t][s] = name = f"row_{t:0{digits}}_col_{s:0{digits}}.{suffix}"
+        view = light_field.views[t, s]
+        pixels = view[..., 0] if view.shape[2] == 1 else view
+        if suffix == "tif":
+            write_tiff(folder / name, pixels.astype(np.float32), f"view {t},{s}")
+        else:
+            write_png(folder / name, pixels.astype(view.dtype.newbyteorder("=")))
+    if light_field.ground_truth is not None:
+        write_pfm(folder / _TRUTH, light_field.ground_truth)
+    masks = {name: f"mask_{name}.png" for name in sorted(light_field.masks)}
+    for name, file in masks.items():
+        write_png(folder / file, light_field.masks[name])
+    known, camera, positions = light_field.disparity_range, light_field.camera, light_field.positions
+    values = {
+        "name": light_field.name,
+        "views": names,
+        "view": light_field.view,
+        "row_spacing": float(light_field.row_spacing),
+        "positions": None
+        if positions is None
+        else [[place if np.isfinite(place).all() else None for place in row] for row in positions.tolist()],
+        "disparity_range": None if known is None else asdict(known),
+        "camera": None if camera is None else asdict(camera),
+        "ground_truth": None if light_field.ground_truth is None else _TRUTH,
+        "masks": masks,
+        "notes": light_field.notes,
+    }
+    # a line for each key
+    lines = [f"  {json.dumps(key)}: {json.dumps(value, default=_plain)}" for key, value in values.items()]
+    with atomic_path(folder / MANIFEST) as temporary:
+        temporary.write_text("{\n" + ",\n".join(lines) + "\n}\n", encoding="ascii")
+    return {path.name for path in folder.iterdir()}
+
+
+def _plain(number: np.generic) -> object:
+    return number.item()
+
+
+def _earlier_files(folder: Path) -> set[str]:
+    """Files that an earlier export wrote; one that was edited may name a user's own."""
+    with suppress(SepiError):
+        known = read_manifest(folder / MANIFEST)
+        masks = {file for name, file in known.masks.items() if file == f"mask_{name}.png"}
+        views = {name for row in known.views for name in row if name is not None and _VIEW.fullmatch(name)}
+        return {*views, *masks, *([_TRUTH] if known.ground_truth == _TRUTH else [])}
+    return set()

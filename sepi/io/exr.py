@@ -1,0 +1,104 @@
+"""OpenEXR pictures of half and float, grey and in colours, by the format's own library, which is an extra."""
+
+from __future__ import annotations
+
+import importlib
+import io
+import os
+import threading
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager, redirect_stdout, suppress
+from types import ModuleType
+
+import numpy as np
+import numpy.typing as npt
+
+from sepi.errors import SepiError, printable
+
+SIGNATURE = b"v/1\x01"
+"""First bytes of a file."""
+
+_COLOURS = ("R", "G", "B")
+_GREY = "Y"
+# what a message lists
+_LISTED = 12
+
+
+def open_exr() -> ModuleType:
+    """The package that reads and writes OpenEXR.
+
+    Raises
+    ------
+    SepiError
+        If it is not installed.
+    """
+    try:
+        return importlib.import_module("OpenEXR")
+    except ImportError as error:
+        raise SepiError("OpenEXR needs a package that is not installed; pip install 'sepi[exr]'") from error
+
+
+def exr_form(path: str) -> tuple[int, int, list[str]]:
+    """Height and width of a picture, and the names of the channels that show it.
+
+    Raises
+    ------
+    SepiError
+        If it is deep or cropped, or has no channels of grey or colours that are read, or several of either.
+    """
+    exr = open_exr()
+    # not by the package's older class InputFile, which crashes on damaged files
+    with _quiet(), exr.File(path, header_only=True) as file:
+        header = file.header()
+        data, display = ([corner.tolist() for corner in header[f"{of}Window"]] for of in ("data", "display"))
+        channels = {channel.name: (channel.xSampling, channel.ySampling) for channel in header["channels"]}
+        flat = header.get("type", exr.scanlineimage) in (exr.scanlineimage, exr.tiledimage)
+        names = _chosen(list(channels))
+    if not flat or data != display:
+        raise SepiError("an OpenEXR of depths, or whose pixels are not those of its frame (data and display windows)")
+    if any(channels[name] != (1, 1) for name in names):
+        raise SepiError("an OpenEXR with channels of other sizes; save all of them in full")
+    (left, top), (right, bottom) = data
+    return bottom - top + 1, right - left + 1, names
+
+
+def exr_pixels(path: str) -> npt.NDArray[np.float32]:
+    """Pixels (H, W, C) of a file whose size was looked at; half becomes float, transparency is left out."""
+    height, width, names = exr_form(path)
+    with _quiet(), open_exr().File(path, separate_channels=True) as file:
+        channels = file.channels()
+        # of a part whose pixels are damaged there is no channel
+        stored = [channels[name].pixels for name in names]
+    if any(values.dtype not in (np.float16, np.float32) for values in stored):
+        raise SepiError("an OpenEXR of integers; expected half or float")
+    return np.stack([values.astype(np.float32).reshape(height, width) for values in stored], axis=2)
+
+
+def _chosen(names: list[str]) -> list[str]:
+    """Channels of colours, those of the only layer that has some, or the only grey one."""
+    layers = dict.fromkeys(name.removesuffix("R") for name in names if name.endswith("R"))
+    coloured = [layer for layer in layers if {f"{layer}{colour}" for colour in _COLOURS} <= set(names)]
+    if "" in coloured or len(coloured) == 1:
+        layer = "" if "" in coloured else coloured[0]
+        return [f"{layer}{colour}" for colour in _COLOURS]
+    if not coloured and (len(names) == 1 or (_GREY in names and not {"RY", "BY"} & set(names))):
+        return [_GREY if _GREY in names else names[0]]
+    listed = printable(", ".join(names[:_LISTED]))
+    raise SepiError(f"an OpenEXR with the channels {listed}; expected R, G and B, or Y, or these in one layer alone")
+
+
+_terminal = threading.Lock()
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Keep the library from printing about damage, which is told as an error; it has no other way to be silent."""
+    with _terminal, redirect_stdout(io.StringIO()), ExitStack() as after:
+        # nothing to print to where standard error is closed
+        with suppress(OSError):
+            kept = os.dup(2)
+            after.callback(os.close, kept)
+            after.callback(os.dup2, kept, 2)
+            with open(os.devnull, "wb") as nothing:
+                os.dup2(nothing.fileno(), 2)
+        yield

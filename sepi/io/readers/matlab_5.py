@@ -1,0 +1,184 @@
+"""What lies in MATLAB files of version 5, told without taking memory on any word of theirs.
+
+After a header of 128 bytes come elements, each a tag of type and length and then data; a variable is a *matrix*
+element, or that compressed by zlib, and begins with the elements flags, dimensions and name. The values of an array
+follow; of a structure the length of its fields' names, the names, and a matrix element for each field of each of its
+elements.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+import zlib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, BinaryIO, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from sepi.errors import SepiError
+from sepi.io.hdf5 import DEFLATE_RATIO
+
+HEADER = 128
+"""Bytes before the first element; the last four are version and byte order."""
+
+BYTE_ORDERS = {b"\x00\x01IM": "<", b"\x01\x00MI": ">"}
+"""These four to NumPy's word for the order."""
+
+_MATRIX, _COMPRESSED = 14, 15
+_COMPLEX, _LOGICAL = 0x800, 0x200
+# classes of variables: structures, and arrays of numbers, as which the values are read
+_STRUCTURE = 2
+_CLASSES = dict(zip(range(6, 16), ("f8", "f4", "i1", "u1", "i2", "u2", "i4", "u4", "i8", "u8"), strict=True))
+# types in which values may be stored
+_TYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
+# enough for all that comes before the values: names have at most 63 letters
+_PREFIX = 4096
+# elements before the values of an array
+_BEFORE = 3
+
+
+class _Part(NamedTuple):
+    """An element: its type, the length that its tag states, and as much of its data as was looked at."""
+
+    kind: int
+    length: int
+    data: bytes | memoryview
+
+
+class _Variable(NamedTuple):
+    """A variable: its first elements, its place and length in the file, and how many bytes it may be unpacked."""
+
+    order: str
+    parts: list[_Part]
+    file: BinaryIO
+    start: int
+    length: int
+    compressed: bool
+    most: int
+
+    @property
+    def flags(self) -> int:
+        """Class and kind of the values; 0 for what is no matrix."""
+        return _flags(self.order, self.parts) if self.parts else 0
+
+    def content(self) -> bytes:
+        """The data of the matrix element."""
+        self.file.seek(self.start)
+        stored = self.file.read(self.length)
+        return zlib.decompressobj().decompress(stored, self.most)[8:] if self.compressed else stored
+
+
+def real_arrays(path: Path) -> set[str]:
+    """Names of the variables that are arrays of real numbers.
+
+    Raises
+    ------
+    SepiError, ValueError
+        If values are of a type that there is none of, with which SciPy ends the program, or cannot lie in the file.
+    """
+    names = set()
+    with path.open("rb") as file:
+        for variable in _variables(path, file):
+            if _is_real(variable.flags):
+                _, _, name, values = variable.parts
+                if values.kind not in _TYPES:
+                    raise SepiError(f"damaged MATLAB file: an array with values of type {values.kind}")
+                if values.length > variable.most:
+                    raise ValueError("an array that is longer than the file")
+                names.add(_text(name))
+    return names
+
+
+def nested_arrays(path: Path) -> dict[str, npt.NDArray[Any]]:
+    """Arrays of real numbers in structures, as MATLAB shows them, by names such as ``scene/LF`` or ``scene(2)/LF``.
+
+    Raises
+    ------
+    SepiError, ValueError
+        If the file is damaged.
+    """
+    found: dict[str, npt.NDArray[Any]] = {}
+    with path.open("rb") as file:
+        for variable in _variables(path, file):
+            if variable.flags & 0xFF == _STRUCTURE:
+                content = memoryview(variable.content())
+                found.update(_fields(variable.order, content, _text(variable.parts[2])))
+    return found
+
+
+def _fields(order: str, data: memoryview, name: str) -> Iterator[tuple[str, npt.NDArray[Any]]]:
+    """Arrays in a matrix element, which a structure may be."""
+    parts = _parts(order, data)
+    if any(part.length != len(part.data) for part in parts):
+        raise ValueError(f"{name} is cut off")
+    flags = _flags(order, parts)
+    if flags & 0xFF == _STRUCTURE:
+        width = struct.unpack(order + "i", parts[3].data)[0]
+        text = bytes(parts[4].data)
+        fields = [text[at : at + width].split(b"\0")[0].decode("latin-1") for at in range(0, len(text), width)]
+        values = parts[5:]
+        for number, value in enumerate(values):
+            element, field = divmod(number, len(fields))
+            # an empty one has no data at all
+            if value.kind == _MATRIX and value.length:
+                which = f"({element + 1})" if len(values) > len(fields) else ""
+                yield from _fields(order, memoryview(value.data), f"{name}{which}/{fields[field]}")
+    elif _is_real(flags):
+        _, dimensions, _, numbers = parts[: _BEFORE + 1]
+        shape = np.frombuffer(dimensions.data, order + "i4").tolist()
+        stored = np.dtype(order + _TYPES[numbers.kind])
+        if math.prod(shape) * stored.itemsize != numbers.length:
+            raise ValueError(f"{name} of {numbers.length} bytes for {shape}")
+        # MATLAB saves doubles that are small whole numbers as bytes
+        array = np.frombuffer(numbers.data, stored).reshape(shape, order="F")
+        yield name, array.astype(_CLASSES[flags & 0xFF], copy=False)
+
+
+def _variables(path: Path, file: BinaryIO) -> Iterator[_Variable]:
+    order = BYTE_ORDERS[file.read(HEADER)[-4:]]
+    while tag := file.read(8):
+        kind, length = struct.unpack(order + "II", tag)
+        start = file.tell()
+        if start + length > path.stat().st_size:
+            raise SepiError("damaged MATLAB file: it is cut off")
+        head, compressed, most = file.read(min(length, _PREFIX)), kind == _COMPRESSED, length
+        if compressed:
+            most = length * DEFLATE_RATIO
+            head = zlib.decompressobj().decompress(head, _PREFIX)
+            kind, head = struct.unpack_from(order + "I", head)[0], head[8:]
+        parts = _parts(order, head, _BEFORE + 1) if kind == _MATRIX else []
+        # SciPy takes memory on the word of each, of variables that nobody asks for, too
+        if any(part.length > len(part.data) for part in parts[:_BEFORE]):
+            raise ValueError("a variable whose head is longer than the file")
+        yield _Variable(order, parts, file, start, length, compressed, most)
+        file.seek(start + length)
+
+
+def _parts(order: str, data: bytes | memoryview, most: int | None = None) -> list[_Part]:
+    """The elements in the data of a matrix, the first ones alone or all."""
+    parts: list[_Part] = []
+    at = 0
+    while at + 8 <= len(data) and (most is None or len(parts) < most):
+        kind, length = struct.unpack_from(order + "II", data, at)
+        start, after = at + 8, at + 8 + -(-length // 8) * 8
+        if kind >> 16:
+            # up to four bytes of data stand in the tag itself
+            kind, length, start, after = kind & 0xFFFF, kind >> 16, at + 4, at + 8
+        parts.append(_Part(kind, length, data[start : start + length]))
+        at = after
+    return parts
+
+
+def _flags(order: str, parts: list[_Part]) -> int:
+    return int(struct.unpack_from(order + "I", parts[0].data)[0])
+
+
+def _is_real(flags: int) -> bool:
+    return flags & 0xFF in _CLASSES and not flags & (_COMPLEX | _LOGICAL)
+
+
+def _text(part: _Part) -> str:
+    return bytes(part.data).decode("latin-1")

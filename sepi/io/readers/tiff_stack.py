@@ -1,0 +1,112 @@
+"""TIFFs of several pages, each a view.
+
+ImageJ, OME and tifffile write how the pages are counted: along two axes, such as time and depth, they are a grid of
+views, and an axis of three channels holds their colours. Otherwise the pages are a sequence.
+"""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import replace
+from math import prod
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sepi.errors import SepiError
+from sepi.io.files import reading
+from sepi.io.picture_headers import TIFF_SIGNATURES, Header, open_tiff, tiff_page
+from sepi.io.readers.arrays import Array, light_field_from_array
+from sepi.io.readers.options import ReadOptions
+from sepi.io.readers.view_files import MAX_VIEWS
+from sepi.io.tiff import page_pixels
+from sepi.lightfield import LightField
+
+_SUFFIXES = (".tif", ".tiff")
+_KIND = "TIFF stack"
+_RGB = 3
+# bytes that one of a file can become, and what all pages of a small one may take
+_MOST, _SMALL = 1100, 2**24
+
+
+def matches(path: Path) -> bool:
+    """Whether ``path`` is a TIFF whose first pages are alike, or a damaged one.
+
+    Others hold a picture, or one and a small copy of it.
+    """
+    if path.suffix.lower() not in _SUFFIXES or not path.is_file():
+        return False
+    try:
+        with reading(path, _KIND), path.open("rb") as file:
+            if not file.read(4).startswith(TIFF_SIGNATURES):
+                return False
+            file.seek(0)
+            with open_tiff(file) as pictures:
+                first, *others = (page.aspage() for page in pictures.pages[:2])
+                return not _is_whole(pictures) or any(
+                    (page.shape, page.dtype) == (first.shape, first.dtype) for page in others
+                )
+    except SepiError:
+        # what reads it will say so
+        return True
+
+
+def headers(path: Path) -> list[Header]:
+    """What the pages are, all alike; no pixels are read."""
+    with reading(path, _KIND), path.open("rb") as file, open_tiff(file) as pictures:
+        return _headers(pictures, path.stat().st_size)
+
+
+def read(path: Path, options: ReadOptions) -> LightField:
+    """Read a stack; its grid is that of the options, else that of the file, else it is yet to be found."""
+    with reading(path, _KIND), path.open("rb") as file, open_tiff(file) as pictures:
+        count = len(_headers(pictures, path.stat().st_size))
+        first = page_pixels(pictures.pages[0].aspage())
+        stack: Array = np.empty((count, *first.shape), first.dtype)
+        for number, page in enumerate(pictures.pages):
+            stack[number] = page_pixels(page.aspage())
+        series = pictures.series[0]
+        counted = [(axis, n) for axis, n in zip(series.axes, series.shape, strict=True) if axis not in "YXS" and n > 1]
+    if prod(n for _, n in counted) != count:
+        counted = [("I", count)]
+    if len(counted) > 1 and ("C", _RGB) in counted and stack.shape[3] == 1:
+        # a page for each colour
+        stack = stack.reshape(*(n for _, n in counted), *stack.shape[1:3])
+        colour = counted.index(("C", _RGB))
+        stack = np.moveaxis(stack, colour, -1)
+        del counted[colour]
+    if len(counted) != 2 or options.grid is not None:
+        return light_field_from_array(stack.reshape(-1, *stack.shape[-3:]), path, options, axes="NHWC")
+    rows, columns = (n for _, n in counted)
+    light_field = light_field_from_array(stack.reshape(rows, columns, *stack.shape[-3:]), path, options, axes="TSHWC")
+    note = f"the file counts its pages as {rows}x{columns}, taken for rows and columns; --order transpose if not"
+    return replace(light_field, notes=(note, *light_field.notes))
+
+
+def _is_whole(pictures: Any) -> bool:
+    """Whether no page follows the last that can be read: tifffile leaves out what lies beyond the end of a file."""
+    form, file = pictures.tiff, pictures.filehandle
+    at = pictures.pages[len(pictures.pages) - 1].offset
+    file.seek(at)
+    (tags,) = struct.unpack(form.tagnoformat, file.read(form.tagnosize))
+    file.seek(at + form.tagnosize + tags * form.tagsize)
+    return bool(file.read(form.offsetsize) == bytes(form.offsetsize))
+
+
+def _headers(pictures: Any, size: int) -> list[Header]:
+    if not _is_whole(pictures):
+        raise SepiError(f"damaged TIFF: pages behind the {len(pictures.pages)}. are cut off")
+    found: list[Header] = []
+    for number, page in enumerate(pictures.pages, 1):
+        header, kind = tiff_page(page.aspage(), size), page.aspage().dtype
+        if not header.plain:
+            raise SepiError(f"page {number} is packed in a rarer way; save the stack uncompressed")
+        if found and (header, kind) != (found[0], pictures.pages[0].aspage().dtype):
+            raise SepiError(f"page {number} is unlike the first; all views must be alike")
+        found.append(header)
+        if len(found) > MAX_VIEWS:
+            raise SepiError(f"more than {MAX_VIEWS} pages")
+    if len(found) * found[0].height * found[0].width * found[0].pixel_bytes > size * _MOST + _SMALL:
+        raise SepiError(f"damaged TIFF: {len(found)} pages of {found[0].width}x{found[0].height} in {size} bytes")
+    return found
