@@ -18,7 +18,7 @@ def print_warnings():
     """Show what the readers of light fields and of external maps warned of in this run, from their logs."""
     missing = {}
     for dataset, scene in SETTINGS.scenes:
-        for command in ("ingest", "external"):
+        for command in ("ingest", "truth", "external"):
             log = Path(placed(f"logs/{dataset}/{scene}/{command}.log"))
             for line in log.read_text().splitlines() if is_new(log) else ():
                 absent = re.match(r"sepi: warning: external (.+), scene .+: no such file$", line)

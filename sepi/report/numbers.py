@@ -22,6 +22,7 @@ from sepi.command import SepiCommand
 from sepi.io.external_maps import read_external
 from sepi.io.hdf5 import read_light_field, read_stage
 from sepi.io.scores import Scores, read_evaluations, read_scores, without_nan
+from sepi.io.truth import read_with_truth
 from sepi.matching.unknown import with_unknown
 from sepi.report.plan import Plan
 from sepi.report.runs import Runs, read_json
@@ -109,16 +110,16 @@ def _scene(plan: Plan, dataset: str, scene: str, parts: bool) -> dict[str, Any]:
     if parts:
         return found | {"stages": _stages(plan, dataset, scene, parts)}
     return found | {
-        "light_field": _light_field(plan.light_field_file(dataset, scene)),
+        "light_field": _light_field(plan.light_field_file(dataset, scene), plan.truth_file(dataset, scene)),
         "stages": _stages(plan, dataset, scene, parts),
         "confidence": _confidence(plan, dataset, scene),
         "external": _external(plan, dataset, scene),
     }
 
 
-def _light_field(path: Path) -> dict[str, Any]:
+def _light_field(path: Path, truth: Path) -> dict[str, Any]:
     """What a light field is, with digests of its pixels and its ground truth."""
-    found = read_light_field(path)
+    found = read_with_truth(path, truth)
     known = found.disparity_range
     return {
         "grid": list(found.grid),

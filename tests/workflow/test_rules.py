@@ -64,12 +64,15 @@ def test_every_job_is_made_again_for_its_own_code(read: Any) -> None:
             modules = (command[1],) if chosen is None else stage_modules(rule.name, chosen)
             if rule.name == "ingest":
                 modules = ingest_modules("sepi.scenes")
+            if rule.name == "truth":
+                modules = ("sepi.truth", "sepi.scenes")
             given = code(scene(**{rule.name: name})) if callable(code) else code
             assert given == code_digest(*modules), f"{rule.name} {name}"
         if "--code" in rule.shellcmd:
             assert "--code {params.code}" in rule.shellcmd
     assert {
         "ingest",
+        "truth",
         *STAGES,
         "evaluate",
         "export",
