@@ -26,7 +26,7 @@ from sepi.io.truth import read_with_truth
 from sepi.matching.unknown import with_unknown
 from sepi.report.plan import Plan
 from sepi.report.runs import Runs, read_json
-from sepi.report.tables import BUILDERS
+from sepi.report.tables import table
 from sepi.report.tabular.layout import as_json, write
 from sepi.scoring.confidence import decile_errors, oracle, sparsification
 from sepi.scoring.scores import COUNTS, EDGE_SCORES, PROTOCOLS, SCORED_REGIONS, SCORES
@@ -70,7 +70,7 @@ def collect(plan: Plan, parts: bool = False) -> dict[str, Any]:
     }
     numbers = without_nan(numbers)
     runs = Runs(numbers)
-    tables = {name: as_json(BUILDERS[name](runs)) for name in plan.tables(parts)}
+    tables = {name: as_json(table(name, runs)) for name in plan.tables(parts)}
     return numbers | {"tables": tables}
 
 

@@ -516,6 +516,28 @@ def test_a_failed_job_shows_the_one_clear_line(workflow: Workflow, tmp_path: Pat
     assert "Traceback" not in result.stdout
     assert files_below(broken.folder / "results") == []
 
+def test_a_damaged_scene_leaves_the_tables_of_the_others(finished: Workflow, tmp_path: Path) -> None:
+    """With --keep-going: who computed for days must not go without tables, nor take them for whole."""
+    write_hci(render("dots", size=SIZE, views=3), tmp_path / "broken")
+    picture = tmp_path / "broken" / "input_Cam002.png"
+    picture.write_bytes(picture.read_bytes()[:100])
+    shutil.copytree(finished.folder, tmp_path / "run", symlinks=True)
+    run = replace(finished, folder=tmp_path / "run").with_config(
+        light_fields={"broken": {"path": str(tmp_path / "broken")}}
+    )
+    result = run.run("all", flags=("--keep-going",))
+    assert result.returncode != 0
+    assert "\nsepi: the tables are without own/broken: a job failed\n" in result.stdout
+    assert "\n  reports/table1_mse.md\n" in result.stdout
+    reports = run.folder / "reports"
+    for name in ("table1_mse.md", "index.html"):
+        assert re.search("Without .{0,6}own/broken.{0,7}: a job failed", (reports / name).read_text())
+    # it still counts as not made, even if the scene is given up
+    again = run.plan("all")
+    assert {"ingest", "numbers", "tables", "charts", "page"} <= again.keys()
+    assert {"numbers", "tables", "charts", "page"} <= replace(run, config=finished.config).plan("all").keys()
+
+
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
 def test_an_interrupted_run_leaves_no_half_file_and_resumes(
