@@ -4,9 +4,10 @@
 import subprocess
 import tempfile
 import time
+from shlex import quote
 
 from sepi.workflow.run_folder import note_run, put_away, say_if_full, say_so, take_over
-from sepi.workflow.run_log import show_progress
+from sepi.workflow.run_log import show_progress, tell_nearest
 
 STARTED = time.time()
 
@@ -48,12 +49,12 @@ def print_written(tables, maps):
             print(f"{title} written:", *dict.fromkeys(files), sep="\n  ", flush=True)
 
 
-def run_begins():
 def print_all_written():
     """Name whatever of the report and the final maps this run wrote."""
     print_written([*report_files(), *ablation_files(), *comparison_files()], result_files(SETTINGS.variants))
 
 
+def run_begins():
     """Note that what is made now is to be looked at, should the run be killed."""
     note_run(well=False)
 
@@ -68,10 +69,9 @@ def run_ended_well():
 
 
 def run_failed():
-    """Put away what a job left: it may have been killed, the clock set back, the disk be full."""
+    """Put away what a job left: it may have been killed, the clock set back, the disk be full. Report what there is."""
     put_away(MADE)
     say_if_full(Path())
-
     # a run that was stopped has more to do
     scheduler = workflow.scheduler
     if scheduler.keepgoing and not (scheduler.open_jobs or scheduler.running):
@@ -117,6 +117,7 @@ def run_apart(job, command):
         Path(file).parent.mkdir(parents=True, exist_ok=True)
     return subprocess.run(command, shell=True, executable="bash", check=False).returncode == 0
 
+
 # where all that is made is
 MADE = [Path(placed(RESULTS)), Path(placed("reports"))]
 
@@ -128,6 +129,10 @@ if workflow.is_main_process and not workflow.output_settings.dryrun:
         # not every version of Snakemake calls handlers of a module, and the workflow that has it may not either
         run_begins()
 
+
+# ... and what cannot be made is told with its nearest names
+if workflow.is_main_process and not IS_MODULE:
+    tell_nearest(logger, names_like)
 
 # a progress bar, or a line for each job; a dry run is as Snakemake shows it, and so is another workflow's run
 if workflow.is_main_process and not (IS_MODULE or workflow.output_settings.dryrun or workflow.output_settings.verbose):

@@ -35,6 +35,8 @@ _RESERVED = ("stages", "complete", "external", "ground_truth", "reference_view",
 _BUILTIN_VIEWS = 81
 # keys whose values are text even where they look like numbers
 _TEXTS = ("path", "pattern", "variable", "include", "exclude")
+# what is drawn of a scene
+_PICTURES = re.compile(r"reports/(?:comparison/)?(?:maps/([^/]+)/([^/]+)|page/([^/]+)/([^/]+)\.json)")
 _WORDS = {"true": True, "false": False, "null": None}
 
 
@@ -220,7 +222,7 @@ class Settings:
         return self.scenes[dataset, name]
 
     def require_target(self, path: str) -> None:
-        """Check the names in a file that a user asks for, if it lies among the results.
+        """Check the names in a file that a user asks for, if it lies among the results or is of a scene's pictures.
 
         Raises
         ------
@@ -230,6 +232,9 @@ class Settings:
         if path in PAGES and not self.has_page:
             why = "is false" if self.report.page is False else f"is null, and there are over {MOST_ON_PAGE} scenes"
             raise SepiError(f"{path}: not made: report.page {why}; true asks for it")
+        pictures = _PICTURES.fullmatch(path)
+        if pictures:
+            self.scene(*filter(None, pictures.groups()))
         folder, *names = Path(path).parts or ("",)
         if folder == str(RESULTS) and len(names) > 2:
             self.scene(names[0], names[1])

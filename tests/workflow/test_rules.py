@@ -110,6 +110,28 @@ def test_the_page_can_be_left_out_and_is_by_itself_where_there_are_too_many_scen
     assert not replace(many, scenes=scenes | {("own", "one"): None}).has_page
 
 
+@pytest.mark.parametrize(
+    ("target", "wrong", "meant"),
+    [
+        ("results/builtin/dotz/paper/result.h5", "dotz", "dots"),
+        ("results/bultin/dots/paper/result.h5", "bultin", "builtin"),
+        ("reports/maps/builtin/dotz", "dotz", "dots"),
+        ("reports/comparison/page/bultin/dots.json", "bultin", "builtin"),
+    ],
+)
+def test_a_wrong_scene_in_a_target_is_told(read: Any, target: str, wrong: str, meant: str) -> None:
+    """Snakemake would show a dozen lines of its own, or of Python."""
+    with pytest.raises(SepiError, match=f"unknown '{wrong}'; did you mean '{meant}'"):
+        read.globals["SETTINGS"].require_target(target)
+    read.globals["SETTINGS"].require_target(target.replace(wrong, meant))
+
+
+def test_a_wrong_target_finds_what_is_near(read: Any) -> None:
+    near = read.globals["names_like"]
+    assert {"all", "reports/table1_mse.md", "reports/maps/builtin/dots"} <= {*near("al")}
+    assert "results/builtin/dots/best/disparity.pfm" in near("results/builtin/dots/best/disparty.pfm")
+
+
 def test_what_a_cluster_ended_is_tried_with_twice_as_much(read: Any) -> None:
     found = read.globals
     for stage in ("initial", "occlusion", "optimize"):
