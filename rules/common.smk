@@ -202,6 +202,12 @@ def ingest_source(wildcards):
     return [str(scene.source), *scene.flags]
 
 
+def truth_source(wildcards):
+    """Where a scene's ground truth comes from, as words for its command; none where there is no ground truth."""
+    scene = scene_of(wildcards)
+    return ingest_source(wildcards) if scene.source is None or scene.truth else []
+
+
 def ingest_range(wildcards):
     """The disparity range that the user set, as flags; none where the scene's own or an estimate serves."""
     given = scene_of(wildcards).disparity_range

@@ -4,6 +4,7 @@
 rule evaluate:
     input:
         light_field=SCENE.light_field,
+        truth=SCENE.truth,
         maps=scored_maps,
     output:
         scores=SCENE.scores("{which}"),
@@ -24,6 +25,6 @@ rule evaluate:
         "{wildcards.dataset}/{wildcards.scene}: scores"
     shell:
         command(
-            "sepi.evaluate --light-field {input.light_field:q} --stages {params.stages:q} "
+            "sepi.evaluate --light-field {input.light_field:q} --truth {input.truth:q} --stages {params.stages:q} "
             "--output {output.scores:q} {input.maps:q} 2> {log:q}"
         )

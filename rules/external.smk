@@ -5,6 +5,7 @@
 rule external:
     input:
         light_field=SCENE.light_field,
+        truth=SCENE.truth,
         maps=external_inputs,
     output:
         maps=SCENE.external,
@@ -26,6 +27,6 @@ rule external:
         "{wildcards.dataset}/{wildcards.scene}: maps of external methods"
     shell:
         command(
-            "sepi.external --light-field {input.light_field:q} --maps {params.maps:q} "
+            "sepi.external --light-field {input.light_field:q} --truth {input.truth:q} --maps {params.maps:q} "
             "--scene {params.scene:q} --output {output.maps:q} 2> {log:q}"
         )

@@ -1,4 +1,4 @@
-# Light fields: any format in, one HDF5 file out (views, disparity range and where that came from, ground truth, masks).
+# Light fields: any format in, one HDF5 file out (views, disparity range and where that came from).
 # A scene's pictures are the inputs: a changed or new one is read again.
 rule ingest:
     input:

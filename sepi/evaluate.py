@@ -12,9 +12,10 @@ import click
 import numpy as np
 
 from sepi.command import SepiCommand
-from sepi.io.hdf5 import read_light_field, read_stage
+from sepi.io.hdf5 import read_stage
 from sepi.io.provenance import scene_attributes
 from sepi.io.scores import Evaluation, map_name, write_scores
+from sepi.io.truth import read_with_truth
 from sepi.lightfield import FloatMap, LightField, require_light_field
 from sepi.scoring.edges import edges_of
 from sepi.scoring.scores import (
@@ -126,12 +127,13 @@ _PATH = click.Path(path_type=Path)
 
 @click.command(name="python -m sepi.evaluate", cls=SepiCommand)
 @click.option("--light-field", "light_field_path", type=_PATH, required=True, help="From ingest.")
+@click.option("--truth", type=_PATH, help="Ground truth, from sepi.truth; the light field's own unless given.")
 @click.option("--stages", type=_PATH, required=True, help="Folder of the stage files; their paths in it name the maps.")
 @click.option("--output", type=_PATH, required=True, help="Score file (HDF5) to write.")
 @click.argument("paths", nargs=-1, type=_PATH, metavar="STAGE_FILE...", required=True)
-def command(light_field_path: Path, stages: Path, output: Path, paths: tuple[Path, ...]) -> None:
+def command(light_field_path: Path, truth: Path | None, stages: Path, output: Path, paths: tuple[Path, ...]) -> None:
     """Score the disparity maps of stage files against the light field's ground truth, if it has one."""
-    light_field = read_light_field(light_field_path)
+    light_field = read_with_truth(light_field_path, truth)
     maps = {map_name(stages, path): read_stage(path).disparity for path in paths}
     write_scores(output, evaluations_of(light_field, maps), scene_attributes(light_field))
     if light_field.ground_truth is None:

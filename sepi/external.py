@@ -20,7 +20,7 @@ from sepi.errors import SepiError, SepiWarning
 from sepi.evaluate import evaluations_of
 from sepi.io.disparity_maps import map_file, read_disparity
 from sepi.io.external_maps import ExternalMap, ExternalSource, write_external
-from sepi.io.hdf5 import read_light_field
+from sepi.io.truth import read_with_truth
 from sepi.lightfield import LightField
 
 NO_FILE = "no file"
@@ -110,13 +110,18 @@ def _sources(text: str) -> dict[str, ExternalSource]:
 
 @click.command(name="python -m sepi.external", cls=SepiCommand)
 @click.option("--light-field", "light_field_path", type=click.Path(path_type=Path), required=True, help="From ingest.")
+@click.option(
+    "--truth",
+    type=click.Path(path_type=Path),
+    help="Ground truth, from sepi.truth; the light field's own unless given.",
+)
 @click.option("--maps", required=True, help='JSON: {"METHOD": {"path": FILE, "scale": NUMBER, "offset": NUMBER}, ...}.')
 @click.option("--scene", default="", help="What messages call the scene; the light field's own name unless given.")
 @click.option("--output", type=click.Path(path_type=Path), required=True, help="File to write (HDF5).")
-def command(light_field_path: Path, maps: str, scene: str, output: Path) -> None:
+def command(light_field_path: Path, truth: Path | None, maps: str, scene: str, output: Path) -> None:
     """Read and score the disparity maps that external methods made of a light field."""
     sources = _sources(maps)
-    write_external(output, external_maps(read_light_field(light_field_path), sources, scene))
+    write_external(output, external_maps(read_with_truth(light_field_path, truth), sources, scene))
 
 
 if __name__ == "__main__":

@@ -1,8 +1,12 @@
-"""Stage ingest: read a light field of any format, settle its disparity range, write one HDF5 file."""
+"""Stage ingest: read a light field of any format, settle its disparity range, write one HDF5 file.
+
+Ground truth lies apart (:mod:`sepi.truth`): no stage runs again for it.
+"""
 
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import click
@@ -43,12 +47,12 @@ def main(
     if (path is None) == (builtin is None):
         raise click.UsageError("expected either PATH or --builtin NAME")
     if path is not None:
-        light_field = reading.read(path)
+        light_field = reading.read(path, truth=False)
     else:
         from sepi.scenes import render
 
         assert builtin is not None  # one of them is given
-        light_field = render(builtin, size=size, views=views)
+        light_field = replace(render(builtin, size=size, views=views), ground_truth=None, masks={})
     write_light_field(output, settle_range(light_field, disparity_range))
     if timing is not None:
         write_timing(timing, started, threads)

@@ -27,6 +27,9 @@ from sepi.validation import described, is_finite, require_known, require_type, w
 FloatMap = npt.NDArray[np.float32]
 BoolMap = npt.NDArray[np.bool_]
 
+Truth = tuple[FloatMap | None, Mapping[str, BoolMap]]
+"""Ground truth of the reference view, and masks by name: what only scores are made with."""
+
 RANGE_SOURCES = ("parameters", "given", "estimated")
 """Where the range of a light field may come from."""
 

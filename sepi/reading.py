@@ -33,6 +33,7 @@ def read_light_field(
     file_format: str | None = None,
     options: ReadOptions | None = None,
     check_order: bool = True,
+    truth: bool = True,
 ) -> LightField:
     """Read a light field of any known format.
 
@@ -51,6 +52,8 @@ def read_light_field(
     check_order : bool
         Look at the views: warn (:class:`SepiWarning`) where another order of them clearly fits better, and find how far
         their rows are apart where nothing says so.
+    truth : bool
+        Read ground truth and masks where there are any; without, as if there were none.
 
     Returns
     -------
@@ -86,7 +89,7 @@ def read_light_field(
     require_type(f"{path}: options", options, (ReadOptions, NoneType), "sepi.ReadOptions")
     options = options or ReadOptions()
     given = None if disparity_range is None else _given_range(path, disparity_range)
-    light_field = read(path, options, file_format)
+    light_field = read(path, options, file_format, truth=truth)
     require_memory(KERNELS)
     tell_kernel_cache()
     if not light_field.arranged:

@@ -19,6 +19,7 @@ from sepi.io.hdf5 import read_light_field, read_stage, write_light_field, write_
 from sepi.io.pfm import write_pfm
 from sepi.io.provenance import scene_attributes, stage_attributes
 from sepi.io.scores import map_name, write_scores
+from sepi.io.truth import write_truth
 from sepi.lightfield import FloatMap, LightField
 from sepi.machine import this_machine
 from sepi.report import numbers
@@ -122,6 +123,7 @@ def write_results(plan: Plan, scene: tuple[str, str]) -> None:
     """Every file of a scene that the report reads."""
     light_field = small_light_field(scene)
     write_light_field(plan.light_field_file(*scene), light_field)
+    write_truth(plan.truth_file(*scene), (light_field.ground_truth, light_field.masks))
     for variant in plan.variants:
         run_stages(plan, scene, light_field, variant)
     write_plan_scores(plan, scene, light_field)

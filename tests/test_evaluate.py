@@ -8,11 +8,14 @@ import pytest
 from click.testing import CliRunner
 from geometries import grid_baselines
 
+from sepi import ingest, truth
 from sepi.errors import SepiError
 from sepi.evaluate import command, evaluation_of
 from sepi.io.hdf5 import write_light_field, write_stage
 from sepi.io.scores import read_evaluations, read_scores
+from sepi.io.truth import read_with_truth
 from sepi.lightfield import DisparityRange, LightField
+from sepi.scenes import render, write_hci
 from sepi.scoring import regions
 from sepi.scoring.scores import EDGE_SCORES, score
 from sepi.stage import StageMaps
@@ -234,3 +237,29 @@ def test_a_map_that_was_not_scored_is_named(tmp_path: Path) -> None:
     path, _ = run_command(tmp_path, scene(None), {"sepi": np.zeros((40, 40), np.float32)})
     with pytest.raises(SepiError, match=r"no scores of 'sepi/wang'; it holds: sepi$"):
         read_evaluations(path, ["sepi/wang"])
+
+
+@pytest.mark.parametrize("kind", ["built-in", "folder", "file"])
+def test_ground_truth_lies_apart_whatever_the_scene_is(tmp_path: Path, kind: str) -> None:
+    """In the light field's own file, new ground truth would ask for all maps; lost, the scene would have no scores."""
+    whole = render("dots", size=64, views=3)
+    words = {"built-in": ["--builtin", "dots", "--size", "64", "--views", "3"]}.get(kind, [str(tmp_path / kind)])
+    if kind == "folder":
+        write_hci(whole, tmp_path / kind)
+    elif kind == "file":
+        write_light_field(tmp_path / kind, whole)
+    views, apart = tmp_path / "lightfield.h5", tmp_path / "truth.h5"
+    for main, output in ((ingest.main, views), (truth.main, apart)):
+        result = CliRunner().invoke(main, [*words, "--output", str(output)])
+        assert result.exit_code == 0, result.output
+    alone = read_with_truth(views, None)
+    assert (alone.ground_truth, alone.masks) == (None, {})
+    found = read_with_truth(views, apart)
+    np.testing.assert_array_equal(found.views, whole.views)
+    np.testing.assert_array_equal(found.ground_truth, whole.ground_truth)
+    assert {name: mask.tolist() for name, mask in found.masks.items()} == {
+        k: v.tolist() for k, v in whole.masks.items()
+    }
+    write_light_field(views, scene(None))
+    with pytest.raises(SepiError, match=f"^{apart}: .*ground_truth must have the views' shape"):
+        read_with_truth(views, apart)

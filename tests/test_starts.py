@@ -28,6 +28,7 @@ MODULES = (
     "sepi.optimize",
     "sepi.evaluate",
     "sepi.ingest",
+    "sepi.truth",
     "sepi.export",
     "sepi.pipeline",
     "sepi.variants",

@@ -30,7 +30,7 @@ from sepi.camera import Camera
 from sepi.errors import SepiError, printable
 from sepi.io import apart
 from sepi.io.files import PatientFile, atomic_path, reading
-from sepi.lightfield import RANGE_SOURCES, DisparityRange, LightField, require_light_field
+from sepi.lightfield import RANGE_SOURCES, DisparityRange, LightField, Truth, require_light_field
 from sepi.stage import CostVolume, StageMaps
 from sepi.validation import require_known, require_path
 
@@ -156,11 +156,23 @@ def write_light_field(path: str | Path, light_field: LightField) -> None:
             file.attrs["camera"] = astuple(light_field.camera)
         if light_field.notes:
             file.attrs["notes"] = [_fixed(note) for note in light_field.notes]
-        if light_field.ground_truth is not None:
-            file.create_dataset("ground_truth", data=light_field.ground_truth)
-            file["ground_truth"].attrs["units"] = UNITS["disparity"]
-        for name, mask in sorted(light_field.masks.items()):
-            file.create_dataset(f"masks/{name}", data=mask, compression="gzip", compression_opts=1)
+        put_truth(file, (light_field.ground_truth, light_field.masks))
+
+
+def put_truth(file: h5py.File, truth: Truth) -> None:
+    """Write what scores are made with, as far as there is any."""
+    ground_truth, masks = truth
+    if ground_truth is not None:
+        file.create_dataset("ground_truth", data=ground_truth)
+        file["ground_truth"].attrs["units"] = UNITS["disparity"]
+    for name, mask in sorted(masks.items()):
+        file.create_dataset(f"masks/{name}", data=mask, compression="gzip", compression_opts=1)
+
+
+def truth_in(path: Path, file: h5py.File) -> Truth:
+    """What :func:`put_truth` wrote."""
+    ground_truth = read_dataset(path, file["ground_truth"]).astype(np.float32) if "ground_truth" in file else None
+    return ground_truth, {name: read_dataset(path, mask).astype(bool) for name, mask in members(file.get("masks", {}))}
 
 
 def has_dataset(path: Path, name: str, *, if_damaged: bool = False) -> bool:
@@ -178,15 +190,16 @@ def has_dataset(path: Path, name: str, *, if_damaged: bool = False) -> bool:
 def read_light_field(path: Path) -> LightField:
     """Read a light field written by ``write_light_field``."""
     with open_hdf5(path, "light field of this package") as file:
-        known_arrays = ("views", "present", "positions", "ground_truth")
+        known_arrays = ("views", "present", "positions")
         arrays = {name: read_dataset(path, file[name]) for name in known_arrays if name in file}
+        ground_truth, masks = truth_in(path, file)
         known = None
         if "disparity_range" in file.attrs:
             minimum, maximum = map(float, attribute(file, "disparity_range"))
             known = DisparityRange(minimum, maximum, _text(file, "disparity_range_source"))
             require_known("disparity range", [known.source], RANGE_SOURCES)
         view = attribute(file, "view") if "view" in file.attrs else None
-        ground_truth, positions = arrays.get("ground_truth"), arrays.get("positions")
+        positions = arrays.get("positions")
         return LightField(
             views=arrays["views"],
             name=_text(file, "name"),
@@ -199,8 +212,8 @@ def read_light_field(path: Path) -> LightField:
             camera=read_camera(file),
             notes=tuple(_text(file, "notes").split("\0")) if "notes" in file.attrs else (),
             disparity_range=known,
-            ground_truth=None if ground_truth is None else ground_truth.astype(np.float32),
-            masks={name: read_dataset(path, mask).astype(bool) for name, mask in members(file.get("masks", {}))},
+            ground_truth=ground_truth,
+            masks=masks,
             reading=_text(file, "reading") if "reading" in file.attrs else "",
         )
 

@@ -18,9 +18,10 @@ import numpy as np
 from sepi.command import SepiCommand
 from sepi.io.external_maps import read_external
 from sepi.io.files import atomic_folder, atomic_path
-from sepi.io.hdf5 import read_light_field, read_stage
+from sepi.io.hdf5 import read_stage
 from sepi.io.images import write_png
 from sepi.io.scores import read_evaluations
+from sepi.io.truth import read_with_truth
 from sepi.matching.unknown import with_unknown
 from sepi.report.panels import Panel, SceneResults, first_final, panels_of
 from sepi.report.plan import MAIN_VARIANT, Plan
@@ -42,7 +43,7 @@ def read_results(plan: Plan, dataset: str, scene: str) -> SceneResults:
         variant: {stage: read(plan.stage_file(dataset, scene, variant, stage)) for stage in plan.stages}
         for variant in plan.listed
     }
-    light_field = read_light_field(plan.light_field_file(dataset, scene))
+    light_field = read_with_truth(plan.light_field_file(dataset, scene), plan.truth_file(dataset, scene))
     for stages in maps.values():
         stages[plan.stages[-1]] = with_unknown(light_field, stages[plan.stages[-1]])
     keys = {variant: plan.stage_key(variant, plan.stages[-1]) for variant in maps}

@@ -22,10 +22,11 @@ from sepi.command import SepiCommand
 from sepi.io.external_maps import read_external
 from sepi.io.hdf5 import read_light_field, read_stage
 from sepi.io.scores import Scores, read_evaluations, read_scores, without_nan
+from sepi.io.truth import read_with_truth
 from sepi.matching.unknown import with_unknown
 from sepi.report.plan import Plan
 from sepi.report.runs import Runs, read_json
-from sepi.report.tables import BUILDERS
+from sepi.report.tables import table
 from sepi.report.tabular.layout import as_json, write
 from sepi.scoring.confidence import decile_errors, oracle, sparsification
 from sepi.scoring.scores import COUNTS, EDGE_SCORES, PROTOCOLS, SCORED_REGIONS, SCORES
@@ -69,7 +70,7 @@ def collect(plan: Plan, parts: bool = False) -> dict[str, Any]:
     }
     numbers = without_nan(numbers)
     runs = Runs(numbers)
-    tables = {name: as_json(BUILDERS[name](runs)) for name in plan.tables(parts)}
+    tables = {name: as_json(table(name, runs)) for name in plan.tables(parts)}
     return numbers | {"tables": tables}
 
 
@@ -109,16 +110,16 @@ def _scene(plan: Plan, dataset: str, scene: str, parts: bool) -> dict[str, Any]:
     if parts:
         return found | {"stages": _stages(plan, dataset, scene, parts)}
     return found | {
-        "light_field": _light_field(plan.light_field_file(dataset, scene)),
+        "light_field": _light_field(plan.light_field_file(dataset, scene), plan.truth_file(dataset, scene)),
         "stages": _stages(plan, dataset, scene, parts),
         "confidence": _confidence(plan, dataset, scene),
         "external": _external(plan, dataset, scene),
     }
 
 
-def _light_field(path: Path) -> dict[str, Any]:
+def _light_field(path: Path, truth: Path) -> dict[str, Any]:
     """What a light field is, with digests of its pixels and its ground truth."""
-    found = read_light_field(path)
+    found = read_with_truth(path, truth)
     known = found.disparity_range
     return {
         "grid": list(found.grid),

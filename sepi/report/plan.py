@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import itertools
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
@@ -74,6 +74,8 @@ class Plan:
         External methods, in the order of the tables.
     beside : sequence of str
         Variants that stand beside the published figures, where these are not the best one and the paper's alone.
+    missing : sequence of str
+        ``DATASET/SCENE`` of those that are left out, since a job of theirs failed.
     """
 
     results: Path
@@ -81,12 +83,14 @@ class Plan:
     variants: Mapping[str, Mapping[str, str]]
     external: Names = ()
     beside: Names = ()
+    missing: Names = ()
 
     @classmethod
     def from_json(cls, results: Path, text: str) -> Plan:
         """Plan from JSON ``{"scenes": {DATASET: [SCENE]}, "variants": {VARIANT: {STAGE: CHOICE}}}``.
 
-        External methods, ``"external": [NAME]``, and variants, ``"beside": [NAME]``, may be added.
+        External methods, ``"external": [NAME]``, variants, ``"beside": [NAME]``, and scenes, ``"missing": [NAME]``, may
+        be added.
 
         Raises
         ------
@@ -106,7 +110,7 @@ class Plan:
 
     def to_json(self) -> str:
         """The text that :meth:`from_json` reads; the results' folder is not part of it."""
-        return json.dumps({key: getattr(self, key) for key in ("scenes", "variants", "external", "beside")})
+        return json.dumps({key: getattr(self, key) for key in ("scenes", "variants", "external", "beside", "missing")})
 
     def comparison(self) -> Plan:
         """The plan of the comparison: this project's variants and the compared methods, computed on the same scenes."""
@@ -114,6 +118,12 @@ class Plan:
         own = [name for name in self.variants if name not in VARIANTS]
         names = [name for name in (*ours, *own, *METHODS) if name in self.variants]
         return replace(self, variants={name: self.variants[name] for name in names}, beside=tuple(names))
+
+    def without(self, scenes: Collection[tuple[str, str]]) -> Plan:
+        """The plan of the other scenes, which says that these are missing."""
+        left = [pair for pair in self.pairs if pair not in scenes]
+        there = {dataset: [name for other, name in left if other == dataset] for dataset, _ in left}
+        return replace(self, scenes=there, missing=tuple("/".join(pair) for pair in self.pairs if pair in scenes))
 
     @property
     def is_comparison(self) -> bool:
@@ -143,6 +153,10 @@ class Plan:
     def light_field_file(self, dataset: str, scene: str) -> Path:
         """The light field of a scene."""
         return self.files(dataset, scene).light_field
+
+    def truth_file(self, dataset: str, scene: str) -> Path:
+        """The ground truth of a scene."""
+        return self.files(dataset, scene).truth
 
     def stage_file(self, dataset: str, scene: str, variant: str, stage: str, ending: str = "h5") -> Path:
         """The file with a variant's maps after a stage, or one beside it: ``ending`` is ``"time.json"``."""
@@ -183,7 +197,7 @@ class Plan:
             for variant in self.collected(parts):
                 files += [self.stage_file(dataset, scene, variant, stage, "time.json") for stage in self.stages]
             if not parts:
-                files.append(self.light_field_file(dataset, scene))
+                files += [self.light_field_file(dataset, scene), self.truth_file(dataset, scene)]
                 files += [self.stage_file(dataset, scene, variant, last) for variant in self.compared]
                 files += [self.external_file(dataset, scene)] if self.external else []
         return list(dict.fromkeys(files))
@@ -223,7 +237,8 @@ class Plan:
 
     def map_inputs(self, dataset: str, scene: str) -> list[Path]:
         """The files that the pictures of a scene are made from, each once."""
-        files = [self.light_field_file(dataset, scene), self.scores_file(dataset, scene)]
+        known = self.files(dataset, scene)
+        files = [known.light_field, known.truth, known.scores(self.ending())]
         files += self.scored_files(dataset, scene)
         files += [self.external_file(dataset, scene)] if self.external else []
         return list(dict.fromkeys(files))

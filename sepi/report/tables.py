@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import click
@@ -36,6 +37,13 @@ BUILDERS: dict[str, Callable[[Runs], Report]] = {
 """Name of each table to the function that makes it."""
 
 
+def table(name: str, runs: Runs) -> Report:
+    """One of the tables; its caption says which scenes are left out."""
+    report = BUILDERS[name](runs)
+    missing = ", ".join(f"`{scene}`" for scene in runs.plan.missing)
+    return replace(report, caption=f"{report.caption} Without {missing}: a job failed.") if missing else report
+
+
 @click.command(name="python -m sepi.report.tables", cls=SepiCommand)
 @click.option("--numbers", "path", type=click.Path(path_type=Path), required=True, help="From sepi.report.numbers.")
 @click.option("--table", "names", type=click.Choice([*BUILDERS]), multiple=True, help="Table to write; default: all.")
@@ -46,7 +54,7 @@ def command(path: Path, names: tuple[str, ...], output: Path) -> None:
     require_known(f"{path}: tables", names, numbers["tables"])
     runs = Runs(numbers)
     for name in names or numbers["tables"]:
-        report = BUILDERS[name](runs)
+        report = table(name, runs)
         for ending, text in (("csv", as_csv(report)), ("md", as_markdown(report)), ("tex", as_latex(report, name))):
             write(output / f"{name}.{ending}", text)
 

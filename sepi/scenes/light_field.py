@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sepi.errors import SepiError
-from sepi.lightfield import DisparityRange, FloatMap, LightField
+from sepi.lightfield import DisparityRange, FloatMap, LightField, Truth
 from sepi.scenes.definitions import DEFINITIONS
 from sepi.validation import require_known
 
@@ -80,7 +80,35 @@ def render(
     True
     """
     # brings the compiler with it
-    from sepi.scenes.rendering import drawing, occluded, render_view, visible
+    from sepi.scenes.rendering import render_view
+
+    scene, light_field = _with_truth(name, size, views, row_spacing, positions)
+    baselines = light_field.baselines
+    rng = np.random.default_rng(zlib.crc32(name.encode()))
+    deviation = np.linspace(*DEFINITIONS[name].pixel_noise, size)[:, None]
+    for t, s in np.ndindex(views, views):
+        picture = render_view(scene, size, *baselines[t, s]).astype(np.float64)
+        if deviation.any():
+            picture += deviation * rng.standard_normal(picture.shape)
+        light_field.views[t, s] = np.round(np.clip(picture, 0, 1) * 255)
+    return light_field
+
+
+def scene_truth(name: str, size: int, views: int) -> Truth:
+    """Ground truth and masks of what :func:`render` makes, without its pictures."""
+    _, light_field = _with_truth(name, size, views)
+    return light_field.ground_truth, light_field.masks
+
+
+def _with_truth(
+    name: str,
+    size: int,
+    views: int,
+    row_spacing: float = 1.0,
+    positions: npt.NDArray[np.float64] | None = None,
+) -> tuple[Drawing, LightField]:
+    """What is to be drawn, and the light field with all but its pictures."""
+    from sepi.scenes.rendering import drawing, occluded, visible
 
     _require_scene(name, size)
     _require_whole(name, "views", views, 2, MOST_VIEWS)
@@ -97,16 +125,8 @@ def render(
         row_spacing=row_spacing,
         positions=positions,
     )
-    baselines = light_field.baselines
-    rng = np.random.default_rng(zlib.crc32(name.encode()))
-    deviation = np.linspace(*DEFINITIONS[name].pixel_noise, size)[:, None]
-    for t, s in np.ndindex(views, views):
-        picture = render_view(scene, size, *baselines[t, s]).astype(np.float64)
-        if deviation.any():
-            picture += deviation * rng.standard_normal(picture.shape)
-        light_field.views[t, s] = np.round(np.clip(picture, 0, 1) * 255)
-    masks = {"occluded": occluded(scene, disparity, baselines), **light_field.masks}
-    return replace(light_field, masks=masks)
+    masks = {"occluded": occluded(scene, disparity, light_field.baselines), **light_field.masks}
+    return scene, replace(light_field, masks=masks)
 
 
 def true_disparity(name: str, *, size: int = 192, baseline: tuple[float, float] = (0.0, 0.0)) -> FloatMap:

@@ -17,6 +17,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from sepi.errors import SepiError
 from sepi.io.disparity_maps import SUFFIXES
 from sepi.io.external_maps import ExternalSource
+from sepi.io.readers import hci
 from sepi.io.readers.formats import FORMATS
 from sepi.io.readers.options import ORDERS
 from sepi.lightfield import DisparityRange
@@ -34,6 +35,8 @@ _RESERVED = ("stages", "complete", "external", "ground_truth", "reference_view",
 _BUILTIN_VIEWS = 81
 # keys whose values are text even where they look like numbers
 _TEXTS = ("path", "pattern", "variable", "include", "exclude")
+# what is drawn of a scene
+_PICTURES = re.compile(r"reports/(?:comparison/)?(?:maps/([^/]+)/([^/]+)|page/([^/]+)/([^/]+)\.json)")
 _WORDS = {"true": True, "false": False, "null": None}
 
 
@@ -219,7 +222,7 @@ class Settings:
         return self.scenes[dataset, name]
 
     def require_target(self, path: str) -> None:
-        """Check the names in a file that a user asks for, if it lies among the results.
+        """Check the names in a file that a user asks for, if it lies among the results or is of a scene's pictures.
 
         Raises
         ------
@@ -229,6 +232,9 @@ class Settings:
         if path in PAGES and not self.has_page:
             why = "is false" if self.report.page is False else f"is null, and there are over {MOST_ON_PAGE} scenes"
             raise SepiError(f"{path}: not made: report.page {why}; true asks for it")
+        pictures = _PICTURES.fullmatch(path)
+        if pictures:
+            self.scene(*filter(None, pictures.groups()))
         folder, *names = Path(path).parts or ("",)
         if folder == str(RESULTS) and len(names) > 2:
             self.scene(names[0], names[1])
@@ -346,7 +352,7 @@ def _scenes(config: Config) -> dict[str, Scene]:
     if not scenes:
         raise SepiError("config: no scene to run on; name some in builtin.scenes or light_fields, or set hci_root")
     for scene in scenes:
-        for file in scene.files:
+        for file in (*scene.files, *(hci.truth_files(scene.source) if scene.source else ())):
             require_plain_path(str(file), f"config: scene {scene.dataset}/{scene.name}")
     return {f"{scene.dataset}/{scene.name}": scene for scene in scenes}
 

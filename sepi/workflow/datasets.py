@@ -7,15 +7,17 @@ import os
 import re
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
+from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
 
 from sepi.errors import SepiError
 from sepi.io.images import SUFFIXES
 from sepi.io.readers import exported, hci, hci_2013
-from sepi.io.readers.formats import format_of
+from sepi.io.readers.formats import Format, format_of
 from sepi.io.readers.row_folders import view_files
 from sepi.io.readers.sizes import size_of
 
@@ -24,10 +26,6 @@ VIEW_PATTERN = "input_Cam*.png"
 LONGEST_NAME = 80
 """Bytes of the name of a scene, a variant or a method: a file's holds 255, and some are made of several."""
 
-# what a scene's folder may hold besides views, and ingest reads
-_OTHER_PATTERNS = ("parameters.cfg", "gt_disp_lowres.pfm", "*mask*.png")
-# ... and of a folder of pictures in any layout
-_BESIDE_PICTURES = (hci.PARAMETERS, hci.TRUTH, exported.MANIFEST)
 _FORMAT_OF = {"hci": "hci", "hci_2013": "hci-2013"}
 # a scene's name is a folder name below results/ and a word on the command line
 _NAME = re.compile(rf"[A-Za-z0-9][A-Za-z0-9_.+-]{{0,{LONGEST_NAME - 1}}}")
@@ -55,7 +53,7 @@ class Scene:
     source : Path or None
         The folder or file to read; None for a built-in scene.
     files : tuple of Path
-        What ingest reads: a change in one of them is a change of the scene.
+        What ingest reads: a change in one of them is a change of the scene, but for its ground truth.
     views : int
         Number of views.
     height, width : int
@@ -89,12 +87,20 @@ class Scene:
         """The module that reads the views, or renders them."""
         if self.source is None:
             return "sepi.scenes"
+        # of an unknown format: ingest will say what is wrong
+        return format_of.__module__ if self._format is None else self._format.read.__module__
+
+    @property
+    def truth(self) -> tuple[Path, ...]:
+        """The files with ground truth and masks: a change in one of them asks for scores and for no map."""
+        return () if self.source is None or self._format is None else tuple(self._format.truth_files(self.source))
+
+    @cached_property
+    def _format(self) -> Format | None:
         given = dict(pairwise(self.flags)).get("--format", _FORMAT_OF.get(self.dataset))
-        try:
-            return format_of(self.source, given).read.__module__
-        except SepiError:
-            # ingest will say what is wrong
-            return format_of.__module__
+        with suppress(SepiError):
+            return None if self.source is None else format_of(self.source, given)
+        return None
 
     def memory_mb(self, bytes_per_sample: float, bytes_per_pixel: float = 0, copies: int = 2) -> int:
         """Memory of a job on this scene in MB.
@@ -199,10 +205,12 @@ def own_scene(name: str, source: Path, flags: tuple[str, ...], where: str) -> Sc
     if not os.path.exists(source):
         raise SepiError(f"{where}: no file or folder '{source}'")
     source = source.resolve()
+    if dict(pairwise(flags)).get("--format", "hci") == "hci" and hci.matches(source):
+        return _benchmark_scene("own", name, source, flags)
     inside = [path for path in view_files(source) if path.is_file()] if source.is_dir() else [source]
     files = tuple(path for path in inside if not path.name.startswith("."))
     # notes beside pictures are no part of the light field
-    read = tuple(path for path in files if path.suffix.lower() in SUFFIXES or path.name in _BESIDE_PICTURES)
+    read = tuple(path for path in files if path.suffix.lower() in SUFFIXES or path.name == exported.MANIFEST)
     files = read if source.is_dir() and read else files
     return Scene("own", name, source, files, *size_of(files), flags=flags)
 
@@ -215,14 +223,17 @@ def _require_plain(name: str, where: str) -> None:
 
 
 def _benchmark_scenes(folder: Path, depth: int = _DEPTH) -> Iterator[Scene]:
-    views = sorted(folder.glob(VIEW_PATTERN))
-    if views:
-        others = sorted({path for pattern in _OTHER_PATTERNS for path in folder.glob(pattern)})
-        yield Scene("hci", folder.name, folder, (*views, *others), *size_of(views))
+    if any(folder.glob(VIEW_PATTERN)):
+        yield _benchmark_scene("hci", folder.name, folder)
     elif depth:
         for inner in sorted(folder.iterdir()):
             if inner.is_dir() and not inner.name.startswith("."):
                 yield from _benchmark_scenes(inner, depth - 1)
+
+
+def _benchmark_scene(dataset: str, name: str, folder: Path, flags: tuple[str, ...] = ()) -> Scene:
+    views = sorted(folder.glob(VIEW_PATTERN))
+    return Scene(dataset, name, folder, (*views, *folder.glob(hci.PARAMETERS)), *size_of(views), flags=flags)
 
 
 def _archive_scenes(path: Path, depth: int = _DEPTH + 1) -> Iterator[Scene]:

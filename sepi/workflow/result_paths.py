@@ -40,6 +40,11 @@ class SceneFiles:
         return self.folder / "lightfield.h5"
 
     @property
+    def truth(self) -> Path:
+        """Ground truth and masks, if there are any."""
+        return self.folder / "truth.h5"
+
+    @property
     def external(self) -> Path:
         """The maps of all external methods and their scores."""
         return self.folder / "external.h5"

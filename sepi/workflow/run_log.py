@@ -6,18 +6,24 @@ listens to the same events; what went wrong is shown as Snakemake shows it, in f
 
 from __future__ import annotations
 
+import difflib
 import logging
 import re
 import sys
+from collections.abc import Callable, Iterable
 from typing import Any, TextIO
 
 from snakemake_interface_logger_plugins.common import LogEvent
 from tqdm import tqdm
 
+from sepi.errors import one_line
+
 # what Snakemake says of its own doings
 _CHATTER = re.compile(
     r"Building DAG|Using shell|Provided cores|Rules claiming|Select jobs|Execute \d|Assuming unrestricted|Complete log"
 )
+# of a target, with the name of the exception before it
+_NO_RULE = re.compile(r"No rule to produce (.+?) \(if you use input functions", re.DOTALL)
 # said by this handler in fewer words, or by no one
 _SILENT = {LogEvent.JOB_STARTED, LogEvent.JOB_FINISHED, LogEvent.RESOURCES_INFO, LogEvent.WORKFLOW_STARTED}
 
@@ -90,6 +96,37 @@ class RunLog(logging.Handler):
             self._bar.update(done - self._bar.n)
             if done == total:
                 self.close()
+
+
+class _NearestNames(logging.Filter):
+    """Makes one line of what Snakemake says of a target that no rule makes, with the names that are nearest to it."""
+
+    def __init__(self, known: Callable[[str], Iterable[str]]) -> None:
+        super().__init__()
+        self._known = known
+
+    def filter(self, record: logging.LogRecord) -> bool:
+        found = _NO_RULE.search(record.getMessage())
+        if found:
+            near = difflib.get_close_matches(found[1], self._known(found[1]), n=3)
+            hint = f"did you mean {' or '.join(near)}?" if near else "docs/reproduce/workflow.md lists what there is"
+            record.msg, record.args = f"sepi: {one_line(found[1])}: nothing makes this; {hint}", ()
+        return True
+
+
+def tell_nearest(logger: logging.Logger, known: Callable[[str], Iterable[str]]) -> None:
+    """Let a wrong target be told in one line.
+
+    Parameters
+    ----------
+    logger : logging.Logger
+        Snakemake's.
+    known : callable
+        From a wrong target to names of rules and files that may be meant by it.
+    """
+    for before in [one for one in logger.filters if isinstance(one, _NearestNames)]:
+        logger.removeFilter(before)
+    logger.addFilter(_NearestNames(known))
 
 
 def show_progress(logger: logging.Logger) -> RunLog | None:

@@ -16,6 +16,7 @@ from sepi.external import NO_FILE
 from sepi.io.external_maps import ExternalMap, write_external
 from sepi.io.hdf5 import read_stage, write_light_field, write_stage
 from sepi.io.scores import Evaluation, map_name, write_scores
+from sepi.io.truth import write_truth
 from sepi.lightfield import DisparityRange, LightField
 from sepi.report import numbers, tables
 from sepi.report.plan import Plan
@@ -83,7 +84,8 @@ def with_results(made: Plan) -> Plan:
     """The plan, its result files written."""
     for dataset, name in made.pairs:
         scene = light_field(name)
-        write_light_field(made.light_field_file(dataset, name), scene)
+        write_light_field(made.light_field_file(dataset, name), replace(scene, ground_truth=None, masks={}))
+        write_truth(made.truth_file(dataset, name), (scene.ground_truth, scene.masks))
         for variant in made.variants:
             for stage in (stage for stage in made.stages if made.runs_stage(variant, stage)):
                 maps = stage_maps(scene, variant, stage)

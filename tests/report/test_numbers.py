@@ -31,7 +31,9 @@ def test_numbers_read_their_declared_inputs_and_no_others(parts: bool, complete:
         away.rename(path)
 
 
-@pytest.mark.parametrize("ending", ["lightfield.h5", "scores.h5", "time.json", "optimize.h5", "external.h5"])
+@pytest.mark.parametrize(
+    "ending", ["lightfield.h5", "truth.h5", "scores.h5", "time.json", "optimize.h5", "external.h5"]
+)
 @pytest.mark.parametrize("content", [None, b"", b"[1]"])
 def test_a_missing_or_broken_file_is_one_line(
     ending: str, content: bytes | None, complete: Plan, tmp_path: Path

@@ -290,13 +290,18 @@ class TestFolderOfScenes:
         scene = self.settings(tmp_path).scene("hci", "cotton")
         assert (scene.views, scene.height, scene.width) == (25, 48, 64)
 
-    def test_everything_that_ingest_reads_is_an_input(self, tmp_path: Path) -> None:
+    @pytest.mark.parametrize("dataset", ["hci", "own"])
+    def test_ground_truth_is_no_input_of_the_maps(self, tmp_path: Path, dataset: str) -> None:
+        """Adding it would compute them all anew; a file that is read and no input would leave stale ones."""
         folder = make_scene(tmp_path / "cotton", views=3)
-        for name in ("parameters.cfg", "gt_disp_lowres.pfm", "mask_planes_lowres.png", "license.txt"):
+        truth = ["gt_disp_lowres.pfm", "mask_planes_lowres.png"]
+        for name in ("parameters.cfg", *truth, "license.txt"):
             (folder / name).touch()
-        names = {path.name for path in self.settings(tmp_path).scene("hci", "cotton").files}
-        assert {"input_Cam000.png", "input_Cam002.png", "parameters.cfg", "gt_disp_lowres.pfm"} <= names
-        assert "license.txt" not in names
+        root = {"hci_root": str(tmp_path)} if dataset == "hci" else {"light_fields": {"cotton": {"path": str(folder)}}}
+        scene = load_settings(root).scene(dataset, "cotton")
+        views = [f"input_Cam00{number}.png" for number in range(3)]
+        assert [path.name for path in scene.files] == [*views, "parameters.cfg"]
+        assert [path.name for path in scene.truth] == truth
 
     def test_two_scenes_of_one_name_are_refused(self, tmp_path: Path) -> None:
         make_scene(tmp_path / "a" / "cotton")

@@ -64,12 +64,15 @@ def test_every_job_is_made_again_for_its_own_code(read: Any) -> None:
             modules = (command[1],) if chosen is None else stage_modules(rule.name, chosen)
             if rule.name == "ingest":
                 modules = ingest_modules("sepi.scenes")
+            if rule.name == "truth":
+                modules = ("sepi.truth", "sepi.scenes")
             given = code(scene(**{rule.name: name})) if callable(code) else code
             assert given == code_digest(*modules), f"{rule.name} {name}"
         if "--code" in rule.shellcmd:
             assert "--code {params.code}" in rule.shellcmd
     assert {
         "ingest",
+        "truth",
         *STAGES,
         "evaluate",
         "export",
@@ -105,6 +108,28 @@ def test_the_page_can_be_left_out_and_is_by_itself_where_there_are_too_many_scen
     many = replace(found["SETTINGS"], scenes=scenes, report=Report())
     assert many.has_page
     assert not replace(many, scenes=scenes | {("own", "one"): None}).has_page
+
+
+@pytest.mark.parametrize(
+    ("target", "wrong", "meant"),
+    [
+        ("results/builtin/dotz/paper/result.h5", "dotz", "dots"),
+        ("results/bultin/dots/paper/result.h5", "bultin", "builtin"),
+        ("reports/maps/builtin/dotz", "dotz", "dots"),
+        ("reports/comparison/page/bultin/dots.json", "bultin", "builtin"),
+    ],
+)
+def test_a_wrong_scene_in_a_target_is_told(read: Any, target: str, wrong: str, meant: str) -> None:
+    """Snakemake would show a dozen lines of its own, or of Python."""
+    with pytest.raises(SepiError, match=f"unknown '{wrong}'; did you mean '{meant}'"):
+        read.globals["SETTINGS"].require_target(target)
+    read.globals["SETTINGS"].require_target(target.replace(wrong, meant))
+
+
+def test_a_wrong_target_finds_what_is_near(read: Any) -> None:
+    near = read.globals["names_like"]
+    assert {"all", "reports/table1_mse.md", "reports/maps/builtin/dots"} <= {*near("al")}
+    assert "results/builtin/dots/best/disparity.pfm" in near("results/builtin/dots/best/disparty.pfm")
 
 
 def test_what_a_cluster_ended_is_tried_with_twice_as_much(read: Any) -> None:

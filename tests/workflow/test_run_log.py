@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from snakemake_interface_logger_plugins.common import LogEvent
 
-from sepi.workflow.run_log import RunLog, show_progress
+from sepi.workflow.run_log import RunLog, show_progress, tell_nearest
 
 
 class Terminal(io.StringIO):
@@ -119,3 +119,20 @@ def test_another_handler_of_the_users_stays() -> None:
     logger.addHandler(other)
     assert show_progress(logger) is None
     assert logger.handlers == [other]
+
+
+def test_a_wrong_target_is_one_line_with_the_nearest() -> None:
+    """Snakemake's own goes on about input functions."""
+    logger = logging.Logger("snakemake")
+    usual = ColorizingTextHandler(io.StringIO())
+    logger.addHandler(usual)
+    for known in (["another workflow's"], ["ablation", "all"]):
+        tell_nearest(logger, lambda target, known=known: known)
+    for target in ("al", "x\ny"):
+        logger.error(f"MissingRuleException:\nNo rule to produce {target} (if you use input functions make sure ...).")
+    logger.error("100 %s")
+    assert usual.shown == [
+        "sepi: al: nothing makes this; did you mean all?",
+        "sepi: x y: nothing makes this; docs/reproduce/workflow.md lists what there is",
+        "100 %s",
+    ]

@@ -23,7 +23,9 @@ from workflow_copy import SIZE, SLOW_WRITING, TINY, Workflow, copy_of_the_projec
 from sepi.compared.methods import LEARNED, METHODS
 from sepi.io.files import is_temporary
 from sepi.io.hdf5 import read_attributes, read_stage
-from sepi.io.scores import read_scores
+from sepi.io.pfm import write_pfm
+from sepi.io.scores import Evaluation, read_scores, write_scores
+from sepi.io.truth import read_with_truth
 from sepi.reading import read_light_field
 from sepi.scenes import render, write_hci
 from sepi.variants import STAGES, VARIANTS
@@ -229,16 +231,44 @@ class TestRerun:
         assert attributes["choice"] == "wls"
         assert json.loads(attributes["parameters"])["alpha"] == 1e-5
 
+    def test_ground_truth_asks_for_scores_and_for_no_map(self, finished: Workflow, tmp_path: Path) -> None:
+        """Whoever measures it later, or mends it, must not wait for all maps again."""
+        shutil.copytree(finished.folder, tmp_path / "run", symlinks=True)
+        run = replace(finished, folder=tmp_path / "run")
+        file = Path(run.config["hci_root"]) / "training" / "box" / "gt_disp_lowres.pfm"
+        truth = render("curved_occluders", size=SIZE, views=5).ground_truth
+        scores = "results/hci/box/scores.h5"
+        assert not any(read_scores(run.folder / scores).values())
+        try:
+            write_pfm(file, truth)
+            result = run.run(scores)
+            assert result.returncode == 0, result.stdout
+            assert "\n2 jobs\n" in result.stdout
+            assert all(read_scores(run.folder / scores).values())
+            write_pfm(file, truth + np.float32(1))
+            plan = run.plan("all")
+        finally:
+            file.unlink()
+        # what shows the scene
+        follows = {
+            rule: count for rule, count in plan.items() if rule not in ("all", "numbers", "tables", "charts", "page")
+        }
+        assert follows == {"truth": 1, "evaluate": 1, "maps": 1}
+
     def test_scores_follow_a_changed_map(self, finished: Workflow, tmp_path: Path) -> None:
-        """The scores of a scene are one job, whatever changed of it."""
+        """The scores of a scene are one job, whatever changed of it, and whatever an earlier score file says."""
         shutil.copytree(finished.folder, tmp_path / "run", symlinks=True)
         stages = copy.deepcopy(TINY["stages"])
         stages["optimize"] = {"second_order": other_parameters("optimize", "second_order")}
         changed = replace(finished, folder=tmp_path / "run").with_config(stages=stages)
         target = "results/builtin/dots/scores.h5"
         assert changed.plan(target) == {"optimize": 2, "evaluate": 1}
-        result = changed.run(target)
+        path = changed.folder / target
+        stale = read_scores(path)
+        write_scores(path, {name: Evaluation({"paper": {"all": {"mse100": 7.0}}}) for name in stale}, {})
+        result = changed.run(target, flags=("--forcerun", "evaluate"))
         assert result.returncode == 0, result.stdout
+        assert list(path.parent.glob("scores*")) == [path]
         before, after = (read_scores(flow.folder / target) for flow in (finished, changed))
         # a score over no pixels is NaN, which equals nothing
         others = [name for name in after if str(after[name]) != str(before[name])]
@@ -289,9 +319,8 @@ class TestReport:
 
     def test_wrong_and_missing_maps_of_other_methods_stop_nothing(self, finished: Workflow, tmp_path: Path) -> None:
         """The report still comes; the cell and a line at the end say what is wrong."""
-        ground_truth = read_light_field(
-            finished.folder / "results/builtin/dots/lightfield.h5", check_order=False
-        ).ground_truth
+        scene = finished.folder / "results/builtin/dots"
+        ground_truth = read_with_truth(scene / "lightfield.h5", scene / "truth.h5").ground_truth
         assert ground_truth is not None
         holed = ground_truth + np.float32(0.1)
         holed[:10] = np.nan
@@ -391,9 +420,8 @@ class TestTargets:
     @pytest.mark.parametrize(
         ("target", "expected"),
         [
-            ("results/builtin/dotz/paper/result.h5", "unknown 'dotz'; did you mean 'dots'?"),
-            ("results/bultin/dots/paper/result.h5", "unknown 'bultin'; did you mean 'builtin'?"),
             ("results/builtin/dots/papr/result.h5", "unknown 'papr'; did you mean 'paper'?"),
+            ("reports/ablation_bst.md", "nothing makes this; did you mean reports/ablation_best.md or "),
         ],
     )
     def test_an_unknown_name_in_a_target_is_named(self, workflow: Workflow, target: str, expected: str) -> None:
@@ -486,6 +514,27 @@ def test_a_failed_job_shows_the_one_clear_line(workflow: Workflow, tmp_path: Pat
     assert re.search(rf"^ *sepi: .*{picture.name}.*$", result.stdout, re.MULTILINE)
     assert "Traceback" not in result.stdout
     assert files_below(broken.folder / "results") == []
+
+
+def test_a_damaged_scene_leaves_the_tables_of_the_others(finished: Workflow, tmp_path: Path) -> None:
+    """With --keep-going: who computed for days must not go without tables, nor take them for whole."""
+    write_hci(render("dots", size=SIZE, views=3), tmp_path / "broken")
+    picture = tmp_path / "broken" / "input_Cam002.png"
+    picture.write_bytes(picture.read_bytes()[:100])
+    shutil.copytree(finished.folder, tmp_path / "run", symlinks=True)
+    run = replace(finished, folder=tmp_path / "run").with_config(
+        light_fields={"broken": {"path": str(tmp_path / "broken")}}
+    )
+    target = "reports/table1_mse.md"
+    result = run.run(target, flags=("--keep-going",))
+    assert result.returncode != 0
+    assert "\nsepi: the tables are without own/broken: a job failed\n" in result.stdout
+    assert f"\n  {target}\n" in result.stdout
+    table = (run.folder / target).read_text()
+    assert "Without `own/broken`: a job failed" in table
+    assert "dots" in table
+    # it counts as not made, even where all that it should be made of is there: the scene is given up
+    assert {"numbers", "tables"} <= replace(run, config=finished.config).plan(target).keys()
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])

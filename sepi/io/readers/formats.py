@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
@@ -26,7 +26,7 @@ from sepi.io.readers import (
 from sepi.io.readers.arrays import rearrange, with_white
 from sepi.io.readers.options import ReadOptions
 from sepi.io.readers.row_folders import has_rows
-from sepi.lightfield import LightField
+from sepi.lightfield import LightField, Truth
 from sepi.validation import require_known
 
 
@@ -47,6 +47,10 @@ class Format:
         What of :class:`ReadOptions` only some formats have a use for, and this one does.
     scales : bool
         Whether it reads values of any scale, and asks the options for their white.
+    read_views, read_truth : callable or None
+        What ``read`` does but for ground truth and masks, and these alone, where they have files of their own.
+    truth_files : callable
+        The files with ground truth and masks; the light field's own where it may hold them.
     """
 
     name: str
@@ -55,6 +59,9 @@ class Format:
     read: Callable[[Path, ReadOptions], LightField]
     options: tuple[str, ...] = ()
     scales: bool = False
+    read_views: Callable[[Path, ReadOptions], LightField] | None = None
+    read_truth: Callable[[Path, ReadOptions], Truth] | None = None
+    truth_files: Callable[[Path], Sequence[Path]] = lambda path: ()
 
 
 # light fields that a message names, and levels of folders in which it looks for them
@@ -69,9 +76,25 @@ _ARRAY_OPTIONS = ("grid", "axes", "variable")
 FORMATS = {
     # before the other folders: its pictures may have any names
     "exported": Format(
-        "exported folder", "written by 'sepi export'", exported.matches, exported.read, ("follow_links",), True
+        "exported folder",
+        "written by 'sepi export'",
+        exported.matches,
+        exported.read,
+        ("follow_links",),
+        True,
+        truth_files=lambda path: [path / exported.MANIFEST],
     ),
-    "hci": Format("HCI folder", "input_Cam000.png, ...", hci.matches, hci.read, ("grid", "follow_links"), True),
+    "hci": Format(
+        "HCI folder",
+        "input_Cam000.png, ...",
+        hci.matches,
+        hci.read,
+        ("grid", "follow_links"),
+        True,
+        read_views=hci.read_views,
+        read_truth=hci.read_truth,
+        truth_files=hci.truth_files,
+    ),
     "images": Format(
         "folder of views",
         "a numbered picture for each",
@@ -87,7 +110,14 @@ FORMATS = {
     "numpy": Format("NumPy file", ".npy or .npz", numpy_files.matches, numpy_files.read, _ARRAY_OPTIONS, True),
     # before the other kinds with something called LF
     "openlf": Format("OpenLF HDF5", "with a group LF", open_lf.matches, open_lf.read, scales=True),
-    "hci-2013": Format("HCI 2013 HDF5", "with LF (T, S, H, W, 3)", hci_2013.matches, hci_2013.read, scales=True),
+    "hci-2013": Format(
+        "HCI 2013 HDF5",
+        "with LF (T, S, H, W, 3)",
+        hci_2013.matches,
+        hci_2013.read,
+        scales=True,
+        truth_files=lambda path: [path],
+    ),
     # behind those whose arrays have names of their own
     "hdf5": Format(
         "HDF5 file", "with an array of all views", hdf5_arrays.matches, hdf5_arrays.read, _ARRAY_OPTIONS, True
@@ -98,6 +128,7 @@ FORMATS = {
         "written by this package",
         lambda path: has_dataset(path, "views", if_damaged=True),
         lambda path, options: rearrange(_own(path), options),
+        truth_files=lambda path: [path],
     ),
 }
 """Word for ``--format`` to format; the first that matches reads."""
@@ -141,7 +172,7 @@ def format_of(path: Path, file_format: str | None = None) -> Format:
     raise SepiError(f"{path}: {_what_else(path)}; expected {expected}")
 
 
-def read(path: Path, options: ReadOptions, file_format: str | None = None) -> LightField:
+def read(path: Path, options: ReadOptions, file_format: str | None = None, *, truth: bool = True) -> LightField:
     """Read a light field of any known format as its files have it.
 
     Parameters
@@ -151,6 +182,8 @@ def read(path: Path, options: ReadOptions, file_format: str | None = None) -> Li
     options : ReadOptions
     file_format : str, optional
         Key of :data:`FORMATS`, in place of looking.
+    truth : bool
+        False: without ground truth and masks, as if there were none.
 
     Returns
     -------
@@ -160,12 +193,24 @@ def read(path: Path, options: ReadOptions, file_format: str | None = None) -> Li
     known = format_of(path, file_format)
     _require_used(path, known, options)
     with naming(path):
-        light_field = known.read(path, options)
+        light_field = (known.read if truth else known.read_views or known.read)(path, options)
+        if not truth:
+            light_field = replace(light_field, ground_truth=None, masks={})
         if options.white is not None and not known.scales:
             views = with_white(light_field.views, light_field.present, path, options.white)
             light_field = replace(light_field, views=views)
         seen = options.view if light_field.arranged else None
         return light_field if seen is None else light_field.seen_from(seen)
+
+
+def read_truth(path: Path, options: ReadOptions, file_format: str | None = None) -> Truth:
+    """Ground truth and masks of the light field that :func:`read` reads without them."""
+    known = format_of(path, file_format)
+    if known.read_truth is None:
+        light_field = read(path, options, file_format)
+        return light_field.ground_truth, light_field.masks
+    with naming(path):
+        return known.read_truth(path, options)
 
 
 def _require_used(path: Path, known: Format, options: ReadOptions) -> None:

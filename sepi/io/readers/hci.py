@@ -15,6 +15,8 @@ from __future__ import annotations
 import configparser
 import math
 import re
+import warnings
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -22,13 +24,13 @@ import numpy as np
 from pydantic import BaseModel, PositiveInt
 
 from sepi.camera import camera_from
-from sepi.errors import SepiError
+from sepi.errors import SepiError, SepiWarning
 from sepi.io.files import name_of, naming, reading
 from sepi.io.images import picture_header, read_picture
 from sepi.io.pfm import read_pfm
-from sepi.io.readers.options import ReadOptions, position_of
+from sepi.io.readers.options import Numbers, ReadOptions, arrange_numbers, position_of
 from sepi.io.readers.view_files import read_grid
-from sepi.lightfield import BoolMap, DisparityRange, FloatMap, LightField
+from sepi.lightfield import BoolMap, DisparityRange, FloatMap, LightField, Truth
 from sepi.validation import validated
 
 PARAMETERS = "parameters.cfg"
@@ -77,16 +79,42 @@ def read(path: Path, options: ReadOptions) -> LightField:
     LightField
         With the scene's own disparity range, ground truth and masks where the folder has them.
     """
+    return _read(path, options, with_truth=True)
+
+
+def read_views(path: Path, options: ReadOptions) -> LightField:
+    """Read a folder but for its ground truth and masks, on which nothing else depends then."""
+    return _read(path, options, with_truth=False)
+
+
+def read_truth(path: Path, options: ReadOptions) -> Truth:
+    """Ground truth and masks of a folder alone, where they are of the reference view of :func:`read_views`."""
+    files, grid = _views_in(path, options, _parameters_of(path))
+    numbers = arrange_numbers(str(path), grid, replace(options, exclude=()))
+    of, reference = _view_of_truth(numbers, grid), options.view or (numbers.shape[0] // 2, numbers.shape[1] // 2)
+    if of == reference:
+        header = picture_header(next(iter(files.values())))
+        return _truth_of(path, (header.height, header.width))
+    if of is not None and options.view is None and truth_files(path):
+        known, made = (f"{t},{s}" for t, s in (of, reference))
+        told = f"{path}: its ground truth is of view {known}, the depth of view {made}; --view {known} scores it"
+        warnings.warn(told, SepiWarning, stacklevel=2)
+    return None, {}
+
+
+def truth_files(folder: Path) -> list[Path]:
+    """The files of a folder with ground truth and masks."""
+    return sorted(path for name in (TRUTH, "mask_*.png") for path in folder.glob(name) if path.is_file())
+
+
+def _read(path: Path, options: ReadOptions, with_truth: bool) -> LightField:
     file = path / PARAMETERS
-    parameters = _read_parameters(file) if file.is_file() else _Parameters()
+    parameters = _parameters_of(path)
     with naming(file):
-        given_grid = parameters.pair("num_cams_y", "num_cams_x")
         given_shape = parameters.pair("image_resolution_y_px", "image_resolution_x_px")
         limits = parameters.pair("disp_min", "disp_max")
         disparity_range = None if limits is None else DisparityRange(*limits, "parameters")
-    files = _numbered_views(path)
-    grid = options.grid or given_grid or _square_grid(path, files)
-    _require_inside(files, grid, "--grid" if options.grid else PARAMETERS)
+    files, grid = _views_in(path, options, parameters)
     views, present, numbers = read_grid(path, files, grid, options)
     shape = views.shape[2], views.shape[3]
     if given_shape not in (None, shape):
@@ -97,20 +125,39 @@ def read(path: Path, options: ReadOptions) -> LightField:
     camera = parameters.model_dump(include=set(_CAMERA))
     with naming(file):
         known_camera = None if None in camera.values() else camera_from(**camera, shape=shape)
-    # ground truth and masks belong to the centre view of the folder's own grid
-    with_truth = position_of(numbers, grid[0] // 2 * grid[1] + grid[1] // 2)
-    read_truth = with_truth is not None and options.view in (None, with_truth) and _has_truth(path)
+    of = _view_of_truth(numbers, grid)
+    has_truth = with_truth and of is not None and options.view in (None, of) and bool(truth_files(path))
+    ground_truth, masks = _truth_of(path, shape) if has_truth else (None, {})
     return LightField(
         views=views,
         name=parameters.scene or str(name_of(path)),
         source=str(path),
         present=present,
-        view=with_truth if read_truth else options.view,
+        view=of if has_truth else options.view,
         disparity_range=disparity_range,
-        ground_truth=_read_truth(path / TRUTH, shape) if read_truth else None,
-        masks=_read_masks(path, shape) if read_truth else {},
+        ground_truth=ground_truth,
+        masks=masks,
         camera=known_camera,
     )
+
+
+def _views_in(path: Path, options: ReadOptions, parameters: _Parameters) -> tuple[dict[int, Path], tuple[int, int]]:
+    """The views by their numbers, and their grid."""
+    with naming(path / PARAMETERS):
+        given = parameters.pair("num_cams_y", "num_cams_x")
+    files = _numbered_views(path)
+    grid = options.grid or given or _square_grid(path, files)
+    _require_inside(files, grid, "--grid" if options.grid else PARAMETERS)
+    return files, grid
+
+
+def _view_of_truth(numbers: Numbers, grid: tuple[int, int]) -> tuple[int, int] | None:
+    """Where the centre view of the folder's own grid stands, to which ground truth and masks belong."""
+    return position_of(numbers, grid[0] // 2 * grid[1] + grid[1] // 2)
+
+
+def _truth_of(folder: Path, shape: tuple[int, int]) -> Truth:
+    return _read_truth(folder / TRUTH, shape), _read_masks(folder, shape)
 
 
 def _numbered_views(folder: Path) -> dict[int, Path]:
@@ -151,8 +198,11 @@ def _require_inside(views: dict[int, Path], grid: tuple[int, int], source: str) 
         )
 
 
-def _read_parameters(path: Path) -> _Parameters:
+def _parameters_of(folder: Path) -> _Parameters:
     """Keys of all sections together."""
+    path = folder / PARAMETERS
+    if not path.is_file():
+        return _Parameters()
     parser = configparser.ConfigParser(interpolation=None)
     with reading(path, "text file with '[section]' and 'key = value'"):
         data = path.read_bytes()
@@ -165,10 +215,6 @@ def _read_parameters(path: Path) -> _Parameters:
     values = {key: value for section in parser.sections() for key, value in parser.items(section)}
     used = {key: values[key] for key in _Parameters.model_fields if key in values}
     return validated(_Parameters, used, f"{path}: parameters")
-
-
-def _has_truth(folder: Path) -> bool:
-    return (folder / TRUTH).is_file() or any(folder.glob("mask_*.png"))
 
 
 def _read_truth(path: Path, shape: tuple[int, int]) -> FloatMap | None:

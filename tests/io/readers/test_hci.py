@@ -2,6 +2,7 @@
 
 import shutil
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -11,8 +12,10 @@ from error_lines import reading_error
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sepi.errors import SepiError
+from sepi.errors import SepiError, SepiWarning
 from sepi.io.pfm import write_pfm
+from sepi.io.readers.formats import read_truth
+from sepi.io.readers.options import ReadOptions
 from sepi.lightfield import DisparityRange
 from sepi.reading import read_light_field
 from sepi.scenes import render, write_hci
@@ -308,6 +311,25 @@ def test_real_scene_with_a_view_missing(hci: Path, tmp_path: Path) -> None:
     assert light_field.ground_truth is not None
     (tmp_path / "cotton/input_Cam040.png").unlink()
     assert "the centre view (t, s) = (4, 4) is missing" in reading_error(tmp_path / "cotton")
+
+
+def test_ground_truth_can_be_read_apart(full: Path) -> None:
+    """The workflow's maps must not depend on it: not if it comes later, not if it is damaged."""
+    whole = read_light_field(full)
+    ground_truth, masks = read_truth(full, ReadOptions())
+    np.testing.assert_array_equal(ground_truth, whole.ground_truth)
+    np.testing.assert_equal(dict(masks), dict(whole.masks))
+    # with two rows, the centre view of the flipped grid is another
+    flipped = ReadOptions(order="flip-rows")
+    with pytest.warns(SepiWarning, match="its ground truth is of view 0,1, the depth of view 1,1; --view 0,1 scores"):
+        assert read_truth(full, flipped) == (None, {})
+    np.testing.assert_array_equal(read_truth(full, replace(flipped, view=(0, 1)))[0], whole.ground_truth)
+    (full / "gt_disp_lowres.pfm").write_bytes(b"Pf")
+    views = read_light_field(full, truth=False)
+    assert (views.ground_truth, views.masks) == (None, {})
+    np.testing.assert_array_equal(views.views, whole.views)
+    with pytest.raises(SepiError, match=r"gt_disp_lowres\.pfm"):
+        read_truth(full, ReadOptions())
 
 
 @pytest.mark.parametrize("encoding", ["utf-8-sig", "latin-1"])

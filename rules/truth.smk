@@ -1,0 +1,24 @@
+# Ground truth and masks of a scene, which only scores are made with: a new or changed one asks for no map. A scene without any
+# gets a file that says so.
+rule truth:
+    input:
+        files=lambda wildcards: list(map(own_file, scene_of(wildcards).truth)),
+    output:
+        truth=SCENE.truth,
+    log:
+        "logs/{dataset}/{scene}/truth.log",
+    benchmark:
+        "benchmarks/{dataset}/{scene}/truth.tsv"
+    group:
+        GROUP
+    threads: 1
+    resources:
+        mem_mb=memory_for(bytes_per_sample=8, bytes_per_pixel=300),
+        runtime=minutes_for(0.05),
+    params:
+        source=truth_source,
+        code=lambda wildcards: code_digest("sepi.truth", scene_of(wildcards).reader),
+    message:
+        "{wildcards.dataset}/{wildcards.scene}: ground truth"
+    shell:
+        command("sepi.truth {params.source:q} --output {output.truth:q} 2> {log:q}")
