@@ -24,7 +24,7 @@ BOUNDS: dict[str, dict[str, tuple[float, float]]] = {
     "oavc": {"cotton": (1.1, 0.096), "antinous": (28.0, 0.84)},
     "cae": {"cotton": (2.9, 0.072), "antinous": (34.0, 0.77)},
     "pobr": {"cotton": (16.0, 0.09), "antinous": (26.0, 0.5)},
-    "spo": {"cotton": (2.9, 0.63), "antinous": (30.0, 1.4)},
+    "spo": {"cotton": (2.3, 0.09), "antinous": (30.1, 1.4)},
     "mishiba": {"cotton": (1.3, 0.28), "antinous": (30.0, 0.95)},
     "acc": {"cotton": (19.0, 1.0), "antinous": (27.0, 1.1)},
     "occ": {"cotton": (5.2, 0.42), "antinous": (21.0, 0.93)},
