@@ -97,11 +97,10 @@ def test_planes_stay_within_the_range() -> None:
 def test_a_wall_in_steps_of_integers_is_bare() -> None:
     """Light that falls off along a wall changes by one grey level here and there: no texture, though no noise."""
     light_field, maps = scene()
-    views = np.repeat(gaussian_filter(light_field.views[0, 0].astype(float), (4, 4, 0))[None, None], 3, axis=1)
-    views[..., 10:40, 10:60, :] = 120 + np.arange(50)[:, None] / 12
-    views = np.round(views).astype(np.uint8)
-    smooth = LightField(views, "wall", disparity_range=light_field.disparity_range)
-    _, filled = fill_uniform_regions(smooth, maps, UniformPlanesParameters(growth=0, ransac_iterations=40))
+    # upright bars and level steps, in which no noise is found
+    light_field.views[:] = light_field.views[..., :1, :, :]
+    light_field.views[..., 10:40, 10:60, :] = 120 + np.arange(30)[:, None, None] // 12
+    _, filled = fill_uniform_regions(light_field, maps, UniformPlanesParameters(growth=0, ransac_iterations=40))
     assert filled[16:34, 16:54].mean() > 0.95
 
 
@@ -110,6 +109,8 @@ def test_what_is_found_in_one_region_does_not_move_the_plane_of_the_next() -> No
     left, right = np.s_[10:40, 10:39], np.s_[10:40, 40:70]
     light_field, maps = scene(left, right)
     light_field.views[..., 10:40, 39, :] = 40
+    # the cable stays sharp in the mean of the views, so that the walls reach it from both sides
+    maps.disparity[:, 35:44] = 0
     parameters = UniformPlanesParameters(window_radius=1, growth=8, ransac_iterations=40)
     usual, filled = fill_uniform_regions(light_field, maps, parameters)
     assert filled[left].mean() > 0.9
