@@ -66,7 +66,7 @@ def copy_to(tree: Path) -> None:
 def failing(tree: Path, tests: list[str]) -> bool:
     """Whether one of these tests fails in a tree."""
     # processes that tests start import the copy, too
-    environment = {"SEPI_DATA": str(ROOT.parent / "shared/data"), **os.environ, "PYTHONPATH": str(tree)}
+    environment = {**os.environ, "PYTHONPATH": str(tree)}
     command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", *tests]
     try:
         done = subprocess.run(command, cwd=tree, env=environment, capture_output=True, text=True, timeout=_MOST_SECONDS)
