@@ -31,7 +31,7 @@ class Mutant(NamedTuple):
     old: str
     new: str
     breaks: str
-    tests: list[str]
+    tests: tuple[str, ...]
 
     def text(self, tree: Path) -> str | None:
         """The file with the fault; None where what it replaces is not there exactly once."""
@@ -43,27 +43,22 @@ def mutants(words: list[str]) -> Iterator[Mutant]:
     """Those whose file or description holds all words."""
     for group in yaml.safe_load(Path(__file__).with_name("mutants.yaml").read_text(encoding="utf-8")):
         for values in group["mutants"]:
-            mutant = Mutant(values["file"], values["old"], values["new"], values["breaks"], group["tests"].split())
+            mutant = Mutant(**values, tests=tuple(group["tests"].split()))
             if all(word in f"{mutant.file} {mutant.breaks}" for word in words):
                 yield mutant
 
 
 def copy_to(tree: Path) -> None:
     """Copy what git knows or would, and the compiled kernels, whose times must stay."""
-    listed = subprocess.run(
-        ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"],
-        cwd=ROOT,
-        stdout=subprocess.PIPE,
-        check=True,
-    )
-    names = [name for name in listed.stdout.decode().split("\0") if name]
+    words = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
+    names = subprocess.run(words, cwd=ROOT, stdout=subprocess.PIPE, check=True).stdout.decode().split("\0")[:-1]
     kernels = [str(path.relative_to(ROOT)) for path in ROOT.glob("sepi/**/__pycache__/*.nb[ci]")]
     for name in filter(lambda name: (ROOT / name).is_file(), names + kernels):
         (tree / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy2(ROOT / name, tree / name)
 
 
-def failing(tree: Path, tests: list[str]) -> bool:
+def failing(tree: Path, tests: tuple[str, ...]) -> bool:
     """Whether one of these tests fails in a tree."""
     # processes that tests start import the copy, too
     environment = {**os.environ, "PYTHONPATH": str(tree)}
@@ -78,16 +73,17 @@ def failing(tree: Path, tests: list[str]) -> bool:
 
 
 def main(words: list[str]) -> int:
-    """Number of mutants that no test sees."""
+    """Tell of each mutant whether its tests see it; 1 where one of them does not, else 0."""
     chosen = list(mutants(words))
     missed = 0
+    sound: set[tuple[str, ...]] = set()
     with tempfile.TemporaryDirectory(prefix="sepi-mutants-") as folder:
         tree = Path(folder).resolve() / "sepi"
         copy_to(tree)
-        tests = list(dict.fromkeys(test for mutant in chosen for test in mutant.tests))
-        if tests and failing(tree, tests):
-            raise SystemExit("the tests fail without any fault")
         for mutant in chosen:
+            if mutant.tests not in sound and failing(tree, mutant.tests):
+                raise SystemExit(f"{' '.join(mutant.tests)}: fails without any fault")
+            sound.add(mutant.tests)
             text = mutant.text(tree)
             if text is None:
                 state = "absent"
