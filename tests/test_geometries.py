@@ -90,3 +90,10 @@ def test_metres_are_right_where_rows_are_closer() -> None:
     moved = light_field.ground_truth * light_field.baselines[6, 3, 0]
     expected = apart * focal_px / (moved + apart * focal_px / focus)
     assert np.median(np.abs(depth / expected - 1)) < 5e-3
+
+
+def test_the_longer_side_of_a_picture_is_that_of_the_sensor() -> None:
+    """An upright picture has the depth of the same camera's wide one."""
+    known = {"focal_length_mm": 50, "baseline_mm": 20, "focus_distance_m": 4, "sensor_size_mm": 32}
+    assert camera_from(**known, shape=(96, 64)) == camera_from(**known, shape=(64, 96))
+    assert camera_from(**known, shape=(96, 64)).focal_px == 150

@@ -14,7 +14,7 @@ from sepi.lightfield import DisparityRange, LightField
 from sepi.matching.view_subsets import half_planes, halves_and_quarters
 from sepi.occlusion import CHOICES, nearer_on_hidden_side
 from sepi.scenes import render
-from sepi.stage import no_progress
+from sepi.stage import StageMaps, no_progress
 
 SIZE = 48
 EDGE = 24
@@ -219,3 +219,62 @@ def test_the_file_says_which_views_were_kept(tmp_path, choice):
     assert any(name.startswith("half-plane") for name in kept) == (choice == "wang")
     # stages that follow hand it on
     assert back.updated(initial.disparity, initial.confidence).subset_names == maps.subset_names
+
+
+@pytest.mark.parametrize("choice", ["half_sepi", "wang"])
+def test_small_changes_keep_the_depth_from_all_views(choice):
+    """A half's depth is noisier: what it moves by less than ``min_change`` is no occlusion mended."""
+    light_field = two_planes("right")
+    initial, _ = run(light_field, "none")
+    changes = {}
+    for least in (0.0, 0.5):
+        parameters = CHOICES[choice].parameters(num_disparities=41, min_change=least, gain_half=0)
+        maps = CHOICES[choice].run(light_field, initial, parameters, no_progress)
+        change = np.abs(maps.disparity - initial.disparity)
+        changes[least] = change[change > 0]
+    # in steps of which the farthest view is 4 away, here 2
+    assert (changes[0.0] < 1).any()
+    assert (changes[0.5] > 1).all()
+    assert changes[0.5].any()
+
+
+def test_a_mirrored_scene_keeps_the_mirrored_halves():
+    """Halves that lay askew to the edge would hold views in which the occluder hides the pixel."""
+    light_field = two_planes("right")
+    views = np.flip(light_field.views, (1, 3)).copy()
+    other = LightField(views, "mirrored", disparity_range=light_field.disparity_range)
+    _, usual = run(light_field, "wang")
+    _, mirrored = run(other, "wang")
+    directions = CHOICES["wang"].parameters().directions
+    # the angle (n + 1/2) pi / directions, seen in a mirror
+    half = np.fliplr(mirrored.extra["view_subset"]).astype(int) - 1
+    expected = np.where(half < 0, 0, (directions - 1 - half) % (2 * directions) + 1)
+    occluded = usual.extra["occluded"]
+    assert occluded.any()
+    assert (usual.extra["view_subset"] == expected)[occluded].mean() > 0.95
+
+
+@pytest.mark.parametrize("choice", ["half_sepi", "wang"])
+def test_depth_steps_without_an_edge_are_candidates(choice):
+    """Before a background of its own colour, an occluder has no edge but that of the depth."""
+    views = np.full((3, 3, 40, 40, 3), 128, np.uint8)
+    light_field = LightField(views, "one colour", disparity_range=DisparityRange(-1, 1, "given"))
+    step = np.repeat(np.where(np.arange(40) < 20, -1, 1)[None], 40, axis=0).astype(np.float32)
+    parameters = CHOICES[choice].parameters(num_disparities=5, candidate_reach=3)
+    maps = CHOICES[choice].run(light_field, StageMaps(step, np.ones_like(step)), parameters, no_progress)
+    found = maps.extra["occlusion_candidates"]
+    assert found[:, 16:24].all()
+    assert not found[:, :14].any()
+    assert not found[:, 26:].any()
+
+
+def test_best_marks_what_some_view_does_not_see():
+    """The mask is scored, shown, and left out by those who need sure depth."""
+    light_field = two_planes("right")
+    before = StageMaps(light_field.ground_truth, np.ones((SIZE, SIZE), np.float32))
+    parameters = CHOICES["visibility"].parameters(num_disparities=41)
+    occluded = CHOICES["visibility"].run(light_field, before, parameters, no_progress).extra["occluded"]
+    # two views away, the near plane has moved by 4 px to the left, and the far one by 2 to the right
+    assert occluded[6:-6, EDGE - 6 : EDGE].mean() > 0.9
+    assert occluded[6:-6, 4 : EDGE - 8].mean() < 0.02
+    assert occluded[6:-6, EDGE + 2 : -6].mean() < 0.02

@@ -14,7 +14,7 @@ import sepi
 from sepi.inspection.disparity_range import estimate_range
 from sepi.lightfield import DisparityRange, LightField
 from sepi.scenes import render, write_hci
-from sepi.variants import VARIANTS, Variant, choice_label, choice_of, stage_parameters
+from sepi.variants import STAGES, VARIANTS, Variant, choice_label, choice_of, stage_parameters
 
 CANDIDATES = {"initial": {"num_disparities": 21}, "occlusion": {"num_disparities": 21}}
 
@@ -145,3 +145,14 @@ def test_equal_files_for_any_number_of_threads(tmp_path: Path, variant: str) -> 
         subprocess.run([*command, "--threads", threads], env=environment, check=True, capture_output=True)
         files.append({file.name: file.read_bytes() for file in out.iterdir()})
     assert files[0] == files[1]
+
+
+@pytest.mark.parametrize("variant", ["best", "paper"])
+def test_progress_goes_from_nothing_to_all_once(variant: str) -> None:
+    """A bar that starts anew says nothing about when the map is there."""
+    told: list[float] = []
+    sepi.estimate_depth(ODD["small"], variant, CANDIDATES, told.append)
+    assert told == sorted(told)
+    assert 0 <= told[0] <= 1 / len(STAGES)
+    assert told[-1] == 1
+    assert len([fraction for fraction in told if 0 < fraction < 1]) >= len(STAGES) - 1

@@ -184,3 +184,23 @@ def test_sample_modes_equal_their_numpy_twin():
     np.testing.assert_allclose(modes, expected, atol=0.03 * 0.01)
     for cluster in modes.reshape(5, 20, 3):
         assert np.ptp(cluster, axis=0).max() < 0.03 * 0.01
+
+
+@pytest.mark.parametrize("end", ["nearest", "farthest"])
+def test_depth_at_the_end_of_the_range_resists_no_plane(end):
+    """Where no candidate was best, a bare surface lies at the range's end as a whole: agreement that means nothing."""
+    light_field, ground_truth, bare, maps = bare_plane(noise=False)
+    maps.disparity[bare] = 2 if end == "nearest" else -2
+    inner = binary_erosion(bare, iterations=15)
+    assert np.abs(run(light_field, maps).disparity - ground_truth)[inner].max() < 0.05
+
+
+def test_planes_stay_within_the_range():
+    """Continued from their borders they lead beyond what was searched."""
+    light_field, _, bare, maps = bare_plane()
+    narrow = light_field.with_range(DisparityRange(-0.1, 0.5, "given"))
+    within = StageMaps(np.clip(maps.disparity, -0.1, 0.5), maps.confidence)
+    refined = run(narrow, within)
+    assert refined.extra["textureless"][bare].mean() > 0.5
+    assert refined.disparity.min() >= np.float32(-0.1)
+    assert refined.disparity.max() <= np.float32(0.5)

@@ -331,6 +331,26 @@ def test_the_command_writes_a_map_of_every_view(tmp_path: Path) -> None:
     assert not (tmp_path / "all" / "all_views.h5").exists()
 
 
+def test_all_views_are_made_as_the_command_says(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Within the same memory and with the same parameters as the centre view, or neither means anything."""
+    scene = tmp_path / "pyramids"
+    write_hci(render("pyramids", size=64, views=2), scene)
+    made = []
+
+    def estimate(light_field: LightField, *arguments: object) -> StageMaps:
+        made.append(arguments)
+        return sepi.estimate_depth(light_field, "no_occlusion_no_textureless")
+
+    monkeypatch.setattr("sepi.applications.all_views.estimate_depth", estimate)
+    words = f"depth {scene} -o {tmp_path}/maps --all-views --memory 4000 --variant no_occlusion_no_textureless"
+    done = CliRunner().invoke(main, [*words.split(), "--threads", "1", "--set", "initial.sepi.num_disparities=21"])
+    assert done.exit_code == 0, done.output
+    assert len(made) == 3
+    for _, parameters, _, memory in made:
+        assert parameters == {"initial": {"num_disparities": 21}}
+        assert memory == 4000 * 2**20
+
+
 def test_missing_views_are_nan_in_the_file(tmp_path: Path) -> None:
     """A map of 0 would look like one that was made."""
     scene = tmp_path / "views"

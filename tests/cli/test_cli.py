@@ -6,18 +6,23 @@ import re
 import shutil
 import subprocess
 import sys
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
+import click
+import cv2
 import h5py
+import numba
 import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 from error_lines import error_of
 
 import sepi
-from sepi import ingest
+from sepi import ingest, initial
 from sepi.cli.main import main
+from sepi.command import stage_command
 from sepi.io.hdf5 import read_attributes, read_stage, write_light_field
 from sepi.io.images import write_png
 from sepi.io.pfm import read_pfm, write_pfm
@@ -25,6 +30,7 @@ from sepi.io.result_folder import RESULT_FILES
 from sepi.lightfield import LightField
 from sepi.reading import read_light_field
 from sepi.scenes import SCENES, render, write_hci
+from sepi.threads import threads_used
 
 # few candidates: these tests are about the commands, not about depth
 FAST = ("--threads", "2", "--set", "initial.semi_global.num_disparities=21")
@@ -197,6 +203,36 @@ def test_depth_within_a_limit_of_memory(scene: Path) -> None:
     assert not Path("none").exists()
 
 
+@pytest.fixture
+def many_threads() -> Iterator[None]:
+    """More threads than one, which a command has to lower."""
+    before = numba.get_num_threads(), cv2.getNumThreads()
+    numba.set_num_threads(numba.config.NUMBA_NUM_THREADS)
+    cv2.setNumThreads(3)
+    yield
+    numba.set_num_threads(before[0])
+    cv2.setNumThreads(before[1])
+
+
+@pytest.mark.usefixtures("many_threads")
+@pytest.mark.parametrize(
+    ("command", "words"),
+    [
+        (main, "depth pyramids --variant no_occlusion_no_textureless --set initial.sepi.num_disparities=5"),
+        (main, "refocus pyramids --disparity 0"),
+        (ingest.main, "pyramids --output again.h5"),
+        (stage_command("initial", initial.CHOICES), "--light-field lf.h5 --choice structure_tensor --output stage.h5"),
+    ],
+    ids=["depth", "refocus", "ingest", "stage"],
+)
+def test_a_command_keeps_to_its_threads(scene: Path, command: click.Command, words: str) -> None:
+    """On a machine that others use too, or that a scheduler divides among jobs."""
+    write_light_field(Path("lf.h5"), read_light_field(scene))
+    called = CliRunner().invoke(command, [*words.split(), "--threads", "1"])
+    assert called.exit_code == 0, called.output
+    assert (threads_used(), cv2.getNumThreads()) == (1, 1)
+
+
 def test_a_warning_does_not_stop_the_depth(scene: Path) -> None:
     """Views in the wrong order give a map that looks like one; the user must hear of it, and of the way out."""
     views = render("curved_occluders", size=96, views=5).views
@@ -362,6 +398,18 @@ def test_bad_maps_are_one_line(
     views = np.random.default_rng(0).integers(0, 255, (2, 2, 6, 8, 1), np.uint8)
     write_light_field(Path("plain.h5"), LightField(views, "plain"))
     assert message in error_of(call("evaluate", estimate, ground_truth))
+
+
+# --- points
+
+
+def test_points_of_every_nth_row_and_column(result: Path, tmp_path: Path) -> None:
+    """A cloud of millions of points is too much for many viewers."""
+    known = ~read_stage(result / "result.h5").mask("unknown")
+    for step in (1, 3):
+        called = call("points", result, "-o", tmp_path / f"{step}.ply", "--step", step)
+        assert called.exit_code == 0
+        assert f"element vertex {known[::step, ::step].sum()}\n".encode() in (tmp_path / f"{step}.ply").read_bytes()
 
 
 # --- info and scenes

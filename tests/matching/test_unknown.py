@@ -74,6 +74,13 @@ def test_overexposed_sky_is_unknown(noise: float) -> None:
     assert not found[30:].any()
 
 
+def test_a_surface_of_full_colour_is_known() -> None:
+    """A red car has its depth: overexposed is what is at full scale in all channels."""
+    picture = np.repeat(texture(0.2, 0.8)[..., None], 3, axis=2)
+    picture[:30] = 1, 0.2, 0.2
+    assert not unknown_in(light_field(picture)).any()
+
+
 @pytest.mark.parametrize("level", [0.03, 0.5, 0.98])
 @pytest.mark.parametrize("noise", [0, 2 / 255])
 def test_a_bare_wall_between_known_borders_is_known(level: float, noise: float) -> None:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from geometries import GEOMETRIES, standing
-from scipy.ndimage import map_coordinates, spline_filter
+from scipy.ndimage import gaussian_filter, map_coordinates, spline_filter
 from scipy.sparse import coo_array, diags
 from scipy.sparse.linalg import spsolve
 
@@ -243,3 +243,38 @@ def test_pixels_that_nothing_holds_stay_as_they_are() -> None:
     stencil = second_difference_stencil([np.zeros((2, 0)), np.zeros((0, 2)), np.full((1, 1), 1.04)], (2, 2))
     found = solve_smooth(stencil, np.zeros((2, 2), np.float32), data, 3e-3, 200)
     np.testing.assert_array_equal(found, data)
+
+
+@pytest.mark.parametrize("contrast", [0, 4])
+def test_planes_of_bare_regions_stay_as_they_were_put(contrast: int) -> None:
+    """Neither a reflection that stands still in them, nor doubt, nor the slope of the surface beside may bend them."""
+    size = 48
+    random = np.random.default_rng(6)
+    picture = np.full((size, size, 3), 120, np.uint8)
+    picture[:, 24:] += random.integers(0, contrast + 1, (size, 24, 3)).astype(np.uint8)
+    # detail wider than a pixel, so that it is not taken for noise of the camera
+    picture[:, :24] = np.clip(120 + gaussian_filter(random.normal(0, 60, (size, 24, 3)), (1, 1, 0)), 0, 255)
+    views = np.broadcast_to(picture, (3, 3, *picture.shape)).copy()
+    y, x = np.mgrid[:size, :size]
+    # two planes, one behind the other, that begin at the textured surface and lean away from it
+    planes = np.where(x < 24, 0, 0.02 * (x - 24) + 0.5 * (y >= 24)).astype(np.float32)
+    before = StageMaps(planes, np.where(x < 24, 1, 0.05).astype(np.float32), {"textureless": x >= 24})
+    light_field = LightField(views, "bare", disparity_range=DisparityRange(-1, 2, "given"))
+    result = second_order(light_field, before, SecondOrderParameters(), no_progress)
+    assert np.abs(result.disparity - planes)[:, 30:].max() < 0.03
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_a_mirrored_picture_is_smoothed_alike(axis: int) -> None:
+    """Colours hold surfaces apart along both diagonals."""
+    random = np.random.default_rng(7)
+    picture = random.integers(80, 160, (32, 32, 3)).astype(np.uint8)
+    views = np.broadcast_to(picture, (3, 3, *picture.shape)).copy()
+    known = DisparityRange(-1, 1, "given")
+    maps = StageMaps(random.normal(0, 0.02, (32, 32)).astype(np.float32), np.ones((32, 32), np.float32))
+    flipped = StageMaps(np.flip(maps.disparity, axis).copy(), maps.confidence)
+    parameters = SecondOrderParameters(rtol=LEAST_SINGLE_RTOL, first_rtol=LEAST_SINGLE_RTOL)
+    usual = second_order(LightField(views, "one", disparity_range=known), maps, parameters, no_progress)
+    views = np.flip(views, (axis, axis + 2)).copy()
+    other = second_order(LightField(views, "other", disparity_range=known), flipped, parameters, no_progress)
+    np.testing.assert_allclose(np.flip(other.disparity, axis), usual.disparity, atol=1e-5)

@@ -81,3 +81,40 @@ def test_small_regions_are_left_alone() -> None:
     disparity, filled = fill_uniform_regions(light_field, maps, PARAMETERS)
     assert not filled.any()
     np.testing.assert_array_equal(disparity, maps.disparity)
+
+
+def test_planes_stay_within_the_range() -> None:
+    """A plane that its border holds at one side only would lead behind what was searched."""
+    light_field, maps = scene(NEAR)
+    narrow = light_field.with_range(DisparityRange(0.0, 0.05, "given"))
+    whole, filled = fill_uniform_regions(light_field, maps, PARAMETERS)
+    cut, _ = fill_uniform_regions(narrow, maps, PARAMETERS)
+    assert whole[filled].min() < -0.01
+    assert whole[filled].max() > 0.06
+    np.testing.assert_array_equal(cut[filled], np.clip(whole[filled], 0, np.float32(0.05)))
+
+
+def test_a_wall_in_steps_of_integers_is_bare() -> None:
+    """Light that falls off along a wall changes by one grey level here and there: no texture, though no noise."""
+    light_field, maps = scene()
+    # upright bars and level steps, in which no noise is found
+    light_field.views[:] = light_field.views[..., :1, :, :]
+    light_field.views[..., 10:40, 10:60, :] = 120 + np.arange(30)[:, None, None] // 12
+    _, filled = fill_uniform_regions(light_field, maps, UniformPlanesParameters(growth=0, ransac_iterations=40))
+    assert filled[16:34, 16:54].mean() > 0.95
+
+
+def test_what_is_found_in_one_region_does_not_move_the_plane_of_the_next() -> None:
+    """Two walls with a cable between them: the depth of one is no border of the other, since nobody knows it."""
+    left, right = np.s_[10:40, 10:39], np.s_[10:40, 40:70]
+    light_field, maps = scene(left, right)
+    light_field.views[..., 10:40, 39, :] = 40
+    # the cable stays sharp in the mean of the views, so that the walls reach it from both sides
+    maps.disparity[:, 35:44] = 0
+    parameters = UniformPlanesParameters(window_radius=1, growth=8, ransac_iterations=40)
+    usual, filled = fill_uniform_regions(light_field, maps, parameters)
+    assert filled[left].mean() > 0.9
+    assert filled[right].mean() > 0.9
+    maps.disparity[right] = 1
+    moved, _ = fill_uniform_regions(light_field, maps, parameters)
+    np.testing.assert_array_equal(moved[left], usual[left])

@@ -34,12 +34,14 @@ def scene(**labels: str) -> Wildcards:
 
 @pytest.fixture(scope="module")
 def read(tmp_path_factory: pytest.TempPathFactory) -> Any:
-    """The workflow with maps of another method, of which one is there."""
+    """The workflow with a light field of one's own, and maps of another method, of which one is there."""
     root = tmp_path_factory.mktemp("rules")
     (root / "maps").mkdir()
     (root / "maps/dots.pfm").touch()
     maps = {"there": str(root / "maps"), "absent": str(root / "nowhere")}
-    return Workflow(REPOSITORY, root / "run", TINY | {"external": maps}).read()
+    (root / "mine.npy").touch()
+    own = {"mine": {"path": str(root / "mine.npy")}}
+    return Workflow(REPOSITORY, root / "run", TINY | {"external": maps, "light_fields": own}).read()
 
 
 def of_size(size: int, folder: Path, **more: Any) -> dict[str, Any]:
@@ -86,8 +88,10 @@ def test_every_job_is_made_again_for_its_own_code(read: Any) -> None:
 
 
 def test_every_file_that_a_job_reads_is_an_input(read: Any) -> None:
-    """A published figure that was mended, a map of another method, a template of the page: none would be seen."""
+    """A new picture, a published figure that was mended, a map of another method, a template: none would be seen."""
     rules = {rule.name: rule for rule in read.rules}
+    (views,) = rules["ingest"].input.files(scene(dataset="own", scene="mine"))
+    assert views.endswith("mine.npy")
     (there,) = rules["external"].input.maps(scene())
     assert there.endswith("maps/dots.pfm")
     assert {Path(file) for file in rules["numbers"].input.published} == set(PUBLISHED.glob("*.csv"))
