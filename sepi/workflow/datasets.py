@@ -205,7 +205,8 @@ def own_scene(name: str, source: Path, flags: tuple[str, ...], where: str) -> Sc
     if not os.path.exists(source):
         raise SepiError(f"{where}: no file or folder '{source}'")
     source = source.resolve()
-    if dict(pairwise(flags)).get("--format", "hci") == "hci" and hci.matches(source):
+    word = dict(pairwise(flags)).get("--format")
+    if hci.matches(source) and (word == "hci" or (word is None and not exported.matches(source))):
         return _benchmark_scene("own", name, source, flags)
     inside = [path for path in view_files(source) if path.is_file()] if source.is_dir() else [source]
     files = tuple(path for path in inside if not path.name.startswith("."))

@@ -373,14 +373,15 @@ class TestOwnLightFields:
 
     def test_every_picture_of_a_folder_is_an_input(self, tmp_path: Path) -> None:
         folder = make_scene(tmp_path / "flowers", views=4)
-        for name in (".hidden", "notes.txt", "parameters.cfg", "light_field.json"):
-            (folder / name).touch()
         (folder / "below").mkdir()
-        scene = load_settings({"light_fields": {"a": {"path": str(folder)}}}).scene("own", "a")
-        # notes are no part of the light field: whoever writes them need not wait for all maps
         pictures = [f"input_Cam00{number}.png" for number in range(4)]
-        assert [path.name for path in scene.files] == [*pictures, "light_field.json", "parameters.cfg"]
-        assert (scene.views, scene.height, scene.width) == (4, 30, 40)
+        # notes are no part of the light field: whoever writes them need not wait for all maps
+        for beside in ("parameters.cfg", "light_field.json"):
+            for name in (".hidden", "notes.txt", beside):
+                (folder / name).touch()
+            scene = load_settings({"light_fields": {"a": {"path": str(folder)}}}).scene("own", "a")
+            assert [path.name for path in scene.files] == [*pictures, beside]
+            assert (scene.views, scene.height, scene.width) == (4, 30, 40)
 
     @pytest.mark.parametrize(
         ("entry", "expected"),
