@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from io import BytesIO
 from pathlib import Path
 from typing import Any, Literal
 
@@ -32,5 +33,8 @@ def new_figure(width: float, height: float, layout: Literal["constrained"] | Non
 def save(figure: Figure, folder: Path, name: str, endings: Sequence[str] = BOTH) -> None:
     """Write a figure as ``NAME.ENDING`` for each of the endings ``png`` and ``pdf``, each whole or not at all."""
     for ending in endings:
+        # in memory first: on a full disk matplotlib fails a second time while it closes its file
+        content = BytesIO()
+        figure.savefig(content, format=ending, **_OPTIONS[ending])
         with atomic_path(folder / f"{name}.{ending}") as temporary:
-            figure.savefig(temporary, format=ending, **_OPTIONS[ending])
+            temporary.write_bytes(content.getvalue())
