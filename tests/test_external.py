@@ -49,6 +49,16 @@ def call(folder: Path, light_field: LightField, maps: str) -> Result:
     return CliRunner().invoke(command, [str(part) for pair in files.items() for part in pair], catch_exceptions=False)
 
 
+@pytest.mark.parametrize("kept", ["Cotton.pfm", "COTTON.PFM", "cotton.npy"])
+def test_a_map_is_found_by_the_name_of_its_scene(tmp_path: Path, kept: str) -> None:
+    """Authors write scenes' names with capitals, as papers do; exactly the scene's name comes first."""
+    source = ExternalSource(path=str(tmp_path))
+    (tmp_path / kept).touch()
+    assert source.file("hci", "cotton") == tmp_path / kept
+    (tmp_path / "cotton.pfm").touch()
+    assert source.file("hci", "cotton") == tmp_path / "cotton.pfm"
+
+
 class TestImport:
     def test_scores_are_those_of_our_own_maps(
         self, tmp_path: Path, light_field: LightField, estimate: np.ndarray
