@@ -11,7 +11,7 @@ from pathlib import Path
 
 import click
 
-from sepi.cli.input_options import Reading, reading_flags
+from sepi.cli.input_options import Reading, builtin_flags, range_to_search, reading_flags
 from sepi.command import SepiCommand, write_timing
 from sepi.inspection.disparity_range import settle_range
 from sepi.io.hdf5 import write_light_field
@@ -22,10 +22,8 @@ _PATH = click.Path(path_type=Path)
 
 @click.command(name="python -m sepi.ingest", cls=SepiCommand)
 @click.argument("path", type=_PATH, required=False)
-@click.option("--builtin", help="Render this built-in scene in place of reading PATH.")
-@click.option("--size", type=click.IntRange(min=1), default=192, show_default=True, help="Built-in: pixels a side.")
-@click.option("--views", type=click.IntRange(min=2), default=9, show_default=True, help="Built-in: views a side.")
-@click.option("--disparity-range", nargs=2, type=float, metavar="MIN MAX", help="Pixels per view step.")
+@builtin_flags
+@range_to_search
 @reading_flags
 @click.option("--threads", type=click.IntRange(min=1), default=1, show_default=True, help="Threads to use.")
 @click.option("--output", type=_PATH, required=True, help="HDF5 file to write.")

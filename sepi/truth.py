@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from sepi.cli.input_options import Reading, reading_flags
+from sepi.cli.input_options import Reading, builtin_flags, reading_flags
 from sepi.command import SepiCommand
 from sepi.io.truth import write_truth
 from sepi.lightfield import Truth
@@ -16,9 +16,7 @@ _PATH = click.Path(path_type=Path)
 
 @click.command(name="python -m sepi.truth", cls=SepiCommand)
 @click.argument("path", type=_PATH, required=False)
-@click.option("--builtin", help="That of this built-in scene.")
-@click.option("--size", type=click.IntRange(min=1), default=192, show_default=True, help="Built-in: pixels a side.")
-@click.option("--views", type=click.IntRange(min=2), default=9, show_default=True, help="Built-in: views a side.")
+@builtin_flags
 @reading_flags
 @click.option("--output", type=_PATH, required=True, help="HDF5 file to write.")
 def main(path: Path | None, builtin: str | None, size: int, views: int, reading: Reading, output: Path) -> None:

@@ -11,7 +11,7 @@ from pathlib import Path
 import click
 
 from sepi.cli.info import range_text, size_text
-from sepi.cli.input_options import Geometry, Reading, camera_flags, reading_flags
+from sepi.cli.input_options import Geometry, Reading, camera_flags, range_to_search, reading_flags
 from sepi.command import SepiCommand
 from sepi.errors import SepiError
 
@@ -21,13 +21,7 @@ _PATH = click.Path(path_type=Path)
 @click.command(cls=SepiCommand, short_help="Save the light field INPUT as it was read, for reading without flags.")
 @click.argument("light_field_path", metavar="INPUT", type=_PATH)
 @click.argument("output", metavar="OUT", type=_PATH)
-@click.option(
-    "--disparity-range",
-    nargs=2,
-    type=float,
-    metavar="MIN MAX",
-    help="Disparities to search, pixels per view step; the scene's own or an estimate unless given.",
-)
+@range_to_search
 @click.option("--force", is_flag=True, help="Write where something is already, too.")
 @camera_flags
 @reading_flags

@@ -115,6 +115,12 @@ _FLAGS = (
 )
 
 
+_BUILTIN = (
+    click.option("--builtin", help="Built-in scene, in place of PATH."),
+    click.option("--size", type=click.IntRange(min=1), default=192, show_default=True, help="Built-in: pixels a side."),
+    click.option("--views", type=click.IntRange(min=2), default=9, show_default=True, help="Built-in: views a side."),
+)
+
 view_of_result = click.option(
     "--view",
     type=Pair("ROW,COLUMN", ","),
@@ -122,8 +128,23 @@ view_of_result = click.option(
     help="View to take, where 'sepi depth --all-views' made maps of all; that of the result unless given.",
 )
 
+range_to_search = click.option(
+    "--disparity-range",
+    nargs=2,
+    type=float,
+    metavar="MIN MAX",
+    help="Disparities to search, pixels per view step; the scene's own or an estimate unless given.",
+)
+
 Geometry = Callable[..., "Camera"]
 """Makes the camera of views of a ``shape``."""
+
+
+def builtin_flags(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Give a command the flags of a scene that is rendered rather than read."""
+    for flag in reversed(_BUILTIN):
+        command = flag(command)
+    return command
 
 
 def reading_flags(command: Callable[..., Any]) -> Callable[..., Any]:

@@ -16,7 +16,14 @@ from sepi.cli.convert import convert
 from sepi.cli.evaluate import evaluate
 from sepi.cli.export import export
 from sepi.cli.info import check, info, range_text, size_text
-from sepi.cli.input_options import Geometry, Reading, camera_flags, default_folder, reading_flags
+from sepi.cli.input_options import (
+    Geometry,
+    Reading,
+    camera_flags,
+    default_folder,
+    range_to_search,
+    reading_flags,
+)  # fmt: skip
 from sepi.cli.poses import poses
 from sepi.cli.refocus import refocus
 from sepi.cli.results import check_submission, points, submission
@@ -55,13 +62,7 @@ def main() -> None:
 @click.argument("light_field_path", metavar="INPUT", type=_PATH)
 @click.option("-o", "--output", type=_PATH, help="Folder to write; ./NAME-depth after INPUT's name unless given.")
 @click.option("--variant", default="best", show_default=True, help="Named choice of stages; see above.")
-@click.option(
-    "--disparity-range",
-    nargs=2,
-    type=float,
-    metavar="MIN MAX",
-    help="Disparities to search, pixels per view step; the scene's own or an estimate unless given.",
-)
+@range_to_search
 @click.option("--threads", type=click.IntRange(min=1), help="Threads to use; one per core unless given.")
 @click.option(
     "--memory",

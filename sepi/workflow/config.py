@@ -17,7 +17,6 @@ from pydantic import BaseModel, ConfigDict, Field
 from sepi.errors import SepiError
 from sepi.io.disparity_maps import SUFFIXES
 from sepi.io.external_maps import ExternalSource
-from sepi.io.readers import hci
 from sepi.io.readers.formats import FORMATS
 from sepi.io.readers.options import ORDERS
 from sepi.lightfield import DisparityRange
@@ -352,7 +351,7 @@ def _scenes(config: Config) -> dict[str, Scene]:
     if not scenes:
         raise SepiError("config: no scene to run on; name some in builtin.scenes or light_fields, or set hci_root")
     for scene in scenes:
-        for file in (*scene.files, *(hci.truth_files(scene.source) if scene.source else ())):
+        for file in (*scene.files, *scene.truth):
             require_plain_path(str(file), f"config: scene {scene.dataset}/{scene.name}")
     return {f"{scene.dataset}/{scene.name}": scene for scene in scenes}
 

@@ -211,6 +211,9 @@ def own_scene(name: str, source: Path, flags: tuple[str, ...], where: str) -> Sc
     inside = [path for path in view_files(source) if path.is_file()] if source.is_dir() else [source]
     files = tuple(path for path in inside if not path.name.startswith("."))
     # notes beside pictures are no part of the light field
+    if exported.matches(source):
+        manifest, *truth = exported.truth_files(source)
+        files = (*(path for path in files if path not in (manifest, *truth)), manifest)
     read = tuple(path for path in files if path.suffix.lower() in SUFFIXES or path.name == exported.MANIFEST)
     files = read if source.is_dir() and read else files
     return Scene("own", name, source, files, *size_of(files), flags=flags)

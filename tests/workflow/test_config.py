@@ -13,10 +13,11 @@ import pytest
 import yaml
 
 from sepi.errors import SepiError
+from sepi.io.exported import write_exported
 from sepi.io.images import write_png
 from sepi.io.readers.formats import FORMATS
 from sepi.renamed import RENAMED
-from sepi.scenes import SCENES
+from sepi.scenes import SCENES, render
 from sepi.stage import Parameters
 from sepi.variants import STAGES, VARIANTS
 from sepi.workflow.config import Config, Settings, load_settings
@@ -302,6 +303,16 @@ class TestFolderOfScenes:
         views = [f"input_Cam00{number}.png" for number in range(3)]
         assert [path.name for path in scene.files] == [*views, "parameters.cfg"]
         assert [path.name for path in scene.truth] == truth
+
+    def test_ground_truth_of_an_exported_folder_is_what_its_file_names(self, tmp_path: Path) -> None:
+        """Its pictures may have any names: a changed mask would compute all maps anew, a changed truth no score."""
+        light_field = render("dots", size=64, views=3)
+        write_exported(tmp_path / "dots", light_field)
+        scene = load_settings({"light_fields": {"dots": {"path": str(tmp_path / "dots")}}}).scene("own", "dots")
+        views = [f"row_{t:02}_col_{s:02}.png" for t, s in np.ndindex(3, 3)]
+        assert [path.name for path in scene.files] == [*views, "light_field.json"]
+        masks = [f"mask_{name}.png" for name in sorted(light_field.masks)]
+        assert [path.name for path in scene.truth] == ["light_field.json", "gt_disp_lowres.pfm", *masks]
 
     def test_two_scenes_of_one_name_are_refused(self, tmp_path: Path) -> None:
         make_scene(tmp_path / "a" / "cotton")

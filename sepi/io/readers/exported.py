@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from contextlib import suppress
 from itertools import chain
 from pathlib import Path
 
@@ -69,6 +70,16 @@ def read_manifest(path: Path) -> Manifest:
 def matches(path: Path) -> bool:
     """Whether ``path`` is a folder with ``light_field.json``."""
     return (path / MANIFEST).is_file()
+
+
+def truth_files(folder: Path) -> list[Path]:
+    """The files of a folder with ground truth and masks, and the one that names them."""
+    names: list[str] = []
+    # of a damaged one, reading says what is wrong
+    with suppress(SepiError):
+        known = read_manifest(folder / MANIFEST)
+        names = [name for name in (known.ground_truth, *known.masks.values()) if name is not None]
+    return [folder / name for name in (MANIFEST, *names)]
 
 
 def read(path: Path, options: ReadOptions) -> LightField:

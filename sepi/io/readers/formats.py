@@ -82,7 +82,7 @@ FORMATS = {
         exported.read,
         ("follow_links",),
         True,
-        truth_files=lambda path: [path / exported.MANIFEST],
+        truth_files=exported.truth_files,
     ),
     "hci": Format(
         "HCI folder",
