@@ -18,6 +18,9 @@ from typing import Any
 
 from sepi.errors import SepiError, one_line, printable
 
+DEFLATE_RATIO = 1100
+"""Bytes that a byte can unpack to; zlib's limit is 1032."""
+
 # an interrupt may strike between any two instructions, also where no `finally` is in force: what is still listed when
 # the program ends was not finished, and is removed
 _unfinished: set[Path] = set()

@@ -1,9 +1,6 @@
 """All HDF5 reading and writing: light fields and stage files.
 
-A file begins with a digest of all that follows it (in what HDF5 calls the user block, which other programs skip), so
-that damage is told before anything is made of it: HDF5 itself may read other numbers, crash, or hang. Where it does not
-fit, another process looks whether all that was written is there yet, by digests of groups and datasets: then another
-program only added attributes.
+Each file tells whether it was damaged (:mod:`sepi.io.integrity`).
 
 A stage file holds ``disparity (H, W) float32`` in pixels per view step, ``confidence (H, W) float32`` in 0..1, the
 stage's own maps, and attributes that say what made them; where a later stage is to choose among candidates, their costs
@@ -12,10 +9,6 @@ stage's own maps, and attributes that say what made them; where a later stage is
 
 from __future__ import annotations
 
-import hashlib
-import io
-import json
-import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import astuple
@@ -30,30 +23,25 @@ from sepi.camera import Camera
 from sepi.errors import SepiError, printable
 from sepi.io import apart
 from sepi.io.files import PatientFile, atomic_path, reading
+from sepi.io.integrity import (
+    BLOCK,
+    digest_block,
+    fixed_text,
+    has_digest,
+    members,
+    own_attributes,
+    record,
+    require_held,
+    require_sound,
+)
 from sepi.lightfield import RANGE_SOURCES, DisparityRange, LightField, Truth, require_light_field
 from sepi.stage import CostVolume, StageMaps
 from sepi.validation import require_known, require_path
 
 Attribute = str | float | int | tuple[float, float]
 
-DEFLATE_RATIO = 1100
-"""Bytes that a byte can unpack to; zlib's limit is 1032."""
-
-# the user block: HDF5 wants a power of two, 512 at least
-_BLOCK = 512
-_MARK = b"sepi sha256 "
-# attribute of a group or dataset: digest of it and of what is below it, and its other attributes that are ours
-_OWN = "sepi_sha256"
-# seconds of processor that an attribute may take, and a file but for what its size adds
+# seconds of processor that an attribute may take
 _PATIENCE = 1
-_BYTES_A_SECOND = 10_000_000
-# bytes of a dataset that are read at once for its digest
-_PART = 16_000_000
-# a file's time tells a later change when it is so many seconds old, as disks keep times no finer
-_SETTLED = 2
-
-# whether files are sound, by device, number, size and time
-_sound: dict[tuple[int, int, int, int], bool] = {}
 
 # datasets of a cost volume
 _COSTS, _CANDIDATES = "cost_volume", "candidates"
@@ -72,7 +60,7 @@ def write_stage(path: Path, maps: StageMaps, attributes: Mapping[str, Attribute]
             if name in UNITS:
                 dataset.attrs["units"] = UNITS[name]
             if name == "view_subset":
-                dataset.attrs["names"] = [_fixed(subset) for subset in maps.subset_names]
+                dataset.attrs["names"] = [fixed_text(subset) for subset in maps.subset_names]
         if maps.cost_volume is not None:
             # half precision hardly compresses
             file.create_dataset(_COSTS, data=maps.cost_volume.costs)
@@ -138,13 +126,13 @@ def write_light_field(path: str | Path, light_field: LightField) -> None:
         file.create_dataset("present", data=light_field.present)
         # what jobs on this file need: told without reading it
         file.attrs["reach"] = light_field.reach
-        file.attrs["name"] = _fixed(light_field.name)
-        file.attrs["source"] = _fixed(light_field.source)
+        file.attrs["name"] = fixed_text(light_field.name)
+        file.attrs["source"] = fixed_text(light_field.source)
         if light_field.reading:
-            file.attrs["reading"] = _fixed(light_field.reading)
+            file.attrs["reading"] = fixed_text(light_field.reading)
         if known is not None:
             file.attrs["disparity_range"] = (known.minimum, known.maximum)
-            file.attrs["disparity_range_source"] = _fixed(known.source)
+            file.attrs["disparity_range_source"] = fixed_text(known.source)
         if light_field.view is not None:
             file.attrs["view"] = light_field.view
         file.attrs["row_spacing"] = light_field.row_spacing
@@ -155,7 +143,7 @@ def write_light_field(path: str | Path, light_field: LightField) -> None:
         if light_field.camera is not None:
             file.attrs["camera"] = astuple(light_field.camera)
         if light_field.notes:
-            file.attrs["notes"] = [_fixed(note) for note in light_field.notes]
+            file.attrs["notes"] = [fixed_text(note) for note in light_field.notes]
         put_truth(file, (light_field.ground_truth, light_field.masks))
 
 
@@ -180,7 +168,7 @@ def has_dataset(path: Path, name: str, *, if_damaged: bool = False) -> bool:
     if not path.is_file() or not h5py.is_hdf5(path):
         return False
     try:
-        _require_sound(path)
+        require_sound(path)
         with h5py.File(path, "r") as file:
             return name in file
     except (SepiError, OSError, LookupError, ValueError, RuntimeError):
@@ -223,22 +211,6 @@ def read_camera(file: h5py.File) -> Camera | None:
     return Camera(*map(float, attribute(file, "camera"))) if "camera" in file.attrs else None
 
 
-def members(group: h5py.Group | Mapping[str, Any]) -> list[tuple[str, Any]]:
-    """Names and entries of a group, all at once.
-
-    Until the last is taken from h5py's own iterator, it holds its lock: where an error ends a loop before, for as long
-    as anyone keeps that error. Another thread that needs HDF5, be it to forget a file, would wait for ever.
-    """
-    return list(group.items())
-
-
-def own_attributes(holder: h5py.Group | h5py.Dataset) -> list[str]:
-    """Names of the attributes; in a file of this package, of those that it was written with."""
-    if _has_digest(holder) and _OWN in holder.attrs:
-        return list(json.loads(holder.attrs[_OWN].partition(b" ")[2]))
-    return [name for name in holder.attrs if name != _OWN]
-
-
 def attribute(holder: h5py.Group | h5py.Dataset, key: str) -> Any:
     """The value of an attribute; text of fixed length as text, too.
 
@@ -250,7 +222,7 @@ def attribute(holder: h5py.Group | h5py.Dataset, key: str) -> Any:
         If HDF5 hangs on it, or crashes, as it does on text of variable length in damaged files.
     """
     # those of our own were looked at when the file was opened
-    doubtful = holder.attrs.get_id(key).dtype.hasobject and not (_has_digest(holder) and key in own_attributes(holder))
+    doubtful = holder.attrs.get_id(key).dtype.hasobject and not (has_digest(holder) and key in own_attributes(holder))
     if doubtful and apart.outcome(lambda: holder.attrs[key], _PATIENCE) is None:
         raise SepiError(f"damaged HDF5 file: its attribute '{printable(key)}' cannot be read")
     value = holder.attrs[key]
@@ -266,23 +238,8 @@ def read_dataset(path: Path, dataset: h5py.Dataset, part: Any = ...) -> npt.NDAr
         If ``dataset`` is none, lies in another file, or claims more values than it can have: no memory is taken on the
         word of its shape.
     """
-    _require_held(path, dataset)
+    require_held(path, dataset)
     return np.asarray(dataset[part])
-
-
-def _require_held(path: Path, dataset: Any) -> None:
-    name = printable(str(dataset.name).lstrip("/"))
-    if not isinstance(dataset, h5py.Dataset) or dataset.shape is None:
-        raise SepiError(f"{path}: damaged HDF5 file: '{name}' is no array")
-    if dataset.is_virtual or dataset.external or dataset.file.filename != str(path):
-        raise SepiError(f"{path}: the values of '{name}' lie in another file; copy them into this one")
-    if dataset.dtype.hasobject:
-        # as of such attributes
-        raise SepiError(f"{path}: the values of '{name}' are of variable length; expected numbers")
-    held = dataset.id.get_storage_size()
-    # what is not compressed is stored as it is, but for chunks never written
-    if held > path.stat().st_size or dataset.nbytes > held * (DEFLATE_RATIO if dataset.chunks else 1):
-        raise SepiError(f"{path}: damaged HDF5 file: '{name}' of shape {dataset.shape} cannot lie in {held} bytes")
 
 
 @contextmanager
@@ -298,82 +255,9 @@ def open_hdf5(path: Path, kind: str = "readable HDF5 file", check: bool = True) 
         raise SepiError(f"{path}: no such file")
     with reading(path, kind):
         if check:
-            _require_sound(path)
+            require_sound(path)
         with h5py.File(path, "r") as file:
             yield file
-
-
-def _require_sound(path: Path) -> None:
-    """Refuse a file of this package that does not hold what was written, once looked at by this process."""
-    status = path.stat()
-    now = (status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns)
-    sound = _sound.get(now)
-    if sound is None:
-        sound = _is_as_written(path) or _was_added_to(path)
-        if status.st_mtime < time.time() - _SETTLED:
-            _sound[now] = sound
-    if not sound:
-        raise SepiError(f"{path}: damaged, or changed by another program; remove it and make it again")
-
-
-def _is_as_written(path: Path) -> bool:
-    """Whether the digest of a file is that of its bytes; others than those of this package have none."""
-    with path.open("rb") as file:
-        block = file.read(_BLOCK)
-        return not block.startswith(_MARK) or block == _block(file)
-
-
-def _was_added_to(path: Path) -> bool:
-    """Whether a file has attributes beside those that were written, and all else is what was written."""
-
-    def found() -> bool:
-        with h5py.File(path, "r") as file:
-            known: dict[Any, bytes] = {}
-            whole = file.attrs[_OWN] == _record(file, known, path)
-            return whole and any(len(entry.attrs) > len(own_attributes(entry)) + 1 for entry in known)
-
-    return apart.CAN_TRY and apart.outcome(found, _PATIENCE + path.stat().st_size / _BYTES_A_SECOND) is True
-
-
-def _record(entry: h5py.Group | h5py.Dataset, known: dict[Any, bytes], path: Path | None = None) -> bytes:
-    """What tells a group or dataset from a changed one: in the file at ``path``, or for a file that is being written.
-
-    ``known`` are those of entries before: they may have several names.
-    """
-    if entry in known:
-        return known[entry]
-    names = sorted(entry.attrs) if path is None else own_attributes(entry)
-    total = hashlib.sha256()
-    for name in names:
-        value = np.asarray(entry.attrs[name])
-        total.update(repr((name, value.dtype.str, value.tolist())).encode())
-    if isinstance(entry, h5py.Group):
-        for name, member in members(entry):
-            total.update(repr((name, _record(member, known, path))).encode())
-    else:
-        if path is not None:
-            _require_held(path, entry)
-        total.update(repr((entry.dtype.str, entry.shape)).encode())
-        # a part of what is packed would be unpacked with all that is packed with it
-        rows = max(1, len(entry) if entry.chunks else _PART * len(entry) // max(1, entry.nbytes))
-        for start in range(0, len(entry), rows):
-            total.update(entry[start : start + rows])
-    known[entry] = _fixed(f"{total.hexdigest()} {json.dumps(names)}")
-    if path is None:
-        entry.attrs[_OWN] = known[entry]
-    return known[entry]
-
-
-def _has_digest(holder: h5py.Group | h5py.Dataset) -> bool:
-    """Whether the file, which was opened, begins with a digest, which was looked at then."""
-    with Path(holder.file.filename).open("rb") as file:
-        return file.read(len(_MARK)) == _MARK
-
-
-def _block(file: io.BufferedReader | io.BufferedRandom) -> bytes:
-    """The user block for what follows in a file."""
-    file.seek(_BLOCK)
-    return (_MARK + hashlib.file_digest(file, "sha256").hexdigest().encode()).ljust(_BLOCK, b"\0")
 
 
 @contextmanager
@@ -381,23 +265,18 @@ def create_hdf5(path: Path) -> Iterator[h5py.File]:
     """Write an HDF5 file, whole or not at all."""
     with atomic_path(path) as temporary:
         with PatientFile(temporary, "w+") as disk:
-            with h5py.File(disk, "w", userblock_size=_BLOCK) as file:
+            with h5py.File(disk, "w", userblock_size=BLOCK) as file:
                 yield file
                 # what cannot be written cannot be read for its digest either
                 file.flush()
                 if disk.failure is None:
-                    _record(file, {})
+                    record(file, {})
             if disk.failure is not None:
                 raise disk.failure
         with temporary.open("r+b") as written:
-            block = _block(written)
+            block = digest_block(written)
             written.seek(0)
             written.write(block)
-
-
-def _fixed(text: str) -> np.bytes_:
-    """Text to be stored at a fixed length; HDF5 may hang on a damaged file that holds text of variable length."""
-    return np.bytes_(text.encode() or b"\0")
 
 
 def _text(file: h5py.File, key: str) -> str:

@@ -13,7 +13,8 @@ import numpy.typing as npt
 from pydantic import TypeAdapter, ValidationError
 
 from sepi.errors import SepiError
-from sepi.io.hdf5 import Attribute, attribute, open_hdf5, own_attributes, read_dataset
+from sepi.io.hdf5 import Attribute, attribute, open_hdf5, read_dataset
+from sepi.io.integrity import own_attributes
 from sepi.io.readers.options import ReadOptions
 from sepi.lightfield import LightField
 

@@ -18,7 +18,8 @@ import h5py
 import numpy as np
 
 from sepi.errors import SepiError
-from sepi.io.hdf5 import UNITS, Attribute, attribute, create_hdf5, members, open_hdf5, own_attributes, read_dataset
+from sepi.io.hdf5 import UNITS, Attribute, attribute, create_hdf5, open_hdf5, read_dataset
+from sepi.io.integrity import members, own_attributes
 from sepi.lightfield import BoolMap, FloatMap
 
 _MAPS = "maps"

@@ -14,7 +14,8 @@ import pytest
 
 import sepi
 from sepi.errors import SepiError
-from sepi.io.hdf5 import own_attributes, read_attributes, read_light_field, read_stage, write_light_field, write_stage
+from sepi.io.hdf5 import read_attributes, read_light_field, read_stage, write_light_field, write_stage
+from sepi.io.integrity import own_attributes
 from sepi.io.result_folder import read_result, write_result
 from sepi.io.scores import Evaluation, read_evaluations, write_scores
 from sepi.lightfield import DisparityRange, LightField

@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sepi.errors import SepiError
-from sepi.io.hdf5 import DEFLATE_RATIO
+from sepi.io.files import DEFLATE_RATIO
 
 HEADER = 128
 """Bytes before the first element; the last four are version and byte order."""

@@ -12,8 +12,7 @@ import numpy as np
 from numpy.lib import format as npy
 
 from sepi.errors import SepiError, printable
-from sepi.io.files import reading
-from sepi.io.hdf5 import DEFLATE_RATIO
+from sepi.io.files import DEFLATE_RATIO, reading
 from sepi.io.readers.arrays import Array, light_field_from_array
 from sepi.io.readers.named_arrays import Shapes, light_field_from_arrays
 from sepi.io.readers.options import ReadOptions

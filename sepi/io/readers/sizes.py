@@ -10,7 +10,8 @@ from typing import NamedTuple
 import h5py
 
 from sepi.errors import SepiError
-from sepi.io.hdf5 import DEFLATE_RATIO, open_hdf5
+from sepi.io.files import DEFLATE_RATIO
+from sepi.io.hdf5 import open_hdf5
 from sepi.io.images import SUFFIXES, picture_header
 from sepi.io.readers import eslf, matlab, numpy_files, open_lf, tiff_stack
 from sepi.io.readers.named_arrays import datasets_in
