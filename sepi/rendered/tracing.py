@@ -15,13 +15,11 @@ import numpy as np
 import numpy.typing as npt
 
 from sepi.errors import SepiError
-from sepi.lightfield import FloatMap
 from sepi.rendered.rig import Rig
 from sepi.rendered.shapes import normals
 from sepi.rendered.world import FloatArray, Lamp, Material, Mesh, Pattern, Vector, World
+from sepi.threads import threads_used
 
-# samples of a pixel's colours without light: enough to know whether a surface has a pattern
-_ALBEDO_SAMPLES = 16
 # metres at which rays begin; far less would cost digits of their directions
 _NEAR = 0.1
 # Vogel's spiral: points that fill a disc evenly
@@ -59,12 +57,15 @@ class FirstSurface:
         Metres along the viewing direction; infinite where there is nothing.
     normal : ndarray, shape (H, W, 3), float32
         Of the triangles, towards the camera: right, down, away.
+    uv : ndarray, shape (H, W, 2), float32
+        Where on its pattern, in periods.
     thing : ndarray, shape (H, W), int64
         Which of the world's things; -1 where there is none.
     """
 
     depth: npt.NDArray[np.float64]
     normal: FloatArray
+    uv: FloatArray
     thing: npt.NDArray[np.int64]
 
 
@@ -76,9 +77,13 @@ def require_mitsuba() -> None:
 
 def _mitsuba() -> ModuleType:
     require_mitsuba()
+    import drjit
     import mitsuba
 
     mitsuba.set_variant("scalar_rgb")
+    drjit.set_thread_count(threads_used())
+    # it says what it makes of odd numbers of samples
+    mitsuba.set_log_level(mitsuba.LogLevel.Error)
     return mitsuba
 
 
@@ -135,7 +140,7 @@ class Tracer:
         for number, (right, down) in enumerate(self._lens):
             samples = self._samples * (number + 1) // count - self._samples * number // count
             point = self._at(position.right + right, position.down + down, position.turn)
-            sensor = self._sensor(point, "independent" if samples < 4 else "multijitter", samples)
+            sensor = self._sensor(point, samples)
             seen = self._mi.render(self._scene, sensor=sensor, spp=samples, seed=seed * count + number)
             total += samples * np.asarray(seen, np.float64)
         found: FloatArray = (self._exposure / self._samples * total).astype(np.float32)
@@ -143,7 +148,8 @@ class Tracer:
 
     def first_surface(self, position: Position) -> FirstSurface:
         """What one ray through the middle of each pixel meets."""
-        seen = self._values(position, "z:depth,n:geo_normal,i:shape_index", 1)
+        integrator = self._mi.load_dict({"type": "aov", "aovs": "z:depth,n:geo_normal,uv:uv,i:shape_index"})
+        seen = np.array(self._mi.render(self._scene, sensor=self._sensor(position, 1), integrator=integrator, spp=1))
         distance, normal = seen[..., 0].astype(np.float64), seen[..., 1:4]
         directions = self._directions(position)
         hit = distance > 0
@@ -151,21 +157,12 @@ class Tracer:
         return FirstSurface(
             depth=np.where(hit, distance * directions[..., 2] + _NEAR, np.inf),
             normal=np.where(towards, -normal, normal).astype(np.float32),
-            thing=self._things[np.where(hit, seen[..., 4], 0).astype(np.int64)],
+            uv=seen[..., 4:6].astype(np.float32),
+            thing=self._things[np.where(hit, seen[..., 6], 0).astype(np.int64)],
         )
 
-    def albedo(self, position: Position) -> FloatMap:
-        """Colours without light, ``(H, W, 3)`` float32, sRGB: what is painted on the surfaces."""
-        return coded(self._values(position, "a:albedo", _ALBEDO_SAMPLES))
-
-    def _values(self, position: Position, wanted: str, samples: int) -> FloatArray:
-        """Of the surfaces that rays meet first; a single ray goes through the middle of its pixel."""
-        integrator = self._mi.load_dict({"type": "aov", "aovs": wanted})
-        sensor = self._sensor(position, "stratified", samples)
-        seen: FloatArray = np.array(self._mi.render(self._scene, sensor=sensor, integrator=integrator, spp=samples))
-        return seen
-
-    def _sensor(self, position: Position, sampler: str, samples: int) -> Any:
+    def _sensor(self, position: Position, samples: int) -> Any:
+        """Samples are spread over a pixel; a single one is its middle."""
         transform = self._mi.ScalarTransform4f
         turn = transform()
         for axis, angle in zip(np.eye(3), position.turn, strict=True):
@@ -183,11 +180,11 @@ class Tracer:
                 "principal_point_offset_x": -position.shear_right,
                 "principal_point_offset_y": -position.shear_down,
                 "film": {"type": "hdrfilm", "pixel_format": "rgb", "component_format": "float32", **film},
-                "sampler": {
-                    "type": sampler,
-                    "sample_count": samples,
-                    **({"jitter": samples > 1} if sampler == "stratified" else {}),
-                },
+                "sampler": (
+                    {"type": "multijitter", "sample_count": samples}
+                    if samples > 1
+                    else {"type": "stratified", "sample_count": 1, "jitter": False}
+                ),
             }
         )
 
