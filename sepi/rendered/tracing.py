@@ -258,8 +258,8 @@ class Tracer:
         if not isinstance(sky, np.ndarray):
             return {"sky": {"type": "constant", "radiance": {"type": "rgb", "value": list(sky)}}} if any(sky) else {}
         transform = self._mi.ScalarTransform4f
-        # Mitsuba's panoramas have -z in the middle and y above
-        upright = transform().rotate([1, 0, 0], 180.0)
+        # Mitsuba's panoramas have y above
+        upright = transform().rotate([0, 0, 1], 180.0)
         return {"sky": {"type": "envmap", "bitmap": self._mi.Bitmap(sky.astype(np.float32)), "to_world": upright}}
 
 
