@@ -1,7 +1,8 @@
-"""What several scenes set things up with: books, crates, sticks that lean; and worlds seen from any place in them."""
+"""What scenes are set up with: books, crates, chairs, tables, sticks; and a world seen from any place in it."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -77,8 +78,39 @@ def crate(size: Vector, rows: int, turn: float, by: Vector) -> Mesh:
     ]
     ends = [box((side * (w - thickness) / 2, -h / 2, 0), (thickness, h, d - thickness)) for side in (-1, 1)]
     bottom = box((0, -0.02, 0), (w - 2 * thickness, thickness, d - thickness))
-    parts = [painted_from(part, 0.13 * n, 0.09 * n) for n, part in enumerate([*slats, *ends, bottom])]
-    return moved(joined(parts), (0, turn, 0), by)
+    return moved(of_boards([*slats, *ends, bottom]), (0, turn, 0), by)
+
+
+def of_boards(parts: Sequence[Mesh]) -> Mesh:
+    """Boards as one, none of which shows the grain of another."""
+    return joined([painted_from(part, 0.137 * n, 0.091 * n) for n, part in enumerate(parts)])
+
+
+def chair(turn: float, by: Vector, slats: int = 4) -> Mesh:
+    """A wooden chair on y=0 that faces -z, turned about the vertical."""
+    wide, deep, seat, back, leg = 0.42, 0.42, 0.45, 0.9, 0.036
+    x, z = wide / 2 - leg / 2, deep / 2 - leg / 2
+    parts = [box((0, -seat + 0.011, 0), (wide, 0.022, deep))]
+    parts += [box((side * x, -seat / 2 + 0.011, -z), (leg, seat - 0.022, leg)) for side in (-1, 1)]
+    parts += [box((side * x, -back / 2, z + leg), (leg, back, leg)) for side in (-1, 1)]
+    parts += [box((0, -height, z + leg), (wide - 2 * leg, 0.06, 0.02)) for height in (seat - 0.02, back - 0.04)]
+    parts += [box((side * x, -0.2, leg / 2), (0.02, 0.025, 2 * z)) for side in (-1, 1)]
+    parts += [box((0, -seat + 0.045, -z), (wide - 2 * leg, 0.045, 0.02))]
+    places = np.linspace(-x, x, slats + 2)[1:-1]
+    parts += [box((place, -(seat + back) / 2, z + leg), (0.03, back - seat - 0.08, 0.012)) for place in places.tolist()]
+    return moved(of_boards(parts), (0, turn, 0), by)
+
+
+def table(size: Vector, turn: float, by: Vector) -> Mesh:
+    """A wooden table of width, height and depth on y=0, turned about the vertical."""
+    w, h, d = size
+    leg = 0.055
+    x, z = w / 2 - leg, d / 2 - leg
+    parts = [box((0, -h + 0.0125, 0), (w, 0.025, d))]
+    parts += [box((i * x, -(h - 0.025) / 2, k * z), (leg, h - 0.025, leg)) for i in (-1, 1) for k in (-1, 1)]
+    parts += [box((0, -h + 0.07, k * z), (2 * x - leg, 0.09, 0.022)) for k in (-1, 1)]
+    parts += [box((i * x, -h + 0.07, 0), (0.022, 0.09, 2 * z - leg)) for i in (-1, 1)]
+    return moved(of_boards(parts), (0, turn, 0), by)
 
 
 def leaning(foot: npt.ArrayLike, over: npt.ArrayLike, beyond: float, radius: float) -> Mesh:
