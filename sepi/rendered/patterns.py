@@ -5,8 +5,11 @@ A pattern has 1024 texels a side unless it is asked for otherwise, and repeats w
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 import numpy.typing as npt
+import scipy.fft
 
 from sepi.rendered.world import FloatArray, Pattern, Vector
 
@@ -27,14 +30,21 @@ def field(seed: int, finest: float, coarsest: float, texels: int = TEXELS, stret
     stretch : float
         By how much it is longer across than down.
     """
-    frequency = np.hypot(np.fft.fftfreq(texels)[:, None], stretch * np.fft.rfftfreq(texels)[None, :])
-    with np.errstate(divide="ignore"):
-        amplitude = np.where(frequency > 0, 1 / frequency, 0)
-    amplitude *= np.exp(-((frequency * finest) ** 4)) * (1 - np.exp(-((frequency * coarsest) ** 4)))
-    white = np.random.default_rng(seed).standard_normal((texels, texels))
-    found: Field = np.fft.irfft2(np.fft.rfft2(white) * amplitude, s=(texels, texels))
+    white = np.random.default_rng(seed).standard_normal((texels, texels), np.float32)
+    spectrum = scipy.fft.rfft2(white) * _amplitude(finest, coarsest, texels, stretch)
+    found: Field = scipy.fft.irfft2(spectrum, s=(texels, texels)).astype(np.float64)
     found /= found.std()
     return found
+
+
+@lru_cache(maxsize=4)
+def _amplitude(finest: float, coarsest: float, texels: int, stretch: float) -> FloatArray:
+    frequency = np.hypot(np.fft.fftfreq(texels)[:, None], stretch * np.fft.rfftfreq(texels)[None, :])
+    fourth = np.square(np.square(frequency))
+    with np.errstate(divide="ignore"):
+        found = np.where(frequency > 0, 1 / frequency, 0)
+    found *= np.exp(-fourth * finest**4) * (1 - np.exp(-fourth * coarsest**4))
+    return found.astype(np.float32)
 
 
 def noise(

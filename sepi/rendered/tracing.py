@@ -111,8 +111,11 @@ class Tracer:
         angle = np.arange(count) * _GOLDEN_ANGLE
         self._lens = np.stack([distance * np.cos(angle), distance * np.sin(angle)], axis=1)
         parts: dict[str, Any] = {}
+        # things that share a material share its pictures
+        surfaces = {id(thing.material): thing.material for thing in world.things}
+        loaded = {key: self._mi.load_dict(self._surface(material)) for key, material in surfaces.items()}
         for number, thing in enumerate(world.things):
-            parts[f"thing{number}"] = self._shape(thing.mesh, thing.material)
+            parts[f"thing{number}"] = self._shape(thing.mesh, thing.material, loaded[id(thing.material)])
         for number, lamp in enumerate(world.lamps):
             parts[f"lamp{number}"] = self._lamp(lamp)
         for number, sun in enumerate(world.suns):
@@ -198,9 +201,9 @@ class Tracer:
         found /= np.linalg.norm(found, axis=-1, keepdims=True)
         return found
 
-    def _shape(self, mesh: Mesh, material: Material) -> Any:
+    def _shape(self, mesh: Mesh, material: Material, surface: Any) -> Any:
         properties = self._mi.Properties()
-        properties["bsdf"] = self._mi.load_dict(self._surface(material))
+        properties["bsdf"] = surface
         properties["face_normals"] = not mesh.smooth
         shape = self._mi.Mesh(
             "thing",
@@ -251,7 +254,7 @@ class Tracer:
     def _texture(self, material: Material) -> dict[str, Any]:
         if not isinstance(material.pattern, Pattern):
             return {"type": "rgb", "value": _linear(np.array(material.pattern)).tolist()}
-        raster = _linear(material.pattern.raster).astype(np.float32)
+        raster = _linear(material.pattern.raster)
         return {"type": "bitmap", "bitmap": self._mi.Bitmap(raster), "raw": True, "wrap_mode": "repeat"}
 
     def _sky(self, sky: Vector | FloatArray) -> dict[str, Any]:
