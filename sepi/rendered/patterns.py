@@ -5,8 +5,11 @@ A pattern has 1024 texels a side unless it is asked for otherwise, and repeats w
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 import numpy.typing as npt
+from scipy import fft
 
 from sepi.rendered.world import FloatArray, Pattern, Vector
 
@@ -27,13 +30,20 @@ def field(seed: int, finest: float, coarsest: float, texels: int = TEXELS, stret
     stretch : float
         By how much it is longer across than down.
     """
+    white = np.random.default_rng(seed).standard_normal((texels, texels), np.float32)
+    amplitude = _amplitude(finest, coarsest, texels, stretch)
+    found: Field = fft.irfft2(fft.rfft2(white) * amplitude, s=(texels, texels)).astype(np.float64)
+    found /= found.std()
+    return found
+
+
+@lru_cache(maxsize=4)
+def _amplitude(finest: float, coarsest: float, texels: int, stretch: float) -> FloatArray:
     frequency = np.hypot(np.fft.fftfreq(texels)[:, None], stretch * np.fft.rfftfreq(texels)[None, :])
     with np.errstate(divide="ignore"):
         amplitude = np.where(frequency > 0, 1 / frequency, 0)
     amplitude *= np.exp(-((frequency * finest) ** 4)) * (1 - np.exp(-((frequency * coarsest) ** 4)))
-    white = np.random.default_rng(seed).standard_normal((texels, texels))
-    found: Field = np.fft.irfft2(np.fft.rfft2(white) * amplitude, s=(texels, texels))
-    found /= found.std()
+    found: FloatArray = amplitude.astype(np.float32)
     return found
 
 

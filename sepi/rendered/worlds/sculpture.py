@@ -1,7 +1,7 @@
 """A bust: the surface on which a distance is zero.
 
-Ellipsoids, capsules and cuts run into each other, as a sculptor adds clay and takes it away. In here ``y`` is up and the
-face looks along ``z``; lengths are in metres.
+Ellipsoids, capsules and cuts run into each other, as a sculptor adds clay and takes it away. In here ``y`` is up and
+the face looks along ``z``; lengths are in metres.
 """
 
 from __future__ import annotations
