@@ -118,6 +118,22 @@ def weave(seed: int, size: float, colour: Vector, contrast: float = 0.1, threads
     return _pattern(np.array(colour) * (1 + shade[..., None]), size)
 
 
+def linen(seed: int, size: float, colour: Vector, contrast: float = 0.06) -> Pattern:
+    """Yarn that is thick here and thin there, both ways, with specks."""
+    yarn = field(seed, 2, 24, stretch=12) + field(seed + 1, 2, 24, stretch=12).T
+    shade = contrast * (0.6 * yarn + 0.4 * field(seed + 2, 3, 200))
+    return _pattern(np.array(colour) * (1 + shade[..., None]), size)
+
+
+def plaid(seed: int, size: float, ground: Vector, bands: Vector, count: int = 4, depth: float = 0.5) -> Pattern:
+    """Bands across and down on linen; ``depth`` is the part of the bands' colour where two cross."""
+    position = np.arange(TEXELS) * count / TEXELS % 1
+    band = ((position > 0.2) & (position < 0.55)) * 0.8 + ((position > 0.75) & (position < 0.8)) * 1.0
+    share = 0.5 * depth * (band[:, None] + band[None, :])
+    cloth = linen(seed, size, ground).raster / np.array(ground, np.float32)
+    return _pattern(_between(np.array(ground), np.array(bands), share) * cloth, size)
+
+
 def printed(seed: int, size: float, lines: int = 40, paper: Vector = (0.9, 0.89, 0.85), ink: float = 0.12) -> Pattern:
     """Lines of words, as on a page."""
     rng = np.random.default_rng(seed)
