@@ -121,7 +121,8 @@ class Tracer:
         for number, sun in enumerate(world.suns):
             light = {"type": "rgb", "value": list(sun.irradiance)}
             parts[f"sun{number}"] = {"type": "directional", "direction": list(sun.direction), "irradiance": light}
-        integrator = {"type": "path", "max_depth": world.depth}
+        # paths end by chance from the second surface on: most of the time goes into light that hardly counts
+        integrator = {"type": "path", "max_depth": world.depth, "rr_depth": 2}
         self._scene = self._mi.load_dict({"type": "scene", **parts, **self._sky(world.sky), "integrator": integrator})
         # Mitsuba counts shapes in its own order, from 1
         names = [shape.id() for shape in self._scene.shapes()]
