@@ -46,7 +46,7 @@ def world() -> World:
     """The wall of a garden."""
     garden = World(
         [*_ground(), *_shrubs()],
-        near=1.15,
+        near=1.13,
         far=2.75,
         at_near=2.2,
         at_far=-1.6,
