@@ -135,14 +135,14 @@ def _wallpaper() -> Pattern:
         0.8 * flower + 0.6 * (np.abs(lattice) < 0.12) + 0.15 * (np.cos(8 * x) > 0) + 0.06 * patterns.field(51, 3, 60)
     )
     colour = np.array([0.37, 0.49, 0.43]) + share[..., None] * np.array([0.3, 0.22, 0.14])
-    return Pattern(np.clip(colour, 0.02, 0.98).astype(np.float32), (0.5, 0.7))
+    return patterns.painted(colour, 0.5, 0.7)
 
 
 def _china() -> Pattern:
     """Blue on white."""
     blue = np.clip(3 * (np.abs(patterns.field(61, 20, 90)) - 0.7), 0, 1)[..., None]
     colour = np.array([0.9, 0.9, 0.88]) + blue * np.array([-0.7, -0.6, -0.3])
-    return Pattern(np.clip(colour, 0.02, 0.98).astype(np.float32), (0.25, 0.25))
+    return patterns.painted(colour, 0.25)
 
 
 def _room() -> FloatArray:

@@ -77,7 +77,7 @@ def _poster(number: int, tint: Vector) -> Pattern:
     ground = np.array(tint) * (0.6 + 0.3 * hills[..., None])
     grain = 0.05 * patterns.field(seed + 3, 2, 20)[60:580, 60:964, None]
     paper[220:740, 60:964] = np.where((motif & (hills == 1))[..., None], [0.93, 0.88, 0.7], ground) + grain
-    return Pattern(np.clip(paper, 0.02, 0.98).astype(np.float32), (0.4, 0.56))
+    return patterns.painted(paper, 0.4, 0.56)
 
 
 def _upright(foot: Vector, width: float, height: float, turn: float) -> Mesh:
