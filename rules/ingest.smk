@@ -2,7 +2,7 @@
 # A scene's pictures are the inputs: a changed or new one is read again.
 rule ingest:
     input:
-        files=lambda wildcards: list(map(own_file, scene_of(wildcards).files)),
+        files=lambda wildcards: source_files(scene_of(wildcards), scene_of(wildcards).files),
     output:
         light_field=SCENE.light_field,
     log:

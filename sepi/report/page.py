@@ -98,7 +98,7 @@ def page_of(
         .render(
             title="sepi: light field depth by stitched epipolar plane images",
             numbers=numbers,
-            is_comparison=runs.plan.is_comparison,
+            report=runs.plan.report,
             variants=page_data.shown_variants(runs, parts),
             tables=tables,
             headline=page_data.headline(runs),

@@ -95,7 +95,7 @@ def with_results(made: Plan) -> Plan:
                 took = {"seconds": 1.5, "peak_memory_mb": 200 + 10 * len(stage)}
                 timing.write_text(json.dumps({**took, "machine": MACHINE, "parameters": {"words": len(stage)}}))
         folder = made.files(dataset, name).stages
-        for parts in (False,) if made.is_comparison else (False, True):
+        for parts in (False,) if made.report else (False, True):
             files = made.scored_files(dataset, name, parts)
             disparity = {map_name(folder, file): read_stage(file).disparity for file in files}
             scored = evaluations_of(scene, disparity)

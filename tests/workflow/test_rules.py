@@ -95,17 +95,16 @@ def test_every_file_that_a_job_reads_is_an_input(read: Any) -> None:
     (there,) = rules["external"].input.maps(scene())
     assert there.endswith("maps/dots.pfm")
     assert {Path(file) for file in rules["numbers"].input.published} == set(PUBLISHED.glob("*.csv"))
-    for page in ("page", "comparison_page"):
-        assert {Path(file) for file in rules[page].input.templates} == set(TEMPLATES)
+    assert {Path(file) for file in rules["page"].input.templates} == set(TEMPLATES)
 
 
 def test_the_page_can_be_left_out_and_is_by_itself_where_there_are_too_many_scenes(tmp_path: Path) -> None:
     """Nothing of it is made then, and whoever asks for it is told in one line."""
     for values, expected in (({}, True), ({"page": False}, False)):
         found = of_size(64, tmp_path, report=values)
-        pages = [*found["report_files"](), *found["comparison_files"]()]
-        assert ("reports/index.html" in pages, "reports/comparison/index.html" in pages) == (expected, expected)
-        assert bool(found["page_of_scene"]("reports")) == expected
+        files = found["every_file"]()
+        assert {f"reports/{name}index.html" in files for name in ("", "comparison/", "rendered/")} == {expected}
+        assert bool(found["page_of_scene"]()) == expected
     with pytest.raises(SepiError, match=r"^reports/index.html: not made: report.page is false; true asks for it$"):
         found["SETTINGS"].require_target("reports/index.html")
     scenes = {("own", str(number)): None for number in range(MOST_ON_PAGE)}
