@@ -27,6 +27,7 @@ from sepi.cli.input_options import (
 from sepi.cli.poses import poses
 from sepi.cli.refocus import refocus
 from sepi.cli.results import check_submission, points, submission
+from sepi.cli.scenes import scenes
 from sepi.command import SepiGroup, progress_bar
 from sepi.errors import SepiError
 from sepi.io.provenance import package_version, result_attributes
@@ -159,41 +160,8 @@ def depth(
     click.echo(f"written to {folder}/: {' '.join(files)}")
 
 
-@main.command(short_help="Write built-in scenes with exact ground truth.")
-@click.argument("names", metavar="[NAME]...", nargs=-1)
-@click.option("-o", "--output", type=_PATH, default=Path("scenes"), show_default=True, help="Folder to write to.")
-@click.option("--size", type=click.IntRange(min=1), default=192, show_default=True, help="Pixels a side of a view.")
-@click.option("--views", type=click.IntRange(min=2), default=9, show_default=True, help="Views a side of the grid.")
-@click.option("--list", "only_list", is_flag=True, help="List the scenes and write nothing.")
-def scenes(names: tuple[str, ...], output: Path, size: int, views: int, only_list: bool) -> None:
-    """Write built-in scenes, with exact ground truth, as HCI 4D benchmark folders.
-
-    All of them unless NAMEs are given.
-
-    \b
-    Examples:
-      sepi scenes --list
-      sepi scenes pyramids stripes -o scenes --size 256
-    """
-    from sepi.scenes import SCENES, render, write_hci
-
-    if only_list:
-        width = max(map(len, SCENES))
-        for name, description in SCENES.items():
-            click.echo(f"{name.ljust(width)}  {description}")
-        return
-    require_known("built-in scenes", names, SCENES)
-    chosen = dict.fromkeys(names or SCENES)
-    for name in chosen:
-        if (output / name).exists():
-            raise SepiError(f"{output / name}: exists already; remove it or choose another folder with -o")
-    for name in chosen:
-        write_hci(render(name, size=size, views=views), output / name)
-        click.echo(f"written: {output / name}/")
-
-
 for command in (
-    info, check, export, evaluate, compare, refocus, points, poses, convert, submission, check_submission,
+    scenes, info, check, export, evaluate, compare, refocus, points, poses, convert, submission, check_submission,
 ):  # fmt: skip
     main.add_command(command)
 

@@ -1,7 +1,8 @@
-"""A built-in scene as a folder in the layout of the HCI 4D light field benchmark."""
+"""A scene as a folder in the layout of the HCI 4D light field benchmark."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from configparser import RawConfigParser
 from pathlib import Path
 
@@ -9,9 +10,9 @@ import numpy as np
 
 from sepi.errors import SepiError
 from sepi.io.files import atomic_folder
-from sepi.io.images import write_png
+from sepi.io.images import Pixels, write_png
 from sepi.io.pfm import write_pfm
-from sepi.lightfield import LightField, require_light_field
+from sepi.lightfield import FloatMap, LightField, require_light_field
 from sepi.validation import require_path
 
 # A made-up camera with the benchmark's numbers. A disparity of d pixels is then a depth of 36.57 / (d + 8.605) metres,
@@ -22,8 +23,13 @@ FOCUS_DISTANCE_M = 4.25
 BASELINE_MM_AT_512 = 25.0
 
 
-def write_hci(light_field: LightField, folder: str | Path) -> None:
-    """Write a built-in scene as an HCI 4D benchmark folder, whole or not at all.
+def write_hci(
+    light_field: LightField,
+    folder: str | Path,
+    camera: Mapping[str, float] | None = None,
+    maps: Mapping[str, FloatMap] | None = None,
+) -> None:
+    """Write a scene as an HCI 4D benchmark folder, whole or not at all.
 
     The folder holds ``input_CamNNN.png`` (number ``S * t + s``), ``parameters.cfg``, and where they are known
     ``gt_disp_lowres.pfm`` and one ``mask_NAME.png`` per mask (white inside).
@@ -31,10 +37,15 @@ def write_hci(light_field: LightField, folder: str | Path) -> None:
     Parameters
     ----------
     light_field : LightField
-        As :func:`sepi.scenes.render` makes it: all views present, uint8 RGB, with a disparity range; rows as far apart
-        as columns, which is all that the layout can say.
+        As :func:`sepi.scenes.render` makes it: all views present, uint8 or uint16 RGB, with a disparity range; rows as
+        far apart as columns, which is all that the layout can say.
     folder : str or Path
         Must not exist yet, or be empty.
+    camera : mapping of str to float, optional
+        ``focal_length_mm``, ``baseline_mm``, ``focus_distance_m`` and ``sensor_size_mm``; those of a made-up camera
+        unless given.
+    maps : mapping of str to ndarray, shape (H, W), float32, optional
+        Further maps to write, by the names of their files without ``.pfm``.
 
     Raises
     ------
@@ -58,42 +69,52 @@ def write_hci(light_field: LightField, folder: str | Path) -> None:
     if light_field.row_spacing != 1 or light_field.positions is not None:
         raise SepiError(f"{light_field.name}: the layout of the HCI benchmark needs views on a grid of even spacing")
     with atomic_folder(folder) as temporary:
-        views = light_field.views.astype(np.uint8, copy=False)
+        kind: type[np.unsignedinteger] = np.uint16 if light_field.views.dtype == np.uint16 else np.uint8
+        views: Pixels = light_field.views.astype(kind, copy=False)
         for number, view in enumerate(views.reshape(-1, *light_field.shape, 3)):
             write_png(temporary / f"input_Cam{number:03d}.png", view)
         with (temporary / "parameters.cfg").open("w", encoding="utf-8") as file:
-            _settings(light_field).write(file)
+            _settings(light_field, camera).write(file)
         if light_field.ground_truth is not None:
             write_pfm(temporary / "gt_disp_lowres.pfm", light_field.ground_truth)
+        for name, values in (maps or {}).items():
+            write_pfm(temporary / f"{name}.pfm", values)
         for name, mask in light_field.masks.items():
             write_png(temporary / f"mask_{name}.png", mask)
 
 
-def _settings(light_field: LightField) -> RawConfigParser:
+def _settings(light_field: LightField, camera: Mapping[str, float] | None) -> RawConfigParser:
     """Content of ``parameters.cfg``."""
     height, width = light_field.shape
     rows, columns = light_field.grid
     known = light_field.require_disparity_range()
+    if camera is None:
+        camera = {
+            "focal_length_mm": FOCAL_LENGTH_MM,
+            "sensor_size_mm": SENSOR_SIZE_MM,
+            "baseline_mm": BASELINE_MM_AT_512 * 512 / max(width, height),
+            "focus_distance_m": FOCUS_DISTANCE_M,
+        }
     settings = RawConfigParser()
     settings.read_dict(
         {
             "intrinsics": {
-                "focal_length_mm": FOCAL_LENGTH_MM,
+                "focal_length_mm": camera["focal_length_mm"],
                 "image_resolution_x_px": width,
                 "image_resolution_y_px": height,
-                "sensor_size_mm": SENSOR_SIZE_MM,
+                "sensor_size_mm": camera["sensor_size_mm"],
                 "fstop": 100.0,
             },
             "extrinsics": {
                 "num_cams_x": columns,
                 "num_cams_y": rows,
-                "baseline_mm": BASELINE_MM_AT_512 * 512 / max(width, height),
-                "focus_distance_m": FOCUS_DISTANCE_M,
+                "baseline_mm": camera["baseline_mm"],
+                "focus_distance_m": camera["focus_distance_m"],
                 **{f"center_cam_{key}": 0.0 for key in ("x_m", "y_m", "z_m", "rx_rad", "ry_rad", "rz_rad")},
             },
             "meta": {
                 "scene": light_field.name,
-                "category": "built-in",
+                "category": light_field.source,
                 "disp_min": known.minimum,
                 "disp_max": known.maximum,
                 "depth_map_scale": 1.0,

@@ -1,0 +1,181 @@
+"""Command ``sepi scenes``: scenes with exact ground truth, drawn at once or path-traced."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+import numpy as np
+
+from sepi.command import progress_bar
+from sepi.errors import SepiError
+from sepi.rendered.catalogue import NOISE_LEVELS, RENDERED
+from sepi.validation import require_known, validated
+
+if TYPE_CHECKING:
+    from sepi.rendered.options import Exposure, Taking
+    from sepi.rendered.render_file import Render
+
+_PATH = click.Path(path_type=Path)
+
+
+@click.command(short_help="Write scenes with exact ground truth.")
+@click.argument("names", metavar="[NAME]...", nargs=-1)
+@click.option("-o", "--output", type=_PATH, default=Path("scenes"), show_default=True, help="Folder to write to.")
+@click.option("--rendered", is_flag=True, help="Path-traced scenes, by Mitsuba 3 (extra [render]): minutes for each.")
+@click.option("--size", type=click.IntRange(min=1), help="Pixels a side of a view; 192, with --rendered 512.")
+@click.option("--views", type=click.IntRange(min=2), default=9, show_default=True, help="Views a side of the grid.")
+@click.option("--samples", type=click.IntRange(min=1), help="With --rendered: paths of light for each pixel; 64.")
+@click.option(
+    "--noise",
+    "levels",
+    type=click.Choice(NOISE_LEVELS),
+    multiple=True,
+    help="With --rendered: noise of the sensor; repeatable, a folder for each; off.",
+)
+@click.option(
+    "--set",
+    "settings",
+    multiple=True,
+    metavar="KEY=VALUE",
+    help="With --rendered: lens=0.5, vignetting=0.4, ...; repeatable. docs/reproduce/rendered.md lists them.",
+)
+@click.option("--all-views", is_flag=True, help="With --rendered: also a disparity map for each view.")
+@click.option("--list", "only_list", is_flag=True, help="List the scenes and write nothing.")
+def scenes(
+    names: tuple[str, ...],
+    output: Path,
+    rendered: bool,
+    size: int | None,
+    views: int,
+    samples: int | None,
+    levels: tuple[str, ...],
+    settings: tuple[str, ...],
+    all_views: bool,
+    only_list: bool,
+) -> None:
+    """Write scenes, with exact ground truth, as HCI 4D benchmark folders.
+
+    All of them unless NAMEs are given. Those built in are drawn at once, of flat shapes; those of --rendered are
+    path-traced, with plain walls, gloss, mirrors and glass; beside their folder there is a file NAME.h5 with their
+    light, and disparity, normals and masks of every view.
+
+    \b
+    Examples:
+      sepi scenes --list
+      sepi scenes pyramids stripes -o scenes --size 256
+      sepi scenes --rendered sticks --size 256 --samples 16 --noise off --noise low
+    """
+    if only_list:
+        _list(rendered)
+    elif rendered:
+        given: dict[str, Any] = {"grid": [views, views]}
+        given |= {key: value for key, value in (("size", size), ("samples", samples)) if value is not None}
+        _write_rendered(names, output, given | _settings(settings), dict.fromkeys(levels or ("off",)), all_views)
+    else:
+        only = {"--samples": samples, "--noise": levels, "--set": settings, "--all-views": all_views}
+        for flag in (flag for flag, value in only.items() if value):
+            raise click.UsageError(f"{flag} is of use with --rendered alone")
+        _write_builtin(names, output, 192 if size is None else size, views)
+
+
+def _list(rendered: bool) -> None:
+    from sepi.scenes import SCENES
+
+    told = {name: f"{entry.description}: {entry.tests}" for name, entry in RENDERED.items()} if rendered else SCENES
+    width = max(map(len, told))
+    for name, description in told.items():
+        click.echo(f"{name.ljust(width)}  {description}")
+
+
+def _write_builtin(names: Sequence[str], output: Path, size: int, views: int) -> None:
+    from sepi.scenes import SCENES, render, write_hci
+
+    require_known("built-in scenes", names, SCENES)
+    chosen = dict.fromkeys(names or SCENES)
+    _require_new(output, chosen)
+    for name in chosen:
+        write_hci(render(name, size=size, views=views), output / name)
+        click.echo(f"written: {output / name}/")
+
+
+def _write_rendered(
+    names: Sequence[str],
+    output: Path,
+    settings: dict[str, Any],
+    levels: Sequence[str] | dict[str, None],
+    all_views: bool,
+) -> None:
+    from sepi.rendered.exposure import exposed_name
+    from sepi.rendered.options import Exposure, Taking
+    from sepi.rendered.tracing import require_mitsuba
+
+    require_known("path-traced scenes", names, RENDERED)
+    chosen = list(dict.fromkeys(names or RENDERED))
+    unknown = [key for key in settings if key not in (*Taking.model_fields, *Exposure.model_fields)]
+    require_known("--set", unknown, (*Taking.model_fields, *Exposure.model_fields))
+    taking = validated(Taking, {key: settings[key] for key in settings if key in Taking.model_fields}, "--set")
+    of_sensor = {key: settings[key] for key in settings if key in Exposure.model_fields}
+    exposures = [validated(Exposure, {"noise": level, **of_sensor}, "--set") for level in levels]
+    folders = [exposed_name(name, one.noise, one.noise_seed) for name in chosen for one in exposures]
+    _require_new(output, folders)
+    require_mitsuba()
+    for name in chosen:
+        with progress_bar(name) as progress:
+            render = _rendered(name, taking, output / f"{name}.h5", progress)
+        for exposure in exposures:
+            folder = output / exposed_name(name, exposure.noise, exposure.noise_seed)
+            _write_folder(render, exposure, folder, all_views)
+            click.echo(f"written: {folder}/")
+
+
+def _rendered(name: str, taking: Taking, path: Path, progress: Any) -> Render:
+    """A scene's render: of the file that is there already if it is of the same options, else made anew."""
+    from sepi.rendered.render_file import read_render
+    from sepi.rendered.rendering import made_by, render_scene
+
+    if path.is_file():
+        known = read_render(path)
+        if known.made_by != made_by(name, taking):
+            raise SepiError(f"{path}: was rendered with other options; remove it or choose another folder with -o")
+        return known
+    render_scene(name, taking, path, progress)
+    return read_render(path)
+
+
+def _write_folder(render: Render, exposure: Exposure, folder: Path, all_views: bool) -> None:
+    from sepi.camera import camera_from
+    from sepi.rendered.exposure import exposed
+    from sepi.scenes.folder import write_hci
+
+    light_field = exposed(render, exposure)
+    camera = camera_from(**render.settings, shape=light_field.shape)
+    maps = {"gt_depth_lowres": camera.depth(render.disparity[render.centre])}
+    if all_views:
+        views = render.disparity.reshape(-1, *light_field.shape)
+        maps |= {f"gt_disp_lowres_Cam{number:03d}": np.ascontiguousarray(view) for number, view in enumerate(views)}
+    write_hci(light_field, folder, render.settings, maps)
+
+
+def _require_new(output: Path, folders: Iterable[str]) -> None:
+    for name in folders:
+        if (output / name).exists():
+            raise SepiError(f"{output / name}: exists already; remove it or choose another folder with -o")
+
+
+def _settings(texts: Sequence[str]) -> dict[str, Any]:
+    """Options from ``KEY=VALUE``."""
+    found = {}
+    for text in texts:
+        match = re.fullmatch(r"(\w+)=(.*)", text)
+        if match is None:
+            raise SepiError(f"--set {text}: expected KEY=VALUE, such as lens=0.5")
+        try:
+            found[match[1]] = json.loads(match[2])
+        except ValueError:
+            found[match[1]] = match[2]
+    return found

@@ -1,0 +1,61 @@
+"""The path-traced scenes: what each one tests, and whether parameters may be chosen on it."""
+
+from __future__ import annotations
+
+import importlib
+from dataclasses import dataclass
+
+from sepi.rendered.world import World
+from sepi.validation import require_known
+
+NOISE_LEVELS = ("off", "low", "high")
+"""How many electrons each pixel of a camera has: without end, those of a quiet camera, and those of a dim evening."""
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A path-traced scene.
+
+    Attributes
+    ----------
+    description : str
+        What is seen.
+    tests : str
+        What it is hard for.
+    for_choosing : bool
+        Whether parameters may be chosen on it; the others are for finding out what the choice is worth.
+    """
+
+    description: str
+    tests: str
+    for_choosing: bool
+
+
+RENDERED: dict[str, Entry] = {
+    "sticks": Entry("sticks, boxes and books in a heap", "many depths in a small window, thin occluders", True),
+    "foliage": Entry("a shrub and twigs before a plastered wall", "hundreds of small outlines, all alike", False),
+    "wires": Entry("a wire fence and cables before a yard", "structures of one to three pixels", True),
+    "room": Entry("furniture in a room with painted walls", "large surfaces without texture, at a slant", False),
+    "floor": Entry("chairs and pots on a polished floor", "reflections that move against the surface", True),
+    "chrome": Entry("a plane mirror, chrome and brass", "surfaces that show nothing but others", False),
+    "glass": Entry("panes, a bottle and tumblers before posters", "two depths in each pixel", False),
+    "cloth": Entry("curtains and a table cloth", "folds, faint texture, soft shading", True),
+    "bust": Entry("a stone head and vases", "strong curvature, outlines that turn away", True),
+    "windows": Entry("house fronts with rows of windows and awnings", "repetition by whole periods", False),
+    "landscape": Entry("hills, houses and trees far away", "disparities within a pixel", True),
+    "dim": Entry("a workshop by the light of one lamp", "a tenth of the light: noise in the shadows", False),
+}
+"""The path-traced scenes in their order."""
+
+
+def world_of(name: str) -> World:
+    """The things, lights and depths of a scene.
+
+    Raises
+    ------
+    SepiError
+        If there is no such scene.
+    """
+    require_known("path-traced scenes", [name], RENDERED)
+    found: World = importlib.import_module(f"sepi.rendered.worlds.{name}").world()
+    return found

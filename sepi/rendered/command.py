@@ -1,0 +1,37 @@
+"""Render a path-traced scene into a file, for the workflow."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import click
+
+from sepi.command import SepiCommand, progress_bar, write_timing
+from sepi.rendered.options import Taking
+from sepi.rendered.rendering import render_scene
+from sepi.validation import validated
+
+_PATH = click.Path(path_type=Path)
+
+
+@click.command(name="python -m sepi.rendered.command", cls=SepiCommand)
+@click.argument("name")
+@click.option("--size", type=int, default=512, show_default=True, help="Height and width of a view in pixels.")
+@click.option("--views", type=int, default=9, show_default=True, help="Rows and columns of views.")
+@click.option("--samples", type=int, default=64, show_default=True, help="Paths of light for each pixel.")
+@click.option("--threads", type=click.IntRange(min=1), default=1, show_default=True, help="Threads to use.")
+@click.option("--output", type=_PATH, required=True, help="HDF5 file to write.")
+@click.option("--timing", type=_PATH, help="JSON file to write: seconds and peak memory.")
+def main(name: str, size: int, views: int, samples: int, threads: int, output: Path, timing: Path | None) -> None:
+    """Render the scene NAME; views that are done are kept if it is interrupted."""
+    started = time.perf_counter()
+    values = {"size": size, "grid": [views, views], "samples": samples}
+    with progress_bar(name) as progress:
+        render_scene(name, validated(Taking, values, "rendered"), output, progress, threads)
+    if timing is not None:
+        write_timing(timing, started, threads)
+
+
+if __name__ == "__main__":
+    main()

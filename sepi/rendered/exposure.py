@@ -1,0 +1,120 @@
+"""From light to pictures: photons, the sensor's noise, vignetting, exposure, curve and bits."""
+
+from __future__ import annotations
+
+import math
+import zlib
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from sepi.camera import camera_from
+from sepi.lightfield import DisparityRange, LightField, Truth
+from sepi.rendered.options import NOISE, Exposure
+from sepi.rendered.render_file import Render, read_render, read_truth
+from sepi.rendered.tracing import coded
+
+
+def exposed_name(scene: str, noise: str = "off", seed: int = 1) -> str:
+    """What a scene is called at a noise level: ``sticks``, ``sticks_low``, ``sticks_low_2``."""
+    return scene + (f"_{noise}" if noise != "off" else "") + (f"_{seed}" if noise != "off" and seed != 1 else "")
+
+
+def read_exposed(path: Path, noise: str = "off", seed: int = 1) -> LightField:
+    """The light field of a render at a noise level.
+
+    Parameters
+    ----------
+    path : Path
+        File that :func:`sepi.rendered.rendering.render_scene` wrote.
+    noise : str
+        One of :data:`sepi.rendered.NOISE_LEVELS`.
+    seed : int
+        Of the noise.
+
+    Returns
+    -------
+    LightField
+        As :func:`exposed` makes it.
+    """
+    return exposed(read_render(path), Exposure.model_validate({"noise": noise, "noise_seed": seed}))
+
+
+def read_render_truth(path: Path) -> Truth:
+    """Ground truth and masks of a render's reference view."""
+    return read_truth(path)
+
+
+def exposed(render: Render, exposure: Exposure) -> LightField:
+    """The pictures that a sensor takes of a rendered scene.
+
+    Parameters
+    ----------
+    render : Render
+    exposure : Exposure
+
+    Returns
+    -------
+    LightField
+        Views uint8 or uint16 RGB, with disparity range, camera, and ground truth and masks of the centre view. Equal
+        arguments give equal bytes. The views' true positions are not told, as a camera's are not.
+    """
+    rows, columns = render.views.shape[:2]
+    views = np.empty(render.views.shape, np.uint8 if exposure.bits == 8 else np.uint16)
+    # a scene, level and seed of its own each: no two pictures share their noise
+    key = zlib.crc32(f"{render.name} {exposure.noise}".encode())
+    factors = np.exp2(
+        exposure.exposure_spread * np.random.default_rng([exposure.noise_seed, key]).standard_normal((rows, columns))
+    )
+    factors[render.centre] = 1
+    shade = _vignette(render.views.shape[2:4], exposure.vignetting)
+    for t, s in np.ndindex(rows, columns):
+        light = np.maximum(render.views[t, s].astype(np.float64), 0) * (factors[t, s] * shade)
+        rng = np.random.default_rng([exposure.noise_seed, key, t * columns + s])
+        views[t, s] = _values(_noisy(light, exposure, render.light, rng), exposure)
+    return LightField(
+        views=views,
+        name=exposed_name(render.name, exposure.noise, exposure.noise_seed),
+        source="rendered",
+        disparity_range=_range_of(render.disparity),
+        ground_truth=render.disparity[render.centre],
+        masks=render.masks_of(render.centre),
+        camera=camera_from(**render.settings, shape=render.views.shape[2:4]),
+    )
+
+
+def _noisy(
+    light: npt.NDArray[np.float64], exposure: Exposure, share: float, rng: np.random.Generator
+) -> npt.NDArray[np.float64]:
+    """Light as electrons tell it: photons come one by one, and reading adds a little."""
+    sensor = NOISE[exposure.noise]
+    if sensor is None:
+        return light
+    white = sensor.white * share
+    # a well holds no more than white
+    electrons = rng.poisson(np.minimum(light, 1) * white) + sensor.read * rng.standard_normal(light.shape)
+    return electrons / white
+
+
+def _values(light: npt.NDArray[np.float64], exposure: Exposure) -> npt.NDArray[np.float64]:
+    """Values that are to be rounded to whole ones."""
+    light = np.clip(light, 0, 1)
+    curve = np.float64(coded(light.astype(np.float32))) if exposure.gamma is None else light ** (1 / exposure.gamma)
+    values: npt.NDArray[np.float64] = np.round(curve * (2**exposure.bits - 1))
+    return values
+
+
+def _vignette(shape: tuple[int, int], strength: float) -> npt.NDArray[np.float64]:
+    """Part of the light that arrives, ``(H, W, 1)``: falls with the square of the distance from the middle."""
+    down, across = (np.linspace(-1, 1, length) for length in shape)
+    return (1 - strength * (down[:, None] ** 2 + across[None, :] ** 2) / 2)[..., None]
+
+
+def _range_of(disparity: npt.NDArray[np.float32]) -> DisparityRange:
+    """Bounds of all views in tenths, as the benchmark gives them."""
+    # rounded first, so that a bound that is a tenth up to the last bits stays one
+    low, high = (round(10 * float(value), 3) for value in (disparity.min(), disparity.max()))
+    low, high = math.floor(low) / 10, math.ceil(high) / 10
+    # a scene of one plane still has to be searched
+    return DisparityRange(low, max(high, low + 0.2), "parameters")

@@ -1,0 +1,166 @@
+"""A path-traced scene, view by view; what is done is kept, and an interrupted run goes on from there."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+from zipfile import BadZipFile
+
+import numpy as np
+import numpy.typing as npt
+
+from sepi.io.files import atomic_path
+from sepi.rendered.catalogue import RENDERED, world_of
+from sepi.rendered.masks import seen_bits, surface_bits
+from sepi.rendered.options import Taking
+from sepi.rendered.render_file import Render, write_render
+from sepi.rendered.rig import Rig, rig_of
+from sepi.rendered.tracing import Tracer, require_mitsuba
+from sepi.rendered.world import World
+from sepi.stage import no_progress
+from sepi.threads import available_cores, use_threads
+from sepi.validation import require_known
+
+_TYPES = {"views": np.float16, "disparity": np.float32, "normal": np.float16, "masks": np.uint16, "upright": np.float32}
+
+
+def render_scene(
+    name: str,
+    taking: Taking,
+    path: Path,
+    progress: Callable[[float], None] = no_progress,
+    threads: int | None = None,
+) -> None:
+    """Render a scene into a file.
+
+    Parameters
+    ----------
+    name : str
+        A key of :data:`sepi.rendered.RENDERED`.
+    taking : Taking
+    path : Path
+        HDF5 file to write (:mod:`sepi.rendered.render_file`). Views that are done lie in a folder beside it until all
+        are, and are taken over by a later run of the same scene and options.
+    progress : callable, optional
+        Called with the fraction done.
+    threads : int, optional
+        As many as there are cores unless given; the same bytes for any number.
+
+    Raises
+    ------
+    SepiError
+        If there is no such scene, Mitsuba is not installed, or files cannot be written.
+    """
+    require_known("path-traced scenes", [name], RENDERED)
+    require_mitsuba()
+    use_threads(threads or available_cores())
+    render_world(name, world_of(name), taking, path, progress)
+
+
+def made_by(name: str, taking: Taking) -> dict[str, Any]:
+    """What a file of a render says that it was rendered with."""
+    return {"scene": name, **taking.model_dump(mode="json")}
+
+
+def render_world(
+    name: str, world: World, taking: Taking, path: Path, progress: Callable[[float], None] = no_progress
+) -> None:
+    """Render a world of one's own; see :func:`render_scene`."""
+    rig = rig_of(world, taking.size, taking.grid, taking.baseline)
+    positions, turns = _stand(rig, taking)
+    count = positions.shape[0] * positions.shape[1]
+    parts = path.with_name(f"{path.name}.parts")
+    _take_over(parts, json.dumps(made_by(name, taking), sort_keys=True))
+    tracer = Tracer(world, rig, taking.samples, taking.lens * rig.baseline)
+    for number in range(count):
+        file = parts / f"view_{number:03d}.npz"
+        if not _is_whole(file):
+            at = divmod(number, taking.grid[1])
+            values = _view(world, tracer, rig, positions[at], turns[at], taking.seed * count + number)
+            with atomic_path(file) as temporary, temporary.open("wb") as stream:
+                np.savez(stream, allow_pickle=False, **values)
+        progress((number + 1) / (count + 1))
+    write_render(path, _assembled(name, world, rig, taking, parts))
+    shutil.rmtree(parts)
+    progress(1.0)
+
+
+def _view(
+    world: World, tracer: Tracer, rig: Rig, position: npt.NDArray[np.float64], turn: npt.NDArray[np.float64], seed: int
+) -> dict[str, npt.NDArray[np.generic]]:
+    """Picture and truth of one view."""
+    x, y, z = map(float, turn)
+    at = tracer.position(float(position[0]), float(position[1]), (x, y, z))
+    seen = tracer.first_surface(at)
+    disparity = rig.disparity(seen.depth).astype(np.float32)
+    straight = seen if not turn.any() else tracer.first_surface(tracer.position(float(position[0]), float(position[1])))
+    found = {
+        # beyond half precision is far beyond white
+        "views": np.minimum(tracer.picture(at, seed), 60000.0),
+        "disparity": disparity,
+        "normal": seen.normal,
+        "masks": surface_bits(world.things, seen, disparity),
+        # which views see a point is asked of cameras that are not turned
+        "upright": rig.disparity(straight.depth),
+    }
+    return {part: values.astype(_TYPES[part]) for part, values in found.items()}
+
+
+def _stand(rig: Rig, taking: Taking) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+    """Where views stand and how they are turned; the reference view as it should."""
+    rng = np.random.default_rng(taking.seed)
+    positions = rig.positions
+    shift, turns = rng.standard_normal(positions.shape), rng.standard_normal((*positions.shape[:2], 3))
+    centre = positions.shape[0] // 2, positions.shape[1] // 2
+    shift[centre], turns[centre] = 0, 0
+    return positions + taking.position_error * shift, np.radians(taking.rotation_error) * turns
+
+
+def _assembled(name: str, world: World, rig: Rig, taking: Taking, parts: Path) -> Render:
+    """The views together, and which views see what."""
+    rows, columns = taking.grid
+    positions, turns = _stand(rig, taking)
+    shape = (rows * columns, rig.size, rig.size)
+    views = {part: np.empty(shape + (3,) * (part in ("views", "normal")), _TYPES[part]) for part in _TYPES}
+    for number in range(rows * columns):
+        with np.load(parts / f"view_{number:03d}.npz") as file:
+            for part in _TYPES:
+                views[part][number] = file[part]
+    upright, stands = views.pop("upright"), positions.reshape(-1, 2)
+    # of a turned view it is not told
+    for number in map(int, np.flatnonzero(~turns.reshape(-1, 3).any(axis=1))):
+        views["masks"][number] |= seen_bits(upright, stands, number)
+    return Render(
+        name=name,
+        **{part: values.reshape(rows, columns, *values.shape[1:]) for part, values in views.items()},
+        positions=positions,
+        turns=turns,
+        settings=rig.settings,
+        light=world.light,
+        made_by=made_by(name, taking),
+    )
+
+
+def _take_over(parts: Path, made_by: str) -> None:
+    """Make the folder of views, or keep one of the same scene and options."""
+    note = parts / "made_by.json"
+    if note.is_file() and note.read_text(encoding="utf-8") == made_by:
+        return
+    shutil.rmtree(parts, ignore_errors=True)
+    parts.mkdir(parents=True)
+    with atomic_path(note) as temporary:
+        temporary.write_text(made_by, encoding="utf-8")
+
+
+def _is_whole(file: Path) -> bool:
+    """Whether a view was written to its end."""
+    if not file.is_file():
+        return False
+    try:
+        with np.load(file) as values:
+            return set(_TYPES) == set(values.files)
+    except (OSError, ValueError, BadZipFile):
+        return False

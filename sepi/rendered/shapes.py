@@ -1,0 +1,186 @@
+"""Meshes by NumPy: sheets, boxes, balls, tubes, turned and cut-out bodies, moved and put together.
+
+``uv`` are metres along the surface, as well as its bending allows, so that a pattern has its size wherever it is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from sepi.rendered.world import FloatArray, Mesh, Vector
+
+Points = npt.NDArray[np.float64]
+
+
+def sheet(points: Points, *, smooth: bool = True) -> Mesh:
+    """A surface through a raster of points.
+
+    Parameters
+    ----------
+    points : ndarray, shape (R, C, 3), float64
+        In metres; ``uv`` are the mean lengths along columns and rows.
+    smooth : bool
+        Whether it is curved, rather than faceted.
+    """
+    rows, columns = points.shape[:2]
+    across = np.linalg.norm(np.diff(points, axis=1), axis=2).mean(0)
+    down = np.linalg.norm(np.diff(points, axis=0), axis=2).mean(1)
+    u, v = (np.concatenate([[0.0], np.cumsum(steps)]) for steps in (across, down))
+    uv = np.stack(np.broadcast_arrays(u[None, :], v[:, None]), axis=-1).reshape(-1, 2)
+    corner = np.arange(rows * columns).reshape(rows, columns)
+    a, b, c, d = (part.ravel() for part in (corner[:-1, :-1], corner[:-1, 1:], corner[1:, 1:], corner[1:, :-1]))
+    faces = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
+    return _mesh(points.reshape(-1, 3), faces, uv, smooth)
+
+
+def rectangle(corner: Vector, across: Vector, down: Vector) -> Mesh:
+    """A flat rectangle, or parallelogram, from one corner along two edges."""
+    start, u, v = (np.array(values, float) for values in (corner, across, down))
+    return sheet(np.stack([np.stack([start, start + u]), np.stack([start + v, start + u + v])]), smooth=False)
+
+
+def box(centre: Vector, size: Vector, turn: Vector = (0, 0, 0)) -> Mesh:
+    """A box, turned by angles about its own x, y and z axes, in radians."""
+    w, h, d = size
+    x, y, z = (-w / 2, -h / 2, -d / 2)
+    sides = [
+        rectangle((x, y, z), (w, 0, 0), (0, h, 0)),
+        rectangle((-x, y, -z), (-w, 0, 0), (0, h, 0)),
+        rectangle((x, y, -z), (0, 0, -d), (0, h, 0)),
+        rectangle((-x, y, z), (0, 0, d), (0, h, 0)),
+        rectangle((x, y, -z), (w, 0, 0), (0, 0, -d)),
+        rectangle((x, -y, z), (w, 0, 0), (0, 0, d)),
+    ]
+    return moved(joined(sides), turn, centre)
+
+
+def ball(
+    centre: Vector, radius: float, relief: Callable[[Points], npt.NDArray[np.float64]] | None = None, fineness: int = 96
+) -> Mesh:
+    """A ball, each point of which is moved outwards by a part of the radius.
+
+    Parameters
+    ----------
+    centre : (float, float, float)
+    radius : float
+    relief : callable, optional
+        Takes directions ``(R, C, 3)`` of length 1 and gives parts of the radius ``(R, C)``.
+    fineness : int
+        Rows of points from pole to pole.
+    """
+    polar = np.linspace(0, np.pi, fineness)[:, None]
+    turn = np.linspace(0, 2 * np.pi, 2 * fineness)[None, :]
+    direction = np.stack(
+        np.broadcast_arrays(np.sin(polar) * np.cos(turn), -np.cos(polar), -np.sin(polar) * np.sin(turn)), axis=-1
+    )
+    height = 1.0 if relief is None else 1 + relief(direction)[..., None]
+    mesh = sheet(np.array(centre) + radius * height * direction)
+    uv = np.stack(np.broadcast_arrays(turn * radius, polar * radius), axis=-1).reshape(-1, 2)
+    return _mesh(mesh.vertices, mesh.faces, uv, True)
+
+
+def tube(path: Points, radius: float | npt.NDArray[np.float64], sides: int = 12) -> Mesh:
+    """A tube along a line of points ``(N, 3)``, of one radius or one for each point; its ends are open."""
+    path = np.asarray(path, float)
+    along = np.gradient(path, axis=0)
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    # carried along so that it does not turn about the line
+    normal = np.cross(along[0], np.eye(3)[np.argmin(np.abs(along[0]))])
+    normals = []
+    for direction in along:
+        normal = normal - direction * (normal @ direction)
+        normal = normal / np.linalg.norm(normal)
+        normals.append(normal)
+    first = np.array(normals)
+    second = np.cross(along, first)
+    angle = np.linspace(0, 2 * np.pi, sides + 1)[None, :, None]
+    ring = np.cos(angle) * first[:, None] + np.sin(angle) * second[:, None]
+    return sheet(path[:, None] + np.broadcast_to(radius, len(path))[:, None, None] * ring)
+
+
+def turned_body(profile: Points, centre: Vector, sides: int = 96) -> Mesh:
+    """A body of revolution about the vertical through ``centre``: vases, bottles, columns.
+
+    Parameters
+    ----------
+    profile : ndarray, shape (N, 2), float64
+        Distance from the axis, and height above ``centre`` (upwards), of the points of the outline, from the top down.
+    centre : (float, float, float)
+    sides : int
+    """
+    profile = np.asarray(profile, float)
+    angle = np.linspace(0, 2 * np.pi, sides + 1)[None, :]
+    points = np.stack(
+        np.broadcast_arrays(profile[:, :1] * np.cos(angle), -profile[:, 1:], -profile[:, :1] * np.sin(angle)), axis=-1
+    )
+    return sheet(points + np.array(centre))
+
+
+def plate(outline: Points, thickness: float) -> Mesh:
+    """A flat body of an outline that is seen whole from its mean: leaves, discs, stars.
+
+    Parameters
+    ----------
+    outline : ndarray, shape (N, 2), float64
+        Points ``(x, y)`` in order, in metres; the body lies about ``z = 0``. With no thickness it has one side.
+    thickness : float
+    """
+    outline = np.asarray(outline, float)
+    middle = outline.mean(0)
+    count = len(outline)
+    rim = np.concatenate([outline, middle[None]])
+    other = np.roll(np.arange(count), -1)
+    fan = np.stack([np.full(count, count), np.arange(count), other], axis=1)
+    if thickness == 0:
+        return _mesh(np.concatenate([rim, np.zeros((count + 1, 1))], 1), fan, rim - outline.min(0), False)
+    front, back = (np.concatenate([rim, np.full((count + 1, 1), z)], 1) for z in (-thickness / 2, thickness / 2))
+    closed = np.concatenate([outline, outline[:1]])
+    wall = np.stack([np.concatenate([closed, np.full((count + 1, 1), z)], 1) for z in (-thickness / 2, thickness / 2)])
+    uv = rim - outline.min(0)
+    return joined([_mesh(front, fan, uv, False), _mesh(back, fan[:, ::-1], uv, False), sheet(wall, smooth=False)])
+
+
+def moved(mesh: Mesh, turn: Vector = (0, 0, 0), by: Vector = (0, 0, 0), scale: float = 1.0) -> Mesh:
+    """The mesh scaled, turned about the x, then y, then z axis by angles in radians, and shifted."""
+    rotation = np.eye(3)
+    for axis, angle in enumerate(turn):
+        i, j = (axis + 1) % 3, (axis + 2) % 3
+        step = np.eye(3)
+        step[i, i] = step[j, j] = np.cos(angle)
+        step[i, j], step[j, i] = -np.sin(angle), np.sin(angle)
+        rotation = step @ rotation
+    vertices = scale * np.asarray(mesh.vertices, float) @ rotation.T + np.array(by)
+    return _mesh(vertices, mesh.faces, scale * mesh.uv, mesh.smooth)
+
+
+def joined(meshes: Sequence[Mesh]) -> Mesh:
+    """Several meshes as one; all of them smooth, or none."""
+    starts = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
+    return _mesh(
+        np.concatenate([mesh.vertices for mesh in meshes]),
+        np.concatenate([mesh.faces + start for mesh, start in zip(meshes, starts[:-1], strict=True)]),
+        np.concatenate([mesh.uv for mesh in meshes]),
+        all(mesh.smooth for mesh in meshes),
+    )
+
+
+def normals(mesh: Mesh) -> FloatArray:
+    """Normals of the vertices: means of those of the triangles round them, weighted by area, for a smooth mesh."""
+    corners = mesh.vertices[mesh.faces].astype(np.float64)
+    facing = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    # vertices that lie in one place, such as along a seam, are one
+    _, same = np.unique(np.round(mesh.vertices, 6), axis=0, return_inverse=True)
+    same = same.ravel()
+    total = np.zeros((same.max() + 1, 3))
+    for corner in range(3):
+        np.add.at(total, same[mesh.faces[:, corner]], facing)
+    length = np.linalg.norm(total, axis=1, keepdims=True)
+    found: FloatArray = (total / np.where(length > 0, length, 1))[same].astype(np.float32)
+    return found
+
+
+def _mesh(vertices: npt.ArrayLike, faces: npt.ArrayLike, uv: npt.ArrayLike, smooth: bool) -> Mesh:
+    return Mesh(np.asarray(vertices, np.float32), np.asarray(faces, np.uint32), np.asarray(uv, np.float32), smooth)
