@@ -59,8 +59,9 @@ _ALTERNATIVES = (
         )
     ),
 )
-# what is told to people alone
+# what is told to people alone: words of calls, and what the rendered scenes are
 _TOLD = ("help", "description")
+_TELLING = "rendered.catalogue"
 
 
 def stage_modules(stage: str, choice: Choice) -> tuple[str, ...]:
@@ -77,7 +78,7 @@ def ingest_modules(reader: str) -> tuple[str, ...]:
 
 def render_modules(world: str) -> tuple[str, ...]:
     """Modules that decide what is in the file of a rendered scene: the renderer, and the module of that scene."""
-    return ("sepi.rendered.command", f"sepi.rendered.worlds.{world}")
+    return ("sepi.rendered.rendering", f"sepi.rendered.worlds.{world}")
 
 
 @cache
@@ -115,7 +116,7 @@ def imported_modules(*modules: str, root: Path = ROOT) -> set[str]:
         name = waiting.pop()
         if name not in found:
             found.add(name)
-            followed = _code_and_imports(name, root)[1]
+            followed = [other for other in _code_and_imports(name, root)[1] if other.partition(".")[2] != _TELLING]
             waiting.extend(other for other in followed if _is_alternative(name) or not _is_alternative(other))
     return found
 
