@@ -13,7 +13,7 @@ from sepi.errors import SepiError
 from sepi.report.plan import TEMPLATES
 from sepi.report.published import FOLDER as PUBLISHED
 from sepi.variants import HANDED_ON, STAGES
-from sepi.workflow.code_digest import code_digest, ingest_modules, stage_modules
+from sepi.workflow.code_digest import code_digest, ingest_modules, render_modules, stage_modules
 from sepi.workflow.config import MOST_ON_PAGE, Report
 from sepi.workflow.datasets import Scene
 
@@ -28,7 +28,8 @@ BEST = {
 
 
 def scene(**labels: str) -> Wildcards:
-    names = {"dataset": "builtin", "scene": "dots", "which": "", "variant": "best", **BEST, **labels}
+    names = {"dataset": "builtin", "scene": "dots", "which": "", "report": "", "variant": "best", "world": "sticks"}
+    names |= BEST | labels
     return Wildcards(fromdict=names)
 
 
@@ -66,6 +67,8 @@ def test_every_job_is_made_again_for_its_own_code(read: Any) -> None:
             modules = (command[1],) if chosen is None else stage_modules(rule.name, chosen)
             if rule.name == "ingest":
                 modules = ingest_modules("sepi.scenes")
+            if rule.name == "render":
+                modules = render_modules("sticks")
             if rule.name == "truth":
                 modules = ("sepi.truth", "sepi.scenes")
             given = code(scene(**{rule.name: name})) if callable(code) else code
@@ -84,6 +87,7 @@ def test_every_job_is_made_again_for_its_own_code(read: Any) -> None:
         "maps",
         "page",
         "graph",
+        "render",
     } <= checked
 
 
