@@ -170,7 +170,9 @@ def _is_seen_in_movements(views: Views, trial: _Trial, spacing: float) -> bool:
     matched = fits[0] & fits[1]
     if matched.sum() < FEWEST_POINTS or not np.ptp(movements[1][matched]):
         return False
-    line = theilslopes(movements[0][matched], movements[1][matched])
+    # where nearly all movements are the same its interval is none, and no number is nearer than that
+    with np.errstate(invalid="ignore"):
+        line = theilslopes(movements[0][matched], movements[1][matched])
     # all of the slope's interval of confidence is nearer to the spacing than to one
     middle = math.sqrt(spacing)
     return bool(line.low_slope > middle if spacing > 1 else line.low_slope > 0 and line.high_slope < middle)

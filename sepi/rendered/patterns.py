@@ -5,8 +5,11 @@ A pattern has 1024 texels a side unless it is asked for otherwise, and repeats w
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 import numpy.typing as npt
+from scipy import fft
 
 from sepi.rendered.world import FloatArray, Pattern, Vector
 
@@ -27,14 +30,21 @@ def field(seed: int, finest: float, coarsest: float, texels: int = TEXELS, stret
     stretch : float
         By how much it is longer across than down.
     """
-    frequency = np.hypot(np.fft.fftfreq(texels)[:, None], stretch * np.fft.rfftfreq(texels)[None, :])
-    with np.errstate(divide="ignore"):
-        amplitude = np.where(frequency > 0, 1 / frequency, 0)
-    amplitude *= np.exp(-((frequency * finest) ** 4)) * (1 - np.exp(-((frequency * coarsest) ** 4)))
-    white = np.random.default_rng(seed).standard_normal((texels, texels))
-    found: Field = np.fft.irfft2(np.fft.rfft2(white) * amplitude, s=(texels, texels))
+    white = np.random.default_rng(seed).standard_normal((texels, texels), np.float32)
+    amplitude = _amplitude(finest, coarsest, texels, stretch)
+    found: Field = fft.irfft2(fft.rfft2(white) * amplitude, s=(texels, texels)).astype(np.float64)
     found /= found.std()
     return found
+
+
+@lru_cache(maxsize=4)
+def _amplitude(finest: float, coarsest: float, texels: int, stretch: float) -> FloatArray:
+    frequency = np.hypot(np.fft.fftfreq(texels)[:, None], stretch * np.fft.rfftfreq(texels)[None, :])
+    fourth = np.square(np.square(frequency))
+    with np.errstate(divide="ignore"):
+        found = np.where(frequency > 0, 1 / frequency, 0)
+    found *= np.exp(-fourth * finest**4) * (1 - np.exp(-fourth * coarsest**4))
+    return found.astype(np.float32)
 
 
 def noise(
@@ -106,6 +116,22 @@ def weave(seed: int, size: float, colour: Vector, contrast: float = 0.1, threads
     bulge = np.where(over == 0, np.sin(np.pi * (x % 1)), np.sin(np.pi * (y % 1)))
     shade = contrast * (bulge - bulge.mean()) + 0.4 * contrast * field(seed, 3, 120)
     return _pattern(np.array(colour) * (1 + shade[..., None]), size)
+
+
+def linen(seed: int, size: float, colour: Vector, contrast: float = 0.06) -> Pattern:
+    """Yarn that is thick here and thin there, both ways, with specks."""
+    yarn = field(seed, 2, 24, stretch=12) + field(seed + 1, 2, 24, stretch=12).T
+    shade = contrast * (0.6 * yarn + 0.4 * field(seed + 2, 3, 200))
+    return _pattern(np.array(colour) * (1 + shade[..., None]), size)
+
+
+def plaid(seed: int, size: float, ground: Vector, bands: Vector, count: int = 4, depth: float = 0.5) -> Pattern:
+    """Bands across and down on linen; ``depth`` is the part of the bands' colour where two cross."""
+    position = np.arange(TEXELS) * count / TEXELS % 1
+    band = ((position > 0.2) & (position < 0.55)) * 0.8 + ((position > 0.75) & (position < 0.8)) * 1.0
+    share = 0.5 * depth * (band[:, None] + band[None, :])
+    cloth = linen(seed, size, ground).raster / np.array(ground, np.float32)
+    return _pattern(_between(np.array(ground), np.array(bands), share) * cloth, size)
 
 
 def printed(seed: int, size: float, lines: int = 40, paper: Vector = (0.9, 0.89, 0.85), ink: float = 0.12) -> Pattern:

@@ -1,4 +1,4 @@
-"""Meshes by NumPy: sheets, boxes, balls, tubes, turned and cut-out bodies, moved and put together.
+"""Meshes by NumPy: sheets, boxes, balls, tubes, rods, turned and cut-out bodies, moved and put together.
 
 ``uv`` are metres along the surface, as well as its bending allows, so that a pattern has its size wherever it is.
 """
@@ -99,6 +99,32 @@ def tube(path: Points, radius: float | npt.NDArray[np.float64], sides: int = 12)
     angle = np.linspace(0, 2 * np.pi, sides + 1)[None, :, None]
     ring = np.cos(angle) * first[:, None] + np.sin(angle) * second[:, None]
     return sheet(path[:, None] + np.broadcast_to(radius, len(path))[:, None, None] * ring)
+
+
+def rod(start: npt.ArrayLike, end: npt.ArrayLike, radius: float, sides: int = 12) -> Mesh:
+    """A straight tube from one point to another, with rounded ends."""
+    first, last = np.asarray(start, float), np.asarray(end, float)
+    length = np.linalg.norm(last - first)
+    cap = np.array([0, 0.3, 1.0]) * min(radius, 0.4 * length)
+    along = np.concatenate([cap, length - cap[::-1]])
+    widths = radius * np.array([0, 0.7, 1, 1, 0.7, 0])
+    return tube(first + along[:, None] / length * (last - first), widths, sides)
+
+
+def bevelled(outline: Points, by: float) -> Points:
+    """An outline ``(N, 2)``, each corner between whose ends is cut off: smooth bodies have sharp edges by it."""
+    outline = np.asarray(outline, float)
+    points = [outline[0]]
+    for before, corner, after in zip(outline[:-2], outline[1:-1], outline[2:], strict=True):
+        for other in (before, after):
+            part = by / max(float(np.linalg.norm(other - corner)), 3 * by)
+            points.append(corner + part * (other - corner))
+    return np.array([*points, outline[-1]])
+
+
+def painted_from(mesh: Mesh, across: float, down: float) -> Mesh:
+    """The mesh with another part of its pattern: so many metres further."""
+    return _mesh(mesh.vertices, mesh.faces, mesh.uv + np.array([across, down]), mesh.smooth)
 
 
 def turned_body(profile: Points, centre: Vector, sides: int = 96) -> Mesh:

@@ -111,14 +111,18 @@ class Tracer:
         angle = np.arange(count) * _GOLDEN_ANGLE
         self._lens = np.stack([distance * np.cos(angle), distance * np.sin(angle)], axis=1)
         parts: dict[str, Any] = {}
+        # things that share a material share its pictures
+        surfaces = {id(thing.material): thing.material for thing in world.things}
+        loaded = {key: self._mi.load_dict(self._surface(material)) for key, material in surfaces.items()}
         for number, thing in enumerate(world.things):
-            parts[f"thing{number}"] = self._shape(thing.mesh, thing.material)
+            parts[f"thing{number}"] = self._shape(thing.mesh, thing.material, loaded[id(thing.material)])
         for number, lamp in enumerate(world.lamps):
             parts[f"lamp{number}"] = self._lamp(lamp)
         for number, sun in enumerate(world.suns):
             light = {"type": "rgb", "value": list(sun.irradiance)}
             parts[f"sun{number}"] = {"type": "directional", "direction": list(sun.direction), "irradiance": light}
-        integrator = {"type": "path", "max_depth": world.depth}
+        # paths end by chance from the second surface on: most of the time goes into light that hardly counts
+        integrator = {"type": "path", "max_depth": world.depth, "rr_depth": 2}
         self._scene = self._mi.load_dict({"type": "scene", **parts, **self._sky(world.sky), "integrator": integrator})
         # Mitsuba counts shapes in its own order, from 1
         names = [shape.id() for shape in self._scene.shapes()]
@@ -198,9 +202,9 @@ class Tracer:
         found /= np.linalg.norm(found, axis=-1, keepdims=True)
         return found
 
-    def _shape(self, mesh: Mesh, material: Material) -> Any:
+    def _shape(self, mesh: Mesh, material: Material, surface: Any) -> Any:
         properties = self._mi.Properties()
-        properties["bsdf"] = self._mi.load_dict(self._surface(material))
+        properties["bsdf"] = surface
         properties["face_normals"] = not mesh.smooth
         shape = self._mi.Mesh(
             "thing",
@@ -251,15 +255,15 @@ class Tracer:
     def _texture(self, material: Material) -> dict[str, Any]:
         if not isinstance(material.pattern, Pattern):
             return {"type": "rgb", "value": _linear(np.array(material.pattern)).tolist()}
-        raster = _linear(material.pattern.raster).astype(np.float32)
+        raster = _linear(material.pattern.raster)
         return {"type": "bitmap", "bitmap": self._mi.Bitmap(raster), "raw": True, "wrap_mode": "repeat"}
 
     def _sky(self, sky: Vector | FloatArray) -> dict[str, Any]:
         if not isinstance(sky, np.ndarray):
             return {"sky": {"type": "constant", "radiance": {"type": "rgb", "value": list(sky)}}} if any(sky) else {}
         transform = self._mi.ScalarTransform4f
-        # Mitsuba's panoramas have -z in the middle and y above
-        upright = transform().rotate([1, 0, 0], 180.0)
+        # Mitsuba's panoramas have y above
+        upright = transform().rotate([0, 0, 1], 180.0)
         return {"sky": {"type": "envmap", "bitmap": self._mi.Bitmap(sky.astype(np.float32)), "to_world": upright}}
 
 

@@ -1,0 +1,121 @@
+"""What scenes are set up with: books, crates, chairs, tables, sticks; and a world seen from any place in it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from sepi.rendered.shapes import box, joined, moved, painted_from, rod
+from sepi.rendered.world import Lamp, Material, Mesh, Sun, Thing, Vector, World
+
+
+def seen_from(world: World, eye: Vector, below: float = 0.0, rightwards: float = 0.0) -> World:
+    """A world that was built elsewhere, as the reference camera sees it.
+
+    Parameters
+    ----------
+    world : World
+        ``y`` points down; a panorama stays as it is.
+    eye : (float, float, float)
+        Where the reference camera stands in it.
+    below, rightwards : float
+        Degrees by which it looks below the horizon, and to the right of ``z``.
+    """
+    pitch, yaw = np.radians(below), np.radians(rightwards)
+    forward = np.array([np.sin(yaw) * np.cos(pitch), np.sin(pitch), np.cos(yaw) * np.cos(pitch)])
+    right = np.array([np.cos(yaw), 0, -np.sin(yaw)])
+    axes = np.stack([right, np.cross(forward, right), forward])
+
+    def turned(vector: Vector) -> Vector:
+        x, y, z = (axes @ np.array(vector)).tolist()
+        return x, y, z
+
+    def shifted(point: Vector) -> Vector:
+        return turned((point[0] - eye[0], point[1] - eye[1], point[2] - eye[2]))
+
+    def mesh(old: Mesh) -> Mesh:
+        vertices = (old.vertices.astype(np.float64) - np.array(eye)) @ axes.T
+        return replace(old, vertices=vertices.astype(np.float32))
+
+    return replace(
+        world,
+        things=[replace(thing, mesh=mesh(thing.mesh)) for thing in world.things],
+        lamps=[
+            Lamp(shifted(lamp.corner), turned(lamp.across), turned(lamp.down), lamp.radiance) for lamp in world.lamps
+        ],
+        suns=[Sun(turned(sun.direction), sun.irradiance) for sun in world.suns],
+    )
+
+
+def book(size: Vector, cover: Material, paper: Material, turn: Vector, by: Vector) -> list[Thing]:
+    """A closed book of width, thickness and depth that lies on y=0 with its back to the left."""
+    w, h, d = size
+    board = min(0.003, h / 6)
+    middle = -h / 2
+    covers = [
+        box((0, -h + board / 2, 0), (w, board, d)),
+        box((0, -board / 2, 0), (w, board, d)),
+        box((-w / 2 + board / 2, middle, 0), (board, h - 2 * board, d)),
+    ]
+    pages = box((0, middle, 0), (w - 2.5 * board, h - 2 * board, d - 3 * board))
+    return [
+        Thing(moved(joined(covers), turn, by), cover),
+        Thing(moved(pages, turn, by), paper),
+    ]
+
+
+def crate(size: Vector, rows: int, turn: float, by: Vector) -> Mesh:
+    """An open crate of rows of slats and two ends, which stands on y=0, turned about the vertical."""
+    w, h, d = size
+    thickness, pitch = 0.014, h / rows
+    slats = [
+        box((0, -(row + 0.5) * pitch, side * (d / 2)), (w, 0.84 * pitch, thickness))
+        for row in range(rows)
+        for side in (-1, 1)
+    ]
+    ends = [box((side * (w - thickness) / 2, -h / 2, 0), (thickness, h, d - thickness)) for side in (-1, 1)]
+    bottom = box((0, -0.02, 0), (w - 2 * thickness, thickness, d - thickness))
+    return moved(of_boards([*slats, *ends, bottom]), (0, turn, 0), by)
+
+
+def of_boards(parts: Sequence[Mesh]) -> Mesh:
+    """Boards as one, none of which shows the grain of another."""
+    return joined([painted_from(part, 0.137 * n, 0.091 * n) for n, part in enumerate(parts)])
+
+
+def chair(turn: float, by: Vector, slats: int = 4) -> Mesh:
+    """A wooden chair on y=0 that faces -z, turned about the vertical."""
+    wide, deep, seat, back, leg = 0.42, 0.42, 0.45, 0.9, 0.036
+    x, z = wide / 2 - leg / 2, deep / 2 - leg / 2
+    parts = [box((0, -seat + 0.011, 0), (wide, 0.022, deep))]
+    parts += [box((side * x, -seat / 2 + 0.011, -z), (leg, seat - 0.022, leg)) for side in (-1, 1)]
+    parts += [box((side * x, -back / 2, z + leg), (leg, back, leg)) for side in (-1, 1)]
+    parts += [box((0, -height, z + leg), (wide - 2 * leg, 0.06, 0.02)) for height in (seat - 0.02, back - 0.04)]
+    parts += [box((side * x, -0.2, leg / 2), (0.02, 0.025, 2 * z)) for side in (-1, 1)]
+    parts += [box((0, -seat + 0.045, -z), (wide - 2 * leg, 0.045, 0.02))]
+    places = np.linspace(-x, x, slats + 2)[1:-1]
+    parts += [box((place, -(seat + back) / 2, z + leg), (0.03, back - seat - 0.08, 0.012)) for place in places.tolist()]
+    return moved(of_boards(parts), (0, turn, 0), by)
+
+
+def table(size: Vector, turn: float, by: Vector) -> Mesh:
+    """A wooden table of width, height and depth on y=0, turned about the vertical."""
+    w, h, d = size
+    leg = 0.055
+    x, z = w / 2 - leg, d / 2 - leg
+    parts = [box((0, -h + 0.0125, 0), (w, 0.025, d))]
+    parts += [box((i * x, -(h - 0.025) / 2, k * z), (leg, h - 0.025, leg)) for i in (-1, 1) for k in (-1, 1)]
+    parts += [box((0, -h + 0.07, k * z), (2 * x - leg, 0.09, 0.022)) for k in (-1, 1)]
+    parts += [box((i * x, -h + 0.07, 0), (0.022, 0.09, 2 * z - leg)) for i in (-1, 1)]
+    return moved(of_boards(parts), (0, turn, 0), by)
+
+
+def leaning(foot: npt.ArrayLike, over: npt.ArrayLike, beyond: float, radius: float) -> Mesh:
+    """A stick from its foot that lies upon a point and goes on for so many metres."""
+    start, rest = np.asarray(foot, float), np.asarray(over, float)
+    along = (rest - start) / np.linalg.norm(rest - start)
+    lift = np.array([0.0, -radius, 0.0])
+    return rod(start + lift, rest + lift + beyond * along, radius)

@@ -1,0 +1,38 @@
+"""Vessels and fruit that more than one path-traced scene has on its tables."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.interpolate import PchipInterpolator
+
+from sepi.rendered import shapes
+from sepi.rendered.shapes import Points
+from sepi.rendered.world import Mesh, Vector
+
+
+def profile(points: list[tuple[float, float]], count: int = 120) -> Points:
+    """A curve through points ``(radius, height)`` of a body of revolution, given from the top down."""
+    given = np.array(points, float)
+    length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(given, axis=0), axis=1))])
+    found: Points = PchipInterpolator(length, given)(np.linspace(0, length[-1], count))
+    return found
+
+
+def vessel(points: list[tuple[float, float]], wall: float, foot: Vector) -> Mesh:
+    """An open vessel of an outline, its inside ``wall`` metres within; it stands on ``foot``."""
+    outer = profile(points)
+    inner = np.stack([np.maximum(outer[:, 0] - wall, 0.0005), np.maximum(outer[:, 1], outer[-1, 1] + wall)], 1)
+    base = np.array([[0.0005, outer[-1, 1]]])
+    return shapes.turned_body(np.concatenate([inner[::-1], outer, base]), foot)
+
+
+def fruit(centre: Vector, radius: float, seed: int) -> Mesh:
+    """A ball with dimples above and below, not quite round."""
+    lean = np.random.default_rng(seed).normal(0, 0.03, 3)
+
+    def relief(direction: Points) -> Points:
+        dimple = np.exp(-(((np.arccos(np.clip(np.abs(direction[..., 1]), 0, 1))) / 0.25) ** 2))
+        found: Points = direction @ lean - 0.12 * dimple + 0.03 * np.cos(5 * direction[..., 0] + 3 * direction[..., 2])
+        return found
+
+    return shapes.ball(centre, radius, relief, 40)
