@@ -152,7 +152,7 @@ def command(numbers_path: Path, parts_path: Path | None, graph_path: Path, outpu
     numbers = read_numbers(numbers_path)
     html = page_of(
         numbers,
-        [read_scene(scenes / dataset / f"{scene}.json") for dataset, scene in Runs(numbers).plan.pairs],
+        [read_scene(scenes / dataset / f"{scene}.json") for dataset, scene in Runs(numbers).plan.pictured],
         graph_path.read_text(encoding="utf-8"),
         None if parts_path is None else read_numbers(parts_path),
     )
