@@ -20,6 +20,7 @@ from sepi.report import published
 from sepi.report.plots.pictures import error_scale, scale_colours
 from sepi.report.runs import Runs, read_json, read_numbers
 from sepi.report.web import page_data
+from sepi.workflow.rendered_scenes import DATASET
 
 SCRIPTS = ("unpack.js", "panels.js", "viewer.js", "cloud.js", "pixel.js", "tables.js", "page.js")
 """Scripts of a page, in the order in which they are run."""
@@ -87,6 +88,8 @@ def page_of(
         HTML.
     """
     runs = Runs(numbers)
+    # averages over all of the rendered scenes and levels of noise would say nothing, and nothing is published of them
+    averaged = runs.plan.report != DATASET
     first_title = page_data.first_scene(runs)
     shown = [scene for scene in scenes if f"{scene['dataset']}/{scene['scene']}" == first_title] or scenes
     tables = {name: numbers["tables"][name] for name in runs.plan.tables() if name in numbers["tables"]}
@@ -101,10 +104,10 @@ def page_of(
             report=runs.plan.report,
             variants=page_data.shown_variants(runs, parts),
             tables=tables,
-            headline=page_data.headline(runs),
-            missing=page_data.missing_scenes(runs),
+            headline=page_data.headline(runs) if averaged else [],
+            missing=page_data.missing_scenes(runs) if averaged else {},
             dataset_titles=published.DATASETS,
-            bars=page_data.ablation_bars(runs),
+            bars=page_data.ablation_bars(runs) if averaged else [],
             part_bars=[] if parts is None else page_data.part_bars(Runs(parts)),
             times=page_data.stage_times(runs),
             total_seconds=page_data.total_seconds(*filter(None, (numbers, parts))),

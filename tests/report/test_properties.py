@@ -4,9 +4,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from click.testing import CliRunner
 from report_results import GLOSSY, VARIANTS, cells_of, csv_rows, numbers_of, only, report_of, with_results
 
 from sepi import variants as built_in
+from sepi.report import numbers, page
 from sepi.report.page import page_of
 from sepi.report.plan import RENDERED_TABLES, Plan
 
@@ -62,10 +64,28 @@ def test_the_best_is_marked_and_a_method_without_a_map_says_so(found: dict[str, 
     assert (row["sticks"]["text"], row["foliage (held out)"]["text"]) == ("0.04", "no file")
 
 
-def test_pictures_are_of_one_seed_and_variants_those_that_are_asked_for(found: dict[str, Any]) -> None:
+def test_pictures_are_of_one_seed_and_variants_those_that_are_asked_for() -> None:
     """Two pictures that differ in their noise alone show nothing new."""
     plan = Plan(Path(), {"hci": ["cotton"]}, VARIANTS).rendered(list(GLOSSY), [], ["wang"])
     assert [scene for _, scene in plan.pictured] == ["sticks", "foliage", "sticks_low", "foliage_low"]
     assert plan.compared == plan.listed == ["wang", "paper"]
     assert plan.scores_file("rendered", "sticks").name == "scores_rendered.h5"
-    assert "<h1>Light field depth: scenes rendered like photographs</h1>" in page_of(found, [], "<svg></svg>")
+
+
+def test_the_page_averages_nothing_over_scenes_and_levels(
+    found: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One figure of all would hide what each property does; and of further seeds it has no scene to read."""
+    text = page_of(found, [], "<svg></svg>")
+    assert "<h1>Light field depth: scenes rendered like photographs</h1>" in text
+    assert "average of" not in text
+    assert "published figures only" not in text
+    shown: list[str] = []
+    monkeypatch.setattr(page, "read_scene", lambda path: shown.append(path.stem))
+    monkeypatch.setattr(page, "page_of", lambda *given: "")
+    (tmp_path / "numbers.json").write_text(numbers.as_text(found))
+    (tmp_path / "graph.svg").touch()
+    words = ["--numbers", "numbers.json", "--graph", "graph.svg", "--scenes", "scenes", "--output", "index.html"]
+    files = [str(tmp_path / word) if not word.startswith("--") else word for word in words]
+    assert CliRunner().invoke(page.command, files, catch_exceptions=False).exit_code == 0
+    assert shown == ["sticks", "foliage", "sticks_low", "foliage_low"]

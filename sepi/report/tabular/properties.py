@@ -52,7 +52,7 @@ def property_table(runs: Runs, score: str) -> Report:
         f"{SCORES[score]} by property",
         f"Of the pixels of all scenes together, not an average of scenes. Part of all pixels: {shares}; properties "
         "overlap. Depth steps: beside discontinuities of the ground truth; occluded: some view does not see it; alone: "
-        "no other view sees it.",
+        "no other view sees it. ",
         shown,
         figure,
     )
@@ -70,7 +70,7 @@ def scene_table(runs: Runs, score: str) -> Report:
         found = _scores(runs, method, scene.name)
         return found[WHOLE_MAP][score] if found else runs.external_problem(DATASET, scene.name, method.name)
 
-    return _report(runs, f"{SCORES[score]} by scene", "The whole map.", heads, figure)
+    return _report(runs, f"{SCORES[score]} by scene", "", heads, figure)
 
 
 def _report(runs: Runs, title: str, caption: str, heads: Mapping[str, str], figure: _Figure) -> Report:
@@ -104,7 +104,7 @@ def _report(runs: Runs, title: str, caption: str, heads: Mapping[str, str], figu
     spreads = [f"{key}_sd" for key in heads] if any(len(seeds) > 1 for seeds in levels.values()) else []
     return Report(
         title,
-        f"{methods.PROTOCOL_NOTE} {caption} {_split(runs)}"
+        f"{methods.PROTOCOL_NOTE} {caption}{_split(runs)}"
         + (f" {methods.EXTERNAL_NOTE}" if runs.plan.external else ""),
         ["noise", "seeds", "method", *heads, *spreads],
         records,
