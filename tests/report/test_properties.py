@@ -78,7 +78,8 @@ def test_the_page_averages_nothing_over_scenes_and_levels(
     """One figure of all would hide what each property does; and of further seeds it has no scene to read."""
     text = page_of(found, [], "<svg></svg>")
     assert "<h1>Light field depth: scenes rendered like photographs</h1>" in text
-    assert "average of" not in text
+    assert "rendered, average of" not in text
+    assert "whole map, average of" not in text
     assert "published figures only" not in text
     shown: list[str] = []
     monkeypatch.setattr(page, "read_scene", lambda path: shown.append(path.stem))
