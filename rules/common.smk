@@ -299,6 +299,15 @@ def minutes_for(*seconds, **more):
     return minutes
 
 
+def of_source(read, rendered):
+    """Function of wildcards: memory or time of a job that reads files, or what the renderer made, which is wider."""
+
+    def ask(wildcards, attempt):
+        return (rendered if scene_of(wildcards).is_rendered else read)(wildcards, attempt)
+
+    return ask
+
+
 def sweep_of(stage, wildcards):
     """A scene's light field, and the parameters of the choice that a stage makes of it."""
     light_field = scene_files(wildcards.dataset, wildcards.scene, Path(placed(RESULTS))).light_field

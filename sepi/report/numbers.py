@@ -53,9 +53,9 @@ def collect(plan: Plan, parts: bool = False) -> dict[str, Any]:
         result, and the machines that the stages ran on, with their versions; ``protocols``: name to border; ``plan``;
         ``parameters``: stage to choice to what it ran with, a list, as scenes may differ; ``scenes``: a list, each
         with ``dataset``, ``scene``, ``light_field``, ``stages`` (path of choices to ``stage``, ``scores``,
-        ``seconds``, ``peak_memory_mb``), ``confidence`` (variant to errors) and ``external`` (method to ``problem``,
-        ``source``, ``sha256``, ``scores``); of the rendered scenes ``pooled_q25`` (:data:`sepi.report.pooled.Pooled`);
-        ``tables``: name to :func:`sepi.report.tabular.layout.as_json`. With
+        ``seconds``, ``peak_memory_mb``), ``confidence`` (variant to errors, of the main report) and ``external``
+        (method to ``problem``, ``source``, ``sha256``, ``scores``); of the rendered scenes ``pooled_q25``
+        (:data:`sepi.report.pooled.Pooled`); ``tables``: name to :func:`sepi.report.tabular.layout.as_json`. With
         ``parts``, scenes have ``stages`` only, and ``scores`` is None but after the last stage.
 
     Raises
@@ -117,7 +117,7 @@ def _scene(plan: Plan, dataset: str, scene: str, parts: bool) -> dict[str, Any]:
     return found | {
         "light_field": _light_field(plan.light_field_file(dataset, scene), plan.truth_file(dataset, scene)),
         "stages": _stages(plan, dataset, scene, parts),
-        "confidence": _confidence(plan, dataset, scene),
+        "confidence": _confidence(plan, dataset, scene) if plan.tells_confidence else {},
         "external": _external(plan, dataset, scene),
     }
 

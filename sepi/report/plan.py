@@ -153,6 +153,11 @@ class Plan:
         return tuple(name for name in TABLES if (name in PARTS_TABLES) == parts)
 
     @property
+    def tells_confidence(self) -> bool:
+        """Whether a table says what confidence is worth, which takes a look at every map."""
+        return "confidence" in self.tables()
+
+    @property
     def stages(self) -> list[str]:
         """Stages, in order."""
         return list(self.variants[MAIN_VARIANT])
@@ -219,7 +224,8 @@ class Plan:
                 files += [self.stage_file(dataset, scene, variant, stage, "time.json") for stage in self.stages]
             if not parts:
                 files += [self.light_field_file(dataset, scene), self.truth_file(dataset, scene)]
-                files += [self.stage_file(dataset, scene, variant, last) for variant in self.compared]
+                compared = self.compared if self.tells_confidence else []
+                files += [self.stage_file(dataset, scene, variant, last) for variant in compared]
                 files += [self.external_file(dataset, scene)] if self.external else []
         return list(dict.fromkeys(files))
 

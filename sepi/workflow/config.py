@@ -14,6 +14,7 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from sepi.compared.methods import LEARNED
 from sepi.errors import SepiError
 from sepi.io.disparity_maps import SUFFIXES
 from sepi.io.external_maps import ExternalSource
@@ -212,7 +213,9 @@ class Settings:
     @property
     def rendered_variants(self) -> list[str] | None:
         """The variants that the user chose for the rendered scenes, if any."""
-        return list(VARIANTS) if self.rendered.variants == "all" else self.rendered.variants
+        if self.rendered.variants == "all":
+            return [name for name in VARIANTS if name not in LEARNED]
+        return self.rendered.variants
 
     @property
     def own_variants(self) -> list[str]:

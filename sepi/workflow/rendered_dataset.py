@@ -35,7 +35,7 @@ class Rendered(BaseModel):
     variants: list[str] | Literal["all"] | None = Field(
         None,
         description="variants to run, and 'paper' with them; null: 'best', 'fast', 'paper', your own and the compared "
-        "methods; all: every built-in one",
+        "methods; all: every built-in one that needs no file of yours",
     )
 
     @field_validator("noise", mode="before")
