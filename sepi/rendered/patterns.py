@@ -60,7 +60,7 @@ def noise(
     """Noise round a colour: ``contrast`` is the deviation of the brightness, ``chroma`` the colours' part of it."""
     brightness = field(seed, finest, coarsest)[..., None]
     colours = np.stack([field(seed + 1 + channel, finest, coarsest) for channel in range(3)], axis=-1)
-    return _pattern(np.array(colour) + contrast * (brightness + chroma * colours), size)
+    return painted(np.array(colour) + contrast * (brightness + chroma * colours), size)
 
 
 def wood(seed: int, size: float, light: Vector = (0.72, 0.52, 0.34), dark: Vector = (0.42, 0.26, 0.15)) -> Pattern:
@@ -68,14 +68,14 @@ def wood(seed: int, size: float, light: Vector = (0.72, 0.52, 0.34), dark: Vecto
     grain = field(seed, 3, 90, stretch=14) + 0.7 * field(seed + 1, 40, 400, stretch=5)
     rings = 0.5 + 0.5 * np.sin(5 * grain)
     share = np.clip(0.65 * rings + 0.35 * (0.5 + 0.3 * field(seed + 2, 2, 16, stretch=20)), 0, 1)
-    return _pattern(_between(np.array(light), np.array(dark), share), size)
+    return painted(_between(np.array(light), np.array(dark), share), size)
 
 
 def stone(seed: int, size: float, light: Vector = (0.82, 0.8, 0.77), dark: Vector = (0.4, 0.38, 0.4)) -> Pattern:
     """Veins through clouds."""
     clouds = 0.5 + 0.2 * field(seed, 4, 300)
     veins = np.exp(-18 * np.abs(field(seed + 1, 60, 500) + 0.25 * field(seed + 2, 4, 60)))
-    return _pattern(_between(np.array(light), np.array(dark), np.clip(0.4 * clouds + 0.7 * veins, 0, 1)), size)
+    return painted(_between(np.array(light), np.array(dark), np.clip(0.4 * clouds + 0.7 * veins, 0, 1)), size)
 
 
 def bricks(seed: int, size: float, rows: int = 10, colour: Vector = (0.6, 0.32, 0.24)) -> Pattern:
@@ -87,7 +87,7 @@ def bricks(seed: int, size: float, rows: int = 10, colour: Vector = (0.6, 0.32, 
     to_joint = np.minimum(np.abs(y - np.round(y)), 2 * np.abs(along - np.round(along)))
     face = np.array(colour) * (1 + tone[..., None] + 0.12 * field(seed + 1, 3, 80)[..., None])
     mortar = np.array([0.7, 0.68, 0.64]) + 0.05 * field(seed + 2, 3, 30)[..., None]
-    return _pattern(np.where((to_joint > 0.06)[..., None], face, mortar), size)
+    return painted(np.where((to_joint > 0.06)[..., None], face, mortar), size)
 
 
 def tiles(
@@ -98,7 +98,7 @@ def tiles(
     odd = (np.floor(y) + np.floor(x)) % 2
     colour = _between(np.array(light), np.array(dark), odd) + 0.03 * field(seed, 4, 200)[..., None]
     joint = np.minimum(np.abs(y - np.round(y)), np.abs(x - np.round(x))) < 0.02
-    return _pattern(np.where(joint[..., None], 0.5, colour), size)
+    return painted(np.where(joint[..., None], 0.5, colour), size)
 
 
 def stripes(size: float, colours: list[Vector], across: bool = True) -> Pattern:
@@ -106,7 +106,7 @@ def stripes(size: float, colours: list[Vector], across: bool = True) -> Pattern:
     position = np.arange(TEXELS) * len(colours) // TEXELS
     row = np.array(colours)[position]
     raster = np.broadcast_to(row[None, :] if across else row[:, None], (TEXELS, TEXELS, 3))
-    return _pattern(raster, size)
+    return painted(raster, size)
 
 
 def weave(seed: int, size: float, colour: Vector, contrast: float = 0.1, threads: int = 128) -> Pattern:
@@ -115,14 +115,14 @@ def weave(seed: int, size: float, colour: Vector, contrast: float = 0.1, threads
     over = (np.floor(y) + np.floor(x)) % 2
     bulge = np.where(over == 0, np.sin(np.pi * (x % 1)), np.sin(np.pi * (y % 1)))
     shade = contrast * (bulge - bulge.mean()) + 0.4 * contrast * field(seed, 3, 120)
-    return _pattern(np.array(colour) * (1 + shade[..., None]), size)
+    return painted(np.array(colour) * (1 + shade[..., None]), size)
 
 
 def linen(seed: int, size: float, colour: Vector, contrast: float = 0.06) -> Pattern:
     """Yarn that is thick here and thin there, both ways, with specks."""
     yarn = field(seed, 2, 24, stretch=12) + field(seed + 1, 2, 24, stretch=12).T
     shade = contrast * (0.6 * yarn + 0.4 * field(seed + 2, 3, 200))
-    return _pattern(np.array(colour) * (1 + shade[..., None]), size)
+    return painted(np.array(colour) * (1 + shade[..., None]), size)
 
 
 def plaid(seed: int, size: float, ground: Vector, bands: Vector, count: int = 4, depth: float = 0.5) -> Pattern:
@@ -131,7 +131,7 @@ def plaid(seed: int, size: float, ground: Vector, bands: Vector, count: int = 4,
     band = ((position > 0.2) & (position < 0.55)) * 0.8 + ((position > 0.75) & (position < 0.8)) * 1.0
     share = 0.5 * depth * (band[:, None] + band[None, :])
     cloth = linen(seed, size, ground).raster / np.array(ground, np.float32)
-    return _pattern(_between(np.array(ground), np.array(bands), share) * cloth, size)
+    return painted(_between(np.array(ground), np.array(bands), share) * cloth, size)
 
 
 def printed(seed: int, size: float, lines: int = 40, paper: Vector = (0.9, 0.89, 0.85), ink: float = 0.12) -> Pattern:
@@ -147,14 +147,15 @@ def printed(seed: int, size: float, lines: int = 40, paper: Vector = (0.9, 0.89,
             top, left = line * 2 * cell + cell // 3, column * cell
             part = page[top : top + glyph.shape[0], left : left + glyph.shape[1]]
             part[:] = glyph[: part.shape[0], : part.shape[1]]
-    return _pattern(_between(np.array(paper), np.full(3, ink), page), size)
+    return painted(_between(np.array(paper), np.full(3, ink), page), size)
+
+
+def painted(colours: npt.ArrayLike, width: float, height: float | None = None) -> Pattern:
+    """Colours as a pattern; none is quite black or white. It is as high as wide unless said otherwise."""
+    raster: FloatArray = np.clip(np.asarray(colours), 0.02, 0.98).astype(np.float32)
+    return Pattern(raster, (width, height or width))
 
 
 def _between(first: npt.NDArray[np.float64], second: npt.NDArray[np.float64], share: Field) -> Field:
     mixed: Field = first + share[..., None] * (second - first)
     return mixed
-
-
-def _pattern(colours: npt.ArrayLike, size: float) -> Pattern:
-    raster: FloatArray = np.clip(np.asarray(colours), 0.02, 0.98).astype(np.float32)
-    return Pattern(raster, (size, size))

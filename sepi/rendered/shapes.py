@@ -169,6 +169,31 @@ def plate(outline: Points, thickness: float) -> Mesh:
     return joined([_mesh(front, fan, uv, False), _mesh(back, fan[:, ::-1], uv, False), sheet(wall, smooth=False)])
 
 
+def leaf(length: float, width: float, bend: float, fold: float = 0.3, rows: int = 6) -> Mesh:
+    """A pointed leaf from the origin along ``x``, its upper side to ``-y``.
+
+    Parameters
+    ----------
+    length, width : float
+    bend : float
+        Radians by which its tip has turned downwards.
+    fold : float
+        Slope of its halves up from the midrib.
+    rows : int
+        Of points, along it.
+    """
+    part = np.linspace(0, 1, rows)
+    angle = bend * part
+    step = length / (rows - 1)
+    along = step * np.concatenate([[0], np.cumsum((np.cos(angle[1:]) + np.cos(angle[:-1])) / 2)])
+    down = step * np.concatenate([[0], np.cumsum((np.sin(angle[1:]) + np.sin(angle[:-1])) / 2)])
+    half = width / 2 * np.sin(np.pi * np.clip(part, 0.03, 0.995) ** 0.75) ** 0.8
+    side = np.array([-1.0, 0.0, 1.0])
+    off = half[:, None] * side
+    rise = fold * np.abs(off)
+    return sheet(np.stack([along[:, None] + rise * np.sin(angle)[:, None], down[:, None] - rise, off], axis=-1))
+
+
 def moved(mesh: Mesh, turn: Vector = (0, 0, 0), by: Vector = (0, 0, 0), scale: float = 1.0) -> Mesh:
     """The mesh scaled, turned about the x, then y, then z axis by angles in radians, and shifted."""
     rotation = np.eye(3)
@@ -191,6 +216,25 @@ def joined(meshes: Sequence[Mesh]) -> Mesh:
         np.concatenate([mesh.uv for mesh in meshes]),
         all(mesh.smooth for mesh in meshes),
     )
+
+
+def copies(mesh: Mesh, axes: Points, places: Points, scales: npt.ArrayLike = 1.0) -> Mesh:
+    """Copies of a mesh as one, each with another part of its pattern.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    axes : ndarray, shape (N, 3, 3), float64
+        Where each copy's ``x``, ``y`` and ``z`` point: ``axes[n, 0]`` is where its ``x`` does.
+    places : ndarray, shape (N, 3), float64
+        Where the origin of each goes.
+    scales : float or ndarray, shape (N,)
+    """
+    count, scale = len(places), np.broadcast_to(scales, len(places))[:, None, None]
+    vertices = scale * (mesh.vertices.astype(np.float64) @ axes) + places[:, None]
+    faces = mesh.faces.astype(np.int64) + len(mesh.vertices) * np.arange(count)[:, None, None]
+    uv = scale * mesh.uv + np.arange(count)[:, None, None] * np.array([0.137, 0.091])
+    return _mesh(vertices.reshape(-1, 3), faces.reshape(-1, 3), uv.reshape(-1, 2), mesh.smooth)
 
 
 def normals(mesh: Mesh) -> FloatArray:

@@ -50,6 +50,17 @@ def seen_from(world: World, eye: Vector, below: float = 0.0, rightwards: float =
     )
 
 
+def lamp_towards(middle: Vector, target: Vector, size: float, radiance: Vector) -> Lamp:
+    """A square lamp of a side's length that faces a point; not one straight above or below it."""
+    facing = np.array(target) - np.array(middle)
+    facing /= np.linalg.norm(facing)
+    down = np.array([0.0, 1.0, 0.0]) - facing[1] * facing
+    down *= size / np.linalg.norm(down)
+    across = np.cross(down, facing)
+    corner, first, second = (edge.tolist() for edge in (np.array(middle) - across / 2 - down / 2, across, down))
+    return Lamp(tuple(corner), tuple(first), tuple(second), radiance)
+
+
 def book(size: Vector, cover: Material, paper: Material, turn: Vector, by: Vector) -> list[Thing]:
     """A closed book of width, thickness and depth that lies on y=0 with its back to the left."""
     w, h, d = size

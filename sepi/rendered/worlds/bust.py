@@ -140,4 +140,4 @@ def _amphora_paint() -> Pattern:
     )
     worn = 1 + 0.06 * patterns.field(71, 3, 120)
     colour = np.where(black[..., None] > 0, [0.17, 0.13, 0.12], [0.74, 0.42, 0.24]) * worn[..., None]
-    return Pattern(np.clip(colour, 0.02, 0.98).astype(np.float32), (0.6, 0.6))
+    return patterns.painted(colour, 0.6)

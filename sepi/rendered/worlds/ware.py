@@ -18,12 +18,15 @@ def profile(points: list[tuple[float, float]], count: int = 120) -> Points:
     return found
 
 
-def vessel(points: list[tuple[float, float]], wall: float, foot: Vector) -> Mesh:
-    """An open vessel of an outline, its inside ``wall`` metres within; it stands on ``foot``."""
+def vessel(points: list[tuple[float, float]], wall: float, foot: Vector, floor: float = 0.006, sides: int = 96) -> Mesh:
+    """An open vessel of an outline, its inside ``wall`` metres within and ``floor`` above ``foot``, where it stands."""
     outer = profile(points)
-    inner = np.stack([np.maximum(outer[:, 0] - wall, 0.0005), np.maximum(outer[:, 1], outer[-1, 1] + wall)], 1)
-    base = np.array([[0.0005, outer[-1, 1]]])
-    return shapes.turned_body(np.concatenate([inner[::-1], outer, base]), foot)
+    low = outer[-1, 1]
+    inner = np.stack([np.maximum(outer[:, 0] - wall, 1e-5), np.maximum(outer[:, 1], low + floor)], 1)
+    shares = np.linspace(0, 1, 12, endpoint=False)[:, None]
+    within = shares * [inner[-1, 0], 0] + [1e-5, low + floor]
+    below = shares[::-1] * [outer[-1, 0], 0] + [1e-5, low]
+    return shapes.turned_body(np.concatenate([within, inner[::-1], outer, below]), foot, sides)
 
 
 def fruit(centre: Vector, radius: float, seed: int) -> Mesh:
