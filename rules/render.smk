@@ -50,4 +50,6 @@ rule render:
     message:
         "rendered/{wildcards.world}: rendering"
     shell:
-        command("sepi.rendered.command {wildcards.world:q} {params.flags} --threads {threads} --output {output:q} 2> {log:q}")
+        command(
+            "sepi.rendered.command {wildcards.world:q} {params.flags} --threads {threads} --output {output:q} 2> {log:q}"
+        )
