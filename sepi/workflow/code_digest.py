@@ -12,6 +12,7 @@ Snakemake sees the shell command of a rule, not the modules that the command imp
   is imported from the package itself;
 - not the readers of the formats, the built-in and the rendered scenes, of which a job runs one: only that counts, which
   :func:`ingest_modules` names;
+- not what is told of the rendered scenes, since to render them takes long;
 - the syntax tree without docstrings, texts of help and descriptions of parameters: neither these nor comments nor
   layout count, and every version of Python gives the same digest;
 - not other libraries: a new version of numpy reruns nothing.
