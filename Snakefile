@@ -4,6 +4,7 @@
 #   snakemake scenes      what is made of each scene, without the tables and the page that need all of them
 #   snakemake ablation    the five columns of the paper's table 4, Wang's occlusion stage, and the parts of variant best
 #   snakemake comparison  the methods that the paper compares with, computed on the same scenes
+#   snakemake rendered    path-traced scenes in several levels of noise: rendered, computed, scored by property
 #   snakemake -- FILE     one file: results/DATASET/SCENE/VARIANT/disparity.pfm
 #
 # docs/reproduce/workflow.md explains targets, configuration and what makes a job run again.
@@ -15,6 +16,7 @@ configfile: f"{workflow.current_basedir}/config.yaml"
 include: "rules/package.smk"
 include: "rules/common.smk"
 include: "rules/targets.smk"
+include: "rules/render.smk"
 include: "rules/ingest.smk"
 include: "rules/truth.smk"
 include: "rules/initial.smk"
@@ -25,14 +27,13 @@ include: "rules/export.smk"
 include: "rules/evaluate.smk"
 include: "rules/external.smk"
 include: "rules/report.smk"
-include: "rules/comparison.smk"
 include: "rules/run.smk"
 
 
 # Tables and figures, and the maps of the most accurate variant, of the paper's, and of variants that the user added
 rule all:
     input:
-        report_files(),
+        all_files(),
         result_files(LISTED_MAPS),
     message:
         "all tables, figures and maps are made"
@@ -58,10 +59,18 @@ rule ablation:
 # The compared methods on every scene: tables, page, pictures, and their maps
 rule comparison:
     input:
-        comparison_files(),
+        report_files(COMPARISON),
         result_files(METHODS),
     message:
         "all compared methods are computed"
+
+
+# The rendered scenes in every level of noise: tables by property, page and pictures
+rule rendered:
+    input:
+        lambda wildcards: rendered_files(),
+    message:
+        "all rendered scenes are made"
 
 
 onstart:

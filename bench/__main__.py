@@ -20,9 +20,11 @@ from sepi.io.files import atomic_path
 from sepi.io.readers.options import AS_GIVEN, ReadOptions
 from sepi.machine import this_machine
 from sepi.reading import read_light_field
+from sepi.rendered import NOISE_LEVELS
 from sepi.scenes import SCENES, render
-from sepi.threads import use_threads
-from sepi.variants import VARIANTS
+from sepi.scoring.scores import SCORES
+from sepi.threads import available_cores, use_threads
+from sepi.variants import VARIANTS, variant_named
 
 _PATH = click.Path(path_type=Path)
 
@@ -164,6 +166,53 @@ def digests(scene: str, size: int, views: int, threads: tuple[int, ...], variant
     click.echo(tables.markdown(rows))
     if any(row["other with"] != "none" for row in rows):
         raise SepiError("the maps depend on the threads or on when the kernels were compiled")
+
+
+@main.command()
+@click.argument("parameter", metavar="STAGE.CHOICE.NAME")
+@click.argument("values", metavar="VALUE...", nargs=-1, required=True)
+@click.option("--variant", default="best", show_default=True, help="Variant whose parameter it is.")
+@click.option(
+    "--scene",
+    "scenes",
+    multiple=True,
+    help="Built-in scene, light field or file of a rendered scene; repeatable, at least two. Those of rendered scenes "
+    "that are held out are refused.",
+)
+@click.option("--noise", type=click.Choice(NOISE_LEVELS), default="low", show_default=True, help="Of rendered scenes.")
+@click.option("--score", type=click.Choice(list(SCORES)), default="mse100", show_default=True, help="What is compared.")
+@click.option("--threads", type=click.IntRange(min=1), help="Threads to use; one per core unless given.")
+def sweep(
+    parameter: str,
+    values: tuple[str, ...],
+    variant: str,
+    scenes: tuple[str, ...],
+    noise: str,
+    score: str,
+    threads: int | None,
+) -> None:
+    """Print scores of final maps for each VALUE of a parameter, and which value wins without each of the scenes.
+
+    \b
+    Example:
+      python -m bench sweep optimize.second_order.solves 1 2 3 --scene sticks.h5 --scene bust.h5
+    """
+    from bench.sweep import scene_for_choosing, scores_of, settings_of
+    from bench.sweep import tables as tables_of
+
+    use_threads(threads or available_cores())
+    chosen = variant_named(variant)
+    stage, settings = settings_of(chosen, parameter, values)
+    # all are read before the first is computed: one that is refused is told at once
+    light_fields = {found.name: found for found in (scene_for_choosing(scene, noise) for scene in scenes)}
+    if len(light_fields) < 2:
+        raise click.UsageError("expected at least two scenes, by --scene")
+    found = {}
+    with tqdm(light_fields.items(), disable=None, leave=False, bar_format="{n}/{total} {desc} |{bar}|") as bar:
+        for name, light_field in bar:
+            bar.set_description(name)
+            found[name] = scores_of(light_field, chosen, stage, settings, score)
+    click.echo(f"{variant}, {parameter}, {SCORES[score]} of the whole map\n\n{tables_of(values, found)}")
 
 
 def _all_measured(cases: list[Case], repeats: int, threads: int) -> tuple[list[Measurement], int]:

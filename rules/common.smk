@@ -13,10 +13,12 @@ from sepi.io.result_folder import RESULT_FILES
 from sepi.variants import HANDED_ON, STAGES, VARIANTS, choice_of
 from sepi.report.plan import Plan
 from sepi.validation import require_known
-from sepi.workflow.code_digest import ROOT, code_digest, ingest_modules, stage_modules
+from sepi.workflow.code_digest import ROOT, code_digest, ingest_modules, render_modules, stage_modules
 from sepi.workflow.candidates import candidates_factor, candidates_mb
 from sepi.workflow.config import load_settings
-from sepi.workflow.result_paths import COMPARISON_ENDING, PARTS_ENDING, RESULTS, key_of, scene_files
+from sepi.rendered import RENDERED
+from sepi.workflow.rendered_scenes import rendered_scene
+from sepi.workflow.result_paths import PARTS_ENDING, RESULTS, key_of, scene_files
 
 # where a module's `prefix` puts things, and whether this is a module at all, while the rules are read
 MODIFIER = workflow.modifier
@@ -54,7 +56,19 @@ except OSError as error:
 VARIANT_LABELS = {name: variant.labels for name, variant in SETTINGS.variants.items()}
 SCENES_BY_DATASET = {name: SETTINGS.scenes_of(name) for name in SETTINGS.datasets}
 PLAN = Plan(RESULTS, SCENES_BY_DATASET, VARIANT_LABELS, list(SETTINGS.external))
-COMPARISON = PLAN.comparison()
+# report to its scenes and variants; the main one has no name, the others' files lie in folders of their names
+REPORTS = {
+    plan.report: plan
+    for plan in (
+        PLAN,
+        PLAN.comparison(),
+        PLAN.rendered(
+            [scene for _, scene in SETTINGS.rendered_scenes],
+            [name for name, entry in RENDERED.items() if entry.for_choosing],
+            SETTINGS.rendered_variants,
+        ),
+    )
+}
 
 
 def placed(path):
@@ -102,7 +116,8 @@ wildcard_constraints:
     dataset="[^/]+",
     scene="[^/]+",
     variant="[^/]+",
-    which=f"|{PARTS_ENDING}|{COMPARISON_ENDING}",
+    which="|".join([*(plan.ending() for plan in REPORTS.values()), PARTS_ENDING]),
+    report="|".join(name and f"{name}/" for name in REPORTS),
 
 
 def stage_output(stage, ending):
@@ -159,7 +174,13 @@ def result_files(variants, scenes=SETTINGS.scenes):
 
 def plan_of(which):
     """The plan of one of the files of numbers or scores, and whether it is that of the parts of variant best."""
-    return COMPARISON if which == COMPARISON_ENDING else PLAN, which == PARTS_ENDING
+    parts = which == PARTS_ENDING
+    return REPORTS["" if parts else which.removeprefix("_")], parts
+
+
+def report_of(wildcards):
+    """The plan of the report in whose folder something lies."""
+    return REPORTS[wildcards.report.removesuffix("/")]
 
 
 def scored_maps(wildcards):
@@ -194,17 +215,26 @@ def scene_of(wildcards):
     return SETTINGS.scene(wildcards.dataset, wildcards.scene)
 
 
+def source_files(scene, files):
+    """Files that a scene is read from, as inputs."""
+    return list(map(str if scene.is_rendered else own_file, files))
+
+
 def ingest_source(wildcards):
     """Where a scene comes from, as words for the ingest command."""
     scene = scene_of(wildcards)
     if scene.source is None:
         return ["--builtin", scene.name, "--size", str(scene.height)]
+    if scene.is_rendered:
+        return ["--rendered", placed(scene.source), *scene.flags]
     return [str(scene.source), *scene.flags]
 
 
 def truth_source(wildcards):
     """Where a scene's ground truth comes from, as words for its command; none where there is no ground truth."""
     scene = scene_of(wildcards)
+    if scene.is_rendered:
+        return ["--rendered", placed(scene.source)]
     return ingest_source(wildcards) if scene.source is None or scene.truth else []
 
 
@@ -267,6 +297,15 @@ def minutes_for(*seconds, **more):
         return attempt * scene_of(wildcards).minutes(*seconds, **more)
 
     return minutes
+
+
+def of_source(read, rendered):
+    """Function of wildcards: memory or time of a job that reads files, or what the renderer made, which is wider."""
+
+    def ask(wildcards, attempt):
+        return (rendered if scene_of(wildcards).is_rendered else read)(wildcards, attempt)
+
+    return ask
 
 
 def sweep_of(stage, wildcards):

@@ -2,7 +2,7 @@
 # A scene's pictures are the inputs: a changed or new one is read again.
 rule ingest:
     input:
-        files=lambda wildcards: list(map(own_file, scene_of(wildcards).files)),
+        files=lambda wildcards: source_files(scene_of(wildcards), scene_of(wildcards).files),
     output:
         light_field=SCENE.light_field,
     log:
@@ -13,8 +13,8 @@ rule ingest:
         GROUP
     threads: threads_for
     resources:
-        mem_mb=memory_for(bytes_per_sample=12, copies=3),
-        runtime=minutes_for(0.2),
+        mem_mb=of_source(memory_for(bytes_per_sample=12, copies=3), memory_for(bytes_per_sample=24)),
+        runtime=of_source(minutes_for(0.2), minutes_for(1)),
     params:
         source=ingest_source,
         disparity_range=ingest_range,

@@ -36,8 +36,8 @@ rule numbers:
     threads: 1
     resources:
         # light fields are read one after the other
-        mem_mb=500 + max(scene.samples for scene in SETTINGS.scenes.values()) * 8 // 2**20,
-        runtime=5 + sum(scene.minutes(0.1) for scene in SETTINGS.scenes.values()) // 5,
+        mem_mb=lambda wildcards: 500 + max(scene.samples for scene in scenes_of(wildcards.which)) * 8 // 2**20,
+        runtime=lambda wildcards: 5 + sum(scene.minutes(0.1) for scene in scenes_of(wildcards.which)) // 5,
     params:
         results=results_folder,
         flags=lambda wildcards: "--parts" if wildcards.which == PARTS_ENDING else "",
@@ -51,56 +51,34 @@ rule numbers:
         )
 
 
-# Tables 1 to 4, the scores after each stage and at depth discontinuities, the run times, the confidence evaluation
-rule tables:
-    input:
-        "reports/report.json",
-    output:
-        report(
-            expand("reports/{table}.csv", table=MAIN_TABLES),
-            caption="captions/tables.rst",
-            category="Tables",
-        ),
-        expand("reports/{table}.{ending}", table=MAIN_TABLES, ending=["md", "tex"]),
-    log:
-        "logs/tables.log",
-    benchmark:
-        "benchmarks/tables.tsv"
-    localrule: True
-    threads: 1
-    params:
-        folder=folder_of_output,
-        code=code_digest("sepi.report.tables"),
-    message:
-        "tables"
-    shell:
-        command("sepi.report.tables --numbers {input:q} --output {params.folder:q} 2> {log:q}")
+# The tables of each report, and those of the parts of variant best, whose numbers are a file of their own
+for which in TABLES:
 
-
-# What each part of variant best gains and costs
-rule parts_table:
-    input:
-        "reports/report_parts.json",
-    output:
-        report(
-            expand("reports/{table}.csv", table=PARTS_TABLES),
-            caption="captions/tables.rst",
-            category="Tables",
-        ),
-        expand("reports/{table}.{ending}", table=PARTS_TABLES, ending=["md", "tex"]),
-    log:
-        "logs/parts_table.log",
-    benchmark:
-        "benchmarks/parts_table.tsv"
-    localrule: True
-    threads: 1
-    params:
-        folder=folder_of_output,
-        code=code_digest("sepi.report.tables"),
-    message:
-        "table of the parts of best"
-    shell:
-        command("sepi.report.tables --numbers {input:q} --output {params.folder:q} 2> {log:q}")
+    rule:
+        name:
+            f"tables{which}"
+        input:
+            f"reports/report{which}.json",
+        output:
+            report(
+                [file for file in table_files(which) if file.endswith(".csv")],
+                caption="captions/tables.rst",
+                category="Tables",
+            ),
+            [file for file in table_files(which) if not file.endswith(".csv")],
+        log:
+            f"logs/tables{which}.log",
+        benchmark:
+            f"benchmarks/tables{which}.tsv"
+        localrule: True
+        threads: 1
+        params:
+            folder=folder_of_output,
+            code=code_digest("sepi.report.tables"),
+        message:
+            "tables"
+        shell:
+            command("sepi.report.tables --numbers {input:q} --output {params.folder:q} 2> {log:q}")
 
 
 # Charts of the numbers, for a paper
@@ -159,20 +137,20 @@ rule parts_chart:
 # on a sheet (overview); single pixels that the method is shown at work on (pixels); and the scene for the page.
 rule maps:
     input:
-        lambda wildcards: PLAN.map_inputs(wildcards.dataset, wildcards.scene),
+        lambda wildcards: report_of(wildcards).map_inputs(wildcards.dataset, wildcards.scene),
     output:
-        **page_of_scene("reports"),
+        **page_of_scene(),
         folder=report(
-            directory("reports/maps/{dataset}/{scene}"),
+            directory("reports/{report}maps/{dataset}/{scene}"),
             patterns=["{name,overview}.png"],
             caption="captions/maps.rst",
             category="Scenes",
-            subcategory="{dataset}/{scene}",
+            subcategory="{report}{dataset}/{scene}",
         ),
     log:
-        "logs/{dataset}/{scene}/maps.log",
+        "logs/{dataset}/{scene}/{report}maps.log",
     benchmark:
-        "benchmarks/{dataset}/{scene}/maps.tsv"
+        "benchmarks/{dataset}/{scene}/{report}maps.tsv"
     group:
         GROUP
     threads: 1
@@ -237,26 +215,26 @@ rule graph:
         )
 
 
-# The page: all numbers, tables and scenes in one file
+# The page of a report: all numbers, tables and scenes in one file
 rule page:
     input:
-        numbers="reports/report.json",
-        parts=PARTS,
+        numbers=lambda wildcards: f"reports/report{report_of(wildcards).ending()}.json",
+        parts=lambda wildcards: [] if wildcards.report else PARTS,
         graph="reports/page/rules.svg",
-        scenes=[f"reports/page/{dataset}/{scene}.json" for dataset, scene in SETTINGS.scenes],
+        scenes=pages_of_scenes,
         templates=TEMPLATES,
     output:
-        report("reports/index.html", caption="captions/page.rst", category="Page"),
+        report("reports/{report}index.html", caption="captions/page.rst", category="Page"),
     log:
-        "logs/page.log",
+        "logs/{report}page.log",
     benchmark:
-        "benchmarks/page.tsv"
+        "benchmarks/{report}page.tsv"
     localrule: True
     threads: 1
     resources:
         mem_mb=1000,
     params:
-        parts=lambda wildcards, input: ["--parts", input.parts] if PARTS else [],
+        parts=lambda wildcards, input: ["--parts", input.parts] if input.parts else [],
         scenes=folder_of_scenes,
         code=code_digest("sepi.report.page"),
     message:

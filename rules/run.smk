@@ -20,7 +20,7 @@ def is_new(file):
 def print_warnings():
     """Show what the readers of light fields and of external maps warned of in this run, from their logs."""
     missing = {}
-    for dataset, scene in SETTINGS.scenes:
+    for dataset, scene in (*SETTINGS.scenes, *SETTINGS.rendered_scenes):
         for command in ("ingest", "truth", "external"):
             log = Path(placed(f"logs/{dataset}/{scene}/{command}.log"))
             for line in log.read_text().splitlines() if is_new(log) else ():
@@ -51,7 +51,7 @@ def print_written(tables, maps):
 
 def print_all_written():
     """Name whatever of the report and the final maps this run wrote."""
-    print_written([*report_files(), *ablation_files(), *comparison_files()], result_files(SETTINGS.variants))
+    print_written(every_file(), result_files(SETTINGS.variants))
 
 
 def run_begins():

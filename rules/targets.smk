@@ -1,18 +1,20 @@
-# What the page, the tables and the pictures consist of, and what they are made of.
+# What the pages, the tables and the pictures consist of, and what they are made of.
 
 from dataclasses import replace
 
-from sepi.report.plan import COMPARISON_TABLES, PARTS_TABLES, TABLES, TEMPLATES
+from sepi.report.plan import COMPARISON, PARTS_TABLES, TEMPLATES
 from sepi.report.published import FOLDER as PUBLISHED
 
-MAIN_TABLES = [table for table in TABLES if table not in PARTS_TABLES]
 PARTS = "reports/report_parts.json" if SETTINGS.report.parts_of_best else []
-COMPARISON_REPORT = "reports/comparison"
+# what ends the name of a file of numbers, to the folder and the tables that are made of it
+TABLES = {plan.ending(): (f"reports/{name}".rstrip("/"), plan.tables()) for name, plan in REPORTS.items()}
+TABLES[PARTS_ENDING] = ("reports", PARTS_TABLES)
 
 
-def table_files(tables):
-    """Each of the tables as CSV, Markdown and LaTeX."""
-    return [f"reports/{table}.{ending}" for table in tables for ending in ("csv", "md", "tex")]
+def table_files(which):
+    """The tables of one of the files of numbers, each as CSV, Markdown and LaTeX."""
+    folder, tables = TABLES[which]
+    return [f"{folder}/{table}.{ending}" for table in tables for ending in ("csv", "md", "tex")]
 
 
 def figure_files(names):
@@ -20,33 +22,30 @@ def figure_files(names):
     return [f"reports/figures/{name}.{ending}" for name in names for ending in ("png", "pdf")]
 
 
-def pages(folder):
-    """The page below a folder of the report, if there is to be one."""
-    return [f"{folder}/index.html"] if SETTINGS.has_page else []
+def report_files(name=""):
+    """What lies in the folder of a report: page if there is one, numbers, tables, and pictures of every scene."""
+    plan = REPORTS[name]
+    folder, _ = TABLES[plan.ending()]
+    page = [f"{folder}/index.html"] if SETTINGS.has_page else []
+    pictures = [f"{folder}/maps/{dataset}/{scene}" for dataset, scene in plan.pictured]
+    return [*page, f"reports/report{plan.ending()}.json", *table_files(plan.ending()), *pictures]
 
 
-def page_of_scene(folder):
-    """What the page needs of a scene, as an output of the rule that draws its pictures; nothing without a page."""
-    return {"page": f"{folder}/page/{{dataset}}/{{scene}}.json"} if SETTINGS.has_page else {}
-
-
-def page_flags(wildcards, output):
-    """The page's part of a scene, as words for the command that draws its pictures."""
-    return ["--page", output.page] if SETTINGS.has_page else []
-
-
-def report_files():
-    """Page if there is one, numbers, all tables and charts but those of the parts of ``best``, pictures of every scene."""
-    pictures = [f"reports/maps/{dataset}/{scene}" for dataset, scene in SETTINGS.scenes]
+def all_files():
+    """The main report, its charts, and the parts of ``best`` if they are asked for."""
     charts = figure_files(["ablation", "time_and_memory"])
-    parts = ablation_files() if PARTS else []
-    tables = table_files(MAIN_TABLES)
-    return list(dict.fromkeys([*pages("reports"), "reports/report.json", *tables, *charts, *parts, *pictures]))
+    return list(dict.fromkeys([*report_files(), *charts, *(ablation_files() if PARTS else [])]))
 
 
 def ablation_files():
     """The paper's table 4, and the ablation of ``best``."""
-    return [*table_files(["table4_ablation", *PARTS_TABLES]), *figure_files(["ablation", "ablation_best"])]
+    paper = [file for file in table_files("") if Path(file).stem == "table4_ablation"]
+    return [*paper, *table_files(PARTS_ENDING), *figure_files(["ablation", "ablation_best"])]
+
+
+def every_file():
+    """All of every report."""
+    return [*all_files(), *ablation_files(), *(file for name in REPORTS if name for file in report_files(name))]
 
 
 def measured_files(which):
@@ -55,21 +54,36 @@ def measured_files(which):
     return plan.number_inputs(parts)
 
 
-def plan_of_scene(wildcards, plan=PLAN):
+def scenes_of(which):
+    """The scenes of one of the files of numbers."""
+    return [SETTINGS.scene(*pair) for pair in plan_of(which)[0].pairs]
+
+
+def page_of_scene():
+    """What the page needs of a scene, as an output of the rule that draws its pictures; nothing without a page."""
+    return {"page": "reports/{report}page/{dataset}/{scene}.json"} if SETTINGS.has_page else {}
+
+
+def page_flags(wildcards, output):
+    """The page's part of a scene, as words for the command that draws its pictures."""
+    return ["--page", output.page] if SETTINGS.has_page else []
+
+
+def pages_of_scenes(wildcards):
+    """What a page is made of, by scene."""
+    return [
+        f"reports/{wildcards.report}page/{dataset}/{scene}.json" for dataset, scene in report_of(wildcards).pictured
+    ]
+
+
+def plan_of_scene(wildcards):
     """A plan for one scene alone, so that another scene in the configuration does not redraw it."""
-    return replace(plan, scenes={wildcards.dataset: [wildcards.scene]}).to_json()
+    return replace(report_of(wildcards), scenes={wildcards.dataset: [wildcards.scene]}).to_json()
 
 
 def pixels_of(wildcards):
     """The pixels of a scene that the configuration asks for, as JSON."""
     return json.dumps(SETTINGS.report.pixels.get(f"{wildcards.dataset}/{wildcards.scene}", []))
-
-
-def comparison_files():
-    """The page of the comparison, its numbers and tables, and pictures of every scene."""
-    tables = [f"{COMPARISON_REPORT}/{table}.{ending}" for table in COMPARISON_TABLES for ending in ("csv", "md", "tex")]
-    pictures = [f"{COMPARISON_REPORT}/maps/{dataset}/{scene}" for dataset, scene in SETTINGS.scenes]
-    return [*pages(COMPARISON_REPORT), f"reports/report{COMPARISON_ENDING}.json", *tables, *pictures]
 
 
 def external_inputs(wildcards):
@@ -82,10 +96,10 @@ def names_like(target):
     """Names of rules, and of files that are made, of which one may be meant by a target that nothing makes."""
     rules = [rule.name for rule in workflow.rules]
     scene = tuple(Path(target).parts[1:3])
-    if scene in SETTINGS.scenes:
+    if scene in {**SETTINGS.scenes, **SETTINGS.rendered_scenes}:
         known = PLAN.files(*scene)
         return [*rules, *result_files(SETTINGS.variants, [scene]), *map(str, (known.light_field, known.scores()))]
-    return [*rules, *report_files(), *ablation_files(), *comparison_files()]
+    return [*rules, *every_file()]
 
 
 def folder_of_output(wildcards, output):

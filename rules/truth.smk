@@ -2,7 +2,7 @@
 # gets a file that says so.
 rule truth:
     input:
-        files=lambda wildcards: list(map(own_file, scene_of(wildcards).truth)),
+        files=lambda wildcards: source_files(scene_of(wildcards), scene_of(wildcards).truth),
     output:
         truth=SCENE.truth,
     log:

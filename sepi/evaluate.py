@@ -66,8 +66,8 @@ def evaluations_of(light_field: LightField, maps: Mapping[str, FloatMap]) -> dic
     Parameters
     ----------
     light_field : LightField
-        Its own masks ``occluded`` and ``textureless`` are used where it has them, else those of
-        :mod:`sepi.scoring.regions`. Without ground truth the evaluations are empty.
+        Scored over the regions of :func:`sepi.scoring.scores.region_masks`. Without ground truth the evaluations are
+        empty.
     maps : mapping of str to ndarray, shape (H, W), float32
         Name to disparity in pixels per view step.
 

@@ -23,6 +23,9 @@ _PATH = click.Path(path_type=Path)
 @click.command(name="python -m sepi.ingest", cls=SepiCommand)
 @click.argument("path", type=_PATH, required=False)
 @builtin_flags
+@click.option("--rendered", type=_PATH, help="File of a rendered scene, from sepi.rendered.command, in place of PATH.")
+@click.option("--noise", default="off", show_default=True, help="Rendered: level of noise.")
+@click.option("--seed", type=int, default=1, show_default=True, help="Rendered: seed of the noise.")
 @range_to_search
 @reading_flags
 @click.option("--threads", type=click.IntRange(min=1), default=1, show_default=True, help="Threads to use.")
@@ -33,6 +36,9 @@ def main(
     builtin: str | None,
     size: int,
     views: int,
+    rendered: Path | None,
+    noise: str,
+    seed: int,
     disparity_range: tuple[float, float] | None,
     reading: Reading,
     threads: int,
@@ -42,10 +48,14 @@ def main(
     """Read the light field at PATH and write it as one HDF5 file with a disparity range."""
     started = time.perf_counter()
     use_threads(threads)
-    if (path is None) == (builtin is None):
-        raise click.UsageError("expected either PATH or --builtin NAME")
+    if [path, builtin, rendered].count(None) != 2:
+        raise click.UsageError("expected one of PATH, --builtin NAME and --rendered FILE")
     if path is not None:
         light_field = reading.read(path, truth=False)
+    elif rendered is not None:
+        from sepi.rendered.exposure import read_exposed
+
+        light_field = replace(read_exposed(rendered, noise, seed), ground_truth=None, masks={})
     else:
         from sepi.scenes import render
 

@@ -17,15 +17,28 @@ _PATH = click.Path(path_type=Path)
 @click.command(name="python -m sepi.truth", cls=SepiCommand)
 @click.argument("path", type=_PATH, required=False)
 @builtin_flags
+@click.option("--rendered", type=_PATH, help="File of a rendered scene, from sepi.rendered.command, in place of PATH.")
 @reading_flags
 @click.option("--output", type=_PATH, required=True, help="HDF5 file to write.")
-def main(path: Path | None, builtin: str | None, size: int, views: int, reading: Reading, output: Path) -> None:
-    """Write ground truth and masks of the light field at PATH; with neither PATH nor --builtin, that there are none."""
+def main(
+    path: Path | None,
+    builtin: str | None,
+    size: int,
+    views: int,
+    rendered: Path | None,
+    reading: Reading,
+    output: Path,
+) -> None:
+    """Write ground truth and masks of the light field at PATH; without one that is named, that there are none."""
     truth: Truth = (None, {})
     if path is not None:
         from sepi.io.readers.formats import read_truth
 
         truth = read_truth(path, reading.options, reading.file_format)
+    elif rendered is not None:
+        from sepi.rendered.exposure import read_render_truth
+
+        truth = read_render_truth(rendered)
     elif builtin is not None:
         from sepi.scenes.light_field import scene_truth
 

@@ -25,12 +25,14 @@ from sepi.io.scores import Scores, read_evaluations, read_scores, without_nan
 from sepi.io.truth import read_with_truth
 from sepi.matching.unknown import with_unknown
 from sepi.report.plan import Plan
+from sepi.report.pooled import pooled_q25
 from sepi.report.runs import Runs, read_json
 from sepi.report.tables import table
 from sepi.report.tabular.layout import as_json, write
 from sepi.scoring.confidence import decile_errors, oracle, sparsification
 from sepi.scoring.scores import COUNTS, EDGE_SCORES, PROTOCOLS, SCORED_REGIONS, SCORES
 from sepi.validation import require_known
+from sepi.workflow.rendered_scenes import DATASET
 from sepi.workflow.result_paths import stage_of
 
 
@@ -51,8 +53,9 @@ def collect(plan: Plan, parts: bool = False) -> dict[str, Any]:
         result, and the machines that the stages ran on, with their versions; ``protocols``: name to border; ``plan``;
         ``parameters``: stage to choice to what it ran with, a list, as scenes may differ; ``scenes``: a list, each
         with ``dataset``, ``scene``, ``light_field``, ``stages`` (path of choices to ``stage``, ``scores``,
-        ``seconds``, ``peak_memory_mb``), ``confidence`` (variant to errors) and ``external`` (method to ``problem``,
-        ``source``, ``sha256``, ``scores``); ``tables``: name to :func:`sepi.report.tabular.layout.as_json`. With
+        ``seconds``, ``peak_memory_mb``), ``confidence`` (variant to errors, of the main report) and ``external``
+        (method to ``problem``, ``source``, ``sha256``, ``scores``); of the rendered scenes ``pooled_q25``
+        (:data:`sepi.report.pooled.Pooled`); ``tables``: name to :func:`sepi.report.tabular.layout.as_json`. With
         ``parts``, scenes have ``stages`` only, and ``scores`` is None but after the last stage.
 
     Raises
@@ -68,6 +71,8 @@ def collect(plan: Plan, parts: bool = False) -> dict[str, Any]:
         "parameters": parameters,
         "scenes": [_scene(plan, dataset, scene, parts) for dataset, scene in plan.pairs],
     }
+    if plan.report == DATASET:
+        numbers["pooled_q25"] = pooled_q25(plan)
     numbers = without_nan(numbers)
     runs = Runs(numbers)
     tables = {name: as_json(table(name, runs)) for name in plan.tables(parts)}
@@ -112,7 +117,7 @@ def _scene(plan: Plan, dataset: str, scene: str, parts: bool) -> dict[str, Any]:
     return found | {
         "light_field": _light_field(plan.light_field_file(dataset, scene), plan.truth_file(dataset, scene)),
         "stages": _stages(plan, dataset, scene, parts),
-        "confidence": _confidence(plan, dataset, scene),
+        "confidence": _confidence(plan, dataset, scene) if plan.tells_confidence else {},
         "external": _external(plan, dataset, scene),
     }
 
@@ -201,11 +206,12 @@ def _external(plan: Plan, dataset: str, scene: str) -> dict[str, Any]:
 def _ordered(scores: Mapping[str, Mapping[str, Scores]]) -> dict[str, Any]:
     """Scores in the order of protocols, regions and names."""
     names = (*SCORES, *EDGE_SCORES, *COUNTS)
-    return {
-        protocol: {region: {name: scores[protocol][region][name] for name in names} for region in SCORED_REGIONS}
-        for protocol in PROTOCOLS
-        if scores
-    }
+    found: dict[str, Any] = {}
+    for protocol in PROTOCOLS if scores else ():
+        regions = scores[protocol]
+        order = dict.fromkeys([*SCORED_REGIONS, *sorted(regions)])
+        found[protocol] = {region: {name: regions[region][name] for name in names} for region in order}
+    return found
 
 
 def _digest(values: npt.NDArray[Any]) -> str:

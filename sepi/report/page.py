@@ -20,6 +20,7 @@ from sepi.report import published
 from sepi.report.plots.pictures import error_scale, scale_colours
 from sepi.report.runs import Runs, read_json, read_numbers
 from sepi.report.web import page_data
+from sepi.workflow.rendered_scenes import DATASET
 
 SCRIPTS = ("unpack.js", "panels.js", "viewer.js", "cloud.js", "pixel.js", "tables.js", "page.js")
 """Scripts of a page, in the order in which they are run."""
@@ -87,6 +88,8 @@ def page_of(
         HTML.
     """
     runs = Runs(numbers)
+    # averages over all of the rendered scenes and levels of noise would say nothing, and nothing is published of them
+    averaged = runs.plan.report != DATASET
     first_title = page_data.first_scene(runs)
     shown = [scene for scene in scenes if f"{scene['dataset']}/{scene['scene']}" == first_title] or scenes
     tables = {name: numbers["tables"][name] for name in runs.plan.tables() if name in numbers["tables"]}
@@ -98,13 +101,13 @@ def page_of(
         .render(
             title="sepi: light field depth by stitched epipolar plane images",
             numbers=numbers,
-            is_comparison=runs.plan.is_comparison,
+            report=runs.plan.report,
             variants=page_data.shown_variants(runs, parts),
             tables=tables,
-            headline=page_data.headline(runs),
-            missing=page_data.missing_scenes(runs),
+            headline=page_data.headline(runs) if averaged else [],
+            missing=page_data.missing_scenes(runs) if averaged else {},
             dataset_titles=published.DATASETS,
-            bars=page_data.ablation_bars(runs),
+            bars=page_data.ablation_bars(runs) if averaged else [],
             part_bars=[] if parts is None else page_data.part_bars(Runs(parts)),
             times=page_data.stage_times(runs),
             total_seconds=page_data.total_seconds(*filter(None, (numbers, parts))),
@@ -152,7 +155,7 @@ def command(numbers_path: Path, parts_path: Path | None, graph_path: Path, outpu
     numbers = read_numbers(numbers_path)
     html = page_of(
         numbers,
-        [read_scene(scenes / dataset / f"{scene}.json") for dataset, scene in Runs(numbers).plan.pairs],
+        [read_scene(scenes / dataset / f"{scene}.json") for dataset, scene in Runs(numbers).plan.pictured],
         graph_path.read_text(encoding="utf-8"),
         None if parts_path is None else read_numbers(parts_path),
     )

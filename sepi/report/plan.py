@@ -18,7 +18,8 @@ from pydantic.dataclasses import dataclass
 from sepi.compared.methods import LEARNED, METHODS
 from sepi.errors import SepiError
 from sepi.variants import HANDED_ON, PARTS_OF_BEST, VARIANTS
-from sepi.workflow.result_paths import COMPARISON_ENDING, PARTS_ENDING, SceneFiles, key_of, scene_files
+from sepi.workflow.rendered_scenes import DATASET, rendered_scene
+from sepi.workflow.result_paths import PARTS_ENDING, SceneFiles, key_of, scene_files
 
 MAIN_VARIANT = "paper"
 """The variant that does what the paper describes; its figures stand beside the published ones."""
@@ -28,6 +29,9 @@ BEST_VARIANT = "best"
 
 FAST_VARIANT = "fast"
 """The quick variant, which stands beside them in the comparison."""
+
+COMPARISON = "comparison"
+"""The report of the compared methods; that of the rendered scenes is called as they are, the main one nothing."""
 
 TABLES = (
     "table1_mse",
@@ -44,6 +48,9 @@ TABLES = (
 
 COMPARISON_TABLES = ("methods", "table1_mse", "table2_q25", "table3_regions", "edges", "runtime")
 """Tables of the comparison with the methods that are computed here, in the order of its page."""
+
+RENDERED_TABLES = ("properties_mse", "properties_q25", "properties_badpix", "scenes_mse", "scenes_badpix")
+"""Tables of the rendered scenes, in the order of their page."""
 
 TEMPLATES = sorted(
     path for path in (Path(__file__).parent / "web" / "templates").iterdir() if path.suffix in (".j2", ".js", ".css")
@@ -72,8 +79,10 @@ class Plan:
         Variant to stage to the label of its choice (:func:`sepi.variants.choice_label`), in order.
     external : sequence of str
         External methods, in the order of the tables.
-    beside : sequence of str
-        Variants that stand beside the published figures, where these are not the best one and the paper's alone.
+    report : str
+        :data:`COMPARISON`, ``rendered``, or empty for the main one.
+    choosing : sequence of str
+        Rendered scenes, without their noise, that parameters may be chosen on.
     missing : sequence of str
         ``DATASET/SCENE`` of those that are left out, since a job of theirs failed.
     """
@@ -82,15 +91,15 @@ class Plan:
     scenes: Mapping[str, Names]
     variants: Mapping[str, Mapping[str, str]]
     external: Names = ()
-    beside: Names = ()
+    report: str = ""
+    choosing: Names = ()
     missing: Names = ()
 
     @classmethod
     def from_json(cls, results: Path, text: str) -> Plan:
         """Plan from JSON ``{"scenes": {DATASET: [SCENE]}, "variants": {VARIANT: {STAGE: CHOICE}}}``.
 
-        External methods, ``"external": [NAME]``, variants, ``"beside": [NAME]``, and scenes, ``"missing": [NAME]``, may
-        be added.
+        The other attributes may be added.
 
         Raises
         ------
@@ -110,14 +119,26 @@ class Plan:
 
     def to_json(self) -> str:
         """The text that :meth:`from_json` reads; the results' folder is not part of it."""
-        return json.dumps({key: getattr(self, key) for key in ("scenes", "variants", "external", "beside", "missing")})
+        keys = ("scenes", "variants", "external", "report", "choosing", "missing")
+        return json.dumps({key: getattr(self, key) for key in keys})
 
     def comparison(self) -> Plan:
         """The plan of the comparison: this project's variants and the compared methods, computed on the same scenes."""
         ours = [BEST_VARIANT, FAST_VARIANT, MAIN_VARIANT]
         own = [name for name in self.variants if name not in VARIANTS]
         names = [name for name in (*ours, *own, *METHODS) if name in self.variants]
-        return replace(self, variants={name: self.variants[name] for name in names}, beside=tuple(names))
+        return replace(self, variants={name: self.variants[name] for name in names}, report=COMPARISON)
+
+    def rendered(self, scenes: Sequence[str], choosing: Sequence[str], variants: Sequence[str] | None = None) -> Plan:
+        """The plan of the rendered scenes: of these variants and the paper's, those of the comparison unless given."""
+        names = self.comparison().variants if variants is None else dict.fromkeys([*variants, MAIN_VARIANT])
+        return replace(
+            self,
+            scenes={DATASET: tuple(scenes)},
+            variants={name: self.variants[name] for name in names},
+            report=DATASET,
+            choosing=tuple(choosing),
+        )
 
     def without(self, scenes: Collection[tuple[str, str]]) -> Plan:
         """The plan of the other scenes, which says that these are missing."""
@@ -125,16 +146,16 @@ class Plan:
         there = {dataset: [name for other, name in left if other == dataset] for dataset, _ in left}
         return replace(self, scenes=there, missing=tuple("/".join(pair) for pair in self.pairs if pair in scenes))
 
-    @property
-    def is_comparison(self) -> bool:
-        """Whether this is the plan of the comparison, which has tables and score files of its own."""
-        return bool(self.beside)
-
     def tables(self, parts: bool = False) -> tuple[str, ...]:
         """Names of the tables that are made of one of the files of numbers, in the order of the page."""
-        if self.is_comparison:
-            return COMPARISON_TABLES
+        if self.report:
+            return COMPARISON_TABLES if self.report == COMPARISON else RENDERED_TABLES
         return tuple(name for name in TABLES if (name in PARTS_TABLES) == parts)
+
+    @property
+    def tells_confidence(self) -> bool:
+        """Whether a table says what confidence is worth, which takes a look at every map."""
+        return "confidence" in self.tables()
 
     @property
     def stages(self) -> list[str]:
@@ -145,6 +166,11 @@ class Plan:
     def pairs(self) -> list[tuple[str, str]]:
         """Every ``(dataset, scene)``."""
         return [(dataset, scene) for dataset, scenes in self.scenes.items() for scene in scenes]
+
+    @property
+    def pictured(self) -> list[tuple[str, str]]:
+        """Every ``(dataset, scene)`` but those whose noise alone is another."""
+        return [pair for pair in self.pairs if pair[0] != DATASET or rendered_scene(pair[1]).seed == 1]
 
     def files(self, dataset: str, scene: str) -> SceneFiles:
         """Where the files of a scene lie."""
@@ -168,7 +194,7 @@ class Plan:
 
     def ending(self, parts: bool = False) -> str:
         """What ends the names of the files of scores and numbers."""
-        return COMPARISON_ENDING if self.is_comparison else PARTS_ENDING if parts else ""
+        return PARTS_ENDING if parts else f"_{self.report}" if self.report else ""
 
     def external_file(self, dataset: str, scene: str) -> Path:
         """The maps and scores of all external methods for a scene."""
@@ -198,7 +224,8 @@ class Plan:
                 files += [self.stage_file(dataset, scene, variant, stage, "time.json") for stage in self.stages]
             if not parts:
                 files += [self.light_field_file(dataset, scene), self.truth_file(dataset, scene)]
-                files += [self.stage_file(dataset, scene, variant, last) for variant in self.compared]
+                compared = self.compared if self.tells_confidence else []
+                files += [self.stage_file(dataset, scene, variant, last) for variant in compared]
                 files += [self.external_file(dataset, scene)] if self.external else []
         return list(dict.fromkeys(files))
 
@@ -211,7 +238,7 @@ class Plan:
     @property
     def compared(self) -> list[str]:
         """Variants that stand beside the published figures, where the plan has them."""
-        return list(self.beside) or self.detailed
+        return list(self.variants) if self.report else self.detailed
 
     @property
     def detailed(self) -> list[str]:

@@ -84,6 +84,11 @@ class Runs:
         """Why an external map has no scores, in a few words; empty where it has some or there is no ground truth."""
         return str(self._scenes[dataset, scene]["external"][method]["problem"])
 
+    def pooled_q25(self, method: str, level: str, region: str) -> float:
+        """Q25 x100 over the pixels of several scenes (:func:`sepi.report.pooled.pooled_q25`)."""
+        found: float = _with_nan(self.numbers["pooled_q25"][method][level].get(region))
+        return found
+
     def _stage(self, dataset: str, scene: str, variant: str, stage: str) -> dict[str, Any]:
         key = self.plan.stage_key(variant, stage)
         stages: dict[str, dict[str, Any]] = self._scenes[dataset, scene]["stages"]

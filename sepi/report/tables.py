@@ -19,6 +19,8 @@ from sepi.report.tabular.edges import edge_table
 from sepi.report.tabular.latex import as_latex
 from sepi.report.tabular.layout import Report, as_csv, write
 from sepi.report.tabular.markdown import as_markdown
+from sepi.report.tabular.properties import property_table
+from sepi.report.tabular.properties import scene_table as rendered_scene_table
 from sepi.report.tabular.stages import runtime_table, stage_table
 from sepi.validation import require_known
 
@@ -33,6 +35,11 @@ BUILDERS: dict[str, Callable[[Runs], Report]] = {
     "confidence": confidence_table,
     "stages": stage_table,
     "runtime": runtime_table,
+    "properties_mse": lambda runs: property_table(runs, "mse100"),
+    "properties_q25": lambda runs: property_table(runs, "q25"),
+    "properties_badpix": lambda runs: property_table(runs, "badpix007"),
+    "scenes_mse": lambda runs: rendered_scene_table(runs, "mse100"),
+    "scenes_badpix": lambda runs: rendered_scene_table(runs, "badpix007"),
 }
 """Name of each table to the function that makes it."""
 

@@ -54,7 +54,7 @@ DISCONTINUITIES = "discontinuities"
 """Name of the region beside depth discontinuities."""
 
 SCORED_REGIONS: tuple[str, ...] = (*REGIONS, DISCONTINUITIES)
-"""Regions that are scored."""
+"""Regions that are scored of every scene; one that brings masks of other names has them scored, too."""
 
 
 def score(
@@ -157,8 +157,7 @@ def score_regions(
     Returns
     -------
     dict
-        Protocol (``paper``, ``benchmark``) to region (``all``, ``occluded``, ``textureless``,
-        ``discontinuities``) to the scores of :func:`score`.
+        Protocol (``paper``, ``benchmark``) to region (``all``, and those of ``masks``) to the scores of :func:`score`.
 
     Raises
     ------
@@ -198,13 +197,13 @@ def region_masks(light_field: LightField) -> dict[str, BoolMap]:
     Parameters
     ----------
     light_field : LightField
-        With ground truth. Its own masks ``occluded`` and ``textureless`` are taken where it has them; the others are
-        computed (:mod:`sepi.scoring.regions`, :mod:`sepi.scoring.edges`).
+        With ground truth. All of its own masks are taken; ``occluded`` and ``textureless``, where it has none, and
+        ``discontinuities`` are computed (:mod:`sepi.scoring.regions`, :mod:`sepi.scoring.edges`).
 
     Returns
     -------
     dict of str to ndarray, shape (H, W), bool
-        ``occluded``, ``textureless`` and ``discontinuities``.
+        ``occluded``, ``textureless`` and ``discontinuities``, then the scene's others by name.
 
     Raises
     ------
@@ -233,8 +232,9 @@ def region_masks(light_field: LightField) -> dict[str, BoolMap]:
             masks["occluded"] = regions.occluded(light_field.ground_truth, light_field.baselines)
         if "textureless" not in masks:
             masks["textureless"] = regions.textureless(light_field.reference_view)
-    found = {name: masks[name] for name in names}
-    return found | {DISCONTINUITIES: edges_of(light_field.ground_truth).region}
+    edges = edges_of(light_field.ground_truth).region
+    found = {name: masks[name] for name in names} | {DISCONTINUITIES: edges}
+    return found | {name: masks[name] for name in sorted(masks) if name not in (WHOLE_MAP, *found)}
 
 
 def _within(border: int, shape: tuple[int, ...]) -> BoolMap:

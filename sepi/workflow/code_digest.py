@@ -10,8 +10,9 @@ Snakemake sees the shell command of a rule, not the modules that the command imp
 - not what stands below ``if TYPE_CHECKING:``, which never runs;
 - not the ``__init__`` of a package on the way to a module: it is run, but nothing of it is used. It counts where a name
   is imported from the package itself;
-- not the readers of the formats and the built-in scenes, of which a job runs one: only that one counts, which
+- not the readers of the formats, the built-in and the rendered scenes, of which a job runs one: only that counts, which
   :func:`ingest_modules` names;
+- not what is told of the rendered scenes, since to render them takes long;
 - the syntax tree without docstrings, texts of help and descriptions of parameters: neither these nor comments nor
   layout count, and every version of Python gives the same digest;
 - not other libraries: a new version of numpy reruns nothing.
@@ -42,6 +43,7 @@ _NOT_RUN = ("TYPE_CHECKING", "__name__ == '__main__'")
 # packages and modules of which a job runs one
 _ALTERNATIVES = (
     "scenes",
+    "rendered",
     *(
         f"io.readers.{name}"
         for name in (
@@ -58,8 +60,9 @@ _ALTERNATIVES = (
         )
     ),
 )
-# what is told to people alone
+# what is told to people alone: words of calls, and what the rendered scenes are
 _TOLD = ("help", "description")
+_TELLING = "rendered.catalogue"
 
 
 def stage_modules(stage: str, choice: Choice) -> tuple[str, ...]:
@@ -72,6 +75,11 @@ def stage_modules(stage: str, choice: Choice) -> tuple[str, ...]:
 def ingest_modules(reader: str) -> tuple[str, ...]:
     """Modules that decide what is in a light field's file: ingest, and the module that reads or renders the views."""
     return ("sepi.ingest", reader)
+
+
+def render_modules(world: str) -> tuple[str, ...]:
+    """Modules that decide what is in the file of a rendered scene: the renderer, and the module of that scene."""
+    return ("sepi.rendered.rendering", f"sepi.rendered.worlds.{world}")
 
 
 @cache
@@ -109,7 +117,7 @@ def imported_modules(*modules: str, root: Path = ROOT) -> set[str]:
         name = waiting.pop()
         if name not in found:
             found.add(name)
-            followed = _code_and_imports(name, root)[1]
+            followed = [other for other in _code_and_imports(name, root)[1] if other.partition(".")[2] != _TELLING]
             waiting.extend(other for other in followed if _is_alternative(name) or not _is_alternative(other))
     return found
 

@@ -14,6 +14,7 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from sepi.compared.methods import LEARNED
 from sepi.errors import SepiError
 from sepi.io.disparity_maps import SUFFIXES
 from sepi.io.external_maps import ExternalSource
@@ -26,6 +27,7 @@ from sepi.validation import require_known, validated
 from sepi.variants import VARIANT_ENTRIES, VARIANTS, Variant, variant_from
 from sepi.workflow.datasets import LONGEST_NAME, Scene, own_scene, require_plain_path, scenes_in
 from sepi.workflow.parameters import default_values, stage_settings
+from sepi.workflow.rendered_dataset import Rendered
 from sepi.workflow.result_paths import RESULTS
 
 # names of folders, panels and columns of tables that stand beside those of variants
@@ -35,7 +37,7 @@ _BUILTIN_VIEWS = 81
 # keys whose values are text even where they look like numbers
 _TEXTS = ("path", "pattern", "variable", "include", "exclude")
 # what is drawn of a scene
-_PICTURES = re.compile(r"reports/(?:comparison/)?(?:maps/([^/]+)/([^/]+)|page/([^/]+)/([^/]+)\.json)")
+_PICTURES = re.compile(r"reports/(?:comparison/|rendered/)?(?:maps/([^/]+)/([^/]+)|page/([^/]+)/([^/]+)\.json)")
 _WORDS = {"true": True, "false": False, "null": None}
 
 
@@ -93,7 +95,7 @@ class OwnLightField(_Keys):
         return (*flags, "--follow-links") if self.follow_links else tuple(flags)
 
 
-PAGES = ("reports/index.html", "reports/comparison/index.html")
+PAGES = tuple(f"reports/{report}index.html" for report in ("", "comparison/", "rendered/"))
 
 MOST_ON_PAGE = 50
 """Scenes that a page has unless it is asked for: 100 MB, which a browser still opens."""
@@ -141,6 +143,11 @@ class Config(_Keys):
         "{lego: {path: /data/lego, grid: [17, 17]}}. Beside path: format, grid, pattern, axes, variable, central, "
         "order, exclude, view, row_spacing, white, follow_links, which mean what the flags of 'sepi depth' mean.",
     )
+    rendered: Rendered = Field(
+        Rendered(),
+        description="Dataset 'rendered', of 'snakemake rendered' alone: path-traced scenes with exact ground truth, in "
+        "several levels of noise (docs/reproduce/rendered.md). To render them needs the extra sepi[render].",
+    )
     external: dict[str, dict[str, Any]] = Field(
         {},
         description="Disparity maps of external methods, by the method's name, to be scored and shown beside ours: "
@@ -175,7 +182,9 @@ class Settings:
     Attributes
     ----------
     scenes : mapping of (dataset, scene) to Scene
-        Every scene to run on, in the tables' order.
+        Every scene of ``all``, ``ablation`` and ``comparison``, in the tables' order.
+    rendered_scenes : mapping of (dataset, scene) to Scene
+        Those of ``rendered``.
     variants : mapping of str to Variant
         The built-in variants, then the user's own.
     parameters : mapping of stage to label to Parameters
@@ -184,18 +193,29 @@ class Settings:
         External methods, and where their maps are.
     report : Report
         What the report's page shows beside the rest.
+    rendered : Rendered
+        How scenes are rendered.
     """
 
     scenes: Mapping[tuple[str, str], Scene]
+    rendered_scenes: Mapping[tuple[str, str], Scene]
     variants: Mapping[str, Variant]
     parameters: Mapping[str, Mapping[str, Parameters]]
     external: Mapping[str, ExternalSource]
     report: Report
+    rendered: Rendered
 
     @property
     def datasets(self) -> list[str]:
-        """Names of the datasets that have scenes."""
+        """Names of the datasets that have scenes, but for the rendered ones."""
         return list(dict.fromkeys(dataset for dataset, _ in self.scenes))
+
+    @property
+    def rendered_variants(self) -> list[str] | None:
+        """The variants that the user chose for the rendered scenes, if any."""
+        if self.rendered.variants == "all":
+            return [name for name in VARIANTS if name not in LEARNED]
+        return self.rendered.variants
 
     @property
     def own_variants(self) -> list[str]:
@@ -204,7 +224,7 @@ class Settings:
 
     def scenes_of(self, dataset: str) -> list[str]:
         """Names of a dataset's scenes."""
-        return [name for other, name in self.scenes if other == dataset]
+        return [name for other, name in (*self.scenes, *self.rendered_scenes) if other == dataset]
 
     def scene(self, dataset: str, name: str) -> Scene:
         """A scene by name.
@@ -215,10 +235,12 @@ class Settings:
             If there is none; the message suggests the nearest.
         """
         # thousands of jobs ask: all names are gone through only where one is wrong
-        if (dataset, name) not in self.scenes:
-            require_known("dataset", [dataset], self.datasets)
-            require_known(f"scene of dataset '{dataset}'", [name], self.scenes_of(dataset))
-        return self.scenes[dataset, name]
+        for known in (self.scenes, self.rendered_scenes):
+            if (dataset, name) in known:
+                return known[dataset, name]
+        require_known("dataset", [dataset], dict.fromkeys([*self.datasets, *(one for one, _ in self.rendered_scenes)]))
+        require_known(f"scene of dataset '{dataset}'", [name], self.scenes_of(dataset))
+        raise AssertionError(f"{dataset}/{name} is among the known ones")
 
     def require_target(self, path: str) -> None:
         """Check the names in a file that a user asks for, if it lies among the results or is of a scene's pictures.
@@ -283,20 +305,28 @@ def load_settings(values: Mapping[str, Any]) -> Settings:
     except RecursionError as error:
         raise SepiError("config: a key holds itself (by & and *), or values lie too deep in each other") from error
     config = validated(Config, spelled, "config")
-    scenes = _scenes(config)
+    scenes, rendered = _scenes(config), config.rendered.found("config.rendered")
     ranges = config.disparity_range
-    require_known("config.disparity_range", ranges, scenes)
+    require_known("config.disparity_range", ranges, scenes | rendered)
     for name, (minimum, maximum) in ranges.items():
         DisparityRange(minimum, maximum, f"config.disparity_range of {name}")
-    _require_inside(config.report.pixels, scenes)
+    _require_inside(config.report.pixels, scenes | rendered)
     entries = {**VARIANT_ENTRIES, **config.variants}
     variants = {name: _variant(name, entries) for name in entries}
+    chosen = config.rendered.variants
+    require_known("config.rendered.variants", chosen if isinstance(chosen, list) else (), variants)
+
+    def with_ranges(found: Mapping[str, Scene]) -> dict[tuple[str, str], Scene]:
+        return {(one.dataset, one.name): replace(one, disparity_range=ranges.get(name)) for name, one in found.items()}
+
     return Settings(
-        {(one.dataset, one.name): replace(one, disparity_range=ranges.get(name)) for name, one in scenes.items()},
+        with_ranges(scenes),
+        with_ranges(rendered),
         variants,
         stage_settings(config.stages, variants),
         {name: _external(name, entry, variants) for name, entry in config.external.items()},
         config.report,
+        config.rendered,
     )
 
 

@@ -38,7 +38,7 @@ def default_yaml() -> str:
     for key, field in Config.model_fields.items():
         lines += _comment(field, "")
         default = field.get_default(call_default_factory=True)
-        if key in ("builtin", "report"):
+        if key in ("builtin", "rendered", "report"):
             lines += [f"{key}:", *_without_effect(_fields(type(default), "  ", default.model_dump()))]
         elif key == "variants":
             lines += ["variants:", *_without_effect(f"  {name}: {_flow(entry)}" for name, entry in default.items())]

@@ -20,6 +20,7 @@ from sepi.io.readers import exported, hci, hci_2013
 from sepi.io.readers.formats import Format, format_of
 from sepi.io.readers.row_folders import view_files
 from sepi.io.readers.sizes import size_of
+from sepi.workflow.rendered_scenes import DATASET
 
 VIEW_PATTERN = "input_Cam*.png"
 
@@ -51,7 +52,7 @@ class Scene:
     dataset, name : str
         Together they name the scene's folder ``results/DATASET/NAME``.
     source : Path or None
-        The folder or file to read; None for a built-in scene.
+        The folder or file to read; None for a built-in scene, the file of :mod:`sepi.rendered` for a rendered one.
     files : tuple of Path
         What ingest reads: a change in one of them is a change of the scene, but for its ground truth.
     views : int
@@ -83,16 +84,25 @@ class Scene:
         return self.views * self.height * self.width
 
     @property
+    def is_rendered(self) -> bool:
+        """Whether a job makes what is read, and nothing is there before."""
+        return self.dataset == DATASET
+
+    @property
     def reader(self) -> str:
         """The module that reads the views, or renders them."""
         if self.source is None:
             return "sepi.scenes"
+        if self.is_rendered:
+            return "sepi.rendered.exposure"
         # of an unknown format: ingest will say what is wrong
         return format_of.__module__ if self._format is None else self._format.read.__module__
 
     @property
     def truth(self) -> tuple[Path, ...]:
         """The files with ground truth and masks: a change in one of them asks for scores and for no map."""
+        if self.is_rendered:
+            return self.files
         return () if self.source is None or self._format is None else tuple(self._format.truth_files(self.source))
 
     @cached_property

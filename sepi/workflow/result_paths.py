@@ -18,8 +18,9 @@ PARTS_ENDING = "_parts"
 """Ending of the files that belong to the ablation of the best variant alone."""
 
 
-COMPARISON_ENDING = "_comparison"
-"""Ending of the files that belong to the comparison with other methods alone."""
+def render_file(world: str) -> Path:
+    """What the renderer makes of a rendered scene: views without noise and ground truth, for all levels of noise."""
+    return RESULTS / "renders" / f"{world}.h5"
 
 
 @dataclass(frozen=True)
@@ -70,7 +71,7 @@ class SceneFiles:
         return self.stages / key / f"{stage_of(key)}.{ending}"
 
     def scores(self, which: str = "") -> Path:
-        """The scores of the maps; ``which`` is :data:`PARTS_ENDING` or :data:`COMPARISON_ENDING` for those alone."""
+        """The scores of the maps; ``which`` is :data:`PARTS_ENDING` or ``_REPORT`` for those of these alone."""
         return self.folder / f"scores{which}.h5"
 
     def variant(self, name: str) -> Path:

@@ -13,7 +13,7 @@ from sepi.errors import SepiError
 from sepi.report.plan import TEMPLATES
 from sepi.report.published import FOLDER as PUBLISHED
 from sepi.variants import HANDED_ON, STAGES
-from sepi.workflow.code_digest import code_digest, ingest_modules, stage_modules
+from sepi.workflow.code_digest import code_digest, ingest_modules, render_modules, stage_modules
 from sepi.workflow.config import MOST_ON_PAGE, Report
 from sepi.workflow.datasets import Scene
 
@@ -28,7 +28,8 @@ BEST = {
 
 
 def scene(**labels: str) -> Wildcards:
-    names = {"dataset": "builtin", "scene": "dots", "which": "", "variant": "best", **BEST, **labels}
+    names = {"dataset": "builtin", "scene": "dots", "which": "", "report": "", "variant": "best", "world": "sticks"}
+    names |= BEST | labels
     return Wildcards(fromdict=names)
 
 
@@ -66,6 +67,8 @@ def test_every_job_is_made_again_for_its_own_code(read: Any) -> None:
             modules = (command[1],) if chosen is None else stage_modules(rule.name, chosen)
             if rule.name == "ingest":
                 modules = ingest_modules("sepi.scenes")
+            if rule.name == "render":
+                modules = render_modules("sticks")
             if rule.name == "truth":
                 modules = ("sepi.truth", "sepi.scenes")
             given = code(scene(**{rule.name: name})) if callable(code) else code
@@ -84,6 +87,7 @@ def test_every_job_is_made_again_for_its_own_code(read: Any) -> None:
         "maps",
         "page",
         "graph",
+        "render",
     } <= checked
 
 
@@ -95,17 +99,16 @@ def test_every_file_that_a_job_reads_is_an_input(read: Any) -> None:
     (there,) = rules["external"].input.maps(scene())
     assert there.endswith("maps/dots.pfm")
     assert {Path(file) for file in rules["numbers"].input.published} == set(PUBLISHED.glob("*.csv"))
-    for page in ("page", "comparison_page"):
-        assert {Path(file) for file in rules[page].input.templates} == set(TEMPLATES)
+    assert {Path(file) for file in rules["page"].input.templates} == set(TEMPLATES)
 
 
 def test_the_page_can_be_left_out_and_is_by_itself_where_there_are_too_many_scenes(tmp_path: Path) -> None:
     """Nothing of it is made then, and whoever asks for it is told in one line."""
     for values, expected in (({}, True), ({"page": False}, False)):
         found = of_size(64, tmp_path, report=values)
-        pages = [*found["report_files"](), *found["comparison_files"]()]
-        assert ("reports/index.html" in pages, "reports/comparison/index.html" in pages) == (expected, expected)
-        assert bool(found["page_of_scene"]("reports")) == expected
+        files = found["every_file"]()
+        assert {f"reports/{name}index.html" in files for name in ("", "comparison/", "rendered/")} == {expected}
+        assert bool(found["page_of_scene"]()) == expected
     with pytest.raises(SepiError, match=r"^reports/index.html: not made: report.page is false; true asks for it$"):
         found["SETTINGS"].require_target("reports/index.html")
     scenes = {("own", str(number)): None for number in range(MOST_ON_PAGE)}

@@ -63,7 +63,7 @@ def scene_table(runs: Runs, score: str, paper: SceneTable, title: str) -> Report
 def _counterparts(plan: Plan) -> str:
     """Whose published figures ours are divided by, for the caption."""
     papers = f"the paper's method, {published.methods()[PAPERS_METHOD].label}"
-    return f"the same method, for this project's own variants {papers}" if plan.is_comparison else papers
+    return f"the same method, for this project's own variants {papers}" if plan.report else papers
 
 
 def _is_shown(runs: Runs, dataset: str, method: Method, rows: Sequence[Record]) -> bool:

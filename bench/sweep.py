@@ -1,0 +1,138 @@
+"""What a parameter is worth over scenes, and whether its best value on some holds on another, left out in turn.
+
+Rendered scenes that are held out from choosing (:data:`sepi.rendered.RENDERED`) are refused.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from tabulate import tabulate
+
+from sepi.errors import SepiError
+from sepi.inspection.disparity_range import settle_range
+from sepi.lightfield import LightField
+from sepi.reading import read_light_field
+from sepi.rendered import RENDERED
+from sepi.scenes import SCENES, render
+from sepi.scoring.scores import score
+from sepi.stage import Parameters, StageMaps, no_progress
+from sepi.validation import require_known
+from sepi.variants import STAGES, Variant, stage_parameters
+from sepi.workflow.rendered_scenes import rendered_scene
+
+Scores = Mapping[str, Sequence[float]]
+"""Scene to a score for each value."""
+
+
+def scene_for_choosing(given: str, noise: str) -> LightField:
+    """A built-in scene by its name, or by its path a light field, or a render in a level of noise.
+
+    Raises
+    ------
+    SepiError
+        If it is none, has no ground truth, or is held out.
+    """
+    if given in SCENES:
+        light_field = render(given)
+    elif _is_render(Path(given)):
+        from sepi.rendered.exposure import read_exposed
+
+        light_field = read_exposed(Path(given), noise, 1)
+    else:
+        light_field = read_light_field(Path(given))
+    # as the files have it: a folder may have any name
+    world = rendered_scene(light_field.name).world
+    if world in RENDERED and not RENDERED[world].for_choosing:
+        free = ", ".join(name for name, entry in RENDERED.items() if entry.for_choosing)
+        raise SepiError(f"{given}: scene '{world}' is held out, no parameter may be chosen on it; on {free} one may")
+    if light_field.ground_truth is None:
+        raise SepiError(f"{given}: has no ground truth to score against")
+    return settle_range(light_field)
+
+
+def settings_of(variant: Variant, target: str, texts: Sequence[str]) -> tuple[str, list[dict[str, Parameters]]]:
+    """The stage of ``STAGE.CHOICE.NAME``, and for each value the parameters of all stages.
+
+    Raises
+    ------
+    SepiError
+        If the variant has no such parameter, or a value is not allowed.
+    """
+    stage, _, rest = target.partition(".")
+    choice, _, name = rest.partition(".")
+    require_known(f"{target}: stage", [stage], STAGES)
+    require_known(f"{target}: choice of this variant", [choice], [variant.choices[stage]])
+    return stage, [stage_parameters(variant, {stage: {name: _value(text)}}) for text in texts]
+
+
+def scores_of(
+    light_field: LightField, variant: Variant, stage: str, settings: Sequence[Mapping[str, Parameters]], which: str
+) -> list[float]:
+    """A score of the final map for each of some settings that differ in one stage."""
+    place = list(STAGES).index(stage)
+    before, after = list(STAGES)[:place], list(STAGES)[place:]
+    first = _run(light_field, None, variant, before, settings[0])
+    maps = [_run(light_field, first, variant, after, values) for values in settings]
+    assert light_field.ground_truth is not None
+    return [score(found.disparity, light_field.ground_truth)[which] for found in maps if found is not None]
+
+
+def tables(texts: Sequence[str], scores: Scores) -> str:
+    """Markdown: scores of each value; then for each scene the value that is best on the others, and what it gives."""
+    scenes = list(scores)
+    rows = [[text, _mean(scores, i, scenes), *(scores[one][i] for one in scenes)] for i, text in enumerate(texts)]
+    folds: list[tuple[str, str, float, float]] = []
+    for left_out in scenes:
+        others = [scene for scene in scenes if scene != left_out]
+        means = [_mean(scores, i, others) for i in range(len(texts))]
+        chosen = means.index(min(means))
+        folds.append((left_out, texts[chosen], scores[left_out][chosen], min(scores[left_out])))
+    mean = sum(row[2] for row in folds) / len(folds)
+    return "\n\n".join(
+        (
+            _markdown(rows, ["value", "mean", *scenes]),
+            _markdown(folds, ["left out", "best on the others", "that value here", "best here"]),
+            f"Mean over scenes, each with the value that was chosen without it: {mean:.3f}",
+        )
+    )
+
+
+def _mean(scores: Scores, value: int, scenes: Sequence[str]) -> float:
+    return sum(scores[scene][value] for scene in scenes) / len(scenes)
+
+
+def _markdown(rows: Sequence[Sequence[Any]], heads: Sequence[str]) -> str:
+    shown = [[f"{cell:.3f}" if isinstance(cell, float) else cell for cell in row] for row in rows]
+    return str(tabulate(shown, heads, tablefmt="pipe", disable_numparse=True))
+
+
+def _run(
+    light_field: LightField,
+    maps: StageMaps | None,
+    variant: Variant,
+    stages: Sequence[str],
+    settings: Mapping[str, Parameters],
+) -> StageMaps | None:
+    for stage in stages:
+        maps = STAGES[stage][variant.choices[stage]].run(light_field, maps, settings[stage], no_progress)
+    return maps
+
+
+def _value(text: str) -> Any:
+    with suppress(ValueError):
+        return json.loads(text)
+    return text
+
+
+def _is_render(path: Path) -> bool:
+    import h5py
+
+    if not (path.is_file() and h5py.is_hdf5(path)):
+        return False
+    with h5py.File(path) as file:
+        return "render" in file.attrs

@@ -1,0 +1,69 @@
+"""The dataset of rendered scenes: its keys of the configuration, and the scenes that follow from them."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, field_validator
+
+from sepi.rendered import NOISE_LEVELS, RENDERED
+from sepi.validation import require_known
+from sepi.workflow.datasets import Scene
+from sepi.workflow.rendered_scenes import DATASET, WITHOUT_NOISE, RenderedScene
+from sepi.workflow.result_paths import render_file
+
+
+class Rendered(BaseModel):
+    """Keys of ``rendered``."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+    scenes: list[str] = Field(
+        list(RENDERED), description="which of the rendered scenes to use, in the order of the tables"
+    )
+    size: int = Field(512, ge=64, le=2048, description="height and width of a view in pixels")
+    views: int = Field(9, ge=3, le=17, description="rows and columns of views")
+    samples: int = Field(64, ge=1, le=4096, description="paths traced for a pixel; fewer are quicker, and grainy")
+    noise: list[str] = Field(
+        list(NOISE_LEVELS),
+        min_length=1,
+        description="levels of the camera's noise; each makes a light field of a scene",
+    )
+    seeds: int = Field(
+        1, ge=1, le=99, description="light fields of each scene and noise; from 2 on, tables say how far scores vary"
+    )
+    variants: list[str] | Literal["all"] | None = Field(
+        None,
+        description="variants to run, and 'paper' with them; null: 'best', 'fast', 'paper', your own and the compared "
+        "methods; all: every built-in one that needs no file of yours",
+    )
+
+    @field_validator("noise", mode="before")
+    @classmethod
+    def _off_is_a_word(cls, value: Any) -> Any:
+        # YAML takes a bare off for false
+        return [WITHOUT_NOISE if level is False else level for level in value] if isinstance(value, list) else value
+
+    def found(self, where: str) -> dict[str, Scene]:
+        """Every scene in every level of noise, by ``rendered/NAME``; without noise there is one of each.
+
+        Raises
+        ------
+        SepiError
+            If there is no such scene or level; ``where`` is the key.
+        """
+        require_known(f"{where}.scenes", self.scenes, RENDERED)
+        require_known(f"{where}.noise", self.noise, NOISE_LEVELS)
+        names = [
+            RenderedScene(world, noise, seed)
+            for noise in dict.fromkeys(self.noise)
+            for world in dict.fromkeys(self.scenes)
+            for seed in range(1, 2 if noise == WITHOUT_NOISE else self.seeds + 1)
+        ]
+        return {f"{DATASET}/{name.name}": self.scene(name) for name in names}
+
+    def scene(self, name: RenderedScene) -> Scene:
+        """One of them."""
+        file = render_file(name.world)
+        flags = ("--noise", name.noise, "--seed", str(name.seed))
+        return Scene(DATASET, name.name, file, (file,), self.views**2, self.size, self.size, flags=flags)

@@ -1,0 +1,46 @@
+"""Names of rendered scenes in the workflow: scene of :mod:`sepi.rendered`, level of noise, and seed of the noise."""
+
+from __future__ import annotations
+
+import re
+from typing import NamedTuple
+
+from sepi.rendered import NOISE_LEVELS
+
+DATASET = "rendered"
+"""The dataset of rendered scenes, and their report."""
+
+WITHOUT_NOISE = "off"
+"""The level of noise that is in no name, and of which there is one seed alone."""
+
+
+class RenderedScene(NamedTuple):
+    """A rendered scene with noise.
+
+    Attributes
+    ----------
+    world : str
+        Name in :data:`sepi.rendered.RENDERED`.
+    noise : str
+        One of :data:`sepi.rendered.NOISE_LEVELS`.
+    seed : int
+        Of the noise, from 1.
+    """
+
+    world: str
+    noise: str = WITHOUT_NOISE
+    seed: int = 1
+
+    @property
+    def name(self) -> str:
+        """``clutter`` without noise, ``clutter_low``, and with another seed ``clutter_low_2``."""
+        parts = [self.world, *([self.noise] if self.noise != WITHOUT_NOISE else [])]
+        return "_".join([*parts, *([str(self.seed)] if self.seed > 1 else [])])
+
+
+def rendered_scene(name: str) -> RenderedScene:
+    """What a name says."""
+    levels = "|".join(level for level in NOISE_LEVELS if level != WITHOUT_NOISE)
+    found = re.fullmatch(rf"(.+?)(?:_({levels})(?:_(\d+))?)?", name)
+    assert found is not None
+    return RenderedScene(found[1], found[2] or WITHOUT_NOISE, int(found[3] or 1))

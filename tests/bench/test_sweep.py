@@ -1,0 +1,62 @@
+"""A parameter is chosen on some scenes and tried on the one left out; held-out rendered scenes are no part of it."""
+
+import re
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+from rendered_files import write_drawn
+
+from bench import sweep
+from bench.__main__ import main
+from sepi.errors import SepiError
+from sepi.rendered.exposure import read_exposed
+from sepi.scenes import write_hci
+from sepi.variants import VARIANTS
+
+QUICK = ("--variant", "no_occlusion_no_textureless", "--threads", "1")
+
+
+def test_the_value_for_a_scene_is_chosen_on_the_others() -> None:
+    """Value 2 is best on average, but without the third scene, which it was chosen for, value 1 is."""
+    text = sweep.tables(["1", "2", "3"], {"a": [1.0, 2.0, 9.0], "b": [2.0, 1.5, 9.0], "c": [9.0, 4.0, 1.0]})
+    rows = [re.findall(r"[^|\s]+(?: [^|\s]+)*", line) for line in text.splitlines()]
+    assert ["2", "2.500", "2.000", "1.500", "4.000"] in rows
+    assert rows[8:11] == [["a", "2", "2.000", "1.000"], ["b", "2", "1.500", "1.500"], ["c", "1", "9.000", "1.000"]]
+    assert text.endswith(f": {(2 + 1.5 + 9) / 3:.3f}")
+
+
+def test_held_out_scenes_are_refused_whatever_their_files_are_called(tmp_path: Path) -> None:
+    """A parameter that was chosen on them would say nothing about other scenes."""
+    write_drawn(tmp_path / "innocent.h5", "foliage")
+    write_hci(read_exposed(tmp_path / "innocent.h5", "low", 2), tmp_path / "folder")
+    write_drawn(tmp_path / "sticks.h5", "sticks")
+    for name in ("innocent.h5", "folder"):
+        with pytest.raises(SepiError, match=f"{name}: scene 'foliage' is held out, .*; on sticks, wires"):
+            sweep.scene_for_choosing(str(tmp_path / name), "off")
+    assert sweep.scene_for_choosing(str(tmp_path / "sticks.h5"), "high").name == "sticks_high"
+
+
+def test_the_command_scores_each_value_on_each_scene(tmp_path: Path) -> None:
+    for name, builtin in (("sticks", "dots"), ("wires", "pyramids")):
+        write_drawn(tmp_path / f"{name}.h5", name, builtin)
+    scenes = [word for name in ("sticks", "wires") for word in ("--scene", str(tmp_path / f"{name}.h5"))]
+    words = ["sweep", "optimize.wls.alpha", "1e-6", "1", *QUICK, "--noise", "off", *scenes]
+    result = CliRunner().invoke(main, words, catch_exceptions=False)
+    assert result.exit_code == 0, result.output
+    assert "| left out" in result.stdout
+    assert re.search(r"\| sticks +\| 1e-6 ", result.stdout)
+
+
+@pytest.mark.parametrize(
+    ("target", "values", "message"),
+    [
+        ("optimize.second_order.alpha", ["1"], "unknown 'second_order'; known: wls"),
+        ("optimise.wls.alpha", ["1"], "unknown 'optimise'; did you mean 'optimize'"),
+        ("optimize.wls.alpa", ["1"], "optimize.wls: unknown 'alpa'"),
+        ("optimize.wls.alpha", ["-1"], "optimize.wls.alpha"),
+    ],
+)
+def test_what_cannot_be_swept_is_told(target: str, values: list[str], message: str) -> None:
+    with pytest.raises(SepiError, match=message):
+        sweep.settings_of(VARIANTS["paper"], target, values)

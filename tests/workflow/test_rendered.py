@@ -1,0 +1,125 @@
+"""Rendered scenes in the workflow: what the configuration names, which jobs that makes, how their files are read."""
+
+import importlib.util
+import json
+from pathlib import Path
+from typing import Any
+from unittest import mock
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from rendered_files import write_drawn
+from workflow_copy import REPOSITORY, TINY, Workflow
+
+from sepi import ingest, truth
+from sepi.compared.methods import LEARNED
+from sepi.errors import SepiError
+from sepi.io.hdf5 import read_light_field
+from sepi.io.truth import read_with_truth
+from sepi.rendered import RENDERED
+from sepi.rendered.exposure import exposed_name, read_exposed
+from sepi.rendered.options import Exposure, Taking
+from sepi.scoring.scores import region_masks, score_regions
+from sepi.variants import VARIANTS
+from sepi.workflow.config import load_settings
+from sepi.workflow.rendered_scenes import RenderedScene, rendered_scene
+
+TWO = {"scenes": ["sticks", "room"], "noise": [False, "low"], "seeds": 2, "size": 64, "views": 3, "variants": ["best"]}
+
+
+def test_scenes_are_named_by_noise_and_seed() -> None:
+    """YAML reads a bare ``off`` as false; without noise every seed would give the same light field."""
+    settings = load_settings({"rendered": TWO, "disparity_range": {"rendered/room_low_2": [-1, 2]}})
+    names = ["sticks", "room", "sticks_low", "sticks_low_2", "room_low", "room_low_2"]
+    assert [name for _, name in settings.rendered_scenes] == names
+    assert settings.scene("rendered", "room_low_2").disparity_range == (-1, 2)
+    assert settings.scene("rendered", "room_low_2").samples == 9 * 64**2
+    assert len(load_settings({}).rendered_scenes) == 3 * len(RENDERED)
+    for name in (RenderedScene("a_b"), RenderedScene("low", "high"), RenderedScene("c", "low", 12)):
+        assert rendered_scene(name.name) == name
+        assert name.name == exposed_name(*name)
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"scenes": ["stick"]}, "config.rendered.scenes: unknown 'stick'; did you mean 'sticks'"),
+        ({"noise": ["lots"]}, "config.rendered.noise: unknown 'lots'"),
+        ({"variants": ["bestt"]}, "config.rendered.variants: unknown 'bestt'; did you mean 'best'"),
+        ({"size": 10}, "config.rendered.size"),
+    ],
+)
+def test_a_wrong_value_is_named(values: dict[str, Any], message: str) -> None:
+    with pytest.raises(SepiError, match=f"^{message}"):
+        load_settings({"rendered": values})
+
+
+@pytest.mark.workflow
+class TestJobs:
+    @pytest.fixture
+    def workflow(self, tmp_path: Path) -> Workflow:
+        for name in TWO["scenes"]:
+            write_drawn(tmp_path / f"run/results/renders/{name}.h5", name)
+        return Workflow(REPOSITORY, tmp_path / "run", TINY | {"rendered": TWO})
+
+    def test_one_target_makes_all_of_them_and_no_other_has_any(self, workflow: Workflow) -> None:
+        """One render serves all levels of noise; pictures are of one seed."""
+        jobs = workflow.jobs("rendered")
+        counts = {rule: sum(job.rule.name == rule for job in jobs) for rule in ("ingest", "truth", "evaluate", "maps")}
+        assert counts == {"ingest": 6, "truth": 6, "evaluate": 6, "maps": 4}
+        made = {str(file) for job in jobs for file in job.output}
+        assert {"reports/rendered/index.html", "reports/rendered/properties_mse.tex"} <= made
+        assert {job.wildcards.dataset for job in jobs if hasattr(job.wildcards, "dataset")} == {"rendered"}
+        (words,) = (job.params.source for job in jobs if "results/rendered/room_low_2/lightfield.h5" in job.output)
+        assert words == ["--rendered", "results/renders/room.h5", "--noise", "low", "--seed", "2"]
+        assert not any("render" in file for file in workflow.read().globals["all_files"]())
+
+    def test_a_missing_renderer_is_told_before_any_job(self, workflow: Workflow) -> None:
+        (workflow.folder / "results/renders/room.h5").unlink()
+        known = importlib.util.find_spec
+
+        def found(name: str, *more: Any) -> Any:
+            return None if name == "mitsuba" else known(name, *more)
+
+        with mock.patch("importlib.util.find_spec", found), pytest.raises(SystemExit) as ended:
+            workflow.jobs("rendered")
+        assert ended.value.code == "sepi: rendered scenes need the package mitsuba: pip install 'sepi[render]'"
+
+
+def test_a_render_becomes_a_light_field_and_apart_from_it_its_truth(tmp_path: Path) -> None:
+    """No stage may find ground truth in its input; every mask is a region that is scored."""
+    file, field, apart = (tmp_path / name for name in ("render.h5", "lightfield.h5", "truth.h5"))
+    write_drawn(file, "sticks")
+    words = ["--rendered", str(file), "--noise", "high", "--seed", "2", "--output", str(field)]
+    assert CliRunner().invoke(ingest.main, words, catch_exceptions=False).exit_code == 0
+    words = ["--rendered", str(file), "--output", str(apart)]
+    assert CliRunner().invoke(truth.main, words, catch_exceptions=False).exit_code == 0
+    alone, whole = read_light_field(field), read_with_truth(field, apart)
+    assert (alone.name, alone.ground_truth, alone.masks) == ("sticks_high_2", None, {})
+    np.testing.assert_array_equal(alone.views, read_exposed(file, "high", 2).views)
+    assert whole.ground_truth is not None
+    scores = score_regions(whole.ground_truth, whole.ground_truth, region_masks(whole))["paper"]
+    assert list(scores)[:4] == ["all", "occluded", "textureless", "discontinuities"]
+    assert scores["glossy"]["pixels"] == 16 * 64
+    result = CliRunner().invoke(ingest.main, ["--rendered", str(file), "--builtin", "dots", "--output", str(field)])
+    assert result.exit_code == 2
+
+
+def test_chosen_variants_are_those_and_the_papers() -> None:
+    assert load_settings({"rendered": {"variants": "all"}}).rendered_variants == [
+        name for name in VARIANTS if name not in LEARNED
+    ]
+    assert load_settings({}).rendered_variants is None
+
+
+def test_the_page_lists_scenes_split_and_options_as_the_code_has_them() -> None:
+    """A scene that the page calls free for choosing, and the command refuses, would be no split."""
+    page = (REPOSITORY / "docs/reproduce/rendered.md").read_text(encoding="utf-8")
+    for name, entry in RENDERED.items():
+        split = "choosing" if entry.for_choosing else "held out"
+        assert f"\n| `{name}` | {entry.description} | {entry.tests} | {split} |\n" in page
+    for name, field in {**Taking.model_fields, **Exposure.model_fields}.items():
+        meaning = str(field.description).replace("|", r"\|")
+        default = json.dumps(field.default).strip('"')
+        assert f"\n| `{name}` | {default} | {meaning} |\n" in page
