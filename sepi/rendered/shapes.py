@@ -237,6 +237,14 @@ def copies(mesh: Mesh, axes: Points, places: Points, scales: npt.ArrayLike = 1.0
     return _mesh(vertices.reshape(-1, 3), faces.reshape(-1, 3), uv.reshape(-1, 2), mesh.smooth)
 
 
+def about_vertical(turns: npt.ArrayLike) -> Points:
+    """Axes ``(N, 3, 3)`` of upright :func:`copies`, turned by angles ``(N,)`` in radians."""
+    turns = np.asarray(turns, float)
+    cos, sin, zero = np.cos(turns), np.sin(turns), np.zeros_like(turns)
+    rows = ((cos, zero, sin), (zero, zero + 1, zero), (-sin, zero, cos))
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
 def normals(mesh: Mesh) -> FloatArray:
     """Normals of the vertices: means of those of the triangles round them, weighted by area, for a smooth mesh."""
     corners = mesh.vertices[mesh.faces].astype(np.float64)

@@ -31,8 +31,9 @@ def world() -> World:
         at_far=-1.6,
         sky=(0.62, 0.76, 1.0),
         suns=[Sun((0.55, 0.75, 0.6), (7.0, 6.3, 5.2))],
-        exposure=0.68,
+        exposure=0.8,
         field_of_view=50,
+        depth=6,
     )
     return seen_from(yard, (0.0, -1.15, 0.0), below=5)
 
