@@ -2,7 +2,7 @@
 
 Nothing is nearer than fifty metres, and all disparities lie within half a pixel or so: what counts is what can be told
 from a fraction of a pixel. The terrain is a height field that houses and trees stand on; the sky behind is painted on a
-screen at the far end, with the haze of its distance.
+screen at the far end.
 """
 
 from __future__ import annotations
