@@ -106,8 +106,10 @@ def rod(start: npt.ArrayLike, end: npt.ArrayLike, radius: float, sides: int = 12
     first, last = np.asarray(start, float), np.asarray(end, float)
     length = np.linalg.norm(last - first)
     cap = np.array([0, 0.3, 1.0]) * min(radius, 0.4 * length)
-    along = np.concatenate([cap, length - cap[::-1]])
-    widths = radius * np.array([0, 0.7, 1, 1, 0.7, 0])
+    # rays find short triangles sooner than long ones aslant
+    between = np.linspace(cap[-1], length - cap[-1], 2 + int(length / (16 * radius)))
+    along = np.concatenate([cap[:-1], between, length - cap[-2::-1]])
+    widths = radius * np.concatenate([[0, 0.7], np.ones(len(between)), [0.7, 0]])
     return tube(first + along[:, None] / length * (last - first), widths, sides)
 
 
