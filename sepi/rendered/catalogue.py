@@ -33,7 +33,7 @@ class Entry:
 
 RENDERED: dict[str, Entry] = {
     "sticks": Entry("sticks, boxes and books in a heap", "many depths in a small window, thin occluders", True),
-    "foliage": Entry("a shrub and twigs before a plastered wall", "hundreds of small outlines, all alike", False),
+    "foliage": Entry("shrubs and a bough before a plastered wall", "hundreds of small outlines, all alike", False),
     "wires": Entry("a wire fence and cables before a yard", "structures of one to three pixels", True),
     "room": Entry("furniture in a room with painted walls", "large surfaces without texture, at a slant", False),
     "floor": Entry("chairs and pots on a polished floor", "reflections that move against the surface", True),

@@ -58,9 +58,11 @@ def noise(
     chroma: float = 0.3,
 ) -> Pattern:
     """Noise round a colour: ``contrast`` is the deviation of the brightness, ``chroma`` the colours' part of it."""
-    brightness = field(seed, finest, coarsest)[..., None]
-    colours = np.stack([field(seed + 1 + channel, finest, coarsest) for channel in range(3)], axis=-1)
-    return painted(np.array(colour) + contrast * (brightness + chroma * colours), size)
+    found = field(seed, finest, coarsest)[..., None]
+    if chroma:
+        colours = [field(seed + 1 + channel, finest, coarsest) for channel in range(3)]
+        found = found + chroma * np.stack(colours, axis=-1)
+    return painted(np.array(colour) + contrast * found, size)
 
 
 def wood(seed: int, size: float, light: Vector = (0.72, 0.52, 0.34), dark: Vector = (0.42, 0.26, 0.15)) -> Pattern:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any
 from zipfile import BadZipFile
@@ -13,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sepi.io.files import atomic_path
+from sepi.io.provenance import package_version
 from sepi.rendered.catalogue import RENDERED, world_of
 from sepi.rendered.masks import seen_bits, surface_bits
 from sepi.rendered.options import Taking
@@ -72,7 +75,7 @@ def render_scene(
 
 def made_by(name: str, taking: Taking) -> dict[str, Any]:
     """What a file of a render says that it was rendered with."""
-    return {"scene": name, **taking.model_dump(mode="json")}
+    return {"scene": name, "version": package_version(), **taking.model_dump(mode="json")}
 
 
 def render_world(
@@ -83,7 +86,7 @@ def render_world(
     positions, turns = _stand(rig, taking)
     count = positions.shape[0] * positions.shape[1]
     parts = path.with_name(f"{path.name}.parts")
-    _take_over(parts, json.dumps(made_by(name, taking), sort_keys=True))
+    _take_over(parts, json.dumps({**made_by(name, taking), "world": _digest(world)}, sort_keys=True))
     tracer = Tracer(world, rig, taking.samples, taking.lens * rig.baseline)
     for number in range(count):
         file = parts / f"view_{number:03d}.npz"
@@ -160,6 +163,26 @@ def _assembled(name: str, world: World, rig: Rig, taking: Taking, parts: Path) -
         light=world.light,
         made_by=made_by(name, taking),
     )
+
+
+def _digest(world: World) -> str:
+    """Of all that a world consists of: views of one that was changed since are not mixed with those of another."""
+    digest = hashlib.sha256()
+
+    def add(part: Any) -> None:
+        if is_dataclass(part):
+            for member in fields(part):
+                add(getattr(part, member.name))
+        elif isinstance(part, np.ndarray):
+            digest.update(np.ascontiguousarray(part).data)
+        elif isinstance(part, Sequence) and not isinstance(part, str):
+            for member in part:
+                add(member)
+        else:
+            digest.update(repr(part).encode())
+
+    add(world)
+    return digest.hexdigest()
 
 
 def _take_over(parts: Path, made_by: str) -> None:

@@ -106,8 +106,10 @@ def rod(start: npt.ArrayLike, end: npt.ArrayLike, radius: float, sides: int = 12
     first, last = np.asarray(start, float), np.asarray(end, float)
     length = np.linalg.norm(last - first)
     cap = np.array([0, 0.3, 1.0]) * min(radius, 0.4 * length)
-    along = np.concatenate([cap, length - cap[::-1]])
-    widths = radius * np.array([0, 0.7, 1, 1, 0.7, 0])
+    # rays find short triangles sooner than long ones aslant
+    between = np.linspace(cap[-1], length - cap[-1], 2 + int(length / (16 * radius)))
+    along = np.concatenate([cap[:-1], between, length - cap[-2::-1]])
+    widths = radius * np.concatenate([[0, 0.7], np.ones(len(between)), [0.7, 0]])
     return tube(first + along[:, None] / length * (last - first), widths, sides)
 
 
@@ -235,6 +237,14 @@ def copies(mesh: Mesh, axes: Points, places: Points, scales: npt.ArrayLike = 1.0
     faces = mesh.faces.astype(np.int64) + len(mesh.vertices) * np.arange(count)[:, None, None]
     uv = scale * mesh.uv + np.arange(count)[:, None, None] * np.array([0.137, 0.091])
     return _mesh(vertices.reshape(-1, 3), faces.reshape(-1, 3), uv.reshape(-1, 2), mesh.smooth)
+
+
+def about_vertical(turns: npt.ArrayLike) -> Points:
+    """Axes ``(N, 3, 3)`` of upright :func:`copies`, turned by angles ``(N,)`` in radians."""
+    turns = np.asarray(turns, float)
+    cos, sin, zero = np.cos(turns), np.sin(turns), np.zeros_like(turns)
+    rows = ((cos, zero, sin), (zero, zero + 1, zero), (-sin, zero, cos))
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
 def normals(mesh: Mesh) -> FloatArray:

@@ -1,4 +1,4 @@
-"""What scenes are set up with: books, crates, chairs, tables, sticks; and a world seen from any place in it."""
+"""What scenes are set up with: books, crates, chairs, tables, houses; and a world seen from any place in it."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from sepi.rendered.shapes import box, joined, moved, painted_from, rod
+from sepi.rendered.shapes import box, joined, moved, painted_from, plate, rod
 from sepi.rendered.world import Lamp, Material, Mesh, Sun, Thing, Vector, World
 
 
@@ -122,6 +122,28 @@ def table(size: Vector, turn: float, by: Vector) -> Mesh:
     parts += [box((0, -h + 0.07, k * z), (2 * x - leg, 0.09, 0.022)) for k in (-1, 1)]
     parts += [box((i * x, -h + 0.07, 0), (0.022, 0.09, 2 * z - leg)) for i in (-1, 1)]
     return moved(of_boards(parts), (0, turn, 0), by)
+
+
+def house(wide: float, deep: float, tall: float, rise: float) -> tuple[Mesh, Mesh, Mesh]:
+    """Walls with gables, roof and chimney, and windows, of a house that stands on y=0."""
+    gable = np.array([[-deep / 2, -tall], [0, -tall - rise], [deep / 2, -tall]])
+    ends = [moved(plate(gable, 0.0), (0, np.pi / 2, 0), (side * (wide / 2 - 0.01), 0, 0)) for side in (-1, 1)]
+    body = joined([box((0, -tall / 2, 0), (wide, tall, deep)), *ends])
+    slope, over = np.hypot(deep / 2, rise), 0.5
+    pitch = np.arctan2(rise, deep / 2)
+    roof = [
+        moved(
+            box((0, -0.12, side * (slope / 2 + over / 2)), (wide + 2 * over, 0.22, slope + over)),
+            (-side * pitch, 0, 0),
+            (0, -tall - rise, 0),
+        )
+        for side in (-1, 1)
+    ]
+    chimney = box((wide / 4, -tall - rise - 0.2, 0.6), (0.8, 2.4, 0.8))
+    rows = np.arange(1.6, tall - 0.5, 2.4)
+    spots = [(x, -y) for y in rows.tolist() for x in np.arange(-wide / 2 + 1.4, wide / 2 - 1, 2.1).tolist()]
+    openings = [box((x, y, side * deep / 2), (0.9, 1.2, 0.08)) for x, y in spots for side in (-1, 1)]
+    return body, joined([*roof, chimney]), joined(openings)
 
 
 def leaning(foot: npt.ArrayLike, over: npt.ArrayLike, beyond: float, radius: float) -> Mesh:

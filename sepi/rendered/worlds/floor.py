@@ -28,6 +28,7 @@ def world() -> World:
         lamps=[lamp_towards((-2.6, -3.2, 0.8), (0.1, -0.3, 3.0), 1.7, (26.0, 24.0, 21.0))],
         exposure=1.25,
         field_of_view=36,
+        depth=7,
     )
     return seen_from(hall, (0.05, -0.95, 0.0), below=12)
 

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sepi.rendered import patterns
-from sepi.rendered.shapes import Points, ball, copies, joined, leaf, painted_from, rectangle, tube
+from sepi.rendered.shapes import Points, about_vertical, ball, copies, joined, leaf, painted_from, rectangle, tube
 from sepi.rendered.staging import seen_from
 from sepi.rendered.world import Material, Mesh, Sun, Thing, World
 
@@ -54,6 +54,7 @@ def world() -> World:
         suns=[Sun((0.6, 0.9, 0.75), (7.5, 6.9, 5.8))],
         exposure=0.85,
         field_of_view=42,
+        depth=6,
     )
     return seen_from(garden, (-0.05, -0.92, 0.42), below=5)
 
@@ -93,7 +94,7 @@ def _shrubs() -> list[Thing]:
         blades = Material(patterns.noise(20 + 5 * number, green, 0.045, 0.5, finest=4, coarsest=200, chroma=0.6))
         found.append(Thing(_leaves(rng, plant, habit.leaf), blades))
     places = np.concatenate(plants[0][0].places)[::14] + np.array([0, 0.012, 0])
-    berries = copies(ball((0, 0, 0), 0.008, fineness=10), np.tile(np.eye(3), (len(places), 1, 1)), places)
+    berries = copies(ball((0, 0, 0), 0.008, fineness=10), about_vertical(np.zeros(len(places))), places)
     return [*found, Thing(berries, Material((0.62, 0.07, 0.05), "glossy", 0.15)), _fallen(rng, round_leaf)]
 
 
@@ -144,10 +145,7 @@ def _fallen(rng: np.random.Generator, blade: Mesh) -> Thing:
     """Leaves on the ground."""
     count = 220
     places = np.stack([rng.uniform(-1.4, 1.4, count), np.full(count, -0.008), rng.uniform(1.9, 2.95, count)], axis=1)
-    turn = rng.uniform(0, 2 * np.pi, count)
-    along = np.stack([np.cos(turn), np.zeros(count), np.sin(turn)], axis=1)
-    down = np.tile(-_UP, (count, 1))
-    axes = np.stack([along, down, np.cross(along, down)], axis=1)
+    axes = about_vertical(rng.uniform(0, 2 * np.pi, count))
     brown = patterns.noise(41, (0.5, 0.33, 0.14), 0.06, 0.3, finest=4, coarsest=200, chroma=0.6)
     return Thing(copies(blade, axes, places), Material(brown))
 

@@ -2,7 +2,7 @@
 
 Nothing is nearer than fifty metres, and all disparities lie within half a pixel or so: what counts is what can be told
 from a fraction of a pixel. The terrain is a height field that houses and trees stand on; the sky behind is painted on a
-screen at the far end, with the haze of its distance.
+screen at the far end.
 """
 
 from __future__ import annotations
@@ -10,8 +10,19 @@ from __future__ import annotations
 import numpy as np
 
 from sepi.rendered import patterns
-from sepi.rendered.shapes import Points, ball, box, copies, joined, moved, plate, rectangle, sheet, turned_body
-from sepi.rendered.staging import seen_from
+from sepi.rendered.shapes import (
+    Points,
+    about_vertical,
+    ball,
+    box,
+    copies,
+    joined,
+    moved,
+    rectangle,
+    sheet,
+    turned_body,
+)
+from sepi.rendered.staging import house, seen_from
 from sepi.rendered.world import Material, Mesh, Pattern, Sun, Thing, World
 
 _FAR = 900.0
@@ -88,7 +99,7 @@ def _village() -> list[Thing]:
         wide, deep, tall = float(rng.uniform(8, 12)), float(rng.uniform(7, 9)), float(rng.uniform(4.5, 6.5))
         turn, rise = float(rng.uniform(-0.6, 0.6)), float(rng.uniform(3.0, 4.2))
         at = (x, -float(_height(np.array(x), np.array(z))) + 0.8, z)
-        body, roof, openings = _house(wide, deep, tall, rise)
+        body, roof, openings = house(wide, deep, tall, rise)
         for parts, kind in ((body, walls[number % 3]), (roof, roofs), (openings, dark)):
             kind.append(moved(parts, (0, turn, 0), at))
     colours = ((0.8, 0.76, 0.66), (0.74, 0.6, 0.46), (0.84, 0.83, 0.8))
@@ -100,28 +111,6 @@ def _village() -> list[Thing]:
         Thing(joined(roofs), Material(patterns.bricks(21, 7.0, 24, (0.56, 0.27, 0.18)))),
         Thing(joined(dark), Material((0.1, 0.11, 0.13), "glossy")),
     ]
-
-
-def _house(wide: float, deep: float, tall: float, rise: float) -> tuple[Mesh, Mesh, Mesh]:
-    """Walls with gables, roof and chimney, and windows, of a house that stands on y=0."""
-    gable = np.array([[-deep / 2, -tall], [0, -tall - rise], [deep / 2, -tall]])
-    ends = [moved(plate(gable, 0.0), (0, np.pi / 2, 0), (side * (wide / 2 - 0.01), 0, 0)) for side in (-1, 1)]
-    body = joined([box((0, -tall / 2, 0), (wide, tall, deep)), *ends])
-    slope, over = np.hypot(deep / 2, rise), 0.5
-    pitch = np.arctan2(rise, deep / 2)
-    roof = [
-        moved(
-            box((0, -0.12, side * (slope / 2 + over / 2)), (wide + 2 * over, 0.22, slope + over)),
-            (-side * pitch, 0, 0),
-            (0, -tall - rise, 0),
-        )
-        for side in (-1, 1)
-    ]
-    chimney = box((wide / 4, -tall - rise - 0.2, 0.6), (0.8, 2.4, 0.8))
-    rows = np.arange(1.6, tall - 0.5, 2.4)
-    spots = [(x, -y) for y in rows.tolist() for x in np.arange(-wide / 2 + 1.4, wide / 2 - 1, 2.1).tolist()]
-    openings = [box((x, y, side * deep / 2), (0.9, 1.2, 0.08)) for x, y in spots for side in (-1, 1)]
-    return body, joined([*roof, chimney]), joined(openings)
 
 
 def _trees() -> list[Thing]:
@@ -143,16 +132,7 @@ def _trees() -> list[Thing]:
             keep &= np.hypot(x - right, z - far) > 8.5
         x, z = x[keep], z[keep]
         places = np.stack([x, -_height(x, z) + 0.4, z], axis=1)
-        turn = rng.uniform(0, 2 * np.pi, len(x))
-        zero, one = np.zeros_like(turn), np.ones_like(turn)
-        axes = np.stack(
-            [
-                np.stack([np.cos(turn), zero, np.sin(turn)], 1),
-                np.stack([zero, one, zero], 1),
-                np.stack([-np.sin(turn), zero, np.cos(turn)], 1),
-            ],
-            axis=1,
-        )
+        axes = about_vertical(rng.uniform(0, 2 * np.pi, len(x)))
         leaves = patterns.noise(50 + 5 * number, green, 0.07, 12.0, finest=3, coarsest=120, chroma=0.3)
         found.append(Thing(copies(shape, axes, places, rng.uniform(*heights, len(x))), Material(leaves)))
     return found

@@ -29,7 +29,7 @@ def world() -> World:
             Lamp((_LEFT + 0.01, -2.3, 0.4), (0.0, 1.5, 0.0), (0.0, 0.0, 2.4), (6.0, 6.2, 6.6)),
             Lamp((_LEFT, -_HIGH, -1.5), (_RIGHT - _LEFT, 0.0, 0.0), (0.0, _HIGH, 0.0), (0.9, 0.95, 1.0)),
         ],
-        exposure=1.55,
+        exposure=2.1,
         field_of_view=60,
         depth=6,
     )

@@ -30,6 +30,7 @@ def world() -> World:
         lamps=[Lamp((-1.9, -2.9, 2.4), (-0.6, 0.0, -2.2), (-0.4, 1.5, 0.0), (22.0, 20.5, 18.5))],
         exposure=1.0,
         field_of_view=38,
+        depth=6,
     )
     return seen_from(heap, (0.02, -1.0, 0.3), below=19)
 

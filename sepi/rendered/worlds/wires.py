@@ -31,8 +31,9 @@ def world() -> World:
         at_far=-1.6,
         sky=(0.62, 0.76, 1.0),
         suns=[Sun((0.55, 0.75, 0.6), (7.0, 6.3, 5.2))],
-        exposure=0.68,
+        exposure=1.0,
         field_of_view=50,
+        depth=6,
     )
     return seen_from(yard, (0.0, -1.15, 0.0), below=5)
 
@@ -64,7 +65,7 @@ def _wall() -> list[Thing]:
     return [
         Thing(rectangle((-9, -6, _WALL), (18, 0, 0), (0, 6, 0)), Material(patterns.bricks(10, 1.5, 20))),
         Thing(joined(boards), Material(green)),
-        Thing(joined(frame), Material((0.68, 0.66, 0.6))),
+        Thing(joined(frame), Material((0.88, 0.87, 0.83))),
         Thing(rectangle((1.0, -2.35, _WALL - 0.01), (1.4, 0, 0), (0, 0.9, 0)), Material((0.1, 0.13, 0.16), "glossy")),
         Thing(pipe, Material((0.36, 0.37, 0.36), "glossy", 0.2)),
     ]
