@@ -69,7 +69,7 @@ def world() -> World:
     )
 
 
-_PEAR = Material(patterns.noise(21, (0.62, 0.62, 0.22), 0.06, 0.12, finest=3))
+_PEAR = Material(patterns.noise(21, (0.66, 0.62, 0.24), 0.03, 0.12, finest=3))
 
 
 def _plane() -> Mesh:
