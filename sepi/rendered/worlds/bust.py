@@ -48,7 +48,7 @@ def world() -> World:
         lamps=[Lamp((-2.5, -1.0, 0.3), (0, 0, 1.3), (0.6, -1.2, 0), (15.0, 14.2, 13.0))],
         exposure=1.35,
         field_of_view=31,
-        depth=6,
+        depth=4,
     )
 
 

@@ -66,7 +66,7 @@ def world() -> World:
         sky=_room(),
         exposure=1.65,
         field_of_view=38,
-        depth=8,
+        depth=6,
     )
 
 

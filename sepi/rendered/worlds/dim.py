@@ -68,7 +68,7 @@ def world() -> World:
         exposure=4.5,
         field_of_view=44,
         light=0.1,
-        depth=6,
+        depth=5,
     )
 
 
