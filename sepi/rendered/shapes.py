@@ -14,6 +14,9 @@ from sepi.rendered.world import FloatArray, Mesh, Vector
 
 Points = npt.NDArray[np.float64]
 
+# angles round a body: the seam of its pattern is behind
+_ROUND = (-np.pi / 2, 3 * np.pi / 2)
+
 
 def sheet(points: Points, *, smooth: bool = True) -> Mesh:
     """A surface through a raster of points.
@@ -72,7 +75,7 @@ def ball(
         Rows of points from pole to pole.
     """
     polar = np.linspace(0, np.pi, fineness)[:, None]
-    turn = np.linspace(0, 2 * np.pi, 2 * fineness)[None, :]
+    turn = np.linspace(*_ROUND, 2 * fineness)[None, :]
     direction = np.stack(
         np.broadcast_arrays(np.sin(polar) * np.cos(turn), -np.cos(polar), -np.sin(polar) * np.sin(turn)), axis=-1
     )
@@ -140,7 +143,7 @@ def turned_body(profile: Points, centre: Vector, sides: int = 96) -> Mesh:
     sides : int
     """
     profile = np.asarray(profile, float)
-    angle = np.linspace(0, 2 * np.pi, sides + 1)[None, :]
+    angle = np.linspace(*_ROUND, sides + 1)[None, :]
     points = np.stack(
         np.broadcast_arrays(profile[:, :1] * np.cos(angle), -profile[:, 1:], -profile[:, :1] * np.sin(angle)), axis=-1
     )

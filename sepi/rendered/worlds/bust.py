@@ -48,7 +48,7 @@ def world() -> World:
         lamps=[Lamp((-2.5, -1.0, 0.3), (0, 0, 1.3), (0.6, -1.2, 0), (15.0, 14.2, 13.0))],
         exposure=1.35,
         field_of_view=31,
-        depth=6,
+        depth=4,
     )
 
 
@@ -68,9 +68,8 @@ def _arch(radius: float, spring: float, rows: int = 40) -> Array:
 
 def _wall(radius: float, spring: float) -> Mesh:
     inner = _arch(radius, spring)
-    reach = np.abs(inner - [0, TABLE]) / [2.5, 2.5]
-    outer = [0, TABLE] + (inner - [0, TABLE]) / reach.max(1, keepdims=True)
-    flat = np.stack([inner, outer])
+    out = inner - [0, TABLE]
+    flat = np.stack([inner, [0, TABLE] + 2.5 * out / np.abs(out).max(1, keepdims=True)])
     mesh = shapes.sheet(np.concatenate([flat, np.full((*flat.shape[:2], 1), WALL)], -1), smooth=False)
     return replace(mesh, uv=mesh.vertices[:, :2])
 
@@ -91,12 +90,10 @@ def _niche(radius: float, spring: float) -> Mesh:
 def _amphora(foot: Vector) -> Mesh:
     outline = [(0.062, 0.5), (0.066, 0.49), (0.045, 0.475), (0.04, 0.4), (0.075, 0.365), (0.125, 0.29), (0.122, 0.2),
                (0.075, 0.08), (0.046, 0.03), (0.062, 0.02), (0.064, 0.0)]  # fmt: skip
-    handles = []
+    handles, turn = [], np.linspace(0, np.pi, 30)
     for side in (-1, 1):
-        turn = np.linspace(0, np.pi, 30)
-        path = np.stack(
-            [side * (0.042 + 0.035 * turn / np.pi + 0.065 * np.sin(turn)), -0.455 + 0.115 * turn / np.pi, 0 * turn], 1
-        )
+        out = 0.042 + 0.035 * turn / np.pi + 0.065 * np.sin(turn)
+        path = np.stack([side * out, -0.455 + 0.115 * turn / np.pi, 0 * turn], 1)
         handles.append(shapes.tube(path @ _about_y(0.5) + np.array(foot), 0.011))
     return shapes.joined([ware.vessel(outline, 0.006, foot), *handles])
 
@@ -120,16 +117,8 @@ def _urn(foot: Vector) -> Mesh:
 def _amphora_paint() -> Pattern:
     """Bands of black gloss, keys and tongues on orange clay; ``v`` begins inside, at the foot."""
     y, x = np.mgrid[:1024, :1024] / 1024
-    key = np.array(
-        [
-            [1, 1, 1, 1, 1, 1],
-            [1, 0, 0, 0, 0, 0],
-            [1, 0, 1, 1, 1, 0],
-            [1, 0, 1, 0, 1, 0],
-            [1, 0, 0, 0, 1, 0],
-            [1, 1, 1, 1, 1, 0],
-        ]
-    )
+    rows = ("111111", "100000", "101110", "101010", "100010", "111110")
+    key = np.array([[int(cell) for cell in row] for row in rows])
     key = key[(6 * 24 * y).astype(int) % 6, (6 * 24 * x).astype(int) % 6]
     tongue = np.cos(2 * np.pi * 48 * x) > 0.2
     band = (y * 24).astype(int)

@@ -14,6 +14,7 @@ from sepi.rendered.worlds import ware
 
 TABLE, WALL = 0.3, 2.3
 CHROME, SILVER = Material(kind="mirror", metal="Cr"), Material(kind="mirror", metal="Ag")
+_QUINCE = Material(patterns.noise(21, (0.66, 0.62, 0.24), 0.03, 0.12, finest=3))
 GILT = Material(kind="mirror", metal="Au", roughness=0.22)
 # place of the mirror, its turn (leaning, to the left), width and height
 _MIRROR = ((-0.18, TABLE - 0.035, 1.95), (-0.04, 0.13, 0.0), 0.46, 0.6)
@@ -45,7 +46,7 @@ def world() -> World:
         Thing(shapes.box((-0.42, TABLE - 0.112, 1.42), (0.25, 0.02, 0.18), (0, 0.35, 0)), lacquer),
         Thing(ware.vessel(_CUP, 0.003, (0.3, TABLE, 1.47)), Material(_china(), "glossy")),
         *(
-            Thing(ware.fruit((x, TABLE - 0.033, z), 0.036, n), _PEAR)
+            Thing(ware.fruit((x, TABLE - 0.033, z), 0.036, n), _QUINCE)
             for n, (x, z) in enumerate([(0.02, 1.34), (-0.22, 1.22)])
         ),
         *_books((0.43, TABLE, 1.4), 31, [0.024, 0.03, 0.018]),
@@ -65,11 +66,8 @@ def world() -> World:
         sky=_room(),
         exposure=1.65,
         field_of_view=38,
-        depth=8,
+        depth=6,
     )
-
-
-_PEAR = Material(patterns.noise(21, (0.62, 0.62, 0.22), 0.06, 0.12, finest=3))
 
 
 def _plane() -> Mesh:

@@ -55,7 +55,7 @@ def world() -> World:
         lamps=[Lamp((-3.0, -1.2, 0.4), (0, 0, 1.6), (0.9, -1.3, 0), (13.0, 12.5, 11.8))],
         exposure=2.0,
         field_of_view=46,
-        depth=6,
+        depth=4,
     )
 
 

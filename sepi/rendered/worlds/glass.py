@@ -69,7 +69,8 @@ def _poster(number: int, tint: Vector) -> Pattern:
     """A headline, a picture and small print."""
     seed = 30 + 10 * number
     paper = patterns.printed(seed, 1.0, 40).raster.copy()
-    paper[:200] = patterns.printed(seed + 1, 1.0, 6).raster[80:280]
+    paper[:780] = paper[0, 0]
+    paper[40:190, 60:964] = patterns.printed(seed + 1, 1.0, 6).raster[20:170, :904]
     y, x = np.mgrid[:520, :904] / 904
     rings = np.sin(60 * np.hypot(x - 0.4, y - 0.3))
     motif = (rings, np.sin(40 * (x + y)) * np.sin(40 * (x - y)), np.sin(70 * y + 6 * np.sin(9 * x)))[number] > 0

@@ -23,7 +23,7 @@ def bust(finest: float = 0.002) -> Mesh:
         if level:
             # only near the surface is it worth while to look again
             step, distance = step / 2, distance.repeat(2, 0).repeat(2, 1).repeat(2, 2)
-        near = np.nonzero(np.abs(distance) < 3 * step)
+        near = np.nonzero(np.abs(distance) < 2.5 * step)
         distance[near] = _sculpture(low + step * (np.stack(near, -1) + 0.5))
     points, faces, _, _ = measure.marching_cubes(distance, 0.0)  # type: ignore[no-untyped-call]
     points = low + step * (points + 0.5)
@@ -104,12 +104,20 @@ def _body(p: Array) -> Array:
 
 def _sculpture(p: Array) -> Array:
     x, y, z = p[..., 0], p[..., 1], p[..., 2]
-    hairline = np.interp(z, [-0.03, 0.0, 0.035, 0.07], [-0.09, 0.012, 0.03, 0.066])
-    hair = np.clip((y - hairline) / 0.01, 0, 1)
-    d = _head(p) - hair * (0.008 + 0.004 * _locks(p))
+    # the head is far from what lies lower
+    upper = y > -0.17
+    d = np.full(y.shape, 1.0)
+    d[upper] = _head(p[upper]) - _hair(p[upper])
     d = _blend(d, _body(p - np.array([0, 0.03, 0])), 0.022)
     fold = np.sin(75 * (y - 0.45 * x) + 5 * np.sin(14 * x + 3 * z))
     found: Array = d - np.clip((0.45 * x - 0.305 - y) / 0.008, 0, 1) * (0.006 + 0.005 * fold)
+    return found
+
+
+def _hair(p: Array) -> Array:
+    """Height of the hair: it ends over the brow, before the ears and in the neck."""
+    hairline = np.interp(p[..., 2], [-0.03, 0.0, 0.035, 0.07], [-0.09, 0.012, 0.03, 0.066])
+    found: Array = np.clip((p[..., 1] - hairline) / 0.01, 0, 1) * (0.008 + 0.004 * _locks(p))
     return found
 
 

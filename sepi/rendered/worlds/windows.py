@@ -68,7 +68,7 @@ def world() -> World:
         suns=[Sun((0.36, 0.72, 0.55), (2.0, 1.86, 1.62))],
         exposure=1.6,
         field_of_view=50,
-        depth=6,
+        depth=4,
     )
 
 
@@ -103,7 +103,7 @@ def _front(front: Front) -> list[Thing]:
                 iron += _railing((x - w / 2 - 0.15, low + 0.05), w + 0.3, 0.95, -0.3, 0.12, 0.012)
                 sills.append(_slab((x - w / 2 - 0.2, low), (x + w / 2 + 0.2, low + 0.12), 0.1, -0.38))
     if front.awnings:
-        for x in centres[::2] + front.pitch / 2:
+        for x in centres[-2::-2] + front.pitch / 2:
             awnings += _awning(x, 1.7 * front.pitch)
     panes = [_slab((0, -front.floors * front.storey), (length, 0), 0.05, 0.27)]
     blind = Material(patterns.stripes(0.3, [(0.8, 0.76, 0.66), (0.7, 0.66, 0.56)], across=False))
