@@ -18,13 +18,23 @@ from sepi.rendered.masks import seen_bits, surface_bits
 from sepi.rendered.options import Taking
 from sepi.rendered.render_file import Render, write_render
 from sepi.rendered.rig import Rig, rig_of
+from sepi.rendered.shared_light import with_shared_light
 from sepi.rendered.tracing import Tracer, require_mitsuba
 from sepi.rendered.world import World
 from sepi.stage import no_progress
 from sepi.threads import available_cores, use_threads
 from sepi.validation import require_known
 
-_TYPES = {"views": np.float16, "disparity": np.float32, "normal": np.float16, "masks": np.uint16, "upright": np.float32}
+# what is kept of a view until all are done
+_TYPES = {
+    "views": np.float32,
+    "paint": np.float32,
+    "disparity": np.float32,
+    "normal": np.float16,
+    "masks": np.uint16,
+    "upright": np.float32,
+    "things": np.int16,
+}
 
 
 def render_scene(
@@ -97,9 +107,10 @@ def _view(
     seen = tracer.first_surface(at)
     disparity = rig.disparity(seen.depth).astype(np.float32)
     straight = seen if not turn.any() else tracer.first_surface(tracer.position(float(position[0]), float(position[1])))
-    found = {
-        # beyond half precision is far beyond white
-        "views": np.minimum(tracer.picture(at, seed), 60000.0),
+    found: dict[str, npt.NDArray[Any]] = {
+        "views": tracer.picture(at, seed),
+        "paint": tracer.paint(at, seed),
+        "things": seen.thing,
         "disparity": disparity,
         "normal": seen.normal,
         "masks": surface_bits(world.things, seen, disparity),
@@ -121,21 +132,28 @@ def _stand(rig: Rig, taking: Taking) -> tuple[npt.NDArray[np.float64], npt.NDArr
 
 def _assembled(name: str, world: World, rig: Rig, taking: Taking, parts: Path) -> Render:
     """The views together, and which views see what."""
-    rows, columns = taking.grid
     positions, turns = _stand(rig, taking)
-    shape = (rows * columns, rig.size, rig.size)
-    views = {part: np.empty(shape + (3,) * (part in ("views", "normal")), _TYPES[part]) for part in _TYPES}
-    for number in range(rows * columns):
-        with np.load(parts / f"view_{number:03d}.npz") as file:
-            for part in _TYPES:
-                views[part][number] = file[part]
-    upright, stands = views.pop("upright"), positions.reshape(-1, 2)
+    files = [parts / f"view_{number:03d}.npz" for number in range(len(positions.reshape(-1, 2)))]
+    views: dict[str, npt.NDArray[Any]] = {}
+    for number, file in enumerate(files):
+        with np.load(file) as values:
+            for part, kind in _TYPES.items():
+                if number == 0:
+                    views[part] = np.empty((len(files), *values[part].shape), kind)
+                views[part][number] = values[part]
+    upright, paint, things = (views.pop(part) for part in ("upright", "paint", "things"))
+    stands, turned = positions.reshape(-1, 2), turns.reshape(-1, 3).any(axis=1)
+    if not turned.any() and not taking.lens:
+        matte = np.array([thing.material.kind == "matte" for thing in world.things] + [False])[things]
+        views["views"] = with_shared_light(views["views"], paint, upright, things, matte, stands)
+    # beyond half precision is far beyond white
+    views["views"] = np.minimum(views["views"], 60000.0).astype(np.float16)
     # of a turned view it is not told
-    for number in map(int, np.flatnonzero(~turns.reshape(-1, 3).any(axis=1))):
+    for number in map(int, np.flatnonzero(~turned)):
         views["masks"][number] |= seen_bits(upright, stands, number)
     return Render(
         name=name,
-        **{part: values.reshape(rows, columns, *values.shape[1:]) for part, values in views.items()},
+        **{part: values.reshape(*taking.grid, *values.shape[1:]) for part, values in views.items()},
         positions=positions,
         turns=turns,
         settings=rig.settings,

@@ -104,8 +104,9 @@ class Tracer:
 
     def __init__(self, world: World, rig: Rig, samples: int, lens: float = 0.0, lens_points: int = 32) -> None:
         self._mi = _mitsuba()
-        self._rig, self._samples = rig, samples
+        self._world, self._rig, self._samples = world, rig, samples
         self._exposure = world.exposure
+        self._paintings: list[Any] = []
         count = min(samples, lens_points) if lens else 1
         distance = lens * np.sqrt((np.arange(count) + 0.5) / count) if lens else np.zeros(1)
         angle = np.arange(count) * _GOLDEN_ANGLE
@@ -115,7 +116,7 @@ class Tracer:
         surfaces = {id(thing.material): thing.material for thing in world.things}
         loaded = {key: self._mi.load_dict(self._surface(material)) for key, material in surfaces.items()}
         for number, thing in enumerate(world.things):
-            parts[f"thing{number}"] = self._shape(thing.mesh, thing.material, loaded[id(thing.material)])
+            parts[f"thing{number}"] = self._shape(thing.mesh, thing.material, {"bsdf": loaded[id(thing.material)]})
         for number, lamp in enumerate(world.lamps):
             parts[f"lamp{number}"] = self._lamp(lamp)
         for number, sun in enumerate(world.suns):
@@ -139,16 +140,26 @@ class Tracer:
 
     def picture(self, position: Position, seed: int) -> FloatArray:
         """Radiance times exposure, ``(H, W, 3)`` float32, linear: 1 is white."""
+        return self._exposure * self._seen(self._scene, position, seed)
+
+    def paint(self, position: Position, seed: int) -> FloatArray:
+        """What is painted on matte surfaces, ``(H, W, 3)`` float32, linear, by the rays of the picture of that seed."""
+        if not self._paintings:
+            self._paintings = [self._painted(self._world, side) for side in (1, -1)]
+        front, back = (self._seen(scene, position, seed) for scene in self._paintings)
+        return front + back
+
+    def _seen(self, scene: Any, position: Position, seed: int) -> FloatArray:
+        """Mean radiance of the rays through each pixel."""
         count = len(self._lens)
         total = np.zeros((self._rig.size, self._rig.size, 3), np.float64)
         for number, (right, down) in enumerate(self._lens):
             samples = self._samples * (number + 1) // count - self._samples * number // count
             point = self._at(position.right + right, position.down + down, position.turn)
             sensor = self._sensor(point, samples)
-            seen = self._mi.render(self._scene, sensor=sensor, spp=samples, seed=seed * count + number)
+            seen = self._mi.render(scene, sensor=sensor, spp=samples, seed=seed * count + number)
             total += samples * np.asarray(seen, np.float64)
-        found: FloatArray = (self._exposure / self._samples * total).astype(np.float32)
-        return found
+        return (total / self._samples).astype(np.float32)
 
     def first_surface(self, position: Position) -> FirstSurface:
         """What one ray through the middle of each pixel meets."""
@@ -202,9 +213,11 @@ class Tracer:
         found /= np.linalg.norm(found, axis=-1, keepdims=True)
         return found
 
-    def _shape(self, mesh: Mesh, material: Material, surface: Any) -> Any:
+    def _shape(self, mesh: Mesh, material: Material, parts: dict[str, Any], side: int = 1) -> Any:
+        """A mesh with its surface, and light of its own if it has any; of side -1 it is turned inside out."""
         properties = self._mi.Properties()
-        properties["bsdf"] = surface
+        for name, part in parts.items():
+            properties[name] = part
         properties["face_normals"] = not mesh.smooth
         shape = self._mi.Mesh(
             "thing",
@@ -217,12 +230,24 @@ class Tracer:
         size = material.pattern.size if isinstance(material.pattern, Pattern) else (1.0, 1.0)
         values = self._mi.traverse(shape)
         values["vertex_positions"] = np.ravel(mesh.vertices)
-        values["faces"] = np.ravel(mesh.faces)
+        values["faces"] = np.ravel(mesh.faces[:, ::side])
         values["vertex_texcoords"] = np.ravel(mesh.uv / np.array(size, np.float32))
         if mesh.smooth:
-            values["vertex_normals"] = np.ravel(normals(mesh))
+            values["vertex_normals"] = np.ravel(side * normals(mesh))
         values.update()
         return shape
+
+    def _painted(self, world: World, side: int) -> Any:
+        """The world with matte surfaces that shine by what is painted on them, to one side, and all else black."""
+        black = self._mi.load_dict({"type": "diffuse", "reflectance": {"type": "rgb", "value": 0.0}})
+        parts: dict[str, Any] = {}
+        for number, thing in enumerate(world.things):
+            shining: dict[str, Any] = {"bsdf": black}
+            if thing.material.kind == "matte":
+                texture = self._texture(thing.material)
+                shining["emitter"] = self._mi.load_dict({"type": "area", "radiance": texture})
+            parts[f"thing{number}"] = self._shape(thing.mesh, thing.material, shining, side)
+        return self._mi.load_dict({"type": "scene", **parts, "integrator": {"type": "path", "max_depth": 1}})
 
     def _lamp(self, lamp: Lamp) -> dict[str, Any]:
         """Mitsuba's square from -1 to 1 in x and y, which shines towards z, laid on the lamp's corner and edges."""
