@@ -16,7 +16,7 @@ from sepi.report.plan import RENDERED_TABLES, Plan
 @pytest.fixture(scope="module")
 def found(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     """Numbers of two scenes, without noise and with little of two seeds; one method has a map of one scene alone."""
-    variants = VARIANTS | {name: built_in.VARIANTS[name].labels for name in ("best", "spo", "best_wls")}
+    variants = VARIANTS | {"best": built_in.VARIANTS["best"].labels}
     whole = Plan(tmp_path_factory.mktemp("rendered"), {"hci": ["cotton"]}, variants, ("SPO",))
     return numbers_of(with_results(whole.rendered(list(GLOSSY), ["sticks"])))
 

@@ -150,7 +150,7 @@ def _pooled(scores: Sequence[Scores], score: str) -> float:
 
 
 def _over_seeds(figures: Sequence[Cell]) -> tuple[Cell, float | None]:
-    """Mean and standard deviation; of what is no figure, the first word of it, and no deviation where there is one."""
+    """Mean and standard deviation, which one seed has none of; where a figure is missing, what is said in its place."""
     known = [figure for figure in figures if isinstance(figure, float)]
     if len(known) < len(figures):
         return next((figure for figure in figures if not isinstance(figure, float)), None), None
