@@ -31,7 +31,7 @@ _MARKS = {"real_data": "real", "browser": "browser", "slurm": "slurm"}
 _FIRST = ("slurm", "real", "workflow", "slow", "browser")
 # files whose tests share what takes long to make: real maps, a run of the workflow, a report, kernels for other types
 _TOGETHER = {
-    **dict.fromkeys(["test_real", "test_real_formats"], "real"),
+    **dict.fromkeys(["test_real", "test_real_formats", "test_real_methods"], "real"),
     **dict.fromkeys(["test_compare", "test_packing", "test_page", "test_page_browser"], "page"),
     **dict.fromkeys(["test_page_cloud", "test_page_pixels", "test_page_viewer"], "page"),
     "test_pipeline": "types",

@@ -25,6 +25,12 @@ _CORNERS = {"cotton": (60, 120), "antinous": (60, 100)}
 
 
 @cache
+def views_of(folder: Path) -> LightField:
+    """A scene as its files are, without a look at the order of its views."""
+    return read_light_field(folder, check_order=False)
+
+
+@cache
 def scene(folder: Path) -> LightField:
     """A scene with its own disparity range, or one estimated from the views; a warning of its order is an error."""
     return settle_range(read_light_field(folder))
