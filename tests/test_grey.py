@@ -12,6 +12,8 @@ from sepi.scoring.regions import textureless
 from sepi.stage import CostVolume, StageMaps, no_progress
 from sepi.variants import STAGES
 
+pytestmark = pytest.mark.slow
+
 SCENE = render("curved_occluders", size=64, views=5)
 KINDS = {"uint8": np.uint8, "uint16": np.uint16, "float32": np.float32}
 

@@ -14,6 +14,8 @@ from sepi.pipeline import estimate_depth
 from sepi.scenes import render
 from sepi.scoring.scores import score
 
+pytestmark = pytest.mark.slow
+
 # those that have a choice, or a way through it, that no other has; the rest leave parts of these out
 DIFFERENT = ("paper", "no_sepi", "wang", "best", "best_no_detail", "fast", *METHODS)
 T, S = np.mgrid[:9, :9]

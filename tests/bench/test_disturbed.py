@@ -7,6 +7,8 @@ from bench.__main__ import main
 from bench.disturbed import DISTURBANCES, disturbed_verdicts
 from sepi.scenes import render
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.mark.parametrize("name", ["curved_occluders", "slanted_plane"])
 def test_no_verdict_is_wrong(name: str) -> None:
