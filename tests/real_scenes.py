@@ -50,7 +50,7 @@ Read = Callable[[Path], LightField]
 
 
 @cache
-def maps_after(folder: Path, labels: tuple[str, ...], read: Read = scene) -> StageMaps:
+def maps_after(folder: Path, labels: tuple[str, ...], read: Read) -> StageMaps:
     """Maps after the stages whose choices are labelled so; variants share what they have in common."""
     before = maps_after(folder, labels[:-1], read) if len(labels) > 1 else None
     stage, label = list(STAGES)[len(labels) - 1], labels[-1]

@@ -44,7 +44,8 @@ def test_each_stage_lowers_the_error(hci: Path, name: str) -> None:
     light_field = scene(hci / name)
     choices = tuple(VARIANTS["paper"].choices.values())
     errors = [
-        score(maps_after(hci / name, choices[:n]).disparity, light_field.ground_truth)["mse100"] for n in (1, 2, 3, 4)
+        score(maps_after(hci / name, choices[:n], scene).disparity, light_field.ground_truth)["mse100"]
+        for n in (1, 2, 3, 4)
     ]
     assert np.all(np.diff(errors) < 0), errors
 
