@@ -12,7 +12,7 @@
 # make bench  environment, then times, memory and growth of the pipeline, to reports/
 # make dist   source archive and wheel, to dist/, and the checks of the package index
 # make release  that, then the wheel installed and used in a fresh environment of every Python found: minutes for each
-# make oldest  the fast part of the tests with the oldest versions of other packages that pyproject.toml allows: half an hour
+# make oldest  the tests of all but workflow, page and real scenes with the oldest versions of other packages that pyproject.toml allows: half an hour
 # make clean  remove results and everything else that was made, but for the environment
 
 # the first Python here that is new enough
@@ -41,8 +41,10 @@ QUICK := not real and not workflow and not browser and not slow and not system a
 check: $(COMPARED)
 	$(TESTS) -m "$(QUICK)"
 
+# of a core of the calibration loop in tests/cpu_budget.py: a quarter more than they take
+CPU_SECONDS := 1900
 test: $(COMPARED)
-	$(TESTS) -m "not system and not faults"
+	$(TESTS) -m "not system and not faults" --cpu-budget $(CPU_SECONDS)
 
 test-system: $(COMPARED)
 	$(TESTS) -m "system and not faults"
@@ -156,7 +158,8 @@ oldest: $(TOOLS)/ready
 	$(UV) pip install --quiet --python $(OLDEST)/bin/python --no-deps --editable .
 	$(OLDEST)/bin/python -m sepi.cli.warm_up --comparison
 	$(ONE_THREAD) $(OLDEST)/bin/python -m pytest --numprocesses $(WORKERS) \
-		-W default::DeprecationWarning -W default::PendingDeprecationWarning -m "$(QUICK)"
+		-W default::DeprecationWarning -W default::PendingDeprecationWarning \
+		-m "not real and not workflow and not browser and not system and not faults"
 
 clean:
 	find reports -mindepth 1 ! -name README.md -delete

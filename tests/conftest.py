@@ -1,18 +1,25 @@
 """Shared fixtures: real light fields and a browser, and whether their absence is an error; a small report."""
 
 import os
+import shutil
+import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from remembered_scenes import FOLDER, remembered
 
+import sepi.scenes
 from sepi.threads import available_cores
 
 if TYPE_CHECKING:
     from page_example import Example
 
 pytest_plugins = ("cpu_budget",)
+
+# before the tests import it
+sepi.scenes.render = remembered(sepi.scenes.render)
 
 # beside a checkout, unless the environment names another place
 DATA = Path(os.environ.get("SEPI_DATA", Path(__file__).parents[2] / "shared" / "data"))
@@ -24,7 +31,7 @@ _MARKS = {"real_data": "real", "browser": "browser", "slurm": "slurm"}
 _FIRST = ("slurm", "real", "workflow", "slow", "browser")
 # files whose tests share what takes long to make: real maps, a run of the workflow, a report, kernels for other types
 _TOGETHER = {
-    **dict.fromkeys(["test_real", "test_real_formats"], "real"),
+    **dict.fromkeys(["test_real", "test_real_formats", "test_real_methods"], "real"),
     **dict.fromkeys(["test_compare", "test_packing", "test_page", "test_page_browser"], "page"),
     **dict.fromkeys(["test_page_cloud", "test_page_pixels", "test_page_viewer"], "page"),
     "test_pipeline": "types",
@@ -36,6 +43,13 @@ _TOGETHER = {
 
 # files whose tests of one variant or light field, the last word of their names, share what takes long to make
 _BY_LAST_WORD = ("test_missing_views", "test_real_sets")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Several processes of one run share the scenes that they draw."""
+    if FOLDER not in os.environ:
+        os.environ[FOLDER] = tempfile.mkdtemp(prefix="sepi-scenes-")
+        config.add_cleanup(lambda: shutil.rmtree(os.environ.pop(FOLDER)))
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -20,6 +20,8 @@ from sepi.scoring.confidence import decile_errors, oracle, sparsification
 from sepi.scoring.scores import score
 from sepi.variants import PARTS_OF_BEST, VARIANTS
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.mark.parametrize(
     ("name", "mean_error"), [("fronto_parallel", 1e-3), ("slanted_plane", 4e-3), ("pyramids", 1e-2)]
@@ -48,7 +50,6 @@ def glossy(scene: LightField) -> LightField:
     return replace(scene, views=np.clip(views * (1 + gloss[..., None]), 0, 1).astype(np.float32))
 
 
-@pytest.mark.slow
 def test_gloss_does_not_move_faint_texture() -> None:
     """On a surface of faint texture, brightness that changes with the view pulls colours alone aside."""
     scene = render("slanted_plane", size=128)

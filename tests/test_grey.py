@@ -3,14 +3,16 @@
 import numpy as np
 import pytest
 
-from sepi.compared.methods import LEARNED
+from sepi.compared.methods import LEARNED, METHODS
 from sepi.inspection.disparity_range import estimate_range
 from sepi.inspection.view_order import check_order
 from sepi.lightfield import LightField
 from sepi.scenes import render
 from sepi.scoring.regions import textureless
 from sepi.stage import CostVolume, StageMaps, no_progress
-from sepi.variants import STAGES
+from sepi.variants import STAGES, VARIANTS
+
+pytestmark = pytest.mark.slow
 
 SCENE = render("curved_occluders", size=64, views=5)
 KINDS = {"uint8": np.uint8, "uint16": np.uint16, "float32": np.float32}
@@ -24,9 +26,19 @@ def grey_and_rgb(kind: type) -> tuple[LightField, LightField]:
     return tuple(LightField(v, "g", disparity_range=SCENE.disparity_range, view=(1, 2)) for v in views)
 
 
-@pytest.mark.parametrize("kind", KINDS)
+# of the compared methods' choices, which are slow, in one kind: they compute with floats whatever the kind
+OWN = {(stage, choice) for name in VARIANTS.keys() - METHODS.keys() for stage, choice in VARIANTS[name].choices.items()}
+
+
 @pytest.mark.parametrize(
-    ("stage", "choice"), [(stage, choice) for stage in STAGES for choice in STAGES[stage] if choice not in LEARNED]
+    ("stage", "choice", "kind"),
+    [
+        (stage, choice, kind)
+        for stage, choices in STAGES.items()
+        for choice in choices
+        if choice not in LEARNED
+        for kind in (KINDS if (stage, choice) in OWN else ["uint8"])
+    ],
 )
 def test_every_choice_sees_grey_as_equal_channels(stage: str, choice: str, kind: str) -> None:
     """A camera without colours, such as infrared, must not get another depth than the same pictures saved as RGB."""

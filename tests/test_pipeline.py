@@ -136,7 +136,7 @@ def test_light_fields_without_depth_are_refused(views, present, complaint) -> No
 @pytest.mark.slow
 def test_equal_files_for_any_number_of_threads(tmp_path: Path, variant: str) -> None:
     """A result made on another machine must be the same, byte for byte: cores are not part of the input."""
-    write_hci(render("wall", size=128, views=5), tmp_path / "wall")
+    write_hci(render("wall", size=64, views=5), tmp_path / "wall")
     files = []
     for threads in ("1", "2"):
         out = tmp_path / threads

@@ -9,6 +9,8 @@ from sepi import estimate_depth
 from sepi.lightfield import DisparityRange, LightField
 from sepi.scenes import render
 
+pytestmark = pytest.mark.slow
+
 VARIANTS = ("best", "fast", "paper", "no_sepi", "mishiba")
 
 

@@ -16,6 +16,7 @@ from typing import Any
 from unittest import mock
 
 import yaml
+from warm_python import warm_python
 
 from sepi.variants import STAGES
 
@@ -47,15 +48,17 @@ class Workflow:
     tree: Path
     folder: Path
     config: dict[str, Any]
+    # whether what runs to its end, and its jobs, are forks of a Python that has the libraries
+    warm: bool = True
 
-    def command(self, *targets: str, flags: tuple[str, ...] = ()) -> list[str]:
+    def command(self, *targets: str, flags: tuple[str, ...] = (), python: str = sys.executable) -> list[str]:
         """Snakemake with this configuration."""
         self.folder.mkdir(exist_ok=True)
         config = self.folder / "config.yaml"
         config.write_text(yaml.safe_dump(self.config))
         snakefile = str(self.tree / "Snakefile")
         words = ["-m", "snakemake", "--snakefile", snakefile, "--configfile", str(config)]
-        return [sys.executable, *words, *flags, "--", *targets]
+        return [python, *words, *flags, "--", *targets]
 
     @property
     def environment(self) -> dict[str, str]:
@@ -65,14 +68,14 @@ class Workflow:
     def run(self, *targets: str, flags: tuple[str, ...] = (), **environment: str) -> subprocess.CompletedProcess[str]:
         """Run Snakemake to its end; stdout holds its messages too."""
         return subprocess.run(
-            self.command(*targets, flags=flags),
+            self.command(*targets, flags=flags, python=warm_python() if self.warm else sys.executable),
             cwd=self.folder,
             env=self.environment | environment,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             text=True,
             check=False,
-            timeout=300,
+            timeout=1200,
         )
 
     def start(self, *targets: str, flags: tuple[str, ...] = (), **environment: str) -> subprocess.Popen[bytes]:

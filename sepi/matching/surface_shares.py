@@ -153,7 +153,9 @@ def _views_alike(
     present = spread_views(light_field, parameters.share_views)
     places, baselines = np.argwhere(present), light_field.baselines[present]
     units = np.full(len(places), 1 / full_scale(light_field.views.dtype), np.float32)
-    views = RimViews(light_field.views, units, places, baselines, np.empty((0, 0, 0, 0), np.float32), 0)
+    # a part of another array would have kernels of its own compiled, which takes a minute
+    pixels = np.ascontiguousarray(light_field.views)
+    views = RimViews(pixels, units, places, baselines, np.empty((0, 0, 0, 0), np.float32), 0)
     brightness, residual = brightness_of_views(views, disparity, light_field.reference_view, clean)
     alike = (brightness > 1 / _MOST_DARKENING) & (brightness < _MOST_DARKENING)
     alike &= residual <= 2 * np.median(residual) + _LEAST_SCALE

@@ -32,6 +32,8 @@ from sepi.lightfield import FloatMap, LightField
 from sepi.scenes import render, true_disparity, write_hci
 from sepi.stage import StageMaps
 
+pytestmark = pytest.mark.slow
+
 SIZE, VIEWS = 96, 5
 LAYERS = "stripes"
 """Upright stripes before a plane: two layers, with gaps that each view opens elsewhere."""

@@ -15,7 +15,7 @@ from sepi.applications.refocusing import all_in_focus, evenly_spaced, focal_stac
 from sepi.applications.refocusing_kernels import WIDEST, add_view, fill_between
 from sepi.errors import SepiError
 from sepi.lightfield import FloatMap, LightField
-from sepi.scenes import render
+from sepi.scenes import light_field, render
 from sepi.scenes.definitions import DEFINITIONS
 from sepi.stage import StageMaps
 
@@ -257,7 +257,7 @@ def dots() -> tuple[LightField, LightField]:
     noisy = render("dots", size=96, views=5)
     with pytest.MonkeyPatch.context() as patch:
         patch.setitem(DEFINITIONS, "dots", usual._replace(pixel_noise=(0.0, 0.0)))
-        return noisy, render("dots", size=96, views=5)
+        return noisy, light_field.render("dots", size=96, views=5)
 
 
 def psnr(picture: FloatMap, expected: FloatMap) -> float:

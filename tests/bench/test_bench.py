@@ -25,6 +25,8 @@ from sepi.matching.plane_sweep import SweepParameters, sweep
 from sepi.regularization.wls import energy_system
 from sepi.scenes import render
 
+pytestmark = pytest.mark.slow
+
 
 def holding(megabytes: int) -> Prepared:
     return Prepared(lambda: np.ones(megabytes * 2**17), lambda array: {"sum": float(array.sum())})
@@ -201,7 +203,6 @@ def test_machine_names_no_host_and_no_user() -> None:
 
 
 @pytest.mark.system
-@pytest.mark.slow
 def test_small_run_measures_everything(tmp_path: Path) -> None:
     """The command of `make bench`, on a tiny scene: files to read, to compute with, and to look at."""
     words = [sys.executable, "-m", "bench", "run", "--small", "--output", str(tmp_path)]

@@ -7,21 +7,24 @@ from bench.__main__ import main
 from bench.disturbed import DISTURBANCES, disturbed_verdicts
 from sepi.scenes import render
 
+pytestmark = pytest.mark.slow
 
-@pytest.mark.parametrize("name", ["curved_occluders", "wall", "slanted_plane"])
+
+@pytest.mark.parametrize("name", ["curved_occluders", "slanted_plane"])
 def test_no_verdict_is_wrong(name: str) -> None:
     """A wrong word turns depth inside out, or makes nonsense of it."""
-    found = dict(disturbed_verdicts(render(name, size=96, views=5), ["as-given", "flip-both", "transpose-flip-rows"]))
+    turns = ["flip-both", "transpose-flip-rows"]
+    found = dict(disturbed_verdicts(render(name, size=96, views=5), turns))
     assert list(found) == list(DISTURBANCES)
     assert not any(verdicts.orders["wrong"] for verdicts in found.values())
-    assert all(sum(verdicts.orders.values()) == 3 for verdicts in found.values())
+    assert all(sum(verdicts.orders.values()) == len(turns) for verdicts in found.values())
     told = sum(verdicts.orders["right"] for verdicts in found.values())
-    assert (told > 18) == (name == "curved_occluders")
+    assert (told > 12) == (name == "curved_occluders")
     assert all(verdicts.row_spacing == 1 for verdicts in found.values())
 
 
 def test_the_command_prints_a_table(monkeypatch: pytest.MonkeyPatch) -> None:
-    first = dict(list(DISTURBANCES.items())[:2])
+    first = dict(list(DISTURBANCES.items())[:1])
     monkeypatch.setattr("bench.disturbed.DISTURBANCES", first)
     result = CliRunner().invoke(main, ["disturb", "fronto_parallel"])
     assert result.exit_code == 0, result.output

@@ -5,10 +5,13 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
 from click.testing import CliRunner
 
 from sepi.cli.warm_up import COMPARED, command
 from sepi.compared.methods import METHODS
+
+pytestmark = pytest.mark.slow
 
 # every kernel with code kept on disk that was not called; those that only other kernels call are part of these
 _UNCALLED = """

@@ -61,7 +61,7 @@ def workflow(tmp_path_factory: pytest.TempPathFactory) -> Workflow:
     for name in SCENES:
         write_hci(render("dots", size=SIZE, views=3), root / "scenes" / name)
     config = TINY | {"builtin": {"scenes": []}, "hci_root": str(root / "scenes")}
-    return Workflow(copy_of_the_project(root / "tree"), root / "cluster", config)
+    return Workflow(copy_of_the_project(root / "tree"), root / "cluster", config, warm=False)
 
 
 @pytest.fixture(scope="module")

@@ -21,6 +21,8 @@ from sepi.pipeline import estimate_depth
 from sepi.scenes import render
 from sepi.stage import CostVolume, no_progress
 
+pytestmark = pytest.mark.slow
+
 FEW = {"initial": {"num_disparities": 25}}
 
 

@@ -20,6 +20,8 @@ from sepi.matching.sheared_views import ShearedViews
 from sepi.scenes import render
 from sepi.stage import no_progress
 
+pytestmark = pytest.mark.slow
+
 PARAMETERS = ConstrainedEntropyParameters(num_disparities=31)
 
 

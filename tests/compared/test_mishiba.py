@@ -30,6 +30,8 @@ from sepi.pipeline import estimate_depth
 from sepi.scenes import render
 from sepi.stage import StageMaps, no_progress
 
+pytestmark = pytest.mark.slow
+
 PARAMETERS = MishibaParameters()
 
 

@@ -16,6 +16,8 @@ from sepi.pipeline import estimate_depth
 from sepi.scenes import render
 from sepi.stage import CostVolume, StageMaps, no_progress
 
+pytestmark = pytest.mark.slow
+
 PARAMETERS = oavc.OavcParameters(num_disparities=61)
 FILTER = oavc.GuidedMedianParameters(radius=7, epsilon=1e-5)
 FEW = {"initial": {"num_disparities": 31}}

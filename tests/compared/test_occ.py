@@ -28,6 +28,8 @@ from sepi.scenes import render
 from sepi.scoring.scores import score
 from sepi.stage import StageMaps, no_progress
 
+pytestmark = pytest.mark.slow
+
 Array = npt.NDArray[np.float64]
 
 

@@ -27,6 +27,8 @@ from sepi.pipeline import estimate_depth
 from sepi.scenes import render
 from sepi.stage import StageMaps, no_progress
 
+pytestmark = pytest.mark.slow
+
 SIZE = 64
 
 

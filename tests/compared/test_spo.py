@@ -17,6 +17,8 @@ from sepi.pipeline import estimate_depth
 from sepi.scenes import render
 from sepi.stage import CostVolume, StageMaps, no_progress
 
+pytestmark = pytest.mark.slow
+
 WRONG = 0.1
 """Error of a wrong pixel, pixels per view step."""
 

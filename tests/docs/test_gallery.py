@@ -2,11 +2,12 @@
 
 import os
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+from warm_python import warm_python
 
+RUN = Path(__file__).with_name("example_with_claims.py")
 GALLERY = Path(__file__).parents[2] / "docs" / "gallery"
 
 # what the text of each example says, in the example's own names
@@ -83,13 +84,6 @@ CLAIMS: dict[str, list[str]] = {
     ],
 }
 
-_RUN = """
-import runpy, sys
-names = runpy.run_path(sys.argv[1], run_name="__main__")
-wrong = [claim for claim in sys.argv[2:] if not eval(claim, dict(names))]
-sys.exit("not so: " + "; ".join(wrong) if wrong else 0)
-"""
-
 
 def test_every_example_is_checked() -> None:
     """A new example that nobody runs would break unseen."""
@@ -101,9 +95,7 @@ def test_every_example_is_checked() -> None:
 def test_example_runs_and_shows_what_it_says(name: str, tmp_path: Path) -> None:
     """Someone who downloads the script gets an error or a warning, or pictures that do not show what the text says."""
     environment = os.environ | dict.fromkeys(("NUMBA_NUM_THREADS", "OMP_NUM_THREADS"), "1") | {"MPLBACKEND": "agg"}
-    # pyplot.show() says so where there is a display that it cannot use
-    warnings = ["-W", "error", "-W", "ignore:FigureCanvasAgg is non-interactive"]
-    command = [sys.executable, *warnings, "-c", _RUN, str(GALLERY / f"{name}.py"), *CLAIMS[name]]
+    command = [warm_python(), str(RUN), str(GALLERY / f"{name}.py"), *CLAIMS[name]]
     done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, env=environment, check=False)
     assert done.returncode == 0, done.stderr
     assert not done.stderr

@@ -115,7 +115,7 @@ def test_a_terminal_that_closes(undisturbed: Workflow) -> None:
 def test_the_same_on_one_thread_and_on_four(undisturbed: Workflow) -> None:
     """More cores must not be another result."""
     for cores in (1, 4):
-        other = replace(undisturbed, folder=undisturbed.folder.with_name(f"cores-{cores}"))
+        other = replace(undisturbed, folder=undisturbed.folder.with_name(f"cores-{cores}"), warm=False)
         result = other.run(PART, flags=("--cores", str(cores), "--set-threads", f"initial={cores}"))
         assert result.returncode == 0, result.stdout
         assert PART in made(other)

@@ -297,7 +297,9 @@ def test_kernels_equal_a_plain_twin(geometry: str, dtype: Any) -> None:
     nearest = z_buffers(cv2.dilate(disparity, AROUND), present, field.baselines, 0, 12)
     unit = np.float32(1 / 255 if dtype == np.uint8 else 1)
     units = random.uniform(0.9, 1.1, present.sum()).astype(np.float32) * unit
-    rim_views = kernels.RimViews(views, units, np.argwhere(present), field.baselines[present], nearest, 0)
+    # in the order in memory that they have for maps: no other kernels are compiled
+    places = np.ascontiguousarray(np.argwhere(present))
+    rim_views = kernels.RimViews(views, units, places, field.baselines[present], nearest, 0)
     twin = Twin(rim_views, float(margin))
     layer = np.where(rim.is_near, rim.far, disparity)
     background = kernels.background_of(rim_views, layer, np.ones_like(present, shape=layer.shape), margin, 0, 12)

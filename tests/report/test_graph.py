@@ -4,6 +4,7 @@ import json
 import re
 import shutil
 import xml.etree.ElementTree as ElementTree
+from functools import cache
 from pathlib import Path
 
 import networkx as nx
@@ -12,6 +13,7 @@ import pytest
 from click.testing import CliRunner
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from warm_python import warm_python
 
 from sepi.errors import SepiError
 from sepi.report import graph
@@ -121,12 +123,25 @@ def test_names_are_no_markup() -> None:
     assert [text.text for text in picture.iter("text")] == ["<b&\"'", "x"]
 
 
+@pytest.fixture
+def warm(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Snakemake is asked without waiting for its libraries."""
+    monkeypatch.setattr("sys.executable", warm_python())
+
+
+@cache
+def own_edges(external: bool = False) -> Edges:
+    """Of this workflow."""
+    return rule_edges(REPOSITORY / "Snakefile", external)
+
+
 @pytest.mark.workflow
+@pytest.mark.usefixtures("warm")
 @pytest.mark.parametrize("external", [False, True])
 def test_the_workflows_own_graph(external: bool) -> None:
     """Snakemake itself is asked; the four stages follow each other, and all end in the page."""
     before = set(REPOSITORY.iterdir())
-    edges = rule_edges(REPOSITORY / "Snakefile", external)
+    edges = own_edges(external)
     needs = set(nx.transitive_closure(nx.DiGraph(edges)).edges)
     stages = ["ingest", "initial", "occlusion", "textureless", "optimize", "evaluate", "numbers", "page", "all"]
     for number, stage in enumerate(stages[:-1]):
@@ -138,6 +153,7 @@ def test_the_workflows_own_graph(external: bool) -> None:
 
 
 @pytest.mark.workflow
+@pytest.mark.usefixtures("warm")
 def test_without_a_graph_the_page_says_so_and_still_comes(tmp_path: Path) -> None:
     """A version of Snakemake that draws otherwise must not cost the whole report."""
     snakefile = tmp_path / "Snakefile"
@@ -154,6 +170,7 @@ def test_without_a_graph_the_page_says_so_and_still_comes(tmp_path: Path) -> Non
 
 
 @pytest.mark.workflow
+@pytest.mark.usefixtures("warm")
 def test_the_users_own_configuration_does_not_reach_the_graph(tmp_path: Path) -> None:
     """An edited config.yaml beside the Snakefile: its relative paths and its scenes mean nothing to the graph."""
     tree = tmp_path / "tree"
@@ -162,4 +179,4 @@ def test_the_users_own_configuration_does_not_reach_the_graph(tmp_path: Path) ->
     shutil.copy2(REPOSITORY / "Snakefile", tree)
     edited = {"hci_root": "scenes/here", "report": {"pixels": {"builtin/wall": [[1, 2]]}}, "external": {"a": "maps"}}
     (tree / "config.yaml").write_text(json.dumps(edited))
-    assert rule_edges(tree / "Snakefile") == rule_edges(REPOSITORY / "Snakefile")
+    assert rule_edges(tree / "Snakefile") == own_edges()

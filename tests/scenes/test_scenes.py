@@ -14,8 +14,11 @@ from sepi.errors import SepiError
 from sepi.io.pfm import read_pfm
 from sepi.lightfield import LightField
 from sepi.reading import read_light_field
-from sepi.scenes import SCENES, render, rendering, true_disparity, write_hci
+from sepi.scenes import SCENES, rendering, write_hci
 from sepi.scenes.definitions import DEFINITIONS
+
+# as it is drawn: the tests' other modules have it from a file
+from sepi.scenes.light_field import render, true_disparity
 from sepi.scenes.surfaces import Plane, Surface, blob, everywhere, rectangle
 from sepi.scenes.textures import PERIOD, noise, photograph, shading
 

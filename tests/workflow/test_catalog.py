@@ -3,10 +3,10 @@
 import os
 import re
 import subprocess
-import sys
 
 import pytest
 import yaml
+from warm_python import warm_python
 from workflow_copy import REPOSITORY
 
 from sepi.workflow.config import Config
@@ -19,7 +19,7 @@ ALLOWED = {"Specify a conda environment or container for each rule."}
 def test_snakemakes_linter_finds_nothing_else() -> None:
     """It finds what makes a workflow hard to read or to run elsewhere; the catalog shows what it says."""
     result = subprocess.run(
-        [sys.executable, "-m", "snakemake", "--lint", "--", "all"],
+        [warm_python(), "-m", "snakemake", "--lint", "--", "all"],
         cwd=REPOSITORY,
         env=os.environ | {"PYTHONPATH": str(REPOSITORY)},
         stdout=subprocess.PIPE,

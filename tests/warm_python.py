@@ -1,0 +1,196 @@
+"""Python processes that wait for no library: forks of one that has loaded them.
+
+A job of the workflow is a process of its own, which mostly waits for numba, and Snakemake takes seconds to be imported.
+What is tested is loaded after the fork, from ``PYTHONPATH`` as ever. Not for tests of how processes begin or are
+killed: a fork outlives its caller's SIGKILL.
+"""
+
+from __future__ import annotations
+
+import atexit
+import importlib
+import json
+import os
+import runpy
+import select
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import threading
+import traceback
+from contextlib import suppress
+from functools import cache
+from pathlib import Path
+
+# what takes the place of Python: it hands its words and files to the server, and ends as the fork does
+_PROGRAM = """#!{python} -IS
+import json, os, signal, socket, sys
+words = sys.argv[1:]
+if words[:1] == ["-m"] or words and words[0].endswith(".py"):
+    server = socket.socket(socket.AF_UNIX)
+    server.connect({address!r})
+    message = json.dumps([words, dict(os.environ), os.getcwd()]).encode()
+    socket.send_fds(server, [len(message).to_bytes(8, "big")], [0, 1, 2])
+    server.sendall(message)
+    fork = int.from_bytes(server.recv(8), "big")
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, lambda number, _: os.kill(fork, number))
+    sys.exit(int.from_bytes(server.recv(1) or b"\\xff", "big"))
+os.execv({python!r}, [{python!r}, *words])
+"""
+
+# by the first part of a module's name, or the ending of a file
+_LIBRARIES = {
+    "sepi": (
+        *("numpy", "numba", "h5py", "cv2", "click", "pydantic", "yaml", "psutil", "PIL.Image"),
+        *("scipy.sparse.linalg", "scipy.ndimage", "skimage.segmentation"),
+    ),
+    "sepi.report": ("matplotlib.backends.backend_agg", "matplotlib.backends.backend_pdf", "jinja2"),
+    "snakemake": ("snakemake.cli", "snakemake.report", "pulp", "pydantic", "psutil", "yaml"),
+    ".py": ("matplotlib.pyplot",),
+}
+
+_servers: list[int] = []
+
+
+@cache
+def warm_python() -> str:
+    """Path of a program that stands for Python where it is called as ``-m MODULE`` or with a file.
+
+    The measurement of coverage, which a fork would lose, gets Python itself.
+    """
+    if "COVERAGE_RCFILE" in os.environ:
+        return sys.executable
+    folder = Path(tempfile.mkdtemp(prefix="sepi-python-"))
+    address, program = str(folder / "socket"), folder / "python"
+    program.write_text(_PROGRAM.format(python=sys.executable, address=address))
+    program.chmod(0o700)
+    # it ends with this process, which holds the other end of its input
+    server = subprocess.Popen(
+        [sys.executable, __file__, address, str(program)],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        # forks draw without a display
+        env=os.environ | {"MPLBACKEND": "agg"},
+    )
+    assert server.stdin is not None
+    assert server.stdout is not None
+    assert server.stdout.readline() == b"ready\n"
+    _servers.append(server.pid)
+    atexit.register(_end, server, folder)
+    return str(program)
+
+
+def _end(server: subprocess.Popen[bytes], folder: Path) -> None:
+    server.communicate()
+    for path in folder.iterdir():
+        path.unlink()
+    folder.rmdir()
+
+
+def forks_cpu_seconds() -> float:
+    """What the server of this process has taken, with all its forks that have ended."""
+    import psutil
+
+    return sum(sum(psutil.Process(pid).cpu_times()[:4]) for pid in _servers)
+
+
+def _serve(address: str, program: str) -> None:
+    """Answer each connection by a fork that becomes what was called, until the input ends."""
+    # the folder of this file, and what only the tests' own process was told to import from
+    own = [str(Path(__file__).parent), *os.environ.get("PYTHONPATH", "").split(os.pathsep)]
+    path = [entry for entry in sys.path if entry not in own]
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGCHLD, lambda *_: _reap())
+    with socket.socket(socket.AF_UNIX) as listener:
+        listener.bind(address)
+        listener.listen(64)
+        print("ready", flush=True)
+        while listener in select.select([listener, sys.stdin], [], [])[0]:
+            called, _ = listener.accept()
+            head, files, _, _ = socket.recv_fds(called, 8, 3)
+            message = b""
+            while len(message) < int.from_bytes(head, "big"):
+                message += called.recv(1 << 20)
+            words, environment, folder = json.loads(message)
+            _load(words)
+            if not os.fork():
+                listener.close()
+                called.send(os.getpid().to_bytes(8, "big"))
+                code = _become(words, environment, folder, files, path, program)
+                called.send(bytes([code]))
+                os._exit(code)
+            for file in (called.detach(), *files):
+                os.close(file)
+
+
+def _reap() -> None:
+    with suppress(ChildProcessError):
+        while os.waitpid(-1, os.WNOHANG)[0]:
+            pass
+
+
+@cache
+def _loaded(name: str) -> None:
+    for library in _LIBRARIES[name]:
+        importlib.import_module(library)
+    if name == "sepi":
+        # the compiler's own start
+        sys.modules["numba"].njit(lambda x: x)(1.0)
+
+
+def _load(words: list[str]) -> None:
+    if words[0] != "-m":
+        _loaded("sepi")
+        _loaded(".py")
+        return
+    for name in _LIBRARIES:
+        if f"{words[1]}.".startswith(f"{name}."):
+            _loaded(name)
+
+
+def _become(
+    words: list[str], environment: dict[str, str], folder: str, files: list[int], path: list[str], program: str
+) -> int:
+    """Run what was called as Python would, in this process; the code with which it ends."""
+    signal.signal(signal.SIGCHLD, signal.SIG_DFL)
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    for number, file in enumerate(files):
+        os.dup2(file, number)
+        os.close(file)
+    os.chdir(folder)
+    os.environ.clear()
+    os.environ.update(environment)
+    if "numba" in sys.modules:
+        importlib.import_module("numba.core.config").reload_config()
+    sys.dont_write_bytecode = False
+    sys.executable = program
+    start = folder if words[0] == "-m" else str(Path(words[0]).parent)
+    sys.path[:] = [start, *filter(None, environment.get("PYTHONPATH", "").split(os.pathsep)), *path]
+    importlib.invalidate_caches()
+    try:
+        if words[0] == "-m":
+            sys.argv = words[1:]
+            runpy.run_module(words[1], run_name="__main__", alter_sys=True)
+        else:
+            sys.argv = words
+            runpy.run_path(words[0], run_name="__main__")
+        code = 0
+    except SystemExit as end:
+        code = end.code if isinstance(end.code, int) else int(end.code is not None)
+        if isinstance(end.code, str):
+            print(end.code, file=sys.stderr)
+    except BaseException:
+        traceback.print_exc()
+        code = 1
+    threading._shutdown()  # type: ignore[attr-defined]
+    atexit._run_exitfuncs()
+    sys.stdout.flush()
+    sys.stderr.flush()
+    return code & 0xFF
+
+
+if __name__ == "__main__":
+    _serve(*sys.argv[1:])
