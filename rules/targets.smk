@@ -1,9 +1,15 @@
 # What the pages, the tables and the pictures consist of, and what they are made of.
 
 from dataclasses import replace
+from importlib.util import find_spec
 
 from sepi.report.plan import COMPARISON, PARTS_TABLES, TEMPLATES
 from sepi.report.published import FOLDER as PUBLISHED
+from sepi.workflow.datasets import Scene
+from sepi.workflow.rendered_scenes import DATASET
+from sepi.workflow.result_paths import render_file
+
+RENDERING = SETTINGS.rendered
 
 PARTS = "reports/report_parts.json" if SETTINGS.report.parts_of_best else []
 # what ends the name of a file of numbers, to the folder and the tables that are made of it
@@ -115,3 +121,23 @@ def folder_of_scenes(wildcards, output):
 def results_folder(wildcards):
     """The folder that commands look for results in."""
     return placed(RESULTS)
+
+
+def without_renderer(wildcards):
+    """No input; where the renderer is missing, that is told before any job, rather than after hours of others."""
+    if find_spec("mitsuba") is None and not os.path.exists(placed(render_file(wildcards.world))):
+        sys.exit("sepi: rendered scenes need the package mitsuba: pip install 'sepi[render]'")
+    return []
+
+
+def rendered_files():
+    """All that is made of the rendered scenes."""
+    if not SETTINGS.rendered_scenes:
+        sys.exit("sepi: config.rendered.scenes names none; leave the key out for all")
+    return report_files(DATASET)
+
+
+def of_render(ask):
+    """Function of wildcards: memory or time of a render of this size."""
+    size = RENDERING.size
+    return lambda wildcards, attempt: attempt * ask(Scene(DATASET, "", None, (), RENDERING.views**2, size, size))

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 import numpy as np
 
-from sepi.command import progress_bar
+from sepi.command import SepiCommand, progress_bar
 from sepi.errors import SepiError
 from sepi.rendered.catalogue import NOISE_LEVELS, RENDERED
 from sepi.validation import require_known, validated
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 _PATH = click.Path(path_type=Path)
 
 
-@click.command(short_help="Write scenes with exact ground truth.")
+@click.command(cls=SepiCommand, short_help="Write scenes with exact ground truth.")
 @click.argument("names", metavar="[NAME]...", nargs=-1)
 @click.option("-o", "--output", type=_PATH, default=Path("scenes"), show_default=True, help="Folder to write to.")
 @click.option("--rendered", is_flag=True, help="Path-traced scenes, by Mitsuba 3 (extra [render]): minutes for each.")

@@ -12,12 +12,17 @@ from __future__ import annotations
 import time
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
+from typing import TYPE_CHECKING
 
 import click
+import numpy as np
 
 from sepi.command import SepiCommand
 from sepi.kernel_cache import tell_kernel_cache
 from sepi.threads import use_threads
+
+if TYPE_CHECKING:
+    from sepi.lightfield import LightField
 
 SHARES: tuple[tuple[str, ...], ...] = (("paper", "no_sepi", "wang"), ("best", "best_no_detail"))
 """Variants that together call every kernel; those of one share have few kernels in common with the other's."""
@@ -51,9 +56,22 @@ def compile_kernels(variants: tuple[str, ...]) -> None:
     check_order(bare)
     estimate_range(bare)
     if DEFAULT_VARIANT in variants:
+        _share_light(light_field)
         estimate_all_views(light_field, maps)
         all_in_focus(light_field, maps)
         refocus(light_field, 0.0, maps)
+
+
+def _share_light(light_field: LightField) -> None:
+    """Call what rendering calls of the views together."""
+    from sepi.rendered.masks import seen_bits
+    from sepi.rendered.shared_light import with_shared_light
+
+    rows, columns = light_field.grid
+    flat = np.zeros((rows * columns, *light_field.shape), np.float32)
+    grey, stands = np.ones((*flat.shape, 3), np.float32), light_field.baselines.reshape(-1, 2)
+    with_shared_light(grey, grey, flat, flat.astype(np.int16), flat == 0, stands)
+    seen_bits(flat, stands, 0)
 
 
 @click.command(name="python -m sepi.cli.warm_up", cls=SepiCommand)

@@ -644,7 +644,7 @@ def test_ingest_renders_a_built_in_scene(tmp_path: Path) -> None:
 def test_ingest_reads_either_a_path_or_a_built_in_scene(tmp_path: Path, words: tuple[str, ...]) -> None:
     called = ingested(*words, "--output", tmp_path / "lf.h5")
     assert called.exit_code == 2
-    assert "either PATH or --builtin" in called.stderr
+    assert "one of PATH, --builtin NAME and --rendered FILE" in called.stderr
     assert os.listdir(tmp_path) == []
 
 
