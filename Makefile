@@ -42,7 +42,7 @@ check: $(COMPARED)
 	$(TESTS) -m "$(QUICK)"
 
 # of a core of the calibration loop in tests/cpu_budget.py: a quarter more than they take
-CPU_SECONDS := 1900
+CPU_SECONDS := 2700
 test: $(COMPARED)
 	$(TESTS) -m "not system and not faults" --cpu-budget $(CPU_SECONDS)
 

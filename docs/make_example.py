@@ -1,22 +1,26 @@
-"""The pictures of README.md and of the rendered scenes, from what ``snakemake rendered`` made.
+"""Pictures of README.md and of the rendered scenes, and their tables, from what ``snakemake rendered`` made.
 
-``python docs/make_example.py results docs/example.png docs/reproduce/rendered.png``
+``python docs/make_example.py . docs`` after a run here; the first word is the folder that it was run in.
 """
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import click
+from PIL import Image
 
 from sepi.io.hdf5 import read_stage
 from sepi.io.truth import read_with_truth
 from sepi.lightfield import FloatMap, LightField
 from sepi.rendered.catalogue import RENDERED
+from sepi.report.plan import RENDERED_TABLES
 from sepi.report.plots.overview import write_overview
 from sepi.report.plots.pictures import Picture, disparity_limits, error_picture, map_picture, reference_picture
 from sepi.variants import VARIANTS
-from sepi.workflow.result_paths import scene_files
+from sepi.workflow.rendered_scenes import DATASET
+from sepi.workflow.result_paths import RESULTS, scene_files
 
 SCENE = "sticks"
 ACROSS = 2
@@ -25,7 +29,7 @@ ACROSS = 2
 
 def scene(results: Path, name: str) -> tuple[LightField, FloatMap]:
     """A rendered light field without noise, and its map by variant ``best``."""
-    files = scene_files("rendered", name, results)
+    files = scene_files(DATASET, name, results)
     return read_with_truth(files.light_field, files.truth), read_stage(
         files.stage(VARIANTS["best"].labels, "optimize")
     ).disparity
@@ -42,22 +46,38 @@ def pictures(light_field: LightField, disparity: FloatMap) -> list[tuple[str, Pi
     ]
 
 
+def tables(reports: Path) -> str:
+    """The tables of the rendered scenes, one after the other."""
+    found = [(reports / f"{name}.md").read_text(encoding="utf-8") for name in RENDERED_TABLES]
+    # a title of the page, and one level less for all others
+    return "# Results on the rendered scenes\n\n" + re.sub(r"^#", "##", "\n".join(found), flags=re.MULTILINE)
+
+
 @click.command()
-@click.argument("results", type=click.Path(path_type=Path, exists=True))
-@click.argument("example", type=click.Path(path_type=Path))
-@click.argument("every", type=click.Path(path_type=Path))
-def main(results: Path, example: Path, every: Path) -> None:
-    """Write the picture of one scene to EXAMPLE, and that of all of them to EVERY."""
+@click.argument("run", type=click.Path(path_type=Path, exists=True))
+@click.argument("docs", type=click.Path(path_type=Path, exists=True))
+def main(run: Path, docs: Path) -> None:
+    """Write pictures and tables into DOCS from the results below RUN."""
+    results = run / RESULTS
     light_field, disparity = scene(results, SCENE)
     assert light_field.ground_truth is not None
     error = ("error, ±0.2 px", error_picture(disparity - light_field.ground_truth))
-    write_overview(example.parent, example.stem, "", [[*pictures(light_field, disparity), error]], endings=("png",))
+    write_overview(docs, "example", "", [[*pictures(light_field, disparity), error]], endings=("png",))
     names = list(RENDERED)
     rows = [
         [panel for name in names[start : start + ACROSS] for panel in pictures(*scene(results, name))]
         for start in range(0, len(names), ACROSS)
     ]
-    write_overview(every.parent, every.stem, "", rows, endings=("png",))
+    write_overview(docs / "reproduce", "rendered", "", rows, endings=("png",))
+    # a third of the bytes, and no difference that one sees
+    every = docs / "reproduce" / "rendered.png"
+    with Image.open(every) as picture:
+        smaller = picture.convert("RGB").resize(
+            (picture.width * 2 // 3, picture.height * 2 // 3), Image.Resampling.LANCZOS
+        )
+    smaller.quantize(256, dither=Image.Dither.NONE).save(every, optimize=True)
+    text = tables(run / "reports" / DATASET)
+    (docs / "reproduce" / "rendered_results.md").write_text(text, encoding="utf-8")
 
 
 if __name__ == "__main__":
