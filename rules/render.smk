@@ -15,7 +15,7 @@ rule render:
     threads: 8
     resources:
         mem_mb=of_render(lambda scene: scene.memory_mb(bytes_per_sample=20, bytes_per_pixel=2000)),
-        runtime=of_render(lambda scene: scene.minutes(0.6 * RENDERING.samples)),
+        runtime=of_render(lambda scene: scene.minutes(2 * RENDERING.samples)),
     params:
         flags=f"--size {RENDERING.size} --views {RENDERING.views} --samples {RENDERING.samples}",
         code=lambda wildcards: code_digest(*render_modules(wildcards.world)),

@@ -4,12 +4,18 @@ from __future__ import annotations
 
 import importlib
 from dataclasses import dataclass
+from typing import Literal, get_args
 
 from sepi.rendered.world import World
 from sepi.validation import require_known
 
-NOISE_LEVELS = ("off", "low", "high")
+NoiseLevel = Literal["off", "low", "high"]
+
+NOISE_LEVELS: tuple[NoiseLevel, ...] = get_args(NoiseLevel)
 """How many electrons each pixel of a camera has: without end, those of a quiet camera, and those of a dim evening."""
+
+WITHOUT_NOISE: NoiseLevel = "off"
+"""The level of noise that is in no name, and of which there is one seed alone."""
 
 
 @dataclass(frozen=True)
@@ -46,6 +52,12 @@ RENDERED: dict[str, Entry] = {
     "dim": Entry("a workshop by the light of one lamp", "a tenth of the light: noise in the shadows", False),
 }
 """The path-traced scenes in their order."""
+
+
+def exposed_name(scene: str, noise: str = WITHOUT_NOISE, seed: int = 1) -> str:
+    """What a scene is called at a noise level: ``sticks``, ``sticks_low``, and with another seed ``sticks_low_2``."""
+    parts = [scene] if noise == WITHOUT_NOISE else [scene, noise, *([str(seed)] if seed != 1 else [])]
+    return "_".join(parts)
 
 
 def world_of(name: str) -> World:

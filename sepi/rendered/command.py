@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 
 from sepi.command import SepiCommand, progress_bar, write_timing
-from sepi.rendered.options import Taking
+from sepi.rendered.options import RenderOptions
 from sepi.rendered.rendering import render_scene
 from sepi.validation import validated
 
@@ -28,7 +28,7 @@ def main(name: str, size: int, views: int, samples: int, threads: int, output: P
     started = time.perf_counter()
     values = {"size": size, "grid": [views, views], "samples": samples}
     with progress_bar(name) as progress:
-        render_scene(name, validated(Taking, values, "rendered"), output, progress, threads)
+        render_scene(name, validated(RenderOptions, values, "rendered"), output, progress, threads)
     if timing is not None:
         write_timing(timing, started, threads)
 

@@ -10,15 +10,12 @@ import numpy as np
 import numpy.typing as npt
 
 from sepi.camera import camera_from
-from sepi.lightfield import DisparityRange, LightField, Truth
+from sepi.lightfield import DisparityRange, LightField
+from sepi.rendered.catalogue import exposed_name
 from sepi.rendered.options import NOISE, Exposure
-from sepi.rendered.render_file import Render, read_render, read_truth
-from sepi.rendered.tracing import coded
-
-
-def exposed_name(scene: str, noise: str = "off", seed: int = 1) -> str:
-    """What a scene is called at a noise level: ``sticks``, ``sticks_low``, ``sticks_low_2``."""
-    return scene + (f"_{noise}" if noise != "off" else "") + (f"_{seed}" if noise != "off" and seed != 1 else "")
+from sepi.rendered.render_file import Render, read_render
+from sepi.rendered.srgb import srgb_encoded
+from sepi.validation import validated
 
 
 def read_exposed(path: Path, noise: str = "off", seed: int = 1) -> LightField:
@@ -37,13 +34,13 @@ def read_exposed(path: Path, noise: str = "off", seed: int = 1) -> LightField:
     -------
     LightField
         As :func:`exposed` makes it.
+
+    Raises
+    ------
+    SepiError
+        If the file is no render, or there is no such level or seed.
     """
-    return exposed(read_render(path), Exposure.model_validate({"noise": noise, "noise_seed": seed}))
-
-
-def read_render_truth(path: Path) -> Truth:
-    """Ground truth and masks of a render's reference view."""
-    return read_truth(path)
+    return exposed(read_render(path), validated(Exposure, {"noise": noise, "noise_seed": seed}, "noise"))
 
 
 def exposed(render: Render, exposure: Exposure) -> LightField:
@@ -100,7 +97,9 @@ def _noisy(
 def _values(light: npt.NDArray[np.float64], exposure: Exposure) -> npt.NDArray[np.float64]:
     """Values that are to be rounded to whole ones."""
     light = np.clip(light, 0, 1)
-    curve = np.float64(coded(light.astype(np.float32))) if exposure.gamma is None else light ** (1 / exposure.gamma)
+    curve = (
+        np.float64(srgb_encoded(light.astype(np.float32))) if exposure.gamma is None else light ** (1 / exposure.gamma)
+    )
     values: npt.NDArray[np.float64] = np.round(curve * (2**exposure.bits - 1))
     return values
 

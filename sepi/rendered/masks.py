@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numba
 import numpy as np
 import numpy.typing as npt
 
 from sepi.lightfield import BoolMap, FloatMap
-from sepi.rendered.tracing import FirstSurface
+from sepi.rendered.surfaces import FirstSurface
+from sepi.rendered.view_kernels import seen_elsewhere
 from sepi.rendered.world import FloatArray, Pattern, Thing
 from sepi.scoring.edges import edges_of
 from sepi.scoring.regions import textureless
@@ -33,8 +33,8 @@ _BIT = {name: 1 << number for number, name in enumerate(MASKS)}
 _SAME = 0.05
 
 
-def painted(things: Sequence[Thing], seen: FirstSurface) -> FloatArray:
-    """The colours that are painted on what a view shows, without light, ``(H, W, 3)``."""
+def albedo_of(things: Sequence[Thing], seen: FirstSurface) -> FloatArray:
+    """The colours of what a view shows, without light, ``(H, W, 3)``, as on a screen."""
     colours = np.zeros((*seen.thing.shape, 3), np.float32)
     for number in np.unique(seen.thing[seen.thing >= 0]):
         pattern, here = things[number].material.pattern, seen.thing == number
@@ -52,7 +52,7 @@ def surface_bits(things: Sequence[Thing], seen: FirstSurface, disparity: FloatMa
     """Masks of a view that do not depend on others: kinds of surfaces, and depth steps."""
     kinds = np.array([thing.material.kind for thing in things] + ["matte"])[seen.thing]
     thin = np.array([thing.thin for thing in things] + [False])[seen.thing]
-    plain = textureless(painted(things, seen))
+    plain = textureless(albedo_of(things, seen))
     solid = (kinds == "matte") | (kinds == "glossy")
     masks = {
         "textured": solid & ~plain,
@@ -77,7 +77,7 @@ def seen_bits(disparities: FloatArray, positions: npt.NDArray[np.float64], view:
     view : int
         Whose masks are wanted.
     """
-    hidden, seen = _seen(disparities, positions - positions[view], view)
+    hidden, seen = seen_elsewhere(disparities, positions - positions[view], view, _SAME)
     bits: Bits = hidden * np.uint16(_BIT["occluded"]) + ~seen * np.uint16(_BIT["alone"])
     return bits
 
@@ -86,35 +86,3 @@ def mask(bits: Bits, name: str) -> BoolMap:
     """One of a view's masks."""
     found: BoolMap = (bits & _BIT[name]) != 0
     return found
-
-
-@numba.njit(cache=True, parallel=True)
-def _seen(
-    disparities: FloatArray, baselines: npt.NDArray[np.float64], view: int
-) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
-    """Whether some view that has the point in its picture does not see it, and whether some other view sees it.
-
-    A point lands between four pixels of another view; where all of them are nearer, it is hidden.
-    """
-    count, height, width = disparities.shape
-    hidden = np.zeros((height, width), np.bool_)
-    seen = np.zeros((height, width), np.bool_)
-    for y in numba.prange(height):
-        for x in range(width):
-            own = disparities[view, y, x]
-            for other in range(count):
-                if other == view:
-                    continue
-                row, column = y - own * baselines[other, 0], x - own * baselines[other, 1]
-                if not (0 <= row <= height - 1 and 0 <= column <= width - 1):
-                    continue
-                top, left = min(int(row), height - 2), min(int(column), width - 2)
-                there = min(
-                    min(disparities[other, top, left], disparities[other, top, left + 1]),
-                    min(disparities[other, top + 1, left], disparities[other, top + 1, left + 1]),
-                )
-                if there > own + _SAME:
-                    hidden[y, x] = True
-                else:
-                    seen[y, x] = True
-    return hidden, seen

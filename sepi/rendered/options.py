@@ -5,7 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
+
+from sepi.rendered.catalogue import NoiseLevel
+from sepi.validation import CheckedModel
 
 _Share = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 _Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
@@ -13,11 +16,7 @@ _Rows = Annotated[int, Field(ge=1, le=33)]
 _Seed = Annotated[int, Field(ge=0, lt=2**31)]
 
 
-class _Options(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
-
-
-class Taking(_Options):
+class RenderOptions(CheckedModel):
     """What has to be known before a scene is rendered."""
 
     size: int = Field(512, ge=32, le=4096, description="height and width of a view in pixels; disparities stay")
@@ -35,6 +34,11 @@ class Taking(_Options):
     )
     seed: _Seed = Field(0, description="of the light's paths and of these errors")
 
+    @property
+    def shares_light(self) -> bool:
+        """Whether views share the light of matte surfaces: they show the same points, sharp, where disparity says."""
+        return not (self.lens or self.rotation_error)
+
 
 @dataclass(frozen=True)
 class Electrons:
@@ -44,7 +48,7 @@ class Electrons:
     read: float
 
 
-NOISE: dict[str, Electrons | None] = {
+NOISE: dict[NoiseLevel, Electrons | None] = {
     "off": None,
     # in grey of 18 % deviations of 3 and of 9 of 255
     "low": Electrons(2000.0, 4.0),
@@ -53,10 +57,10 @@ NOISE: dict[str, Electrons | None] = {
 """The sensors of the noise levels; none for pictures without noise."""
 
 
-class Exposure(_Options):
+class Exposure(CheckedModel):
     """What a sensor makes of the light."""
 
-    noise: Literal["off", "low", "high"] = Field(
+    noise: NoiseLevel = Field(
         "off", description="photons and reading of a sensor that holds 2,000 (low) or 250 (high) electrons at white"
     )
     noise_seed: int = Field(1, ge=1, lt=2**31, description="of the noise, and of what differs from view to view")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import shutil
 from collections.abc import Callable, Sequence
 from dataclasses import fields, is_dataclass
@@ -18,9 +19,10 @@ from sepi.io.files import atomic_path
 from sepi.io.provenance import package_version
 from sepi.rendered.catalogue import RENDERED, world_of
 from sepi.rendered.masks import seen_bits, surface_bits
-from sepi.rendered.options import Taking
+from sepi.rendered.options import RenderOptions
 from sepi.rendered.render_file import Render, write_render
 from sepi.rendered.rig import Rig, rig_of
+from sepi.rendered.sampling import sampled
 from sepi.rendered.shared_light import with_shared_light
 from sepi.rendered.tracing import Tracer, require_mitsuba
 from sepi.rendered.world import World
@@ -31,18 +33,19 @@ from sepi.validation import require_known
 # what is kept of a view until all are done
 _TYPES = {
     "views": np.float32,
-    "paint": np.float32,
+    "albedo": np.float32,
     "disparity": np.float32,
     "normal": np.float16,
     "masks": np.uint16,
     "upright": np.float32,
     "things": np.int16,
+    "whole": np.bool_,
 }
 
 
 def render_scene(
     name: str,
-    taking: Taking,
+    options: RenderOptions,
     path: Path,
     progress: Callable[[float], None] = no_progress,
     threads: int | None = None,
@@ -53,7 +56,7 @@ def render_scene(
     ----------
     name : str
         A key of :data:`sepi.rendered.RENDERED`.
-    taking : Taking
+    options : RenderOptions
     path : Path
         HDF5 file to write (:mod:`sepi.rendered.render_file`). Views that are done lie in a folder beside it until all
         are, and are taken over by a later run of the same scene and options.
@@ -70,49 +73,64 @@ def render_scene(
     require_known("path-traced scenes", [name], RENDERED)
     require_mitsuba()
     use_threads(threads or available_cores())
-    render_world(name, world_of(name), taking, path, progress)
+    render_world(name, world_of(name), options, path, progress)
 
 
-def made_by(name: str, taking: Taking) -> dict[str, Any]:
+def made_by(name: str, options: RenderOptions) -> dict[str, Any]:
     """What a file of a render says that it was rendered with."""
-    return {"scene": name, "version": package_version(), **taking.model_dump(mode="json")}
+    return {"scene": name, "version": package_version(), **options.model_dump(mode="json")}
 
 
 def render_world(
-    name: str, world: World, taking: Taking, path: Path, progress: Callable[[float], None] = no_progress
+    name: str, world: World, options: RenderOptions, path: Path, progress: Callable[[float], None] = no_progress
 ) -> None:
     """Render a world of one's own; see :func:`render_scene`."""
-    rig = rig_of(world, taking.size, taking.grid, taking.baseline)
-    positions, turns = _stand(rig, taking)
-    count = positions.shape[0] * positions.shape[1]
+    rig = rig_of(world, options.size, options.grid, options.baseline)
+    positions, turns = _stand(rig, options)
+    count = math.prod(options.grid)
     parts = path.with_name(f"{path.name}.parts")
-    _take_over(parts, json.dumps({**made_by(name, taking), "world": _digest(world)}, sort_keys=True))
-    tracer = Tracer(world, rig, taking.samples, taking.lens * rig.baseline)
+    _take_over(parts, json.dumps({**made_by(name, options), "world": _digest(world)}, sort_keys=True))
+    tracer = Tracer(world, rig, options.lens * rig.baseline)
     for number in range(count):
         file = parts / f"view_{number:03d}.npz"
         if not _is_whole(file):
-            at = divmod(number, taking.grid[1])
-            values = _view(world, tracer, rig, positions[at], turns[at], taking.seed * count + number)
+            at = divmod(number, options.grid[1])
+            values = _view(world, tracer, rig, options, positions[at], turns[at], number)
             with atomic_path(file) as temporary, temporary.open("wb") as stream:
                 np.savez(stream, allow_pickle=False, **values)
         progress((number + 1) / (count + 1))
-    write_render(path, _assembled(name, world, rig, taking, parts))
+    write_render(path, _assembled(name, world, rig, options, parts))
     shutil.rmtree(parts)
     progress(1.0)
 
 
 def _view(
-    world: World, tracer: Tracer, rig: Rig, position: npt.NDArray[np.float64], turn: npt.NDArray[np.float64], seed: int
+    world: World,
+    tracer: Tracer,
+    rig: Rig,
+    options: RenderOptions,
+    position: npt.NDArray[np.float64],
+    turn: npt.NDArray[np.float64],
+    number: int,
 ) -> dict[str, npt.NDArray[np.generic]]:
     """Picture and truth of one view."""
     x, y, z = map(float, turn)
+    count = math.prod(options.grid)
+    # of its own for all that takes samples: a view's tiles ask for a few
+    seed = int(np.random.SeedSequence([options.seed, number]).generate_state(1)[0])
     at = tracer.position(float(position[0]), float(position[1]), (x, y, z))
     seen = tracer.first_surface(at)
     disparity = rig.disparity(seen.depth).astype(np.float32)
     straight = seen if not turn.any() else tracer.first_surface(tracer.position(float(position[0]), float(position[1])))
+    if options.shares_light:
+        picture, albedo, whole = sampled(tracer, at, seen, disparity, options.samples, count, seed)
+    else:
+        picture = tracer.picture(at, seed, options.samples)
+        albedo, whole = np.zeros_like(picture), np.zeros(disparity.shape, bool)
     found: dict[str, npt.NDArray[Any]] = {
-        "views": tracer.picture(at, seed),
-        "paint": tracer.paint(at, seed),
+        "views": picture,
+        "albedo": albedo,
+        "whole": whole,
         "things": seen.thing,
         "disparity": disparity,
         "normal": seen.normal,
@@ -123,19 +141,19 @@ def _view(
     return {part: values.astype(_TYPES[part]) for part, values in found.items()}
 
 
-def _stand(rig: Rig, taking: Taking) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+def _stand(rig: Rig, options: RenderOptions) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
     """Where views stand and how they are turned; the reference view as it should."""
-    rng = np.random.default_rng(taking.seed)
+    rng = np.random.default_rng(options.seed)
     positions = rig.positions
     shift, turns = rng.standard_normal(positions.shape), rng.standard_normal((*positions.shape[:2], 3))
     centre = positions.shape[0] // 2, positions.shape[1] // 2
     shift[centre], turns[centre] = 0, 0
-    return positions + taking.position_error * shift, np.radians(taking.rotation_error) * turns
+    return positions + options.position_error * shift, np.radians(options.rotation_error) * turns
 
 
-def _assembled(name: str, world: World, rig: Rig, taking: Taking, parts: Path) -> Render:
+def _assembled(name: str, world: World, rig: Rig, options: RenderOptions, parts: Path) -> Render:
     """The views together, and which views see what."""
-    positions, turns = _stand(rig, taking)
+    positions, turns = _stand(rig, options)
     files = [parts / f"view_{number:03d}.npz" for number in range(len(positions.reshape(-1, 2)))]
     views: dict[str, npt.NDArray[Any]] = {}
     for number, file in enumerate(files):
@@ -144,11 +162,10 @@ def _assembled(name: str, world: World, rig: Rig, taking: Taking, parts: Path) -
                 if number == 0:
                     views[part] = np.empty((len(files), *values[part].shape), kind)
                 views[part][number] = values[part]
-    upright, paint, things = (views.pop(part) for part in ("upright", "paint", "things"))
+    upright, albedo, things, whole = (views.pop(part) for part in ("upright", "albedo", "things", "whole"))
     stands, turned = positions.reshape(-1, 2), turns.reshape(-1, 3).any(axis=1)
-    if not turned.any() and not taking.lens:
-        matte = np.array([thing.material.kind == "matte" for thing in world.things] + [False])[things]
-        views["views"] = with_shared_light(views["views"], paint, upright, things, matte, stands)
+    if options.shares_light:
+        views["views"] = with_shared_light(views["views"], albedo, upright, things, whole, stands)
     # beyond half precision is far beyond white
     views["views"] = np.minimum(views["views"], 60000.0).astype(np.float16)
     # of a turned view it is not told
@@ -156,12 +173,12 @@ def _assembled(name: str, world: World, rig: Rig, taking: Taking, parts: Path) -
         views["masks"][number] |= seen_bits(upright, stands, number)
     return Render(
         name=name,
-        **{part: values.reshape(*taking.grid, *values.shape[1:]) for part, values in views.items()},
+        **{part: values.reshape(*options.grid, *values.shape[1:]) for part, values in views.items()},
         positions=positions,
         turns=turns,
         settings=rig.settings,
         light=world.light,
-        made_by=made_by(name, taking),
+        made_by=made_by(name, options),
     )
 
 

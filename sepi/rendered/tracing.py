@@ -1,7 +1,7 @@
 """Pictures and first surfaces of a world by Mitsuba 3, one view at a time.
 
-Variant ``scalar_rgb`` needs nothing beside the wheel. It seeds the sampler by view and block, and a box filter keeps
-each pixel to its own block: the same bytes from run to run, for any number of threads.
+Variant ``scalar_rgb`` needs nothing beside the wheel. It seeds the sampler by view and block, blocks are of one size,
+and a box filter keeps each pixel to its own: the same bytes from run to run, for any number of threads.
 """
 
 from __future__ import annotations
@@ -18,11 +18,19 @@ import numpy.typing as npt
 from sepi.errors import SepiError
 from sepi.rendered.rig import Rig
 from sepi.rendered.shapes import normals
+from sepi.rendered.srgb import srgb_decoded
+from sepi.rendered.surfaces import FirstSurface, Surfaces, period
 from sepi.rendered.world import FloatArray, Lamp, Material, Mesh, Pattern, Vector, World
 from sepi.threads import threads_used
 
 # metres at which rays begin; far less would cost digits of their directions
 _NEAR = 0.1
+# side of the blocks that Mitsuba renders; left to it, they would be smaller for many threads, and seeded otherwise
+_BLOCK = 16
+# samples of a pixel from which on it pays to spread them evenly
+_SPREAD = 9
+# one ray through the middle of a pixel
+_MIDDLE = {"sampler": {"type": "stratified", "sample_count": 1, "jitter": False}}
 # Vogel's spiral: points that fill a disc evenly
 _GOLDEN_ANGLE = np.pi * (3 - np.sqrt(5))
 
@@ -47,27 +55,18 @@ class Position:
     shear_down: float
     turn: Vector = (0.0, 0.0, 0.0)
 
-
-@dataclass(frozen=True)
-class FirstSurface:
-    """What the rays through the middles of a view's pixels meet first.
-
-    Attributes
-    ----------
-    depth : ndarray, shape (H, W), float64
-        Metres along the viewing direction; infinite where there is nothing.
-    normal : ndarray, shape (H, W, 3), float32
-        Of the triangles, towards the camera: right, down, away.
-    uv : ndarray, shape (H, W, 2), float32
-        Where on its pattern, in periods.
-    thing : ndarray, shape (H, W), int64
-        Which of the world's things; -1 where there is none.
-    """
-
-    depth: npt.NDArray[np.float64]
-    normal: FloatArray
-    uv: FloatArray
-    thing: npt.NDArray[np.int64]
+    @property
+    def rotation(self) -> npt.NDArray[np.float64]:
+        """Matrix, ``(3, 3)``, that carries directions of the camera into the world."""
+        matrix = np.eye(3)
+        for axis, angle in enumerate(self.turn):
+            i, j = (axis + 1) % 3, (axis + 2) % 3
+            about = np.eye(3)
+            about[i, i] = about[j, j] = np.cos(angle)
+            about[j, i] = np.sin(angle)
+            about[i, j] = -about[j, i]
+            matrix = about @ matrix
+        return matrix
 
 
 def require_mitsuba() -> None:
@@ -95,23 +94,21 @@ class Tracer:
     ----------
     world : World
     rig : Rig
-    samples : int
-        Of each pixel.
     lens : float
         Radius of the lens in metres; 0 for a pinhole. It is in focus where the disparity is zero.
     lens_points : int
         Into so many pinholes, at most, a lens is divided.
+
+    Attributes
+    ----------
+    surfaces : Surfaces
+        All triangles of the world in one list.
     """
 
-    def __init__(self, world: World, rig: Rig, samples: int, lens: float = 0.0, lens_points: int = 32) -> None:
+    def __init__(self, world: World, rig: Rig, lens: float = 0.0, lens_points: int = 32) -> None:
         self._mi = _mitsuba()
-        self._world, self._rig, self._samples = world, rig, samples
-        self._exposure = world.exposure
-        self._paintings: list[Any] = []
-        count = min(samples, lens_points) if lens else 1
-        distance = lens * np.sqrt((np.arange(count) + 0.5) / count) if lens else np.zeros(1)
-        angle = np.arange(count) * _GOLDEN_ANGLE
-        self._lens = np.stack([distance * np.cos(angle), distance * np.sin(angle)], axis=1)
+        self._rig, self._lens, self._lens_points = rig, lens, lens_points if lens else 1
+        self._exposure, self._depth = world.exposure, world.depth
         parts: dict[str, Any] = {}
         # things that share a material share its pictures
         surfaces = {id(thing.material): thing.material for thing in world.things}
@@ -123,12 +120,11 @@ class Tracer:
         for number, sun in enumerate(world.suns):
             light = {"type": "rgb", "value": list(sun.irradiance)}
             parts[f"sun{number}"] = {"type": "directional", "direction": list(sun.direction), "irradiance": light}
-        # paths end by chance from the second surface on: most of the time goes into light that hardly counts
-        integrator = {"type": "path", "max_depth": world.depth, "rr_depth": 2}
-        self._scene = self._mi.load_dict({"type": "scene", **parts, **self._sky(world.sky), "integrator": integrator})
-        # Mitsuba counts shapes in its own order, from 1
-        names = [shape.id() for shape in self._scene.shapes()]
-        self._things = np.array([-1, *(int(name[5:]) if name.startswith("thing") else -1 for name in names)])
+        self._scene = self._mi.load_dict({"type": "scene", **parts, **self._sky(world.sky)})
+        self.surfaces = Surfaces(world)
+        # asked for what a ray meets, Mitsuba goes through all shapes: of one it answers ten times as fast
+        everything = self._shape(self.surfaces.mesh, Material(), {})
+        self._triangles = self._mi.load_dict({"type": "scene", "all": everything})
 
     def position(self, down: float, across: float, turn: Vector = (0.0, 0.0, 0.0)) -> Position:
         """The camera of the view ``(down, across)`` view steps from the centre."""
@@ -139,84 +135,117 @@ class Tracer:
         shear = self._rig.focal_px / (self._rig.focus * self._rig.size)
         return Position(right, down, right * shear, down * shear, turn)
 
-    def picture(self, position: Position, seed: int) -> FloatArray:
-        """Radiance times exposure, ``(H, W, 3)`` float32, linear: 1 is white."""
-        return self._exposure * self._seen(self._scene, position, seed)
-
-    def paint(self, position: Position, seed: int) -> FloatArray:
-        """What is painted on matte surfaces, ``(H, W, 3)`` float32, linear, by the rays of the picture of that seed."""
-        if not self._paintings:
-            self._paintings = [self._painted(self._world, side) for side in (1, -1)]
-        front, back = (self._seen(scene, position, seed) for scene in self._paintings)
-        return front + back
-
-    def _seen(self, scene: Any, position: Position, seed: int) -> FloatArray:
-        """Mean radiance of the rays through each pixel."""
-        count = len(self._lens)
+    def picture(self, position: Position, seed: int, samples: int) -> FloatArray:
+        """Radiance times exposure, ``(H, W, 3)`` float32, linear: 1 is white; of so many paths a pixel."""
+        count = min(samples, self._lens_points)
         total = np.zeros((self._rig.size, self._rig.size, 3), np.float64)
-        for number, (right, down) in enumerate(self._lens):
-            samples = self._samples * (number + 1) // count - self._samples * number // count
+        for number, (right, down) in enumerate(_in_disc(self._lens, count)):
+            part = samples * (number + 1) // count - samples * number // count
             point = self._at(position.right + right, position.down + down, position.turn)
-            sensor = self._sensor(point, samples)
-            seen = self._mi.render(scene, sensor=sensor, spp=samples, seed=seed * count + number)
-            total += samples * np.asarray(seen, np.float64)
-        return (total / self._samples).astype(np.float32)
+            sensor = {**self._whole(point), **_sampler(part)}
+            total += part * self._seen(self._scene, self._paths(_BLOCK), sensor, part, (seed + number) % 2**32)
+        return (self._exposure / samples * total).astype(np.float32)
+
+    def tiles(self, position: Position, pixels: npt.NDArray[np.int64], seed: int, samples: int) -> FloatArray:
+        """What :meth:`picture` is, of square tiles alone: ``(N, T, T, 3)`` for their pixels ``(N, T, T, 2)``."""
+        integrator, sampler = self._paths(pixels.shape[1]), _sampler(samples)
+        seen = [
+            self._side_by_side(self._scene, integrator, position, some, sampler, (seed + number) % 2**32)
+            for number, some in enumerate(_some(pixels))
+        ]
+        return np.float32(self._exposure) * np.concatenate([np.zeros((0, *pixels.shape[1:3], 3), np.float32), *seen])
 
     def first_surface(self, position: Position) -> FirstSurface:
         """What one ray through the middle of each pixel meets."""
-        integrator = self._mi.load_dict({"type": "aov", "aovs": "z:depth,n:geo_normal,uv:uv,i:shape_index"})
-        seen = np.array(self._mi.render(self._scene, sensor=self._sensor(position, 1), integrator=integrator, spp=1))
-        distance, normal = seen[..., 0].astype(np.float64), seen[..., 1:4]
-        directions = self._directions(position)
-        hit = distance > 0
-        towards = np.sum(normal * directions, axis=-1, keepdims=True) > 0
-        return FirstSurface(
-            depth=np.where(hit, distance * directions[..., 2] + _NEAR, np.inf),
-            normal=np.where(towards, -normal, normal).astype(np.float32),
-            uv=seen[..., 4:6].astype(np.float32),
-            thing=self._things[np.where(hit, seen[..., 6], 0).astype(np.int64)],
+        straight = self.directions(position)
+        return self.surfaces.first(
+            self._faces(position, 1), straight @ position.rotation.T, (position.right, position.down, 0.0)
         )
 
-    def _sensor(self, position: Position, samples: int) -> Any:
-        """Samples are spread over a pixel; a single one is its middle."""
+    def things(self, position: Position, fine: int) -> npt.NDArray[np.int64]:
+        """Which things F by F rays of each pixel meet first, ``(H, F, W, F)``; -1 for none."""
+        size = self._rig.size
+        return self.surfaces.thing[self._faces(position, fine)].reshape(size, fine, size, fine)
+
+    def _faces(self, position: Position, fine: int) -> npt.NDArray[np.int32]:
+        """Triangles of :attr:`surfaces` that F by F rays of each pixel meet, ``(H F, W F)``."""
+        sensor = {**self._whole(position), **self._film(fine * self._rig.size), **_MIDDLE}
+        seen = self._seen(self._triangles, self._first(_BLOCK), sensor, 1, 0)
+        return seen[..., 0].astype(np.int32)
+
+    def albedo(self, position: Position, faces: npt.NDArray[np.int32], pixels: npt.NDArray[np.int64]) -> FloatArray:
+        """Mean albedo, ``(N, 3)``, of pixels each of which shows one triangle; without a turn."""
+        focal, size = self._rig.focal_px, self._rig.size
+        axis = [(0.5 + shear) * size for shear in (position.shear_down, position.shear_right)]
+        return self.surfaces.albedo(faces, pixels, np.array([position.right, position.down, *axis, focal]))
+
+    def _side_by_side(
+        self, scene: Any, integrator: Any, position: Position, pixels: Any, sampler: Any, seed: int
+    ) -> FloatArray:
+        """Tiles by one camera each, in a picture of all."""
+        count, side = pixels.shape[:2]
+        film = {"film": self._mi.load_dict(self._film(side)["film"])}
+        camera = {**self._camera(position, side), **film}
+        windows = {
+            f"tile{number:04d}": {**camera, **self._offsets(position, int(top), int(left), side)}
+            for number, (top, left) in enumerate(pixels[:, 0, 0])
+        }
+        together = {"type": "batch", **windows, **self._film(side, count), **sampler}
+        seen = self._seen(scene, integrator, together, sampler["sampler"]["sample_count"], seed)
+        found: FloatArray = seen.reshape(side, count, side, -1).transpose(1, 0, 2, 3)
+        return found
+
+    def _whole(self, position: Position) -> dict[str, Any]:
+        """The camera of a whole picture."""
+        size = self._rig.size
+        return {**self._camera(position, size), **self._offsets(position, 0, 0, size), **self._film(size)}
+
+    def _seen(self, scene: Any, integrator: Any, sensor: dict[str, Any], samples: int, seed: int) -> FloatArray:
+        loaded = self._mi.load_dict(sensor)
+        return np.array(self._mi.render(scene, sensor=loaded, integrator=integrator, spp=samples, seed=seed))
+
+    def _paths(self, block: int) -> Any:
+        # paths end by chance from the second surface on: most of the time goes into light that hardly counts
+        paths = {"type": "path", "max_depth": self._depth, "rr_depth": 2, "block_size": block}
+        return self._mi.load_dict(paths)
+
+    def _first(self, block: int) -> Any:
+        return self._mi.load_dict({"type": "aov", "aovs": "i:prim_index", "block_size": block})
+
+    def _film(self, height: int, count: int = 1) -> dict[str, Any]:
+        values = {"width": count * height, "height": height, "rfilter": {"type": "box"}}
+        return {"film": {"type": "hdrfilm", "pixel_format": "rgb", "component_format": "float32", **values}}
+
+    def _camera(self, position: Position, side: int) -> dict[str, Any]:
+        """A camera that sees a square of the picture."""
         transform = self._mi.ScalarTransform4f
-        turn = transform()
-        for axis, angle in zip(np.eye(3), position.turn, strict=True):
-            turn = transform().rotate(axis.tolist(), float(np.degrees(angle))) @ turn
+        turn = transform(np.vstack([np.c_[position.rotation, np.zeros(3)], [0, 0, 0, 1]]))
         stand = transform().translate([position.right, position.down, 0.0])
-        film = {"width": self._rig.size, "height": self._rig.size, "rfilter": {"type": "box"}}
-        return self._mi.load_dict(
-            {
-                "type": "perspective",
-                "fov": float(2 * np.degrees(np.arctan(self._rig.size / (2 * self._rig.focal_px)))),
-                "to_world": stand @ turn @ transform().look_at([0, 0, 0], [0, 0, 1], [0, -1, 0]),
-                "near_clip": _NEAR,
-                "far_clip": 1000.0,
-                # Mitsuba moves the window, not the picture
-                "principal_point_offset_x": -position.shear_right,
-                "principal_point_offset_y": -position.shear_down,
-                "film": {"type": "hdrfilm", "pixel_format": "rgb", "component_format": "float32", **film},
-                "sampler": self._sampler(samples),
-            }
-        )
+        return {
+            "type": "perspective",
+            "fov": float(2 * np.degrees(np.arctan(side / (2 * self._rig.focal_px)))),
+            "to_world": stand @ turn @ transform().look_at([0, 0, 0], [0, 0, 1], [0, -1, 0]),
+            "near_clip": _NEAR,
+            "far_clip": 1000.0,
+        }
 
-    def _sampler(self, samples: int) -> dict[str, Any]:
-        """Samples spread over a pixel, by the quicker sampler where it takes their number; one is its middle."""
-        kind = "stratified" if samples == 4 ** round(math.log(samples, 4)) else "multijitter"
-        return {"type": kind, "sample_count": samples} | ({"jitter": False} if samples == 1 else {})
+    def _offsets(self, position: Position, top: int, left: int, side: int) -> dict[str, float]:
+        """Where that square lies; Mitsuba moves the window, not the picture."""
+        return {
+            f"principal_point_offset_{axis}": float((first + side / 2 - (0.5 + shear) * self._rig.size) / side)
+            for axis, first, shear in (("x", left, position.shear_right), ("y", top, position.shear_down))
+        }
 
-    def _directions(self, position: Position) -> npt.NDArray[np.float64]:
-        """Of the rays through the middles of the pixels, in the camera's own frame but for its turn; length 1."""
+    def directions(self, position: Position) -> npt.NDArray[np.float64]:
+        """Of the rays through the middles of the pixels, ``(H, W, 3)``, in the camera's own frame; 1 along its axis."""
         middles = np.arange(self._rig.size) + 0.5 - self._rig.size / 2
         right = (middles - position.shear_right * self._rig.size) / self._rig.focal_px
         down = (middles - position.shear_down * self._rig.size) / self._rig.focal_px
         x, y = np.broadcast_arrays(right[None, :], down[:, None])
-        found = np.stack([x, y, np.ones_like(x)], axis=-1)
-        found /= np.linalg.norm(found, axis=-1, keepdims=True)
-        return found
+        return np.stack([x, y, np.ones_like(x)], axis=-1)
 
-    def _shape(self, mesh: Mesh, material: Material, parts: dict[str, Any], side: int = 1) -> Any:
-        """A mesh with its surface, and light of its own if it has any; of side -1 it is turned inside out."""
+    def _shape(self, mesh: Mesh, material: Material, parts: dict[str, Any]) -> Any:
+        """A mesh with its surface."""
         properties = self._mi.Properties()
         for name, part in parts.items():
             properties[name] = part
@@ -229,27 +258,15 @@ class Tracer:
             has_vertex_normals=mesh.smooth,
             has_vertex_texcoords=True,
         )
-        size = material.pattern.size if isinstance(material.pattern, Pattern) else (1.0, 1.0)
+        size = period(material)
         values = self._mi.traverse(shape)
         values["vertex_positions"] = np.ravel(mesh.vertices)
-        values["faces"] = np.ravel(mesh.faces[:, ::side])
+        values["faces"] = np.ravel(mesh.faces)
         values["vertex_texcoords"] = np.ravel(mesh.uv / np.array(size, np.float32))
         if mesh.smooth:
-            values["vertex_normals"] = np.ravel(side * normals(mesh))
+            values["vertex_normals"] = np.ravel(normals(mesh))
         values.update()
         return shape
-
-    def _painted(self, world: World, side: int) -> Any:
-        """The world with matte surfaces that shine by what is painted on them, to one side, and all else black."""
-        black = self._mi.load_dict({"type": "diffuse", "reflectance": {"type": "rgb", "value": 0.0}})
-        parts: dict[str, Any] = {}
-        for number, thing in enumerate(world.things):
-            shining: dict[str, Any] = {"bsdf": black}
-            if thing.material.kind == "matte":
-                texture = self._texture(thing.material)
-                shining["emitter"] = self._mi.load_dict({"type": "area", "radiance": texture})
-            parts[f"thing{number}"] = self._shape(thing.mesh, thing.material, shining, side)
-        return self._mi.load_dict({"type": "scene", **parts, "integrator": {"type": "path", "max_depth": 1}})
 
     def _lamp(self, lamp: Lamp) -> dict[str, Any]:
         """Mitsuba's square from -1 to 1 in x and y, which shines towards z, laid on the lamp's corner and edges."""
@@ -281,9 +298,10 @@ class Tracer:
 
     def _texture(self, material: Material) -> dict[str, Any]:
         if not isinstance(material.pattern, Pattern):
-            return {"type": "rgb", "value": _linear(np.array(material.pattern)).tolist()}
-        raster = _linear(material.pattern.raster)
-        return {"type": "bitmap", "bitmap": self._mi.Bitmap(raster), "raw": True, "format": "fp16"}
+            return {"type": "rgb", "value": srgb_decoded(np.array(material.pattern)).tolist()}
+        raster = self._mi.Bitmap(srgb_decoded(material.pattern.raster))
+        # paths spread over a pixel, which is no smaller than a texel: interpolation would cost a fifth of their time
+        return {"type": "bitmap", "bitmap": raster, "raw": True, "format": "fp16", "filter_type": "nearest"}
 
     def _sky(self, sky: Vector | FloatArray) -> dict[str, Any]:
         if not isinstance(sky, np.ndarray):
@@ -294,15 +312,19 @@ class Tracer:
         return {"sky": {"type": "envmap", "bitmap": self._mi.Bitmap(sky.astype(np.float32)), "to_world": upright}}
 
 
-def coded(values: FloatArray) -> FloatArray:
-    """Values as on a screen (sRGB) of linear ones, both 0..1."""
-    found: FloatArray = np.where(
-        values <= 0.0031308, 12.92 * values, 1.055 * np.maximum(values, 1e-9) ** (1 / 2.4) - 0.055
-    )
-    return found
+def _sampler(samples: int) -> dict[str, Any]:
+    """Few samples are independent: all pixels of a block spread theirs alike, which shows where there are few."""
+    spread = "stratified" if samples == 4 ** round(math.log(samples, 4)) else "multijitter"
+    return {"sampler": {"type": spread if samples >= _SPREAD else "independent", "sample_count": samples}}
 
 
-def _linear(values: npt.NDArray[Any]) -> npt.NDArray[Any]:
-    """Linear values of those on a screen, both 0..1."""
-    found: npt.NDArray[Any] = np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4)
-    return found
+def _in_disc(radius: float, count: int) -> npt.NDArray[np.float64]:
+    """Points spread evenly over a disc, ``(N, 2)``; the middle alone of one without a radius."""
+    angle = np.arange(count) * _GOLDEN_ANGLE
+    distance = radius * np.sqrt((np.arange(count) + 0.5) / count)
+    return np.stack([distance * np.cos(angle), distance * np.sin(angle)], axis=1)
+
+
+def _some(tiles: npt.NDArray[np.int64]) -> list[npt.NDArray[np.int64]]:
+    """So few at a time that single precision tells the rays of all of them apart."""
+    return [tiles[first : first + 512] for first in range(0, len(tiles), 512)]

@@ -13,5 +13,6 @@ Examples
 from sepi.scenes.definitions import SCENES
 from sepi.scenes.folder import write_hci
 from sepi.scenes.light_field import render, true_disparity
+from sepi.scenes.posed import render_shot
 
-__all__ = ["SCENES", "render", "true_disparity", "write_hci"]
+__all__ = ["SCENES", "render", "render_shot", "true_disparity", "write_hci"]

@@ -165,16 +165,16 @@ def true_disparity(name: str, *, size: int = 192, baseline: tuple[float, float] 
     """
     from sepi.scenes.rendering import visible
 
-    _require_scene(name, size)
-    disparity, _ = visible(_drawn(name, size), size, *map(float, baseline))
+    disparity, _ = visible(drawn(name, size), size, *map(float, baseline))
     return disparity.astype(np.float32)
 
 
 @lru_cache(maxsize=1)
-def _drawn(name: str, size: int) -> Drawing:
+def drawn(name: str, size: int) -> Drawing:
     """A scene's surfaces, kept from view to view: their textures take longer than a view."""
     from sepi.scenes.rendering import drawing
 
+    _require_scene(name, size)
     return drawing(DEFINITIONS[name].surfaces(), size)
 
 

@@ -177,3 +177,68 @@ def _inside(edges: FloatArray, begin: int, end: int, x: float, y: float) -> bool
             if at > x:
                 odd = not odd
     return odd
+
+
+@numba.njit(cache=True)
+def cast(
+    first_edge: IntArray,
+    edges: FloatArray,
+    boxes: FloatArray,
+    normals: FloatArray,
+    origin: FloatArray,
+    rays: FloatArray,
+    pinhole: FloatArray,
+    owner: IntArray,
+    hits: FloatArray,
+) -> None:
+    """Nearest surface along each ray ``(N, 3)`` from ``origin``: its index, -1 for none, and ``(t, x, y)`` of the hit.
+
+    Surface ``p`` lies where ``normals[p] @ point`` is 1; edges and boxes are in pixels of the view from the world's
+    origin, whose ``(focal length, x, y)`` are ``pinhole``, and so is the hit's place; ``t`` is in lengths of the ray.
+    """
+    focal, cx, cy = pinhole
+    ahead = np.empty(normals.shape[0])
+    for p in range(normals.shape[0]):
+        ahead[p] = 1 - (normals[p, 0] * origin[0] + normals[p, 1] * origin[1] + normals[p, 2] * origin[2])
+    for i in range(rays.shape[0]):
+        owner[i] = -1
+        nearest_t = np.inf
+        for p in range(normals.shape[0]):
+            along = normals[p, 0] * rays[i, 0] + normals[p, 1] * rays[i, 1] + normals[p, 2] * rays[i, 2]
+            if along * ahead[p] <= 0:
+                continue
+            t = ahead[p] / along
+            z = origin[2] + t * rays[i, 2]
+            if t >= nearest_t - TOLERANCE * t or z <= 0:
+                continue
+            x = cx + focal * (origin[0] + t * rays[i, 0]) / z
+            y = cy + focal * (origin[1] + t * rays[i, 1]) / z
+            if (
+                boxes[p, 0] <= x <= boxes[p, 2]
+                and boxes[p, 1] <= y <= boxes[p, 3]
+                and _inside(edges, first_edge[p], first_edge[p + 1], x, y)
+            ):
+                nearest_t = t
+                owner[i] = p
+                hits[i, 0], hits[i, 1], hits[i, 2] = t, x, y
+
+
+@numba.njit(cache=True)
+def colours_at(
+    texels: FloatMap, first_texel: IntArray, side: IntArray, owner: IntArray, hits: FloatArray, colours: FloatArray
+) -> None:
+    """Texture of the surface that each ray of :func:`cast` hits; black where there is none."""
+    weight_x, weight_y = np.empty(4), np.empty(4)
+    for i in range(owner.size):
+        p = owner[i]
+        colours[i] = 0
+        if p < 0:
+            continue
+        m = side[p]
+        ix = _spline_weights(hits[i, 1], weight_x)
+        iy = _spline_weights(hits[i, 2], weight_y)
+        for j in range(4):
+            line = first_texel[p] + (iy + j) % m * m
+            for k in range(4):
+                for c in range(3):
+                    colours[i, c] += weight_y[j] * weight_x[k] * texels[line + (ix + k) % m, c]

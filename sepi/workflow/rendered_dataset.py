@@ -4,19 +4,17 @@ from __future__ import annotations
 
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator
+from pydantic import Field, field_validator
 
-from sepi.rendered import NOISE_LEVELS, RENDERED
-from sepi.validation import require_known
+from sepi.rendered.catalogue import NOISE_LEVELS, RENDERED, WITHOUT_NOISE
+from sepi.validation import CheckedModel, require_known
 from sepi.workflow.datasets import Scene
-from sepi.workflow.rendered_scenes import DATASET, WITHOUT_NOISE, RenderedScene
+from sepi.workflow.rendered_scenes import DATASET, RenderedScene
 from sepi.workflow.result_paths import render_file
 
 
-class Rendered(BaseModel):
+class Rendered(CheckedModel):
     """Keys of ``rendered``."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
     scenes: list[str] = Field(
         list(RENDERED), description="which of the rendered scenes to use, in the order of the tables"

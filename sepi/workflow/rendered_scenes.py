@@ -5,13 +5,10 @@ from __future__ import annotations
 import re
 from typing import NamedTuple
 
-from sepi.rendered import NOISE_LEVELS
+from sepi.rendered.catalogue import NOISE_LEVELS, WITHOUT_NOISE, exposed_name
 
 DATASET = "rendered"
 """The dataset of rendered scenes, and their report."""
-
-WITHOUT_NOISE = "off"
-"""The level of noise that is in no name, and of which there is one seed alone."""
 
 
 class RenderedScene(NamedTuple):
@@ -33,9 +30,8 @@ class RenderedScene(NamedTuple):
 
     @property
     def name(self) -> str:
-        """``clutter`` without noise, ``clutter_low``, and with another seed ``clutter_low_2``."""
-        parts = [self.world, *([self.noise] if self.noise != WITHOUT_NOISE else [])]
-        return "_".join([*parts, *([str(self.seed)] if self.seed > 1 else [])])
+        """What it is called."""
+        return exposed_name(*self)
 
 
 def rendered_scene(name: str) -> RenderedScene:

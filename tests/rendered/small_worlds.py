@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from sepi.rendered import shapes
-from sepi.rendered.options import Taking
+from sepi.rendered.options import RenderOptions
 from sepi.rendered.patterns import noise
 from sepi.rendered.world import Lamp, Material, Thing, World
 
@@ -15,8 +15,8 @@ RED = Material((0.6, 0.2, 0.2))
 PAINT = noise(1, (0.5, 0.45, 0.4), 0.12, 2.4, finest=80)
 
 
-def taking(size: int = 64, views: int = 3, samples: int = 4, **values: object) -> Taking:
-    return Taking.model_validate({"size": size, "grid": (views, views), "samples": samples, **values})
+def taking(size: int = 64, views: int = 3, samples: int = 4, **values: object) -> RenderOptions:
+    return RenderOptions.model_validate({"size": size, "grid": (views, views), "samples": samples, **values})
 
 
 def room(*things: Thing, **values: Any) -> World:

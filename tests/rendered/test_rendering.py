@@ -3,6 +3,7 @@
 import hashlib
 import importlib.util
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,11 +17,12 @@ from sepi.errors import SepiError
 from sepi.rendered import NOISE_LEVELS, RENDERED, rendering, shapes
 from sepi.rendered.catalogue import world_of
 from sepi.rendered.exposure import exposed
-from sepi.rendered.masks import MASKS
+from sepi.rendered.masks import MASKS, mask, seen_bits
 from sepi.rendered.options import NOISE, Exposure
 from sepi.rendered.render_file import Render, read_render
 from sepi.rendered.rendering import render_scene, render_world
 from sepi.rendered.rig import rig_of
+from sepi.rendered.sampling import sampled
 from sepi.rendered.tracing import Tracer
 from sepi.rendered.world import Material, Sun, World
 from sepi.scenes.folder import write_hci
@@ -115,6 +117,62 @@ def test_the_same_bytes_whatever_the_threads(tmp_path: Path) -> None:
     assert len(found) == 1
 
 
+def test_no_number_of_threads_changes_a_picture() -> None:
+    """Mitsuba makes blocks smaller for many threads, and seeds each: machines with many cores had other bytes."""
+    import drjit
+
+    world = room()
+    tracer = Tracer(world, rig_of(world, 48, (1, 1)))
+    at = tracer.position(0, 0)
+    found = []
+    for threads in (1, 16):
+        drjit.set_thread_count(threads)
+        found.append(tracer.picture(at, 3, 2))
+    drjit.set_thread_count(1)
+    assert np.array_equal(*found)
+
+
+def test_few_paths_show_the_light_of_many() -> None:
+    """If this fails, pictures of few samples are too bright or too dark, not only noisy."""
+    world = room()
+    tracer = Tracer(world, rig_of(world, 64, (1, 1)))
+    at = tracer.position(0, 0)
+    many = tracer.picture(at, 1, 64).mean()
+    assert [tracer.picture(at, 2, few).mean() for few in (1, 2, 4)] == pytest.approx(3 * [many], rel=0.03)
+
+
+def test_paths_are_traced_where_views_differ() -> None:
+    """A matte room takes few, a mirror all; a bar too thin for the rays through middles is not painted over."""
+    world = room(ball(0.3, Material(kind="mirror")), bar(depth=1.5, width=0.01))
+    size, samples = 64, 64
+    rig = rig_of(world, size, (9, 9))
+    tracer = Tracer(world, rig)
+    taken = np.zeros((size, size), int)
+    picture, tiles = tracer.picture, tracer.tiles
+
+    def whole_picture(at: Any, seed: int, paths: int) -> np.ndarray:
+        taken[:] += paths
+        return picture(at, seed, paths)
+
+    def some_tiles(at: Any, pixels: np.ndarray, seed: int, paths: int) -> np.ndarray:
+        taken[pixels[..., 0], pixels[..., 1]] = paths
+        return tiles(at, pixels, seed, paths)
+
+    tracer.picture, tracer.tiles = whole_picture, some_tiles  # type: ignore[method-assign]
+    at = tracer.position(0, 0)
+    seen = tracer.first_surface(at)
+    disparity = rig.disparity(seen.depth).astype(np.float32)
+    shown, _, whole = sampled(tracer, at, seen, disparity, samples, 81, 0)
+    mirror = seen.thing == 2
+    assert (taken[mirror] == samples).all()
+    assert (taken == 7).mean() > 0.5
+    assert taken.mean() < samples / 4
+    # tiles lie where they belong
+    assert np.corrcoef(shown[mirror].ravel(), picture(at, 9, 64)[mirror].ravel())[0, 1] > 0.9
+    # the bar is a quarter of a pixel wide and stands between the middle columns
+    assert not whole[:20, 31:33].any()
+
+
 def test_an_interrupted_run_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Each view is rendered once, and what comes out is what an undisturbed run gives."""
     whole = rendered(tmp_path, room(), size=32)
@@ -175,6 +233,21 @@ def test_masks_say_what_a_pixel_shows(tmp_path: Path) -> None:
     assert masks["textured"][3, 3]
     assert (masks["glossy"] & masks["textureless"]).sum() > 0.4 * masks["glossy"].sum()
     assert not masks["alone"].any()
+
+
+def test_what_one_view_alone_sees_is_told() -> None:
+    """A wall seen through a slit: the columns beside it are hidden from the one view, those that leave it are not."""
+    disparities = np.zeros((2, 4, 12), np.float32)
+    # the other view stands two steps to the right, and a board of disparity 2 before it hides columns 4 to 7
+    disparities[1, :, 4:8] = 2
+    positions = np.array([(0, 0), (0, 2)], float)
+    bits = seen_bits(disparities, positions, 0)
+    assert mask(bits, "occluded")[1].nonzero()[0].tolist() == [4, 5, 6]
+    assert mask(bits, "alone")[1].nonzero()[0].tolist() == [4, 5, 6]
+    # what lies outside the other picture is hidden by nothing, and seen by nobody else
+    shifted = seen_bits(np.ones((2, 4, 12), np.float32), positions, 0)
+    assert not mask(shifted, "occluded").any()
+    assert mask(shifted, "alone")[1].nonzero()[0].tolist() == [0, 1]
 
 
 def test_noise_is_that_of_the_stated_sensor(plain: Render) -> None:
@@ -253,8 +326,8 @@ def test_lights_and_surfaces_do_what_they_say() -> None:
     """A lamp shines to the stated side, a sun where it is not shaded, a mirror shows what is before it."""
 
     def mean(world: World) -> np.ndarray:
-        tracer = Tracer(world, rig_of(world, 32, (1, 1)), 16)
-        return tracer.picture(tracer.position(0, 0), 0)
+        tracer = Tracer(world, rig_of(world, 32, (1, 1)))
+        return tracer.picture(tracer.position(0, 0), 0, 16)
 
     dark = room()
     base = {"things": dark.things, "near": 1.2, "far": 3.0, "at_near": 2.0, "at_far": -1.5}
@@ -307,7 +380,7 @@ def test_every_ray_of_a_scene_meets_something(name: str) -> None:
     """At the corners of a 9x9 grid, too; and disparities stay in what the scene says."""
     world = world_of(name)
     rig = rig_of(world, 64, (9, 9))
-    tracer = Tracer(world, rig, 4)
+    tracer = Tracer(world, rig)
     slack = 0.1 * (world.at_near - world.at_far)
     for corner in ((0, 0), (-4, -4), (4, 4)):
         seen = tracer.first_surface(tracer.position(*corner))
@@ -316,7 +389,7 @@ def test_every_ray_of_a_scene_meets_something(name: str) -> None:
         assert world.at_far - slack <= disparity.min()
         # corners of so small pictures look far down
         assert disparity.max() <= world.at_near + slack or corner != (0, 0)
-    light = tracer.picture(tracer.position(0, 0), 0)
+    light = tracer.picture(tracer.position(0, 0), 0, 16)
     assert 0.02 < np.median(light) < 0.6
     assert (light.max(axis=2) > 1).mean() < 0.08
 
@@ -346,6 +419,12 @@ def test_a_scene_as_a_user_renders_it(tmp_path: Path) -> None:
     refused = CliRunner().invoke(main, [*words, "--samples", "4", "--noise", "low", "--set", "noise_seed=2"])
     assert refused.exit_code == 1
     assert "was rendered with other options" in refused.output
+
+
+def test_a_light_field_needs_no_albedo_that_it_does_not_share(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Through a lens no point is sharp, and no view has another's."""
+    monkeypatch.delattr(Tracer, "albedo")
+    assert rendered(tmp_path, room(), size=32, samples=1, lens=0.5).views.any()
 
 
 def test_render_scene_knows_its_scenes(tmp_path: Path) -> None:

@@ -1,0 +1,163 @@
+"""All triangles of a world in one list: what is at a ray's end follows from which of them it meets, exactly."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from sepi.lightfield import BoolMap
+from sepi.rendered.paint_kernels import painted
+from sepi.rendered.srgb import srgb_decoded
+from sepi.rendered.world import FloatArray, Material, Mesh, Pattern, Vector, World
+
+# rays of a pixel, across and down, that find what is painted there
+_FINE = 8
+
+Faces = npt.NDArray[np.int32]
+
+
+@dataclass(frozen=True)
+class FirstSurface:
+    """What the rays through the middles of a view's pixels meet first.
+
+    Attributes
+    ----------
+    face : ndarray, shape (H, W), int32
+        Triangle of :class:`Surfaces`; 0 where there is none.
+    depth : ndarray, shape (H, W), float64
+        Metres along the viewing direction; infinite where there is nothing.
+    normal : ndarray, shape (H, W, 3), float32
+        Of the triangles, towards the camera: right, down, away.
+    uv : ndarray, shape (H, W, 2), float32
+        Where on its pattern, in periods.
+    thing : ndarray, shape (H, W), int64
+        Which of the world's things; -1 where there is none.
+    """
+
+    face: Faces
+    depth: npt.NDArray[np.float64]
+    normal: FloatArray
+    uv: FloatArray
+    thing: npt.NDArray[np.int64]
+
+
+class Surfaces:
+    """The triangles of a world's things and lamps. The first one is nothing, which no ray meets.
+
+    Attributes
+    ----------
+    mesh : Mesh
+        All of them.
+    thing : ndarray, shape (M,), int64
+        Whose they are; -1 for lamps and nothing.
+    """
+
+    def __init__(self, world: World) -> None:
+        parts = [(number, thing.mesh, period(thing.material)) for number, thing in enumerate(world.things)]
+        for lamp in world.lamps:
+            corners = np.array([[0, 0, 0], lamp.across, np.add(lamp.across, lamp.down), lamp.down]) + lamp.corner
+            sheet = Mesh(corners.astype(np.float32), np.array([[0, 1, 2], [0, 2, 3]], np.uint32), _unpainted(4))
+            parts.append((-1, sheet, (1.0, 1.0)))
+        nothing = Mesh(np.zeros((3, 3), np.float32), np.array([[0, 1, 2]], np.uint32), _unpainted(3))
+        parts.insert(0, (-1, nothing, (1.0, 1.0)))
+        starts = np.cumsum([0, *(len(mesh.vertices) for _, mesh, _ in parts)])
+        self.mesh = Mesh(
+            np.concatenate([mesh.vertices for _, mesh, _ in parts]).astype(np.float32),
+            np.concatenate([mesh.faces + int(at) for (_, mesh, _), at in zip(parts, starts, strict=False)]).astype(
+                np.uint32
+            ),
+            np.concatenate([mesh.uv / np.array(period) for _, mesh, period in parts]).astype(np.float32),
+        )
+        self.thing = np.concatenate([np.full(len(mesh.faces), number) for number, mesh, _ in parts])
+        first, second, third = (self.mesh.vertices.astype(np.float64)[self.mesh.faces[:, n]] for n in range(3))
+        self._corner, self._normal = first, np.cross(second - first, third - first)
+        # uv rises along the triangle by this much in each direction
+        at, along, beyond = (self.mesh.uv.astype(np.float64)[self.mesh.faces[:, n]] for n in range(3))
+        square = np.maximum(np.sum(self._normal**2, axis=1), 1e-300)[:, None]
+        rise = [np.cross(third - first, self._normal) / square, np.cross(self._normal, second - first) / square]
+        self._uv = at
+        self._gradient = (along - at)[:, :, None] * rise[0][:, None] + (beyond - at)[:, :, None] * rise[1][:, None]
+        self._patterns = [thing.material.pattern for thing in world.things]
+        self._matte = np.array([thing.material.kind == "matte" for thing in world.things] + [False])
+
+    def matte(self, faces: Faces) -> BoolMap:
+        """Whether triangles are of matte things."""
+        found: BoolMap = self._matte[self.thing[faces]]
+        return found
+
+    def first(self, faces: Faces, directions: npt.NDArray[np.float64], origin: Vector) -> FirstSurface:
+        """What is seen where these triangles are met.
+
+        Parameters
+        ----------
+        faces : ndarray, shape (H, W), int32
+        directions : ndarray, shape (H, W, 3), float64
+            Of the rays; 1 along the camera's axis.
+        origin : (float, float, float)
+            Where they begin.
+        """
+        normal = self._normal[faces]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            depth = np.sum(normal * (self._corner[faces] - origin), axis=-1) / np.sum(normal * directions, axis=-1)
+            normal = normal / np.linalg.norm(normal, axis=-1, keepdims=True)
+            point = np.array(origin) + depth[..., None] * directions - self._corner[faces]
+        hit = faces > 0
+        towards = np.sum(normal * directions, axis=-1, keepdims=True) > 0
+        uv = self._uv[faces] + np.einsum("...ij,...j", self._gradient[faces], point)
+        return FirstSurface(
+            face=faces,
+            depth=np.where(hit, depth, np.inf),
+            normal=np.where(hit[..., None], np.where(towards, -normal, normal), 0).astype(np.float32),
+            uv=np.where(hit[..., None], uv, 0).astype(np.float32),
+            thing=self.thing[faces],
+        )
+
+    def albedo(self, faces: Faces, pixels: npt.NDArray[np.int64], frame: npt.NDArray[np.float64]) -> FloatArray:
+        """Mean albedo of what pixels show, ``(N, 3)`` float32, linear, where each shows the plane of one triangle.
+
+        Parameters
+        ----------
+        faces : ndarray, shape (N,), int32
+            The triangles, none of them 0.
+        pixels : ndarray, shape (N, 2), int64
+            Rows and columns.
+        frame : ndarray, shape (5,), float64
+            Where the camera is (right, down), the row and column that its axis meets, its focal length in pixels.
+        """
+        found: FloatArray = painted(
+            faces,
+            pixels,
+            frame,
+            self._corner,
+            self._normal,
+            self._uv,
+            self._gradient,
+            self.thing,
+            *self._texels,
+            _FINE,
+        )
+        return found
+
+    @cached_property
+    def _texels(self) -> tuple[npt.NDArray[np.int64], FloatArray]:
+        """Where each thing's pattern begins in a list of all texels, how high and wide it is; and the texels."""
+        rasters: dict[int, FloatArray] = {}
+        for pattern in self._patterns:
+            raster = pattern.raster if isinstance(pattern, Pattern) else np.array([[pattern]], np.float32)
+            rasters.setdefault(id(pattern), raster)
+        begin = dict(zip(rasters, np.cumsum([0, *(raster[..., 0].size for raster in rasters.values())]), strict=False))
+        starts = [(begin[id(pattern)], *rasters[id(pattern)].shape[:2]) for pattern in self._patterns]
+        texels = np.concatenate([srgb_decoded(raster).reshape(-1, 3) for raster in rasters.values()])
+        return np.array(starts), texels.astype(np.float32)
+
+
+def period(material: Material) -> tuple[float, float]:
+    """Metres after which a material's pattern repeats."""
+    return material.pattern.size if isinstance(material.pattern, Pattern) else (1.0, 1.0)
+
+
+def _unpainted(count: int) -> FloatArray:
+    return np.zeros((count, 2), np.float32)

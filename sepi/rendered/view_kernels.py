@@ -1,0 +1,168 @@
+"""Compiled loops over the views of a scene together: what one sees of another's points, by the exact disparity."""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+import numpy.typing as npt
+
+from sepi.lightfield import BoolMap
+from sepi.rendered.world import FloatArray
+
+
+@numba.njit(cache=True)
+def _landing(
+    y: int, x: int, disparity: float, baseline: npt.NDArray[np.float64], height: int, width: int
+) -> tuple[bool, float, float, int, int]:
+    """Where a view shows a pixel's point: whether inside, row and column, and the first of the four pixels round it."""
+    row, column = y - disparity * baseline[0], x - disparity * baseline[1]
+    inside = 0 <= row <= height - 1 and 0 <= column <= width - 1
+    return inside, row, column, min(int(row), height - 2), min(int(column), width - 2)
+
+
+@numba.njit(cache=True, parallel=True)
+def seen_elsewhere(
+    disparities: FloatArray, baselines: npt.NDArray[np.float64], view: int, same: float
+) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
+    """Whether some view that has the point in its picture does not see it, and whether some other view sees it.
+
+    A point lands between four pixels of another view; where all of them are nearer, it is hidden.
+    """
+    count, height, width = disparities.shape
+    hidden = np.zeros((height, width), np.bool_)
+    seen = np.zeros((height, width), np.bool_)
+    for y in numba.prange(height):
+        for x in range(width):
+            own = disparities[view, y, x]
+            for other in range(count):
+                if other == view:
+                    continue
+                inside, _, _, top, left = _landing(y, x, own, baselines[other], height, width)
+                if not inside:
+                    continue
+                there = min(
+                    min(disparities[other, top, left], disparities[other, top, left + 1]),
+                    min(disparities[other, top + 1, left], disparities[other, top + 1, left + 1]),
+                )
+                if there > own + same:
+                    hidden[y, x] = True
+                else:
+                    seen[y, x] = True
+    return hidden, seen
+
+
+@numba.njit(cache=True, parallel=True)
+def gathered_light(
+    light: FloatArray,
+    disparities: FloatArray,
+    things: npt.NDArray[np.int16],
+    whole: BoolMap,
+    baselines: npt.NDArray[np.float64],
+    view: int,
+    bend: float,
+) -> tuple[FloatArray, FloatArray]:
+    """Mean light of all views that show the surface whole, for whole pixels of one view; its own elsewhere.
+
+    Second, the variance of that mean, of all colours' sum.
+    """
+    count, height, width = disparities.shape
+    result = light[view].copy()
+    variance = np.zeros((height, width), np.float32)
+    for y in numba.prange(height):
+        for x in range(width):
+            if not whole[view, y, x]:
+                continue
+            own = disparities[view, y, x]
+            total = light[view, y, x].astype(np.float64)
+            squares = (light[view, y, x, 0] + light[view, y, x, 1] + light[view, y, x, 2]) ** 2
+            seen = 1
+            for other in range(count):
+                if other == view:
+                    continue
+                inside, row, column, top, left = _landing(y, x, own, baselines[other], height, width)
+                if not inside:
+                    continue
+                down, across = row - top, column - left
+                one = True
+                there = 0.0
+                for i in range(2):
+                    for j in range(2):
+                        weight = (down if i else 1 - down) * (across if j else 1 - across)
+                        there += weight * disparities[other, top + i, left + j]
+                        one &= whole[other, top + i, left + j]
+                        one &= things[other, top + i, left + j] == things[view, y, x]
+                if not one or abs(there - own) > bend:
+                    continue
+                seen += 1
+                grey = 0.0
+                for i in range(2):
+                    for j in range(2):
+                        weight = (down if i else 1 - down) * (across if j else 1 - across)
+                        for c in range(3):
+                            part = weight * light[other, top + i, left + j, c]
+                            total[c] += part
+                            grey += part
+                squares += grey * grey
+            for c in range(3):
+                result[y, x, c] = total[c] / seen
+            if seen > 1:
+                # equal ones may differ by rounding
+                variance[y, x] = max(squares / seen - (total.sum() / seen) ** 2, 0.0) / (seen - 1)
+    return result, variance
+
+
+@numba.njit(cache=True, parallel=True)
+def alike_light(
+    light: FloatArray, variance: FloatArray, things: npt.NDArray[np.int16], whole: BoolMap, reach: int, doubt: float
+) -> FloatArray:
+    """Mean light of the pixels about each whole one that chance alone may tell from it: 3x3 pixels from 3x3."""
+    height, width = whole.shape
+    grey = light[..., 0] + light[..., 1] + light[..., 2]
+    result = light.copy()
+    for y in numba.prange(height):
+        for x in range(width):
+            if not whole[y, x]:
+                continue
+            total = np.zeros(3)
+            count = 0
+            for v in range(max(y - reach, 1), min(y + reach + 1, height - 1)):
+                for u in range(max(x - reach, 1), min(x + reach + 1, width - 1)):
+                    if not whole[v, u] or things[v, u] != things[y, x]:
+                        continue
+                    apart, expected = 0.0, 0.0
+                    for i in range(-1, 2):
+                        for j in range(-1, 2):
+                            if whole[y + i, x + j] and whole[v + i, u + j]:
+                                apart += (grey[y + i, x + j] - grey[v + i, u + j]) ** 2
+                                expected += variance[y + i, x + j] + variance[v + i, u + j]
+                    if apart <= doubt * expected:
+                        count += 1
+                        for c in range(3):
+                            total[c] += light[v, u, c]
+            for c in range(3):
+                result[y, x, c] = total[c] / count
+    return result
+
+
+@numba.njit(cache=True, parallel=True)
+def limit_bent(shown: FloatArray, things: npt.NDArray[np.int16], whole: BoolMap, reach: int) -> FloatArray:
+    """Keep pixels that are not whole, amid one thing, within the light of its whole ones beside them."""
+    height, width = whole.shape
+    result = shown.copy()
+    for y in numba.prange(height):
+        for x in range(width):
+            one = not whole[y, x]
+            for i in range(max(y - 1, 0), min(y + 2, height)):
+                for j in range(max(x - 1, 0), min(x + 2, width)):
+                    one &= things[i, j] == things[y, x]
+            if not one:
+                continue
+            for c in range(3):
+                low, high = np.inf, 0.0
+                for i in range(max(y - reach, 0), min(y + reach + 1, height)):
+                    for j in range(max(x - reach, 0), min(x + reach + 1, width)):
+                        if whole[i, j] and things[i, j] == things[y, x]:
+                            low, high = min(low, shown[i, j, c]), max(high, shown[i, j, c])
+                if low <= high:
+                    result[y, x, c] = min(max(shown[y, x, c], low), high)
+    return result
