@@ -5,9 +5,7 @@ Rendered scenes that are held out from choosing (:data:`sepi.rendered.RENDERED`)
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -15,13 +13,14 @@ from tabulate import tabulate
 
 from sepi.errors import SepiError
 from sepi.inspection.disparity_range import settle_range
+from sepi.io.hdf5 import has_dataset
 from sepi.lightfield import LightField
 from sepi.reading import read_light_field
 from sepi.rendered import RENDERED
 from sepi.scenes import SCENES, render
 from sepi.scoring.scores import score
 from sepi.stage import Parameters, StageMaps, no_progress
-from sepi.validation import require_known
+from sepi.validation import require_known, value_of
 from sepi.variants import STAGES, Variant, stage_parameters
 from sepi.workflow.rendered_scenes import rendered_scene
 
@@ -39,7 +38,7 @@ def scene_for_choosing(given: str, noise: str) -> LightField:
     """
     if given in SCENES:
         light_field = render(given)
-    elif _is_render(Path(given)):
+    elif has_dataset(Path(given), "turns"):
         from sepi.rendered.exposure import read_exposed
 
         light_field = read_exposed(Path(given), noise, 1)
@@ -67,7 +66,7 @@ def settings_of(variant: Variant, target: str, texts: Sequence[str]) -> tuple[st
     choice, _, name = rest.partition(".")
     require_known(f"{target}: stage", [stage], STAGES)
     require_known(f"{target}: choice of this variant", [choice], [variant.choices[stage]])
-    return stage, [stage_parameters(variant, {stage: {name: _value(text)}}) for text in texts]
+    return stage, [stage_parameters(variant, {stage: {name: value_of(text)}}) for text in texts]
 
 
 def scores_of(
@@ -121,18 +120,3 @@ def _run(
     for stage in stages:
         maps = STAGES[stage][variant.choices[stage]].run(light_field, maps, settings[stage], no_progress)
     return maps
-
-
-def _value(text: str) -> Any:
-    with suppress(ValueError):
-        return json.loads(text)
-    return text
-
-
-def _is_render(path: Path) -> bool:
-    import h5py
-
-    if not (path.is_file() and h5py.is_hdf5(path)):
-        return False
-    with h5py.File(path) as file:
-        return "render" in file.attrs

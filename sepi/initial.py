@@ -18,6 +18,7 @@ References
 from __future__ import annotations
 
 from sepi.lightfield import LightField
+from sepi.matching.denoising import denoised
 from sepi.matching.plane_sweep import SweepParameters, sweep
 from sepi.matching.structure_tensor import StructureTensorParameters, structure_tensor_depth
 from sepi.matching.visibility_sweep import (
@@ -116,7 +117,7 @@ def semi_global(
     >>> bool(np.median(np.abs(maps.disparity - light_field.ground_truth)) < 0.05)
     True
     """
-    result = first_depth(light_field, parameters, progress)
+    result = first_depth(denoised(light_field, parameters.denoising), parameters, progress)
     return StageMaps(result.disparity, result.confidence)
 
 

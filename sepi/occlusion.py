@@ -39,6 +39,7 @@ from sepi.image.isolated_pixels import join_isolated_pixels
 from sepi.image.mixed_pixels import MixtureParameters, mixture_evidence
 from sepi.image.noise import residual_variance
 from sepi.lightfield import BoolMap, FloatMap, LightField
+from sepi.matching.denoising import denoised
 from sepi.matching.plane_sweep import SweepParameters, SweepResult, sweep
 from sepi.matching.surface_shares import SurfaceShareParameters, reassign_at_steps
 from sepi.matching.view_subsets import SIDES, half_planes, halves_and_quarters, spread_views
@@ -268,6 +269,7 @@ def visibility(
     True
     """
     before = require_previous(previous)
+    light_field = denoised(light_field, parameters.denoising)
     result = depth_from_visible_views(light_field, before.disparity, parameters, progress)
     colours = light_field.reference_view
     mixture = mixture_evidence(result.disparity, colours, residual_variance(colours), parameters)

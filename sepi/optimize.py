@@ -27,6 +27,7 @@ from pydantic import Field, model_validator
 from sepi.image.noise import residual_variance
 from sepi.lightfield import FloatMap, LightField
 from sepi.matching.base_detail import BaseDetailParameters
+from sepi.matching.denoising import denoised
 from sepi.matching.view_subsets import spread_views
 from sepi.regularization.wls import (
     WlsParameters,
@@ -187,6 +188,7 @@ def second_order(
     from sepi.regularization.second_order import colour_changes
 
     before = require_previous(previous)
+    light_field = denoised(light_field, parameters.denoising)
     disparity = before.disparity
     uniform = before.mask("textureless")
     reliability = np.where(uniform, 1, reliable(before.confidence, parameters)).astype(np.float32)

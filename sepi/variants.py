@@ -280,6 +280,10 @@ VARIANT_ENTRIES: dict[str, dict[str, Any]] = {
         "occlusion": {"detail_share": 0, "colour_scale": 0.0164},
         "optimize": {"detail_share": 0, "colour_scale": 0.0164},
     },
+    "best_no_denoising": {
+        "base": "best",
+        **{stage: {"denoising": 0} for stage in ("initial", "occlusion", "textureless", "optimize")},
+    },
     "best_half_sepi": {"base": "best", "occlusion": "half_sepi"},
     "best_no_shares": {"base": "best", "occlusion": {"share_evidence": 1}},
     "best_no_mixture": {"base": "best", "occlusion": {"alpha_threshold": 0}},
@@ -301,6 +305,7 @@ PARTS_OF_BEST: dict[str, str] = {
     "best": "all parts",
     "best_paper_initial": "the paper's initial depth",
     "best_no_detail": "colours alone, no detail",
+    "best_no_denoising": "noisy views as they are",
     "best_half_sepi": "half-SEPIs, no visibility",
     "best_no_shares": "edges not decided by shares of the views",
     "best_no_mixture": "edges not decided by colours of the reference view",

@@ -37,13 +37,22 @@ def noise_level(image: FloatMap, region: BoolMap | None = None) -> float:
     float
         In the image's units, 0..1; 0 over no pixels.
     """
-    response = np.abs(cv2.filter2D(np.ascontiguousarray(image), cv2.CV_32F, _MASK))
+    response = np.abs(_response(image))
     if region is None:
         region = _with_signal(image)
     response = response.reshape(image.shape)[region]
     if not response.size:
         return 0.0
     return float(np.median(response).item() * _MEDIAN_TO_SIGMA / 6)
+
+
+def mask_energy(image: FloatMap) -> FloatMap:
+    """Squared response of the mask (H, W), mean over the channels: of white noise its variance, on average."""
+    return np.asarray(np.square(_response(image).reshape(image.shape) / 6).mean(axis=2), np.float32)
+
+
+def _response(image: FloatMap) -> FloatMap:
+    return np.asarray(cv2.filter2D(np.ascontiguousarray(image), cv2.CV_32F, _MASK), np.float32)
 
 
 def _with_signal(image: FloatMap) -> BoolMap:

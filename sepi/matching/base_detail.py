@@ -26,8 +26,8 @@ from pydantic import Field
 
 from sepi.image.noise import noise_level, variance_of_residuals
 from sepi.lightfield import BoolMap, FloatMap, LightField, full_scale
+from sepi.matching.denoising import LEFT, DenoisedLightField, DenoisingParameters, kept_views
 from sepi.matching.row_bands import Rows
-from sepi.stage import Parameters
 
 DETAIL_UNIT = 1 / 32000
 """Unit of the detail, which is stored as int16: colours differ by at most 1."""
@@ -43,7 +43,7 @@ ColourScale = Annotated[
 """A parameter whose default is not the same for every sweep."""
 
 
-class BaseDetailParameters(Parameters):
+class BaseDetailParameters(DenoisingParameters):
     """Parameters of the decomposition, and of how well colours and detail must fit."""
 
     colour_scale: ColourScale = 0.0316
@@ -170,13 +170,14 @@ _kept: ContextVar[_Kept | None] = ContextVar("_kept", default=None)
 
 @contextmanager
 def kept_detail() -> Iterator[None]:
-    """Inside, in this thread, the detail of a view is made once, however many stages and passes compare it.
+    """Inside, in this thread, views are denoised and their detail is made once, however many passes compare it.
 
     That holds for whole views; what is made in bands of rows, since memory is short, is not kept.
     """
     token = _kept.set(_Kept())
     try:
-        yield
+        with kept_views():
+            yield
     finally:
         _kept.reset(token)
 
@@ -209,7 +210,12 @@ def _detail_so_far(
 
 
 def reference_noise(light_field: LightField) -> float:
-    """Noise of the reference view (:func:`sepi.image.noise.noise_level`); inside :func:`kept_detail` found once."""
+    """Noise of the reference view (:func:`sepi.image.noise.noise_level`); inside :func:`kept_detail` found once.
+
+    Of denoised views what is left where nothing but noise was: the mask would not see it, since it is smooth.
+    """
+    if isinstance(light_field, DenoisedLightField):
+        return LEFT * light_field.noise
     kept = _kept.get()
     if kept is None:
         return noise_level(light_field.reference_view)

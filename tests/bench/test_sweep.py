@@ -60,3 +60,16 @@ def test_the_command_scores_each_value_on_each_scene(tmp_path: Path) -> None:
 def test_what_cannot_be_swept_is_told(target: str, values: list[str], message: str) -> None:
     with pytest.raises(SepiError, match=message):
         sweep.settings_of(VARIANTS["paper"], target, values)
+
+
+def test_noise_is_added_measured_and_scored() -> None:
+    """If this fails, the table of noise is of something else than it says."""
+    arguments = ["noise", "--scene", "pyramids", "--sigma", "0", "--sigma", "12", "--variant", "fast", "--threads", "1"]
+    done = CliRunner().invoke(main, arguments)
+    assert done.exit_code == 0, done.output
+    clean, noisy = ([cell.strip() for cell in line.split("|")[1:-1]] for line in done.output.splitlines()[2:])
+    assert clean[:2] == ["pyramids", "0"]
+    assert float(clean[2]) < 1
+    assert noisy[:2] == ["pyramids", "12"]
+    assert float(noisy[2]) == pytest.approx(12, rel=0.12)
+    assert float(clean[3].split(" / ")[1]) < float(noisy[3].split(" / ")[1])

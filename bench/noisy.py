@@ -1,0 +1,43 @@
+"""What noise costs: scores of variants on copies of light fields to which noise was added."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from sepi.lightfield import LightField, full_scale
+from sepi.matching.view_noise import view_noise
+from sepi.pipeline import estimate_depth
+from sepi.scoring.scores import score
+
+Row = dict[str, str]
+
+
+def with_noise(light_field: LightField, sigma: float) -> LightField:
+    """A copy with white noise of so many of 255 levels, rounded and cut off as a camera does.
+
+    Equal arguments give equal bytes.
+    """
+    views: npt.NDArray[np.generic] = light_field.views
+    full = full_scale(views.dtype)
+    noise = np.random.default_rng(0).standard_normal(views.shape, np.float32)
+    noisy = np.clip(views.astype(np.float32) + sigma / 255 * full * noise, 0, full)
+    return replace(light_field, views=(noisy if views.dtype == np.float32 else np.rint(noisy)).astype(views.dtype))
+
+
+def rows(light_fields: Iterable[LightField], sigmas: Sequence[float], variants: Sequence[str]) -> Iterator[Row]:
+    """A row for each light field and level of noise: the noise that is measured in it, and each variant's scores."""
+    for light_field in light_fields:
+        assert light_field.ground_truth is not None
+        for sigma in sigmas:
+            noisy = with_noise(light_field, sigma) if sigma else light_field
+            row = {"scene": light_field.name, "added": f"{sigma:g}", "measured": f"{255 * view_noise(noisy).usual:.1f}"}
+            for variant in variants:
+                found = score(estimate_depth(noisy, variant).disparity, light_field.ground_truth)
+                row[variant] = " / ".join(
+                    f"{found[name]:.{digits}f}" for name, digits in (("mse100", 2), ("q25", 2), ("badpix007", 1))
+                )
+            yield row

@@ -1,0 +1,161 @@
+"""Views without what noise alone explains.
+
+Of each view, the detail of up to two pixels (what a binomial mean ``1 2 1`` along both axes takes away) is kept as far
+as its energy in a window exceeds that of the noise there, as the Wiener filter has it [1]_: texture and edges stay, and
+where nothing rises above the noise its variance falls to a seventh. What is left no longer depends much on how far
+between pixels a sample lies, which would draw faint texture to some candidates.
+
+Views with little noise stay as they are. The smoothing of costs takes its colours from a reference view that is freed
+of noise at edges, too, by a bilateral filter [2]_: noise would pass for edges, across which nothing is carried.
+
+References
+----------
+.. [1] Lee: Digital image enhancement and noise filtering by use of local statistics. IEEE TPAMI 2(2), 1980.
+   doi:10.1109/TPAMI.1980.4766994
+.. [2] Tomasi, Manduchi: Bilateral filtering for gray and color images. ICCV 1998. doi:10.1109/ICCV.1998.710815
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass, fields
+from typing import Any
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+from pydantic import Field
+
+from sepi.image.noise import noise_level
+from sepi.lightfield import FloatMap, LightField, full_scale
+from sepi.matching.view_noise import PARTS, view_noise
+from sepi.stage import Parameters
+
+LEAST_NOISE = 1.25 / 255
+"""Noise that is worth it: less is that of rounding, and of renderings."""
+
+LEAST_SHARE = 0.75
+"""Of what views differ by that must be noise of each of them: where more is something else, detail is worth more."""
+
+LEFT = 0.375
+"""Of the noise's standard deviation, what the binomial mean leaves."""
+
+_NOISIEST = 0.9
+"""Part of the parts of a picture that have no more noise than its scales bear with."""
+
+_GUIDE_SIZE, _GUIDE_SPACE, _GUIDE_COLOUR = 7, 3.0, 7.0
+"""Window and width of the bilateral filter, pixels, and sum of the channels' differences, in units of the noise."""
+
+
+class DenoisingParameters(Parameters):
+    """Parameters of the denoising."""
+
+    denoising: float = Field(
+        1.5, ge=0, le=10, description="detail of noisy views below so many times its noise is left out; 0 keeps all"
+    )
+
+
+@dataclass(frozen=True)
+class DenoisedLightField(LightField):
+    """A light field whose views are denoised.
+
+    Attributes
+    ----------
+    noise : float
+        Standard deviation in one channel of the reference view before, where there is most of it.
+    """
+
+    noise: float = 0.0
+
+
+def denoised(light_field: LightField, least: float) -> LightField:
+    """The same light field with denoised views, where they are noisy.
+
+    Parameters
+    ----------
+    light_field : LightField
+        With a known disparity range.
+    least : float
+        Detail below so many times the noise's energy is left out.
+
+    Returns
+    -------
+    LightField
+        The light field itself where there is little noise.
+
+    Raises
+    ------
+    SepiError
+        If the disparity range is unknown.
+    """
+    if least == 0:
+        return light_field
+    kept = _kept.get()
+    if kept is None:
+        made = _denoised_views(light_field, least)
+    else:
+        if kept.views is not light_field.views or kept.least != least:
+            # each stage is given the same views anew
+            kept.views, kept.least = light_field.views, least
+            kept.made = _denoised_views(light_field, least)
+        made = kept.made
+    if made is None:
+        return light_field
+    others = {field.name: getattr(light_field, field.name) for field in fields(LightField) if field.name != "views"}
+    return DenoisedLightField(made, **others, noise=_noise_of_parts(light_field.reference_view))
+
+
+def _noise_of_parts(image: FloatMap) -> float:
+    """Noise of the parts of an image that have most: a scale that bears with it must bear with theirs."""
+    parts = [part for band in np.array_split(image, PARTS) for part in np.array_split(band, PARTS, axis=1)]
+    return float(np.quantile([noise_level(part) for part in parts], _NOISIEST))
+
+
+@dataclass
+class _Kept:
+    """What was made of the views of one light field: None where they stay as they are."""
+
+    views: npt.NDArray[Any] | None = None
+    least: float = 0.0
+    made: npt.NDArray[Any] | None = None
+
+
+_kept: ContextVar[_Kept | None] = ContextVar("_kept", default=None)
+
+
+@contextmanager
+def kept_views() -> Iterator[None]:
+    """Inside, in this thread, views are denoised once, however many stages ask."""
+    token = _kept.set(_Kept())
+    try:
+        yield
+    finally:
+        _kept.reset(token)
+
+
+def _denoised_views(light_field: LightField, least: float) -> npt.NDArray[Any] | None:
+    noise = view_noise(light_field)
+    if noise.usual < LEAST_NOISE or noise.share < LEAST_SHARE:
+        return None
+    from sepi.matching.denoising_kernels import denoise_views
+
+    views = light_field.views
+    # levels of as many bits: what is left of the noise is more than their rounding, and kernels need no other version
+    out = np.zeros_like(views)
+    full = np.float32(full_scale(views.dtype))
+    whole = views.dtype != np.float32
+    height, width = light_field.shape
+    by_place = cv2.resize(np.float32(least) * noise.by_place, (width, height), interpolation=cv2.INTER_LINEAR)
+    denoise_views(views, light_field.present, full, noise.brightness, noise.variance, by_place, whole, out)
+    return out
+
+
+def guide_of(light_field: LightField) -> FloatMap:
+    """Colours that tell where costs may be carried on: the reference view (H, W, 3), without noise at edges, too."""
+    guide = light_field.reference_view
+    if not isinstance(light_field, DenoisedLightField):
+        return guide
+    colour = _GUIDE_COLOUR * light_field.noise
+    return np.asarray(cv2.bilateralFilter(np.ascontiguousarray(guide), _GUIDE_SIZE, colour, _GUIDE_SPACE))

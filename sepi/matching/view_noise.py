@@ -1,0 +1,168 @@
+"""Noise of the views by brightness and by place, from the views themselves.
+
+Two bounds from above, of which the lower one holds. Within a view, what the flattest blocks of a brightness vary by:
+texture adds to it. Between views, by what a block differs from others at whole pixels from it, nothing being
+interpolated: where texture fits, however strong, the noise of two pixels is left; where no whole pixel fits, or a
+surface is hidden or shines, or the cameras' pictures are not alike, more is left. So the best tenth of blocks tells.
+The mean of a block does not count, which exposure may change from view to view.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+
+from sepi.image.noise import BLACK, SATURATED, mask_energy
+from sepi.lightfield import BoolMap, FloatMap, LightField, full_scale
+
+VIEWS = 16
+"""Nearest other views that are compared."""
+
+MOST_MOVES = 400
+"""Beyond so many whole pixels of all of them no other view is compared: where disparities are large, few will do."""
+
+LEVELS = 8
+"""Of brightness, each with as many blocks as the next."""
+
+PARTS = 4
+"""Of the picture, down and across."""
+
+BEST_SHARE = 0.1
+"""Of the blocks of a brightness, or of a part, that tell its noise."""
+
+# the best tenth of blocks of nothing but noise has so much less of it than all: measured on white noise
+_OF_ONE_VIEW, _OF_VIEWS = 1.23, 1.25
+
+_ROUNDING = 0.29
+"""Standard deviation of what rounding to whole levels adds."""
+
+_LEAST = 1e-5
+"""The same of single precision."""
+
+_MOST_UNEVEN = 16.0
+"""Most that a part's noise may differ from the picture's, as a factor of its variance."""
+
+
+@dataclass(frozen=True)
+class ViewNoise:
+    """Noise at several brightnesses.
+
+    Attributes
+    ----------
+    brightness : ndarray, shape (N,), float32
+        Rising, 0..1.
+    variance : ndarray, shape (N,), float32
+        Of one channel, colours in 0..1.
+    by_place : ndarray, shape (PARTS, PARTS), float32
+        What that is multiplied with in parts of the picture, where a lens darkens it or its light is uneven.
+    share : float
+        Of the variance by which views differ, at most, what is noise of each view.
+    """
+
+    brightness: FloatMap
+    variance: FloatMap
+    by_place: FloatMap
+    share: float
+
+    @property
+    def usual(self) -> float:
+        """Standard deviation at the brightness in the middle."""
+        return float(np.sqrt(np.median(self.variance)))
+
+
+def view_noise(light_field: LightField) -> ViewNoise:
+    """Noise of the views of a light field.
+
+    Parameters
+    ----------
+    light_field : LightField
+        With a known disparity range.
+
+    Returns
+    -------
+    ViewNoise
+
+    Raises
+    ------
+    SepiError
+        If the disparity range is unknown.
+    """
+    from sepi.matching.view_noise_kernels import BLOCK, least_differences
+
+    views, image = light_field.rgb_views, light_field.reference_view
+    unit = 1 / full_scale(views.dtype)
+    least = (_LEAST if views.dtype == np.float32 else _ROUNDING * unit) ** 2
+    place, moves = light_field.reference_position, whole_pixel_moves(light_field)
+    # beyond the picture nothing is known
+    between = np.minimum(least_differences(views.transpose(0, 1, 4, 2, 3), *place, moves) * unit**2 / 2, 1)
+    within, level = (_of_blocks(values, between.shape, BLOCK) for values in (mask_energy(image), image.mean(axis=2)))
+    # what is black, overexposed or flat has none of the noise that the rest has
+    tells = (within > 0) & (level > BLACK) & (level < SATURATED)
+    even = np.ones((PARTS, PARTS), np.float32)
+    if tells.sum() < LEVELS:
+        return ViewNoise(np.array([0.5], np.float32), np.array([least], np.float32), even, 1.0)
+    found: list[tuple[float, float, float]] = []
+    for low, high in pairwise(np.quantile(level[tells], np.linspace(0, 1, LEVELS + 1))):
+        chosen = tells & (level >= low) & (level <= high)
+        of_one, of_two = (max(bound, least) for bound in _bounds(within[chosen], between[chosen]))
+        found.append((float(np.median(level[chosen])), min(of_one, of_two), min(of_one / of_two, 1)))
+    brightness, variance, shares = np.array(found, np.float32).T
+    expected = np.interp(level, brightness, variance)
+    by_place = _by_place(within / expected, between / expected, tells)
+    return ViewNoise(brightness, variance, by_place, float(np.median(shares)))
+
+
+def _by_place(within: FloatMap, between: FloatMap, tells: BoolMap) -> FloatMap:
+    """Noise of each part of the picture, from energies of blocks in units of what their brightness has."""
+    down, across = (np.arange(n) * PARTS // max(n, 1) for n in tells.shape)
+    part = down[:, None] * PARTS + across
+    factors = np.ones((PARTS, PARTS), np.float32)
+    for number in range(PARTS * PARTS):
+        chosen = tells & (part == number)
+        if chosen.sum() >= LEVELS:
+            bound = min(_bounds(within[chosen], between[chosen]))
+            factors.flat[number] = np.clip(bound, 1 / _MOST_UNEVEN, _MOST_UNEVEN)
+    return factors
+
+
+def _bounds(within: FloatMap, between: FloatMap) -> tuple[float, float]:
+    """What the best blocks tell of the noise, within a view and between views."""
+    of_one, of_two = (float(np.quantile(energy, BEST_SHARE)) for energy in (within, between))
+    return _OF_ONE_VIEW * of_one, _OF_VIEWS * of_two
+
+
+def whole_pixel_moves(light_field: LightField) -> npt.NDArray[np.int64]:
+    """Where the nearest views may have a pixel of the reference view, in whole pixels from it.
+
+    Parameters
+    ----------
+    light_field : LightField
+        With a known disparity range.
+
+    Returns
+    -------
+    ndarray, shape (N, 4), int64
+        Row and column of a view in the grid, pixels down and across.
+    """
+    known = light_field.require_disparity_range()
+    others = light_field.present.copy()
+    others[light_field.reference_position] = False
+    places, baselines = np.argwhere(others), light_field.baselines[others]
+    moves: list[tuple[int, ...]] = []
+    for n in np.argsort((baselines**2).sum(axis=1), kind="stable")[:VIEWS]:
+        longest = float(np.abs(baselines[n]).max())
+        if longest == 0 or len(moves) > MOST_MOVES:
+            continue
+        for k in np.arange(np.floor(known.minimum * longest), np.ceil(known.maximum * longest) + 1):
+            moves.append((*places[n], *np.rint(-k / longest * baselines[n]).astype(int)))
+    return np.array(moves, np.int64).reshape(-1, 4)
+
+
+def _of_blocks(values: FloatMap, shape: tuple[int, ...], size: int) -> FloatMap:
+    """Means over blocks of ``size`` pixels."""
+    rows, columns = shape
+    blocks = values[: rows * size, : columns * size].reshape(rows, size, columns, size)
+    return np.asarray(blocks.mean(axis=(1, 3)), np.float32)

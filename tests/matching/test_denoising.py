@@ -1,0 +1,101 @@
+"""Noise told from the views, and views without what it explains."""
+
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from scipy import ndimage
+
+from sepi.lightfield import FloatMap, LightField
+from sepi.matching.denoising import DenoisedLightField, denoised, kept_views
+from sepi.matching.denoising_kernels import denoise_views
+from sepi.matching.view_noise import view_noise
+from sepi.scenes import render
+
+
+def with_noise(light_field: LightField, sigma: FloatMap | float, seed: int = 0) -> LightField:
+    """A scene in bytes with white noise of ``sigma`` levels."""
+    noise = np.random.default_rng(seed).standard_normal(light_field.views.shape, np.float32)
+    views = 255 * light_field.rgb_views.astype(np.float32) + sigma * noise
+    return replace(light_field, views=np.clip(np.rint(views), 0, 255).astype(np.uint8))
+
+
+def textured(scale: float = 0.25) -> LightField:
+    """A slanted plane of strong texture, ``scale`` of black to white round grey, floats."""
+    scene = render("slanted_plane", size=128, views=5)
+    views = scene.views.astype(np.float32) / np.iinfo(scene.views.dtype).max
+    return replace(scene, views=0.5 + scale * (views - views.mean()))
+
+
+def test_noise_is_told_by_brightness_and_by_place_whatever_the_texture() -> None:
+    """If this fails, views with texture pass for noisy, or a dark corner's noise is taken for everybody's."""
+    scene = textured()
+    assert view_noise(with_noise(scene, 0)).usual * 255 < 1
+    assert view_noise(with_noise(scene, 6)).usual * 255 == pytest.approx(6, rel=0.12)
+    bright = np.where(np.arange(128) < 64, -0.25, 0.25).astype(np.float32)[:, None]
+    halves = replace(scene, views=0.5 + bright + 0.4 * (scene.views - 0.5))
+    by_brightness = view_noise(with_noise(halves, 16 * (1 - halves.views)))
+    told = np.sqrt(by_brightness.variance) * 255
+    np.testing.assert_allclose(told, 16 * (1 - by_brightness.brightness), rtol=0.15)
+    assert told[0] > 2 * told[-1]
+    sides = np.where(np.arange(128) < 64, 3, 9).astype(np.float32)[:, None]
+    by_place = np.sqrt(view_noise(with_noise(scene, sides)).by_place).mean(axis=0)
+    assert by_place[3] / by_place[0] == pytest.approx(3, rel=0.2)
+
+
+def test_pictures_of_unlike_brightness_are_no_noise() -> None:
+    """If this fails, an automatic exposure makes all detail be taken for noise."""
+    scene = textured()
+    steps = np.random.default_rng(1).choice([-0.05, 0.05], scene.grid).astype(np.float32)[..., None, None, None]
+    steps[scene.reference_position] = 0
+    noise = view_noise(with_noise(replace(scene, views=scene.views + steps), 4))
+    assert noise.usual * 255 == pytest.approx(4, rel=0.15)
+    assert noise.share > 0.75
+
+
+def plain_denoised(view: FloatMap, levels: FloatMap, variances: FloatMap, least: FloatMap) -> npt.NDArray[np.float64]:
+    """The same as the kernel by plain means, (H, W, C), mirrored at the ends."""
+    mean = np.asarray(view, np.float64)
+    for axis in (0, 1):
+        mean = ndimage.convolve1d(mean, [0.25, 0.5, 0.25], axis=axis, mode="mirror")
+    detail = view - mean
+    noise = 0.640625 * least * np.interp(mean.mean(axis=2), levels, variances)
+    energy = ndimage.uniform_filter((detail**2).mean(axis=2), 5, mode="mirror")
+    gain = np.maximum(energy - noise, 0) / np.maximum(energy, 1e-30)
+    return np.asarray(mean + gain[..., None] * detail)
+
+
+@pytest.mark.parametrize("channels", [1, 3])
+def test_kernel_equals_plain_means(channels: int) -> None:
+    rng = np.random.default_rng(2)
+    views = rng.random((1, 2, 71, 23, channels)).astype(np.float32)
+    views[..., :11, :] = 0.5 + 0.01 * views[..., :11, :]
+    levels, variances = np.array([0.2, 0.6], np.float32), np.array([1e-4, 4e-2], np.float32)
+    least = rng.uniform(1, 2, views.shape[2:4]).astype(np.float32)
+    present = np.array([[True, False]])
+    out = np.zeros_like(views)
+    denoise_views(views, present, np.float32(1), levels, variances, least, False, out)
+    np.testing.assert_allclose(out[0, 0], plain_denoised(views[0, 0], levels, variances, least), atol=2e-6)
+    assert not out[0, 1].any()
+    levels_of_bytes = np.rint(255 * views).astype(np.uint8)
+    rounded = np.zeros_like(levels_of_bytes)
+    denoise_views(levels_of_bytes, present, np.float32(255), levels, variances, least, True, rounded)
+    expected = plain_denoised((levels_of_bytes[0, 0] / np.float32(255)), levels, variances, least)
+    np.testing.assert_allclose(rounded[0, 0], 255 * np.clip(expected, 0, 1), atol=0.51)
+
+
+def test_only_noisy_views_are_changed() -> None:
+    """If this fails, clean scenes lose detail, or each stage denoises anew."""
+    scene = textured()
+    clean = with_noise(scene, 0.5)
+    assert denoised(clean, 1.5) is clean
+    noisy = with_noise(scene, 6)
+    assert denoised(noisy, 0) is noisy
+    with kept_views():
+        one, other = denoised(noisy, 1.5), denoised(replace(noisy), 1.5)
+        assert one.views is other.views
+    assert isinstance(one, DenoisedLightField)
+    assert one.noise * 255 == pytest.approx(6, rel=0.5)
+    before, after = (np.abs(v.reference_view - scene.reference_view).mean() for v in (noisy, one))
+    assert after < before
