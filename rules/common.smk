@@ -9,7 +9,7 @@ from pathlib import Path
 from sepi.command import WORKFLOW_PROCESS
 from sepi.compared.methods import LEARNED, METHODS
 from sepi.errors import SepiError
-from sepi.io.result_folder import RESULT_FILES
+from sepi.io.result_files import RESULT_FILES
 from sepi.variants import HANDED_ON, STAGES, VARIANTS, choice_of
 from sepi.report.plan import Plan
 from sepi.validation import require_known
@@ -55,7 +55,7 @@ except OSError as error:
 
 VARIANT_LABELS = {name: variant.labels for name, variant in SETTINGS.variants.items()}
 SCENES_BY_DATASET = {name: SETTINGS.scenes_of(name) for name in SETTINGS.datasets}
-PLAN = Plan(RESULTS, SCENES_BY_DATASET, VARIANT_LABELS, list(SETTINGS.external))
+PLAN = Plan(RESULTS, SCENES_BY_DATASET, VARIANT_LABELS, list(SETTINGS.external), bad_thresholds=SETTINGS.bad_thresholds)
 # report to its scenes and variants; the main one has no name, the others' files lie in folders of their names
 REPORTS = {
     plan.report: plan
@@ -235,7 +235,25 @@ def truth_source(wildcards):
     scene = scene_of(wildcards)
     if scene.is_rendered:
         return ["--rendered", placed(scene.source)]
-    return ingest_source(wildcards) if scene.source is None or scene.truth else []
+    return ingest_source(wildcards) if scene.source is None or scene.brought_truth else []
+
+
+def own_truth_size(wildcards):
+    """The light field that ground truth of the user's own must have the size of; nothing without any."""
+    return scene_files(wildcards.dataset, wildcards.scene).light_field if scene_of(wildcards).own_truth else []
+
+
+def own_truth(wildcards, input):
+    """The user's own ground truth of a scene, as flags."""
+    own = scene_of(wildcards).own_truth
+    if own is None:
+        return []
+    scale = [] if own.scale is None else ["--truth-scale", str(own.scale)]
+    return ["--truth", str(own.path), *scale, "--light-field", input.light_field]
+
+
+# errors that the user asked to score
+BAD_THRESHOLDS = [word for threshold in SETTINGS.bad_thresholds for word in ("--bad", str(threshold))]
 
 
 def ingest_range(wildcards):

@@ -20,11 +20,12 @@ rule evaluate:
         runtime=lambda wildcards, input, attempt: minutes_for(0.05, 0.15 * len(input.maps))(wildcards, attempt),
     params:
         stages=str(PLACED_SCENE.stages),
+        bad=BAD_THRESHOLDS,
         code=lambda wildcards: code_digest("sepi.evaluate"),
     message:
         "{wildcards.dataset}/{wildcards.scene}: scores"
     shell:
         command(
             "sepi.evaluate --light-field {input.light_field:q} --truth {input.truth:q} --stages {params.stages:q} "
-            "--output {output.scores:q} {input.maps:q} 2> {log:q}"
+            "{params.bad:q} --output {output.scores:q} {input.maps:q} 2> {log:q}"
         )

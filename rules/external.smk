@@ -22,11 +22,12 @@ rule external:
     params:
         maps=lambda wildcards: SETTINGS.external_json(wildcards.dataset, wildcards.scene),
         scene="{dataset}/{scene}",
+        bad=BAD_THRESHOLDS,
         code=code_digest("sepi.external"),
     message:
         "{wildcards.dataset}/{wildcards.scene}: maps of external methods"
     shell:
         command(
             "sepi.external --light-field {input.light_field:q} --truth {input.truth:q} --maps {params.maps:q} "
-            "--scene {params.scene:q} --output {output.maps:q} 2> {log:q}"
+            "--scene {params.scene:q} {params.bad:q} --output {output.maps:q} 2> {log:q}"
         )

@@ -3,6 +3,7 @@
 rule truth:
     input:
         files=lambda wildcards: source_files(scene_of(wildcards), scene_of(wildcards).truth),
+        light_field=own_truth_size,
     output:
         truth=SCENE.truth,
     log:
@@ -17,8 +18,9 @@ rule truth:
         runtime=minutes_for(0.05),
     params:
         source=truth_source,
+        own=own_truth,
         code=lambda wildcards: code_digest("sepi.truth", scene_of(wildcards).reader),
     message:
         "{wildcards.dataset}/{wildcards.scene}: ground truth"
     shell:
-        command("sepi.truth {params.source:q} --output {output.truth:q} 2> {log:q}")
+        command("sepi.truth {params.source:q} {params.own:q} --output {output.truth:q} 2> {log:q}")

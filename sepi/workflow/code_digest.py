@@ -47,6 +47,7 @@ _ALTERNATIVES = (
     *(
         f"io.readers.{name}"
         for name in (
+            "calibrated",
             "eslf",
             "exported",
             "hci",

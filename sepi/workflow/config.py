@@ -2,50 +2,41 @@
 
 from __future__ import annotations
 
-import json
 import math
 import os
 import re
 from collections.abc import Collection, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
-from sepi.compared.methods import LEARNED
 from sepi.errors import SepiError
-from sepi.io.disparity_maps import SUFFIXES
+from sepi.io.disparity_maps import SUFFIXES, TruthFile
 from sepi.io.external_maps import ExternalSource
 from sepi.io.readers.formats import FORMATS
 from sepi.io.readers.options import ORDERS
 from sepi.lightfield import DisparityRange
 from sepi.scenes import SCENES
-from sepi.stage import Parameters
-from sepi.validation import require_known, validated
+from sepi.validation import CheckedModel, require_known, validated
 from sepi.variants import VARIANT_ENTRIES, VARIANTS, Variant, variant_from
 from sepi.workflow.datasets import LONGEST_NAME, Scene, own_scene, require_plain_path, scenes_in
 from sepi.workflow.parameters import default_values, stage_settings
 from sepi.workflow.rendered_dataset import Rendered
-from sepi.workflow.result_paths import RESULTS
+from sepi.workflow.settings import Index, Report, Settings
 
 # names of folders, panels and columns of tables that stand beside those of variants
 _RESERVED = ("stages", "complete", "external", "ground_truth", "reference_view", "dataset", "scene", "row", "region")
 # the built-in scenes have 9x9 views
 _BUILTIN_VIEWS = 81
 # keys whose values are text even where they look like numbers
-_TEXTS = ("path", "pattern", "variable", "include", "exclude")
-# what is drawn of a scene
-_PICTURES = re.compile(r"reports/(?:comparison/|rendered/)?(?:maps/([^/]+)/([^/]+)|page/([^/]+)/([^/]+)\.json)")
+_TEXTS = ("path", "truth", "images", "reference", "pattern", "variable", "include", "exclude")
 _WORDS = {"true": True, "false": False, "null": None}
 
 
-class _Keys(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
-
-
-class Builtin(_Keys):
+class Builtin(CheckedModel):
     """Keys of ``builtin``."""
 
     scenes: list[str] = Field(
@@ -55,22 +46,25 @@ class Builtin(_Keys):
 
 
 _Count = Annotated[int, Field(ge=1)]
-_Index = Annotated[int, Field(ge=0)]
 _Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 
 
-class Root(_Keys):
+class Root(CheckedModel):
     """A folder of scenes, and patterns of the names of those to take and to leave out."""
 
     path: str
-    include: list[str] = []
-    exclude: list[str] = []
+    include: list[str] = Field([])
+    exclude: list[str] = Field([])
 
 
-class OwnLightField(_Keys):
-    """Keys of one of the ``light_fields``: where it is, and the flags of ``sepi depth`` that say how to read it."""
+class OwnLightField(CheckedModel):
+    """Keys of one of the ``light_fields``: where it is, the flags of ``sepi depth`` that say how to read it, and its
+    ground truth.
+    """
 
     path: str = Field(min_length=1)
+    truth: str | None = Field(None, min_length=1)
+    truth_scale: _Positive | None = None
     format: str | None = None
     grid: tuple[_Count, _Count] | None = None
     pattern: str | None = None
@@ -78,48 +72,32 @@ class OwnLightField(_Keys):
     variable: str | None = None
     central: _Count | None = None
     order: str | None = None
-    exclude: list[str] = []
-    view: tuple[_Index, _Index] | None = None
+    exclude: list[str] = Field([])
+    view: tuple[Index, Index] | None = None
     row_spacing: _Positive | None = None
     white: _Positive | None = None
+    images: str | None = None
+    reference: str | None = None
     follow_links: bool = False
 
     @property
     def flags(self) -> tuple[str, ...]:
-        """All but the path, as flags of the command line."""
+        """How to read it, as flags of the command line."""
         pairs = {"grid": "x", "view": ","}
         flags: list[str] = []
-        for key, value in self.model_dump(exclude={"path", "exclude", "follow_links"}, exclude_none=True).items():
+        others = {"path", "truth", "truth_scale", "exclude", "follow_links"}
+        for key, value in self.model_dump(exclude=others, exclude_none=True).items():
             flags += [f"--{key.replace('_', '-')}", pairs[key].join(map(str, value)) if key in pairs else str(value)]
         flags += [flag for view in self.exclude for flag in ("--exclude", view)]
         return (*flags, "--follow-links") if self.follow_links else tuple(flags)
 
-
-PAGES = tuple(f"reports/{report}index.html" for report in ("", "comparison/", "rendered/"))
-
-MOST_ON_PAGE = 50
-"""Scenes that a page has unless it is asked for: 100 MB, which a browser still opens."""
-
-
-class Report(_Keys):
-    """Keys of ``report``."""
-
-    pixels: dict[str, list[tuple[_Index, _Index]]] = Field(
-        {},
-        description="pixels to look into beside those chosen automatically, such as {hci/cotton: [[200, 310]]}: row "
-        "and column",
-    )
-    page: bool | None = Field(
-        None,
-        description=f"whether there is a page; null: for up to {MOST_ON_PAGE} scenes, each of which adds up to 2 MB",
-    )
-    parts_of_best: bool = Field(
-        False,
-        description="whether the page also shows the ablation of 'best'; its variants are then run by 'all', too",
-    )
+    @property
+    def own_truth(self) -> TruthFile | None:
+        """The file of ground truth, if there is one."""
+        return None if self.truth is None else TruthFile(Path(self.truth).expanduser(), self.truth_scale)
 
 
-class Config(_Keys):
+class Config(CheckedModel):
     """Keys of ``config.yaml``."""
 
     builtin: Builtin = Field(
@@ -141,7 +119,9 @@ class Config(_Keys):
         {},
         description="Dataset 'own': light fields of any format that 'sepi depth' reads, by a name of yours, such as "
         "{lego: {path: /data/lego, grid: [17, 17]}}. Beside path: format, grid, pattern, axes, variable, central, "
-        "order, exclude, view, row_spacing, white, follow_links, which mean what the flags of 'sepi depth' mean.",
+        "order, exclude, view, row_spacing, white, images, reference, follow_links, which mean what the flags of 'sepi "
+        "depth' mean; truth, a file of ground truth, and truth_scale, pixels per view step for each of its levels "
+        "(docs/reproduce/real_truth.md).",
     )
     rendered: Rendered = Field(
         Rendered(),
@@ -153,6 +133,11 @@ class Config(_Keys):
         description="Disparity maps of external methods, by the method's name, to be scored and shown beside ours: "
         "a folder with SCENE.pfm, .npy, .png or .h5, a file pattern such as {SPO: '/maps/{dataset}/{scene}/spo.pfm'}, "
         "or {path: ..., scale: ..., offset: ...} where disparity = value * scale + offset.",
+    )
+    bad_thresholds: list[_Positive] = Field(
+        [],
+        description="Errors in pixels per view step to score beside 0.07, 0.03 and 0.01: the percentage of the pixels "
+        "with a larger one.",
     )
     report: Report = Field(Report(), description="The report's page.")
     disparity_range: dict[str, tuple[float, float]] = Field(
@@ -173,121 +158,6 @@ class Config(_Keys):
         description="Parameters of each stage, by choice. Those below shared hold for every choice that has them, but "
         "for one that has its own value below its stage.",
     )
-
-
-@dataclass(frozen=True)
-class Settings:
-    """A checked configuration.
-
-    Attributes
-    ----------
-    scenes : mapping of (dataset, scene) to Scene
-        Every scene of ``all``, ``ablation`` and ``comparison``, in the tables' order.
-    rendered_scenes : mapping of (dataset, scene) to Scene
-        Those of ``rendered``.
-    variants : mapping of str to Variant
-        The built-in variants, then the user's own.
-    parameters : mapping of stage to label to Parameters
-        What each stage runs with, by choice and what is overridden of it.
-    external : mapping of str to ExternalSource
-        External methods, and where their maps are.
-    report : Report
-        What the report's page shows beside the rest.
-    rendered : Rendered
-        How scenes are rendered.
-    """
-
-    scenes: Mapping[tuple[str, str], Scene]
-    rendered_scenes: Mapping[tuple[str, str], Scene]
-    variants: Mapping[str, Variant]
-    parameters: Mapping[str, Mapping[str, Parameters]]
-    external: Mapping[str, ExternalSource]
-    report: Report
-    rendered: Rendered
-
-    @property
-    def datasets(self) -> list[str]:
-        """Names of the datasets that have scenes, but for the rendered ones."""
-        return list(dict.fromkeys(dataset for dataset, _ in self.scenes))
-
-    @property
-    def rendered_variants(self) -> list[str] | None:
-        """The variants that the user chose for the rendered scenes, if any."""
-        if self.rendered.variants == "all":
-            return [name for name in VARIANTS if name not in LEARNED]
-        return self.rendered.variants
-
-    @property
-    def own_variants(self) -> list[str]:
-        """Names of the variants that the user added."""
-        return [name for name in self.variants if name not in VARIANTS]
-
-    def scenes_of(self, dataset: str) -> list[str]:
-        """Names of a dataset's scenes."""
-        return [name for other, name in (*self.scenes, *self.rendered_scenes) if other == dataset]
-
-    def scene(self, dataset: str, name: str) -> Scene:
-        """A scene by name.
-
-        Raises
-        ------
-        SepiError
-            If there is none; the message suggests the nearest.
-        """
-        # thousands of jobs ask: all names are gone through only where one is wrong
-        for known in (self.scenes, self.rendered_scenes):
-            if (dataset, name) in known:
-                return known[dataset, name]
-        require_known("dataset", [dataset], dict.fromkeys([*self.datasets, *(one for one, _ in self.rendered_scenes)]))
-        require_known(f"scene of dataset '{dataset}'", [name], self.scenes_of(dataset))
-        raise AssertionError(f"{dataset}/{name} is among the known ones")
-
-    def require_target(self, path: str) -> None:
-        """Check the names in a file that a user asks for, if it lies among the results or is of a scene's pictures.
-
-        Raises
-        ------
-        SepiError
-            If there is no such dataset, scene or variant; the message suggests the nearest.
-        """
-        if path in PAGES and not self.has_page:
-            why = "is false" if self.report.page is False else f"is null, and there are over {MOST_ON_PAGE} scenes"
-            raise SepiError(f"{path}: not made: report.page {why}; true asks for it")
-        pictures = _PICTURES.fullmatch(path)
-        if pictures:
-            self.scene(*filter(None, pictures.groups()))
-        folder, *names = Path(path).parts or ("",)
-        if folder == str(RESULTS) and len(names) > 2:
-            self.scene(names[0], names[1])
-            if len(names) == 4 and names[2] != "stages":
-                require_known(f"{path}: variant", [names[2]], self.variants)
-
-    @property
-    def has_page(self) -> bool:
-        """Whether the report has a page."""
-        return len(self.scenes) <= MOST_ON_PAGE if self.report.page is None else self.report.page
-
-    def parameters_json(self, stage: str, label: str) -> str:
-        """Parameters of a stage's choice as JSON with sorted keys."""
-        return json.dumps(self.parameters[stage][label].model_dump(mode="json"), sort_keys=True)
-
-    def external_files(self, dataset: str, name: str) -> dict[str, Path]:
-        """Method to the file of its map of a scene, whether or not it is there.
-
-        Raises
-        ------
-        SepiError
-            If there is no such scene.
-        """
-        scene = self.scene(dataset, name)
-        return {method: source.file(scene.dataset, scene.name) for method, source in self.external.items()}
-
-    def external_json(self, dataset: str, name: str) -> str:
-        """What ``python -m sepi.external`` is to read for a scene, in the order of the configuration."""
-        files = self.external_files(dataset, name)
-        return json.dumps(
-            {method: source.model_dump() | {"path": str(files[method])} for method, source in self.external.items()}
-        )
 
 
 def load_settings(values: Mapping[str, Any]) -> Settings:
@@ -327,6 +197,7 @@ def load_settings(values: Mapping[str, Any]) -> Settings:
         {name: _external(name, entry, variants) for name, entry in config.external.items()},
         config.report,
         config.rendered,
+        tuple(config.bad_thresholds),
     )
 
 
@@ -377,7 +248,9 @@ def _scenes(config: Config) -> dict[str, Scene]:
         own = validated(OwnLightField, values, where)
         require_known(f"{where}.order", filter(None, [own.order]), ORDERS)
         require_known(f"{where}.format", filter(None, [own.format]), FORMATS)
-        scenes.append(own_scene(name, Path(own.path).expanduser(), own.flags, where))
+        if own.truth is None and own.truth_scale is not None:
+            raise SepiError(f"{where}.truth_scale: says what the numbers of a file mean; name it as truth")
+        scenes.append(own_scene(name, Path(own.path).expanduser(), own.flags, where, own.own_truth))
     if not scenes:
         raise SepiError("config: no scene to run on; name some in builtin.scenes or light_fields, or set hci_root")
     for scene in scenes:

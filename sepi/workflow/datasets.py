@@ -8,13 +8,15 @@ import re
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
 
+from sepi.cameras.files import cameras_in, described_by, read_model
 from sepi.errors import SepiError
+from sepi.io.disparity_maps import TruthFile
 from sepi.io.images import SUFFIXES
 from sepi.io.readers import exported, hci, hci_2013
 from sepi.io.readers.formats import Format, format_of
@@ -65,6 +67,8 @@ class Scene:
         Range the user set, pixels per view step; None: the scene's own or an estimate.
     flags : tuple of str
         How ingest is to read it, as flags of its command line.
+    own_truth : TruthFile or None
+        The user's, in place of the light field's.
     """
 
     dataset: str
@@ -77,6 +81,7 @@ class Scene:
     pixel_bytes: int = _RGB
     disparity_range: tuple[float, float] | None = None
     flags: tuple[str, ...] = ()
+    own_truth: TruthFile | None = None
 
     @property
     def samples(self) -> int:
@@ -101,6 +106,12 @@ class Scene:
     @property
     def truth(self) -> tuple[Path, ...]:
         """The files with ground truth and masks: a change in one of them asks for scores and for no map."""
+        own = () if self.own_truth is None else (self.own_truth.path,)
+        return own + self.brought_truth
+
+    @property
+    def brought_truth(self) -> tuple[Path, ...]:
+        """Those of them that the light field brings."""
         if self.is_rendered:
             return self.files
         return () if self.source is None or self._format is None else tuple(self._format.truth_files(self.source))
@@ -203,30 +214,42 @@ def _matches(scene: Scene, patterns: Sequence[str]) -> bool:
     return any(fnmatchcase(scene.name, pattern) for pattern in patterns)
 
 
-def own_scene(name: str, source: Path, flags: tuple[str, ...], where: str) -> Scene:
+def own_scene(name: str, source: Path, flags: tuple[str, ...], where: str, truth: TruthFile | None = None) -> Scene:
     """A light field of any format as a scene of dataset ``own``.
 
     Raises
     ------
     SepiError
-        If nothing is there, or ``name`` is no plain word.
+        If nothing is there, be it the light field or its ``truth``, or ``name`` is no plain word.
     """
     _require_plain(name, where)
     if not os.path.exists(source):
         raise SepiError(f"{where}: no file or folder '{source}'")
     source = source.resolve()
+    if truth is not None:
+        if not os.path.isfile(truth.path):
+            raise SepiError(f"{where}.truth: no file '{truth.path}'")
+        truth = replace(truth, path=truth.path.resolve())
     word = dict(pairwise(flags)).get("--format")
     if hci.matches(source) and (word == "hci" or (word is None and not exported.matches(source))):
-        return _benchmark_scene("own", name, source, flags)
+        return replace(_benchmark_scene("own", name, source, flags), own_truth=truth)
+    cameras = cameras_in(source) if word in (None, "cameras") and not exported.matches(source) else None
+    if cameras is not None:
+        # pictures may lie elsewhere
+        model = read_model(source, dict(pairwise(flags)).get("--images"))
+        files = (*described_by(cameras), *model.files)
+        return Scene("own", name, source, files, *size_of(model.pictures), flags=flags, own_truth=truth)
     inside = [path for path in view_files(source) if path.is_file()] if source.is_dir() else [source]
     files = tuple(path for path in inside if not path.name.startswith("."))
+    if truth is not None:
+        files = tuple(path for path in files if path.resolve() != truth.path)
     # notes beside pictures are no part of the light field
     if exported.matches(source):
-        manifest, *truth = exported.truth_files(source)
-        files = (*(path for path in files if path not in (manifest, *truth)), manifest)
+        manifest, *others = exported.truth_files(source)
+        files = (*(path for path in files if path not in (manifest, *others)), manifest)
     read = tuple(path for path in files if path.suffix.lower() in SUFFIXES or path.name == exported.MANIFEST)
     files = read if source.is_dir() and read else files
-    return Scene("own", name, source, files, *size_of(files), flags=flags)
+    return Scene("own", name, source, files, *size_of(files), flags=flags, own_truth=truth)
 
 
 def _require_plain(name: str, where: str) -> None:

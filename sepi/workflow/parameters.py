@@ -15,6 +15,7 @@ from sepi.compared.guided_costs import GuidedCostsParameters
 from sepi.compared.occ import OccParameters
 from sepi.image.edges import CannyParameters
 from sepi.matching.base_detail import BaseDetailParameters
+from sepi.matching.denoising import DenoisingParameters
 from sepi.matching.plane_sweep import SweepParameters
 from sepi.matching.semi_global import SmoothingParameters
 from sepi.matching.visibility_sweep import VisibilitySweepParameters
@@ -30,6 +31,7 @@ GROUPS: dict[str, type[Parameters]] = {
     "plane_sweep": SweepParameters,
     "canny_edges": CannyParameters,
     "view_subsets": OcclusionParameters,
+    "denoising": DenoisingParameters,
     "base_detail": BaseDetailParameters,
     "base_detail_sweep": VisibilitySweepParameters,
     "semi_global_smoothing": SmoothingParameters,

@@ -13,6 +13,7 @@ import pytest
 import yaml
 
 from sepi.errors import SepiError
+from sepi.io.disparity_maps import TruthFile
 from sepi.io.exported import write_exported
 from sepi.io.images import write_png
 from sepi.io.readers.formats import FORMATS
@@ -20,10 +21,11 @@ from sepi.renamed import RENAMED
 from sepi.scenes import SCENES, render
 from sepi.stage import Parameters
 from sepi.variants import STAGES, VARIANTS
-from sepi.workflow.config import Config, Settings, load_settings
+from sepi.workflow.config import Config, load_settings
 from sepi.workflow.config_file import default_yaml
 from sepi.workflow.parameters import GROUPS
 from sepi.workflow.result_paths import key_of
+from sepi.workflow.settings import Settings
 
 REPOSITORY = Path(__file__).parents[2]
 
@@ -88,6 +90,7 @@ def test_defaults_run_every_builtin_scene_and_variant() -> None:
         ({"builtin": {"size": 3}}, "config.builtin.size: input should be greater than or equal to 64, got 3"),
         ({"builtin": {"scenes": ["dotz"]}}, "config.builtin.scenes: unknown 'dotz'; did you mean 'dots'?"),
         ({"builtin": {"scenes": []}}, "config: no scene to run on; name some in builtin.scenes or light_fields"),
+        ({"bad_thresholds": [0]}, "config.bad_thresholds.0: input should be greater than 0, got 0"),
         ({"builtin": 3}, "config.builtin: input should be an object, got 3"),
         ({"hci_root": "/nowhere"}, "config.hci_root: no folder '/nowhere'"),
         ({"stages": {"initail": {}}}, "config.stages: unknown 'initail'; did you mean 'initial'?"),
@@ -416,12 +419,33 @@ class TestOwnLightFields:
                 {"path": "/", "view": [-1, 2]},
                 "light_fields.a.view.0: input should be greater than or equal to 0",
             ),
+            ({"path": "/", "truth": "/nowhere.pfm"}, "config.light_fields.a.truth: no file '/nowhere.pfm'"),
+            ({"path": "/", "truth_scale": 2.0}, "config.light_fields.a.truth_scale: says what the numbers of a file"),
+            (
+                {"path": "/", "truth": "/", "truth_scale": 0.0},
+                "config.light_fields.a.truth_scale: input should be greater than 0",
+            ),
             ({"path": "/", "central": "big"}, "config.light_fields.a.central: input should be a valid integer"),
             ("/data/lego", "config.light_fields.a: input should be an object, got '/data/lego'"),
         ],
     )
     def test_a_wrong_entry_is_named(self, entry: Any, expected: str) -> None:
         assert expected in message_of({"light_fields": {"a": entry}})
+
+    def test_ground_truth_beside_the_views_is_none_of_them(self, tmp_path: Path, monkeypatch: Any) -> None:
+        """A changed one asks for scores and for no map, whatever folder it lies in and whatever the scene brings."""
+        monkeypatch.chdir(tmp_path)
+        folder = make_scene(tmp_path / "flowers", views=4)
+        for name in ("gt_disp_lowres.pfm", "input_truth.png", "parameters.cfg"):
+            (folder / name).touch()
+        entry = {"path": "flowers", "truth": "flowers/input_truth.png", "truth_scale": "0.5", "view": [0, 1]}
+        for kind, brought in (("images", ()), ("hci", ("gt_disp_lowres.pfm",))):
+            scene = load_settings({"light_fields": {"a": entry | {"format": kind}}}).scene("own", "a")
+            assert scene.own_truth == TruthFile(folder / "input_truth.png", 0.5)
+            assert [path.name for path in scene.truth] == ["input_truth.png", *brought]
+            assert not set(scene.files) & set(scene.truth)
+            assert scene.views == 4
+            assert scene.flags == ("--format", kind, "--view", "0,1")
 
     def test_texts_that_look_like_numbers_stay_texts(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.chdir(tmp_path)

@@ -17,8 +17,8 @@ from sepi.report.published import FOLDER as PUBLISHED
 from sepi.variants import HANDED_ON, STAGES
 from sepi.workflow import run_folder
 from sepi.workflow.code_digest import code_digest, ingest_modules, render_modules, stage_modules
-from sepi.workflow.config import MOST_ON_PAGE, Report
 from sepi.workflow.datasets import Scene
+from sepi.workflow.settings import MOST_ON_PAGE, Report
 
 pytestmark = pytest.mark.workflow
 
@@ -43,8 +43,9 @@ def read(tmp_path_factory: pytest.TempPathFactory) -> Any:
     (root / "maps").mkdir()
     (root / "maps/dots.pfm").touch()
     maps = {"there": str(root / "maps"), "absent": str(root / "nowhere")}
-    (root / "mine.npy").touch()
-    own = {"mine": {"path": str(root / "mine.npy")}}
+    for name in ("mine.npy", "truth.png"):
+        (root / name).touch()
+    own = {"mine": {"path": str(root / "mine.npy"), "truth": str(root / "truth.png"), "truth_scale": 0.5}}
     return Workflow(REPOSITORY, root / "run", TINY | {"external": maps, "light_fields": own}).read()
 
 
@@ -99,6 +100,8 @@ def test_every_file_that_a_job_reads_is_an_input(read: Any) -> None:
     rules = {rule.name: rule for rule in read.rules}
     (views,) = rules["ingest"].input.files(scene(dataset="own", scene="mine"))
     assert views.endswith("mine.npy")
+    (truth,) = rules["truth"].input.files(scene(dataset="own", scene="mine"))
+    assert truth.endswith("truth.png")
     (there,) = rules["external"].input.maps(scene())
     assert there.endswith("maps/dots.pfm")
     assert {Path(file) for file in rules["numbers"].input.published} == set(PUBLISHED.glob("*.csv"))

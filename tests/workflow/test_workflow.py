@@ -25,6 +25,7 @@ from workflow_copy import SIZE, SLOW_WRITING, TINY, Workflow, copy_of_the_projec
 from sepi.compared.methods import LEARNED, METHODS
 from sepi.io.files import is_temporary
 from sepi.io.hdf5 import read_attributes, read_stage
+from sepi.io.images import write_png
 from sepi.io.pfm import write_pfm
 from sepi.io.scores import Evaluation, read_scores, write_scores
 from sepi.io.truth import read_with_truth
@@ -40,7 +41,7 @@ COMPLETE = {"ingest": 2, "initial": 8, "occlusion": 10, "textureless": 12, "opti
 # the variant of the fewest stages
 QUICK = "no_occlusion_no_textureless"
 # what the ablation of best asks for beyond that
-PARTS = {"initial": 2, "occlusion": 10, "textureless": 10, "optimize": 16}
+PARTS = {"initial": 4, "occlusion": 12, "textureless": 12, "optimize": 18}
 
 
 @pytest.fixture(scope="module")
@@ -52,7 +53,7 @@ def workflow(tmp_path_factory: pytest.TempPathFactory) -> Workflow:
     write_hci(render("curved_occluders", size=SIZE, views=5), scene)
     for name in ("parameters.cfg", "gt_disp_lowres.pfm", *(path.name for path in scene.glob("mask_*"))):
         (scene / name).unlink()
-    config = TINY | {"hci_root": str(inside / "my scenes")}
+    config = TINY | {"hci_root": str(inside / "my scenes"), "bad_thresholds": [0.25]}
     return Workflow(copy_of_the_project(root / "tree"), inside / "fresh", config)
 
 
@@ -271,6 +272,33 @@ class TestRerun:
         }
         assert follows == {"truth": 1, "evaluate": 1, "maps": 1}
 
+    def test_ground_truth_of_ones_own_asks_for_scores_and_for_no_map(self, finished: Workflow, tmp_path: Path) -> None:
+        """Levels with a scale, some of them unknown: named in the configuration, they are what maps are held to."""
+        shutil.copytree(finished.folder, tmp_path / "run", symlinks=True)
+        results = tmp_path / "run" / "results"
+        (results / "hci").rename(results / "own")
+        for name in ("truth.h5", "scores.h5"):
+            (results / "own/box" / name).unlink()
+        views = Path(finished.config["hci_root"]) / "training" / "box"
+        levels = np.full((SIZE, SIZE), 4, np.uint16)
+        levels[:10] = 0
+        write_png(tmp_path / "truth.png", levels)
+        entry = {"path": str(views), "truth": str(tmp_path / "truth.png"), "truth_scale": 0.125}
+        run = replace(finished, folder=tmp_path / "run").with_config(hci_root=None, light_fields={"box": entry})
+        scores = "results/own/box/scores.h5"
+        result = run.run(scores)
+        assert result.returncode == 0, result.stdout
+        assert "\n2 jobs\n" in result.stdout
+        found = read_scores(run.folder / scores)
+        disparity = read_stage(results / "own/box/stages/sepi/half_sepi/lti/wls/optimize.h5").disparity[10:]
+        whole = found["sepi/half_sepi/lti/wls"]["paper"]["all"]
+        assert whole["pixels"] == disparity.size
+        assert whole["badpix_0.25"] == pytest.approx(100 * (np.abs(disparity - 0.5) > 0.25).mean())
+        write_png(tmp_path / "truth.png", levels[1:])
+        failed = run.run(scores).stdout
+        assert f"{tmp_path / 'truth.png'}: ground truth is ({SIZE - 1}, {SIZE})" in failed
+        assert "\n2 jobs\n" in failed
+
     def test_scores_follow_a_changed_map(self, finished: Workflow, tmp_path: Path) -> None:
         """The scores of a scene are one job, whatever changed of it, and whatever an earlier score file says."""
         shutil.copytree(finished.folder, tmp_path / "run", symlinks=True)
@@ -314,6 +342,11 @@ class TestReport:
         ):
             for ending in ("csv", "md", "tex"):
                 assert (reports / f"{table}.{ending}").stat().st_size > 0
+        # a threshold of the user's
+        with (reports / "stages.csv").open(newline="") as file:
+            rows = [row for row in csv.DictReader(file) if row["pixels"] != "0"]
+        assert all(0 < float(row["badpix_0.25"]) <= float(row["badpix007"]) for row in rows if row["region"] == "all")
+        assert re.search(r"BadPix 0.07 [\d.]+ %,\\nBadPix 0.25 [\d.]+ %", page)
         figures = [reports / "figures" / name for name in ("ablation", "time_and_memory")]
         figures += [reports / "maps/builtin/dots" / name for name in ("overview", "pixels", "best/sparsification")]
         for figure in figures:
@@ -401,6 +434,7 @@ class TestComparison:
             rows = list(csv.DictReader(file))
         assert [row["variant"] for row in rows] == ["best", "fast", "paper", *METHODS]
         assert all(0 < float(row["mse100"]) < 100 for row in rows)
+        assert all(float(row["badpix_0.25"]) <= float(row["badpix007"]) for row in rows)
         assert (done.folder / "reports/comparison/index.html").stat().st_size > 100_000
         assert (done.folder / "reports/comparison/maps/builtin/dots/spo/error.png").is_file()
         assert (done.folder / "results/builtin/dots/oavc/disparity.pfm").is_file()

@@ -1,0 +1,168 @@
+"""A checked configuration: what the rules are told of it."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import Field
+
+from sepi.compared.methods import LEARNED
+from sepi.errors import SepiError
+from sepi.io.external_maps import ExternalSource
+from sepi.stage import Parameters
+from sepi.validation import CheckedModel, require_known
+from sepi.variants import VARIANTS, Variant
+from sepi.workflow.datasets import Scene
+from sepi.workflow.rendered_dataset import Rendered
+from sepi.workflow.result_paths import RESULTS
+
+# what is drawn of a scene
+_PICTURES = re.compile(r"reports/(?:comparison/|rendered/)?(?:maps/([^/]+)/([^/]+)|page/([^/]+)/([^/]+)\.json)")
+
+
+Index = Annotated[int, Field(ge=0)]
+PAGES = tuple(f"reports/{report}index.html" for report in ("", "comparison/", "rendered/"))
+
+MOST_ON_PAGE = 50
+"""Scenes that a page has unless it is asked for: 100 MB, which a browser still opens."""
+
+
+class Report(CheckedModel):
+    """Keys of ``report``."""
+
+    pixels: dict[str, list[tuple[Index, Index]]] = Field(
+        {},
+        description="pixels to look into beside those chosen automatically, such as {hci/cotton: [[200, 310]]}: row "
+        "and column",
+    )
+    page: bool | None = Field(
+        None,
+        description=f"whether there is a page; null: for up to {MOST_ON_PAGE} scenes, each of which adds up to 2 MB",
+    )
+    parts_of_best: bool = Field(
+        False,
+        description="whether the page also shows the ablation of 'best'; its variants are then run by 'all', too",
+    )
+
+
+@dataclass(frozen=True)
+class Settings:
+    """A checked configuration.
+
+    Attributes
+    ----------
+    scenes : mapping of (dataset, scene) to Scene
+        Every scene of ``all``, ``ablation`` and ``comparison``, in the tables' order.
+    rendered_scenes : mapping of (dataset, scene) to Scene
+        Those of ``rendered``.
+    variants : mapping of str to Variant
+        The built-in variants, then the user's own.
+    parameters : mapping of stage to label to Parameters
+        What each stage runs with, by choice and what is overridden of it.
+    external : mapping of str to ExternalSource
+        External methods, and where their maps are.
+    report : Report
+        What the report's page shows beside the rest.
+    rendered : Rendered
+        How scenes are rendered.
+    bad_thresholds : tuple of float
+        Errors to score beside the usual ones.
+    """
+
+    scenes: Mapping[tuple[str, str], Scene]
+    rendered_scenes: Mapping[tuple[str, str], Scene]
+    variants: Mapping[str, Variant]
+    parameters: Mapping[str, Mapping[str, Parameters]]
+    external: Mapping[str, ExternalSource]
+    report: Report
+    rendered: Rendered
+    bad_thresholds: tuple[float, ...] = ()
+
+    @property
+    def datasets(self) -> list[str]:
+        """Names of the datasets that have scenes, but for the rendered ones."""
+        return list(dict.fromkeys(dataset for dataset, _ in self.scenes))
+
+    @property
+    def rendered_variants(self) -> list[str] | None:
+        """The variants that the user chose for the rendered scenes, if any."""
+        if self.rendered.variants == "all":
+            return [name for name in VARIANTS if name not in LEARNED]
+        return self.rendered.variants
+
+    @property
+    def own_variants(self) -> list[str]:
+        """Names of the variants that the user added."""
+        return [name for name in self.variants if name not in VARIANTS]
+
+    def scenes_of(self, dataset: str) -> list[str]:
+        """Names of a dataset's scenes."""
+        return [name for other, name in (*self.scenes, *self.rendered_scenes) if other == dataset]
+
+    def scene(self, dataset: str, name: str) -> Scene:
+        """A scene by name.
+
+        Raises
+        ------
+        SepiError
+            If there is none; the message suggests the nearest.
+        """
+        # thousands of jobs ask: all names are gone through only where one is wrong
+        for known in (self.scenes, self.rendered_scenes):
+            if (dataset, name) in known:
+                return known[dataset, name]
+        require_known("dataset", [dataset], dict.fromkeys([*self.datasets, *(one for one, _ in self.rendered_scenes)]))
+        require_known(f"scene of dataset '{dataset}'", [name], self.scenes_of(dataset))
+        raise AssertionError(f"{dataset}/{name} is among the known ones")
+
+    def require_target(self, path: str) -> None:
+        """Check the names in a file that a user asks for, if it lies among the results or is of a scene's pictures.
+
+        Raises
+        ------
+        SepiError
+            If there is no such dataset, scene or variant; the message suggests the nearest.
+        """
+        if path in PAGES and not self.has_page:
+            why = "is false" if self.report.page is False else f"is null, and there are over {MOST_ON_PAGE} scenes"
+            raise SepiError(f"{path}: not made: report.page {why}; true asks for it")
+        pictures = _PICTURES.fullmatch(path)
+        if pictures:
+            self.scene(*filter(None, pictures.groups()))
+        folder, *names = Path(path).parts or ("",)
+        if folder == str(RESULTS) and len(names) > 2:
+            self.scene(names[0], names[1])
+            if len(names) == 4 and names[2] != "stages":
+                require_known(f"{path}: variant", [names[2]], self.variants)
+
+    @property
+    def has_page(self) -> bool:
+        """Whether the report has a page."""
+        return len(self.scenes) <= MOST_ON_PAGE if self.report.page is None else self.report.page
+
+    def parameters_json(self, stage: str, label: str) -> str:
+        """Parameters of a stage's choice as JSON with sorted keys."""
+        return json.dumps(self.parameters[stage][label].model_dump(mode="json"), sort_keys=True)
+
+    def external_files(self, dataset: str, name: str) -> dict[str, Path]:
+        """Method to the file of its map of a scene, whether or not it is there.
+
+        Raises
+        ------
+        SepiError
+            If there is no such scene.
+        """
+        scene = self.scene(dataset, name)
+        return {method: source.file(scene.dataset, scene.name) for method, source in self.external.items()}
+
+    def external_json(self, dataset: str, name: str) -> str:
+        """What ``python -m sepi.external`` is to read for a scene, in the order of the configuration."""
+        files = self.external_files(dataset, name)
+        return json.dumps(
+            {method: source.model_dump() | {"path": str(files[method])} for method, source in self.external.items()}
+        )
