@@ -215,6 +215,47 @@ def sweep(
     click.echo(f"{variant}, {parameter}, {SCORES[score]} of the whole map\n\n{tables_of(values, found)}")
 
 
+@main.command()
+@click.option("--scene", "scenes", multiple=True, help="Built-in scene or light field with ground truth; repeatable.")
+@click.option("--sigma", "sigmas", type=click.FloatRange(0, 128), multiple=True, help="Noise, of 255; repeatable.")
+@click.option("--variant", "variants", type=click.Choice(list(VARIANTS)), multiple=True, help="Repeatable.")
+@click.option("--threads", type=click.IntRange(min=1), help="Threads to use; one per core unless given.")
+def noise(scenes: tuple[str, ...], sigmas: tuple[float, ...], variants: tuple[str, ...], threads: int | None) -> None:
+    """Print scores of variants on light fields with noise added: MSE x100 / Q25 x100 / BadPix 0.07 %.
+
+    \b
+    Example:
+      python -m bench noise --scene HCI/cotton --sigma 0 --sigma 3 --sigma 8
+    """
+    from bench.noisy import rows
+    from bench.sweep import scene_for_choosing
+
+    use_threads(threads or available_cores())
+    light_fields = [scene_for_choosing(scene, "off") for scene in scenes or ("dots",)]
+    found = list(rows(light_fields, sigmas or (0.0, 3.0, 8.0), variants or ("best", "fast", "best_no_denoising")))
+    click.echo(tables.markdown(found))
+
+
+@main.command()
+@click.option("--scene", "scenes", multiple=True, help="Built-in scene; repeatable.")
+@click.option("--size", type=click.IntRange(min=48), default=128, show_default=True, help="Pixels of the pictures.")
+@click.option("--views", type=click.IntRange(min=3), default=5, show_default=True, help="Rows and columns of cameras.")
+@click.option("--seeds", type=click.IntRange(min=1), default=3, show_default=True, help="Arrays of each kind.")
+@click.option("--variant", type=click.Choice(list(VARIANTS)), default="best", show_default=True)
+@click.option("--threads", type=click.IntRange(min=1), help="Threads to use; one per core unless given.")
+def cameras(scenes: tuple[str, ...], size: int, views: int, seeds: int, variant: str, threads: int | None) -> None:
+    """Print scores of scenes seen by calibrated cameras, over those of perfect cameras in their place.
+
+    \b
+    Example:
+      python -m bench cameras --scene pyramids --scene curved_occluders
+    """
+    from bench.calibrated import rows
+
+    use_threads(threads or available_cores())
+    click.echo(tables.markdown(list(rows(scenes or ("pyramids",), size, views, range(seeds), variant))))
+
+
 def _all_measured(cases: list[Case], repeats: int, threads: int) -> tuple[list[Measurement], int]:
     """Measurements, and how many cases failed; each of those is warned of."""
     found = []

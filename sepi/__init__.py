@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from sepi.io.result_folder import read_result, write_result
     from sepi.lightfield import DisparityRange, LightField
     from sepi.pipeline import estimate_depth
-    from sepi.reading import read_light_field
+    from sepi.reading import read_cameras, read_light_field
     from sepi.stage import StageMaps
 
     __version__: str
@@ -61,6 +61,7 @@ __all__ = [
     "all_in_focus",
     "estimate_all_views",
     "estimate_depth",
+    "read_cameras",
     "read_light_field",
     "read_result",
     "refocus",
@@ -79,6 +80,7 @@ _HOME = {
     "all_in_focus": "sepi.applications.refocusing",
     "estimate_all_views": "sepi.applications.all_views",
     "estimate_depth": "sepi.pipeline",
+    "read_cameras": "sepi.reading",
     "read_light_field": "sepi.reading",
     "read_result": "sepi.io.result_folder",
     "refocus": "sepi.applications.refocusing",

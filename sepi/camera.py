@@ -19,7 +19,7 @@ References
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from numbers import Real
 
 import numpy as np
@@ -46,6 +46,9 @@ class Camera:
         ``b f / F``: what a disparity must be above for its point to lie before infinity, pixels per view step.
     focal_px : float
         Focal length in pixels.
+    right, down : float
+        How far the principal point of the grid's centre view lies to the right of the picture's middle, and below it,
+        in pixels.
 
     Raises
     ------
@@ -71,10 +74,12 @@ class Camera:
     scale: float
     offset: float
     focal_px: float
+    right: float = 0.0
+    down: float = 0.0
 
     def __post_init__(self) -> None:
         positive = all(is_finite(value) and value > 0 for value in (self.scale, self.focal_px))
-        if not (positive and is_finite(self.offset)):
+        if not (positive and all(map(is_finite, (self.offset, self.right, self.down)))):
             raise SepiError(
                 "camera: expected focal length, baseline, focus distance and sensor size to be positive numbers"
             )
@@ -156,3 +161,9 @@ def camera_from(
     focal_px = focal_length_mm / sensor_size_mm * max(whole_pair("camera: shape", shape, "height and width of a view"))
     scale = baseline_mm / 1000 * focal_px
     return Camera(scale, scale / focus_distance_m, focal_px)
+
+
+def numbers_of(camera: Camera) -> tuple[float, ...]:
+    """What :class:`Camera` takes, as files keep it: three numbers, and two more where the principal point is aside."""
+    first, aside = astuple(camera)[:3], (camera.right, camera.down)
+    return (*first, *aside) if any(aside) else first

@@ -22,6 +22,7 @@ import numpy.typing as npt
 
 from sepi.camera import Camera
 from sepi.errors import SepiError, one_line
+from sepi.rig import Rig
 from sepi.validation import described, is_finite, require_known, require_type, whole_pair
 
 FloatMap = npt.NDArray[np.float32]
@@ -139,6 +140,12 @@ class LightField:
         True: ``row_spacing`` is known, be it one; it is not looked for in the views.
     reading : str
         How the source was read where flags or options say so, as JSON: what reads it in the same way again.
+    rig : Rig or None
+        Where the views stand in the world, and the cameras that they were rectified from; None unless such were read.
+    missing : ndarray, shape (T, S, H, W), bool, or None
+        Pixels that views do not show, since their cameras looked elsewhere; None: they show all. Views hold the nearest
+        pixel there that they show, so that filters end there as at a picture's border, and nothing is compared with it.
+        (Methods of others that know no border compare it, as they do beyond the border.)
 
     Raises
     ------
@@ -180,6 +187,8 @@ class LightField:
     arranged: bool = True
     settled: bool = False
     reading: str = ""
+    rig: Rig | None = None
+    missing: BoolMap | None = None
 
     def __post_init__(self) -> None:
         v = self.views
@@ -234,6 +243,8 @@ class LightField:
             raise SepiError(
                 f"{self.name}: the {which} (t, s) = {self.reference_position} is missing; depth is made for it"
             )
+        if self.missing is not None and (self.missing.shape != v.shape[:4] or self.missing.dtype != bool):
+            raise SepiError(f"{self.name}: missing must be bool of shape {v.shape[:4]}, got {self.missing.shape}")
         if self.present.sum() < 2:
             raise SepiError(f"{self.name}: depth needs at least two views, only the {which} {t},{s} is present")
         if v.dtype == np.float32:
@@ -269,7 +280,8 @@ class LightField:
 
     def _arrays(self) -> dict[str, object]:
         require_type(f"{self.name}: masks", self.masks, Mapping, "names with arrays")
-        named = {"present": self.present, "positions": self.positions, "ground_truth": self.ground_truth, **self.masks}
+        known = ("present", "missing", "positions", "ground_truth")
+        named = {**{what: getattr(self, what) for what in known}, **self.masks}
         return {what: array for what, array in named.items() if array is not None}
 
     def require_seen_range(self) -> None:
@@ -304,6 +316,14 @@ class LightField:
             down, across = (self.positions[t, s] - self.positions[centre]).tolist()
             return down, across
         return (t - centre[0]) * self.row_spacing, float(s - centre[1])
+
+    @property
+    def reference_rig(self) -> Rig | None:
+        """The rig with the reference view at its origin, and that view's camera alone; None without one."""
+        if self.rig is None or self.positions is None:
+            return None
+        at = self.reference_position
+        return replace(self.rig.seen_from(self.positions[at]), views={at: self.rig.views[at]})
 
     @property
     def shape(self) -> tuple[int, int]:

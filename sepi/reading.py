@@ -24,6 +24,8 @@ from sepi.validation import described, require_type
 
 # 16-bit views darker than this, a sixteenth of the full scale, hold fewer bits or next to no light
 _NARROW = 4096
+# what cameras may stand off a plane, in view steps, before it matters how far away the scene is
+_FLAT = 1e-3
 
 
 def read_light_field(
@@ -90,6 +92,8 @@ def read_light_field(
     options = options or ReadOptions()
     given = None if disparity_range is None else _given_range(path, disparity_range)
     light_field = read(path, options, file_format, truth=truth)
+    if light_field.rig is not None and light_field.disparity_range is None:
+        light_field = _with_depths(path, light_field, options, given)
     require_memory(KERNELS)
     tell_kernel_cache()
     if not light_field.arranged:
@@ -114,9 +118,88 @@ def read_light_field(
         from sepi.inspection.view_order import check_order as checked_order
 
         found.append(checked_order(light_field, options.order).warning())
+    if light_field.rig is not None and found[1:] and found[1]:
+        raise SepiError(
+            f"{path}: the views do not fit the poses, but would turned over; expected poses of cameras that look along "
+            "their z axis, y pointing down, and rotations from the world to the camera (OpenCV, COLMAP)"
+        )
     for warning in filter(None, found):
         warnings.warn(f"{path}: {warning}", SepiWarning, stacklevel=2)
     return light_field
+
+
+def _with_depths(path: Path, light_field: LightField, options: ReadOptions, given: DisparityRange | None) -> LightField:
+    """Calibrated cameras without points: rectified for the depths that the views tell, if they stand off a plane."""
+    from sepi.inspection.disparity_range import estimate_range
+    from sepi.io.readers import calibrated
+
+    rig, camera = light_field.rig, light_field.camera
+    assert rig is not None
+    assert camera is not None
+    centres = np.array([view.shot.centre for view in rig.views.values()])
+    if np.abs((centres - rig.origin) @ rig.rotation[2]).max() < _FLAT * rig.step:
+        return light_field
+    known = given or estimate_range(light_field)
+    low, high = ((bound + camera.offset) / camera.scale for bound in (known.minimum, known.maximum))
+    same = replace(options, reference=rig.views[light_field.reference_position].shot.name)
+    again = calibrated.read(path, same, (max(low, 0.0), max(high, 1e-12)))
+    return replace(again, disparity_range=None)
+
+
+def read_cameras(
+    path: str | Path,
+    *,
+    images: str | Path | None = None,
+    reference: str | None = None,
+    exclude: tuple[str, ...] = (),
+    disparity_range: tuple[float, float] | None = None,
+) -> LightField:
+    """Read views with calibrated cameras, and rectify them to a light field.
+
+    Parameters
+    ----------
+    path : str or Path
+        COLMAP model (extra ``sepi[colmap]``), ``transforms.json``, or a table ``cameras.csv`` or ``cameras.yaml``; or
+        a folder with one of them.
+    images : str or Path, optional
+        Folder of the pictures, where the model's own does not lead to them.
+    reference : str, optional
+        Name of the picture whose depth is made; that of the most central camera unless given.
+    exclude : tuple of str
+        Names of pictures to leave out.
+    disparity_range : tuple of float, optional
+        ``(minimum, maximum)`` in pixels per view step.
+
+    Returns
+    -------
+    LightField
+        Views of float32, with positions, camera and ``rig``; its notes say how flat the cameras stand.
+
+    Raises
+    ------
+    SepiError
+        If there are no cameras or pictures, or they make no light field.
+
+    Examples
+    --------
+    >>> import json
+    >>> from pathlib import Path
+    >>> import cv2
+    >>> import sepi
+    >>> from sepi.scenes import render
+    >>> views = render("pyramids", size=64, views=3).views
+    >>> table = []
+    >>> for t in range(3):
+    ...     for s in range(3):
+    ...         written = cv2.imwrite(f"{t}{s}.png", views[t, s, :, :, ::-1])
+    ...         table.append({"file": f"{t}{s}.png", "position": [0.1 * s, 0.1 * t, 0.0], "focal": 80.0})
+    >>> text = Path("cameras.yaml").write_text(json.dumps({"units": "metres", "cameras": table}))
+    >>> light_field = sepi.read_cameras("cameras.yaml", disparity_range=(-1.5, 1.5))
+    >>> light_field.grid, light_field.shape, light_field.rig.units
+    ((3, 3), (64, 64), 'metres')
+    """
+    options = ReadOptions(images=None if images is None else str(images), reference=reference, exclude=exclude)
+    return read_light_field(path, disparity_range=disparity_range, file_format="cameras", options=options)
 
 
 def _given_range(path: Path, bounds: tuple[float, float]) -> DisparityRange:

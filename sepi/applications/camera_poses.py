@@ -117,7 +117,9 @@ def camera_poses(light_field: LightField, camera: Camera) -> CameraPoses:
         positions=positions,
         baselines=baselines,
         centres=np.column_stack([baselines[:, ::-1] * baseline, np.zeros(len(baselines))]),
-        principal_points=np.array([width - 1, height - 1]) / 2 + from_centre[:, ::-1] * camera.offset,
+        principal_points=np.array([width - 1, height - 1]) / 2
+        + (camera.right, camera.down)
+        + from_centre[:, ::-1] * camera.offset,
         focal_px=camera.focal_px,
         shape=(height, width),
         reference=int(np.flatnonzero((positions == light_field.reference_position).all(axis=1))[0]),

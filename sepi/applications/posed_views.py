@@ -16,6 +16,7 @@ from sepi.applications.camera_poses import CameraPoses, Points, camera_poses, no
 from sepi.camera import Camera
 from sepi.errors import SepiError
 from sepi.lightfield import BoolMap, FloatMap, LightField, as_unit_float
+from sepi.rig import Rig
 
 Colours = npt.NDArray[np.uint8]
 
@@ -49,6 +50,8 @@ class PosedViews:
         Pixels of the reference view that have a point.
     surfaces : callable or None
         Disparity of the other views; the reference view's, carried to them, where there is none.
+    rig : Rig or None
+        Where the cameras stand in the world that they were calibrated in; None: in the reference view's axes.
     """
 
     light_field: LightField
@@ -59,6 +62,7 @@ class PosedViews:
     known: BoolMap
     chosen: BoolMap
     surfaces: Surfaces | None = None
+    rig: Rig | None = None
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -69,7 +73,18 @@ class PosedViews:
     @property
     def units(self) -> str:
         """Units of positions and depth, in a few words."""
+        if self.rig is not None:
+            return self.rig.units
         return "metres" if self.metric else "nominal units, not to scale: the camera is not known"
+
+    @property
+    def rotation(self) -> Points:
+        """From the world's axes to those of all cameras, (3, 3)."""
+        return np.eye(3) if self.rig is None else self.rig.rotation
+
+    def in_world(self, points: Points) -> Points:
+        """Points (P, 3) of the reference view's axes in the world."""
+        return points if self.rig is None else self.rig.to_world(points)
 
     @property
     def points(self) -> Points:
@@ -90,8 +105,25 @@ class PosedViews:
             return np.asarray(pixels, np.uint8)
         return np.rint(255 * np.clip(as_unit_float(pixels), 0, 1)).astype(np.uint8)
 
+    @property
+    def incomplete(self) -> bool:
+        """Whether there are pixels that a view does not show."""
+        return self.light_field.missing is not None
+
+    def shown(self, view: int) -> BoolMap:
+        """Which pixels (H, W) a view shows."""
+        missing = self.light_field.missing
+        if missing is None:
+            return np.ones(self.light_field.shape, bool)
+        t, s = self.poses.positions[view]
+        return np.asarray(~missing[t, s])
+
     def carried(self, view: int) -> FloatMap:
-        """Disparity as a view sees it, (H, W) float32; NaN where it is not known."""
+        """Disparity as a view sees it, (H, W) float32; NaN where it is not known, or the view does not show it."""
+        carried = self._carried(view)
+        return np.where(self.shown(view), carried, np.float32(np.nan)) if self.incomplete else carried
+
+    def _carried(self, view: int) -> FloatMap:
         if view == self.poses.reference:
             return np.where(self.known, self.disparity, np.float32(np.nan))
         if self.surfaces is None:
@@ -192,6 +224,7 @@ def posed_views(
         known=known,
         chosen=_thinned(_sure(known, confidence, min_confidence), max_points),
         surfaces=surfaces,
+        rig=light_field.reference_rig if camera is None else None,
     )
 
 

@@ -23,6 +23,8 @@ import numpy as np
 from sepi.errors import SepiError
 from sepi.image.noise import noise_level, variance_of_residuals
 from sepi.lightfield import BoolMap, FloatMap, LightField, as_unit_float, require_light_field
+from sepi.matching.nearest_surfaces import nearest_surfaces
+from sepi.matching.row_bands import Rows
 from sepi.matching.sheared_views import ShearedViews
 from sepi.stage import Progress, StageMaps, no_progress
 from sepi.validation import described, is_finite, require_map, require_type
@@ -113,10 +115,12 @@ def refocus(
             views = ShearedViews(light_field, one_row).at(disparity)
             if surfaces is not None:
                 views = _filled_between(light_field, one_row, views, surfaces, disparity)
-            for sheared, (down, across) in zip(views, moved[one_row], strict=True):
+            for place, sheared in zip(np.argwhere(one_row).tolist(), views, strict=True):
+                down, across = moved[tuple(place)]
                 inside = _held(down, height), _held(across, width)
-                sums[:, *inside] += sheared[:, *inside]
-                counts[inside] += 1
+                shown = _shown(light_field, tuple(place), moved[tuple(place)])[inside]
+                sums[:, *inside] += sheared[:, *inside] * shown
+                counts[inside] += shown
         progress((t + 1) / light_field.grid[0])
     picture = np.clip(sums / counts, 0, 1).transpose(1, 2, 0)
     return np.ascontiguousarray(picture[..., : light_field.views.shape[4]])
@@ -325,6 +329,20 @@ def _without_holes(nearest: FloatMap, otherwise: float) -> FloatMap:
     return np.where(np.isinf(found), np.float32(otherwise), found).astype(np.float32)
 
 
+def _shown(light_field: LightField, place: tuple[int, ...], moved: FloatMap) -> FloatMap:
+    """1 where a view shows what is read of it for the pixels of the reference view, else 0; shape (H, W)."""
+    height, width = light_field.shape
+    shown = np.ones((height, width), np.float32)
+    # of what the reference view itself does not show, something has to stand there
+    if light_field.missing is not None and place != light_field.reference_position:
+        # as far as a cubic sample reaches
+        beside = cv2.dilate(light_field.missing[place].astype(np.uint8), np.ones((5, 5), np.uint8))
+        rows = np.clip(np.rint(np.arange(height) - moved[0]), 0, height - 1).astype(int)
+        columns = np.clip(np.rint(np.arange(width) - moved[1]), 0, width - 1).astype(int)
+        shown -= beside[np.ix_(rows, columns)]
+    return shown
+
+
 def _held(moved: float, length: int) -> slice:
     """Pixels of a line that a view holds when its pixel ``p - moved`` is read for the pixel ``p``."""
     return slice(max(0, math.ceil(moved)), min(length, math.floor(length - 1 + moved) + 1))
@@ -340,11 +358,12 @@ def _add_row(
 ) -> None:
     """Add the chosen views of one row of the grid to a mean: its expected colours, squared scale, sums and weights."""
     from sepi.applications.refocusing_kernels import add_view
-    from sepi.matching.visibility_kernels import z_buffers
 
     disparity, surfaces = disparities
     baselines = light_field.baselines[t : t + 1]
-    nearest = z_buffers(surfaces, chosen[None], baselines, 0, light_field.shape[0])[0]
+    of_row = np.zeros(light_field.grid, bool)
+    of_row[t] = chosen
+    nearest = nearest_surfaces(light_field, surfaces, of_row, Rows(0, light_field.shape[0]))[t]
     for s in np.flatnonzero(chosen).tolist():
         view = as_unit_float(light_field.views[t, s])
         add_view(view, baselines[0, s], disparity, nearest[s], np.float32(margin), *mean)

@@ -52,7 +52,7 @@ def add_view(
     disparity : ndarray, shape (H, W), float32
         Pixels per view step; pixels where it is NaN get nothing.
     nearest : ndarray, shape (H, W), float32
-        z-buffer of the map in the view (:func:`sepi.matching.visibility_kernels.z_buffers`).
+        What is nearest in the view (:func:`sepi.matching.nearest_surfaces.nearest_surfaces`).
     margin : float32
         By how much an occluder must be nearer, pixels per view step.
     centre : ndarray, shape (H, W, C), float32

@@ -3,31 +3,36 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
-from sepi.cli.input_options import Reading, reading_flags
+from sepi.cli.input_options import Reading, reading_flags, truth_flags
 from sepi.cli.scene_argument import read_ground_truth, require_one_view
 from sepi.command import SepiCommand
 from sepi.errors import SepiError
 
+if TYPE_CHECKING:
+    from sepi.io.disparity_maps import TruthFile
+
 _PATH = click.Path(path_type=Path)
 
 
-@click.command(cls=SepiCommand, short_help="Show two disparity maps side by side on a page.")
+@click.command(cls=SepiCommand)
 @click.argument("a", metavar="A", type=_PATH)
 @click.argument("b", metavar="B", type=_PATH)
 @click.argument("ground_truth", metavar="[GROUND_TRUTH|SCENE]", type=_PATH, required=False)
 @click.option("-o", "--output", type=_PATH, default=Path("compare.html"), show_default=True, help="Page to write.")
+@truth_flags
 @reading_flags
-def compare(a: Path, b: Path, ground_truth: Path | None, output: Path, reading: Reading) -> None:
+def compare(a: Path, b: Path, ground_truth: Path | None, output: Path, own: TruthFile | None, reading: Reading) -> None:
     """Show the disparity maps A and B side by side on a page.
 
     A and B are maps of any program: PFM, HDF5 with a dataset 'disparity', NumPy (.npy), TIFF of floats,
     'disparity_16bit.png', or a folder that 'sepi depth' wrote. GROUND_TRUTH is such a map, too; give the SCENE itself,
-    a light field, to see its view beside the maps, and to have regions scored. The page is one file and needs no
-    network: a slider wipes between any two of the maps, their differences and their errors; numbers and close-ups
-    follow the cursor; a point cloud turns.
+    a light field, to see its view beside the maps, and to have regions scored, with --truth FILE if it has no ground
+    truth. The page is one file and needs no network: a slider wipes between any two of the maps, their differences and
+    their errors; numbers and close-ups follow the cursor; a point cloud turns.
 
     \b
     Examples:
@@ -42,8 +47,8 @@ def compare(a: Path, b: Path, ground_truth: Path | None, output: Path, reading: 
     view = reading.options.view
     maps = read_disparity_at(a, view), read_disparity_at(b, view)
     require_one_view(a, b, reading)
-    values, light_field = (None, None) if ground_truth is None else read_ground_truth(ground_truth, a, reading)
-    for path, other in ((b, maps[1]), (ground_truth, values), (ground_truth, light_field)):
+    values, light_field = read_ground_truth(ground_truth, a, reading, own)
+    for path, other in ((b, maps[1]), (own.path if own else ground_truth, values), (ground_truth, light_field)):
         if other is not None and other.shape != maps[0].shape:
             raise SepiError(f"{path}: is {other.shape}, but {a} is {maps[0].shape} (height, width)")
     found = Comparison(_names(a, b), maps, values, light_field)

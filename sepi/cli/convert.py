@@ -22,7 +22,7 @@ _GREY = "Y"
 _PFM = ".pfm"
 
 
-@click.command(cls=SepiCommand, short_help="Write a finished map as OpenEXR, TIFF or PFM.")
+@click.command(cls=SepiCommand)
 @click.argument("result_path", metavar="RESULT", type=_PATH)
 @click.argument("output", metavar="FILE", type=_PATH)
 @click.option("--map", "name", type=click.Choice(list(_MAPS)), help="Map to write; in .exr all of them unless given.")

@@ -4,26 +4,30 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from sepi.cli.input_options import Pair, Reading, reading_flags
+from sepi.cli.input_options import Pair, Reading, reading_flags, truth_flags
 from sepi.cli.scene_argument import read_ground_truth
-from sepi.command import SepiCommand
+from sepi.command import SepiCommand, bad_thresholds
 from sepi.errors import SepiError
 
 if TYPE_CHECKING:
+    from sepi.io.disparity_maps import TruthFile
     from sepi.io.scores import AllScores
 
 _PATH = click.Path(path_type=Path)
 
 
-@click.command(cls=SepiCommand, short_help="Score a disparity map against ground truth.")
+@click.command(cls=SepiCommand)
 @click.argument("estimate", type=_PATH)
-@click.argument("ground_truth", metavar="GROUND_TRUTH|SCENE", type=_PATH)
+@click.argument("ground_truth", metavar="[GROUND_TRUTH|SCENE]", type=_PATH, required=False)
+@truth_flags
+@bad_thresholds
 @click.option("--border", type=click.IntRange(min=0), help="Score with this many pixels left out on each side only.")
 @click.option(
     "--offset",
@@ -35,7 +39,9 @@ _PATH = click.Path(path_type=Path)
 @reading_flags
 def evaluate(
     estimate: Path,
-    ground_truth: Path,
+    ground_truth: Path | None,
+    own: TruthFile | None,
+    thresholds: tuple[float, ...],
     border: int | None,
     offset: tuple[int, int] | None,
     as_json: bool,
@@ -48,6 +54,9 @@ def evaluate(
     light field with ground truth, to have its occluded and textureless regions scored too. A folder that 'sepi depth'
     wrote knows which view of which light field it belongs to, and how that was read.
 
+    With --truth FILE, a scene without ground truth is scored, too, or the file alone without any: a grey picture of 8
+    or 16 bit with --truth-scale K (disparity = level * K, 0 is unknown), or such a file as above.
+
     Both protocols are used: 'paper' scores the whole map, 'benchmark' leaves out 15 pixels on each side. With --offset,
     the crop's pixels are scored, and borders are counted from the edges of the ground truth, not from the crop's.
 
@@ -56,6 +65,7 @@ def evaluate(
       sepi evaluate cotton-depth cotton
       sepi evaluate estimate.pfm gt_disp_lowres.pfm --border 15 --json
       sepi evaluate inner_482x482.pfm cotton --offset 15,15
+      sepi evaluate venus-depth venus --truth disp2.pgm --truth-scale 0.03125 --bad 0.25
     """
     from sepi.io.all_views import read_disparity_at
     from sepi.io.files import naming
@@ -63,11 +73,14 @@ def evaluate(
     from sepi.scoring.crops import in_frame
     from sepi.scoring.scores import PROTOCOLS, region_masks, score_regions
 
+    source = ground_truth if own is None else own.path
+    if source is None:
+        raise click.UsageError("expected GROUND_TRUTH, a SCENE, or --truth FILE")
     disparity = read_disparity_at(estimate, reading.options.view)
-    values, light_field = read_ground_truth(ground_truth, estimate, reading)
+    values, light_field = read_ground_truth(ground_truth, estimate, reading, own)
     if values is None:
         view = "" if light_field is None else ",".join(map(str, light_field.reference_position))
-        raise SepiError(f"{ground_truth}: no ground truth for view {view}")
+        raise SepiError(f"{source}: no ground truth for view {view}")
     crop = None if offset is None else _Crop(offset, (disparity.shape[0], disparity.shape[1]), values.shape)
     inside = None
     if crop is not None:
@@ -75,17 +88,18 @@ def evaluate(
             disparity, inside = in_frame(disparity, crop.offset, crop.whole)
     elif values.shape != disparity.shape:
         raise SepiError(
-            f"{ground_truth}: ground truth is {values.shape}, the estimate {disparity.shape} (height, width)"
+            f"{source}: ground truth is {values.shape}, the estimate {disparity.shape} (height, width)"
             + ("; --offset tells where a crop lies" if _fits(disparity.shape, values.shape) else "")
         )
     masks = None if light_field is None else region_masks(light_field)
     protocols = PROTOCOLS if border is None else {f"border {border}": border}
-    scores = score_regions(disparity, values, masks, protocols, within=inside)
+    scores = score_regions(disparity, values, masks, protocols, within=inside, thresholds=thresholds)
     if as_json:
         told = without_nan(scores) | ({} if crop is None else {"crop": asdict(crop)})
         click.echo(json.dumps(told, indent=2, sort_keys=True))
     else:
-        click.echo(score_table(scores) if crop is None else f"{crop.described}\n{score_table(scores)}")
+        table = score_table(scores, thresholds)
+        click.echo(table if crop is None else f"{crop.described}\n{table}")
 
 
 @dataclass(frozen=True)
@@ -110,13 +124,13 @@ def _fits(shape: tuple[int, ...], whole: tuple[int, ...]) -> bool:
     return all(length <= most for length, most in zip(shape, whole, strict=True))
 
 
-def score_table(scores: AllScores) -> str:
+def score_table(scores: AllScores, thresholds: Sequence[float] = ()) -> str:
     """Scores as aligned columns."""
     from tabulate import tabulate
 
-    from sepi.scoring.scores import COUNTS, EDGE_SCORES, SCORES
+    from sepi.scoring.scores import COUNTS, EDGE_SCORES, score_heads
 
-    heads = SCORES | EDGE_SCORES | COUNTS
+    heads = score_heads(thresholds) | EDGE_SCORES | COUNTS
     rows = [
         [protocol, region, *(_cell(values[name]) for name in heads)]
         for protocol, regions in scores.items()

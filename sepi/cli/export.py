@@ -7,22 +7,27 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from sepi.cli.info import range_text, size_text
-from sepi.cli.input_options import Geometry, Reading, camera_flags, range_to_search, reading_flags
+from sepi.cli.input_options import Geometry, Reading, camera_flags, range_to_search, reading_flags, truth_flags
 from sepi.command import SepiCommand
 from sepi.errors import SepiError
+
+if TYPE_CHECKING:
+    from sepi.io.disparity_maps import TruthFile
 
 _PATH = click.Path(path_type=Path)
 
 
-@click.command(cls=SepiCommand, short_help="Save the light field INPUT as it was read, for reading without flags.")
+@click.command(cls=SepiCommand)
 @click.argument("light_field_path", metavar="INPUT", type=_PATH)
 @click.argument("output", metavar="OUT", type=_PATH)
 @range_to_search
 @click.option("--force", is_flag=True, help="Write where something is already, too.")
+@truth_flags
 @camera_flags
 @reading_flags
 def export(
@@ -30,6 +35,7 @@ def export(
     output: Path,
     disparity_range: tuple[float, float] | None,
     force: bool,
+    own: TruthFile | None,
     geometry: Geometry | None,
     reading: Reading,
 ) -> None:
@@ -55,6 +61,8 @@ def export(
     light_field = reading.read(light_field_path, disparity_range=disparity_range)
     if geometry is not None:
         light_field = replace(light_field, camera=geometry(shape=light_field.shape))
+    if own is not None:
+        light_field = replace(light_field, ground_truth=own.read(light_field.shape))
     # what was assumed is settled by now, and flags are of no more use
     note = f"exported from {light_field_path}"
     light_field = replace(settle_range(light_field), source="", reading="", notes=(note,))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -26,7 +27,7 @@ _RANGE_SOURCES = {
 _as_json = click.option("--json", "as_json", is_flag=True, help="Print one JSON object; see docs/reference/formats.md.")
 
 
-@click.command(cls=SepiCommand, short_help="Show what is known about the light field INPUT.")
+@click.command(cls=SepiCommand)
 @click.argument("light_field_path", metavar="INPUT", type=_PATH)
 @camera_flags
 @reading_flags
@@ -45,7 +46,9 @@ def info(light_field_path: Path, geometry: Geometry | None, reading: Reading, as
         estimated: DisparityRange | str = estimate_range(light_field)
     except SepiError as error:
         estimated = str(error)
-    camera = light_field.camera if geometry is None else geometry(shape=light_field.shape)
+    if geometry is not None:
+        light_field = replace(light_field, camera=geometry(shape=light_field.shape), rig=None)
+    camera = light_field.camera
     missing = [(int(t), int(s)) for t, s in zip(*(~light_field.present).nonzero(), strict=True)]
     t0, s0 = light_field.reference_position
     own = light_field.disparity_range
@@ -76,7 +79,7 @@ def info(light_field_path: Path, geometry: Geometry | None, reading: Reading, as
         "pixels": _pixels(light_field),
         "disparity range": "none given; the estimate is used" if own is None else range_text(own),
         "estimated range": estimated if isinstance(estimated, str) else range_text(estimated),
-        "metric depth": "unknown camera" if camera is None else f"{camera.scale:g} m / (disparity + {camera.offset:g})",
+        "metric depth": _depth(light_field),
         "ground truth": "none" if light_field.ground_truth is None else "yes",
         "masks": ", ".join(light_field.masks) or "none",
     }
@@ -88,7 +91,7 @@ def info(light_field_path: Path, geometry: Geometry | None, reading: Reading, as
         click.echo(f"{'note:':17}{note}")
 
 
-@click.command(cls=SepiCommand, short_help="Check the order of the views of the light field INPUT.")
+@click.command(cls=SepiCommand)
 @click.argument("light_field_path", metavar="INPUT", type=_PATH)
 @reading_flags
 @_as_json
@@ -149,10 +152,34 @@ def range_text(known: DisparityRange) -> str:
     return f"{known.minimum:g} to {known.maximum:g} pixels per view step ({_RANGE_SOURCES[known.source]})"
 
 
+def _depth(light_field: LightField) -> str:
+    """How disparities become depth."""
+    from sepi.rig import METRES
+
+    camera, rig = light_field.camera, light_field.rig
+    if camera is None:
+        return "unknown camera"
+    units = "m" if rig is None or rig.units == METRES else rig.units
+    return f"{camera.scale:g} {units} / (disparity + {camera.offset:g})"
+
+
 def _pixels(light_field: LightField) -> str:
     kind = light_field.views.dtype
     bits = f"{8 * kind.itemsize} bit{' float' if kind.kind == 'f' else ''}"
-    return f"{'RGB' if light_field.views.shape[4] == 3 else 'grey'}, {bits}; values as stored, no gamma applied"
+    shown = _shown(light_field)
+    told = (
+        ""
+        if shown is None
+        else f"; a view shows {100 * sum(shown) / len(shown):.0f} % of the picture, at least {100 * min(shown):.0f} %"
+    )
+    return f"{'RGB' if light_field.views.shape[4] == 3 else 'grey'}, {bits}; values as stored, no gamma applied{told}"
+
+
+def _shown(light_field: LightField) -> list[float] | None:
+    """Which part of the picture each view shows; None where all show everything."""
+    if light_field.missing is None:
+        return None
+    return [1 - float(view.mean()) for view in light_field.missing[light_field.present]]
 
 
 def _described(light_field: LightField) -> dict[str, Any]:
@@ -167,6 +194,7 @@ def _described(light_field: LightField) -> dict[str, Any]:
         "channels": light_field.views.shape[4],
         "dtype": light_field.views.dtype.name,
         "row_spacing": light_field.row_spacing,
+        "shown": _shown(light_field),
     }
 
 

@@ -6,7 +6,7 @@ import functools
 import math
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -76,8 +76,8 @@ _FLAGS = (
         "--format",
         "file_format",
         metavar="FORMAT",
-        help="exported, hci, hci-2013, images, eslf, tiff-stack, matlab, numpy, openlf, hdf5 or sepi; found by looking "
-        "unless given.",
+        help="exported, cameras, hci, hci-2013, images, eslf, tiff-stack, matlab, numpy, openlf, hdf5 or sepi; found "
+        "by looking unless given.",
     ),
     click.option(
         "--grid", type=Pair("ROWSxCOLUMNS", "xX×"), metavar="ROWSxCOLUMNS", help="Grid of views in the files."
@@ -111,14 +111,21 @@ _FLAGS = (
     click.option(
         "--white", type=_Positive("W"), metavar="W", help="Value of white: 1023 in files of 10 bits, 4095 of 12."
     ),
+    click.option("--images", metavar="FOLDER", help="Pictures of calibrated cameras, if not beside the model."),
+    click.option(
+        "--reference",
+        metavar="PICTURE",
+        help="Calibrated camera whose depth is made; the most central one unless given.",
+    ),
     click.option("--follow-links", is_flag=True, help="Read views that are links out of their folder."),
 )
 
 
-_BUILTIN = (
+_SCENES = (
     click.option("--builtin", help="Built-in scene, in place of PATH."),
     click.option("--size", type=click.IntRange(min=1), default=192, show_default=True, help="Built-in: pixels a side."),
     click.option("--views", type=click.IntRange(min=2), default=9, show_default=True, help="Built-in: views a side."),
+    click.option("--rendered", type=click.Path(path_type=Path), help="Render of a scene, in place of PATH."),
 )
 
 view_of_result = click.option(
@@ -140,9 +147,9 @@ Geometry = Callable[..., "Camera"]
 """Makes the camera of views of a ``shape``."""
 
 
-def builtin_flags(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Give a command the flags of a scene that is rendered rather than read."""
-    for flag in reversed(_BUILTIN):
+def scene_flags(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Give a command the flags of a scene of this package, in place of one that is read."""
+    for flag in reversed(_SCENES):
         command = flag(command)
     return command
 
@@ -151,16 +158,45 @@ def reading_flags(command: Callable[..., Any]) -> Callable[..., Any]:
     """Give a command the flags that say how to read a light field; it gets them as one argument ``reading``."""
 
     @functools.wraps(command)
-    def with_reading(*args: Any, file_format: str | None, follow_links: bool, **values: Any) -> Any:
+    def with_reading(*args: Any, file_format: str | None, **values: Any) -> Any:
         from sepi.io.readers.options import ReadOptions
 
-        names = ("grid", "pattern", "axes", "variable", "central", "order", "exclude", "view", "row_spacing", "white")
-        options = ReadOptions(**{name: values.pop(name) for name in names}, follow_links=follow_links)
+        options = ReadOptions(**{field.name: values.pop(field.name) for field in fields(ReadOptions)})
         return command(*args, reading=Reading(file_format, options), **values)
 
     for flag in reversed(_FLAGS):
         with_reading = flag(with_reading)
     return with_reading
+
+
+def truth_flags(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Give a command the flags of ground truth of a user's own; it gets them as one argument ``own``, None without."""
+
+    @functools.wraps(command)
+    def with_truth(*args: Any, truth: Path | None, truth_scale: float | None, **values: Any) -> Any:
+        if truth is None and truth_scale is not None:
+            raise click.UsageError("--truth-scale says what the numbers of --truth FILE mean: give that, too")
+        from sepi.io.disparity_maps import TruthFile
+
+        own = None if truth is None else TruthFile(truth, truth_scale)
+        return command(*args, own=own, **values)
+
+    for flag in (
+        click.option(
+            "--truth-scale",
+            type=_Positive("K"),
+            metavar="K",
+            help="Pixels per view step that 1 in the file of --truth stands for; pictures of 8 and 16 bit need it.",
+        ),
+        click.option(
+            "--truth",
+            type=click.Path(path_type=Path),
+            metavar="FILE",
+            help="Ground truth of one's own: PFM, NumPy, HDF5, or a grey picture, in which 0 is unknown.",
+        ),
+    ):
+        with_truth = flag(with_truth)
+    return with_truth
 
 
 def camera_flags(command: Callable[..., Any]) -> Callable[..., Any]:

@@ -13,7 +13,7 @@ from sepi.command import SepiCommand, progress_bar
 _PATH = click.Path(path_type=Path)
 
 
-@click.command(cls=SepiCommand, short_help="Write camera poses and depth for COLMAP or nerfstudio.")
+@click.command(cls=SepiCommand)
 @click.argument("light_field_path", metavar="INPUT", type=_PATH)
 @click.argument("result_path", metavar="RESULT", type=_PATH)
 @click.option(
@@ -81,5 +81,5 @@ def poses(
             "the camera is not known: a nominal one is taken, that sees the scene at a distance of 1 to 2; pixels fit "
             "exactly, positions and depth are neither in metres nor to scale"
         )
-    units = "metres" if posed.metric else "nominal units"
+    units = posed.units.partition(",")[0]
     click.echo(f"written: {folder}/ ({len(posed.poses)} views, {posed.chosen.sum()} points, {units})")

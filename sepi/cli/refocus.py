@@ -14,13 +14,12 @@ from sepi.cli.input_options import Geometry, Reading, camera_flags, default_fold
 from sepi.cli.scene_argument import read_light_field_of
 from sepi.command import SepiCommand, progress_bar
 from sepi.errors import SepiError
-from sepi.stage import Progress
-from sepi.threads import available_cores, use_threads
 
 if TYPE_CHECKING:
     from sepi.camera import Camera
     from sepi.io.refocused_folder import Focus
     from sepi.lightfield import BoolMap, FloatMap, LightField
+    from sepi.stage import Progress
 
 _PATH = click.Path(path_type=Path)
 _STEPS = 9
@@ -45,7 +44,7 @@ class _Wanted:
     pixels: tuple[tuple[int, int], ...]
 
 
-@click.command(cls=SepiCommand, short_help="Focus a light field after the fact.")
+@click.command(cls=SepiCommand)
 @click.argument("light_field_path", metavar="INPUT", type=_PATH)
 @click.argument("result_path", metavar="[RESULT]", type=_PATH, required=False)
 @click.option("-o", "--output", type=_PATH, help="Folder to write; ./NAME-refocused after INPUT's name unless given.")
@@ -116,7 +115,8 @@ def refocus(
     """
     from sepi.applications.refocusing import all_in_focus, views_within
     from sepi.io.refocused_folder import write_refocused
-    from sepi.io.result_folder import require_target
+    from sepi.io.result_files import require_target
+    from sepi.threads import available_cores, use_threads
 
     use_threads(threads or available_cores())
     folder = output or default_folder(light_field_path, "refocused")

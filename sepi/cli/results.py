@@ -16,7 +16,7 @@ _PATH = click.Path(path_type=Path)
 _PARTIAL = click.option("--partial", is_flag=True, help="Take fewer than the benchmark's 12 scenes.")
 
 
-@click.command(cls=SepiCommand, short_help="Write the point cloud of a finished disparity map.")
+@click.command(cls=SepiCommand)
 @click.argument("result_path", metavar="RESULT", type=_PATH)
 @click.option(
     "-o", "--output", type=_PATH, help="PLY file to write; points.ply beside the result, or points_ROW_COLUMN.ply."
@@ -63,6 +63,7 @@ def points(
         max_depth=max_depth,
         step=step,
         unknown=None if keep_unknown else result.unknown,
+        rig=None if geometry is not None else result.rig,
     )
     if not len(cloud.positions):
         tried = "lower --min-confidence, raise --max-depth or give --keep-unknown"
@@ -72,11 +73,11 @@ def points(
     if path.suffix.lower() != ".ply":
         raise SepiError(f"{path}: expected a name that ends with .ply, the format of the file")
     write_ply(path, cloud)
-    units = "metres" if cloud.metric else "relief: the camera is not known, so not to scale"
+    units = cloud.units or "metres" if cloud.metric else "relief: the camera is not known, so not to scale"
     click.echo(f"written: {path} ({len(cloud.positions)} points, {units})")
 
 
-@click.command(cls=SepiCommand, short_help="Pack results as a submission to the HCI 4D benchmark.")
+@click.command(cls=SepiCommand)
 @click.argument("results", metavar="RESULT...", nargs=-1, required=True, type=_PATH)
 @click.option("-o", "--output", type=_PATH, default=Path("submission.zip"), show_default=True, help="Zip to write.")
 @click.option(
@@ -109,7 +110,7 @@ def submission(results: tuple[Path, ...], output: Path, runtimes: tuple[str, ...
     click.echo(f"written: {output} ({len(entries)} scenes)")
 
 
-@click.command("check-submission", cls=SepiCommand, short_help="Check a submission to the HCI 4D benchmark.")
+@click.command("check-submission", cls=SepiCommand)
 @click.argument("path", metavar="ZIP|FOLDER", type=_PATH)
 @_PARTIAL
 @click.pass_context

@@ -8,10 +8,13 @@ from dataclasses import fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import click
+
 from sepi.cli.input_options import Reading
 from sepi.errors import SepiError
 
 if TYPE_CHECKING:
+    from sepi.io.disparity_maps import TruthFile
     from sepi.io.origin import Origin
     from sepi.lightfield import FloatMap, LightField
 
@@ -27,8 +30,10 @@ def require_one_view(estimate: Path, other: Path, reading: Reading) -> None:
         raise SepiError(f"{other}: depth of another view than {estimate}; compare maps of one view ({_BARE})")
 
 
-def read_ground_truth(path: Path, estimate: Path, reading: Reading) -> tuple[FloatMap | None, LightField | None]:
-    """The ground truth for an estimate, and the light field if ``path`` is one.
+def read_ground_truth(
+    path: Path | None, estimate: Path, reading: Reading, own: TruthFile | None = None
+) -> tuple[FloatMap | None, LightField | None]:
+    """The ground truth for an estimate, ``own`` where it is given, and the light field if ``path`` is one.
 
     Raises
     ------
@@ -38,12 +43,31 @@ def read_ground_truth(path: Path, estimate: Path, reading: Reading) -> tuple[Flo
     from sepi.io.all_views import read_disparity_at
     from sepi.io.disparity_maps import is_disparity
 
+    if path is None:
+        if own is None:
+            return None, None
+        _require_view_of(estimate, reading)
+        return own.read(), None
     if is_disparity(path):
+        if own is not None:
+            raise click.UsageError(f"{path} is ground truth, and so is --truth FILE: give one of them")
         values = read_disparity_at(path, reading.options.view)
         require_one_view(estimate, path, reading)
         return values, None
     light_field = read_light_field_of(path, estimate, reading, check_order=False)
+    if own is not None:
+        light_field = replace(light_field, ground_truth=own.read(light_field.shape))
     return light_field.ground_truth, light_field
+
+
+def _require_view_of(estimate: Path, reading: Reading) -> None:
+    """Raise for a map of another view than --view says, which nothing else would tell."""
+    from sepi.io.all_views import read_origin_at
+
+    origin, view = read_origin_at(estimate, reading.options.view), reading.options.view
+    if origin is not None and view not in (None, origin.view):
+        (t, s), (t0, s0) = view, origin.view
+        raise SepiError(f"{estimate}: depth of view {t0},{s0}, not of view {t},{s}; 'sepi depth' takes --view, too")
 
 
 def read_light_field_of(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -13,17 +12,17 @@ import numpy as np
 
 from sepi.command import SepiCommand, progress_bar
 from sepi.errors import SepiError
-from sepi.rendered.catalogue import NOISE_LEVELS, RENDERED
-from sepi.validation import require_known, validated
+from sepi.rendered.catalogue import NOISE_LEVELS, RENDERED, WITHOUT_NOISE, exposed_name
+from sepi.validation import require_known, validated, value_of
 
 if TYPE_CHECKING:
-    from sepi.rendered.options import Exposure, Taking
+    from sepi.rendered.options import Exposure, RenderOptions
     from sepi.rendered.render_file import Render
 
 _PATH = click.Path(path_type=Path)
 
 
-@click.command(cls=SepiCommand, short_help="Write scenes with exact ground truth.")
+@click.command(cls=SepiCommand)
 @click.argument("names", metavar="[NAME]...", nargs=-1)
 @click.option("-o", "--output", type=_PATH, default=Path("scenes"), show_default=True, help="Folder to write to.")
 @click.option("--rendered", is_flag=True, help="Path-traced scenes, by Mitsuba 3 (extra [render]): minutes for each.")
@@ -75,7 +74,9 @@ def scenes(
     elif rendered:
         given: dict[str, Any] = {"grid": [views, views]}
         given |= {key: value for key, value in (("size", size), ("samples", samples)) if value is not None}
-        _write_rendered(names, output, given | _settings(settings), dict.fromkeys(levels or ("off",)), all_views)
+        _write_rendered(
+            names, output, given | _settings(settings), dict.fromkeys(levels or (WITHOUT_NOISE,)), all_views
+        )
     else:
         only = {"--samples": samples, "--noise": levels, "--set": settings, "--all-views": all_views}
         for flag in (flag for flag, value in only.items() if value):
@@ -110,40 +111,41 @@ def _write_rendered(
     levels: Sequence[str] | dict[str, None],
     all_views: bool,
 ) -> None:
-    from sepi.rendered.exposure import exposed_name
-    from sepi.rendered.options import Exposure, Taking
+    from sepi.rendered.options import Exposure, RenderOptions
     from sepi.rendered.tracing import require_mitsuba
 
     require_known("path-traced scenes", names, RENDERED)
     chosen = list(dict.fromkeys(names or RENDERED))
-    unknown = [key for key in settings if key not in (*Taking.model_fields, *Exposure.model_fields)]
-    require_known("--set", unknown, (*Taking.model_fields, *Exposure.model_fields))
-    taking = validated(Taking, {key: settings[key] for key in settings if key in Taking.model_fields}, "--set")
-    of_sensor = {key: settings[key] for key in settings if key in Exposure.model_fields}
+    require_known("--set", settings, (*RenderOptions.model_fields, *Exposure.model_fields))
+    of_render, of_sensor = (
+        {key: value for key, value in settings.items() if key in model.model_fields}
+        for model in (RenderOptions, Exposure)
+    )
+    options = validated(RenderOptions, of_render, "--set")
     exposures = [validated(Exposure, {"noise": level, **of_sensor}, "--set") for level in levels]
     folders = [exposed_name(name, one.noise, one.noise_seed) for name in chosen for one in exposures]
     _require_new(output, folders)
     require_mitsuba()
     for name in chosen:
         with progress_bar(name) as progress:
-            render = _rendered(name, taking, output / f"{name}.h5", progress)
+            render = _rendered(name, options, output / f"{name}.h5", progress)
         for exposure in exposures:
             folder = output / exposed_name(name, exposure.noise, exposure.noise_seed)
             _write_folder(render, exposure, folder, all_views)
             click.echo(f"written: {folder}/")
 
 
-def _rendered(name: str, taking: Taking, path: Path, progress: Any) -> Render:
+def _rendered(name: str, options: RenderOptions, path: Path, progress: Any) -> Render:
     """A scene's render: of the file that is there already if it is of the same options, else made anew."""
     from sepi.rendered.render_file import read_render
     from sepi.rendered.rendering import made_by, render_scene
 
     if path.is_file():
         known = read_render(path)
-        if known.made_by != made_by(name, taking):
+        if known.made_by != made_by(name, options):
             raise SepiError(f"{path}: was rendered with other options; remove it or choose another folder with -o")
         return known
-    render_scene(name, taking, path, progress)
+    render_scene(name, options, path, progress)
     return read_render(path)
 
 
@@ -174,8 +176,5 @@ def _settings(texts: Sequence[str]) -> dict[str, Any]:
         match = re.fullmatch(r"(\w+)=(.*)", text)
         if match is None:
             raise SepiError(f"--set {text}: expected KEY=VALUE, such as lens=0.5")
-        try:
-            found[match[1]] = json.loads(match[2])
-        except ValueError:
-            found[match[1]] = match[2]
+        found[match[1]] = value_of(match[2])
     return found

@@ -3,8 +3,8 @@
 Compiled code is kept on disk, beside the package or in ``NUMBA_CACHE_DIR``, so this is done once in an environment.
 Without it the first jobs of a workflow compile what they need, several of them the same at the same time. Here every
 stage of enough variants runs on a tiny light field, in two processes, since one compiles one function at a time.
-Kernels for 16-bit and float views are compiled when they are first needed, those of the compared methods with
-``--comparison``.
+Kernels for 16-bit and float views are compiled when they are first needed, or with ``--all-types``; those of the
+compared methods with ``--comparison``.
 """
 
 from __future__ import annotations
@@ -30,11 +30,17 @@ SHARES: tuple[tuple[str, ...], ...] = (("paper", "no_sepi", "wang"), ("best", "b
 COMPARED: tuple[tuple[str, ...], ...] = (("acc", "mishiba", "oavc", "pobr"), ("cae", "occ", "spo"))
 """The compared methods, whose kernels are compiled only when asked for: `snakemake all` runs none of them."""
 
+TYPES = ("uint16", "float32")
+"""What views may be but 8-bit colours."""
+
 _SCENE, _SIZE, _VIEWS = "curved_occluders", 64, 3
 
 
-def compile_kernels(variants: tuple[str, ...]) -> None:
-    """Call every kernel that these variants use, and those that reading and evaluating use, as their jobs do."""
+def compile_kernels(variants: tuple[str, ...], kind: str = "uint8") -> None:
+    """Call every kernel that these variants use, and those that reading and evaluating use, as their jobs do.
+
+    ``kind`` is the type of the views.
+    """
     from dataclasses import replace
 
     from sepi.applications.all_views import estimate_all_views
@@ -48,7 +54,7 @@ def compile_kernels(variants: tuple[str, ...]) -> None:
 
     # one thread: compiling is all there is to do
     use_threads(1)
-    light_field = render(_SCENE, size=_SIZE, views=_VIEWS)
+    light_field = _of_type(render(_SCENE, size=_SIZE, views=_VIEWS), kind)
     for variant in variants:
         maps = estimate_depth(light_field, variant, {})
     bare = replace(light_field, disparity_range=None, masks={})
@@ -56,15 +62,49 @@ def compile_kernels(variants: tuple[str, ...]) -> None:
     check_order(bare)
     estimate_range(bare)
     if DEFAULT_VARIANT in variants:
+        _denoise(light_field)
+        _look()
         _share_light(light_field)
         estimate_all_views(light_field, maps)
         all_in_focus(light_field, maps)
         refocus(light_field, 0.0, maps)
 
 
+def _look() -> None:
+    """Call what a scene takes that is seen by a camera of any pose."""
+    from sepi.camera import Camera
+    from sepi.rig import Lens, Shot
+    from sepi.scenes import render_shot
+
+    shot = Shot("", Lens(8, 8, (8.0, 8.0), (3.5, 3.5)), np.eye(3), np.zeros(3))
+    render_shot(_SCENE, shot, camera=Camera(4.0, 4.0, 8.0), size=_SIZE)
+
+
+def _of_type(light_field: LightField, kind: str) -> LightField:
+    """The same views as numbers of another type."""
+    from dataclasses import replace
+
+    from sepi.lightfield import as_unit_float, full_scale
+
+    if light_field.views.dtype == kind:
+        return light_field
+    return replace(light_field, views=(as_unit_float(light_field.views) * full_scale(np.dtype(kind))).astype(kind))
+
+
+def _denoise(light_field: LightField) -> None:
+    """Call what noisy views need: the scene has none."""
+    from dataclasses import replace
+
+    from sepi.matching.denoising import denoised
+
+    noise = np.random.default_rng(0).integers(0, 64, light_field.views.shape, np.uint8)
+    denoised(_of_type(replace(light_field, views=noise), str(light_field.views.dtype)), 1.0)
+
+
 def _share_light(light_field: LightField) -> None:
-    """Call what rendering calls of the views together."""
+    """Call what rendering calls of views together, and of what is painted."""
     from sepi.rendered.masks import seen_bits
+    from sepi.rendered.paint_kernels import painted
     from sepi.rendered.shared_light import with_shared_light
 
     rows, columns = light_field.grid
@@ -72,18 +112,26 @@ def _share_light(light_field: LightField) -> None:
     grey, stands = np.ones((*flat.shape, 3), np.float32), light_field.baselines.reshape(-1, 2)
     with_shared_light(grey, grey, flat, flat.astype(np.int16), flat == 0, stands)
     seen_bits(flat, stands, 0)
+    # one triangle, of one texel
+    none, number = np.zeros(0, np.int32), np.zeros(1, np.int64)
+    space, plane = np.zeros((1, 3)), np.zeros((1, 2))
+    texels = np.zeros((1, 3), np.int64), np.zeros((1, 3), np.float32)
+    painted(none, np.zeros((0, 2), np.int64), np.zeros(5), space, space, plane, np.zeros((1, 2, 3)), number, *texels, 1)
 
 
 @click.command(name="python -m sepi.cli.warm_up", cls=SepiCommand)
 @click.option("--comparison", is_flag=True, help="Those of the compared methods, too.")
-def command(comparison: bool) -> None:
+@click.option("--all-types", is_flag=True, help="Those for 16-bit and float views, too.")
+def command(comparison: bool, all_types: bool) -> None:
     """Compile the kernels, so that the first run need not."""
     started = time.perf_counter()
     tell_kernel_cache()
-    shares = (*SHARES, *COMPARED) if comparison else SHARES
+    work = [(share, "uint8") for share in ((*SHARES, *COMPARED) if comparison else SHARES)]
+    # a process for each type, which all of its kernels have in common
+    work += [(sum(SHARES, ()), kind) for kind in TYPES] if all_types else []
     with ProcessPoolExecutor(len(SHARES), get_context("spawn")) as processes:
         # taken from the iterator, so that an error in a process is one here
-        list(processes.map(compile_kernels, shares))
+        list(processes.map(compile_kernels, *zip(*work, strict=True)))
     click.echo(f"kernels ready after {time.perf_counter() - started:.0f} s")
 
 

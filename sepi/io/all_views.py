@@ -15,9 +15,20 @@ import numpy.typing as npt
 
 from sepi.errors import SepiError
 from sepi.io.disparity_maps import read_disparity
-from sepi.io.hdf5 import UNITS, Attribute, attribute, create_hdf5, has_dataset, open_hdf5, read_camera, read_dataset
+from sepi.io.hdf5 import (
+    UNITS,
+    Attribute,
+    attribute,
+    create_hdf5,
+    has_dataset,
+    open_hdf5,
+    read_camera,
+    read_dataset,
+    read_rig,
+)
 from sepi.io.origin import Origin, read_origin
-from sepi.io.result_folder import ALL_VIEWS, Result, read_result
+from sepi.io.result_files import ALL_VIEWS
+from sepi.io.result_folder import Result, read_result
 from sepi.lightfield import FloatMap, LightField
 
 View = tuple[int, int]
@@ -138,7 +149,9 @@ def _read_view(file_path: Path, view: View | None, check: bool = True) -> Result
     """The maps of a view; unchecked, without reading the whole file for its digest."""
     with open_hdf5(file_path, _KIND, check) as file:
         position = _position(file_path, file, view)
-        down, across = (read_dataset(file_path, file["baselines"]) + attribute(file, "from_centre"))[position].tolist()
+        baseline = read_dataset(file_path, file["baselines"])[position]
+        down, across = (baseline + attribute(file, "from_centre")).tolist()
+        rig = read_rig(file)
         disparity, confidence, extended, picture = (
             read_dataset(file_path, file[name], position) for name in ("disparity", "confidence", _MARK, "picture")
         )
@@ -150,6 +163,7 @@ def _read_view(file_path: Path, view: View | None, check: bool = True) -> Result
             unknown=extended.astype(bool) | (confidence == 0),
             camera=read_camera(file),
             from_centre=(down, across),
+            rig=None if rig is None else rig.seen_from(baseline),
         )
 
 

@@ -11,7 +11,8 @@ The folder is COLMAP's workspace::
     stereo/normal_maps/view_04_04.png.geometric.bin           the way that surfaces face, 0 where it is not known
     stereo/fusion.cfg                                         the views, for stereo_fusion
 
-Each view has a camera of its own, a ``PINHOLE`` with its principal point, and no rotation. Points are those of the
+Each view has a camera of its own, a ``PINHOLE`` with its principal point. Origin and axes are those of the reference
+view's camera, so there is no rotation; of calibrated cameras they are those of their world. Points are those of the
 reference view, with a track: the pixel at which each view sees them, unless something nearer hides them.
 
 References
@@ -39,6 +40,7 @@ from sepi.stage import Progress, no_progress
 if TYPE_CHECKING:
     from sepi.applications.posed_views import PosedViews
 
+Points = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
 """Which of the views sees which of the points, (N, P)."""
 
@@ -70,6 +72,9 @@ def write_colmap(folder: str | Path, posed: PosedViews, progress: Progress = no_
             carried = posed.carried(view)
             sees[view] = posed.sees(view, carried)
             write_png(temporary / "images" / f"{name}.png", posed.picture(view))
+            if posed.incomplete:
+                # as ``--ImageReader.mask_path`` and ``--StereoFusion.mask_path`` look for them
+                write_png(temporary / "masks" / f"{name}.png.png", posed.shown(view))
             stereo = f"{name}.png.geometric.bin"
             write_depth(temporary / "stereo/depth_maps" / stereo, posed.depth(carried))
             _write_maps(temporary / "stereo/normal_maps" / stereo, posed.normals(view, carried))
@@ -110,13 +115,16 @@ def _cameras(posed: PosedViews) -> Iterator[str]:
 def _images(posed: PosedViews, sees: Flags) -> Iterator[str]:
     numbers = np.arange(1, sees.shape[1] + 1)
     points = posed.points
+    # without rotation the translation is minus the camera's place
+    places = posed.poses.centres if posed.rig is None else posed.in_world(posed.poses.centres) @ posed.rotation.T
+    turn = "1 0 0 0" if posed.rig is None else _quaternion(posed.rotation)
     yield "# Image list with two lines of data per image:"
     yield _IMAGES
     yield f"# units: {posed.units}"
     for view, name in enumerate(posed.names):
-        # without rotation the translation is minus the camera's place; adding zero makes -0 a 0
-        x, y, z = (0.0 - posed.poses.centres[view]).tolist()
-        yield f"{view + 1} 1 0 0 0 {x!r} {y!r} {z!r} {view + 1} {name}.png"
+        # adding zero makes -0 a 0
+        x, y, z = (0.0 - places[view]).tolist()
+        yield f"{view + 1} {turn} {x!r} {y!r} {z!r} {view + 1} {name}.png"
         there = posed.poses.project(points[sees[view]], view) + 0.5
         yield " ".join(
             f"{column!r} {row!r} {number}"
@@ -124,12 +132,21 @@ def _images(posed: PosedViews, sees: Flags) -> Iterator[str]:
         )
 
 
+def _quaternion(rotation: Points) -> str:
+    from scipy.spatial.transform import Rotation
+
+    x, y, z, w = Rotation.from_matrix(rotation).as_quat(canonical=True).tolist()
+    return f"{w!r} {x!r} {y!r} {z!r}"
+
+
 def _points(posed: PosedViews, sees: Flags) -> Iterator[str]:
     # a point's number among those that a view sees
     places = np.cumsum(sees, axis=1) - 1
     yield "# 3D point list with one line of data per point:"
     yield _POINTS
-    for point, ((x, y, z), (r, g, b)) in enumerate(zip(posed.points.tolist(), posed.colours.tolist(), strict=True)):
+    for point, ((x, y, z), (r, g, b)) in enumerate(
+        zip(posed.in_world(posed.points).tolist(), posed.colours.tolist(), strict=True)
+    ):
         views = np.flatnonzero(sees[:, point])
         track = " ".join(f"{view + 1} {places[view, point]}" for view in views.tolist())
         yield f"{point + 1} {x!r} {y!r} {z!r} {r} {g} {b} 0 {track}"

@@ -3,23 +3,29 @@
 from __future__ import annotations
 
 import math
+from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from sepi.errors import SepiError
 from sepi.io.hdf5 import has_dataset, open_hdf5, read_dataset
 from sepi.io.images import picture_header, png_texts, read_picture
 from sepi.io.pfm import read_pfm
-from sepi.io.readers.numpy_files import read_array
-from sepi.lightfield import FloatMap
+from sepi.io.readers.numpy_files import array_shapes, read_named
+from sepi.lightfield import FloatMap, full_scale
 from sepi.validation import described, is_finite, require_path
 
 _HDF5 = (".h5", ".hdf5")
 
 _TIFF = (".tif", ".tiff")
 
-SUFFIXES: tuple[str, ...] = (".pfm", ".npy", ".png", *_TIFF, *_HDF5)
+_NUMPY = (".npy", ".npz")
+
+SUFFIXES: tuple[str, ...] = (".pfm", *_NUMPY, ".png", ".pgm", *_TIFF, *_HDF5)
 """Ends of names of the files that are read, in small letters."""
 
 _DATASET = "disparity"
@@ -37,7 +43,8 @@ def map_file(path: Path) -> Path:
 def is_disparity(path: Path) -> bool:
     """Whether ``path`` is one disparity map rather than a light field.
 
-    Of a PNG, whether its text chunks say so; of a TIFF, whether it is grey, of floats.
+    Of a PNG, whether its text chunks say so; of a TIFF, whether it is grey, of floats; of a NumPy file, whether its
+    arrays have two axes.
     """
     if path.is_dir():
         return map_file(path).is_file()
@@ -48,6 +55,9 @@ def is_disparity(path: Path) -> bool:
         return {_SCALE, _OFFSET} <= set(png_texts(path))
     if suffix in _TIFF:
         return _is_float_tiff(path)
+    if suffix in _NUMPY:
+        with suppress(SepiError):
+            return all(len(shape) == 2 for shape, _ in array_shapes(path).values())
     return suffix in SUFFIXES
 
 
@@ -57,13 +67,13 @@ def read_disparity(path: str | Path, *, scale: float | None = None, offset: floa
     Parameters
     ----------
     path : str or Path
-        A one-channel PFM; a NumPy file (``.npy``) with an array of numbers of shape (H, W); an HDF5 file with such a
-        dataset ``disparity``; a grey TIFF of 32-bit floats; a grey PNG of 8 or 16 bit; or a folder that ``sepi depth``
-        wrote. A PNG with the text chunks ``scale`` and ``offset``, as ``disparity_16bit.png`` has them, holds what
-        these say, 0 being unknown.
+        A one-channel PFM; a NumPy file (``.npy``, ``.npz``) with one array of numbers of shape (H, W); an HDF5 file
+        with such a dataset ``disparity``; a grey TIFF of 32-bit floats; a grey PNG, TIFF or PGM of 8 or 16 bit; or a
+        folder that ``sepi depth`` wrote. A PNG with the text chunks ``scale`` and ``offset``, as
+        ``disparity_16bit.png`` has them, holds what these say, 0 being unknown.
     scale, offset : float
         What the file holds is multiplied by ``scale`` (1 unless given), then ``offset`` is added: -1 turns a map of
-        opposite sign. A PNG without these text chunks needs a scale; its values are levels, and none means unknown.
+        opposite sign. Other pictures of 8 or 16 bit need a scale; their values are levels, and none means unknown.
 
     Returns
     -------
@@ -73,7 +83,7 @@ def read_disparity(path: str | Path, *, scale: float | None = None, offset: floa
     Raises
     ------
     SepiError
-        If there is no such file, it is damaged or no such map, or a PNG does not say what its levels mean.
+        If there is no such file, it is damaged or no such map, or a picture does not say what its levels mean.
 
     Examples
     --------
@@ -88,29 +98,70 @@ def read_disparity(path: str | Path, *, scale: float | None = None, offset: floa
     [[1.0, 0.25, -0.5]]
     """
     path = map_file(require_path("disparity map", path))
-    if not path.is_file():
-        raise SepiError(f"{path}: no such file")
     for name, value in (("scale", 1 if scale is None else scale), ("offset", offset)):
         if not is_finite(value):
             raise SepiError(f"{path}: {name}: expected a finite number, got {described(value)}")
+    return _scaled(_stored(path, scale is not None), scale, offset)
+
+
+@dataclass(frozen=True)
+class TruthFile:
+    """A file of ground truth that a user has beside a light field.
+
+    Attributes
+    ----------
+    path : Path
+        What :func:`read_disparity` reads. Of whole numbers 0 is unknown, of others what is not finite.
+    scale : float or None
+        Pixels per view step that one of the file's numbers stands for, above 0; 1 where it is not given.
+    """
+
+    path: Path
+    scale: float | None = None
+
+    def read(self, shape: tuple[int, int] | None = None) -> FloatMap:
+        """Disparity in pixels per view step, (H, W) float32, top row first; NaN where it is unknown.
+
+        Raises
+        ------
+        SepiError
+            If it cannot be read, does not have the views' ``shape``, or knows no pixel.
+        """
+        path = map_file(self.path)
+        stored = _stored(path, self.scale is not None)
+        truth = _scaled(stored, self.scale)
+        known = np.isfinite(truth) if stored.dtype.kind == "f" else stored != 0
+        if shape not in (None, truth.shape):
+            raise SepiError(f"{path}: ground truth is {truth.shape}, the views are {shape} (height, width)")
+        if not known.any():
+            raise SepiError(f"{path}: no pixel is known; 0 in whole numbers, NaN and infinity in others are unknown")
+        return np.where(known, truth, np.float32(np.nan))
+
+
+def _scaled(stored: npt.NDArray[Any], scale: float | None, offset: float = 0.0) -> FloatMap:
     # numbers beyond float32 become infinite, and count as unknown
     with np.errstate(over="ignore", invalid="ignore"):
-        values = _read(path, scaled=scale is not None)
         if scale is None and offset == 0:
-            return values
-        return np.asarray(values.astype(np.float64) * (1 if scale is None else scale) + offset, np.float32)
+            return np.asarray(stored, np.float32)
+        # as float32 first, in which all formats hold the same numbers
+        held = stored.astype(np.float32).astype(np.float64)
+        return np.asarray(held * (1 if scale is None else scale) + offset, np.float32)
 
 
-def _read(path: Path, scaled: bool) -> FloatMap:
+def _stored(path: Path, scaled: bool) -> npt.NDArray[Any]:
+    """The numbers in a file, (H, W), whole ones or floats."""
+    if not path.is_file():
+        raise SepiError(f"{path}: no such file")
     suffix = path.suffix.lower()
     if suffix == ".pfm":
         return read_pfm(path)
-    if suffix == ".png":
-        return _read_png(path, scaled)
-    if suffix in _TIFF:
-        return _read_tiff(path)
-    if suffix == ".npy":
-        values = read_array(path)
+    if suffix in (".png", ".pgm", *_TIFF):
+        return _read_tiff(path) if _is_float_tiff(path) else _read_levels(path, scaled)
+    if suffix in _NUMPY:
+        shapes = array_shapes(path)
+        if len(shapes) != 1:
+            raise SepiError(f"{path}: expected one array of shape (H, W), found {', '.join(shapes) or 'none'}")
+        values = read_named(path, *shapes)
     elif suffix in _HDF5:
         with open_hdf5(path) as file:
             values = read_dataset(path, file[_DATASET])
@@ -118,7 +169,7 @@ def _read(path: Path, scaled: bool) -> FloatMap:
         raise _no_map(path)
     if values.ndim != 2 or values.dtype.kind not in "fiu":
         raise SepiError(f"{path}: expected an array of numbers of shape (H, W), got {values.dtype} {values.shape}")
-    return np.asarray(values, np.float32)
+    return values
 
 
 def _is_float_tiff(path: Path) -> bool:
@@ -130,29 +181,33 @@ def _is_float_tiff(path: Path) -> bool:
 
 
 def _read_tiff(path: Path) -> FloatMap:
-    values = read_picture(path, any_floats=True)
-    if values.dtype != np.float32 or values.shape[2] != 1:
-        raise _no_map(path)
-    return np.asarray(values[:, :, 0], np.float32)
+    return np.asarray(read_picture(path, any_floats=True)[:, :, 0], np.float32)
 
 
-def _read_png(path: Path, scaled: bool) -> FloatMap:
-    levels = read_picture(path)[:, :, 0].astype(np.float64)
-    with path.open("rb") as file:
-        head = file.read(26)
-    # levels of fewer bits would have been stretched to 8
-    if not head.startswith(b"\x89PNG") or head[24] not in (8, 16) or head[25] != _GREY:
+def _read_levels(path: Path, scaled: bool) -> npt.NDArray[Any]:
+    levels, header = read_picture(path, any_floats=True)[:, :, 0], picture_header(path)
+    if not header.grey or header.kind not in ("PNG", "TIFF", "PNM") or (header.kind == "PNG" and _is_packed(path)):
         raise _no_map(path)
     texts = png_texts(path)
     if {_SCALE, _OFFSET} <= set(texts):
         own_scale, own_offset = (_number(path, key, texts[key]) for key in (_SCALE, _OFFSET))
-        return np.where(levels > 0, (levels - 1) * own_scale + own_offset, np.nan).astype(np.float32)
+        values = (levels.astype(np.float64) - 1) * own_scale + own_offset
+        return np.where(levels > 0, values, np.nan).astype(np.float32)
     if not scaled:
+        kind = "a PNG without the text chunks 'scale' and 'offset'" if header.kind == "PNG" else f"a {header.kind}"
         raise SepiError(
-            f"{path}: a PNG without the text chunks 'scale' and 'offset' does not say what its levels mean; give a "
-            "scale (disparity = level * scale + offset) where it is configured, or write the map as .pfm or .npy"
+            f"{path}: {kind} does not say what its levels mean; give a scale (--truth-scale; in the configuration "
+            "scale or truth_scale), or write the map as .pfm or .npy"
         )
-    return levels.astype(np.float32)
+    # of a PGM, whose levels end at a white of its own
+    return np.rint(levels * (header.white / full_scale(levels.dtype))).astype(int) if header.white else levels
+
+
+def _is_packed(path: Path) -> bool:
+    """Whether a PNG has levels of fewer bits, which are stretched to 8, or something else than levels."""
+    with path.open("rb") as file:
+        head = file.read(26)
+    return head[24] not in (8, 16) or head[25] != _GREY
 
 
 def _number(path: Path, key: str, text: str) -> float:
@@ -166,5 +221,5 @@ def _number(path: Path, key: str, text: str) -> float:
 
 
 def _no_map(path: Path) -> SepiError:
-    kinds = "as .pfm, .h5 or .npy, or as grey .png of 8 or 16 bit, or as grey .tiff of 32-bit floats"
+    kinds = "as .pfm, .h5 or .npy, or as grey .png of 8 or 16 bit, .pgm or .tiff"
     return SepiError(f"{path}: expected a disparity map {kinds}")

@@ -21,7 +21,7 @@ from sepi.io.hdf5 import write_light_field
 from sepi.io.images import SUFFIXES, write_png
 from sepi.io.pfm import write_pfm
 from sepi.io.readers.exported import MANIFEST, read_manifest
-from sepi.io.result_folder import require_target
+from sepi.io.result_files import require_target
 from sepi.lightfield import LightField
 
 HDF5 = (".h5", ".hdf5")
@@ -105,6 +105,12 @@ def _write_folder(folder: Path, light_field: LightField) -> set[str]:
     masks = {name: f"mask_{name}.png" for name in sorted(light_field.masks)}
     for name, file in masks.items():
         write_png(folder / file, light_field.masks[name])
+    missing: list[list[str | None]] | None = None
+    if light_field.missing is not None:
+        missing = [[None] * light_field.grid[1] for _ in range(light_field.grid[0])]
+        for t, s in np.argwhere(light_field.present & light_field.missing.any(axis=(2, 3))).tolist():
+            missing[t][s] = name = f"missing_row_{t:0{digits}}_col_{s:0{digits}}.png"
+            write_png(folder / name, light_field.missing[t, s])
     known, camera, positions = light_field.disparity_range, light_field.camera, light_field.positions
     values = {
         "name": light_field.name,
@@ -114,6 +120,7 @@ def _write_folder(folder: Path, light_field: LightField) -> set[str]:
         "positions": None
         if positions is None
         else [[place if np.isfinite(place).all() else None for place in row] for row in positions.tolist()],
+        "missing": missing,
         "disparity_range": None if known is None else asdict(known),
         "camera": None if camera is None else asdict(camera),
         "ground_truth": None if light_field.ground_truth is None else _TRUTH,

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import astuple
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +18,7 @@ import h5py
 import numpy as np
 import numpy.typing as npt
 
-from sepi.camera import Camera
+from sepi.camera import Camera, numbers_of
 from sepi.errors import SepiError, printable
 from sepi.io import apart
 from sepi.io.files import PatientFile, atomic_path, reading
@@ -35,13 +34,17 @@ from sepi.io.integrity import (
     require_sound,
 )
 from sepi.lightfield import RANGE_SOURCES, DisparityRange, LightField, Truth, require_light_field
+from sepi.rig import Rig
 from sepi.stage import CostVolume, StageMaps
 from sepi.validation import require_known, require_path
 
-Attribute = str | float | int | tuple[float, float]
+Attribute = str | float | int | tuple[float, ...]
 
 # seconds of processor that an attribute may take
 _PATIENCE = 1
+
+RIG = "rig"
+"""Dataset of a light field, or attribute of a result: where rectified cameras stood, as JSON."""
 
 # datasets of a cost volume
 _COSTS, _CANDIDATES = "cost_volume", "candidates"
@@ -124,6 +127,8 @@ def write_light_field(path: str | Path, light_field: LightField) -> None:
         file.create_dataset("views", data=light_field.views)
         file["views"].attrs["axes"] = "t s y x channel"
         file.create_dataset("present", data=light_field.present)
+        if light_field.missing is not None:
+            file.create_dataset("missing", data=light_field.missing, compression="gzip", compression_opts=1)
         # what jobs on this file need: told without reading it
         file.attrs["reach"] = light_field.reach
         file.attrs["name"] = fixed_text(light_field.name)
@@ -141,7 +146,9 @@ def write_light_field(path: str | Path, light_field: LightField) -> None:
             file["positions"].attrs["axes"] = "t s (down, across)"
             file["positions"].attrs["units"] = "view steps"
         if light_field.camera is not None:
-            file.attrs["camera"] = astuple(light_field.camera)
+            file.attrs["camera"] = numbers_of(light_field.camera)
+        if light_field.rig is not None:
+            file.create_dataset(RIG, data=np.frombuffer(light_field.rig.to_text().encode(), np.uint8))
         if light_field.notes:
             file.attrs["notes"] = [fixed_text(note) for note in light_field.notes]
         put_truth(file, (light_field.ground_truth, light_field.masks))
@@ -178,7 +185,7 @@ def has_dataset(path: Path, name: str, *, if_damaged: bool = False) -> bool:
 def read_light_field(path: Path) -> LightField:
     """Read a light field written by ``write_light_field``."""
     with open_hdf5(path, "light field of this package") as file:
-        known_arrays = ("views", "present", "positions")
+        known_arrays = ("views", "present", "missing", "positions", RIG)
         arrays = {name: read_dataset(path, file[name]) for name in known_arrays if name in file}
         ground_truth, masks = truth_in(path, file)
         known = None
@@ -187,7 +194,7 @@ def read_light_field(path: Path) -> LightField:
             known = DisparityRange(minimum, maximum, _text(file, "disparity_range_source"))
             require_known("disparity range", [known.source], RANGE_SOURCES)
         view = attribute(file, "view") if "view" in file.attrs else None
-        positions = arrays.get("positions")
+        positions, missing = arrays.get("positions"), arrays.get("missing")
         return LightField(
             views=arrays["views"],
             name=_text(file, "name"),
@@ -202,13 +209,20 @@ def read_light_field(path: Path) -> LightField:
             disparity_range=known,
             ground_truth=ground_truth,
             masks=masks,
+            rig=Rig.from_text(arrays[RIG].tobytes().decode("utf-8", "replace")) if RIG in arrays else None,
             reading=_text(file, "reading") if "reading" in file.attrs else "",
+            missing=None if missing is None else missing.astype(bool),
         )
 
 
 def read_camera(file: h5py.File) -> Camera | None:
     """The camera of a light field's or a result's file, where it has one."""
     return Camera(*map(float, attribute(file, "camera"))) if "camera" in file.attrs else None
+
+
+def read_rig(file: h5py.File) -> Rig | None:
+    """Where the view of a result's file stands in the world, if it says so."""
+    return Rig.from_text(str(attribute(file, RIG))) if RIG in file.attrs else None
 
 
 def attribute(holder: h5py.Group | h5py.Dataset, key: str) -> Any:

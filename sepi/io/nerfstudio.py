@@ -31,6 +31,7 @@ import numpy.typing as npt
 from sepi.io.files import atomic_folder, atomic_path
 from sepi.io.images import write_png
 from sepi.io.ply import write_ply
+from sepi.rig import WORLD
 from sepi.stage import Progress, no_progress
 
 if TYPE_CHECKING:
@@ -48,9 +49,12 @@ class _WorldCloud:
     positions: Points
     colours: npt.NDArray[np.uint8]
     units: str
+    calibrated: bool
 
     def comments(self) -> tuple[str, ...]:
         """What the numbers are."""
+        if self.calibrated:
+            return WORLD, self.units
         return "x right, y the way that the cameras look, z up", f"{self.units}; origin: camera of the reference view"
 
 
@@ -75,11 +79,14 @@ def write_nerfstudio(folder: str | Path, posed: PosedViews, progress: Progress =
         for view, name in enumerate(posed.names):
             depth = posed.depth(posed.carried(view)) * np.float32(_MILLIMETRES)
             write_png(temporary / "images" / f"{name}.png", posed.picture(view))
+            if posed.incomplete:
+                write_png(temporary / "masks" / f"{name}.png", posed.shown(view))
             with atomic_path(temporary / "depths" / f"{name}.npy") as path, path.open("wb") as file:
                 np.save(file, depth.astype("<f4"), allow_pickle=False)
             progress((view + 1) / len(posed.poses))
         if posed.chosen.any():
-            write_ply(temporary / _CLOUD, _WorldCloud(_world(posed.points), posed.colours, posed.units))
+            cloud = _WorldCloud(_world(posed, posed.points), posed.colours, posed.units, posed.rig is not None)
+            write_ply(temporary / _CLOUD, cloud)
         with atomic_path(temporary / "transforms.json") as path:
             path.write_text(json.dumps(_transforms(posed), indent=1) + "\n", encoding="ascii")
 
@@ -91,28 +98,35 @@ def _transforms(posed: PosedViews) -> dict[str, Any]:
         {
             "file_path": f"images/{name}.png",
             "depth_file_path": f"depths/{name}.npy",
+            # of all views, or none
+            **({"mask_path": f"masks/{name}.png"} if posed.incomplete else {}),
             "w": width,
             "h": height,
             "fl_x": focal,
             "fl_y": focal,
             "cx": x,
             "cy": y,
-            "transform_matrix": _camera_to_world(centre),
+            "transform_matrix": _camera_to_world(posed, centre),
         }
         for name, (x, y), centre in zip(
-            posed.names, posed.poses.from_corner.tolist(), _world(posed.poses.centres).tolist(), strict=True
+            posed.names, posed.poses.from_corner.tolist(), _world(posed, posed.poses.centres).tolist(), strict=True
         )
     ]
     cloud = {"ply_file_path": _CLOUD} if posed.chosen.any() else {}
     return {"camera_model": "OPENCV", "units": posed.units, **cloud, "frames": frames}
 
 
-def _world(points: Points) -> Points:
-    """Points of axes right, down, forward in axes right, forward, up."""
+def _world(posed: PosedViews, points: Points) -> Points:
+    """Points of the reference view's axes in those of the world: of the calibrated cameras, or right, forward, up."""
+    if posed.rig is not None:
+        return posed.in_world(points)
     return np.column_stack([points[:, 0], points[:, 2], 0.0 - points[:, 1]])
 
 
-def _camera_to_world(centre: list[float]) -> list[list[float]]:
+def _camera_to_world(posed: PosedViews, centre: list[float]) -> list[list[float]]:
     """Columns: the camera's right, up and back in the world, and its place."""
+    if posed.rig is not None:
+        axes = (posed.rotation * [[1], [-1], [-1]]).T.tolist()
+        return [[*axis, place] for axis, place in zip(axes, centre, strict=True)] + [[0.0, 0.0, 0.0, 1.0]]
     x, y, z = centre
     return [[1.0, 0.0, 0.0, x], [0.0, 0.0, -1.0, y], [0.0, 1.0, 0.0, z], [0.0, 0.0, 0.0, 1.0]]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from dataclasses import astuple, dataclass, fields
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +12,9 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import TypeAdapter, ValidationError
 
+from sepi.camera import numbers_of
 from sepi.errors import SepiError
-from sepi.io.hdf5 import Attribute, attribute, open_hdf5, read_dataset
+from sepi.io.hdf5 import RIG, Attribute, attribute, open_hdf5, read_dataset
 from sepi.io.integrity import own_attributes
 from sepi.io.readers.options import ReadOptions
 from sepi.lightfield import LightField
@@ -95,14 +96,15 @@ class Origin:
 
 def origin_attributes(light_field: LightField) -> dict[str, Attribute]:
     """What a file of maps says of the light field that they were made from, as :func:`read_origin` reads it."""
-    camera = light_field.camera
+    camera, rig = light_field.camera, light_field.reference_rig
     return {
         "view_position": light_field.reference_position,
         "grid": light_field.grid,
         "from_centre": light_field.from_centre,
         "light_field": digest_of(light_field),
         **({"reading": light_field.reading} if light_field.reading else {}),
-        **({} if camera is None else {"camera": astuple(camera)}),
+        **({} if camera is None else {"camera": numbers_of(camera)}),
+        **({} if rig is None else {RIG: rig.to_text()}),
     }
 
 

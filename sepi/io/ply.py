@@ -8,10 +8,19 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
-from sepi.io.files import atomic_path
+from sepi.errors import SepiError
+from sepi.io.files import atomic_path, reading
 from sepi.validation import require_path, require_type
 
 _POINT = np.dtype([("position", "<f4", 3), ("colour", "u1", 3)])
+# words of the format for numbers
+_NUMBERS = {
+    **dict.fromkeys(("char", "int8"), "i1"), **dict.fromkeys(("uchar", "uint8"), "u1"),
+    **dict.fromkeys(("short", "int16"), "i2"), **dict.fromkeys(("ushort", "uint16"), "u2"),
+    **dict.fromkeys(("int", "int32"), "i4"), **dict.fromkeys(("uint", "uint32"), "u4"),
+    **dict.fromkeys(("float", "float32"), "f4"), **dict.fromkeys(("double", "float64"), "f8"),
+}  # fmt: skip
+_LONGEST_HEADER = 2**16
 _PROPERTIES = (*(f"float {axis}" for axis in "xyz"), *(f"uchar {colour}" for colour in ("red", "green", "blue")))
 
 
@@ -73,3 +82,36 @@ def write_ply(path: str | Path, cloud: Cloud) -> None:
     with atomic_path(path) as temporary, temporary.open("wb") as file:
         file.write(("\n".join(header) + "\n").encode("ascii"))
         file.write(points.tobytes())
+
+
+def read_positions(path: Path) -> npt.NDArray[np.float64]:
+    """Coordinates (N, 3) of the points of a PLY file whose first element are its vertices.
+
+    Raises
+    ------
+    SepiError
+        If it is damaged, or a vertex has lists.
+    """
+    with reading(path, "PLY file"):
+        data = path.read_bytes()
+        end = data.find(b"end_header", 0, _LONGEST_HEADER)
+        words = [line.split() for line in data[: max(0, end)].decode("ascii", "replace").splitlines()]
+        kind = next((line[1] for line in words if line[:1] == ["format"]), "")
+        elements = [n for n, line in enumerate(words) if line[:1] == ["element"]]
+        if (
+            end < 0
+            or not elements
+            or words[elements[0]][1] != "vertex"
+            or kind not in ("ascii", "binary_little_endian")
+        ):
+            raise SepiError("not a PLY file of points, as text or of little-endian numbers")
+        last = elements[1] if len(elements) > 1 else len(words)
+        properties = [line[1:] for line in words[elements[0] + 1 : last] if line[:1] == ["property"]]
+        point = np.dtype([(name, f"<{_NUMBERS[word]}") for word, name in properties])
+        count, begin = int(words[elements[0]][2]), data.index(b"\n", end) + 1
+        if kind == "ascii":
+            rows = [tuple(map(float, line.split())) for line in data[begin:].splitlines()[:count]]
+            values = np.array(rows, [(name, "f8") for _, name in properties])
+        else:
+            values = np.frombuffer(data, point, count, begin)
+        return np.column_stack([values[axis].astype(np.float64) for axis in "xyz"])

@@ -19,7 +19,7 @@ range is a third of the picture's width. Shape and proportions are then not thos
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import NoneType
 from typing import Any
 
@@ -29,6 +29,7 @@ import numpy.typing as npt
 from sepi.camera import Camera
 from sepi.errors import SepiError
 from sepi.lightfield import BoolMap, FloatMap
+from sepi.rig import WORLD, Rig
 from sepi.validation import require_map, require_type
 
 Positions = npt.NDArray[np.float32]
@@ -54,6 +55,8 @@ class PointCloud:
         Whether positions are in metres; otherwise x and y are pixels and z is ``stretch`` times the disparity.
     stretch : float
         Pixels per unit of disparity of a relief; 1 for a metric cloud.
+    units : str or None
+        Units of the world in whose axes the points are, where calibrated cameras tell; None: axes are as above.
 
     Examples
     --------
@@ -70,6 +73,7 @@ class PointCloud:
     colours: Colours
     metric: bool
     stretch: float = 1.0
+    units: str | None = None
 
     def comments(self) -> tuple[str, ...]:
         """What the numbers are, for the file's header.
@@ -79,6 +83,8 @@ class PointCloud:
         tuple of str
             Axes, and units.
         """
+        if self.units is not None:
+            return WORLD, self.units
         if self.metric:
             units = "metres; origin: camera of the view"
         else:
@@ -97,6 +103,7 @@ def point_cloud(
     max_depth: float | None = None,
     step: int = 1,
     unknown: BoolMap | None = None,
+    rig: Rig | None = None,
 ) -> PointCloud:
     """Point cloud of one view; pixels without a finite disparity, and those at or beyond infinity, have no point.
 
@@ -125,6 +132,8 @@ def point_cloud(
         Use every so-many-th row and column of pixels.
     unknown : ndarray, shape (H, W), bool, optional
         Pixels to leave out.
+    rig : Rig, optional
+        Puts a metric cloud into the world of the calibrated cameras.
 
     Returns
     -------
@@ -180,7 +189,12 @@ def point_cloud(
     if camera is not None:
         depth = camera.depth(disparity)
         used &= np.isfinite(depth) & (depth > 0) & (depth <= (max_depth or np.inf))
-        return _metric(picture, disparity, used, camera, from_centre)
+        cloud = _metric(picture, disparity, used, camera, from_centre)
+        if rig is None:
+            return cloud
+        # from right, up, back
+        points = rig.to_world(cloud.positions.astype(np.float64) * (1, -1, -1))
+        return replace(cloud, positions=points.astype(np.float32), units=rig.units)
     if max_depth is not None:
         raise SepiError("point cloud: a largest depth in metres needs the camera's geometry, which is not known")
     return _relief(picture, disparity, used)
@@ -195,8 +209,8 @@ def _metric(
 ) -> PointCloud:
     across, down = _from_middle(used)
     depth = camera.depth(disparity[used]).astype(np.float64)
-    x = (across - from_centre[1] * camera.offset) * depth / camera.focal_px
-    y = (down - from_centre[0] * camera.offset) * depth / camera.focal_px
+    x = (across - camera.right - from_centre[1] * camera.offset) * depth / camera.focal_px
+    y = (down - camera.down - from_centre[0] * camera.offset) * depth / camera.focal_px
     return PointCloud(_stacked(x, -y, -depth), _colours(picture[used]), metric=True)
 
 

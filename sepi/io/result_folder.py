@@ -5,10 +5,8 @@ docs/reference/outputs.md describes the files.
 
 from __future__ import annotations
 
-import os
 import re
-from collections.abc import Collection, Mapping
-from contextlib import nullcontext, suppress
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import NoneType
@@ -21,35 +19,18 @@ import numpy.typing as npt
 from sepi.camera import Camera
 from sepi.errors import SepiError
 from sepi.io.files import atomic_files, atomic_folder, atomic_path
-from sepi.io.hdf5 import Attribute, attribute, open_hdf5, read_camera, read_dataset, write_stage
+from sepi.io.hdf5 import Attribute, attribute, open_hdf5, read_camera, read_dataset, read_rig, write_stage
 from sepi.io.images import write_png
-from sepi.io.origin import RESULT, read_origin
+from sepi.io.origin import RESULT
 from sepi.io.pfm import write_pfm
 from sepi.io.ply import write_ply
 from sepi.io.point_cloud import point_cloud
 from sepi.io.provenance import result_attributes
+from sepi.io.result_files import DEPTH, MASK_NAME, RESULT_FILES, RUNTIME, names_as_taken, remove_files, require_own
 from sepi.lightfield import BoolMap, FloatMap, LightField, require_light_field
+from sepi.rig import Rig
 from sepi.stage import StageMaps
 from sepi.validation import described, is_finite, require_map, require_path, require_type
-
-RESULT_FILES = (
-    "disparity.pfm",
-    "disparity.npy",
-    "disparity_16bit.png",
-    "disparity.png",
-    "confidence.png",
-    "points.ply",
-    RESULT,
-)
-"""What :func:`write_result` always writes; ``depth.pfm`` and ``mask_NAME.png`` come with what it is given."""
-
-RUNTIME = "runtime.txt"
-"""Seconds that it took, where that is told."""
-
-ALL_VIEWS = "all_views.h5"
-"""Maps of all views, which the command writes on request (:mod:`sepi.io.all_views`)."""
-
-_DEPTH = "depth.pfm"
 
 # masks that have a meaning here
 _UNKNOWN = "unknown"
@@ -59,10 +40,7 @@ _GREY = 128
 # part of the pixels beyond each end of the colour scale, so that a few wrong pixels do not use it up
 _BEYOND = 0.005
 
-_MASK_NAME = r"[\w-]+"
 _MASK_TEXT = {"Software": "sepi", "Description": "mask: 255 inside, 0 outside"}
-# files that a message names
-_LISTED = 3
 
 
 @dataclass(frozen=True)
@@ -83,6 +61,8 @@ class Result:
         Where it is known.
     from_centre : (float, float)
         Baseline (down, across) from the grid's centre view to the view, in view steps.
+    rig : Rig or None
+        Where the view stands in the world, at the rig's origin, if it was made from calibrated cameras.
 
     Examples
     --------
@@ -104,6 +84,7 @@ class Result:
     unknown: BoolMap
     camera: Camera | None
     from_centre: tuple[float, float]
+    rig: Rig | None = None
 
 
 def write_result(
@@ -121,8 +102,9 @@ def write_result(
     Disparity as ``disparity.pfm``, ``disparity.npy`` and ``disparity_16bit.png`` (numbers) and ``disparity.png``
     (colours, from far, dark blue, to near, yellow; grey where the mask ``unknown`` is set), ``confidence.png`` from
     black (0) to white (1), ``mask_NAME.png`` of each boolean map, ``points.ply`` without what is unknown, ``depth.pfm``
-    in metres where the light field has a camera, and ``result.h5`` with everything: all maps, the view itself, the
-    camera, what made the maps, and which light field they are of. docs/reference/outputs.md describes them.
+    in metres where the light field has a camera, ``original_disparity.pfm`` and ``original_depth.pfm`` in the picture
+    as a calibrated camera took it, and ``result.h5`` with everything: all maps, the view itself, the camera, what made
+    the maps, and which light field they are of. docs/reference/outputs.md describes them.
     Equal content gives equal bytes.
 
     A new folder appears whole or not at all; in an existing one the files are replaced when all are written, and what
@@ -193,62 +175,8 @@ def write_result(
     attributes = {**result_attributes(light_field, maps), **(attributes or {})}
     with atomic_files(target) if existing else atomic_folder(target) as temporary:
         names = _write_files(temporary, light_field, maps, attributes, seconds, beside)
-    _remove(target, earlier.difference(names))
+    remove_files(target, earlier.difference(names))
     return names
-
-
-def require_own(folder: Path, light_field: LightField, *, force: bool = False) -> frozenset[str]:
-    """Raise unless a result of this light field may be written to ``folder``; what an earlier one wrote there.
-
-    Raises
-    ------
-    SepiError
-        As :func:`require_target`; and unless ``force``, if the folder holds anything but an earlier result of this
-        light field, or beside it a file that would be taken for one of the result's.
-    """
-    require_target(folder)
-    there = sorted(path.name for path in folder.iterdir() if path.name[0] != ".") if folder.is_dir() else []
-    origin = None
-    # a damaged one is replaced as well
-    with suppress(SepiError) if force else nullcontext():
-        origin = read_origin(folder)
-    # who made the file may have had another file in mind than one of this folder
-    files = frozenset() if origin is None else frozenset(filter(_is_results, origin.files or RESULT_FILES))
-    others = [name for name in there if name not in files and (origin is None or _is_results(name))]
-    if force:
-        return files
-    advice = "choose another folder, or overwrite it with --force (in Python force=True)"
-    if others:
-        listed = ", ".join(others[:_LISTED]) + (", ..." if len(others) > _LISTED else "")
-        raise SepiError(f"{folder}: holds files that no earlier result wrote ({listed}); {advice}")
-    if origin is not None and not origin.is_of(light_field):
-        other = origin.source or origin.scene
-        raise SepiError(f"{folder}: holds the result of another light field ({other}); {advice}")
-    return files
-
-
-def remove_result(folder: Path) -> None:
-    """Remove all that has the name of a file of a result, from a folder that is known to hold nothing else."""
-    if folder.is_dir():
-        _remove(folder, [path.name for path in folder.iterdir() if _is_results(path.name)])
-
-
-def require_target(folder: Path) -> None:
-    """Raise unless a folder of this name can be made or written to; for telling before a long computation.
-
-    Raises
-    ------
-    SepiError
-        If ``folder`` is a file or holds a light field, or it or its nearest existing parent is not a writable folder.
-    """
-    if folder.exists() and not folder.is_dir():
-        raise SepiError(f"{folder}: is a file; expected a folder to write to")
-    existing = next(path for path in (folder, *folder.absolute().parents) if path.exists())
-    if not existing.is_dir() or not os.access(existing, os.W_OK | os.X_OK):
-        raise SepiError(f"{folder}: cannot be written ({existing} is not a writable folder)")
-    # masks of the scene would be replaced by those of the result, which have the same names
-    if folder.is_dir() and any(folder.glob("input_Cam*.png")):
-        raise SepiError(f"{folder}: holds the views of a light field; choose another folder for the result")
 
 
 def read_result(path: str | Path) -> Result:
@@ -292,6 +220,7 @@ def read_result(path: str | Path) -> Result:
         down, across = map(float, told)
         scene = str(attribute(file, "scene")) if "scene" in file.attrs else ""
         camera = read_camera(file)
+        rig = read_rig(file)
     alike = disparity.shape == confidence.shape == unknown.shape == picture.shape[:2]
     if not alike or picture.shape[2:] not in ((1,), (3,)):
         raise SepiError(f"{path}: damaged: view {picture.shape} and disparity {disparity.shape} do not fit together")
@@ -303,6 +232,7 @@ def read_result(path: str | Path) -> Result:
         unknown=unknown.astype(bool),
         camera=camera,
         from_centre=(down, across),
+        rig=rig,
     )
 
 
@@ -358,7 +288,7 @@ def _sound(light_field: LightField, maps: StageMaps) -> StageMaps:
             raise SepiError(
                 f"{light_field.name}: maps must have the views' shape {light_field.shape}, got {name} of {values.shape}"
             )
-        if values.dtype == bool and not re.fullmatch(_MASK_NAME, name):
+        if values.dtype == bool and not re.fullmatch(MASK_NAME, name):
             raise SepiError(f"{light_field.name}: map '{name}': expected a name of letters, digits, '-' and '_'")
     if np.isnan(maps.confidence).all():
         raise SepiError(f"{light_field.name}: confidence must lie within 0..1, got NaN everywhere")
@@ -384,7 +314,7 @@ def _write_files(
     more: dict[str, npt.NDArray[Any]] = {"view": view}
     if camera is not None:
         more["depth"] = camera.depth(maps.disparity)
-        write_pfm(folder / _DEPTH, more["depth"])
+        write_pfm(folder / DEPTH, more["depth"])
     if seconds is not None:
         with atomic_path(folder / RUNTIME) as temporary:
             temporary.write_text(f"{seconds:.3f}\n", encoding="ascii")
@@ -395,11 +325,19 @@ def _write_files(
     unknown = maps.mask(_UNKNOWN)
     write_png(folder / "disparity.png", colour_code(maps.disparity, unknown))
     write_png(folder / "confidence.png", _levels(maps.confidence))
-    cloud = point_cloud(view, maps.disparity, camera=camera, from_centre=light_field.from_centre, unknown=unknown)
+    cloud = point_cloud(
+        view,
+        maps.disparity,
+        camera=camera,
+        from_centre=light_field.from_centre,
+        unknown=unknown,
+        rig=light_field.reference_rig,
+    )
     write_ply(folder / "points.ply", cloud)
     for name, mask in masks.items():
         write_png(folder / name, mask, _MASK_TEXT)
-    given = [*([] if camera is None else [_DEPTH]), *([] if seconds is None else [RUNTIME])]
+    original = names_as_taken() if write_as_taken(folder, light_field, maps.disparity) else ()
+    given = [*([] if camera is None else [DEPTH]), *original, *([] if seconds is None else [RUNTIME])]
     names = (*RESULT_FILES[:-1], *given, *masks, RESULT)
     everything = maps.updated(maps.disparity, maps.confidence, **more)
     # of these a later result is sure that they are not a user's own
@@ -407,17 +345,30 @@ def _write_files(
     return names
 
 
-def _is_results(name: str) -> bool:
-    """Whether a result may have a file of this name."""
-    return name in (*RESULT_FILES, _DEPTH, RUNTIME, ALL_VIEWS) or bool(re.fullmatch(rf"mask_{_MASK_NAME}\.png", name))
+def write_as_taken(
+    folder: Path, light_field: LightField, disparity: FloatMap, position: tuple[int, int] | None = None
+) -> bool:
+    """Write the maps of a view in the picture that its camera took; False where no calibrated camera did.
 
+    Parameters
+    ----------
+    folder : Path
+    light_field : LightField
+    disparity : ndarray, shape (H, W), float32
+        Of the view.
+    position : (int, int), optional
+        Another view's in the grid than the reference view's.
+    """
+    if light_field.camera is None or light_field.rig is None:
+        return False
+    from sepi.cameras.as_taken import as_taken
 
-def _remove(folder: Path, names: Collection[str]) -> None:
-    for name in names:
-        try:
-            (folder / name).unlink(missing_ok=True)
-        except OSError as error:
-            raise SepiError(f"{folder / name}: an earlier run's file cannot be removed ({error.strerror})") from error
+    t, s = position or light_field.reference_position
+    down, across = (light_field.baselines[t, s] + light_field.from_centre).tolist()
+    maps = as_taken(disparity, light_field.camera, light_field.rig, (t, s), (down, across))
+    for name, values in zip(names_as_taken(position), maps, strict=True):
+        write_pfm(folder / name, values)
+    return True
 
 
 def _write_16bit(path: Path, disparity: FloatMap) -> None:

@@ -17,9 +17,9 @@ import numpy as np
 from sepi.lightfield import BoolMap, FloatMap, LightField
 from sepi.matching.base_detail import BaseDetailParameters, base_detail_decomposition, forget_detail
 from sepi.matching.gauss_newton_kernels import Seeing, SplineViews, mean_of_views, normal_equations
+from sepi.matching.nearest_surfaces import nearest_surfaces
 from sepi.matching.row_bands import Band, Rows, row_bands
 from sepi.matching.spline_kernels import MARGIN, REACH, SPLINE_UNIT, spline_coefficients, view_splines
-from sepi.matching.visibility_kernels import z_buffers
 
 _SMOOTH = np.array([1, 4, 1], np.float32) / 6
 _DIFFERENCE = np.array([-1, 0, 1], np.float32) / 2
@@ -112,11 +112,11 @@ class GaussNewton:
                 self._splines = spline_views(field, self._parameters, bands[0].rows, self._present)
             if self._nearest is None or self._nearest[0] is not disparity:
                 self._nearest = None
-                self._nearest = disparity, z_buffers(disparity, self._present, field.baselines, *bands[0].rows)
+                self._nearest = disparity, nearest_surfaces(field, disparity, self._present, bands[0].rows)
             add(self._splines, Seeing(self._nearest[1], self._margin), bands[0])
             return
         for band in bands:
-            nearest = z_buffers(disparity, self._present, field.baselines, *band.rows)
+            nearest = nearest_surfaces(field, disparity, self._present, band.rows)
             add(spline_views(field, self._parameters, band.rows, self._present), Seeing(nearest, self._margin), band)
 
 

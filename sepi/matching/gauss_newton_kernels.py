@@ -60,7 +60,7 @@ class Seeing(NamedTuple):
     Attributes
     ----------
     nearest : ndarray, shape (T, S, n, W), float32
-        z-buffers of the map in the views (:func:`sepi.matching.visibility_kernels.z_buffers`), rows from the splines'
+        What is nearest in the views (:func:`sepi.matching.nearest_surfaces.nearest_surfaces`), rows from the splines'
         ``low`` on.
     occlusion_margin : float32
         By how much an occluder must be nearer, pixels per view step.

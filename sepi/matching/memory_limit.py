@@ -12,6 +12,7 @@ from collections.abc import Iterable
 from sepi.errors import SepiError
 from sepi.lightfield import LightField
 from sepi.matching.base_detail import BaseDetailParameters
+from sepi.matching.denoising import DenoisingParameters, denoised
 from sepi.matching.plane_sweep import SweepParameters
 from sepi.matching.row_bands import least_band_bytes
 from sepi.matching.visibility_sweep import BYTES_PER_CANDIDATE, VisibilitySweepParameters
@@ -85,6 +86,9 @@ def _bytes_taken(light_field: LightField, stages: Iterable[Parameters]) -> tuple
     pixels, samples = height * width, height * width * int(light_field.present.sum())
     own = max((p.needs.bytes_per_sample * samples + p.needs.bytes_per_pixel * pixels for p in stages), default=0)
     ours = _BYTES_OF_MAPS * pixels + max(volume * pixels, *rings, 0)
+    least = max((p.denoising for p in stages if isinstance(p, DenoisingParameters)), default=0.0)
+    copy = denoised(light_field, least)
+    ours += 0 if copy is light_field else copy.views.nbytes
     whole = _LIBRARIES + light_field.views.nbytes + round(max(ours, own))
     in_bands = any(isinstance(p, (BaseDetailParameters, OcclusionMarginParameters)) for p in stages)
     if not in_bands:

@@ -25,6 +25,7 @@ from pydantic import Field
 from sepi.image.noise import residual_variance
 from sepi.lightfield import BoolMap, FloatMap, LightField, full_scale
 from sepi.matching.candidates import CandidateParameters, CandidateRule, number_field
+from sepi.matching.nearest_surfaces import shown_columns
 from sepi.matching.sweep_arrays import BestMaps, Candidates, ViewStack, Window
 from sepi.stage import Progress, no_progress
 
@@ -157,7 +158,8 @@ def sweep(
     colours = planar(light_field)
     noise = residual_variance(light_field.reference_view)
     scale2 = np.float32((parameters.scale**2 + noise) * full_scale(colours.dtype) ** 2)
-    views = ViewStack(colours, *light_field.reference_position, groups, subsets, scale2)
+    shown = shown_columns(light_field)
+    views = ViewStack(colours, *light_field.reference_position, groups, subsets, scale2, shown)
     disparities = parameters.candidates(light_field)
     candidates = sampled_candidates(disparities, light_field.baselines)
     guide = np.ascontiguousarray(light_field.reference_view.transpose(2, 0, 1))

@@ -133,13 +133,31 @@ def _add_two(out: Any, other: Any, a: Any, b: Any, reference: Any, w: Any, v: An
         other[x] += _robust(q0, q1, q2, scale2)
 
 
+@njit(inline="always")
+def _seen_run(views: ViewStack, candidates: Candidates, t: int, s: int, run: Run, k: int) -> Any:
+    """Row above the samples of a run of pixels in a view and its distance, and the columns whose samples it shows."""
+    H, W = views.colours.shape[3:]
+    r, c = candidates.row[t, s], candidates.column[t, s]
+    top, below = run.y + candidates.down[r, k], candidates.fy[r, k]
+    if top == H - 1 and below == 0:
+        # the last row has none below: seen from the one above
+        top, below = H - 2, np.float32(1)
+    left = candidates.across[c, k]
+    low, high = 0, W
+    if views.shown.shape[2] > 0 and 0 <= top <= H - 2:
+        low = max(views.shown[t, s, top, 0], views.shown[t, s, top + 1, 0])
+        high = min(views.shown[t, s, top, 1], views.shown[t, s, top + 1, 1])
+    # on the last column nothing beyond it has a weight
+    return top, below, max(run.begin, low - left), min(run.end, (high if candidates.fx[c, k] == 0 else high - 1) - left)
+
+
 @njit(cache=True, fastmath=EXACT, error_model="numpy")
 def _add_view(
     views: ViewStack, candidates: Candidates, t: int, s: int, run: Run, low: int, band: Any, cost: Any
 ) -> None:
     """Add the residuals of one view to ``cost (K, n)``; ``band``: its rows from ``low`` on, and the reference row."""
-    H, W = views.colours.shape[3:]
-    y, begin, end = run
+    H = views.colours.shape[3]
+    y, begin, _ = run
     r, c = candidates.row[t, s], candidates.column[t, s]
     down, fy, across, fx = candidates.down[r], candidates.fy[r], candidates.across[c], candidates.fx[c]
     pixels, reference = band
@@ -148,14 +166,8 @@ def _add_view(
     while k < K:
         here = k
         k += 1
-        top, below = y + down[here], fy[here]
-        if top == H - 1 and below == 0:
-            # the last row has none below: seen from the one above
-            top, below = H - 2, np.float32(1)
-        left = across[here]
-        # run of pixels whose sample lies inside the view: on its last column where nothing beyond it has a weight
-        whole = fx[here] == 0
-        first, last = max(begin, -left), min(end, W - left if whole else W - 1 - left)
+        top, below, first, last = _seen_run(views, candidates, t, s, run, here)
+        left, whole = across[here], fx[here] == 0
         if top < 0 or top > H - 2 or last <= first:
             continue
         n, i, j = top - low, first + left, last + left + 1
@@ -245,6 +257,24 @@ def _count_views(views: ViewStack, candidates: Candidates, run: Run, counts: Any
                     for k in range(K):
                         inside = x + left[k] >= 0 and x + left[k] < (W if fx[k] == 0 else W - 1)
                         number[k] += of_column[k] if inside else np.float32(0)
+
+
+@njit(cache=True, error_model="numpy")
+def _count_shown(views: ViewStack, candidates: Candidates, run: Run, counts: Any) -> None:
+    """:func:`_count_views` of views that do not show all of the picture."""
+    T, S, _, H, _ = views.colours.shape
+    K = candidates.disparities.size
+    counts[: run.end - run.begin] = 0
+    for t in range(T):
+        for s in range(S):
+            g = views.groups[t, s]
+            if g < 0:
+                continue
+            for k in range(K):
+                top, _, first, last = _seen_run(views, candidates, t, s, run, k)
+                if 0 <= top <= H - 2:
+                    for x in range(first - run.begin, last - run.begin):
+                        counts[x, g * K + k] += np.float32(1)
 
 
 @njit(cache=True, fastmath=EXACT, error_model="numpy")
@@ -428,7 +458,9 @@ def _fill_row(
             left = min(last, inner)
             right = max(first, left, W - inner)
         for begin, end in ((first, left), (right, last)):
-            if begin < end:
+            if begin < end and views.shown.shape[2] > 0:
+                _count_shown(views, candidates, Run(row, begin, end), counts[begin - origin :])
+            elif begin < end:
                 _count_views(views, candidates, Run(row, begin, end), counts[begin - origin :])
 
 
@@ -484,8 +516,9 @@ def sweep_plane_rows(
     width: int, maps: BestMaps,
 ) -> None:  # fmt: skip
     """Sweep the rows ``begin..end`` of the ``mask (H, W)`` in tiles of at most ``height`` rows, ``width`` columns."""
-    W = views.colours.shape[4]
-    margin = math.ceil(candidates.reach) + window.radius + 1
+    H, W = views.colours.shape[3:]
+    # where a view may show less than the picture, all pixels are as those near its border
+    margin = H + W if views.shown.shape[2] > 0 else math.ceil(candidates.reach) + window.radius + 1
     for task in prange((end - begin + height - 1) // height):
         top = begin + task * height
         for left in range(0, W, width):

@@ -23,6 +23,7 @@ from pydantic import Field
 
 from sepi.image.noise import noise_level
 from sepi.lightfield import BoolMap, FloatMap, LightField, full_scale
+from sepi.matching.nearest_surfaces import nearest_surfaces
 from sepi.matching.row_bands import row_bands
 from sepi.matching.view_subsets import spread_views
 from sepi.stage import OcclusionMarginParameters
@@ -110,13 +111,12 @@ def reassign_at_steps(
 def _evidence(light_field: LightField, disparity: FloatMap, rim: Rim, parameters: SurfaceShareParameters) -> FloatMap:
     """By how much the other surface explains the views better than the one that a pixel has, shape (H, W)."""
     from sepi.matching import surface_shares_kernels as kernels
-    from sepi.matching.visibility_kernels import z_buffers
 
     guide = light_field.reference_view
     scales2 = _LEAST_SCALE**2 + 2 * noise_level(guide) ** 2, parameters.share_scale**2
     around = np.ones((3, 3), np.uint8)
     clean = disparity - cv2.erode(disparity, around) < parameters.share_step
-    widened = cv2.dilate(disparity, around)
+    widened = np.asarray(cv2.dilate(disparity, around), np.float32)
     margin = np.float32(parameters.occlusion_margin)
     layer, distance = _more_distant_layer(disparity, rim, margin)
     views = _views_alike(light_field, disparity, clean, parameters)
@@ -130,7 +130,7 @@ def _evidence(light_field: LightField, disparity: FloatMap, rim: Rim, parameters
     evidence = np.zeros_like(disparity)
     height = light_field.shape[0]
     for begin, end, rows in row_bands(light_field, present, farthest, BYTES_PER_PIXEL, rows_moved):
-        nearest = z_buffers(widened, present, light_field.baselines, *rows)
+        nearest = nearest_surfaces(light_field, widened, present, rows)
         views = views._replace(nearest=nearest, low=rows.low)
         background = kernels.background_of(
             views, layer, distance <= moved, margin, max(0, begin - rows_moved), min(height, end + rows_moved)
@@ -156,9 +156,12 @@ def _views_alike(
     # a part of another array would have kernels of its own compiled, which takes a minute
     pixels = np.ascontiguousarray(light_field.views)
     views = RimViews(pixels, units, places, baselines, np.empty((0, 0, 0, 0), np.float32), 0)
-    brightness, residual = brightness_of_views(views, disparity, light_field.reference_view, clean)
+    missing = np.zeros((*light_field.grid, 0, 0), bool) if light_field.missing is None else light_field.missing
+    brightness, residual = brightness_of_views(views, disparity, light_field.reference_view, clean, missing)
     alike = (brightness > 1 / _MOST_DARKENING) & (brightness < _MOST_DARKENING)
-    alike &= residual <= 2 * np.median(residual) + _LEAST_SCALE
+    showing = np.isfinite(residual)
+    usual = float(np.median(residual[showing])) if showing.any() else 0.0
+    alike &= showing & (residual <= 2 * usual + _LEAST_SCALE)
     units = (units[alike] / brightness[alike]).astype(np.float32)
     return views._replace(units=units, places=places[alike], baselines=baselines[alike])
 

@@ -125,7 +125,7 @@ def _sample(views: RimViews, view: int, row: int, column: int, fy: Any, fx: Any,
 
 
 @njit(parallel=True, cache=True)
-def brightness_of_views(views: RimViews, disparity: Any, guide: Any, clean: Any) -> Any:
+def brightness_of_views(views: RimViews, disparity: Any, guide: Any, clean: Any, missing: Any) -> Any:
     """How bright each view is beside the reference, and how badly it shows the same.
 
     Parameters
@@ -137,17 +137,21 @@ def brightness_of_views(views: RimViews, disparity: Any, guide: Any, clean: Any)
         Reference view, 0..1.
     clean : ndarray, shape (H, W), bool
         Pixels that are looked at, some of them.
+    missing : ndarray, shape (T, S, H, W) or (T, S, 0, 0), bool
+        Pixels that a view does not show; empty: none.
 
     Returns
     -------
     brightness, residual : ndarray, shape (N,), float64
-        Ratio of the sums of the colours; mean absolute difference of one channel, 0..1, that is left.
+        Ratio of the sums of the colours; mean absolute difference of one channel, 0..1, that is left, NaN of views that
+        show none of the pixels.
     """
     H, W = disparity.shape
     N = len(views.places)
     brightness, residual = np.ones(N), np.zeros(N)
     for view in prange(N):
         colour = np.empty(3)
+        of_view = missing[views.places[view, 0], views.places[view, 1]]
         for turn in range(2):
             own, other, rest, n = 1e-9, 1e-9, 0.0, 1
             for y in range(0, H, _STRIDE):
@@ -157,6 +161,8 @@ def brightness_of_views(views: RimViews, disparity: Any, guide: Any, clean: Any)
                     if not clean[y, x] or down < 0 or across < 0 or down >= H - 1 or across >= W - 1:
                         continue
                     row, column = int(down), int(across)
+                    if of_view.size > 0 and of_view[row : row + 2, column : column + 2].any():
+                        continue
                     _sample(views, view, row, column, down - row, across - column, colour)
                     for c in range(3):
                         own += guide[y, x, c]
@@ -166,7 +172,7 @@ def brightness_of_views(views: RimViews, disparity: Any, guide: Any, clean: Any)
             if turn == 0:
                 brightness[view] = other / own
             else:
-                residual[view] = rest / n
+                residual[view] = rest / n if n > 1 else np.nan
     return brightness, residual
 
 

@@ -27,6 +27,8 @@ class ViewStack(NamedTuple):
         Which groups make up each subset.
     scale2 : float32
         Square of the robust scale, in the units of the colours.
+    shown : ndarray, shape (T, S, H, 2) or (T, S, 0, 2), int64
+        First column that each row of a view shows, and the one after the last; empty: all views show all.
     """
 
     colours: npt.NDArray[np.generic]
@@ -35,6 +37,7 @@ class ViewStack(NamedTuple):
     groups: npt.NDArray[np.int64]
     subsets: BoolMap
     scale2: np.float32
+    shown: npt.NDArray[np.int64]
 
 
 class Candidates(NamedTuple):

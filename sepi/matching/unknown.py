@@ -5,7 +5,8 @@ A depth map has a value everywhere. At some pixels it is a guess for which there
 - regions without a signal, where the view is as dark as nothing, or at full scale, and varies no more than its noise: a
   black background, what is overexposed;
 - the dark corners that a lens leaves (vignettes), which stray light may lift above black;
-- pixels that hardly any other view holds: at their disparity they lie outside the others' pictures.
+- pixels that hardly any other view holds: at their disparity they lie outside the others' pictures; and those that the
+  reference view itself does not show.
 
 A bare wall is none of these: it is neither black nor overexposed, and what it borders on tells its depth.
 """
@@ -103,7 +104,10 @@ def unknown_pixels(light_field: LightField, disparity: FloatMap) -> BoolMap:
     """
     require_light_field(light_field)
     require_map(f"{light_field.name}: disparity", disparity, light_field.shape)
-    return without_signal(light_field, disparity) | held_by_few(light_field, disparity)
+    unknown = without_signal(light_field, disparity) | held_by_few(light_field, disparity)
+    if light_field.missing is not None:
+        unknown |= light_field.missing[light_field.reference_position]
+    return unknown
 
 
 def without_signal(light_field: LightField, disparity: FloatMap) -> BoolMap:
@@ -153,9 +157,14 @@ def held_by_few(light_field: LightField, disparity: FloatMap) -> BoolMap:
     d, held = disparity.ravel().astype(np.float64), np.zeros(H * W, np.int64)
     left = np.arange(H * W)
     # the nearest views hold almost every pixel
-    for down, across in light_field.baselines[tuple(others.T)]:
+    for t, s in others:
+        down, across = light_field.baselines[t, s]
         row, column = y[left] - d[left] * down, x[left] - d[left] * across
-        held[left] += (row >= -0.5) & (row <= H - 0.5) & (column >= -0.5) & (column <= W - 0.5)
+        holds = (row >= -0.5) & (row <= H - 0.5) & (column >= -0.5) & (column <= W - 0.5)
+        if light_field.missing is not None:
+            at = (np.clip(np.rint(place), 0, n - 1).astype(int) for place, n in ((row, H), (column, W)))
+            holds &= ~light_field.missing[t, s][tuple(at)]
+        held[left] += holds
         left = left[held[left] < least]
     return (held < least).reshape(H, W)
 
@@ -184,7 +193,10 @@ def _mean_of_dark(light_field: LightField, disparity: FloatMap, limit: float) ->
     for t, s in _nearest_first(light_field)[:_MOST_AVERAGED]:
         down, across = baselines[t, s]
         position = x - disparity * across, y - disparity * down
-        seen = cv2.remap(as_unit_float(light_field.rgb_views[t, s]), *position, cv2.INTER_LINEAR, borderValue=(1, 1, 1))
+        view = as_unit_float(light_field.rgb_views[t, s])
+        if light_field.missing is not None:
+            view[light_field.missing[t, s]] = 1
+        seen = cv2.remap(view, *position, cv2.INTER_LINEAR, borderValue=(1, 1, 1))
         dark = seen.max(axis=2) <= limit
         total += seen * dark[..., None]
         number += dark

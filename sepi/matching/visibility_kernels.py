@@ -17,6 +17,9 @@ EXACT = {"nnan", "ninf", "nsz"}
 EMPTY = np.float32(-1e9)
 """Disparity in a z-buffer where no pixel of the reference view falls: nothing is nearer."""
 
+MISSING = np.float32(1e9)
+"""The same where the view shows nothing: not even a view that hides a pixel counts less."""
+
 
 class Visibility(NamedTuple):
     """In which views a pixel is seen.
@@ -24,13 +27,13 @@ class Visibility(NamedTuple):
     Attributes
     ----------
     nearest : ndarray, shape (T, S, n, W) or (T, S, n, 0), float32
-        From :func:`z_buffers`; empty: all views see all pixels.
+        From :func:`sepi.matching.nearest_surfaces.nearest_surfaces`; empty: all views see all pixels.
     low : int
         First row of ``nearest``.
     occlusion_margin : float32
         By how much an occluder must be nearer, pixels per view step.
     occluded_view_weight : float32
-        Weight of a view in which the pixel is occluded.
+        Weight of a view in which the pixel is occluded; none where the view has no pixel.
     """
 
     nearest: FloatMap
@@ -199,7 +202,7 @@ def _add_view(
     v, u, y, low, band = view
     cost, weight, scratch = sums
     margin, hidden = visibility.occlusion_margin, visibility.occluded_view_weight
-    one = np.float32(1)
+    one, none = np.float32(1), np.float32(0)
     for k in range(disparities.size):
         d = disparities[k]
         down, across = y - d * v, -d * u
@@ -220,7 +223,7 @@ def _add_view(
             before = nearest[top - visibility.low + (1 if fy > 0.5 else 0), i + right : last + left + right]
             limit = np.float32(d + margin)
             for x in range(seen.size):
-                seen[x] = one if before[x] <= limit else hidden
+                seen[x] = one if before[x] <= limit else (hidden if before[x] < MISSING else none)
         count = weight[k, first:last]
         for x in range(seen.size):
             count[x] += seen[x]

@@ -19,6 +19,8 @@ from sepi.image.noise import variance_of_residuals
 from sepi.lightfield import BoolMap, FloatMap, LightField
 from sepi.matching.base_detail import BaseDetailParameters, ColourScale, base_detail_decomposition, reference_noise
 from sepi.matching.candidates import CandidateParameters, CandidateRule, number_field
+from sepi.matching.denoising import guide_of
+from sepi.matching.nearest_surfaces import nearest_surfaces
 from sepi.matching.row_bands import Band, row_bands
 from sepi.matching.semi_global import SmallPenalty, SmoothedResult, SmoothingParameters, smooth_and_choose
 from sepi.matching.view_subsets import spread_views
@@ -172,6 +174,9 @@ def occluded_in_any_view(
     occluded = np.empty(light_field.shape, bool)
     for begin, end, rows in row_bands(light_field, present, float(np.abs(disparity).max()), BYTES_PER_PIXEL):
         nearest = kernels.z_buffers(disparity, present, baselines, *rows)
+        if light_field.missing is not None:
+            # a view that does not show a place cannot see a pixel there
+            nearest[light_field.missing[:, :, rows.low : rows.high]] = kernels.EMPTY
         occluded[begin:end] = kernels.occluded_in_any_view(
             disparity, present, baselines, nearest, rows.low, np.float32(occlusion_margin), begin, end
         )
@@ -202,7 +207,7 @@ def _sweep(
             cost,
             lambda row: progress(0.8 * row / height),
         )
-    guide = light_field.reference_view
+    guide = guide_of(light_field)
     # not held by a name: it goes as soon as it has been used
     volume = [cost]
     del cost
@@ -244,12 +249,14 @@ def _visibility(
     band: Band,
 ) -> Visibility:
     """In which views the pixels of a band are seen: in all of them where no map tells."""
-    from sepi.matching.visibility_kernels import Visibility, z_buffers
+    from sepi.matching.visibility_kernels import Visibility
 
     low, high = band.rows
     if disparity is None or not isinstance(parameters, VisibleViewsParameters):
         everywhere = np.empty((*light_field.grid, high - low, 0), np.float32)
+        if light_field.missing is not None:
+            everywhere = nearest_surfaces(light_field, None, present, band.rows)
         return Visibility(everywhere, low, np.float32(0), np.float32(1))
-    nearest = z_buffers(disparity, present, light_field.baselines, low, high)
+    nearest = nearest_surfaces(light_field, disparity, present, band.rows)
     margin, weight = np.float32(parameters.occlusion_margin), np.float32(parameters.occluded_view_weight)
     return Visibility(nearest, low, margin, weight)

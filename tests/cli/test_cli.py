@@ -26,7 +26,7 @@ from sepi.command import stage_command
 from sepi.io.hdf5 import read_attributes, read_stage, write_light_field
 from sepi.io.images import write_png
 from sepi.io.pfm import read_pfm, write_pfm
-from sepi.io.result_folder import RESULT_FILES
+from sepi.io.result_files import RESULT_FILES
 from sepi.lightfield import LightField
 from sepi.reading import read_light_field
 from sepi.scenes import SCENES, render, write_hci
@@ -358,7 +358,7 @@ def test_evaluate_reads_every_kind_of_map(pyramids: Path, result: Path, tmp_path
         ("small.pfm", "map.pfm", "(6, 8), the estimate (5, 5)"),
         ("text.npy", "map.pfm", "text.npy: not a NumPy file"),
         ("cube.npy", "map.pfm", "cube.npy: expected an array of numbers of shape (H, W)"),
-        ("zipped.npy", "map.pfm", "zipped.npy: not a NumPy file"),
+        ("two.npz", "map.pfm", "two.npz: expected one array of shape (H, W), found a, b"),
         ("words.npy", "map.pfm", "words.npy: expected an array"),
         ("lie.npy", "map.pfm", "lie.npy: not a NumPy file, or damaged"),
         ("damaged.h5", "map.pfm", "damaged.h5"),
@@ -391,8 +391,7 @@ def test_bad_maps_are_one_line(
         Path(name).write_text("hello")
     np.save("cube.npy", np.zeros((2, 3, 4)))
     np.save("words.npy", np.array([["a", "b"]]))
-    np.savez("zipped", values=np.zeros((6, 8)))
-    Path("zipped.npz").rename("zipped.npy")
+    np.savez("two", a=np.zeros((6, 8)), b=np.zeros((6, 8)))
     with h5py.File("other.h5", "w") as file:
         file["depth"] = 1
     views = np.random.default_rng(0).integers(0, 255, (2, 2, 6, 8, 1), np.uint8)
@@ -640,7 +639,7 @@ def test_ingest_renders_a_built_in_scene(tmp_path: Path) -> None:
     assert light_field.ground_truth is None
 
 
-@pytest.mark.parametrize("words", [(), ("x", "--builtin", "dots")])
+@pytest.mark.parametrize("words", [(), ("x", "--builtin", "dots"), ("x", "--rendered", "y.h5")])
 def test_ingest_reads_either_a_path_or_a_built_in_scene(tmp_path: Path, words: tuple[str, ...]) -> None:
     called = ingested(*words, "--output", tmp_path / "lf.h5")
     assert called.exit_code == 2

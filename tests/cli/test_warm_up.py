@@ -58,6 +58,6 @@ def test_every_compared_method_is_in_a_share() -> None:
 
 
 def test_the_command_compiles_all_shares() -> None:
-    result = CliRunner().invoke(command)
+    result = CliRunner().invoke(command, ["--all-types"])
     assert result.exit_code == 0, result.output
     assert result.stdout.startswith("kernels ready after ")

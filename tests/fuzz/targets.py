@@ -3,13 +3,14 @@
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
+import rigs
 import seed_files as seeds
 import texts
 from executions import Target
 from mutations import MAT, PNG
 
 from sepi.errors import SepiError
-from sepi.io.disparity_maps import is_disparity, read_disparity
+from sepi.io.disparity_maps import TruthFile, is_disparity, read_disparity
 from sepi.io.external_maps import read_external
 from sepi.io.hdf5 import read_light_field as read_own
 from sepi.io.hdf5 import read_stage
@@ -66,6 +67,10 @@ def _map_with_scale(path: Path) -> None:
     read_disparity(path, scale=1e300, offset=-1e300)
 
 
+def _truth(path: Path) -> None:
+    TruthFile(path, 0.1).read()
+
+
 def _submission(path: Path) -> None:
     for problem in problems_of(path, partial=True):
         assert problem.isprintable(), problem
@@ -88,10 +93,10 @@ TARGETS: dict[str, Target] = {
     "bmp": _pictures_of(seeds.bmp_files, "bmp"),
     "webp": _pictures_of(seeds.webp_files, "webp"),
     "pnm": _pictures_of(seeds.pnm_files, "pgm"),
-    "pfm": Target("a.pfm", seeds.pfm_files, _each(_map, _map_with_scale)),
-    "map-npy": Target("a.npy", seeds.npy_map_files, _each(_map, _map_with_scale)),
-    "map-png": Target("a.png", texts.map_png_files, _each(_map, _map_with_scale), wrappings=PNG),
-    "map-tiff": Target("a.tif", seeds.tiff_map_files, _each(_map, _map_with_scale)),
+    "pfm": Target("a.pfm", seeds.pfm_files, _each(_map, _map_with_scale, _truth)),
+    "map-npy": Target("a.npy", seeds.npy_map_files, _each(_map, _map_with_scale, _truth)),
+    "map-png": Target("a.png", texts.map_png_files, _each(_map, _map_with_scale, _truth), wrappings=PNG),
+    "map-tiff": Target("a.tif", seeds.tiff_map_files, _each(_map, _map_with_scale, _truth)),
     "map-hdf5": _hdf5(seeds.hdf5_map_files, _map),
     "hci-parameters": Target("parameters.cfg", texts.parameter_files, texts.read_parent, seeds.hci_pictures),
     "hci-mask": Target("mask_occluded.png", seeds.mask_files, texts.read_parent, seeds.hci_folder, wrappings=PNG),
@@ -119,6 +124,10 @@ TARGETS: dict[str, Target] = {
     "pattern": Target("pattern.txt", texts.pattern_files, texts.read_pattern, names_path=False),
     "config": Target("config.yaml", texts.config_files, texts.read_config, texts.config_folder, names_path=False),
     "flags": Target("flags.txt", texts.flag_files, texts.read_flags, texts.flag_folder, names_path=False),
+    "cameras-yaml": Target("cameras.yaml", rigs.table_files, texts.read_parent, rigs.pictures),
+    "cameras-csv": Target("cameras.csv", rigs.csv_files, texts.read_parent, rigs.pictures),
+    "transforms": Target("transforms.json", rigs.transforms_files, texts.read_parent, rigs.pictures),
+    "colmap-images": Target("images.txt", rigs.images_files, texts.read_parent, rigs.rest_of_model),
     "settings": Target("settings.txt", texts.setting_files, texts.read_settings, names_path=False),
 }
 """Name to target."""

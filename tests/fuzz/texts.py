@@ -11,7 +11,8 @@ import seed_files as seeds
 import yaml
 from click.testing import CliRunner
 
-from sepi.cli import main as command_line
+from sepi.cli.depth import _parameters
+from sepi.cli.main import main
 from sepi.cli.results import _runtime
 from sepi.command import _json_object
 from sepi.errors import SepiError
@@ -209,7 +210,7 @@ def read_flags(path: Path) -> None:
     # places outside the folder are not looked into
     if any(line.startswith(("/", "..")) for line in lines):
         return
-    called = CliRunner().invoke(command_line.main, ["info", *lines], catch_exceptions=False)
+    called = CliRunner().invoke(main, ["info", *lines], catch_exceptions=False)
     assert called.exit_code in (0, 1, 2), called.output
     if called.exit_code == 2:
         # click's own words
@@ -236,7 +237,7 @@ def read_settings(path: Path) -> None:
     with suppress(SepiError):
         _runtime(variant)
     chosen = variant_named(variant)
-    stage_parameters(chosen, command_line._parameters(tuple(settings), variant, chosen))
+    stage_parameters(chosen, _parameters(tuple(settings), variant, chosen))
 
 
 def read_json_flags(path: Path) -> None:

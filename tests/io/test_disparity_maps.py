@@ -12,7 +12,7 @@ from PIL import Image, PngImagePlugin
 
 from sepi.cli.main import main
 from sepi.errors import SepiError
-from sepi.io.disparity_maps import SUFFIXES, is_disparity, read_disparity
+from sepi.io.disparity_maps import SUFFIXES, TruthFile, is_disparity, read_disparity
 from sepi.io.pfm import write_pfm
 from sepi.io.result_folder import write_result
 from sepi.lightfield import LightField
@@ -168,8 +168,35 @@ def test_tiff_of_floats_is_a_map_and_of_levels_is_none(tmp_path: Path, disparity
         np.testing.assert_array_equal(read_disparity(tmp_path / name), disparity)
         np.testing.assert_array_equal(read_disparity(tmp_path / name, scale=-2), -2 * disparity)
     colours = np.zeros((*SHAPE, 3), np.float32)
-    for name, values in (("levels.tif", np.ones(SHAPE, np.uint16)), ("colours.tif", colours)):
+    wrong = {"levels.tif": "a TIFF does not say what its levels mean", "colours.tif": "expected a disparity map"}
+    for (name, message), values in zip(wrong.items(), (np.ones(SHAPE, np.uint16), colours), strict=True):
         tifffile.imwrite(tmp_path / name, values, photometric="rgb" if values.ndim == 3 else "minisblack")
         assert not is_disparity(tmp_path / name)
-        with pytest.raises(SepiError, match=rf"{name}: expected a disparity map"):
+        with pytest.raises(SepiError, match=f"{name}: {message}"):
             read_disparity(tmp_path / name)
+
+
+def test_ground_truth_is_the_same_in_every_format(tmp_path: Path) -> None:
+    """What a data set calls unknown, 0 in its levels, would be scored as depth, or levels as pixels."""
+    levels = np.random.default_rng(2).integers(0, 200, SHAPE).astype(np.uint8)
+    levels[0, :3] = 0, 1, 199
+    wanted = np.where(levels > 0, np.float32(0.0625) * levels, np.float32(np.nan))
+    floats = np.where(levels > 0, levels, np.nan).astype(np.float32)
+    floats[0, 0] = np.inf
+    for name, values in (("8.png", levels), ("16.png", levels.astype(np.uint16)), ("8.pgm", levels)):
+        cv2.imwrite(str(tmp_path / name), values)
+    (tmp_path / "200.pgm").write_bytes(b"P5 %d %d 200\n" % SHAPE[::-1] + levels.tobytes())
+    tifffile.imwrite(tmp_path / "16.tif", levels.astype(np.uint16))
+    tifffile.imwrite(tmp_path / "float.tif", floats)
+    write_pfm(tmp_path / "float.pfm", floats)
+    np.save(tmp_path / "8.npy", levels)
+    np.savez(tmp_path / "float.npz", depth=floats.astype(np.float64))
+    with h5py.File(tmp_path / "float.h5", "w") as file:
+        file["disparity"] = floats
+    for path in sorted(tmp_path.iterdir()):
+        np.testing.assert_array_equal(TruthFile(path, 0.0625).read(SHAPE), wanted, err_msg=path.name)
+    np.testing.assert_array_equal(TruthFile(tmp_path / "float.pfm").read(), np.where(levels > 0, floats, np.nan))
+    # a light field in such a file is none
+    np.savez(tmp_path / "views.npz", LF=np.zeros((3, 3, *SHAPE, 3)))
+    assert is_disparity(tmp_path / "float.npz")
+    assert not is_disparity(tmp_path / "views.npz")

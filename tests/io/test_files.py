@@ -17,7 +17,7 @@ from sepi.io import files
 from sepi.io.files import atomic_folder, atomic_path
 from sepi.io.hdf5 import create_hdf5
 from sepi.io.pfm import read_pfm
-from sepi.io.result_folder import RESULT_FILES
+from sepi.io.result_files import RESULT_FILES
 from sepi.scenes import render, write_hci
 
 SOURCE = Path(__file__).parents[2]

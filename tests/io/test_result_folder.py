@@ -12,7 +12,8 @@ from PIL import Image
 
 from sepi.camera import Camera
 from sepi.errors import SepiError
-from sepi.io.result_folder import RESULT_FILES, colour_code, read_result, write_result
+from sepi.io.result_files import RESULT_FILES
+from sepi.io.result_folder import colour_code, read_result, write_result
 from sepi.lightfield import DisparityRange, LightField
 from sepi.stage import StageMaps
 

@@ -15,6 +15,7 @@ from several_threads import several_threads
 from sepi.errors import SepiError
 from sepi.image.noise import noise_level, residual_variance
 from sepi.lightfield import DisparityRange, LightField
+from sepi.matching.nearest_surfaces import shown_columns
 from sepi.matching.plane_sweep import TILE_WIDTH, SweepParameters, planar, sampled_candidates, sweep
 from sepi.matching.plane_sweep_kernels import SHORTEST_GAP, Run, cost_row
 from sepi.matching.stitched_epi import line_cost, stitched_epi
@@ -195,7 +196,9 @@ def test_candidates_done_together_equal_candidates_done_alone():
     light_field = random_light_field(shape=(20, 40))
     disparities = np.linspace(-1.3, 1.3, 61).astype(np.float32)
     groups = halves_and_quarters(light_field).groups
-    views = ViewStack(planar(light_field), 2, 2, groups, np.eye(9, dtype=bool), np.float32(900))
+    views = ViewStack(
+        planar(light_field), 2, 2, groups, np.eye(9, dtype=bool), np.float32(900), shown_columns(light_field)
+    )
     candidates = sampled_candidates(disparities, light_field.baselines)
     shared = (np.diff(candidates.down) == 0).mean() * (np.diff(candidates.across) == 0).mean()
     assert 0.5 < shared < 1, "some candidates read the same pixels, some do not"

@@ -335,7 +335,9 @@ def test_brightness_is_told_view_by_view() -> None:
         views, np.ones(3, np.float32), np.argwhere(field.present), field.baselines[field.present],
         np.empty((0, 0, 0, 0), np.float32), 0,
     )  # fmt: skip
-    brightness, residual = kernels.brightness_of_views(rim_views, still, field.reference_view, still == 0)
+    brightness, residual = kernels.brightness_of_views(
+        rim_views, still, field.reference_view, still == 0, np.zeros((*field.grid, 0, 0), bool)
+    )
     np.testing.assert_allclose(brightness, factors[0], rtol=0.02)
     assert (residual < 0.01).all()
 

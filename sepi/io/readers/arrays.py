@@ -105,6 +105,9 @@ def rearrange(light_field: LightField, options: ReadOptions) -> LightField:
     views = light_field.views.reshape(T * S, *light_field.views.shape[2:])[numbers]
     present = light_field.present.ravel()[numbers] & (numbers >= 0)
     views[~present] = 0
+    missing = light_field.missing
+    if missing is not None:
+        missing = missing.reshape(T * S, *missing.shape[2:])[numbers] & present[..., None, None]
     positions, row_spacing = reordered(light_field.positions, light_field.row_spacing, options.order, numbers)
     view, truth, masks = options.view, None, {}
     position = position_of(numbers, light_field.reference_position[0] * S + light_field.reference_position[1])
@@ -119,6 +122,7 @@ def rearrange(light_field: LightField, options: ReadOptions) -> LightField:
         masks=masks,
         positions=positions,
         row_spacing=row_spacing,
+        missing=missing,
     )
 
 

@@ -24,11 +24,11 @@ from sepi.validation import validated
 MANIFEST = "light_field.json"
 
 
-class Manifest(BaseModel):
+class Manifest(BaseModel, defer_build=True):
     """Content of ``light_field.json``: the fields of a light field, and names of files in the folder for its arrays.
 
     ``views`` has a name, or null for a missing view, for each row and column of the grid; ``positions`` likewise a pair
-    ``[down, across]`` in view steps.
+    ``[down, across]`` in view steps, and ``missing`` a mask of the pixels that a view does not show, null for none.
     """
 
     name: str
@@ -36,6 +36,7 @@ class Manifest(BaseModel):
     view: tuple[int, int] | None = None
     row_spacing: float = 1.0
     positions: list[list[tuple[float, float] | None]] | None = None
+    missing: list[list[str | None]] | None = None
     disparity_range: DisparityRange | None = None
     camera: Camera | None = None
     ground_truth: str | None = None
@@ -57,10 +58,10 @@ def read_manifest(path: Path) -> Manifest:
             raise ValueError("expected keys with values")
         known = validated(Manifest, values, f"{path}: light field")
         columns = len(known.views[0]) if known.views else 0
-        for key, rows in (("views", known.views), ("positions", known.positions)):
+        for key, rows in (("views", known.views), ("positions", known.positions), ("missing", known.missing)):
             if rows is not None and (columns == 0 or [len(row) for row in rows] != [columns] * len(known.views)):
                 raise SepiError(f"{key}: expected {len(known.views)} rows of {columns} values, as 'views' has")
-        named = [name for row in known.views for name in row]
+        named = [name for row in (*known.views, *(known.missing or ())) for name in row]
         for name in filter(None, (*named, known.ground_truth, *known.masks.values())):
             if name != Path(name).name or name == ".." or "\0" in name:
                 raise SepiError(f"expected names of files in its own folder, got {name[:80]!r}")
@@ -94,6 +95,12 @@ def read(path: Path, options: ReadOptions) -> LightField:
         places = [place or (np.nan, np.nan) for place in chain(*known.positions)]
         positions = np.array(places, np.float64).reshape(rows, columns, 2)
     truth = None if known.ground_truth is None else read_pfm(path / known.ground_truth)
+    missing = None
+    if known.missing is not None:
+        missing = np.zeros((rows, columns, *views.shape[2:4]), bool)
+        for place, name in zip(np.ndindex(rows, columns), chain(*known.missing), strict=True):
+            if name is not None:
+                missing[place] = _read_mask(path / name, views.shape[2:4])
     with naming(file):
         light_field = LightField(
             views=views,
@@ -109,12 +116,15 @@ def read(path: Path, options: ReadOptions) -> LightField:
             camera=known.camera,
             notes=known.notes,
             settled=True,
+            missing=missing,
         )
     return rearrange(light_field, in_grid(options))
 
 
-def _read_mask(path: Path) -> BoolMap:
+def _read_mask(path: Path, shape: tuple[int, ...] | None = None) -> BoolMap:
     values = read_picture(path)
+    if shape is not None and values.shape[:2] != shape:
+        raise SepiError(f"{path}: {values.shape[1]}x{values.shape[0]} pixels; expected a mask as large as the views")
     if not np.isin(values, (0, 255)).all():
         raise SepiError(f"{path}: expected a mask of black and white")
     return np.asarray(values[:, :, 0] > 0)

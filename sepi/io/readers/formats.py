@@ -12,6 +12,7 @@ from sepi.io.files import naming
 from sepi.io.hdf5 import has_dataset, read_light_field
 from sepi.io.images import SUFFIXES
 from sepi.io.readers import (
+    calibrated,
     eslf,
     exported,
     hci,
@@ -83,6 +84,14 @@ FORMATS = {
         ("follow_links",),
         True,
         truth_files=exported.truth_files,
+    ),
+    # before folders of pictures, which may lie beside
+    "cameras": Format(
+        "calibrated cameras",
+        "COLMAP model, transforms.json, cameras.csv or cameras.yaml",
+        calibrated.matches,
+        calibrated.read,
+        ("images", "reference"),
     ),
     "hci": Format(
         "HCI folder",
@@ -215,7 +224,7 @@ def read_truth(path: Path, options: ReadOptions, file_format: str | None = None)
 
 def _require_used(path: Path, known: Format, options: ReadOptions) -> None:
     """Raise where an option is given that a format has no use for: the user would think that it did something."""
-    for name in ("grid", "pattern", "axes", "variable", "follow_links"):
+    for name in ("grid", "pattern", "axes", "variable", "images", "reference", "follow_links"):
         if getattr(options, name) not in (None, False) and name not in known.options:
             others = ", ".join(other.name for other in FORMATS.values() if name in other.options)
             flag = "--" + name.replace("_", "-")

@@ -43,7 +43,7 @@ _VIEW = re.compile(r"input_Cam(\d{1,6})\.png")
 _EVALUATED = ("occluded", "textureless")
 
 
-class _Parameters(BaseModel):
+class _Parameters(BaseModel, defer_build=True):
     """What this package uses of ``parameters.cfg``; None where the file does not say."""
 
     scene: str | None = None

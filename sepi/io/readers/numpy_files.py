@@ -38,8 +38,7 @@ def read(path: Path, options: ReadOptions) -> LightField:
     """Read the array of a NumPy file; of an archive, ``options.variable`` or what can be a light field."""
     if not _is_zipped(path) and options.variable is None:
         return light_field_from_array(read_array(path), path, options)
-    load = functools.partial(_read_member, path) if _is_zipped(path) else lambda _: read_array(path)
-    return light_field_from_arrays(path, array_shapes(path), options, load)
+    return light_field_from_arrays(path, array_shapes(path), options, functools.partial(read_named, path))
 
 
 def read_array(path: Path) -> Array:
@@ -68,7 +67,10 @@ def array_shapes(path: Path) -> Shapes:
     return found
 
 
-def _read_member(path: Path, name: str) -> Array:
+def read_named(path: Path, name: str) -> Array:
+    """One of the arrays that :func:`array_shapes` found."""
+    if not _is_zipped(path):
+        return read_array(path)
     with reading(path, _KIND), np.load(path, allow_pickle=False) as archive:
         array: Array = archive[name]
         return array

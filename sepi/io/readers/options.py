@@ -80,6 +80,10 @@ class ReadOptions:
         the next.
     white : float, optional
         Value that stands for white where it is not the highest of the type: 1023 in files of 10 bits.
+    images : str, optional
+        Folder of the pictures of calibrated cameras, where the model's own folder does not lead to them.
+    reference : str, optional
+        Picture of a calibrated camera whose depth is made; that of the most central one unless given.
     follow_links : bool
         Read views that are links to files outside their folder.
 
@@ -120,13 +124,15 @@ class ReadOptions:
     view: tuple[int, int] | None = None
     row_spacing: float | None = None
     white: float | None = None
+    images: str | None = None
+    reference: str | None = None
     follow_links: bool = False
 
     def __post_init__(self) -> None:
         for name, example in (("grid", "(5, 7)"), ("view", "(2, 3)")):
             if (value := getattr(self, name)) is not None:
                 object.__setattr__(self, name, whole_pair(f"options: {name}", value, f"two whole numbers {example}"))
-        for name in ("pattern", "axes", "variable"):
+        for name in ("pattern", "axes", "variable", "images", "reference"):
             require_type(f"options: {name}", getattr(self, name), (str, NoneType), "text")
         require_type("options: central", self.central, (int, np.integer, NoneType), "a whole number")
         require_type("options: exclude", self.exclude, (tuple, list), 'positions and names such as ("0,0", "a.png")')

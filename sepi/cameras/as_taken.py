@@ -1,0 +1,88 @@
+"""The way back: maps of a rectified view in the picture that its camera took, its turn and distortion included."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sepi.camera import Camera
+from sepi.lightfield import FloatMap
+from sepi.rig import Floats, Rectified, Rig
+
+# pixels beside each other whose disparities differ by more are of two surfaces, between which there is nothing
+_ONE_SURFACE = 0.25
+
+
+def as_taken(
+    disparity: FloatMap,
+    camera: Camera,
+    rig: Rig,
+    position: tuple[int, int],
+    from_centre: tuple[float, float],
+) -> tuple[FloatMap, FloatMap]:
+    """Disparity and depth at the pixels of the picture that was taken.
+
+    Parameters
+    ----------
+    disparity : ndarray, shape (H, W), float32
+        Of the rectified view, pixels per view step.
+    camera : Camera
+        Of the light field.
+    rig : Rig
+        With any rectified view at its origin.
+    position : (int, int)
+        The view's, in the grid.
+    from_centre : (float, float)
+        Baseline (down, across) from the grid's centre view to the view, in view steps.
+
+    Returns
+    -------
+    disparity : ndarray, shape (height, width of the picture), float32
+        As the rectified view has it there, interpolated within a surface; NaN where the rectified view shows nothing.
+    depth : ndarray, of the same shape, float32
+        Along the way that the camera looked, units of the world; infinite at and beyond infinity.
+    """
+    view = rig.views[position]
+    lens = view.shot.lens
+    pixels = np.stack(np.meshgrid(np.arange(lens.width), np.arange(lens.height)), axis=-1).reshape(-1, 2)
+    own = lens.rays(pixels.astype(np.float64))
+    rays = own @ (view.shot.rotation @ rig.rotation.T)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        flat = np.where(rays[:, 2:] > 0, rays[:, :2] / rays[:, 2:], np.nan)
+    at = _principal(disparity.shape, camera, from_centre) + camera.focal_px * view.zoom * flat
+    found = _sampled(disparity, at)
+    # both from the camera itself: along the common way that rectified views look, then along its own
+    along = camera.depth(found).astype(np.float64) - _ahead(view, rig)
+    depth = np.where(np.isfinite(found), along * own[:, 2] / rays[:, 2], np.nan)
+    shape = lens.height, lens.width
+    return found.reshape(shape), depth.astype(np.float32).reshape(shape)
+
+
+def _principal(shape: tuple[int, ...], camera: Camera, from_centre: tuple[float, float]) -> Floats:
+    """Principal point ``(x, y)`` of a rectified view of ``shape``."""
+    (height, width), (down, across) = shape, from_centre
+    x = (width - 1) / 2 + camera.right + across * camera.offset
+    y = (height - 1) / 2 + camera.down + down * camera.offset
+    return np.array([x, y])
+
+
+def _ahead(view: Rectified, rig: Rig) -> float:
+    """How far before the plane of the views a camera stood."""
+    return float((view.shot.centre - rig.origin) @ rig.rotation[2])
+
+
+def _sampled(values: FloatMap, at: Floats) -> FloatMap:
+    """Values at places ``(x, y)``, (N, 2): linear within a surface, else those of the nearest pixel; NaN outside."""
+    height, width = values.shape
+    # what is nearest to a pixel of the border is that pixel's
+    with np.errstate(invalid="ignore"):
+        inside = ((at > -0.5) & (at < np.array([width, height]) - 0.5)).all(axis=1)
+    within = np.clip(np.where(np.asarray(inside)[:, None], at, 0), 0, (width - 1, height - 1))
+    left, top = np.floor(within).astype(int).T
+    right, below = np.minimum(left + 1, width - 1), np.minimum(top + 1, height - 1)
+    four = np.stack([values[y, x] for y in (top, below) for x in (left, right)]).astype(np.float64)
+    across, down = within.T - (left, top)
+    above, beneath = (four[n] + across * (four[n + 1] - four[n]) for n in (0, 2))
+    linear = above + down * (beneath - above)
+    nearest = values[tuple(np.rint(within).astype(int).T[::-1])]
+    found = np.where(np.ptp(four, axis=0) <= _ONE_SURFACE, linear, nearest)
+    return np.where(inside, found, np.float32(np.nan)).astype(np.float32)

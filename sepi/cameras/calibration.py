@@ -1,0 +1,301 @@
+"""Pictures without poses become a COLMAP model that :func:`sepi.read_cameras` takes: structure from motion by pycolmap.
+
+The sweeps that make light fields are narrow, and what structure from motion usually asks for is not there: wide angles
+between rays, and pictures that tell the focal length. So features that lie a pixel off are none, points need no more
+angle than a pixel, and lenses are as the files tell, or usual ones, until all pictures are placed; then they are freed,
+and stay so where that brings the points clearly closer.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sepi.cameras.colmap_model import LENS_MODELS, require_pycolmap
+from sepi.cameras.features import SEED, Finding, colmap, match, tolerance, write_features
+from sepi.cameras.files import read_model
+from sepi.cameras.motion import require_motion
+from sepi.cameras.pictures import PROJECT
+from sepi.cameras.rectification import rectification_of
+from sepi.errors import SepiError
+from sepi.io.files import atomic_folder
+from sepi.io.images import SUFFIXES
+from sepi.stage import Progress, no_progress
+from sepi.threads import available_cores
+from sepi.validation import require_known
+
+CAMERAS = ("one", "each")
+"""Whether one camera took all pictures, or each has a camera of its own."""
+
+# longer side, pixels, of what features are found in
+_SIDE = 2000
+# pictures of which all pairs are matched; beyond, steps in the order of their names
+_ALL_PAIRS = 60
+_STEPS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128)
+# least angles between rays of the first two pictures, degrees, from each of which COLMAP goes down alone; the next is
+# tried where less than this part of the pictures is placed
+_FIRST_ANGLES, _ENOUGH = (4.0, 1.0), 0.9
+# pairs of pictures that are tried as the first at each
+_FIRST_PAIRS = 40
+# matches that the first two pictures need, and a picture that is placed
+_FIRST_MATCHES, _PLACED_MATCHES = 40, 20
+# least angle between the rays of a point, pixels; but never more than COLMAP's own, degrees
+_POINT_ANGLE, _MOST_ANGLE = 1.0, 1.5
+# the freed lens stays where points lie closer by this part
+_CLEARLY = 0.1
+# part of the progress when pictures are matched, and placed
+_FOUND, _MATCHED = 0.4, 0.7
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """A model that was made.
+
+    Attributes
+    ----------
+    folder : Path
+        Where it is.
+    placed : tuple of str
+        Names of the pictures whose cameras are known.
+    left_out : tuple of str
+        Those of the others.
+    error : float
+        Mean distance of the points in the pictures from where the model has them, pixels.
+    notes : tuple of str
+        What :func:`sepi.read_cameras` will say of the cameras: how flat they stand, and what it leaves out.
+    unusable : str or None
+        Why they make no light field; None where they do.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from sepi.cameras.calibration import Calibration
+    >>> made = Calibration(Path("sweep-cameras"), ("1.jpg", "2.jpg"), ("3.jpg",), 0.4, (), None)
+    >>> len(made.placed), made.left_out
+    (2, ('3.jpg',))
+    """
+
+    folder: Path
+    placed: tuple[str, ...]
+    left_out: tuple[str, ...]
+    error: float
+    notes: tuple[str, ...]
+    unusable: str | None
+
+
+def calibrate(
+    folder: str | Path,
+    output: str | Path,
+    *,
+    lens: str = "SIMPLE_RADIAL",
+    cameras: str = "one",
+    force: bool = False,
+    threads: int | None = None,
+    progress: Progress = no_progress,
+) -> Calibration:
+    """Find the cameras that took the pictures of a folder, and write them as a COLMAP model.
+
+    Parameters
+    ----------
+    folder : str or Path
+        Pictures, and nothing in folders below it.
+    output : str or Path
+        Folder to make; an empty one may exist.
+    lens : str
+        COLMAP's name of the lens model.
+    cameras : str
+        One of :data:`CAMERAS`.
+    force : bool
+        Go on whatever a quick look at a few pictures says.
+    threads : int, optional
+        One per core unless given.
+    progress : callable
+        Told the fraction that is done.
+
+    Returns
+    -------
+    Calibration
+
+    Raises
+    ------
+    SepiError
+        If pycolmap (extra ``sepi[colmap]``) is not installed, the pictures are no sweep of one scene, or the output is
+        there already.
+
+    Examples
+    --------
+    >>> import cv2
+    >>> import numpy as np
+    >>> from pathlib import Path
+    >>> from sepi import Camera
+    >>> from sepi.cameras.calibration import calibrate
+    >>> from sepi.scenes import render
+    >>> views = render("curved_occluders", size=128, views=3).views
+    >>> Path("sweep").mkdir()
+    >>> for view, (t, s) in enumerate(np.ndindex(3, 3)):
+    ...     written = cv2.imwrite(f"sweep/{view}.png", views[t, s, :, :, ::-1])
+    >>> made = calibrate("sweep", "sweep-cameras", threads=1)
+    >>> len(made.placed), made.unusable
+    (9, None)
+    """
+    folder, output = Path(folder), Path(output)
+    require_known("lens", [lens], LENS_MODELS)
+    require_known("cameras", [cameras], CAMERAS)
+    pycolmap = require_pycolmap(str(folder))
+    pictures = pictures_in(folder)
+    finding = Finding(lens, cameras == "each", threads or available_cores(), _SIDE)
+    with atomic_folder(output) as temporary, colmap(folder):
+        if not force:
+            require_motion(pycolmap, folder, pictures, finding)
+        work = temporary / "work"
+        work.mkdir()
+        database = work / "database.db"
+        write_features(pycolmap, database, pictures, finding, lambda done: progress(_FOUND * done))
+        with pycolmap.Database.open(str(database)) as file:
+            camera = file.read_all_cameras()[0]
+        match(
+            pycolmap,
+            database,
+            pairs_of([path.name for path in pictures]),
+            tolerance(camera.width, camera.height),
+            finding.threads,
+            lambda done: progress(_FOUND + (_MATCHED - _FOUND) * done),
+        )
+        model = _placed(pycolmap, folder, database, camera, len(pictures), progress)
+        model = _with_free_lens(pycolmap, model)
+        sparse = temporary / "sparse" / "0"
+        sparse.mkdir(parents=True)
+        model.write_text(str(sparse))
+        # where to look for the pictures
+        beside = os.path.relpath(folder.resolve(), Path(os.path.realpath(output)))
+        (temporary / PROJECT).write_text(f"image_path = {beside}\n", "utf-8")
+        shutil.rmtree(work)
+    placed = {image.name for image in model.images.values() if image.has_pose}
+    notes, unusable = _checked(output)
+    return Calibration(
+        output,
+        tuple(path.name for path in pictures if path.name in placed),
+        tuple(path.name for path in pictures if path.name not in placed),
+        float(model.compute_mean_reprojection_error()),
+        notes,
+        unusable,
+    )
+
+
+def pictures_in(folder: Path) -> list[Path]:
+    """Pictures of a folder, in the order of their names, numbers by their values.
+
+    Raises
+    ------
+    SepiError
+        If there are fewer than two.
+    """
+    if not folder.is_dir():
+        raise SepiError(f"{folder}: no folder of pictures")
+    found = [path for path in folder.iterdir() if path.suffix.lower() in SUFFIXES and path.name[0] != "."]
+    if len(found) < 2:
+        what = "no pictures" if not found else "one picture alone"
+        raise SepiError(f"{folder}: {what}; expected two or more of one scene, from different places, by one camera")
+    odd = next((path for path in found if not path.name.isprintable() or re.search(r"\s", path.name)), None)
+    if odd is not None:
+        raise SepiError(f"{odd}: COLMAP's files take no names with spaces; expected a name without them")
+    return sorted(found, key=lambda path: [int(part) if part.isdigit() else part for part in _parts(path.name)])
+
+
+def _parts(name: str) -> list[str]:
+    # words and numbers by turns, beginning with a word
+    return re.split(r"([0-9]+)", name)
+
+
+def pairs_of(names: Sequence[str]) -> list[tuple[str, str]]:
+    """Pairs of pictures to match: all of a few; of many each with those some steps on, nearer ones more closely."""
+    if len(names) <= _ALL_PAIRS:
+        return list(combinations(names, 2))
+    return [(names[n], names[n + step]) for n in range(len(names)) for step in _STEPS if n + step < len(names)]
+
+
+def _placed(pycolmap: Any, folder: Path, database: Path, camera: Any, count: int, progress: Progress) -> Any:
+    """The model of most pictures that is found, with lenses as they are in the database."""
+    best: Any = None
+    for attempt, angle in enumerate(_FIRST_ANGLES):
+        model = _mapped(pycolmap, folder, database, camera, angle, count, progress)
+        if model is not None and (best is None or model.num_reg_images() > best.num_reg_images()):
+            best = model
+        if best is not None and best.num_reg_images() >= _ENOUGH * count:
+            break
+        progress(_MATCHED + (1 - _MATCHED) * attempt / len(_FIRST_ANGLES))
+    if best is None:
+        raise SepiError(
+            f"{folder}: no two pictures tell where their cameras stood; the camera moved too little, or the way it "
+            "looks, or the pictures have too little in common; expected a sweep sideways past a scene with texture"
+        )
+    return best
+
+
+def _mapped(
+    pycolmap: Any, folder: Path, database: Path, camera: Any, angle: float, count: int, progress: Progress
+) -> Any:
+    """The largest model whose first two pictures see points by at least an angle, degrees; None where there is none."""
+    size = tolerance(camera.width, camera.height)
+    least = min(_MOST_ANGLE, float(np.degrees(_POINT_ANGLE * size / camera.mean_focal_length())))
+    options = pycolmap.IncrementalPipelineOptions()
+    # with one thread sums are the same each time
+    options.random_seed, options.num_threads = SEED, 1
+    options.multiple_models, options.min_model_size = False, 2
+    options.min_num_matches, options.init_num_trials = _PLACED_MATCHES, _FIRST_PAIRS
+    options.ba_refine_focal_length = options.ba_refine_extra_params = False
+    mapper, triangulation = options.mapper, options.triangulation
+    mapper.random_seed = triangulation.random_seed = SEED
+    mapper.num_threads = 1
+    mapper.abs_pose_refine_focal_length = mapper.abs_pose_refine_extra_params = False
+    mapper.init_min_tri_angle = mapper.ba_local_min_tri_angle = angle
+    mapper.init_min_num_inliers, mapper.abs_pose_min_num_inliers = _FIRST_MATCHES, _PLACED_MATCHES
+    mapper.init_max_error = size
+    mapper.abs_pose_max_error = 2 * size
+    mapper.filter_max_reproj_error = triangulation.merge_max_reproj_error = 2 * size
+    triangulation.complete_max_reproj_error = 2 * size
+    mapper.filter_min_tri_angle = triangulation.min_angle = least
+    done = 2
+
+    def one_more() -> None:
+        nonlocal done
+        done += 1
+        progress(_MATCHED + (1 - _MATCHED) * min(1.0, done / count))
+
+    made = database.parent / "models"
+    made.mkdir(exist_ok=True)
+    found = pycolmap.incremental_mapping(str(database), str(folder), str(made), options, next_image_callback=one_more)
+    return max(found.values(), key=lambda model: model.num_reg_images(), default=None)
+
+
+def _with_free_lens(pycolmap: Any, model: Any) -> Any:
+    """The model with focal length and distortion as its points tell them; itself where they tell nothing clearly."""
+    freed = pycolmap.Reconstruction(model)
+    options = pycolmap.BundleAdjustmentOptions()
+    options.print_summary = False
+    options.ceres.solver_options.num_threads = 1
+    config = pycolmap.BundleAdjustmentConfig()
+    for image in freed.reg_image_ids():
+        config.add_image(image)
+    config.fix_gauge(pycolmap.BundleAdjustmentGauge.TWO_CAMS_FROM_WORLD)
+    pycolmap.create_default_bundle_adjuster(options, config, freed).solve()
+    freed.update_point_3d_errors()
+    model.update_point_3d_errors()
+    closer = freed.compute_mean_reprojection_error() < (1 - _CLEARLY) * model.compute_mean_reprojection_error()
+    return freed if closer else model
+
+
+def _checked(output: Path) -> tuple[tuple[str, ...], str | None]:
+    """What is said of the cameras when they are read, and why they cannot be."""
+    try:
+        return rectification_of(read_model(output)).notes, None
+    except SepiError as error:
+        return (), str(error)

@@ -1,0 +1,99 @@
+"""Calibrated cameras of a COLMAP model, text or binary, rigs included; by pycolmap."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sepi.cameras.model import CameraModel
+from sepi.cameras.pictures import Pictures, mask_of
+from sepi.errors import SepiError
+from sepi.io.files import reading
+from sepi.rig import FISHEYE, PINHOLE, Lens, Shot
+
+# model to lens, and the places of its parameters: fx, fy, cx, cy, then OpenCV's coefficients; -1: zero
+_MODELS: dict[str, tuple[str, tuple[int, int, int, int], tuple[int, ...]]] = {
+    "SIMPLE_PINHOLE": (PINHOLE, (0, 0, 1, 2), ()),
+    "PINHOLE": (PINHOLE, (0, 1, 2, 3), ()),
+    "SIMPLE_RADIAL": (PINHOLE, (0, 0, 1, 2), (3,)),
+    "RADIAL": (PINHOLE, (0, 0, 1, 2), (3, 4)),
+    "OPENCV": (PINHOLE, (0, 1, 2, 3), (4, 5, 6, 7)),
+    "FULL_OPENCV": (PINHOLE, (0, 1, 2, 3), (4, 5, 6, 7, 8, 9, 10, 11)),
+    "OPENCV_FISHEYE": (FISHEYE, (0, 1, 2, 3), (4, 5, 6, 7)),
+    "SIMPLE_RADIAL_FISHEYE": (FISHEYE, (0, 0, 1, 2), (3,)),
+    "RADIAL_FISHEYE": (FISHEYE, (0, 0, 1, 2), (3, 4)),
+}
+LENS_MODELS = tuple(_MODELS)
+"""COLMAP's names of the lens models that can be read."""
+
+
+def read_colmap(folder: Path, pictures: Pictures) -> CameraModel:
+    """Read the cameras of a COLMAP model.
+
+    Raises
+    ------
+    SepiError
+        If pycolmap is not installed, the model is damaged or empty, a lens is of another kind, or a picture is not
+        there.
+    """
+    pycolmap = require_pycolmap(str(folder))
+    with reading(folder, "COLMAP model"):
+        try:
+            model = pycolmap.Reconstruction(str(folder))
+            # names that are no text are errors, too
+            images = sorted((image for image in model.images.values() if image.has_pose), key=lambda image: image.name)
+        except (ValueError, RuntimeError, IndexError, KeyError) as error:
+            raise SepiError(f"not a COLMAP model, or damaged ({str(error).splitlines()[0][:120]})") from error
+    if not images:
+        raise SepiError(f"{folder}: a COLMAP model without pictures")
+    shots = tuple(_shot(folder, image, model.cameras[image.camera_id]) for image in images)
+    points = np.array([point.xyz for point in model.points3D.values()], np.float64).reshape(-1, 3)
+    files = tuple(pictures.find(image.name) for image in images)
+    masks = tuple(mask_of(file, image.name) for file, image in zip(files, images, strict=True))
+    return CameraModel(folder, shots, files, points, masks=masks)
+
+
+def require_pycolmap(where: str) -> Any:
+    """pycolmap, or an error that says how to get it."""
+    # loaded before OpenCV it makes that write PNG by other copies of its libraries, and crash
+    import cv2  # noqa: F401
+
+    try:
+        import pycolmap
+    except ImportError as error:
+        raise SepiError(f"{where}: COLMAP's models need pycolmap: pip install 'sepi[colmap]'") from error
+    # it ends the program by itself where that is to end, and unfinished files stay
+    before = signal.getsignal(signal.SIGTERM)
+    if before is not None and threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGTERM, before)
+    # it tells everything it does on the standard error
+    pycolmap.logging.minloglevel = pycolmap.logging.Level.FATAL  # type: ignore[assignment]
+    return pycolmap
+
+
+def _shot(folder: Path, image: Any, camera: Any) -> Shot:
+    word = camera.model.name
+    if word not in _MODELS:
+        raise SepiError(f"{folder}: {image.name}: camera model {word}; expected one of {', '.join(_MODELS)}")
+    kind, (fx, fy, cx, cy), places = _MODELS[word]
+    values = [float(value) for value in camera.params]
+    # from the corner of the picture to the middle of its first pixel
+    principal = values[cx] - 0.5, values[cy] - 0.5
+    try:
+        lens = Lens(
+            int(camera.width),
+            int(camera.height),
+            (values[fx], values[fy]),
+            principal,
+            kind,
+            tuple(values[place] for place in places),
+        )
+    except SepiError as error:
+        raise SepiError(f"{folder}: {image.name}: {error}") from error
+    pose = image.cam_from_world()
+    rotation = np.array(pose.rotation.matrix(), np.float64)
+    return Shot(image.name, lens, rotation, -rotation.T @ np.array(pose.translation, np.float64))

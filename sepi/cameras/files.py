@@ -1,0 +1,91 @@
+"""Files of calibrated cameras: which kind a path is of, and reading it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from sepi.cameras.model import CameraModel
+
+TABLES = ("cameras.csv", "cameras.yaml", "cameras.yml")
+"""Names of tables in a folder."""
+
+TRANSFORMS = "transforms.json"
+
+TABLE_SUFFIXES = tuple(Path(name).suffix for name in TABLES)
+
+# where COLMAP and others put a model below a folder
+_INSIDE = (".", "sparse/0", "sparse", "colmap/sparse/0", "0")
+_FILES = ("cameras", "images", "points3D")
+MODEL_FILES = (*_FILES, "rigs", "frames")
+"""What the files of a model are called, whatever their ending; the last two are those of newer versions alone."""
+
+
+def cameras_in(path: Path) -> Path | None:
+    """The file or folder that says of cameras at ``path``; None where there is none. Quick, and never raises."""
+    try:
+        if path.is_dir():
+            for name in (*TABLES, TRANSFORMS):
+                if (path / name).is_file():
+                    return path / name
+            return model_in(path)
+        if path.is_file() and (path.suffix.lower() in TABLE_SUFFIXES or path.name.startswith("transforms")):
+            return path if path.suffix.lower() in (*TABLE_SUFFIXES, ".json") else None
+        # a file of a COLMAP model, as others name it
+        return model_in(path.parent) if path.is_file() and path.stem in ("cameras", "images") else None
+    except OSError:
+        return None
+
+
+def model_in(folder: Path) -> Path | None:
+    """The folder of a COLMAP model in a folder, where there is one."""
+    for inside in _INSIDE:
+        place = folder / inside
+        if any(all((place / f"{name}{end}").is_file() for name in _FILES) for end in (".bin", ".txt")):
+            return place
+    return None
+
+
+def described_by(found: Path) -> tuple[Path, ...]:
+    """The files that say of the cameras which :func:`cameras_in` found."""
+    return tuple(sorted(path for path in found.iterdir() if path.stem in MODEL_FILES)) if found.is_dir() else (found,)
+
+
+def read_model(path: Path, images: str | None = None) -> CameraModel:
+    """Read calibrated cameras of any known format.
+
+    Parameters
+    ----------
+    path : Path
+        File or folder.
+    images : str, optional
+        Folder of the pictures.
+
+    Raises
+    ------
+    SepiError
+        If there are none, the file is damaged, or pictures are missing.
+    """
+    # asked of every path that is read: what reads one kind is imported when it is there
+    from sepi.cameras.pictures import Pictures
+    from sepi.errors import SepiError
+
+    found = cameras_in(path)
+    if found is None:
+        raise SepiError(
+            f"{path}: no calibrated cameras; expected a COLMAP model (cameras, images and points3D, .txt or .bin), "
+            f"{TRANSFORMS}, or a table {', '.join(TABLES)}"
+        )
+    pictures = Pictures(found, None if images is None else Path(images).expanduser())
+    if found.is_dir():
+        from sepi.cameras.colmap_model import read_colmap
+
+        return read_colmap(found, pictures)
+    if found.suffix.lower() == ".json":
+        from sepi.cameras.transforms import read_transforms
+
+        return read_transforms(found, pictures)
+    from sepi.cameras.table import read_table
+
+    return read_table(found, pictures)

@@ -1,0 +1,110 @@
+"""What files of calibrated cameras hold, and what they must not hold."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import combinations
+from pathlib import Path
+
+import numpy as np
+
+from sepi.errors import SepiError
+from sepi.rig import Floats, Shot
+
+UNITS_OF_MODEL = "units of the model"
+
+# what counts as one place, as part of the distance of the farthest cameras
+_SAME_PLACE = 1e-6
+# degrees between the ways that two cameras of one light field may look
+_MOST_TURNED = 60.0
+# part of the model's points that must lie before the cameras
+_BEFORE = 0.5
+
+
+@dataclass(frozen=True)
+class CameraModel:
+    """Calibrated cameras, and where their pictures are.
+
+    Attributes
+    ----------
+    path : Path
+        What was read, for messages.
+    shots : tuple of Shot
+    pictures : tuple of Path
+        The picture of each.
+    points : ndarray, shape (N, 3), float64
+        Points of the scene in the world; none in most files.
+    units : str
+        What the world's lengths are.
+    masks : tuple of Path or None
+        Pictures that are black where those are not to be used, None for all of a picture; empty: there is none.
+    """
+
+    path: Path
+    shots: tuple[Shot, ...]
+    pictures: tuple[Path, ...]
+    points: Floats
+    units: str = UNITS_OF_MODEL
+    masks: tuple[Path | None, ...] = ()
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """All pictures and their masks."""
+        return (*self.pictures, *(mask for mask in self.masks if mask is not None))
+
+    @property
+    def centres(self) -> Floats:
+        """Where the cameras stand, (N, 3)."""
+        return np.array([shot.centre for shot in self.shots])
+
+    @property
+    def axes(self) -> Floats:
+        """The ways that they look, (N, 3)."""
+        return np.array([shot.rotation[2] for shot in self.shots])
+
+    def without(self, names: tuple[str, ...]) -> CameraModel:
+        """The model without some of its pictures, by the names of their files with or without folders."""
+        known = {word for shot in self.shots for word in (shot.name, Path(shot.name).name)}
+        for name in names:
+            if name not in known:
+                some = ", ".join(sorted(known)[:3])
+                raise SepiError(f"{self.path}: picture '{name}' to exclude: there is none (found: {some}, ...)")
+        kept = [n for n, shot in enumerate(self.shots) if not {shot.name, Path(shot.name).name} & set(names)]
+        return self.of(kept)
+
+    def of(self, kept: list[int]) -> CameraModel:
+        """The model with these cameras alone."""
+        shots, pictures = tuple(self.shots[n] for n in kept), tuple(self.pictures[n] for n in kept)
+        return replace(self, shots=shots, pictures=pictures, masks=tuple(self.masks[n] for n in kept if self.masks))
+
+    def require_sound(self) -> None:
+        """Raise for cameras that make no light field, whatever they show.
+
+        Raises
+        ------
+        SepiError
+            If there are fewer than two, two stand at one place, look at each other, or have the scene behind them.
+        """
+        if len(self.shots) < 2:
+            raise SepiError(f"{self.path}: depth needs at least two cameras, got {len(self.shots)}")
+        names = [shot.name for shot in self.shots]
+        centres, axes = self.centres, self.axes
+        extent = float(np.linalg.norm(np.ptp(centres, axis=0)))
+        for one, other in combinations(range(len(names)), 2):
+            if np.linalg.norm(centres[one] - centres[other]) <= _SAME_PLACE * extent:
+                raise SepiError(
+                    f"{self.path}: {names[one]} and {names[other]} stand at one place; leave one of them out "
+                    f"(--exclude {names[other]})"
+                )
+        turned = np.degrees(np.arccos(np.clip(axes @ axes.T, -1, 1)))
+        one, other = divmod(int(turned.argmax()), len(turned))
+        if turned[one, other] > _MOST_TURNED:
+            raise SepiError(
+                f"{self.path}: {names[one]} and {names[other]} look {turned[one, other]:.0f} degrees apart; expected "
+                f"cameras that look much the same way, at most {_MOST_TURNED:.0f} degrees apart"
+            )
+        if len(self.points) and np.mean((self.points - centres.mean(axis=0)) @ axes.mean(axis=0) > 0) < _BEFORE:
+            raise SepiError(
+                f"{self.path}: the scene's points lie behind the cameras; expected poses of cameras that look along "
+                "their z axis, y pointing down (OpenCV), not backwards with y up (OpenGL)"
+            )

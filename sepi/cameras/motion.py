@@ -1,0 +1,154 @@
+"""Whether pictures without poses can become a light field: a quick look at a few, small, before hours are spent.
+
+What it says is a guess, as the focal length is one where the files do not tell it: only what is far from what
+:mod:`sepi.cameras.rectification` takes is refused here.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+
+from sepi.cameras.features import SEED, Finding, colmap, match, matched_points, tolerance, write_features
+from sepi.errors import SepiError
+from sepi.rig import Floats
+from sepi.stage import no_progress
+
+# how many pictures are looked at, spread over all of them, and the longer side of each, pixels
+_LOOKED_AT, _LOOK = 6, 640
+# features below which a picture shows next to nothing; matches below which two show different things
+_FEATURES, _MATCHES = 40, 20
+# part of the matches, of which some are false, that tells how far things move against each other; pixels of such
+# movement, in pictures of the size looked at, below which there is none, and from which its direction is sure
+_MOST, _NARROW, _FIRM = 0.85, 0.8, 1.5
+# degrees: between the motion and the way the cameras look; between the ways that two of them look
+_AHEAD, _TURNED = 30.0, 60.0
+
+
+@dataclass(frozen=True)
+class Step:
+    """How the camera got from one picture to another.
+
+    Attributes
+    ----------
+    names : (str, str)
+    parallax : float
+        How far things move against each other, pixels.
+    ahead : float or None
+        Degrees from the way that the first looks to where the second stands; None where that is not known.
+    turned : float
+        Degrees between the ways that they look.
+    """
+
+    names: tuple[str, str]
+    parallax: float
+    ahead: float | None
+    turned: float
+
+
+def require_motion(pycolmap: Any, folder: Path, pictures: Sequence[Path], finding: Finding) -> None:
+    """Raise where the camera hardly moved, moved along the way that it looks, or turned too far.
+
+    Raises
+    ------
+    SepiError
+        Of that, and where the pictures show next to nothing, or nothing that two of them show.
+    """
+    chosen = np.unique(np.rint(np.linspace(0, len(pictures) - 1, _LOOKED_AT)).astype(int)).tolist()
+    # neighbours, where those far apart have nothing in common
+    looked_at = [pictures[n] for n in sorted({*chosen, 1})]
+    with tempfile.TemporaryDirectory() as place, colmap(folder):
+        database = Path(place) / "look.db"
+        counts = write_features(pycolmap, database, looked_at, replace(finding, side=_LOOK), no_progress)
+        poor = [path.name for path, count in zip(looked_at, counts, strict=True) if count < _FEATURES]
+        if 2 * len(poor) > len(counts):
+            raise SepiError(
+                f"{folder}: hardly anything to recognise in {_listed(poor)}; expected pictures with texture, in focus "
+                "and well lit"
+            )
+        with pycolmap.Database.open(str(database)) as file:
+            camera = file.read_all_cameras()[0]
+        names = [path.name for path in looked_at]
+        size = tolerance(camera.width, camera.height) * max(1.0, max(camera.width, camera.height) / _LOOK)
+        match(pycolmap, database, list(combinations(names, 2)), size, finding.threads, no_progress)
+        with pycolmap.Database.open(str(database)) as file:
+            steps = _steps(pycolmap, file, size)
+    require_sideways(folder, names, steps, max(1.0, max(camera.width, camera.height) / _LOOK))
+
+
+def require_sideways(folder: Path, names: Sequence[str], steps: Sequence[Step], unit: float) -> None:
+    """Raise for steps of a camera that make no light field; ``unit`` is the width of a pixel that was looked at."""
+    if not steps:
+        raise SepiError(
+            f"{folder}: no two of {_listed(names)} show the same; expected pictures of one scene in which nothing "
+            "moves, each from a little beside the last"
+        )
+    widest = max(steps, key=lambda step: step.parallax)
+    if widest.parallax < _NARROW * unit:
+        raise SepiError(
+            f"{folder}: from {widest.names[0]} to {widest.names[1]} things move by {widest.parallax:.1f} pixels "
+            "against each other: the camera turned but hardly moved, or the scene is flat; expected a camera that "
+            f"moves sideways, so that near things move by {4 * _NARROW * unit:.0f} pixels or more against far ones"
+        )
+    turned = max(steps, key=lambda step: step.turned)
+    if turned.turned > _TURNED:
+        raise SepiError(
+            f"{folder}: {turned.names[0]} and {turned.names[1]} look about {turned.turned:.0f} degrees apart; expected "
+            f"a camera that looks much the same way in all pictures, at most {_TURNED:.0f} degrees apart"
+        )
+    firm = [step.ahead for step in steps if step.ahead is not None and step.parallax >= _FIRM * unit]
+    if firm and np.median(firm) < _AHEAD:
+        raise SepiError(
+            f"{folder}: the camera moves along the way that it looks (about {np.median(firm):.0f} degrees from it); "
+            "expected it to move across it, by 45 to 90 degrees"
+        )
+
+
+def _listed(names: Sequence[str]) -> str:
+    return ", ".join(names[:3]) + (f" and {len(names) - 3} more" if len(names) > 3 else "")
+
+
+def _steps(pycolmap: Any, file: Any, size: float) -> list[Step]:
+    options = pycolmap.TwoViewGeometryOptions()
+    options.ransac.random_seed, options.ransac.max_error, options.compute_relative_pose = SEED, size, True
+    steps = []
+    for one, other in combinations(sorted(file.read_all_images(), key=lambda image: image.image_id), 2):
+        here, there, pairs = matched_points(file, one.image_id, other.image_id)
+        if len(pairs) < _MATCHES:
+            continue
+        cameras = [file.read_camera(image.camera_id) for image in (one, other)]
+        found = pycolmap.estimate_calibrated_two_view_geometry(cameras[0], here, cameras[1], there, pairs, options)
+        motion = found.cam2_from_cam1
+        if len(found.inlier_matches) < _MATCHES or motion is None:
+            continue
+        rotation = np.array(motion.rotation.matrix())
+        place = -rotation.T @ np.array(motion.translation)
+        length = float(np.linalg.norm(place))
+        steps.append(
+            Step(
+                (one.name, other.name),
+                _parallax(here[pairs[:, 0]], there[pairs[:, 1]], size),
+                float(np.degrees(np.arccos(min(1.0, abs(place[2]) / length)))) if length else None,
+                float(np.degrees(np.arccos(np.clip(rotation[2, 2], -1, 1)))),
+            )
+        )
+    return steps
+
+
+def _parallax(here: Floats, there: Floats, size: float) -> float:
+    """Pixels by which things move against each other: what is left when one picture is laid over the other as well as a
+    camera that only turns allows.
+    """
+    cv2.setRNGSeed(SEED)
+    turned, _ = cv2.findHomography(here, there, cv2.RANSAC, size)
+    if turned is None:
+        return 0.0
+    moved = cv2.perspectiveTransform(here[:, None], turned)[:, 0]
+    return float(np.quantile(np.linalg.norm(moved - there, axis=1), _MOST))

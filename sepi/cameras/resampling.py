@@ -1,0 +1,142 @@
+"""Pictures of calibrated cameras, turned, undistorted and brought to one brightness by one interpolation each."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from sepi.cameras.frame import Frame, Seeing
+from sepi.errors import SepiError
+from sepi.io.images import read_picture
+from sepi.lightfield import BoolMap, FloatMap, as_unit_float
+from sepi.rig import Floats
+
+# order of the splines: the third blurs more, which costs accuracy at silhouettes
+_SPLINES = 5
+# samples this close to pixels are these pixels
+_ON_PIXEL = 1e-6
+# values that tell of brightness, full range = 1: neither black nor burnt out
+_DARKEST, _BRIGHTEST = 0.03, 0.97
+# blur before brightness is compared, pixels; part of the picture's pixels that must be comparable
+_BLUR = 2.0
+_COMPARABLE = 0.02
+# gains of all views within this of one are none
+_ALIKE = 0.02
+
+
+def rectified_view(seeing: Seeing, frame: Frame, view: int) -> tuple[FloatMap, BoolMap]:
+    """A view's pixels (H, W, C) of float32 in 0..1, but for what interpolation overshoots, and which it does not show.
+
+    The latter are 0. By splines of the fifth order: they blur less than the same number of samples weighted directly.
+    """
+    from scipy import ndimage
+
+    height, width = frame.shape
+    # the frame's first pixel, as the reference's own picture counts
+    first = np.subtract(seeing.principal, frame.principal)
+    pixels = (
+        np.stack(np.meshgrid(np.arange(width), np.arange(height)), axis=-1).reshape(-1, 2).astype(np.float64) + first
+    )
+    at = seeing.pixels(view, pixels)[:, ::-1].T
+    absent = np.isnan(at[0])
+    at = np.where(absent, 0, at)
+    picture, unusable = _picture(seeing, view), _masked(seeing, view)
+    if np.abs(at - np.rint(at)).max() < _ON_PIXEL:
+        row, column = np.rint(at).astype(int)
+        found = picture[row, column]
+    else:
+        # samples between pixels take from the four round them, most of all
+        unusable = np.asarray(cv2.dilate(unusable, np.ones((3, 3), np.uint8)), np.uint8)
+        channels = [
+            ndimage.map_coordinates(picture[..., c], at, np.float32, order=_SPLINES, mode="mirror")
+            for c in range(picture.shape[2])
+        ]
+        found = np.clip(np.stack(channels, axis=-1), -0.5, 1.5)
+    absent |= unusable[tuple(np.rint(at).astype(int))] > 0
+    found = np.where(absent[:, None], 0, found).reshape(height, width, -1)
+    return np.asarray(found, np.float32), absent.reshape(height, width)
+
+
+def completed(view: FloatMap, missing: BoolMap) -> FloatMap:
+    """A view (H, W, C) that has at missing pixels (H, W) what the nearest other one shows."""
+    if missing.all() or not missing.any():
+        return view
+    from scipy import ndimage
+
+    row, column = ndimage.distance_transform_edt(missing, return_distances=False, return_indices=True)
+    return np.asarray(view[row, column])
+
+
+def _picture(seeing: Seeing, view: int) -> FloatMap:
+    path, lens = seeing.model.pictures[view], seeing.model.shots[view].lens
+    picture = read_picture(path)
+    if picture.shape[:2] != (lens.height, lens.width):
+        raise SepiError(
+            f"{path}: {picture.shape[1]}x{picture.shape[0]} pixels, but its camera has {lens.width}x{lens.height}; "
+            "expected the pictures that were calibrated, neither scaled nor turned"
+        )
+    return as_unit_float(picture if picture.ndim == 3 else picture[..., None])
+
+
+def _masked(seeing: Seeing, view: int) -> npt.NDArray[np.uint8]:
+    """1 where a picture is not to be used, else 0."""
+    lens, masks = seeing.model.shots[view].lens, seeing.model.masks
+    path = masks[view] if masks else None
+    if path is None:
+        return np.zeros((lens.height, lens.width), np.uint8)
+    mask = read_picture(path)
+    if mask.shape[:2] != (lens.height, lens.width):
+        raise SepiError(
+            f"{path}: {mask.shape[1]}x{mask.shape[0]} pixels; expected a mask as large as its picture, "
+            f"{lens.width}x{lens.height}"
+        )
+    return np.asarray(mask.reshape(lens.height, lens.width, -1)[..., 0] == 0, np.uint8)
+
+
+def gains(reference: FloatMap, view: FloatMap, shown: BoolMap) -> Floats:
+    """What to multiply each channel of a view by to be as bright as the reference view where both see the same, (C,).
+
+    ``shown`` tells which of its pixels (H, W) the view has.
+
+    Pictures are laid over each other by the one shift that fits best, and the ratio is the median over all pixels: what
+    is hidden, or moves by more, is outvoted.
+    """
+    shift, _ = cv2.phaseCorrelate(
+        _grey(reference), _grey(view), cv2.createHanningWindow(_grey(view).shape[::-1], cv2.CV_32F)
+    )
+    across, down = np.rint(shift).astype(int)
+    height, width = view.shape[:2]
+    if abs(across) > width // 2 or abs(down) > height // 2:
+        across = down = 0
+    there = view[max(0, down) : height + min(0, down), max(0, across) : width + min(0, across)]
+    has = shown[max(0, down) : height + min(0, down), max(0, across) : width + min(0, across)]
+    here = reference[max(0, -down) : height + min(0, -down), max(0, -across) : width + min(0, -across)]
+    found = np.ones(view.shape[2])
+    for c in range(view.shape[2]):
+        one, other = (cv2.GaussianBlur(np.ascontiguousarray(part[..., c]), (0, 0), _BLUR) for part in (here, there))
+        both = has & (np.minimum(one, other) > _DARKEST)
+        both &= np.maximum(one, other) < _BRIGHTEST
+        if both.mean() >= _COMPARABLE:
+            found[c] = np.exp(np.median(np.log(one[both]) - np.log(other[both])))
+    return found
+
+
+def equalized(
+    views: npt.NDArray[np.float32], shown: npt.NDArray[np.bool_], reference: int
+) -> tuple[npt.NDArray[np.float32], float]:
+    """Views (N, H, W, C) as bright as the reference, and the greatest change as a part; as they are where all are.
+
+    ``shown`` tells which of their pixels (N, H, W) they have.
+    """
+    factors = np.array([gains(views[reference], view, has) for view, has in zip(views, shown, strict=True)])
+    factors[reference] = 1
+    change = float(np.abs(np.log(factors)).max())
+    if change <= _ALIKE:
+        return views, 0.0
+    # nothing may be brighter than white
+    return np.clip(views * factors[:, None, None].astype(np.float32), -0.5, 1.5), float(np.expm1(change))
+
+
+def _grey(view: FloatMap) -> FloatMap:
+    return np.ascontiguousarray(view.mean(axis=2), np.float32)

@@ -1,0 +1,153 @@
+"""Calibrated cameras in a table of one's own: CSV, or YAML.
+
+docs/depth/calibrated_cameras.md describes both. A row of a CSV, or an entry of ``cameras`` in a YAML file, is a
+picture: ``file``, the camera's place, its rotation from the world's axes, and its lens. What all pictures share stands
+once in the YAML file, below ``shared``.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+import yaml
+from pydantic import Field
+from scipy.spatial.transform import Rotation
+
+from sepi.cameras.model import UNITS_OF_MODEL, CameraModel
+from sepi.cameras.pictures import Pictures
+from sepi.errors import SepiError, one_line
+from sepi.io.files import reading
+from sepi.io.images import picture_header
+from sepi.rig import FISHEYE, METRES, MOST_COEFFICIENTS, PINHOLE, Floats, Lens, Shot
+from sepi.validation import CheckedModel, validated
+
+# a table is short; what is longer is something else
+_MOST_BYTES = 16 * 2**20
+# what a matrix may be from a rotation, and a quaternion's length from 1: what was typed with a few digits
+_NEARLY = 1e-2
+
+_Number = Annotated[float, Field(allow_inf_nan=False)]
+_Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+_PLACE = ("x", "y", "z")
+_ROTATION = ("qw", "qx", "qy", "qz")
+_DISTORTION = {PINHOLE: ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"), FISHEYE: ("k1", "k2", "k3", "k4")}
+_COLUMNS = ("file", *_PLACE, *_ROTATION, "fx", "fy", "cx", "cy", "lens", *_DISTORTION[PINHOLE])
+
+
+class _Camera(CheckedModel):
+    file: str = Field(min_length=1)
+    position: tuple[_Number, _Number, _Number]
+    rotation: list[_Number] | list[list[_Number]] = Field([1.0, 0.0, 0.0, 0.0])
+    focal: _Positive | tuple[_Positive, _Positive]
+    principal: tuple[_Number, _Number] | None = None
+    lens: Literal["pinhole", "fisheye"] = "pinhole"
+    distortion: list[_Number] = Field([], max_length=MOST_COEFFICIENTS[PINHOLE])
+
+
+class _Table(CheckedModel):
+    units: Literal["metres", "unknown"] = "unknown"
+    shared: dict[str, Any] = Field({})
+    cameras: list[dict[str, Any]] = Field(min_length=1)
+
+
+def read_table(path: Path, pictures: Pictures) -> CameraModel:
+    """Read a table of cameras.
+
+    Raises
+    ------
+    SepiError
+        If it is damaged, a key is missing, unknown or no number, or a picture is not there.
+    """
+    with reading(path, "table of cameras"):
+        if path.stat().st_size > _MOST_BYTES:
+            raise SepiError("not a table of cameras: too long")
+        text = path.read_text(encoding="utf-8-sig")
+    entries = _rows(path, text) if path.suffix.lower() == ".csv" else None
+    if entries is None:
+        table = validated(_Table, _loaded(path, text), str(path))
+        entries, metres = [{**table.shared, **entry} for entry in table.cameras], table.units == "metres"
+    else:
+        metres = False
+    cameras = [validated(_Camera, entry, f"{path}: camera {n}") for n, entry in enumerate(entries, 1)]
+    files = [pictures.find(camera.file) for camera in cameras]
+    shots = tuple(_shot(path, camera, pictures, file) for camera, file in zip(cameras, files, strict=True))
+    return CameraModel(path, shots, tuple(files), np.zeros((0, 3)), METRES if metres else UNITS_OF_MODEL)
+
+
+def _loaded(path: Path, text: str) -> Any:
+    try:
+        loaded = yaml.safe_load(text)
+    except (yaml.YAMLError, RecursionError, ValueError) as error:
+        raise SepiError(f"{path}: not YAML: {one_line(str(error))[:120]}") from error
+    if not isinstance(loaded, dict):
+        raise SepiError(
+            f"{path}: expected a key 'cameras' with a list of cameras, and where needed 'shared' and 'units'"
+        )
+    return loaded
+
+
+def _rows(path: Path, text: str) -> list[dict[str, Any]]:
+    rows = csv.DictReader(text.splitlines(), skipinitialspace=True)
+    try:
+        named = list(rows)
+        columns = [name.strip() for name in rows.fieldnames or ()]
+    except csv.Error as error:
+        raise SepiError(f"{path}: not CSV: {error}") from error
+    rows.fieldnames = columns
+    for name in ("file", *_PLACE, "fx"):
+        if name not in columns:
+            raise SepiError(f"{path}: no column '{name}'; expected {', '.join(_COLUMNS)}, those from qw on if needed")
+    for name in columns:
+        if name not in _COLUMNS:
+            raise SepiError(f"{path}: column '{name}' is unknown; expected {', '.join(_COLUMNS)}")
+    return [_entry(path, n, {(k or "").strip(): v for k, v in row.items()}) for n, row in enumerate(named, 1)]
+
+
+def _entry(path: Path, line: int, row: Mapping[str, Any]) -> dict[str, Any]:
+    def numbers(names: tuple[str, ...]) -> list[float]:
+        told = [row.get(name) for name in names]
+        try:
+            return [float(value or 0) for value in told]
+        except (TypeError, ValueError) as error:
+            raise SepiError(f"{path}: camera {line}: expected numbers in {' '.join(names)}, got {told}") from error
+
+    lens = (row.get("lens") or PINHOLE).strip()
+    entry: dict[str, Any] = {"file": (row["file"] or "").strip(), "position": tuple(numbers(_PLACE)), "lens": lens}
+    (fx,), (fy,) = numbers(("fx",)), numbers(("fy",))
+    entry["focal"] = (fx, fy or fx)
+    if row.get("cx") and row.get("cy"):
+        entry["principal"] = tuple(numbers(("cx", "cy")))
+    if any(row.get(name) for name in _ROTATION):
+        entry["rotation"] = numbers(_ROTATION)
+    entry["distortion"] = numbers(_DISTORTION.get(lens, _DISTORTION[PINHOLE]))
+    return entry
+
+
+def _shot(path: Path, camera: _Camera, pictures: Pictures, file: Path) -> Shot:
+    header = picture_header(file)
+    height, width = header.height, header.width
+    focal = camera.focal if isinstance(camera.focal, tuple) else (camera.focal, camera.focal)
+    principal = camera.principal or ((width - 1) / 2, (height - 1) / 2)
+    try:
+        lens = Lens(width, height, focal, principal, camera.lens, tuple(camera.distortion))
+    except SepiError as error:
+        raise SepiError(f"{path}: {camera.file}: {error}") from error
+    return Shot(camera.file, lens, rotation_of(path, camera.file, camera.rotation), np.array(camera.position))
+
+
+def rotation_of(path: Path, name: str, told: Any) -> Floats:
+    """A rotation matrix from a quaternion ``(w, x, y, z)`` or a matrix that was written down with a few digits."""
+    values = np.array(told, np.float64) if len({np.size(row) for row in told}) == 1 else np.zeros(0)
+    if values.shape == (4,) and abs(np.linalg.norm(values) - 1) < _NEARLY:
+        return np.asarray(Rotation.from_quat(values, scalar_first=True).as_matrix(), np.float64)
+    if values.shape == (3, 3) and np.abs(values @ values.T - np.eye(3)).max() < _NEARLY and np.linalg.det(values) > 0:
+        left, _, right = np.linalg.svd(values)
+        return np.asarray(left @ right, np.float64)
+    raise SepiError(
+        f"{path}: {name}: rotation: expected a quaternion w x y z of length 1, or the 3x3 matrix of a rotation, "
+        "no mirror, from the world's axes to the camera's"
+    )

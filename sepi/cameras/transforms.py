@@ -1,0 +1,123 @@
+"""Calibrated cameras in a ``transforms.json`` of nerfstudio or instant-ngp.
+
+Poses go from the camera to the world; the camera's axes point right, up and back. Principal points are counted from the
+corner of the picture. What is not said of a frame is said of all.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sepi.cameras.model import UNITS_OF_MODEL, CameraModel
+from sepi.cameras.pictures import Pictures
+from sepi.cameras.table import rotation_of
+from sepi.errors import SepiError
+from sepi.io.files import reading
+from sepi.io.images import picture_header
+from sepi.rig import FISHEYE, METRES, PINHOLE, Lens, Shot
+
+_MOST_BYTES = 256 * 2**20
+_MODELS = {"OPENCV": PINHOLE, "PINHOLE": PINHOLE, "SIMPLE_PINHOLE": PINHOLE, "OPENCV_FISHEYE": FISHEYE}
+_COEFFICIENTS = {PINHOLE: ("k1", "k2", "p1", "p2", "k3", "k4"), FISHEYE: ("k1", "k2", "k3", "k4")}
+# right, up, back to right, down, forward
+_TURN = np.diag([1.0, -1.0, -1.0])
+
+
+def read_transforms(path: Path, pictures: Pictures) -> CameraModel:
+    """Read the cameras of a ``transforms.json``.
+
+    Raises
+    ------
+    SepiError
+        If it is damaged, something is missing or of another kind, or a picture is not there.
+    """
+    with reading(path, "transforms.json"):
+        if path.stat().st_size > _MOST_BYTES:
+            raise SepiError("not a transforms.json: too long")
+        try:
+            told = json.loads(path.read_bytes())
+        except (ValueError, RecursionError) as error:
+            raise SepiError(f"not a transforms.json: {error}") from error
+    frames = told.get("frames") if isinstance(told, dict) else None
+    if not isinstance(frames, list) or not frames or not all(isinstance(frame, dict) for frame in frames):
+        raise SepiError(f"{path}: no cameras; expected a list 'frames'")
+    # what nerfstudio adds: its own turn and scale of the world
+    shots, files, masks = [], [], []
+    for n, frame in enumerate(frames, 1):
+        entry = {**told, **frame}
+        name = entry.get("file_path")
+        if not isinstance(name, str) or not name:
+            raise SepiError(f"{path}: frame {n}: no file_path")
+        name = name.removeprefix("./")
+        file = _found(pictures, name)
+        files.append(file)
+        mask = entry.get("mask_path")
+        masks.append(_found(pictures, mask) if isinstance(mask, str) and mask else None)
+        shots.append(_shot(path, name, entry, pictures, file))
+    units = METRES if told.get("units") == METRES else UNITS_OF_MODEL
+    return CameraModel(path, tuple(shots), tuple(files), _points(path, told), units, tuple(masks))
+
+
+def _found(pictures: Pictures, name: str) -> Path:
+    try:
+        return pictures.find(name)
+    except SepiError:
+        # the folder of pictures itself may be given
+        for other in (Path(name).name, f"{name}.png"):
+            try:
+                return pictures.find(other)
+            except SepiError:
+                continue
+        raise
+
+
+def _shot(path: Path, name: str, entry: Mapping[str, Any], pictures: Pictures, file: Path) -> Shot:
+    header = picture_header(file)
+    height, width = header.height, header.width
+    word = str(entry.get("camera_model", "OPENCV"))
+    if word not in _MODELS:
+        raise SepiError(f"{path}: camera_model '{word[:40]}'; expected one of {', '.join(_MODELS)}")
+    kind = _MODELS[word]
+
+    def number(key: str, other: float | None = None) -> float:
+        value = entry.get(key, other)
+        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+            raise SepiError(f"{path}: {name}: expected a number as {key}, got {str(value)[:40]}")
+        return float(value)
+
+    if "fl_x" not in entry and "camera_angle_x" in entry:
+        focal_x = width / 2 / math.tan(min(3.0, max(1e-3, number("camera_angle_x"))) / 2)
+    else:
+        focal_x = number("fl_x")
+    focal = focal_x, number("fl_y", focal_x)
+    # from the corner to the middle of the first pixel
+    principal = number("cx", width / 2) - 0.5, number("cy", height / 2) - 0.5
+    coefficients = tuple(number(key, 0.0) for key in _COEFFICIENTS[kind])
+    try:
+        matrix = np.array(entry.get("transform_matrix"), np.float64)
+    except (ValueError, TypeError):
+        matrix = np.zeros(0)
+    if matrix.shape not in ((4, 4), (3, 4)) or not np.isfinite(matrix).all():
+        raise SepiError(f"{path}: {name}: expected 4 rows of 4 numbers as transform_matrix")
+    try:
+        lens = Lens(width, height, focal, principal, kind, coefficients)
+    except SepiError as error:
+        raise SepiError(f"{path}: {name}: {error}") from error
+    return Shot(name, lens, rotation_of(path, name, (matrix[:3, :3] @ _TURN).T), matrix[:3, 3].copy())
+
+
+def _points(path: Path, told: Mapping[str, Any]) -> np.ndarray[Any, np.dtype[np.float64]]:
+    """Points of the PLY file beside it that is named, as far as they can be read."""
+    name = told.get("ply_file_path")
+    if not isinstance(name, str) or Path(name).is_absolute() or ".." in Path(name).parts:
+        return np.zeros((0, 3))
+    from sepi.io.ply import read_positions
+
+    file = path.parent / name
+    return read_positions(file) if file.is_file() else np.zeros((0, 3))

@@ -1,0 +1,66 @@
+"""The command ``sepi calibrate``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from sepi.cli.input_options import default_folder
+from sepi.command import SepiCommand, progress_bar
+from sepi.errors import SepiError
+
+_PATH = click.Path(path_type=Path)
+
+
+@click.command(cls=SepiCommand)
+@click.argument("folder", type=_PATH)
+@click.option("-o", "--output", type=_PATH, help="Folder to make; ./NAME-cameras after FOLDER's name unless given.")
+@click.option(
+    "--lens",
+    default="SIMPLE_RADIAL",
+    show_default=True,
+    metavar="MODEL",
+    help="COLMAP's lens model: SIMPLE_PINHOLE, RADIAL, OPENCV, OPENCV_FISHEYE, ...",
+)
+@click.option(
+    "--cameras",
+    type=click.Choice(["one", "each"]),
+    default="one",
+    show_default=True,
+    help="One camera took all pictures, or each has its own.",
+)
+@click.option("--force", is_flag=True, help="Go on whatever a quick look at a few pictures says.")
+@click.option("--threads", type=click.IntRange(min=1), help="Threads to use; one per core unless given.")
+def calibrate(folder: Path, output: Path | None, lens: str, cameras: str, force: bool, threads: int | None) -> None:
+    """Find the cameras that took the pictures in FOLDER, and write them as a COLMAP model for 'sepi depth'.
+
+    One camera, moved sideways past a scene in which nothing moves, and looking much the same way; a grid, a row or any
+    sweep. First a few of the pictures are looked at, small: a camera that hardly moved, moved forward or turned too far
+    is told at once. At the end it says how many pictures are placed, and how flat the motion was. Focal length is that
+    of the files' EXIF, else a usual one, unless the pictures tell it. Needs pycolmap: pip install 'sepi[colmap]'.
+
+    \b
+    Examples:
+      sepi calibrate sweep
+      sepi depth sweep-cameras
+    """
+    from sepi.cameras.calibration import calibrate as calibrated
+    from sepi.io.files import name_of
+    from sepi.threads import available_cores, use_threads
+
+    threads = threads or available_cores()
+    use_threads(threads)
+    target = output or default_folder(folder, "cameras")
+    with progress_bar(name_of(folder).name) as progress:
+        made = calibrated(folder, target, lens=lens, cameras=cameras, force=force, threads=threads, progress=progress)
+    count = len(made.placed)
+    missing = f"; not placed: {', '.join(made.left_out)}" if made.left_out else ""
+    click.echo(f"placed: {count} of {count + len(made.left_out)} pictures{missing}")
+    click.echo(f"points lie within {made.error:.2g} pixels of where the pictures show them, at the mean")
+    for note in made.notes:
+        click.echo(note)
+    click.echo(f"written: {target}/")
+    if made.unusable is not None:
+        raise SepiError(f"'sepi depth' cannot use it: {made.unusable}")
+    click.echo(f"next: sepi depth {target}")

@@ -1,0 +1,170 @@
+"""Command ``sepi depth``: from a light field to the folder of its maps."""
+
+from __future__ import annotations
+
+import re
+import time
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from sepi.cli.info import range_text, size_text
+from sepi.cli.input_options import Geometry, Reading, camera_flags, default_folder, range_to_search, reading_flags
+from sepi.command import SepiCommand, progress_bar
+from sepi.errors import SepiError
+
+# imported in the functions: `sepi depth --help` does without what they import
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
+    from sepi.applications.all_views import ViewMaps
+    from sepi.lightfield import LightField
+    from sepi.stage import MadeBy
+    from sepi.variants import Variant
+
+_PATH = click.Path(path_type=Path)
+
+
+@click.command(cls=SepiCommand)
+@click.argument("light_field_path", metavar="INPUT", type=_PATH)
+@click.option("-o", "--output", type=_PATH, help="Folder to write; ./NAME-depth after INPUT's name unless given.")
+@click.option("--variant", default="best", show_default=True, help="Named choice of stages; see above.")
+@range_to_search
+@click.option("--threads", type=click.IntRange(min=1), help="Threads to use; one per core unless given.")
+@click.option(
+    "--memory",
+    type=click.IntRange(min=1),
+    metavar="MB",
+    help="Stay within so much memory; the same maps, more slowly. As much as is of use unless given.",
+)
+@click.option(
+    "--set",
+    "settings",
+    multiple=True,
+    metavar="KEY=VALUE",
+    help="Set a parameter, STAGE.CHOICE.NAME=VALUE; repeatable. config.yaml lists them.",
+)
+@click.option("--force", is_flag=True, help="Write to a folder with other files or another light field's result, too.")
+@click.option("--timing", is_flag=True, help="Also write runtime.txt: seconds, as a benchmark submission needs.")
+@click.option("--all-views", is_flag=True, help="Also write all_views.h5: a map for each view, which takes longer.")
+@camera_flags
+@reading_flags
+def depth(
+    light_field_path: Path,
+    output: Path | None,
+    variant: str,
+    disparity_range: tuple[float, float] | None,
+    threads: int | None,
+    memory: int | None,
+    settings: tuple[str, ...],
+    force: bool,
+    timing: bool,
+    all_views: bool,
+    geometry: Geometry | None,
+    reading: Reading,
+) -> None:
+    """Compute the disparity map of the light field INPUT.
+
+    INPUT is a folder of views, a Lytro picture (*_eslf.png), an array (.mat, .npy, .npz) or an HDF5 file; 'sepi info'
+    shows how it is read, 'sepi check' whether its views are in the right order. Writes the disparity as numbers and in
+    colour, confidence, masks and a point cloud; depth in metres where the camera is known. With --all-views a map for
+    every view, too, made from those of a few: docs/depth/all_views.md.
+
+    Variants: best (the most accurate), fast (half its time), paper (the method as published), no_sepi, no_occlusion,
+    no_textureless, no_occlusion_no_textureless (parts of it switched off), wang (another treatment of occlusion);
+    best_no_detail and others that docs/method/best.md lists (parts of best switched off); acc, cae, mishiba, oavc, occ,
+    pobr, spo (other authors' methods), onnx (a network of yours), which docs/reproduce/compared.md explains.
+
+    \b
+    Examples:
+      sepi depth cotton
+      sepi depth cotton -o maps --disparity-range -2 2
+      sepi depth cotton --all-views
+      sepi depth flowers_eslf.png --central 7
+      sepi depth views --grid 5x5 --exclude 0,0 --exclude 0,4
+      sepi depth cotton --variant paper --set initial.sepi.num_disparities=91
+    """
+    from sepi.inspection.disparity_range import settle_range
+    from sepi.io.provenance import result_attributes
+    from sepi.io.result_files import ALL_VIEWS, names_of_others, require_own, require_target
+    from sepi.io.result_folder import write_result
+    from sepi.matching.unknown import UNKNOWN
+    from sepi.pipeline import estimate_depth
+    from sepi.threads import available_cores, use_threads
+    from sepi.variants import stage_parameters, variant_named
+
+    started = time.perf_counter()
+    use_threads(threads or available_cores())
+    chosen = variant_named(variant)
+    parameters = _parameters(settings, variant, chosen)
+    stage_parameters(chosen, parameters)
+    folder = output or default_folder(light_field_path, "depth")
+    require_target(folder)
+    if light_field_path.resolve() == folder.resolve():
+        raise SepiError(f"{folder}: is the light field itself; choose another folder for the result")
+    light_field = reading.read(light_field_path, disparity_range=disparity_range)
+    require_own(folder, light_field, force=force)
+    if geometry is not None:
+        # another camera than the calibrated one: its rig's lengths mean nothing
+        light_field = replace(light_field, camera=geometry(shape=light_field.shape), rig=None)
+    light_field = settle_range(light_field)
+    with progress_bar(light_field.name) as progress:
+        maps = estimate_depth(light_field, variant, parameters, progress, memory and memory * 2**20)
+    seconds = time.perf_counter() - started if timing else None
+    beside = (ALL_VIEWS, *names_of_others(light_field)) if all_views else ()
+    files = write_result(folder, light_field, maps, force=force, seconds=seconds, beside=beside)
+    if all_views:
+        from sepi.applications.all_views import maps_of_all_views
+        from sepi.io.all_views import write_all_views
+
+        made_by = result_attributes(light_field, maps)
+        with progress_bar(f"{light_field.name}, all views") as progress:
+            views = maps_of_all_views(light_field, maps, chosen, parameters, progress, memory and memory * 2**20)
+            write_all_views(folder / ALL_VIEWS, light_field, _also_as_taken(folder, light_field, views), made_by)
+        files = (*files, *beside)
+    click.echo(f"{light_field.name}: {size_text(light_field)}")
+    click.echo(f"disparity range: {range_text(light_field.require_disparity_range())}{_candidates(maps.made_by)}")
+    unknown = float(maps.mask(UNKNOWN).mean())
+    if unknown:
+        click.echo(f"unknown: {100 * unknown:.2g} % of the pixels; no view knows anything about them")
+    click.echo(f"written to {folder}/: {' '.join(files)}")
+
+
+def _also_as_taken(
+    folder: Path, light_field: LightField, views: Iterable[ViewMaps]
+) -> Iterator[tuple[tuple[int, int], Mapping[str, npt.NDArray[Any]]]]:
+    """The maps of views one after the other; each is also written as its calibrated camera took it."""
+    from sepi.io.result_folder import write_as_taken
+
+    for view in views:
+        if view.position != light_field.reference_position:
+            write_as_taken(folder, light_field, view.disparity, view.position)
+        yield view.position, view.maps
+
+
+def _candidates(made_by: MadeBy | None) -> str:
+    """How many candidates there are in the range; nothing where no stage has any."""
+    history = () if made_by is None else made_by.history
+    known = [step["parameters"]["num_disparities"] for step in history if "num_disparities" in step["parameters"]]
+    return f", {' and '.join(map(str, dict.fromkeys(known)))} candidates" if known else ""
+
+
+def _parameters(settings: tuple[str, ...], name: str, variant: Variant) -> dict[str, dict[str, Any]]:
+    """Stage to field to value from ``STAGE.CHOICE.NAME=VALUE`` of the command line."""
+    from sepi.validation import require_known, value_of
+
+    parameters: dict[str, dict[str, Any]] = {}
+    for setting in settings:
+        match = re.fullmatch(r"(\w+)\.(\w+)\.(\w+)=(.*)", setting)
+        if match is None:
+            raise SepiError(
+                f"--set {setting}: expected STAGE.CHOICE.NAME=VALUE, such as initial.semi_global.num_disparities=91"
+            )
+        stage, choice, field, text = match.groups()
+        used = [f"{stage}.{choice}" for stage, choice in variant.choices.items()]
+        require_known(f"--set {setting}: stages of variant {name}", [f"{stage}.{choice}"], used)
+        parameters.setdefault(stage, {})[field] = value_of(text)
+    return parameters

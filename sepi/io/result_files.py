@@ -1,0 +1,127 @@
+"""The files of a result: their names, and whose a folder is that one is to be written to."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Collection
+from contextlib import nullcontext, suppress
+from pathlib import Path
+
+import numpy as np
+
+from sepi.errors import SepiError
+from sepi.io.origin import RESULT, read_origin
+from sepi.lightfield import LightField
+
+RESULT_FILES = (
+    "disparity.pfm",
+    "disparity.npy",
+    "disparity_16bit.png",
+    "disparity.png",
+    "confidence.png",
+    "points.ply",
+    RESULT,
+)
+"""What :func:`write_result` always writes; ``depth.pfm`` and ``mask_NAME.png`` come with what it is given."""
+
+RUNTIME = "runtime.txt"
+"""Seconds that it took, where that is told."""
+
+ALL_VIEWS = "all_views.h5"
+"""Maps of all views, which the command writes on request (:mod:`sepi.io.all_views`)."""
+
+DEPTH = "depth.pfm"
+"""Depth in metres, where the camera is known."""
+
+AS_TAKEN = ("original_disparity", "original_depth")
+"""Maps in the picture as a calibrated camera took it; those of other views than the result's end with ``_T_S``."""
+
+MASK_NAME = r"[\w-]+"
+"""Names of masks, as a regular expression."""
+
+# files that a message names
+_LISTED = 3
+
+
+def require_own(folder: Path, light_field: LightField, *, force: bool = False) -> frozenset[str]:
+    """Raise unless a result of this light field may be written to ``folder``; what an earlier one wrote there.
+
+    Raises
+    ------
+    SepiError
+        As :func:`require_target`; and unless ``force``, if the folder holds anything but an earlier result of this
+        light field, or beside it a file that would be taken for one of the result's.
+    """
+    require_target(folder)
+    there = sorted(path.name for path in folder.iterdir() if path.name[0] != ".") if folder.is_dir() else []
+    origin = None
+    # a damaged one is replaced as well
+    with suppress(SepiError) if force else nullcontext():
+        origin = read_origin(folder)
+    # who made the file may have had another file in mind than one of this folder
+    files = frozenset() if origin is None else frozenset(filter(is_results_name, origin.files or RESULT_FILES))
+    others = [name for name in there if name not in files and (origin is None or is_results_name(name))]
+    if force:
+        return files
+    advice = "choose another folder, or overwrite it with --force (in Python force=True)"
+    if others:
+        listed = ", ".join(others[:_LISTED]) + (", ..." if len(others) > _LISTED else "")
+        raise SepiError(f"{folder}: holds files that no earlier result wrote ({listed}); {advice}")
+    if origin is not None and not origin.is_of(light_field):
+        other = origin.source or origin.scene
+        raise SepiError(f"{folder}: holds the result of another light field ({other}); {advice}")
+    return files
+
+
+def remove_result(folder: Path) -> None:
+    """Remove all that has the name of a file of a result, from a folder that is known to hold nothing else."""
+    if folder.is_dir():
+        remove_files(folder, [path.name for path in folder.iterdir() if is_results_name(path.name)])
+
+
+def require_target(folder: Path) -> None:
+    """Raise unless a folder of this name can be made or written to; for telling before a long computation.
+
+    Raises
+    ------
+    SepiError
+        If ``folder`` is a file or holds a light field, or it or its nearest existing parent is not a writable folder.
+    """
+    if folder.exists() and not folder.is_dir():
+        raise SepiError(f"{folder}: is a file; expected a folder to write to")
+    existing = next(path for path in (folder, *folder.absolute().parents) if path.exists())
+    if not existing.is_dir() or not os.access(existing, os.W_OK | os.X_OK):
+        raise SepiError(f"{folder}: cannot be written ({existing} is not a writable folder)")
+    # masks of the scene would be replaced by those of the result, which have the same names
+    if folder.is_dir() and any(folder.glob("input_Cam*.png")):
+        raise SepiError(f"{folder}: holds the views of a light field; choose another folder for the result")
+
+
+def is_results_name(name: str) -> bool:
+    """Whether a result may have a file of this name."""
+    some = rf"mask_{MASK_NAME}\.png|({'|'.join(AS_TAKEN)})(_\d+_\d+)?\.pfm"
+    return name in (*RESULT_FILES, DEPTH, RUNTIME, ALL_VIEWS) or bool(re.fullmatch(some, name))
+
+
+def names_as_taken(position: tuple[int, int] | None = None) -> tuple[str, ...]:
+    """Names of the maps in the picture that a calibrated camera took, of a view's or the result's own."""
+    return tuple("_".join([name, *map(str, position or ())]) + ".pfm" for name in AS_TAKEN)
+
+
+def names_of_others(light_field: LightField) -> tuple[str, ...]:
+    """Names of the maps as calibrated cameras took them of all views but the reference view; none without a rig."""
+    if light_field.camera is None or light_field.rig is None:
+        return ()
+    places = [(int(t), int(s)) for t, s in np.argwhere(light_field.present)]
+    others = [place for place in places if place != light_field.reference_position]
+    return tuple(name for place in others for name in names_as_taken(place))
+
+
+def remove_files(folder: Path, names: Collection[str]) -> None:
+    """Remove files of an earlier result, as far as they are there."""
+    for name in names:
+        try:
+            (folder / name).unlink(missing_ok=True)
+        except OSError as error:
+            raise SepiError(f"{folder / name}: an earlier run's file cannot be removed ({error.strerror})") from error
