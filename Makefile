@@ -1,5 +1,6 @@
 # make        environment, then `snakemake all` on the built-in scenes
 # make check  environment, then the fast part of the tests: for every save
+# make long-tests  which of them are too long for that, to tests/long_tests.txt, when `make check` is over its budget
 # make test   environment, then every test of what a user would notice, on all cores
 # make test-system  environment, then kills, Slurm, full disks, memory limits, kernels compiled anew, archives
 # make faults  environment, then a hundred kills of the workflow and thousands of damaged files: half an hour
@@ -25,7 +26,7 @@ COMPARED := .venv/compared
 
 LINTS := lint-style lint-types lint-imports lint-rules lint-project
 
-.PHONY: all check test test-system faults fuzz coverage lint $(LINTS) actionlint docs docs-links demo bench dist release oldest clean
+.PHONY: all check long-tests test test-system faults fuzz coverage lint $(LINTS) actionlint docs docs-links demo bench dist release oldest clean
 .DEFAULT_GOAL := all
 
 all: $(READY)
@@ -38,8 +39,16 @@ ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 TESTS := $(ONE_THREAD) $(BIN)/python -m pytest --numprocesses $(WORKERS)
 QUICK := not real and not workflow and not browser and not slow and not system and not faults
 
+# tests that are not named there count as quick until they no longer fit
+QUICK_CPU_SECONDS := 150
 check: $(COMPARED)
-	$(TESTS) -m "$(QUICK)"
+	$(TESTS) -m "$(QUICK) and not long" --cpu-budget $(QUICK_CPU_SECONDS)
+
+# twice: what tests share is made by the first of them that is left
+long-tests: $(COMPARED)
+	rm -f tests/long_tests.txt
+	$(TESTS) -m "$(QUICK)" --note-long tests/long_tests.txt
+	$(TESTS) -m "$(QUICK) and not long" --note-long tests/long_tests.txt
 
 # of a core of the calibration loop in tests/cpu_budget.py: a quarter more than they take
 CPU_SECONDS := 2700
@@ -177,7 +186,7 @@ $(READY): requirements.lock pyproject.toml
 	$(BIN)/python -m sepi.cli.warm_up
 	touch $@
 
-# the kernels of the compared methods: only their target and the tests call them
+# the kernels of the compared methods, and those for other views than 8-bit ones: only their target and the tests call them
 $(COMPARED): $(READY)
-	$(BIN)/python -m sepi.cli.warm_up --comparison
+	$(BIN)/python -m sepi.cli.warm_up --comparison --all-types
 	touch $@

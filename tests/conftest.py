@@ -28,7 +28,9 @@ DATA = Path(os.environ.get("SEPI_DATA", Path(__file__).parents[2] / "shared" / "
 # what a test is marked with for a fixture that it uses
 _MARKS = {"real_data": "real", "browser": "browser", "slurm": "slurm"}
 # what takes longest is begun first, so that several processes end at about the same time
-_FIRST = ("slurm", "real", "workflow", "slow", "browser")
+_FIRST = ("slurm", "real", "workflow", "slow", "browser", "long")
+# written by `make long-tests`
+_LONG_TESTS = Path(__file__).with_name("long_tests.txt")
 # files whose tests share what takes long to make: real maps, a run of the workflow, a report, kernels for other types
 _TOGETHER = {
     **dict.fromkeys(["test_real", "test_real_formats", "test_real_methods"], "real"),
@@ -53,8 +55,11 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark tests by the fixtures that they use, and put those first that take long."""
+    """Mark tests by the fixtures that they use and by how long they take, and put those first that take longest."""
+    long = set(_LONG_TESTS.read_text(encoding="utf-8").split()) if _LONG_TESTS.is_file() else set()
     for item in items:
+        if item.nodeid.partition("[")[0] in long:
+            item.add_marker("long")
         for fixture, mark in _MARKS.items():
             if fixture in getattr(item, "fixturenames", ()):
                 item.add_marker(mark)

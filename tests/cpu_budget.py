@@ -11,6 +11,7 @@ import os
 import time
 from collections import Counter
 from collections.abc import Generator
+from pathlib import Path
 from statistics import median
 from typing import Any
 
@@ -21,6 +22,9 @@ from warm_python import forks_cpu_seconds
 LOOP = 0.01
 """Seconds that the calibration loop takes on the core that the budget is in seconds of."""
 
+LONG = 0.3
+"""CPU seconds of such a core from which a test is too long for every save."""
+
 # CPU seconds of a process between two calibrations
 _EVERY = 2.0
 _SHOWN = 15
@@ -30,10 +34,16 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption(
         "--cpu-budget", type=float, metavar="SECONDS", help="fail if the tests take more of the processors"
     )
+    parser.addoption(
+        "--note-long",
+        type=Path,
+        metavar="FILE",
+        help=f"add the names of tests that take more than {LONG:g} s of them",
+    )
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    config.pluginmanager.register(CpuBudget(config.getoption("--cpu-budget")))
+    config.pluginmanager.register(CpuBudget(config.getoption("--cpu-budget"), config.getoption("--note-long")))
 
 
 def cpu_seconds() -> float:
@@ -54,8 +64,8 @@ def calibration() -> float:
 class CpuBudget:
     """Tells each test's time by its reports, which come together in one process, and adds them up."""
 
-    def __init__(self, budget: float | None) -> None:
-        self.budget = budget
+    def __init__(self, budget: float | None, noted: Path | None = None) -> None:
+        self.budget, self.noted = budget, noted
         self.before = self.calibrated = 0.0
         self.taken: Counter[str] = Counter()
         self.loops: list[float] = []
@@ -90,6 +100,12 @@ class CpuBudget:
     @pytest.hookimpl(tryfirst=True)
     def pytest_sessionfinish(self, session: pytest.Session) -> None:
         in_a_worker = hasattr(session.config, "workerinput")
+        if self.noted is not None and not in_a_worker:
+            known = self.noted.read_text(encoding="utf-8").split() if self.noted.is_file() else []
+            long = set(known) | {
+                name.partition("[")[0] for name, taken in self.taken.items() if taken * self._scale > LONG
+            }
+            self.noted.write_text("".join(f"{name}\n" for name in sorted(long)), encoding="utf-8")
         if self.budget is not None and not in_a_worker and self.seconds > self.budget and not session.exitstatus:
             session.exitstatus = pytest.ExitCode.TESTS_FAILED
 
