@@ -20,22 +20,15 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import FrameType
-from typing import IO, Any
+from typing import IO, TYPE_CHECKING, Any
 
 import click
 
-from sepi.compared.methods import StageChoices
 from sepi.errors import SepiError, SepiWarning, one_line
-from sepi.io.files import atomic_path
-from sepi.io.hdf5 import read_light_field, read_stage, write_stage
-from sepi.io.provenance import history_of, stage_attributes
-from sepi.kernel_cache import tell_kernel_cache
-from sepi.machine import this_machine
-from sepi.matching.base_detail import kept_detail
-from sepi.memory import KERNELS, require_memory
-from sepi.stage import Choice, Progress, entry, no_progress
-from sepi.threads import use_threads
-from sepi.validation import validated
+
+# what only the commands of stages need is imported there: every command imports this module
+if TYPE_CHECKING:
+    from sepi.stage import Choice, Progress
 
 # a workflow that stops its jobs; a terminal that is closed, which not all systems tell of
 _ENDING = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
@@ -66,6 +59,16 @@ class SepiCommand(click.Command):
         with shown_errors(), _rare_collections():
             _end_with_the_workflow()
             return super().invoke(ctx)
+
+
+bad_thresholds = click.option(
+    "--bad",
+    "thresholds",
+    type=click.FloatRange(min=0, min_open=True),
+    multiple=True,
+    metavar="T",
+    help="Score the pixels with a larger error than T pixels per view step, too; repeatable.",
+)
 
 
 class SepiGroup(click.Group):
@@ -147,6 +150,8 @@ def _exit_on_signal(number: int, _: FrameType | None) -> None:
 def progress_bar(label: str) -> Iterator[Progress]:
     """A bar from 0 to 100 % on a terminal, silence elsewhere; yields the function to call with the fraction done."""
     if not sys.stderr.isatty():
+        from sepi.stage import no_progress
+
         yield no_progress
         return
     from tqdm import tqdm
@@ -184,6 +189,9 @@ def megabytes(maxrss: int) -> float:
 
 def write_timing(path: Path, started: float, threads: int, **more: Any) -> None:
     """Write as JSON seconds since ``started`` (of ``time.perf_counter``), peak memory, machine, and what is given."""
+    from sepi.io.files import atomic_path
+    from sepi.machine import this_machine
+
     timing = {
         "seconds": round(time.perf_counter() - started, 3),
         "peak_memory_mb": round(peak_memory_mb(), 1),
@@ -201,6 +209,16 @@ def stage_command(stage: str, own: Mapping[str, Choice]) -> click.Command:
     It reads a light field and the maps of the stage before, runs one choice, and writes one stage file, whole or not at
     all.
     """
+    from sepi.compared.methods import StageChoices
+    from sepi.io.hdf5 import read_light_field, read_stage, write_stage
+    from sepi.io.provenance import history_of, stage_attributes
+    from sepi.kernel_cache import tell_kernel_cache
+    from sepi.matching.base_detail import kept_detail
+    from sepi.memory import KERNELS, require_memory
+    from sepi.stage import entry
+    from sepi.threads import use_threads
+    from sepi.validation import validated
+
     existing = click.Path(path_type=Path)
     choices = StageChoices(stage, own)
 

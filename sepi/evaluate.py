@@ -5,13 +5,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import click
 import numpy as np
 
-from sepi.command import SepiCommand
+from sepi.command import SepiCommand, bad_thresholds
 from sepi.io.hdf5 import read_stage
 from sepi.io.provenance import scene_attributes
 from sepi.io.scores import Evaluation, map_name, write_scores
@@ -60,7 +60,9 @@ def evaluation_of(light_field: LightField, disparity: FloatMap) -> Evaluation:
     return evaluations_of(light_field, {"": disparity})[""]
 
 
-def evaluations_of(light_field: LightField, maps: Mapping[str, FloatMap]) -> dict[str, Evaluation]:
+def evaluations_of(
+    light_field: LightField, maps: Mapping[str, FloatMap], thresholds: Sequence[float] = ()
+) -> dict[str, Evaluation]:
     """Scores, error maps and masks of disparity maps of one light field, by name; the masks are found once for all.
 
     Parameters
@@ -70,6 +72,8 @@ def evaluations_of(light_field: LightField, maps: Mapping[str, FloatMap]) -> dic
         empty.
     maps : mapping of str to ndarray, shape (H, W), float32
         Name to disparity in pixels per view step.
+    thresholds : sequence of float
+        As :func:`sepi.scoring.scores.score` takes them.
 
     Returns
     -------
@@ -107,7 +111,7 @@ def evaluations_of(light_field: LightField, maps: Mapping[str, FloatMap]) -> dic
     edges = edges_of(light_field.ground_truth)
     return {
         name: Evaluation(
-            scores=score_regions(disparity, light_field.ground_truth, masks, edges=edges),
+            scores=score_regions(disparity, light_field.ground_truth, masks, edges=edges, thresholds=thresholds),
             error=_error(disparity, light_field.ground_truth),
             regions=masks,
             region_sources=sources,
@@ -129,13 +133,21 @@ _PATH = click.Path(path_type=Path)
 @click.option("--light-field", "light_field_path", type=_PATH, required=True, help="From ingest.")
 @click.option("--truth", type=_PATH, help="Ground truth, from sepi.truth; the light field's own unless given.")
 @click.option("--stages", type=_PATH, required=True, help="Folder of the stage files; their paths in it name the maps.")
+@bad_thresholds
 @click.option("--output", type=_PATH, required=True, help="Score file (HDF5) to write.")
 @click.argument("paths", nargs=-1, type=_PATH, metavar="STAGE_FILE...", required=True)
-def command(light_field_path: Path, truth: Path | None, stages: Path, output: Path, paths: tuple[Path, ...]) -> None:
+def command(
+    light_field_path: Path,
+    truth: Path | None,
+    stages: Path,
+    thresholds: tuple[float, ...],
+    output: Path,
+    paths: tuple[Path, ...],
+) -> None:
     """Score the disparity maps of stage files against the light field's ground truth, if it has one."""
     light_field = read_with_truth(light_field_path, truth)
     maps = {map_name(stages, path): read_stage(path).disparity for path in paths}
-    write_scores(output, evaluations_of(light_field, maps), scene_attributes(light_field))
+    write_scores(output, evaluations_of(light_field, maps, thresholds), scene_attributes(light_field))
     if light_field.ground_truth is None:
         click.echo(f"{light_field.name}: no ground truth, no scores", err=True)
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import hashlib
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,7 +15,7 @@ import click
 import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
-from sepi.command import SepiCommand
+from sepi.command import SepiCommand, bad_thresholds
 from sepi.errors import SepiError, SepiWarning
 from sepi.evaluate import evaluations_of
 from sepi.io.disparity_maps import map_file, read_disparity
@@ -32,7 +32,10 @@ _SOURCES = TypeAdapter(dict[str, ExternalSource])
 
 
 def external_maps(
-    light_field: LightField, sources: Mapping[str, ExternalSource], scene: str = ""
+    light_field: LightField,
+    sources: Mapping[str, ExternalSource],
+    scene: str = "",
+    thresholds: Sequence[float] = (),
 ) -> dict[str, ExternalMap]:
     """Read and score external methods' maps of a light field.
 
@@ -47,6 +50,8 @@ def external_maps(
         Method to its map, whose ``path`` is a file.
     scene : str
         What messages call the scene; the light field's own name unless given.
+    thresholds : sequence of float
+        As :func:`sepi.scoring.scores.score` takes them.
 
     Returns
     -------
@@ -58,7 +63,7 @@ def external_maps(
     scene = scene or light_field.name
     found = {method: _read(light_field, scene, method, source) for method, source in sources.items()}
     maps = {method: external.disparity for method, external in found.items() if external.disparity is not None}
-    for method, evaluation in evaluations_of(light_field, maps).items():
+    for method, evaluation in evaluations_of(light_field, maps, thresholds).items():
         found[method] = replace(found[method], evaluation=evaluation)
     return found
 
@@ -117,11 +122,14 @@ def _sources(text: str) -> dict[str, ExternalSource]:
 )
 @click.option("--maps", required=True, help='JSON: {"METHOD": {"path": FILE, "scale": NUMBER, "offset": NUMBER}, ...}.')
 @click.option("--scene", default="", help="What messages call the scene; the light field's own name unless given.")
+@bad_thresholds
 @click.option("--output", type=click.Path(path_type=Path), required=True, help="File to write (HDF5).")
-def command(light_field_path: Path, truth: Path | None, maps: str, scene: str, output: Path) -> None:
+def command(
+    light_field_path: Path, truth: Path | None, maps: str, scene: str, thresholds: tuple[float, ...], output: Path
+) -> None:
     """Read and score the disparity maps that external methods made of a light field."""
     sources = _sources(maps)
-    write_external(output, external_maps(read_with_truth(light_field_path, truth), sources, scene))
+    write_external(output, external_maps(read_with_truth(light_field_path, truth), sources, scene, thresholds))
 
 
 if __name__ == "__main__":

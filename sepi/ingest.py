@@ -11,10 +11,11 @@ from pathlib import Path
 
 import click
 
-from sepi.cli.input_options import Reading, builtin_flags, range_to_search, reading_flags
+from sepi.cli.input_options import Reading, range_to_search, reading_flags, scene_flags
 from sepi.command import SepiCommand, write_timing
 from sepi.inspection.disparity_range import settle_range
 from sepi.io.hdf5 import write_light_field
+from sepi.rendered.catalogue import NOISE_LEVELS, WITHOUT_NOISE
 from sepi.threads import use_threads
 
 _PATH = click.Path(path_type=Path)
@@ -22,10 +23,11 @@ _PATH = click.Path(path_type=Path)
 
 @click.command(name="python -m sepi.ingest", cls=SepiCommand)
 @click.argument("path", type=_PATH, required=False)
-@builtin_flags
-@click.option("--rendered", type=_PATH, help="File of a rendered scene, from sepi.rendered.command, in place of PATH.")
-@click.option("--noise", default="off", show_default=True, help="Rendered: level of noise.")
-@click.option("--seed", type=int, default=1, show_default=True, help="Rendered: seed of the noise.")
+@scene_flags
+@click.option(
+    "--noise", type=click.Choice(NOISE_LEVELS), default=WITHOUT_NOISE, show_default=True, help="Rendered: noise."
+)
+@click.option("--seed", type=click.IntRange(min=1), default=1, show_default=True, help="Rendered: seed of the noise.")
 @range_to_search
 @reading_flags
 @click.option("--threads", type=click.IntRange(min=1), default=1, show_default=True, help="Threads to use.")

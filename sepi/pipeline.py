@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from contextlib import nullcontext
+from contextlib import ExitStack
 from dataclasses import replace
 from numbers import Real
 from types import NoneType
@@ -84,11 +84,12 @@ def estimate_depth(
 
         light_field = light_field.with_range(estimate_range(light_field))
     light_field.require_seen_range()
-    require_memory_of(light_field, settings.values())
     tell_kernel_cache()
     maps: StageMaps | None = None
-    limited = nullcontext() if memory is None else band_memory(bytes_of_bands(light_field, settings.values(), memory))
-    with limited, kept_detail():
+    with kept_detail(), ExitStack() as limited:
+        require_memory_of(light_field, settings.values())
+        if memory is not None:
+            limited.enter_context(band_memory(bytes_of_bands(light_field, settings.values(), memory)))
         for number, (stage, choice) in enumerate(chosen.choices.items()):
 
             def of_all(fraction: float, number: int = number) -> None:

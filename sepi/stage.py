@@ -93,7 +93,7 @@ class Parameters(BaseModel):
     ValidationError: 1 validation error for BlurParameters
     """
 
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, defer_build=True)
 
     needs: ClassVar[Needs] = Needs()
     """What the workflow asks a cluster for beyond the usual."""

@@ -6,8 +6,10 @@ from pathlib import Path
 
 import click
 
-from sepi.cli.input_options import Reading, builtin_flags, reading_flags
+from sepi.cli.input_options import Reading, reading_flags, scene_flags, truth_flags
 from sepi.command import SepiCommand
+from sepi.io.disparity_maps import TruthFile
+from sepi.io.hdf5 import read_light_field
 from sepi.io.truth import write_truth
 from sepi.lightfield import Truth
 
@@ -16,9 +18,10 @@ _PATH = click.Path(path_type=Path)
 
 @click.command(name="python -m sepi.truth", cls=SepiCommand)
 @click.argument("path", type=_PATH, required=False)
-@builtin_flags
-@click.option("--rendered", type=_PATH, help="File of a rendered scene, from sepi.rendered.command, in place of PATH.")
+@scene_flags
 @reading_flags
+@truth_flags
+@click.option("--light-field", type=_PATH, help="From ingest: what --truth has to have the size of.")
 @click.option("--output", type=_PATH, required=True, help="HDF5 file to write.")
 def main(
     path: Path | None,
@@ -27,22 +30,29 @@ def main(
     views: int,
     rendered: Path | None,
     reading: Reading,
+    own: TruthFile | None,
+    light_field: Path | None,
     output: Path,
 ) -> None:
-    """Write ground truth and masks of the light field at PATH; without one that is named, that there are none."""
+    """Write ground truth and masks of the light field at PATH; without one that is named, that there are none.
+
+    Ground truth of one's own, --truth, takes the place of the light field's.
+    """
     truth: Truth = (None, {})
     if path is not None:
         from sepi.io.readers.formats import read_truth
 
         truth = read_truth(path, reading.options, reading.file_format)
     elif rendered is not None:
-        from sepi.rendered.exposure import read_render_truth
+        from sepi.rendered.render_file import read_truth as read_render_truth
 
         truth = read_render_truth(rendered)
     elif builtin is not None:
         from sepi.scenes.light_field import scene_truth
 
         truth = scene_truth(builtin, size, views)
+    if own is not None:
+        truth = own.read(None if light_field is None else read_light_field(light_field).shape), truth[1]
     write_truth(output, truth)
 
 

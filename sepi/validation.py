@@ -13,12 +13,26 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel, ConfigDict, ValidationError
 
 from sepi.errors import SepiError
 from sepi.renamed import new_name
 
 Model = TypeVar("Model", bound=BaseModel)
+
+
+class CheckedModel(BaseModel):
+    """Keys and values that a user writes: frozen, unknown keys refused, no value taken for one of another type."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, defer_build=True)
+
+
+def value_of(text: str) -> Any:
+    """What a user wrote after ``KEY=``: as JSON reads it, or the text itself."""
+    try:
+        return json.loads(text)
+    except (ValueError, RecursionError):
+        return text
 
 
 def require_known(where: str, names: Iterable[str], known: Iterable[str]) -> None:

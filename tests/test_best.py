@@ -171,7 +171,7 @@ def test_parts_of_best_differ_from_it_in_one_thing() -> None:
     assert set(PARTS_OF_BEST) == {name for name in VARIANTS if name.startswith("best")}
     for name in PARTS_OF_BEST:
         different = [s for s, c in VARIANTS[name].labels.items() if VARIANTS["best"].labels[s] != c]
-        assert len(different) == {"best": 0, "best_no_detail": 3}.get(name, 1)
+        assert len(different) == {"best": 0, "best_no_detail": 3, "best_no_denoising": 4}.get(name, 1)
 
 
 def test_sparsification_is_what_its_name_says() -> None:

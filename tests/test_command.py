@@ -151,9 +151,10 @@ class TestErrors:
 SLOW = """
 import sys, time
 from pathlib import Path
-from sepi import command
+from sepi.command import stage_command
 from sepi.stage import Choice, NoParameters, StageMaps
 import numpy as np
+from sepi.io import hdf5
 from sepi.io.files import atomic_path
 
 def slow(light_field, previous, parameters, progress):
@@ -165,8 +166,8 @@ def write_slowly(path, maps, attributes):
         print("writing", flush=True)
         time.sleep(60)
 
-command.write_stage = write_slowly
-command.stage_command("slow", {"slow": Choice(NoParameters, slow, own_steps=True)})()
+hdf5.write_stage = write_slowly
+stage_command("slow", {"slow": Choice(NoParameters, slow, own_steps=True)})()
 """
 
 

@@ -1,6 +1,8 @@
 """Scores: by hand, against a plain twin, with unknown pixels, and as the command that the workflow calls."""
 
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
@@ -10,8 +12,9 @@ from geometries import grid_baselines
 
 from sepi import ingest, truth
 from sepi.errors import SepiError
-from sepi.evaluate import command, evaluation_of
+from sepi.evaluate import command, evaluation_of, evaluations_of
 from sepi.io.hdf5 import write_light_field, write_stage
+from sepi.io.images import write_png
 from sepi.io.scores import read_evaluations, read_scores
 from sepi.io.truth import read_with_truth
 from sepi.lightfield import DisparityRange, LightField
@@ -143,6 +146,38 @@ def test_error_map_is_signed_and_nan_where_unknown() -> None:
     assert np.isnan(error[1, 1])
 
 
+def test_what_the_ground_truth_does_not_know_counts_nowhere() -> None:
+    """Measured truth has holes and margins: scores that follow what an estimate says there would be of nothing."""
+    light_field = render("curved_occluders", size=64, views=3)
+    assert light_field.ground_truth is not None
+    random = np.random.default_rng(5)
+    unknown = random.random((64, 64)) < 0.2
+    unknown[:, :18] = True
+    holed = np.where(unknown, np.float32(np.nan), light_field.ground_truth)
+    seen = replace(light_field, ground_truth=holed, masks={})
+    estimate = (np.roll(light_field.ground_truth, 1, axis=1) + random.normal(0, 0.2, (64, 64))).astype(np.float32)
+    elsewhere = {value: np.where(unknown, np.float32(value), estimate) for value in (np.nan, np.inf, -7, 7)}
+    found = list(evaluations_of(seen, {str(k): v for k, v in elsewhere.items()}, [0.3, 0.07]).values())
+    # a score over no pixels is NaN, which equals nothing
+    assert len({str(one.scores) for one in found}) == 1
+    whole = found[0].scores["paper"]["all"]
+    error = np.abs(estimate - light_field.ground_truth)[~unknown]
+    assert (whole["pixels"], whole["non_finite"]) == (error.size, 0)
+    assert whole["badpix_0.3"] == pytest.approx(100 * (error > 0.3).mean())
+    assert "badpix_0.07" not in whole, "as badpix007 it is there"
+    assert found[0].scores["paper"]["occluded"]["pixels"] > 0
+    assert not found[0].regions["discontinuities"][unknown].any()
+    assert not found[0].regions["occluded"][unknown].any()
+    assert found[0].error is not None
+    np.testing.assert_array_equal(np.isnan(found[0].error), unknown)
+
+
+@pytest.mark.parametrize("threshold", [0, -1, np.nan, "a"])
+def test_a_threshold_that_is_none_is_refused(threshold: Any) -> None:
+    with pytest.raises(SepiError, match="thresholds: expected numbers above 0"):
+        score(np.zeros((2, 2), np.float32), np.zeros((2, 2), np.float32), thresholds=[threshold])
+
+
 def test_no_ground_truth_no_scores() -> None:
     assert evaluation_of(scene(None), np.zeros((40, 40), np.float32)).scores == {}
 
@@ -260,6 +295,18 @@ def test_ground_truth_lies_apart_whatever_the_scene_is(tmp_path: Path, kind: str
     assert {name: mask.tolist() for name, mask in found.masks.items()} == {
         k: v.tolist() for k, v in whole.masks.items()
     }
+    # a file of one's own takes the place of the light field's, of which the masks stay
+    own = tmp_path / "own.png"
+    write_png(own, np.pad(np.full((60, 64), 9, np.uint8), ((4, 0), (0, 0))))
+    flags = ["--truth", str(own), "--truth-scale", "0.5", "--light-field", str(views), "--output", str(apart)]
+    assert CliRunner().invoke(truth.main, [*words, *flags]).exit_code == 0
+    found = read_with_truth(views, apart)
+    assert found.ground_truth is not None
+    np.testing.assert_array_equal(np.isnan(found.ground_truth).sum(1), [64] * 4 + [0] * 60)
+    assert np.nanmin(found.ground_truth) == np.nanmax(found.ground_truth) == 4.5
+    assert found.masks.keys() == whole.masks.keys()
     write_light_field(views, scene(None))
+    result = CliRunner().invoke(truth.main, flags)
+    assert f"{own}: ground truth is (64, 64), the views are (40, 40)" in result.output
     with pytest.raises(SepiError, match=f"^{apart}: .*ground_truth must have the views' shape"):
         read_with_truth(views, apart)

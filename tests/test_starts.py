@@ -6,16 +6,18 @@ import subprocess
 import sys
 from pathlib import Path
 
+import click
 import numpy as np
 import pytest
 
+from sepi.cli.main import main
 from sepi.io.hdf5 import write_light_field, write_stage
 from sepi.scenes import render, write_hci
 from sepi.stage import StageMaps
 
 SLOW = (
     *("numba", "scipy", "skimage", "matplotlib", "pyamg", "jinja2", "snakemake", "tqdm"),
-    *("PIL", "tifffile", "tabulate", "networkx", "pandas"),
+    *("PIL", "tifffile", "tabulate", "networkx", "pandas", "psutil"),
 )
 """Libraries that take longer to import than many a job takes."""
 
@@ -67,6 +69,42 @@ def test_nothing_slow_is_imported_before_it_is_needed() -> None:
     environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[1])}
     done = subprocess.run([sys.executable, "-c", EACH], env=environment, capture_output=True, text=True, check=True)
     assert done.stdout.splitlines() == list(MODULES), done.stderr
+
+
+# words of `sepi`, in a process each
+LIGHT = f"""
+import os, sys
+import click
+from sepi.cli.main import main
+commands = [name for name in main.list_commands(None) if name != "scenes"]
+for words in (["--help"], ["nonsense"], *([name, "--help"] for name in commands)):
+    if not os.fork():
+        sys.stdout = sys.stderr = open(os.devnull, "w")
+        try:
+            main(words)
+        except SystemExit:
+            found = [name for name in {("numpy", *SLOW)!r} if name in sys.modules]
+            print(*words, *found, file=sys.__stdout__, flush=True)
+        os._exit(0)
+    os.wait()
+"""
+
+
+def test_help_waits_for_no_library() -> None:
+    """A list of the commands, or a flag looked up, at the speed of typing."""
+    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[1])}
+    done = subprocess.run([sys.executable, "-c", LIGHT], env=environment, capture_output=True, text=True, check=True)
+    listed = [f"{name} --help" for name in sorted(main.commands) if name != "scenes"]
+    assert done.stdout.splitlines() == ["--help", "nonsense", *listed], done.stderr
+
+
+@pytest.mark.parametrize("name", main.commands)
+def test_commands_are_what_the_list_says(name: str) -> None:
+    """A line of `sepi --help` for a command that is another one, or none."""
+    command = main.get_command(click.Context(main), name)
+    assert command is not None
+    assert command.name == name
+    assert command.params
 
 
 @pytest.mark.slow
@@ -184,11 +222,12 @@ def test_the_api_can_be_imported_where_a_system_lacks_signals_and_limits() -> No
 @needs_affinity
 @pytest.mark.parametrize("command", ["depth", "check", "info"])
 def test_a_command_takes_the_cores_that_it_was_given(tmp_path: Path, command: str) -> None:
-    """Without --threads, too; each library would take what it thinks that the machine has."""
+    """Without --threads, too; each library would take what it thinks that the machine has. Nor does it load others."""
     write_hci(render("dots", size=64, views=3), tmp_path / "dots")
     words = [command, str(tmp_path / "dots"), *(["-o", str(tmp_path / "out")] if command == "depth" else [])]
     program = (
-        f"{NARROW}from sepi.cli.main import main\nmain({words!r}, standalone_mode=False)\n"
+        f"{NARROW}import sys\nfrom sepi.cli.main import main\nmain({words!r}, standalone_mode=False)\n"
+        f"assert {{name for name in {SLOW!r} if name in sys.modules}} == {{'numba', 'scipy', 'PIL'}}\n"
         "import numba, cv2\nassert (numba.config.NUMBA_NUM_THREADS, cv2.getNumThreads()) == (1, 1)"
     )
     run_without_limits(program)

@@ -68,6 +68,9 @@ def layout_costs(
                     )
                     total += squares / (squares + variation)
                     seen += 1
+                    # the mean stays above the lowest, whatever the views that are left say
+                    if total >= cost[p, n] * (seen + V - 1 - v):
+                        break
                 if 2 * seen >= V and total < cost[p, n] * seen:
                     cost[p, n] = total / np.float32(seen)
                     disparity[p, n] = candidates[k]

@@ -23,6 +23,7 @@ from pydantic import Field
 from sepi.image.noise import noise_level
 from sepi.lightfield import BoolMap, FloatMap, LightField, full_scale
 from sepi.matching.base_detail import BaseDetailParameters
+from sepi.matching.denoising import DenoisingParameters, denoised
 from sepi.matching.view_subsets import spread_views
 from sepi.stage import OcclusionMarginParameters, StageMaps
 
@@ -34,7 +35,7 @@ _AT_ONCE = 2**17
 _PIXELS_OF_A_PLANE = 12  # least border to fit one to
 
 
-class UniformPlanesParameters(OcclusionMarginParameters):
+class UniformPlanesParameters(OcclusionMarginParameters, DenoisingParameters):
     """Parameters of uniform regions and their planes."""
 
     colour_scale: float = Field(
@@ -88,6 +89,7 @@ def fill_uniform_regions(
 
     from sepi.matching.gauss_newton import GaussNewton
 
+    light_field = denoised(light_field, parameters.denoising)
     colours = BaseDetailParameters(colour_scale=parameters.colour_scale, detail_share=0.0)
     compared = spread_views(light_field, parameters.views)
     mean = GaussNewton(light_field, colours, parameters.occlusion_margin, compared).mean(before.disparity)[..., :3]

@@ -30,7 +30,7 @@ from sepi.report.runs import Runs, read_json
 from sepi.report.tables import table
 from sepi.report.tabular.layout import as_json, write
 from sepi.scoring.confidence import decile_errors, oracle, sparsification
-from sepi.scoring.scores import COUNTS, EDGE_SCORES, PROTOCOLS, SCORED_REGIONS, SCORES
+from sepi.scoring.scores import COUNTS, EDGE_SCORES, PROTOCOLS, SCORED_REGIONS, score_heads
 from sepi.validation import require_known
 from sepi.workflow.rendered_scenes import DATASET
 from sepi.workflow.result_paths import stage_of
@@ -130,6 +130,8 @@ def _light_field(path: Path, truth: Path) -> dict[str, Any]:
         "grid": list(found.grid),
         "row_spacing": found.row_spacing,
         "positions": "grid" if found.positions is None else "given",
+        # from the reference view, where the grid does not say it
+        "baselines": None if found.positions is None else found.baselines[found.present].tolist(),
         "shape": list(found.shape),
         "channels": found.views.shape[4],
         "dtype": str(found.views.dtype),
@@ -160,7 +162,7 @@ def _stages(plan: Plan, dataset: str, scene: str, parts: bool) -> dict[str, Any]
         took = _timing(path, stage_of(key))
         found[key] = {
             "stage": stage_of(key),
-            "scores": _ordered(scores[key]) if key in scores else None,
+            "scores": _ordered(plan, scores[key]) if key in scores else None,
             "seconds": float(took["seconds"]),
             "peak_memory_mb": float(took["peak_memory_mb"]),
         }
@@ -198,14 +200,14 @@ def _external(plan: Plan, dataset: str, scene: str) -> dict[str, Any]:
     require_known(str(path), plan.external, maps)
     return {
         method: {key: getattr(maps[method], key) for key in ("problem", "source", "sha256")}
-        | {"scores": _ordered(maps[method].evaluation.scores)}
+        | {"scores": _ordered(plan, maps[method].evaluation.scores)}
         for method in plan.external
     }
 
 
-def _ordered(scores: Mapping[str, Mapping[str, Scores]]) -> dict[str, Any]:
+def _ordered(plan: Plan, scores: Mapping[str, Mapping[str, Scores]]) -> dict[str, Any]:
     """Scores in the order of protocols, regions and names."""
-    names = (*SCORES, *EDGE_SCORES, *COUNTS)
+    names = (*score_heads(plan.bad_thresholds), *EDGE_SCORES, *COUNTS)
     found: dict[str, Any] = {}
     for protocol in PROTOCOLS if scores else ():
         regions = scores[protocol]

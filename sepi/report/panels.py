@@ -13,7 +13,7 @@ from sepi.io.scores import Evaluation
 from sepi.lightfield import FloatMap, LightField
 from sepi.matching.unknown import UNKNOWN
 from sepi.report.plan import BEST_VARIANT, MAIN_VARIANT
-from sepi.scoring.scores import WHOLE_MAP
+from sepi.scoring.scores import OWN_BAD_PIXEL, WHOLE_MAP
 from sepi.stage import StageMaps
 
 Kind = Literal["picture", "disparity", "error", "change", "confidence", "grey", "mask", "outline"]
@@ -118,11 +118,13 @@ def first_final(panels: list[Panel]) -> str:
 
 
 def note_of(evaluation: Evaluation) -> str:
-    """The scores of a final map in one line; empty without ground truth."""
+    """The scores of a final map in one line, and a second for thresholds of the user's; empty without ground truth."""
     if not evaluation.scores:
         return ""
     scores = evaluation.scores["paper"][WHOLE_MAP]
-    return f"MSE {scores['mse100']:.2f}, Q25 {scores['q25']:.2f}, BadPix 0.07 {scores['badpix007']:.1f} %"
+    own = sorted((float(name.removeprefix(OWN_BAD_PIXEL)), name) for name in scores if name.startswith(OWN_BAD_PIXEL))
+    usual = f"MSE {scores['mse100']:.2f}, Q25 {scores['q25']:.2f}, BadPix 0.07 {scores['badpix007']:.1f} %"
+    return ",\n".join(filter(None, [usual, ", ".join(f"BadPix {one:g} {scores[name]:.1f} %" for one, name in own)]))
 
 
 def _scene_panels(results: SceneResults) -> Iterator[Panel]:

@@ -85,6 +85,8 @@ class Plan:
         Rendered scenes, without their noise, that parameters may be chosen on.
     missing : sequence of str
         ``DATASET/SCENE`` of those that are left out, since a job of theirs failed.
+    bad_thresholds : sequence of float
+        Those that the user chose to score (:func:`sepi.scoring.scores.score`).
     """
 
     results: Path
@@ -94,6 +96,7 @@ class Plan:
     report: str = ""
     choosing: Names = ()
     missing: Names = ()
+    bad_thresholds: Annotated[Sequence[float], AfterValidator(tuple)] = ()
 
     @classmethod
     def from_json(cls, results: Path, text: str) -> Plan:
@@ -119,7 +122,7 @@ class Plan:
 
     def to_json(self) -> str:
         """The text that :meth:`from_json` reads; the results' folder is not part of it."""
-        keys = ("scenes", "variants", "external", "report", "choosing", "missing")
+        keys = ("scenes", "variants", "external", "report", "choosing", "missing", "bad_thresholds")
         return json.dumps({key: getattr(self, key) for key in keys})
 
     def comparison(self) -> Plan:

@@ -28,7 +28,8 @@ import numpy as np
 from sepi.errors import SepiError
 from sepi.io.files import atomic_path
 from sepi.io.pfm import read_pfm
-from sepi.io.result_folder import RUNTIME, read_result
+from sepi.io.result_files import RUNTIME
+from sepi.io.result_folder import read_result
 from sepi.validation import require_known, require_path, require_type
 
 SCENES = (

@@ -15,7 +15,7 @@ The paper's tables score whole maps, the HCI benchmark leaves a border out:
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -23,7 +23,7 @@ from sepi.errors import SepiError
 from sepi.io.scores import AllScores, Scores
 from sepi.lightfield import BoolMap, FloatMap, LightField, require_light_field
 from sepi.scoring.edges import Edges, edges_of, fattening_and_thinning
-from sepi.validation import require_map, require_type
+from sepi.validation import described, is_finite, require_map, require_type
 
 PROTOCOLS: dict[str, int] = {"paper": 0, "benchmark": 15}
 """Protocol to the pixels left out on each side."""
@@ -41,8 +41,12 @@ SCORES: dict[str, str] = {
 EDGE_SCORES: dict[str, str] = {"fattening": "fattening %", "thinning": "thinning %"}
 """Score of what happens beside depth discontinuities (:mod:`sepi.scoring.edges`) to its name in tables."""
 
+OWN_BAD_PIXEL = "badpix_"
+"""What begins the names of scores of thresholds that a user chose."""
+
 COUNTS: dict[str, str] = {"non_finite": "non-finite", "pixels": "pixels"}
 """Count that stands beside the scores to its name in tables."""
+
 
 WHOLE_MAP = "all"
 """Name of the region that is the whole map."""
@@ -57,12 +61,32 @@ SCORED_REGIONS: tuple[str, ...] = (*REGIONS, DISCONTINUITIES)
 """Regions that are scored of every scene; one that brings masks of other names has them scored, too."""
 
 
+def own_bad_pixel(thresholds: Sequence[float]) -> dict[str, float]:
+    """Score to threshold as :data:`BAD_PIXEL` has them, for thresholds that are not among these.
+
+    Raises
+    ------
+    SepiError
+        If one is no number above 0.
+    """
+    for one in thresholds:
+        if not (is_finite(one) and one > 0):
+            raise SepiError(f"thresholds: expected numbers above 0 in pixels per view step, got {described(one)}")
+    return {f"{OWN_BAD_PIXEL}{one:.10g}": one for one in thresholds if one not in BAD_PIXEL.values()}
+
+
+def score_heads(thresholds: Sequence[float] = ()) -> dict[str, str]:
+    """:data:`SCORES`, and those of thresholds that a user chose."""
+    return SCORES | {name: f"BadPix {threshold:.10g} %" for name, threshold in own_bad_pixel(thresholds).items()}
+
+
 def score(
     estimate: FloatMap,
     ground_truth: FloatMap,
     border: int = 0,
     region: BoolMap | None = None,
     edges: Edges | None = None,
+    thresholds: Sequence[float] = (),
 ) -> Scores:
     """Scores of a disparity map: those of the paper (section V) and of the HCI 4D light field benchmark [1]_.
 
@@ -76,6 +100,8 @@ def score(
         Where to score; everywhere unless given.
     edges : Edges, optional
         Those of the ground truth, which are found unless given.
+    thresholds : sequence of float
+        Further errors in pixels per view step above which a pixel is bad: 0.5 gives the score ``badpix_0.5``.
 
     Returns
     -------
@@ -122,8 +148,9 @@ def score(
     finite = np.isfinite(error)
     quarter = float(np.sort(100 * error)[error.size // 4]) if error.size else float("nan")
     scores: Scores = {"mse100": 100 * _mean(error[finite] ** 2), "q25": quarter}
+    bad_pixel = BAD_PIXEL | own_bad_pixel(thresholds)
     # written so that NaN is bad
-    scores |= {name: 100 * _mean(~(error <= threshold)) for name, threshold in BAD_PIXEL.items()}
+    scores |= {name: 100 * _mean(~(error <= threshold)) for name, threshold in bad_pixel.items()}
     edge_scores = fattening_and_thinning(estimate, edges or edges_of(ground_truth), chosen)
     scores |= dict(zip(EDGE_SCORES, edge_scores, strict=True))
     scores |= {"non_finite": int(np.count_nonzero(~finite)), "pixels": error.size}
@@ -137,6 +164,7 @@ def score_regions(
     protocols: Mapping[str, int] = PROTOCOLS,
     edges: Edges | None = None,
     within: BoolMap | None = None,
+    thresholds: Sequence[float] = (),
 ) -> AllScores:
     """Scores of a disparity map by every protocol and over every region.
 
@@ -153,6 +181,8 @@ def score_regions(
     within : ndarray, shape (H, W), bool, optional
         The pixels that count in every region, such as those of a crop (:func:`sepi.scoring.crops.in_frame`); all
         unless given.
+    thresholds : sequence of float
+        As :func:`score` takes them.
 
     Returns
     -------
@@ -186,7 +216,9 @@ def score_regions(
     if within is not None:
         regions = {name: within if mask is None else within & mask for name, mask in regions.items()}
     return {
-        protocol: {name: score(estimate, ground_truth, border, mask, edges) for name, mask in regions.items()}
+        protocol: {
+            name: score(estimate, ground_truth, border, mask, edges, thresholds) for name, mask in regions.items()
+        }
         for protocol, border in protocols.items()
     }
 

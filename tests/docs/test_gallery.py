@@ -82,6 +82,11 @@ CLAIMS: dict[str, list[str]] = {
         "agree.min() > 0.75 and agree[2, 2] == 1",
         "np.max(1 - agree - hidden) < 0.03",
     ],
+    "plot_14_calibrated_cameras": [
+        "np.median(error[known]) < 5 and 0.6 < known.mean() < 1",
+        "light_field.grid == (3, 3) and light_field.rig.units == 'metres'",
+        "np.ptp(positions[:3, 0]) > 0.1",
+    ],
 }
 
 

@@ -85,6 +85,7 @@ def test_numbers_say_what_they_are_of(complete: Plan, tmp_path: Path) -> None:
         "grid": [3, 3],
         "row_spacing": 1.0,
         "positions": "grid",
+        "baselines": None,
         "shape": [SIZE, SIZE],
         "channels": 3,
         "dtype": "uint8",

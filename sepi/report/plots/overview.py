@@ -11,8 +11,8 @@ import numpy as np
 from sepi.report.plots.pictures import Picture
 from sepi.report.plots.saving import BOTH, new_figure, save
 
-# inches: width of a panel, gap round its picture, and room for its title and for that of the sheet
-_PANEL, _GAP, _TITLE = 3.0, 0.1, 0.4
+# inches: width of a panel, gap round its picture, room for its title and for that of the sheet, for a third line of it
+_PANEL, _GAP, _TITLE, _LINE = 3.0, 0.1, 0.4, 0.14
 _DOTS = 100
 
 
@@ -22,7 +22,8 @@ def write_overview(
     """All pictures of one size on one sheet, with their titles; equal pictures give equal bytes."""
     height, width = rows[0][0][1].shape[:2]
     size = (_PANEL - _GAP, (_PANEL - _GAP) * height / width)
-    row_height = size[1] + _TITLE + _GAP / 2
+    lines = max(words.count("\n") + 1 for row in rows for words, _ in row)
+    row_height = size[1] + _TITLE + _LINE * max(0, lines - 2) + _GAP / 2
     head = _TITLE if title else 0.0
     sheet_size = (_PANEL * max(map(len, rows)), row_height * len(rows) + head)
     figure = new_figure(*sheet_size, layout=None)

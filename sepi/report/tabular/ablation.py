@@ -7,7 +7,7 @@ from sepi.report.plan import BEST_VARIANT
 from sepi.report.runs import Runs
 from sepi.report.tabular import methods
 from sepi.report.tabular.layout import Column, Kind, Record, Report, line, printed, section, short
-from sepi.scoring.scores import REGIONS, SCORES, WHOLE_MAP
+from sepi.scoring.scores import REGIONS, WHOLE_MAP, own_bad_pixel, score_heads
 from sepi.variants import PARTS_OF_BEST
 
 _Means = dict[str, dict[str, methods.Mean]]
@@ -72,10 +72,12 @@ def _averages(runs: Runs, dataset: str, scenes: list[str]) -> _Means:
 
 def parts_table(runs: Runs) -> Report:
     """Scores and seconds of the best variant and of those with one part of it switched off."""
+    own = runs.plan.bad_thresholds
+    heads = {name: score_heads(own)[name] for name in (*_SCORES, *own_bad_pixel(own))}
     columns = {
         "variant": Column("variant", Kind.TEXT),
         "difference": Column("what differs", Kind.TEXT),
-        **{name: Column(SCORES[name], Kind.OURS) for name in _SCORES},
+        **{name: Column(head, Kind.OURS) for name, head in heads.items()},
         "seconds": Column("seconds"),
     }
     records: list[Record] = []
@@ -96,7 +98,7 @@ def parts_table(runs: Runs) -> Report:
         f"{methods.PROTOCOL_NOTE} Each row switches one part of `best` off, or puts the paper's in its place. Seconds: "
         "sum of the stages' processes, reading and writing included; variants that begin alike share their first "
         "stages, which ran once.",
-        ["dataset", "scene", "variant", *_SCORES, "seconds"],
+        ["dataset", "scene", "variant", *heads, "seconds"],
         records,
         sections,
     )

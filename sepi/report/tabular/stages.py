@@ -12,16 +12,9 @@ from sepi.report.plan import MAIN_VARIANT
 from sepi.report.runs import Runs, Timing
 from sepi.report.tabular.layout import Cell, Column, Kind, Record, Report, line, printed, section
 from sepi.report.tabular.methods import REGIONS_NOTE, has_column
-from sepi.scoring.scores import COUNTS, PROTOCOLS, REGIONS, SCORES, WHOLE_MAP
+from sepi.scoring.scores import COUNTS, PROTOCOLS, REGIONS, SCORES, WHOLE_MAP, score_heads
 
 _PARTS = [region for region in REGIONS if region != WHOLE_MAP]
-
-_SCORE_COLUMNS = {
-    "variant": Column("variant", Kind.TEXT),
-    "after": Column("after stage", Kind.TEXT),
-    **{score: Column(head) for score, head in SCORES.items()},
-    **{region: Column(f"{SCORES['mse100']}, {region}") for region in _PARTS},
-}
 
 # height and width of the views and number of view rows and columns that the published seconds are for
 _PUBLISHED_SIZE = ([512, 512], [9, 9])
@@ -29,6 +22,13 @@ _PUBLISHED_SIZE = ([512, 512], [9, 9])
 
 def stage_table(runs: Runs) -> Report:
     """Every score after every stage of every variant, and of other methods' maps, by both protocols."""
+    heads = score_heads(runs.plan.bad_thresholds)
+    columns = {
+        "variant": Column("variant", Kind.TEXT),
+        "after": Column("after stage", Kind.TEXT),
+        **{score: Column(head) for score, head in heads.items()},
+        **{region: Column(f"{SCORES['mse100']}, {region}") for region in _PARTS},
+    }
     records: list[Record] = []
     sections = []
     for dataset, scene in runs.scored_pairs():
@@ -36,19 +36,19 @@ def stage_table(runs: Runs) -> Report:
             found = _score_records(runs, dataset, scene, protocol)
             records += found
             lines = [
-                line(_SCORE_COLUMNS, record, Kind.OURS if record["choice"] else Kind.EXTERNAL)
+                line(columns, record, Kind.OURS if record["choice"] else Kind.EXTERNAL)
                 for record in found
                 if record["region"] == WHOLE_MAP
                 and (record["choice"] or has_column(runs, dataset, str(record["variant"])))
             ]
-            sections.append(section(f"{dataset}/{scene}, protocol {protocol} (border {border})", _SCORE_COLUMNS, lines))
+            sections.append(section(f"{dataset}/{scene}, protocol {protocol} (border {border})", columns, lines))
     return Report(
         "Scores after each stage",
         "Whole map unless a region is named; both protocols. A non-finite estimate counts as bad; how many there are, "
         "and every score in the regions, is in the CSV file. Scenes without ground truth have no scores. "
         + ("Maps of other methods stand below ours as stage `external`. " if runs.plan.external else "")
         + REGIONS_NOTE,
-        ["dataset", "scene", "variant", "stage", "choice", "protocol", "region", *SCORES, *COUNTS],
+        ["dataset", "scene", "variant", "stage", "choice", "protocol", "region", *heads, *COUNTS],
         records,
         sections,
     )

@@ -235,6 +235,10 @@ def test_the_page_says_what_it_is_about(example: Example) -> None:
     for name in ("window_radius", "num_disparities"):
         assert f"<dt>{name}</dt>" in text
     assert "7x5 instead of 64x64" in text
+    (cameras,) = re.findall(r'<svg class="standing".*?</svg>', text, re.DOTALL)
+    assert "25 cameras, 4.0 view steps across and 4.0 down" in cameras
+    assert cameras.count("<circle") == 25
+    assert cameras.count('cx="0.0000" cy="0.0000"') == cameras.count('class="reference"') == 1
 
 
 def test_json_in_the_page_cannot_end_its_script() -> None:
