@@ -499,10 +499,10 @@ BAD: dict[str, tuple[list[str], ReadOptions, str]] = {
 def test_names_that_leave_doubt_are_one_line_that_says_what_to_give(tmp_path: Path, case: str) -> None:
     names, options, word = BAD[case]
     folder = put(tmp_path / "f", names)
-    started = time.perf_counter()
+    started = time.process_time()
     with pytest.raises(SepiError) as caught:
         read(folder, options, "images")
-    assert time.perf_counter() - started < 2
+    assert time.process_time() - started < 2
     assert word in str(caught.value)
     assert str(folder) in str(caught.value)
     assert "\n" not in str(caught.value)
@@ -799,19 +799,19 @@ def test_pattern_finds_the_numbers_that_made_the_name(row: int, column: int, tex
 @pytest.mark.parametrize("pattern", ["*" * 200 + "{number}x", "*a" * 100 + "{number}b", "*{row}*{column}*a*a*a*a*a*b"])
 def test_no_pattern_takes_long(pattern: str) -> None:
     """A pattern of many stars may take for ever where each star may end anywhere."""
-    started = time.perf_counter()
+    started = time.process_time()
     names = ["a" * 255, "1" * 255, "a1" * 127, "-" * 255, "1a" * 127]
     with pytest.raises(SepiError, match="no file has a name like"):
         parse_view_numbers("folder", names, pattern)
-    assert time.perf_counter() - started < 1
+    assert time.process_time() - started < 1
 
 
 @pytest.mark.parametrize("name", ["1" * 255, "1." * 127, "-" * 255, "1_" * 127, "-1" * 127, "._" * 127])
 def test_no_name_takes_long(name: str) -> None:
-    started = time.perf_counter()
+    started = time.process_time()
     with pytest.raises(SepiError):
         infer_view_numbers("folder", [name, name + "a"])
-    assert time.perf_counter() - started < 1
+    assert time.process_time() - started < 1
 
 
 def test_lytro_views_are_read(real_data: Path) -> None:
