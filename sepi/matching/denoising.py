@@ -21,7 +21,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, fields
-from typing import Any
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
@@ -30,7 +30,7 @@ from pydantic import Field
 
 from sepi.image.noise import noise_level
 from sepi.lightfield import FloatMap, LightField, full_scale
-from sepi.matching.view_noise import PARTS, view_noise
+from sepi.matching.view_noise import PARTS, ViewNoise, view_noise
 from sepi.stage import Parameters
 
 LEAST_NOISE = 1.25 / 255
@@ -57,7 +57,7 @@ class DenoisingParameters(Parameters):
     )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class DenoisedLightField(LightField):
     """A light field whose views are denoised.
 
@@ -65,9 +65,12 @@ class DenoisedLightField(LightField):
     ----------
     noise : float
         Standard deviation in one channel of the reference view before, where there is most of it.
+    of_views : ViewNoise
+        By brightness and place, before.
     """
 
-    noise: float = 0.0
+    noise: float
+    of_views: ViewNoise
 
 
 def denoised(light_field: LightField, least: float) -> LightField:
@@ -104,7 +107,8 @@ def denoised(light_field: LightField, least: float) -> LightField:
     if made is None:
         return light_field
     others = {field.name: getattr(light_field, field.name) for field in fields(LightField) if field.name != "views"}
-    return DenoisedLightField(made, **others, noise=_noise_of_parts(light_field.reference_view))
+    noise = _noise_of_parts(light_field.reference_view)
+    return DenoisedLightField(made.views, **others, noise=noise, of_views=made.noise)
 
 
 def _noise_of_parts(image: FloatMap) -> float:
@@ -113,13 +117,20 @@ def _noise_of_parts(image: FloatMap) -> float:
     return float(np.quantile([noise_level(part) for part in parts], _NOISIEST))
 
 
+class _Made(NamedTuple):
+    """Denoised views, and what their noise was."""
+
+    views: npt.NDArray[Any]
+    noise: ViewNoise
+
+
 @dataclass
 class _Kept:
     """What was made of the views of one light field: None where they stay as they are."""
 
     views: npt.NDArray[Any] | None = None
     least: float = 0.0
-    made: npt.NDArray[Any] | None = None
+    made: _Made | None = None
 
 
 _kept: ContextVar[_Kept | None] = ContextVar("_kept", default=None)
@@ -135,7 +146,7 @@ def kept_views() -> Iterator[None]:
         _kept.reset(token)
 
 
-def _denoised_views(light_field: LightField, least: float) -> npt.NDArray[Any] | None:
+def _denoised_views(light_field: LightField, least: float) -> _Made | None:
     noise = view_noise(light_field)
     if noise.usual < LEAST_NOISE or noise.share < LEAST_SHARE:
         return None
@@ -149,7 +160,7 @@ def _denoised_views(light_field: LightField, least: float) -> npt.NDArray[Any] |
     height, width = light_field.shape
     by_place = cv2.resize(np.float32(least) * noise.by_place, (width, height), interpolation=cv2.INTER_LINEAR)
     denoise_views(views, light_field.present, full, noise.brightness, noise.variance, by_place, whole, out)
-    return out
+    return _Made(out, noise)
 
 
 def guide_of(light_field: LightField) -> FloatMap:

@@ -14,8 +14,9 @@ from collections.abc import Callable
 import cv2
 import numpy as np
 
+from sepi.image.noise import variance_of_residuals
 from sepi.lightfield import BoolMap, FloatMap, LightField
-from sepi.matching.base_detail import BaseDetailParameters, base_detail_decomposition, forget_detail
+from sepi.matching.base_detail import BaseDetailParameters, base_detail_decomposition, forget_detail, reference_noise
 from sepi.matching.gauss_newton_kernels import Seeing, SplineViews, mean_of_views, normal_equations
 from sepi.matching.nearest_surfaces import nearest_surfaces
 from sepi.matching.row_bands import Band, Rows, row_bands
@@ -51,7 +52,9 @@ class GaussNewton:
     ) -> None:
         self._light_field = light_field
         self._parameters = parameters
-        self._present = light_field.present if present is None else present
+        self.present = light_field.present if present is None else present
+        noise = variance_of_residuals(reference_noise(light_field), 3)
+        self.colour_variance = parameters.colour_scale**2 + noise
         self._margin = np.float32(occlusion_margin)
         # of the whole picture, where there is memory for it
         self._splines: SplineViews | None = None
@@ -78,7 +81,9 @@ class GaussNewton:
         self._in_bands(disparity, add)
         return mean
 
-    def gradient_and_hessian(self, mean: FloatMap, disparity: FloatMap) -> tuple[FloatMap, FloatMap]:
+    def gradient_and_hessian(
+        self, mean: FloatMap, disparity: FloatMap, slopes: tuple[FloatMap, FloatMap] | None = None
+    ) -> tuple[FloatMap, FloatMap]:
         """Gradient and curvature of the cost of each pixel, before any window.
 
         Parameters
@@ -87,6 +92,8 @@ class GaussNewton:
             From :meth:`mean`; of a slightly different map is good enough.
         disparity : ndarray, shape (H, W), float32
             Pixels per view step.
+        slopes : tuple of ndarray, shape (H, W, 4), float32, optional
+            Derivatives of the mean along y and x; those of its spline unless given.
 
         Returns
         -------
@@ -94,7 +101,7 @@ class GaussNewton:
             The curvature is the inverse variance of the disparity, 1 / (pixels per view step)^2.
         """
         gradient, curvature = np.empty_like(disparity), np.empty_like(disparity)
-        image = mean, *spline_derivatives(mean)
+        image = mean, *(spline_derivatives(mean) if slopes is None else slopes)
 
         def add(views: SplineViews, seeing: Seeing, band: Band) -> None:
             normal_equations(views, seeing, disparity, image, band.begin, band.end, gradient, curvature)
@@ -106,18 +113,18 @@ class GaussNewton:
 
     def _in_bands(self, disparity: FloatMap, add: Callable[[SplineViews, Seeing, Band], None]) -> None:
         field = self._light_field
-        bands = row_bands(field, self._present, float(np.abs(disparity).max()), BYTES_PER_PIXEL)
+        bands = row_bands(field, self.present, float(np.abs(disparity).max()), BYTES_PER_PIXEL)
         if len(bands) == 1:
             if self._splines is None:
-                self._splines = spline_views(field, self._parameters, bands[0].rows, self._present)
+                self._splines = spline_views(field, self._parameters, bands[0].rows, self.present)
             if self._nearest is None or self._nearest[0] is not disparity:
                 self._nearest = None
-                self._nearest = disparity, nearest_surfaces(field, disparity, self._present, bands[0].rows)
+                self._nearest = disparity, nearest_surfaces(field, disparity, self.present, bands[0].rows)
             add(self._splines, Seeing(self._nearest[1], self._margin), bands[0])
             return
         for band in bands:
-            nearest = nearest_surfaces(field, disparity, self._present, band.rows)
-            add(spline_views(field, self._parameters, band.rows, self._present), Seeing(nearest, self._margin), band)
+            nearest = nearest_surfaces(field, disparity, self.present, band.rows)
+            add(spline_views(field, self._parameters, band.rows, self.present), Seeing(nearest, self._margin), band)
 
 
 def spline_views(

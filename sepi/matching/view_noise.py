@@ -12,6 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from itertools import pairwise
 
+import cv2
 import numpy as np
 import numpy.typing as npt
 
@@ -41,6 +42,12 @@ _ROUNDING = 0.29
 
 _LEAST = 1e-5
 """The same of single precision."""
+
+_AROUND = 4
+"""Radius of the window of a pixel's own noise."""
+
+_MOST_OF_USUAL = 4.0
+"""Times the noise of its brightness and place that a pixel may have: beyond, it is texture."""
 
 _MOST_UNEVEN = 16.0
 """Most that a part's noise may differ from the picture's, as a factor of its variance."""
@@ -113,6 +120,38 @@ def view_noise(light_field: LightField) -> ViewNoise:
     expected = np.interp(level, brightness, variance)
     by_place = _by_place(within / expected, between / expected, tells)
     return ViewNoise(brightness, variance, by_place, float(np.median(shares)))
+
+
+def variance_map(light_field: LightField, noise: ViewNoise, views: BoolMap) -> FloatMap:
+    """Variance of the noise of one channel of a view, pixel by pixel.
+
+    What the views vary by from pixel to pixel there, which texture adds to; at most so many times what their brightness
+    and place have, at least what rounding adds.
+
+    Parameters
+    ----------
+    light_field : LightField
+        Whose noise it is, not denoised.
+    noise : ViewNoise
+    views : ndarray, shape (T, S), bool
+        That are looked at.
+
+    Returns
+    -------
+    ndarray, shape (H, W), float32
+        Colours in 0..1.
+    """
+    unit = np.float32(1 / full_scale(light_field.views.dtype))
+    energy = np.zeros(light_field.shape, np.float32)
+    for view in light_field.rgb_views[views]:
+        energy += mask_energy(view * unit)
+    window = (2 * _AROUND + 1,) * 2
+    energy = cv2.blur(energy / np.float32(views.sum()), window)
+    height, width = light_field.shape
+    level = cv2.blur(np.ascontiguousarray(light_field.reference_view.mean(axis=2)), window)
+    usual = np.interp(level, noise.brightness, noise.variance).astype(np.float32)
+    usual *= cv2.resize(noise.by_place, (width, height), interpolation=cv2.INTER_LINEAR)
+    return np.asarray(np.maximum(np.minimum(energy, _MOST_OF_USUAL * usual), (_ROUNDING * unit) ** 2), np.float32)
 
 
 def _by_place(within: FloatMap, between: FloatMap, tells: BoolMap) -> FloatMap:

@@ -1,12 +1,11 @@
 """Regions without texture, told from faint texture by the noise, and planes for them.
 
 The mean of all views that see a pixel has a small fraction of one view's noise. A region is uniform where the mean's
-gradients are no larger than that noise explains: then no view knows anything about its depth, whatever a threshold on
-contrast says. (This takes the place of the paper's LTI, section IV-C of [1]_.)
+gradients are no larger than that noise explains: then no view knows anything about the depth of a pixel, whatever a
+threshold on contrast says. (This takes the place of the paper's LTI, section IV-C of [1]_.)
 
-What is known lies on its border. An edge moves with the nearer of the two surfaces that meet there, so the region is
-nowhere nearer than its border: the plane sought agrees with as much of the border as possible, while border that
-would lie *behind* it counts against it. Border that is nearer belongs to what stands before the region.
+What is known lies on its border (:mod:`sepi.regularization.border_planes`), and in how the light changes over the whole
+of it (:mod:`sepi.regularization.lit_planes`).
 
 References
 ----------
@@ -14,6 +13,8 @@ References
 """
 
 from __future__ import annotations
+
+from typing import TYPE_CHECKING
 
 import cv2
 import numpy as np
@@ -23,19 +24,41 @@ from pydantic import Field
 from sepi.image.noise import noise_level
 from sepi.lightfield import BoolMap, FloatMap, LightField, full_scale
 from sepi.matching.base_detail import BaseDetailParameters
-from sepi.matching.denoising import DenoisingParameters, denoised
+from sepi.matching.denoising import DenoisedLightField, DenoisingParameters, denoised
+from sepi.matching.view_noise import variance_map
 from sepi.matching.view_subsets import spread_views
+from sepi.regularization.border_planes import BorderPlane, BorderPlaneParameters
+from sepi.regularization.lit_planes import LitPlane, lit_planes
+from sepi.regularization.regions import Region
 from sepi.stage import OcclusionMarginParameters, StageMaps
+
+if TYPE_CHECKING:
+    from sepi.matching.gauss_newton import GaussNewton
 
 LEAST_NOISE = 1e-5
 """Noise below which rounding of float32 is noise too; integers have at least 0.3 levels by rounding."""
 
-# residuals that are computed at once: enough to save calls, few enough for the cache
-_AT_ONCE = 2**17
-_PIXELS_OF_A_PLANE = 12  # least border to fit one to
+LEFT_OF_SLOPES = 15 / 128
+"""Of the variance of a difference of neighbours, what the binomial mean leaves of white noise."""
+
+LIT_AREA = 600
+"""Regions of so many pixels are asked for how their light changes."""
+
+LIT_SHARE = 0.01
+"""Of the picture, below which nothing is asked: it takes as long as a round of the optimisation."""
+
+SURE = 6.0
+"""Standard deviations by which what a region has must differ from the plane of its light to be given up: light is not
+quite what the model says."""
+
+FAR = 8.0
+"""Standard deviations, over the three coefficients, from which a border's plane contradicts that of the light."""
+
+MOST_MISFIT = 4.0
+"""Times the variance that noise explains, beyond which a region is no plane."""
 
 
-class UniformPlanesParameters(OcclusionMarginParameters, DenoisingParameters):
+class UniformPlanesParameters(OcclusionMarginParameters, DenoisingParameters, BorderPlaneParameters):
     """Parameters of uniform regions and their planes."""
 
     colour_scale: float = Field(
@@ -55,12 +78,7 @@ class UniformPlanesParameters(OcclusionMarginParameters, DenoisingParameters):
     grow_confidence: float = Field(0.75, ge=0, le=1, description="confidence beyond which a pixel keeps its own depth")
     min_area: int = Field(50, ge=1, description="smaller regions are left alone, in pixels")
     border_confidence: float = Field(0.3, ge=0, le=1, description="confidence from which a border pixel counts")
-    tolerance: float = Field(0.05, gt=0, description="distance from the plane of what agrees, pixels per view step")
-    behind_penalty: float = Field(
-        2.0, ge=0, description="weight of border behind the plane against border that agrees with it"
-    )
-    min_inlier_ratio: float = Field(0.25, ge=0, le=1, description="share of the border without which there is no plane")
-    ransac_iterations: int = Field(500, ge=1, description="planes tried for each region")
+    light: bool = Field(True, description="whether planes are sought by how the light of a region changes, too")
 
 
 def fill_uniform_regions(
@@ -85,49 +103,134 @@ def fill_uniform_regions(
     SepiError
         If the disparity range is unknown.
     """
-    from scipy import ndimage
-
     from sepi.matching.gauss_newton import GaussNewton
 
-    light_field = denoised(light_field, parameters.denoising)
-    colours = BaseDetailParameters(colour_scale=parameters.colour_scale, detail_share=0.0)
     compared = spread_views(light_field, parameters.views)
-    mean = GaussNewton(light_field, colours, parameters.occlusion_margin, compared).mean(before.disparity)[..., :3]
-    views = int(compared.sum())
-    rounding = 0.3 / full_scale(light_field.views.dtype) if light_field.views.dtype != np.float32 else 0.0
-    variance = max(noise_level(light_field.reference_view), rounding, LEAST_NOISE) ** 2 / views
-    uniform = uniform_regions(mean, variance, before.confidence, parameters)
-    labels, _ = ndimage.label(uniform)
-    uniform &= np.bincount(labels.ravel())[labels] >= parameters.min_area
+    field = denoised(light_field, parameters.denoising)
+    noisy = isinstance(field, DenoisedLightField)
+    colours = BaseDetailParameters(colour_scale=parameters.colour_scale, detail_share=0.0)
+    matching = GaussNewton(field, colours, parameters.occlusion_margin, compared)
+    variance = _variance_of_views(light_field, field, compared)
+    of_mean = variance * np.float32((LEFT_OF_SLOPES if noisy else 1) / compared.sum())
+    mean = matching.mean(before.disparity)[..., :3]
+    core = plain_pixels(mean, of_mean, parameters)
+    found = _with_borders(uniform_regions(mean, core, of_mean, before.confidence, parameters), before, parameters)
+    lit = _by_light(light_field, matching, before.disparity, found, variance, noisy) if parameters.light else {}
     known = light_field.require_disparity_range()
-    disparity, filled = before.disparity.copy(), np.zeros_like(uniform)
-    for number, place in enumerate(ndimage.find_objects(labels), start=1):
-        around = tuple(slice(max(side.start - 2, 0), side.stop + 2) for side in place)
-        own = uniform[around] & (labels[around] == number)
-        border = cv2.dilate(own.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
+    disparity, held = before.disparity.copy(), np.zeros_like(core)
+    for n, (region, border) in enumerate(found):
+        place, pixels = region
+        chosen = chosen_plane(region, before.disparity[place], border, lit.get(n), noisy)
+        if chosen is None:
+            continue
+        # a plane that its border holds at one side only may lead anywhere
+        disparity[place][pixels] = np.clip(region.basis @ chosen, known.minimum, known.maximum)
+        # where noise hides faint texture, that may know the surface better than the plane of a border
+        faint = noisy and border is not None and chosen is border.plane and core[place][pixels].mean() < 0.5
+        held[place] |= pixels & np.bool_(not faint)
+    return disparity, held
+
+
+def _variance_of_views(light_field: LightField, field: LightField, compared: BoolMap) -> FloatMap:
+    """Variance of the noise of one channel of a view (H, W); ``field`` is the light field, denoised if it is noisy."""
+    if isinstance(field, DenoisedLightField):
+        return variance_map(light_field, field.of_views, compared)
+    rounding = 0.3 / full_scale(light_field.views.dtype) if light_field.views.dtype != np.float32 else 0.0
+    noise = max(noise_level(light_field.reference_view), rounding, LEAST_NOISE)
+    return np.full(light_field.shape, noise**2, np.float32)
+
+
+def _with_borders(
+    uniform: BoolMap, before: StageMaps, parameters: UniformPlanesParameters
+) -> list[tuple[Region, BorderPlane | None]]:
+    """The regions that are large enough, and the planes of their borders."""
+    from scipy import ndimage
+
+    labels, _ = ndimage.label(uniform)
+    uniform = uniform & (np.bincount(labels.ravel())[labels] >= parameters.min_area)
+    found: list[tuple[Region, BorderPlane | None]] = []
+    for number, (rows, columns) in enumerate(ndimage.find_objects(labels), start=1):
+        place = slice(max(rows.start - 2, 0), rows.stop + 2), slice(max(columns.start - 2, 0), columns.stop + 2)
+        pixels = uniform[place] & (labels[place] == number)
+        if not pixels.any():
+            continue
+        border = cv2.dilate(pixels.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
         # what lies in another region is no border, whether or not that one gets a plane: their order must not matter
-        border &= ~uniform[around] & (before.confidence[around] > parameters.border_confidence)
-        plane = ransac_plane(border, before.disparity[around], parameters)
-        if plane is not None:
-            y, x = np.nonzero(own)
-            # a plane that its border holds at one side only may lead anywhere
-            disparity[around][own] = np.clip(_basis(y, x, own.shape) @ plane, known.minimum, known.maximum)
-            filled[around] |= own
-    return disparity, filled
+        border &= ~uniform[place] & (before.confidence[place] > parameters.border_confidence)
+        found.append((Region(place, pixels), BorderPlane.of(border, before.disparity[place], parameters)))
+    return found
 
 
-def uniform_regions(
-    mean: FloatMap, variance: float, confidence: FloatMap, parameters: UniformPlanesParameters
-) -> BoolMap:
+def _by_light(
+    light_field: LightField,
+    matching: GaussNewton,
+    disparity: FloatMap,
+    found: list[tuple[Region, BorderPlane | None]],
+    variance: FloatMap,
+    noisy: bool,
+) -> dict[int, LitPlane]:
+    """Planes by the light, of regions that are large and, where there is no noise, whose border does not tell."""
+    asked = [
+        n
+        for n, (region, border) in enumerate(found)
+        if region.pixels.sum() >= LIT_AREA and (noisy or border is None or not border.is_one_plane)
+    ]
+    if sum(found[n][0].pixels.sum() for n in asked) < LIT_SHARE * disparity.size:
+        return {}
+    regions, starts = [], []
+    for region, border in (found[n] for n in asked):
+        regions.append(region)
+        middle = np.array([np.median(disparity[region.place][region.pixels]), 0, 0])
+        starts.append(middle if border is None else border.plane)
+    told = lit_planes(light_field, matching, disparity, regions, starts, variance)
+    return {n: plane for n, plane in zip(asked, told, strict=True) if plane is not None}
+
+
+def chosen_plane(
+    region: Region, disparity: FloatMap, border: BorderPlane | None, lit: LitPlane | None, noisy: bool
+) -> npt.NDArray[np.float64] | None:
+    """Which plane a region is given; None where it keeps its disparity.
+
+    That of its border, where its light does not contradict it; in noise only of a large region whose border is one
+    plane, since faint texture, which noise hides, knows more than a few pixels beside it. Otherwise that of its light,
+    where it contradicts what the region has.
+
+    Parameters
+    ----------
+    region : Region
+    disparity : ndarray, shape (h, w), float32
+        Of the region's place, so far.
+    border : BorderPlane or None
+    lit : LitPlane or None
+    noisy : bool
+
+    Returns
+    -------
+    ndarray, shape (3,), or None
+    """
+    if border is not None and noisy and not (border.is_one_plane and region.pixels.sum() >= LIT_AREA):
+        border = None
+    if lit is None:
+        return None if border is None else border.plane
+    # of a region of few parts nothing is known (NaN)
+    no_plane = lit.misfit >= MOST_MISFIT
+    if border is not None and lit.distance(border.plane) < FAR and not (noisy and no_plane):
+        return border.plane
+    change = np.sqrt(np.mean((region.basis @ lit.plane - disparity[region.pixels]) ** 2))
+    if not no_plane and change > SURE * lit.deviation(region.basis):
+        return lit.plane
+    return None if border is None or noisy else border.plane
+
+
+def plain_pixels(mean: FloatMap, variance: float | FloatMap, parameters: UniformPlanesParameters) -> BoolMap:
     """Where the mean of the views varies no more than its noise.
 
     Parameters
     ----------
     mean : ndarray, shape (H, W, 3), float32
         Colours, 0..1.
-    variance : float
+    variance : float or ndarray, shape (H, W), float32
         Of the noise of one channel of the mean.
-    confidence : ndarray, shape (H, W), float32
     parameters : UniformPlanesParameters
 
     Returns
@@ -138,80 +241,36 @@ def uniform_regions(
     size = 2 * parameters.window_radius + 1
     energy = cv2.blur((down**2 + across**2).sum(axis=2), (size, size))
     # central differences halve the noise along each of the two axes; three channels
-    core = energy < parameters.noise_factor * 3 * variance
+    return np.asarray(energy < parameters.noise_factor * 3 * variance)
+
+
+def uniform_regions(
+    mean: FloatMap,
+    core: BoolMap,
+    variance: float | FloatMap,
+    confidence: FloatMap,
+    parameters: UniformPlanesParameters,
+) -> BoolMap:
+    """Plain pixels, and what lies round them in their own colour.
+
+    Parameters
+    ----------
+    mean, variance
+        As in :func:`plain_pixels`.
+    core : ndarray, shape (H, W), bool
+        The plain pixels.
+    confidence : ndarray, shape (H, W), float32
+    parameters : UniformPlanesParameters
+
+    Returns
+    -------
+    ndarray, shape (H, W), bool
+    """
     if not core.any():
-        return np.asarray(core)
-    size += 2 * parameters.growth
+        return core
+    size = 2 * (parameters.window_radius + parameters.growth) + 1
     near = cv2.blur(core.astype(np.float32), (size, size))
     colour = cv2.blur(mean * core[..., None].astype(np.float32), (size, size)) / np.maximum(near, 1e-9)[..., None]
     alike = ((mean - colour) ** 2).sum(axis=2) < 27 * variance + parameters.colour_tolerance**2
     # a running sum leaves rounding errors where there is nothing
     return np.asarray(core | ((near > 0.5 / size**2) & alike & (confidence < parameters.grow_confidence)))
-
-
-def ransac_plane(
-    border: BoolMap, disparity: FloatMap, parameters: UniformPlanesParameters
-) -> npt.NDArray[np.float64] | None:
-    """Plane that most of a border agrees with and little of it lies behind.
-
-    The triples of pixels that planes are tried through do not depend on other regions, nor on which way the picture is
-    mirrored.
-
-    Parameters
-    ----------
-    border : ndarray, shape (h, w), bool
-    disparity : ndarray, shape (h, w), float32
-    parameters : UniformPlanesParameters
-
-    Returns
-    -------
-    ndarray, shape (3,), or None
-        ``a, b, c`` of ``a + b x + c y`` with ``x`` and ``y`` from the middle of the array; None where too little of
-        the border agrees.
-    """
-    y, x = np.nonzero(border)
-    values = disparity[border].astype(np.float64)
-    if values.size < _PIXELS_OF_A_PLANE:
-        return None
-    positions = _basis(y, x, border.shape)
-    order = np.lexsort(((positions[:, 1:] ** 2).sum(axis=1), values))
-    positions, values = positions[order], values[order]
-    triples = np.random.default_rng(0).integers(values.size, size=(parameters.ransac_iterations, 3))
-    triples = triples[np.abs(np.linalg.det(positions[triples])) > 1e-9]
-    planes = np.linalg.solve(positions[triples], values[triples, None])[..., 0]
-    if not len(planes):
-        return None
-    parts = np.array_split(planes, -(-len(planes) * values.size // _AT_ONCE))
-    scores = np.concatenate([_scores(positions, values, part, parameters) for part in parts])
-    chosen = abs(_residuals(positions, values, planes[scores.argmax(), None])[0]) < parameters.tolerance
-    if chosen.sum() < max(3, parameters.min_inlier_ratio * values.size):
-        return None
-    return np.asarray(np.linalg.lstsq(positions[chosen], values[chosen], rcond=None)[0])
-
-
-def _scores(
-    positions: npt.NDArray[np.float64],
-    values: npt.NDArray[np.float64],
-    planes: npt.NDArray[np.float64],
-    parameters: UniformPlanesParameters,
-) -> npt.NDArray[np.float64]:
-    """How much of a border agrees with each of some planes (P, 3), less what lies behind it."""
-    residual = _residuals(positions, values, planes)
-    agreeing = (abs(residual) < parameters.tolerance).sum(axis=1)
-    behind = (residual < -parameters.tolerance).sum(axis=1)
-    return np.asarray(agreeing - parameters.behind_penalty * behind)
-
-
-def _residuals(
-    positions: npt.NDArray[np.float64], values: npt.NDArray[np.float64], planes: npt.NDArray[np.float64]
-) -> npt.NDArray[np.float64]:
-    """By how much each of N values is above each of P planes, (P, N)."""
-    a, b, c = planes.T[..., None]
-    # term by term: a product of matrices rounds as the number of threads has it
-    return np.asarray(values - (a + b * positions[:, 1] + c * positions[:, 2]))
-
-
-def _basis(y: npt.NDArray[np.int64], x: npt.NDArray[np.int64], shape: tuple[int, ...]) -> npt.NDArray[np.float64]:
-    """1, x and y of pixels, (N, 3), from the middle of an array of this shape."""
-    height, width = shape
-    return np.stack([np.ones(x.size), x - (width - 1) / 2, y - (height - 1) / 2], axis=1)
