@@ -14,7 +14,8 @@ from sepi.matching.base_detail import (
     base_detail_decomposition,
 )
 from sepi.pipeline import estimate_depth
-from sepi.regularization.uniform_regions import UniformPlanesParameters, ransac_plane, uniform_regions
+from sepi.regularization.border_planes import BorderPlaneParameters, ransac_plane
+from sepi.regularization.uniform_regions import UniformPlanesParameters, plain_pixels
 from sepi.scenes import render
 from sepi.scoring.confidence import decile_errors, oracle, sparsification
 from sepi.scoring.scores import score
@@ -144,8 +145,7 @@ def test_uniform_is_what_the_noise_explains() -> None:
     random = np.random.default_rng(0)
     mean = np.full((60, 80, 3), 0.5) + random.normal(0, 1e-3, (60, 80, 3))
     mean[:, 40:] += 6e-3 * random.normal(0, 1, (60, 40, 1))
-    confidence = np.zeros((60, 80), np.float32)
-    found = uniform_regions(mean.astype(np.float32), 1e-6, confidence, UniformPlanesParameters(growth=0))
+    found = plain_pixels(mean.astype(np.float32), 1e-6, UniformPlanesParameters())
     assert found[:, :34].mean() > 0.95
     assert not found[:, 46:].any()
 
@@ -158,11 +158,11 @@ def test_plane_is_nowhere_nearer_than_most_of_the_border() -> None:
     disparity[:, 30:] = 1.5
     border = np.zeros((30, 40), bool)
     border[[0, -1]] = border[:, [0, -1]] = True
-    plane = ransac_plane(border, disparity.astype(np.float32), UniformPlanesParameters())
+    plane = ransac_plane(border, disparity.astype(np.float32), BorderPlaneParameters())
     assert plane is not None
     found = plane[0] + plane[1] * (x - 19.5) + plane[2] * (y - 14.5)
     np.testing.assert_allclose(found, ground_truth, atol=1e-3)
-    assert ransac_plane(np.zeros((30, 40), bool), disparity, UniformPlanesParameters()) is None
+    assert ransac_plane(np.zeros((30, 40), bool), disparity, BorderPlaneParameters()) is None
 
 
 def test_parts_of_best_differ_from_it_in_one_thing() -> None:

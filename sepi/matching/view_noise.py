@@ -142,16 +142,14 @@ def variance_map(light_field: LightField, noise: ViewNoise, views: BoolMap) -> F
         Colours in 0..1.
     """
     unit = np.float32(1 / full_scale(light_field.views.dtype))
-    energy = np.zeros(light_field.shape, np.float32)
-    for view in light_field.rgb_views[views]:
-        energy += mask_energy(view * unit)
     window = (2 * _AROUND + 1,) * 2
-    energy = cv2.blur(energy / np.float32(views.sum()), window)
+    energies = [mask_energy(view * unit) for view in light_field.rgb_views[views]]
+    energy = np.asarray(np.mean(energies, axis=0), np.float32)
     height, width = light_field.shape
     level = cv2.blur(np.ascontiguousarray(light_field.reference_view.mean(axis=2)), window)
-    usual = np.interp(level, noise.brightness, noise.variance).astype(np.float32)
-    usual *= cv2.resize(noise.by_place, (width, height), interpolation=cv2.INTER_LINEAR)
-    return np.asarray(np.maximum(np.minimum(energy, _MOST_OF_USUAL * usual), (_ROUNDING * unit) ** 2), np.float32)
+    by_place = cv2.resize(noise.by_place, (width, height), interpolation=cv2.INTER_LINEAR)
+    most = _MOST_OF_USUAL * np.interp(level, noise.brightness, noise.variance) * by_place
+    return np.asarray(np.maximum(np.minimum(cv2.blur(energy, window), most), (_ROUNDING * unit) ** 2), np.float32)
 
 
 def _by_place(within: FloatMap, between: FloatMap, tells: BoolMap) -> FloatMap:

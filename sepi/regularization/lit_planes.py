@@ -58,7 +58,8 @@ class LitPlane:
 
     def deviation(self, basis: npt.NDArray[np.float64]) -> float:
         """Standard deviation of the disparity over points ``basis`` (N, 3), root mean square."""
-        return float(np.sqrt(np.maximum(np.sum(basis @ self.covariance * basis) / len(basis), 0)))
+        mean = _weighted(basis, np.full(len(basis), 1 / len(basis)))
+        return float(np.sqrt(np.maximum(np.sum(self.covariance * mean), 0)))
 
     def distance(self, plane: npt.NDArray[np.float64]) -> float:
         """Standard deviations that another plane is away, over the three coefficients."""
@@ -153,7 +154,7 @@ def _unlike(
         if like.sum() > 0.5 * like.size:
             offsets.append(residual[like].mean(axis=0, dtype=np.float64))
     noise = float(variance[region].mean() / region.sum())
-    left = float(np.square(offsets).mean()) if offsets else 0.0
+    left = float(np.var(offsets, axis=0).mean()) if offsets else 0.0
     return max(left - noise, UNLIKE**2)
 
 
@@ -174,20 +175,20 @@ class _Sums:
         if len(terms) < _PART**2 // 4:
             return None
         h = curvature[region].astype(np.float64)
-        return cls(region, terms, gradient[region].astype(np.float64), h, (terms * h[:, None]).T @ terms)
+        return cls(region, terms, gradient[region].astype(np.float64), h, _weighted(terms, h))
 
     def plane(self) -> npt.NDArray[np.float64] | None:
         """By how much the plane changes; None where the views say nothing of one of its coefficients."""
         if np.linalg.cond(_scaled(self.information)) > 1e6:
             return None
-        return np.asarray(np.linalg.solve(self.information, self.basis.T @ self.gradient))
+        return np.asarray(np.linalg.solve(self.information, np.einsum("ni,n->i", self.basis, self.gradient)))
 
     def spread(
         self, variance: FloatMap, slopes: FloatMap, unlike: float, field: LightField, matching: GaussNewton
     ) -> tuple[npt.NDArray[np.float64], float]:
         """Covariance of the plane, and its misfit; ``unlike`` is the variance between whole views."""
         varied = self.curvature * variance[self.region] / matching.colour_variance
-        sums = (self.basis * varied[:, None]).T @ self.basis
+        sums = _weighted(self.basis, varied)
         # a view's offset changes each gradient by itself times the slope that is seen from there
         down, across = (np.einsum("ni,nc->ic", self.basis, slope[self.region][:, :3]) for slope in slopes)
         for v, u in field.baselines[matching.present]:
@@ -204,6 +205,11 @@ class _Sums:
         if not many.any():
             return np.nan
         return float(np.mean(asked[many] ** 2 / np.maximum(expected[many], 1e-30)))
+
+
+def _weighted(terms: npt.NDArray[np.float64], weights: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """Sum of the products of terms (N, 3) with each other, (3, 3); a product of matrices rounds as threads have it."""
+    return np.asarray(np.einsum("ni,n,nj->ij", terms, weights, terms))
 
 
 def _scaled(matrix: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:

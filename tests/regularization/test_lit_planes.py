@@ -1,0 +1,192 @@
+"""Planes of walls without texture, by how light falls off along them: a tenth of a level per pixel, in noise."""
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from sepi.lightfield import BoolMap, DisparityRange, LightField
+from sepi.matching.base_detail import BaseDetailParameters
+from sepi.matching.gauss_newton import GaussNewton
+from sepi.regularization.border_planes import BorderPlane
+from sepi.regularization.lit_planes import LitPlane, lit_planes
+from sepi.regularization.regions import Region
+from sepi.regularization.uniform_regions import (
+    FAR,
+    LIT_AREA,
+    SURE,
+    UniformPlanesParameters,
+    chosen_plane,
+    fill_uniform_regions,
+)
+from sepi.stage import StageMaps
+
+SIZE, VIEWS = 128, 5
+ALL = (slice(0, SIZE), slice(0, SIZE))
+# 1, x and y from the middle
+WALL = np.array([-0.9, 0.002, -0.003])
+NOISE = 3.0
+
+
+def light(x: npt.NDArray[np.float64], y: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """Of a lamp beside the picture, in levels: about 0.3 of them from pixel to pixel."""
+    fall = 90 / (1 + ((x - 20) ** 2 + (y + 60) ** 2) / 120**2) ** 1.5
+    return 60 + fall[..., None] * np.array([1.0, 0.8, 0.6])
+
+
+def wall_of(plane: npt.NDArray[np.float64], noise: float = NOISE, brighter: float = 0, bend: float = 0) -> LightField:
+    """A lit plane; ``brighter``: levels by which views differ; ``bend``: disparity by which its middle comes forward."""
+    random = np.random.default_rng(3)
+    middle = (SIZE - 1) / 2
+    Y, X = np.mgrid[:SIZE, :SIZE] - middle
+    views = np.empty((VIEWS, VIEWS, SIZE, SIZE, 3))
+    for t, s in np.ndindex(VIEWS, VIEWS):
+        v, u = t - VIEWS // 2, s - VIEWS // 2
+        x, y = X, Y
+        for _ in range(20):
+            d = plane[0] + plane[1] * x + plane[2] * y + bend * np.exp(-(x**2 + y**2) / 20**2)
+            x, y = X + d * u, Y + d * v
+        views[t, s] = light(x, y) + random.normal(0, brighter) + random.normal(0, noise, (SIZE, SIZE, 3))
+    pictures = np.clip(np.rint(views), 0, 255).astype(np.uint8)
+    return LightField(pictures, "wall", disparity_range=DisparityRange(-2, 2, "given"))
+
+
+def told_of(light_field: LightField, variance: float = NOISE**2) -> LitPlane | None:
+    """What the whole picture tells, from the middle of the range."""
+    matching = GaussNewton(light_field, BaseDetailParameters(detail_share=0.0), 0.15)
+    region = Region(ALL, np.ones((SIZE, SIZE), bool))
+    disparity = np.zeros((SIZE, SIZE), np.float32)
+    known = np.full((SIZE, SIZE), variance / 255**2, np.float32)
+    return lit_planes(light_field, matching, disparity, [region], [np.zeros(3)], known)[0]
+
+
+def test_a_wall_without_texture_has_the_depth_that_its_light_tells() -> None:
+    """Otherwise plain walls, half of the picture of a room, are a guess from what stands before them."""
+    lit = told_of(wall_of(WALL))
+    assert lit is not None
+    basis = Region(ALL, np.ones((SIZE, SIZE), bool)).basis
+    error = np.sqrt(np.mean((basis @ (lit.plane - WALL)) ** 2))
+    assert error < 0.04
+    # and it says how far it may be off
+    assert 0.3 * error < lit.deviation(basis) < 0.06
+    assert lit.distance(WALL) < 4
+    assert 0.3 < lit.misfit < 2
+
+
+def test_noise_and_unlike_views_make_a_plane_less_sure() -> None:
+    """If this fails, cameras of unlike exposure move walls."""
+    basis = Region(ALL, np.ones((SIZE, SIZE), bool)).basis
+    quiet, noisy, unlike = (
+        told_of(light_field, variance)
+        for light_field, variance in (
+            (wall_of(WALL, 1.5), 1.5**2),
+            (wall_of(WALL, 6), 6.0**2),
+            (wall_of(WALL, 1.5, brighter=1), 1.5**2),
+        )
+    )
+    assert quiet is not None
+    assert noisy is not None
+    assert unlike is not None
+    assert noisy.deviation(basis) == pytest.approx(4 * quiet.deviation(basis), rel=0.35)
+    assert unlike.deviation(basis) > 4 * quiet.deviation(basis)
+    assert unlike.distance(WALL) < 4
+
+
+def test_what_is_bent_is_no_plane() -> None:
+    """Otherwise a column before a wall becomes a part of the wall."""
+    straight, bent = told_of(wall_of(WALL, 1.0), 1.0), told_of(wall_of(WALL, 1.0, bend=0.6), 1.0)
+    assert straight is not None
+    assert bent is not None
+    assert straight.misfit < 4 < bent.misfit
+
+
+def test_without_light_or_within_another_range_nothing_is_told() -> None:
+    """A plane by noise alone would lie anywhere."""
+    even = wall_of(WALL)
+    dark = LightField(np.full_like(even.views, 80), "dark", disparity_range=even.disparity_range)
+    assert told_of(dark) is None
+    near = LightField(even.views, "near", disparity_range=DisparityRange(0.5, 2, "given"))
+    assert told_of(near) is None
+
+
+SMALL = np.zeros((SIZE, SIZE), bool)
+SMALL[:20, :20] = True
+HERE = np.full((SIZE, SIZE), 0.5, np.float32)
+
+
+def lit_at(distance: float, deviation: float = 0.01, misfit: float = 1.0) -> LitPlane:
+    covariance = np.diag([deviation**2, 1e-12, 1e-12])
+    return LitPlane(np.array([0.5 + distance, 0, 0]), covariance, misfit)
+
+
+@pytest.mark.parametrize(
+    ("border", "lit", "noisy", "chosen"),
+    [
+        # without noise the border's, unless light contradicts it and what there is
+        ((0.0, 300, 0.3), None, False, "border"),
+        ((0.0, 300, 0.3), (-0.5, 0.01), False, "border"),
+        ((0.0, 300, 0.3), (0.4, 0.01), False, "lit"),
+        ((0.0, 300, 0.3), (0.03, 0.01), False, "border"),
+        ((0.0, 300, 0.3), (0.4, 0.01, 9.0), False, "border"),
+        (None, (0.4, 0.01), False, "lit"),
+        # in noise only of a border that is one plane, and of what may be one
+        ((0.0, 300, 0.3), None, True, None),
+        ((0.0, 40, 0.9), None, True, None),
+        ((0.0, 300, 0.9), None, True, "border"),
+        ((0.0, 300, 0.9), (-0.5, 0.01), True, "border"),
+        ((0.0, 300, 0.9), (-0.5, 0.01, np.nan), True, "border"),
+        ((0.0, 300, 0.9), (-0.5, 0.01, 9.0), True, None),
+        ((0.0, 300, 0.9), (0.4, 0.01), True, "lit"),
+        (None, (0.4, 0.01), True, "lit"),
+        (None, (0.4, 0.4 / SURE * 1.1), True, None),
+        (None, (0.4, 0.01, 9.0), True, None),
+        ((0.0, 300, 0.9), (0.4, 0.9 / FAR * 1.1), True, "border"),
+    ],
+)
+def test_which_plane_a_region_is_given(
+    border: tuple[float, int, float] | None, lit: tuple[float, ...] | None, noisy: bool, chosen: str | None
+) -> None:
+    """Of the region's own disparity 0.5, a border's plane at 0 and its light's."""
+    beside = None if border is None else BorderPlane(np.array([border[0], 0, 0]), *border[1:])
+    told = None if lit is None else lit_at(*lit)
+    found = chosen_plane(Region(ALL, np.ones((SIZE, SIZE), bool)), HERE, beside, told, noisy)
+    expected = {None: None, "border": beside and beside.plane, "lit": told and told.plane}[chosen]
+    assert (found is None) if expected is None else np.array_equal(found, expected)
+
+
+def test_a_small_region_in_noise_keeps_what_it_has() -> None:
+    """Stripes of a few pixels would join the wall behind them."""
+    assert SMALL.sum() < LIT_AREA
+    border = BorderPlane(np.array([0.0, 0, 0]), 300, 0.9)
+    assert chosen_plane(Region(ALL, SMALL), HERE, border, None, True) is None
+    assert chosen_plane(Region(ALL, SMALL), HERE, border, None, False) is border.plane
+
+
+@pytest.fixture(scope="module")
+def room() -> tuple[LightField, StageMaps, BoolMap]:
+    """The wall behind a board of strong texture, and a map that takes the wall for the board's."""
+    noise = 2 * NOISE
+    wall = wall_of(WALL, noise)
+    board = np.s_[40:90, 50:100]
+    random = np.random.default_rng(8)
+    # repeated enough that the board is the same in all views: its disparity is 0
+    texture = random.uniform(30, 220, (50, 50, 3))
+    views = wall.views.astype(np.float64)
+    views[:, :, *board] = texture + random.normal(0, noise, (VIEWS, VIEWS, 50, 50, 3))
+    pictures = np.clip(np.rint(views), 0, 255).astype(np.uint8)
+    light_field = LightField(pictures, "room", disparity_range=wall.disparity_range)
+    of_wall = np.ones((SIZE, SIZE), bool)
+    of_wall[board] = False
+    maps = StageMaps(np.zeros((SIZE, SIZE), np.float32), np.full((SIZE, SIZE), 0.5, np.float32))
+    return light_field, maps, of_wall
+
+
+def test_a_noisy_wall_leaves_the_depth_of_what_stands_before_it(room: tuple[LightField, StageMaps, BoolMap]) -> None:
+    light_field, maps, of_wall = room
+    truth = (Region(ALL, np.ones((SIZE, SIZE), bool)).basis @ WALL).reshape(SIZE, SIZE)
+    disparity, held = fill_uniform_regions(light_field, maps, UniformPlanesParameters())
+    assert held[of_wall].mean() > 0.9
+    assert not held[45:85, 55:95].any()
+    assert np.abs(disparity - truth)[held].mean() < 0.1
+    np.testing.assert_array_equal(disparity[~held], maps.disparity[~held])
+    without, held = fill_uniform_regions(light_field, maps, UniformPlanesParameters(light=False))
+    assert np.abs(without - truth)[of_wall].mean() > 0.5
