@@ -10,7 +10,7 @@ from scipy import ndimage
 from sepi.lightfield import FloatMap, LightField
 from sepi.matching.denoising import DenoisedLightField, denoised, kept_views
 from sepi.matching.denoising_kernels import denoise_views
-from sepi.matching.view_noise import view_noise
+from sepi.matching.view_noise import variance_map, view_noise
 from sepi.scenes import render
 
 
@@ -42,6 +42,16 @@ def test_noise_is_told_by_brightness_and_by_place_whatever_the_texture() -> None
     sides = np.where(np.arange(128) < 64, 3, 9).astype(np.float32)[:, None]
     by_place = np.sqrt(view_noise(with_noise(scene, sides)).by_place).mean(axis=0)
     assert by_place[3] / by_place[0] == pytest.approx(3, rel=0.2)
+
+
+def test_a_pixels_own_noise_is_not_its_texture() -> None:
+    """If this fails, texture whose depth is wrong passes for a bare wall."""
+    scene = textured()
+    scene.views[..., :64, :] = 0.5
+    noisy = with_noise(scene, 4)
+    variance = 255**2 * variance_map(noisy, view_noise(noisy), noisy.present)
+    assert variance[:, :50].mean() == pytest.approx(16, rel=0.2)
+    assert variance[:, 80:].max() < 5 * 16
 
 
 def test_pictures_of_unlike_brightness_are_no_noise() -> None:

@@ -34,7 +34,7 @@ def light(x: npt.NDArray[np.float64], y: npt.NDArray[np.float64]) -> npt.NDArray
 
 
 def wall_of(plane: npt.NDArray[np.float64], noise: float = NOISE, brighter: float = 0, bend: float = 0) -> LightField:
-    """A lit plane; ``brighter``: levels by which views differ; ``bend``: disparity by which its middle comes forward."""
+    """A lit plane; ``brighter``: levels by which views differ; ``bend``: by how much its middle comes forward, px."""
     random = np.random.default_rng(3)
     middle = (SIZE - 1) / 2
     Y, X = np.mgrid[:SIZE, :SIZE] - middle
