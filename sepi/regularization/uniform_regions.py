@@ -54,6 +54,12 @@ quite what the model says."""
 FAR = 8.0
 """Standard deviations, over the three coefficients, from which a border's plane contradicts that of the light."""
 
+STEP = 0.3
+"""Disparity by which a part of a region lies off its plane, pixels per view step."""
+
+_RING, _GOES_ON = 3, 0.9
+"""Width of what is round such a part, pixels, and how much of it must be as near as it is."""
+
 MOST_MISFIT = 4.0
 """Times the variance that noise explains, beyond which a region is no plane."""
 
@@ -125,6 +131,10 @@ def fill_uniform_regions(
             continue
         # a plane that its border holds at one side only may lead anywhere
         disparity[place][pixels] = np.clip(region.basis @ chosen, known.minimum, known.maximum)
+        if noisy:
+            others = other_surfaces(pixels, disparity[place], before.disparity[place])
+            disparity[place][others] = before.disparity[place][others]
+            pixels = pixels & ~others
         # where noise hides faint texture, that may know the surface better than the plane of a border
         faint = noisy and border is not None and chosen is border.plane and core[place][pixels].mean() < 0.5
         held[place] |= pixels & np.bool_(not faint)
@@ -220,6 +230,38 @@ def chosen_plane(
     if not no_plane and change > SURE * lit.deviation(region.basis):
         return lit.plane
     return None if border is None or noisy else border.plane
+
+
+def other_surfaces(pixels: BoolMap, disparity: FloatMap, before: FloatMap) -> BoolMap:
+    """Parts of a region that lie off its plane and go on beyond it.
+
+    In noise a dark fold may hang together with the dark wall behind it, while its depth is known from round about.
+
+    Parameters
+    ----------
+    pixels : ndarray, shape (h, w), bool
+        The region.
+    disparity, before : ndarray, shape (h, w), float32
+        With its plane, and without.
+
+    Returns
+    -------
+    ndarray, shape (h, w), bool
+    """
+    from scipy import ndimage
+
+    labels, _ = ndimage.label(pixels & (np.abs(before - disparity) > STEP))
+    others = np.zeros_like(pixels)
+    for number, (rows, columns) in enumerate(ndimage.find_objects(labels), start=1):
+        place = (
+            slice(max(rows.start - _RING, 0), rows.stop + _RING),
+            slice(max(columns.start - _RING, 0), columns.stop + _RING),
+        )
+        part, depth = labels[place] == number, before[place]
+        ring = cv2.dilate(part.astype(np.uint8), np.ones((2 * _RING + 1,) * 2, np.uint8)).astype(bool) & ~part
+        if np.mean(np.abs(depth[ring] - np.median(depth[part])) < STEP) >= _GOES_ON:
+            others[place] |= part
+    return others
 
 
 def plain_pixels(mean: FloatMap, variance: float | FloatMap, parameters: UniformPlanesParameters) -> BoolMap:

@@ -17,6 +17,7 @@ from sepi.regularization.uniform_regions import (
     UniformPlanesParameters,
     chosen_plane,
     fill_uniform_regions,
+    other_surfaces,
 )
 from sepi.stage import StageMaps
 
@@ -159,6 +160,22 @@ def test_a_small_region_in_noise_keeps_what_it_has() -> None:
     border = BorderPlane(np.array([0.0, 0, 0]), 300, 0.9)
     assert chosen_plane(Region(ALL, SMALL), HERE, border, None, True) is None
     assert chosen_plane(Region(ALL, SMALL), HERE, border, None, False) is border.plane
+
+
+def test_a_fold_that_goes_on_beyond_a_region_is_none_of_it() -> None:
+    """If this fails, a dark fold of a coat takes the depth of the dark wall behind it."""
+    before = np.zeros((60, 80), np.float32)
+    before[:, 50:] = 1.5
+    plane = np.zeros_like(before)
+    pixels = np.zeros(before.shape, bool)
+    # the wall, a bridge to a fold within the coat, and the wall's outermost pixels, which the coat was carried over
+    pixels[5:55, 5:50] = pixels[29:31, 50:60] = pixels[25:35, 60:75] = True
+    pixels[10:20, 50:53] = True
+    others = other_surfaces(pixels, plane, before)
+    assert others[25:35, 60:75].all()
+    assert not others[10:20, 50:53].any()
+    assert not others[:, :50].any()
+    assert not other_surfaces(pixels, plane, plane).any()
 
 
 @pytest.fixture(scope="module")
