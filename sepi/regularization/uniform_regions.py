@@ -250,8 +250,11 @@ def other_surfaces(pixels: BoolMap, disparity: FloatMap, before: FloatMap) -> Bo
     """
     from scipy import ndimage
 
-    labels, _ = ndimage.label(pixels & (np.abs(before - disparity) > STEP))
-    others = np.zeros_like(pixels)
+    off, others = pixels & (np.abs(before - disparity) > STEP), np.zeros_like(pixels)
+    if off.sum() > 0.5 * pixels.sum():
+        # nothing was known of this region
+        return others
+    labels, _ = ndimage.label(off)
     for number, (rows, columns) in enumerate(ndimage.find_objects(labels), start=1):
         place = (
             slice(max(rows.start - _RING, 0), rows.stop + _RING),
