@@ -47,7 +47,9 @@ def test_noise_is_told_by_brightness_and_by_place_whatever_the_texture() -> None
 def test_a_pixels_own_noise_is_not_its_texture() -> None:
     """If this fails, texture whose depth is wrong passes for a bare wall."""
     scene = textured()
-    scene.views[..., :64, :] = 0.5
+    scene.views[:] = 0.5
+    # a grain of single pixels at disparity 0
+    scene.views[..., 64:, :] += 0.1 * np.random.default_rng(2).standard_normal((128, 64, 3), np.float32)
     noisy = with_noise(scene, 4)
     variance = 255**2 * variance_map(noisy, view_noise(noisy), noisy.present)
     assert variance[:, :50].mean() == pytest.approx(16, rel=0.2)
