@@ -18,8 +18,9 @@ from sepi.lightfield import BoolMap, FloatMap
 from sepi.regularization.regions import basis_of
 from sepi.stage import Parameters
 
-LONG_BORDER = 50
-"""Pixels from which a border may tell of itself whether it is one plane."""
+KNOWN_BORDER = 2.0
+"""Pixels of border for each pixel of the side of a square of the region's area, from which it tells whether it is one
+plane: a quarter of the shortest way round, two pixels wide."""
 
 # residuals that are computed at once: enough to save calls, few enough for the cache
 _AT_ONCE = 2**17
@@ -55,10 +56,9 @@ class BorderPlane:
     pixels: int
     share: float
 
-    @property
-    def is_one_plane(self) -> bool:
-        """Whether most of a border that is worth the name agrees."""
-        return self.pixels >= LONG_BORDER and self.share >= 0.5
+    def is_one_plane(self, area: int) -> bool:
+        """Whether most of a border agrees that is known on enough of the way round a region of so many pixels."""
+        return self.pixels >= KNOWN_BORDER * area**0.5 and self.share >= 0.5
 
     @classmethod
     def of(cls, border: BoolMap, disparity: FloatMap, parameters: BorderPlaneParameters) -> Self | None:

@@ -25,6 +25,11 @@ class Region(NamedTuple):
     pixels: BoolMap
 
     @property
+    def area(self) -> int:
+        """How many they are."""
+        return int(np.count_nonzero(self.pixels))
+
+    @property
     def basis(self) -> npt.NDArray[np.float64]:
         """1, x and y of its pixels, (N, 3), from the middle of its place."""
         return basis_of(self.pixels)

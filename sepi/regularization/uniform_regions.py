@@ -183,9 +183,9 @@ def _by_light(
     asked = [
         n
         for n, (region, border) in enumerate(found)
-        if region.pixels.sum() >= LIT_AREA and (noisy or border is None or not border.is_one_plane)
+        if region.area >= LIT_AREA and (noisy or border is None or not border.is_one_plane(region.area))
     ]
-    if sum(found[n][0].pixels.sum() for n in asked) < LIT_SHARE * disparity.size:
+    if sum(found[n][0].area for n in asked) < LIT_SHARE * disparity.size:
         return {}
     regions, starts = [], []
     for region, border in (found[n] for n in asked):
@@ -218,7 +218,7 @@ def chosen_plane(
     -------
     ndarray, shape (3,), or None
     """
-    if border is not None and noisy and not (border.is_one_plane and region.pixels.sum() >= LIT_AREA):
+    if border is not None and noisy and not (border.is_one_plane(region.area) and region.area >= LIT_AREA):
         border = None
     if lit is None:
         return None if border is None else border.plane
