@@ -14,14 +14,17 @@ disparity by more than noise explains.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import cv2
 import numpy as np
 import numpy.typing as npt
 
 from sepi.lightfield import BoolMap, FloatMap, LightField, full_scale
-from sepi.matching.gauss_newton import GaussNewton
 from sepi.regularization.regions import Region, basis_of
+
+if TYPE_CHECKING:
+    from sepi.matching.gauss_newton import GaussNewton
 
 UNLIKE = 0.01 / 255
 """Standard deviation by which a whole view is brighter than another, at least; colours in 0..1."""
