@@ -18,7 +18,6 @@ from typing import TYPE_CHECKING
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 from pydantic import Field
 
 from sepi.image.noise import noise_level
@@ -29,6 +28,7 @@ from sepi.matching.view_noise import variance_map
 from sepi.matching.view_subsets import spread_views
 from sepi.regularization.border_planes import BorderPlane, BorderPlaneParameters
 from sepi.regularization.lit_planes import LitPlane, lit_planes
+from sepi.regularization.plane_choice import LIT_AREA, chosen_plane, kept_pixels
 from sepi.regularization.regions import Region
 from sepi.stage import OcclusionMarginParameters, StageMaps
 
@@ -41,27 +41,8 @@ LEAST_NOISE = 1e-5
 LEFT_OF_SLOPES = 15 / 128
 """Of the variance of a difference of neighbours, what the binomial mean leaves of white noise."""
 
-LIT_AREA = 600
-"""Regions of so many pixels are asked for how their light changes."""
-
 LIT_SHARE = 0.01
 """Of the picture, below which nothing is asked: it takes as long as a round of the optimisation."""
-
-SURE = 6.0
-"""Standard deviations by which what a region has must differ from the plane of its light to be given up: light is not
-quite what the model says."""
-
-FAR = 8.0
-"""Standard deviations, over the three coefficients, from which a border's plane contradicts that of the light."""
-
-STEP = 0.3
-"""Disparity by which a part of a region lies off its plane, pixels per view step."""
-
-_RING, _GOES_ON = 3, 0.9
-"""Width of what is round such a part, pixels, and how much of it must be as near as it is."""
-
-MOST_MISFIT = 4.0
-"""Times the variance that noise explains, beyond which a region is no plane."""
 
 
 class UniformPlanesParameters(OcclusionMarginParameters, DenoisingParameters, BorderPlaneParameters):
@@ -130,13 +111,13 @@ def fill_uniform_regions(
         if chosen is None:
             continue
         # a plane that its border holds at one side only may lead anywhere
-        disparity[place][pixels] = np.clip(region.basis @ chosen, known.minimum, known.maximum)
+        disparity[place][pixels] = np.clip(region.basis @ chosen.plane, known.minimum, known.maximum)
         if noisy:
-            others = other_surfaces(pixels, disparity[place], before.disparity[place])
-            disparity[place][others] = before.disparity[place][others]
-            pixels = pixels & ~others
+            kept = kept_pixels(pixels, disparity[place], before.disparity[place], chosen)
+            disparity[place][kept] = before.disparity[place][kept]
+            pixels = pixels & ~kept
         # where noise hides faint texture, that may know the surface better than the plane of a border
-        faint = noisy and border is not None and chosen is border.plane and core[place][pixels].mean() < 0.5
+        faint = noisy and chosen.source == "border" and 2 * core[place][pixels].sum() < pixels.sum()
         held[place] |= pixels & np.bool_(not faint)
     return disparity, held
 
@@ -194,77 +175,6 @@ def _by_light(
         starts.append(middle if border is None else border.plane)
     told = lit_planes(light_field, matching, disparity, regions, starts, variance)
     return {n: plane for n, plane in zip(asked, told, strict=True) if plane is not None}
-
-
-def chosen_plane(
-    region: Region, disparity: FloatMap, border: BorderPlane | None, lit: LitPlane | None, noisy: bool
-) -> npt.NDArray[np.float64] | None:
-    """Which plane a region is given; None where it keeps its disparity.
-
-    That of its border, where its light does not contradict it; in noise only of a large region whose border is one
-    plane, since faint texture, which noise hides, knows more than a few pixels beside it. Otherwise that of its light,
-    where it contradicts what the region has.
-
-    Parameters
-    ----------
-    region : Region
-    disparity : ndarray, shape (h, w), float32
-        Of the region's place, so far.
-    border : BorderPlane or None
-    lit : LitPlane or None
-    noisy : bool
-
-    Returns
-    -------
-    ndarray, shape (3,), or None
-    """
-    if border is not None and noisy and not (border.is_one_plane(region.area) and region.area >= LIT_AREA):
-        border = None
-    if lit is None:
-        return None if border is None else border.plane
-    # of a region of few parts nothing is known (NaN)
-    no_plane = lit.misfit >= MOST_MISFIT
-    if border is not None and lit.distance(border.plane) < FAR and not (noisy and no_plane):
-        return border.plane
-    change = np.sqrt(np.mean((region.basis @ lit.plane - disparity[region.pixels]) ** 2))
-    if not no_plane and change > SURE * lit.deviation(region.basis):
-        return lit.plane
-    return None if border is None or noisy else border.plane
-
-
-def other_surfaces(pixels: BoolMap, disparity: FloatMap, before: FloatMap) -> BoolMap:
-    """Parts of a region that lie off its plane and go on beyond it.
-
-    In noise a dark fold may hang together with the dark wall behind it, while its depth is known from round about.
-
-    Parameters
-    ----------
-    pixels : ndarray, shape (h, w), bool
-        The region.
-    disparity, before : ndarray, shape (h, w), float32
-        With its plane, and without.
-
-    Returns
-    -------
-    ndarray, shape (h, w), bool
-    """
-    from scipy import ndimage
-
-    off, others = pixels & (np.abs(before - disparity) > STEP), np.zeros_like(pixels)
-    if off.sum() > 0.5 * pixels.sum():
-        # nothing was known of this region
-        return others
-    labels, _ = ndimage.label(off)
-    for number, (rows, columns) in enumerate(ndimage.find_objects(labels), start=1):
-        place = (
-            slice(max(rows.start - _RING, 0), rows.stop + _RING),
-            slice(max(columns.start - _RING, 0), columns.stop + _RING),
-        )
-        part, depth = labels[place] == number, before[place]
-        ring = cv2.dilate(part.astype(np.uint8), np.ones((2 * _RING + 1,) * 2, np.uint8)).astype(bool) & ~part
-        if np.mean(np.abs(depth[ring] - np.median(depth[part])) < STEP) >= _GOES_ON:
-            others[place] |= part
-    return others
 
 
 def plain_pixels(mean: FloatMap, variance: float | FloatMap, parameters: UniformPlanesParameters) -> BoolMap:

@@ -7,18 +7,9 @@ import pytest
 from sepi.lightfield import BoolMap, DisparityRange, LightField
 from sepi.matching.base_detail import BaseDetailParameters
 from sepi.matching.gauss_newton import GaussNewton
-from sepi.regularization.border_planes import BorderPlane
 from sepi.regularization.lit_planes import LitPlane, lit_planes
 from sepi.regularization.regions import Region
-from sepi.regularization.uniform_regions import (
-    FAR,
-    LIT_AREA,
-    SURE,
-    UniformPlanesParameters,
-    chosen_plane,
-    fill_uniform_regions,
-    other_surfaces,
-)
+from sepi.regularization.uniform_regions import UniformPlanesParameters, fill_uniform_regions
 from sepi.stage import StageMaps
 
 SIZE, VIEWS = 128, 5
@@ -107,75 +98,6 @@ def test_without_light_or_within_another_range_nothing_is_told() -> None:
     assert told_of(dark) is None
     near = LightField(even.views, "near", disparity_range=DisparityRange(0.5, 2, "given"))
     assert told_of(near) is None
-
-
-SMALL = np.zeros((SIZE, SIZE), bool)
-SMALL[:20, :20] = True
-HERE = np.full((SIZE, SIZE), 0.5, np.float32)
-
-
-def lit_at(distance: float, deviation: float = 0.01, misfit: float = 1.0) -> LitPlane:
-    covariance = np.diag([deviation**2, 1e-12, 1e-12])
-    return LitPlane(np.array([0.5 + distance, 0, 0]), covariance, misfit)
-
-
-@pytest.mark.parametrize(
-    ("border", "lit", "noisy", "chosen"),
-    [
-        # without noise the border's, unless light contradicts it and what there is
-        ((0.0, 300, 0.3), None, False, "border"),
-        ((0.0, 300, 0.3), (-0.5, 0.01), False, "border"),
-        ((0.0, 300, 0.3), (0.4, 0.01), False, "lit"),
-        ((0.0, 300, 0.3), (0.03, 0.01), False, "border"),
-        ((0.0, 300, 0.3), (0.4, 0.01, 9.0), False, "border"),
-        (None, (0.4, 0.01), False, "lit"),
-        # in noise only of a border that is one plane, and of what may be one
-        ((0.0, 300, 0.3), None, True, None),
-        ((0.0, 40, 0.9), None, True, None),
-        ((0.0, 300, 0.9), None, True, "border"),
-        ((0.0, 300, 0.9), (-0.5, 0.01), True, "border"),
-        ((0.0, 300, 0.9), (-0.5, 0.01, np.nan), True, "border"),
-        ((0.0, 300, 0.9), (-0.5, 0.01, 9.0), True, None),
-        ((0.0, 300, 0.9), (0.4, 0.01), True, "lit"),
-        (None, (0.4, 0.01), True, "lit"),
-        (None, (0.4, 0.4 / SURE * 1.1), True, None),
-        (None, (0.4, 0.01, 9.0), True, None),
-        ((0.0, 300, 0.9), (0.4, 0.9 / FAR * 1.1), True, "border"),
-    ],
-)
-def test_which_plane_a_region_is_given(
-    border: tuple[float, int, float] | None, lit: tuple[float, ...] | None, noisy: bool, chosen: str | None
-) -> None:
-    """Of the region's own disparity 0.5, a border's plane at 0 and its light's."""
-    beside = None if border is None else BorderPlane(np.array([border[0], 0, 0]), *border[1:])
-    told = None if lit is None else lit_at(*lit)
-    found = chosen_plane(Region(ALL, np.ones((SIZE, SIZE), bool)), HERE, beside, told, noisy)
-    expected = {None: None, "border": beside and beside.plane, "lit": told and told.plane}[chosen]
-    assert (found is None) if expected is None else np.array_equal(found, expected)
-
-
-def test_a_small_region_in_noise_keeps_what_it_has() -> None:
-    """Stripes of a few pixels would join the wall behind them."""
-    assert SMALL.sum() < LIT_AREA
-    border = BorderPlane(np.array([0.0, 0, 0]), 300, 0.9)
-    assert chosen_plane(Region(ALL, SMALL), HERE, border, None, True) is None
-    assert chosen_plane(Region(ALL, SMALL), HERE, border, None, False) is border.plane
-
-
-def test_a_fold_that_goes_on_beyond_a_region_is_none_of_it() -> None:
-    """If this fails, a dark fold of a coat takes the depth of the dark wall behind it."""
-    before = np.zeros((60, 80), np.float32)
-    before[:, 50:] = 1.5
-    plane = np.zeros_like(before)
-    pixels = np.zeros(before.shape, bool)
-    # the wall, a bridge to a fold within the coat, and the wall's outermost pixels, which the coat was carried over
-    pixels[5:55, 5:50] = pixels[29:31, 50:60] = pixels[25:35, 60:75] = True
-    pixels[10:20, 50:53] = True
-    others = other_surfaces(pixels, plane, before)
-    assert others[25:35, 60:75].all()
-    assert not others[10:20, 50:53].any()
-    assert not others[:, :50].any()
-    assert not other_surfaces(pixels, plane, plane).any()
 
 
 @pytest.fixture(scope="module")

@@ -1,0 +1,168 @@
+"""Which plane a region without texture is given, and which of its pixels keep what they have.
+
+There are three that may know: its border (:mod:`sepi.regularization.border_planes`), how its light changes
+(:mod:`sepi.regularization.lit_planes`), and, where noise hides faint texture, the disparity that it has.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from sepi.lightfield import BoolMap, FloatMap
+from sepi.regularization.border_planes import BorderPlane
+from sepi.regularization.lit_planes import LitPlane
+from sepi.regularization.regions import Region
+
+LIT_AREA = 600
+"""Regions of so many pixels are asked for how their light changes."""
+
+SURE = 6.0
+"""Standard deviations by which what a region has must differ from the plane of its light to be given up: light is not
+quite what the model says."""
+
+FAR = 8.0
+"""Standard deviations, over the three coefficients, from which a plane contradicts that of the light."""
+
+STEP = 0.3
+"""Disparity by which a part of a region lies off its plane, pixels per view step."""
+
+MOST_MISFIT = 4.0
+"""Times the variance that noise explains, beyond which a region is no plane."""
+
+_OWN_SPREAD = 2.0
+"""Standard deviations of the light's plane within which what a region has must lie about a plane of its own."""
+
+_RING, _GOES_ON = 3, 0.9
+"""Width of what is round such a part, pixels, and how much of it must be as near as it is."""
+
+
+class Chosen(NamedTuple):
+    """The plane of a region.
+
+    Attributes
+    ----------
+    plane : ndarray, shape (3,), float64
+        ``a, b, c`` of ``a + b x + c y``, pixels per view step.
+    source : str
+        ``border``, ``light`` or ``own``.
+    confirmed : bool
+        Whether the light of the region, as far as it is known, agrees.
+    """
+
+    plane: npt.NDArray[np.float64]
+    source: str
+    confirmed: bool
+
+
+def chosen_plane(
+    region: Region, disparity: FloatMap, border: BorderPlane | None, lit: LitPlane | None, noisy: bool
+) -> Chosen | None:
+    """Which plane a region is given; None where it keeps its disparity.
+
+    That of its border, where its light does not contradict it. In noise only of a large region whose border is one
+    plane, since faint texture, which noise hides, knows more than a few pixels beside it; and where what the region
+    has lies about a plane, that one if it is nearer to the light's. Otherwise that of its light, where it contradicts
+    what the region has.
+
+    Parameters
+    ----------
+    region : Region
+    disparity : ndarray, shape (h, w), float32
+        Of the region's place, so far.
+    border : BorderPlane or None
+    lit : LitPlane or None
+    noisy : bool
+
+    Returns
+    -------
+    Chosen or None
+    """
+    if border is not None and noisy and not (border.is_one_plane(region.area) and region.area >= LIT_AREA):
+        border = None
+    beside = None if border is None else Chosen(border.plane, "border", False)
+    if lit is None:
+        return beside
+    # of a region of few parts nothing is known (NaN)
+    if lit.misfit >= MOST_MISFIT:
+        return None if noisy else beside
+    known = [] if border is None else [Chosen(border.plane, "border", True)]
+    own = own_plane(region, disparity, lit) if noisy else None
+    if own is not None:
+        known.append(Chosen(own, "own", True))
+    nearest = min(known, key=lambda chosen: lit.distance(chosen.plane), default=None)
+    if nearest is not None and lit.distance(nearest.plane) < FAR:
+        return nearest
+    change = np.sqrt(np.mean((region.basis @ lit.plane - disparity[region.pixels]) ** 2))
+    if change > SURE * lit.deviation(region.basis):
+        return Chosen(lit.plane, "light", True)
+    return None if noisy else beside
+
+
+def own_plane(region: Region, disparity: FloatMap, lit: LitPlane) -> npt.NDArray[np.float64] | None:
+    """Plane of what a region has, without what its light contradicts.
+
+    None where that is half of it, or does not lie about a plane as closely as its light is known.
+
+    Parameters
+    ----------
+    region : Region
+    disparity : ndarray, shape (h, w), float32
+        Of the region's place.
+    lit : LitPlane
+
+    Returns
+    -------
+    ndarray, shape (3,), or None
+    """
+    basis, own, deviation = region.basis, disparity[region.pixels].astype(np.float64), lit.deviation(region.basis)
+    agreeing = np.abs(own - basis @ lit.plane) < SURE * deviation
+    if agreeing.sum() <= 0.5 * agreeing.size:
+        return None
+    basis, own = basis[agreeing], own[agreeing]
+    # a product of matrices would round as the number of threads has it
+    normal = np.einsum("ni,nj->ij", basis, basis), np.einsum("ni,n->i", basis, own)
+    plane: npt.NDArray[np.float64] = np.linalg.lstsq(*normal, rcond=None)[0]
+    spread = np.median(np.abs(own - basis @ plane)) / 0.6745
+    return plane if spread < _OWN_SPREAD * deviation else None
+
+
+def kept_pixels(pixels: BoolMap, disparity: FloatMap, before: FloatMap, chosen: Chosen) -> BoolMap:
+    """Which pixels of a region in noise keep the disparity that they have.
+
+    Parts that lie off its plane and go on beyond the region: a dark fold may hang together with the dark wall behind
+    it, while its depth is known from round about. Large parts, unless the light confirms the plane. And where the
+    plane is the region's own, all that lies near it: only noise makes it a plane.
+
+    Parameters
+    ----------
+    pixels : ndarray, shape (h, w), bool
+        The region.
+    disparity, before : ndarray, shape (h, w), float32
+        With its plane, and without.
+    chosen : Chosen
+
+    Returns
+    -------
+    ndarray, shape (h, w), bool
+    """
+    from scipy import ndimage
+
+    off = pixels & (np.abs(before - disparity) > STEP)
+    kept = pixels & ~off if chosen.source == "own" else np.zeros_like(pixels)
+    anything_known = off.sum() <= 0.5 * pixels.sum()
+    labels, _ = ndimage.label(off)
+    for number, (rows, columns) in enumerate(ndimage.find_objects(labels), start=1):
+        place = (
+            slice(max(rows.start - _RING, 0), rows.stop + _RING),
+            slice(max(columns.start - _RING, 0), columns.stop + _RING),
+        )
+        part, depth = labels[place] == number, before[place]
+        ring = cv2.dilate(part.astype(np.uint8), np.ones((2 * _RING + 1,) * 2, np.uint8)).astype(bool) & ~part
+        goes_on = np.mean(np.abs(depth[ring] - np.median(depth[part])) < STEP) >= _GOES_ON
+        if (anything_known and goes_on) or (not chosen.confirmed and part.sum() >= LIT_AREA):
+            kept[place] |= part
+    return kept
