@@ -20,7 +20,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from sepi.lightfield import BoolMap, FloatMap, LightField, full_scale
+from sepi.lightfield import BoolMap, DisparityRange, FloatMap, LightField, full_scale
 from sepi.regularization.regions import Region, basis_of
 
 if TYPE_CHECKING:
@@ -105,9 +105,9 @@ def lit_planes(
     found: list[LitPlane | None] = [None] * len(regions)
     disparity = disparity.copy()
     for step in range(_STEPS + 1):
-        for region, plane in zip(regions, planes, strict=True):
+        for n, (region, plane) in enumerate(zip(regions, planes, strict=True)):
             if plane is not None:
-                disparity[region.place][region.pixels] = np.clip(region.basis @ plane, known.minimum, known.maximum)
+                planes[n], disparity[region.place][region.pixels] = _within(region, plane, known)
         mean = matching.mean(disparity)
         slopes = np.zeros((2, *mean.shape), np.float32)
         inner = [_slopes(pixels, mean[place], slopes[:, *place]) for place, pixels in regions]
@@ -125,10 +125,21 @@ def lit_planes(
             else:
                 unlike = _unlike(light_field, matching, place, pixels, disparity[place], mean[place], variance[place])
                 spread = sums.spread(variance[place], slopes[:, *place], unlike, light_field, matching)
-                beyond = region.basis @ plane - disparity[region.place][region.pixels]
+                asked = region.basis @ (plane + moved)
+                beyond = asked - np.clip(asked, known.minimum, known.maximum)
                 if np.abs(beyond).mean() < _BEYOND:
                     found[n] = LitPlane(plane, *spread)
     return found
+
+
+def _within(
+    region: Region, plane: npt.NDArray[np.float64], known: DisparityRange
+) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+    """A plane whose middle is brought back into the range, where the next step begins, and its disparities there."""
+    basis = region.basis
+    middle = float(np.mean(basis @ plane))
+    plane = plane + np.array([np.clip(middle, known.minimum, known.maximum) - middle, 0, 0])
+    return plane, np.clip(basis @ plane, known.minimum, known.maximum)
 
 
 def _unlike(

@@ -41,6 +41,7 @@ print(len(called))
 """
 
 
+@pytest.mark.system
 def test_every_kernel_is_compiled() -> None:
     """One that is left out is compiled by the first jobs that need it, several at a time."""
     environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
@@ -57,6 +58,7 @@ def test_every_compared_method_is_in_a_share() -> None:
     assert {variant for share in COMPARED for variant in share} == set(METHODS)
 
 
+@pytest.mark.system
 def test_the_command_compiles_all_shares() -> None:
     result = CliRunner().invoke(command, ["--all-types"])
     assert result.exit_code == 0, result.output

@@ -100,6 +100,15 @@ def test_without_light_or_within_another_range_nothing_is_told() -> None:
     assert told_of(near) is None
 
 
+def test_a_wall_at_the_end_of_the_range_is_told() -> None:
+    """Ranges end at the farthest wall; an error of a few hundredths beyond it would leave the wall a guess."""
+    wall = wall_of(np.array([-0.9, 0, 0]))
+    near = LightField(wall.views, "at the end", disparity_range=DisparityRange(-0.86, 2, "given"))
+    lit = told_of(near)
+    assert lit is not None
+    assert np.abs(Region(ALL, np.ones((SIZE, SIZE), bool)).basis @ lit.plane + 0.88).mean() < 0.06
+
+
 @pytest.fixture(scope="module")
 def room() -> tuple[LightField, StageMaps, BoolMap]:
     """The wall behind a board of strong texture, and a map that takes the wall for the board's."""
