@@ -33,6 +33,9 @@ STEP = 0.3
 MOST_MISFIT = 4.0
 """Times the variance that noise explains, beyond which a region is no plane."""
 
+CONFIRMS = 0.1
+"""Standard deviation within which light has to know a plane to confirm one, pixels per view step."""
+
 _OWN_SPREAD = 2.0
 """Standard deviations of the light's plane within which what a region has must lie about a plane of its own."""
 
@@ -89,10 +92,11 @@ def chosen_plane(
     # of a region of few parts nothing is known (NaN)
     if lit.misfit >= MOST_MISFIT:
         return None if noisy else beside
-    known = [] if border is None else [Chosen(border.plane, "border", True)]
+    confirms = lit.deviation(region.basis) < CONFIRMS
+    known = [] if border is None else [Chosen(border.plane, "border", confirms)]
     own = own_plane(region, disparity, lit) if noisy else None
     if own is not None:
-        known.append(Chosen(own, "own", True))
+        known.append(Chosen(own, "own", confirms))
     nearest = min(known, key=lambda chosen: lit.distance(chosen.plane), default=None)
     if nearest is not None and lit.distance(nearest.plane) < FAR:
         return nearest
