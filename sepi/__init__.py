@@ -23,6 +23,7 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 from sepi.kernel_cache import provide_kernel_cache
+from sepi.openmp import wait_asleep
 
 if TYPE_CHECKING:
     from sepi.applications.all_views import AllViews, estimate_all_views
@@ -88,6 +89,7 @@ _HOME = {
 }
 
 provide_kernel_cache()
+wait_asleep()
 
 
 def __getattr__(name: str) -> Any:

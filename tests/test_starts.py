@@ -14,6 +14,7 @@ from sepi.cli.main import main
 from sepi.io.hdf5 import write_light_field, write_stage
 from sepi.scenes import render, write_hci
 from sepi.stage import StageMaps
+from sepi.threads import available_cores
 
 SLOW = (
     *("numba", "scipy", "skimage", "matplotlib", "pyamg", "jinja2", "snakemake", "tqdm"),
@@ -231,3 +232,28 @@ def test_a_command_takes_the_cores_that_it_was_given(tmp_path: Path, command: st
         "import numba, cv2\nassert (numba.config.NUMBA_NUM_THREADS, cv2.getNumThreads()) == (1, 1)"
     )
     run_without_limits(program)
+
+
+# loops of microseconds, and a rest after each that is longer than all of them
+WAITING = """
+import sys, time
+import numpy as np
+import sepi
+from sepi.matching.depth_step_kernels import rim_of
+disparity = np.zeros((8, 8), np.float32)
+rim_of(disparity, 1, np.float32(0.1))
+begun = time.process_time()
+for _ in range(200):
+    rim_of(disparity, 1, np.float32(0.1))
+    time.sleep(0.002)
+print(time.process_time() - begun)
+"""
+
+
+@pytest.mark.skipif(available_cores() < 2, reason="one thread waits for nobody")
+def test_threads_that_wait_leave_the_processor_to_others() -> None:
+    """Threads that spin make every run beside other work slower, and half of a test suite's time is theirs."""
+    own = {"PYTHONPATH": str(Path(__file__).parents[1]), "NUMBA_NUM_THREADS": "2"}
+    environment = {name: value for name, value in os.environ.items() if name != "OMP_WAIT_POLICY"} | own
+    done = subprocess.run([sys.executable, "-c", WAITING], env=environment, capture_output=True, text=True, check=True)
+    assert float(done.stdout) < 0.2
