@@ -14,7 +14,7 @@ References
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Self
 
 import numpy as np
 from pydantic import Field
@@ -32,22 +32,58 @@ HALF_CONFIDENT = 0.05
 """Margin of cost at which the confidence is one half."""
 
 
-SmallPenalty = Annotated[float, Field(ge=0, description="cost of a change by one candidate along a path")]
+ENOUGH_VIEWS = 25
+"""Views from which on one more makes a mean cost no surer: what is left in it is no chance."""
+
+_MOST_WIDENED = 2
+
+
+SmallPenalty = Annotated[
+    float, Field(ge=0, description="cost of a change by one candidate along a path; more below 25 views")
+]
 """A parameter whose default is not the same for every sweep."""
 
 
 class SmoothingParameters(Parameters):
     """Parameters of aggregation and semi-global smoothing."""
 
-    window_radius: int = Field(2, ge=0, le=10, description="cost window of 2 r + 1 pixels, in pixels")
+    window_radius: int = Field(
+        2, ge=0, le=10, description="cost window of 2 r + 1 pixels, in pixels; wider below 25 views"
+    )
     window_sigma: float = Field(
         0.01, ge=1e-6, le=10, description="colour distance at which a window pixel's weight falls, colours in 0..1"
     )
     small_penalty: SmallPenalty = 0.03
-    large_penalty: float = Field(1.0, ge=0, description="cost of a larger change where the colour stays")
+    large_penalty: float = Field(
+        1.0, ge=0, description="cost of a larger change where the colour stays; more below 25 views"
+    )
     colour_weakening: float = Field(
         65.0, ge=0, description="how much a colour change weakens the larger penalty, per sum of RGB differences"
     )
+
+    def for_views(self, views: int) -> Self:
+        """These parameters for light fields of few views: as given from :data:`ENOUGH_VIEWS` on.
+
+        Costs are means over the views, and what they say against a smooth map counts once for each: with a third of the
+        views, a mean weighs a third of what it does, so penalties weigh three times as much. The window grows while it
+        holds no more samples of all views than it does where there are enough.
+
+        Parameters
+        ----------
+        views : int
+            Of the light field, at least 1.
+
+        Returns
+        -------
+        SmoothingParameters
+        """
+        if views >= ENOUGH_VIEWS:
+            return self
+        radius, samples = self.window_radius, ENOUGH_VIEWS * (2 * self.window_radius + 1) ** 2
+        while radius < _MOST_WIDENED * self.window_radius and views * (2 * radius + 3) ** 2 <= samples:
+            radius += 1
+        penalties = {name: getattr(self, name) * ENOUGH_VIEWS / views for name in ("small_penalty", "large_penalty")}
+        return self.model_copy(update={"window_radius": radius, **penalties})
 
 
 @dataclass(frozen=True)

@@ -212,7 +212,8 @@ def _sweep(
     volume = [cost]
     del cost
     noise = variance_of_residuals(reference_noise(light_field), guide.shape[2])
-    result = smooth_and_choose(volume.pop(), disparities, guide, noise, parameters)
+    smoothing = parameters.for_views(int(light_field.present.sum()))
+    result = smooth_and_choose(volume.pop(), disparities, guide, noise, smoothing)
     progress(1.0)
     return result
 
