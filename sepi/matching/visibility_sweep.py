@@ -212,7 +212,10 @@ def _sweep(
     volume = [cost]
     del cost
     noise = variance_of_residuals(reference_noise(light_field), guide.shape[2])
-    smoothing = parameters.for_views(int(light_field.present.sum()))
+    shown = light_field.present
+    if light_field.missing is not None:
+        shown = shown & ~light_field.missing.all(axis=(2, 3))
+    smoothing = parameters.for_views(int(shown.sum()))
     result = smooth_and_choose(volume.pop(), disparities, guide, noise, smoothing)
     progress(1.0)
     return result
