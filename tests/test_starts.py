@@ -252,7 +252,7 @@ print(time.process_time() - begun)
 
 @pytest.mark.skipif(available_cores() < 2, reason="one thread waits for nobody")
 def test_threads_that_wait_leave_the_processor_to_others() -> None:
-    """Threads that spin make every run beside other work slower, and half of a test suite's time is theirs."""
+    """Threads that spin make every run beside other work slower, tests that run side by side above all."""
     own = {"PYTHONPATH": str(Path(__file__).parents[1]), "NUMBA_NUM_THREADS": "2"}
     environment = {name: value for name, value in os.environ.items() if name != "OMP_WAIT_POLICY"} | own
     done = subprocess.run([sys.executable, "-c", WAITING], env=environment, capture_output=True, text=True, check=True)

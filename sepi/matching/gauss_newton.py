@@ -10,6 +10,7 @@ are interpolated by cubic splines, since linear interpolation pulls the minimum 
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cached_property
 
 import cv2
 import numpy as np
@@ -53,12 +54,15 @@ class GaussNewton:
         self._light_field = light_field
         self._parameters = parameters
         self.present = light_field.present if present is None else present
-        noise = variance_of_residuals(reference_noise(light_field), 3)
-        self.colour_variance = parameters.colour_scale**2 + noise
         self._margin = np.float32(occlusion_margin)
         # of the whole picture, where there is memory for it
         self._splines: SplineViews | None = None
         self._nearest: tuple[FloatMap, FloatMap] | None = None
+
+    @cached_property
+    def colour_variance(self) -> float:
+        """What squared residuals of colours are divided by, in gradients and curvatures."""
+        return self._parameters.colour_scale**2 + variance_of_residuals(reference_noise(self._light_field), 3)
 
     def mean(self, disparity: FloatMap) -> FloatMap:
         """Mean of the views that see each pixel.

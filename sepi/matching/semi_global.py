@@ -31,12 +31,11 @@ SAME_SHARE = 0.1
 HALF_CONFIDENT = 0.05
 """Margin of cost at which the confidence is one half."""
 
-
 ENOUGH_VIEWS = 25
-"""Views from which on one more makes a mean cost no surer: what is left in it is no chance."""
+"""Views from which on more make a mean cost no surer: what errs in it then errs in all of them."""
 
+# times the radius of the window, where there are few
 _MOST_WIDENED = 2
-
 
 SmallPenalty = Annotated[
     float, Field(ge=0, description="cost of a change by one candidate along a path; more below 25 views")

@@ -15,7 +15,7 @@ import numpy.typing as npt
 from pydantic import Field
 
 from sepi.lightfield import BoolMap, FloatMap
-from sepi.regularization.regions import basis_of
+from sepi.regularization.regions import Plane, basis_of
 from sepi.stage import Parameters
 
 KNOWN_BORDER = 2.0
@@ -44,15 +44,14 @@ class BorderPlane:
 
     Attributes
     ----------
-    plane : ndarray, shape (3,), float64
-        ``a, b, c`` of ``a + b x + c y``, pixels per view step.
+    plane : Plane
     pixels : int
         Of the border.
     share : float
         Of them that agree with the plane.
     """
 
-    plane: npt.NDArray[np.float64]
+    plane: Plane
     pixels: int
     share: float
 
@@ -70,9 +69,7 @@ class BorderPlane:
         return cls(plane, residuals.size, float((np.abs(residuals) < parameters.tolerance).mean()))
 
 
-def ransac_plane(
-    border: BoolMap, disparity: FloatMap, parameters: BorderPlaneParameters
-) -> npt.NDArray[np.float64] | None:
+def ransac_plane(border: BoolMap, disparity: FloatMap, parameters: BorderPlaneParameters) -> Plane | None:
     """Plane that most of a border agrees with and little of it lies behind.
 
     The triples of pixels that planes are tried through do not depend on other regions, nor on which way the picture is
@@ -86,9 +83,8 @@ def ransac_plane(
 
     Returns
     -------
-    ndarray, shape (3,), or None
-        ``a, b, c`` of ``a + b x + c y`` with ``x`` and ``y`` from the middle of the array; None where too little of
-        the border agrees.
+    Plane or None
+        None where too little of the border agrees.
     """
     values = disparity[border].astype(np.float64)
     if values.size < _PIXELS_OF_A_PLANE:

@@ -21,7 +21,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sepi.lightfield import BoolMap, DisparityRange, FloatMap, LightField, full_scale
-from sepi.regularization.regions import Region, basis_of
+from sepi.regularization.regions import Plane, Region, basis_of
 
 if TYPE_CHECKING:
     from sepi.matching.gauss_newton import GaussNewton
@@ -48,14 +48,13 @@ class LitPlane:
 
     Attributes
     ----------
-    plane : ndarray, shape (3,), float64
-        ``a, b, c`` of ``a + b x + c y``, pixels per view step.
+    plane : Plane
     covariance : ndarray, shape (3, 3), float64
     misfit : float
         Mean square of what parts of the region ask for, in units of its variance by noise: 1 on a plane.
     """
 
-    plane: npt.NDArray[np.float64]
+    plane: Plane
     covariance: npt.NDArray[np.float64]
     misfit: float
 
@@ -64,7 +63,7 @@ class LitPlane:
         mean = _weighted(basis, np.full(len(basis), 1 / len(basis)))
         return float(np.sqrt(np.maximum(np.sum(self.covariance * mean), 0)))
 
-    def distance(self, plane: npt.NDArray[np.float64]) -> float:
+    def distance(self, plane: Plane) -> float:
         """Standard deviations that another plane is away, over the three coefficients."""
         difference = plane - self.plane
         return float(np.sqrt(np.maximum(difference @ np.linalg.solve(self.covariance, difference), 0)))
@@ -75,7 +74,7 @@ def lit_planes(
     matching: GaussNewton,
     disparity: FloatMap,
     regions: list[Region],
-    starts: list[npt.NDArray[np.float64]],
+    starts: list[Plane],
     variance: FloatMap,
 ) -> list[LitPlane | None]:
     """Planes of some regions, by all views.
@@ -90,8 +89,8 @@ def lit_planes(
         Outside the regions, what hides them in some views.
     regions : list of Region
         That no pixel belongs to twice.
-    starts : list of ndarray, shape (3,)
-        Planes to begin with; 1, x and y count from the middle of a region's place.
+    starts : list of Plane
+        To begin with.
     variance : ndarray, shape (H, W), float32
         Of the noise of one channel of a view, colours in 0..1.
 
@@ -101,7 +100,7 @@ def lit_planes(
         None where nothing can be told, or what is told lies beyond the range.
     """
     known = light_field.require_disparity_range()
-    planes: list[npt.NDArray[np.float64] | None] = [start.copy() for start in starts]
+    planes: list[Plane | None] = [start.copy() for start in starts]
     found: list[LitPlane | None] = [None] * len(regions)
     disparity = disparity.copy()
     for step in range(_STEPS + 1):
@@ -132,9 +131,7 @@ def lit_planes(
     return found
 
 
-def _within(
-    region: Region, plane: npt.NDArray[np.float64], known: DisparityRange
-) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+def _within(region: Region, plane: Plane, known: DisparityRange) -> tuple[Plane, npt.NDArray[np.float64]]:
     """A plane whose middle is brought back into the range, where the next step begins, and its disparities there."""
     basis = region.basis
     middle = float(np.mean(basis @ plane))
@@ -191,7 +188,7 @@ class _Sums:
         h = curvature[region].astype(np.float64)
         return cls(region, terms, gradient[region].astype(np.float64), h, _weighted(terms, h))
 
-    def plane(self) -> npt.NDArray[np.float64] | None:
+    def plane(self) -> Plane | None:
         """By how much the plane changes; None where the views say nothing of one of its coefficients."""
         if np.linalg.cond(_scaled(self.information)) > 1e6:
             return None

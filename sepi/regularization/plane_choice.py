@@ -10,12 +10,11 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
 from sepi.lightfield import BoolMap, FloatMap
 from sepi.regularization.border_planes import BorderPlane
 from sepi.regularization.lit_planes import LitPlane
-from sepi.regularization.regions import Region
+from sepi.regularization.regions import Plane, Region
 
 LIT_AREA = 600
 """Regions of so many pixels are asked for how their light changes."""
@@ -48,15 +47,14 @@ class Chosen(NamedTuple):
 
     Attributes
     ----------
-    plane : ndarray, shape (3,), float64
-        ``a, b, c`` of ``a + b x + c y``, pixels per view step.
+    plane : Plane
     source : str
         ``border``, ``light`` or ``own``.
     confirmed : bool
         Whether the light of the region, as far as it is known, agrees.
     """
 
-    plane: npt.NDArray[np.float64]
+    plane: Plane
     source: str
     confirmed: bool
 
@@ -106,7 +104,7 @@ def chosen_plane(
     return None if noisy else beside
 
 
-def own_plane(region: Region, disparity: FloatMap, lit: LitPlane) -> npt.NDArray[np.float64] | None:
+def own_plane(region: Region, disparity: FloatMap, lit: LitPlane) -> Plane | None:
     """Plane of what a region has, without what its light contradicts.
 
     None where that is half of it, or does not lie about a plane as closely as its light is known.
@@ -120,7 +118,7 @@ def own_plane(region: Region, disparity: FloatMap, lit: LitPlane) -> npt.NDArray
 
     Returns
     -------
-    ndarray, shape (3,), or None
+    Plane or None
     """
     basis, own, deviation = region.basis, disparity[region.pixels].astype(np.float64), lit.deviation(region.basis)
     agreeing = np.abs(own - basis @ lit.plane) < SURE * deviation
@@ -129,7 +127,7 @@ def own_plane(region: Region, disparity: FloatMap, lit: LitPlane) -> npt.NDArray
     basis, own = basis[agreeing], own[agreeing]
     # a product of matrices would round as the number of threads has it
     normal = np.einsum("ni,nj->ij", basis, basis), np.einsum("ni,n->i", basis, own)
-    plane: npt.NDArray[np.float64] = np.linalg.lstsq(*normal, rcond=None)[0]
+    plane: Plane = np.linalg.lstsq(*normal, rcond=None)[0]
     spread = np.median(np.abs(own - basis @ plane)) / 0.6745
     return plane if spread < _OWN_SPREAD * deviation else None
 

@@ -9,6 +9,10 @@ import numpy.typing as npt
 
 from sepi.lightfield import BoolMap
 
+Plane = npt.NDArray[np.float64]
+"""``a, b, c`` of the disparity ``a + b x + c y``, shape (3,), pixels per view step; ``x`` and ``y`` as in
+:func:`basis_of`."""
+
 
 class Region(NamedTuple):
     """Pixels that belong together.
