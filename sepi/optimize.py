@@ -24,6 +24,7 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import Field, model_validator
 
+from sepi.error_bars.bars import error_bars
 from sepi.image.noise import residual_variance
 from sepi.lightfield import FloatMap, LightField
 from sepi.matching.base_detail import BaseDetailParameters
@@ -144,7 +145,7 @@ def wls(
     progress(0.1)
     matrix, right = energy_system(before.disparity, weight, smoothness, parameters.alpha)
     disparity = solve(matrix, right, before.disparity, parameters.rtol)
-    return before.updated(disparity.astype(np.float32), confidence)
+    return _with_bars(before, disparity.astype(np.float32), confidence)
 
 
 def second_order(
@@ -219,7 +220,12 @@ def second_order(
                 target, disparity, weight, reliability, colours, colour_variance, parameters, rtol
             )
         disparity = np.clip(target, lowest, highest)
-    return before.updated(disparity, smooth_confidence(disparity, curvature))
+    return _with_bars(before, disparity, smooth_confidence(disparity, curvature))
+
+
+def _with_bars(before: StageMaps, disparity: FloatMap, confidence: FloatMap) -> StageMaps:
+    bars = error_bars(disparity, confidence)
+    return before.updated(disparity, bars.confidence, sigma=bars.sigma, low=bars.low, high=bars.high)
 
 
 def smooth_confidence(disparity: FloatMap, curvature: FloatMap) -> FloatMap:

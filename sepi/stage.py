@@ -21,6 +21,9 @@ from sepi.lightfield import BoolMap, DisparityRange, FloatMap, LightField
 REACH = 4.0
 """View steps from the reference view to the farthest, along an axis, in what a stage function sees: of 9x9 views."""
 
+SIGMA, LOW, HIGH = ERROR_BARS = "sigma", "low", "high"
+"""Maps of how far a disparity may be wrong: standard deviation, and bounds of the interval of 90 %."""
+
 Progress = Callable[[float], None]
 """Called with the fraction done, 0..1."""
 
@@ -202,7 +205,8 @@ class StageMaps:
     confidence : ndarray, shape (H, W), float32
         0..1.
     extra : mapping of str to ndarray, shape (H, W)
-        Maps of this stage and of those before it (``occluded``, ``view_subset``, ``superpixels``, ...).
+        Maps of this stage and of those before it (``occluded``, ``view_subset``, ``superpixels``, ...); of this
+        package's last stages the error bars ``sigma``, ``low`` and ``high``, too.
     subset_names : tuple of str
         What the values of the map ``view_subset`` stand for, from 0 on; empty without such a map.
     cost_volume : CostVolume or None
@@ -248,6 +252,21 @@ class StageMaps:
             ``disparity`` and ``confidence`` first, then ``extra``.
         """
         return {"disparity": self.disparity, "confidence": self.confidence, **self.extra}
+
+    @property
+    def sigma(self) -> FloatMap | None:
+        """Standard deviation of the disparity (H, W), float32, pixels per view step; None where nothing tells it."""
+        return self.extra.get(SIGMA)
+
+    @property
+    def low(self) -> FloatMap | None:
+        """Lower bound (H, W), float32, of the interval that holds the disparity with a probability of 90 %."""
+        return self.extra.get(LOW)
+
+    @property
+    def high(self) -> FloatMap | None:
+        """Upper bound (H, W), float32, of the interval that holds the disparity with a probability of 90 %."""
+        return self.extra.get(HIGH)
 
     def mask(self, name: str) -> BoolMap:
         """A boolean map of an earlier stage.
@@ -381,7 +400,8 @@ def _rescaled(maps: StageMaps, factor: float) -> StageMaps:
     unit, volume = np.float32(factor), maps.cost_volume
     if volume is not None:
         volume = replace(volume, disparities=volume.disparities * unit)
-    return replace(maps, disparity=maps.disparity * unit, cost_volume=volume)
+    extra = {name: values * unit if name in ERROR_BARS else values for name, values in maps.extra.items()}
+    return replace(maps, disparity=maps.disparity * unit, extra=extra, cost_volume=volume)
 
 
 def none(

@@ -19,7 +19,7 @@ import numpy.typing as npt
 
 from sepi.image.noise import SATURATED, noise_level
 from sepi.lightfield import BoolMap, FloatMap, LightField, as_unit_float, full_scale, require_light_field
-from sepi.stage import StageMaps
+from sepi.stage import HIGH, LOW, SIGMA, StageMaps
 from sepi.validation import require_map
 
 UNKNOWN = "unknown"
@@ -58,7 +58,9 @@ _FLOAT_ROUNDING = 1e-5
 
 
 def with_unknown(light_field: LightField, maps: StageMaps) -> StageMaps:
-    """A variant's final maps with the mask ``unknown``, and no confidence there; the disparity stays as it is.
+    """A variant's final maps with the mask ``unknown``; the disparity there stays as it is, but may be any.
+
+    The confidence is 0 there, and where there are error bars, the interval is the whole range.
 
     Parameters
     ----------
@@ -71,7 +73,13 @@ def with_unknown(light_field: LightField, maps: StageMaps) -> StageMaps:
     StageMaps
     """
     unknown = unknown_pixels(light_field, maps.disparity)
-    return maps.updated(maps.disparity, np.where(unknown, np.float32(0), maps.confidence), **{UNKNOWN: unknown})
+    extra = {UNKNOWN: unknown}
+    if maps.sigma is not None:
+        lowest, highest = light_field.require_disparity_range().candidates(2)
+        # of all disparities being as likely
+        anywhere = {SIGMA: (highest - lowest) / np.float32(12) ** 0.5, LOW: lowest, HIGH: highest}
+        extra |= {name: np.where(unknown, np.float32(value), maps.extra[name]) for name, value in anywhere.items()}
+    return maps.updated(maps.disparity, np.where(unknown, np.float32(0), maps.confidence), **extra)
 
 
 def unknown_pixels(light_field: LightField, disparity: FloatMap) -> BoolMap:
