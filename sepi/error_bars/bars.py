@@ -41,4 +41,5 @@ def error_bars(disparity: FloatMap, confidence: FloatMap) -> ErrorBars:
     low = np.minimum(disparity - width, cv2.erode(disparity, box))
     high = np.maximum(disparity + width, cv2.dilate(disparity, box))
     sigma = (high - low) / np.float32(2 * _HALF_WIDTH)
+    low, high, sigma = (np.asarray(values, np.float32) for values in (low, high, sigma))
     return ErrorBars(sigma, low, high, np.exp(-0.5 * (sigma / CLOSE) ** 2).astype(np.float32))
