@@ -17,7 +17,7 @@ References
 
 from __future__ import annotations
 
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 import cv2
 import numpy as np
@@ -25,10 +25,12 @@ import numpy.typing as npt
 from pydantic import Field, model_validator
 
 from sepi.error_bars.bars import error_bars
+from sepi.error_bars.calibration import SECOND_ORDER, WLS, Calibration
+from sepi.error_bars.signs import deviation_by, signs_of_map, signs_of_stage_before, signs_of_views
 from sepi.image.noise import residual_variance
 from sepi.lightfield import FloatMap, LightField
 from sepi.matching.base_detail import BaseDetailParameters
-from sepi.matching.denoising import denoised
+from sepi.matching.denoising import denoised, measured_noise
 from sepi.matching.view_subsets import spread_views
 from sepi.regularization.wls import (
     WlsParameters,
@@ -48,14 +50,14 @@ from sepi.stage import (
     require_previous,
 )
 
+if TYPE_CHECKING:
+    from sepi.matching.gauss_newton_kernels import Evidence
+
 UNIFORM_WEIGHT = 0.05
 """Weight of a plane that was put into a region without texture; planes cost nothing, so little holds it."""
 
-IGNORANCE = 0.01
-"""What a view's information of 1 / px^2 adds to the second difference, in the confidence; pixels per view step."""
-
-HALF_CONFIDENT_DIFFERENCE = 0.01
-"""Second difference at which the confidence is one half, pixels per view step."""
+WLS_VIEWS = 25
+"""Views that are asked how far a map by weighted least squares may be wrong, at least."""
 
 LEAST_RELIABILITY = 1e-6
 LEAST_SMOOTHNESS = 1e-8
@@ -111,7 +113,8 @@ def wls(
     Returns
     -------
     StageMaps
-        ``confidence`` is the rectified confidence c' of Eq. 10.
+        With the error bars ``sigma``, ``low`` and ``high``; ``confidence`` is the probability of an error of at most
+        :data:`sepi.error_bars.bars.CLOSE`, not the rectified confidence c' of Eq. 10, which weighs the data.
 
     Raises
     ------
@@ -138,14 +141,21 @@ def wls(
     >>> bool(errors[1] < 0.8 * errors[0])
     True
     """
+    from sepi.matching.gauss_newton import GaussNewton, windowed_step
+
     before = require_previous(previous)
     confidence = rectified_confidence(before.confidence, before.mask("textureless"), parameters)
     weight = data_weight(before.disparity, confidence, parameters)
     smoothness = smoothness_coefficient(light_field.reference_view, confidence, parameters)
     progress(0.1)
     matrix, right = energy_system(before.disparity, weight, smoothness, parameters.alpha)
-    disparity = solve(matrix, right, before.disparity, parameters.rtol)
-    return _with_bars(before, disparity.astype(np.float32), confidence)
+    disparity = solve(matrix, right, before.disparity, parameters.rtol).astype(np.float32)
+    progress(0.6)
+    views = spread_views(light_field, WLS_VIEWS)
+    matching = GaussNewton(light_field, BaseDetailParameters(), OcclusionMarginParameters().occlusion_margin, views)
+    told = matching.with_evidence(matching.mean(disparity), disparity)
+    deviation = deviation_by(windowed_step(told[0], told[1], 1, 1.0)[1])
+    return _with_bars(light_field, before, disparity, told, deviation, WLS)
 
 
 def second_order(
@@ -165,7 +175,8 @@ def second_order(
     Returns
     -------
     StageMaps
-        ``confidence`` is that of :func:`smooth_confidence`: high where the surface is plain and the views know it well.
+        With the error bars ``sigma``, ``low`` and ``high``; ``confidence`` is the probability of an error of at most
+        :data:`sepi.error_bars.bars.CLOSE`.
 
     Raises
     ------
@@ -186,9 +197,10 @@ def second_order(
     True
     """
     from sepi.matching.gauss_newton import GaussNewton, windowed_step
+    from sepi.regularization.local_inverse import inverse_diagonal
     from sepi.regularization.second_order import colour_changes
 
-    before = require_previous(previous)
+    before, given = require_previous(previous), light_field
     light_field = denoised(light_field, parameters.denoising)
     disparity = before.disparity
     uniform = before.mask("textureless")
@@ -207,46 +219,49 @@ def second_order(
         if i <= parameters.refinements or last:
             # other steps are too small to change it
             mean = matching.mean(disparity)
-        gradient, curvature = matching.gradient_and_hessian(mean, disparity)
+        told = matching.with_evidence(mean, disparity) if last else matching.gradient_and_hessian(mean, disparity)
         radius = parameters.solve_radius if smooth else parameters.refinement_radius
-        step, curvature = windowed_step(gradient, curvature, radius, parameters.max_update)
+        step, curvature = windowed_step(*told[:2], radius, parameters.max_update)
         # where no view knows anything, a step would follow the noise
         target = np.clip(disparity + np.where(uniform, np.float32(0), step), lowest, highest)
+        deviation = deviation_by(curvature)
         if smooth:
-            weight = np.minimum(curvature / max(float(np.percentile(curvature, 90)), 1e-9), 1) * reliability
+            unit = max(float(np.percentile(curvature, 90)), 1e-9)
+            weight = np.minimum(curvature / unit, 1) * reliability
             weight = np.where(uniform, np.float32(UNIFORM_WEIGHT), weight)
-            rtol = parameters.rtol if last else parameters.first_rtol
-            target = smooth_second_order(
-                target, disparity, weight, reliability, colours, colour_variance, parameters, rtol
+            smoothness = _smoothness(disparity, colours, reliability, colour_variance, parameters)
+            target = _smoothed(
+                target, weight, smoothness, parameters.rtol if last else parameters.first_rtol, parameters
             )
+            if last:
+                deviation = np.sqrt(inverse_diagonal(weight, smoothness) / np.float32(unit))
         disparity = np.clip(target, lowest, highest)
-    return _with_bars(before, disparity, smooth_confidence(disparity, curvature))
+    assert len(told) == 3  # those of the last step
+    return _with_bars(given, before, disparity, told, deviation, SECOND_ORDER)
 
 
-def _with_bars(before: StageMaps, disparity: FloatMap, confidence: FloatMap) -> StageMaps:
-    bars = error_bars(disparity, confidence)
-    return before.updated(disparity, bars.confidence, sigma=bars.sigma, low=bars.low, high=bars.high)
+def _with_bars(
+    light_field: LightField,
+    before: StageMaps,
+    disparity: FloatMap,
+    told: tuple[FloatMap, FloatMap, Evidence],
+    deviation: FloatMap,
+    calibration: Calibration,
+) -> StageMaps:
+    """Maps with error bars, by what the views told of (nearly) this map, and by the deviation that this leaves.
 
-
-def smooth_confidence(disparity: FloatMap, curvature: FloatMap) -> FloatMap:
-    """Confidence by the second difference of the surface round a pixel and how little the views know about it.
-
-    Parameters
-    ----------
-    disparity : ndarray, shape (H, W), float32
-    curvature : ndarray, shape (H, W), float32
-        Information on the disparity, 1 / (pixels per view step)^2.
-
-    Returns
-    -------
-    ndarray, shape (H, W), float32
-        ``h / (h + b + i / sqrt(curvature))`` with the mean second difference ``b`` over 5x5 pixels,
-        ``h = HALF_CONFIDENT_DIFFERENCE`` and ``i = IGNORANCE``. Near depth discontinuities, where errors are large, it
-        is close to 0.
+    The light field is the one that was given, not denoised: its noise counts.
     """
-    difference = cv2.blur(np.abs(cv2.Laplacian(disparity, cv2.CV_32F)), (5, 5))
-    unknown = np.maximum(difference, 0) + IGNORANCE / np.sqrt(curvature + np.float32(1e-3))
-    return np.asarray(HALF_CONFIDENT_DIFFERENCE / (HALF_CONFIDENT_DIFFERENCE + unknown), np.float32)
+    gradient, curvature, evidence = told
+    known = light_field.require_disparity_range()
+    signs = {
+        "deviation": deviation,
+        **signs_of_map(disparity, cv2.blur(curvature, (3, 3)), known),
+        **signs_of_views(gradient, curvature, evidence, measured_noise(light_field).usual),
+        **signs_of_stage_before(before.confidence, before.mask("textureless")),
+    }
+    bars = error_bars(disparity, signs, known, calibration)
+    return before.updated(disparity, bars.confidence, sigma=bars.sigma, low=bars.low, high=bars.high)
 
 
 def reliable(confidence: FloatMap, parameters: SecondOrderParameters) -> FloatMap:
@@ -255,26 +270,32 @@ def reliable(confidence: FloatMap, parameters: SecondOrderParameters) -> FloatMa
     return np.asarray(np.clip((best / parameters.reliable_confidence) ** 2, LEAST_RELIABILITY, 1), np.float32)
 
 
-def smooth_second_order(
-    target: FloatMap,
+def _smoothness(
     shape: FloatMap,
-    weight: FloatMap,
-    reliability: FloatMap,
     colours: list[npt.NDArray[np.float64]],
+    reliability: FloatMap,
     colour_variance: float,
     parameters: SecondOrderParameters,
-    rtol: float,
-) -> FloatMap:
-    """Second-order smoothing of ``target``, whose discontinuities are looked for in ``shape``; all shapes (H, W), but
-    for ``colours``, the colour changes at whose ``colour_variance`` smoothness falls. The solver stops at the relative
-    residual ``rtol``.
-    """
-    from sepi.regularization.second_order import second_difference_stencil, smoothness_weights, solve_smooth
+) -> list[npt.NDArray[np.float64]]:
+    """Weights of second differences: little where ``shape`` has a discontinuity, or the colours change."""
+    from sepi.regularization.second_order import smoothness_weights
 
     threshold = parameters.second_difference_threshold
     weights = smoothness_weights(shape, colours, reliability, threshold, colour_variance)
-    weights = [parameters.strength * w + LEAST_SMOOTHNESS for w in weights]
-    stencil = second_difference_stencil(weights, target.shape)
+    return [parameters.strength * weight + LEAST_SMOOTHNESS for weight in weights]
+
+
+def _smoothed(
+    target: FloatMap,
+    weight: FloatMap,
+    smoothness: list[npt.NDArray[np.float64]],
+    rtol: float,
+    parameters: SecondOrderParameters,
+) -> FloatMap:
+    """Second-order smoothing of ``target``, weighted; the solver stops at the relative residual ``rtol``."""
+    from sepi.regularization.second_order import second_difference_stencil, solve_smooth
+
+    stencil = second_difference_stencil(smoothness, target.shape)
     return solve_smooth(stencil, weight, target, rtol, parameters.max_iterations)
 
 

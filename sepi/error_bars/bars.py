@@ -1,18 +1,28 @@
-"""Error bars of a final map."""
+"""Error bars of a final map: from signs of how far it may be wrong, by a calibrated model.
+
+The error of a pixel has the distribution of :mod:`sepi.error_bars.mixture`; its parameters follow from the signs of
+:mod:`sepi.error_bars.signs`, scales as products of their powers, probabilities as the logistic function of such; the powers
+are those of :mod:`sepi.error_bars.calibration`. docs/method/error_bars.md derives the model and says what it does not know.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
-import cv2
 import numpy as np
 
-from sepi.lightfield import FloatMap
+from sepi.error_bars.calibration import CONSTANT, Calibration
+from sepi.error_bars.mixture import Mixture, described
+from sepi.error_bars.signs import FLOORS, Signs
+from sepi.lightfield import DisparityRange, FloatMap
 
 CLOSE = 0.07
 """Error that the confidence is about, pixels per view step of which the farthest view is four away."""
 
-_HALF_WIDTH = 1.645
+
+_LOGARITHMS = (-9.0, 9.0)
+"""Of scales, in pixels per view step, and odds."""
 
 
 class ErrorBars(NamedTuple):
@@ -34,12 +44,56 @@ class ErrorBars(NamedTuple):
     confidence: FloatMap
 
 
-def error_bars(disparity: FloatMap, confidence: FloatMap) -> ErrorBars:
-    """Error bars by the second difference of the surface and what the views know about it."""
-    box = np.ones((3, 3), np.uint8)
-    width = np.float32(_HALF_WIDTH) * np.float32(0.01) / np.maximum(confidence, np.float32(0.02))
-    low = np.minimum(disparity - width, cv2.erode(disparity, box))
-    high = np.maximum(disparity + width, cv2.dilate(disparity, box))
-    sigma = (high - low) / np.float32(2 * _HALF_WIDTH)
-    low, high, sigma = (np.asarray(values, np.float32) for values in (low, high, sigma))
-    return ErrorBars(sigma, low, high, np.exp(-0.5 * (sigma / CLOSE) ** 2).astype(np.float32))
+def error_bars(disparity: FloatMap, signs: Signs, known: DisparityRange, calibration: Calibration) -> ErrorBars:
+    """Error bars of a disparity map.
+
+    Parameters
+    ----------
+    disparity : ndarray, shape (H, W), float32
+        Pixels per view step of which the farthest view is four away.
+    signs : mapping of str to ndarray, shape (H, W), float32
+        Of :mod:`sepi.error_bars.signs`, with those that the calibration asks for.
+    known : DisparityRange
+        Which the interval does not leave.
+    calibration : Calibration
+
+    Returns
+    -------
+    ErrorBars
+    """
+    mixture = mixture_of(signs, calibration)
+    found = described(mixture, calibration.tail, CLOSE)
+    lowest, highest = np.float32(known.minimum), np.float32(known.maximum)
+    low = np.minimum(np.maximum(disparity - found.below, lowest), disparity)
+    high = np.maximum(np.minimum(disparity + found.above, highest), disparity)
+    return ErrorBars(found.sigma, low, high, found.probability)
+
+
+def mixture_of(signs: Signs, calibration: Calibration) -> Mixture:
+    """Parameters of the distribution of each pixel's error.
+
+    Parameters
+    ----------
+    signs : mapping of str to ndarray, shape (H, W), float32
+    calibration : Calibration
+
+    Returns
+    -------
+    Mixture
+    """
+    logarithms = {
+        name: np.log(np.maximum(signs[name], np.float32(FLOORS[name])))
+        for name in sorted({name for part in calibration.parts for name in part} - {CONSTANT})
+    }
+
+    def exponential(powers: Mapping[str, float]) -> FloatMap:
+        total = np.full_like(signs["above"], powers[CONSTANT])
+        for name, power in powers.items():
+            if name != CONSTANT:
+                total += np.float32(power) * logarithms[name]
+        return np.asarray(np.exp(np.clip(total, *_LOGARITHMS)), np.float32)
+
+    stray, rim = exponential(calibration.stray), exponential(calibration.rim)
+    whole = 1 + stray + rim
+    scale, reach = exponential(calibration.scale), exponential(calibration.reach)
+    return Mixture(scale, reach, stray / whole, rim / whole, signs["above"], signs["below"])

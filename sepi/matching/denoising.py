@@ -21,7 +21,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, fields
-from typing import Any, NamedTuple
+from typing import Any
 
 import cv2
 import numpy as np
@@ -95,20 +95,35 @@ def denoised(light_field: LightField, least: float) -> LightField:
     """
     if least == 0:
         return light_field
-    kept = _kept.get()
-    if kept is None:
-        made = _denoised_views(light_field, least)
-    else:
-        if kept.views is not light_field.views or kept.least != least:
-            # each stage is given the same views anew
-            kept.views, kept.least = light_field.views, least
-            kept.made = _denoised_views(light_field, least)
-        made = kept.made
-    if made is None:
+    kept = _kept_of(light_field)
+    of_views = _noise(light_field, kept)
+    if kept.least != least:
+        kept.least, kept.made = least, _denoised_views(light_field, of_views, least)
+    if kept.made is None:
         return light_field
     others = {field.name: getattr(light_field, field.name) for field in fields(LightField) if field.name != "views"}
     noise = _noise_of_parts(light_field.reference_view)
-    return DenoisedLightField(made.views, **others, noise=noise, of_views=made.noise)
+    return DenoisedLightField(kept.made, **others, noise=noise, of_views=of_views)
+
+
+def measured_noise(light_field: LightField) -> ViewNoise:
+    """Noise of the views of a light field, inside :func:`kept_views` measured once.
+
+    Parameters
+    ----------
+    light_field : LightField
+        With a known disparity range, not denoised.
+
+    Returns
+    -------
+    ViewNoise
+
+    Raises
+    ------
+    SepiError
+        If the disparity range is unknown.
+    """
+    return _noise(light_field, _kept_of(light_field))
 
 
 def _noise_of_parts(image: FloatMap) -> float:
@@ -117,20 +132,14 @@ def _noise_of_parts(image: FloatMap) -> float:
     return float(np.quantile([noise_level(part) for part in parts], _NOISIEST))
 
 
-class _Made(NamedTuple):
-    """Denoised views, and what their noise was."""
-
-    views: npt.NDArray[Any]
-    noise: ViewNoise
-
-
 @dataclass
 class _Kept:
-    """What was made of the views of one light field: None where they stay as they are."""
+    """What is known of the views of one light field: their noise, and what they are without it; None as they are."""
 
     views: npt.NDArray[Any] | None = None
+    noise: ViewNoise | None = None
     least: float = 0.0
-    made: _Made | None = None
+    made: npt.NDArray[Any] | None = None
 
 
 _kept: ContextVar[_Kept | None] = ContextVar("_kept", default=None)
@@ -146,8 +155,24 @@ def kept_views() -> Iterator[None]:
         _kept.reset(token)
 
 
-def _denoised_views(light_field: LightField, least: float) -> _Made | None:
-    noise = view_noise(light_field)
+def _kept_of(light_field: LightField) -> _Kept:
+    """What is kept of these views; outside of :func:`kept_views` nothing, and it is not kept."""
+    kept = _kept.get()
+    if kept is None:
+        return _Kept(light_field.views)
+    if kept.views is not light_field.views:
+        # each stage is given the same views anew
+        kept.views, kept.noise, kept.least, kept.made = light_field.views, None, 0.0, None
+    return kept
+
+
+def _noise(light_field: LightField, kept: _Kept) -> ViewNoise:
+    if kept.noise is None:
+        kept.noise = view_noise(light_field)
+    return kept.noise
+
+
+def _denoised_views(light_field: LightField, noise: ViewNoise, least: float) -> npt.NDArray[Any] | None:
     if noise.usual < LEAST_NOISE or noise.share < LEAST_SHARE:
         return None
     from sepi.matching.denoising_kernels import denoise_views
@@ -160,7 +185,7 @@ def _denoised_views(light_field: LightField, least: float) -> _Made | None:
     height, width = light_field.shape
     by_place = cv2.resize(np.float32(least) * noise.by_place, (width, height), interpolation=cv2.INTER_LINEAR)
     denoise_views(views, light_field.present, full, noise.brightness, noise.variance, by_place, whole, out)
-    return _Made(out, noise)
+    return out
 
 
 def guide_of(light_field: LightField) -> FloatMap:

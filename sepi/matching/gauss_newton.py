@@ -18,7 +18,14 @@ import numpy as np
 from sepi.image.noise import variance_of_residuals
 from sepi.lightfield import BoolMap, FloatMap, LightField
 from sepi.matching.base_detail import BaseDetailParameters, base_detail_decomposition, forget_detail, reference_noise
-from sepi.matching.gauss_newton_kernels import Seeing, SplineViews, mean_of_views, normal_equations
+from sepi.matching.gauss_newton_kernels import (
+    Evidence,
+    Seeing,
+    SplineViews,
+    equations_and_evidence,
+    mean_of_views,
+    normal_equations,
+)
 from sepi.matching.nearest_surfaces import nearest_surfaces
 from sepi.matching.row_bands import Band, Rows, row_bands
 from sepi.matching.spline_kernels import MARGIN, REACH, SPLINE_UNIT, spline_coefficients, view_splines
@@ -114,6 +121,31 @@ class GaussNewton:
         # the next map is another one
         self._nearest = None
         return gradient, curvature
+
+    def with_evidence(self, mean: FloatMap, disparity: FloatMap) -> tuple[FloatMap, FloatMap, Evidence]:
+        """:meth:`gradient_and_hessian`, and what else the views say about the disparity.
+
+        Parameters
+        ----------
+        mean : ndarray, shape (H, W, 4), float32
+        disparity : ndarray, shape (H, W), float32
+            Pixels per view step.
+
+        Returns
+        -------
+        gradient, curvature : ndarray, shape (H, W), float32
+        evidence : Evidence
+        """
+        gradient, curvature = np.empty_like(disparity), np.empty_like(disparity)
+        halves, rest = (np.empty((*n, *disparity.shape), np.float32) for n in ((4, 2), (4,)))
+        image = mean, *spline_derivatives(mean)
+
+        def add(views: SplineViews, seeing: Seeing, band: Band) -> None:
+            rows = band.begin, band.end
+            equations_and_evidence(views, seeing, disparity, image, *rows, gradient, curvature, halves, rest)
+
+        self._in_bands(disparity, add)
+        return gradient, curvature, Evidence(halves, *rest)
 
     def _in_bands(self, disparity: FloatMap, add: Callable[[SplineViews, Seeing, Band], None]) -> None:
         field = self._light_field

@@ -264,3 +264,106 @@ def normal_equations(
         for x in range(W):
             gradient[y, x] = colour * sums[x, 0] + detail * sums[x, 2]
             curvature[y, x] = colour * sums[x, 1] + detail * sums[x, 3]
+
+
+class Evidence(NamedTuple):
+    """What the views say about a disparity beside the Gauss-Newton step: sums of each pixel over those that see it.
+
+    Attributes
+    ----------
+    halves : ndarray, shape (4, 2, H, W), float32
+        Gradient and curvature by the views to the left, to the right, above and below alone.
+    misfit : ndarray, shape (H, W), float32
+        Squared residual of the colours, times its weight.
+    agreement, detail_agreement : ndarray, shape (H, W), float32
+        Weight of the views by colours, and by detail: 1 for each that is as the mean is.
+    seeing : ndarray, shape (H, W), float32
+        Number of views.
+    """
+
+    halves: FloatMap
+    misfit: FloatMap
+    agreement: FloatMap
+    detail_agreement: FloatMap
+    seeing: FloatMap
+
+
+@njit(inline="always")
+def _add_to_evidence(
+    views: SplineViews, n: int, y: int, seeing: Seeing, disparity: Any, image: Any, sums: Any, halves: Any, more: Any
+) -> None:
+    """As :func:`_add_to_equations`; and to a row of the halves ``(W, 4, 2)``, and ``more (W, 4)``."""
+    mean, down, across = image
+    v, u = views.baselines[n]
+    three, zero = np.float32(3), np.float32(0)
+    colour, detail = views.shares[0] / views.scales2[0], views.shares[1] / views.scales2[1]
+    for x in range(disparity.shape[1]):
+        d = disparity[y, x]
+        fy, fx = np.float32(y) - d * v, np.float32(x) - d * u
+        if not _is_seen(views, seeing, n, disparity.shape, fy, fx, d):
+            continue
+        v0, v1, v2, v3 = _sample(views, n, fy, fx)
+        m, p, q, total, rest = mean[y, x], down[y, x], across[y, x], sums[x], more[x]
+        r0, r1, r2, r3 = v0 - m[0], v1 - m[1], v2 - m[2], v3 - m[3]
+        g0, g1, g2, g3 = p[0] * v + q[0] * u, p[1] * v + q[1] * u, p[2] * v + q[2] * u, p[3] * v + q[3] * u
+        z = r0 * r0 + r1 * r1 + r2 * r2
+        w = _robust_weight(z, views.scales2[0])
+        slope, curve = w * (r0 * g0 + r1 * g1 + r2 * g2), w * (g0 * g0 + g1 * g1 + g2 * g2)
+        total[0] += slope
+        total[1] += curve
+        rest[0] += w * z
+        rest[1] += w
+        w = three * _robust_weight(three * r3 * r3, views.scales2[1])
+        detail_slope, detail_curve = w * r3 * g3, w * g3 * g3
+        total[2] += detail_slope
+        total[3] += detail_curve
+        rest[2] += w / three
+        rest[3] += np.float32(1)
+        slope, curve = colour * slope + detail * detail_slope, colour * curve + detail * detail_curve
+        if u != zero:
+            half = halves[x, 0 if u < zero else 1]
+            half[0] += slope
+            half[1] += curve
+        if v != zero:
+            half = halves[x, 2 if v < zero else 3]
+            half[0] += slope
+            half[1] += curve
+
+
+@njit(parallel=True, cache=True, fastmath=EXACT, error_model="numpy")
+def equations_and_evidence(
+    views: SplineViews,
+    seeing: Seeing,
+    disparity: Any,
+    image: Any,
+    begin: int,
+    end: int,
+    gradient: Any,
+    curvature: Any,
+    all_halves: Any,
+    rest: Any,
+) -> None:
+    """:func:`normal_equations`, and what else the views say, filled in these rows.
+
+    Parameters
+    ----------
+    views, seeing, disparity, image, begin, end, gradient, curvature
+        As there.
+    all_halves : ndarray, shape (4, 2, H, W), float32
+        Those of :class:`Evidence`.
+    rest : ndarray, shape (4, H, W), float32
+        The other maps of it.
+    """
+    W = disparity.shape[1]
+    colour, detail = views.shares[0] / views.scales2[0], views.shares[1] / views.scales2[1]
+    for y in prange(begin, end):
+        sums, halves = np.zeros((W, 4), np.float32), np.zeros((W, 4, 2), np.float32)
+        more = np.zeros((W, 4), np.float32)
+        for n in range(len(views.places)):
+            _add_to_evidence(views, n, y, seeing, disparity, image, sums, halves, more)
+        for x in range(W):
+            gradient[y, x] = colour * sums[x, 0] + detail * sums[x, 2]
+            curvature[y, x] = colour * sums[x, 1] + detail * sums[x, 3]
+            for i in range(4):
+                all_halves[i, 0, y, x], all_halves[i, 1, y, x] = halves[x, i, 0], halves[x, i, 1]
+                rest[i, y, x] = more[x, i]

@@ -1,0 +1,108 @@
+"""Compiled loops of the error distribution (:mod:`sepi.error_bars.mixture`)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba import njit, prange
+
+from sepi.error_bars.mixture import LEAST_RIM, RIM_WIDTH
+
+_EVALUATIONS = 30
+_PRECISION = 1e-3
+"""Of the bounds, relative."""
+
+
+@njit(inline="always")
+def _beyond(x: float, width: float) -> float:
+    """Share of a Laplace distribution about 0 that lies above ``x``."""
+    half = 0.5 * np.exp(-abs(x) / width)
+    return half if x > 0 else 1 - half
+
+
+@njit(inline="always")
+def _above(x: float, p: Any) -> float:
+    """Probability that the true disparity is more than ``x >= 0`` above the map's."""
+    scale, reach, stray, rim, above, below = p
+    core = (1 - stray - rim) * 0.5 * np.exp(-x / scale)
+    strays = stray * 0.5 * np.exp(-x / reach)
+    share = (above * above + 1e-6) / (above * above + below * below + 2e-6)
+    other = share * _beyond(x - above, RIM_WIDTH * above + LEAST_RIM)
+    other += (1 - share) * _beyond(x + below, RIM_WIDTH * below + LEAST_RIM)
+    return float(core + strays + rim * other)
+
+
+@njit(inline="always")
+def _bound(tail: float, p: Any) -> float:
+    """Distance above the map beyond which the true disparity lies with probability ``tail``: regula falsi of logarithms."""
+    low, at_low = 0.0, _above(0.0, p)
+    if at_low <= tail:
+        return 0.0
+    high = 4 * p[0]
+    at_high = _above(high, p)
+    while at_high > tail:
+        low, at_low = high, at_high
+        high *= 2
+        at_high = _above(high, p)
+    goal = np.log(tail)
+    f_low, f_high = np.log(at_low) - goal, np.log(at_high) - goal
+    side = 0
+    for _ in range(_EVALUATIONS):
+        if high - low <= _PRECISION * high:
+            break
+        x = (low * f_high - high * f_low) / (f_high - f_low)
+        f = np.log(_above(x, p)) - goal
+        if abs(f) < _PRECISION:
+            return float(x)
+        if f > 0:
+            low, f_low = x, f
+            if side == 1:
+                f_high *= 0.5
+            side = 1
+        else:
+            high, f_high = x, f
+            if side == -1:
+                f_low *= 0.5
+            side = -1
+    return float(0.5 * (low + high))
+
+
+@njit(inline="always")
+def _squared(p: Any) -> float:
+    """Expected squared error."""
+    scale, reach, stray, rim, above, below = p
+    share = (above * above + 1e-6) / (above * above + below * below + 2e-6)
+    core = (1 - stray - rim) * 2 * scale * scale
+    strays = stray * 2 * reach * reach
+    wide, deep = RIM_WIDTH * above + LEAST_RIM, RIM_WIDTH * below + LEAST_RIM
+    other = share * (above * above + 2 * wide * wide) + (1 - share) * (below * below + 2 * deep * deep)
+    return float(core + strays + rim * other)
+
+
+@njit(parallel=True, cache=True, error_model="numpy")
+def describe(parameters: Any, tail: float, close: float, out: Any) -> None:
+    """Standard deviation, bounds and probability of each pixel's error.
+
+    Parameters
+    ----------
+    parameters : tuple of ndarray, shape (H, W), float32
+        Those of :class:`sepi.error_bars.mixture.Mixture`.
+    tail : float
+        Probability beyond each bound.
+    close : float
+        Error that the probability is about.
+    out : ndarray, shape (4, H, W), float32
+        Filled: standard deviation, distance of the lower and of the upper bound, probability.
+    """
+    scale, reach, stray, rim, above, below = parameters
+    H, W = scale.shape
+    for y in prange(H):
+        for x in range(W):
+            a, b = float(above[y, x]), float(below[y, x])
+            same = float(scale[y, x]), float(reach[y, x]), float(stray[y, x]), float(rim[y, x])
+            upwards, downwards = (*same, a, b), (*same, b, a)
+            out[0, y, x] = np.sqrt(_squared(upwards))
+            out[1, y, x] = _bound(tail, downwards)
+            out[2, y, x] = _bound(tail, upwards)
+            out[3, y, x] = max(0.0, 1 - _above(close, upwards) - _above(close, downwards))
