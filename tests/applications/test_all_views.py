@@ -135,10 +135,16 @@ def test_carried_surfaces_are_what_plain_numpy_draws(v: float, u: float) -> None
     """Otherwise views would show surfaces where they are not."""
     disparity = bumpy_map()
     corners = kernels.corner_disparities(disparity, np.float32(TOLERANCE))
-    nearest, believed = np.empty_like(disparity), np.empty_like(disparity)
-    kernels.carry(disparity, np.ones_like(disparity), corners, v, u, 2.0, nearest, believed)
+    nearest, origin = np.empty_like(disparity), np.empty(disparity.shape, np.int32)
+    kernels.carry(disparity, corners, v, u, 2.0, nearest, origin)
     np.testing.assert_allclose(nearest, plain_carry(disparity, corners, v, u, 2.0), atol=1e-4)
-    np.testing.assert_array_equal(believed, nearest != kernels.EMPTY)
+    seen = origin >= 0
+    np.testing.assert_array_equal(seen, nearest != kernels.EMPTY)
+    # the pixel that is seen is the one whose place this is, to half a pixel and the slope of its surface
+    row, column = np.divmod(origin[seen], disparity.shape[1])
+    y, x = np.nonzero(seen)
+    assert np.abs(row - nearest[seen] * v - y).max() <= 0.51
+    assert np.abs(column - nearest[seen] * u - x).max() <= 0.51
 
 
 def test_a_map_carried_nowhere_stays_as_it_is() -> None:
