@@ -26,7 +26,7 @@ import numpy.typing as npt
 from sepi.errors import SepiError
 from sepi.lightfield import BoolMap, FloatMap, LightField, require_light_field
 from sepi.pipeline import estimate_depth
-from sepi.stage import ERROR_BARS, SIGMA, Progress, StageMaps, no_progress
+from sepi.stage import ERROR_BARS, Progress, StageMaps, no_progress
 from sepi.validation import require_type
 from sepi.variants import DEFAULT_VARIANT, Variant
 
@@ -319,7 +319,7 @@ def _sources(found: list[StageMaps], baselines: npt.NDArray[np.float64]) -> Sour
     """The maps that are carried, with the surfaces that their pixels are parts of."""
     from sepi.applications.all_views_kernels import Sources, corner_disparities
 
-    bars = [_offsets(maps) for maps in found if maps.sigma is not None]
+    bars = [offsets for offsets in map(_offsets, found) if offsets is not None]
     return Sources(
         np.stack([maps.disparity for maps in found]),
         np.stack([maps.confidence for maps in found]),
@@ -330,11 +330,13 @@ def _sources(found: list[StageMaps], baselines: npt.NDArray[np.float64]) -> Sour
     )
 
 
-def _offsets(maps: StageMaps) -> FloatMap:
-    """Sigma, and how far the bounds lie below and above the disparity, (H, W, 3): what stays as it is in other views."""
-    disparity = maps.disparity
-    below, above = (np.maximum(side, np.float32(0)) for side in (disparity - maps.low, maps.high - disparity))
-    return np.stack([maps.extra[SIGMA], below, above], axis=2).astype(np.float32, copy=False)
+def _offsets(maps: StageMaps) -> FloatMap | None:
+    """Sigma, and how far the bounds lie below and above the disparity, (H, W, 3): what is the same in other views."""
+    if maps.sigma is None or maps.low is None or maps.high is None:
+        return None
+    below, above = maps.disparity - maps.low, maps.high - maps.disparity
+    # where nothing is known the disparity may lie beyond both
+    return np.stack([maps.sigma, np.maximum(below, 0), np.maximum(above, 0)], axis=2).astype(np.float32, copy=False)
 
 
 def _fused(light_field: LightField, sources: Sources, places: npt.NDArray[np.int64]) -> list[ViewMaps]:
@@ -346,7 +348,7 @@ def _fused(light_field: LightField, sources: Sources, places: npt.NDArray[np.int
     rules = Rules(MOST_STRETCHED, np.float32(TOLERANCE), np.float32(LEAST_WEIGHT))
     baselines = np.ascontiguousarray(light_field.baselines[tuple(places.T)])
     told = len(sources.bars) > 0
-    bars = np.empty((*shape, 3) if told else (1, 0, 0, 3), np.float32)
+    bars = np.empty((*shape, 3) if told else (len(places), 0, 0, 3), np.float32)
     maps_of_views(sources, rules, baselines, disparity, confidence, bars, extended)
     positions = [(int(t), int(s)) for t, s in places]
     views = [ViewMaps(*of_view) for of_view in zip(positions, disparity, confidence, extended, strict=True)]
@@ -359,7 +361,7 @@ def _fused(light_field: LightField, sources: Sources, places: npt.NDArray[np.int
 
 
 def _with_doubt(light_field: LightField, view: ViewMaps, decided: FloatMap) -> ViewMaps:
-    """A view's maps with the disparity that was decided on, and error bars that know of that and of what was made up."""
+    """A view's maps with the disparity that was decided on, and error bars that know of that and of what is made up."""
     if view.sigma is None or view.low is None or view.high is None:
         return view._replace(disparity=decided)
     # a pixel that changed sides may be of either

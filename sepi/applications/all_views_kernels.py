@@ -222,7 +222,15 @@ def _score(
 
 @njit(cache=True, fastmath=EXACT, error_model="numpy")
 def _fuse(
-    sources: Sources, carried: Any, origin: Any, rules: Rules, v: float, u: float, disparity: Any, confidence: Any, bars: Any
+    sources: Sources,
+    carried: Any,
+    origin: Any,
+    rules: Rules,
+    v: float,
+    u: float,
+    disparity: Any,
+    confidence: Any,
+    bars: Any,
 ) -> None:
     """One map of a view out of the carried ones; ``EMPTY`` where none shows anything."""
     N, H, W = carried.shape
@@ -342,7 +350,7 @@ def maps_of_views(
     disparity, confidence : ndarray, shape (V, H, W), float32
         Filled.
     bars : ndarray, shape (V, H, W, 3), float32
-        Filled, as those of the sources; of one view without pixels where they have none.
+        Filled, as those of the sources; without pixels where they have none.
     extended : ndarray, shape (V, H, W), bool
         Filled: no source shows anything there, and the background was extended.
     """
@@ -356,8 +364,7 @@ def maps_of_views(
                 v - sources.baselines[n, 0], u - sources.baselines[n, 1], rules.most_stretched,
                 carried[n], origin[n],
             )  # fmt: skip
-        own = bars[min(view, len(bars) - 1)]
-        _fuse(sources, carried, origin, rules, v, u, disparity[view], confidence[view], own)
+        _fuse(sources, carried, origin, rules, v, u, disparity[view], confidence[view], bars[view])
         extended[view] = False
         # gaps open beside the reference view's surfaces, for it is those that most of the maps are made of
         extend_background(disparity[view], v, u, extended[view])

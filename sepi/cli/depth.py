@@ -70,8 +70,8 @@ def depth(
 
     INPUT is a folder of views, a Lytro picture (*_eslf.png), an array (.mat, .npy, .npz) or an HDF5 file; 'sepi info'
     shows how it is read, 'sepi check' whether its views are in the right order. Writes the disparity as numbers and in
-    colour, how far it may be wrong, confidence, masks and a point cloud; depth in metres where the camera is known. With
-    --all-views a map for every view, too, made from those of a few: docs/depth/all_views.md.
+    colour, how far it may be wrong, confidence, masks and a point cloud; depth in metres where the camera is known.
+    With --all-views a map for every view, too, made from those of a few: docs/depth/all_views.md.
 
     Variants: best (the most accurate), fast (half its time), paper (the method as published), no_sepi, no_occlusion,
     no_textureless, no_occlusion_no_textureless (parts of it switched off), wang (another treatment of occlusion);

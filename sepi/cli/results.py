@@ -27,8 +27,8 @@ _PARTIAL = click.option("--partial", is_flag=True, help="Take fewer than the ben
     "--max-sigma",
     type=float,
     metavar="X",
-    help="Leave out points of a larger standard deviation: of the depth in metres where the camera is known, else of the "
-    "disparity in pixels per view step.",
+    help="Leave out points of a larger standard deviation: of the depth in metres where the camera is known, else of "
+    "the disparity in pixels per view step.",
 )
 @click.option("--step", type=click.IntRange(min=1), default=1, metavar="N", help="Use every Nth row and column only.")
 @click.option("--keep-unknown", is_flag=True, help="Keep pixels that no view knows anything about.")

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -87,7 +88,7 @@ def write_error_bars(
         return ()
     write_pfm(folder / SIGMA_PFM, maps.sigma)
     write_png(folder / SIGMA_PNG, sigma_picture(maps.sigma, unknown))
-    bounds = {"low": maps.low, "high": maps.high}
+    bounds: dict[str, Any] = {"low": maps.low, "high": maps.high}
     bounds |= {name: metres[name] for name in ("nearest", "farthest") if name in metres}
     with atomic_path(folder / INTERVAL) as temporary, temporary.open("wb") as file:
         # by name NumPy would put its own end to the temporary file's; it stamps no time
@@ -99,7 +100,7 @@ def write_error_bars(
 
 
 def sigma_picture(sigma: FloatMap, unknown: BoolMap | None = None) -> Picture:
-    """A standard deviation in colours on a logarithmic scale, dark blue (least) to yellow (greatest), beside that scale.
+    """A standard deviation in colours, dark blue (least) to yellow (greatest) on a logarithmic scale, and that scale.
 
     Parameters
     ----------

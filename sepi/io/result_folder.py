@@ -366,9 +366,7 @@ def write_as_taken(
     t, s = position or light_field.reference_position
     down, across = (light_field.baselines[t, s] + light_field.from_centre).tolist()
     where = light_field.camera, light_field.rig, (t, s), (down, across)
-    maps = as_taken(disparity, *where)
-    if sigma is not None:
-        maps = (*maps, sigma_as_taken(sigma, *where))
+    maps = [*as_taken(disparity, *where), *([] if sigma is None else [sigma_as_taken(sigma, *where)])]
     for name, values in zip(names_as_taken(position, with_sigma=sigma is not None), maps, strict=True):
         write_pfm(folder / name, values)
     return True
