@@ -297,7 +297,7 @@ def test_nerfstudio_depth_has_its_error_in_every_view(tmp_path: Path) -> None:
         there = 30_000 / depth[known].astype(float) - 6
         expected = (0.02 + 0.01 * (there - disparity.min())) * 30_000 / (there + 6) ** 2
         # pixels are carried whole, disparity between them
-        assert np.quantile(np.abs(found[known] / expected - 1), 0.9) < 0.03
+        assert np.quantile(np.abs(found[known] / expected - 1), 0.99) < 0.03
     assert "depth_sigma" not in (tmp_path / "bare/transforms.json").read_text()
 
 
