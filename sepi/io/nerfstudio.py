@@ -53,7 +53,6 @@ class _WorldCloud:
     colours: npt.NDArray[np.uint8]
     units: str
     calibrated: bool
-    sigma: None = None
 
     def comments(self) -> tuple[str, ...]:
         """What the numbers are."""

@@ -27,7 +27,7 @@ _SIGMA = "sigma"
 
 
 class Cloud(Protocol):
-    """Coloured points, such as :class:`sepi.io.point_cloud.PointCloud`."""
+    """Coloured points, such as :class:`sepi.io.point_cloud.PointCloud`; they may have a ``sigma`` each."""
 
     @property
     def positions(self) -> npt.NDArray[np.floating]:
@@ -36,10 +36,6 @@ class Cloud(Protocol):
     @property
     def colours(self) -> npt.NDArray[np.uint8]:
         """RGB, shape (N, 3)."""
-
-    @property
-    def sigma(self) -> npt.NDArray[np.floating] | None:
-        """Standard deviation of each point, shape (N,), where it is known."""
 
     def comments(self) -> tuple[str, ...]:
         """What the numbers are, for the file's header."""
@@ -77,12 +73,14 @@ def write_ply(path: str | Path, cloud: Cloud) -> None:
     for name in ("positions", "colours"):
         require_type(f"{path}: {name}", getattr(cloud, name, None), np.ndarray, "an array of the points")
     kind, properties = _POINT, _PROPERTIES
-    if cloud.sigma is not None:
+    # a cloud of one's own need have none
+    sigma = getattr(cloud, _SIGMA, None)
+    if sigma is not None:
         kind, properties = np.dtype([*kind.descr, (_SIGMA, "<f4")]), (*properties, f"float {_SIGMA}")
     points = np.empty(len(cloud.positions), kind)
     points["position"], points["colour"] = cloud.positions, cloud.colours
-    if cloud.sigma is not None:
-        points[_SIGMA] = cloud.sigma
+    if sigma is not None:
+        points[_SIGMA] = sigma
     header = [
         "ply",
         "format binary_little_endian 1.0",

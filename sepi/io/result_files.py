@@ -23,7 +23,7 @@ RESULT_FILES = (
     "points.ply",
     RESULT,
 )
-"""What :func:`write_result` always writes; ``depth.pfm`` and ``mask_NAME.png`` come with what it is given."""
+"""What :func:`write_result` always writes; masks, depth and error bars come with what it is given."""
 
 RUNTIME = "runtime.txt"
 """Seconds that it took, where that is told."""
