@@ -26,7 +26,7 @@ import numpy.typing as npt
 from sepi.errors import SepiError
 from sepi.lightfield import BoolMap, FloatMap, LightField, require_light_field
 from sepi.pipeline import estimate_depth
-from sepi.stage import Progress, StageMaps, no_progress
+from sepi.stage import ERROR_BARS, Progress, StageMaps, no_progress
 from sepi.validation import require_type
 from sepi.variants import DEFAULT_VARIANT, Variant
 
@@ -60,17 +60,24 @@ class ViewMaps(NamedTuple):
         Pixels per view step; 0..1.
     extended : ndarray, shape (H, W), bool
         No map shows anything there: the background beside it was extended. The confidence is 0.
+    sigma : ndarray, shape (H, W), float32, or None
+        Standard deviation of the disparity, pixels per view step; None where the variant has no model of its error.
+    low, high : ndarray, shape (H, W), float32, or None
+        Bounds of the interval of 90 %: the whole range where the background was extended.
     """
 
     position: tuple[int, int]
     disparity: FloatMap
     confidence: FloatMap
     extended: BoolMap
+    sigma: FloatMap | None = None
+    low: FloatMap | None = None
+    high: FloatMap | None = None
 
     @property
     def maps(self) -> dict[str, npt.NDArray[Any]]:
         """Every map by name."""
-        return {"disparity": self.disparity, "confidence": self.confidence, "extended": self.extended}
+        return {name: values for name, values in self._asdict().items() if isinstance(values, np.ndarray)}
 
 
 @dataclass(frozen=True)
@@ -85,6 +92,8 @@ class AllViews:
         0..1; 0 in missing views.
     extended : ndarray, shape (T, S, H, W), bool
         Pixels that none of the maps tells about; see :class:`ViewMaps`.
+    sigma, low, high : ndarray, shape (T, S, H, W), float32, or None
+        Error bars, pixels per view step; NaN in missing views, None where the variant has no model of its own error.
 
     Examples
     --------
@@ -95,11 +104,16 @@ class AllViews:
     >>> every = sepi.estimate_all_views(render("fronto_parallel", size=64, views=3))
     >>> isinstance(every, sepi.AllViews), bool(abs(every.disparity - 1).mean() < 0.01)
     (True, True)
+    >>> bool(((every.low <= every.disparity) & (every.disparity <= every.high)).all())
+    True
     """
 
     disparity: FloatMap
     confidence: FloatMap
     extended: BoolMap
+    sigma: FloatMap | None = None
+    low: FloatMap | None = None
+    high: FloatMap | None = None
 
 
 def estimate_all_views(
@@ -118,7 +132,7 @@ def estimate_all_views(
     light_field : LightField
         Where its disparity range is unknown, it is estimated from the views.
     maps : StageMaps, optional
-        Of the reference view; computed unless given. Its disparity and confidence stay as they are.
+        Of the reference view; computed unless given. Its disparity, confidence and error bars stay as they are.
     variant : str or Variant
         As of :func:`sepi.estimate_depth`, which makes the maps of up to five views.
     parameters : mapping, optional
@@ -159,12 +173,14 @@ def estimate_all_views(
     require_light_field(light_field)
     require_type(f"{light_field.name}: maps", maps, (StageMaps, NoneType), "StageMaps")
     shape = (*light_field.grid, *light_field.shape)
-    result = AllViews(np.full(shape, np.nan, np.float32), np.zeros(shape, np.float32), np.zeros(shape, bool))
+    result: dict[str, npt.NDArray[Any]] = {}
     for view in maps_of_all_views(light_field, maps, variant, parameters, progress, memory, edge_views):
-        result.disparity[view.position] = view.disparity
-        result.confidence[view.position] = view.confidence
-        result.extended[view.position] = view.extended
-    return result
+        for name, values in view.maps.items():
+            if name not in result:
+                missing = 0 if name in ("confidence", "extended") else np.nan
+                result[name] = np.full(shape, missing, values.dtype)
+            result[name][view.position] = values
+    return AllViews(**result)
 
 
 def maps_of_all_views(
@@ -207,12 +223,17 @@ def maps_of_all_views(
         found.append(known or estimate_depth(light_field.seen_from(position), variant, parameters, of_all, memory))
         of_all(1.0)
     sources = _sources(found, np.array([light_field.baselines[position] for position in anchors]))
+    # the others' maps are not held twice
+    reference = found[0]
+    del found
     for begin in range(0, len(places), _AT_ONCE):
         for number, view in enumerate(_fused(light_field, sources, places[begin : begin + _AT_ONCE])):
             if view.position == light_field.reference_position:
-                yield view._replace(disparity=found[0].disparity, confidence=found[0].confidence)
+                own = {name: getattr(reference, name) for name in ERROR_BARS if view.sigma is not None}
+                yield view._replace(disparity=reference.disparity, confidence=reference.confidence, **own)
             else:
-                yield view._replace(disparity=_with_own_edges(light_field, view, edge_views))
+                decided = _with_own_edges(light_field, view, edge_views)
+                yield _with_doubt(light_field, view, decided)
             progress((len(anchors) + 0.1 * (begin + number + 1)) / total)
 
 
@@ -251,32 +272,71 @@ def carried_map(disparity: FloatMap, baseline: tuple[float, float], known: BoolM
     ndarray, shape (H, W), float32
         NaN where the other view sees no surface of the map.
     """
-    from sepi.applications.all_views_kernels import EMPTY, carry, corner_disparities
+    return _carried(disparity, baseline, known)[0]
 
-    nearest, believed = np.empty_like(disparity), np.empty_like(disparity)
-    counted = np.ones_like(disparity) if known is None else known.astype(np.float32)
+
+def carried_values(
+    disparity: FloatMap, values: FloatMap, baseline: tuple[float, float], known: BoolMap | None = None
+) -> FloatMap:
+    """Values of a map's pixels as another view sees its surfaces; arguments as :func:`carried_map`.
+
+    Parameters
+    ----------
+    values : ndarray, shape (H, W), float32
+        Of each pixel of the map.
+
+    Returns
+    -------
+    ndarray, shape (H, W), float32
+        NaN where the other view sees no surface of the map.
+    """
+    origin = _carried(disparity, baseline, known)[1]
+    return np.where(origin >= 0, values.ravel()[origin], np.float32(np.nan))
+
+
+def _carried(
+    disparity: FloatMap, baseline: tuple[float, float], known: BoolMap | None
+) -> tuple[FloatMap, npt.NDArray[np.int32]]:
+    """The map that :func:`carried_map` gives, and the number of the pixel that is seen, -1 where none is."""
+    from sepi.applications.all_views_kernels import carry, corner_disparities
+
+    nearest, origin = np.empty_like(disparity), np.empty(disparity.shape, np.int32)
     if known is not None:
         # compiled code knows no NaN; behind all else, what is unknown hides nothing
         disparity = np.where(known, disparity, disparity[known].min(initial=0) - np.float32(1))
     corners = corner_disparities(disparity, np.float32(TOLERANCE))
     down, across = map(float, baseline)
-    carry(disparity, counted, corners, down, across, MOST_STRETCHED, nearest, believed)
-    nearest[(nearest == EMPTY) | (believed == 0)] = np.nan
+    carry(disparity, corners, down, across, MOST_STRETCHED, nearest, origin)
+    if known is not None:
+        origin[~known.ravel()[origin]] = -1
+    nearest[origin < 0] = np.nan
     # surfaces go on to the border of their last pixel, but no surface is farther or nearer than the map has one
     seen = disparity if known is None else disparity[known]
-    return np.clip(nearest, seen.min(), seen.max()) if seen.size else nearest
+    return (np.clip(nearest, seen.min(), seen.max()) if seen.size else nearest), origin
 
 
 def _sources(found: list[StageMaps], baselines: npt.NDArray[np.float64]) -> Sources:
     """The maps that are carried, with the surfaces that their pixels are parts of."""
     from sepi.applications.all_views_kernels import Sources, corner_disparities
 
+    bars = [offsets for offsets in map(_offsets, found) if offsets is not None]
     return Sources(
         np.stack([maps.disparity for maps in found]),
         np.stack([maps.confidence for maps in found]),
+        # of all maps, or of none
+        np.stack(bars) if len(bars) == len(found) else np.empty((0, *found[0].disparity.shape, 3), np.float32),
         np.stack([corner_disparities(maps.disparity, np.float32(TOLERANCE)) for maps in found]),
         baselines,
     )
+
+
+def _offsets(maps: StageMaps) -> FloatMap | None:
+    """Sigma, and how far the bounds lie below and above the disparity, (H, W, 3): what is the same in other views."""
+    if maps.sigma is None or maps.low is None or maps.high is None:
+        return None
+    below, above = maps.disparity - maps.low, maps.high - maps.disparity
+    # where nothing is known the disparity may lie beyond both
+    return np.stack([maps.sigma, np.maximum(below, 0), np.maximum(above, 0)], axis=2).astype(np.float32, copy=False)
 
 
 def _fused(light_field: LightField, sources: Sources, places: npt.NDArray[np.int64]) -> list[ViewMaps]:
@@ -287,9 +347,33 @@ def _fused(light_field: LightField, sources: Sources, places: npt.NDArray[np.int
     disparity, confidence, extended = np.empty(shape, np.float32), np.empty(shape, np.float32), np.empty(shape, bool)
     rules = Rules(MOST_STRETCHED, np.float32(TOLERANCE), np.float32(LEAST_WEIGHT))
     baselines = np.ascontiguousarray(light_field.baselines[tuple(places.T)])
-    maps_of_views(sources, rules, baselines, disparity, confidence, extended)
+    told = len(sources.bars) > 0
+    bars = np.empty((*shape, 3) if told else (len(places), 0, 0, 3), np.float32)
+    maps_of_views(sources, rules, baselines, disparity, confidence, bars, extended)
     positions = [(int(t), int(s)) for t, s in places]
-    return [ViewMaps(*of_view) for of_view in zip(positions, disparity, confidence, extended, strict=True)]
+    views = [ViewMaps(*of_view) for of_view in zip(positions, disparity, confidence, extended, strict=True)]
+    if not told:
+        return views
+    return [
+        view._replace(sigma=own[..., 0], low=view.disparity - own[..., 1], high=view.disparity + own[..., 2])
+        for view, own in zip(views, bars, strict=True)
+    ]
+
+
+def _with_doubt(light_field: LightField, view: ViewMaps, decided: FloatMap) -> ViewMaps:
+    """A view's maps with the disparity that was decided on, and error bars that know of that and of what is made up."""
+    if view.sigma is None or view.low is None or view.high is None:
+        return view._replace(disparity=decided)
+    # a pixel that changed sides may be of either
+    moved = decided - view.disparity
+    low, high = view.low + np.minimum(moved, 0), view.high + np.maximum(moved, 0)
+    sigma = np.hypot(view.sigma, moved / 2)
+    # what no map shows may be anywhere, as may what no view knows (sepi.matching.unknown)
+    lowest, highest = light_field.require_disparity_range().candidates(2)
+    low = np.where(view.extended, np.minimum(lowest, decided), low)
+    high = np.where(view.extended, np.maximum(highest, decided), high)
+    sigma = np.where(view.extended, np.float32((highest - lowest) / 12**0.5), sigma)
+    return view._replace(disparity=decided, sigma=sigma, low=low, high=high)
 
 
 def _with_own_edges(light_field: LightField, view: ViewMaps, edge_views: int) -> FloatMap:

@@ -34,6 +34,9 @@ class Sources(NamedTuple):
     ----------
     disparity, confidence : ndarray, shape (N, H, W), float32
         Pixels per view step; 0..1.
+    bars : ndarray, shape (N, H, W, 3), float32
+        Standard deviation of the disparity, and how far the bounds of its interval lie below and above it; of no maps
+        where there are none.
     corners : ndarray, shape (N, H, W, 4), float32
         Disparity at the corners of each pixel, from :func:`corner_disparities`.
     baselines : ndarray, shape (N, 2), float64
@@ -42,6 +45,7 @@ class Sources(NamedTuple):
 
     disparity: FloatMap
     confidence: FloatMap
+    bars: FloatMap
     corners: FloatMap
     baselines: npt.NDArray[np.float64]
 
@@ -122,8 +126,8 @@ def corner_disparities(disparity: Any, tolerance: Any) -> Any:
 
 
 @njit(inline="always")
-def _draw_triangle(a: Any, b: Any, c: Any, most_area: float, confidence: Any, nearest: Any, believed: Any) -> None:
-    """Draw a triangle of corners ``(y, x, disparity)``, clockwise in its own view, into a view's maps."""
+def _draw_triangle(a: Any, b: Any, c: Any, most_area: float, pixel: Any, nearest: Any, origin: Any) -> None:
+    """Draw a triangle of a pixel, of corners ``(y, x, disparity)``, clockwise in its own view, into a view's maps."""
     H, W = nearest.shape
     area = (b[1] - a[1]) * (c[0] - a[0]) - (b[0] - a[0]) * (c[1] - a[1])
     if not 0.5 * _EDGE_ON < area <= most_area:
@@ -137,36 +141,37 @@ def _draw_triangle(a: Any, b: Any, c: Any, most_area: float, confidence: Any, ne
             if of_b >= _TOUCHING and of_c >= _TOUCHING and of_b + of_c <= 1 - _TOUCHING:
                 d = np.float32(a[2] + of_b * (b[2] - a[2]) + of_c * (c[2] - a[2]))
                 if d > nearest[y, x]:
-                    nearest[y, x], believed[y, x] = d, confidence
+                    nearest[y, x], origin[y, x] = d, pixel
 
 
 @njit(cache=True, fastmath=EXACT, error_model="numpy")
 def carry(
     disparity: Any,
-    confidence: Any,
     corners: Any,
     v: float,
     u: float,
     most_stretched: float,
     nearest: Any,
-    believed: Any,
+    origin: Any,
 ) -> None:
     """Draw the surfaces of a map as another view sees them; the nearest wins.
 
     Parameters
     ----------
-    disparity, confidence : ndarray, shape (H, W), float32
+    disparity : ndarray, shape (H, W), float32
     corners : ndarray, shape (H, W, 4), float32
         From :func:`corner_disparities`.
     v, u : float
         Baseline from the map's view to the other, in view steps.
     most_stretched : float
         See :class:`Rules`.
-    nearest, believed : ndarray, shape (H, W), float32
-        Filled: disparity and confidence in the other view; ``EMPTY`` and 0 where no surface of the map is seen.
+    nearest : ndarray, shape (H, W), float32
+        Filled: disparity in the other view, ``EMPTY`` where no surface of the map is seen.
+    origin : ndarray, shape (H, W), int32
+        Filled: number of the map's pixel, row by row, that is seen there; -1 where none is.
     """
     H, W = disparity.shape
-    nearest[:], believed[:] = EMPTY, np.float32(0)
+    nearest[:], origin[:] = EMPTY, np.int32(-1)
     # twice the area of a quarter of a pixel
     most_area = 0.5 * most_stretched
     for y in range(H):
@@ -181,7 +186,7 @@ def carry(
                 e = np.float64(corners[y, x, corner])
                 down, across = -0.5 + corner // 2, 0.5 if corner in (1, 2) else -0.5
                 here = (y + down - e * v, x + across - e * u, e)
-                _draw_triangle(middle, before, here, most_area, confidence[y, x], nearest, believed)
+                _draw_triangle(middle, before, here, most_area, np.int32(y * W + x), nearest, origin)
                 before = here
 
 
@@ -217,11 +222,19 @@ def _score(
 
 @njit(cache=True, fastmath=EXACT, error_model="numpy")
 def _fuse(
-    sources: Sources, carried: Any, believed: Any, rules: Rules, v: float, u: float, disparity: Any, confidence: Any
+    sources: Sources,
+    carried: Any,
+    origin: Any,
+    rules: Rules,
+    v: float,
+    u: float,
+    disparity: Any,
+    confidence: Any,
+    bars: Any,
 ) -> None:
     """One map of a view out of the carried ones; ``EMPTY`` where none shows anything."""
     N, H, W = carried.shape
-    closeness, weights = np.empty(N, np.float32), np.empty(N, np.float32)
+    closeness, weights, believed = np.empty(N, np.float32), np.empty(N, np.float32), np.empty(N, np.float32)
     for n in range(N):
         closeness[n] = 1 / (1 + math.hypot(v - sources.baselines[n, 0], u - sources.baselines[n, 1]))
     for y in range(H):
@@ -229,7 +242,9 @@ def _fuse(
             low, high = np.float32(1e9), EMPTY
             for n in range(N):
                 d = carried[n, y, x]
-                weights[n] = closeness[n] * (rules.least_weight + believed[n, y, x])
+                pixel = origin[n, y, x]
+                believed[n] = sources.confidence[n, pixel // W, pixel % W] if pixel >= 0 else np.float32(0)
+                weights[n] = closeness[n] * (rules.least_weight + believed[n])
                 if d > EMPTY:
                     low, high = min(low, d), max(high, d)
             best, most = high, np.float32(-1e9)
@@ -242,14 +257,23 @@ def _fuse(
                             best, most = d, score
             # of the maps that agree with the best, the mean
             total, belief, weight = np.float32(0), np.float32(0), np.float32(0)
+            if len(sources.bars) > 0:
+                bars[y, x] = np.float32(0)
             for n in range(N):
                 d = carried[n, y, x]
                 if d > EMPTY and abs(d - best) <= rules.tolerance:
                     total += weights[n] * (d - best)
-                    belief += weights[n] * believed[n, y, x]
+                    belief += weights[n] * believed[n]
                     weight += weights[n]
+                    if len(sources.bars) > 0:
+                        # maps of one light field are wrong together: their mean is no surer than they are
+                        for k in range(3):
+                            bars[y, x, k] += weights[n] * sources.bars[n, origin[n, y, x] // W, origin[n, y, x] % W, k]
             disparity[y, x] = best + total / weight if weight > 0 else EMPTY
             confidence[y, x] = belief / weight if weight > 0 else np.float32(0)
+            if len(sources.bars) > 0 and weight > 0:
+                for k in range(3):
+                    bars[y, x, k] /= weight
 
 
 @njit(inline="always")
@@ -307,7 +331,13 @@ def extend_background(disparity: Any, v: float, u: float, extended: Any) -> None
 
 @njit(parallel=True, cache=True, fastmath=EXACT, error_model="numpy")
 def maps_of_views(
-    sources: Sources, rules: Rules, baselines: Any, disparity: FloatMap, confidence: FloatMap, extended: BoolMap
+    sources: Sources,
+    rules: Rules,
+    baselines: Any,
+    disparity: FloatMap,
+    confidence: FloatMap,
+    bars: FloatMap,
+    extended: BoolMap,
 ) -> None:
     """The maps of some views.
 
@@ -319,20 +349,22 @@ def maps_of_views(
         Of the views, down and across, in view steps, from where those of the sources are counted.
     disparity, confidence : ndarray, shape (V, H, W), float32
         Filled.
+    bars : ndarray, shape (V, H, W, 3), float32
+        Filled, as those of the sources; without pixels where they have none.
     extended : ndarray, shape (V, H, W), bool
         Filled: no source shows anything there, and the background was extended.
     """
     N, H, W = sources.disparity.shape
     for view in prange(len(baselines)):
         v, u = baselines[view, 0], baselines[view, 1]
-        carried, believed = np.empty((N, H, W), np.float32), np.empty((N, H, W), np.float32)
+        carried, origin = np.empty((N, H, W), np.float32), np.empty((N, H, W), np.int32)
         for n in range(N):
             carry(
-                sources.disparity[n], sources.confidence[n], sources.corners[n],
+                sources.disparity[n], sources.corners[n],
                 v - sources.baselines[n, 0], u - sources.baselines[n, 1], rules.most_stretched,
-                carried[n], believed[n],
+                carried[n], origin[n],
             )  # fmt: skip
-        _fuse(sources, carried, believed, rules, v, u, disparity[view], confidence[view])
+        _fuse(sources, carried, origin, rules, v, u, disparity[view], confidence[view], bars[view])
         extended[view] = False
         # gaps open beside the reference view's surfaces, for it is those that most of the maps are made of
         extend_background(disparity[view], v, u, extended[view])

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from sepi.applications.all_views import carried_map
+from sepi.applications.all_views import carried_map, carried_values
 from sepi.applications.camera_poses import CameraPoses, Points, camera_poses, nominal_camera
 from sepi.camera import Camera
 from sepi.errors import SepiError
@@ -52,6 +52,10 @@ class PosedViews:
         Disparity of the other views; the reference view's, carried to them, where there is none.
     rig : Rig or None
         Where the cameras stand in the world that they were calibrated in; None: in the reference view's axes.
+    sigma : ndarray, shape (H, W), float32, or None
+        Standard deviation of the reference view's disparity, pixels per view step; None where nothing tells it.
+    sigmas : callable or None
+        That of the other views, where ``surfaces`` gives their disparity.
     """
 
     light_field: LightField
@@ -63,6 +67,8 @@ class PosedViews:
     chosen: BoolMap
     surfaces: Surfaces | None = None
     rig: Rig | None = None
+    sigma: FloatMap | None = None
+    sigmas: Surfaces | None = None
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -137,6 +143,43 @@ class PosedViews:
         depth = self.camera.depth(carried)
         return np.where(np.isfinite(depth) & ~np.isnan(carried), depth, np.float32(0))
 
+    @property
+    def sure(self) -> bool:
+        """Whether :meth:`depth_sigma` is known of all views."""
+        return self.sigma is not None and (self.surfaces is None or self.sigmas is not None)
+
+    def depth_sigma(self, view: int, carried: FloatMap) -> FloatMap:
+        """Standard deviation of the depth of a view, (H, W) float32, given its :meth:`carried` disparity; 0 without
+        depth. For views that are :attr:`sure`.
+        """
+        sigma = self._carried_sigma(view)
+        return np.where(self.depth(carried) > 0, self.camera.depth_sigma(carried, sigma), np.float32(0))
+
+    def _carried_sigma(self, view: int) -> FloatMap:
+        assert self.sigma is not None
+        if view == self.poses.reference:
+            return self.sigma
+        if self.sigmas is None:
+            down, across = self.poses.baselines[view].tolist()
+            return carried_values(self.disparity, self.sigma, (down, across), self.known)
+        t, s = self.poses.positions[view].tolist()
+        return self.sigmas((t, s))
+
+    def pixel_errors(self, sees: npt.NDArray[np.bool_]) -> npt.NDArray[np.float64]:
+        """How far from where they are said to be views see the points, (P,), pixels; 0 where nothing tells it.
+
+        Parameters
+        ----------
+        sees : ndarray, shape (N, P), bool
+            Which views see which points: the mean is over these.
+        """
+        if self.sigma is None:
+            return np.zeros(sees.shape[1])
+        # what is wrong by sigma in each view step is wrong by this much at a view so many steps away
+        steps = np.linalg.norm(self.poses.baselines, axis=1)
+        mean = (sees * steps[:, None]).sum(axis=0) / np.maximum(sees.sum(axis=0), 1)
+        return np.asarray(self.sigma[self.chosen].astype(np.float64) * mean)
+
     def normals(self, view: int, carried: FloatMap) -> FloatMap:
         """Unit normals of a view's surfaces in its camera's axes, towards it, (3, H, W) float32; 0 without depth.
 
@@ -175,6 +218,8 @@ def posed_views(
     min_confidence: float | None = None,
     max_points: int = MAX_POINTS,
     surfaces: Surfaces | None = None,
+    sigma: FloatMap | None = None,
+    sigmas: Surfaces | None = None,
 ) -> PosedViews:
     """Prepare a light field and the disparity map of its reference view for other programs.
 
@@ -190,18 +235,24 @@ def posed_views(
     camera : Camera, optional
         The light field's own unless given, or a nominal one where it has none.
     min_confidence : float, optional
-        Less sure pixels have no point; the surer half of all pixels with a depth has one unless given.
+        Less sure pixels have no point. Unless given, the surer half of all pixels with a depth has one: by ``sigma``
+        where it is given, else by the confidence.
     max_points : int
         Every so-many-th row and column has points, so that they are no more than this.
     surfaces : callable, optional
         Disparity of the other views; the map is carried to them unless given.
+    sigma : ndarray, shape (H, W), float32, optional
+        Standard deviation of the disparity, pixels per view step.
+    sigmas : callable, optional
+        That of the other views; needed beside ``surfaces`` for the error of their depth.
 
     Raises
     ------
     SepiError
         If a map is not of the light field's shape, or a number is out of bounds.
     """
-    for name, values in {"disparity": disparity, "confidence": confidence, "unknown": unknown}.items():
+    given = {"disparity": disparity, "confidence": confidence, "unknown": unknown, "sigma": sigma}
+    for name, values in given.items():
         if values is not None and values.shape != light_field.shape:
             raise SepiError(f"{light_field.name}: {name} is {values.shape}, the views {light_field.shape}")
     if min_confidence is not None and not 0 <= min_confidence <= 1:
@@ -222,9 +273,11 @@ def posed_views(
         poses=camera_poses(light_field, used),
         disparity=disparity,
         known=known,
-        chosen=_thinned(_sure(known, confidence, min_confidence), max_points),
+        chosen=_thinned(_surer(known, confidence, min_confidence, sigma), max_points),
         surfaces=surfaces,
         rig=light_field.reference_rig if camera is None else None,
+        sigma=sigma,
+        sigmas=sigmas,
     )
 
 
@@ -238,8 +291,11 @@ def _slopes(disparity: FloatMap, axis: int) -> npt.NDArray[np.float64]:
     return np.nan_to_num(np.where(size_before <= size_after, before, after))
 
 
-def _sure(known: BoolMap, confidence: FloatMap | None, least: float | None) -> BoolMap:
+def _surer(known: BoolMap, confidence: FloatMap | None, least: float | None, sigma: FloatMap | None) -> BoolMap:
     """The known pixels that are sure enough."""
+    if sigma is not None and least is None and known.any():
+        # many pixels have the greatest confidence there is; hardly any two have one sigma
+        return known & (sigma <= np.median(sigma[known]))
     if confidence is None or not known.any():
         return known
     # unknown confidence is none

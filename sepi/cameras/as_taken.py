@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import numpy.typing as npt
 
 from sepi.camera import Camera
 from sepi.lightfield import FloatMap
@@ -43,18 +44,52 @@ def as_taken(
     """
     view = rig.views[position]
     lens = view.shot.lens
-    pixels = np.stack(np.meshgrid(np.arange(lens.width), np.arange(lens.height)), axis=-1).reshape(-1, 2)
-    own = lens.rays(pixels.astype(np.float64))
-    rays = own @ (view.shot.rotation @ rig.rotation.T)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        flat = np.where(rays[:, 2:] > 0, rays[:, :2] / rays[:, 2:], np.nan)
-    at = _principal(disparity.shape, camera, from_centre) + camera.focal_px * view.zoom * flat
-    found = _sampled(disparity, at)
+    own, rays = _rays(view, rig)
+    found = _sampled(disparity, _places(disparity.shape, camera, view, rays, from_centre))
     # both from the camera itself: along the common way that rectified views look, then along its own
     along = camera.depth(found).astype(np.float64) - _ahead(view, rig)
     depth = np.where(np.isfinite(found), along * own[:, 2] / rays[:, 2], np.nan)
     shape = lens.height, lens.width
     return found.reshape(shape), depth.astype(np.float32).reshape(shape)
+
+
+def sigma_as_taken(
+    sigma: FloatMap,
+    camera: Camera,
+    rig: Rig,
+    position: tuple[int, int],
+    from_centre: tuple[float, float],
+) -> FloatMap:
+    """Standard deviation of the disparity at the pixels of the picture that was taken; arguments as :func:`as_taken`.
+
+    Returns
+    -------
+    ndarray, shape (height, width of the picture), float32
+        That of the nearest pixel of the rectified view, for what stands between two tells of neither; NaN where the
+        rectified view shows nothing.
+    """
+    view = rig.views[position]
+    _, rays = _rays(view, rig)
+    inside, within = _inside(sigma.shape, _places(sigma.shape, camera, view, rays, from_centre))
+    found = np.where(inside, _nearest(sigma, within), np.float32(np.nan))
+    return found.astype(np.float32).reshape(view.shot.lens.height, view.shot.lens.width)
+
+
+def _rays(view: Rectified, rig: Rig) -> tuple[Floats, Floats]:
+    """Ways that a camera's pixels look, row by row, (N, 3): in its own axes, and in those of the rectified views."""
+    lens = view.shot.lens
+    pixels = np.stack(np.meshgrid(np.arange(lens.width), np.arange(lens.height)), axis=-1).reshape(-1, 2)
+    own = lens.rays(pixels.astype(np.float64))
+    return own, own @ (view.shot.rotation @ rig.rotation.T)
+
+
+def _places(
+    shape: tuple[int, ...], camera: Camera, view: Rectified, rays: Floats, from_centre: tuple[float, float]
+) -> Floats:
+    """Places ``(x, y)`` in a rectified view of ``shape`` that rays go through, (N, 2); NaN for what lies behind."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        flat = np.where(rays[:, 2:] > 0, rays[:, :2] / rays[:, 2:], np.nan)
+    return _principal(shape, camera, from_centre) + camera.focal_px * view.zoom * flat
 
 
 def _principal(shape: tuple[int, ...], camera: Camera, from_centre: tuple[float, float]) -> Floats:
@@ -73,16 +108,26 @@ def _ahead(view: Rectified, rig: Rig) -> float:
 def _sampled(values: FloatMap, at: Floats) -> FloatMap:
     """Values at places ``(x, y)``, (N, 2): linear within a surface, else those of the nearest pixel; NaN outside."""
     height, width = values.shape
-    # what is nearest to a pixel of the border is that pixel's
-    with np.errstate(invalid="ignore"):
-        inside = ((at > -0.5) & (at < np.array([width, height]) - 0.5)).all(axis=1)
-    within = np.clip(np.where(np.asarray(inside)[:, None], at, 0), 0, (width - 1, height - 1))
+    inside, within = _inside(values.shape, at)
     left, top = np.floor(within).astype(int).T
     right, below = np.minimum(left + 1, width - 1), np.minimum(top + 1, height - 1)
     four = np.stack([values[y, x] for y in (top, below) for x in (left, right)]).astype(np.float64)
     across, down = within.T - (left, top)
     above, beneath = (four[n] + across * (four[n + 1] - four[n]) for n in (0, 2))
     linear = above + down * (beneath - above)
-    nearest = values[tuple(np.rint(within).astype(int).T[::-1])]
-    found = np.where(np.ptp(four, axis=0) <= _ONE_SURFACE, linear, nearest)
+    found = np.where(np.ptp(four, axis=0) <= _ONE_SURFACE, linear, _nearest(values, within))
     return np.where(inside, found, np.float32(np.nan)).astype(np.float32)
+
+
+def _inside(shape: tuple[int, ...], at: Floats) -> tuple[npt.NDArray[np.bool_], Floats]:
+    """Which places ``(x, y)``, (N, 2), lie in a picture, and the places between the middles of its outer pixels."""
+    height, width = shape
+    # what is nearest to a pixel of the border is that pixel's
+    with np.errstate(invalid="ignore"):
+        inside = np.asarray(((at > -0.5) & (at < np.array([width, height]) - 0.5)).all(axis=1))
+    return inside, np.clip(np.where(inside[:, None], at, 0), 0, (width - 1, height - 1))
+
+
+def _nearest(values: FloatMap, within: Floats) -> FloatMap:
+    """Values of the pixels nearest to places in the picture, (N,)."""
+    return np.asarray(values[tuple(np.rint(within).astype(int).T[::-1])])

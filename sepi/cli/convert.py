@@ -15,7 +15,16 @@ if TYPE_CHECKING:
     from sepi.lightfield import FloatMap
 
 _PATH = click.Path(path_type=Path)
-_MAPS = {"disparity": "pixels per view step", "depth": "metres", "confidence": "0 to 1"}
+# names of sepi.stage, whose import would take longer than the help
+_BARS = "sigma", "low", "high"
+_STEPS, _METRES = "pixels per view step", "metres"
+_MAPS = {
+    "disparity": _STEPS,
+    "depth": _METRES,
+    "confidence": "0 to 1",
+    **dict.fromkeys(_BARS, _STEPS),
+    "depth_sigma": _METRES,
+}
 # by these names programs know depth, and a grey picture
 _CHANNELS = {"depth": "Z"}
 _GREY = "Y"
@@ -34,14 +43,16 @@ def convert(
     """Write maps of RESULT as FILE, a picture of 32-bit floats: OpenEXR (.exr), TIFF (.tif, .tiff) or PFM (.pfm).
 
     RESULT is a folder that 'sepi depth' wrote, its result.h5 or its all_views.h5. OpenEXR holds the channels disparity
-    (pixels per view step), confidence, and, where the camera is known, Z (depth, metres); one map alone, chosen with
-    --map, is the grey channel Y, which OpenCV reads. TIFF and PFM hold one map, the disparity unless --map names
-    another. OpenEXR needs the package of that name: pip install 'sepi[exr]'.
+    (pixels per view step), confidence, and, where the camera is known, Z (depth, metres); where RESULT has error bars,
+    sigma, low and high (pixels per view step) and depth_sigma (metres); one map alone, chosen with --map, is the grey
+    channel Y, which OpenCV reads. TIFF and PFM hold one map, the disparity unless --map names another. OpenEXR needs
+    the package of that name: pip install 'sepi[exr]'.
 
     \b
     Examples:
       sepi convert cotton-depth cotton.exr
       sepi convert cotton-depth depth.tiff --map depth
+      sepi convert cotton-depth sigma.tiff --map sigma
       sepi convert cotton-depth corner.pfm --view 0,0
     """
     from sepi.io.float_pictures import EXR, TIFF, write_exr, write_tiff
@@ -54,7 +65,9 @@ def convert(
     if name is None and suffix not in EXR:
         name = "disparity"
     if name is not None and name not in maps:
-        raise SepiError(f"{result_path}: no depth, as the camera is not known; give --focal-length and the others")
+        if name != "depth" and "sigma" not in maps:
+            raise SepiError(f"{result_path}: no {name}, as the result has no error bars")
+        raise SepiError(f"{result_path}: no {name}, as the camera is not known; give --focal-length and the others")
     written = maps if name is None else {name: maps[name]}
     comment = ", ".join(f"{key}: {_MAPS[key]}" for key in written)
     if name is None:
@@ -69,10 +82,17 @@ def convert(
 
 
 def _maps(path: Path, view: tuple[int, int] | None, geometry: Geometry | None) -> dict[str, FloatMap]:
-    """Maps of a result by their names; depth where the camera is known."""
+    """Maps of a result by their names; depth where the camera is known, error bars where it has any."""
     from sepi.io.all_views import read_result_at
 
     result = read_result_at(path, view)
     camera = result.camera if geometry is None else geometry(shape=result.disparity.shape)
-    depth = {} if camera is None else {"depth": camera.depth(result.disparity)}
-    return {"disparity": result.disparity, **depth, "confidence": result.confidence}
+    maps = {
+        "disparity": result.disparity,
+        "depth": None if camera is None else camera.depth(result.disparity),
+        "confidence": result.confidence,
+        **{name: getattr(result, name) for name in _BARS},
+    }
+    if camera is not None and result.sigma is not None:
+        maps["depth_sigma"] = camera.depth_sigma(result.disparity, result.sigma)
+    return {name: values for name, values in maps.items() if values is not None}

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from sepi.applications.all_views import ViewMaps
     from sepi.lightfield import LightField
-    from sepi.stage import MadeBy
+    from sepi.stage import MadeBy, StageMaps
     from sepi.variants import Variant
 
 _PATH = click.Path(path_type=Path)
@@ -70,8 +70,8 @@ def depth(
 
     INPUT is a folder of views, a Lytro picture (*_eslf.png), an array (.mat, .npy, .npz) or an HDF5 file; 'sepi info'
     shows how it is read, 'sepi check' whether its views are in the right order. Writes the disparity as numbers and in
-    colour, confidence, masks and a point cloud; depth in metres where the camera is known. With --all-views a map for
-    every view, too, made from those of a few: docs/depth/all_views.md.
+    colour, how far it may be wrong, confidence, masks and a point cloud; depth in metres where the camera is known.
+    With --all-views a map for every view, too, made from those of a few: docs/depth/all_views.md.
 
     Variants: best (the most accurate), fast (half its time), paper (the method as published), no_sepi, no_occlusion,
     no_textureless, no_occlusion_no_textureless (parts of it switched off), wang (another treatment of occlusion);
@@ -114,7 +114,8 @@ def depth(
     with progress_bar(light_field.name) as progress:
         maps = estimate_depth(light_field, variant, parameters, progress, memory and memory * 2**20)
     seconds = time.perf_counter() - started if timing else None
-    beside = (ALL_VIEWS, *names_of_others(light_field)) if all_views else ()
+    taken = names_of_others(light_field, with_sigma=maps.sigma is not None)
+    beside = (ALL_VIEWS, *taken) if all_views else ()
     files = write_result(folder, light_field, maps, force=force, seconds=seconds, beside=beside)
     if all_views:
         from sepi.applications.all_views import maps_of_all_views
@@ -130,6 +131,7 @@ def depth(
     unknown = float(maps.mask(UNKNOWN).mean())
     if unknown:
         click.echo(f"unknown: {100 * unknown:.2g} % of the pixels; no view knows anything about them")
+    click.echo(_interval(maps, variant))
     click.echo(f"written to {folder}/: {' '.join(files)}")
 
 
@@ -141,8 +143,21 @@ def _also_as_taken(
 
     for view in views:
         if view.position != light_field.reference_position:
-            write_as_taken(folder, light_field, view.disparity, view.position)
+            write_as_taken(folder, light_field, view.disparity, view.position, view.sigma)
         yield view.position, view.maps
+
+
+def _interval(maps: StageMaps, variant: str) -> str:
+    """How wide the intervals of what is known are, or that there are none."""
+    import numpy as np
+
+    from sepi.matching.unknown import UNKNOWN
+
+    if maps.low is None or maps.high is None:
+        return f"no interval: {variant} has no model of its own error"
+    width, known = maps.high - maps.low, ~maps.mask(UNKNOWN)
+    half = float(np.median(width[known] if known.any() else width)) / 2
+    return f"90 % interval: median half width {half:.2g} pixels per view step"
 
 
 def _candidates(made_by: MadeBy | None) -> str:

@@ -48,7 +48,8 @@ def poses(
     RESULT is the folder that 'sepi depth' wrote for INPUT, or its result.h5; it knows how INPUT was read.
     Poses are exact, so nothing has to be matched. Each view has a principal point of its own: programs that ignore it
     see another scene. Depth of the other views is that of 'sepi depth --all-views', else RESULT's, carried over; 0
-    where it is not known. Positions are in metres where the camera is known. docs/reference/outputs.md describes the
+    where it is not known. Positions are in metres where the camera is known. Where RESULT has error bars, COLMAP's
+    points have an error, and nerfstudio's depth has a standard deviation. docs/reference/outputs.md describes the
     files.
 
     \b
@@ -73,6 +74,8 @@ def poses(
         min_confidence=min_confidence,
         max_points=points,
         surfaces=surfaces_of(result_path),
+        sigma=result.sigma,
+        sigmas=surfaces_of(result_path, "sigma"),
     )
     with progress_bar(light_field.name) as progress:
         {"colmap": write_colmap, "nerfstudio": write_nerfstudio}[kind](folder, posed, progress)

@@ -23,6 +23,13 @@ _PARTIAL = click.option("--partial", is_flag=True, help="Take fewer than the ben
 )
 @click.option("--min-confidence", type=float, default=0.0, metavar="X", help="Leave out less sure pixels; 0 to 1.")
 @click.option("--max-depth", type=float, metavar="M", help="Leave out points more distant than this many metres.")
+@click.option(
+    "--max-sigma",
+    type=float,
+    metavar="X",
+    help="Leave out points of a larger standard deviation: of the depth in metres where the camera is known, else of "
+    "the disparity in pixels per view step.",
+)
 @click.option("--step", type=click.IntRange(min=1), default=1, metavar="N", help="Use every Nth row and column only.")
 @click.option("--keep-unknown", is_flag=True, help="Keep pixels that no view knows anything about.")
 @view_of_result
@@ -32,6 +39,7 @@ def points(
     output: Path | None,
     min_confidence: float,
     max_depth: float | None,
+    max_sigma: float | None,
     step: int,
     keep_unknown: bool,
     view: tuple[int, int] | None,
@@ -40,12 +48,13 @@ def points(
     """Write the coloured point cloud of RESULT as a PLY file.
 
     RESULT is a folder that 'sepi depth' wrote, its result.h5 or its all_views.h5. Points are in metres where the
-    scene's files or the flags give the camera; otherwise they are a relief with x and y in pixels.
-    docs/reference/outputs.md describes both.
+    scene's files or the flags give the camera; otherwise they are a relief with x and y in pixels. Each has a sigma
+    where RESULT has error bars, in metres or in pixels per view step. docs/reference/outputs.md describes both.
 
     \b
     Examples:
       sepi points cotton-depth --min-confidence 0.5 --max-depth 6
+      sepi points cotton-depth --max-sigma 0.02
       sepi points views-depth -o views.ply --focal-length 50 --baseline 10 --focus-distance 2 --sensor-size 36
     """
     from sepi.io.all_views import read_result_at
@@ -53,6 +62,8 @@ def points(
     from sepi.io.point_cloud import point_cloud
 
     result = read_result_at(result_path, view)
+    if max_sigma is not None and result.sigma is None:
+        raise SepiError(f"{result_path}: --max-sigma: the result has no error bars, as the methods compared with")
     cloud = point_cloud(
         result.picture,
         result.disparity,
@@ -64,9 +75,11 @@ def points(
         step=step,
         unknown=None if keep_unknown else result.unknown,
         rig=None if geometry is not None else result.rig,
+        sigma=result.sigma,
+        max_sigma=max_sigma,
     )
     if not len(cloud.positions):
-        tried = "lower --min-confidence, raise --max-depth or give --keep-unknown"
+        tried = "lower --min-confidence, raise --max-depth or --max-sigma, give --keep-unknown"
         raise SepiError(f"{result_path}: no point is left; {tried}")
     name = "_".join(["points", *map(str, view or ())]) + ".ply"
     path = output or (result_path if result_path.is_dir() else result_path.parent) / name

@@ -30,13 +30,14 @@ from sepi.io.origin import Origin, read_origin
 from sepi.io.result_files import ALL_VIEWS
 from sepi.io.result_folder import Result, read_result
 from sepi.lightfield import FloatMap, LightField
+from sepi.stage import ERROR_BARS
 
 View = tuple[int, int]
 
 _KIND = "file of maps of all views, of this version of 'sepi depth --all-views'"
 # of the datasets the one that no other file has
 _MARK = "extended"
-_MISSING = {"disparity": np.nan}
+_MISSING = dict.fromkeys(("disparity", *ERROR_BARS), np.nan)
 
 
 def write_all_views(
@@ -57,8 +58,8 @@ def write_all_views(
     light_field : LightField
         That the maps belong to.
     views : iterable of ((int, int), mapping of str to ndarray of shape (H, W))
-        Position in the grid, and maps by name, the same of every view. Of views that do not come, the disparity is NaN
-        and everything else 0.
+        Position in the grid, and maps by name, the same of every view. Of views that do not come, disparity and error
+        bars are NaN and everything else 0.
     attributes : mapping
         What made the maps.
 
@@ -121,19 +122,28 @@ def read_origin_at(path: Path, view: View | None) -> Origin | None:
     return replace(origin, view=view or origin.view, picture=read_result_at(path, view).picture)
 
 
-def surfaces_of(path: Path) -> Callable[[View], FloatMap] | None:
-    """What gives the disparity of a view, (H, W) float32, NaN where it is unknown; None without maps of all views."""
+def surfaces_of(path: Path, name: str = "disparity") -> Callable[[View], FloatMap] | None:
+    """What gives a map of a view, (H, W) float32, NaN where the view is unknown; None without such maps of all views.
+
+    Parameters
+    ----------
+    path : Path
+        As for :func:`read_result_at`.
+    name : str
+        ``"disparity"`` or ``"sigma"``.
+    """
     file_path = _file_of(path, (0, 0))
     if file_path is None:
         return None
 
     # checked once, not for each view
-    with open_hdf5(file_path, _KIND):
-        pass
+    with open_hdf5(file_path, _KIND) as file:
+        if name not in file:
+            return None
 
     def surface(view: View) -> FloatMap:
         result = _read_view(file_path, view, check=False)
-        return np.where(result.unknown, np.float32(np.nan), result.disparity)
+        return np.where(result.unknown, np.float32(np.nan), getattr(result, name))
 
     return surface
 
@@ -155,6 +165,7 @@ def _read_view(file_path: Path, view: View | None, check: bool = True) -> Result
         disparity, confidence, extended, picture = (
             read_dataset(file_path, file[name], position) for name in ("disparity", "confidence", _MARK, "picture")
         )
+        bars = {name: read_dataset(file_path, file[name], position) for name in ERROR_BARS if name in file}
         return Result(
             scene=str(attribute(file, "scene")),
             picture=picture,
@@ -164,6 +175,7 @@ def _read_view(file_path: Path, view: View | None, check: bool = True) -> Result
             camera=read_camera(file),
             from_centre=(down, across),
             rig=None if rig is None else rig.seen_from(baseline),
+            **{name: values.astype(np.float32) for name, values in bars.items()},
         )
 
 

@@ -13,7 +13,9 @@ The folder is COLMAP's workspace::
 
 Each view has a camera of its own, a ``PINHOLE`` with its principal point. Origin and axes are those of the reference
 view's camera, so there is no rotation; of calibrated cameras they are those of their world. Points are those of the
-reference view, with a track: the pixel at which each view sees them, unless something nearer hides them.
+reference view, with a track: the pixel at which each view sees them, unless something nearer hides them. Their error is
+how far from there a view of the track sees them on average, in pixels, as the standard deviation of the disparity has
+it; 0 where that is not known.
 
 References
 ----------
@@ -144,9 +146,10 @@ def _points(posed: PosedViews, sees: Flags) -> Iterator[str]:
     places = np.cumsum(sees, axis=1) - 1
     yield "# 3D point list with one line of data per point:"
     yield _POINTS
-    for point, ((x, y, z), (r, g, b)) in enumerate(
-        zip(posed.in_world(posed.points).tolist(), posed.colours.tolist(), strict=True)
+    errors = posed.pixel_errors(sees).tolist()
+    for point, ((x, y, z), (r, g, b), error) in enumerate(
+        zip(posed.in_world(posed.points).tolist(), posed.colours.tolist(), errors, strict=True)
     ):
         views = np.flatnonzero(sees[:, point])
         track = " ".join(f"{view + 1} {places[view, point]}" for view in views.tolist())
-        yield f"{point + 1} {x!r} {y!r} {z!r} {r} {g} {b} 0 {track}"
+        yield f"{point + 1} {x!r} {y!r} {z!r} {r} {g} {b} {error:.6g} {track}"

@@ -35,7 +35,7 @@ from sepi.io.integrity import (
 )
 from sepi.lightfield import RANGE_SOURCES, DisparityRange, LightField, Truth, require_light_field
 from sepi.rig import Rig
-from sepi.stage import CostVolume, StageMaps
+from sepi.stage import ERROR_BARS, CostVolume, StageMaps
 from sepi.validation import require_known, require_path
 
 Attribute = str | float | int | tuple[float, ...]
@@ -49,7 +49,13 @@ RIG = "rig"
 # datasets of a cost volume
 _COSTS, _CANDIDATES = "cost_volume", "candidates"
 
-UNITS = {"disparity": "pixels per view step", "confidence": "0..1", "depth": "metres"}
+_STEPS, _METRES = "pixels per view step", "metres"
+UNITS = {
+    **dict.fromkeys(("disparity", *ERROR_BARS), _STEPS),
+    "confidence": "0..1",
+    **dict.fromkeys(("depth", "depth_sigma", "nearest", "farthest"), _METRES),
+}
+"""Units of maps, by their names."""
 
 
 def write_stage(path: Path, maps: StageMaps, attributes: Mapping[str, Attribute]) -> None:

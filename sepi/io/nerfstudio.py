@@ -5,10 +5,12 @@
     transforms.json              cameras: `w h fl_x fl_y cx cy` of each view, camera-to-world matrices
     images/view_04_04.png        each view, RGB of 8 bit
     depths/view_04_04.npy        depth of each view in millimetres, float32; 0 where it is not known
+    depth_sigmas/view_04_04.npy  its standard deviation, likewise; where the map has error bars
     points.ply                   coloured points, for methods that begin with some
 
 A camera's axes point right, up and back. The world's z points up; y points the way that the cameras look, and the
-origin is the reference view's camera. Principal points are counted from the corner of the picture.
+origin is the reference view's camera. Principal points are counted from the corner of the picture. No key for the error
+of depth is known to the programs: ``depth_sigma_file_path`` is for those who weigh it themselves.
 
 References
 ----------
@@ -31,6 +33,7 @@ import numpy.typing as npt
 from sepi.io.files import atomic_folder, atomic_path
 from sepi.io.images import write_png
 from sepi.io.ply import write_ply
+from sepi.lightfield import FloatMap
 from sepi.rig import WORLD
 from sepi.stage import Progress, no_progress
 
@@ -77,18 +80,24 @@ def write_nerfstudio(folder: str | Path, posed: PosedViews, progress: Progress =
     """
     with atomic_folder(Path(folder)) as temporary:
         for view, name in enumerate(posed.names):
-            depth = posed.depth(posed.carried(view)) * np.float32(_MILLIMETRES)
+            carried = posed.carried(view)
+            _write_millimetres(temporary / "depths" / f"{name}.npy", posed.depth(carried))
+            if posed.sure:
+                _write_millimetres(temporary / "depth_sigmas" / f"{name}.npy", posed.depth_sigma(view, carried))
             write_png(temporary / "images" / f"{name}.png", posed.picture(view))
             if posed.incomplete:
                 write_png(temporary / "masks" / f"{name}.png", posed.shown(view))
-            with atomic_path(temporary / "depths" / f"{name}.npy") as path, path.open("wb") as file:
-                np.save(file, depth.astype("<f4"), allow_pickle=False)
             progress((view + 1) / len(posed.poses))
         if posed.chosen.any():
             cloud = _WorldCloud(_world(posed, posed.points), posed.colours, posed.units, posed.rig is not None)
             write_ply(temporary / _CLOUD, cloud)
         with atomic_path(temporary / "transforms.json") as path:
             path.write_text(json.dumps(_transforms(posed), indent=1) + "\n", encoding="ascii")
+
+
+def _write_millimetres(path: Path, metres: FloatMap) -> None:
+    with atomic_path(path) as temporary, temporary.open("wb") as file:
+        np.save(file, (metres * np.float32(_MILLIMETRES)).astype("<f4"), allow_pickle=False)
 
 
 def _transforms(posed: PosedViews) -> dict[str, Any]:
@@ -99,6 +108,7 @@ def _transforms(posed: PosedViews) -> dict[str, Any]:
             "file_path": f"images/{name}.png",
             "depth_file_path": f"depths/{name}.npy",
             # of all views, or none
+            **({"depth_sigma_file_path": f"depth_sigmas/{name}.npy"} if posed.sure else {}),
             **({"mask_path": f"masks/{name}.png"} if posed.incomplete else {}),
             "w": width,
             "h": height,

@@ -23,9 +23,11 @@ _NUMBERS = {
 _LONGEST_HEADER = 2**16
 _PROPERTIES = (*(f"float {axis}" for axis in "xyz"), *(f"uchar {colour}" for colour in ("red", "green", "blue")))
 
+_SIGMA = "sigma"
+
 
 class Cloud(Protocol):
-    """Coloured points, such as :class:`sepi.io.point_cloud.PointCloud`."""
+    """Coloured points, such as :class:`sepi.io.point_cloud.PointCloud`; they may have a ``sigma`` each."""
 
     @property
     def positions(self) -> npt.NDArray[np.floating]:
@@ -45,7 +47,8 @@ def write_ply(path: str | Path, cloud: Cloud) -> None:
     Parameters
     ----------
     path : str or Path
-        MeshLab, CloudCompare, Blender and others open it; a comment in its header names the units.
+        MeshLab, CloudCompare, Blender and others open it; comments in its header name the units. Where the cloud has a
+        sigma, each vertex has a property of that name, which CloudCompare shows as a scalar field.
     cloud : Cloud
         Such as a :class:`~sepi.io.point_cloud.PointCloud`.
 
@@ -69,14 +72,21 @@ def write_ply(path: str | Path, cloud: Cloud) -> None:
     path = require_path("PLY to write", path)
     for name in ("positions", "colours"):
         require_type(f"{path}: {name}", getattr(cloud, name, None), np.ndarray, "an array of the points")
-    points = np.empty(len(cloud.positions), _POINT)
+    kind, properties = _POINT, _PROPERTIES
+    # a cloud of one's own need have none
+    sigma = getattr(cloud, _SIGMA, None)
+    if sigma is not None:
+        kind, properties = np.dtype([*kind.descr, (_SIGMA, "<f4")]), (*properties, f"float {_SIGMA}")
+    points = np.empty(len(cloud.positions), kind)
     points["position"], points["colour"] = cloud.positions, cloud.colours
+    if sigma is not None:
+        points[_SIGMA] = sigma
     header = [
         "ply",
         "format binary_little_endian 1.0",
         *(f"comment {comment}" for comment in cloud.comments()),
         f"element vertex {len(points)}",
-        *(f"property {words}" for words in _PROPERTIES),
+        *(f"property {words}" for words in properties),
         "end_header",
     ]
     with atomic_path(path) as temporary, temporary.open("wb") as file:

@@ -40,6 +40,8 @@ Colours = npt.NDArray[np.uint8]
 _RELIEF = 1 / 3
 _BEYOND = 0.005
 
+_AXES = "x right, y up, z towards the viewer"
+
 
 @dataclass(frozen=True)
 class PointCloud:
@@ -57,6 +59,9 @@ class PointCloud:
         Pixels per unit of disparity of a relief; 1 for a metric cloud.
     units : str or None
         Units of the world in whose axes the points are, where calibrated cameras tell; None: axes are as above.
+    sigma : ndarray, shape (N,), float32, or None
+        Standard deviation of each point's depth, in the unit of a metric cloud, or of its disparity in a relief, pixels
+        per view step; None where nothing tells it.
 
     Examples
     --------
@@ -74,6 +79,7 @@ class PointCloud:
     metric: bool
     stretch: float = 1.0
     units: str | None = None
+    sigma: FloatMap | None = None
 
     def comments(self) -> tuple[str, ...]:
         """What the numbers are, for the file's header.
@@ -81,15 +87,18 @@ class PointCloud:
         Returns
         -------
         tuple of str
-            Axes, and units.
+            Axes, units, and what ``sigma`` is where there is one.
         """
+        of_depth = "sigma: standard deviation of the depth along the viewing direction, "
         if self.units is not None:
-            return WORLD, self.units
-        if self.metric:
-            units = "metres; origin: camera of the view"
+            lines, sigma = (WORLD, self.units), of_depth + self.units
+        elif self.metric:
+            lines = _AXES, "metres; origin: camera of the view"
+            sigma = of_depth + "metres"
         else:
             units = f"x and y: pixels from the middle; z: disparity (pixels per view step) times {self.stretch!r}"
-        return "x right, y up, z towards the viewer", units
+            lines, sigma = (_AXES, units), "sigma: standard deviation of the disparity, pixels per view step"
+        return lines if self.sigma is None else (*lines, sigma)
 
 
 def point_cloud(
@@ -104,6 +113,8 @@ def point_cloud(
     step: int = 1,
     unknown: BoolMap | None = None,
     rig: Rig | None = None,
+    sigma: FloatMap | None = None,
+    max_sigma: float | None = None,
 ) -> PointCloud:
     """Point cloud of one view; pixels without a finite disparity, and those at or beyond infinity, have no point.
 
@@ -134,6 +145,11 @@ def point_cloud(
         Pixels to leave out.
     rig : Rig, optional
         Puts a metric cloud into the world of the calibrated cameras.
+    sigma : ndarray, shape (H, W), float32, optional
+        Standard deviation of the disparity, pixels per view step; that of the depth follows by the derivative.
+    max_sigma : float, optional
+        Leave out points of a larger standard deviation than this: of the depth in metres with a camera, else of the
+        disparity in pixels per view step.
 
     Returns
     -------
@@ -144,7 +160,7 @@ def point_cloud(
     ------
     SepiError
         If the maps are not of the picture's size, a number is out of bounds, ``max_depth`` is given without a camera,
-        or ``min_confidence`` without a confidence.
+        ``min_confidence`` without a confidence, or ``max_sigma`` without a sigma.
 
     Examples
     --------
@@ -163,10 +179,14 @@ def point_cloud(
     >>> sure = point_cloud(picture, maps.disparity, maps.confidence, camera=camera, min_confidence=0.5, step=2)
     >>> len(sure.positions) <= 32 * 32
     True
+    >>> near = point_cloud(picture, maps.disparity, camera=camera, sigma=maps.sigma, max_sigma=0.05)
+    >>> bool((near.sigma <= 0.05).all())  # metres
+    True
     """
     require_type("point cloud: picture", picture, np.ndarray, "a view")
     require_map("point cloud: disparity", disparity)
-    for name, values in {"disparity": disparity, "confidence": confidence, "unknown": unknown}.items():
+    given = {"disparity": disparity, "confidence": confidence, "unknown": unknown, "sigma": sigma}
+    for name, values in given.items():
         require_type(f"point cloud: {name}", values, (np.ndarray, NoneType), "an array")
         if values is not None and values.shape != picture.shape[:2]:
             raise SepiError(f"point cloud: {name} is {values.shape}, the view {picture.shape[:2]} (height, width)")
@@ -176,6 +196,8 @@ def point_cloud(
         raise SepiError(f"point cloud: expected a least confidence within 0..1, got {min_confidence:g}")
     if max_depth is not None and not max_depth > 0:
         raise SepiError(f"point cloud: expected a positive largest depth in metres, got {max_depth:g}")
+    if max_sigma is not None and not max_sigma > 0:
+        raise SepiError(f"point cloud: expected a positive largest sigma, got {max_sigma:g}")
     used = np.zeros(disparity.shape, bool)
     used[::step, ::step] = True
     used &= np.isfinite(disparity)
@@ -189,7 +211,10 @@ def point_cloud(
     if camera is not None:
         depth = camera.depth(disparity)
         used &= np.isfinite(depth) & (depth > 0) & (depth <= (max_depth or np.inf))
+        sigma = None if sigma is None else camera.depth_sigma(disparity, sigma)
+        used &= _sure(sigma, max_sigma)
         cloud = _metric(picture, disparity, used, camera, from_centre)
+        cloud = replace(cloud, sigma=None if sigma is None else sigma[used])
         if rig is None:
             return cloud
         # from right, up, back
@@ -197,7 +222,22 @@ def point_cloud(
         return replace(cloud, positions=points.astype(np.float32), units=rig.units)
     if max_depth is not None:
         raise SepiError("point cloud: a largest depth in metres needs the camera's geometry, which is not known")
-    return _relief(picture, disparity, used)
+    used &= _sure(sigma, max_sigma)
+    return replace(_relief(picture, disparity, used), sigma=None if sigma is None else _single(sigma[used]))
+
+
+def _sure(sigma: FloatMap | None, most: float | None) -> BoolMap | bool:
+    """Which pixels are sure enough."""
+    if most is None:
+        return True
+    if sigma is None:
+        raise SepiError("point cloud: a largest sigma needs a map of it")
+    # comparison with NaN is false: unknown error is any
+    return np.asarray(sigma <= most, bool)
+
+
+def _single(values: npt.NDArray[Any]) -> FloatMap:
+    return values.astype(np.float32, copy=False)
 
 
 def _metric(

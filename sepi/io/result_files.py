@@ -23,7 +23,7 @@ RESULT_FILES = (
     "points.ply",
     RESULT,
 )
-"""What :func:`write_result` always writes; ``depth.pfm`` and ``mask_NAME.png`` come with what it is given."""
+"""What :func:`write_result` always writes; masks, depth and error bars come with what it is given."""
 
 RUNTIME = "runtime.txt"
 """Seconds that it took, where that is told."""
@@ -34,7 +34,13 @@ ALL_VIEWS = "all_views.h5"
 DEPTH = "depth.pfm"
 """Depth in metres, where the camera is known."""
 
-AS_TAKEN = ("original_disparity", "original_depth")
+ERROR_FILES = SIGMA_PFM, SIGMA_PNG, INTERVAL = "sigma.pfm", "sigma.png", "interval.npz"
+"""Error bars, where the maps have any."""
+
+DEPTH_SIGMA = "depth_sigma.pfm"
+"""Standard deviation of the depth in metres, where the camera is known, too."""
+
+AS_TAKEN = ("original_disparity", "original_depth", "original_sigma")
 """Maps in the picture as a calibrated camera took it; those of other views than the result's end with ``_T_S``."""
 
 MASK_NAME = r"[\w-]+"
@@ -101,21 +107,23 @@ def require_target(folder: Path) -> None:
 def is_results_name(name: str) -> bool:
     """Whether a result may have a file of this name."""
     some = rf"mask_{MASK_NAME}\.png|({'|'.join(AS_TAKEN)})(_\d+_\d+)?\.pfm"
-    return name in (*RESULT_FILES, DEPTH, RUNTIME, ALL_VIEWS) or bool(re.fullmatch(some, name))
+    names = (*RESULT_FILES, DEPTH, RUNTIME, ALL_VIEWS, *ERROR_FILES, DEPTH_SIGMA)
+    return name in names or bool(re.fullmatch(some, name))
 
 
-def names_as_taken(position: tuple[int, int] | None = None) -> tuple[str, ...]:
+def names_as_taken(position: tuple[int, int] | None = None, *, with_sigma: bool = False) -> tuple[str, ...]:
     """Names of the maps in the picture that a calibrated camera took, of a view's or the result's own."""
-    return tuple("_".join([name, *map(str, position or ())]) + ".pfm" for name in AS_TAKEN)
+    names = AS_TAKEN if with_sigma else AS_TAKEN[:-1]
+    return tuple("_".join([name, *map(str, position or ())]) + ".pfm" for name in names)
 
 
-def names_of_others(light_field: LightField) -> tuple[str, ...]:
+def names_of_others(light_field: LightField, *, with_sigma: bool = False) -> tuple[str, ...]:
     """Names of the maps as calibrated cameras took them of all views but the reference view; none without a rig."""
     if light_field.camera is None or light_field.rig is None:
         return ()
     places = [(int(t), int(s)) for t, s in np.argwhere(light_field.present)]
     others = [place for place in places if place != light_field.reference_position]
-    return tuple(name for place in others for name in names_as_taken(place))
+    return tuple(name for place in others for name in names_as_taken(place, with_sigma=with_sigma))
 
 
 def remove_files(folder: Path, names: Collection[str]) -> None:

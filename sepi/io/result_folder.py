@@ -5,7 +5,6 @@ docs/reference/outputs.md describes the files.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,6 +17,7 @@ import numpy.typing as npt
 
 from sepi.camera import Camera
 from sepi.errors import SepiError
+from sepi.io.error_bar_files import bars_in_metres, write_error_bars
 from sepi.io.files import atomic_files, atomic_folder, atomic_path
 from sepi.io.hdf5 import Attribute, attribute, open_hdf5, read_camera, read_dataset, read_rig, write_stage
 from sepi.io.images import write_png
@@ -26,14 +26,13 @@ from sepi.io.pfm import write_pfm
 from sepi.io.ply import write_ply
 from sepi.io.point_cloud import point_cloud
 from sepi.io.provenance import result_attributes
-from sepi.io.result_files import DEPTH, MASK_NAME, RESULT_FILES, RUNTIME, names_as_taken, remove_files, require_own
+from sepi.io.result_files import DEPTH, RESULT_FILES, RUNTIME, names_as_taken, remove_files, require_own
+from sepi.io.sound_maps import UNKNOWN, sound_maps
 from sepi.lightfield import BoolMap, FloatMap, LightField, require_light_field
 from sepi.rig import Rig
-from sepi.stage import StageMaps
+from sepi.stage import ERROR_BARS, StageMaps
 from sepi.validation import described, is_finite, require_map, require_path, require_type
 
-# masks that have a meaning here
-_UNKNOWN = "unknown"
 # neutral grey is none of the colours of the scale
 _GREY = 128
 
@@ -63,6 +62,10 @@ class Result:
         Baseline (down, across) from the grid's centre view to the view, in view steps.
     rig : Rig or None
         Where the view stands in the world, at the rig's origin, if it was made from calibrated cameras.
+    sigma : ndarray, shape (H, W), float32, or None
+        Standard deviation of the disparity, pixels per view step; None in a result that has no error bars.
+    low, high : ndarray, shape (H, W), float32, or None
+        Bounds of the interval that holds the disparity with a probability of 90 %.
 
     Examples
     --------
@@ -85,6 +88,9 @@ class Result:
     camera: Camera | None
     from_centre: tuple[float, float]
     rig: Rig | None = None
+    sigma: FloatMap | None = None
+    low: FloatMap | None = None
+    high: FloatMap | None = None
 
 
 def write_result(
@@ -104,7 +110,8 @@ def write_result(
     black (0) to white (1), ``mask_NAME.png`` of each boolean map, ``points.ply`` without what is unknown, ``depth.pfm``
     in metres where the light field has a camera, ``original_disparity.pfm`` and ``original_depth.pfm`` in the picture
     as a calibrated camera took it, and ``result.h5`` with everything: all maps, the view itself, the camera, what made
-    the maps, and which light field they are of. docs/reference/outputs.md describes them.
+    the maps, and which light field they are of. Where the maps have error bars, ``sigma.pfm``, ``sigma.png`` and
+    ``interval.npz`` have them, ``depth_sigma.pfm`` those of the depth. docs/reference/outputs.md describes them.
     Equal content gives equal bytes.
 
     A new folder appears whole or not at all; in an existing one the files are replaced when all are written, and what
@@ -136,8 +143,9 @@ def write_result(
     Raises
     ------
     SepiError
-        If the maps are not of the light field's shape or the confidence not within 0..1, or the folder is a file, holds
-        the views of a light field, files of others or another light field's result, or cannot be written.
+        If the maps are not of the light field's shape, the confidence not within 0..1, or an interval does not hold the
+        disparity; or if the folder is a file, holds the views of a light field, files of others or another light
+        field's result, or cannot be written.
 
     Examples
     --------
@@ -154,6 +162,9 @@ def write_result(
     disparity.png
     confidence.png
     points.ply
+    sigma.pfm
+    sigma.png
+    interval.npz
     mask_occluded.png
     mask_textureless.png
     mask_unknown.png
@@ -167,7 +178,7 @@ def write_result(
     require_type(f"{folder}: attributes", attributes, (Mapping, NoneType), "names with values")
     if not (seconds is None or is_finite(seconds)):
         raise SepiError(f"{folder}: seconds: expected a number, got {described(seconds)}")
-    maps = _sound(light_field, maps)
+    maps = sound_maps(light_field, maps)
     earlier = require_own(folder, light_field, force=force)
     # the folder itself may be a link to where there is room
     target = folder.resolve()
@@ -206,6 +217,8 @@ def read_result(path: str | Path) -> Result:
     >>> result = sepi.read_result("dots-depth")
     >>> bool((result.disparity == maps.disparity).all()), int(result.unknown.sum())
     (True, 0)
+    >>> bool((result.low <= result.disparity).all()), bool((result.sigma == maps.sigma).all())
+    (True, True)
     """
     path = require_path("result", path)
     path = path / RESULT if path.is_dir() else path
@@ -213,7 +226,8 @@ def read_result(path: str | Path) -> Result:
         picture, disparity, confidence = (
             read_dataset(path, file[name]) for name in ("view", "disparity", "confidence")
         )
-        unknown = read_dataset(path, file[_UNKNOWN]) if _UNKNOWN in file else np.zeros(disparity.shape, bool)
+        unknown = read_dataset(path, file[UNKNOWN]) if UNKNOWN in file else np.zeros(disparity.shape, bool)
+        bars = {name: read_dataset(path, file[name]).astype(np.float32) for name in ERROR_BARS if name in file}
         (t, s), (rows, columns) = (map(int, attribute(file, name)) for name in ("view_position", "grid"))
         # results of earlier versions: rows as far apart as columns, no view off the grid
         told = attribute(file, "from_centre") if "from_centre" in file.attrs else (t - rows // 2, s - columns // 2)
@@ -221,8 +235,8 @@ def read_result(path: str | Path) -> Result:
         scene = str(attribute(file, "scene")) if "scene" in file.attrs else ""
         camera = read_camera(file)
         rig = read_rig(file)
-    alike = disparity.shape == confidence.shape == unknown.shape == picture.shape[:2]
-    if not alike or picture.shape[2:] not in ((1,), (3,)):
+    shapes = {values.shape for values in (disparity, confidence, unknown, *bars.values())}
+    if shapes != {picture.shape[:2]} or picture.shape[2:] not in ((1,), (3,)):
         raise SepiError(f"{path}: damaged: view {picture.shape} and disparity {disparity.shape} do not fit together")
     return Result(
         scene=scene,
@@ -233,6 +247,7 @@ def read_result(path: str | Path) -> Result:
         camera=camera,
         from_centre=(down, across),
         rig=rig,
+        **bars,
     )
 
 
@@ -276,31 +291,6 @@ def colour_code(values: FloatMap, unknown: BoolMap | None = None) -> npt.NDArray
     return colours
 
 
-def _sound(light_field: LightField, maps: StageMaps) -> StageMaps:
-    """Maps that can be written, disparity and confidence of float32 whatever numbers they were."""
-    for name, values in maps.all().items():
-        require_type(f"{light_field.name}: map '{name}'", values, np.ndarray, "an array")
-        kinds = {"disparity": "fiu", "confidence": "fiu", _UNKNOWN: "b"}.get(name, "bfiu")
-        if values.dtype.kind not in kinds:
-            expected = "bool" if kinds == "b" else "numbers"
-            raise SepiError(f"{light_field.name}: map '{name}': expected {expected}, got {values.dtype}")
-        if values.shape != light_field.shape:
-            raise SepiError(
-                f"{light_field.name}: maps must have the views' shape {light_field.shape}, got {name} of {values.shape}"
-            )
-        if values.dtype == bool and not re.fullmatch(MASK_NAME, name):
-            raise SepiError(f"{light_field.name}: map '{name}': expected a name of letters, digits, '-' and '_'")
-    if np.isnan(maps.confidence).all():
-        raise SepiError(f"{light_field.name}: confidence must lie within 0..1, got NaN everywhere")
-    if ((maps.confidence < 0) | (maps.confidence > 1)).any():
-        raise SepiError(
-            f"{light_field.name}: confidence must lie within 0..1, got {np.nanmin(maps.confidence):g} to "
-            f"{np.nanmax(maps.confidence):g}"
-        )
-    disparity, confidence = (values.astype(np.float32, copy=False) for values in (maps.disparity, maps.confidence))
-    return maps.updated(disparity, confidence)
-
-
 def _write_files(
     folder: Path,
     light_field: LightField,
@@ -312,8 +302,9 @@ def _write_files(
     camera, view = light_field.camera, light_field.views[light_field.reference_position]
     masks = {f"mask_{name}.png": values for name, values in maps.extra.items() if values.dtype == bool}
     more: dict[str, npt.NDArray[Any]] = {"view": view}
+    metres = bars_in_metres(maps, camera)
     if camera is not None:
-        more["depth"] = camera.depth(maps.disparity)
+        more |= {"depth": camera.depth(maps.disparity), **metres}
         write_pfm(folder / DEPTH, more["depth"])
     if seconds is not None:
         with atomic_path(folder / RUNTIME) as temporary:
@@ -322,7 +313,7 @@ def _write_files(
     with atomic_path(folder / "disparity.npy") as temporary, temporary.open("wb") as file:
         np.save(file, maps.disparity.astype("<f4"), allow_pickle=False)
     _write_16bit(folder / "disparity_16bit.png", maps.disparity)
-    unknown = maps.mask(_UNKNOWN)
+    unknown = maps.mask(UNKNOWN)
     write_png(folder / "disparity.png", colour_code(maps.disparity, unknown))
     write_png(folder / "confidence.png", _levels(maps.confidence))
     cloud = point_cloud(
@@ -332,12 +323,15 @@ def _write_files(
         from_centre=light_field.from_centre,
         unknown=unknown,
         rig=light_field.reference_rig,
+        sigma=maps.sigma,
     )
     write_ply(folder / "points.ply", cloud)
+    bars = write_error_bars(folder, maps, metres, unknown)
     for name, mask in masks.items():
         write_png(folder / name, mask, _MASK_TEXT)
-    original = names_as_taken() if write_as_taken(folder, light_field, maps.disparity) else ()
-    given = [*([] if camera is None else [DEPTH]), *original, *([] if seconds is None else [RUNTIME])]
+    taken = write_as_taken(folder, light_field, maps.disparity, sigma=maps.sigma)
+    original = names_as_taken(with_sigma=maps.sigma is not None) if taken else ()
+    given = [*([] if camera is None else [DEPTH]), *bars, *original, *([] if seconds is None else [RUNTIME])]
     names = (*RESULT_FILES[:-1], *given, *masks, RESULT)
     everything = maps.updated(maps.disparity, maps.confidence, **more)
     # of these a later result is sure that they are not a user's own
@@ -346,7 +340,11 @@ def _write_files(
 
 
 def write_as_taken(
-    folder: Path, light_field: LightField, disparity: FloatMap, position: tuple[int, int] | None = None
+    folder: Path,
+    light_field: LightField,
+    disparity: FloatMap,
+    position: tuple[int, int] | None = None,
+    sigma: FloatMap | None = None,
 ) -> bool:
     """Write the maps of a view in the picture that its camera took; False where no calibrated camera did.
 
@@ -358,15 +356,18 @@ def write_as_taken(
         Of the view.
     position : (int, int), optional
         Another view's in the grid than the reference view's.
+    sigma : ndarray, shape (H, W), float32, optional
+        Standard deviation of the disparity.
     """
     if light_field.camera is None or light_field.rig is None:
         return False
-    from sepi.cameras.as_taken import as_taken
+    from sepi.cameras.as_taken import as_taken, sigma_as_taken
 
     t, s = position or light_field.reference_position
     down, across = (light_field.baselines[t, s] + light_field.from_centre).tolist()
-    maps = as_taken(disparity, light_field.camera, light_field.rig, (t, s), (down, across))
-    for name, values in zip(names_as_taken(position), maps, strict=True):
+    where = light_field.camera, light_field.rig, (t, s), (down, across)
+    maps = [*as_taken(disparity, *where), *([] if sigma is None else [sigma_as_taken(sigma, *where)])]
+    for name, values in zip(names_as_taken(position, with_sigma=sigma is not None), maps, strict=True):
         write_pfm(folder / name, values)
     return True
 

@@ -19,7 +19,15 @@ from several_threads import several_threads
 import sepi
 from bench.all_views import disagreement, moved_pixels
 from sepi.applications import all_views_kernels as kernels
-from sepi.applications.all_views import TOLERANCE, AllViews, ViewMaps, anchor_views, carried_map, estimate_all_views
+from sepi.applications.all_views import (
+    TOLERANCE,
+    AllViews,
+    ViewMaps,
+    _with_doubt,
+    anchor_views,
+    carried_map,
+    estimate_all_views,
+)
 from sepi.camera import Camera
 from sepi.cli.main import main
 from sepi.errors import SepiError
@@ -135,10 +143,16 @@ def test_carried_surfaces_are_what_plain_numpy_draws(v: float, u: float) -> None
     """Otherwise views would show surfaces where they are not."""
     disparity = bumpy_map()
     corners = kernels.corner_disparities(disparity, np.float32(TOLERANCE))
-    nearest, believed = np.empty_like(disparity), np.empty_like(disparity)
-    kernels.carry(disparity, np.ones_like(disparity), corners, v, u, 2.0, nearest, believed)
+    nearest, origin = np.empty_like(disparity), np.empty(disparity.shape, np.int32)
+    kernels.carry(disparity, corners, v, u, 2.0, nearest, origin)
     np.testing.assert_allclose(nearest, plain_carry(disparity, corners, v, u, 2.0), atol=1e-4)
-    np.testing.assert_array_equal(believed, nearest != kernels.EMPTY)
+    seen = origin >= 0
+    np.testing.assert_array_equal(seen, nearest != kernels.EMPTY)
+    # the pixel that is seen is the one whose place this is, to half a pixel and the slope of its surface
+    row, column = np.divmod(origin[seen], disparity.shape[1])
+    y, x = np.nonzero(seen)
+    assert np.abs(row - nearest[seen] * v - y).max() <= 0.51
+    assert np.abs(column - nearest[seen] * u - x).max() <= 0.51
 
 
 def test_a_map_carried_nowhere_stays_as_it_is() -> None:
@@ -232,6 +246,68 @@ def test_the_reference_views_map_is_the_one_that_is_given() -> None:
     found = sepi.estimate_all_views(light_field, maps, "fast", edge_views=0)
     np.testing.assert_array_equal(found.disparity[1, 1], maps.disparity)
     np.testing.assert_array_equal(found.confidence[1, 1], maps.confidence)
+    for name in ("sigma", "low", "high"):
+        np.testing.assert_array_equal(getattr(found, name)[1, 1], maps.extra[name])
+
+
+def barred(disparity: FloatMap) -> StageMaps:
+    """A map with error bars, twice as wide above as below, that tell its surfaces apart."""
+    sigma = np.where(disparity > 0, np.float32(0.25), np.float32(0.0625))
+    bars = {"sigma": sigma, "low": disparity - sigma, "high": disparity + 2 * sigma}
+    return StageMaps(disparity, np.full_like(disparity, 0.9), bars)
+
+
+@pytest.fixture
+def from_the_reference_view(monkeypatch: pytest.MonkeyPatch) -> AllViews:
+    """All views as the reference view's true map alone tells of them."""
+    monkeypatch.setattr("sepi.applications.all_views.anchor_views", lambda light_field: [(2, 2)])
+    maps = barred(np.asarray(layers().ground_truth, np.float32))
+    return estimate_all_views(layers(), maps, edge_views=0)
+
+
+def test_error_bars_go_with_the_surfaces(from_the_reference_view: AllViews) -> None:
+    """A view's interval must be that of the surface which it sees, about the disparity which it has there."""
+    found = from_the_reference_view
+    for layer, sigma in ((found.disparity > 0, 0.25), (found.disparity <= 0, 0.0625)):
+        shown = layer & ~found.extended
+        assert shown.sum() > 10000
+        np.testing.assert_array_equal(found.sigma[shown], sigma)
+        np.testing.assert_allclose((found.disparity - found.low)[shown], sigma, atol=1e-5)
+        np.testing.assert_allclose((found.high - found.disparity)[shown], 2 * sigma, atol=1e-5)
+
+
+def test_what_no_map_shows_may_be_anywhere(from_the_reference_view: AllViews) -> None:
+    """The background was extended there: a narrow interval would be a claim about what nobody saw."""
+    found, known = from_the_reference_view, layers().require_disparity_range()
+    assert found.extended.sum() > 1000
+    assert (found.low[found.extended] <= known.minimum).all()
+    assert (found.high[found.extended] >= known.maximum).all()
+    np.testing.assert_allclose(found.sigma[found.extended], (known.maximum - known.minimum) / 12**0.5, rtol=1e-5)
+    assert (found.high - found.low)[~found.extended].max() < 0.76
+
+
+def test_a_pixel_that_changes_sides_may_be_of_either() -> None:
+    maps = barred(np.asarray(layers().ground_truth, np.float32))
+    before = ViewMaps((0, 0), maps.disparity, maps.confidence, np.zeros((SIZE, SIZE), bool), **maps.extra)
+    decided = np.roll(maps.disparity, 1, axis=1)
+    after = _with_doubt(layers(), before, decided)
+    np.testing.assert_array_equal(after.disparity, decided)
+    for disparity in (maps.disparity, decided):
+        assert (after.low <= disparity).all()
+        assert (disparity <= after.high).all()
+    moved = decided != maps.disparity
+    assert moved.any()
+    assert (after.sigma >= np.abs(decided - maps.disparity) / 2).all()
+    np.testing.assert_array_equal(after.sigma[~moved], maps.extra["sigma"][~moved])
+
+
+def test_variants_without_error_bars_have_none_of_other_views(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nor is a map that has them given to views beside which others tell nothing."""
+    truth = np.asarray(layers().ground_truth, np.float32)
+    monkeypatch.setattr("sepi.applications.all_views.estimate_depth", lambda *_: StageMaps(truth, truth * 0))
+    for maps in (None, barred(truth)):
+        found = estimate_all_views(layers(), maps, edge_views=0)
+        assert found.sigma is found.low is found.high is None
 
 
 def test_maps_of_another_shape_are_refused() -> None:
@@ -319,11 +395,13 @@ def test_the_command_writes_a_map_of_every_view(tmp_path: Path) -> None:
             "disparity": (3, 3, 64, 64),
             "confidence": (3, 3, 64, 64),
             "extended": (3, 3, 64, 64),
+            **dict.fromkeys(("sigma", "low", "high"), (3, 3, 64, 64)),
             "present": (3, 3),
             "baselines": (3, 3, 2),
             "picture": (3, 3, 64, 64, 3),
         }
-        assert file["disparity"].attrs["units"] == "pixels per view step"
+        for name in ("disparity", "sigma", "low", "high"):
+            assert file[name].attrs["units"] == "pixels per view step"
         assert file.attrs["variant"] == "fast"
         np.testing.assert_array_equal(file["disparity"][1, 1], np.load(tmp_path / "all" / "disparity.npy"))
         for t, s in np.ndindex(3, 3):
@@ -393,9 +471,12 @@ def exact(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> FloatMap:
     write_light_field("scene.h5", scene)
     write_light_field("other.h5", replace(scene, views=scene.views[:, ::-1], present=scene.present[:, ::-1]))
     for name, light_field in (("maps", scene), ("corner", scene.seen_from((2, 0)))):
-        maps = StageMaps(truth[light_field.reference_position], sure, {"unknown": nothing & (name == "corner")})
-        write_result(name, light_field, maps)
-    views = [ViewMaps((t, s), truth[t, s], sure, nothing) for t, s in np.argwhere(scene.present).tolist()]
+        maps = barred(truth[light_field.reference_position])
+        write_result(name, light_field, maps.updated(maps.disparity, sure, unknown=nothing & (name == "corner")))
+    views = [
+        ViewMaps((t, s), truth[t, s], sure, nothing, **barred(truth[t, s]).extra)
+        for t, s in np.argwhere(scene.present).tolist()
+    ]
     attributes = result_attributes(scene, StageMaps(truth[1, 1], sure))
     write_all_views(Path("maps/all_views.h5"), scene, ((view.position, view.maps) for view in views), attributes)
     return truth
@@ -416,6 +497,9 @@ def test_a_view_of_all_makes_what_a_result_of_that_view_makes(exact: FloatMap) -
     np.testing.assert_array_equal(read_pfm(Path("view.pfm")), exact[2, 0])
     call("convert", "maps", "metres.pfm", "--view", "2,0", "--map", "depth")
     np.testing.assert_array_equal(read_pfm(Path("metres.pfm")), CAMERA.depth(exact[2, 0]))
+    for name, values in barred(exact[2, 0]).extra.items():
+        call("convert", "maps", "view.pfm", "--view", "2,0", "--map", name)
+        np.testing.assert_array_equal(read_pfm(Path("view.pfm")), values)
     call("refocus", "scene.h5", "maps", "--view", "2,0", "--disparity", "1", "-o", "one")
     call("refocus", "scene.h5", "corner", "--disparity", "1", "-o", "two")
     assert Path("one/all_in_focus.png").read_bytes() == Path("two/all_in_focus.png").read_bytes()
@@ -445,6 +529,10 @@ def test_poses_have_the_depth_of_every_view(exact: FloatMap, kind: str) -> None:
         expected = CAMERA.depth(exact[t, s])
         expected[5, 6] = 0
         np.testing.assert_allclose(depth, expected, rtol=1e-6)
+        if kind == "nerfstudio":
+            sigma = CAMERA.depth_sigma(exact[t, s], barred(exact[t, s]).extra["sigma"])
+            sigma[5, 6] = 0
+            np.testing.assert_allclose(np.load(f"out/depth_sigmas/{name}.npy") / 1000, sigma, rtol=1e-6)
 
 
 @pytest.mark.usefixtures("exact")

@@ -459,6 +459,9 @@ def test_maps_are_told_in_the_pictures_as_they_were_taken(folder: Path, tmp_path
         assert np.nanmax(disparity) <= truth.max() + 1e-6
         # between two surfaces there is nothing
         halves = np.where(np.arange(truth.shape[1]) < truth.shape[1] // 2, np.float32(-1), np.float32(1))
-        write_as_taken(tmp_path, light_field, np.broadcast_to(halves, truth.shape), named)
-        told = read_pfm(tmp_path / names_as_taken(named)[0])
+        halves = np.broadcast_to(halves, truth.shape)
+        write_as_taken(tmp_path, light_field, halves, named, sigma=np.where(halves < 0, np.float32(0.5), 2))
+        told, _, sigma = (read_pfm(tmp_path / name) for name in names_as_taken(named, with_sigma=True))
         assert set(np.unique(told[np.isfinite(told)]).tolist()) == {-1.0, 1.0}
+        # nor an error of both: each pixel has that of the surface it shows
+        np.testing.assert_array_equal(sigma, np.where(np.isnan(told), np.nan, np.where(told < 0, 0.5, 2)))

@@ -30,6 +30,7 @@ from sepi.io.result_files import RESULT_FILES
 from sepi.lightfield import LightField
 from sepi.reading import read_light_field
 from sepi.scenes import SCENES, render, write_hci
+from sepi.stage import StageMaps
 from sepi.threads import threads_used
 
 # few candidates: these tests are about the commands, not about depth
@@ -79,12 +80,26 @@ def test_depth_writes_the_maps_and_says_so(scene: Path) -> None:
     assert "scene's parameters), 21 and 91 candidates\n" in called.stdout
     assert "unknown" not in called.stdout.split("written to")[0]
     masks = {"mask_occluded.png", "mask_textureless.png", "mask_unknown.png"}
-    assert set(os.listdir("pyramids-depth")) == {*RESULT_FILES, *masks, "depth.pfm"}
+    bars = {"sigma.pfm", "sigma.png", "interval.npz", "depth_sigma.pfm"}
+    assert set(os.listdir("pyramids-depth")) == {*RESULT_FILES, *masks, "depth.pfm", *bars}
     assert f"written to pyramids-depth/: {' '.join(RESULT_FILES[:-1])}" in called.stdout
+    with np.load("pyramids-depth/interval.npz") as interval:
+        half = np.median(interval["high"] - interval["low"]) / 2
+    assert f"90 % interval: median half width {half:.2g} pixels per view step\n" in called.stdout
     disparity = read_pfm(Path("pyramids-depth/disparity.pfm"))
     assert disparity.shape == (64, 64)
     assert np.isfinite(disparity).all()
     np.testing.assert_array_equal(read_stage(Path("pyramids-depth/result.h5")).disparity, disparity)
+
+
+def test_a_method_without_a_model_of_its_error_says_so(scene: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Silence would be taken for certainty."""
+    flat = np.zeros((64, 64), np.float32)
+    monkeypatch.setattr("sepi.pipeline.estimate_depth", lambda *_: StageMaps(flat, flat))
+    called = call("depth", scene, "-o", "out", "--variant", "oavc")
+    assert called.exit_code == 0, called.output
+    assert "no interval: oavc has no model of its own error\n" in called.stdout
+    assert set(os.listdir("out")) == {*RESULT_FILES, "depth.pfm"}
 
 
 def test_result_says_what_made_it(scene: Path) -> None:

@@ -292,6 +292,21 @@ def test_exr_without_its_package_says_what_to_install(monkeypatch: pytest.Monkey
     assert not Path("all.exr").exists()
 
 
+def test_error_bars_are_maps_to_convert_as_well(scene: LightField) -> None:
+    disparity = np.zeros(scene.shape, np.float32)
+    sigma = np.random.default_rng(2).uniform(0.01, 0.1, scene.shape).astype(np.float32)
+    bars = {"sigma": sigma, "low": disparity - sigma, "high": disparity + 3 * sigma}
+    assert "maps: no sigma, as the result has no error bars" in error_of(
+        call("convert", "maps", "x.tif", "--map", "sigma")
+    )
+    write_result("maps", scene, StageMaps(disparity, disparity, bars))
+    # 30 / 6^2 metres for each pixel per view step
+    for name, expected in {**bars, "depth_sigma": sigma * 30 / 36}.items():
+        called = call("convert", "maps", "x.tif", "--map", name)
+        assert called.exit_code == 0, called.output
+        np.testing.assert_allclose(tifffile.imread("x.tif"), expected, rtol=1e-6)
+
+
 def test_convert_says_what_is_wrong(scene: LightField) -> None:
     assert "ends with .exr, .tif, .tiff or .pfm" in error_of(call("convert", "maps", "map.jpg"))
     put(replace(scene, camera=None))

@@ -138,6 +138,25 @@ def test_tracks_leave_out_views_in_which_a_point_is_hidden(tmp_path: Path) -> No
     assert there[0, 3] == ["1", "2", "3"]
 
 
+def test_colmap_points_have_the_error_that_their_views_would_see(tmp_path: Path) -> None:
+    """COLMAP leaves out points by it, in pixels: an error of sigma in each view step, at views some steps away."""
+    scene = scene_of()
+    sigma = np.random.default_rng(4).uniform(0.01, 0.2, scene.shape).astype(np.float32)
+    posed = posed_of(scene, sigma=sigma, max_points=10**6)
+    # the half of least error
+    np.testing.assert_array_equal(posed.chosen, sigma <= np.median(sigma))
+    write_colmap(tmp_path / "model", posed)
+    steps = [np.hypot(t - 1, s - 1) for t, s in np.argwhere(scene.present)]
+    lines = lines_of(tmp_path / "model/sparse/points3D.txt")
+    expected = [
+        float(sigma[y, x]) * np.mean([steps[int(view) - 1] for view in line[8::2]])
+        for line, (y, x) in zip(lines, np.argwhere(posed.chosen), strict=True)
+    ]
+    np.testing.assert_allclose([float(line[7]) for line in lines], expected, rtol=1e-5)
+    write_colmap(tmp_path / "bare", posed_of(scene))
+    assert {line[7] for line in lines_of(tmp_path / "bare/sparse/points3D.txt")} == {"0"}
+
+
 def test_colmap_depth_is_that_of_the_camera(tmp_path: Path) -> None:
     posed = posed_of(scene_of())
     write_colmap(tmp_path / "model", posed)
@@ -260,6 +279,26 @@ def test_nerfstudio_points_lie_in_the_same_world(tmp_path: Path) -> None:
     np.testing.assert_array_equal(colours, posed.light_field.views[1, 1][posed.chosen])
     # z points up: what is at the top of the picture is high in the world
     assert np.corrcoef(world[:, 2], here[:, 0])[0, 1] < -0.9
+
+
+def test_nerfstudio_depth_has_its_error_in_every_view(tmp_path: Path) -> None:
+    """Who weighs depth by it needs it in the unit of the depth, and at the pixels that see the same surface."""
+    scene = scene_of()
+    disparity = np.asarray(scene.ground_truth)
+    # of each surface its own
+    sigma = (0.02 + 0.01 * (disparity - disparity.min())).astype(np.float32)
+    write_nerfstudio(tmp_path / "set", posed_of(scene, sigma=sigma))
+    write_nerfstudio(tmp_path / "bare", posed_of(scene))
+    for frame in json.loads((tmp_path / "set/transforms.json").read_text())["frames"]:
+        depth, found = (np.load(tmp_path / "set" / frame[key]) for key in ("depth_file_path", "depth_sigma_file_path"))
+        known = depth > 0
+        assert found.dtype == np.dtype("<f4")
+        assert (found[~known] == 0).all()
+        there = 30_000 / depth[known].astype(float) - 6
+        expected = (0.02 + 0.01 * (there - disparity.min())) * 30_000 / (there + 6) ** 2
+        # pixels are carried whole, disparity between them
+        assert np.quantile(np.abs(found[known] / expected - 1), 0.99) < 0.03
+    assert "depth_sigma" not in (tmp_path / "bare/transforms.json").read_text()
 
 
 def test_no_points_are_no_file_of_points(tmp_path: Path) -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner, Result
+from error_lines import error_of
 from plyfile import PlyData
 
 from sepi.camera import Camera
@@ -145,6 +146,9 @@ BAD_CALLS = {
     "confidence above 1": ({"min_confidence": 1.5}, "0..1"),
     "NaN confidence": ({"min_confidence": np.nan}, "0..1"),
     "least confidence of none": ({"min_confidence": 0.5}, "confidence map"),
+    "largest sigma of none": ({"max_sigma": 0.5}, "largest sigma needs a map"),
+    "no sigma at all": ({"max_sigma": 0.0}, "positive largest sigma"),
+    "sigma of another size": ({"sigma": np.zeros((3, 3), np.float32)}, "(3, 3)"),
 }
 
 
@@ -230,6 +234,29 @@ def test_camera_flags_give_metres(result: Path, tmp_path: Path) -> None:
     kept = np.where((confidence >= 0.5) & (0.5 / (disparity + 0.25) <= 1), disparity, np.nan).astype(np.float32)
     np.testing.assert_array_equal(positions, cloud_of(whole, kept).positions)
     assert 0 < len(positions) < (confidence >= 0.5).sum()
+
+
+def test_points_know_their_error_in_the_units_of_the_cloud(result: Path, tmp_path: Path) -> None:
+    """Pixels per view step in a relief, metres with a camera: the same number leaves out other points."""
+    line = error_of(call(result, "--max-sigma", 0.1))
+    assert "toy-depth: --max-sigma: the result has no error bars" in line
+    rng = np.random.default_rng(8)
+    disparity, sigma = (rng.uniform(*ends, (H, W)).astype(np.float32) for ends in ((0, 1), (0.1, 0.3)))
+    bars = {"sigma": sigma, "low": disparity - sigma, "high": disparity + sigma}
+    write_result(tmp_path / "out", light_field(), StageMaps(disparity, 0 * disparity, bars))
+    data = PlyData.read(str(tmp_path / "out" / "points.ply"))
+    assert data.comments[-1] == "sigma: standard deviation of the disparity, pixels per view step"
+    np.testing.assert_array_equal(data["vertex"]["sigma"], sigma.ravel())
+    camera = ("--focal-length", 50, "--baseline", 10, "--focus-distance", 2, "--sensor-size", 31)
+    metres = 0.5 / (disparity.astype(float) + 0.25) ** 2 * sigma
+    for flags, expected, unit in (((), sigma, "pixels per view step"), (camera, metres, "metres")):
+        called = call(tmp_path / "out", "-o", tmp_path / "sure.ply", "--max-sigma", 0.2, *flags)
+        assert called.exit_code == 0, called.output
+        data = PlyData.read(str(tmp_path / "sure.ply"))
+        assert data.comments[-1].endswith(unit)
+        found = data["vertex"]["sigma"]
+        assert 0 < len(found) < H * W
+        np.testing.assert_allclose(found, expected[expected <= 0.2], rtol=1e-5)
 
 
 def test_unknown_pixels_have_no_point_unless_asked_for(tmp_path: Path) -> None:

@@ -37,6 +37,17 @@ def maps() -> StageMaps:
     return StageMaps(disparity, confidence, {"occluded": occluded, "superpixels": np.arange(192).reshape(SHAPE)})
 
 
+def with_bars(maps: StageMaps) -> StageMaps:
+    """Maps with error bars, wider above than below, and a pixel that no view knows, outside its interval."""
+    disparity, rng = maps.disparity, np.random.default_rng(3)
+    sigma = rng.uniform(0.01, 0.5, SHAPE).astype(np.float32)
+    low, high = disparity - sigma, disparity + 2 * sigma
+    unknown = np.zeros(SHAPE, bool)
+    unknown[3, 4] = True
+    low[3, 4], high[3, 4], sigma[3, 4] = 40, 50, 3
+    return maps.updated(disparity, maps.confidence, sigma=sigma, low=low, high=high, unknown=unknown)
+
+
 def names_in(folder: Path) -> list[str]:
     return sorted(path.name for path in folder.iterdir())
 
@@ -164,18 +175,81 @@ def test_result_says_where_the_views_stood(tmp_path: Path, light_field: LightFie
     assert read_result(tmp_path / "closer").from_centre == (-1, 2)
 
 
+def test_error_bars_in_view_steps_and_metres(tmp_path: Path, light_field: LightField, maps: StageMaps) -> None:
+    """Who weighs depth by its error, or plans by the nearest that a thing may be, takes these numbers as they are."""
+    disparity = maps.disparity.copy()
+    # at infinity, and so near it that the farther bound is beyond
+    disparity[1, :2] = -8, -7.995
+    barred = with_bars(replace(maps, disparity=disparity))
+    named = write_result(tmp_path, light_field, barred)
+    assert {"sigma.pfm", "sigma.png", "interval.npz", "depth_sigma.pfm"} < set(named)
+    assert sorted(named) == names_in(tmp_path)
+    told = np.isfinite(disparity)
+    before = disparity.astype(float) > -8
+    np.testing.assert_array_equal(pixels_of(tmp_path / "sigma.pfm"), barred.sigma)
+    sigma = pixels_of(tmp_path / "depth_sigma.pfm")
+    # of a small change of the disparity, the change of the depth
+    change = 36 / (disparity.astype(float) + 8 - 5e-4) - 36 / (disparity.astype(float) + 8 + 5e-4)
+    near = told & (disparity > -4)
+    np.testing.assert_allclose(sigma[near], (np.abs(change) / 1e-3 * barred.sigma)[near], rtol=1e-5)
+    assert np.isinf(sigma[told & ~before]).all()
+    with np.load(tmp_path / "interval.npz") as interval:
+        bounds = {name: interval[name] for name in interval}
+    assert {values.dtype for values in bounds.values()} == {np.dtype("<f4")}
+    np.testing.assert_array_equal(bounds["low"], barred.low)
+    np.testing.assert_array_equal(bounds["high"], barred.high)
+    known = near & ~barred.mask("unknown")
+    depth = pixels_of(tmp_path / "depth.pfm")
+    assert (bounds["nearest"] < depth)[known].all()
+    assert (depth < bounds["farthest"])[known].all()
+    np.testing.assert_allclose(bounds["nearest"][near], 36 / (barred.high[near].astype(float) + 8), rtol=1e-6)
+    assert np.isinf(bounds["farthest"][1, :2]).all()
+    assert np.isfinite(bounds["nearest"][1, :2]).all()
+    with h5py.File(tmp_path / "result.h5") as file:
+        for name, values in {**bounds, "sigma": barred.sigma, "depth_sigma": sigma}.items():
+            np.testing.assert_array_equal(file[name], values)
+            steps = name in ("sigma", "low", "high")
+            assert file[name].attrs["units"] == ("pixels per view step" if steps else "metres")
+    back = read_result(tmp_path)
+    for name in ("sigma", "low", "high"):
+        np.testing.assert_array_equal(getattr(back, name), barred.extra[name])
+
+
+def test_sigma_in_colours_says_how_much_it_is(tmp_path: Path, light_field: LightField, maps: StageMaps) -> None:
+    """Errors differ by powers of ten: on an even scale all but the worst would look alike."""
+    sigma = np.tile(np.geomspace(0.001, 0.1, SHAPE[1], dtype=np.float32), (SHAPE[0], 1))
+    barred = with_bars(maps).updated(maps.disparity, maps.confidence, sigma=sigma)
+    write_result(tmp_path, light_field, barred)
+    picture = pixels_of(tmp_path / "sigma.png")[:, :, ::-1].astype(int)
+    assert (picture[3, 4] == 128).all()
+    # as even as the scale of the disparity is for even steps, from the map's left to its right
+    even = colour_code(np.tile(np.linspace(-1, 1, SHAPE[1], dtype=np.float32), (SHAPE[0], 1)))
+    assert np.abs(picture[5, : SHAPE[1]] - even[5]).max() <= 12
+    bar = picture[:, SHAPE[1] :]
+    assert len(np.unique(bar.reshape(-1, 3), axis=0)) > 60
+    assert (bar.sum(axis=2) == 0).any()
+
+
+def test_a_result_without_error_bars_claims_none(tmp_path: Path, light_field: LightField, maps: StageMaps) -> None:
+    """As those of the methods compared with, and of earlier versions."""
+    named = write_result(tmp_path, light_field, maps)
+    assert not any(word in name for name in named for word in ("sigma", "interval"))
+    back = read_result(tmp_path)
+    assert back.sigma is back.low is back.high is None
+
+
 def test_equal_results_give_equal_bytes(tmp_path: Path, light_field: LightField, maps: StageMaps) -> None:
     for name in ("a", "b"):
-        names = write_result(tmp_path / name, light_field, maps, {"variant": "paper"})
+        names = write_result(tmp_path / name, light_field, with_bars(maps), {"variant": "paper"})
     for name in names:
         assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes(), name
 
 
 def test_files_of_an_earlier_run_do_not_outlive_it(tmp_path: Path, light_field: LightField, maps: StageMaps) -> None:
-    """A mask of a stage that is now switched off, depth of a camera no longer given, a time or maps of all views would
-    be taken for this run's; a user's own file stays.
+    """A mask of a stage that is now switched off, depth of a camera no longer given, a time, error bars of another
+    variant or maps of all views would be taken for this run's; a user's own file stays.
     """
-    write_result(tmp_path, light_field, maps, seconds=1.5, beside=("all_views.h5",))
+    write_result(tmp_path, light_field, with_bars(maps), seconds=1.5, beside=("all_views.h5",))
     assert (tmp_path / "runtime.txt").read_text() == "1.500\n"
     for name in ("all_views.h5", "notes.txt"):
         (tmp_path / name).write_bytes(b"mine")
@@ -294,6 +368,42 @@ BAD_MAPS = {
         "expected a name",
     ),
 }
+
+
+BAD_BARS = {
+    "no bounds": (lambda bars: bars.pop("low"), "sigma and high alone"),
+    "negative sigma": (lambda bars: bars.update(sigma=-bars["sigma"]), "sigma must be finite and not negative, got -0"),
+    "endless sigma": (lambda bars: bars.update(sigma=bars["sigma"] * np.inf), "sigma must be finite"),
+    "bounds the wrong way round": (
+        lambda bars: bars.update(low=bars["high"], high=bars["low"]),
+        "low must be no more than high",
+    ),
+    "disparity beyond": (
+        lambda bars: bars.update(high=bars["high"] - np.float32(2.5) * bars["sigma"]),
+        "must enclose the disparity",
+    ),
+    "bounds of text": (lambda bars: bars.update(low=np.full(SHAPE, "a")), "map 'low': expected numbers"),
+}
+
+
+@pytest.mark.parametrize("case", BAD_BARS)
+def test_bad_error_bars_are_refused(tmp_path: Path, light_field: LightField, maps: StageMaps, case: str) -> None:
+    spoil, word = BAD_BARS[case]
+    bars = dict(with_bars(maps).extra)
+    spoil(bars)
+    with pytest.raises(SepiError, match="toy: ") as raised:
+        write_result(tmp_path / "out", light_field, replace(maps, extra=bars))
+    assert word in str(raised.value)
+    assert names_in(tmp_path) == []
+
+
+def test_bounds_may_be_rounded(tmp_path: Path, light_field: LightField, maps: StageMaps) -> None:
+    """Maps that were counted in other view steps come back to the last digit but one."""
+    disparity = maps.disparity
+    below = np.nextafter(disparity, np.float32(-np.inf))
+    bars = {"sigma": np.ones(SHAPE), "low": disparity - 1, "high": below}
+    write_result(tmp_path / "out", light_field, replace(maps, extra=bars))
+    assert read_result(tmp_path / "out").sigma.dtype == np.float32
 
 
 @pytest.mark.parametrize("case", BAD_MAPS)
