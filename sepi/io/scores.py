@@ -2,8 +2,8 @@
 
 Layout: a group ``maps/NAME`` per map, in it a group ``scores/PROTOCOL/REGION`` per cell with one attribute per score,
 the signed error map ``error (H, W)`` and the masks ``regions/NAME (H, W)``; the masks are the same for every map, and
-stored once. Of a map with error bars there is ``reliability (3, 10)``, too. Where the scene has no ground truth the groups of the maps are empty, and the root attribute
-``ground_truth`` is False.
+stored once. A map with error bars has ``reliability (3, 10)``, too. Where the scene has no ground truth the groups of
+the maps are empty, and the root attribute ``ground_truth`` is False.
 """
 
 from __future__ import annotations

@@ -5,7 +5,7 @@ An interval that always holds the truth may be as wide as the range: coverage sa
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple, Self
 
 import numpy as np
@@ -14,6 +14,7 @@ import numpy.typing as npt
 from sepi.io.scores import Scores
 from sepi.lightfield import BoolMap, FloatMap
 from sepi.scoring.confidence import oracle, sparsification
+from sepi.scoring.crops import in_frame
 from sepi.stage import REACH, StageMaps
 
 CLOSE = 0.07
@@ -91,6 +92,12 @@ class ErrorBars:
             return None
         close = CLOSE * REACH / reach if reach else None
         return cls(maps.sigma, maps.low, maps.high, maps.confidence, close, truth_step)
+
+    def in_frame(self, offset: tuple[int, int], shape: tuple[int, int]) -> Self:
+        """Those of a crop in the whole picture, as :func:`sepi.scoring.crops.in_frame` puts its map."""
+        maps = (self.sigma, self.low, self.high, self.confidence)
+        sigma, low, high, confidence = (in_frame(values, offset, shape)[0] for values in maps)
+        return replace(self, sigma=sigma, low=low, high=high, confidence=confidence)
 
     def scores(self, estimate: FloatMap, ground_truth: FloatMap, chosen: BoolMap) -> Scores:
         """Those of :data:`ERROR_BAR_SCORES`, over the chosen pixels (H, W) that have finite ground truth."""

@@ -145,9 +145,9 @@ def test_panels_name_arrays_that_are_there(example: Example) -> None:
         keys = [shown["key"] for shown in scene["panels"]]
         assert len(set(keys)) == len(keys)
         kinds = {shown["kind"] for shown in scene["panels"]}
-        assert kinds <= {"picture", "disparity", "error", "change", "confidence", "grey", "mask", "outline"}
+        assert kinds <= {"picture", "disparity", "error", "change", "confidence", "sigma", "grey", "mask", "outline"}
         for shown in scene["panels"]:
-            for role in ("map", "minus", "ground_truth", "confidence"):
+            for role in ("map", "minus", "ground_truth", "confidence", "sigma", "below", "above"):
                 if role in shown:
                     is_mask = role == "map" and shown["kind"] in ("mask", "outline")
                     assert (scene["arrays"][shown[role]]["step"] == 1) == is_mask, (shown, role)
@@ -162,7 +162,14 @@ def test_a_scene_has_every_panel(example: Example) -> None:
     cotton = set(panels["cotton"])
     assert {"reference_view", "ground_truth", "occluded_ground_truth", "textureless_ground_truth", *stages} <= cotton
     assert {"paper/error", "best/error", "best/change", "external/SPO/disparity", "external/SPO/error"} <= cotton
-    assert {"paper/confidence", "best/confidence", "paper/superpixels", "paper/lti"} <= cotton
+    assert {
+        "paper/confidence",
+        "best/confidence",
+        "paper/sigma",
+        "best/sigma",
+        "paper/superpixels",
+        "paper/lti",
+    } <= cotton
     for kind, count in (("mask", 7), ("outline", 1), ("grey", 1)):
         assert sum(shown["kind"] == kind for shown in panels["cotton"].values()) == count, kind
     assert not any("external" in key for key in panels["dots"])
