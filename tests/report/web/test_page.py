@@ -24,6 +24,7 @@ from sepi.report.figures import page_json
 from sepi.report.graph import drawn
 from sepi.report.page import embedded, prose, read_scene
 from sepi.report.panels import Kind, Panel, SceneResults, note_of, panels_of
+from sepi.report.plots.error_bars import write_error_bars
 from sepi.report.runs import Runs
 from sepi.report.web import page_data
 from sepi.report.web.viewer import CONFIDENCE, OTHER, PRECISE, STEPS, viewer_json
@@ -408,12 +409,13 @@ def test_the_first_scene(example: Example) -> None:
 def test_charts_are_written_twice_the_same(example: Example, tmp_path: Path) -> None:
     """Each as a picture to look at and as one for a paper."""
     numbers = numbers_file(tmp_path, example.numbers)
+    wanted = ("ablation", "time_and_memory", "error_bars")
     for name in ("one", "two"):
-        words = ["--numbers", numbers, "--chart", "ablation", "--chart", "time_and_memory", "--output", tmp_path / name]
+        words = ["--numbers", numbers, *(f"--chart={chart}" for chart in wanted), "--output", tmp_path / name]
         result = CliRunner().invoke(charts.command, list(map(str, words)), catch_exceptions=False)
         assert result.exit_code == 0, result.output
     one = tmp_path / "one"
-    names = {f"{name}.{ending}" for name in ("ablation", "time_and_memory") for ending in ("png", "pdf")}
+    names = {f"{name}.{ending}" for name in wanted for ending in ("png", "pdf")}
     assert {path.name for path in one.iterdir()} == names
     for path in one.iterdir():
         assert path.read_bytes() == (tmp_path / "two" / path.name).read_bytes(), path.name
@@ -428,5 +430,6 @@ def test_charts_are_written_twice_the_same(example: Example, tmp_path: Path) -> 
 def test_a_chart_without_a_scene_with_truth(example: Example, tmp_path: Path) -> None:
     """The rule promises the files: they come, and say why they are empty."""
     charts.write_bars(tmp_path, "ablation", [])
-    picture = cv2.imread(str(tmp_path / "ablation.png"))
-    assert (picture < 128).any()
+    write_error_bars(tmp_path, "error_bars", [], [])
+    for name in ("ablation", "error_bars"):
+        assert (cv2.imread(str(tmp_path / f"{name}.png")) < 128).any()
