@@ -37,6 +37,7 @@ def read_error_bars(path: Path, view: tuple[int, int] | None = None) -> StageMap
         names = ("disparity", "confidence", *ERROR_BARS)
         if not all(name in file for name in names) or (view is None and file["disparity"].ndim != 2):
             return None
+        # of maps of all views, one
         part = view if view is not None and file["disparity"].ndim == 4 else ...
         disparity, confidence, *bars = (read_dataset(path, file[name], part).astype(np.float32) for name in names)
     if {values.shape for values in bars} != {disparity.shape} or confidence.shape != disparity.shape:

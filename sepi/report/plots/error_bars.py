@@ -55,7 +55,7 @@ def write_error_bars(folder: Path, name: str, scenes: Sequence[str], variants: S
     diagram.set(xlim=(0, 1), ylim=(0, 1), aspect="equal")
     diagram.set_xlabel("confidence: said probability of an error of at most 0.07", fontsize=8)
     diagram.set_ylabel("found share of such errors", fontsize=8)
-    diagram.legend(fontsize=7, loc="upper left")
+    diagram.legend(fontsize=7, loc="lower right")
     held.set_yticks(rows, scenes, fontsize=7, parse_math=False)
     held.set_ylim(len(scenes) - 0.5, -0.5)
     wide.tick_params(labelleft=False)
