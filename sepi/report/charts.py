@@ -84,7 +84,7 @@ def error_bars(folder: Path, name: str, runs: Runs) -> None:
     found = [
         VariantBars(
             variant,
-            pooled_reliability(runs, variant),
+            pooled_reliability(runs, variant, pairs),
             *([whole(runs, pair, variant)[score] for pair in pairs] for score in ("coverage", "width")),
         )
         for variant in variants_with_bars(runs)

@@ -18,9 +18,7 @@ from sepi.report.tabular.methods import PROTOCOL_NOTE
 from sepi.report.tabular.properties import split_note
 from sepi.scoring.error_bars import ERROR_BAR_SCORES, Reliability
 from sepi.scoring.scores import WHOLE_MAP
-from sepi.workflow.rendered_scenes import DATASET
-
-_TOGETHER = "all scenes"
+from sepi.workflow.rendered_scenes import DATASET, rendered_scene
 
 _COLUMNS = {
     "scene": Column("scene", Kind.TEXT),
@@ -53,9 +51,8 @@ def error_bar_table(runs: Runs) -> Report:
         "pixels that are left while those of largest standard deviation, or least confidence, are taken away, minus "
         "that in the order of the errors, divided by the error of all pixels; 0 is best. Confidence's gap: the "
         "confidence says with which probability the error is at most 0.07 (for 9x9 views); the largest difference to "
-        f"the share found in a tenth of 0 to 1. {_TOGETHER.capitalize()}: coverage, NLL and gap of all pixels "
-        "together; means of width and AUSE, by pixels."
-        + (f" {split_note(runs)}" if runs.plan.report == DATASET else ""),
+        "the share found in a tenth of 0 to 1. All scenes: coverage, NLL and gap of all pixels together; "
+        "means of width and AUSE, by pixels." + (f" {split_note(runs)}" if runs.plan.report == DATASET else ""),
         ["dataset", "scene", "variant", "region", "pixels", *ERROR_BAR_SCORES],
         records,
         [*sections, *(_region_section(records, variant) for variant in variants[:1])],
@@ -63,22 +60,30 @@ def error_bar_table(runs: Runs) -> Report:
 
 
 def _records(runs: Runs, pairs: Sequence[tuple[str, str]], variants: Sequence[str]) -> list[Record]:
-    """A row of the CSV file for each scene, variant and region; then those of all scenes together."""
+    """A row of the CSV file for each scene, variant and region; then those of all scenes of a level of noise."""
     records: list[Record] = []
+    levels: dict[str, list[tuple[str, str]]] = {}
+    for pair in pairs:
+        levels.setdefault(_together(*pair), []).append(pair)
     for variant in variants:
-        by_region: dict[str, list[Scores]] = {}
+        by_region: dict[tuple[str, str], list[Scores]] = {}
         for dataset, scene in pairs:
             for region, scores in runs.scores(dataset, scene, variant)["paper"].items():
                 about = {"dataset": dataset, "scene": scene, "variant": variant, "region": region}
                 records.append({**about, **{name: scores[name] for name in ("pixels", *ERROR_BAR_SCORES)}})
-                by_region.setdefault(region, []).append(scores)
-        if len(pairs) > 1:
-            for region, found in by_region.items():
+                by_region.setdefault((_together(dataset, scene), region), []).append(scores)
+        for (level, region), found in by_region.items():
+            if len(levels[level]) > 1:
                 pooled = _pooled(found)
                 if region == WHOLE_MAP:
-                    pooled["gap"] = pooled_reliability(runs, variant).gap
-                records.append({"scene": _TOGETHER, "variant": variant, "region": region, **pooled})
+                    pooled["gap"] = pooled_reliability(runs, variant, levels[level]).gap
+                records.append({"scene": level, "variant": variant, "region": region, **pooled})
     return records
+
+
+def _together(dataset: str, scene: str) -> str:
+    """What the scenes are called that a scene is pooled with."""
+    return f"all scenes, noise {rendered_scene(scene).noise}" if dataset == DATASET else "all scenes"
 
 
 def _pooled(scores: Sequence[Scores]) -> dict[str, Cell]:
@@ -92,9 +97,9 @@ def _pooled(scores: Sequence[Scores]) -> dict[str, Cell]:
     return found
 
 
-def pooled_reliability(runs: Runs, variant: str) -> Reliability:
-    """The reliability of a variant's confidence over the pixels of all scenes together."""
-    every = [runs.reliability(*pair, variant) for pair in runs.scored_pairs()]
+def pooled_reliability(runs: Runs, variant: str, pairs: Sequence[tuple[str, str]]) -> Reliability:
+    """The reliability of a variant's confidence over the pixels of several scenes together."""
+    every = [runs.reliability(*pair, variant) for pair in pairs]
     pixels = np.sum([one.pixels for one in every], axis=0)
     there = np.where(pixels > 0, pixels, np.nan)
     said, found = (

@@ -36,7 +36,8 @@ def test_all_scenes_together_are_means_over_their_pixels(found: dict[str, Any]) 
     assert float(whole["coverage"]) == 50
     assert float(occluded["coverage"]) == pytest.approx(200 / 3, abs=1e-3)
     # a confidence of 0.5 for errors of at most 0.28, which all are; half of the pixels would be said if they were not
-    reliability = pooled_reliability(Runs(found), "paper")
+    runs = Runs(found)
+    reliability = pooled_reliability(runs, "paper", runs.scored_pairs())
     assert (reliability.pixels[5], reliability.said[5], reliability.found[5]) == (4 * SIZE**2, 0.5, 1)
     assert float(whole["gap"]) == 50
 
