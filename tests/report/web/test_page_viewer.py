@@ -150,9 +150,11 @@ def test_the_read_out_shows_the_interval(page: Any, example: Example) -> None:
     assert maps.sigma is not None
     assert maps.low is not None
     assert maps.high is not None
+    reaches = maps.high - maps.disparity, maps.disparity - maps.low
+    row, column = np.unravel_index(np.abs(reaches[0] - reaches[1]).argmax(), maps.low.shape)
     for other in ("external/SPO/disparity", "paper/1_initial", "best/sigma"):
         choose(page, a="best/4_optimize", b=other)
-        for x, y in PLACES:
+        for x, y in (*PLACES, (int(column), int(row))):
             point_at(page, x, y)
             shown = read_out(page)
             low, high = map(float, shown["interval a"].split(" … "))
