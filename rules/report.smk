@@ -91,7 +91,9 @@ rule charts:
             multiext("reports/figures/time_and_memory", ".png", ".pdf"), caption="captions/time.rst", category="Charts"
         ),
         report(
-            multiext("reports/figures/error_bars", ".png", ".pdf"), caption="captions/error_bars.rst", category="Charts"
+            multiext("reports/figures/error_bars", ".png", ".pdf"),
+            caption="captions/error_bars.rst",
+            category="Charts",
         ),
     log:
         "logs/charts.log",
