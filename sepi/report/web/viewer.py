@@ -37,7 +37,7 @@ _FIXED = (1.0, 0.05)
 
 # characters for each pixel of an array, on average: ten scenes of 512x512 and the page round them stay below 20 MB; a
 # small scene may take as much as one of 512x512
-_SHARE = 0.275
+_SHARE = 0.255
 _LEAST_PIXELS = 2**18
 
 # larger pictures are thinned out, so that a browser can hold all their maps
@@ -66,8 +66,10 @@ class _Arrays:
         self.held[key] = (values, min(role, before))
         return list(self.held).index(key)
 
-    def packed(self, budget: float) -> list[dict[str, Any]]:
-        """All arrays, in the finest steps that keep them within a number of characters, or the coarsest."""
+    def packed(self, pixels: int) -> list[dict[str, Any]]:
+        """All arrays, in the finest steps that keep them within their shares of characters, or the coarsest."""
+        # error bars have no share: a page does not grow by them, other maps are a little coarser where it is full
+        budget = _SHARE * pixels * sum(role != LOGARITHM for _, role in self.held.values())
         for steps in STEPS:
             found = [packed(values, (*steps, *_FIXED)[role]) for values, role in self.held.values()]
             if sum(len(array["data"]) for array in found) <= budget:
@@ -105,7 +107,7 @@ def viewer_json(
         "camera": None if light_field is None else _camera(light_field),
         "picture": "" if picture is None else picture_uri(picture, "webp", _WEBP),
         "panels": entries,
-        "arrays": arrays.packed(_SHARE * max(_LEAST_PIXELS, height * width) * len(arrays.held)),
+        "arrays": arrays.packed(max(_LEAST_PIXELS, height * width)),
     }
 
 
@@ -134,12 +136,16 @@ def _entry(panel: Panel, arrays: _Arrays) -> dict[str, Any]:
 
 
 def _bars(panel: Panel) -> dict[str, tuple[npt.NDArray[Any], int]]:
-    """The logarithms of a standard deviation, and of how far the interval reaches below and above a map."""
+    """The logarithms of a standard deviation, and of how many of these the interval reaches below and above a map.
+
+    As such they are nearly the same everywhere, and take a fourth of the characters that widths would.
+    """
     values, bars = panel.values, panel.bars
     if values is None or bars is None or bars.sigma is None or bars.low is None or bars.high is None:
         return {}
-    found = {"sigma": bars.sigma, "below": values - bars.low, "above": bars.high - values}
-    return {name: (logarithms(widths), LOGARITHM) for name, widths in found.items()}
+    sigma, below, above = (logarithms(widths) for widths in (bars.sigma, values - bars.low, bars.high - values))
+    found = {"sigma": sigma, "below": below - sigma, "above": above - sigma}
+    return {name: (logarithm, LOGARITHM) for name, logarithm in found.items()}
 
 
 def _camera(light_field: LightField) -> dict[str, Any] | None:

@@ -29,6 +29,7 @@ from sepi.report.runs import Runs
 from sepi.report.web import page_data
 from sepi.report.web.viewer import CONFIDENCE, OTHER, PRECISE, STEPS, viewer_json
 from sepi.scoring.scores import REGIONS
+from sepi.stage import StageMaps
 
 LARGEST_PAGE = 20_000_000
 """Bytes that a page of ten scenes of 512x512 may have."""
@@ -128,8 +129,16 @@ def test_ten_noisy_scenes_stay_below_20_megabytes(noise: float, outliers: float,
     def confidence() -> FloatMap:
         return (blobs() + random.normal(0, 0.05, shape)).clip(0, 1).astype(np.float32)
 
+    def with_bars(shown: Panel) -> Panel:
+        assert shown.values is not None
+        sigma = (10 ** (blobs() / 2 - 2) * random.uniform(0.9, 1.1, shape)).astype(np.float32)
+        reach = 1.7 * sigma * (1 + blobs() / 9)
+        bars = {"sigma": sigma, "low": shown.values - reach, "high": shown.values + reach}
+        return replace(shown, bars=StageMaps(shown.values, sigma, bars))
+
     panels = [panel(0, ground_truth, precise=True)]
     panels += [panel(1 + number, estimate(), precise=number < 2) for number in range(16)]
+    panels[1:3] = [with_bars(shown) for shown in panels[1:3]]
     panels += [panel(17 + number, confidence(), "confidence") for number in range(2)]
     panels += [panel(19 + number, blobs() > 1, "mask") for number in range(6)]
     scene = len(json.dumps(viewer_json(panels, SCALE, a_light_field(picture))))

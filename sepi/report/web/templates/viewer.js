@@ -240,7 +240,8 @@ Sepi.Viewer = class {
     this.part(`sigma-${side}`).textContent = sigma ? this.spread(sigma) : "–";
     if (sigma && this.cursor) {
       const place = this.cursor[1] * this.scene.width + this.cursor[0];
-      const ends = [values[place] - 10 ** below[place], values[place] + 10 ** above[place]];
+      const reach = (sigmas) => 10 ** (sigma[place] + sigmas[place]);
+      const ends = [values[place] - reach(below), values[place] + reach(above)];
       interval = ends.some(Number.isNaN) ? "unknown" : ends.map((end) => end.toFixed(3)).join(" … ");
     }
     this.part(`interval-${side}`).textContent = interval;
