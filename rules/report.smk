@@ -90,6 +90,11 @@ rule charts:
         report(
             multiext("reports/figures/time_and_memory", ".png", ".pdf"), caption="captions/time.rst", category="Charts"
         ),
+        report(
+            multiext("reports/figures/error_bars", ".png", ".pdf"),
+            caption="captions/error_bars.rst",
+            category="Charts",
+        ),
     log:
         "logs/charts.log",
     benchmark:
@@ -103,7 +108,7 @@ rule charts:
         "charts"
     shell:
         command(
-            "sepi.report.charts --numbers {input:q} --chart ablation --chart time_and_memory "
+            "sepi.report.charts --numbers {input:q} --chart ablation --chart time_and_memory --chart error_bars "
             "--output {params.folder:q} 2> {log:q}"
         )
 

@@ -39,7 +39,7 @@ def report_files(name=""):
 
 def all_files():
     """The main report, its charts, and the parts of ``best`` if they are asked for."""
-    charts = figure_files(["ablation", "time_and_memory"])
+    charts = figure_files(["ablation", "time_and_memory", "error_bars"])
     return list(dict.fromkeys([*report_files(), *charts, *(ablation_files() if PARTS else [])]))
 
 

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import click
@@ -17,24 +18,27 @@ from sepi.io.provenance import scene_attributes
 from sepi.io.scores import Evaluation, map_name, write_scores
 from sepi.io.truth import read_with_truth
 from sepi.lightfield import FloatMap, LightField, require_light_field
-from sepi.scoring.edges import edges_of
+from sepi.matching.unknown import with_unknown
+from sepi.scoring.edges import Edges, edges_of
+from sepi.scoring.error_bars import ErrorBars, reliability
 from sepi.scoring.scores import (
     DISCONTINUITIES,
     region_masks,
     score_regions,
 )
+from sepi.stage import ERROR_BARS, StageMaps
 from sepi.validation import require_map, require_type
 
 
-def evaluation_of(light_field: LightField, disparity: FloatMap) -> Evaluation:
+def evaluation_of(light_field: LightField, maps: FloatMap | StageMaps) -> Evaluation:
     """Scores, error map and masks of one disparity map of a light field.
 
     Parameters
     ----------
     light_field : LightField
         With ground truth; without, the evaluation is empty.
-    disparity : ndarray, shape (H, W), float32
-        Pixels per view step.
+    maps : ndarray, shape (H, W), float32, or StageMaps
+        Disparity in pixels per view step; finished maps have their error bars scored, too, where they have any.
 
     Returns
     -------
@@ -51,17 +55,22 @@ def evaluation_of(light_field: LightField, disparity: FloatMap) -> Evaluation:
     >>> from sepi.evaluate import evaluation_of
     >>> from sepi.scenes import render
     >>> light_field = render("wall", size=96, views=5)
-    >>> found = evaluation_of(light_field, sepi.estimate_depth(light_field).disparity)
+    >>> found = evaluation_of(light_field, sepi.estimate_depth(light_field))
     >>> list(found.scores["paper"])
     ['all', 'occluded', 'textureless', 'discontinuities']
     >>> found.scores["paper"]["all"]["mse100"] < found.scores["paper"]["occluded"]["mse100"]
     True
+
+    What its error bars are worth, among them how often the interval holds the truth, and how wide it is:
+
+    >>> {"coverage", "width"} <= found.scores["paper"]["all"].keys()
+    True
     """
-    return evaluations_of(light_field, {"": disparity})[""]
+    return evaluations_of(light_field, {"": maps})[""]
 
 
 def evaluations_of(
-    light_field: LightField, maps: Mapping[str, FloatMap], thresholds: Sequence[float] = ()
+    light_field: LightField, maps: Mapping[str, FloatMap | StageMaps], thresholds: Sequence[float] = ()
 ) -> dict[str, Evaluation]:
     """Scores, error maps and masks of disparity maps of one light field, by name; the masks are found once for all.
 
@@ -70,8 +79,8 @@ def evaluations_of(
     light_field : LightField
         Scored over the regions of :func:`sepi.scoring.scores.region_masks`. Without ground truth the evaluations are
         empty.
-    maps : mapping of str to ndarray, shape (H, W), float32
-        Name to disparity in pixels per view step.
+    maps : mapping of str to ndarray, shape (H, W), float32, or StageMaps
+        Name to disparity in pixels per view step, or to finished maps, whose error bars are scored, too.
     thresholds : sequence of float
         As :func:`sepi.scoring.scores.score` takes them.
 
@@ -101,29 +110,55 @@ def evaluations_of(
     """
     require_light_field(light_field)
     require_type(f"{light_field.name}: maps", maps, Mapping, "names with their maps")
-    for name, disparity in maps.items():
-        require_map(f"{light_field.name}: disparity{name and f' of {name}'}", disparity, light_field.shape)
+    for name, found in maps.items():
+        require_map(f"{light_field.name}: disparity{name and f' of {name}'}", _disparity(found), light_field.shape)
     if light_field.ground_truth is None or not maps:
         return {name: Evaluation() for name in maps}
     masks = region_masks(light_field)
     sources = {name: "scene" if name in light_field.masks else "computed" for name in masks}
     sources[DISCONTINUITIES] = "computed"
     edges = edges_of(light_field.ground_truth)
-    return {
-        name: Evaluation(
-            scores=score_regions(disparity, light_field.ground_truth, masks, edges=edges, thresholds=thresholds),
-            error=_error(disparity, light_field.ground_truth),
-            regions=masks,
-            region_sources=sources,
-        )
-        for name, disparity in maps.items()
-    }
+    common = Evaluation(regions=masks, region_sources=sources)
+    return {name: _evaluation(light_field, found, common, edges, thresholds) for name, found in maps.items()}
+
+
+def _evaluation(
+    light_field: LightField,
+    maps: FloatMap | StageMaps,
+    common: Evaluation,
+    edges: Edges,
+    thresholds: Sequence[float],
+) -> Evaluation:
+    """What is to be said of a map, beside what all maps of the scene have in common."""
+    disparity, truth = _disparity(maps), light_field.ground_truth
+    assert truth is not None
+    bars = ErrorBars.of(maps, light_field.reach) if isinstance(maps, StageMaps) else None
+    scores = score_regions(disparity, truth, common.regions, edges=edges, thresholds=thresholds, bars=bars)
+    found = replace(common, scores=scores, error=_error(disparity, truth))
+    if bars is None or bars.close is None:
+        return found
+    known = np.isfinite(truth)
+    right = reliability(bars.confidence[known], disparity[known] - truth[known], bars.close)
+    return replace(found, reliability=np.array(right))
+
+
+def _disparity(maps: FloatMap | StageMaps) -> FloatMap:
+    return maps.disparity if isinstance(maps, StageMaps) else maps
 
 
 def _error(disparity: FloatMap, ground_truth: FloatMap) -> FloatMap:
     """Estimate minus ground truth; NaN where either is unknown."""
     known = np.isfinite(ground_truth) & np.isfinite(disparity)
     return np.subtract(disparity, ground_truth, out=np.full(ground_truth.shape, np.nan, np.float32), where=known)
+
+
+def _scored(light_field: LightField, maps: StageMaps) -> FloatMap | StageMaps:
+    """What is scored of a stage's maps, and no more of them: there are dozens."""
+    if maps.sigma is None:
+        return maps.disparity
+    # as they are handed to users
+    final = with_unknown(light_field, maps)
+    return StageMaps(final.disparity, final.confidence, {name: final.extra[name] for name in ERROR_BARS})
 
 
 _PATH = click.Path(path_type=Path)
@@ -146,7 +181,7 @@ def command(
 ) -> None:
     """Score the disparity maps of stage files against the light field's ground truth, if it has one."""
     light_field = read_with_truth(light_field_path, truth)
-    maps = {map_name(stages, path): read_stage(path).disparity for path in paths}
+    maps = {map_name(stages, path): _scored(light_field, read_stage(path)) for path in paths}
     write_scores(output, evaluations_of(light_field, maps, thresholds), scene_attributes(light_field))
     if light_field.ground_truth is None:
         click.echo(f"{light_field.name}: no ground truth, no scores", err=True)

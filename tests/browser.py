@@ -152,7 +152,9 @@ def part(page: Any, name: str) -> str:
 def read_out(page: Any) -> dict[str, str]:
     """The numbers under the cursor."""
     sides = {
-        f"{name} {side}": part(page, f"{name}-{side}") for name in ("value", "error", "confidence") for side in "ab"
+        f"{name} {side}": part(page, f"{name}-{side}")
+        for name in ("value", "error", "confidence", "sigma", "interval")
+        for side in "ab"
     }
     return sides | {"ground_truth": part(page, "ground_truth"), "pixel": part(page, "pixel")}
 

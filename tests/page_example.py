@@ -153,7 +153,7 @@ def run_stages(plan: Plan, scene: tuple[str, str], light_field: LightField, vari
 def write_plan_scores(plan: Plan, scene: tuple[str, str], light_field: LightField) -> None:
     """The score file of a scene, from its stage files."""
     folder = plan.files(*scene).stages
-    maps = {map_name(folder, file): read_stage(file).disparity for file in plan.scored_files(*scene)}
+    maps = {map_name(folder, file): read_stage(file) for file in plan.scored_files(*scene)}
     write_scores(plan.scores_file(*scene), evaluations_of(light_field, maps), scene_attributes(light_field))
 
 

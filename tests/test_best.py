@@ -17,7 +17,7 @@ from sepi.pipeline import estimate_depth
 from sepi.regularization.border_planes import BorderPlaneParameters, ransac_plane
 from sepi.regularization.uniform_regions import UniformPlanesParameters, plain_pixels
 from sepi.scenes import render
-from sepi.scoring.confidence import decile_errors, oracle, sparsification
+from sepi.scoring.confidence import oracle, sparsification
 from sepi.scoring.scores import score
 from sepi.variants import PARTS_OF_BEST, VARIANTS
 
@@ -184,10 +184,6 @@ def test_sparsification_is_what_its_name_says() -> None:
     assert np.all(oracle(error) <= curve + 1e-9)
     unknown = np.full((2, 2), np.nan, np.float32)
     assert np.isnan(sparsification(confidence, unknown)).all()
-    assert np.isnan(decile_errors(confidence, unknown)).all()
-    squared, absolute = decile_errors(np.arange(20, dtype=np.float32), np.arange(20, dtype=np.float32))
-    assert absolute[0] == pytest.approx(1850)
-    assert squared[-1] == pytest.approx(50)
 
 
 def test_range_narrower_than_the_scene_is_no_crash() -> None:

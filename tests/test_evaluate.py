@@ -1,5 +1,6 @@
 """Scores: by hand, against a plain twin, with unknown pixels, and as the command that the workflow calls."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,9 +16,10 @@ from sepi.errors import SepiError
 from sepi.evaluate import command, evaluation_of, evaluations_of
 from sepi.io.hdf5 import write_light_field, write_stage
 from sepi.io.images import write_png
-from sepi.io.scores import read_evaluations, read_scores
+from sepi.io.scores import read_evaluations, read_reliability, read_scores
 from sepi.io.truth import read_with_truth
 from sepi.lightfield import DisparityRange, LightField
+from sepi.matching.unknown import unknown_pixels
 from sepi.scenes import render, write_hci
 from sepi.scoring import regions
 from sepi.scoring.scores import EDGE_SCORES, score
@@ -190,13 +192,14 @@ def test_wrong_shape_is_a_clear_error() -> None:
 
 
 def run_command(
-    folder: Path, light_field: LightField, maps: dict[str, np.ndarray], output: str = "scores.h5"
+    folder: Path, light_field: LightField, maps: Mapping[str, np.ndarray | StageMaps], output: str = "scores.h5"
 ) -> tuple[Path, str]:
     """Score these maps as the workflow does; the score file, and what the command said."""
     write_light_field(folder / "lightfield.h5", light_field)
     stages = folder / "stages"
-    for name, disparity in maps.items():
-        write_stage(stages / name / "stage.h5", StageMaps(disparity, np.ones_like(disparity)), STAGE_ATTRIBUTES)
+    for name, found in maps.items():
+        known = found if isinstance(found, StageMaps) else StageMaps(found, np.ones_like(found))
+        write_stage(stages / name / "stage.h5", known, STAGE_ATTRIBUTES)
     files = [stages / name / "stage.h5" for name in maps]
     options = ["--light-field", folder / "lightfield.h5", "--stages", stages, "--output", folder / output]
     words = [str(word) for word in [*options, *files]]
@@ -230,6 +233,31 @@ def test_command_writes_what_evaluate_finds(tmp_path: Path) -> None:
     assert path.read_bytes() == run_command(tmp_path, light_field, maps, "again.h5")[0].read_bytes()
     # nothing is kept beside the scores: a job that is forced scores anew
     assert {file.name for file in tmp_path.iterdir()} == {"lightfield.h5", "stages", "scores.h5", "again.h5"}
+
+
+def test_command_scores_error_bars_as_users_get_them(tmp_path: Path) -> None:
+    """Of final maps alone; where no view knows anything the interval is the whole range, which holds the truth."""
+    seen = render("dots", size=64, views=3)
+    seen.views[:, :, :32] = 0
+    ones = np.ones((64, 64), np.float32)
+    assert seen.ground_truth is not None
+    estimate = seen.ground_truth + np.float32(0.3)
+    bars = {"sigma": 0.1 * ones, "low": estimate - 0.1 * ones, "high": estimate + 0.1 * ones}
+    maps = {"sepi": estimate, "sepi/none": StageMaps(estimate, 0.75 * ones, bars)}
+    path, _ = run_command(tmp_path, seen, maps)
+    before, final = read_evaluations(path).values()
+    assert "coverage" not in before.scores["paper"]["all"]
+    assert before.reliability is None
+    whole = final.scores["paper"]["all"]
+    unknown = unknown_pixels(seen, estimate)
+    assert 0.4 < unknown.mean() < 0.6
+    assert whole["coverage"] == pytest.approx(100 * unknown.mean())
+    assert final.reliability is not None
+    pixels, said, found = final.reliability
+    assert (pixels[0], pixels[7]) == (unknown.sum(), (~unknown).sum())
+    assert (said[0], said[7], found[0], found[7]) == (0, 0.75, 0, 0)
+    np.testing.assert_array_equal(read_reliability(path, ["sepi", "sepi/none"])["sepi/none"], final.reliability)
+    assert list(read_reliability(path, ["sepi", "sepi/none"])) == ["sepi/none"]
 
 
 def test_command_says_that_there_is_no_truth(tmp_path: Path) -> None:

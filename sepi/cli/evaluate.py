@@ -22,6 +22,9 @@ if TYPE_CHECKING:
 
 _PATH = click.Path(path_type=Path)
 
+NO_INTERVAL = "no interval: the map has no error bars"
+"""What is said of one that has none."""
+
 
 @click.command(cls=SepiCommand)
 @click.argument("estimate", type=_PATH)
@@ -35,6 +38,13 @@ _PATH = click.Path(path_type=Path)
     metavar="ROW,COLUMN",
     help="ESTIMATE is a crop: where its top left pixel lies in the ground truth, counted from 0.",
 )
+@click.option(
+    "--truth-step",
+    type=click.FloatRange(min=0),
+    metavar="D",
+    help="What rounded ground truth is a multiple of, pixels per view step: an interval may miss it by half of that. "
+    "[default: K of --truth-scale where FILE holds whole numbers, else 0]",
+)
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 @reading_flags
 def evaluate(
@@ -44,6 +54,7 @@ def evaluate(
     thresholds: tuple[float, ...],
     border: int | None,
     offset: tuple[int, int] | None,
+    truth_step: float | None,
     as_json: bool,
     reading: Reading,
 ) -> None:
@@ -60,6 +71,10 @@ def evaluate(
     Both protocols are used: 'paper' scores the whole map, 'benchmark' leaves out 15 pixels on each side. With --offset,
     the crop's pixels are scored, and borders are counted from the edges of the ground truth, not from the crop's.
 
+    Where ESTIMATE has error bars, as what 'sepi depth' wrote has, they are scored, too: how often the interval of 90 %
+    holds the truth, its median width, the likelihood of the errors (NLL), and whether doubt is where errors are (AUSE,
+    0 is best).
+
     \b
     Examples:
       sepi evaluate cotton-depth cotton
@@ -68,9 +83,11 @@ def evaluate(
       sepi evaluate venus-depth venus --truth disp2.pgm --truth-scale 0.03125 --bad 0.25
     """
     from sepi.io.all_views import read_disparity_at
+    from sepi.io.error_bars import read_error_bars
     from sepi.io.files import naming
     from sepi.io.scores import without_nan
     from sepi.scoring.crops import in_frame
+    from sepi.scoring.error_bars import ErrorBars
     from sepi.scoring.scores import PROTOCOLS, region_masks, score_regions
 
     source = ground_truth if own is None else own.path
@@ -93,13 +110,20 @@ def evaluate(
         )
     masks = None if light_field is None else region_masks(light_field)
     protocols = PROTOCOLS if border is None else {f"border {border}": border}
-    scores = score_regions(disparity, values, masks, protocols, within=inside, thresholds=thresholds)
+    if truth_step is None:
+        truth_step = 0.0 if own is None else own.step
+    maps = read_error_bars(estimate, reading.options.view)
+    bars = None if maps is None else ErrorBars.of(maps, None if light_field is None else light_field.reach, truth_step)
+    if bars is not None and crop is not None:
+        bars = bars.in_frame(crop.offset, crop.whole)
+    scores = score_regions(disparity, values, masks, protocols, within=inside, thresholds=thresholds, bars=bars)
     if as_json:
         told = without_nan(scores) | ({} if crop is None else {"crop": asdict(crop)})
+        told |= {"truth_step": truth_step} if bars is not None and truth_step else {}
         click.echo(json.dumps(told, indent=2, sort_keys=True))
     else:
-        table = score_table(scores, thresholds)
-        click.echo(table if crop is None else f"{crop.described}\n{table}")
+        lines = [] if crop is None else [crop.described]
+        click.echo("\n".join([*lines, score_table(scores, thresholds, truth_step)]))
 
 
 @dataclass(frozen=True)
@@ -124,13 +148,16 @@ def _fits(shape: tuple[int, ...], whole: tuple[int, ...]) -> bool:
     return all(length <= most for length, most in zip(shape, whole, strict=True))
 
 
-def score_table(scores: AllScores, thresholds: Sequence[float] = ()) -> str:
-    """Scores as aligned columns."""
+def score_table(scores: AllScores, thresholds: Sequence[float] = (), truth_step: float = 0.0) -> str:
+    """Scores as aligned columns; below them whether there was an interval to score."""
     from tabulate import tabulate
 
+    from sepi.scoring.error_bars import ERROR_BAR_SCORES
     from sepi.scoring.scores import COUNTS, EDGE_SCORES, score_heads
 
-    heads = score_heads(thresholds) | EDGE_SCORES | COUNTS
+    there = {name for regions in scores.values() for values in regions.values() for name in values}
+    bars = {name: head for name, head in ERROR_BAR_SCORES.items() if name in there}
+    heads = score_heads(thresholds) | EDGE_SCORES | bars | COUNTS
     rows = [
         [protocol, region, *(_cell(values[name]) for name in heads)]
         for protocol, regions in scores.items()
@@ -138,7 +165,11 @@ def score_table(scores: AllScores, thresholds: Sequence[float] = ()) -> str:
     ]
     alignment = ["left", "left", *["right"] * len(heads)]
     titles = ["protocol", "region", *heads.values()]
-    return str(tabulate(rows, titles, tablefmt="plain", colalign=alignment, disable_numparse=True))
+    table = str(tabulate(rows, titles, tablefmt="plain", colalign=alignment, disable_numparse=True))
+    if not bars:
+        return f"{table}\n{NO_INTERVAL}"
+    rounded = f"ground truth in steps of {truth_step:g}: an interval that misses it by half a step holds it"
+    return f"{table}\n{rounded}" if truth_step else table
 
 
 def _cell(value: float) -> str:

@@ -137,6 +137,12 @@ class TruthFile:
             raise SepiError(f"{path}: no pixel is known; 0 in whole numbers, NaN and infinity in others are unknown")
         return np.where(known, truth, np.float32(np.nan))
 
+    @property
+    def step(self) -> float:
+        """What the disparities are multiples of, pixels per view step; 0 where the file holds no whole numbers."""
+        stored = _stored(map_file(self.path), self.scale is not None)
+        return 0.0 if stored.dtype.kind == "f" else self.scale or 1.0
+
 
 def _scaled(stored: npt.NDArray[Any], scale: float | None, offset: float = 0.0) -> FloatMap:
     # numbers beyond float32 become infinite, and count as unknown

@@ -2,8 +2,8 @@
 
 Layout: a group ``maps/NAME`` per map, in it a group ``scores/PROTOCOL/REGION`` per cell with one attribute per score,
 the signed error map ``error (H, W)`` and the masks ``regions/NAME (H, W)``; the masks are the same for every map, and
-stored once. Where the scene has no ground truth the groups of the maps are empty, and the root attribute
-``ground_truth`` is False.
+stored once. A map with error bars has ``reliability (3, 10)``, too. Where the scene has no ground truth the groups of
+the maps are empty, and the root attribute ``ground_truth`` is False.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from typing import Any
 
 import h5py
 import numpy as np
+import numpy.typing as npt
 
 from sepi.errors import SepiError
 from sepi.io.hdf5 import UNITS, Attribute, attribute, create_hdf5, open_hdf5, read_dataset
@@ -23,6 +24,7 @@ from sepi.io.integrity import members, own_attributes
 from sepi.lightfield import BoolMap, FloatMap
 
 _MAPS = "maps"
+_RELIABILITY = "reliability"
 _KIND = "score file (written by python -m sepi.evaluate)"
 
 Scores = dict[str, float]
@@ -46,6 +48,9 @@ class Evaluation:
         The masks that the scores of a region were taken over.
     region_sources : mapping of str to str
         ``"scene"`` (the scene brought the mask) or ``"computed"`` (by :mod:`sepi.scoring.regions`).
+    reliability : ndarray, shape (3, 10), or None
+        How right the confidence is, over the whole map (:class:`sepi.scoring.error_bars.Reliability`); None where the
+        map has no error bars.
 
     Examples
     --------
@@ -65,6 +70,7 @@ class Evaluation:
     error: FloatMap | None = None
     regions: Mapping[str, BoolMap] = field(default_factory=dict)
     region_sources: Mapping[str, str] = field(default_factory=dict)
+    reliability: npt.NDArray[np.float64] | None = None
 
 
 def map_name(stages: Path, file: Path) -> str:
@@ -115,6 +121,21 @@ def read_scores(path: Path, names: Collection[str] | None = None) -> dict[str, A
         return {name: scores_in(group) for name, group in _groups(path, file, names).items()}
 
 
+def read_reliability(path: Path, names: Collection[str]) -> dict[str, npt.NDArray[np.float64]]:
+    """The reliability of those of these maps that have error bars.
+
+    Raises
+    ------
+    SepiError
+        As :func:`read_scores`.
+    """
+    with open_hdf5(path, _KIND) as file:
+        groups = _groups(path, file, names)
+        return {
+            name: read_dataset(path, group[_RELIABILITY]) for name, group in groups.items() if _RELIABILITY in group
+        }
+
+
 def read_evaluations(path: Path, names: Collection[str] | None = None) -> dict[str, Evaluation]:
     """Everything that a score file holds of these maps, or of all.
 
@@ -135,6 +156,9 @@ def put_evaluation(group: h5py.Group, evaluation: Evaluation) -> None:
     if evaluation.error is not None:
         group.create_dataset("error", data=evaluation.error)
         group["error"].attrs["units"] = UNITS["disparity"]
+    if evaluation.reliability is not None:
+        group.create_dataset(_RELIABILITY, data=evaluation.reliability)
+        group[_RELIABILITY].attrs["axes"] = "(pixels, said, found) said_tenth"
     for name, mask in sorted(evaluation.regions.items()):
         dataset = group.create_dataset(f"regions/{name}", data=mask, compression="gzip", compression_opts=1)
         dataset.attrs["source"] = evaluation.region_sources[name]
@@ -160,6 +184,7 @@ def evaluation_in(group: h5py.Group) -> Evaluation:
         error=read_dataset(path, group["error"]).astype(np.float32) if "error" in group else None,
         regions={name: read_dataset(path, mask).astype(bool) for name, mask in regions},
         region_sources={name: str(attribute(mask, "source")) for name, mask in regions},
+        reliability=read_dataset(path, group[_RELIABILITY]) if _RELIABILITY in group else None,
     )
 
 

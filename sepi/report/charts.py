@@ -1,4 +1,4 @@
-"""The report's charts as figures for a paper (PNG and PDF): the ablation, and time and memory of the stages."""
+"""The report's charts as figures for a paper (PNG and PDF): the ablation, time and memory of the stages, error bars."""
 
 from __future__ import annotations
 
@@ -10,8 +10,10 @@ import numpy as np
 from matplotlib.patches import Patch
 
 from sepi.command import SepiCommand
+from sepi.report.plots.error_bars import VariantBars, write_error_bars
 from sepi.report.plots.saving import new_figure, save
 from sepi.report.runs import Runs, read_numbers
+from sepi.report.tabular.error_bars import pooled_reliability, variants_with_bars, whole
 from sepi.report.web.page_data import BarGroup, StageTimes, ablation_bars, part_bars, stage_times
 
 _OURS, _PUBLISHED = "#4a7fae", "#b9bfc5"
@@ -76,9 +78,24 @@ def write_times(folder: Path, name: str, rows: Sequence[StageTimes]) -> None:
     save(figure, folder, name)
 
 
+def error_bars(folder: Path, name: str, runs: Runs) -> None:
+    """What the table of this name says of all scenes and of each, as a chart."""
+    pairs = runs.scored_pairs()
+    found = [
+        VariantBars(
+            variant,
+            pooled_reliability(runs, variant, pairs),
+            *([whole(runs, pair, variant)[score] for pair in pairs] for score in ("coverage", "width")),
+        )
+        for variant in variants_with_bars(runs)
+    ]
+    write_error_bars(folder, name, ["/".join(pair) for pair in pairs], found)
+
+
 CHARTS: dict[str, Callable[[Path, str, Runs], None]] = {
     "ablation": lambda folder, name, runs: write_bars(folder, name, ablation_bars(runs)),
     "time_and_memory": lambda folder, name, runs: write_times(folder, name, stage_times(runs)),
+    "error_bars": error_bars,
     "ablation_best": lambda folder, name, runs: write_bars(folder, name, part_bars(runs)),
 }
 """Name of each chart to the function that writes it."""

@@ -27,11 +27,11 @@ from sepi.report.panels import Panel, SceneResults, first_final, panels_of
 from sepi.report.plan import MAIN_VARIANT, Plan
 from sepi.report.plots.overview import write_overview
 from sepi.report.plots.pictures import disparity_limits, panel_picture, reference_picture
+from sepi.report.plots.sparsification import write_curves
 from sepi.report.probes.figure import write_probes
 from sepi.report.probes.pixels import InterestingPixel
 from sepi.report.probes.probe import Probe, to_json
 from sepi.report.probes.scene_probes import scene_probes
-from sepi.report.tabular.confidence import write_curves
 from sepi.report.web.viewer import viewer_json
 
 

@@ -20,16 +20,14 @@ import numpy.typing as npt
 
 from sepi.command import SepiCommand
 from sepi.io.external_maps import read_external
-from sepi.io.hdf5 import read_light_field, read_stage
-from sepi.io.scores import Scores, read_evaluations, read_scores, without_nan
+from sepi.io.scores import Scores, read_reliability, read_scores, without_nan
 from sepi.io.truth import read_with_truth
-from sepi.matching.unknown import with_unknown
 from sepi.report.plan import Plan
 from sepi.report.pooled import pooled_q25
 from sepi.report.runs import Runs, read_json
 from sepi.report.tables import table
 from sepi.report.tabular.layout import as_json, write
-from sepi.scoring.confidence import decile_errors, oracle, sparsification
+from sepi.scoring.error_bars import ERROR_BAR_SCORES
 from sepi.scoring.scores import COUNTS, EDGE_SCORES, PROTOCOLS, SCORED_REGIONS, score_heads
 from sepi.validation import require_known
 from sepi.workflow.rendered_scenes import DATASET
@@ -53,8 +51,8 @@ def collect(plan: Plan, parts: bool = False) -> dict[str, Any]:
         result, and the machines that the stages ran on, with their versions; ``protocols``: name to border; ``plan``;
         ``parameters``: stage to choice to what it ran with, a list, as scenes may differ; ``scenes``: a list, each
         with ``dataset``, ``scene``, ``light_field``, ``stages`` (path of choices to ``stage``, ``scores``,
-        ``seconds``, ``peak_memory_mb``), ``confidence`` (variant to errors, of the main report) and ``external``
-        (method to ``problem``, ``source``, ``sha256``, ``scores``); of the rendered scenes ``pooled_q25``
+        ``seconds``, ``peak_memory_mb``, ``reliability``, None without error bars) and ``external`` (method to
+        ``problem``, ``source``, ``sha256``, ``scores``); of the rendered scenes ``pooled_q25``
         (:data:`sepi.report.pooled.Pooled`); ``tables``: name to :func:`sepi.report.tabular.layout.as_json`. With
         ``parts``, scenes have ``stages`` only, and ``scores`` is None but after the last stage.
 
@@ -117,7 +115,6 @@ def _scene(plan: Plan, dataset: str, scene: str, parts: bool) -> dict[str, Any]:
     return found | {
         "light_field": _light_field(plan.light_field_file(dataset, scene), plan.truth_file(dataset, scene)),
         "stages": _stages(plan, dataset, scene, parts),
-        "confidence": _confidence(plan, dataset, scene) if plan.tells_confidence else {},
         "external": _external(plan, dataset, scene),
     }
 
@@ -156,7 +153,8 @@ def _stages(plan: Plan, dataset: str, scene: str, parts: bool) -> dict[str, Any]
     }
     # of the parts, only the last stage is scored
     last = [plan.stage_key(variant, plan.stages[-1]) for variant in plan.collected(parts)]
-    scores = read_scores(plan.scores_file(dataset, scene, parts), last if parts else files.keys())
+    scored, wanted = plan.scores_file(dataset, scene, parts), last if parts else files.keys()
+    scores, reliability = read_scores(scored, wanted), read_reliability(scored, wanted)
     found = {}
     for key, path in files.items():
         took = _timing(path, stage_of(key))
@@ -165,29 +163,8 @@ def _stages(plan: Plan, dataset: str, scene: str, parts: bool) -> dict[str, Any]
             "scores": _ordered(plan, scores[key]) if key in scores else None,
             "seconds": float(took["seconds"]),
             "peak_memory_mb": float(took["peak_memory_mb"]),
+            "reliability": reliability[key].tolist() if key in reliability else None,
         }
-    return found
-
-
-def _confidence(plan: Plan, dataset: str, scene: str) -> dict[str, dict[str, list[float]]]:
-    """Errors by confidence of the compared variants' final maps; nothing without ground truth."""
-    found = {}
-    last = plan.stages[-1]
-    keys = {variant: plan.stage_key(variant, last) for variant in plan.compared}
-    scored = read_evaluations(plan.scores_file(dataset, scene), list(keys.values()))
-    for variant, key in keys.items():
-        error = scored[key].error
-        if error is not None:
-            maps = read_stage(plan.stage_file(dataset, scene, variant, last))
-            light_field = read_light_field(plan.light_field_file(dataset, scene))
-            confidence = with_unknown(light_field, maps).confidence
-            squared, absolute = decile_errors(confidence, error)
-            found[variant] = {
-                "squared": squared.tolist(),
-                "absolute": absolute.tolist(),
-                "curve": sparsification(confidence, error).tolist(),
-                "oracle": oracle(error).tolist(),
-            }
     return found
 
 
@@ -208,11 +185,15 @@ def _external(plan: Plan, dataset: str, scene: str) -> dict[str, Any]:
 def _ordered(plan: Plan, scores: Mapping[str, Mapping[str, Scores]]) -> dict[str, Any]:
     """Scores in the order of protocols, regions and names."""
     names = (*score_heads(plan.bad_thresholds), *EDGE_SCORES, *COUNTS)
+    of_bars = ERROR_BAR_SCORES.keys()
     found: dict[str, Any] = {}
     for protocol in PROTOCOLS if scores else ():
         regions = scores[protocol]
         order = dict.fromkeys([*SCORED_REGIONS, *sorted(regions)])
-        found[protocol] = {region: {name: regions[region][name] for name in names} for region in order}
+        found[protocol] = {
+            region: {name: regions[region][name] for name in (*names, *(n for n in of_bars if n in regions[region]))}
+            for region in order
+        }
     return found
 
 

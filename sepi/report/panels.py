@@ -16,9 +16,10 @@ from sepi.report.plan import BEST_VARIANT, MAIN_VARIANT
 from sepi.scoring.scores import OWN_BAD_PIXEL, WHOLE_MAP
 from sepi.stage import StageMaps
 
-Kind = Literal["picture", "disparity", "error", "change", "confidence", "grey", "mask", "outline"]
+Kind = Literal["picture", "disparity", "error", "change", "confidence", "sigma", "grey", "mask", "outline"]
 """How a panel is drawn: the reference view; a map on the scale of disparity; a map minus another; how much larger the
-error of a map is than that of another; a map from 0 to 1; a mask, or the borders between labels, over the view."""
+error of a map is than that of another; a map from 0 to 1; a standard deviation, by its logarithm; a mask, or the
+borders between labels, over the view."""
 
 
 @dataclass(frozen=True)
@@ -40,6 +41,10 @@ class Panel:
         What both maps of a change are compared with.
     confidence : ndarray, shape (H, W), or None
         Read out beside the map.
+    bars : StageMaps or None
+        Maps with error bars, which are read out beside the map, too.
+    no_interval : str
+        What is read out where the page holds none, unless that there is none.
     note : str
         What is to be said of it.
     ends : (str, str) or None
@@ -58,6 +63,8 @@ class Panel:
     minus: FloatMap | None = None
     ground_truth: FloatMap | None = None
     confidence: FloatMap | None = None
+    bars: StageMaps | None = None
+    no_interval: str = ""
     note: str = ""
     ends: tuple[str, str] | None = None
     precise: bool = False
@@ -148,6 +155,8 @@ def _stage_panels(results: SceneResults, variant: str) -> Iterator[Panel]:
             "disparity",
             found.disparity,
             confidence=found.confidence if final and detailed else None,
+            bars=found if final and detailed and found.sigma is not None else None,
+            no_interval="" if detailed or found.sigma is None else "not on this page",
             note=note_of(results.evaluations[variant]) if final else "",
             precise=final and detailed,
             in_page=final or detailed,
@@ -202,7 +211,7 @@ def _change_panels(results: SceneResults) -> Iterator[Panel]:
 
 
 def _detail_panels(results: SceneResults, variant: str) -> Iterator[Panel]:
-    """Confidence, and what a variant took for occluded and textureless, with the superpixels that it used."""
+    """Confidence, error bars, and what was taken for occluded and textureless, with the superpixels that were used."""
     final, shown = results.final(variant), variant in results.detailed
     kinds: dict[str, tuple[str, Kind]] = {
         # what was detected need not be the region that is scored
@@ -214,6 +223,9 @@ def _detail_panels(results: SceneResults, variant: str) -> Iterator[Panel]:
     }
     group = f"Masks and confidence of {variant}"
     yield Panel(f"{variant}/confidence", f"{variant}: confidence", group, "confidence", final.confidence, in_page=shown)
+    if final.sigma is not None:
+        title = f"{variant}: standard deviation"
+        yield Panel(f"{variant}/sigma", title, group, "sigma", final.sigma, in_page=shown)
     for name, (title, kind) in kinds.items():
         if name in final.extra and (name != UNKNOWN or final.mask(name).any()):
             values = final.mask(name) if kind == "mask" else final.extra[name]

@@ -40,7 +40,7 @@ TABLES = (
     "table4_ablation",
     "ablation_best",
     "edges",
-    "confidence",
+    "error_bars",
     "stages",
     "runtime",
 )
@@ -49,7 +49,7 @@ TABLES = (
 COMPARISON_TABLES = ("methods", "table1_mse", "table2_q25", "table3_regions", "edges", "runtime")
 """Tables of the comparison with the methods that are computed here, in the order of its page."""
 
-RENDERED_TABLES = ("properties_mse", "properties_q25", "properties_badpix", "scenes_mse", "scenes_badpix")
+RENDERED_TABLES = ("properties_mse", "properties_q25", "properties_badpix", "scenes_mse", "scenes_badpix", "error_bars")
 """Tables of the rendered scenes, in the order of their page."""
 
 TEMPLATES = sorted(
@@ -156,11 +156,6 @@ class Plan:
         return tuple(name for name in TABLES if (name in PARTS_TABLES) == parts)
 
     @property
-    def tells_confidence(self) -> bool:
-        """Whether a table says what confidence is worth, which takes a look at every map."""
-        return "confidence" in self.tables()
-
-    @property
     def stages(self) -> list[str]:
         """Stages, in order."""
         return list(self.variants[MAIN_VARIANT])
@@ -219,7 +214,6 @@ class Plan:
         parts : bool
             The numbers of :data:`PARTS_TABLES`, instead of those of all other tables.
         """
-        last = self.stages[-1]
         files: list[Path] = []
         for dataset, scene in self.pairs:
             files.append(self.scores_file(dataset, scene, parts))
@@ -227,8 +221,6 @@ class Plan:
                 files += [self.stage_file(dataset, scene, variant, stage, "time.json") for stage in self.stages]
             if not parts:
                 files += [self.light_field_file(dataset, scene), self.truth_file(dataset, scene)]
-                compared = self.compared if self.tells_confidence else []
-                files += [self.stage_file(dataset, scene, variant, last) for variant in compared]
                 files += [self.external_file(dataset, scene)] if self.external else []
         return list(dict.fromkeys(files))
 

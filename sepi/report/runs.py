@@ -10,9 +10,12 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from sepi.errors import SepiError
 from sepi.io.scores import AllScores
 from sepi.report.plan import MAIN_VARIANT, Plan
+from sepi.scoring.error_bars import Reliability
 from sepi.scoring.scores import WHOLE_MAP
 
 Numbers = Mapping[str, Any]
@@ -70,10 +73,10 @@ class Runs:
         values = self._stage(dataset, scene, variant, stage)
         return Timing(values["seconds"], values["peak_memory_mb"])
 
-    def confidence(self, dataset: str, scene: str, variant: str) -> dict[str, list[float]]:
-        """``squared``, ``absolute``, ``curve`` and ``oracle`` of a final map that has scores."""
-        found: dict[str, list[float]] = _with_nan(self._scenes[dataset, scene]["confidence"][variant])
-        return found
+    def reliability(self, dataset: str, scene: str, variant: str) -> Reliability:
+        """How right the confidence of a final map is that has error bars and scores."""
+        found = _with_nan(self._stage(dataset, scene, variant, self.plan.stages[-1])["reliability"])
+        return Reliability(*(np.array(values, np.float64) for values in found))
 
     def external_scores(self, dataset: str, scene: str, method: str) -> AllScores:
         """Protocol to region to scores of another method's map; empty without a map that can be scored."""

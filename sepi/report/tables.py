@@ -14,8 +14,8 @@ from sepi.report.runs import Runs, read_numbers
 from sepi.report.tabular.ablation import ablation_table, parts_table
 from sepi.report.tabular.comparison import region_table, scene_table
 from sepi.report.tabular.computed_methods import computed_methods_table
-from sepi.report.tabular.confidence import confidence_table
 from sepi.report.tabular.edges import edge_table
+from sepi.report.tabular.error_bars import error_bar_table
 from sepi.report.tabular.latex import as_latex
 from sepi.report.tabular.layout import Report, as_csv, write
 from sepi.report.tabular.markdown import as_markdown
@@ -32,7 +32,7 @@ BUILDERS: dict[str, Callable[[Runs], Report]] = {
     "table4_ablation": ablation_table,
     "ablation_best": parts_table,
     "edges": edge_table,
-    "confidence": confidence_table,
+    "error_bars": error_bar_table,
     "stages": stage_table,
     "runtime": runtime_table,
     "properties_mse": lambda runs: property_table(runs, "mse100"),

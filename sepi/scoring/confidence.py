@@ -1,4 +1,4 @@
-"""What a confidence is worth: errors by decile of confidence, and sparsification curves [1]_.
+"""What an order of the pixels by confidence is worth: sparsification curves [1]_.
 
 References
 ----------
@@ -14,33 +14,10 @@ import numpy.typing as npt
 from sepi.lightfield import FloatMap
 from sepi.validation import require_type
 
-DECILES = 10
-
 STEPS = 100
 """Points of a sparsification curve."""
 
 FloatArray = npt.NDArray[np.float64]
-
-
-def decile_errors(confidence: FloatMap, error: FloatMap) -> tuple[FloatArray, FloatArray]:
-    """Errors of the tenths of the pixels, from the most confident to the least.
-
-    Parameters
-    ----------
-    confidence, error : ndarray, shape (H, W), float32
-        Pixels whose error is not finite are left out.
-
-    Returns
-    -------
-    squared, absolute : ndarray, shape (10,), float64
-        Mean squared and mean absolute error of each tenth, times 100; NaN where there is no pixel.
-    """
-    ordered = _by_confidence(confidence, error)
-    tenths = np.array_split(ordered, DECILES)
-    return (
-        np.array([100 * np.mean(tenth**2) if tenth.size else np.nan for tenth in tenths]),
-        np.array([100 * np.mean(np.abs(tenth)) if tenth.size else np.nan for tenth in tenths]),
-    )
 
 
 def sparsification(confidence: FloatMap, error: FloatMap) -> FloatArray:

@@ -23,6 +23,7 @@ from sepi.errors import SepiError
 from sepi.io.scores import AllScores, Scores
 from sepi.lightfield import BoolMap, FloatMap, LightField, require_light_field
 from sepi.scoring.edges import Edges, edges_of, fattening_and_thinning
+from sepi.scoring.error_bars import ErrorBars
 from sepi.validation import described, is_finite, require_map, require_type
 
 PROTOCOLS: dict[str, int] = {"paper": 0, "benchmark": 15}
@@ -87,6 +88,7 @@ def score(
     region: BoolMap | None = None,
     edges: Edges | None = None,
     thresholds: Sequence[float] = (),
+    bars: ErrorBars | None = None,
 ) -> Scores:
     """Scores of a disparity map: those of the paper (section V) and of the HCI 4D light field benchmark [1]_.
 
@@ -102,6 +104,8 @@ def score(
         Those of the ground truth, which are found unless given.
     thresholds : sequence of float
         Further errors in pixels per view step above which a pixel is bad: 0.5 gives the score ``badpix_0.5``.
+    bars : ErrorBars, optional
+        Those of the estimate (:class:`sepi.scoring.error_bars.ErrorBars`), to be scored, too.
 
     Returns
     -------
@@ -110,7 +114,7 @@ def score(
         error, not interpolated; ``badpix007``, ``badpix003``, ``badpix001``: percentage of pixels with a larger error
         than 0.07, 0.03, 0.01, a non-finite estimate being one; ``fattening``, ``thinning``: as
         :func:`sepi.scoring.edges.fattening_and_thinning`; ``non_finite``, ``pixels``: counts. A score over no pixels is
-        NaN.
+        NaN. Of error bars those of :data:`sepi.scoring.error_bars.ERROR_BAR_SCORES`, too.
 
     Raises
     ------
@@ -154,7 +158,7 @@ def score(
     edge_scores = fattening_and_thinning(estimate, edges or edges_of(ground_truth), chosen)
     scores |= dict(zip(EDGE_SCORES, edge_scores, strict=True))
     scores |= {"non_finite": int(np.count_nonzero(~finite)), "pixels": error.size}
-    return scores
+    return scores if bars is None else scores | bars.scores(estimate, ground_truth, chosen)
 
 
 def score_regions(
@@ -165,6 +169,7 @@ def score_regions(
     edges: Edges | None = None,
     within: BoolMap | None = None,
     thresholds: Sequence[float] = (),
+    bars: ErrorBars | None = None,
 ) -> AllScores:
     """Scores of a disparity map by every protocol and over every region.
 
@@ -182,6 +187,8 @@ def score_regions(
         The pixels that count in every region, such as those of a crop (:func:`sepi.scoring.crops.in_frame`); all
         unless given.
     thresholds : sequence of float
+        As :func:`score` takes them.
+    bars : ErrorBars, optional
         As :func:`score` takes them.
 
     Returns
@@ -217,7 +224,7 @@ def score_regions(
         regions = {name: within if mask is None else within & mask for name, mask in regions.items()}
     return {
         protocol: {
-            name: score(estimate, ground_truth, border, mask, edges, thresholds) for name, mask in regions.items()
+            name: score(estimate, ground_truth, border, mask, edges, thresholds, bars) for name, mask in regions.items()
         }
         for protocol, border in protocols.items()
     }

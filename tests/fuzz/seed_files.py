@@ -270,8 +270,12 @@ LIGHT_FIELD = LightField(
     notes=("one", "two"),
     positions=np.indices((2, 3)).transpose(1, 2, 0).astype(np.float64),
 )
-MAPS = StageMaps(MAP, abs(MAP) / 2, {"unknown": MASK, "view_subset": MASK.astype(np.uint8)}, ("all", "left"))
-EVALUATION = Evaluation({"paper": {"all": {"mse": 1.5}}}, MAP, {"all": MASK}, {"all": "scene"})
+ERROR_BARS = {"sigma": abs(MAP), "low": MAP - 1, "high": MAP + 1}
+MAPS = StageMaps(
+    MAP, abs(MAP) / 2, {"unknown": MASK, "view_subset": MASK.astype(np.uint8), **ERROR_BARS}, ("all", "left")
+)
+RELIABILITY = np.arange(30.0).reshape(3, 10)
+EVALUATION = Evaluation({"paper": {"all": {"mse": 1.5}}}, MAP, {"all": MASK}, {"all": "scene"}, RELIABILITY)
 # what sepi.io.provenance reads of a stage file
 _HISTORY = {"stage": "initial", "choice": "sepi", "parameters": '{"a": 1}', "made_from": '[{"stage": "none"}]'}
 

@@ -11,6 +11,7 @@ from mutations import MAT, PNG
 
 from sepi.errors import SepiError
 from sepi.io.disparity_maps import TruthFile, is_disparity, read_disparity
+from sepi.io.error_bars import read_error_bars
 from sepi.io.external_maps import read_external
 from sepi.io.hdf5 import read_light_field as read_own
 from sepi.io.hdf5 import read_stage
@@ -69,6 +70,7 @@ def _map_with_scale(path: Path) -> None:
 
 def _truth(path: Path) -> None:
     TruthFile(path, 0.1).read()
+    assert TruthFile(path, 0.1).step in (0, 0.1)
 
 
 def _submission(path: Path) -> None:
@@ -97,7 +99,7 @@ TARGETS: dict[str, Target] = {
     "map-npy": Target("a.npy", seeds.npy_map_files, _each(_map, _map_with_scale, _truth)),
     "map-png": Target("a.png", texts.map_png_files, _each(_map, _map_with_scale, _truth), wrappings=PNG),
     "map-tiff": Target("a.tif", seeds.tiff_map_files, _each(_map, _map_with_scale, _truth)),
-    "map-hdf5": _hdf5(seeds.hdf5_map_files, _map),
+    "map-hdf5": _hdf5(seeds.hdf5_map_files, _map, read_error_bars),
     "hci-parameters": Target("parameters.cfg", texts.parameter_files, texts.read_parent, seeds.hci_pictures),
     "hci-mask": Target("mask_occluded.png", seeds.mask_files, texts.read_parent, seeds.hci_folder, wrappings=PNG),
     "hci-truth": Target("gt_disp_lowres.pfm", seeds.pfm_files, texts.read_parent, seeds.hci_folder),
@@ -113,7 +115,7 @@ TARGETS: dict[str, Target] = {
     "looked-at": Target("a.npy", texts.larger_npy_files, read_light_field),
     "own-light-field": _hdf5(seeds.own_light_field_files, read_own, _light_field),
     "stage": _hdf5(seeds.stage_files, read_stage, history_of, read_origin),
-    "result": _hdf5(seeds.result_files, read_result, read_origin, _map),
+    "result": _hdf5(seeds.result_files, read_result, read_origin, read_error_bars, _map),
     "scores": _hdf5(seeds.score_files, read_evaluations, read_scores),
     "external-maps": _hdf5(seeds.external_files, read_external, lambda path: read_external(path, with_maps=False)),
     "submission": Target("a.zip", seeds.submission_files, _submission, wrappings=(seeds.SUBMISSION,)),

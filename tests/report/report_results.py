@@ -44,6 +44,9 @@ VARIANT_ERROR = {
     "spo": 0.1,
 }
 SCENE_ERROR = {"dots": 0.0, "flat": 0.1, "cotton": 0.0, "mine": 0.1, "picture": 0.0}
+# error bars of final maps, of all variants but one: how far intervals reach
+SIGMA, BELOW, ABOVE = 0.1, 0.15, 0.05
+WITHOUT_BARS = "spo"
 # rendered scenes: the rows that are glossy, and what is added to the ground truth
 GLOSSY = {"sticks": 5, "foliage": 20, "sticks_low": 5, "sticks_low_2": 5, "foliage_low": 20, "foliage_low_2": 20}
 SCENE_ERROR |= {"sticks": 0, "foliage": 0.2, "sticks_low": 0.1, "sticks_low_2": 0.3}
@@ -86,6 +89,9 @@ def stage_maps(scene: LightField, variant: str, stage: str) -> StageMaps:
         "textureless": scene.masks["textureless"],
         "superpixels": (np.indices(scene.shape) // 10).sum(0).astype(np.int32),
     }
+    if stage == "optimize" and variant != WITHOUT_BARS:
+        disparity, ones = ground_truth + step, np.ones(scene.shape, np.float32)
+        extra |= {"sigma": SIGMA * ones, "low": disparity - np.float32(BELOW), "high": disparity + np.float32(ABOVE)}
     return StageMaps(ground_truth + step, np.full(scene.shape, 0.5, np.float32), extra)
 
 
@@ -106,8 +112,7 @@ def with_results(made: Plan) -> Plan:
         folder = made.files(dataset, name).stages
         for parts in (False,) if made.report else (False, True):
             files = made.scored_files(dataset, name, parts)
-            disparity = {map_name(folder, file): read_stage(file).disparity for file in files}
-            scored = evaluations_of(scene, disparity)
+            scored = evaluations_of(scene, {map_name(folder, file): read_stage(file) for file in files})
             write_scores(made.scores_file(dataset, name, parts), scored, {"scene": name})
         if made.external:
             maps = {method: external_map(scene, EXTERNAL[method][name]) for method in made.external}

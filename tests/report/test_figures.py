@@ -29,7 +29,7 @@ def test_pictures_of_a_scene(plan: Plan, tmp_path: Path) -> None:
         "discontinuities_ground_truth.png",
     }
     stages = {"1_initial", "2_occlusion", "3_textureless", "4_optimize"}
-    each = stages | {"error", "confidence", "occluded", "textureless", "superpixels"}
+    each = stages | {"error", "confidence", "sigma", "occluded", "textureless", "superpixels"}
     common |= {"paper/sparsification.png", "pixels.png"}
     common |= {f"{variant}/change.png" for variant in VARIANTS if variant != "paper"}
     assert written == common | {f"{variant}/{name}.png" for variant in VARIANTS for name in each}

@@ -31,9 +31,7 @@ def test_numbers_read_their_declared_inputs_and_no_others(parts: bool, complete:
         away.rename(path)
 
 
-@pytest.mark.parametrize(
-    "ending", ["lightfield.h5", "truth.h5", "scores.h5", "time.json", "optimize.h5", "external.h5"]
-)
+@pytest.mark.parametrize("ending", ["lightfield.h5", "truth.h5", "scores.h5", "time.json", "external.h5"])
 @pytest.mark.parametrize("content", [None, b"", b"[1]"])
 def test_a_missing_or_broken_file_is_one_line(
     ending: str, content: bytes | None, complete: Plan, tmp_path: Path
@@ -104,8 +102,9 @@ def test_numbers_say_what_they_are_of(complete: Plan, tmp_path: Path) -> None:
     first = scene["stages"]["sepi"]
     assert (first["stage"], first["seconds"], first["peak_memory_mb"]) == ("initial", 1.5, 270)
     assert first["scores"]["paper"]["all"]["mse100"] == pytest.approx(16)
-    lengths = {name: len(values) for name, values in scene["confidence"]["best"].items()}
-    assert lengths == {"squared": 10, "absolute": 10, "curve": 100, "oracle": 100}
+    pixels, said, shares = scene["stages"][complete.stage_key("best", "optimize")]["reliability"]
+    assert (pixels[5], said[5], shares[5]) == (SIZE**2, 0.5, 1.0)
+    assert first["reliability"] is None, "no final map"
     spo = scene["external"]["SPO"]
     assert (spo["problem"], spo["source"], spo["sha256"]) == ("", "/maps/some.pfm", 64 * "a")
     assert spo["scores"]["benchmark"]["all"]["mse100"] == pytest.approx(4)

@@ -16,8 +16,8 @@ def test_variants_share_the_files_of_their_first_stages(plan: Plan) -> None:
     files = [plan.stage_file("hci", "cotton", variant, "initial") for variant in VARIANTS]
     assert len(set(files)) == 1
     assert files[0] == plan.results / "hci/cotton/stages/sepi/initial.h5"
-    # of each scene: scores, times of nine stages, light field and ground truth, and the paper's final maps
-    assert len(plan.number_inputs()) == 5 * (1 + 2 + 3 * 3 - 1 + 2)
+    # of each scene: scores, times of nine stages, light field and ground truth
+    assert len(plan.number_inputs()) == 5 * (1 + 9 + 2)
 
 
 def test_a_stage_that_hands_its_maps_on_has_no_file() -> None:

@@ -42,6 +42,18 @@ def test_pixels_of_all_scenes_count_alike(found: dict[str, Any]) -> None:
     assert {"mirror", "discontinuities"}.isdisjoint(report_of(found, "properties_mse").heads)
 
 
+def test_intervals_are_told_by_noise_and_property(found: dict[str, Any]) -> None:
+    """Coverage beside width; scenes of unlike noise are not pooled. Best is off by 0.05 and, on foliage, 0.25."""
+    rows = [row for row in csv_rows(found, "error_bars") if row["variant"] == "best"]
+    row = only(rows, scene="all scenes, noise off", region="glossy")
+    assert float(row["coverage"]) == pytest.approx(20)
+    assert float(row["width"]) == pytest.approx(0.2, abs=1e-4)
+    assert {row["scene"] for row in rows if row["scene"].startswith("all")} == {
+        "all scenes, noise off",
+        "all scenes, noise low",
+    }
+
+
 def test_several_seeds_tell_how_far_scores_vary(found: dict[str, Any]) -> None:
     """Of seed 1 errors are 0.2 and 0.3, of seed 2 0.4 and 0.5; without noise there is one light field alone."""
     low, off = (only(csv_rows(found, "properties_mse"), noise=noise, method="paper") for noise in ("low", "off"))

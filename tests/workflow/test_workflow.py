@@ -338,7 +338,7 @@ class TestReport:
             "table4_ablation",
             "stages",
             "runtime",
-            "confidence",
+            "error_bars",
         ):
             for ending in ("csv", "md", "tex"):
                 assert (reports / f"{table}.{ending}").stat().st_size > 0
@@ -347,7 +347,7 @@ class TestReport:
             rows = [row for row in csv.DictReader(file) if row["pixels"] != "0"]
         assert all(0 < float(row["badpix_0.25"]) <= float(row["badpix007"]) for row in rows if row["region"] == "all")
         assert re.search(r"BadPix 0.07 [\d.]+ %,\\nBadPix 0.25 [\d.]+ %", page)
-        figures = [reports / "figures" / name for name in ("ablation", "time_and_memory")]
+        figures = [reports / "figures" / name for name in ("ablation", "time_and_memory", "error_bars")]
         figures += [reports / "maps/builtin/dots" / name for name in ("overview", "pixels", "best/sparsification")]
         for figure in figures:
             assert figure.with_suffix(".png").read_bytes().startswith(b"\x89PNG")

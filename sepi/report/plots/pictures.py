@@ -23,6 +23,12 @@ Picture = npt.NDArray[np.uint8]
 ERROR_LIMIT = 0.2
 """Error in pixels per view step at the ends of the colour scale of error maps, the same in all of them."""
 
+SIGMA_LIMITS = (-3.0, 0.0)
+"""Logarithms to base 10 of the standard deviations at the ends of their colour scale, pixels per view step."""
+
+# smaller ones are told as this
+_LEAST = 1e-4
+
 # ends of the scale of errors: too far and too near; blue and red-brown are told apart by every kind of eye
 _FAR, _NEAR = (0, 62, 150), (150, 40, 0)
 
@@ -86,6 +92,8 @@ def panel_picture(panel: Panel, view: Picture, limits: tuple[float, float]) -> P
         return mask_picture(view, values)
     if panel.kind == "outline":
         return outline_picture(view, values)
+    if panel.kind == "sigma":
+        return map_picture(logarithms(values), SIGMA_LIMITS, "gray")
     if panel.kind in ("confidence", "grey"):
         return map_picture(values, (0, 1), "gray")
     if minus is None:
@@ -103,6 +111,12 @@ def map_picture(values: FloatMap, limits: tuple[float, float], scale: str | Colo
     chosen = colormaps[scale] if isinstance(scale, str) else scale
     colours: npt.NDArray[Any] = chosen.with_extremes(bad=_UNKNOWN)(np.clip(unit, 0, 1), bytes=True)
     return colours[:, :, :3].astype(np.uint8)
+
+
+def logarithms(values: FloatMap) -> FloatMap:
+    """Logarithms to base 10 of a map (H, W) of positive numbers, at least -4; NaN where it is not finite."""
+    known = np.where(np.isfinite(values), np.maximum(values, np.float32(_LEAST)), np.float32(np.nan))
+    return np.asarray(np.log10(known), np.float32)
 
 
 def error_picture(error: FloatMap) -> Picture:

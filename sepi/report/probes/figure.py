@@ -23,7 +23,7 @@ _QUARTER = "#999999"
 # disparities of final maps: colour, dashes, width and name; narrow upon wide, since they often coincide
 _MARKS: dict[str, tuple[str, Literal["-", "--", ":"], float, str]] = {
     "chosen": ("#0072B2", "-", 3.0, "chosen (final map)"),
-    "best": ("#CC79A7", "--", 1.6, "variant best"),
+    "best": ("#CC79A7", "--", 1.6, "variant best, 90 % interval"),
     "ground_truth": ("#000000", ":", 1.2, "ground truth"),
 }
 _PIXEL = "#F0E442"
@@ -148,6 +148,8 @@ def _draw_curves(axes: Axes, found: Probe, last: bool) -> None:
         if value is not None:
             axes.axvline(value, color=colour, linestyle=dashes, linewidth=width, zorder=1)
     curves = found.curves
+    if found.interval is not None:
+        axes.axvspan(*found.interval, color=_MARKS["best"][0], alpha=0.15, linewidth=0, zorder=0)
     for name, cost in zip(curves.names, curves.costs, strict=True):
         if name not in _CURVES and name != found.kept_subset:
             continue

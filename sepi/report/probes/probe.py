@@ -77,6 +77,8 @@ class Probe:
         Views of that subset that are present.
     best : float or None
         Disparity in the final map of the most accurate variant, if it was given.
+    interval : (float, float) or None
+        What holds the disparity with a probability of 90 % by that variant's error bars, where it has some.
     ground_truth : float or None
         None where it is unknown.
     confidence : float
@@ -94,6 +96,7 @@ class Probe:
     kept_subset: str
     kept: BoolMap
     best: float | None
+    interval: tuple[float, float] | None
     ground_truth: float | None
     confidence: float
     occluded: bool
@@ -206,6 +209,7 @@ def probe(
         kept_subset=views.names[number],
         kept=views.subsets[number][views.groups] & light_field.present,
         best=None if best is None else _finite(best.disparity[y, x]),
+        interval=None if best is None else _interval(best, y, x),
         ground_truth=ground_truth,
         confidence=float(maps.confidence[y, x]),
         occluded=bool(maps.mask("occluded")[y, x]),
@@ -244,6 +248,7 @@ def to_json(found: Probe) -> dict[str, Any]:
         "kept_subset": found.kept_subset,
         "kept": "".join("01"[int(view)] for view in found.kept.ravel()),
         "best": _short(found.best),
+        "interval": None if found.interval is None else [_short(end) for end in found.interval],
         "ground_truth": _short(found.ground_truth),
         "confidence": _short(found.confidence),
         "occluded": found.occluded,
@@ -254,6 +259,12 @@ def to_json(found: Probe) -> dict[str, Any]:
         },
         "patch": picture_uri(found.patch, "png", _PNG),
     }
+
+
+def _interval(maps: StageMaps, y: int, x: int) -> tuple[float, float] | None:
+    if maps.low is None or maps.high is None:
+        return None
+    return float(maps.low[y, x]), float(maps.high[y, x])
 
 
 def _finite(value: float) -> float | None:

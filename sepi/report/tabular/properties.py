@@ -104,7 +104,7 @@ def _report(runs: Runs, title: str, caption: str, heads: Mapping[str, str], figu
     spreads = [f"{key}_sd" for key in heads] if any(len(seeds) > 1 for seeds in levels.values()) else []
     return Report(
         title,
-        f"{methods.PROTOCOL_NOTE} {caption}{_split(runs)}"
+        f"{methods.PROTOCOL_NOTE} {caption}{split_note(runs)}"
         + (f" {methods.EXTERNAL_NOTE}" if runs.plan.external else ""),
         ["noise", "seeds", "method", *heads, *spreads],
         records,
@@ -113,7 +113,7 @@ def _report(runs: Runs, title: str, caption: str, heads: Mapping[str, str], figu
     )
 
 
-def _split(runs: Runs) -> str:
+def split_note(runs: Runs) -> str:
     """Which scenes parameters may be chosen on."""
     worlds = dict.fromkeys(scene.world for scene in _scenes(runs))
     parts = (("For choosing parameters", True), ("held out from that", False))

@@ -15,12 +15,16 @@ from sepi.report.page import SCRIPTS, colour_scales, embedded_scenes, environmen
 from sepi.report.panels import Panel
 from sepi.report.tabular.layout import BEST, Column, Entry, Kind, Line, Section, entry
 from sepi.report.web.viewer import viewer_json
+from sepi.scoring.error_bars import ERROR_BAR_SCORES, ErrorBars
 from sepi.scoring.scores import COUNTS, EDGE_SCORES, SCORES, region_masks, score_regions
+from sepi.stage import StageMaps
 
 # part of the pixels beyond each end of the colour scale, so that a few wrong ones do not use it up
 _BEYOND = 0.005
 
 _SHOWN = ("mse100", "q25", "badpix007", "fattening", "thinning", "non_finite")
+# of intervals neither the widest nor the narrowest are best
+_WITH_BARS = ("coverage", "width")
 
 
 @dataclass(frozen=True)
@@ -35,12 +39,18 @@ class Comparison:
     ground_truth : ndarray, shape (H, W), float32, or None
     light_field : LightField or None
         Gives the reference view and the regions.
+    bars : (StageMaps or None, StageMaps or None)
+        The maps with error bars and confidence, of those that have any.
+    truth_step : float
+        What the ground truth is a multiple of, pixels per view step; 0 unless it is rounded.
     """
 
     names: tuple[str, str]
     maps: tuple[FloatMap, FloatMap]
     ground_truth: FloatMap | None = None
     light_field: LightField | None = None
+    bars: tuple[StageMaps | None, StageMaps | None] = (None, None)
+    truth_step: float = 0.0
 
     @cached_property
     def scores(self) -> dict[str, AllScores]:
@@ -48,7 +58,16 @@ class Comparison:
         if self.ground_truth is None:
             return {}
         masks = None if self.light_field is None else region_masks(self.light_field)
-        scores = [score_regions(values, self.ground_truth, masks) for values in self.maps]
+        reach = None if self.light_field is None else self.light_field.reach
+        scores = [
+            score_regions(
+                values,
+                self.ground_truth,
+                masks,
+                bars=None if bars is None else ErrorBars.of(bars, reach, self.truth_step),
+            )
+            for values, bars in zip(self.maps, self.bars, strict=True)
+        ]
         return dict(zip(self.names, scores, strict=True))
 
 
@@ -83,9 +102,13 @@ def _panels(found: Comparison) -> Iterator[Panel]:
         yield Panel("reference_view", "reference view", "Scene", "picture")
     if ground_truth is not None:
         yield Panel("ground_truth", "ground truth", "Scene", "disparity", ground_truth, precise=True)
-    for key, name, values in zip("ab", found.names, maps, strict=True):
-        yield Panel(key, name, "Maps", "disparity", values, precise=True)
+    for key, name, values, bars in zip("ab", found.names, maps, found.bars, strict=True):
+        confidence = None if bars is None else bars.confidence
+        yield Panel(key, name, "Maps", "disparity", values, confidence=confidence, bars=bars, precise=True)
     yield Panel("difference", f"{a} minus {b}", "Maps", "error", maps[0], minus=maps[1])
+    for key, name, bars in zip("ab", found.names, found.bars, strict=True):
+        if bars is not None:
+            yield Panel(f"{key}/sigma", f"{name}: standard deviation", "Error bars", "sigma", bars.sigma)
     if ground_truth is not None:
         for key, name, values in zip("ab", found.names, maps, strict=True):
             yield Panel(f"{key}/error", f"{name}: error", "Errors", "error", values, minus=ground_truth)
@@ -116,23 +139,27 @@ def _score_section(found: Comparison) -> dict[str, Any] | None:
     """A table for the page: a row per protocol and region, each score of both maps, the better one marked."""
     if not found.scores:
         return None
-    heads = SCORES | EDGE_SCORES | COUNTS
+    heads = SCORES | EDGE_SCORES | ERROR_BAR_SCORES | COUNTS
+    with_bars = any(bars is not None for bars in found.bars)
+    shown = (*_SHOWN, *_WITH_BARS) if with_bars else _SHOWN
     columns = [Column("protocol", Kind.TEXT), Column("region", Kind.TEXT)]
-    columns += [Column(f"{heads[name]}, {title}", Kind.OURS) for name in _SHOWN for title in found.names]
+    columns += [Column(f"{heads[name]}, {title}", Kind.OURS) for name in shown for title in found.names]
     rows = []
     one, other = found.scores.values()
     for protocol, regions in one.items():
         for region in regions:
             cells = [entry(protocol, Kind.TEXT), entry(region, Kind.TEXT)]
-            for name in _SHOWN:
-                pair = [one[protocol][region][name], other[protocol][region][name]]
-                cells += [_cell(value, pair) for value in pair]
+            for name in shown:
+                pair = [scores[protocol][region].get(name) for scores in (one, other)]
+                cells += [_cell(value, pair, ranked=name not in _WITH_BARS) for value in pair]
             rows.append(Line(cells))
     return asdict(Section("", columns, rows))
 
 
-def _cell(value: float, pair: list[float]) -> Entry:
+def _cell(value: float | None, pair: list[float | None], ranked: bool) -> Entry:
+    if value is None:
+        return Entry("no interval", None, Kind.OURS)
     known = not np.isnan(value)
     text = "n/a" if not known else str(value) if isinstance(value, int) else f"{value:.3f}"
-    better = known and value == min(pair) and pair[0] != pair[1]
+    better = ranked and known and value == min(one for one in pair if one is not None) and pair[0] != pair[1]
     return Entry(text, value if known else None, Kind.OURS, BEST if better else None)

@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from sepi.lightfield import LightField
 from sepi.report.panels import Panel
-from sepi.report.plots.pictures import ERROR_LIMIT, outlines, picture_uri, reference_picture
+from sepi.report.plots.pictures import ERROR_LIMIT, SIGMA_LIMITS, logarithms, outlines, picture_uri, reference_picture
 from sepi.report.web.packing import packed
 
 STEPS = (
@@ -30,12 +30,14 @@ STEPS = (
 """Steps of precise maps, of confidences and of other maps, from the finest; a page has the first of them that
 keep a scene within its share."""
 
-PRECISE, CONFIDENCE, OTHER, MASK = range(4)
-"""What an array is held for: its place in a row of :data:`STEPS`. A mask has steps of 1."""
+PRECISE, CONFIDENCE, OTHER, MASK, LOGARITHM = range(5)
+"""What an array is held for: its place in a row of :data:`STEPS`. A mask has steps of 1, a logarithm those of 12 %."""
+
+_FIXED = (1.0, 0.05)
 
 # characters for each pixel of an array, on average: ten scenes of 512x512 and the page round them stay below 20 MB; a
 # small scene may take as much as one of 512x512
-_SHARE = 0.275
+_SHARE = 0.255
 _LEAST_PIXELS = 2**18
 
 # larger pictures are thinned out, so that a browser can hold all their maps
@@ -64,10 +66,12 @@ class _Arrays:
         self.held[key] = (values, min(role, before))
         return list(self.held).index(key)
 
-    def packed(self, budget: float) -> list[dict[str, Any]]:
-        """All arrays, in the finest steps that keep them within a number of characters, or the coarsest."""
+    def packed(self, pixels: int) -> list[dict[str, Any]]:
+        """All arrays, in the finest steps that keep them within their shares of characters, or the coarsest."""
+        # error bars have no share: a page does not grow by them, other maps are a little coarser where it is full
+        budget = _SHARE * pixels * sum(role != LOGARITHM for _, role in self.held.values())
         for steps in STEPS:
-            found = [packed(values, (*steps, 1.0)[role]) for values, role in self.held.values()]
+            found = [packed(values, (*steps, *_FIXED)[role]) for values, role in self.held.values()]
             if sum(len(array["data"]) for array in found) <= budget:
                 break
         return found
@@ -99,25 +103,28 @@ def viewer_json(
         "stride": stride,
         "limits": list(limits),
         "error_limit": ERROR_LIMIT,
+        "sigma_limits": list(SIGMA_LIMITS),
         "camera": None if light_field is None else _camera(light_field),
         "picture": "" if picture is None else picture_uri(picture, "webp", _WEBP),
         "panels": entries,
-        "arrays": arrays.packed(_SHARE * max(_LEAST_PIXELS, height * width) * len(arrays.held)),
+        "arrays": arrays.packed(max(_LEAST_PIXELS, height * width)),
     }
 
 
 def _entry(panel: Panel, arrays: _Arrays) -> dict[str, Any]:
     """A panel with the numbers of its arrays, without what it does not have."""
     entry: dict[str, Any] = {"key": panel.key, "title": panel.title, "group": panel.group, "kind": panel.kind}
-    entry |= {name: text for name, text in (("note", panel.note), ("ends", panel.ends)) if text}
-    role = {"mask": MASK, "outline": MASK, "confidence": CONFIDENCE}.get(
+    texts = {"note": panel.note, "ends": panel.ends, "no_interval": panel.no_interval}
+    entry |= {name: text for name, text in texts.items() if text}
+    role = {"mask": MASK, "outline": MASK, "confidence": CONFIDENCE, "sigma": LOGARITHM}.get(
         panel.kind, PRECISE if panel.precise else OTHER
     )
     shown = {
-        "map": (panel.values, role),
+        "map": (logarithms(panel.values) if panel.kind == "sigma" and panel.values is not None else panel.values, role),
         "minus": (panel.minus, OTHER),
         "ground_truth": (panel.ground_truth, OTHER),
         "confidence": (panel.confidence, CONFIDENCE),
+        **_bars(panel),
     }
     for name, (values, held_for) in shown.items():
         if values is not None:
@@ -126,6 +133,19 @@ def _entry(panel: Panel, arrays: _Arrays) -> dict[str, Any]:
             thinned = outlines(thinned) if panel.kind == "outline" else thinned
             entry[name] = arrays.number(thinned, held_for)
     return entry
+
+
+def _bars(panel: Panel) -> dict[str, tuple[npt.NDArray[Any], int]]:
+    """The logarithms of a standard deviation, and of how many of these the interval reaches below and above a map.
+
+    As such they are nearly the same everywhere, and take a fourth of the characters that widths would.
+    """
+    values, bars = panel.values, panel.bars
+    if values is None or bars is None or bars.sigma is None or bars.low is None or bars.high is None:
+        return {}
+    sigma, below, above = (logarithms(widths) for widths in (bars.sigma, values - bars.low, bars.high - values))
+    found = {"sigma": sigma, "below": below - sigma, "above": above - sigma}
+    return {name: (logarithm, LOGARITHM) for name, logarithm in found.items()}
 
 
 def _camera(light_field: LightField) -> dict[str, Any] | None:

@@ -177,12 +177,14 @@ def test_probe_tells_what_the_maps_say():
     side[20, 30] = 2
     flag = side > 0
     maps = made_maps(light_field, view_subset=side, occluded=flag, textureless=~flag)
-    best = StageMaps(np.full((60, 60), 0.625, np.float32), maps.confidence)
+    bars = dict(zip(("sigma", "low", "high"), (0.1 * np.ones((60, 60)), side / 8, np.ones((60, 60))), strict=True))
+    best = StageMaps(np.full((60, 60), 0.625, np.float32), maps.confidence, bars)
     parameters = SweepParameters(num_disparities=41)
     pixel = InterestingPixel(20, 30, "here")
     found = probe(light_field, pixel, maps=maps, best=best, parameters=parameters)
     assert found.pixel == pixel
     assert (found.chosen, found.best, found.ground_truth, found.confidence) == (0.5, 0.625, 0.5, 0.75)
+    assert (found.interval, to_json(found)["interval"]) == ((0.25, 1.0), [0.25, 1.0])
     assert found.curves.minimum()[0] == pytest.approx(0.5, abs=0.02)
     assert found.occluded
     assert not found.textureless

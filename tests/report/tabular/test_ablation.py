@@ -1,8 +1,7 @@
-"""Table 4 and the ablation of variant best, with the errors by confidence."""
+"""Table 4 and the ablation of variant best."""
 
 from typing import Any
 
-import pytest
 from report_results import VARIANTS, csv_rows, markdown, numbers_of, only
 
 from sepi.report.plan import Plan
@@ -35,11 +34,3 @@ def test_best_has_an_ablation_of_its_own(complete: Plan) -> None:
         ("best", "0.2500", "6.0000"),
         ("best_wls", "16.0000", "6.0000"),
     ]
-
-
-def test_errors_by_confidence(complete: Plan) -> None:
-    rows = csv_rows(numbers_of(complete), "confidence")
-    assert {row["variant"] for row in rows} == {"best", "paper"}
-    row = only(rows, variant="best", error="mae100")
-    assert float(row["decile 1"]) == pytest.approx(5, abs=1e-3)
-    assert float(row["area"]) == pytest.approx(float(row["oracle"]), abs=1e-3)

@@ -24,10 +24,12 @@ from sepi.report.figures import page_json
 from sepi.report.graph import drawn
 from sepi.report.page import embedded, prose, read_scene
 from sepi.report.panels import Kind, Panel, SceneResults, note_of, panels_of
+from sepi.report.plots.error_bars import write_error_bars
 from sepi.report.runs import Runs
 from sepi.report.web import page_data
 from sepi.report.web.viewer import CONFIDENCE, OTHER, PRECISE, STEPS, viewer_json
 from sepi.scoring.scores import REGIONS
+from sepi.stage import StageMaps
 
 LARGEST_PAGE = 20_000_000
 """Bytes that a page of ten scenes of 512x512 may have."""
@@ -127,8 +129,16 @@ def test_ten_noisy_scenes_stay_below_20_megabytes(noise: float, outliers: float,
     def confidence() -> FloatMap:
         return (blobs() + random.normal(0, 0.05, shape)).clip(0, 1).astype(np.float32)
 
+    def with_bars(shown: Panel) -> Panel:
+        assert shown.values is not None
+        sigma = (10 ** (blobs() / 2 - 2) * random.uniform(0.9, 1.1, shape)).astype(np.float32)
+        reach = 1.7 * sigma * (1 + blobs() / 9)
+        bars = {"sigma": sigma, "low": shown.values - reach, "high": shown.values + reach}
+        return replace(shown, bars=StageMaps(shown.values, sigma, bars))
+
     panels = [panel(0, ground_truth, precise=True)]
     panels += [panel(1 + number, estimate(), precise=number < 2) for number in range(16)]
+    panels[1:3] = [with_bars(shown) for shown in panels[1:3]]
     panels += [panel(17 + number, confidence(), "confidence") for number in range(2)]
     panels += [panel(19 + number, blobs() > 1, "mask") for number in range(6)]
     scene = len(json.dumps(viewer_json(panels, SCALE, a_light_field(picture))))
@@ -145,9 +155,9 @@ def test_panels_name_arrays_that_are_there(example: Example) -> None:
         keys = [shown["key"] for shown in scene["panels"]]
         assert len(set(keys)) == len(keys)
         kinds = {shown["kind"] for shown in scene["panels"]}
-        assert kinds <= {"picture", "disparity", "error", "change", "confidence", "grey", "mask", "outline"}
+        assert kinds <= {"picture", "disparity", "error", "change", "confidence", "sigma", "grey", "mask", "outline"}
         for shown in scene["panels"]:
-            for role in ("map", "minus", "ground_truth", "confidence"):
+            for role in ("map", "minus", "ground_truth", "confidence", "sigma", "below", "above"):
                 if role in shown:
                     is_mask = role == "map" and shown["kind"] in ("mask", "outline")
                     assert (scene["arrays"][shown[role]]["step"] == 1) == is_mask, (shown, role)
@@ -162,7 +172,14 @@ def test_a_scene_has_every_panel(example: Example) -> None:
     cotton = set(panels["cotton"])
     assert {"reference_view", "ground_truth", "occluded_ground_truth", "textureless_ground_truth", *stages} <= cotton
     assert {"paper/error", "best/error", "best/change", "external/SPO/disparity", "external/SPO/error"} <= cotton
-    assert {"paper/confidence", "best/confidence", "paper/superpixels", "paper/lti"} <= cotton
+    assert {
+        "paper/confidence",
+        "best/confidence",
+        "paper/sigma",
+        "best/sigma",
+        "paper/superpixels",
+        "paper/lti",
+    } <= cotton
     for kind, count in (("mask", 7), ("outline", 1), ("grey", 1)):
         assert sum(shown["kind"] == kind for shown in panels["cotton"].values()) == count, kind
     assert not any("external" in key for key in panels["dots"])
@@ -401,12 +418,13 @@ def test_the_first_scene(example: Example) -> None:
 def test_charts_are_written_twice_the_same(example: Example, tmp_path: Path) -> None:
     """Each as a picture to look at and as one for a paper."""
     numbers = numbers_file(tmp_path, example.numbers)
+    wanted = ("ablation", "time_and_memory", "error_bars")
     for name in ("one", "two"):
-        words = ["--numbers", numbers, "--chart", "ablation", "--chart", "time_and_memory", "--output", tmp_path / name]
+        words = ["--numbers", numbers, *(f"--chart={chart}" for chart in wanted), "--output", tmp_path / name]
         result = CliRunner().invoke(charts.command, list(map(str, words)), catch_exceptions=False)
         assert result.exit_code == 0, result.output
     one = tmp_path / "one"
-    names = {f"{name}.{ending}" for name in ("ablation", "time_and_memory") for ending in ("png", "pdf")}
+    names = {f"{name}.{ending}" for name in wanted for ending in ("png", "pdf")}
     assert {path.name for path in one.iterdir()} == names
     for path in one.iterdir():
         assert path.read_bytes() == (tmp_path / "two" / path.name).read_bytes(), path.name
@@ -421,5 +439,6 @@ def test_charts_are_written_twice_the_same(example: Example, tmp_path: Path) -> 
 def test_a_chart_without_a_scene_with_truth(example: Example, tmp_path: Path) -> None:
     """The rule promises the files: they come, and say why they are empty."""
     charts.write_bars(tmp_path, "ablation", [])
-    picture = cv2.imread(str(tmp_path / "ablation.png"))
-    assert (picture < 128).any()
+    write_error_bars(tmp_path, "error_bars", [], [])
+    for name in ("ablation", "error_bars"):
+        assert (cv2.imread(str(tmp_path / f"{name}.png")) < 128).any()

@@ -37,6 +37,9 @@ def test_a_pixel_that_the_configuration_asks_for_comes_first(page: Any, example:
     facts = part(page, "facts")
     for variant in ("paper", "best"):
         assert f"chosen by {variant}{example.final(COTTON, variant).disparity[y, x]:.3f}" in facts
+    interval = cotton_probes(example)[0]["interval"]
+    assert "90 % interval of best{:.3f} … {:.3f}".format(*interval) in facts
+    assert page.locator('[data-part="curves"] rect.interval').count() == 1
     ground_truth = example.light_field(COTTON).ground_truth
     assert ground_truth is not None
     assert f"ground truth{ground_truth[y, x]:.3f}" in facts

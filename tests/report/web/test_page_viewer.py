@@ -25,6 +25,7 @@ from browser import (
 )
 from page_example import COTTON, DOTS_TITLE, PICTURE, PICTURE_TITLE, SIZE, UNKNOWN, Example
 
+from sepi.matching.unknown import with_unknown
 from sepi.report.plots.pictures import disparity_limits, error_picture, map_picture
 
 # pixels (x, y): corners, edges, inside
@@ -143,11 +144,41 @@ def test_the_read_out_of_other_maps_is_right_within_their_step(page: Any, exampl
     assert (read_out(page)["value a"], read_out(page)["error a"]) == ("unknown", "unknown")
 
 
+def test_the_read_out_shows_the_interval(page: Any, example: Example) -> None:
+    """As the files hold it, within the steps of 12 % that the page keeps its widths in; a map without one says so."""
+    maps = with_unknown(example.light_field(COTTON), example.final(COTTON, "best"))
+    assert maps.sigma is not None
+    assert maps.low is not None
+    assert maps.high is not None
+    reaches = maps.high - maps.disparity, maps.disparity - maps.low
+    row, column = np.unravel_index(np.abs(reaches[0] - reaches[1]).argmax(), maps.low.shape)
+    for other in ("external/SPO/disparity", "paper/1_initial", "best/sigma"):
+        choose(page, a="best/4_optimize", b=other)
+        for x, y in (*PLACES, (int(column), int(row))):
+            point_at(page, x, y)
+            shown = read_out(page)
+            low, high = map(float, shown["interval a"].split(" … "))
+            value = maps.disparity[y, x]
+            # half a step of a logarithm is 6 %, of two 12 %; two digits of sigma are another 5 %
+            assert value - low == pytest.approx(value - maps.low[y, x], rel=0.125, abs=0.0011)
+            assert high - value == pytest.approx(maps.high[y, x] - value, rel=0.125, abs=0.0011)
+            assert float(shown["sigma a"]) == pytest.approx(maps.sigma[y, x], rel=0.12)
+            assert shown["sigma b"] == "–"
+            if other == "best/sigma":
+                assert (shown["value b"], shown["interval b"]) == (shown["sigma a"], "–")
+            else:
+                assert shown["interval b"] == "no interval"
+    legends = part(page, "legends")
+    assert "sure 0.001" in legends
+    assert "1 unsure" in legends
+
+
 def test_pictures_have_no_numbers(page: Any) -> None:
     choose(page, a="reference_view", b="occluded_ground_truth")
     point_at(page, 10, 10)
     shown = read_out(page)
-    assert {shown[f"{name} {side}"] for name in ("value", "error", "confidence") for side in "ab"} == {"–"}
+    names = ("value", "error", "confidence", "sigma", "interval")
+    assert {shown[f"{name} {side}"] for name in names for side in "ab"} == {"–"}
 
 
 def test_every_panel_of_the_grid_reads_out(page: Any, example: Example) -> None:

@@ -44,11 +44,13 @@ Sepi.Panels = class {
   scale(panel) {
     const limit = this.scene.error_limit;
     if (panel.kind === "error" || panel.kind === "change") return ["error", -limit, limit];
+    if (panel.kind === "sigma") return ["grey", ...this.scene.sigma_limits];
     if (panel.kind === "confidence" || panel.kind === "grey") return ["grey", 0, 1];
     return ["disparity", ...this.scene.limits];
   }
 
-  /** Numbers that a panel shows, as an array over the pixels; null for pictures and masks. */
+  /** Numbers that a panel shows, as an array over the pixels; null for pictures and masks. Those of a standard
+   * deviation are logarithms. */
   async values(panel) {
     if (Sepi.overView(panel)) return null;
     const map = await this.array(panel.map);
@@ -125,13 +127,9 @@ Sepi.legend = (panels, panel) => {
     error: ["too far", "too near"],
     change: ["degraded", "improved"],
     confidence: ["low", "high"],
+    sigma: ["sure", "unsure"],
     grey: ["low", "high"],
   }[panel.kind];
-  return Sepi.element(
-    "span",
-    { className: "legend" },
-    `${words[0]} ${low.toFixed(2)} `,
-    bar,
-    ` ${high.toFixed(2)} ${words[1]}`,
-  );
+  const [first, last] = [low, high].map((end) => (panel.kind === "sigma" ? `${10 ** end}` : end.toFixed(2)));
+  return Sepi.element("span", { className: "legend" }, `${words[0]} ${first} `, bar, ` ${last} ${words[1]}`);
 };

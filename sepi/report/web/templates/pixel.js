@@ -57,6 +57,7 @@ Sepi.Pixels = class {
       pixel: `x ${probe.x}, y ${probe.y} ([${probe.y}, ${probe.x}] in the configuration)`,
       "chosen by paper": value(probe.chosen),
       "chosen by best": value(probe.best),
+      "90 % interval of best": probe.interval?.map(value).join(" … ") ?? "none",
       "lowest cost": `${value(probe.minimum)} (all views); lowest of all subsets: ${Sepi.subset(probe.best_subset)}`,
       "ground truth": value(probe.ground_truth),
       confidence: value(probe.confidence),
@@ -149,6 +150,12 @@ Sepi.curves = (probe) => {
     text({ x: left - 6, y: top + 8, "text-anchor": "end" }, highest.toFixed(2)),
     text({ transform: `translate(12 ${(base + top) / 2}) rotate(-90)` }, "cost"),
   ];
+  // what lies beyond the candidates is not drawn
+  const ends = (probe.interval ?? []).map((d) => across(Math.max(low, Math.min(high, d ?? NaN))));
+  const band = ends.every(Number.isFinite) && ends.length ? [ends] : [];
+  const bands = band.map(([from, to]) =>
+    Sepi.shape("rect", { x: from, y: top, width: Math.max(1, to - from), height: base - top, class: "interval" }),
+  );
   // that of all views upon the others
   costs.sort(([one], [other]) => (one === "full") - (other === "full"));
   const lines = costs.map(([name, curve]) => {
@@ -173,7 +180,7 @@ Sepi.curves = (probe) => {
   return Sepi.element(
     "div",
     {},
-    Sepi.shape("svg", box, ...axes, ...lines, ...marks),
+    Sepi.shape("svg", box, ...bands, ...axes, ...lines, ...marks),
     Sepi.element("p", { className: "key" }, ...words),
   );
 };

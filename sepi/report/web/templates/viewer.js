@@ -92,7 +92,9 @@ Sepi.Viewer = class {
     for (const side of ["a", "b"]) {
       const panel = this.panels.get(keys[side]);
       shown[side] = { panel, picture: await this.panels.picture(panel.key), values: await this.panels.values(panel) };
-      if (panel.confidence !== undefined) shown[side].confidence = await this.panels.array(panel.confidence);
+      for (const name of ["confidence", "sigma", "below", "above"]) {
+        if (panel[name] !== undefined) shown[side][name] = await this.panels.array(panel[name]);
+      }
     }
     const groundTruth = this.panels.groundTruth && (await this.panels.array(this.panels.groundTruth.map));
     if (turn !== this.turn || keys.a !== this.key("a") || keys.b !== this.key("b")) return;
@@ -117,7 +119,8 @@ Sepi.Viewer = class {
 
   /** What is to be said of a panel: its scores, and how finely the page holds it. */
   small(panel) {
-    const steps = Sepi.overView(panel) ? "" : `held in steps of ${this.scene.arrays[panel.map].step}`;
+    const steps =
+      Sepi.overView(panel) || panel.kind === "sigma" ? "" : `held in steps of ${this.scene.arrays[panel.map].step}`;
     return [panel.note, steps].filter(Boolean).join("; ");
   }
 
@@ -207,7 +210,9 @@ Sepi.Viewer = class {
     show("ground_truth", this.groundTruth, panels.groundTruth?.map);
     for (const side of ["a", "b"]) {
       const { panel, values, confidence } = this.shown[side];
-      show(`value-${side}`, values, panel.map);
+      if (panel.kind === "sigma") this.part(`value-${side}`).textContent = this.spread(values);
+      else show(`value-${side}`, values, panel.map);
+      this.readOutBars(side);
       const compares = cursor && panel.kind === "disparity" && this.groundTruth && panel !== panels.groundTruth;
       show(`error-${side}`, compares && this.errors(side), panel.map);
       show(`confidence-${side}`, confidence, panel.confidence);
@@ -219,6 +224,27 @@ Sepi.Viewer = class {
     if (!cursor) return;
     marker.style.left = `${(100 * (this.cursor[0] + 0.5)) / this.scene.width}%`;
     marker.style.top = `${(100 * (this.cursor[1] + 0.5)) / this.scene.height}%`;
+  }
+
+  /** The pixel under the cursor of a map of logarithms, as the number itself. */
+  spread(logarithms) {
+    const value = this.cursor && logarithms?.[this.cursor[1] * this.scene.width + this.cursor[0]];
+    return Number.isNaN(value) ? "unknown" : Number.isFinite(value) ? `${Number((10 ** value).toPrecision(2))}` : "–";
+  }
+
+  /** Standard deviation and interval of what a side shows; a disparity that has none says so. */
+  readOutBars(side) {
+    const { panel, values, sigma, below, above } = this.shown[side];
+    const estimate = this.cursor && panel.kind === "disparity" && panel !== this.panels.groundTruth;
+    let interval = estimate && !sigma ? (panel.no_interval ?? "no interval") : "–";
+    this.part(`sigma-${side}`).textContent = sigma ? this.spread(sigma) : "–";
+    if (sigma && this.cursor) {
+      const place = this.cursor[1] * this.scene.width + this.cursor[0];
+      const reach = (sigmas) => 10 ** (sigma[place] + sigmas[place]);
+      const ends = [values[place] - reach(below), values[place] + reach(above)];
+      interval = ends.some(Number.isNaN) ? "unknown" : ends.map((end) => end.toFixed(3)).join(" … ");
+    }
+    this.part(`interval-${side}`).textContent = interval;
   }
 
   /** Errors of what a side shows, made when they are first read out. */

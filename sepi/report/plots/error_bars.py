@@ -1,0 +1,68 @@
+"""The chart of the error bars: is the confidence right, do intervals hold the truth, and how wide are they."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from sepi.report.plots.saving import new_figure, save
+from sepi.scoring.error_bars import ENOUGH, Reliability
+
+INTERVAL = 90
+"""Percent of the pixels whose truth an interval should hold."""
+
+# Okabe and Ito's colours, told apart by every kind of eye
+_COLOURS = ("#0072b2", "#e69f00", "#009e73")
+_MARKERS = ("o", "s", "^")
+
+
+@dataclass(frozen=True)
+class VariantBars:
+    """What the chart shows of a variant: over all scenes together, and for each of them, in the same order."""
+
+    variant: str
+    reliability: Reliability
+    coverage: Sequence[float]
+    width: Sequence[float]
+
+
+def write_error_bars(folder: Path, name: str, scenes: Sequence[str], variants: Sequence[VariantBars]) -> None:
+    """The reliability diagram beside coverage and width by scene; a sentence where no scene has both truth and bars."""
+    if not variants:
+        figure = new_figure(4.2, 1)
+        figure.text(0.5, 0.5, "no scene with ground truth and error bars", ha="center", va="center", fontsize=8)
+        save(figure, folder, name)
+        return
+    figure = new_figure(11, max(3.6, 1.4 + 0.24 * len(scenes)))
+    diagram, held, wide = figure.subplots(1, 3, width_ratios=(1.2, 1, 1))
+    held.sharey(wide)
+    diagram.plot([0, 1], [0, 1], color="0.6", linestyle="--", linewidth=1)
+    held.axvline(INTERVAL, color="0.6", linestyle="--", linewidth=1)
+    rows = np.arange(len(scenes))
+    for number, found in enumerate(variants):
+        colour, marker = _COLOURS[number % len(_COLOURS)], _MARKERS[number % len(_MARKERS)]
+        right = found.reliability
+        # what few pixels say is noise
+        enough = (right.pixels > 0) & (right.pixels >= ENOUGH * right.pixels.sum())
+        label = f"{found.variant}, largest gap {right.gap:.1f} %"
+        diagram.plot(right.said[enough], right.found[enough], color=colour, marker=marker, markersize=5, label=label)
+        shifted = rows + 0.22 * (number - (len(variants) - 1) / 2)
+        for axis, values in ((held, found.coverage), (wide, found.width)):
+            axis.plot(values, shifted, color=colour, marker=marker, markersize=5, linestyle="")
+    diagram.set(xlim=(0, 1), ylim=(0, 1), aspect="equal")
+    diagram.set_xlabel("confidence: said probability of an error of at most 0.07", fontsize=8)
+    diagram.set_ylabel("found share of such errors", fontsize=8)
+    diagram.legend(fontsize=7, loc="lower right")
+    held.set_yticks(rows, scenes, fontsize=7, parse_math=False)
+    held.set_ylim(len(scenes) - 0.5, -0.5)
+    wide.tick_params(labelleft=False)
+    held.set_xlabel(f"truth within the interval of {INTERVAL} % / %", fontsize=8)
+    wide.set_xlabel("median width of the interval / px per view step", fontsize=8)
+    wide.set_xscale("log")
+    for axis in (diagram, held, wide):
+        axis.tick_params(labelsize=7)
+        axis.grid(color="0.9")
+    save(figure, folder, name)
