@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 import numba
@@ -25,6 +26,10 @@ from sepi.scenes import SCENES, render
 from sepi.scoring.scores import SCORES
 from sepi.threads import available_cores, use_threads
 from sepi.variants import VARIANTS, variant_named
+
+if TYPE_CHECKING:
+    from bench.error_model import Judged
+    from bench.error_samples import Sample
 
 _PATH = click.Path(path_type=Path)
 
@@ -254,6 +259,86 @@ def cameras(scenes: tuple[str, ...], size: int, views: int, seeds: int, variant:
 
     use_threads(threads or available_cores())
     click.echo(tables.markdown(list(rows(scenes or ("pyramids",), size, views, range(seeds), variant))))
+
+
+@main.command()
+@click.option("--scene", "scenes", multiple=True, help="Built-in scene, light field or file of a render; repeatable.")
+@click.option(
+    "--rounded",
+    nargs=2,
+    type=(str, float),
+    multiple=True,
+    metavar="SCENE STEP",
+    help="Light field whose ground truth is rounded to STEP pixels per view step; repeatable.",
+)
+@click.option("--judge", multiple=True, help="File of a render that nothing is fitted to; repeatable.")
+@click.option("--sigma", "sigmas", type=click.FloatRange(0, 128), multiple=True, help="Noise, of 255; repeatable.")
+@click.option(
+    "--variant", "variants", type=click.Choice(list(VARIANTS)), multiple=True, help="Repeatable; best and fast."
+)
+@click.option("--leave-out", is_flag=True, help="Judge each scene by a fit to all others.")
+@click.option("--kept", type=_PATH, help="Folder where pixels are kept for the next time.")
+@click.option("--threads", type=click.IntRange(min=1), help="Threads to use; one per core unless given.")
+def errors(
+    scenes: tuple[str, ...],
+    rounded: tuple[tuple[str, float], ...],
+    judge: tuple[str, ...],
+    sigmas: tuple[float, ...],
+    variants: tuple[str, ...],
+    leave_out: bool,
+    kept: Path | None,
+    threads: int | None,
+) -> None:
+    """Fit the numbers of the error bars (sepi/error_bars/calibration.py) and print them, and what they are worth.
+
+    Coverage of the interval of 90 %, its median width in pixels per view step of which the farthest view is four away,
+    and the said and found share of errors below 0.07 there.
+
+    \b
+    Example:
+      python -m bench errors --scene rack --scene pencils --sigma 0 --sigma 8 --leave-out
+    """
+    from bench.error_model import as_code, fitted, judged, left_out
+    from bench.error_samples import CALIBRATIONS, light_fields, sample
+
+    use_threads(threads or available_cores())
+    variants = variants or ("best", "fast")
+    choices = {variant_named(variant).choices["optimize"] for variant in variants}
+    if len(choices) != 1 or not choices <= CALIBRATIONS.keys():
+        raise click.UsageError(f"expected variants that end alike, in one of: {', '.join(CALIBRATIONS)}")
+    (choice,) = choices
+    steps = dict(rounded)
+
+    def sampled(some: Iterable[str], levels: Sequence[float], held_out: bool = False) -> list[Sample]:
+        found = []
+        with tqdm(some, disable=None, leave=False, bar_format="{n}/{total} {desc} |{bar}|") as bar:
+            for scene in bar:
+                bar.set_description(scene)
+                for name, light_field in light_fields([scene], levels, held_out):
+                    found += [sample(light_field, name, one, steps.get(scene, 0.0), kept) for one in variants]
+        return found
+
+    levels = sigmas or (0.0, 3.0, 8.0)
+    samples = sampled(scenes or ("rack", "pencils"), levels) + sampled(steps, (0.0,))
+    calibration = fitted(samples, CALIBRATIONS[choice])
+    click.echo(as_code(choice.upper(), calibration))
+    alone = left_out(samples, CALIBRATIONS[choice]) if leave_out else {}
+    rows = []
+    for one in samples + sampled(judge, levels, held_out=True):
+        row = {"scene": one.name, "variant": one.variant, **_judgement(judged(one, calibration))}
+        if leave_out:
+            fit = alone.get(one.world, calibration)
+            row |= {f"{key}, left out": text for key, text in _judgement(judged(one, fit)).items()}
+        rows.append(row)
+    click.echo(tables.markdown(rows))
+
+
+def _judgement(found: Judged) -> dict[str, str]:
+    return {
+        "coverage %": f"{found.coverage:.1f}",
+        "width": f"{found.width:.4f}",
+        "said / found %": f"{found.said:.1f} / {found.found:.1f}",
+    }
 
 
 def _all_measured(cases: list[Case], repeats: int, threads: int) -> tuple[list[Measurement], int]:

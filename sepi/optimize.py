@@ -256,7 +256,7 @@ def _with_bars(
     known = light_field.require_disparity_range()
     signs = {
         "deviation": deviation,
-        **signs_of_map(disparity, cv2.blur(curvature, (3, 3)), known),
+        **signs_of_map(disparity, curvature, known),
         **signs_of_views(gradient, curvature, evidence, measured_noise(light_field).usual),
         **signs_of_stage_before(before.confidence, before.mask("textureless")),
     }

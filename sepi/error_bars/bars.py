@@ -1,8 +1,8 @@
 """Error bars of a final map: from signs of how far it may be wrong, by a calibrated model.
 
-The error of a pixel has the distribution of :mod:`sepi.error_bars.mixture`; its parameters follow from the signs of
-:mod:`sepi.error_bars.signs`, scales as products of their powers, probabilities as the logistic function of such; the powers
-are those of :mod:`sepi.error_bars.calibration`. docs/method/error_bars.md derives the model and says what it does not know.
+The error of a pixel has the distribution of :mod:`sepi.error_bars.mixture`. Its parameters follow from the signs of
+:mod:`sepi.error_bars.signs`: scales, and odds of the probabilities, are products of their powers, which are those of
+:mod:`sepi.error_bars.calibration`. docs/method/error_bars.md derives the model and says what it does not know.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""The numbers of the error model, as ``python -m bench calibrate`` fits them.
+"""The numbers of the error model, as ``python -m bench errors`` fits them.
 
-One set for all scenes and levels of noise, by what is smoothed how: docs/method/error_bars.md has the scenes they are fitted
-on, and what they are worth on scenes that are left out.
+One set for all scenes and levels of noise, for each way of smoothing: docs/method/error_bars.md has the scenes that
+they are fitted on, and what they are worth on scenes that are left out.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ SECOND_ORDER = Calibration(
     rim=_unfitted("point_bend", "confidence"),
     tail=0.05,
 )
-"""Of Gauss-Newton steps and second-order smoothing: variants 'best' and 'fast', and those that switch parts of them off."""
+"""Of Gauss-Newton steps and second-order smoothing: 'best', 'fast', and those that switch parts of them off."""
 
 WLS = SECOND_ORDER
 """Of weighted least squares: variant 'paper' and its like."""

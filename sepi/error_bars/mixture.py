@@ -3,10 +3,10 @@
 The true disparity differs from the map's by
 
 - noise and smoothing: a Laplace distribution of mean absolute value ``scale``;
-- with probability ``stray``, something that the map does not know of, such as another texture that looks alike, or what a
-  glossy surface mirrors: a Laplace distribution of mean absolute value ``reach``;
-- with probability ``rim``, the surface next to it: the nearest or the farthest disparity of the neighbours, ``above`` or
-  ``below``, whichever differs more being likelier, with a Laplace distribution of a fifth of that distance about it.
+- with probability ``stray``, something that the map does not know of, such as another texture that looks alike, or what
+  a glossy surface mirrors: a Laplace distribution of mean absolute value ``reach``;
+- with probability ``rim``, the surface next to it: the nearest or the farthest disparity of the neighbours, ``above``
+  or ``below``, whichever differs more being likelier, with a Laplace distribution of a fifth of that distance about it.
 
 The bounds leave out a probability ``tail`` on either side.
 """

@@ -17,7 +17,7 @@ _PRECISION = 1e-3
 @njit(inline="always")
 def _beyond(x: float, width: float) -> float:
     """Share of a Laplace distribution about 0 that lies above ``x``."""
-    half = 0.5 * np.exp(-abs(x) / width)
+    half = float(0.5 * np.exp(-abs(x) / width))
     return half if x > 0 else 1 - half
 
 
@@ -35,7 +35,7 @@ def _above(x: float, p: Any) -> float:
 
 @njit(inline="always")
 def _bound(tail: float, p: Any) -> float:
-    """Distance above the map beyond which the true disparity lies with probability ``tail``: regula falsi of logarithms."""
+    """Distance above the map beyond which the truth lies with probability ``tail``: regula falsi of logarithms."""
     low, at_low = 0.0, _above(0.0, p)
     if at_low <= tail:
         return 0.0

@@ -1,4 +1,4 @@
-"""What tells how far a disparity map may be wrong: signs in the map, in what the views say of it, and of the stage before.
+"""Signs of how far a disparity map may be wrong: in the map, in what the views say of it, of the stage before.
 
 All are in view steps of which the farthest view is four away, as stages have them.
 """
@@ -62,20 +62,20 @@ def signs_of_map(disparity: FloatMap, curvature: FloatMap, known: DisparityRange
     ----------
     disparity : ndarray, shape (H, W), float32
     curvature : ndarray, shape (H, W), float32
-        Information on the disparity by the views, mean over a small window, 1 / (pixels per view step)^2.
+        Information on the disparity by the views, before any window, 1 / (pixels per view step)^2.
     known : DisparityRange
 
     Returns
     -------
     dict of str to ndarray, shape (H, W), float32
-        ``bend`` and ``point_bend``, absolute second differences about the pixel and of it; ``long_bend``, over distances
-        of eight pixels, along the axis along which it is less; ``steadiness``, 1 for a plane that the views know and 0
-        beside steps; ``above`` and ``below``, how much nearer and farther the nearest and farthest neighbour are;
-        ``range``, the width of the disparity range.
+        ``bend`` and ``point_bend``, absolute second differences about the pixel and of it; ``long_bend``, over
+        distances of eight pixels, along the axis along which it is less; ``steadiness``, 1 for a plane that the views
+        know and 0 beside steps; ``above`` and ``below``, how much nearer and farther the nearest and the farthest
+        neighbour are; ``range``, the width of the disparity range.
     """
     bend = np.abs(cv2.Laplacian(disparity, cv2.CV_32F))
     mean_bend = np.maximum(_mean(bend, 5), 0)
-    unknown = mean_bend + IGNORANCE / np.sqrt(curvature + np.float32(1e-3))
+    unknown = mean_bend + IGNORANCE / np.sqrt(np.maximum(_mean(curvature, 3), 0) + np.float32(1e-3))
     wide = cv2.copyMakeBorder(disparity, *(_LONG,) * 4, cv2.BORDER_REFLECT_101)
     inner, twice = np.s_[_LONG:-_LONG], 2 * disparity
     across = np.abs(wide[inner, 2 * _LONG :] + wide[inner, : -2 * _LONG] - twice)
@@ -107,8 +107,8 @@ def signs_of_views(gradient: FloatMap, curvature: FloatMap, evidence: Evidence, 
     -------
     dict of str to ndarray, shape (H, W), float32
         ``wide_deviation``, the standard deviation that the information over 7x7 pixels leaves; ``step`` and
-        ``wide_step``, by how much the cost would have the map move, over 3x3 and 15x15 pixels; ``disagreement``, between
-        the views on opposite sides about that; ``misfit``, residuals in units of the noise; ``agreement`` and
+        ``wide_step``, by how much the cost would have the map move, over 3x3 and 15x15 pixels; ``disagreement``,
+        between the views on opposite sides about that; ``misfit``, residuals in units of the noise; ``agreement`` and
         ``detail_agreement``, the mean robust weight of the views.
     """
     seeing = _mean(evidence.seeing, 3) + _LEAST

@@ -35,7 +35,8 @@ def inverse_diagonal(weight: FloatMap, smoothness: list[npt.NDArray[np.float64]]
     weight : ndarray, shape (H, W), float32
         Of the data.
     smoothness : list of ndarray
-        Weights of the second differences along x, along y and across, of shapes (H, W - 2), (H - 2, W) and (H - 1, W - 1).
+        Weights of the second differences along x, along y and across, of shapes (H, W - 2), (H - 2, W) and
+        (H - 1, W - 1).
 
     Returns
     -------

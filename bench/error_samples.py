@@ -1,0 +1,120 @@
+"""Pixels with what tells of their errors, and their errors: what the error model is fitted to and judged by."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from unittest.mock import patch
+
+import numpy as np
+import numpy.typing as npt
+
+from bench.noisy import with_noise
+from bench.sweep import scene_for_choosing
+from sepi.error_bars.bars import ErrorBars, error_bars
+from sepi.error_bars.calibration import SECOND_ORDER, WLS, Calibration
+from sepi.io.hdf5 import has_dataset
+from sepi.lightfield import LightField
+from sepi.pipeline import estimate_depth
+from sepi.rendered.catalogue import NOISE_LEVELS
+from sepi.rendered.exposure import read_exposed
+from sepi.stage import REACH
+from sepi.workflow.rendered_scenes import rendered_scene
+
+PIXELS = 6000
+"""Of each map, chosen at random."""
+
+CALIBRATIONS: dict[str, Calibration] = {"second_order": SECOND_ORDER, "wls": WLS}
+"""Choice of the last stage to its calibration."""
+
+
+@dataclass(frozen=True)
+class Sample:
+    """Pixels of a map, in view steps of which the farthest view is four away.
+
+    Attributes
+    ----------
+    name, world, variant : str
+        Of the light field, with its noise; of the scene without that; of the map.
+    error : ndarray, shape (N,)
+        Ground truth minus map.
+    signs : dict of str to ndarray, shape (N,)
+        Of :mod:`sepi.error_bars.signs`.
+    step : float
+        To which ground truth is rounded.
+    """
+
+    name: str
+    world: str
+    variant: str
+    error: npt.NDArray[np.float64]
+    signs: dict[str, npt.NDArray[np.float64]]
+    step: float
+
+
+def light_fields(
+    scenes: Iterable[str], sigmas: Sequence[float], held_out: bool = False
+) -> Iterator[tuple[str, LightField]]:
+    """Light fields of scenes and their names: built-in ones and folders with so much noise, renders in all levels.
+
+    Raises
+    ------
+    SepiError
+        If one is none, has no ground truth, or is held out from choosing though that is not asked for.
+    """
+    for scene in scenes:
+        if has_dataset(Path(scene), "turns"):
+            for level in NOISE_LEVELS:
+                light_field = read_exposed(Path(scene), level, 1) if held_out else scene_for_choosing(scene, level)
+                yield light_field.name, light_field
+            continue
+        light_field = scene_for_choosing(scene, NOISE_LEVELS[0])
+        for sigma in sigmas:
+            if sigma:
+                yield f"{light_field.name} +{sigma:g}", with_noise(light_field, sigma)
+            else:
+                yield light_field.name, light_field
+
+
+def sample(light_field: LightField, name: str, variant: str, step: float = 0.0, kept: Path | None = None) -> Sample:
+    """Pixels of a variant's map of a light field with ground truth, rounded to a step in its own view steps.
+
+    With a folder ``kept`` they are written there, and read where they are there already.
+    """
+    world = rendered_scene(name.partition(" +")[0]).world
+    factor = REACH / light_field.reach
+    file = None
+    if kept is not None:
+        # of one name there may be a render and a folder
+        views = hashlib.sha256(repr((name, light_field.grid, light_field.shape)).encode()).hexdigest()
+        file = kept / f"{variant}_{views[:16]}.npz"
+    if file is not None and file.exists():
+        with np.load(file) as found:
+            error, signs = found["error"], {key: found[key] for key in found if key != "error"}
+    else:
+        error, signs = _computed(light_field, variant, factor)
+        if file is not None:
+            file.parent.mkdir(parents=True, exist_ok=True)
+            np.savez(file, error=error, **signs)
+    wide = {key: values.astype(np.float64) for key, values in signs.items()}
+    return Sample(name, world, variant, error.astype(np.float64), wide, step / factor)
+
+
+def _computed(light_field: LightField, variant: str, factor: float) -> tuple[Any, dict[str, Any]]:
+    told: dict[str, Any] = {}
+
+    def listened(disparity: Any, signs: Any, known: Any, calibration: Calibration) -> ErrorBars:
+        told.update(signs, disparity=disparity)
+        return error_bars(disparity, signs, known, calibration)
+
+    with patch("sepi.optimize.error_bars", listened):
+        maps = estimate_depth(light_field, variant)
+    assert light_field.ground_truth is not None
+    disparity = told.pop("disparity")
+    error = light_field.ground_truth / np.float32(factor) - disparity
+    pixels = np.flatnonzero(np.isfinite(error) & ~maps.mask("unknown"))
+    chosen = np.random.default_rng(0).permutation(pixels)[:PIXELS]
+    return error.ravel()[chosen], {key: values.ravel()[chosen] for key, values in told.items()}
