@@ -17,7 +17,8 @@ from scipy.optimize import brentq, minimize
 from bench.error_samples import Sample
 from sepi.error_bars.bars import mixture_of
 from sepi.error_bars.calibration import CONSTANT, Calibration
-from sepi.error_bars.mixture import LEAST_RIM, RIM_WIDTH, described
+from sepi.error_bars.mixture import described
+from sepi.error_bars.mixture_kernels import LEAST_RIM, RIM_WIDTH
 from sepi.error_bars.signs import FLOORS
 
 FloatArray = npt.NDArray[np.float64]

@@ -19,12 +19,6 @@ import numpy as np
 
 from sepi.lightfield import FloatMap
 
-RIM_WIDTH = 0.2
-"""Mean absolute deviation of the other surface's disparity, as part of its distance."""
-
-LEAST_RIM = 0.01
-"""The least of it, pixels per view step."""
-
 
 class Mixture(NamedTuple):
     """Parameters of each pixel's error; all of shape (H, W), float32.

@@ -7,7 +7,11 @@ from typing import Any
 import numpy as np
 from numba import njit, prange
 
-from sepi.error_bars.mixture import LEAST_RIM, RIM_WIDTH
+RIM_WIDTH = 0.2
+"""Mean absolute deviation of the other surface's disparity, as part of its distance."""
+
+LEAST_RIM = 0.01
+"""The least of it, pixels per view step."""
 
 _EVALUATIONS = 30
 _PRECISION = 1e-3

@@ -111,6 +111,31 @@ def test_sums_over_the_views_equal_a_plain_twin(geometry: str) -> None:
         np.testing.assert_allclose(found, twin, atol=2e-3 * np.abs(twin).max())
 
 
+def test_evidence_is_what_single_views_add_up_to() -> None:
+    """A half that held other views, or residuals of views that do not see a pixel, would make wrong depth look sure."""
+    scene = render("curved_occluders", size=64, views=5)
+    parameters, disparity = BaseDetailParameters(), scene.ground_truth.astype(np.float32)
+    matching = GaussNewton(scene, parameters, 0.15)
+    mean = matching.mean(disparity)
+    gradient, curvature, evidence = matching.with_evidence(mean, disparity)
+    for found, usual in zip((gradient, curvature), matching.gradient_and_hessian(mean, disparity), strict=True):
+        np.testing.assert_array_equal(found, usual)
+    t0, s0 = scene.reference_position
+    down, across = np.arange(5)[:, None] - t0, np.arange(5)[None] - s0
+    for i, half in enumerate((across < 0, across > 0, down < 0, down > 0)):
+        present = np.broadcast_to(half, (5, 5)).copy()
+        present[t0, s0] = True
+        alone = GaussNewton(scene, parameters, 0.15, present).gradient_and_hessian(mean, disparity)
+        for found, expected in zip(evidence.halves[i], alone, strict=True):
+            np.testing.assert_allclose(found, expected, rtol=1e-3, atol=1e-3 * np.abs(expected).max())
+    # of the true depth of a clean scene: all that see a pixel agree, and the hidden see none of it
+    hidden = scene.masks["occluded"]
+    assert (evidence.seeing[~hidden][:, None] <= 24).all()
+    assert evidence.seeing[hidden].mean() < 20 < evidence.seeing[~hidden].mean()
+    assert np.median(evidence.agreement / evidence.seeing) > 0.9
+    assert np.median(evidence.misfit / evidence.agreement) < 1e-4
+
+
 def test_margin_of_the_splines_is_mirrored() -> None:
     scene = render("dots", size=64)
     parameters = BaseDetailParameters()
