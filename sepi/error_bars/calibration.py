@@ -37,20 +37,74 @@ class Calibration:
         return self.scale, self.reach, self.stray, self.rim
 
 
-def _unfitted(*signs: str) -> dict[str, float]:
-    return dict.fromkeys((CONSTANT, *signs), 0.0)
-
-
 SECOND_ORDER = Calibration(
-    scale=_unfitted(
-        "deviation", "bend", "disagreement", "step", "wide_step", "misfit", "steadiness", "wide_confidence", "long_bend"
-    ),
-    reach=_unfitted("wide_deviation", "range", "plane"),
-    stray=_unfitted("confidence", "bend", "agreement", "wide_deviation", "detail_agreement"),
-    rim=_unfitted("point_bend", "confidence"),
-    tail=0.05,
+    scale={
+        CONSTANT: 1.349,
+        "deviation": 0.32,
+        "bend": 0.306,
+        "disagreement": 0.221,
+        "step": 0.156,
+        "wide_step": 0.04,
+        "misfit": 0.377,
+        "steadiness": 0.335,
+        "wide_confidence": -0.678,
+        "long_bend": 0.202,
+    },
+    reach={
+        CONSTANT: -0.767,
+        "wide_deviation": 0.009,
+        "range": -0.606,
+        "plane": -0.391,
+    },
+    stray={
+        CONSTANT: -2.619,
+        "confidence": -0.369,
+        "bend": 0.056,
+        "agreement": -2.194,
+        "wide_deviation": 1.077,
+        "detail_agreement": -3.911,
+    },
+    rim={
+        CONSTANT: -2.612,
+        "point_bend": 0.189,
+        "confidence": -0.557,
+    },
+    tail=0.0598,
 )
 """Of Gauss-Newton steps and second-order smoothing: 'best', 'fast', and those that switch parts of them off."""
 
-WLS = SECOND_ORDER
+WLS = Calibration(
+    scale={
+        CONSTANT: -1.094,
+        "deviation": 0.361,
+        "bend": 0.008,
+        "disagreement": 0.009,
+        "step": 0.223,
+        "wide_step": 0.151,
+        "misfit": 0.608,
+        "steadiness": -0.186,
+        "wide_confidence": -0.499,
+        "long_bend": 0.151,
+    },
+    reach={
+        CONSTANT: -0.892,
+        "wide_deviation": 0.063,
+        "range": 0.746,
+        "plane": 0.081,
+    },
+    stray={
+        CONSTANT: -6.052,
+        "confidence": -1.855,
+        "bend": -0.058,
+        "agreement": -2.382,
+        "wide_deviation": 0.882,
+        "detail_agreement": -11.817,
+    },
+    rim={
+        CONSTANT: -2.325,
+        "point_bend": 0.386,
+        "confidence": -1.134,
+    },
+    tail=0.0734,
+)
 """Of weighted least squares: variant 'paper' and its like."""
