@@ -1,21 +1,20 @@
 """Fit of the error model (:mod:`sepi.error_bars`) by maximum likelihood, and its worth on scenes that are left out.
 
 Every light field and variant counts the same. Powers are drawn a little towards 0, in units of how much the logarithm
-of their sign varies. What is left out beyond the bounds is such that intervals hold nine of ten pixels on average.
+of their sign varies.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import brentq, minimize
+from scipy.optimize import minimize
 
 from bench.error_samples import Sample
-from sepi.error_bars.bars import mixture_of
+from sepi.error_bars.bars import CLOSE, TAIL, mixture_of
 from sepi.error_bars.calibration import CONSTANT, Calibration
 from sepi.error_bars.mixture import described
 from sepi.error_bars.mixture_kernels import LEAST_RIM, RIM_WIDTH
@@ -25,8 +24,6 @@ FloatArray = npt.NDArray[np.float64]
 
 PULL = 1e-3
 """Weight of the sum of the squared powers against the mean likelihood of a pixel."""
-
-COVERED = 0.9
 
 _PARTS = ("scale", "reach", "stray", "rim")
 _CLIP = 12.0
@@ -82,30 +79,15 @@ def fitted(samples: Sequence[Sample], form: Calibration) -> Calibration:
         raw[0] = powers[0] - float(np.sum(raw[1:] * m[1:]))
         parts.append({label: round(float(value), 3) for label, value in zip(labels, raw, strict=True)})
     scale, reach, stray, rim = parts
-    return with_tail(Calibration(scale, reach, stray, rim, tail=0.05), samples)
-
-
-def with_tail(calibration: Calibration, samples: Sequence[Sample]) -> Calibration:
-    """The same with what is left out beyond the bounds such that the mean coverage is :data:`COVERED`."""
-    mixtures = [mixture_of(_pictures(one), calibration) for one in samples]
-
-    def excess(tail: float) -> float:
-        shares = []
-        for one, mixture in zip(samples, mixtures, strict=True):
-            bars, margin = described(mixture, tail, 0.07), one.step / 2
-            shares.append(np.mean((one.error <= bars.above[0] + margin) & (one.error >= -bars.below[0] - margin)))
-        return float(np.mean(shares)) - COVERED
-
-    tail = round(float(brentq(excess, 0.005, 0.2, xtol=1e-4)), 4)
-    return replace(calibration, tail=tail)
+    return Calibration(scale, reach, stray, rim)
 
 
 def judged(one: Sample, calibration: Calibration) -> Judged:
     """What a calibration is worth on a sample; its intervals are not cut at the ends of the disparity range here."""
-    bars = described(mixture_of(_pictures(one), calibration), calibration.tail, 0.07)
+    bars = described(mixture_of(_pictures(one), calibration), TAIL, CLOSE)
     margin = one.step / 2
     held = (one.error <= bars.above[0] + margin) & (one.error >= -bars.below[0] - margin)
-    small = np.abs(one.error) <= 0.07
+    small = np.abs(one.error) <= CLOSE
     width = float(np.median(bars.above + bars.below))
     return Judged(100 * float(held.mean()), width, 100 * float(bars.probability.mean()), 100 * float(small.mean()))
 
@@ -124,7 +106,7 @@ def as_code(name: str, calibration: Calibration) -> str:
         return "{\n" + inner.replace(f'"{CONSTANT}"', "CONSTANT") + "    }"
 
     parts = "".join(f"    {part}={written(getattr(calibration, part))},\n" for part in _PARTS)
-    return f"{name} = Calibration(\n{parts}    tail={calibration.tail!r},\n)"
+    return f"{name} = Calibration(\n{parts})"
 
 
 class _Data(NamedTuple):

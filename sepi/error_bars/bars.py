@@ -21,6 +21,9 @@ CLOSE = 0.07
 """Error that the confidence is about, pixels per view step of which the farthest view is four away."""
 
 
+TAIL = 0.05
+"""Probability beyond either bound."""
+
 _LOGARITHMS = (-9.0, 9.0)
 """Of scales, in pixels per view step, and odds."""
 
@@ -31,7 +34,7 @@ class ErrorBars(NamedTuple):
     Attributes
     ----------
     sigma : ndarray
-        Standard deviation, pixels per view step.
+        Standard deviation, pixels per view step (:mod:`sepi.error_bars.mixture` says of what).
     low, high : ndarray
         Interval that holds the disparity with a probability of 90 %.
     confidence : ndarray
@@ -62,7 +65,7 @@ def error_bars(disparity: FloatMap, signs: Signs, known: DisparityRange, calibra
     ErrorBars
     """
     mixture = mixture_of(signs, calibration)
-    found = described(mixture, calibration.tail, CLOSE)
+    found = described(mixture, TAIL, CLOSE)
     lowest, highest = np.float32(known.minimum), np.float32(known.maximum)
     low = np.minimum(np.maximum(disparity - found.below, lowest), disparity)
     high = np.maximum(np.minimum(disparity + found.above, highest), disparity)

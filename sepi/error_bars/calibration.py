@@ -21,15 +21,12 @@ class Calibration:
     scale, reach, stray, rim : mapping of str to float
         Sign to its power, in two scales, and in the odds of two probabilities against all being about right; of
         ``constant`` the logarithm itself.
-    tail : float
-        Probability that is left out beyond each bound, so that intervals hold nine of ten.
     """
 
     scale: Mapping[str, float]
     reach: Mapping[str, float]
     stray: Mapping[str, float]
     rim: Mapping[str, float]
-    tail: float
 
     @property
     def parts(self) -> tuple[Mapping[str, float], ...]:
@@ -39,72 +36,72 @@ class Calibration:
 
 SECOND_ORDER = Calibration(
     scale={
-        CONSTANT: 1.349,
-        "deviation": 0.32,
-        "bend": 0.306,
-        "disagreement": 0.221,
-        "step": 0.156,
-        "wide_step": 0.04,
-        "misfit": 0.377,
-        "steadiness": 0.335,
-        "wide_confidence": -0.678,
-        "long_bend": 0.202,
+        CONSTANT: 0.792,
+        "deviation": 0.286,
+        "bend": 0.325,
+        "disagreement": 0.213,
+        "step": 0.152,
+        "wide_step": 0.037,
+        "misfit": 0.338,
+        "steadiness": 0.361,
+        "wide_confidence": -0.723,
+        "long_bend": 0.196,
+        "range": 0.33,
     },
     reach={
-        CONSTANT: -0.767,
-        "wide_deviation": 0.009,
-        "range": -0.606,
-        "plane": -0.391,
+        CONSTANT: -1.734,
+        "wide_confidence": -0.102,
+        "plane": -0.441,
     },
     stray={
-        CONSTANT: -2.619,
-        "confidence": -0.369,
-        "bend": 0.056,
-        "agreement": -2.194,
-        "wide_deviation": 1.077,
-        "detail_agreement": -3.911,
+        CONSTANT: -3.117,
+        "confidence": -0.405,
+        "bend": 0.041,
+        "agreement": -2.327,
+        "wide_deviation": 0.958,
+        "detail_agreement": -3.764,
     },
     rim={
-        CONSTANT: -2.612,
-        "point_bend": 0.189,
-        "confidence": -0.557,
+        CONSTANT: -3.384,
+        "point_bend": 0.14,
+        "confidence": -0.53,
+        "agreement": -0.977,
     },
-    tail=0.0598,
 )
 """Of Gauss-Newton steps and second-order smoothing: 'best', 'fast', and those that switch parts of them off."""
 
 WLS = Calibration(
     scale={
-        CONSTANT: -1.094,
-        "deviation": 0.361,
-        "bend": 0.008,
-        "disagreement": 0.009,
-        "step": 0.223,
-        "wide_step": 0.151,
-        "misfit": 0.608,
-        "steadiness": -0.186,
-        "wide_confidence": -0.499,
+        CONSTANT: -1.304,
+        "deviation": 0.329,
+        "bend": 0.005,
+        "disagreement": 0.015,
+        "step": 0.224,
+        "wide_step": 0.147,
+        "misfit": 0.601,
+        "steadiness": -0.185,
+        "wide_confidence": -0.536,
         "long_bend": 0.151,
+        "range": 0.099,
     },
     reach={
-        CONSTANT: -0.892,
-        "wide_deviation": 0.063,
-        "range": 0.746,
-        "plane": 0.081,
+        CONSTANT: -0.036,
+        "wide_confidence": 0.005,
+        "plane": 0.109,
     },
     stray={
-        CONSTANT: -6.052,
-        "confidence": -1.855,
-        "bend": -0.058,
-        "agreement": -2.382,
-        "wide_deviation": 0.882,
-        "detail_agreement": -11.817,
+        CONSTANT: -5.452,
+        "confidence": -1.674,
+        "bend": -0.059,
+        "agreement": -2.421,
+        "wide_deviation": 1.117,
+        "detail_agreement": -12.161,
     },
     rim={
-        CONSTANT: -2.325,
-        "point_bend": 0.386,
-        "confidence": -1.134,
+        CONSTANT: -2.716,
+        "point_bend": 0.344,
+        "confidence": -1.038,
+        "agreement": -0.679,
     },
-    tail=0.0734,
 )
 """Of weighted least squares: variant 'paper' and its like."""

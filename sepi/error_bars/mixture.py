@@ -8,7 +8,8 @@ The true disparity differs from the map's by
 - with probability ``rim``, the surface next to it: the nearest or the farthest disparity of the neighbours, ``above``
   or ``below``, whichever differs more being likelier, with a Laplace distribution of a fifth of that distance about it.
 
-The bounds leave out a probability ``tail`` on either side.
+The bounds leave out a probability ``tail`` on either side. The standard deviation is that of a normal distribution of
+the same expected absolute error: that of the mixture itself is decided by rare strays.
 """
 
 from __future__ import annotations
@@ -49,7 +50,7 @@ class Described(NamedTuple):
     Attributes
     ----------
     sigma : ndarray
-        Root of the expected squared error, pixels per view step.
+        Standard deviation of a normal distribution of the same expected absolute error, pixels per view step.
     below, above : ndarray
         Distances of the lower and of the upper bound, pixels per view step, at least 0.
     probability : ndarray

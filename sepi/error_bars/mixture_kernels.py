@@ -7,6 +7,9 @@ from typing import Any
 import numpy as np
 from numba import njit, prange
 
+NORMAL = np.sqrt(np.pi / 2)
+"""Standard deviation of a normal distribution, over its mean absolute value."""
+
 RIM_WIDTH = 0.2
 """Mean absolute deviation of the other surface's disparity, as part of its distance."""
 
@@ -73,15 +76,13 @@ def _bound(tail: float, p: Any) -> float:
 
 
 @njit(inline="always")
-def _squared(p: Any) -> float:
-    """Expected squared error."""
+def _expected(p: Any) -> float:
+    """Expected absolute error."""
     scale, reach, stray, rim, above, below = p
     share = (above * above + 1e-6) / (above * above + below * below + 2e-6)
-    core = (1 - stray - rim) * 2 * scale * scale
-    strays = stray * 2 * reach * reach
     wide, deep = RIM_WIDTH * above + LEAST_RIM, RIM_WIDTH * below + LEAST_RIM
-    other = share * (above * above + 2 * wide * wide) + (1 - share) * (below * below + 2 * deep * deep)
-    return float(core + strays + rim * other)
+    other = share * (above + wide * np.exp(-above / wide)) + (1 - share) * (below + deep * np.exp(-below / deep))
+    return float((1 - stray - rim) * scale + stray * reach + rim * other)
 
 
 @njit(parallel=True, cache=True, error_model="numpy")
@@ -106,7 +107,7 @@ def describe(parameters: Any, tail: float, close: float, out: Any) -> None:
             a, b = float(above[y, x]), float(below[y, x])
             same = float(scale[y, x]), float(reach[y, x]), float(stray[y, x]), float(rim[y, x])
             upwards, downwards = (*same, a, b), (*same, b, a)
-            out[0, y, x] = np.sqrt(_squared(upwards))
+            out[0, y, x] = NORMAL * _expected(upwards)
             out[1, y, x] = _bound(tail, downwards)
             out[2, y, x] = _bound(tail, upwards)
             out[3, y, x] = max(0.0, 1 - _above(close, upwards) - _above(close, downwards))

@@ -49,7 +49,6 @@ FLOORS: Mapping[str, float] = {
     "wide_confidence": 0.01,
     "agreement": 0.01,
     "detail_agreement": 0.01,
-    "seeing": 1.0,
     "range": 1e-3,
     "plane": 0.1,
 }
@@ -110,7 +109,7 @@ def signs_of_views(gradient: FloatMap, curvature: FloatMap, evidence: Evidence, 
         ``wide_deviation``, the standard deviation that the information over 7x7 pixels leaves; ``step`` and
         ``wide_step``, by how much the cost would have the map move, over 3x3 and 15x15 pixels; ``disagreement``,
         between the views on opposite sides about that; ``misfit``, residuals in units of the noise; ``agreement`` and
-        ``detail_agreement``, the mean robust weight of the views; ``seeing``, how many there are.
+        ``detail_agreement``, the mean robust weight of the views.
     """
     seeing = _mean(evidence.seeing, 3) + _LEAST
     residual = np.maximum(_mean(evidence.misfit, 3) / (_mean(evidence.agreement, 3) + _LEAST), 0)
@@ -122,7 +121,6 @@ def signs_of_views(gradient: FloatMap, curvature: FloatMap, evidence: Evidence, 
         "misfit": np.sqrt(residual / 3) / np.float32(max(noise, _LEAST_NOISE)),
         "agreement": _mean(evidence.agreement, 3) / seeing,
         "detail_agreement": _mean(evidence.detail_agreement, 3) / seeing,
-        "seeing": evidence.seeing,
     }
 
 
