@@ -19,6 +19,7 @@ from sepi.error_bars.calibration import CONSTANT, Calibration
 from sepi.error_bars.mixture import described
 from sepi.error_bars.mixture_kernels import LEAST_RIM, RIM_WIDTH
 from sepi.error_bars.signs import FLOORS
+from sepi.scoring.error_bars import ause
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -38,12 +39,17 @@ class Judged(NamedTuple):
         Share of the errors within the interval, %, and its median width, pixels per view step.
     said, found : float
         Mean probability of a small error, and the share of such errors, %.
+    ause, ause_steady : float
+        Area under the sparsification error curve (:func:`sepi.scoring.error_bars.ause`) by the standard deviation, and
+        by steadiness, the smoothness and information that a confidence used to be made of.
     """
 
     coverage: float
     width: float
     said: float
     found: float
+    ause: float
+    ause_steady: float
 
 
 def fitted(samples: Sequence[Sample], form: Calibration) -> Calibration:
@@ -89,7 +95,10 @@ def judged(one: Sample, calibration: Calibration) -> Judged:
     held = (one.error <= bars.above[0] + margin) & (one.error >= -bars.below[0] - margin)
     small = np.abs(one.error) <= CLOSE
     width = float(np.median(bars.above + bars.below))
-    return Judged(100 * float(held.mean()), width, 100 * float(bars.probability.mean()), 100 * float(small.mean()))
+    said, found = 100 * float(bars.probability.mean()), 100 * float(small.mean())
+    doubts = bars.sigma[0], (1 - one.signs["steadiness"]).astype(np.float32)
+    orders = [ause(doubt, one.error.astype(np.float32)) for doubt in doubts]
+    return Judged(100 * float(held.mean()), width, said, found, *orders)
 
 
 def left_out(samples: Sequence[Sample], form: Calibration) -> dict[str, Calibration]:
