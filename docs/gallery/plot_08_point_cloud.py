@@ -67,15 +67,15 @@ plt.show()
 # ---------
 #
 # One coloured point per pixel, the origin at the camera: x to the right, y up,
-# z towards the viewer. Pixels of little confidence can be left out. Two of the
-# pyramids stand, two are sunk.
+# z towards the viewer. Pixels that are rather wrong than right, as their
+# confidence has it, can be left out. Two of the pyramids stand, two are sunk.
 
 cloud = point_cloud(
     light_field.views[light_field.reference_position],
     maps.disparity,
     maps.confidence,
     camera=camera,
-    min_confidence=0.05,
+    min_confidence=0.5,
 )
 print(f"{len(cloud.positions)} points, metric: {cloud.metric}")
 
