@@ -7,13 +7,11 @@ import sys
 from pathlib import Path
 
 import click
-import numpy as np
 import pytest
 
 from sepi.cli.main import main
-from sepi.io.hdf5 import write_light_field, write_stage
+from sepi.io.hdf5 import write_light_field
 from sepi.scenes import render, write_hci
-from sepi.stage import StageMaps
 from sepi.threads import available_cores
 
 SLOW = (
@@ -121,18 +119,14 @@ def test_depth_loads_what_it_uses(tmp_path: Path, variant: str, more: set[str]) 
 
 
 def test_a_stage_without_kernels_does_not_wait_for_numba(tmp_path: Path) -> None:
-    """Six of seven variants end with the paper's optimisation, which is milliseconds of work for a small scene."""
-    light_field = render("dots", size=64, views=3)
-    maps = StageMaps(np.zeros(light_field.shape, np.float32), np.ones(light_field.shape, np.float32))
-    write_light_field(tmp_path / "lightfield.h5", light_field)
-    attributes = {"stage": "initial", "choice": "sepi", "parameters": "{}", "made_from": "[]"}
-    write_stage(tmp_path / "initial.h5", maps, attributes)
-    files = {"--light-field": "lightfield.h5", "--previous": "initial.h5", "--output": "optimize.h5"}
-    words = ["--choice", "wls", *(str(part) for name, file in files.items() for part in (name, tmp_path / file))]
-    imports = "from sepi.command import stage_command\nfrom sepi.optimize import CHOICES"
-    program = f"{imports}\nstage_command('optimize', CHOICES)({words!r}, standalone_mode=False)"
-    assert loaded(program) == {"scipy"}
-    assert (tmp_path / "optimize.h5").is_file()
+    """The structure tensor is filters of OpenCV, milliseconds of work for a small scene."""
+    write_light_field(tmp_path / "lightfield.h5", render("dots", size=64, views=3))
+    files = {"--light-field": "lightfield.h5", "--output": "initial.h5"}
+    words = ["--choice", "structure_tensor", *(str(w) for name, file in files.items() for w in (name, tmp_path / file))]
+    imports = "from sepi.command import stage_command\nfrom sepi.initial import CHOICES"
+    program = f"{imports}\nstage_command('initial', CHOICES)({words!r}, standalone_mode=False)"
+    assert "numba" not in loaded(program)
+    assert (tmp_path / "initial.h5").is_file()
 
 
 @pytest.mark.parametrize("squatted", [False, True])

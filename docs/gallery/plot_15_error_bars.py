@@ -29,9 +29,9 @@ width = maps.high - maps.low
 # ---------------
 #
 # ``sigma`` is the standard deviation, ``low`` and ``high`` are the interval's
-# ends, all in px / step like the disparity. Sigma counts large errors also
-# where they are rare, and the interval leaves out the rarest tenth: so sigma
-# can be larger than the whole interval.
+# ends, all in px / step like the disparity. Sigma is that of a bell curve with
+# the same mean error. The interval leaves out a twentieth on either side, and
+# need not lie evenly about the map.
 
 figure, axes = plt.subplots(2, 2, figsize=(6, 5.8), layout="constrained")
 panels = [
@@ -223,7 +223,7 @@ plt.show()
 #
 # With a camera, sigma becomes that of the depth. The same sigma is more metres
 # in the distance than close by. ``max_sigma``, or ``sepi points --max-sigma``,
-# keeps the points that are sure enough: here those to ten centimetres.
+# keeps the points that are sure enough: here those to two centimetres.
 
 camera = sepi.Camera(scale=6.0, offset=4.0, focal_px=120.0)
 cloud = point_cloud(
@@ -231,10 +231,10 @@ cloud = point_cloud(
     maps.disparity,
     camera=camera,
     sigma=maps.sigma,
-    max_sigma=0.1,
+    max_sigma=0.02,
 )
 print(f"{len(cloud.positions)} points of {truth.size}")
 error_cm = 100 * np.abs(camera.depth(maps.disparity) - camera.depth(truth))
-kept = camera.depth_sigma(maps.disparity, maps.sigma) <= 0.1
+kept = camera.depth_sigma(maps.disparity, maps.sigma) <= 0.02
 print(f"mean error of all pixels:  {error_cm.mean():.1f} cm")
 print(f"mean error of those kept:  {error_cm[kept].mean():.1f} cm")

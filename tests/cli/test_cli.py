@@ -358,11 +358,13 @@ def test_evaluate_with_another_border(tmp_path: Path) -> None:
 
 def test_evaluate_reads_every_kind_of_map(pyramids: Path, result: Path, tmp_path: Path) -> None:
     np.save(tmp_path / "map.npy", read_pfm(result / "disparity.pfm").astype(np.float64))
-    texts = {
-        call("evaluate", estimate, pyramids).stdout
-        for estimate in (result, result / "disparity.pfm", result / "result.h5", tmp_path / "map.npy")
-    }
-    assert len(texts) == 1
+    results, maps = (result, result / "result.h5"), (result / "disparity.pfm", tmp_path / "map.npy")
+    # a result has error bars, which have scores of their own; a map alone has none
+    whole, alone = ([call("evaluate", one, pyramids, "--json").stdout for one in kind] for kind in (results, maps))
+    assert len(set(whole)) == len(set(alone)) == 1
+    scores, of_map = (json.loads(texts[0])["paper"]["all"] for texts in (whole, alone))
+    assert of_map.items() <= scores.items()
+    assert "coverage" in scores
 
 
 @pytest.mark.parametrize(

@@ -96,7 +96,6 @@ CLAIMS: dict[str, list[str]] = {
         "np.ptp(positions[:3, 0]) > 0.1",
     ],
     "plot_15_error_bars": [
-        "np.mean(maps.sigma > width) > 0.1",
         # wide at outlines, more so to one side, and on the bare wall; narrow where there is texture
         "np.median(width[~bare & ~rim]) < 0.6 * min(np.median(width[rim]), np.median(width[bare & ~rim]))",
         "np.median((np.maximum(maps.high - maps.disparity, maps.disparity - maps.low) / width)[rim]) > 0.58",
