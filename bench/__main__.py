@@ -298,7 +298,7 @@ def errors(
     Example:
       python -m bench errors --scene rack --scene pencils --sigma 0 --sigma 8 --leave-out
     """
-    from bench.error_model import as_code, fitted, judged, left_out
+    from bench.error_model import as_code, fitted, judged, left_out, pooled
     from bench.error_samples import CALIBRATIONS, light_fields, sample
 
     use_threads(threads or available_cores())
@@ -323,14 +323,17 @@ def errors(
     calibration = fitted(samples, CALIBRATIONS[choice])
     click.echo(as_code(choice.upper(), calibration))
     alone = left_out(samples, CALIBRATIONS[choice]) if leave_out else {}
-    rows = []
-    for one in samples + sampled(judge, levels, held_out=True):
+    rows, held_out = [], sampled(judge, levels, held_out=True)
+    for one in samples + held_out:
         row = {"scene": one.name, "variant": one.variant, **_judgement(judged(one, calibration))}
         if leave_out:
             fit = alone.get(one.world, calibration)
             row |= {f"{key}, left out": text for key, text in _judgement(judged(one, fit)).items()}
         rows.append(row)
     click.echo(tables.markdown(rows))
+    for some in (samples, held_out):
+        if some:
+            click.echo(f"\n{pooled(some, calibration)}")
 
 
 def _judgement(found: Judged) -> dict[str, str]:

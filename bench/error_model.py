@@ -19,7 +19,7 @@ from sepi.error_bars.calibration import CONSTANT, Calibration
 from sepi.error_bars.mixture import described
 from sepi.error_bars.mixture_kernels import LEAST_RIM, RIM_WIDTH
 from sepi.error_bars.signs import FLOORS
-from sepi.scoring.error_bars import ause
+from sepi.scoring.error_bars import ause, reliability
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -99,6 +99,22 @@ def judged(one: Sample, calibration: Calibration) -> Judged:
     doubts = bars.sigma[0], (1 - one.signs["steadiness"]).astype(np.float32)
     orders = [ause(doubt, one.error.astype(np.float32)) for doubt in doubts]
     return Judged(100 * float(held.mean()), width, said, found, *orders)
+
+
+def pooled(samples: Sequence[Sample], calibration: Calibration) -> str:
+    """All samples together: mean and least coverage, the order of the errors, and whether confidences are right."""
+    worth = [judged(one, calibration) for one in samples]
+    ratios = np.array([one.ause / one.ause_steady for one in worth])
+    said = [described(mixture_of(_pictures(one), calibration), TAIL, CLOSE).probability[0] for one in samples]
+    error = np.concatenate([one.error for one in samples]).astype(np.float32)
+    tenths = reliability(np.concatenate(said), error, CLOSE)
+    coverages = [one.coverage for one in worth]
+    parts = (f"{100 * a:.1f} / {100 * b:.1f}" for a, b in zip(tenths.said, tenths.found, strict=True))
+    return (
+        f"{len(samples)} maps: coverage {np.mean(coverages):.1f} %, {min(coverages):.1f} to {max(coverages):.1f} %; "
+        f"AUSE by sigma over that by steadiness {np.exp(np.log(ratios).mean()):.2f}, above 1 on {np.sum(ratios > 1)}; "
+        f"confidence, said / found %: {', '.join(parts)}"
+    )
 
 
 def left_out(samples: Sequence[Sample], form: Calibration) -> dict[str, Calibration]:

@@ -1,0 +1,76 @@
+"""The numbers of the error bars make the errors likeliest, and say of other scenes what they say of these."""
+
+from pathlib import Path
+
+import numpy as np
+from click.testing import CliRunner
+
+from bench.__main__ import main
+from bench.error_model import as_code, fitted, judged
+from bench.error_samples import Sample
+from sepi.error_bars.calibration import CONSTANT, Calibration
+
+TRUE = Calibration(
+    scale={CONSTANT: 1.0, "deviation": 0.8, "bend": 0.0},
+    reach={CONSTANT: -0.7},
+    stray={CONSTANT: -3.0, "confidence": -1.0},
+    rim={CONSTANT: -3.0},
+)
+FORM = Calibration(*(dict.fromkeys(part, 0.0) for part in TRUE.parts))
+
+
+def drawn(name: str, seed: int, pixels: int = 20_000) -> Sample:
+    """Errors as the model of :data:`TRUE` has them."""
+    rng = np.random.default_rng(seed)
+    signs = {
+        "deviation": np.exp(rng.uniform(-7, -2, pixels)),
+        "bend": np.exp(rng.uniform(-8, -2, pixels)),
+        "confidence": rng.uniform(0.05, 1, pixels),
+        "above": rng.uniform(0, 1, pixels),
+        "below": np.zeros(pixels),
+        "steadiness": rng.uniform(0, 1, pixels),
+    }
+    scale = np.exp(1.0) * signs["deviation"] ** 0.8
+    odds = np.stack([np.ones(pixels), np.exp(-3.0) / signs["confidence"], np.full(pixels, np.exp(-3.0))])
+    chosen = (rng.uniform(size=pixels) * odds.sum(axis=0) > np.cumsum(odds, axis=0)).sum(axis=0)
+    width = np.choose(chosen, [scale, np.full(pixels, np.exp(-0.7)), 0.2 * signs["above"] + 0.01])
+    error = np.where(chosen == 2, signs["above"], 0.0) + width * rng.laplace(size=pixels)
+    return Sample(name, name, "best", error, signs, 0.0)
+
+
+def test_a_fit_finds_the_numbers_that_errors_were_drawn_with() -> None:
+    """A sign that tells nothing gets no power, and nine of ten errors of another scene are held."""
+    found = fitted([drawn("one", 0), drawn("another", 1)], FORM)
+    for part, true in zip(found.parts, TRUE.parts, strict=True):
+        for name, value in part.items():
+            assert abs(value - true[name]) < 0.15, (name, value)
+    other = judged(drawn("a third", 2), found)
+    assert 89 < other.coverage < 91
+    assert abs(other.said - other.found) < 1
+    names = {"Calibration": Calibration, "CONSTANT": CONSTANT}
+    exec(as_code("WRITTEN", found), names)
+    assert names["WRITTEN"] == found
+
+
+def test_the_command_fits_and_judges_scenes(tmp_path: Path) -> None:
+    words = [
+        "errors",
+        "--scene",
+        "dots",
+        "--sigma",
+        "3",
+        "--variant",
+        "fast",
+        "--kept",
+        str(tmp_path),
+        "--threads",
+        "1",
+    ]
+    done, again = (CliRunner().invoke(main, words) for _ in range(2))
+    assert done.exit_code == 0, done.output
+    assert "SECOND_ORDER = Calibration(" in done.stdout
+    assert "dots +3" in done.stdout
+    assert "1 maps: coverage" in done.stdout
+    # kept pixels are those that were computed
+    assert again.stdout == done.stdout
+    assert len(list(tmp_path.iterdir())) == 1
