@@ -14,12 +14,13 @@ import numpy.typing as npt
 from scipy.optimize import minimize
 
 from bench.error_samples import Sample
-from sepi.error_bars.bars import CLOSE, TAIL, mixture_of
+from sepi.error_bars.bars import TAIL, mixture_of
 from sepi.error_bars.calibration import CONSTANT, Calibration
 from sepi.error_bars.mixture import described
 from sepi.error_bars.mixture_kernels import LEAST_RIM, RIM_WIDTH
 from sepi.error_bars.signs import FLOORS
 from sepi.scoring.error_bars import ause, reliability
+from sepi.stage import CLOSE
 
 FloatArray = npt.NDArray[np.float64]
 

@@ -26,7 +26,7 @@ from pydantic import Field, model_validator
 
 from sepi.error_bars.bars import error_bars
 from sepi.error_bars.calibration import SECOND_ORDER, WLS, Calibration
-from sepi.error_bars.signs import deviation_by, signs_of_map, signs_of_stage_before, signs_of_views
+from sepi.error_bars.signs import signs_of_map, signs_of_stage_before, signs_of_views
 from sepi.image.noise import residual_variance
 from sepi.lightfield import FloatMap, LightField
 from sepi.matching.base_detail import BaseDetailParameters
@@ -51,7 +51,7 @@ from sepi.stage import (
 )
 
 if TYPE_CHECKING:
-    from sepi.matching.gauss_newton_kernels import Evidence
+    from sepi.matching.gauss_newton import Evidence
 
 UNIFORM_WEIGHT = 0.05
 """Weight of a plane that was put into a region without texture; planes cost nothing, so little holds it."""
@@ -114,7 +114,7 @@ def wls(
     -------
     StageMaps
         With the error bars ``sigma``, ``low`` and ``high``; ``confidence`` is the probability of an error of at most
-        :data:`sepi.error_bars.bars.CLOSE`, not the rectified confidence c' of Eq. 10, which weighs the data.
+        :data:`sepi.stage.CLOSE`, not the rectified confidence c' of Eq. 10, which weighs the data.
 
     Raises
     ------
@@ -141,7 +141,7 @@ def wls(
     >>> bool(errors[1] < 0.8 * errors[0])
     True
     """
-    from sepi.matching.gauss_newton import GaussNewton, windowed_step
+    from sepi.matching.gauss_newton import GaussNewton
 
     before = require_previous(previous)
     confidence = rectified_confidence(before.confidence, before.mask("textureless"), parameters)
@@ -154,8 +154,7 @@ def wls(
     views = spread_views(light_field, WLS_VIEWS)
     matching = GaussNewton(light_field, BaseDetailParameters(), OcclusionMarginParameters().occlusion_margin, views)
     told = matching.with_evidence(matching.mean(disparity), disparity)
-    deviation = deviation_by(windowed_step(told[0], told[1], 1, 1.0)[1])
-    return _with_bars(light_field, before, disparity, told, deviation, WLS)
+    return _with_bars(light_field, before, disparity, told, None, WLS)
 
 
 def second_order(
@@ -176,7 +175,7 @@ def second_order(
     -------
     StageMaps
         With the error bars ``sigma``, ``low`` and ``high``; ``confidence`` is the probability of an error of at most
-        :data:`sepi.error_bars.bars.CLOSE`.
+        :data:`sepi.stage.CLOSE`.
 
     Raises
     ------
@@ -219,12 +218,14 @@ def second_order(
         if i <= parameters.refinements or last:
             # other steps are too small to change it
             mean = matching.mean(disparity)
-        told = matching.with_evidence(mean, disparity) if last else matching.gradient_and_hessian(mean, disparity)
+        if last:
+            told = gradient, information, _ = matching.with_evidence(mean, disparity)
+        else:
+            gradient, information = matching.gradient_and_hessian(mean, disparity)
         radius = parameters.solve_radius if smooth else parameters.refinement_radius
-        step, curvature = windowed_step(*told[:2], radius, parameters.max_update)
+        step, curvature = windowed_step(gradient, information, radius, parameters.max_update)
         # where no view knows anything, a step would follow the noise
         target = np.clip(disparity + np.where(uniform, np.float32(0), step), lowest, highest)
-        deviation = deviation_by(curvature)
         if smooth:
             unit = max(float(np.percentile(curvature, 90)), 1e-9)
             weight = np.minimum(curvature / unit, 1) * reliability
@@ -233,11 +234,10 @@ def second_order(
             target = _smoothed(
                 target, weight, smoothness, parameters.rtol if last else parameters.first_rtol, parameters
             )
-            if last:
-                deviation = np.sqrt(inverse_diagonal(weight, smoothness) / np.float32(unit))
         disparity = np.clip(target, lowest, highest)
-    assert len(told) == 3  # those of the last step
-    return _with_bars(given, before, disparity, told, deviation, SECOND_ORDER)
+    # of the last step
+    variance = inverse_diagonal(weight, smoothness) / np.float32(unit) if smooth else None
+    return _with_bars(given, before, disparity, told, variance, SECOND_ORDER)
 
 
 def _with_bars(
@@ -245,21 +245,23 @@ def _with_bars(
     before: StageMaps,
     disparity: FloatMap,
     told: tuple[FloatMap, FloatMap, Evidence],
-    deviation: FloatMap,
+    variance: FloatMap | None,
     calibration: Calibration,
 ) -> StageMaps:
-    """Maps with error bars, by what the views told of (nearly) this map, and by the deviation that this leaves.
+    """Maps with error bars, by what the views told of (nearly) this map.
 
-    The light field is the one that was given, not denoised: its noise counts.
+    The light field is the one that was given, not denoised: its noise counts. Where smoothing adds to what the views
+    know, ``variance`` is what is left of both.
     """
     gradient, curvature, evidence = told
     known = light_field.require_disparity_range()
     signs = {
-        "deviation": deviation,
         **signs_of_map(disparity, curvature, known),
         **signs_of_views(gradient, curvature, evidence, measured_noise(light_field).usual),
         **signs_of_stage_before(before.confidence, before.mask("textureless")),
     }
+    if variance is not None:
+        signs["deviation"] = np.sqrt(variance)
     bars = error_bars(disparity, signs, known, calibration)
     return before.updated(disparity, bars.confidence, sigma=bars.sigma, low=bars.low, high=bars.high)
 

@@ -21,6 +21,9 @@ from sepi.lightfield import BoolMap, DisparityRange, FloatMap, LightField
 REACH = 4.0
 """View steps from the reference view to the farthest, along an axis, in what a stage function sees: of 9x9 views."""
 
+CLOSE = 0.07
+"""Error that the confidence of maps with error bars is about, in pixels per view step of :data:`REACH`."""
+
 SIGMA, LOW, HIGH = ERROR_BARS = "sigma", "low", "high"
 """Maps of how far a disparity may be wrong: standard deviation, and bounds of the interval of 90 %."""
 

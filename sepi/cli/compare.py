@@ -40,8 +40,7 @@ def compare(a: Path, b: Path, ground_truth: Path | None, output: Path, own: Trut
       sepi compare before.pfm after.pfm gt_disp_lowres.pfm -o page.html
     """
     from sepi.cli.evaluate import score_table
-    from sepi.io.all_views import read_disparity_at
-    from sepi.io.error_bars import read_error_bars
+    from sepi.io.all_views import read_disparity_at, read_error_bars_at
     from sepi.io.files import atomic_path
     from sepi.report.web.comparison_page import Comparison, comparison_page
 
@@ -52,7 +51,7 @@ def compare(a: Path, b: Path, ground_truth: Path | None, output: Path, own: Trut
     for path, other in ((b, maps[1]), (own.path if own else ground_truth, values), (ground_truth, light_field)):
         if other is not None and other.shape != maps[0].shape:
             raise SepiError(f"{path}: is {other.shape}, but {a} is {maps[0].shape} (height, width)")
-    bars = read_error_bars(a, view), read_error_bars(b, view)
+    bars = read_error_bars_at(a, view), read_error_bars_at(b, view)
     step = 0.0 if own is None else own.step
     found = Comparison(_names(a, b), maps, values, light_field, bars, step)
     with atomic_path(output) as temporary:

@@ -82,8 +82,7 @@ def evaluate(
       sepi evaluate inner_482x482.pfm cotton --offset 15,15
       sepi evaluate venus-depth venus --truth disp2.pgm --truth-scale 0.03125 --bad 0.25
     """
-    from sepi.io.all_views import read_disparity_at
-    from sepi.io.error_bars import read_error_bars
+    from sepi.io.all_views import read_disparity_at, read_error_bars_at
     from sepi.io.files import naming
     from sepi.io.scores import without_nan
     from sepi.scoring.crops import in_frame
@@ -112,7 +111,7 @@ def evaluate(
     protocols = PROTOCOLS if border is None else {f"border {border}": border}
     if truth_step is None:
         truth_step = 0.0 if own is None else own.step
-    maps = read_error_bars(estimate, reading.options.view)
+    maps = read_error_bars_at(estimate, reading.options.view)
     bars = None if maps is None else ErrorBars.of(maps, None if light_field is None else light_field.reach, truth_step)
     if bars is not None and crop is not None:
         bars = bars.in_frame(crop.offset, crop.whole)

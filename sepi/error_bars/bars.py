@@ -16,10 +16,7 @@ from sepi.error_bars.calibration import CONSTANT, Calibration
 from sepi.error_bars.mixture import Mixture, described
 from sepi.error_bars.signs import FLOORS, Signs
 from sepi.lightfield import DisparityRange, FloatMap
-
-CLOSE = 0.07
-"""Error that the confidence is about, pixels per view step of which the farthest view is four away."""
-
+from sepi.stage import CLOSE
 
 TAIL = 0.05
 """Probability beyond either bound."""
@@ -38,7 +35,7 @@ class ErrorBars(NamedTuple):
     low, high : ndarray
         Interval that holds the disparity with a probability of 90 %.
     confidence : ndarray
-        Probability that the error is at most :data:`CLOSE`.
+        Probability that the error is at most :data:`sepi.stage.CLOSE`.
     """
 
     sigma: FloatMap

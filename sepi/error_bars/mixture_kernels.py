@@ -29,12 +29,18 @@ def _beyond(x: float, width: float) -> float:
 
 
 @njit(inline="always")
+def _share_above(above: float, below: float) -> float:
+    """Part of the probability of the other surface that the nearer one has: the farther away, the likelier."""
+    return float((above * above + 1e-6) / (above * above + below * below + 2e-6))
+
+
+@njit(inline="always")
 def _above(x: float, p: Any) -> float:
     """Probability that the true disparity is more than ``x >= 0`` above the map's."""
     scale, reach, stray, rim, above, below = p
     core = (1 - stray - rim) * 0.5 * np.exp(-x / scale)
     strays = stray * 0.5 * np.exp(-x / reach)
-    share = (above * above + 1e-6) / (above * above + below * below + 2e-6)
+    share = _share_above(above, below)
     other = share * _beyond(x - above, RIM_WIDTH * above + LEAST_RIM)
     other += (1 - share) * _beyond(x + below, RIM_WIDTH * below + LEAST_RIM)
     return float(core + strays + rim * other)
@@ -79,7 +85,7 @@ def _bound(tail: float, p: Any) -> float:
 def _expected(p: Any) -> float:
     """Expected absolute error."""
     scale, reach, stray, rim, above, below = p
-    share = (above * above + 1e-6) / (above * above + below * below + 2e-6)
+    share = _share_above(above, below)
     wide, deep = RIM_WIDTH * above + LEAST_RIM, RIM_WIDTH * below + LEAST_RIM
     other = share * (above + wide * np.exp(-above / wide)) + (1 - share) * (below + deep * np.exp(-below / deep))
     return float((1 - stray - rim) * scale + stray * reach + rim * other)

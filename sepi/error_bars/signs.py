@@ -14,7 +14,7 @@ import numpy as np
 from sepi.lightfield import BoolMap, DisparityRange, FloatMap
 
 if TYPE_CHECKING:
-    from sepi.matching.gauss_newton_kernels import Evidence
+    from sepi.matching.gauss_newton import Evidence
 
 HALF_CONFIDENT_DIFFERENCE = 0.01
 """Second difference at which a surface is half as steady as a plane, pixels per view step."""
@@ -106,7 +106,8 @@ def signs_of_views(gradient: FloatMap, curvature: FloatMap, evidence: Evidence, 
     Returns
     -------
     dict of str to ndarray, shape (H, W), float32
-        ``wide_deviation``, the standard deviation that the information over 7x7 pixels leaves; ``step`` and
+        ``deviation`` and ``wide_deviation``, the standard deviation that the information over 3x3 and 7x7 pixels
+        leaves; ``step`` and
         ``wide_step``, by how much the cost would have the map move, over 3x3 and 15x15 pixels; ``disagreement``,
         between the views on opposite sides about that; ``misfit``, residuals in units of the noise; ``agreement`` and
         ``detail_agreement``, the mean robust weight of the views.
@@ -114,7 +115,8 @@ def signs_of_views(gradient: FloatMap, curvature: FloatMap, evidence: Evidence, 
     seeing = _mean(evidence.seeing, 3) + _LEAST
     residual = np.maximum(_mean(evidence.misfit, 3) / (_mean(evidence.agreement, 3) + _LEAST), 0)
     return {
-        "wide_deviation": deviation_by(_mean(curvature, 7)),
+        "deviation": _deviation(_mean(curvature, 3)),
+        "wide_deviation": _deviation(_mean(curvature, 7)),
         "step": np.abs(_mean(gradient, 3) / (_mean(curvature, 3) + _LEAST)),
         "wide_step": np.abs(_mean(gradient, 15) / (_mean(curvature, 15) + _LEAST)),
         "disagreement": _disagreement(evidence, curvature),
@@ -133,7 +135,7 @@ def signs_of_stage_before(confidence: FloatMap, plane: BoolMap) -> dict[str, Flo
     }
 
 
-def deviation_by(information: FloatMap) -> FloatMap:
+def _deviation(information: FloatMap) -> FloatMap:
     """Standard deviation that an information leaves, of which a little is always there."""
     return np.asarray(1 / np.sqrt(np.maximum(information, 0) + np.float32(1e-2)), np.float32)
 

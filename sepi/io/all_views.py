@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from sepi.errors import SepiError
 from sepi.io.disparity_maps import read_disparity
+from sepi.io.error_bars import read_error_bars
 from sepi.io.hdf5 import (
     UNITS,
     Attribute,
@@ -30,7 +31,7 @@ from sepi.io.origin import Origin, read_origin
 from sepi.io.result_files import ALL_VIEWS
 from sepi.io.result_folder import Result, read_result
 from sepi.lightfield import FloatMap, LightField
-from sepi.stage import ERROR_BARS
+from sepi.stage import ERROR_BARS, StageMaps
 
 View = tuple[int, int]
 
@@ -111,6 +112,16 @@ def read_result_at(path: Path, view: View | None = None) -> Result:
 def read_disparity_at(path: Path, view: View | None) -> FloatMap:
     """A disparity map, (H, W) float32: that of a view where the file has maps of all views, else the one it holds."""
     return read_disparity(path) if _file_of(path, view) is None else read_result_at(path, view).disparity
+
+
+def read_error_bars_at(path: Path, view: View | None) -> StageMaps | None:
+    """The map of :func:`read_disparity_at` with its confidence and error bars; None where it has none."""
+    if _file_of(path, view) is None:
+        return read_error_bars(path)
+    result = read_result_at(path, view)
+    if result.sigma is None:
+        return None
+    return StageMaps(result.disparity, result.confidence, {name: getattr(result, name) for name in ERROR_BARS})
 
 
 def read_origin_at(path: Path, view: View | None) -> Origin | None:

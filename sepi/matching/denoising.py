@@ -107,22 +107,7 @@ def denoised(light_field: LightField, least: float) -> LightField:
 
 
 def measured_noise(light_field: LightField) -> ViewNoise:
-    """Noise of the views of a light field, inside :func:`kept_views` measured once.
-
-    Parameters
-    ----------
-    light_field : LightField
-        With a known disparity range, not denoised.
-
-    Returns
-    -------
-    ViewNoise
-
-    Raises
-    ------
-    SepiError
-        If the disparity range is unknown.
-    """
+    """:func:`sepi.matching.view_noise.view_noise`, of views that are not denoised; in :func:`kept_views` just once."""
     return _noise(light_field, _kept_of(light_field))
 
 

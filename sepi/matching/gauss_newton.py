@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cached_property
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -19,7 +20,6 @@ from sepi.image.noise import variance_of_residuals
 from sepi.lightfield import BoolMap, FloatMap, LightField
 from sepi.matching.base_detail import BaseDetailParameters, base_detail_decomposition, forget_detail, reference_noise
 from sepi.matching.gauss_newton_kernels import (
-    Evidence,
     Seeing,
     SplineViews,
     equations_and_evidence,
@@ -35,6 +35,28 @@ _DIFFERENCE = np.array([-1, 0, 1], np.float32) / 2
 
 BYTES_PER_PIXEL = 2 * 4 + 2 + 4
 """Of a pixel of a view: four coefficients, the detail, and the z-buffer."""
+
+
+class Evidence(NamedTuple):
+    """What the views say about a disparity beside the Gauss-Newton step: sums of each pixel over those that see it.
+
+    Attributes
+    ----------
+    halves : ndarray, shape (4, 2, H, W), float32
+        Gradient and curvature by the views to the left, to the right, above and below alone.
+    misfit : ndarray, shape (H, W), float32
+        Squared residual of the colours, times its weight.
+    agreement, detail_agreement : ndarray, shape (H, W), float32
+        Weight of the views by colours, and by detail: 1 for each that is as the mean is.
+    seeing : ndarray, shape (H, W), float32
+        Number of views.
+    """
+
+    halves: FloatMap
+    misfit: FloatMap
+    agreement: FloatMap
+    detail_agreement: FloatMap
+    seeing: FloatMap
 
 
 class GaussNewton:

@@ -214,6 +214,22 @@ def mean_of_views(views: SplineViews, seeing: Seeing, disparity: Any, begin: int
 
 
 @njit(inline="always")
+def _terms(views: SplineViews, n: int, at: Any, v: Any, u: Any, m: Any, p: Any, q: Any) -> Any:
+    """What view ``n`` of baseline ``(v, u)`` adds for a pixel that it sees at ``at``: by the mean and its derivatives.
+
+    Slope, curvature, squared residual and weight of colours; slope, curvature and weight of detail.
+    """
+    three = np.float32(3)
+    v0, v1, v2, v3 = _sample(views, n, at[0], at[1])
+    r0, r1, r2, r3 = v0 - m[0], v1 - m[1], v2 - m[2], v3 - m[3]
+    g0, g1, g2, g3 = p[0] * v + q[0] * u, p[1] * v + q[1] * u, p[2] * v + q[2] * u, p[3] * v + q[3] * u
+    z = r0 * r0 + r1 * r1 + r2 * r2
+    w, w3 = _robust_weight(z, views.scales2[0]), three * _robust_weight(three * r3 * r3, views.scales2[1])
+    slope, curve = w * (r0 * g0 + r1 * g1 + r2 * g2), w * (g0 * g0 + g1 * g1 + g2 * g2)
+    return slope, curve, z, w, w3 * r3 * g3, w3 * g3 * g3, w3
+
+
+@njit(inline="always")
 def _add_to_equations(
     views: SplineViews, n: int, y: int, seeing: Seeing, disparity: Any, image: Any, sums: Any
 ) -> None:
@@ -222,22 +238,17 @@ def _add_to_equations(
     """
     mean, down, across = image
     v, u = views.baselines[n]
-    three = np.float32(3)
     for x in range(disparity.shape[1]):
         d = disparity[y, x]
-        fy, fx = np.float32(y) - d * v, np.float32(x) - d * u
-        if not _is_seen(views, seeing, n, disparity.shape, fy, fx, d):
+        at = np.float32(y) - d * v, np.float32(x) - d * u
+        if not _is_seen(views, seeing, n, disparity.shape, at[0], at[1], d):
             continue
-        v0, v1, v2, v3 = _sample(views, n, fy, fx)
-        m, p, q, total = mean[y, x], down[y, x], across[y, x], sums[x]
-        r0, r1, r2, r3 = v0 - m[0], v1 - m[1], v2 - m[2], v3 - m[3]
-        g0, g1, g2, g3 = p[0] * v + q[0] * u, p[1] * v + q[1] * u, p[2] * v + q[2] * u, p[3] * v + q[3] * u
-        w = _robust_weight(r0 * r0 + r1 * r1 + r2 * r2, views.scales2[0])
-        total[0] += w * (r0 * g0 + r1 * g1 + r2 * g2)
-        total[1] += w * (g0 * g0 + g1 * g1 + g2 * g2)
-        w = three * _robust_weight(three * r3 * r3, views.scales2[1])
-        total[2] += w * r3 * g3
-        total[3] += w * g3 * g3
+        slope, curve, _, _, slope3, curve3, _ = _terms(views, n, at, v, u, mean[y, x], down[y, x], across[y, x])
+        total = sums[x]
+        total[0] += slope
+        total[1] += curve
+        total[2] += slope3
+        total[3] += curve3
 
 
 @njit(parallel=True, cache=True, fastmath=EXACT, error_model="numpy")
@@ -266,28 +277,6 @@ def normal_equations(
             curvature[y, x] = colour * sums[x, 1] + detail * sums[x, 3]
 
 
-class Evidence(NamedTuple):
-    """What the views say about a disparity beside the Gauss-Newton step: sums of each pixel over those that see it.
-
-    Attributes
-    ----------
-    halves : ndarray, shape (4, 2, H, W), float32
-        Gradient and curvature by the views to the left, to the right, above and below alone.
-    misfit : ndarray, shape (H, W), float32
-        Squared residual of the colours, times its weight.
-    agreement, detail_agreement : ndarray, shape (H, W), float32
-        Weight of the views by colours, and by detail: 1 for each that is as the mean is.
-    seeing : ndarray, shape (H, W), float32
-        Number of views.
-    """
-
-    halves: FloatMap
-    misfit: FloatMap
-    agreement: FloatMap
-    detail_agreement: FloatMap
-    seeing: FloatMap
-
-
 @njit(inline="always")
 def _add_to_evidence(
     views: SplineViews, n: int, y: int, seeing: Seeing, disparity: Any, image: Any, sums: Any, halves: Any, more: Any
@@ -295,39 +284,31 @@ def _add_to_evidence(
     """As :func:`_add_to_equations`; and to a row of the halves ``(W, 4, 2)``, and ``more (W, 4)``."""
     mean, down, across = image
     v, u = views.baselines[n]
-    three, zero = np.float32(3), np.float32(0)
-    colour, detail = views.shares[0] / views.scales2[0], views.shares[1] / views.scales2[1]
+    zero, colour, detail = np.float32(0), views.shares[0] / views.scales2[0], views.shares[1] / views.scales2[1]
+    # left or right, above or below
+    side, end = 0 if u < zero else 1, 2 if v < zero else 3
     for x in range(disparity.shape[1]):
         d = disparity[y, x]
-        fy, fx = np.float32(y) - d * v, np.float32(x) - d * u
-        if not _is_seen(views, seeing, n, disparity.shape, fy, fx, d):
+        at = np.float32(y) - d * v, np.float32(x) - d * u
+        if not _is_seen(views, seeing, n, disparity.shape, at[0], at[1], d):
             continue
-        v0, v1, v2, v3 = _sample(views, n, fy, fx)
-        m, p, q, total, rest = mean[y, x], down[y, x], across[y, x], sums[x], more[x]
-        r0, r1, r2, r3 = v0 - m[0], v1 - m[1], v2 - m[2], v3 - m[3]
-        g0, g1, g2, g3 = p[0] * v + q[0] * u, p[1] * v + q[1] * u, p[2] * v + q[2] * u, p[3] * v + q[3] * u
-        z = r0 * r0 + r1 * r1 + r2 * r2
-        w = _robust_weight(z, views.scales2[0])
-        slope, curve = w * (r0 * g0 + r1 * g1 + r2 * g2), w * (g0 * g0 + g1 * g1 + g2 * g2)
+        slope, curve, z, w, slope3, curve3, w3 = _terms(views, n, at, v, u, mean[y, x], down[y, x], across[y, x])
+        total, rest = sums[x], more[x]
         total[0] += slope
         total[1] += curve
+        total[2] += slope3
+        total[3] += curve3
         rest[0] += w * z
         rest[1] += w
-        w = three * _robust_weight(three * r3 * r3, views.scales2[1])
-        detail_slope, detail_curve = w * r3 * g3, w * g3 * g3
-        total[2] += detail_slope
-        total[3] += detail_curve
-        rest[2] += w / three
+        rest[2] += w3 / np.float32(3)
         rest[3] += np.float32(1)
-        slope, curve = colour * slope + detail * detail_slope, colour * curve + detail * detail_curve
+        slope, curve = colour * slope + detail * slope3, colour * curve + detail * curve3
         if u != zero:
-            half = halves[x, 0 if u < zero else 1]
-            half[0] += slope
-            half[1] += curve
+            halves[x, side, 0] += slope
+            halves[x, side, 1] += curve
         if v != zero:
-            half = halves[x, 2 if v < zero else 3]
-            half[0] += slope
-            half[1] += curve
+            halves[x, end, 0] += slope
+            halves[x, end, 1] += curve
 
 
 @njit(parallel=True, cache=True, fastmath=EXACT, error_model="numpy")

@@ -15,10 +15,7 @@ from sepi.io.scores import Scores
 from sepi.lightfield import BoolMap, FloatMap
 from sepi.scoring.confidence import oracle, sparsification
 from sepi.scoring.crops import in_frame
-from sepi.stage import REACH, StageMaps
-
-CLOSE = 0.07
-"""Error that a confidence is about, in pixels per view step of which the farthest view is four away."""
+from sepi.stage import CLOSE, REACH, StageMaps
 
 ERROR_BAR_SCORES: dict[str, str] = {
     "coverage": "coverage %",

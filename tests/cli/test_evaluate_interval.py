@@ -9,8 +9,10 @@ from click.testing import CliRunner, Result
 
 from sepi.cli.evaluate import NO_INTERVAL
 from sepi.cli.main import main
+from sepi.io.all_views import write_all_views
 from sepi.io.hdf5 import write_light_field
 from sepi.io.images import write_png
+from sepi.io.origin import origin_attributes
 from sepi.io.pfm import write_pfm
 from sepi.io.result_folder import write_result
 from sepi.scenes import render
@@ -108,3 +110,16 @@ def test_compared_maps_have_it_where_there_is_one(files: StageMaps) -> None:
     assert "map: standard deviation" in page
     assert "bare.pfm: standard deviation" not in page
     assert "no interval</td>" in page
+
+
+def test_maps_of_all_views_have_those_of_the_view(files: StageMaps) -> None:
+    """With the view that is meant, and without one those of the reference view, as its disparity is read."""
+    light_field = render("dots", size=64, views=3)
+    views = [
+        ((t, s), {**files.all(), "extended": np.zeros((64, 64), bool), "low": files.low - np.float32(t)})
+        for t, s in np.ndindex(3, 3)
+    ]
+    write_all_views(Path("all.h5"), light_field, views, {"scene": "dots", **origin_attributes(light_field)})
+    for flags, width in (((), 1.3), (("--view", "1,1"), 1.3), (("--view", "2,0"), 2.3)):
+        scores = json.loads(call("evaluate", "all.h5", "exact.pfm", *flags, "--json").stdout)
+        assert scores["paper"]["all"]["width"] == pytest.approx(width, abs=1e-4)
