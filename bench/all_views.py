@@ -16,7 +16,8 @@ import numpy.typing as npt
 from tqdm import tqdm
 
 from bench import tables
-from sepi.applications.all_views import EDGE_VIEWS, carried_map, estimate_all_views
+from sepi.applications.all_views import EDGE_VIEWS, estimate_all_views
+from sepi.applications.carried_map import carried_map
 from sepi.command import SepiCommand
 from sepi.lightfield import FloatMap, LightField
 from sepi.pipeline import estimate_depth

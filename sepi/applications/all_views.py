@@ -23,6 +23,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from sepi.applications.carried_map import MOST_STRETCHED, TOLERANCE
 from sepi.errors import SepiError
 from sepi.lightfield import BoolMap, FloatMap, LightField, require_light_field
 from sepi.pipeline import estimate_depth
@@ -32,12 +33,6 @@ from sepi.variants import DEFAULT_VARIANT, Variant
 
 if TYPE_CHECKING:
     from sepi.applications.all_views_kernels import Sources
-
-TOLERANCE = 0.1
-"""Disparities that differ by no more are of one surface, pixels per view step."""
-
-MOST_STRETCHED = 2.0
-"""A surface that a view sees so many times larger than the map's view did is left to maps that saw it better."""
 
 LEAST_WEIGHT = 0.05
 """Vote of a map where its confidence is 0, beside 1: beside depth steps all are small, and there they differ."""
@@ -253,66 +248,6 @@ def anchor_views(light_field: LightField) -> list[tuple[int, int]]:
     farthest = [places[np.argmax(baselines @ corner)] for corner in _CORNERS]
     found = [light_field.reference_position, *((int(t), int(s)) for t, s in farthest)]
     return list(dict.fromkeys(found))
-
-
-def carried_map(disparity: FloatMap, baseline: tuple[float, float], known: BoolMap | None = None) -> FloatMap:
-    """A disparity map as another view sees its surfaces.
-
-    Parameters
-    ----------
-    disparity : ndarray, shape (H, W), float32
-        Pixels per view step.
-    baseline : (float, float)
-        From the map's view to the other, down and across, in view steps.
-    known : ndarray, shape (H, W), bool, optional
-        Pixels that count, whose disparity is finite; all unless given.
-
-    Returns
-    -------
-    ndarray, shape (H, W), float32
-        NaN where the other view sees no surface of the map.
-    """
-    return _carried(disparity, baseline, known)[0]
-
-
-def carried_values(
-    disparity: FloatMap, values: FloatMap, baseline: tuple[float, float], known: BoolMap | None = None
-) -> FloatMap:
-    """Values of a map's pixels as another view sees its surfaces; arguments as :func:`carried_map`.
-
-    Parameters
-    ----------
-    values : ndarray, shape (H, W), float32
-        Of each pixel of the map.
-
-    Returns
-    -------
-    ndarray, shape (H, W), float32
-        NaN where the other view sees no surface of the map.
-    """
-    origin = _carried(disparity, baseline, known)[1]
-    return np.where(origin >= 0, values.ravel()[origin], np.float32(np.nan))
-
-
-def _carried(
-    disparity: FloatMap, baseline: tuple[float, float], known: BoolMap | None
-) -> tuple[FloatMap, npt.NDArray[np.int32]]:
-    """The map that :func:`carried_map` gives, and the number of the pixel that is seen, -1 where none is."""
-    from sepi.applications.all_views_kernels import carry, corner_disparities
-
-    nearest, origin = np.empty_like(disparity), np.empty(disparity.shape, np.int32)
-    if known is not None:
-        # compiled code knows no NaN; behind all else, what is unknown hides nothing
-        disparity = np.where(known, disparity, disparity[known].min(initial=0) - np.float32(1))
-    corners = corner_disparities(disparity, np.float32(TOLERANCE))
-    down, across = map(float, baseline)
-    carry(disparity, corners, down, across, MOST_STRETCHED, nearest, origin)
-    if known is not None:
-        origin[~known.ravel()[origin]] = -1
-    nearest[origin < 0] = np.nan
-    # surfaces go on to the border of their last pixel, but no surface is farther or nearer than the map has one
-    seen = disparity if known is None else disparity[known]
-    return (np.clip(nearest, seen.min(), seen.max()) if seen.size else nearest), origin
 
 
 def _sources(found: list[StageMaps], baselines: npt.NDArray[np.float64]) -> Sources:

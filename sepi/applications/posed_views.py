@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from sepi.applications.all_views import carried_map, carried_values
 from sepi.applications.camera_poses import CameraPoses, Points, camera_poses, nominal_camera
+from sepi.applications.carried_map import carried_map, carried_values
 from sepi.camera import Camera
 from sepi.errors import SepiError
 from sepi.lightfield import BoolMap, FloatMap, LightField, as_unit_float

@@ -20,14 +20,13 @@ import sepi
 from bench.all_views import disagreement, moved_pixels
 from sepi.applications import all_views_kernels as kernels
 from sepi.applications.all_views import (
-    TOLERANCE,
     AllViews,
     ViewMaps,
     _with_doubt,
     anchor_views,
-    carried_map,
     estimate_all_views,
 )
+from sepi.applications.carried_map import TOLERANCE, carried_map
 from sepi.camera import Camera
 from sepi.cli.main import main
 from sepi.errors import SepiError

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from geometries import GEOMETRIES, standing
 
-from sepi.applications.all_views import carried_map
 from sepi.applications.camera_poses import CameraPoses, camera_poses, nominal_camera
+from sepi.applications.carried_map import carried_map
 from sepi.applications.posed_views import posed_views
 from sepi.camera import Camera, camera_from
 from sepi.errors import SepiError
