@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -20,10 +21,12 @@ from sepi.scoring.error_bars import ERROR_BAR_SCORES, Reliability
 from sepi.scoring.scores import WHOLE_MAP
 from sepi.workflow.rendered_scenes import DATASET, rendered_scene
 
+# widths are hundredths of a pixel, and less
+_DECIMALS = {"width": 4}
 _COLUMNS = {
     "scene": Column("scene", Kind.TEXT),
     "variant": Column("variant", Kind.TEXT),
-    **{name: Column(head) for name, head in ERROR_BAR_SCORES.items()},
+    **{name: Column(head, decimals=_DECIMALS.get(name, 2)) for name, head in ERROR_BAR_SCORES.items()},
 }
 
 
@@ -123,7 +126,10 @@ def _region_section(records: Sequence[Record], variant: str) -> Section:
     regions = dict.fromkeys(str(record["region"]) for record in own)
     pairs = {f"{region} {name}": (region, name) for region in regions for name in ("coverage", "width")}
     columns = {"scene": Column("scene", Kind.TEXT)}
-    columns |= {key: Column(f"{region}, {ERROR_BAR_SCORES[name]}") for key, (region, name) in pairs.items()}
+    columns |= {
+        key: replace(_COLUMNS[name], head=f"{region}, {ERROR_BAR_SCORES[name]}")
+        for key, (region, name) in pairs.items()
+    }
     rows: dict[str, dict[str, Cell]] = {}
     for record in own:
         row = rows.setdefault(_title(record), {"scene": _title(record)})

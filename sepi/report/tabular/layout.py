@@ -43,10 +43,11 @@ class Kind(StrEnum):
 
 @dataclass(frozen=True)
 class Column:
-    """Head and kind of a page's column."""
+    """Head and kind of a page's column, and how many decimals its figures have."""
 
     head: str
     kind: Kind = Kind.FIGURE
+    decimals: int = 2
 
 
 @dataclass(frozen=True)
@@ -113,9 +114,9 @@ class Report:
     marked: str = ""
 
 
-def entry(cell: Cell, kind: Kind = Kind.FIGURE, mark: str | None = None, note: str = "") -> Entry:
+def entry(cell: Cell, kind: Kind = Kind.FIGURE, mark: str | None = None, note: str = "", decimals: int = 2) -> Entry:
     """A cell of a page; what must be known of its figure, the note, stands after it."""
-    text = f"{short(cell)} ({note})" if note else short(cell)
+    text = f"{short(cell, decimals)} ({note})" if note else short(cell, decimals)
     return Entry(text, _value(cell, kind), kind, mark)
 
 
@@ -139,7 +140,7 @@ def line(
     cells = []
     for key, column in columns.items():
         cell_kind = figures if figures and column.kind != Kind.TEXT else column.kind
-        cells.append(entry(record.get(key), cell_kind, marks.get(key), notes.get(key, "")))
+        cells.append(entry(record.get(key), cell_kind, marks.get(key), notes.get(key, ""), column.decimals))
     available = any(cell.text for cell in cells if cell.kind not in (Kind.TEXT, Kind.PUBLISHED))
     return Line(cells, kind, available)
 
@@ -149,9 +150,9 @@ def printed(value: float | None) -> str | None:
     return None if value is None else f"{value:.2f}"
 
 
-def short(cell: Cell) -> str:
-    """A cell as a page shows it: two decimals, empty where not available, ``n/a`` for a score over no pixels."""
-    return _text(cell, decimals=2, no_pixels="n/a")
+def short(cell: Cell, decimals: int = 2) -> str:
+    """A cell as a page shows it: some decimals, empty where not available, ``n/a`` for a score over no pixels."""
+    return _text(cell, decimals=decimals, no_pixels="n/a")
 
 
 def ranks(figures: Record) -> dict[str, str | None]:

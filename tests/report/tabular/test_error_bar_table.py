@@ -23,9 +23,9 @@ def test_coverage_stands_beside_width_for_every_scene(found: dict[str, Any]) -> 
         assert [float(row[name]) for name in ("ause", "ause_confidence")] == pytest.approx([0, 0], abs=1e-3)
     assert not any(row["scene"] == "picture" for row in rows), "no ground truth"
     page = markdown(found, "error_bars")
-    assert "| builtin/dots | paper | 100.00 | 0.20 |" in page
+    assert "| builtin/dots | paper | 100.00 | 0.2000 |" in page
     assert "all, coverage % | all, width | occluded, coverage % | occluded, width |" in page
-    assert "| builtin/flat | 0.00 | 0.20 | n/a | n/a |" in page
+    assert "| builtin/flat | 0.00 | 0.2000 | n/a | n/a |" in page
 
 
 def test_all_scenes_together_are_means_over_their_pixels(found: dict[str, Any]) -> None:
