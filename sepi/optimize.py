@@ -56,7 +56,7 @@ if TYPE_CHECKING:
 UNIFORM_WEIGHT = 0.05
 """Weight of a plane that was put into a region without texture; planes cost nothing, so little holds it."""
 
-WLS_VIEWS = 25
+WLS_VIEWS = 9
 """Views that are asked how far a map by weighted least squares may be wrong, at least."""
 
 LEAST_RELIABILITY = 1e-6
