@@ -26,7 +26,8 @@ def aggregate(cost: Any, guide: Any, radius: int, variance: Any) -> Any:
         weight = np.empty(W, np.float32)
         for row in range(max(0, y - radius), min(H, y + radius + 1)):
             for dx in range(-radius, radius + 1):
-                first, last = max(0, -dx), min(W, W - dx)
+                # none where the window is wider than the picture: an end below 0 would count from the right
+                first, last = max(0, -dx), max(0, min(W, W - dx))
                 for x in range(first, last):
                     distance = np.float32(0)
                     for c in range(3):

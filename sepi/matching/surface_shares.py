@@ -120,6 +120,9 @@ def _evidence(light_field: LightField, disparity: FloatMap, rim: Rim, parameters
     margin = np.float32(parameters.occlusion_margin)
     layer, distance = _more_distant_layer(disparity, rim, margin)
     views = _views_alike(light_field, disparity, clean, parameters)
+    if not len(views.places):
+        # they say nothing for either surface
+        return np.zeros_like(disparity)
     present = np.zeros(light_field.grid, bool)
     present[tuple(views.places.T)] = True
     # how far from a pixel the pieces of background lie that views show with it

@@ -221,6 +221,15 @@ def test_smoothing_equals_a_plain_twin() -> None:
     np.testing.assert_allclose(smoothed, expected, atol=1e-4)
 
 
+@pytest.mark.parametrize(("shape", "radius"), [((2, 2), 4), ((3, 1), 2), ((9, 3), 4)])
+def test_a_window_may_be_wider_than_the_picture(shape: tuple[int, int], radius: int) -> None:
+    """What is beyond the picture's ends is no part of it: a sliver of a picture had another depth in each run."""
+    random = np.random.default_rng(4)
+    cost, guide = random.random((5, *shape)).astype(np.float32), random.random((*shape, 3)).astype(np.float32) * 0.1
+    averaged = aggregate(cost, guide, radius, np.float32(0.01))
+    np.testing.assert_allclose(averaged, aggregate_twin(cost, guide, radius, 0.01), atol=1e-5)
+
+
 def test_margin_tells_one_minimum_from_two() -> None:
     """Confidence is high for one deep minimum, zero for two equal ones and where nothing differs."""
     disparities = np.linspace(-1, 1, 21).astype(np.float32)
