@@ -54,10 +54,15 @@ class Reliability(NamedTuple):
     found: FloatArray
 
     @property
+    def enough(self) -> BoolMap:
+        """Which bins (10,) hold enough pixels: what few say is noise."""
+        return np.asarray((self.pixels > 0) & (self.pixels >= ENOUGH * self.pixels.sum()))
+
+    @property
     def gap(self) -> float:
         """Largest difference of what was said and found, in percent, over bins that hold enough pixels."""
-        enough = (self.pixels > 0) & (self.pixels >= ENOUGH * self.pixels.sum())
-        return 100 * float(np.abs(self.found - self.said)[enough].max()) if enough.any() else float("nan")
+        gaps = np.abs(self.found - self.said)[self.enough]
+        return 100 * float(gaps.max()) if gaps.size else float("nan")
 
 
 @dataclass(frozen=True)

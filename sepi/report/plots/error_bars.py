@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from sepi.report.plots.saving import new_figure, save
-from sepi.scoring.error_bars import ENOUGH, Reliability
+from sepi.scoring.error_bars import Reliability
 
 INTERVAL = 90
 """Percent of the pixels whose truth an interval should hold."""
@@ -45,8 +45,7 @@ def write_error_bars(folder: Path, name: str, scenes: Sequence[str], variants: S
     for number, found in enumerate(variants):
         colour, marker = _COLOURS[number % len(_COLOURS)], _MARKERS[number % len(_MARKERS)]
         right = found.reliability
-        # what few pixels say is noise
-        enough = (right.pixels > 0) & (right.pixels >= ENOUGH * right.pixels.sum())
+        enough = right.enough
         label = f"{found.variant}, largest gap {right.gap:.1f} %"
         diagram.plot(right.said[enough], right.found[enough], color=colour, marker=marker, markersize=5, label=label)
         shifted = rows + 0.22 * (number - (len(variants) - 1) / 2)
