@@ -341,7 +341,7 @@ def _judgement(found: Judged) -> dict[str, str]:
         "coverage %": f"{found.coverage:.1f}",
         "width": f"{found.width:.4f}",
         "said / found %": f"{found.said:.1f} / {found.found:.1f}",
-        "AUSE sigma / steadiness": f"{found.ause:.2f} / {found.ause_steady:.2f}",
+        "AUSE sigma / smoothness": f"{found.ause:.2f} / {found.ause_smooth:.2f}",
     }
 
 

@@ -1,7 +1,7 @@
 """Fit of the error model (:mod:`sepi.error_bars`) by maximum likelihood, and its worth on scenes that are left out.
 
 Every light field and variant counts the same. Powers are drawn a little towards 0, in units of how much the logarithm
-of their sign varies.
+of their cue varies.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ from scipy.optimize import minimize
 from bench.error_samples import Sample
 from sepi.error_bars.bars import TAIL, mixture_of
 from sepi.error_bars.calibration import CONSTANT, Calibration
+from sepi.error_bars.cues import FLOORS
 from sepi.error_bars.mixture import described
 from sepi.error_bars.mixture_kernels import LEAST_RIM, RIM_WIDTH
-from sepi.error_bars.signs import FLOORS
 from sepi.scoring.error_bars import ause, reliability
 from sepi.stage import CLOSE
 
@@ -27,7 +27,7 @@ FloatArray = npt.NDArray[np.float64]
 PULL = 1e-3
 """Weight of the sum of the squared powers against the mean likelihood of a pixel."""
 
-_PARTS = ("scale", "reach", "stray", "rim")
+_PARTS = ("scale", "outlier_scale", "outlier", "rim")
 _CLIP = 12.0
 
 
@@ -40,9 +40,9 @@ class Judged(NamedTuple):
         Share of the errors within the interval, %, and its median width, pixels per view step.
     said, found : float
         Mean probability of a small error, and the share of such errors, %.
-    ause, ause_steady : float
+    ause, ause_smooth : float
         Area under the sparsification error curve (:func:`sepi.scoring.error_bars.ause`) by the standard deviation, and
-        by steadiness, the smoothness and information that a confidence used to be made of.
+        by the smoothness of the map and the information of the views, which a confidence used to be.
     """
 
     coverage: float
@@ -50,19 +50,19 @@ class Judged(NamedTuple):
     said: float
     found: float
     ause: float
-    ause_steady: float
+    ause_smooth: float
 
 
 def fitted(samples: Sequence[Sample], form: Calibration) -> Calibration:
-    """The calibration of this form, that is with the same signs, that makes the errors likeliest."""
+    """The calibration of this form, that is with the same cues, that makes the errors likeliest."""
     names = [list(part) for part in form.parts]
     columns = [np.concatenate([_columns(one, part) for one in samples]) for part in names]
     middle, spread = _scaling(columns)
     designs = [(column - m) / s for column, m, s in zip(columns, middle, spread, strict=True)]
     data = _Data(
         np.concatenate([one.error for one in samples]),
-        np.concatenate([one.signs["above"] for one in samples]),
-        np.concatenate([one.signs["below"] for one in samples]),
+        np.concatenate([one.cues["above"] for one in samples]),
+        np.concatenate([one.cues["below"] for one in samples]),
         np.concatenate([np.full(one.error.size, one.step**2 / 12) for one in samples]),
         np.concatenate([np.full(one.error.size, 1 / (one.error.size * len(samples))) for one in samples]),
     )
@@ -85,8 +85,8 @@ def fitted(samples: Sequence[Sample], form: Calibration) -> Calibration:
         raw = powers / s
         raw[0] = powers[0] - float(np.sum(raw[1:] * m[1:]))
         parts.append({label: round(float(value), 3) for label, value in zip(labels, raw, strict=True)})
-    scale, reach, stray, rim = parts
-    return Calibration(scale, reach, stray, rim)
+    scale, outlier_scale, outlier, rim = parts
+    return Calibration(scale, outlier_scale, outlier, rim)
 
 
 def judged(one: Sample, calibration: Calibration) -> Judged:
@@ -97,7 +97,7 @@ def judged(one: Sample, calibration: Calibration) -> Judged:
     small = np.abs(one.error) <= CLOSE
     width = float(np.median(bars.above + bars.below))
     said, found = 100 * float(bars.probability.mean()), 100 * float(small.mean())
-    doubts = bars.sigma[0], (1 - one.signs["steadiness"]).astype(np.float32)
+    doubts = bars.sigma[0], (1 - one.cues["smooth_confidence"]).astype(np.float32)
     orders = [ause(doubt, one.error.astype(np.float32)) for doubt in doubts]
     return Judged(100 * float(held.mean()), width, said, found, *orders)
 
@@ -105,7 +105,7 @@ def judged(one: Sample, calibration: Calibration) -> Judged:
 def pooled(samples: Sequence[Sample], calibration: Calibration) -> str:
     """All samples together: mean and least coverage, the order of the errors, and whether confidences are right."""
     worth = [judged(one, calibration) for one in samples]
-    ratios = np.array([one.ause / one.ause_steady for one in worth])
+    ratios = np.array([one.ause / one.ause_smooth for one in worth])
     said = [described(mixture_of(_pictures(one), calibration), TAIL, CLOSE).probability[0] for one in samples]
     error = np.concatenate([one.error for one in samples]).astype(np.float32)
     tenths = reliability(np.concatenate(said), error, CLOSE)
@@ -113,7 +113,7 @@ def pooled(samples: Sequence[Sample], calibration: Calibration) -> str:
     parts = (f"{100 * a:.1f} / {100 * b:.1f}" for a, b in zip(tenths.said, tenths.found, strict=True))
     return (
         f"{len(samples)} maps: coverage {np.mean(coverages):.1f} %, {min(coverages):.1f} to {max(coverages):.1f} %; "
-        f"AUSE by sigma over that by steadiness {np.exp(np.log(ratios).mean()):.2f}, above 1 on {np.sum(ratios > 1)}; "
+        f"AUSE by sigma over that by smoothness {np.exp(np.log(ratios).mean()):.2f}, above 1 on {np.sum(ratios > 1)}; "
         f"confidence, said / found %: {', '.join(parts)}"
     )
 
@@ -146,11 +146,11 @@ class _Data(NamedTuple):
 
 
 def _pictures(one: Sample) -> dict[str, npt.NDArray[np.float32]]:
-    return {name: values[None].astype(np.float32) for name, values in one.signs.items()}
+    return {name: values[None].astype(np.float32) for name, values in one.cues.items()}
 
 
 def _columns(one: Sample, part: Sequence[str]) -> FloatArray:
-    columns = [np.log(np.maximum(one.signs[name], FLOORS[name])) for name in part if name != CONSTANT]
+    columns = [np.log(np.maximum(one.cues[name], FLOORS[name])) for name in part if name != CONSTANT]
     return np.stack([np.ones(one.error.size), *columns], axis=1)
 
 
@@ -166,19 +166,19 @@ def _likelihood(
 ) -> tuple[float, list[FloatArray]]:
     """Negative logarithm of the likelihood, mean over the pixels, and its slopes by the powers."""
     linear = [np.clip(design @ power, -_CLIP, _CLIP) for design, power in zip(designs, powers, strict=True)]
-    scale, reach, stray, rim = np.exp(linear)
-    whole = 1 + stray + rim
-    stray, rim = stray / whole, rim / whole
+    scale, outlier_scale, outlier, rim = np.exp(linear)
+    whole = 1 + outlier + rim
+    outlier, rim = outlier / whole, rim / whole
     size = np.abs(data.error)
     wide = np.sqrt(scale**2 + data.rounding)
-    core = (1 - stray - rim) * np.exp(-size / wide) / (2 * wide)
-    astray = stray * np.exp(-size / reach) / (2 * reach)
+    core = (1 - outlier - rim) * np.exp(-size / wide) / (2 * wide)
+    outlying = outlier * np.exp(-size / outlier_scale) / (2 * outlier_scale)
     other = rim * _density_of_rims(data)
-    total = core + astray + other + 1e-12
+    total = core + outlying + other + 1e-12
     slopes: list[Any] = [
         -core * (size / wide - 1) * (scale / wide) ** 2 / total,
-        -astray * (size / reach - 1) / total,
-        stray - astray / total,
+        -outlying * (size / outlier_scale - 1) / total,
+        outlier - outlying / total,
         rim - other / total,
     ]
     value = -float(np.sum(data.weight * np.log(total)))

@@ -41,8 +41,8 @@ class Sample:
         Of the light field, with its noise; of the scene without that; of the map.
     error : ndarray, shape (N,)
         Ground truth minus map.
-    signs : dict of str to ndarray, shape (N,)
-        Of :mod:`sepi.error_bars.signs`.
+    cues : dict of str to ndarray, shape (N,)
+        Of :mod:`sepi.error_bars.cues`.
     step : float
         To which ground truth is rounded.
     """
@@ -51,7 +51,7 @@ class Sample:
     world: str
     variant: str
     error: npt.NDArray[np.float64]
-    signs: dict[str, npt.NDArray[np.float64]]
+    cues: dict[str, npt.NDArray[np.float64]]
     step: float
 
 
@@ -93,22 +93,22 @@ def sample(light_field: LightField, name: str, variant: str, step: float = 0.0, 
         file = kept / f"{variant}_{views[:16]}.npz"
     if file is not None and file.exists():
         with np.load(file) as found:
-            error, signs = found["error"], {key: found[key] for key in found if key != "error"}
+            error, cues = found["error"], {key: found[key] for key in found if key != "error"}
     else:
-        error, signs = _computed(light_field, variant, factor)
+        error, cues = _computed(light_field, variant, factor)
         if file is not None:
             file.parent.mkdir(parents=True, exist_ok=True)
-            np.savez(file, error=error, **signs)
-    wide = {key: values.astype(np.float64) for key, values in signs.items()}
+            np.savez(file, error=error, **cues)
+    wide = {key: values.astype(np.float64) for key, values in cues.items()}
     return Sample(name, world, variant, error.astype(np.float64), wide, step / factor)
 
 
 def _computed(light_field: LightField, variant: str, factor: float) -> tuple[Any, dict[str, Any]]:
     told: dict[str, Any] = {}
 
-    def listened(disparity: Any, signs: Any, known: Any, calibration: Calibration) -> ErrorBars:
-        told.update(signs, disparity=disparity)
-        return error_bars(disparity, signs, known, calibration)
+    def listened(disparity: Any, cues: Any, known: Any, calibration: Calibration) -> ErrorBars:
+        told.update(cues, disparity=disparity)
+        return error_bars(disparity, cues, known, calibration)
 
     with patch("sepi.optimize.error_bars", listened):
         maps = estimate_depth(light_field, variant)

@@ -26,7 +26,7 @@ from pydantic import Field, model_validator
 
 from sepi.error_bars.bars import error_bars
 from sepi.error_bars.calibration import SECOND_ORDER, WLS, Calibration
-from sepi.error_bars.signs import signs_of_map, signs_of_stage_before, signs_of_views
+from sepi.error_bars.cues import cues_of_map, cues_of_stage_before, cues_of_views
 from sepi.image.noise import residual_variance
 from sepi.lightfield import FloatMap, LightField
 from sepi.matching.base_detail import BaseDetailParameters
@@ -255,14 +255,14 @@ def _with_bars(
     """
     gradient, curvature, evidence = told
     known = light_field.require_disparity_range()
-    signs = {
-        **signs_of_map(disparity, curvature, known),
-        **signs_of_views(gradient, curvature, evidence, measured_noise(light_field).usual),
-        **signs_of_stage_before(before.confidence, before.mask("textureless")),
+    cues = {
+        **cues_of_map(disparity, curvature, known),
+        **cues_of_views(gradient, curvature, evidence, measured_noise(light_field).usual),
+        **cues_of_stage_before(before.confidence, before.mask("textureless")),
     }
     if variance is not None:
-        signs["deviation"] = np.sqrt(variance)
-    bars = error_bars(disparity, signs, known, calibration)
+        cues["deviation"] = np.sqrt(variance)
+    bars = error_bars(disparity, cues, known, calibration)
     return before.updated(disparity, bars.confidence, sigma=bars.sigma, low=bars.low, high=bars.high)
 
 

@@ -1,7 +1,7 @@
-"""Error bars of a final map: from signs of how far it may be wrong, by a calibrated model.
+"""Error bars of a final map: from cues of how far it may be wrong, by a calibrated model.
 
-The error of a pixel has the distribution of :mod:`sepi.error_bars.mixture`. Its parameters follow from the signs of
-:mod:`sepi.error_bars.signs`: scales, and odds of the probabilities, are products of their powers, which are those of
+The error of a pixel has the distribution of :mod:`sepi.error_bars.mixture`. Its parameters follow from the cues of
+:mod:`sepi.error_bars.cues`: scales, and odds of the probabilities, are products of their powers, which are those of
 :mod:`sepi.error_bars.calibration`. docs/method/error_bars.md derives the model and says what it does not know.
 """
 
@@ -13,8 +13,8 @@ from typing import NamedTuple
 import numpy as np
 
 from sepi.error_bars.calibration import CONSTANT, Calibration
+from sepi.error_bars.cues import FLOORS, Cues
 from sepi.error_bars.mixture import Mixture, described
-from sepi.error_bars.signs import FLOORS, Signs
 from sepi.lightfield import DisparityRange, FloatMap
 from sepi.stage import CLOSE
 
@@ -44,15 +44,15 @@ class ErrorBars(NamedTuple):
     confidence: FloatMap
 
 
-def error_bars(disparity: FloatMap, signs: Signs, known: DisparityRange, calibration: Calibration) -> ErrorBars:
+def error_bars(disparity: FloatMap, cues: Cues, known: DisparityRange, calibration: Calibration) -> ErrorBars:
     """Error bars of a disparity map.
 
     Parameters
     ----------
     disparity : ndarray, shape (H, W), float32
         Pixels per view step of which the farthest view is four away.
-    signs : mapping of str to ndarray, shape (H, W), float32
-        Of :mod:`sepi.error_bars.signs`, with those that the calibration asks for.
+    cues : mapping of str to ndarray, shape (H, W), float32
+        Of :mod:`sepi.error_bars.cues`, with those that the calibration asks for.
     known : DisparityRange
         Which the interval does not leave.
     calibration : Calibration
@@ -61,7 +61,7 @@ def error_bars(disparity: FloatMap, signs: Signs, known: DisparityRange, calibra
     -------
     ErrorBars
     """
-    mixture = mixture_of(signs, calibration)
+    mixture = mixture_of(cues, calibration)
     found = described(mixture, TAIL, CLOSE)
     lowest, highest = np.float32(known.minimum), np.float32(known.maximum)
     low = np.minimum(np.maximum(disparity - found.below, lowest), disparity)
@@ -69,12 +69,12 @@ def error_bars(disparity: FloatMap, signs: Signs, known: DisparityRange, calibra
     return ErrorBars(found.sigma, low, high, found.probability)
 
 
-def mixture_of(signs: Signs, calibration: Calibration) -> Mixture:
+def mixture_of(cues: Cues, calibration: Calibration) -> Mixture:
     """Parameters of the distribution of each pixel's error.
 
     Parameters
     ----------
-    signs : mapping of str to ndarray, shape (H, W), float32
+    cues : mapping of str to ndarray, shape (H, W), float32
     calibration : Calibration
 
     Returns
@@ -82,18 +82,18 @@ def mixture_of(signs: Signs, calibration: Calibration) -> Mixture:
     Mixture
     """
     logarithms = {
-        name: np.log(np.maximum(signs[name], np.float32(FLOORS[name])))
+        name: np.log(np.maximum(cues[name], np.float32(FLOORS[name])))
         for name in sorted({name for part in calibration.parts for name in part} - {CONSTANT})
     }
 
     def exponential(powers: Mapping[str, float]) -> FloatMap:
-        total = np.full_like(signs["above"], powers[CONSTANT])
+        total = np.full_like(cues["above"], powers[CONSTANT])
         for name, power in powers.items():
             if name != CONSTANT:
                 total += np.float32(power) * logarithms[name]
         return np.asarray(np.exp(np.clip(total, *_LOGARITHMS)), np.float32)
 
-    stray, rim = exponential(calibration.stray), exponential(calibration.rim)
-    whole = 1 + stray + rim
-    scale, reach = exponential(calibration.scale), exponential(calibration.reach)
-    return Mixture(scale, reach, stray / whole, rim / whole, signs["above"], signs["below"])
+    outlier, rim = exponential(calibration.outlier), exponential(calibration.rim)
+    whole = 1 + outlier + rim
+    scale, outlier_scale = exponential(calibration.scale), exponential(calibration.outlier_scale)
+    return Mixture(scale, outlier_scale, outlier / whole, rim / whole, cues["above"], cues["below"])

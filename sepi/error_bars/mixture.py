@@ -3,13 +3,13 @@
 The true disparity differs from the map's by
 
 - noise and smoothing: a Laplace distribution of mean absolute value ``scale``;
-- with probability ``stray``, something that the map does not know of, such as another texture that looks alike, or what
-  a glossy surface mirrors: a Laplace distribution of mean absolute value ``reach``;
+- with probability ``outlier``, something that the map does not know of, such as another texture that looks alike, or
+  what a glossy surface mirrors: a Laplace distribution of mean absolute value ``outlier_scale``;
 - with probability ``rim``, the surface next to it: the nearest or the farthest disparity of the neighbours, ``above``
   or ``below``, whichever differs more being likelier, with a Laplace distribution of a fifth of that distance about it.
 
 The bounds leave out a probability ``tail`` on either side. The standard deviation is that of a normal distribution of
-the same expected absolute error: that of the mixture itself is decided by rare strays.
+the same expected absolute error: that of the mixture itself is decided by rare outliers.
 """
 
 from __future__ import annotations
@@ -28,17 +28,17 @@ class Mixture(NamedTuple):
     ----------
     scale : ndarray
         Mean absolute error where the map is about right, pixels per view step.
-    reach : ndarray
-        Mean absolute error of strays, pixels per view step.
-    stray, rim : ndarray
+    outlier_scale : ndarray
+        Mean absolute error of outliers, pixels per view step.
+    outlier, rim : ndarray
         Probabilities.
     above, below : ndarray
         Distance of the other surface, pixels per view step, at least 0.
     """
 
     scale: FloatMap
-    reach: FloatMap
-    stray: FloatMap
+    outlier_scale: FloatMap
+    outlier: FloatMap
     rim: FloatMap
     above: FloatMap
     below: FloatMap

@@ -37,13 +37,13 @@ def _share_above(above: float, below: float) -> float:
 @njit(inline="always")
 def _above(x: float, p: Any) -> float:
     """Probability that the true disparity is more than ``x >= 0`` above the map's."""
-    scale, reach, stray, rim, above, below = p
-    core = (1 - stray - rim) * 0.5 * np.exp(-x / scale)
-    strays = stray * 0.5 * np.exp(-x / reach)
+    scale, outlier_scale, outlier, rim, above, below = p
+    core = (1 - outlier - rim) * 0.5 * np.exp(-x / scale)
+    outliers = outlier * 0.5 * np.exp(-x / outlier_scale)
     share = _share_above(above, below)
     other = share * _beyond(x - above, RIM_WIDTH * above + LEAST_RIM)
     other += (1 - share) * _beyond(x + below, RIM_WIDTH * below + LEAST_RIM)
-    return float(core + strays + rim * other)
+    return float(core + outliers + rim * other)
 
 
 @njit(inline="always")
@@ -84,11 +84,11 @@ def _bound(tail: float, p: Any) -> float:
 @njit(inline="always")
 def _expected(p: Any) -> float:
     """Expected absolute error."""
-    scale, reach, stray, rim, above, below = p
+    scale, outlier_scale, outlier, rim, above, below = p
     share = _share_above(above, below)
     wide, deep = RIM_WIDTH * above + LEAST_RIM, RIM_WIDTH * below + LEAST_RIM
     other = share * (above + wide * np.exp(-above / wide)) + (1 - share) * (below + deep * np.exp(-below / deep))
-    return float((1 - stray - rim) * scale + stray * reach + rim * other)
+    return float((1 - outlier - rim) * scale + outlier * outlier_scale + rim * other)
 
 
 @njit(parallel=True, cache=True, error_model="numpy")
@@ -106,12 +106,12 @@ def describe(parameters: Any, tail: float, close: float, out: Any) -> None:
     out : ndarray, shape (4, H, W), float32
         Filled: standard deviation, distance of the lower and of the upper bound, probability.
     """
-    scale, reach, stray, rim, above, below = parameters
+    scale, outlier_scale, outlier, rim, above, below = parameters
     H, W = scale.shape
     for y in prange(H):
         for x in range(W):
             a, b = float(above[y, x]), float(below[y, x])
-            same = float(scale[y, x]), float(reach[y, x]), float(stray[y, x]), float(rim[y, x])
+            same = float(scale[y, x]), float(outlier_scale[y, x]), float(outlier[y, x]), float(rim[y, x])
             upwards, downwards = (*same, a, b), (*same, b, a)
             out[0, y, x] = NORMAL * _expected(upwards)
             out[1, y, x] = _bound(tail, downwards)

@@ -11,9 +11,9 @@ from bench.error_samples import Sample
 from sepi.error_bars.calibration import CONSTANT, Calibration
 
 TRUE = Calibration(
-    scale={CONSTANT: 1.0, "deviation": 0.8, "bend": 0.0},
-    reach={CONSTANT: -0.7},
-    stray={CONSTANT: -3.0, "confidence": -1.0},
+    scale={CONSTANT: 1.0, "deviation": 0.8, "second_difference": 0.0},
+    outlier_scale={CONSTANT: -0.7},
+    outlier={CONSTANT: -3.0, "confidence": -1.0},
     rim={CONSTANT: -3.0},
 )
 FORM = Calibration(*(dict.fromkeys(part, 0.0) for part in TRUE.parts))
@@ -22,24 +22,24 @@ FORM = Calibration(*(dict.fromkeys(part, 0.0) for part in TRUE.parts))
 def drawn(name: str, seed: int, pixels: int = 20_000) -> Sample:
     """Errors as the model of :data:`TRUE` has them."""
     rng = np.random.default_rng(seed)
-    signs = {
+    cues = {
         "deviation": np.exp(rng.uniform(-7, -2, pixels)),
-        "bend": np.exp(rng.uniform(-8, -2, pixels)),
+        "second_difference": np.exp(rng.uniform(-8, -2, pixels)),
         "confidence": rng.uniform(0.05, 1, pixels),
         "above": rng.uniform(0, 1, pixels),
         "below": np.zeros(pixels),
-        "steadiness": rng.uniform(0, 1, pixels),
+        "smooth_confidence": rng.uniform(0, 1, pixels),
     }
-    scale = np.exp(1.0) * signs["deviation"] ** 0.8
-    odds = np.stack([np.ones(pixels), np.exp(-3.0) / signs["confidence"], np.full(pixels, np.exp(-3.0))])
+    scale = np.exp(1.0) * cues["deviation"] ** 0.8
+    odds = np.stack([np.ones(pixels), np.exp(-3.0) / cues["confidence"], np.full(pixels, np.exp(-3.0))])
     chosen = (rng.uniform(size=pixels) * odds.sum(axis=0) > np.cumsum(odds, axis=0)).sum(axis=0)
-    width = np.choose(chosen, [scale, np.full(pixels, np.exp(-0.7)), 0.2 * signs["above"] + 0.01])
-    error = np.where(chosen == 2, signs["above"], 0.0) + width * rng.laplace(size=pixels)
-    return Sample(name, name, "best", error, signs, 0.0)
+    width = np.choose(chosen, [scale, np.full(pixels, np.exp(-0.7)), 0.2 * cues["above"] + 0.01])
+    error = np.where(chosen == 2, cues["above"], 0.0) + width * rng.laplace(size=pixels)
+    return Sample(name, name, "best", error, cues, 0.0)
 
 
 def test_a_fit_finds_the_numbers_that_errors_were_drawn_with() -> None:
-    """A sign that tells nothing gets no power, and nine of ten errors of another scene are held."""
+    """A cue that tells nothing gets no power, and nine of ten errors of another scene are held."""
     found = fitted([drawn("one", 0), drawn("another", 1)], FORM)
     for part, true in zip(found.parts, TRUE.parts, strict=True):
         for name, value in part.items():

@@ -14,11 +14,11 @@ def laplace(x: npt.NDArray[np.float64], middle: float, width: float) -> npt.NDAr
 
 def density(x: npt.NDArray[np.float64], p: Mixture) -> npt.NDArray[np.float64]:
     """Of a single pixel's error."""
-    scale, reach, stray, rim, above, below = (float(value[0, 0]) for value in p)
+    scale, outlier_scale, outlier, rim, above, below = (float(value[0, 0]) for value in p)
     share = (above**2 + 1e-6) / (above**2 + below**2 + 2e-6)
     other = share * laplace(x, above, RIM_WIDTH * above + LEAST_RIM)
     other += (1 - share) * laplace(x, -below, RIM_WIDTH * below + LEAST_RIM)
-    return (1 - stray - rim) * laplace(x, 0, scale) + stray * laplace(x, 0, reach) + rim * other
+    return (1 - outlier - rim) * laplace(x, 0, scale) + outlier * laplace(x, 0, outlier_scale) + rim * other
 
 
 def one(*parameters: float) -> Mixture:
@@ -27,7 +27,7 @@ def one(*parameters: float) -> Mixture:
 
 PIXELS = {
     "sure": one(0.002, 0.3, 0.001, 0.001, 0.01, 0.01),
-    "astray": one(0.01, 0.5, 0.3, 0.02, 0.05, 0.0),
+    "outlier": one(0.01, 0.5, 0.3, 0.02, 0.05, 0.0),
     "beside a nearer surface": one(0.005, 0.2, 0.02, 0.3, 0.9, 0.02),
     "between two": one(0.02, 0.2, 0.05, 0.6, 1.2, 0.7),
     "beside a farther surface": one(0.005, 0.2, 0.0, 0.07, 0.0, 2.5),
@@ -53,10 +53,10 @@ def test_bounds_and_deviation_are_those_of_the_distribution(name: str, tail: flo
 
 def test_errors_are_as_far_up_as_down_in_a_picture_turned_inside_out() -> None:
     rng = np.random.default_rng(0)
-    scale, reach, above, below = rng.uniform(0.01, 1, (4, 5, 7)).astype(np.float32)
-    stray, rim = rng.uniform(0, 0.4, (2, 5, 7)).astype(np.float32)
-    found = described(Mixture(scale, reach, stray, rim, above, below), 0.05, 0.07)
-    inside_out = described(Mixture(scale, reach, stray, rim, below, above), 0.05, 0.07)
+    scale, outlier_scale, above, below = rng.uniform(0.01, 1, (4, 5, 7)).astype(np.float32)
+    outlier, rim = rng.uniform(0, 0.4, (2, 5, 7)).astype(np.float32)
+    found = described(Mixture(scale, outlier_scale, outlier, rim, above, below), 0.05, 0.07)
+    inside_out = described(Mixture(scale, outlier_scale, outlier, rim, below, above), 0.05, 0.07)
     np.testing.assert_array_equal(found.below, inside_out.above)
     np.testing.assert_allclose(found.sigma, inside_out.sigma, rtol=1e-6)
     assert (found.above >= 0).all()

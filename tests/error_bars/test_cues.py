@@ -1,8 +1,8 @@
-"""Signs of error: what they are on maps and sums whose answer is known."""
+"""Cues of error: what they are on maps and sums whose answer is known."""
 
 import numpy as np
 
-from sepi.error_bars.signs import FLOORS, signs_of_map, signs_of_stage_before, signs_of_views
+from sepi.error_bars.cues import FLOORS, cues_of_map, cues_of_stage_before, cues_of_views
 from sepi.lightfield import DisparityRange
 from sepi.matching.gauss_newton import Evidence
 
@@ -22,23 +22,23 @@ def evidence(updates: tuple[float, float, float, float], information: float = 10
 
 
 def test_a_plane_has_no_bend_and_a_step_has_its_two_surfaces() -> None:
-    plane = signs_of_map(0.01 * x - 0.02 * y, np.full(SHAPE, 1e4, np.float32), RANGE)
+    plane = cues_of_map(0.01 * x - 0.02 * y, np.full(SHAPE, 1e4, np.float32), RANGE)
     inner = np.s_[9:-9, 9:-9]
-    for name in ("bend", "point_bend", "long_bend"):
+    for name in ("second_difference", "point_second_difference", "long_second_difference"):
         assert np.abs(plane[name][inner]).max() < 1e-5
-    assert plane["steadiness"][inner].min() > 0.98
+    assert plane["smooth_confidence"][inner].min() > 0.98
     np.testing.assert_allclose(plane["above"][inner], 0.06, atol=1e-5)
-    step = signs_of_map(np.where(x < 25, 0.5, -0.25).astype(np.float32), np.full(SHAPE, 1e4, np.float32), RANGE)
+    step = cues_of_map(np.where(x < 25, 0.5, -0.25).astype(np.float32), np.full(SHAPE, 1e4, np.float32), RANGE)
     # columns within two pixels of the step
     assert (step["below"] > 0).any(axis=0).nonzero()[0].tolist() == [23, 24]
     assert (step["above"] > 0).any(axis=0).nonzero()[0].tolist() == [25, 26]
-    assert step["steadiness"][:, 24].max() < 0.1
+    assert step["smooth_confidence"][:, 24].max() < 0.1
 
 
 def test_a_curve_that_smoothing_flattens_is_seen_over_eight_pixels() -> None:
     """Of a cylinder, which is straight along its axis, nothing is flattened that way."""
     ball, cylinder = (
-        signs_of_map(0.5 * bent, np.full(SHAPE, 1e4, np.float32), RANGE)["long_bend"][20, 25]
+        cues_of_map(0.5 * bent, np.full(SHAPE, 1e4, np.float32), RANGE)["long_second_difference"][20, 25]
         for bent in (1e-3 * (x**2 + y**2), 1e-3 * x**2)
     )
     np.testing.assert_allclose(ball, 0.064, rtol=1e-3)
@@ -47,8 +47,8 @@ def test_a_curve_that_smoothing_flattens_is_seen_over_eight_pixels() -> None:
 
 def test_views_disagree_where_opposite_halves_want_other_depths() -> None:
     """A reflection, or a wrong surface at an occlusion, moves the two sides apart; a wrong depth moves both alike."""
-    alike = signs_of_views(*evidence((0.02, 0.02, 0.02, 0.02)), noise=0.01)
-    apart = signs_of_views(*evidence((0.03, 0.01, 0.02, 0.02)), noise=0.01)
+    alike = cues_of_views(*evidence((0.02, 0.02, 0.02, 0.02)), noise=0.01)
+    apart = cues_of_views(*evidence((0.03, 0.01, 0.02, 0.02)), noise=0.01)
     np.testing.assert_allclose(alike["step"], 0.02, rtol=1e-4)
     assert alike["disagreement"].max() < 1e-6
     np.testing.assert_allclose(apart["step"], 0.02, rtol=1e-4)
@@ -63,18 +63,18 @@ def test_a_row_of_views_is_not_asked_what_it_cannot_know() -> None:
     """Views of one row disagree by what left and right say; that there is nothing above and below is no agreement."""
     gradient, curvature, told = evidence((0.03, 0.01, 0.0, 0.0))
     told.halves[2:] = 0
-    row = signs_of_views(gradient, curvature, told, noise=0.01)["disagreement"]
+    row = cues_of_views(gradient, curvature, told, noise=0.01)["disagreement"]
     np.testing.assert_allclose(row, 0.01, rtol=1e-2)
 
 
 def test_where_no_view_sees_signs_are_numbers() -> None:
     gradient, curvature, told = evidence((0.0, 0.0, 0.0, 0.0), information=0.0)
     nothing = Evidence(*(np.zeros_like(values) for values in told))
-    signs = {
-        **signs_of_map(np.zeros((2, 3), np.float32), np.zeros((2, 3), np.float32), RANGE),
-        **signs_of_views(gradient, curvature, nothing, noise=0.0),
-        **signs_of_stage_before(np.zeros(SHAPE, np.float32), np.ones(SHAPE, bool)),
+    cues = {
+        **cues_of_map(np.zeros((2, 3), np.float32), np.zeros((2, 3), np.float32), RANGE),
+        **cues_of_views(gradient, curvature, nothing, noise=0.0),
+        **cues_of_stage_before(np.zeros(SHAPE, np.float32), np.ones(SHAPE, bool)),
     }
-    for name, values in signs.items():
+    for name, values in cues.items():
         assert np.isfinite(values).all(), name
-    assert set(FLOORS) <= set(signs)
+    assert set(FLOORS) <= set(cues)

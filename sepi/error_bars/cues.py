@@ -1,4 +1,4 @@
-"""Signs of how far a disparity map may be wrong: in the map, in what the views say of it, of the stage before.
+"""Cues of how far a disparity map may be wrong: in the map, in what the views say of it, of the stage before.
 
 All are in view steps of which the farthest view is four away, as stages have them.
 """
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from sepi.matching.gauss_newton import Evidence
 
 HALF_CONFIDENT_DIFFERENCE = 0.01
-"""Second difference at which a surface is half as steady as a plane, pixels per view step."""
+"""Second difference that halves the smooth confidence, pixels per view step."""
 
 IGNORANCE = 0.01
 """What a view's information of 1 / px^2 adds to the second difference there; pixels per view step."""
@@ -26,12 +26,12 @@ STEP_REACH = 2
 """Distance within which a neighbour's surface may be the pixel's own, pixels."""
 
 _LONG = 8
-"""Distance of pixels between which a bend is smoothed away, pixels."""
+"""Distance of pixels between which smoothing flattens what curves, pixels."""
 
 _LEAST_NOISE = 3e-4
 _LEAST = np.float32(1e-6)
 
-Signs = Mapping[str, FloatMap]
+Cues = Mapping[str, FloatMap]
 """Name to map (H, W)."""
 
 FLOORS: Mapping[str, float] = {
@@ -41,10 +41,10 @@ FLOORS: Mapping[str, float] = {
     "wide_step": 1e-4,
     "disagreement": 1e-4,
     "misfit": 0.1,
-    "bend": 1e-4,
-    "point_bend": 1e-4,
-    "long_bend": 1e-3,
-    "steadiness": 0.01,
+    "second_difference": 1e-4,
+    "point_second_difference": 1e-4,
+    "long_second_difference": 1e-3,
+    "smooth_confidence": 0.01,
     "confidence": 0.01,
     "wide_confidence": 0.01,
     "agreement": 0.01,
@@ -52,11 +52,11 @@ FLOORS: Mapping[str, float] = {
     "range": 1e-3,
     "plane": 0.1,
 }
-"""Sign to the value below which it says no more."""
+"""Cue to the value below which it says no more."""
 
 
-def signs_of_map(disparity: FloatMap, curvature: FloatMap, known: DisparityRange) -> dict[str, FloatMap]:
-    """Signs in the map itself.
+def cues_of_map(disparity: FloatMap, curvature: FloatMap, known: DisparityRange) -> dict[str, FloatMap]:
+    """Cues in the map itself.
 
     Parameters
     ----------
@@ -68,32 +68,32 @@ def signs_of_map(disparity: FloatMap, curvature: FloatMap, known: DisparityRange
     Returns
     -------
     dict of str to ndarray, shape (H, W), float32
-        ``bend`` and ``point_bend``, absolute second differences about the pixel and of it; ``long_bend``, over
-        distances of eight pixels, along the axis along which it is less; ``steadiness``, 1 for a plane that the views
-        know and 0 beside steps; ``above`` and ``below``, how much nearer and farther the nearest and the farthest
-        neighbour are; ``range``, the width of the disparity range.
+        ``second_difference`` and ``point_second_difference``, absolute ones about the pixel and of it;
+        ``long_second_difference``, over distances of eight pixels, along the axis along which it is less;
+        ``smooth_confidence``, 1 for a plane that the views know and 0 beside steps; ``above`` and ``below``, how much
+        nearer and farther the nearest and the farthest neighbour are; ``range``, the width of the disparity range.
     """
-    bend = np.abs(cv2.Laplacian(disparity, cv2.CV_32F))
-    mean_bend = np.maximum(_mean(bend, 5), 0)
-    unknown = mean_bend + IGNORANCE / np.sqrt(np.maximum(_mean(curvature, 3), 0) + np.float32(1e-3))
+    difference = np.abs(cv2.Laplacian(disparity, cv2.CV_32F))
+    mean = np.maximum(_mean(difference, 5), 0)
+    unknown = mean + IGNORANCE / np.sqrt(np.maximum(_mean(curvature, 3), 0) + np.float32(1e-3))
     wide = cv2.copyMakeBorder(disparity, *(_LONG,) * 4, cv2.BORDER_REFLECT_101)
     inner, twice = np.s_[_LONG:-_LONG], 2 * disparity
     across = np.abs(wide[inner, 2 * _LONG :] + wide[inner, : -2 * _LONG] - twice)
     down = np.abs(wide[2 * _LONG :, inner] + wide[: -2 * _LONG, inner] - twice)
     box = np.ones((2 * STEP_REACH + 1,) * 2, np.uint8)
     return {
-        "bend": mean_bend,
-        "point_bend": bend,
-        "long_bend": np.minimum(across, down),
-        "steadiness": np.asarray(HALF_CONFIDENT_DIFFERENCE / (HALF_CONFIDENT_DIFFERENCE + unknown), np.float32),
+        "second_difference": mean,
+        "point_second_difference": difference,
+        "long_second_difference": np.minimum(across, down),
+        "smooth_confidence": np.asarray(HALF_CONFIDENT_DIFFERENCE / (HALF_CONFIDENT_DIFFERENCE + unknown), np.float32),
         "above": cv2.dilate(disparity, box) - disparity,
         "below": disparity - cv2.erode(disparity, box),
         "range": np.full_like(disparity, known.maximum - known.minimum),
     }
 
 
-def signs_of_views(gradient: FloatMap, curvature: FloatMap, evidence: Evidence, noise: float) -> dict[str, FloatMap]:
-    """Signs in what the views say about a map.
+def cues_of_views(gradient: FloatMap, curvature: FloatMap, evidence: Evidence, noise: float) -> dict[str, FloatMap]:
+    """Cues in what the views say about a map.
 
     Parameters
     ----------
@@ -126,8 +126,8 @@ def signs_of_views(gradient: FloatMap, curvature: FloatMap, evidence: Evidence, 
     }
 
 
-def signs_of_stage_before(confidence: FloatMap, plane: BoolMap) -> dict[str, FloatMap]:
-    """Signs of the stage before: its ``confidence``, the same over 15x15 pixels, and where a ``plane`` was put in."""
+def cues_of_stage_before(confidence: FloatMap, plane: BoolMap) -> dict[str, FloatMap]:
+    """Cues of the stage before: its ``confidence``, the same over 15x15 pixels, and where a ``plane`` was put in."""
     return {
         "confidence": confidence,
         "wide_confidence": _mean(confidence, 15),
