@@ -38,8 +38,8 @@ def test_best_is_better_than_the_paper_below_a_pixel(name: str) -> None:
     """The most accurate variant has to be that on thin things, under noise, and without texture."""
     scene = render(name, size=128)
     best, paper = (score(estimate_depth(scene, v).disparity, scene.ground_truth) for v in ("best", "paper"))
-    assert best["q25"] < paper["q25"]
-    assert best["badpix007"] < paper["badpix007"]
+    for measure, part in (("mse100", 0.6), ("q25", 0.6), ("badpix007", 0.3)):
+        assert best[measure] < part * paper[measure], measure
 
 
 def glossy(scene: LightField) -> LightField:
@@ -73,10 +73,7 @@ EDGE_BOUNDS = {
 def test_edges_are_sharp(name: str) -> None:
     """Surfaces a pixel too wide, or gaps closed, would double the figure; so would smeared edges."""
     scene = render(name, size=192)
-    errors = {variant: estimate_depth(scene, variant).disparity - scene.ground_truth for variant in ("best", "paper")}
-    mse = {variant: 100 * np.mean(error**2) for variant, error in errors.items()}
-    assert mse["best"] <= EDGE_BOUNDS[name]
-    assert mse["best"] < 0.6 * mse["paper"]
+    assert 100 * np.mean((estimate_depth(scene, "best").disparity - scene.ground_truth) ** 2) <= EDGE_BOUNDS[name]
 
 
 def test_detail_leaves_out_shading_and_edges() -> None:
@@ -187,6 +184,6 @@ def test_sparsification_is_what_its_name_says() -> None:
 
 
 def test_range_narrower_than_the_scene_is_no_crash() -> None:
-    scene = render("pyramids", size=64)
+    scene = render("pyramids", size=64, views=5)
     narrow = scene.with_range(DisparityRange(0.0, 0.1, "given"))
     assert np.isfinite(estimate_depth(narrow, "best").disparity).all()

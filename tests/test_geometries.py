@@ -17,7 +17,7 @@ from sepi.stage import no_progress
 
 pytestmark = pytest.mark.slow
 
-SCENE, SIZE, VIEWS = "curved_occluders", 96, 7
+SCENE, SIZE, VIEWS = "curved_occluders", 96, 5
 
 
 @cache

@@ -1,5 +1,7 @@
 """Grey light fields: grey is three equal channels, so a light field gives the same maps as grey and as RGB."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -14,7 +16,12 @@ from sepi.variants import STAGES, VARIANTS
 
 pytestmark = pytest.mark.slow
 
-SCENE = render("curved_occluders", size=64, views=5)
+WHOLE = render("curved_occluders", size=64, views=5)
+assert WHOLE.ground_truth is not None
+INSIDE = np.s_[12:52, 8:56]
+SCENE = replace(
+    WHOLE, views=WHOLE.views[:, :, *INSIDE].copy(), ground_truth=WHOLE.ground_truth[INSIDE].copy(), masks={}
+)
 KINDS = {"uint8": np.uint8, "uint16": np.uint16, "float32": np.float32}
 
 
