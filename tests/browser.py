@@ -82,10 +82,25 @@ def opened(
     Whatever it complains about, and every request beyond the file itself, fails the test at the end; ``told`` takes
     them instead where it is given.
     """
+    context, page = window(browser, width, height, **options)
+    try:
+        with shown(page, path, told):
+            yield page
+    finally:
+        context.close()
+
+
+def window(browser: Any, width: int = 1400, height: int = 900, **options: Any) -> tuple[Any, Any]:
+    """An empty page without a network, and the context that is to be closed after it."""
     context = browser.new_context(viewport={"width": width, "height": height}, offline=True, **options)
     context.set_default_timeout(_PATIENCE)
     context.add_init_script(_WATCH_JUMPS)
-    page = context.new_page()
+    return context, context.new_page()
+
+
+@contextmanager
+def shown(page: Any, path: Path, told: list[str] | None = None) -> Iterator[None]:
+    """A file in an empty page, watched as :func:`opened` says."""
     wrong: list[str] = [] if told is None else told
     address = path.resolve().as_uri()
 
@@ -93,19 +108,24 @@ def opened(
         if request.url != address and not request.url.startswith(("data:", "blob:")):
             wrong.append(f"request: {request.url}")
 
-    page.on("console", lambda message: wrong.append(f"console: {message.text}") if complains(message) else None)
-    page.on("pageerror", lambda error: wrong.append(f"error: {error}"))
-    page.on("request", requested)
+    watched = {
+        "console": lambda message: wrong.append(f"console: {message.text}") if complains(message) else None,
+        "pageerror": lambda error: wrong.append(f"error: {error}"),
+        "request": requested,
+    }
+    for event, watch in watched.items():
+        page.on(event, watch)
     try:
         page.goto(address)
         page.wait_for_selector("#viewer[data-shown]")
-        yield page
+        yield
         # errors of what the last action began
         settled(page)
         if told is None:
             assert not wrong, wrong
     finally:
-        context.close()
+        for event, watch in watched.items():
+            page.remove_listener(event, watch)
 
 
 def complains(message: Any) -> bool:

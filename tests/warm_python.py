@@ -19,8 +19,10 @@ import subprocess
 import sys
 import tempfile
 import threading
+import time
 import traceback
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
 
@@ -48,10 +50,15 @@ _LIBRARIES = {
         *("scipy.sparse.linalg", "scipy.ndimage", "skimage.segmentation"),
     ),
     "sepi.report": ("matplotlib.backends.backend_agg", "matplotlib.backends.backend_pdf", "jinja2"),
-    "snakemake": ("snakemake.cli", "snakemake.report", "pulp", "pydantic", "psutil", "yaml"),
+    "snakemake": (
+        *("snakemake.cli", "snakemake.report", "pulp", "pydantic.dataclasses", "psutil", "yaml"),
+        *("numpy", "h5py", "cv2", "click", "jinja2", "requests", "PIL.Image"),
+    ),
     ".py": ("matplotlib.pyplot",),
 }
 
+# this module, as the name of a program
+_SERVER = "warm_python"
 _servers: list[int] = []
 
 
@@ -63,13 +70,10 @@ def warm_python() -> str:
     """
     if "COVERAGE_RCFILE" in os.environ:
         return sys.executable
-    folder = Path(tempfile.mkdtemp(prefix="sepi-python-"))
-    address, program = str(folder / "socket"), folder / "python"
-    program.write_text(_PROGRAM.format(python=sys.executable, address=address))
-    program.chmod(0o700)
+    folder, address, program = _new_program()
     # it ends with this process, which holds the other end of its input
     server = subprocess.Popen(
-        [sys.executable, __file__, address, str(program)],
+        [sys.executable, __file__, address, program],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         # forks draw without a display
@@ -77,10 +81,51 @@ def warm_python() -> str:
     )
     assert server.stdin is not None
     assert server.stdout is not None
-    assert server.stdout.readline() == b"ready\n"
+    assert server.stdout.readline().split() == [b"ready", str(server.pid).encode()]
     _servers.append(server.pid)
     atexit.register(_end, server, folder)
-    return str(program)
+    return program
+
+
+def _new_program() -> tuple[Path, str, str]:
+    """A folder, and in it an address for a server and the program that asks it."""
+    folder = Path(tempfile.mkdtemp(prefix="sepi-python-"))
+    address, program = str(folder / "socket"), folder / "python"
+    program.write_text(_PROGRAM.format(python=sys.executable, address=address))
+    program.chmod(0o700)
+    return folder, address, str(program)
+
+
+@contextmanager
+def python_that_has_read(tree: Path) -> Iterator[str]:
+    """Such a program that has read, once, the code of a folder's package, of which each run of Snakemake makes digests.
+
+    Not for runs after a change of that code.
+    """
+    if "COVERAGE_RCFILE" in os.environ:
+        yield sys.executable
+        return
+    folder, address, program = _new_program()
+    here = Path(__file__).parent
+    server = subprocess.Popen(
+        [warm_python(), "-m", _SERVER, address, program, str(tree)],
+        cwd=here,
+        env=os.environ | {"PYTHONPATH": str(here)},
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+    )
+    assert server.stdout is not None
+    ready, pid = server.stdout.readline().split()
+    assert ready == b"ready"
+    _servers.append(int(pid))
+    try:
+        yield program
+    finally:
+        _end(server, folder)
+        # its time is told by the server that it is a fork of as soon as that has seen its end
+        while Path("/proc", pid.decode()).exists():
+            time.sleep(0.01)
+        _servers.remove(int(pid))
 
 
 def _end(server: subprocess.Popen[bytes], folder: Path) -> None:
@@ -97,8 +142,10 @@ def forks_cpu_seconds() -> float:
     return sum(sum(psutil.Process(pid).cpu_times()[:4]) for pid in _servers)
 
 
-def _serve(address: str, program: str) -> None:
+def _serve(address: str, program: str, tree: str = "") -> None:
     """Answer each connection by a fork that becomes what was called, until the input ends."""
+    if tree:
+        _read(Path(tree))
     # the folder of this file, and what only the tests' own process was told to import from
     own = [str(Path(__file__).parent), *os.environ.get("PYTHONPATH", "").split(os.pathsep)]
     path = [entry for entry in sys.path if entry not in own]
@@ -107,7 +154,7 @@ def _serve(address: str, program: str) -> None:
     with socket.socket(socket.AF_UNIX) as listener:
         listener.bind(address)
         listener.listen(64)
-        print("ready", flush=True)
+        print("ready", os.getpid(), flush=True)
         while listener in select.select([listener, sys.stdin], [], [])[0]:
             called, _ = listener.accept()
             head, files, _, _ = socket.recv_fds(called, 8, 3)
@@ -141,13 +188,23 @@ def _loaded(name: str) -> None:
         sys.modules["numba"].njit(lambda x: x)(1.0)
 
 
+def _read(tree: Path) -> None:
+    """Have in memory what digests of a package's code are made of."""
+    sys.path.insert(0, str(tree))
+    digests = importlib.import_module("sepi.workflow.code_digest")
+    sys.path.remove(str(tree))
+    assert tree == digests.ROOT
+    files = (path.relative_to(tree).with_suffix("") for path in (tree / "sepi").rglob("*.py"))
+    digests.code_digest(*(".".join(file.parts) for file in files if file.name != "__init__"))
+
+
 def _load(words: list[str]) -> None:
     if words[0] != "-m":
         _loaded("sepi")
         _loaded(".py")
         return
     for name in _LIBRARIES:
-        if f"{words[1]}.".startswith(f"{name}."):
+        if words[1] == _SERVER or f"{words[1]}.".startswith(f"{name}."):
             _loaded(name)
 
 

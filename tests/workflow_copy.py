@@ -50,6 +50,8 @@ class Workflow:
     config: dict[str, Any]
     # whether what runs to its end, and its jobs, are forks of a Python that has the libraries
     warm: bool = True
+    # forks of which Python they are instead: one that has read the package's code, as long as that stays as it is
+    reader: str | None = None
 
     def command(self, *targets: str, flags: tuple[str, ...] = (), python: str = sys.executable) -> list[str]:
         """Snakemake with this configuration."""
@@ -67,8 +69,9 @@ class Workflow:
 
     def run(self, *targets: str, flags: tuple[str, ...] = (), **environment: str) -> subprocess.CompletedProcess[str]:
         """Run Snakemake to its end; stdout holds its messages too."""
+        python = self.reader or (warm_python() if self.warm else sys.executable)
         return subprocess.run(
-            self.command(*targets, flags=flags, python=warm_python() if self.warm else sys.executable),
+            self.command(*targets, flags=flags, python=python),
             cwd=self.folder,
             env=self.environment | environment,
             stdout=subprocess.PIPE,
@@ -78,10 +81,12 @@ class Workflow:
             timeout=1200,
         )
 
-    def start(self, *targets: str, flags: tuple[str, ...] = (), **environment: str) -> subprocess.Popen[bytes]:
+    def start(
+        self, *targets: str, flags: tuple[str, ...] = (), python: str = sys.executable, **environment: str
+    ) -> subprocess.Popen[bytes]:
         """Run Snakemake beside the test, in a session of its own, as a terminal does."""
         return subprocess.Popen(
-            self.command(*targets, flags=flags),
+            self.command(*targets, flags=flags, python=python),
             cwd=self.folder,
             env=self.environment | environment,
             stdout=subprocess.DEVNULL,
@@ -97,10 +102,7 @@ class Workflow:
             return dict(Counter(job.rule.name for job in self.jobs(*targets)))
         result = self.run(*targets, flags=("--dry-run",))
         assert result.returncode == 0, result.stdout
-        if "Nothing to be done" in result.stdout:
-            return {}
-        table = result.stdout.split("Job stats:")[1].split("total")[0]
-        return {rule: int(count) for rule, count in re.findall(r"^(\w+) +(\d+)$", table, re.MULTILINE)}
+        return planned(result.stdout)
 
     @contextmanager
     def _read(self) -> Iterator[Any]:
@@ -142,11 +144,24 @@ class Workflow:
 
     def stage_plan(self, *targets: str) -> dict[str, int]:
         """The plan without what comes after the stages (scores, tables, maps)."""
-        return {rule: count for rule, count in self.plan(*targets).items() if rule in _STAGE_RULES}
+        return of_stages(self.plan(*targets))
 
     def with_config(self, **values: Any) -> "Workflow":
         """The same workflow with other values of some keys."""
         return replace(self, config=self.config | values)
+
+
+def planned(stdout: str) -> dict[str, int]:
+    """Rule to number of jobs, of what a dry run prints."""
+    if "Nothing to be done" in stdout:
+        return {}
+    table = stdout.split("Job stats:")[1].split("total")[0]
+    return {rule: int(count) for rule, count in re.findall(r"^(\w+) +(\d+)$", table, re.MULTILINE)}
+
+
+def of_stages(plan: dict[str, int]) -> dict[str, int]:
+    """A plan without what comes after the stages."""
+    return {rule: count for rule, count in plan.items() if rule in _STAGE_RULES}
 
 
 def copy_of_the_project(folder: Path) -> Path:

@@ -20,7 +20,7 @@ def choices(*names: str) -> Mapping[str, Mapping[str, str]]:
     return {name: built_in.VARIANTS[name].labels for name in names}
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def comparison(tmp_path_factory: pytest.TempPathFactory) -> Plan:
     """Results of two of ours and one compared method on a scene of the paper's and one that it does not have."""
     variants = VARIANTS | choices("best", "fast", "best_wls", "spo", "onnx")
@@ -29,7 +29,7 @@ def comparison(tmp_path_factory: pytest.TempPathFactory) -> Plan:
     return with_results(whole.comparison())
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def compared(comparison: Plan) -> dict[str, Any]:
     return numbers_of(comparison)
 

@@ -63,7 +63,12 @@ def test_pictures_without_ground_truth(plan: Plan, tmp_path: Path) -> None:
 
 
 def test_pictures_are_the_same_bytes_each_time(plan: Plan, tmp_path: Path) -> None:
-    for name in ("one", "two"):
-        draw(plan, tmp_path / name, "builtin", "dots")
-    for path in (tmp_path / "one").rglob("*.png"):
-        assert path.read_bytes() == (tmp_path / "two" / path.relative_to(tmp_path / "one")).read_bytes()
+    """Those for the screen and those for a paper, and no others the second time."""
+    one, two = tmp_path / "one", tmp_path / "two"
+    for folder in (one, two):
+        draw(plan, folder, "builtin", "dots")
+    written = {path.relative_to(one) for path in one.rglob("*.*")}
+    assert {path.suffix for path in written} == {".png", ".pdf"}
+    assert written == {path.relative_to(two) for path in two.rglob("*.*")}
+    for path in written:
+        assert (one / path).read_bytes() == (two / path).read_bytes(), path

@@ -4,7 +4,6 @@ import json
 import re
 import shutil
 import xml.etree.ElementTree as ElementTree
-from functools import cache
 from pathlib import Path
 
 import networkx as nx
@@ -129,18 +128,30 @@ def warm(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sys.executable", warm_python())
 
 
-@cache
-def own_edges(external: bool = False) -> Edges:
-    """Of this workflow."""
-    return rule_edges(REPOSITORY / "Snakefile", external)
+@pytest.fixture
+def edited_copy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A copy of the workflow with an edited config.yaml beside its Snakefile, in a folder that is worked in."""
+    tree = tmp_path / "tree"
+    for name in ("rules", "profiles"):
+        shutil.copytree(REPOSITORY / name, tree / name)
+    shutil.copy2(REPOSITORY / "Snakefile", tree)
+    edited = {"hci_root": "scenes/here", "report": {"pixels": {"builtin/wall": [[1, 2]]}}, "external": {"a": "maps"}}
+    (tree / "config.yaml").write_text(json.dumps(edited))
+    monkeypatch.chdir(tree)
+    return tree
 
 
 @pytest.mark.workflow
 @pytest.mark.usefixtures("warm")
 @pytest.mark.parametrize("external", [False, True])
-def test_the_workflows_own_graph(external: bool) -> None:
-    """Snakemake itself is asked; the four stages follow each other, and all end in the page."""
-    edges = own_edges(external)
+def test_the_workflows_own_graph(external: bool, edited_copy: Path) -> None:
+    """Snakemake itself is asked; the four stages follow each other, and all end in the page.
+
+    The user's own configuration does not reach the graph: its relative paths and its scenes mean nothing there.
+    """
+    before = set(edited_copy.rglob("*"))
+    edges = rule_edges(edited_copy / "Snakefile", external)
+    assert set(edited_copy.rglob("*")) == before, "the folder that is worked in must stay as it is"
     needs = set(nx.transitive_closure(nx.DiGraph(edges)).edges)
     stages = ["ingest", "initial", "occlusion", "textureless", "optimize", "evaluate", "numbers", "page", "all"]
     for number, stage in enumerate(stages[:-1]):
@@ -165,19 +176,3 @@ def test_without_a_graph_the_page_says_so_and_still_comes(tmp_path: Path) -> Non
     assert result.stderr.startswith("sepi: warning: ")
     assert len(result.stderr.strip().splitlines()) == 1
     assert "no rule graph" in output.read_text()
-
-
-@pytest.mark.workflow
-@pytest.mark.usefixtures("warm")
-def test_the_users_own_configuration_does_not_reach_the_graph(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """An edited config.yaml beside the Snakefile: its relative paths and its scenes mean nothing to the graph."""
-    tree = tmp_path / "tree"
-    for name in ("rules", "profiles"):
-        shutil.copytree(REPOSITORY / name, tree / name)
-    shutil.copy2(REPOSITORY / "Snakefile", tree)
-    edited = {"hci_root": "scenes/here", "report": {"pixels": {"builtin/wall": [[1, 2]]}}, "external": {"a": "maps"}}
-    (tree / "config.yaml").write_text(json.dumps(edited))
-    monkeypatch.chdir(tree)
-    before = set(tree.rglob("*"))
-    assert rule_edges(tree / "Snakefile") == own_edges()
-    assert set(tree.rglob("*")) == before, "the folder that is worked in must stay as it is"

@@ -13,7 +13,7 @@ from sepi.report.page import page_of
 from sepi.report.plan import RENDERED_TABLES, Plan
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def found(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     """Numbers of two scenes, without noise and with little of two seeds; one method has a map of one scene alone."""
     variants = VARIANTS | {"best": built_in.VARIANTS["best"].labels}

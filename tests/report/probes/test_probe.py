@@ -40,7 +40,7 @@ def missing_views(grid=(5, 4)):
     return present
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def occluder():
     """A small scene with occlusions, and its final maps."""
     light_field = render("curved_occluders", size=96)

@@ -187,9 +187,9 @@ def test_nothing_makes_the_page_scroll_sideways(browser: Any, example: Example, 
                 assert page.evaluate("innerWidth") == width
 
 
-def test_everything_has_a_name_for_those_who_do_not_see_it(page: Any) -> None:
-    page.locator("#ablation").scroll_into_view_if_needed()
-    nameless = page.evaluate(
+def test_everything_has_a_name_for_those_who_do_not_see_it(same_page: Any) -> None:
+    same_page.locator("#ablation").scroll_into_view_if_needed()
+    nameless = same_page.evaluate(
         """() => {
           const named = (e) => (e.getAttribute("aria-label") ?? e.getAttribute("alt") ?? "").trim() ||
             e.querySelector(":scope > title")?.textContent;
@@ -203,10 +203,10 @@ def test_everything_has_a_name_for_those_who_do_not_see_it(page: Any) -> None:
         }"""
     )
     assert nameless == []
-    names = page.locator("canvas[role=img]").evaluate_all("(all) => all.map((c) => c.getAttribute('aria-label'))")
+    names = same_page.locator("canvas[role=img]").evaluate_all("(all) => all.map((c) => c.getAttribute('aria-label'))")
     assert len(names) > 20
-    assert page.get_attribute("html", "lang") == "en"
-    levels = page.evaluate("[...document.querySelectorAll('h1, h2, h3')].map((h) => Number(h.tagName[1]))")
+    assert same_page.get_attribute("html", "lang") == "en"
+    levels = same_page.evaluate("[...document.querySelectorAll('h1, h2, h3')].map((h) => Number(h.tagName[1]))")
     assert levels.count(1) == 1
     assert all(after - before <= 1 for before, after in pairwise(levels))
 
@@ -303,14 +303,14 @@ def test_no_name_breaks_the_page_or_runs_as_code(browser: Any, example: Example,
         assert page.evaluate("document.documentElement.scrollWidth") <= 1400
 
 
-def test_external_maps_are_told_apart(page: Any) -> None:
+def test_external_maps_are_told_apart(same_page: Any) -> None:
     """A cell and a line for what is wrong with a map; the rest of the report is there."""
-    text = page.text_content("main")
+    text = same_page.text_content("main")
     assert "7x5 instead of 64x64" in text
     assert "no file" in text
-    assert page.locator('figure[data-key="external/SPO/disparity"] figcaption').text_content().startswith("AB")
-    assert "external" in page.locator('figure[data-key="external/SPO/disparity"] figcaption').text_content()
-    assert page.locator('figure[data-key="external/wrong_size/disparity"]').count() == 0
+    assert same_page.locator('figure[data-key="external/SPO/disparity"] figcaption').text_content().startswith("AB")
+    assert "external" in same_page.locator('figure[data-key="external/SPO/disparity"] figcaption').text_content()
+    assert same_page.locator('figure[data-key="external/wrong_size/disparity"]').count() == 0
 
 
 def test_a_page_without_scenes_opens(browser: Any, example: Example, tmp_path: Path) -> None:
@@ -339,13 +339,13 @@ def test_what_the_page_says_without_scripts(browser: Any, example: Example) -> N
     context.close()
 
 
-def test_the_page_prints_the_numbers_of_the_json(page: Any, example: Example) -> None:
+def test_the_page_prints_the_numbers_of_the_json(same_page: Any, example: Example) -> None:
     """Every cell of every table stands in the page as the JSON has it."""
     for name, table in example.numbers["tables"].items():
         expected = [[cell["text"] for cell in row["cells"]] for section in table["sections"] for row in section["rows"]]
-        shown = page.eval_on_selector_all(
+        shown = same_page.eval_on_selector_all(
             f"#{name} tbody tr", "(rows) => rows.map((row) => [...row.cells].map((cell) => cell.textContent))"
         )
         assert shown == expected, name
     marks = json.dumps(example.numbers["tables"]["table1_mse"]).count('"best"')
-    assert page.locator("#table1_mse td .best").count() == marks > 5
+    assert same_page.locator("#table1_mse td .best").count() == marks > 5

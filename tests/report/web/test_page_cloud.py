@@ -34,9 +34,9 @@ def test_the_point_cloud_draws(page: Any) -> None:
 
 
 @pytest.mark.parametrize("camera", [None, {"scale": 30, "offset": 5, "focal": 40, "from_centre": [0, 0]}])
-def test_the_point_cloud_is_upright_and_not_mirrored(page: Any, camera: dict[str, Any] | None) -> None:
+def test_the_point_cloud_is_upright_and_not_mirrored(same_page: Any, camera: dict[str, Any] | None) -> None:
     """Seen from the front it is the picture: each quarter has its colour; and what is nearer is nearer to the eye."""
-    quarters = page.evaluate(
+    quarters = same_page.evaluate(
         """(camera) => {
           const [width, height, side] = [40, 40, 100];
           const colours = Uint32Array.from({ length: 1600 }, (_, i) => 1 + (i % 40 < 20 ? 0 : 1) + (i < 800 ? 0 : 2));
@@ -59,11 +59,11 @@ def test_the_point_cloud_is_upright_and_not_mirrored(page: Any, camera: dict[str
     assert near > 1.2 * far if camera is None else far > 1.2 * near
 
 
-def test_near_points_hide_far_ones(page: Any) -> None:
+def test_near_points_hide_far_ones(same_page: Any) -> None:
     """The depth buffer: of two points on one place, the nearer is seen, whichever comes first."""
     for order in ([0, 1], [1, 0]):
         colours = [0x0000FF, 0x00FF00]
-        found = page.evaluate(
+        found = same_page.evaluate(
             """([z, colours]) => {
               const pixels = new Uint32Array(400);
               const positions = Float32Array.of(0, 0, z[0], 0, 0, z[1]);

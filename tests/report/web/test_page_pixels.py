@@ -45,21 +45,23 @@ def test_a_pixel_that_the_configuration_asks_for_comes_first(page: Any, example:
     assert f"ground truth{ground_truth[y, x]:.3f}" in facts
 
 
-def test_buttons_choose_prepared_pixels(page: Any, example: Example) -> None:
+def test_buttons_choose_prepared_pixels(same_page: Any, example: Example) -> None:
     """Each with its curves, its SEPIs, and the views that it kept."""
     probes = cotton_probes(example)
-    buttons = page.locator('[data-part="pixels"] button')
+    buttons = same_page.locator('[data-part="pixels"] button')
     assert buttons.count() == len(probes)
     for number, probe in enumerate(probes):
         buttons.nth(number).click()
-        assert page.get_attribute("#pixel", "data-pixel") == f"{probe['x']} {probe['y']}"
+        assert same_page.get_attribute("#pixel", "data-pixel") == f"{probe['x']} {probe['y']}"
         pressed = [button.get_attribute("aria-pressed") for button in buttons.all()]
         assert pressed == ["true" if other == number else "false" for other in range(len(probes))]
-        kept = page.locator('[data-part="sepis"] svg rect').evaluate_all("(all) => all.map((r) => r.className.baseVal)")
+        kept = same_page.locator('[data-part="sepis"] svg rect').evaluate_all(
+            "(all) => all.map((r) => r.className.baseVal)"
+        )
         assert "".join("1" if name == "kept" else "0" for name in kept) == probe["kept"]
-        curves = page.locator('[data-part="curves"] polyline')
+        curves = same_page.locator('[data-part="curves"] polyline')
         assert curves.count() == len(probe["costs"])
-    pictures = page.locator('[data-part="sepis"] img')
+    pictures = same_page.locator('[data-part="sepis"] img')
     pictures.first.scroll_into_view_if_needed()
     sizes = pictures.evaluate_all(
         "async (all) => Promise.all(all.map(async (i) => (await i.decode(), [i.naturalWidth, i.naturalHeight])))"

@@ -86,15 +86,15 @@ def test_swapping_and_choosing(page: Any) -> None:
     assert "paper" in part(page, "legends")
 
 
-def test_the_read_out_shows_the_values_of_the_files(page: Any, example: Example) -> None:
+def test_the_read_out_shows_the_values_of_the_files(same_page: Any, example: Example) -> None:
     """Three decimals of what the HDF5 files hold, at corners, edges and inside."""
     ground_truth = example.light_field(COTTON).ground_truth
     assert ground_truth is not None
     finals = {side: example.final(COTTON, variant) for side, variant in (("a", "paper"), ("b", "best"))}
-    choose(page, a="paper/4_optimize", b="best/4_optimize")
+    choose(same_page, a="paper/4_optimize", b="best/4_optimize")
     for x, y in PLACES:
-        point_at(page, x, y)
-        shown = read_out(page)
+        point_at(same_page, x, y)
+        shown = read_out(same_page)
         for side, maps in finals.items():
             value = float(shown[f"value {side}"])
             assert value == as_shown(maps.disparity[y, x]), (x, y, side)
@@ -108,24 +108,24 @@ def test_the_read_out_shows_the_values_of_the_files(page: Any, example: Example)
     assert not np.isfinite(ground_truth[0, 0])
 
 
-def test_the_read_out_of_truth_and_errors(page: Any, example: Example) -> None:
+def test_the_read_out_of_truth_and_errors(same_page: Any, example: Example) -> None:
     light_field = example.light_field(COTTON)
     assert light_field.ground_truth is not None
-    choose(page, a="ground_truth", b="best/error")
+    choose(same_page, a="ground_truth", b="best/error")
     for x, y in PLACES[1:]:
-        point_at(page, x, y)
+        point_at(same_page, x, y)
         ground_truth = as_shown(light_field.ground_truth[y, x])
         estimate = as_shown(example.final(COTTON, "best").disparity[y, x])
-        shown = read_out(page)
+        shown = read_out(same_page)
         assert float(shown["value a"]) == ground_truth
         assert float(shown["value b"]) == pytest.approx(estimate - ground_truth, abs=1e-6)
         assert shown["error a"] == "–"
 
 
-def test_the_read_out_of_other_maps_is_right_within_their_step(page: Any, example: Example) -> None:
+def test_the_read_out_of_other_maps_is_right_within_their_step(same_page: Any, example: Example) -> None:
     """Stages on the way, confidence as a map, another method's map; what it does not know is called unknown."""
     step = next(scene for scene in example.scenes if scene["scene"] == "cotton")["arrays"]
-    panels = {panel["key"]: panel for panel in page.evaluate("Sepi.viewer.scene.panels")}
+    panels = {panel["key"]: panel for panel in same_page.evaluate("Sepi.viewer.scene.panels")}
     maps = {
         "paper/1_initial": example.stage(COTTON, "paper", "initial").disparity,
         "best/2_occlusion": example.stage(COTTON, "best", "occlusion").disparity,
@@ -133,18 +133,18 @@ def test_the_read_out_of_other_maps_is_right_within_their_step(page: Any, exampl
         "external/SPO/disparity": example.external,
     }
     for key, values in maps.items():
-        choose(page, a=key)
+        choose(same_page, a=key)
         half = step[panels[key]["map"]]["step"] / 2
         # as many decimals as the step has
         slack = half + (0.0005 if half < 0.005 else 0.005) + 1e-6
         for x, y in PLACES:
-            point_at(page, x, y)
-            assert abs(float(read_out(page)["value a"]) - values[y, x]) <= slack, (key, x, y)
-    point_at(page, UNKNOWN[1].start, UNKNOWN[0].start)
-    assert (read_out(page)["value a"], read_out(page)["error a"]) == ("unknown", "unknown")
+            point_at(same_page, x, y)
+            assert abs(float(read_out(same_page)["value a"]) - values[y, x]) <= slack, (key, x, y)
+    point_at(same_page, UNKNOWN[1].start, UNKNOWN[0].start)
+    assert (read_out(same_page)["value a"], read_out(same_page)["error a"]) == ("unknown", "unknown")
 
 
-def test_the_read_out_shows_the_interval(page: Any, example: Example) -> None:
+def test_the_read_out_shows_the_interval(same_page: Any, example: Example) -> None:
     """As the files hold it, within the steps of 12 % that the page keeps its widths in; a map without one says so."""
     maps = with_unknown(example.light_field(COTTON), example.final(COTTON, "best"))
     assert maps.sigma is not None
@@ -153,10 +153,10 @@ def test_the_read_out_shows_the_interval(page: Any, example: Example) -> None:
     reaches = maps.high - maps.disparity, maps.disparity - maps.low
     row, column = np.unravel_index(np.abs(reaches[0] - reaches[1]).argmax(), maps.low.shape)
     for other in ("external/SPO/disparity", "paper/1_initial", "best/sigma"):
-        choose(page, a="best/4_optimize", b=other)
+        choose(same_page, a="best/4_optimize", b=other)
         for x, y in (*PLACES, (int(column), int(row))):
-            point_at(page, x, y)
-            shown = read_out(page)
+            point_at(same_page, x, y)
+            shown = read_out(same_page)
             low, high = map(float, shown["interval a"].split(" … "))
             value = maps.disparity[y, x]
             # half a step of a logarithm is 6 %, of two 12 %; two digits of sigma are another 5 %
@@ -168,28 +168,28 @@ def test_the_read_out_shows_the_interval(page: Any, example: Example) -> None:
                 assert (shown["value b"], shown["interval b"]) == (shown["sigma a"], "–")
             else:
                 assert shown["interval b"] == "no interval"
-    legends = part(page, "legends")
+    legends = part(same_page, "legends")
     assert "sure 0.001" in legends
     assert "1 unsure" in legends
 
 
-def test_pictures_have_no_numbers(page: Any) -> None:
-    choose(page, a="reference_view", b="occluded_ground_truth")
-    point_at(page, 10, 10)
-    shown = read_out(page)
+def test_pictures_have_no_numbers(same_page: Any) -> None:
+    choose(same_page, a="reference_view", b="occluded_ground_truth")
+    point_at(same_page, 10, 10)
+    shown = read_out(same_page)
     names = ("value", "error", "confidence", "sigma", "interval")
     assert {shown[f"{name} {side}"] for name in names for side in "ab"} == {"–"}
 
 
-def test_every_panel_of_the_grid_reads_out(page: Any, example: Example) -> None:
+def test_every_panel_of_the_grid_reads_out(same_page: Any, example: Example) -> None:
     """The cursor over a small panel is the cursor everywhere."""
-    choose(page, b="best/4_optimize")
+    choose(same_page, b="best/4_optimize")
     for key in ("ground_truth", "paper/1_initial"):
-        selector = visible_tile(page, key)
+        selector = visible_tile(same_page, key)
         for x, y in ((12, 40), (55, 20)):
-            point_at(page, x, y, selector)
+            point_at(same_page, x, y, selector)
             value = example.final(COTTON, "best").disparity[y, x]
-            assert float(read_out(page)["value b"]) == as_shown(value)
+            assert float(read_out(same_page)["value b"]) == as_shown(value)
 
 
 def test_the_cursor_moves_by_the_keyboard(page: Any, example: Example) -> None:
@@ -205,39 +205,40 @@ def test_the_cursor_moves_by_the_keyboard(page: Any, example: Example) -> None:
     assert float(read_out(page)["value b"]) == as_shown(example.final(COTTON, "best").disparity[31, 0])
 
 
-def test_legends_have_the_scale_of_the_scene(page: Any, example: Example) -> None:
+def test_legends_have_the_scale_of_the_scene(same_page: Any, example: Example) -> None:
     ground_truth = example.light_field(COTTON).ground_truth
     assert ground_truth is not None
-    legends = part(page, "legends")
+    choose(same_page, a="reference_view", b="best/4_optimize")
+    legends = part(same_page, "legends")
     assert f"{np.nanmin(ground_truth):.2f}" in legends
     assert f"{np.nanmax(ground_truth):.2f}" in legends
-    choose(page, a="paper/error")
-    assert "-0.20" in part(page, "legends")
-    assert "MSE" in part(page, "legends")
+    choose(same_page, a="paper/error")
+    assert "-0.20" in part(same_page, "legends")
+    assert "MSE" in part(same_page, "legends")
 
 
-def test_maps_have_the_colours_of_the_figures(page: Any, example: Example) -> None:
+def test_maps_have_the_colours_of_the_figures(same_page: Any, example: Example) -> None:
     """A page and a paper must not disagree: viridis, the scene's limits, magenta for unknown."""
     light_field = example.light_field(COTTON)
     limits = disparity_limits(light_field)
     expected = map_picture(example.external, limits).astype(int)
-    shown = map_pixels(page, "external/SPO/disparity")[:, :, :3].astype(int)
+    shown = map_pixels(same_page, "external/SPO/disparity")[:, :, :3].astype(int)
     assert (shown[UNKNOWN] == (255, 0, 255)).all()
     assert np.abs(shown - expected).max() <= 6
     best = example.final(COTTON, "best").disparity
     error = error_picture(best - light_field.ground_truth).astype(int)
-    assert np.abs(map_pixels(page, "best/error")[:, :, :3] - error).max() <= 6
+    assert np.abs(map_pixels(same_page, "best/error")[:, :, :3] - error).max() <= 6
 
 
-def test_the_reference_view_is_the_picture(page: Any, example: Example) -> None:
+def test_the_reference_view_is_the_picture(same_page: Any, example: Example) -> None:
     """Compressed, but upright, not mirrored, its colours in order."""
     light_field = example.light_field(COTTON)
-    shown = map_pixels(page, "reference_view")[:, :, :3].astype(int)
+    shown = map_pixels(same_page, "reference_view")[:, :, :3].astype(int)
     off = shown - light_field.views[light_field.reference_position]
     assert np.abs(off.mean(axis=2)).mean() < 5
     assert np.abs(off.mean(axis=(0, 1))).max() < 4
     mask = light_field.masks["occluded"]
-    over = map_pixels(page, "occluded_ground_truth")[:, :, :3].astype(int)
+    over = map_pixels(same_page, "occluded_ground_truth")[:, :, :3].astype(int)
     assert (over[mask][:, 0] > over[mask][:, 2] + 60).all()
     assert (np.abs(over[~mask] - shown[~mask] / 2) <= 1).all()
 
@@ -281,13 +282,13 @@ def test_close_ups_in_all_panels_follow_the_cursor(page: Any, x: int, y: int) ->
     assert (np.abs(plain - seen).max(axis=2) < 12).mean() < 0.8
 
 
-def test_the_large_close_ups_follow_the_cursor(page: Any) -> None:
-    choose(page, a="ground_truth", b="paper/4_optimize")
+def test_the_large_close_ups_follow_the_cursor(same_page: Any) -> None:
+    choose(same_page, a="ground_truth", b="paper/4_optimize")
     for x, y in ((10, 12), (60, 40)):
-        point_at(page, x, y)
+        point_at(same_page, x, y)
         for side, key in (("a", "ground_truth"), ("b", "paper/4_optimize")):
-            seen = canvas_pixels(page, f'[data-part="close-{side}"]')[:, :, :3].astype(int)
-            wanted = magnified(map_pixels(page, key), x, y, len(seen)).astype(int)
+            seen = canvas_pixels(same_page, f'[data-part="close-{side}"]')[:, :, :3].astype(int)
+            wanted = magnified(map_pixels(same_page, key), x, y, len(seen)).astype(int)
             assert (np.abs(seen - wanted).max(axis=2) < 12).mean() > 0.95
 
 
