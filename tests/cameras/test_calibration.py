@@ -55,16 +55,33 @@ def sweep(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[Shot]]:
     return folder, _write(folder, shots)
 
 
-def test_sweep_by_hand_becomes_the_cameras_that_took_it(sweep: tuple[Path, list[Shot]], tmp_path: Path) -> None:
-    """Turns and places are the true ones up to where the world begins and how large it is; and depth takes them."""
-    folder, shots = sweep
-    done = CliRunner().invoke(main, ["calibrate", str(folder), "-o", str(tmp_path / "out"), "--threads", "1"])
+@pytest.fixture(scope="module")
+def calibrated(sweep: tuple[Path, list[Shot]]) -> tuple[Path, str]:
+    """The model of the sweep, made by one thread, and what the command says of it."""
+    out = sweep[0].with_name("out")
+    done = CliRunner().invoke(main, ["calibrate", str(sweep[0]), "-o", str(out), "--threads", "1"])
     assert done.exit_code == 0, done.output
-    assert "placed: 6 of 6 pictures" in done.output
-    assert "pixels of disparity" in done.output
-    assert f"next: sepi depth {tmp_path / 'out'}" in done.output
-    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["project.ini", "sparse"]
-    model = read_model(tmp_path / "out")
+    return out, done.output
+
+
+def _four_of(sweep: tuple[Path, list[Shot]], folder: Path) -> Path:
+    """Pictures enough where it does not matter how many there are."""
+    folder.mkdir()
+    for shot in sweep[1][:4]:
+        (folder / shot.name).symlink_to(sweep[0] / shot.name)
+    return folder
+
+
+def test_sweep_by_hand_becomes_the_cameras_that_took_it(
+    sweep: tuple[Path, list[Shot]], calibrated: tuple[Path, str]
+) -> None:
+    """Turns and places are the true ones up to where the world begins and how large it is; and depth takes them."""
+    (folder, shots), (out, said) = sweep, calibrated
+    assert "placed: 6 of 6 pictures" in said
+    assert "pixels of disparity" in said
+    assert f"next: sepi depth {out}" in said
+    assert sorted(path.name for path in out.iterdir()) == ["project.ini", "sparse"]
+    model = read_model(out)
     assert [path.samefile(folder / shot.name) for path, shot in zip(model.pictures, shots, strict=True)] == [True] * 6
     # from the model's world to the true one
     world = shots[0].rotation.T @ model.shots[0].rotation
@@ -76,12 +93,13 @@ def test_sweep_by_hand_becomes_the_cameras_that_took_it(sweep: tuple[Path, list[
     assert np.linalg.norm(found - true, axis=1).max() < 0.1 * CAMERA.scale / FOCAL
 
 
-def test_the_same_pictures_give_the_same_model(sweep: tuple[Path, list[Shot]], tmp_path: Path) -> None:
+def test_the_same_pictures_give_the_same_model(
+    sweep: tuple[Path, list[Shot]], calibrated: tuple[Path, str], tmp_path: Path
+) -> None:
     """However many threads there are."""
-    for threads in (1, 2):
-        calibrate(sweep[0], tmp_path / str(threads), threads=threads, force=True)
+    calibrate(sweep[0], tmp_path / "out", threads=2, force=True)
     for name in ("cameras.txt", "images.txt", "points3D.txt"):
-        one, two = ((tmp_path / threads / "sparse/0" / name).read_bytes() for threads in "12")
+        one, two = ((out / "sparse/0" / name).read_bytes() for out in (calibrated[0], tmp_path / "out"))
         assert one == two
 
 
@@ -94,14 +112,16 @@ def test_interrupt_and_a_folder_that_is_there_leave_everything_as_it_was(
         if done > 0.5:
             raise KeyboardInterrupt
 
+    pictures, place = _four_of(sweep, tmp_path / "in"), tmp_path / "place"
+    place.mkdir()
     with pytest.raises(KeyboardInterrupt):
-        calibrate(sweep[0], tmp_path / "out", force=True, progress=interrupted)
-    assert list(tmp_path.iterdir()) == []
-    kept = tmp_path / "out" / "kept"
+        calibrate(pictures, place / "out", force=True, progress=interrupted)
+    assert list(place.iterdir()) == []
+    kept = place / "out" / "kept"
     kept.mkdir(parents=True)
     with pytest.raises(SepiError, match="exists already"):
-        calibrate(sweep[0], tmp_path / "out")
-    assert list(tmp_path.rglob("*")) == [tmp_path / "out", kept]
+        calibrate(pictures, place / "out")
+    assert list(place.rglob("*")) == [place / "out", kept]
 
 
 def _blank(folder: Path, picture: np.ndarray) -> None:
@@ -185,7 +205,7 @@ def test_model_that_depth_refuses_is_kept_and_the_reason_told(
         raise SepiError("the cameras stand one behind the other")
 
     monkeypatch.setattr("sepi.cameras.calibration.rectification_of", refused)
-    words = ["calibrate", str(sweep[0]), "-o", str(tmp_path / "out"), "--force"]
+    words = ["calibrate", str(_four_of(sweep, tmp_path / "in")), "-o", str(tmp_path / "out"), "--force"]
     done = CliRunner().invoke(main, words)
     assert done.exit_code == 1
     assert "sepi: 'sepi depth' cannot use it: the cameras stand one behind the other" in done.output

@@ -44,7 +44,8 @@ def holds(known: DisparityRange, low: float, high: float, slack: float = 0.0) ->
 
 @pytest.mark.parametrize("name", SCENES)
 def test_built_in_scenes(name: str) -> None:
-    light_field = render(name, size=128, views=7)
+    # the tips of the pyramids are too small otherwise
+    light_field = render(name, size=128, views=7) if name == "pyramids" else render(name, size=96, views=5)
     ground_truth = light_field.ground_truth
     assert ground_truth is not None
     known = estimate_range(light_field)
@@ -64,18 +65,29 @@ def test_real_scenes(hci: Path, name: str, every: int) -> None:
     assert known.maximum - known.minimum < 1.35 * every * np.ptp(ground_truth)
 
 
+# where a scene's nearest and most distant surfaces have texture; what JPEG leaves of cotton's is little in any part
+PARTS = {"cotton": np.s_[128:384, :], "antinous": np.s_[128:384, 128:384]}
+WHOLE = ("cotton", "JPEG of quality 30")
+
+
 @pytest.mark.parametrize("name", ["cotton", "antinous"])
 @pytest.mark.parametrize("kind", ["noise of 10/255", "JPEG of quality 30", "grey", "half size", "16 bit"])
 def test_disturbed_real_scenes(hci: Path, name: str, kind: str) -> None:
     """Blocks of JPEG match those a block further, and noise stretches what is measured: candidates would be wasted."""
     from bench.disturbed import DISTURBANCES
 
-    whole = views_of(hci / name)
+    whole, part = views_of(hci / name), PARTS[name] if (name, kind) != WHOLE else np.s_[:, :]
     assert whole.ground_truth is not None
     change, factor = DISTURBANCES[kind]
-    # the views in the middle move as all do
-    known = estimate_range(change(LightField(np.ascontiguousarray(whole.views[2:7, 2:7]), name)))
-    low, high = factor * np.quantile(whole.ground_truth, [0.0025, 0.9975])
+    # the views in the middle move as all do, and of those only a row and a column are looked at
+    views = whole.views[2:7, 2:7, *part]
+    row, column = (change(LightField(np.ascontiguousarray(line), name)).views for line in (views[2:3], views[:, 2:3]))
+    present = np.zeros((5, 5), bool)
+    present[2] = present[:, 2] = True
+    disturbed = np.zeros((5, 5, *row.shape[2:]), row.dtype)
+    disturbed[2], disturbed[:, 2] = row[0], column[:, 0]
+    known = estimate_range(LightField(disturbed, name, present=present))
+    low, high = factor * np.quantile(whole.ground_truth[part], [0.0025, 0.9975])
     assert holds(known, low, high)
     assert known.maximum - known.minimum < 1.5 * (high - low)
 
@@ -196,12 +208,12 @@ def test_given_range_wins_over_the_scenes_own() -> None:
 
 def test_dark_corners_are_no_surfaces() -> None:
     """A lens leaves the corners of Lytro pictures black; their edges move from view to view as nothing in the scene."""
-    light_field = render("wall", size=128, views=7)
+    light_field = render("wall", size=96, views=5)
     clean = estimate_range(light_field)
-    y, x = np.mgrid[:128, :128] - 63.5
+    y, x = np.mgrid[:96, :96] - 47.5
     views = light_field.views.copy()
-    for t, s in np.ndindex(7, 7):
-        views[t, s][np.hypot(y - 4 * (t - 3), x - 4 * (s - 3)) > 76] = 1
+    for t, s in np.ndindex(5, 5):
+        views[t, s][np.hypot(y - 4 * (t - 2), x - 4 * (s - 2)) > 57] = 1
     vignetted = LightField(views, "vignetted")
     known = estimate_range(vignetted)
     assert known.minimum == pytest.approx(clean.minimum, abs=0.3)
@@ -249,7 +261,7 @@ def test_kernel_equals_its_plain_twin() -> None:
     rng = np.random.default_rng(4)
     reference = rng.random((37, 23), np.float32)
     views = rng.random((4, 37, 23), np.float32)
-    offsets = np.array([[0, -2], [0, 1], [1, 0], [-1, 2]])
+    offsets = np.array([[0, -2], [0, 1], [1, 0], [-1, 2]], np.float32)
     candidates = np.linspace(-3, 3, 13, dtype=np.float32)
     lowest, second, mean, disparity = coarse_sweep(reference, views, offsets, candidates, np.float32(0.4), 2)
     costs = sweep_in_numpy(reference, views, offsets, candidates, 0.4, 2)

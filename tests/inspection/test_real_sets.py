@@ -4,10 +4,12 @@ The ranges were measured by block matching and by eye, and are those of 99 % of 
 """
 
 import warnings
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
 import pytest
 
 from sepi.errors import SepiWarning
@@ -69,7 +71,9 @@ def known_set(path: Path, name: str) -> LightField:
     """The light field with its views in the right order."""
     if SETS[name].warning is None:
         return read_set(path)[0]
-    return read_light_field(path, options=ReadOptions(order=SETS[name].order), check_order=False)
+    # of large grids as many views as are looked at
+    options = ReadOptions(order=SETS[name].order, central=9 if min(SETS[name].grid) > 9 else None)
+    return read_light_field(path, options=options, check_order=False)
 
 
 @pytest.mark.parametrize("name", SETS)
@@ -101,7 +105,10 @@ def test_near_and_far_are_told(real_data: Path, name: str) -> None:
 def test_the_range_holds_the_scene_and_little_more(real_data: Path, name: str) -> None:
     """Too narrow, it cuts off the nearest or most distant surface; too wide, it costs time and accuracy."""
     known = SETS[name]
-    found = estimate_range(known_set(path_of(real_data, name), name))
+    light_field = known_set(path_of(real_data, name), name)
+    # where things move by so much that the search takes long, a part that has the nearest and the most distant ones
+    part = {"t_rex": np.s_[:, :, :, 210:630]}.get(name, np.s_[:])
+    found = estimate_range(replace(light_field, views=light_field.views[part]))
     assert found.minimum <= known.low
     assert found.maximum >= known.high
     assert found.maximum - found.minimum <= 1.5 * (known.high - known.low)

@@ -89,7 +89,8 @@ def damaged(content: bytes) -> Iterator[bytes]:
         if kind == 0:
             middle = bytes([middle[0] ^ 1 << int(rng.integers(8))]) + middle[1:]
         else:
-            middle = bytes(len(middle)) if kind == 1 else rng.bytes(len(middle))
+            # zeros where there are none
+            middle = bytes(len(middle)) if kind == 1 and any(middle) else rng.bytes(len(middle))
         yield content[:place] + middle + content[place + len(middle) :]
 
 
@@ -124,6 +125,8 @@ def test_damage_is_told_or_does_not_matter(tmp_path: Path, kind: str, added: boo
     errors = []
     for variant in damaged(path.read_bytes()):
         path.write_bytes(variant)
+        # what was looked at is remembered, as of any file that has been there for a while
+        earlier(path)
         try:
             found = plain(read(path))
         except SepiError as error:
@@ -132,7 +135,7 @@ def test_damage_is_told_or_does_not_matter(tmp_path: Path, kind: str, added: boo
             assert found == expected
     assert all(error.startswith(str(path)) for error in errors)
     # what stands before HDF5's own bytes is all that does not matter; and what others added, and room between
-    assert len(errors) > (0.3 if added else 0.8) * VARIANTS
+    assert len(errors) > (0.3 if added else 0.9) * VARIANTS
 
 
 @pytest.mark.parametrize("kind", FILES)

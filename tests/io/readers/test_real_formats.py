@@ -4,6 +4,7 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 import scipy.io
@@ -96,19 +97,23 @@ def test_a_view_off_the_centre(hci: Path) -> None:
 
 def test_lytro_picture_with_one_command(real_data: Path, tmp_path: Path) -> None:
     """No parameters, no range, no flags: from a folder of pictures to disparity, point cloud and colours."""
+    (tmp_path / "in").mkdir()
+    for picture in (real_data / "lytro" / "2067").glob("*.png"):
+        # most of what is looked at below, since larger pictures take longer
+        cv2.imwrite(str(tmp_path / "in" / picture.name), cv2.imread(str(picture))[40:270, 40:400])
     started = time.process_time()
-    words = ["depth", str(real_data / "lytro" / "2067"), "-o", str(tmp_path / "out")]
+    words = ["depth", str(tmp_path / "in"), "-o", str(tmp_path / "out")]
     called = CliRunner().invoke(main, words)
     assert called.exit_code == 0, called.output
     # the order of real views is right, and no reader may doubt it
     assert called.stderr == ""
-    assert time.process_time() - started <= 60
+    assert time.process_time() - started <= 25
     disparity = read_pfm(tmp_path / "out/disparity.pfm")
-    assert disparity.shape == (383, 552)
-    head, back, wall = disparity[190:220, 60:120], disparity[150:250, 300:380], disparity[60:120, 60:200]
+    assert disparity.shape == (230, 360)
+    head, back, wall = disparity[150:180, 20:80], disparity[110:210, 260:340], disparity[20:80, 20:160]
     assert np.median(head) > np.median(back) + 0.2
     assert np.median(back) > np.median(wall) + 0.3
     # the wall is one surface: what is far from its median is speckle
     assert np.mean(np.abs(wall - np.median(wall)) > 0.2) < 0.05
     for file in ("points.ply", "disparity.png", "disparity_16bit.png"):
-        assert (tmp_path / "out" / file).stat().st_size > 100_000
+        assert (tmp_path / "out" / file).stat().st_size > 40_000
