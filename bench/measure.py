@@ -159,9 +159,9 @@ def measured(case: Case, repeats: int, threads: int = 1) -> Measurement:
     )
     try:
         with ProcessPoolExecutor(1, context) as pool:
-            future = pool.submit(_measure, case, repeats, threads)
             try:
-                return future.result()
+                # the case may run before this returns
+                return pool.submit(_measure, case, repeats, threads).result()
             except KeyboardInterrupt:
                 for process in multiprocessing.active_children():
                     process.terminate()
