@@ -6,7 +6,9 @@ from click.testing import CliRunner
 import bench.digests
 from bench.__main__ import main
 
-SMALL = ["digests", "--size", "64", "--views", "3", "--variant", "no_occlusion_no_textureless"]
+# of one texture: each process draws it
+SMALL = ["digests", "--scene", "slanted_plane", "--size", "64", "--views", "3"]
+SMALL += ["--variant", "no_occlusion_no_textureless"]
 
 
 def test_one_digest_on_more_threads_than_cores() -> None:

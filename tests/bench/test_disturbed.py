@@ -1,5 +1,7 @@
 """The bench of disturbed light fields, and what it is for: never a wrong word on the order of the views."""
 
+from functools import partial
+
 import pytest
 from click.testing import CliRunner
 
@@ -10,22 +12,25 @@ from sepi.scenes import render
 pytestmark = pytest.mark.slow
 
 
-@pytest.mark.parametrize("name", ["curved_occluders", "slanted_plane"])
-def test_no_verdict_is_wrong(name: str) -> None:
+@pytest.mark.parametrize(
+    ("name", "turns"),
+    [("curved_occluders", ["flip-both", "transpose-flip-rows"]), ("slanted_plane", ["transpose-flip-rows"])],
+)
+def test_no_verdict_is_wrong(name: str, turns: list[str]) -> None:
     """A wrong word turns depth inside out, or makes nonsense of it."""
-    turns = ["flip-both", "transpose-flip-rows"]
-    found = dict(disturbed_verdicts(render(name, size=96, views=5), turns))
+    found = dict(disturbed_verdicts(render(name, size=80, views=5), turns))
     assert list(found) == list(DISTURBANCES)
     assert not any(verdicts.orders["wrong"] for verdicts in found.values())
     assert all(sum(verdicts.orders.values()) == len(turns) for verdicts in found.values())
     told = sum(verdicts.orders["right"] for verdicts in found.values())
-    assert (told > 12) == (name == "curved_occluders")
+    assert (told > 6 * len(turns)) == (name == "curved_occluders")
     assert all(verdicts.row_spacing == 1 for verdicts in found.values())
 
 
 def test_the_command_prints_a_table(monkeypatch: pytest.MonkeyPatch) -> None:
     first = dict(list(DISTURBANCES.items())[:1])
     monkeypatch.setattr("bench.disturbed.DISTURBANCES", first)
+    monkeypatch.setattr("bench.__main__.render", partial(render, size=64, views=3))
     result = CliRunner().invoke(main, ["disturb", "fronto_parallel"])
     assert result.exit_code == 0, result.output
     rows = result.output.splitlines()

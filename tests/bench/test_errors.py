@@ -1,14 +1,17 @@
 """The numbers of the error bars make the errors likeliest, and say of other scenes what they say of these."""
 
+from functools import partial
 from pathlib import Path
 
 import numpy as np
+import pytest
 from click.testing import CliRunner
 
 from bench.__main__ import main
 from bench.error_model import as_code, fitted, judged
 from bench.error_samples import Sample
 from sepi.error_bars.calibration import CONSTANT, Calibration
+from sepi.scenes import render
 
 TRUE = Calibration(
     scale={CONSTANT: 1.0, "deviation": 0.8, "second_difference": 0.0},
@@ -52,7 +55,8 @@ def test_a_fit_finds_the_numbers_that_errors_were_drawn_with() -> None:
     assert names["WRITTEN"] == found
 
 
-def test_the_command_fits_and_judges_scenes(tmp_path: Path) -> None:
+def test_the_command_fits_and_judges_scenes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("bench.sweep.render", partial(render, size=80, views=5))
     words = [
         "errors",
         "--scene",

@@ -1,6 +1,7 @@
 """A parameter is chosen on some scenes and tried on the one left out; held-out rendered scenes are no part of it."""
 
 import re
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -11,7 +12,7 @@ from bench import sweep
 from bench.__main__ import main
 from sepi.errors import SepiError
 from sepi.rendered.exposure import read_exposed
-from sepi.scenes import write_hci
+from sepi.scenes import render, write_hci
 from sepi.variants import VARIANTS
 
 QUICK = ("--variant", "no_occlusion_no_textureless", "--threads", "1")
@@ -62,8 +63,9 @@ def test_what_cannot_be_swept_is_told(target: str, values: list[str], message: s
         sweep.settings_of(VARIANTS["paper"], target, values)
 
 
-def test_noise_is_added_measured_and_scored() -> None:
+def test_noise_is_added_measured_and_scored(monkeypatch: pytest.MonkeyPatch) -> None:
     """If this fails, the table of noise is of something else than it says."""
+    monkeypatch.setattr(sweep, "render", partial(render, size=96, views=5))
     arguments = ["noise", "--scene", "pyramids", "--sigma", "0", "--sigma", "12", "--variant", "fast", "--threads", "1"]
     done = CliRunner().invoke(main, arguments)
     assert done.exit_code == 0, done.output

@@ -19,6 +19,8 @@ from typing import Any
 
 from pydantic import BaseModel
 
+import sepi
+
 ROOT = Path(__file__).parents[2]
 LIST = ROOT / "docs" / "reference" / "api_names.txt"
 
@@ -128,3 +130,11 @@ def raises_an_error(function: Any) -> bool:
                 seen.add(called)
                 waiting.append(functions[called])
     return False
+
+
+def unimported(source: str) -> set[str]:
+    """What a text takes from ``sepi`` by a dot that ``import sepi`` alone, or a line of its own, does not bring."""
+    imported = {name.split(".")[1] for name in re.findall(r"^import (sepi\.[\w.]+)", source, re.MULTILINE)}
+    used = [node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.Attribute)]
+    names = {node.attr for node in used if isinstance(node.value, ast.Name) and node.value.id == "sepi"}
+    return names - {*sepi.__all__, *imported}

@@ -5,6 +5,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
+from numpy_docstrings import unimported
 from warm_python import warm_python
 
 RUN = Path(__file__).with_name("example_with_claims.py")
@@ -122,6 +123,12 @@ CLAIMS: dict[str, list[str]] = {
 def test_every_example_is_checked() -> None:
     """A new example that nobody runs would break unseen."""
     assert sorted(path.stem for path in GALLERY.glob("plot_*.py")) == sorted(CLAIMS)
+
+
+def test_examples_import_what_they_use() -> None:
+    """What runs them has loaded ``sepi.scenes`` already; whoever runs the script gets an AttributeError."""
+    missing = {name: unimported((GALLERY / f"{name}.py").read_text(encoding="utf-8")) for name in CLAIMS}
+    assert not any(missing.values()), missing
 
 
 @pytest.mark.slow

@@ -28,6 +28,7 @@ from numpy_docstrings import (
     public_members,
     raises_an_error,
     sections,
+    unimported,
 )
 
 import sepi
@@ -133,10 +134,7 @@ def test_examples_import_what_they_use(dotted: str) -> None:
     """``sepi.scenes`` is there in an example that runs after another; a user who pastes it gets an AttributeError."""
     for _, text in examples_of(dotted):
         source = "".join(example.source for example in doctest.DocTestParser().get_examples(text))
-        imported = set(re.findall(r"^import (sepi\.[\w.]+)", source, re.MULTILINE))
-        used = {node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.Attribute)}
-        names = {node.attr for node in used if isinstance(node.value, ast.Name) and node.value.id == "sepi"}
-        assert names <= {*sepi.__all__, *(name.split(".")[1] for name in imported)}
+        assert unimported(source) == set()
 
 
 @pytest.fixture

@@ -76,7 +76,7 @@ def test_light_is_smoothed_where_it_may_be_the_same_and_not_across_a_shadow() ->
 
 
 def test_noise_falls_and_the_picture_stays(tmp_path: object) -> None:
-    """Against 512 paths a pixel: far less noise than of 16 on walls, none added in shadows, at rims, on gloss."""
+    """Against 256 paths a pixel: far less noise than of 16 on walls, none added in shadows, at rims, on gloss."""
     world = room(bar(depth=1.5, width=0.15), ball(0.3, Material(kind="mirror")))
     path = tmp_path / "room.h5"  # type: ignore[operator]
     render_world("room", world, taking(size=SIZE, views=VIEWS, samples=16), path)
@@ -84,7 +84,7 @@ def test_noise_falls_and_the_picture_stays(tmp_path: object) -> None:
     rig = rig_of(world, SIZE, (VIEWS, VIEWS))
     tracer = Tracer(world, rig)
     at = tracer.position(0, 0)
-    truth, raw = tracer.picture(at, 1, 512), tracer.picture(at, 12, 16)
+    truth, raw = tracer.picture(at, 1, 256), tracer.picture(at, 12, 16)
     masks = render.masks_of(render.centre)
     shown = render.views[render.centre].astype(np.float32)
     walls = (masks["textured"] | masks["textureless"]) & ~masks["discontinuities"] & ~masks["mirror"]
