@@ -37,6 +37,8 @@ _TOGETHER = {
     **dict.fromkeys(["test_compare", "test_packing", "test_page", "test_page_browser"], "page"),
     **dict.fromkeys(["test_page_cloud", "test_page_pixels", "test_page_viewer"], "page"),
     "test_pipeline": "types",
+    "test_error_bars": "error bars",
+    "test_geometries": "geometries",
     "test_workflow": "workflow",
     "test_module": "module",
     "test_slurm": "slurm",

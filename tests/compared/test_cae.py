@@ -26,7 +26,7 @@ PARAMETERS = ConstrainedEntropyParameters(num_disparities=31)
 
 
 @cache
-def scene(name: str, views: int = 7) -> LightField:
+def scene(name: str, views: int = 5) -> LightField:
     return render(name, size=64, views=views)
 
 
@@ -72,7 +72,7 @@ def test_entropy_withstands_occluders_and_variance_does_not(name: str) -> None:
 
 def test_the_constraint_withstands_outliers() -> None:
     """Views of a wrong colour would decide: weights by colour leave them out, and the plain entropy counts them."""
-    field = with_outliers(scene("curved_occluders"))
+    field = with_outliers(scene("curved_occluders", views=7))
     occluded = field.masks["occluded"]
     constrained, plain = (mean_error(field, entropy_costs(field, sigma), occluded) for sigma in (0.1, np.inf))
     assert constrained < 0.85 * plain
@@ -106,7 +106,7 @@ def test_both_costs_together_withstand_noise_better_than_the_entropy() -> None:
 def test_a_textured_plane_has_its_disparity(name: str, bound: float) -> None:
     """Half a candidate would be 0.05 pixels and more: the parabola between candidates must be right."""
     field = scene(name)
-    disparity = cae(field, None, ConstrainedEntropyParameters(), no_progress).disparity
+    disparity = cae(field, None, ConstrainedEntropyParameters(num_disparities=20), no_progress).disparity
     assert np.abs(disparity - field.ground_truth)[8:-8, 8:-8].mean() < bound
 
 

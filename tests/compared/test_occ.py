@@ -104,7 +104,8 @@ def test_patches_split_across_the_edge_see_no_more_than_whole_ones(monkeypatch: 
 
     def turned(view: FloatMap, parameters: OccSplitParameters, reach: float) -> Edges:
         edges = edges_to_split(view, parameters, reach)
-        places = edges.places.copy()
+        # in the same order in memory: no other kernel is compiled
+        places = edges.places.copy(order="K")
         places[:, 2] = (places[:, 2] + ORIENTATIONS // 2) % ORIENTATIONS
         return edges._replace(places=places)
 
@@ -159,7 +160,7 @@ def test_reversed_colours_leave_a_candidate_out() -> None:
         split_patch_costs(
             sheared,
             sheared[1],
-            np.zeros((1, 3), np.int64),
+            np.zeros((1, 3), np.int64, order="F"),
             halves,
             np.ascontiguousarray(beside[None]),
             np.float32(0.02),
@@ -183,7 +184,7 @@ def test_split_patch_costs_equal_numpy() -> None:
     """If this fails, the compiled loop does not compute the stated costs of halves."""
     rng = np.random.default_rng(1)
     sheared, reference = rng.random((9, 3, 6, 5), np.float32), rng.random((3, 6, 5), np.float32)
-    places = np.column_stack([rng.integers(0, 6, 8), rng.integers(0, 5, 8), rng.integers(0, 3, 8)])
+    places = np.array([rng.integers(0, 6, 8), rng.integers(0, 5, 8), rng.integers(0, 3, 8)]).T
     halves = rng.random((3, 2, 9)) < 0.6
     halves[:, :, :2] = True
     beside = rng.random((8, 2, 3), np.float32)

@@ -13,12 +13,12 @@ TARGET = "results/hci/box/complete"
 PART = "results/hci/box/paper/result.h5"
 
 
-def undisturbed_run(root: Path) -> Workflow:
+def undisturbed_run(root: Path, target: str = TARGET) -> Workflow:
     """A run to its end."""
     write_hci(render("curved_occluders", size=SIZE, views=3), root / "scenes" / "box")
     config = TINY | {"builtin": {"scenes": []}, "hci_root": str(root / "scenes")}
     workflow = Workflow(copy_of_the_project(root / "tree"), root / "undisturbed", config)
-    result = workflow.run(TARGET)
+    result = workflow.run(target)
     assert result.returncode == 0, result.stdout
     return workflow
 

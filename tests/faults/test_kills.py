@@ -81,9 +81,9 @@ def test_killed_at_any_moment(undisturbed: Workflow) -> None:
 
 @pytest.mark.system
 @pytest.mark.skipif(sys.platform != "linux", reason="only Linux tells a process that its parent is gone")
-def test_a_job_ends_with_its_workflow(undisturbed: Workflow) -> None:
+def test_a_job_ends_with_its_workflow(undisturbed_part: Workflow) -> None:
     """Otherwise it goes on beside the next run, and both write the same files."""
-    lonely = replace(undisturbed, folder=undisturbed.folder.with_name("lonely"))
+    lonely = replace(undisturbed_part, folder=undisturbed_part.folder.with_name("lonely"))
 
     def unfinished() -> list[Path]:
         return [path for path in files_below(lonely.folder / "results") if is_temporary(path)]

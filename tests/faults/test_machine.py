@@ -62,21 +62,27 @@ def kilobytes_of(workflow: Workflow) -> int:
 
 
 @pytest.mark.parametrize(
-    "percent", [pytest.param(30, marks=pytest.mark.system), pytest.param(80, marks=pytest.mark.faults)]
+    ("percent", "run", "target"),
+    [
+        pytest.param(30, "undisturbed_part", PART, marks=pytest.mark.system, id="30"),
+        pytest.param(80, "undisturbed", TARGET, marks=pytest.mark.faults, id="80"),
+    ],
 )
-def test_a_disk_that_is_full(undisturbed: Workflow, percent: int) -> None:
+def test_a_disk_that_is_full(request: pytest.FixtureRequest, percent: int, run: str, target: str) -> None:
     """Half of a file under its own name would be taken for the whole by the next run."""
+    undisturbed: Workflow = request.getfixturevalue(run)
     full = replace(undisturbed, folder=undisturbed.folder.with_name(f"full-{percent}"))
     whole = kilobytes_of(undisturbed)
     expected = made(undisturbed)
     with disk(full.folder, whole * percent // 100):
-        result = full.run(TARGET)
+        result = full.run(target)
         assert result.returncode != 0
         assert "No space left on device" in result.stdout
         assert "Traceback" not in result.stdout
         assert nothing_half_written(full, expected)
         mount("-o", f"remount,size={4 * whole}k", str(full.folder))
-        healed(full, expected)
+        healed(full, expected, target)
+        assert made(full) == expected
 
 
 @pytest.mark.faults

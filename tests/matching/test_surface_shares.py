@@ -31,7 +31,7 @@ def wrong(disparity: npt.NDArray[np.float32], truth: npt.NDArray[np.float32]) ->
 @pytest.mark.parametrize("change", ["too wide", "too narrow"])
 def test_edges_are_found_again(name: str, change: str) -> None:
     """Surfaces a pixel too wide close narrow gaps, those a pixel too narrow lose what is thin."""
-    scene = render(name, size=128)
+    scene = render(name, size=96)
     truth = scene.ground_truth
     assert truth is not None
     changed = (cv2.dilate if change == "too wide" else cv2.erode)(truth, AROUND)
@@ -42,9 +42,9 @@ def test_edges_are_found_again(name: str, change: str) -> None:
 
 @pytest.mark.parametrize("name", ["stripes", "curved_occluders", "dots", "slanted_plane", "pyramids"])
 def test_what_is_right_stays(name: str) -> None:
-    scene = render(name, size=128)
+    scene = render(name, size=96)
     assert scene.ground_truth is not None
-    assert wrong(reassign_at_steps(scene, scene.ground_truth, USUAL), scene.ground_truth) < 0.01 * 128**2
+    assert wrong(reassign_at_steps(scene, scene.ground_truth, USUAL), scene.ground_truth) < 0.01 * 96**2
 
 
 def test_one_asks_for_more_than_there_can_be() -> None:
@@ -117,7 +117,7 @@ def test_a_surface_one_pixel_too_wide_gets_its_edge_back(background: float) -> N
 @pytest.mark.parametrize("factor", [0.15, 1.15])
 def test_dark_views_and_other_exposures_do_no_harm(factor: float) -> None:
     """Lenses darken the views at the edge of the grid: edges would move by pixels."""
-    scene = render("curved_occluders", size=128)
+    scene = render("curved_occluders", size=96)
     assert scene.ground_truth is not None
     wide = cv2.dilate(scene.ground_truth, AROUND)
     views = scene.views * np.float32(0.8)
@@ -345,7 +345,7 @@ def test_brightness_is_told_view_by_view() -> None:
 @pytest.mark.parametrize("grid", [(1, 9), (9, 9)])
 def test_bands_hold_every_row_that_is_looked_at(grid: tuple[int, int], monkeypatch: pytest.MonkeyPatch) -> None:
     """Where memory is short, compiled code would read beside its arrays, and who knows what."""
-    whole = render("pencils", size=96)
+    whole = render("curved_occluders", size=96)
     rows = slice(4, 5) if grid[0] == 1 else slice(None)
     light_field = LightField(whole.views[rows], "rows", disparity_range=whole.disparity_range)
     background_of, asked = kernels.background_of, []

@@ -126,12 +126,13 @@ WRONG = {
 def test_each_problem_is_one_line_that_begins_with_the_file(made: Callable[[Files], Path], case: str) -> None:
     spoil, name, word = WRONG[case]
     path = made(spoil(good()))
-    (line,) = problems_of(path)
+    called = call(check_submission, path)
+    assert called.exit_code == 1
+    (line,) = called.stdout.splitlines()
+    assert called.stdout == line + "\n"
     assert line.startswith(name)
     assert word in line
     assert line.isprintable()
-    called = call(check_submission, path)
-    assert (called.exit_code, called.stdout) == (1, line + "\n")
 
 
 def test_a_name_in_capitals_is_another_name(made: Callable[[Files], Path]) -> None:
