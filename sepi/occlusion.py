@@ -15,8 +15,7 @@ orientation, and the half with the smaller cost is kept. ``none`` hands the init
 
 ``visibility`` chooses the views one by one: those in which nothing of the map so far occludes the pixel
 (:mod:`sepi.matching.visibility_sweep`); pixels that a depth discontinuity runs through then go to the surface that
-fills most of them, by all views (:mod:`sepi.matching.surface_shares`) and by the colours of the reference view
-(:mod:`sepi.image.mixed_pixels`).
+fills most of them (:mod:`sepi.boundaries.decision`).
 
 References
 ----------
@@ -34,14 +33,13 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import Field
 
+from sepi.boundaries.decision import assigned_to_surfaces
+from sepi.boundaries.isolated_pixels import join_isolated_pixels
+from sepi.boundaries.parameters import BoundaryParameters
 from sepi.image.edges import CannyParameters, canny_edges, depth_discontinuities, edge_angle
-from sepi.image.isolated_pixels import join_isolated_pixels
-from sepi.image.mixed_pixels import MixtureParameters, mixture_evidence
-from sepi.image.noise import residual_variance
 from sepi.lightfield import BoolMap, FloatMap, LightField
 from sepi.matching.denoising import denoised
 from sepi.matching.plane_sweep import SweepParameters, SweepResult, sweep
-from sepi.matching.surface_shares import SurfaceShareParameters, reassign_at_steps
 from sepi.matching.view_subsets import SIDES, half_planes, halves_and_quarters, spread_views
 from sepi.matching.visibility_sweep import VisibleViewsParameters, depth_from_visible_views, occluded_in_any_view
 from sepi.stage import Choice, NoParameters, Progress, StageMaps, none, require_previous
@@ -81,8 +79,8 @@ class HalfSepiParameters(OcclusionParameters):
         return 8
 
 
-class VisibilityParameters(VisibleViewsParameters, MixtureParameters, SurfaceShareParameters):
-    """Parameters of the views chosen one by one, and of the mixed pixels."""
+class VisibilityParameters(VisibleViewsParameters, BoundaryParameters):
+    """Parameters of the views chosen one by one, and of pixels beside depth steps."""
 
 
 class WangParameters(OcclusionParameters):
@@ -271,10 +269,8 @@ def visibility(
     before = require_previous(previous)
     light_field = denoised(light_field, parameters.denoising)
     result = depth_from_visible_views(light_field, before.disparity, parameters, progress)
-    colours = light_field.reference_view
-    mixture = mixture_evidence(result.disparity, colours, residual_variance(colours), parameters)
-    disparity = reassign_at_steps(light_field, result.disparity, parameters, mixture)
-    disparity = join_isolated_pixels(disparity, colours, parameters.occlusion_margin)
+    disparity = assigned_to_surfaces(light_field, result.disparity, parameters)
+    disparity = join_isolated_pixels(disparity, light_field.reference_view, parameters.occlusion_margin)
     return before.updated(
         disparity,
         result.confidence,

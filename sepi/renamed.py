@@ -7,6 +7,8 @@ RENAMED = {
     "hci-old": "hci-2013",
     # parameters
     "accuracy": "rtol",
+    "alpha_discontinuity": "boundary_step",
+    "alpha_radius": "clean_radius",
     "bend": "second_difference_threshold",
     "candidates": "num_disparities",
     "contradiction": "behind_penalty",
@@ -18,19 +20,20 @@ RENAMED = {
     "longest_step": "max_update",
     "mixture": "alpha_threshold",
     "mixture_contrast": "alpha_contrast",
-    "mixture_reach": "alpha_radius",
-    "mixture_step": "alpha_discontinuity",
+    "mixture_reach": "clean_radius",
+    "mixture_step": "boundary_step",
     "most_steps": "max_iterations",
+    "share_step": "boundary_step",
     "side_step": "side_margin",
     "solve_accuracy": "rtol",
     "step_weight": "discontinuity_weight",
     "trials": "ransac_iterations",
     # choices that are now another one with parameters that a variant overrides
     "gauss_newton": "second_order with refinements: 3, solves: 0",
-    "second_order_colours": "second_order with detail_share: 0, colour_scale: 0.0164",
-    "semi_global_colours": "semi_global with detail_share: 0",
-    "visibility_colours": "visibility with detail_share: 0, colour_scale: 0.0164",
-    "visibility_unmixed": "visibility with alpha_threshold: 0",
+    "second_order_colours": "second_order with use_detail: false, colour_scale: 0.0164",
+    "semi_global_colours": "semi_global with use_detail: false",
+    "visibility_colours": "visibility with use_detail: false, colour_scale: 0.0164",
+    "visibility_unmixed": "visibility with use_mixture: false",
 }
 """Old name to the new one, which is the first word where more has to be said."""
 

@@ -151,12 +151,12 @@ class Variant:
 
     @property
     def labels(self) -> dict[str, str]:
-        """Stage to what names its choice together with its overrides: ``"visibility+alpha_threshold=0"``."""
+        """Stage to what names its choice together with its overrides: ``"visibility+use_mixture=False"``."""
         return {stage: choice_label(choice, self.overrides.get(stage, {})) for stage, choice in self.choices.items()}
 
 
 def choice_label(choice: str, overrides: Mapping[str, Any]) -> str:
-    """What names a choice and its overrides, in tables and as a folder: ``"visibility+alpha_threshold=0"``.
+    """What names a choice and its overrides, in tables and as a folder: ``"visibility+use_mixture=False"``.
 
     Equal overrides give equal labels, in whatever order and however the numbers are written. A label that would be too
     long for a folder, or holds anything but letters, digits and ``_ . - + =``, ends with a digest instead.
@@ -181,10 +181,10 @@ def choice_of(label: str) -> str:
 
 
 def variant_from(name: str, entries: Mapping[str, Any], where: str, users: tuple[str, ...] = ()) -> Variant:
-    """The variant that an entry such as ``{"base": "best", "occlusion": {"alpha_threshold": 0}}`` describes.
+    """The variant that an entry such as ``{"base": "best", "occlusion": {"use_mixture": False}}`` describes.
 
     For each stage an entry has a choice, ``"visibility"``, or a choice and what to override,
-    ``{"choice": "visibility", "alpha_threshold": 0}``. With ``base`` it starts from another variant: stages that it
+    ``{"choice": "visibility", "use_mixture": False}``. With ``base`` it starts from another variant: stages that it
     leaves out are that variant's, and overrides without a choice are made on top of that variant's.
 
     Parameters
@@ -276,17 +276,17 @@ VARIANT_ENTRIES: dict[str, dict[str, Any]] = {
     # colours alone must tell surfaces apart: their scale is narrower than beside the detail
     "best_no_detail": {
         "base": "best",
-        "initial": {"detail_share": 0},
-        "occlusion": {"detail_share": 0, "colour_scale": 0.0164},
-        "optimize": {"detail_share": 0, "colour_scale": 0.0164},
+        "initial": {"use_detail": False},
+        "occlusion": {"use_detail": False, "colour_scale": 0.0164},
+        "optimize": {"use_detail": False, "colour_scale": 0.0164},
     },
     "best_no_denoising": {
         "base": "best",
         **{stage: {"denoising": 0} for stage in ("initial", "occlusion", "textureless", "optimize")},
     },
     "best_half_sepi": {"base": "best", "occlusion": "half_sepi"},
-    "best_no_shares": {"base": "best", "occlusion": {"share_evidence": 1}},
-    "best_no_mixture": {"base": "best", "occlusion": {"alpha_threshold": 0}},
+    "best_no_shares": {"base": "best", "occlusion": {"use_shares": False}},
+    "best_no_mixture": {"base": "best", "occlusion": {"use_mixture": False}},
     "best_no_light": {"base": "best", "textureless": {"light": False}},
     "best_no_planes": {"base": "best", "textureless": "none"},
     "best_no_smoothing": {"base": "best", "optimize": {"refinements": 3, "solves": 0}},

@@ -240,7 +240,7 @@ WAITING = """
 import sys, time
 import numpy as np
 import sepi
-from sepi.matching.depth_step_kernels import rim_of
+from sepi.boundaries.rim_kernels import rim_of
 disparity = np.zeros((8, 8), np.float32)
 rim_of(disparity, 1, np.float32(0.1))
 begun = time.process_time()

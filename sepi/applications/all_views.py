@@ -5,7 +5,7 @@ it in each diagonal direction, which see round the surfaces that hide something 
 view as a surface (:mod:`sepi.applications.all_views_kernels`), and where they differ they vote: for a surface are the
 maps that show it, against it those that see through it to what is behind, as in the fusion of [1]_. What no map shows
 takes the disparity of the farther of the surfaces beside it. At last each view decides which side its pixels at depth
-steps belong to (:mod:`sepi.matching.surface_shares`), for a carried outline is only known to a pixel.
+steps belong to (:mod:`sepi.boundaries.decision`), for a carried outline is only known to a pixel.
 
 References
 ----------
@@ -315,14 +315,11 @@ def _with_own_edges(light_field: LightField, view: ViewMaps, edge_views: int) ->
     """A view's disparity, the pixels at its depth steps being given to the surface that fills most of them there."""
     if edge_views == 0:
         return view.disparity
-    from sepi.image.mixed_pixels import MixtureParameters, mixture_evidence
-    from sepi.image.noise import residual_variance
-    from sepi.matching.surface_shares import SurfaceShareParameters, reassign_at_steps
+    from sepi.boundaries.decision import assigned_to_surfaces
+    from sepi.boundaries.parameters import BoundaryParameters
 
-    own, parameters = light_field.seen_from(view.position), SurfaceShareParameters(share_views=edge_views)
-    colours = own.reference_view
-    mixture = mixture_evidence(view.disparity, colours, residual_variance(colours), MixtureParameters())
-    decided = reassign_at_steps(own, view.disparity, parameters, mixture)
+    own, parameters = light_field.seen_from(view.position), BoundaryParameters(share_views=edge_views)
+    decided = assigned_to_surfaces(own, view.disparity, parameters)
     # a slope is no step, however steep: a pixel there would leave its surface
     beside = np.ones((2 * parameters.share_radius + 1,) * 2, np.uint8)
     return np.where(cv2.dilate(torn_pixels(view.disparity).astype(np.uint8), beside) > 0, decided, view.disparity)

@@ -53,12 +53,19 @@ class BaseDetailParameters(DenoisingParameters):
         le=2,
         description="residual of the detail at which its cost is one half; RGB distance, colours in 0..1",
     )
-    detail_share: float = Field(0.6, ge=0, le=1, description="share of the detail in the cost; 0 uses colours alone")
+    use_detail: bool = Field(True, description="whether the detail is compared, or colours alone")
+    detail_share: float = Field(0.6, gt=0, le=1, description="share of the detail in the cost")
     base_radius: int = Field(4, ge=1, le=20, description="bilateral window of 2 r + 1 pixels that takes detail out")
     base_sigma_colour: float = Field(
         0.05, gt=0, le=2, description="sum of the RGB differences that counts as an edge of the base, colours in 0..1"
     )
     base_sigma_space: float = Field(4.0, gt=0, le=20, description="width of the base's window, in pixels")
+
+    @property
+    def shares(self) -> FloatMap:
+        """Shares of colours and detail in the cost; shape (2,), float32."""
+        share = self.detail_share if self.use_detail else 0.0
+        return np.array([1 - share, share], np.float32)
 
 
 class BaseDetail(NamedTuple):
@@ -194,7 +201,7 @@ def _detail_so_far(
 ) -> tuple[npt.NDArray[np.int16], BoolMap]:
     """Room for the detail of some rows, with what is made already, and the views of which it is yet to be made."""
     height, width = light_field.shape
-    with_detail = parameters.detail_share > 0
+    with_detail = parameters.use_detail
     # pages that nobody writes to take no memory
     shape = (*light_field.grid, rows.high - rows.low if with_detail else 0, width)
     kept = _kept.get()

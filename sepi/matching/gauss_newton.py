@@ -218,7 +218,7 @@ def spline_views(
         np.argwhere(others),
         light_field.baselines[others].astype(np.float32),
         np.array([views.squared_scale(scale) for scale in scales], np.float32),
-        np.array([1 - parameters.detail_share, parameters.detail_share], np.float32),
+        parameters.shares,
     )
 
 

@@ -236,9 +236,8 @@ def _add_costs(
 
     views = base_detail_decomposition(light_field, parameters, band.rows, present)
     visibility = _visibility(light_field, present, disparity, parameters, band)
-    share = parameters.detail_share
     scales2 = [views.squared_scale(s) for s in (parameters.colour_scale, parameters.detail_scale)]
-    robust = RobustCost(np.array(scales2, np.float32), np.array([1 - share, share], np.float32))
+    robust = RobustCost(np.array(scales2, np.float32), parameters.shares)
     for begin in range(band.begin, band.end, ROWS_PER_REPORT):
         end = min(band.end, begin + ROWS_PER_REPORT)
         sweep_visible_rows(views, visibility, robust, disparities, begin, end, cost)

@@ -95,7 +95,7 @@ def fill_uniform_regions(
     compared = spread_views(light_field, parameters.views)
     field = denoised(light_field, parameters.denoising)
     noisy = isinstance(field, DenoisedLightField)
-    colours = BaseDetailParameters(colour_scale=parameters.colour_scale, detail_share=0.0)
+    colours = BaseDetailParameters(colour_scale=parameters.colour_scale, use_detail=False)
     matching = GaussNewton(field, colours, parameters.occlusion_margin, compared)
     variance = _variance_of_views(light_field, field, compared)
     of_mean = variance * np.float32((LEFT_OF_SLOPES if noisy else 1) / compared.sum())

@@ -142,7 +142,7 @@ light_fields:
 external: {SPO: 'maps', OTHER: {path: 'maps/{scene}.pfm', scale: -1, offset: 0.5}}
 disparity_range: {builtin/dots: [-1.5, 1e-1]}
 report: {pixels: {builtin/dots: [[1, 2]]}, parts_of_best: true}
-variants: {mine: {base: best, occlusion: {choice: visibility, alpha_threshold: 0}}, other: {base: mine}}
+variants: {mine: {base: best, occlusion: {choice: visibility, use_mixture: false}}, other: {base: mine}}
 stages:
   shared: {}
   initial: {sepi: {num_disparities: 91}}

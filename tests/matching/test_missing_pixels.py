@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 
 import sepi
+from sepi.boundaries.decision import assigned_to_surfaces
+from sepi.boundaries.parameters import BoundaryParameters
 from sepi.cameras.resampling import completed
 from sepi.io.exported import write_exported
 from sepi.io.hdf5 import read_light_field, write_light_field
@@ -15,7 +17,6 @@ from sepi.lightfield import LightField, as_unit_float
 from sepi.matching.base_detail import BaseDetailParameters
 from sepi.matching.gauss_newton import GaussNewton
 from sepi.matching.plane_sweep import SweepParameters, sweep
-from sepi.matching.surface_shares import SurfaceShareParameters, reassign_at_steps
 from sepi.matching.unknown import unknown_pixels
 from sepi.matching.visibility_sweep import (
     FirstDepthParameters,
@@ -60,14 +61,14 @@ def _halves(light_field):
 
 
 def _first(light_field):
-    parameters = FirstDepthParameters(num_disparities=21, first_views=VIEWS**2, detail_share=0)
+    parameters = FirstDepthParameters(num_disparities=21, first_views=VIEWS**2, use_detail=False)
     result = first_depth(light_field, parameters, no_progress)
     return np.stack([result.disparity, result.confidence])
 
 
 def _seen(light_field):
     parameters = VisibleViewsParameters(
-        num_disparities=21, first_views=VIEWS**2, views=VIEWS**2, passes=2, detail_share=0
+        num_disparities=21, first_views=VIEWS**2, views=VIEWS**2, passes=2, use_detail=False
     )
     result = depth_from_visible_views(light_field, light_field.ground_truth, parameters, no_progress)
     return np.stack([result.disparity, result.confidence])
@@ -83,7 +84,7 @@ def _newton(light_field):
 def _shares(light_field):
     blurred = light_field.ground_truth.copy()
     blurred[1:] = np.maximum(blurred[1:], blurred[:-1])
-    return reassign_at_steps(light_field, blurred, SurfaceShareParameters(share_evidence=0.1))
+    return assigned_to_surfaces(light_field, blurred, BoundaryParameters(share_evidence=0.1, use_mixture=False))
 
 
 def _occluded(light_field):

@@ -44,7 +44,7 @@ def wall_of(plane: npt.NDArray[np.float64], noise: float = NOISE, brighter: floa
 
 def told_of(light_field: LightField, variance: float = NOISE**2) -> LitPlane | None:
     """What the whole picture tells, from the middle of the range."""
-    matching = GaussNewton(light_field, BaseDetailParameters(detail_share=0.0), 0.15)
+    matching = GaussNewton(light_field, BaseDetailParameters(use_detail=False), 0.15)
     region = Region(ALL, np.ones((SIZE, SIZE), bool))
     disparity = np.zeros((SIZE, SIZE), np.float32)
     known = np.full((SIZE, SIZE), variance / 255**2, np.float32)

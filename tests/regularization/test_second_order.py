@@ -51,12 +51,12 @@ def sums_twin(light_field, decomposed, parameters, disparity, margin):
     nearest = z_buffers(disparity, light_field.present, light_field.baselines, 0, H)
     means, gradient, curvature = [], np.zeros((H, W)), np.zeros((H, W))
     for values, unit, scale, share in (
-        (decomposed.colours, decomposed.colour_unit, parameters.colour_scale, 1 - parameters.detail_share),
+        (decomposed.colours, decomposed.colour_unit, parameters.colour_scale, parameters.shares[0]),
         (
             np.repeat(decomposed.detail[:, :, None], 3, axis=2),
             DETAIL_UNIT,
             parameters.detail_scale,
-            parameters.detail_share,
+            parameters.shares[1],
         ),
     ):
         planes = values * unit

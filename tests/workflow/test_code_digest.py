@@ -126,15 +126,20 @@ def test_a_module_that_does_not_exist_is_an_error(tree: Path) -> None:
 COVERED = {
     "initial": (
         {"matching.plane_sweep_kernels", "matching.visibility_kernels", "matching.structure_tensor", "image.noise"},
-        {"image.mixed_pixels", "image.edges", "regularization.planes", "matching.gauss_newton"},
+        {"boundaries.decision", "image.edges", "regularization.planes", "matching.gauss_newton"},
     ),
     "occlusion": (
-        {"matching.plane_sweep_kernels", "matching.visibility_sweep", "image.mixed_pixels_kernels", "image.edges"},
+        {
+            "matching.plane_sweep_kernels",
+            "matching.visibility_sweep",
+            "boundaries.colour_mixture_kernels",
+            "image.edges",
+        },
         {"matching.structure_tensor", "image.superpixels", "regularization.planes", "matching.gauss_newton"},
     ),
     "textureless": (
         {"image.superpixels", "regularization.planes", "regularization.uniform_regions", "matching.gauss_newton"},
-        {"matching.plane_sweep", "matching.plane_sweep_kernels", "matching.semi_global", "image.mixed_pixels"},
+        {"matching.plane_sweep", "matching.plane_sweep_kernels", "matching.semi_global", "boundaries.decision"},
     ),
     "optimize": (
         {"regularization.wls", "regularization.second_order", "matching.gauss_newton_kernels", "lightfield"},

@@ -200,11 +200,11 @@ def test_own_variants_come_beside_the_builtin_ones() -> None:
     assert settings.own_variants == ["mine", "other"]
     mine, paper, other = (settings.variants[name].labels for name in ("mine", "paper", "other"))
     assert key_of(mine, "textureless") == key_of(mine, "optimize") == key_of(paper, "textureless")
-    assert key_of(other, "optimize") == "semi_global/visibility+alpha_threshold=0+passes=2/uniform_planes/wls+alpha=0"
-    assert settings.parameters["occlusion"]["visibility+alpha_threshold=0+passes=2"].model_dump() == {
+    assert key_of(other, "optimize") == "semi_global/visibility+passes=2+use_mixture=False/uniform_planes/wls+alpha=0"
+    assert settings.parameters["occlusion"]["visibility+passes=2+use_mixture=False"].model_dump() == {
         **settings.parameters["occlusion"]["visibility"].model_dump(),
-        "alpha_threshold": 0,
         "passes": 2,
+        "use_mixture": False,
     }
 
 
@@ -216,7 +216,7 @@ class TestParameters:
         sweeps = [("initial", "sepi"), ("occlusion", "half_sepi"), ("occlusion", "wang")]
         assert [found[stage][word].num_disparities for stage, word in sweeps] == [21, 21, 31]
         # a choice with another default, and a variant that overrides it, keep their own
-        unlike = [("initial", "semi_global"), ("optimize", "second_order+colour_scale=0.0164+detail_share=0")]
+        unlike = [("initial", "semi_global"), ("optimize", "second_order+colour_scale=0.0164+use_detail=False")]
         alike = [("occlusion", "visibility"), ("optimize", "second_order")]
         assert [found[stage][word].colour_scale for stage, word in unlike + alike] == [0.0077, 0.0164, 0.1, 0.1]
         assert {found[stage][word].detail_scale for stage, word in unlike + alike} == {0.2}
@@ -245,7 +245,7 @@ class TestParameters:
         ),
         (
             {"stages": {"occlusion": {"visibility_unmixed": {}}}},
-            "config.stages.occlusion: unknown 'visibility_unmixed'; it is now visibility with alpha_threshold: 0",
+            "config.stages.occlusion: unknown 'visibility_unmixed'; it is now visibility with use_mixture: false",
         ),
         (
             {"variants": {"mine": {"base": "best", "optimize": "gauss_newton"}}},

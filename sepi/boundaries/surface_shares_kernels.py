@@ -1,4 +1,4 @@
-"""Compiled loops of the decision by shares of the views (:mod:`sepi.matching.surface_shares`)."""
+"""Compiled loops of the decision by shares of the views (:mod:`sepi.boundaries.surface_shares`)."""
 
 from __future__ import annotations
 
@@ -8,8 +8,9 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit, prange
 
+from sepi.boundaries.arrays import RimViews, Sides
+from sepi.boundaries.rim_kernels import Rim
 from sepi.lightfield import FloatMap
-from sepi.matching.depth_step_kernels import Rim
 
 FEWEST_VIEWS = 3
 """That see a piece of background, before its colour counts."""
@@ -20,7 +21,6 @@ FEWEST_SAMPLES = 8
 SHARES = 12
 """That are tried, from 0 to 1; none is one half."""
 
-_CLEAN_RADIUS = 4  # how far away clean colours of the nearer surface are looked for, pixels
 _SAME_SURFACE = 0.25  # difference of disparity, pixels per view step
 # standard deviation of a surface's colour from its clean neighbours', beyond theirs; by what its square is divided, as
 # errors of views go together; the same where the colour is free, and where no clean one is known; colours in 0..1
@@ -33,31 +33,10 @@ _STRIDE = 4  # pixels from one to the next that tell the brightness of a view
 _MOST_DIFFERENCE = 0.1  # of one channel, that counts in a view's residual
 _UNKNOWN = 1e3  # cost where nothing tells
 
-
-class RimViews(NamedTuple):
-    """The views that are compared, and what hides what in them.
-
-    Attributes
-    ----------
-    pixels : ndarray, shape (T, S, H, W, C), uint8, uint16 or float32
-    units : ndarray, shape (N,), float32
-        What the pixels of each view that is compared are multiplied with to be 0..1, and as bright as the reference.
-    places : ndarray, shape (N, 2), int64
-        Row and column in the grid of each view that is compared.
-    baselines : ndarray, shape (N, 2), float64
-        Theirs, down and across, in view steps.
-    nearest : ndarray, shape (T, S, n, W), float32
-        z-buffers of the map, its nearer surfaces widened by a pixel, so that no mixed pixel counts as background.
-    low : int
-        First row of ``nearest``.
-    """
-
-    pixels: npt.NDArray[Any]
-    units: FloatMap
-    places: npt.NDArray[np.int64]
-    baselines: npt.NDArray[np.float64]
-    nearest: FloatMap
-    low: int
+# columns of what the views show of a pixel (N, 7): its colours, those behind it, and the variance of the latter
+_BEHIND, _NOISE = 3, 6
+# rows of the nearer surface beside a pixel (3, 3): its colour, and the least and the most that it shows
+_OWN, _LEAST, _MOST = 0, 1, 2
 
 
 class Background(NamedTuple):
@@ -78,7 +57,7 @@ class Background(NamedTuple):
 
 
 @njit(inline="always")
-def _sees(views: RimViews, view: int, d: Any, y: int, x: int, margin: Any) -> Any:
+def _sees(views: RimViews, view: int, d: Any, y: int, x: int) -> Any:
     """Whether a view shows a pixel of disparity ``d``, and where: row and column of the sample, and its fractions."""
     H, W = views.pixels.shape[2], views.pixels.shape[3]
     down, across = y - d * views.baselines[view, 0], x - d * views.baselines[view, 1]
@@ -88,7 +67,7 @@ def _sees(views: RimViews, view: int, d: Any, y: int, x: int, margin: Any) -> An
     nearest = views.nearest[
         views.places[view, 0], views.places[view, 1], int(down + 0.5) - views.low, int(across + 0.5)
     ]
-    return nearest <= d + margin, row, column, down - row, across - column
+    return nearest <= d + views.margin, row, column, down - row, across - column
 
 
 @njit(inline="always")
@@ -125,18 +104,15 @@ def _sample(views: RimViews, view: int, row: int, column: int, fy: Any, fx: Any,
 
 
 @njit(parallel=True, cache=True)
-def brightness_of_views(views: RimViews, disparity: Any, guide: Any, clean: Any, missing: Any) -> Any:
+def brightness_of_views(views: RimViews, sides: Sides, missing: Any) -> Any:
     """How bright each view is beside the reference, and how badly it shows the same.
 
     Parameters
     ----------
     views : RimViews
         Its z-buffers are not looked at.
-    disparity : ndarray, shape (H, W), float32
-    guide : ndarray, shape (H, W, 3), float32
-        Reference view, 0..1.
-    clean : ndarray, shape (H, W), bool
-        Pixels that are looked at, some of them.
+    sides : Sides
+        Some of its clean pixels are looked at.
     missing : ndarray, shape (T, S, H, W) or (T, S, 0, 0), bool
         Pixels that a view does not show; empty: none.
 
@@ -146,6 +122,7 @@ def brightness_of_views(views: RimViews, disparity: Any, guide: Any, clean: Any,
         Ratio of the sums of the colours; mean absolute difference of one channel, 0..1, that is left, NaN of views that
         show none of the pixels.
     """
+    disparity, guide, clean = sides.disparity, sides.guide, sides.clean
     H, W = disparity.shape
     N = len(views.places)
     brightness, residual = np.ones(N), np.zeros(N)
@@ -177,7 +154,7 @@ def brightness_of_views(views: RimViews, disparity: Any, guide: Any, clean: Any,
 
 
 @njit(parallel=True, cache=True)
-def background_of(views: RimViews, layer: Any, wanted: Any, margin: Any, begin: int, end: int) -> Any:
+def background_of(views: RimViews, layer: Any, wanted: Any, begin: int, end: int) -> Any:
     """Colours of the more distant surfaces, medians over the views that see them.
 
     Parameters
@@ -186,8 +163,6 @@ def background_of(views: RimViews, layer: Any, wanted: Any, margin: Any, begin: 
     layer : ndarray, shape (H, W), float32
         Disparity of the more distant surface, also where a nearer one hides it.
     wanted : ndarray, shape (H, W), bool
-    margin : float32
-        By how much an occluder must be nearer, pixels per view step.
     begin, end : int
         Rows that are made; others are left undefined.
 
@@ -206,7 +181,7 @@ def background_of(views: RimViews, layer: Any, wanted: Any, margin: Any, begin: 
                 continue
             n = 0
             for view in range(N):
-                seen, row, column, fy, fx = _sees(views, view, layer[y, x], y, x, margin)
+                seen, row, column, fy, fx = _sees(views, view, layer[y, x], y, x)
                 if seen:
                     _sample(views, view, row, column, fy, fx, colour_there)
                     samples[:, n] = colour_there
@@ -240,31 +215,27 @@ def _behind(background: Background, row: int, column: int, fy: Any, fx: Any, out
 
 
 @njit(inline="always")
-def _nearer_colour(
-    guide: Any, clean: Any, disparity: Any, near: Any, middle: Any, y: int, x: int, out: Any, limits: Any
-) -> Any:
-    """Colour of the nearer surface beside a pixel into ``out (3,)``, and its variance.
-
-    That of clean pixels, or else the pixel's own. ``limits (2, 3)`` are the least and most that the surface shows.
-    """
-    H, W = disparity.shape
+def _nearer_colour(sides: Sides, near: Any, middle: Any, y: int, x: int, surface: Any) -> Any:
+    """Fill in the nearer surface beside a pixel: clean pixels' colour, or else the pixel's own; its variance."""
+    H, W = sides.disparity.shape
+    radius, out = sides.clean_radius, surface[_OWN]
     weights, squares = 0.0, 0.0
     out[:] = 0
-    limits[0], limits[1] = 1.0, 0.0
-    for i in range(max(0, y - _CLEAN_RADIUS), min(H, y + _CLEAN_RADIUS + 1)):
-        for j in range(max(0, x - _CLEAN_RADIUS), min(W, x + _CLEAN_RADIUS + 1)):
-            if disparity[i, j] > middle:
+    surface[_LEAST], surface[_MOST] = 1.0, 0.0
+    for i in range(max(0, y - radius), min(H, y + radius + 1)):
+        for j in range(max(0, x - radius), min(W, x + radius + 1)):
+            if sides.disparity[i, j] > middle:
                 for c in range(3):
-                    limits[0, c] = min(limits[0, c], guide[i, j, c])
-                    limits[1, c] = max(limits[1, c], guide[i, j, c])
-            if clean[i, j] and abs(disparity[i, j] - near) < _SAME_SURFACE:
+                    surface[_LEAST, c] = min(surface[_LEAST, c], sides.guide[i, j, c])
+                    surface[_MOST, c] = max(surface[_MOST, c], sides.guide[i, j, c])
+            if sides.clean[i, j] and abs(sides.disparity[i, j] - near) < _SAME_SURFACE:
                 weight = 1 / (1 + (i - y) ** 2 + (j - x) ** 2) ** 2
                 weights += weight
                 for c in range(3):
-                    out[c] += weight * guide[i, j, c]
-                    squares += weight * guide[i, j, c] ** 2
+                    out[c] += weight * sides.guide[i, j, c]
+                    squares += weight * sides.guide[i, j, c] ** 2
     if weights == 0:
-        out[:] = guide[y, x]
+        out[:] = sides.guide[y, x]
         return _UNKNOWN_DEVIATION**2
     variance = squares / weights
     for c in range(3):
@@ -274,72 +245,63 @@ def _nearer_colour(
 
 
 @njit(inline="always")
-def _along_near(
-    views: RimViews, background: Background, near: Any, far: Any, y: int, x: int, margin: Any, out: Any, behind: Any,
-    noise: Any,
-) -> int:  # fmt: skip
-    """What the views show of a pixel that moves with ``near``, and what is behind it there; how many tell both.
-
-    Into ``out`` and ``behind (N, 3)``, and the variance of the latter into ``noise (N,)``.
-    """
+def _along_near(views: RimViews, background: Background, near: Any, far: Any, y: int, x: int, samples: Any) -> int:
+    """What the views show of a pixel that moves with ``near``, and what is behind it there; how many tell both."""
     H, W = background.views.shape
     n = 0
     for view in range(len(views.places)):
-        seen, row, column, fy, fx = _sees(views, view, near, y, x, margin)
+        seen, row, column, fy, fx = _sees(views, view, near, y, x)
         # where the background that is there in the view is in the reference view
         down = y - (near - far) * views.baselines[view, 0]
         across = x - (near - far) * views.baselines[view, 1]
         if not seen or down < 0 or across < 0 or down >= H - 1 or across >= W - 1:
             continue
         i, j = int(down), int(across)
-        noise[n] = _behind(background, i, j, down - i, across - j, behind[n])
-        if noise[n] >= 0:
-            _sample(views, view, row, column, fy, fx, out[n])
+        samples[n, _NOISE] = _behind(background, i, j, down - i, across - j, samples[n, _BEHIND:_NOISE])
+        if samples[n, _NOISE] >= 0:
+            _sample(views, view, row, column, fy, fx, samples[n])
             n += 1
     return n
 
 
 @njit(inline="always")
-def _cost_of_share(
-    share: Any, colours: Any, behind: Any, noise: Any, own: Any, held: Any, limits: Any, scale2: Any
-) -> Any:
-    """Mean robust residual of views that show a share of one colour before the background, 0..1.
+def _cost_of_share(share: Any, samples: Any, n: int, surface: Any, held: Any, scale2: Any) -> Any:
+    """Mean robust residual of ``n`` views that show a share of one colour before the background, 0..1.
 
-    The colour is that which fits best within ``limits (2, 3)``, and is held near ``own (3,)`` with the weight of
-    ``held`` views. ``colours`` and ``behind (N, 3)`` and the variance ``noise (N,)`` of the latter are the samples.
+    The colour is that which fits best within the surface's limits, and is held near its own with the weight of
+    ``held`` views.
     """
-    n = len(noise)
     rest = 1 - share
     fit = np.empty(3)
     total = 0.0
     for c in range(3):
         along = 0.0
         for v in range(n):
-            along += colours[v, c] - rest * behind[v, c]
-        best = (share * along + held * own[c]) / (share * share * n + held)
-        fit[c] = min(max(best, limits[0, c]), limits[1, c])
-        total += held * (fit[c] - own[c]) ** 2 / scale2
+            along += samples[v, c] - rest * samples[v, _BEHIND + c]
+        best = (share * along + held * surface[_OWN, c]) / (share * share * n + held)
+        fit[c] = min(max(best, surface[_LEAST, c]), surface[_MOST, c])
+        total += held * (fit[c] - surface[_OWN, c]) ** 2 / scale2
     for v in range(n):
-        half = scale2 + rest * rest * noise[v]
+        half = scale2 + rest * rest * samples[v, _NOISE]
         for c in range(3):
-            residual = (colours[v, c] - share * fit[c] - rest * behind[v, c]) ** 2
+            residual = (samples[v, c] - share * fit[c] - rest * samples[v, _BEHIND + c]) ** 2
             total += residual / (residual + half)
     return total / (3 * n)
 
 
 @njit(inline="always")
-def _cost_alone(views: RimViews, guide: Any, d: Any, y: int, x: int, margin: Any, scale2: Any, colour: Any) -> Any:
-    """Mean robust residual of a pixel that moves with ``d``, over views that see it; ``colour`` is scratch."""
+def _cost_alone(views: RimViews, own: Any, d: Any, y: int, x: int, scale2: Any, scratch: Any) -> Any:
+    """Mean robust residual of a pixel of colour ``own (3,)`` that moves with ``d``, over views that see it."""
     total, n = 0.0, 0
     for view in range(len(views.places)):
         if views.baselines[view, 0] == 0 and views.baselines[view, 1] == 0:
             # the reference view itself always fits
             continue
-        seen, row, column, fy, fx = _sees(views, view, d, y, x, margin)
+        seen, row, column, fy, fx = _sees(views, view, d, y, x)
         if seen:
-            _sample(views, view, row, column, fy, fx, colour)
+            _sample(views, view, row, column, fy, fx, scratch)
             for c in range(3):
-                residual = (colour[c] - guide[y, x, c]) ** 2
+                residual = (scratch[c] - own[c]) ** 2
                 total += residual / (residual + scale2)
             n += 1
     return total / (3 * n) if n >= FEWEST_VIEWS else _UNKNOWN
@@ -347,9 +309,8 @@ def _cost_alone(views: RimViews, guide: Any, d: Any, y: int, x: int, margin: Any
 
 @njit(parallel=True, cache=True)
 def evidence_of_shares(
-    views: RimViews, rim: Rim, background: Background, disparity: Any, guide: Any, clean: Any, margin: Any,
-    scales2: Any, begin: int, end: int, evidence: Any,
-) -> None:  # fmt: skip
+    views: RimViews, rim: Rim, background: Background, sides: Sides, scales2: Any, begin: int, end: int, evidence: Any
+) -> None:
     """By how much the other surface explains the views better than the one that a pixel has.
 
     Along the nearer surface's disparity each view shows the same share of that surface before another piece of
@@ -360,13 +321,7 @@ def evidence_of_shares(
     views : RimViews
     rim : Rim
     background : Background
-    disparity : ndarray, shape (H, W), float32
-    guide : ndarray, shape (H, W, 3), float32
-        Reference view, 0..1.
-    clean : ndarray, shape (H, W), bool
-        Pixels of one surface alone.
-    margin : float32
-        By how much an occluder must be nearer, pixels per view step.
+    sides : Sides
     scales2 : tuple of float
         Square of the residual at which a view counts half: the least, and what the squared difference of both surfaces'
         colours adds to it, times this; errors of samples grow with it.
@@ -375,19 +330,18 @@ def evidence_of_shares(
     evidence : ndarray, shape (H, W), float32
         Filled with differences of mean costs, -1..1; left alone where the views do not tell.
     """
-    W = disparity.shape[1]
+    W = sides.disparity.shape[1]
     N = len(views.places)
     for y in prange(begin, end):
-        colours, behind, noise = np.empty((N, 3)), np.empty((N, 3)), np.empty(N)
-        own, limits, scratch = np.empty(3), np.empty((2, 3)), np.empty(3)
+        samples, surface, scratch = np.empty((N, 7)), np.empty((3, 3)), np.empty(3)
         for x in range(W):
             if not rim.inside[y, x]:
                 continue
             near, far = rim.near[y, x], rim.far[y, x]
-            n = _along_near(views, background, near, far, y, x, margin, colours, behind, noise)
+            n = _along_near(views, background, near, far, y, x, samples)
             if n < FEWEST_SAMPLES:
                 continue
-            variance = _nearer_colour(guide, clean, disparity, near, (near + far) / 2, y, x, own, limits)
+            variance = _nearer_colour(sides, near, (near + far) / 2, y, x, surface)
             if rim.is_near[y, x]:
                 # surfaces get darker or brighter towards their edge: to be far, a pixel must be so whatever its colour.
                 # To be near it must have the surface's colour: before a bare background, any is a share of another
@@ -395,12 +349,12 @@ def evidence_of_shares(
             apart2 = 0.0
             for v in range(n):
                 for c in range(3):
-                    apart2 += (own[c] - behind[v, c]) ** 2
+                    apart2 += (surface[_OWN, c] - samples[v, _BEHIND + c]) ** 2
             scale2 = scales2[0] + scales2[1] * apart2 / (3 * n)
             low = high = _UNKNOWN
             for k in range(SHARES):
                 share = k / (SHARES - 1)
-                cost = _cost_of_share(share, colours[:n], behind[:n], noise[:n], own, scale2 / variance, limits, scale2)
+                cost = _cost_of_share(share, samples, n, surface, scale2 / variance, scale2)
                 if 2 * k < SHARES - 1:
                     low = min(low, cost)
                 else:
@@ -408,4 +362,5 @@ def evidence_of_shares(
             if rim.is_near[y, x]:
                 evidence[y, x] = high - low
             else:
-                evidence[y, x] = min(low, _cost_alone(views, guide, far, y, x, margin, scale2, scratch)) - high
+                alone = _cost_alone(views, sides.guide[y, x], far, y, x, scale2, scratch)
+                evidence[y, x] = min(low, alone) - high

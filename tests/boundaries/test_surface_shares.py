@@ -10,15 +10,19 @@ import pytest
 from geometries import GEOMETRIES, standing
 from several_threads import several_threads
 
+from sepi.boundaries import decision
+from sepi.boundaries import surface_shares_kernels as kernels
+from sepi.boundaries.arrays import RimViews, Sides
+from sepi.boundaries.decision import assigned_to_surfaces
+from sepi.boundaries.parameters import BoundaryParameters
+from sepi.boundaries.rim_kernels import Rim, rim_of
+from sepi.boundaries.surroundings import surroundings
 from sepi.lightfield import LightField
-from sepi.matching import surface_shares_kernels as kernels
-from sepi.matching.depth_step_kernels import Rim, rim_of
 from sepi.matching.row_bands import band_memory
-from sepi.matching.surface_shares import SurfaceShareParameters, reassign_at_steps
 from sepi.matching.visibility_kernels import z_buffers
 from sepi.scenes import render
 
-USUAL = SurfaceShareParameters()
+USUAL = BoundaryParameters(use_mixture=False)
 AROUND = np.ones((3, 3), np.uint8)
 
 
@@ -37,37 +41,36 @@ def test_edges_are_found_again(name: str, change: str) -> None:
     changed = (cv2.dilate if change == "too wide" else cv2.erode)(truth, AROUND)
     before = wrong(changed, truth)
     assert before > 500
-    assert wrong(reassign_at_steps(scene, changed, USUAL), truth) < 0.35 * before
+    assert wrong(assigned_to_surfaces(scene, changed, USUAL), truth) < 0.35 * before
 
 
 @pytest.mark.parametrize("name", ["stripes", "curved_occluders", "dots", "slanted_plane", "pyramids"])
 def test_what_is_right_stays(name: str) -> None:
     scene = render(name, size=96)
     assert scene.ground_truth is not None
-    assert wrong(reassign_at_steps(scene, scene.ground_truth, USUAL), scene.ground_truth) < 0.01 * 96**2
+    assert wrong(assigned_to_surfaces(scene, scene.ground_truth, USUAL), scene.ground_truth) < 0.01 * 96**2
 
 
-def test_one_asks_for_more_than_there_can_be() -> None:
-    """The ablation without shares."""
-    scene = render("stripes", size=64)
-    assert scene.ground_truth is not None
-    wide = cv2.dilate(scene.ground_truth, AROUND)
-    assert reassign_at_steps(scene, wide, SurfaceShareParameters(share_evidence=1)) is wide
-
-
-def test_colours_have_a_vote() -> None:
-    """Where views tell nothing, colours decide; without doubt, the views decide."""
+def test_colours_have_a_vote(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where views tell nothing, colours decide; without doubt, the views decide; where neither is asked, nothing is."""
     scene = render("stripes", size=64)
     truth = scene.ground_truth
     assert truth is not None
     wide = cv2.dilate(truth, AROUND)
-    added = ((wide - truth) > 0.3).astype(np.float32)
-    alone = SurfaceShareParameters(share_evidence=1)
-    assert wrong(reassign_at_steps(scene, wide, alone, added), truth) < 0.1 * wrong(wide, truth)
-    np.testing.assert_array_equal(reassign_at_steps(scene, wide, alone, np.zeros_like(wide)), wide)
+    none, alone = (BoundaryParameters(use_shares=False, use_mixture=mixture) for mixture in (False, True))
+    assert assigned_to_surfaces(scene, wide, none) is wide
+
+    def colours_say(evidence: npt.NDArray[np.float32]) -> None:
+        monkeypatch.setattr(decision, "mixture_evidence", lambda *_: evidence)
+
+    colours_say(((wide - truth) > 0.3).astype(np.float32))
+    assert wrong(assigned_to_surfaces(scene, wide, alone), truth) < 0.1 * wrong(wide, truth)
+    colours_say(np.zeros_like(wide))
+    np.testing.assert_array_equal(assigned_to_surfaces(scene, wide, alone), wide)
     # colours that hint at half of it do not move what views say
-    by_views = reassign_at_steps(scene, wide, USUAL)
-    hinted = reassign_at_steps(scene, wide, USUAL, np.full_like(wide, 0.05))
+    by_views = assigned_to_surfaces(scene, wide, USUAL)
+    colours_say(np.full_like(wide, 0.05))
+    hinted = assigned_to_surfaces(scene, wide, BoundaryParameters())
     assert wrong(hinted, by_views) < 0.1 * wrong(wide, by_views)
 
 
@@ -101,7 +104,7 @@ def test_a_surface_darker_towards_its_edge_keeps_it(background: float) -> None:
     """Silhouettes of round things are darker: as shares of the bright surface they would be lost."""
     field, truth = edge(rim=0.55, background=background)
     inner = np.s_[4:-4]
-    assert wrong(reassign_at_steps(field, truth, USUAL)[inner], truth[inner]) == 0
+    assert wrong(assigned_to_surfaces(field, truth, USUAL)[inner], truth[inner]) == 0
 
 
 @pytest.mark.parametrize("background", [0.0, 0.1, 0.3])
@@ -111,7 +114,7 @@ def test_a_surface_one_pixel_too_wide_gets_its_edge_back(background: float) -> N
     wide = cv2.dilate(truth, AROUND)
     inner = np.s_[6:-6]
     assert wrong(wide[inner], truth[inner]) == 28
-    assert wrong(reassign_at_steps(field, wide, USUAL)[inner], truth[inner]) == 0
+    assert wrong(assigned_to_surfaces(field, wide, USUAL)[inner], truth[inner]) == 0
 
 
 @pytest.mark.parametrize("factor", [0.15, 1.15])
@@ -127,7 +130,7 @@ def test_dark_views_and_other_exposures_do_no_harm(factor: float) -> None:
         views = np.rint(views).astype(scene.views.dtype)
     changed = LightField(views, "changed")
     before = wrong(wide, scene.ground_truth)
-    assert wrong(reassign_at_steps(changed, wide, USUAL), scene.ground_truth) < 0.4 * before
+    assert wrong(assigned_to_surfaces(changed, wide, USUAL), scene.ground_truth) < 0.4 * before
 
 
 @pytest.mark.parametrize("geometry", GEOMETRIES)
@@ -139,15 +142,15 @@ def test_grey_bands_and_threads_change_nothing(geometry: str) -> None:
     grey = np.rint(scene.views[2:7, 2:7].mean(axis=4, keepdims=True)).astype(np.uint8)
     field = LightField(grey, "grey", **standing(geometry, (5, 5)))
     threefold = LightField(np.repeat(grey, 3, axis=4), "grey", **standing(geometry, (5, 5)))
-    expected = reassign_at_steps(field, wide, USUAL)
+    expected = assigned_to_surfaces(field, wide, USUAL)
     assert (expected != wide).any()
-    np.testing.assert_array_equal(reassign_at_steps(threefold, wide, USUAL), expected)
+    np.testing.assert_array_equal(assigned_to_surfaces(threefold, wide, USUAL), expected)
     with band_memory(1):
-        np.testing.assert_array_equal(reassign_at_steps(field, wide, USUAL), expected)
+        np.testing.assert_array_equal(assigned_to_surfaces(field, wide, USUAL), expected)
     threads = several_threads()
     numba.set_num_threads(1)
     try:
-        np.testing.assert_array_equal(reassign_at_steps(field, wide, USUAL), expected)
+        np.testing.assert_array_equal(assigned_to_surfaces(field, wide, USUAL), expected)
     finally:
         numba.set_num_threads(threads)
 
@@ -169,8 +172,8 @@ def cubic(picture: npt.NDArray[Any], y: float, x: float) -> npt.NDArray[np.float
 class Twin:
     """The kernels, pixel by pixel and with whole arrays of views."""
 
-    def __init__(self, views: kernels.RimViews, margin: float) -> None:
-        self.views, self.margin = views, margin
+    def __init__(self, views: RimViews, rim: Rim, sides: Sides) -> None:
+        self.views, self.rim, self.sides = views, rim, sides
         self.H, self.W = views.pixels.shape[2:4]
         # pixels that fit best as a whole pixel of the far surface
         self.decided_alone = 0
@@ -182,7 +185,7 @@ class Twin:
             down, across = y - d * v, x - d * u
             if min(down, across) < 0 or down >= self.H - 1 or across >= self.W - 1:
                 continue
-            if self.views.nearest[t, s, int(down + 0.5), int(across + 0.5)] <= d + self.margin:
+            if self.views.nearest[t, s, int(down + 0.5), int(across + 0.5)] <= d + self.views.margin:
                 found.append((n, cubic(self.views.pixels[t, s], down, across) * self.views.units[n]))
         return found
 
@@ -193,10 +196,8 @@ class Twin:
         middle = np.median(colours, axis=0)
         return middle, float(np.minimum((colours - middle) ** 2, 0.01).mean()), len(colours)
 
-    def evidence(
-        self, rim: Rim, background: kernels.Background, disparity: npt.NDArray[np.float32],
-        guide: npt.NDArray[np.float32], clean: npt.NDArray[np.bool_], scales2: tuple[float, float], y: int, x: int,
-    ) -> float:  # fmt: skip
+    def evidence(self, background: kernels.Background, scales2: tuple[float, float], y: int, x: int) -> float:
+        rim, (disparity, guide, clean, _) = self.rim, self.sides
         near, far = float(rim.near[y, x]), float(rim.far[y, x])
         colours, behind, noise = [], [], []
         for n, colour in self.seen(near, y, x):
@@ -286,7 +287,6 @@ def test_kernels_equal_a_plain_twin(geometry: str, dtype: Any) -> None:
     disparity = np.full((12, 14), -0.4, np.float32)
     disparity[3:9, 4:9] = 0.6
     disparity += random.uniform(-0.05, 0.05, disparity.shape).astype(np.float32)
-    margin = np.float32(0.15)
     rim = rim_of(disparity, 2, 0.3)
     for y, x in np.ndindex(disparity.shape):
         step, near, far = twin_rim(disparity, y, x, 2)
@@ -299,25 +299,22 @@ def test_kernels_equal_a_plain_twin(geometry: str, dtype: Any) -> None:
     units = random.uniform(0.9, 1.1, present.sum()).astype(np.float32) * unit
     # in the order in memory that they have for maps: no other kernels are compiled
     places = np.ascontiguousarray(np.argwhere(present))
-    rim_views = kernels.RimViews(views, units, places, field.baselines[present], nearest, 0)
-    twin = Twin(rim_views, float(margin))
+    rim_views = RimViews(views, units, places, field.baselines[present], nearest, 0, np.float32(0.15))
+    clean = disparity - surroundings(disparity).farthest < 0.3
+    sides = Sides(disparity, field.reference_view, clean, 4)
+    twin = Twin(rim_views, rim, sides)
     layer = np.where(rim.is_near, rim.far, disparity)
-    background = kernels.background_of(rim_views, layer, np.ones_like(present, shape=layer.shape), margin, 0, 12)
+    background = kernels.background_of(rim_views, layer, np.ones_like(present, shape=layer.shape), 0, 12)
     for y, x in np.ndindex(disparity.shape):
         colour, variance, count = twin.background(float(layer[y, x]), y, x)
         assert background.views[y, x] == count
         if count >= kernels.FEWEST_VIEWS:
             np.testing.assert_allclose(background.colour[y, x], colour, atol=1e-6)
             np.testing.assert_allclose(background.variance[y, x], variance, atol=1e-7)
-    clean = disparity - cv2.erode(disparity, AROUND) < 0.3
-    guide = field.reference_view
     evidence = np.zeros_like(disparity)
     scales2 = (0.02**2, 0.3**2)
-    kernels.evidence_of_shares(rim_views, rim, background, disparity, guide, clean, margin, scales2, 0, 12, evidence)
-    told = [
-        (evidence[y, x], twin.evidence(rim, background, disparity, guide, clean, scales2, y, x))
-        for y, x in np.argwhere(rim.inside)
-    ]
+    kernels.evidence_of_shares(rim_views, rim, background, sides, scales2, 0, 12, evidence)
+    told = [(evidence[y, x], twin.evidence(background, scales2, y, x)) for y, x in np.argwhere(rim.inside)]
     assert sum(value != 0 for value, _ in told) > 30
     assert twin.decided_alone > 10
     np.testing.assert_allclose(*np.array(told).T, atol=2e-5)
@@ -331,13 +328,12 @@ def test_brightness_is_told_view_by_view() -> None:
     views = np.clip(picture * factors[..., None, None, None], 0, 1)
     field = LightField(views, "bright")
     still = np.zeros((40, 48), np.float32)
-    rim_views = kernels.RimViews(
+    rim_views = RimViews(
         views, np.ones(3, np.float32), np.argwhere(field.present), field.baselines[field.present],
-        np.empty((0, 0, 0, 0), np.float32), 0,
+        np.empty((0, 0, 0, 0), np.float32), 0, np.float32(0),
     )  # fmt: skip
-    brightness, residual = kernels.brightness_of_views(
-        rim_views, still, field.reference_view, still == 0, np.zeros((*field.grid, 0, 0), bool)
-    )
+    sides = Sides(still, field.reference_view, still == 0, 4)
+    brightness, residual = kernels.brightness_of_views(rim_views, sides, np.zeros((*field.grid, 0, 0), bool))
     np.testing.assert_allclose(brightness, factors[0], rtol=0.02)
     assert (residual < 0.01).all()
 
@@ -350,7 +346,7 @@ def test_bands_hold_every_row_that_is_looked_at(grid: tuple[int, int], monkeypat
     light_field = LightField(whole.views[rows], "rows", disparity_range=whole.disparity_range)
     background_of, asked = kernels.background_of, []
 
-    def checked(views, layer, wanted, margin, begin, end):
+    def checked(views, layer, wanted, begin, end):
         y, x = np.nonzero(wanted[begin:end])
         d = layer[begin:end][y, x]
         for down, across in views.baselines:
@@ -358,10 +354,10 @@ def test_bands_hold_every_row_that_is_looked_at(grid: tuple[int, int], monkeypat
             inside = (row >= 0) & (row < 95) & (column >= 0) & (column < 95)
             number = (row[inside] + 0.5).astype(int) - views.low
             asked.append(bool((number >= 0).all() and (number < views.nearest.shape[2]).all()))
-        return background_of(views, layer, wanted, margin, begin, end)
+        return background_of(views, layer, wanted, begin, end)
 
     monkeypatch.setattr(kernels, "background_of", checked)
     with band_memory(1):
-        reassign_at_steps(light_field, whole.ground_truth, SurfaceShareParameters())
+        assigned_to_surfaces(light_field, whole.ground_truth, USUAL)
     assert asked
     assert all(asked)

@@ -11,10 +11,10 @@ does, and all count for less.
 from __future__ import annotations
 
 import numpy as np
-from pydantic import Field
 
+from sepi.boundaries.parameters import BoundaryParameters
+from sepi.boundaries.surroundings import Surroundings
 from sepi.lightfield import FloatMap
-from sepi.stage import Parameters
 
 _GREY_TRUST = 0.26
 """Of colours in a grey picture."""
@@ -23,54 +23,36 @@ _COLOURED = 0.02
 """Part of the colours' variance that is beside grey, from which on a picture is coloured."""
 
 
-class MixtureParameters(Parameters):
-    """Parameters of the evidence by colour mixture."""
-
-    alpha_threshold: float = Field(
-        0.39,
-        ge=0,
-        le=1,
-        description="share of the nearer surface below which colours speak for the more distant one; 0: they never do",
-    )
-    alpha_discontinuity: float = Field(
-        0.3, gt=0, description="depth discontinuity beside which pixels mix, pixels per view step"
-    )
-    alpha_radius: int = Field(4, ge=1, le=20, description="how far away clean colours are looked for, in pixels")
-    alpha_contrast: float = Field(
-        9.0,
-        ge=0,
-        description="squared colour difference of the two sides at which they speak half as loud, in units of their "
-        "variance",
-    )
-
-
-def mixture_evidence(disparity: FloatMap, guide: FloatMap, noise: float, parameters: MixtureParameters) -> FloatMap:
+def mixture_evidence(
+    disparity: FloatMap, around: Surroundings, guide: FloatMap, noise: float, parameters: BoundaryParameters
+) -> FloatMap:
     """How surely the colours say that a pixel of the nearer surface is background for the most part.
 
     Parameters
     ----------
     disparity : ndarray, shape (H, W), float32
         Pixels per view step.
+    around : Surroundings
+        Of the disparity.
     guide : ndarray, shape (H, W, 3), float32
         Reference view, 0..1.
     noise : float
         Expected squared residual by noise, summed over RGB.
-    parameters : MixtureParameters
+    parameters : BoundaryParameters
 
     Returns
     -------
     ndarray, shape (H, W), float32
         0..1; 0 away from depth discontinuities, and on their more distant side.
     """
-    if parameters.alpha_threshold == 0:
-        return np.zeros_like(disparity)
-    from sepi.image import mixed_pixels_kernels as kernels
+    from sepi.boundaries import colour_mixture_kernels as kernels
 
     evidence: FloatMap = kernels.mixture_evidence(
         disparity,
+        around,
         guide,
-        parameters.alpha_discontinuity,
-        parameters.alpha_radius,
+        parameters.boundary_step,
+        parameters.clean_radius,
         parameters.alpha_contrast,
         parameters.alpha_threshold,
         # a hundredth of full scale counts as equal even without noise

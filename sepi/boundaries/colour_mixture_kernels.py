@@ -1,4 +1,4 @@
-"""Compiled loops of the evidence by colour mixture (:mod:`sepi.image.mixed_pixels`)."""
+"""Compiled loops of the evidence by colour mixture (:mod:`sepi.boundaries.colour_mixture`)."""
 
 from __future__ import annotations
 
@@ -8,51 +8,36 @@ from typing import Any
 import numpy as np
 from numba import njit, prange
 
+from sepi.boundaries.surroundings import Surroundings
+
 _WIDTH = 1.0  # of the window's weights, pixels
 _APART = 0.019  # squared distance of a colour from all mixtures at which it counts 1/e, in units of their variance
 _RAMP = 0.07  # share below the threshold from which on there is no doubt
 _LEAST_WEIGHT = 0.05  # of clean pixels of each side, in pixels right beside
 
 
-@njit(inline="always")
-def _clean(disparity: Any, y: int, x: int, middle: Any, near: Any) -> bool:
-    """Whether a pixel and its eight neighbours all lie on one side."""
-    H, W = disparity.shape
-    for row in range(max(0, y - 1), min(H, y + 2)):
-        for column in range(max(0, x - 1), min(W, x + 2)):
-            if (disparity[row, column] > middle) != near:
-                return False
-    return True
-
-
 @njit(parallel=True, cache=True)
 def mixture_evidence(
-    disparity: Any, guide: Any, discontinuity: Any, radius: int, contrast: Any, threshold: Any, least_variance: Any
-) -> Any:
+    disparity: Any, around: Surroundings, guide: Any, discontinuity: Any, radius: int, contrast: Any, threshold: Any,
+    least_variance: Any,
+) -> Any:  # fmt: skip
     """How surely little of the nearer surface is in a pixel, 0..1; shapes (H, W) and (H, W, 3)."""
     H, W = disparity.shape
     out = np.zeros((H, W), np.float32)
     for y in prange(H):
         sums = np.empty((2, 5))  # for each side: weight, RGB, squared RGB
         for x in range(W):
-            d = disparity[y, x]
-            lowest, highest = d, d
-            for row in range(max(0, y - 1), min(H, y + 2)):
-                for column in range(max(0, x - 1), min(W, x + 2)):
-                    lowest, highest = min(lowest, disparity[row, column]), max(highest, disparity[row, column])
+            lowest, highest = around.farthest[y, x], around.nearest[y, x]
             middle = (lowest + highest) / 2
-            if highest - lowest < discontinuity or d <= middle:
+            if highest - lowest < discontinuity or disparity[y, x] <= middle:
                 continue
             sums[:] = 0
             for row in range(max(0, y - radius), min(H, y + radius + 1)):
                 for column in range(max(0, x - radius), min(W, x + radius + 1)):
                     q = disparity[row, column]
+                    clean = around.farthest[row, column] > middle or around.nearest[row, column] <= middle
                     # surfaces beyond the two do not count
-                    if (
-                        q > highest + discontinuity
-                        or q < lowest - discontinuity
-                        or not _clean(disparity, row, column, middle, q > middle)
-                    ):
+                    if q > highest + discontinuity or q < lowest - discontinuity or not clean:
                         continue
                     w = math.exp(-((row - y) ** 2 + (column - x) ** 2) / (2 * _WIDTH**2))
                     own = sums[1 if q > middle else 0]

@@ -1,0 +1,1 @@
+"""Which of two surfaces a pixel beside a depth step belongs to (:mod:`sepi.boundaries.decision`)."""

@@ -1,0 +1,62 @@
+"""Arrays that the decision beside depth steps works on, in named groups: what its kernels take.
+
+No group holds another: numba compiles no parallel loop over such.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from sepi.lightfield import BoolMap, FloatMap
+
+
+class RimViews(NamedTuple):
+    """The views that are compared, and what hides what in them.
+
+    Attributes
+    ----------
+    pixels : ndarray, shape (T, S, H, W, C), uint8, uint16 or float32
+    units : ndarray, shape (N,), float32
+        What the pixels of each view that is compared are multiplied with to be 0..1, and as bright as the reference.
+    places : ndarray, shape (N, 2), int64
+        Row and column in the grid of each view that is compared.
+    baselines : ndarray, shape (N, 2), float64
+        Theirs, down and across, in view steps.
+    nearest : ndarray, shape (T, S, n, W), float32
+        z-buffers of the map, its nearer surfaces widened by a pixel, so that no mixed pixel counts as background.
+    low : int
+        First row of ``nearest``.
+    margin : float32
+        By how much an occluder must be nearer, pixels per view step.
+    """
+
+    pixels: npt.NDArray[Any]
+    units: FloatMap
+    places: npt.NDArray[np.int64]
+    baselines: npt.NDArray[np.float64]
+    nearest: FloatMap
+    low: int
+    margin: np.float32
+
+
+class Sides(NamedTuple):
+    """The surfaces of a map, and what the reference view shows of them.
+
+    Attributes
+    ----------
+    disparity : ndarray, shape (H, W), float32
+    guide : ndarray, shape (H, W, 3), float32
+        Reference view, 0..1.
+    clean : ndarray, shape (H, W), bool
+        Pixels of one surface alone.
+    clean_radius : int
+        How far away clean colours of the nearer surface are looked for, pixels.
+    """
+
+    disparity: FloatMap
+    guide: FloatMap
+    clean: BoolMap
+    clean_radius: int

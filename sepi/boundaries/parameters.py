@@ -1,0 +1,43 @@
+"""Parameters of the decision between the two surfaces of a depth step."""
+
+from __future__ import annotations
+
+from pydantic import Field
+
+from sepi.stage import OcclusionMarginParameters
+
+
+class BoundaryParameters(OcclusionMarginParameters):
+    """What is a depth step, and what decides which side of it a pixel is on."""
+
+    use_shares: bool = Field(True, description="whether the shares of both surfaces that all views show have a vote")
+    use_mixture: bool = Field(True, description="whether the mixture of colours in the reference view has a vote")
+    boundary_step: float = Field(
+        0.3, gt=0, description="depth step beside which pixels may be of either surface, pixels per view step"
+    )
+    clean_radius: int = Field(
+        4, ge=1, le=20, description="how far away clean colours of both surfaces are looked for, in pixels"
+    )
+    share_evidence: float = Field(
+        0.006, ge=0, lt=1, description="difference of mean costs, 0..1, that moves a pixel to the nearer surface"
+    )
+    share_radius: int = Field(2, ge=1, le=10, description="distance from the step within which views vote, in pixels")
+    share_scale: float = Field(
+        0.2,
+        gt=0,
+        le=2,
+        description="residual at which a view counts half, as part of the difference of both surfaces' colours",
+    )
+    share_views: int = Field(81, ge=2, description="views that are compared, at least")
+    alpha_threshold: float = Field(
+        0.39,
+        gt=0,
+        le=1,
+        description="share of the nearer surface below which colours speak for the more distant one",
+    )
+    alpha_contrast: float = Field(
+        9.0,
+        ge=0,
+        description="squared colour difference of the two sides at which they speak half as loud, in units of their "
+        "variance",
+    )

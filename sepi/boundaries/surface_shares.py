@@ -1,0 +1,122 @@
+"""By how much the views say that a pixel beside a depth step belongs to the other of its two surfaces.
+
+A pixel that an edge runs through shows a share ``a`` of the nearer surface, of colour ``F``, and of the background the
+rest. It moves with the nearer surface: along that disparity every view ``v`` shows the same share before another piece
+of background, ``I_v = a F + (1 - a) B_v``. Views that are not hidden show what is behind, ``B_v``, so that ``a`` and
+``F`` follow from all views together, without any window.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import cv2
+import numpy as np
+
+from sepi.boundaries.arrays import RimViews, Sides
+from sepi.boundaries.parameters import BoundaryParameters
+from sepi.boundaries.surroundings import Surroundings
+from sepi.image.noise import noise_level
+from sepi.lightfield import FloatMap, LightField, full_scale
+from sepi.matching.nearest_surfaces import nearest_surfaces
+from sepi.matching.row_bands import row_bands
+from sepi.matching.view_subsets import spread_views
+
+if TYPE_CHECKING:
+    from sepi.boundaries.rim_kernels import Rim
+
+_LEAST_SCALE = 0.005
+"""Of the residual at which a view counts half, beside noise; 0..1."""
+
+_MOST_DARKENING = 1.25
+"""Ratio of brightness, either way, up to which a view is taken for another exposure of the same."""
+
+BYTES_PER_PIXEL = 4
+"""Of a pixel of a view: the z-buffer."""
+
+
+def share_evidence(
+    light_field: LightField, disparity: FloatMap, around: Surroundings, rim: Rim, parameters: BoundaryParameters
+) -> FloatMap:
+    """By how much the other surface explains the views better than the one that a pixel has.
+
+    Parameters
+    ----------
+    light_field : LightField
+    disparity : ndarray, shape (H, W), float32
+        Pixels per view step.
+    around : Surroundings
+        Of the disparity.
+    rim : Rim
+        The pixels that are looked at, and both surfaces.
+    parameters : BoundaryParameters
+
+    Returns
+    -------
+    ndarray, shape (H, W), float32
+        Differences of mean costs, -1..1; 0 where the views do not tell.
+    """
+    from sepi.boundaries import surface_shares_kernels as kernels
+
+    guide = light_field.reference_view
+    # no farther surface within a pixel: none shows through
+    clean = disparity - around.farthest < parameters.boundary_step
+    sides = Sides(disparity, guide, clean, parameters.clean_radius)
+    views = _views_alike(light_field, sides, parameters)
+    if not len(views.places):
+        # they say nothing for either surface
+        return np.zeros_like(disparity)
+    layer, distance = _more_distant_layer(disparity, rim, views.margin)
+    scales2 = _LEAST_SCALE**2 + 2 * noise_level(guide) ** 2, parameters.share_scale**2
+    present = np.zeros(light_field.grid, bool)
+    present[tuple(views.places.T)] = True
+    # how far from a pixel the pieces of background lie that views show with it
+    step = float((rim.near - rim.far).max())
+    moved = math.ceil(step * float(np.abs(views.baselines).max())) + 2
+    rows_moved = math.ceil(step * float(np.abs(views.baselines[:, 0]).max())) + 1
+    farthest = float(np.abs(disparity).max())
+    evidence = np.zeros_like(disparity)
+    height = light_field.shape[0]
+    for begin, end, rows in row_bands(light_field, present, farthest, BYTES_PER_PIXEL, rows_moved):
+        nearest = nearest_surfaces(light_field, around.nearest, present, rows)
+        views = views._replace(nearest=nearest, low=rows.low)
+        background = kernels.background_of(
+            views, layer, distance <= moved, max(0, begin - rows_moved), min(height, end + rows_moved)
+        )
+        kernels.evidence_of_shares(views, rim, background, sides, scales2, begin, end, evidence)
+    return evidence
+
+
+def _views_alike(light_field: LightField, sides: Sides, parameters: BoundaryParameters) -> RimViews:
+    """The views that are compared, as bright as the reference, without those that show it badly or are much darker.
+
+    Lenses darken and blur views towards the edge of the grid; shares would take that for another surface.
+    """
+    from sepi.boundaries.surface_shares_kernels import brightness_of_views
+
+    present = spread_views(light_field, parameters.share_views)
+    places, baselines = np.argwhere(present), light_field.baselines[present]
+    units = np.full(len(places), 1 / full_scale(light_field.views.dtype), np.float32)
+    # a part of another array would have kernels of its own compiled, which takes a minute
+    pixels = np.ascontiguousarray(light_field.views)
+    margin = np.float32(parameters.occlusion_margin)
+    views = RimViews(pixels, units, places, baselines, np.empty((0, 0, 0, 0), np.float32), 0, margin)
+    missing = np.zeros((*light_field.grid, 0, 0), bool) if light_field.missing is None else light_field.missing
+    brightness, residual = brightness_of_views(views, sides, missing)
+    alike = (brightness > 1 / _MOST_DARKENING) & (brightness < _MOST_DARKENING)
+    showing = np.isfinite(residual)
+    usual = float(np.median(residual[showing])) if showing.any() else 0.0
+    alike &= showing & (residual <= 2 * usual + _LEAST_SCALE)
+    units = (units[alike] / brightness[alike]).astype(np.float32)
+    return views._replace(units=units, places=places[alike], baselines=baselines[alike])
+
+
+def _more_distant_layer(disparity: FloatMap, rim: Rim, margin: np.float32) -> tuple[FloatMap, FloatMap]:
+    """The map with the more distant surface of the next step in place of all that is nearer, and the distance to it."""
+    outside = (~rim.inside).astype(np.uint8)
+    distance, labels = cv2.distanceTransformWithLabels(outside, cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_PIXEL)
+    of_label = np.zeros(labels.max() + 1, np.float32)
+    of_label[labels[rim.inside]] = rim.far[rim.inside]
+    behind = of_label[labels]
+    return np.where(disparity > behind + margin, behind, disparity), np.asarray(distance, np.float32)
