@@ -100,8 +100,7 @@ def view_noise(light_field: LightField) -> ViewNoise:
     from sepi.matching.view_noise_kernels import BLOCK, least_differences
 
     views, image = light_field.rgb_views, light_field.reference_view
-    unit = 1 / full_scale(views.dtype)
-    least = (_LEAST if views.dtype == np.float32 else _ROUNDING * unit) ** 2
+    unit, least = 1 / full_scale(views.dtype), _least_variance(views.dtype)
     place, moves = light_field.reference_position, whole_pixel_moves(light_field)
     # beyond the picture nothing is known
     between = np.minimum(least_differences(views.transpose(0, 1, 4, 2, 3), *place, moves) * unit**2 / 2, 1)
@@ -120,6 +119,11 @@ def view_noise(light_field: LightField) -> ViewNoise:
     expected = np.interp(level, brightness, variance)
     by_place = _by_place(within / expected, between / expected, tells)
     return ViewNoise(brightness, variance, by_place, float(np.median(shares)))
+
+
+def _least_variance(dtype: npt.DTypeLike) -> float:
+    """Of what views hold, however little noise there is; colours in 0..1."""
+    return (_LEAST if dtype == np.float32 else _ROUNDING / full_scale(np.dtype(dtype))) ** 2
 
 
 def variance_map(light_field: LightField, noise: ViewNoise, views: BoolMap) -> FloatMap:
@@ -149,7 +153,7 @@ def variance_map(light_field: LightField, noise: ViewNoise, views: BoolMap) -> F
     level = cv2.blur(np.ascontiguousarray(light_field.reference_view.mean(axis=2)), window)
     by_place = cv2.resize(noise.by_place, (width, height), interpolation=cv2.INTER_LINEAR)
     most = _MOST_OF_USUAL * np.interp(level, noise.brightness, noise.variance) * by_place
-    return np.asarray(np.maximum(np.minimum(cv2.blur(energy, window), most), (_ROUNDING * unit) ** 2), np.float32)
+    return np.asarray(np.maximum(np.minimum(cv2.blur(energy, window), most), _least_variance(light_field.views.dtype)), np.float32)
 
 
 def _by_place(within: FloatMap, between: FloatMap, tells: BoolMap) -> FloatMap:
