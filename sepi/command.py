@@ -210,6 +210,7 @@ def stage_command(stage: str, own: Mapping[str, Choice]) -> click.Command:
     all.
     """
     from sepi.compared.methods import StageChoices
+    from sepi.exposure import equally_bright
     from sepi.io.hdf5 import read_light_field, read_stage, write_stage
     from sepi.io.provenance import history_of, stage_attributes
     from sepi.kernel_cache import tell_kernel_cache
@@ -252,7 +253,7 @@ def stage_command(stage: str, own: Mapping[str, Choice]) -> click.Command:
         require_memory(KERNELS)
         tell_kernel_cache()
         with progress_bar(f"{light_field.name} {stage}") as progress, kept_detail():
-            result = chosen.run(light_field, maps, settings, progress)
+            result = chosen.run(equally_bright(light_field), maps, settings, progress)
         history = [*history_of(previous), entry(stage, choice, settings, light_field)]
         write_stage(output, result, stage_attributes(light_field, history))
         if timing is not None:

@@ -9,6 +9,7 @@ from numbers import Real
 from types import NoneType
 from typing import Any
 
+from sepi.exposure import equally_bright
 from sepi.kernel_cache import tell_kernel_cache
 from sepi.lightfield import LightField, require_light_field
 from sepi.matching.base_detail import kept_detail
@@ -85,17 +86,18 @@ def estimate_depth(
         light_field = light_field.with_range(estimate_range(light_field))
     light_field.require_seen_range()
     tell_kernel_cache()
+    compared = equally_bright(light_field)
     maps: StageMaps | None = None
     with kept_detail(), ExitStack() as limited:
-        require_memory_of(light_field, settings.values())
+        require_memory_of(compared, settings.values())
         if memory is not None:
-            limited.enter_context(band_memory(bytes_of_bands(light_field, settings.values(), memory)))
+            limited.enter_context(band_memory(bytes_of_bands(compared, settings.values(), memory)))
         for number, (stage, choice) in enumerate(chosen.choices.items()):
 
             def of_all(fraction: float, number: int = number) -> None:
                 progress((number + fraction) / len(STAGES))
 
-            maps = STAGES[stage][choice].run(light_field, maps, settings[stage], of_all)
+            maps = STAGES[stage][choice].run(compared, maps, settings[stage], of_all)
             of_all(1.0)
     assert maps is not None  # there are stages
     name = variant if isinstance(variant, str) else next((key for key, one in VARIANTS.items() if one == variant), "")

@@ -8,21 +8,14 @@ import numpy.typing as npt
 
 from sepi.cameras.frame import Frame, Seeing
 from sepi.errors import SepiError
+from sepi.exposure import ALIKE, gains
 from sepi.io.images import read_picture
 from sepi.lightfield import BoolMap, FloatMap, as_unit_float
-from sepi.rig import Floats
 
 # order of the splines: the third blurs more, which costs accuracy at silhouettes
 _SPLINES = 5
 # samples this close to pixels are these pixels
 _ON_PIXEL = 1e-6
-# values that tell of brightness, full range = 1: neither black nor burnt out
-_DARKEST, _BRIGHTEST = 0.03, 0.97
-# blur before brightness is compared, pixels; part of the picture's pixels that must be comparable
-_BLUR = 2.0
-_COMPARABLE = 0.02
-# gains of all views within this of one are none
-_ALIKE = 0.02
 
 
 def rectified_view(seeing: Seeing, frame: Frame, view: int) -> tuple[FloatMap, BoolMap]:
@@ -94,34 +87,6 @@ def _masked(seeing: Seeing, view: int) -> npt.NDArray[np.uint8]:
     return np.asarray(mask.reshape(lens.height, lens.width, -1)[..., 0] == 0, np.uint8)
 
 
-def gains(reference: FloatMap, view: FloatMap, shown: BoolMap) -> Floats:
-    """What to multiply each channel of a view by to be as bright as the reference view where both see the same, (C,).
-
-    ``shown`` tells which of its pixels (H, W) the view has.
-
-    Pictures are laid over each other by the one shift that fits best, and the ratio is the median over all pixels: what
-    is hidden, or moves by more, is outvoted.
-    """
-    shift, _ = cv2.phaseCorrelate(
-        _grey(reference), _grey(view), cv2.createHanningWindow(_grey(view).shape[::-1], cv2.CV_32F)
-    )
-    across, down = np.rint(shift).astype(int)
-    height, width = view.shape[:2]
-    if abs(across) > width // 2 or abs(down) > height // 2:
-        across = down = 0
-    there = view[max(0, down) : height + min(0, down), max(0, across) : width + min(0, across)]
-    has = shown[max(0, down) : height + min(0, down), max(0, across) : width + min(0, across)]
-    here = reference[max(0, -down) : height + min(0, -down), max(0, -across) : width + min(0, -across)]
-    found = np.ones(view.shape[2])
-    for c in range(view.shape[2]):
-        one, other = (cv2.GaussianBlur(np.ascontiguousarray(part[..., c]), (0, 0), _BLUR) for part in (here, there))
-        both = has & (np.minimum(one, other) > _DARKEST)
-        both &= np.maximum(one, other) < _BRIGHTEST
-        if both.mean() >= _COMPARABLE:
-            found[c] = np.exp(np.median(np.log(one[both]) - np.log(other[both])))
-    return found
-
-
 def equalized(
     views: npt.NDArray[np.float32], shown: npt.NDArray[np.bool_], reference: int
 ) -> tuple[npt.NDArray[np.float32], float]:
@@ -129,14 +94,10 @@ def equalized(
 
     ``shown`` tells which of their pixels (N, H, W) they have.
     """
-    factors = np.array([gains(views[reference], view, has) for view, has in zip(views, shown, strict=True)])
+    factors = np.array([gains(views[reference], view, has)[0] for view, has in zip(views, shown, strict=True)])
     factors[reference] = 1
     change = float(np.abs(np.log(factors)).max())
-    if change <= _ALIKE:
+    if change <= ALIKE:
         return views, 0.0
     # nothing may be brighter than white
     return np.clip(views * factors[:, None, None].astype(np.float32), -0.5, 1.5), float(np.expm1(change))
-
-
-def _grey(view: FloatMap) -> FloatMap:
-    return np.ascontiguousarray(view.mean(axis=2), np.float32)

@@ -153,7 +153,8 @@ def variance_map(light_field: LightField, noise: ViewNoise, views: BoolMap) -> F
     level = cv2.blur(np.ascontiguousarray(light_field.reference_view.mean(axis=2)), window)
     by_place = cv2.resize(noise.by_place, (width, height), interpolation=cv2.INTER_LINEAR)
     most = _MOST_OF_USUAL * np.interp(level, noise.brightness, noise.variance) * by_place
-    return np.asarray(np.maximum(np.minimum(cv2.blur(energy, window), most), _least_variance(light_field.views.dtype)), np.float32)
+    own = np.minimum(cv2.blur(energy, window), most)
+    return np.asarray(np.maximum(own, _least_variance(light_field.views.dtype)), np.float32)
 
 
 def _by_place(within: FloatMap, between: FloatMap, tells: BoolMap) -> FloatMap:

@@ -1,0 +1,89 @@
+"""Views of unlike exposure: as real cameras take them, and left alone where they are alike."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from click.testing import CliRunner
+
+from sepi.command import stage_command
+from sepi.exposure import brightness_factors, equally_bright
+from sepi.initial import CHOICES
+from sepi.io.hdf5 import read_stage, write_light_field
+from sepi.lightfield import LightField
+from sepi.pipeline import estimate_depth
+from sepi.scenes import SCENES, render
+from sepi.variants import Variant
+
+pytestmark = pytest.mark.slow
+
+
+def exposed(light_field: LightField, factors: npt.NDArray[np.float64]) -> LightField:
+    """Each channel of each view so many times as bright; factors (T, S, C)."""
+    views = light_field.views.astype(np.float64) * factors[:, :, None, None, :]
+    return replace(light_field, views=np.clip(np.rint(views), 0, 255).astype(light_field.views.dtype))
+
+
+def unlike(light_field: LightField, deviation: float) -> LightField:
+    """Other exposures and white balances, but for the reference view's."""
+    factors = 1 + deviation * np.random.default_rng(3).standard_normal((*light_field.grid, 3))
+    factors[light_field.reference_position] = 1
+    return exposed(light_field, factors)
+
+
+def test_views_that_are_alike_stay_as_they_are() -> None:
+    """What moves into a view and out of it changes its brightness, too: taken for exposure it would do harm."""
+    fields = {name: render(name, size=64) for name in SCENES}
+    assert [name for name, field in fields.items() if equally_bright(field) is not field] == []
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.float32])
+def test_exposures_are_told_and_made_equal(dtype: npt.DTypeLike) -> None:
+    """Also with a view missing, and one of which a corner is."""
+    whole = render("curved_occluders", size=128, views=5)
+    given = unlike(whole, 0.06)
+    if dtype == np.float32:
+        given = replace(given, views=given.views.astype(np.float32) / np.float32(255))
+    present = np.ones((5, 5), bool)
+    present[0, 1] = False
+    missing = np.zeros((5, 5, 128, 128), bool)
+    missing[4, 4, :40, :40] = True
+    given = replace(given, present=present, missing=missing)
+    factors, _ = brightness_factors(given)
+    found, before = (factors, brightness_factors(whole)[0])
+    assert (found[0, 1] == 1).all()
+    # as bright as the reference view is what the scene's views are, within what moves in them
+    true = 1 / (1 + 0.06 * np.random.default_rng(3).standard_normal((5, 5, 3)))
+    true[2, 2] = 1
+    assert np.abs(np.log(found / (true * before)))[present].max() < 0.01
+    made = equally_bright(given)
+    assert made.views.dtype == dtype
+    levels = made.views * (255 if dtype == np.float32 else 1)
+    assert np.abs(levels[present].astype(float) - whole.views[present]).mean() < 1.0
+    assert given.views is not made.views
+
+
+@pytest.mark.parametrize("variant", ["fast", "paper"])
+def test_unlike_exposures_cost_hardly_any_accuracy(variant: str) -> None:
+    """Left as they are, a twentieth more or less light from view to view makes a third of the paper's map wrong."""
+    scene = render("pyramids", size=96, views=7)
+    truth = scene.ground_truth
+    assert truth is not None
+    bad = [
+        float((np.abs(estimate_depth(field, variant).disparity - truth) > 0.07).mean())
+        for field in (scene, unlike(scene, 0.05))
+    ]
+    assert bad[1] < 1.2 * bad[0] + 0.01
+
+
+def test_a_stage_of_the_workflow_makes_them_equal_too(tmp_path: Path) -> None:
+    """The command line and the workflow have the same maps."""
+    light_field = unlike(render("pyramids", size=64, views=5), 0.05)
+    write_light_field(tmp_path / "lf.h5", light_field)
+    words = ["--light-field", tmp_path / "lf.h5", "--choice", "sepi", "--output", tmp_path / "initial.h5"]
+    done = CliRunner().invoke(stage_command("initial", CHOICES), list(map(str, words)))
+    assert done.exit_code == 0, done.output
+    expected = estimate_depth(light_field, Variant("sepi", "none", "none", "none"))
+    np.testing.assert_array_equal(read_stage(tmp_path / "initial.h5").disparity, expected.disparity)
