@@ -331,9 +331,8 @@ def errors(
             row |= {f"{key}, left out": text for key, text in _judgement(judged(one, fit)).items()}
         rows.append(row)
     click.echo(tables.markdown(rows))
-    for some in (samples, held_out):
-        if some:
-            click.echo(f"\n{pooled(some, calibration)}")
+    for some in (samples, held_out, samples + held_out) if held_out else (samples,):
+        click.echo(f"\n{pooled(some, calibration)}")
 
 
 def _judgement(found: Judged) -> dict[str, str]:

@@ -49,7 +49,9 @@ def test_exposures_are_told_and_made_equal(dtype: npt.DTypeLike) -> None:
     present = np.ones((5, 5), bool)
     present[0, 1] = False
     missing = np.zeros((5, 5, 128, 128), bool)
-    missing[4, 4, :40, :40] = True
+    missing[4, 4, :90, :90] = True
+    # whatever stands where a view shows nothing
+    given.views[missing] = given.views[missing] // 2 if dtype == np.uint8 else given.views[missing] / 2
     given = replace(given, present=present, missing=missing)
     factors, _ = brightness_factors(given)
     found, before = (factors, brightness_factors(whole)[0])
@@ -57,11 +59,12 @@ def test_exposures_are_told_and_made_equal(dtype: npt.DTypeLike) -> None:
     # as bright as the reference view is what the scene's views are, within what moves in them
     true = 1 / (1 + 0.06 * np.random.default_rng(3).standard_normal((5, 5, 3)))
     true[2, 2] = 1
-    assert np.abs(np.log(found / (true * before)))[present].max() < 0.01
+    assert np.abs(np.log(found / (true * before)))[present].max() < 0.02
     made = equally_bright(given)
     assert made.views.dtype == dtype
     levels = made.views * (255 if dtype == np.float32 else 1)
-    assert np.abs(levels[present].astype(float) - whole.views[present]).mean() < 1.0
+    seen = present[:, :, None, None] & ~missing
+    assert np.abs(levels[seen].astype(float) - whole.views[seen]).mean() < 1.0
     assert given.views is not made.views
 
 

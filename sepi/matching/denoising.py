@@ -34,7 +34,13 @@ from sepi.matching.view_noise import PARTS, ViewNoise, view_noise
 from sepi.stage import Parameters
 
 LEAST_NOISE = 1.25 / 255
-"""Noise that is worth it: less is that of rounding, and of renderings."""
+"""Noise that is worth it: less may be that of rounding, and what is left where texture does not fit at whole pixels."""
+
+LEAST_SURE_NOISE = 0.6 / 255
+"""The same where it cannot be else: faint noise takes dark walls to other depths, too."""
+
+LEAST_AGREEMENT = 0.7
+"""Of what is told of the noise within a view and between views, from which on it cannot be else."""
 
 LEAST_SHARE = 0.75
 """Of what views differ by that must be noise of each of them: where more is something else, detail is worth more."""
@@ -158,7 +164,8 @@ def _noise(light_field: LightField, kept: _Kept) -> ViewNoise:
 
 
 def _denoised_views(light_field: LightField, noise: ViewNoise, least: float) -> npt.NDArray[Any] | None:
-    if noise.usual < LEAST_NOISE or noise.share < LEAST_SHARE:
+    sure = noise.agreement >= LEAST_AGREEMENT
+    if noise.usual < (LEAST_SURE_NOISE if sure else LEAST_NOISE) or noise.share < LEAST_SHARE:
         return None
     from sepi.matching.denoising_kernels import denoise_views
 

@@ -67,12 +67,16 @@ class ViewNoise:
         What that is multiplied with in parts of the picture, where a lens darkens it or its light is uneven.
     share : float
         Of the variance by which views differ, at most, what is noise of each view.
+    agreement : float
+        Ratio, at most 1, of the two standard deviations that are told within a view and between views, at the
+        brightness where they agree least: 1 where nothing but noise can be what both see.
     """
 
     brightness: FloatMap
     variance: FloatMap
     by_place: FloatMap
     share: float
+    agreement: float
 
     @property
     def usual(self) -> float:
@@ -109,16 +113,19 @@ def view_noise(light_field: LightField) -> ViewNoise:
     tells = (within > 0) & (level > BLACK) & (level < SATURATED)
     even = np.ones((PARTS, PARTS), np.float32)
     if tells.sum() < LEVELS:
-        return ViewNoise(np.array([0.5], np.float32), np.array([least], np.float32), even, 1.0)
-    found: list[tuple[float, float, float]] = []
+        return ViewNoise(np.array([0.5], np.float32), np.array([least], np.float32), even, 1.0, 0.0)
+    found: list[tuple[float, float, float, float]] = []
     for low, high in pairwise(np.quantile(level[tells], np.linspace(0, 1, LEVELS + 1))):
         chosen = tells & (level >= low) & (level <= high)
         of_one, of_two = (max(bound, least) for bound in _bounds(within[chosen], between[chosen]))
-        found.append((float(np.median(level[chosen])), min(of_one, of_two), min(of_one / of_two, 1)))
-    brightness, variance, shares = np.array(found, np.float32).T
+        ratio = of_one / of_two
+        found.append(
+            (float(np.median(level[chosen])), min(of_one, of_two), min(ratio, 1), min(ratio, 1 / ratio) ** 0.5)
+        )
+    brightness, variance, shares, agreements = np.array(found, np.float32).T
     expected = np.interp(level, brightness, variance)
     by_place = _by_place(within / expected, between / expected, tells)
-    return ViewNoise(brightness, variance, by_place, float(np.median(shares)))
+    return ViewNoise(brightness, variance, by_place, float(np.median(shares)), float(agreements.min()))
 
 
 def _least_variance(dtype: npt.DTypeLike) -> float:
