@@ -12,6 +12,7 @@ from typing import Any
 from tabulate import tabulate
 
 from sepi.errors import SepiError
+from sepi.exposure import equally_bright
 from sepi.inspection.disparity_range import settle_range
 from sepi.io.hdf5 import has_dataset
 from sepi.lightfield import LightField
@@ -51,7 +52,8 @@ def scene_for_choosing(given: str, noise: str) -> LightField:
         raise SepiError(f"{given}: scene '{world}' is held out, no parameter may be chosen on it; on {free} one may")
     if light_field.ground_truth is None:
         raise SepiError(f"{given}: has no ground truth to score against")
-    return settle_range(light_field)
+    # as the stages are given it
+    return equally_bright(settle_range(light_field))
 
 
 def settings_of(variant: Variant, target: str, texts: Sequence[str]) -> tuple[str, list[dict[str, Parameters]]]:

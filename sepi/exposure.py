@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from sepi.lightfield import BoolMap, FloatMap, LightField, full_scale
+from sepi.lightfield import HIGHEST, LOWEST, BoolMap, FloatMap, LightField, full_scale
 
 # values that tell of brightness, full range = 1: neither black nor burnt out
 _DARKEST, _BRIGHTEST = 0.03, 0.97
@@ -20,7 +20,7 @@ _DARKEST, _BRIGHTEST = 0.03, 0.97
 _BLUR = 2.0
 _COMPARABLE = 0.02
 # factors of all views within this of one are none
-ALIKE = 0.02
+_ALIKE = 0.02
 # the same of means over whole views, at a glance
 _MEANS_ALIKE = 0.01
 # a factor is clear that is so many standard errors from one, of which things that move by more have at most four;
@@ -43,21 +43,27 @@ def equally_bright(light_field: LightField) -> LightField:
     Returns
     -------
     LightField
-        Views of the same dtype; each channel of a view is multiplied by one number. No whole number is beyond white.
+        Views of the same dtype; each channel of a view is multiplied by one number, as far as its values go, and a note
+        says by how much at most.
     """
     if _means_are_alike(light_field):
         return light_field
     factors, errors = brightness_factors(light_field, _SIDE)
     change = np.abs(np.log(factors))
-    if not ((change > ALIKE) & (change > _CLEAR * errors)).any():
+    if not ((change > _ALIKE) & (change > _CLEAR * errors)).any():
         return light_field
     factors, errors = brightness_factors(light_field)
     factors = np.where(np.abs(np.log(factors)) > errors, factors, 1)
     views = np.array(light_field.views)
     for t, s in np.argwhere(light_field.present).tolist():
         bright = views[t, s] * factors[t, s].astype(np.float32)
-        views[t, s] = bright if views.dtype == np.float32 else np.rint(np.minimum(bright, full_scale(views.dtype)))
-    return replace(light_field, views=views)
+        if views.dtype == np.float32:
+            views[t, s] = np.clip(bright, LOWEST, HIGHEST)
+        else:
+            views[t, s] = np.rint(np.minimum(bright, full_scale(views.dtype)))
+    percent = 100 * np.expm1(np.abs(np.log(factors)).max())
+    note = f"brightness and colour differed from view to view, by up to {percent:.2g} %: made equal"
+    return replace(light_field, views=views, notes=(*light_field.notes, note))
 
 
 def brightness_factors(

@@ -68,6 +68,18 @@ def test_exposures_are_told_and_made_equal(dtype: npt.DTypeLike) -> None:
     assert given.views is not made.views
 
 
+def test_bright_floats_stay_in_their_range() -> None:
+    """A view half as bright as the reference view, but for one lamp: twice as bright, no light field may hold it."""
+    light_field = render("pyramids", size=64, views=3)
+    views = light_field.views.astype(np.float32) / np.float32(255)
+    views[0, 0] *= 0.5
+    views[0, 0, :4, :4] = 1
+    made = equally_bright(replace(light_field, views=views))
+    assert np.abs(made.views[0, 0, 8:].mean() / light_field.views[0, 0, 8:].mean() * 255 - 1) < 0.02
+    (note,) = (note for note in made.notes if "brightness" in note)
+    assert float(note.split("up to ")[1].split(" %")[0]) == pytest.approx(100, abs=5)
+
+
 @pytest.mark.parametrize("variant", ["fast", "paper"])
 def test_unlike_exposures_cost_hardly_any_accuracy(variant: str) -> None:
     """Left as they are, a twentieth more or less light from view to view makes a third of the paper's map wrong."""

@@ -16,8 +16,9 @@ from sepi.cameras.frame import Frame, Seeing, frame_of
 from sepi.cameras.grid import grid_of
 from sepi.cameras.model import CameraModel
 from sepi.cameras.plane import Plane, disparity_errors, plane_through, zooms
-from sepi.cameras.resampling import completed, equalized, rectified_view
+from sepi.cameras.resampling import completed, rectified_view
 from sepi.errors import SepiError
+from sepi.exposure import equally_bright
 from sepi.io.files import name_of
 from sepi.lightfield import DisparityRange, LightField
 from sepi.rig import Floats, Rectified, Rig
@@ -148,10 +149,6 @@ def light_field_of(found: Rectification) -> LightField:
     pictures, absent = zip(*(rectified_view(found.seeing, frame, n) for n in range(len(model.shots))), strict=True)
     channels = {picture.shape[2] for picture in pictures}
     views = np.stack([np.broadcast_to(p, (*p.shape[:2], max(channels))) if len(channels) > 1 else p for p in pictures])
-    notes = found.notes
-    views, change = equalized(views, ~np.stack(absent), plane.reference)
-    if change:
-        notes = (*notes, f"brightness and colour differed from view to view, by up to {100 * change:.2g} %: made equal")
     at = grid_of(plane.baselines)
     rows, columns = (at.max(axis=0) + 1).tolist()
     grid = np.zeros((rows, columns, *views.shape[1:]), np.float32)
@@ -172,7 +169,7 @@ def light_field_of(found: Rectification) -> LightField:
         positions=positions,
         disparity_range=_range(found, scale),
         settled=True,
-        notes=notes,
+        notes=found.notes,
         missing=missing if missing.any() else None,
         rig=Rig(
             plane.rotation,
@@ -190,7 +187,7 @@ def light_field_of(found: Rectification) -> LightField:
     # the camera tells of the principal point of the grid's centre view
     right = float(x - (width - 1) / 2 - across * frame.offset)
     below = float(y - (height - 1) / 2 - down * frame.offset)
-    return replace(light_field, camera=Camera(scale, frame.offset, frame.focal, right, below))
+    return equally_bright(replace(light_field, camera=Camera(scale, frame.offset, frame.focal, right, below)))
 
 
 def _range(found: Rectification, scale: float) -> DisparityRange | None:

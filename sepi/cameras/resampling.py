@@ -1,4 +1,4 @@
-"""Pictures of calibrated cameras, turned, undistorted and brought to one brightness by one interpolation each."""
+"""Pictures of calibrated cameras, turned and undistorted by one interpolation each."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ import numpy.typing as npt
 
 from sepi.cameras.frame import Frame, Seeing
 from sepi.errors import SepiError
-from sepi.exposure import ALIKE, gains
 from sepi.io.images import read_picture
 from sepi.lightfield import BoolMap, FloatMap, as_unit_float
 
@@ -85,19 +84,3 @@ def _masked(seeing: Seeing, view: int) -> npt.NDArray[np.uint8]:
             f"{lens.width}x{lens.height}"
         )
     return np.asarray(mask.reshape(lens.height, lens.width, -1)[..., 0] == 0, np.uint8)
-
-
-def equalized(
-    views: npt.NDArray[np.float32], shown: npt.NDArray[np.bool_], reference: int
-) -> tuple[npt.NDArray[np.float32], float]:
-    """Views (N, H, W, C) as bright as the reference, and the greatest change as a part; as they are where all are.
-
-    ``shown`` tells which of their pixels (N, H, W) they have.
-    """
-    factors = np.array([gains(views[reference], view, has)[0] for view, has in zip(views, shown, strict=True)])
-    factors[reference] = 1
-    change = float(np.abs(np.log(factors)).max())
-    if change <= ALIKE:
-        return views, 0.0
-    # nothing may be brighter than white
-    return np.clip(views * factors[:, None, None].astype(np.float32), -0.5, 1.5), float(np.expm1(change))

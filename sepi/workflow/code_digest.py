@@ -68,9 +68,9 @@ _TELLING = "rendered.catalogue"
 
 def stage_modules(stage: str, choice: Choice) -> tuple[str, ...]:
     """Modules that decide, with what they import, what is in a stage's file: the stage, the module of the choice that
-    it runs, and the format of the file.
+    it runs, what is done to the views before, and the format of the file.
     """
-    return (f"sepi.{stage}", choice.function.__module__, "sepi.io.hdf5", "sepi.io.provenance")
+    return (f"sepi.{stage}", choice.function.__module__, "sepi.exposure", "sepi.io.hdf5", "sepi.io.provenance")
 
 
 def ingest_modules(reader: str) -> tuple[str, ...]:

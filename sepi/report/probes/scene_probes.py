@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from sepi.exposure import equally_bright
 from sepi.io.provenance import history_of
 from sepi.matching.plane_sweep import SweepParameters
 from sepi.report.panels import SceneResults
@@ -32,7 +33,8 @@ def scene_probes(results: SceneResults, final_file: Path, asked: Sequence[Intere
         Those asked for first; pixels without a depth are left out.
     """
     maps = results.final(MAIN_VARIANT)
-    light_field = results.light_field
+    # as the stages saw it
+    light_field = equally_bright(results.light_field)
     pixels = [*asked, *interesting_pixels(light_field, maps, light_field.ground_truth)]
     parameters = sweep_parameters(final_file)
     return [

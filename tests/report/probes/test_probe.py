@@ -3,6 +3,7 @@
 import base64
 import json
 from dataclasses import replace
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -10,12 +11,16 @@ import pytest
 from geometries import GEOMETRIES, standing
 
 from sepi.errors import SepiError
+from sepi.exposure import equally_bright
 from sepi.lightfield import DisparityRange, LightField
 from sepi.matching.plane_sweep import SweepParameters, sweep
 from sepi.matching.stitched_epi import stitched_epi
 from sepi.matching.view_subsets import half_planes, halves_and_quarters
 from sepi.pipeline import estimate_depth
+from sepi.report.panels import SceneResults
+from sepi.report.plan import MAIN_VARIANT
 from sepi.report.plots.pictures import reference_picture
+from sepi.report.probes import scene_probes
 from sepi.report.probes.curves import cost_curves
 from sepi.report.probes.figure import write_probes
 from sepi.report.probes.pixels import APART, BORDER, InterestingPixel, interesting_pixels
@@ -92,6 +97,22 @@ def test_curves_of_a_scene_are_those_of_the_default_sweep():
         disparity, cost = cost_curves(light_field, y, x, parameters).minimum()
         assert cost == pytest.approx(result.cost[0, y, x], abs=2e-5)
         assert disparity == pytest.approx(result.disparity[0, y, x], abs=5e-3)
+
+
+def test_curves_of_a_scene_are_of_views_as_bright_as_the_stages_had_them(monkeypatch):
+    """Curves of pictures of unlike exposure would explain a depth that was found in others."""
+    light_field = render("pyramids", size=64, views=5)
+    views = light_field.views.astype(np.float32) / 255
+    views[::2, 1::2] *= 0.7
+    light_field = replace(light_field, views=views)
+    maps = estimate_depth(light_field, "no_occlusion_no_textureless")
+    parameters = SweepParameters(num_disparities=41)
+    monkeypatch.setattr(scene_probes, "sweep_parameters", lambda file: parameters)
+    results = SceneResults(light_field, {MAIN_VARIANT: {"optimize": maps}}, {}, [])
+    found = scene_probes.scene_probes(results, Path("unread"), [InterestingPixel(20, 31, "a pixel")])[0]
+    result = sweep(equally_bright(light_field), parameters)
+    assert found.curves.costs[0].min() == pytest.approx(result.cost[0, 20, 31], abs=2e-5)
+    assert cost_curves(light_field, 20, 31, parameters).costs[0].min() > 2 * found.curves.costs[0].min()
 
 
 def test_a_pixel_outside_the_view_is_refused():
