@@ -4,6 +4,7 @@ No truth is needed, so faults show that look like mere errors: an edge widened t
 another thing in another number format.
 """
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
@@ -74,8 +75,7 @@ Z_BUFFERS = "a pixel that falls on a pixel of a view also covers the next one, t
 UNLIKE = {
     **dict.fromkeys(("paper", "no_sepi", "wang"), (SUPERPIXELS, 4.0)),
     "no_occlusion": (SUPERPIXELS, 8.0),
-    **{name: (Z_BUFFERS, 1.5) for name in VARIANTS if name in ("best", "fast") or name.startswith("best_")},
-    "best_half_sepi": ("nothing", 0.1),
+    **{name: (Z_BUFFERS, 1.5) for name in VARIANTS if re.match("best|fast", name) and name != "best_half_sepi"},
     "mishiba": ("what it computes costs of are every few rows and columns, from the upper left on", 20.0),
     "pobr": ("its random numbers are drawn row by row", 25.0),
     "occ": ("ties between halves of a patch, by the order of directions", 7.0),
