@@ -13,8 +13,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit, prange
 
+from sepi.compiled import njit, prange
 from sepi.lightfield import BoolMap, FloatMap
 
 EXACT = {"nnan", "ninf", "nsz"}

@@ -6,7 +6,8 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit, prange
+
+from sepi.compiled import njit, prange
 
 WIDEST = np.float32(17)
 """Pixels of a box at most: views whose pictures of a point are farther apart show it more than once."""

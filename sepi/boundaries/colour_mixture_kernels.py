@@ -6,9 +6,9 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit, prange
 
 from sepi.boundaries.surroundings import Surroundings
+from sepi.compiled import njit, prange
 
 _WIDTH = 1.0  # of the window's weights, pixels
 _APART = 0.019  # squared distance of a colour from all mixtures at which it counts 1/e, in units of their variance

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit, prange
 
+from sepi.compiled import njit, prange
 from sepi.lightfield import BoolMap, FloatMap
 
 

@@ -6,10 +6,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit, prange
 
 from sepi.boundaries.arrays import RimViews, Sides
 from sepi.boundaries.rim_kernels import Rim
+from sepi.compiled import njit, prange
 from sepi.lightfield import FloatMap
 
 FEWEST_VIEWS = 3
@@ -138,7 +138,12 @@ def brightness_of_views(views: RimViews, sides: Sides, missing: Any) -> Any:
                     if not clean[y, x] or down < 0 or across < 0 or down >= H - 1 or across >= W - 1:
                         continue
                     row, column = int(down), int(across)
-                    if of_view.size > 0 and of_view[row : row + 2, column : column + 2].any():
+                    if of_view.size > 0 and (
+                        of_view[row, column]
+                        or of_view[row, column + 1]
+                        or of_view[row + 1, column]
+                        or of_view[row + 1, column + 1]
+                    ):
                         continue
                     _sample(views, view, row, column, down - row, across - column, colour)
                     for c in range(3):
@@ -151,6 +156,39 @@ def brightness_of_views(views: RimViews, sides: Sides, missing: Any) -> Any:
             else:
                 residual[view] = rest / n if n > 1 else np.nan
     return brightness, residual
+
+
+@njit(inline="always")
+def _median(values: Any, n: int) -> Any:
+    """Median of the first ``n`` values, which it puts in another order.
+
+    NumPy's, compiled, would have every process load SciPy's linear algebra.
+    """
+    low, high, middle = 0, n - 1, n // 2
+    while low < high:
+        # what is less than the value in the middle to the left, what is more to the right
+        pivot, i, j = values[(low + high) // 2], low, high
+        while i <= j:
+            while values[i] < pivot:
+                i += 1
+            while values[j] > pivot:
+                j -= 1
+            if i <= j:
+                values[i], values[j] = values[j], values[i]
+                i += 1
+                j -= 1
+        if middle <= j:
+            high = j
+        elif middle >= i:
+            low = i
+        else:
+            break
+    if n % 2 == 1:
+        return values[middle]
+    before = values[0]
+    for v in range(1, middle):
+        before = max(before, values[v])
+    return (before + values[middle]) / 2
 
 
 @njit(parallel=True, cache=True)
@@ -175,7 +213,7 @@ def background_of(views: RimViews, layer: Any, wanted: Any, begin: int, end: int
     colour, variance = np.empty((H, W, 3), np.float32), np.empty((H, W), np.float32)
     count = np.zeros((H, W), np.int32)
     for y in prange(begin, end):
-        samples, colour_there = np.empty((3, N), np.float32), np.empty(3)
+        samples, ordered, colour_there = np.empty((3, N), np.float32), np.empty(N, np.float32), np.empty(3)
         for x in range(W):
             if not wanted[y, x]:
                 continue
@@ -191,7 +229,9 @@ def background_of(views: RimViews, layer: Any, wanted: Any, begin: int, end: int
                 continue
             total = 0.0
             for c in range(3):
-                middle = np.median(samples[c, :n])
+                for v in range(n):
+                    ordered[v] = samples[c, v]
+                middle = _median(ordered, n)
                 colour[y, x, c] = middle
                 for v in range(n):
                     total += min((samples[c, v] - middle) ** 2, _MOST_DEVIATION2)

@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit, prange
+
+from sepi.compiled import njit, prange
 
 
 @njit(cache=True, parallel=True)

@@ -8,7 +8,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
+
+from sepi.compiled import njit
 
 _LEFT, _ABOVE, _RIGHT, _BELOW = 0, 1, 2, 3
 

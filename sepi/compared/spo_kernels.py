@@ -9,7 +9,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit, prange
+
+from sepi.compiled import njit, prange
 
 EXACT = {"nnan", "ninf", "nsz"}
 """What the compiler may assume of the numbers; it may not change the order of sums."""

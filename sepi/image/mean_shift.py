@@ -17,8 +17,8 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit, prange
 
+from sepi.compiled import njit, prange
 from sepi.lightfield import BoolMap, FloatMap
 
 ITERATIONS = 5

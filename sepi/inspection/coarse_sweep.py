@@ -8,17 +8,18 @@ window, do; sub-pixel accuracy does not matter.
 from __future__ import annotations
 
 import math
+from typing import Any
 
-import numba
 import numpy as np
 
+from sepi.compiled import njit, prange
 from sepi.lightfield import FloatMap
 
 # rows that one thread holds for all candidates: the volume of a block stays within a few MB
 _BLOCK = 16
 
 
-@numba.njit(parallel=True, cache=True)  # type: ignore[untyped-decorator, unused-ignore]
+@njit(parallel=True, cache=True)
 def coarse_sweep(
     reference: FloatMap,
     views: FloatMap,
@@ -59,7 +60,7 @@ def coarse_sweep(
     mean = np.empty((H, W), np.float32)
     disparity = np.empty((H, W), np.float32)
     sampling = candidates[1] - candidates[0]
-    for block in numba.prange((H + _BLOCK - 1) // _BLOCK):
+    for block in prange((H + _BLOCK - 1) // _BLOCK):
         top = block * _BLOCK
         bottom = min(H, top + _BLOCK)
         first = max(0, top - radius)
@@ -82,8 +83,8 @@ def coarse_sweep(
     return lowest, second, mean, disparity
 
 
-@numba.njit(cache=True)  # type: ignore[untyped-decorator, unused-ignore]
-def _row_costs(reference, views, offsets, candidate, truncation, y, cost):  # type: ignore[no-untyped-def]
+@njit(cache=True)
+def _row_costs(reference: Any, views: Any, offsets: Any, candidate: Any, truncation: Any, y: int, cost: Any) -> None:
     """Mean difference of a row over the views that see it; infinite where fewer than half do."""
     H, W = reference.shape
     seen = np.zeros(W, np.float32)
@@ -120,8 +121,8 @@ def _row_costs(reference, views, offsets, candidate, truncation, y, cost):  # ty
         cost[x] = cost[x] / seen[x] if 2 * seen[x] >= len(views) else np.float32(np.inf)
 
 
-@numba.njit(cache=True)  # type: ignore[untyped-decorator, unused-ignore]
-def _box_mean(costs, first, top, H, radius, out):  # type: ignore[no-untyped-def]
+@njit(cache=True)
+def _box_mean(costs: Any, first: int, top: int, H: int, radius: int, out: Any) -> None:
     """Mean of ``costs``, whose first row is row ``first`` of the picture, over the window; from row ``top`` on."""
     rows, W = out.shape
     sums = np.empty_like(costs)
@@ -142,8 +143,8 @@ def _box_mean(costs, first, top, H, radius, out):  # type: ignore[no-untyped-def
             out[r, x] /= np.float32((below - above + 1) * width)
 
 
-@numba.njit(cache=True)  # type: ignore[untyped-decorator, unused-ignore]
-def _valley(costs):  # type: ignore[no-untyped-def]
+@njit(cache=True)
+def _valley(costs: Any) -> Any:
     """Lowest cost, lowest cost outside its valley, mean cost, and the position of the lowest among the candidates."""
     infinite = np.float32(np.inf)
     best, total, count = 0, np.float32(0), 0

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
-import numba
 import numpy as np
 import numpy.typing as npt
 
+from sepi.compiled import njit, prange
 from sepi.lightfield import FloatMap
 
 # difference of two patches that counts one half, as part of the patch's own variation
 _HALF = np.float32(0.25)
 
 
-@numba.njit(parallel=True, cache=True)  # type: ignore[untyped-decorator, unused-ignore]
+@njit(parallel=True, cache=True)
 def layout_costs(
     reference: FloatMap,
     views: FloatMap,
@@ -49,7 +50,7 @@ def layout_costs(
     side = 2 * radius + 1
     cost = np.ones((len(points), L), np.float32)
     disparity = np.zeros((len(points), L), np.float32)
-    for p in numba.prange(len(points)):
+    for p in prange(len(points)):
         y, x = points[p, 0] - radius, points[p, 1] - radius
         patch = reference[y : y + side, x : x + side].copy()
         # never zero, so that nothing is divided by it
@@ -77,7 +78,7 @@ def layout_costs(
     return cost, disparity
 
 
-@numba.njit(parallel=True, cache=True)  # type: ignore[untyped-decorator, unused-ignore]
+@njit(parallel=True, cache=True)
 def residuals(
     reference: FloatMap, view: FloatMap, down: float, across: float, disparity: FloatMap, radius: int
 ) -> FloatMap:
@@ -88,7 +89,7 @@ def residuals(
     H, W = reference.shape
     side = 2 * radius + 1
     out = np.full((H, W), np.inf, np.float32)
-    for y in numba.prange(H - side + 1):
+    for y in prange(H - side + 1):
         for x in range(W - side + 1):
             d = disparity[y + radius, x + radius]
             v, u = y - d * down, x - d * across
@@ -100,8 +101,8 @@ def residuals(
     return out
 
 
-@numba.njit(cache=True, inline="always")  # type: ignore[untyped-decorator, unused-ignore]
-def _squares(patch, view, row, column, fy, fx):  # type: ignore[no-untyped-def]
+@njit(cache=True, inline="always")
+def _squares(patch: Any, view: Any, row: int, column: int, fy: Any, fx: Any) -> Any:
     """Sum of the squared differences of a patch and the samples of a view that begin at ``(row + fy, column + fx)``."""
     total = np.float32(0)
     one = np.float32(1)

@@ -12,10 +12,11 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 from llvmlite import ir
-from numba import njit, prange, types
+from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
+from sepi.compiled import njit, prange
 from sepi.lightfield import FloatMap
 
 EXACT = {"nnan", "ninf", "nsz"}

@@ -18,9 +18,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit, prange, types
+from numba import types
 from numba.extending import intrinsic
 
+from sepi.compiled import njit, prange
 from sepi.lightfield import FloatMap
 from sepi.matching.sweep_arrays import BestMaps, Candidates, ViewStack, Window
 
@@ -483,13 +484,17 @@ def _sweep_tile(
     )
     weights = np.empty((size, size, width), np.float32)
     sums, numbers = np.empty(G * K, np.float32), np.empty(G * K, np.float32)
-    group_sizes = np.empty((G, K), np.float32)
-    for g in range(G):
-        group_sizes[g] = (views.groups == g).sum()
+    group_sizes = np.zeros((G, K), np.float32)
+    for group in views.groups.flat:
+        if group >= 0:
+            group_sizes[group] += 1
     total = np.empty(K, np.float32)
     done = -1  # last row whose costs are in the ring
     for y in range(tile.top, tile.bottom):
-        if not mask[y, tile.begin : tile.end].any():
+        wanted = False
+        for x in range(tile.begin, tile.end):
+            wanted |= mask[y, x]
+        if not wanted:
             continue
         for row in range(max(0, y - radius, done + 1), min(H, y + radius + 1)):
             _fill_row(views, candidates, mask, row, tile, radius, rows)

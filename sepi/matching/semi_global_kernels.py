@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit, prange
+
+from sepi.compiled import njit, prange
 
 EXACT = {"nnan", "ninf", "nsz"}
 """Fast-math flags that keep every rounding as written: see :mod:`sepi.matching.plane_sweep_kernels`."""
@@ -67,9 +68,11 @@ def _large_penalty(guide: Any, y: int, x: int, row: int, column: int, small: Any
 
 @njit(inline="always")
 def _start(cost: Any, path: Any) -> Any:
+    least = cost[0]
     for k in range(cost.size):
         path[k + 1] = cost[k]
-    return cost.min()
+        least = min(least, cost[k])
+    return least
 
 
 @njit(inline="always")

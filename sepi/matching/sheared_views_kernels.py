@@ -6,7 +6,8 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit, prange
+
+from sepi.compiled import njit, prange
 
 
 @njit(inline="always")

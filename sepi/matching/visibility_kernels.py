@@ -6,8 +6,8 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit, prange
 
+from sepi.compiled import njit, prange
 from sepi.lightfield import FloatMap
 from sepi.matching.base_detail import BaseDetail
 

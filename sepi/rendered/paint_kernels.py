@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 import numpy.typing as npt
 
+from sepi.compiled import njit, prange
 from sepi.rendered.world import FloatArray
 
 _Doubles = npt.NDArray[np.float64]
 
 
-@numba.njit(cache=True, parallel=True)
+@njit(cache=True, parallel=True)
 def painted(
     faces: npt.NDArray[np.int32],
     pixels: npt.NDArray[np.int64],
@@ -28,7 +28,7 @@ def painted(
     """Mean colour at the ends of ``fine`` by ``fine`` rays of each pixel on its triangle's plane, ``(N, 3)``."""
     count = len(faces)
     found = np.zeros((count, 3), np.float32)
-    for n in numba.prange(count):
+    for n in prange(count):
         total = np.zeros(3)
         face = faces[n]
         one = thing[face]

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 import numpy.typing as npt
 
+from sepi.compiled import njit, prange
 from sepi.lightfield import BoolMap
 from sepi.rendered.world import FloatArray
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def _landing(
     y: int, x: int, disparity: float, baseline: npt.NDArray[np.float64], height: int, width: int
 ) -> tuple[bool, float, float, int, int]:
@@ -20,7 +20,7 @@ def _landing(
     return inside, row, column, min(int(row), height - 2), min(int(column), width - 2)
 
 
-@numba.njit(cache=True, parallel=True)
+@njit(cache=True, parallel=True)
 def seen_elsewhere(
     disparities: FloatArray, baselines: npt.NDArray[np.float64], view: int, same: float
 ) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
@@ -31,7 +31,7 @@ def seen_elsewhere(
     count, height, width = disparities.shape
     hidden = np.zeros((height, width), np.bool_)
     seen = np.zeros((height, width), np.bool_)
-    for y in numba.prange(height):
+    for y in prange(height):
         for x in range(width):
             own = disparities[view, y, x]
             for other in range(count):
@@ -51,7 +51,7 @@ def seen_elsewhere(
     return hidden, seen
 
 
-@numba.njit(cache=True, parallel=True)
+@njit(cache=True, parallel=True)
 def gathered_light(
     light: FloatArray,
     disparities: FloatArray,
@@ -68,7 +68,7 @@ def gathered_light(
     count, height, width = disparities.shape
     result = light[view].copy()
     variance = np.zeros((height, width), np.float32)
-    for y in numba.prange(height):
+    for y in prange(height):
         for x in range(width):
             if not whole[view, y, x]:
                 continue
@@ -111,7 +111,7 @@ def gathered_light(
     return result, variance
 
 
-@numba.njit(cache=True, parallel=True)
+@njit(cache=True, parallel=True)
 def alike_light(
     light: FloatArray, variance: FloatArray, things: npt.NDArray[np.int16], whole: BoolMap, reach: int, doubt: float
 ) -> FloatArray:
@@ -119,7 +119,7 @@ def alike_light(
     height, width = whole.shape
     grey = light[..., 0] + light[..., 1] + light[..., 2]
     result = light.copy()
-    for y in numba.prange(height):
+    for y in prange(height):
         for x in range(width):
             if not whole[y, x]:
                 continue
@@ -144,12 +144,12 @@ def alike_light(
     return result
 
 
-@numba.njit(cache=True, parallel=True)
+@njit(cache=True, parallel=True)
 def limit_bent(shown: FloatArray, things: npt.NDArray[np.int16], whole: BoolMap, reach: int) -> FloatArray:
     """Keep pixels that are not whole, amid one thing, within the light of its whole ones beside them."""
     height, width = whole.shape
     result = shown.copy()
-    for y in numba.prange(height):
+    for y in prange(height):
         for x in range(width):
             one = not whole[y, x]
             for i in range(max(y - 1, 0), min(y + 2, height)):

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 import numpy.typing as npt
 
+from sepi.compiled import njit
 from sepi.lightfield import BoolMap, FloatMap
 
 # A surface hides a point only if it is nearer by more than rounding (points on the edge between two faces).
@@ -15,7 +15,7 @@ FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def _fill_row(
     first_edge: IntArray,
     planes: FloatArray,
@@ -58,7 +58,7 @@ def _fill_row(
                     owner[column] = p
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def nearest(
     first_edge: IntArray, planes: FloatArray, edges: FloatArray, disparity: FloatArray, owner: IntArray
 ) -> None:
@@ -68,7 +68,7 @@ def nearest(
         _fill_row(first_edge, planes, edges, float(row), 1, crossings, disparity[row], owner[row])
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def shade(
     first_edge: IntArray,
     texels: FloatMap,
@@ -123,7 +123,7 @@ def shade(
     picture /= samples * samples
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def _spline_weights(position: float, weights: FloatArray) -> int:
     """Cubic B-spline weights at ``position``; gives the index of the first of the four texels."""
     base = np.floor(position)
@@ -136,7 +136,7 @@ def _spline_weights(position: float, weights: FloatArray) -> int:
     return int(base) - 1
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def hide(
     first_edge: IntArray,
     planes: FloatArray,
@@ -166,7 +166,7 @@ def hide(
                     break
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def _inside(edges: FloatArray, begin: int, end: int, x: float, y: float) -> bool:
     """Even-odd rule: does a ray to the right cross the outline an odd number of times?"""
     odd = False
@@ -179,7 +179,7 @@ def _inside(edges: FloatArray, begin: int, end: int, x: float, y: float) -> bool
     return odd
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def cast(
     first_edge: IntArray,
     edges: FloatArray,
@@ -223,7 +223,7 @@ def cast(
                 hits[i, 0], hits[i, 1], hits[i, 2] = t, x, y
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def colours_at(
     texels: FloatMap, first_texel: IntArray, side: IntArray, owner: IntArray, hits: FloatArray, colours: FloatArray
 ) -> None:

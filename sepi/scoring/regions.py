@@ -7,11 +7,11 @@ every scene and method, so that rows of a table compare. Estimators never see th
 from __future__ import annotations
 
 import cv2
-import numba
 import numpy as np
 import numpy.typing as npt
 from scipy import ndimage
 
+from sepi.compiled import njit
 from sepi.lightfield import BoolMap, FloatMap
 from sepi.validation import require_map, require_type
 
@@ -126,7 +126,7 @@ def _without_small(mask: BoolMap) -> BoolMap:
     return kept
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def _hidden(ground_truth: npt.NDArray[np.float64], baselines: npt.NDArray[np.float64], nearest: float) -> BoolMap:
     """``occluded`` with -inf for unknown disparities, baselines ``(N, 2)`` and the largest disparity."""
     height, width = ground_truth.shape
@@ -140,7 +140,7 @@ def _hidden(ground_truth: npt.NDArray[np.float64], baselines: npt.NDArray[np.flo
     return result
 
 
-@numba.njit(cache=True)
+@njit(cache=True)
 def _hidden_in(ground_truth: npt.NDArray[np.float64], y: int, x: int, v: float, u: float, nearest: float) -> bool:
     """Whether the view of baseline ``(v, u)`` does not see the pixel ``(y, x)``."""
     height, width = ground_truth.shape
