@@ -183,10 +183,10 @@ $(READY): requirements.lock pyproject.toml
 	$(PYTHON) -m venv .venv
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --requirement requirements.lock
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
-	$(BIN)/python -m sepi.cli.warm_up
+	$(BIN)/python -m sepi.cli.warm_up --check
 	touch $@
 
 # the kernels of the compared methods, and those for other views than 8-bit ones: only their target and the tests call them
 $(COMPARED): $(READY)
-	$(BIN)/python -m sepi.cli.warm_up --comparison --all-types
+	$(BIN)/python -m sepi.cli.warm_up --comparison --all-types --check
 	touch $@

@@ -18,6 +18,7 @@ import time
 import warnings
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
+from dataclasses import replace
 from pathlib import Path
 from types import FrameType
 from typing import IO, TYPE_CHECKING, Any
@@ -214,11 +215,11 @@ def stage_command(stage: str, own: Mapping[str, Choice]) -> click.Command:
     from sepi.io.hdf5 import read_light_field, read_stage, write_stage
     from sepi.io.provenance import history_of, stage_attributes
     from sepi.kernel_cache import tell_kernel_cache
-    from sepi.matching.base_detail import kept_detail
     from sepi.memory import KERNELS, require_memory
     from sepi.stage import entry
     from sepi.threads import use_threads
     from sepi.validation import validated
+    from sepi.workspace import Workspace
 
     existing = click.Path(path_type=Path)
     choices = StageChoices(stage, own)
@@ -252,8 +253,9 @@ def stage_command(stage: str, own: Mapping[str, Choice]) -> click.Command:
             )
         require_memory(KERNELS)
         tell_kernel_cache()
-        with progress_bar(f"{light_field.name} {stage}") as progress, kept_detail():
-            result = chosen.run(equally_bright(light_field), maps, settings, progress)
+        compared = replace(equally_bright(light_field), workspace=Workspace())
+        with progress_bar(f"{light_field.name} {stage}") as progress:
+            result = chosen.run(compared, maps, settings, progress)
         history = [*history_of(previous), entry(stage, choice, settings, light_field)]
         write_stage(output, result, stage_attributes(light_field, history))
         if timing is not None:

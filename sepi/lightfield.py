@@ -16,6 +16,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from types import NoneType
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -24,6 +25,9 @@ from sepi.camera import Camera
 from sepi.errors import SepiError, one_line
 from sepi.rig import Rig
 from sepi.validation import described, is_finite, require_known, require_type, whole_pair
+
+if TYPE_CHECKING:
+    from sepi.workspace import Workspace
 
 FloatMap = npt.NDArray[np.float32]
 BoolMap = npt.NDArray[np.bool_]
@@ -146,6 +150,8 @@ class LightField:
         Pixels that views do not show, since their cameras looked elsewhere; None: they show all. Views hold the nearest
         pixel there that they show, so that filters end there as at a picture's border, and nothing is compared with it.
         (Methods of others that know no border compare it, as they do beyond the border.)
+    workspace : Workspace or None
+        What stages keep of the views for each other (:mod:`sepi.workspace`); None: nothing. No part of the light field.
 
     Raises
     ------
@@ -189,6 +195,7 @@ class LightField:
     reading: str = ""
     rig: Rig | None = None
     missing: BoolMap | None = None
+    workspace: Workspace | None = field(default=None, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         v = self.views

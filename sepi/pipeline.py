@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from contextlib import ExitStack
 from dataclasses import replace
 from numbers import Real
 from types import NoneType
@@ -12,13 +11,12 @@ from typing import Any
 from sepi.exposure import equally_bright
 from sepi.kernel_cache import tell_kernel_cache
 from sepi.lightfield import LightField, require_light_field
-from sepi.matching.base_detail import kept_detail
 from sepi.matching.memory_limit import bytes_of_bands, require_memory_of
-from sepi.matching.row_bands import band_memory
 from sepi.matching.unknown import with_unknown
 from sepi.stage import MadeBy, Progress, StageMaps, entry, no_progress
 from sepi.validation import require_type
 from sepi.variants import DEFAULT_VARIANT, HANDED_ON, STAGES, VARIANTS, Variant, stage_parameters, variant_named
+from sepi.workspace import Workspace
 
 
 def estimate_depth(
@@ -86,19 +84,19 @@ def estimate_depth(
         light_field = light_field.with_range(estimate_range(light_field))
     light_field.require_seen_range()
     tell_kernel_cache()
-    compared = equally_bright(light_field)
+    compared = replace(equally_bright(light_field), workspace=light_field.workspace or Workspace())
+    require_memory_of(compared, settings.values())
+    if memory is not None:
+        own = bytes_of_bands(compared, settings.values(), memory)
+        compared = replace(compared, workspace=Workspace(own))
     maps: StageMaps | None = None
-    with kept_detail(), ExitStack() as limited:
-        require_memory_of(compared, settings.values())
-        if memory is not None:
-            limited.enter_context(band_memory(bytes_of_bands(compared, settings.values(), memory)))
-        for number, (stage, choice) in enumerate(chosen.choices.items()):
+    for number, (stage, choice) in enumerate(chosen.choices.items()):
 
-            def of_all(fraction: float, number: int = number) -> None:
-                progress((number + fraction) / len(STAGES))
+        def of_all(fraction: float, number: int = number) -> None:
+            progress((number + fraction) / len(STAGES))
 
-            maps = STAGES[stage][choice].run(compared, maps, settings[stage], of_all)
-            of_all(1.0)
+        maps = STAGES[stage][choice].run(compared, maps, settings[stage], of_all)
+        of_all(1.0)
     assert maps is not None  # there are stages
     name = variant if isinstance(variant, str) else next((key for key, one in VARIANTS.items() if one == variant), "")
     history = tuple(

@@ -28,7 +28,7 @@ DATA = Path(os.environ.get("SEPI_DATA", Path(__file__).parents[2] / "shared" / "
 # what a test is marked with for a fixture that it uses
 _MARKS = {"real_data": "real", "browser": "browser", "slurm": "slurm"}
 # what takes longest is begun first, so that several processes end at about the same time
-_FIRST = ("slurm", "real", "workflow", "slow", "browser", "long")
+_FIRST = ("slurm", "real", "system", "workflow", "slow", "browser", "long")
 # written by `make long-tests`
 _LONG_TESTS = Path(__file__).with_name("long_tests.txt")
 # files whose tests share what takes long to make: real maps, a run of the workflow, a report, kernels for other types

@@ -4,11 +4,13 @@ Compiled code is kept on disk, beside the package or in ``NUMBA_CACHE_DIR``, so 
 Without it the first jobs of a workflow compile what they need, several of them the same at the same time. Here every
 stage of enough variants runs on a tiny light field, in two processes, since one compiles one function at a time.
 Kernels for 16-bit and float views are compiled when they are first needed, or with ``--all-types``; those of the
-compared methods with ``--comparison``.
+compared methods with ``--comparison``. ``--check`` looks whether what was just compiled computes what it computes once
+it is loaded from disk: else two machines would never agree.
 """
 
 from __future__ import annotations
 
+import hashlib
 import time
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
@@ -18,11 +20,15 @@ import click
 import numpy as np
 
 from sepi.command import SepiCommand
+from sepi.errors import SepiError
 from sepi.kernel_cache import tell_kernel_cache
-from sepi.threads import use_threads
+from sepi.threads import available_cores, use_threads
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from sepi.lightfield import LightField
+    from sepi.stage import StageMaps
 
 SHARES: tuple[tuple[str, ...], ...] = (("paper", "no_sepi", "wang"), ("best", "best_no_detail"))
 """Variants that together call every kernel; those of one share have few kernels in common with the other's."""
@@ -36,10 +42,10 @@ TYPES = ("uint16", "float32")
 _SCENE, _SIZE, _VIEWS = "curved_occluders", 64, 3
 
 
-def compile_kernels(variants: tuple[str, ...], kind: str = "uint8") -> None:
+def compile_kernels(variants: tuple[str, ...], kind: str = "uint8") -> dict[str, str]:
     """Call every kernel that these variants use, and those that reading and evaluating use, as their jobs do.
 
-    ``kind`` is the type of the views.
+    ``kind`` is the type of the views. Returns variant to a digest of its maps.
     """
     from dataclasses import replace
 
@@ -49,14 +55,15 @@ def compile_kernels(variants: tuple[str, ...], kind: str = "uint8") -> None:
     from sepi.inspection.disparity_range import estimate_range
     from sepi.inspection.view_order import check_order
     from sepi.pipeline import estimate_depth
-    from sepi.scenes import render
     from sepi.variants import DEFAULT_VARIANT
 
     # one thread: compiling is all there is to do
     use_threads(1)
-    light_field = _of_type(render(_SCENE, size=_SIZE, views=_VIEWS), kind)
+    light_field = _light_field(kind)
+    digests = {}
     for variant in variants:
         maps = estimate_depth(light_field, variant, {})
+        digests[variant] = _digest(maps)
     bare = replace(light_field, disparity_range=None, masks={})
     evaluation_of(bare, maps.disparity)
     check_order(bare)
@@ -68,6 +75,26 @@ def compile_kernels(variants: tuple[str, ...], kind: str = "uint8") -> None:
         estimate_all_views(light_field, maps)
         all_in_focus(light_field, maps)
         refocus(light_field, 0.0, maps)
+    return digests
+
+
+def maps_of_kernels_on_disk(variants: tuple[str, ...], kind: str = "uint8") -> dict[str, str]:
+    """Variant to a digest of its maps, on as many threads as there are."""
+    from sepi.pipeline import estimate_depth
+
+    use_threads(available_cores())
+    light_field = _light_field(kind)
+    return {variant: _digest(estimate_depth(light_field, variant, {})) for variant in variants}
+
+
+def _digest(maps: StageMaps) -> str:
+    return hashlib.sha256(b"".join(values.tobytes() for values in (maps.disparity, maps.confidence))).hexdigest()
+
+
+def _light_field(kind: str) -> LightField:
+    from sepi.scenes import render
+
+    return _of_type(render(_SCENE, size=_SIZE, views=_VIEWS), kind)
 
 
 def _look() -> None:
@@ -122,17 +149,32 @@ def _share_light(light_field: LightField) -> None:
 @click.command(name="python -m sepi.cli.warm_up", cls=SepiCommand)
 @click.option("--comparison", is_flag=True, help="Those of the compared methods, too.")
 @click.option("--all-types", is_flag=True, help="Those for 16-bit and float views, too.")
-def command(comparison: bool, all_types: bool) -> None:
+@click.option("--check", is_flag=True, help="Look whether they compute the same once they are loaded from disk.")
+def command(comparison: bool, all_types: bool, check: bool) -> None:
     """Compile the kernels, so that the first run need not."""
     started = time.perf_counter()
     tell_kernel_cache()
     work = [(share, "uint8") for share in ((*SHARES, *COMPARED) if comparison else SHARES)]
     # a process for each type, which all of its kernels have in common
     work += [(sum(SHARES, ()), kind) for kind in TYPES] if all_types else []
+    compiled = _by_processes(compile_kernels, work)
+    if check:
+        for (_, kind), before, after in zip(work, compiled, _by_processes(maps_of_kernels_on_disk, work), strict=True):
+            unlike = [variant for variant in before if before[variant] != after[variant]]
+            if unlike:
+                raise SepiError(
+                    f"kernels for views of {kind}: loaded from disk they make another map than just compiled, of "
+                    f"{', '.join(unlike)}"
+                )
+    click.echo(f"kernels ready after {time.perf_counter() - started:.0f} s")
+
+
+def _by_processes(
+    function: Callable[[tuple[str, ...], str], dict[str, str]], work: list[tuple[tuple[str, ...], str]]
+) -> list[dict[str, str]]:
     with ProcessPoolExecutor(len(SHARES), get_context("spawn")) as processes:
         # taken from the iterator, so that an error in a process is one here
-        list(processes.map(compile_kernels, *zip(*work, strict=True)))
-    click.echo(f"kernels ready after {time.perf_counter() - started:.0f} s")
+        return list(processes.map(function, *zip(*work, strict=True)))
 
 
 if __name__ == "__main__":

@@ -14,9 +14,6 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
-from contextvars import ContextVar
 from dataclasses import dataclass
 from typing import Annotated, NamedTuple
 
@@ -26,8 +23,9 @@ from pydantic import Field
 
 from sepi.image.noise import noise_level, variance_of_residuals
 from sepi.lightfield import BoolMap, FloatMap, LightField, full_scale
-from sepi.matching.denoising import LEFT, DenoisedLightField, DenoisingParameters, kept_views
+from sepi.matching.denoising import LEFT, DenoisedLightField, DenoisingParameters
 from sepi.matching.row_bands import Rows
+from sepi.workspace import kept_of
 
 DETAIL_UNIT = 1 / 32000
 """Unit of the detail, which is stored as int16: colours differ by at most 1."""
@@ -163,37 +161,23 @@ def base_detail_decomposition(
 
 @dataclass
 class _Kept:
-    """What is made of one light field so far: its noise, and the detail of some of its views."""
+    """What is made of some views so far: the noise of the reference view, and the detail of some of them.
 
-    light_field: LightField | None = None
-    noise: float = 0.0
+    Detail is kept of whole views; what is made in bands of rows, since memory is short, is not.
+    """
+
+    views: npt.NDArray[np.generic]
+    reference: tuple[int, int]
+    noise: float | None = None
     made_with: tuple[float, ...] = ()
     detail: npt.NDArray[np.int16] | None = None
     made: BoolMap | None = None
 
 
-_kept: ContextVar[_Kept | None] = ContextVar("_kept", default=None)
-
-
-@contextmanager
-def kept_detail() -> Iterator[None]:
-    """Inside, in this thread, views are denoised and their detail is made once, however many passes compare it.
-
-    That holds for whole views; what is made in bands of rows, since memory is short, is not kept.
-    """
-    token = _kept.set(_Kept())
-    try:
-        with kept_views():
-            yield
-    finally:
-        _kept.reset(token)
-
-
-def forget_detail() -> None:
-    """Give back what :func:`kept_detail` keeps, which is made again if it is asked for."""
-    kept = _kept.get()
-    if kept is not None:
-        kept.detail = kept.made = None
+def forget_detail(light_field: LightField) -> None:
+    """Give back the detail that is kept, which is made again if it is asked for."""
+    kept = kept_of(light_field, _Kept)
+    kept.detail = kept.made = None
 
 
 def _detail_so_far(
@@ -204,9 +188,9 @@ def _detail_so_far(
     with_detail = parameters.use_detail
     # pages that nobody writes to take no memory
     shape = (*light_field.grid, rows.high - rows.low if with_detail else 0, width)
-    kept = _kept.get()
-    if kept is None or not with_detail or rows != (0, height):
+    if not with_detail or rows != (0, height):
         return np.zeros(shape, np.int16), present
+    kept = kept_of(light_field, _Kept)
     made_with = (parameters.base_radius, parameters.base_sigma_colour, parameters.base_sigma_space)
     if kept.detail is None or kept.made is None or kept.made_with != made_with:
         kept.made_with = made_with
@@ -217,22 +201,13 @@ def _detail_so_far(
 
 
 def reference_noise(light_field: LightField) -> float:
-    """Noise of the reference view (:func:`sepi.image.noise.noise_level`); inside :func:`kept_detail` found once.
+    """Noise of the reference view (:func:`sepi.image.noise.noise_level`); in a workspace found once.
 
     Of denoised views what is left where nothing but noise was: the mask would not see it, since it is smooth.
     """
     if isinstance(light_field, DenoisedLightField):
         return LEFT * light_field.noise
-    kept = _kept.get()
-    if kept is None:
-        return noise_level(light_field.reference_view)
-    known = kept.light_field
-    # each stage is given the same views anew
-    if (
-        known is None
-        or known.views is not light_field.views
-        or known.reference_position != light_field.reference_position
-    ):
-        # what was kept of another goes
-        _kept.set(kept := _Kept(light_field, noise_level(light_field.reference_view)))
+    kept = kept_of(light_field, _Kept)
+    if kept.noise is None:
+        kept.noise = noise_level(light_field.reference_view)
     return kept.noise

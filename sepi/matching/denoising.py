@@ -17,9 +17,6 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
-from contextvars import ContextVar
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -32,6 +29,7 @@ from sepi.image.noise import noise_level
 from sepi.lightfield import FloatMap, LightField, full_scale
 from sepi.matching.view_noise import PARTS, ViewNoise, view_noise
 from sepi.stage import Parameters
+from sepi.workspace import kept_of
 
 LEAST_NOISE = 1.25 / 255
 """Noise that is worth it: less may be that of rounding, and what is left where texture does not fit at whole pixels."""
@@ -101,7 +99,7 @@ def denoised(light_field: LightField, least: float) -> LightField:
     """
     if least == 0:
         return light_field
-    kept = _kept_of(light_field)
+    kept = kept_of(light_field, _Kept)
     of_views = _noise(light_field, kept)
     if kept.least != least:
         kept.least, kept.made = least, _denoised_views(light_field, of_views, least)
@@ -113,8 +111,8 @@ def denoised(light_field: LightField, least: float) -> LightField:
 
 
 def measured_noise(light_field: LightField) -> ViewNoise:
-    """:func:`sepi.matching.view_noise.view_noise`, of views that are not denoised; in :func:`kept_views` just once."""
-    return _noise(light_field, _kept_of(light_field))
+    """:func:`sepi.matching.view_noise.view_noise`, of views that are not denoised; in a workspace just once."""
+    return _noise(light_field, kept_of(light_field, _Kept))
 
 
 def _noise_of_parts(image: FloatMap) -> float:
@@ -127,34 +125,11 @@ def _noise_of_parts(image: FloatMap) -> float:
 class _Kept:
     """What is known of the views of one light field: their noise, and what they are without it; None as they are."""
 
-    views: npt.NDArray[Any] | None = None
+    views: npt.NDArray[Any]
+    reference: tuple[int, int]
     noise: ViewNoise | None = None
     least: float = 0.0
     made: npt.NDArray[Any] | None = None
-
-
-_kept: ContextVar[_Kept | None] = ContextVar("_kept", default=None)
-
-
-@contextmanager
-def kept_views() -> Iterator[None]:
-    """Inside, in this thread, views are denoised once, however many stages ask."""
-    token = _kept.set(_Kept())
-    try:
-        yield
-    finally:
-        _kept.reset(token)
-
-
-def _kept_of(light_field: LightField) -> _Kept:
-    """What is kept of these views; outside of :func:`kept_views` nothing, and it is not kept."""
-    kept = _kept.get()
-    if kept is None:
-        return _Kept(light_field.views)
-    if kept.views is not light_field.views:
-        # each stage is given the same views anew
-        kept.views, kept.noise, kept.least, kept.made = light_field.views, None, 0.0, None
-    return kept
 
 
 def _noise(light_field: LightField, kept: _Kept) -> ViewNoise:

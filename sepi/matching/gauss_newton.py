@@ -202,7 +202,7 @@ def spline_views(
     )  # fmt: skip
     if (present == light_field.present).all():
         # the splines of all views take its place
-        forget_detail()
+        forget_detail(light_field)
     others = present.copy()
     others[light_field.reference_position] = False
     own = np.zeros((height, width, 4), np.float32)

@@ -8,21 +8,14 @@ begins: results are the same for any number of bands.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from contextlib import contextmanager
-from contextvars import ContextVar
 from itertools import pairwise
 from typing import NamedTuple
 
 from sepi.lightfield import BoolMap, LightField
-
-USUAL_BYTES = 2**29
-"""What the bands may take unless somebody says otherwise."""
+from sepi.workspace import band_bytes_of
 
 FEWEST_ROWS = 16
 """Of a band, however little memory there is."""
-
-_bytes: ContextVar[int] = ContextVar("_bytes", default=USUAL_BYTES)
 
 
 class Rows(NamedTuple):
@@ -38,16 +31,6 @@ class Band(NamedTuple):
     begin: int
     end: int
     rows: Rows
-
-
-@contextmanager
-def band_memory(number: int) -> Iterator[None]:
-    """Bands made inside, in this thread, take about so many bytes at a time, or as few as they can."""
-    token = _bytes.set(number)
-    try:
-        yield
-    finally:
-        _bytes.reset(token)
 
 
 def row_bands(
@@ -74,7 +57,7 @@ def row_bands(
     """
     height, width = light_field.shape
     moved = _rows_moved(light_field, present, reach) + beside
-    fitting = _bytes.get() // max(1, bytes_per_pixel * width * int(present.sum()))
+    fitting = band_bytes_of(light_field) // max(1, bytes_per_pixel * width * int(present.sum()))
     number = 1 if fitting >= height else math.ceil(height / max(FEWEST_ROWS, fitting - 2 * moved))
     ends = [round(height * i / number) for i in range(number + 1)]
     return [Band(begin, end, Rows(max(0, begin - moved), min(height, end + moved))) for begin, end in pairwise(ends)]

@@ -1,5 +1,6 @@
 """Near or far beside a depth step by shares of the views: what it says of exact scenes, and equal to a plain twin."""
 
+from dataclasses import replace
 from typing import Any
 
 import cv2
@@ -18,9 +19,9 @@ from sepi.boundaries.parameters import BoundaryParameters
 from sepi.boundaries.rim_kernels import Rim, rim_of
 from sepi.boundaries.surroundings import surroundings
 from sepi.lightfield import LightField
-from sepi.matching.row_bands import band_memory
 from sepi.matching.visibility_kernels import z_buffers
 from sepi.scenes import render
+from sepi.workspace import Workspace
 
 USUAL = BoundaryParameters(use_mixture=False)
 AROUND = np.ones((3, 3), np.uint8)
@@ -145,8 +146,8 @@ def test_grey_bands_and_threads_change_nothing(geometry: str) -> None:
     expected = assigned_to_surfaces(field, wide, USUAL)
     assert (expected != wide).any()
     np.testing.assert_array_equal(assigned_to_surfaces(threefold, wide, USUAL), expected)
-    with band_memory(1):
-        np.testing.assert_array_equal(assigned_to_surfaces(field, wide, USUAL), expected)
+    in_bands = replace(field, workspace=Workspace(1))
+    np.testing.assert_array_equal(assigned_to_surfaces(in_bands, wide, USUAL), expected)
     threads = several_threads()
     numba.set_num_threads(1)
     try:
@@ -357,7 +358,6 @@ def test_bands_hold_every_row_that_is_looked_at(grid: tuple[int, int], monkeypat
         return background_of(views, layer, wanted, begin, end)
 
     monkeypatch.setattr(kernels, "background_of", checked)
-    with band_memory(1):
-        assigned_to_surfaces(light_field, whole.ground_truth, USUAL)
+    assigned_to_surfaces(replace(light_field, workspace=Workspace(1)), whole.ground_truth, USUAL)
     assert asked
     assert all(asked)

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
+from sepi.cli import warm_up
 from sepi.cli.warm_up import COMPARED, command
 from sepi.compared.methods import METHODS
 
@@ -58,8 +59,18 @@ def test_every_compared_method_is_in_a_share() -> None:
     assert {variant for share in COMPARED for variant in share} == set(METHODS)
 
 
-@pytest.mark.system
-def test_the_command_compiles_all_shares() -> None:
-    result = CliRunner().invoke(command, ["--all-types"])
-    assert result.exit_code == 0, result.output
-    assert result.stdout.startswith("kernels ready after ")
+def test_kernels_that_differ_once_loaded_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Else whoever runs something a second time has another map. (`make` compiles all of them with this check.)"""
+    digests = iter([[{"best": "a", "fast": "b"}, {"paper": "c"}], [{"best": "a", "fast": "x"}, {"paper": "c"}]])
+    monkeypatch.setattr(warm_up, "_by_processes", lambda *_: next(digests))
+    result = CliRunner().invoke(command, ["--check"])
+    assert result.exit_code == 1
+    assert result.stderr == (
+        "sepi: kernels for views of uint8: loaded from disk they make another map than just compiled, of fast\n"
+    )
+
+
+def test_digests_are_of_the_maps() -> None:
+    """One that is of less would find nothing."""
+    found = warm_up.maps_of_kernels_on_disk(("no_occlusion_no_textureless", "no_sepi"))
+    assert len(set(found.values())) == 2

@@ -8,9 +8,10 @@ import pytest
 
 from sepi.image.noise import noise_level
 from sepi.lightfield import LightField, as_unit_float
-from sepi.matching.base_detail import DETAIL_UNIT, BaseDetailParameters, base_detail_decomposition, kept_detail
+from sepi.matching.base_detail import DETAIL_UNIT, BaseDetailParameters, base_detail_decomposition
 from sepi.matching.row_bands import Rows
 from sepi.scenes import render
+from sepi.workspace import Workspace
 
 
 def detail_twin(view: np.ndarray, radius: int, edge: float, width: float) -> np.ndarray:
@@ -79,11 +80,12 @@ def test_what_is_kept_of_views_changes_nothing() -> None:
         for radius, views in ((4, few), (4, all_views), (3, few), (4, few))
     ]
     alone = [base_detail_decomposition(field, parameters, None, views) for field, parameters, views in asked]
-    with kept_detail():
-        for (field, parameters, views), expected in zip(asked, alone, strict=True):
-            found = base_detail_decomposition(field, parameters, None, views)
-            np.testing.assert_array_equal(found.detail[views], expected.detail[views])
-            assert found.noise == expected.noise
-            # of some rows, as in bands: not kept
-            band = base_detail_decomposition(field, parameters, Rows(8, 40), views)
-            np.testing.assert_array_equal(band.detail[views], expected.detail[views][:, 8:40])
+    workspace = Workspace()
+    for (field, parameters, views), expected in zip(asked, alone, strict=True):
+        kept = replace(field, workspace=workspace)
+        found = base_detail_decomposition(kept, parameters, None, views)
+        np.testing.assert_array_equal(found.detail[views], expected.detail[views])
+        assert found.noise == expected.noise
+        # of some rows, as in bands: not kept
+        band = base_detail_decomposition(kept, parameters, Rows(8, 40), views)
+        np.testing.assert_array_equal(band.detail[views], expected.detail[views][:, 8:40])

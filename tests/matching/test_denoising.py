@@ -8,10 +8,11 @@ import pytest
 from scipy import ndimage
 
 from sepi.lightfield import FloatMap, LightField
-from sepi.matching.denoising import DenoisedLightField, denoised, kept_views
+from sepi.matching.denoising import DenoisedLightField, denoised
 from sepi.matching.denoising_kernels import denoise_views
 from sepi.matching.view_noise import variance_map, view_noise
 from sepi.scenes import render
+from sepi.workspace import Workspace
 
 
 def with_noise(light_field: LightField, sigma: FloatMap | float, seed: int = 0) -> LightField:
@@ -121,9 +122,9 @@ def test_only_noisy_views_are_changed() -> None:
     assert denoised(clean, 1.5) is clean
     noisy = with_noise(scene, 6)
     assert denoised(noisy, 0) is noisy
-    with kept_views():
-        one, other = denoised(noisy, 1.5), denoised(replace(noisy), 1.5)
-        assert one.views is other.views
+    kept = replace(noisy, workspace=Workspace())
+    one, other = denoised(kept, 1.5), denoised(replace(kept), 1.5)
+    assert one.views is other.views
     assert isinstance(one, DenoisedLightField)
     assert one.noise * 255 == pytest.approx(6, rel=0.5)
     before, after = (np.abs(v.reference_view - scene.reference_view).mean() for v in (noisy, one))

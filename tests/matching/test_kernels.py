@@ -2,7 +2,6 @@
 
 import ast
 import os
-import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -49,6 +48,9 @@ def foreign_names(source: str) -> set[str]:
             targets = node.targets if isinstance(node, ast.Assign) else [node.target]
             definitions |= {name: node for target in targets for name in names_in(target)}
         elif isinstance(node, ast.ImportFrom) and (node.level or (node.module or "").startswith("sepi")):
+            if node.module == "sepi.compiled":
+                # numba's own words
+                continue
             imported |= {alias.asname or alias.name for alias in node.names}
         elif isinstance(node, ast.Import):
             imported |= {a.asname or "sepi" for a in node.names if a.name.startswith("sepi")}
@@ -82,42 +84,34 @@ def test_compiled_functions_use_their_own_file_only(file: Path) -> None:
     assert foreign_names(file.read_text()) == set()
 
 
-@pytest.mark.system
 @pytest.mark.slow
 def test_changed_source_is_compiled_anew(tmp_path: Path) -> None:
     """With old machine code a changed constant or function would have no effect, until somebody clears the cache."""
-    package, cache = tmp_path / "sepi", tmp_path / "cache"
-    shutil.copytree(PACKAGE, package, ignore=shutil.ignore_patterns("__pycache__"))
-    kernels = package / "matching" / "plane_sweep_kernels.py"
+    kernels = tmp_path / "kernels.py"
+    source = (
+        "from sepi.compiled import njit\nSCALE = 2.0\nFLAGS = {'nnan', 'ninf'}\n"
+        "@njit(inline='always')\ndef robust(z):\n    return z / (z + SCALE)\n"
+        "@njit(cache=True, fastmath=FLAGS)\ndef cost(x):\n    return robust(x * x)\n"
+    )
     program = (
-        "import numpy as np; from sepi.matching.plane_sweep import sampled_candidates;"
-        "from sepi.matching.plane_sweep_kernels import Run, cost_row; from sepi.matching.sweep_arrays import ViewStack;"
-        "colours = np.random.default_rng(0).integers(0, 255, (3, 3, 3, 9, 9)).astype(np.uint8);"
-        "subsets, groups = np.ones((1, 1), bool), np.zeros((3, 3), np.int64);"
-        "shown = np.zeros((3, 3, 0, 2), np.int64);"
-        "views = ViewStack(colours, 1, 1, groups, subsets, np.float32(900), shown);"
-        "baselines = np.moveaxis(np.indices((3, 3)), 0, 2) - 1.0;"
-        "candidates = sampled_candidates(np.linspace(-1, 1, 5).astype(np.float32), baselines);"
-        "cost = np.zeros((1, 5, 9), np.float32); cost_row(views, candidates, Run(4, 0, 9), cost);"
-        "print(sum(cost_row.stats.cache_misses.values()), cost.sum())"
+        f"import sys; sys.path.insert(0, {str(tmp_path)!r}); from kernels import cost; print(cost(2.0));"
+        "print(sum(cost.stats.cache_misses.values()), sum(cost.stats.cache_hits.values()))"
     )
 
-    def compiled_and_cost() -> tuple[str, str]:
-        compiled, cost = run(program, package, cache).decode().split()
-        return compiled, cost
+    def cost_misses_hits(text: str) -> tuple[float, ...]:
+        kernels.write_text(text)
+        return tuple(float(word) for word in run(program, PACKAGE, tmp_path / "cache").split())
 
-    compiled, before = compiled_and_cost()
-    assert compiled == "1"
-    assert compiled_and_cost() == ("0", before)
-    for old, new in (("z / (z + scale2)", "z / (z + 4 * scale2)"), ('"nnan", "ninf", "nsz"', '"nnan", "ninf"')):
-        source = kernels.read_text()
+    assert cost_misses_hits(source) == (4 / 6, 1, 0)
+    for old, new, expected in (
+        ("SCALE = 2.0", "SCALE = 12.0", 4 / 16),
+        ("z / (z", "2 * z / (z", 8 / 16),
+        ("'nnan', 'ninf'", "'nnan'", 8 / 16),
+    ):
         assert old in source
-        kernels.write_text(source.replace(old, new))
-        compiled, cost = compiled_and_cost()
-        assert compiled == "1"
-        # rounding is the same with the other flags
-        assert (float(cost) < 0.9 * float(before)) == ("scale2" in new)
-        before = cost
+        source = source.replace(old, new)
+        assert cost_misses_hits(source) == (expected, 1, 0), new
+    assert run(program, PACKAGE, tmp_path / "cache").split()[1:] == [b"0", b"1"]
 
 
 @pytest.mark.system
@@ -125,7 +119,7 @@ def test_changed_source_is_compiled_anew(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("variants", "number", "factor"),
     [
-        (("paper", "wang", "no_sepi", "best", "best_no_detail"), "u1", 1),
+        pytest.param(("paper", "wang", "no_sepi", "best", "best_no_detail"), "u1", 1, marks=pytest.mark.faults),
         pytest.param(("paper",), "u2", 257, marks=pytest.mark.faults),
         pytest.param(("paper",), "f4", 1 / 255, marks=pytest.mark.faults),
     ],
@@ -133,7 +127,10 @@ def test_changed_source_is_compiled_anew(tmp_path: Path) -> None:
 def test_first_run_gives_the_bytes_of_later_ones(
     tmp_path: Path, variants: tuple[str, ...], number: str, factor: float
 ) -> None:
-    """Freshly compiled kernels round as those loaded from disk do; else two machines would never agree."""
+    """Freshly compiled kernels round as those loaded from disk do; else two machines would never agree.
+
+    `make` asks the same of the kernels that it compiles.
+    """
     program = (
         "import sys, numpy as np; from dataclasses import replace; from sepi.scenes import render;"
         "from sepi.pipeline import estimate_depth; scene = render('pyramids', size=64, views=5);"

@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,17 +13,18 @@ from sepi.errors import SepiError
 from sepi.lightfield import DisparityRange, LightField
 from sepi.matching import row_bands as module
 from sepi.matching.memory_limit import bytes_of_bands
-from sepi.matching.row_bands import FEWEST_ROWS, band_memory, row_bands
+from sepi.matching.row_bands import FEWEST_ROWS, row_bands
 from sepi.pipeline import estimate_depth
 from sepi.scenes import render
 from sepi.variants import stage_parameters, variant_named
+from sepi.workspace import Workspace
 
 
 def test_bands_cover_the_picture_and_what_it_is_seen_in() -> None:
     field = LightField(np.zeros((5, 5, 200, 40, 3), np.uint8), "grid")
     assert len(row_bands(field, field.present, 1.5, 10)) == 1
-    with band_memory(100 * 40 * 25 * 10):
-        bands = row_bands(field, field.present, 1.5, 10)
+    limited = replace(field, workspace=Workspace(100 * 40 * 25 * 10))
+    bands = row_bands(limited, field.present, 1.5, 10)
     assert len(bands) > 1
     assert [band.begin for band in bands] == [0, *(band.end for band in bands[:-1])]
     assert bands[-1].end == 200
@@ -34,9 +36,8 @@ def test_bands_cover_the_picture_and_what_it_is_seen_in() -> None:
 
 
 def test_bands_are_never_narrower_than_useful() -> None:
-    field = LightField(np.zeros((5, 5, 200, 40, 3), np.uint8), "grid")
-    with band_memory(1):
-        assert all(band.end - band.begin >= FEWEST_ROWS - 1 for band in row_bands(field, field.present, 1.5, 10))
+    field = LightField(np.zeros((5, 5, 200, 40, 3), np.uint8), "grid", workspace=Workspace(1))
+    assert all(band.end - band.begin >= FEWEST_ROWS - 1 for band in row_bands(field, field.present, 1.5, 10))
 
 
 @pytest.mark.parametrize("geometry", GEOMETRIES)
@@ -57,8 +58,7 @@ def test_maps_are_the_same_for_any_number_of_bands(variant: str, geometry: str, 
     at_once = estimate_depth(field, variant, few)
     assert set(numbers) == {1}
     numbers.clear()
-    with band_memory(1):
-        in_bands = estimate_depth(field, variant, few)
+    in_bands = estimate_depth(replace(field, workspace=Workspace(1)), variant, few)
     assert set(numbers) == {4}
     np.testing.assert_array_equal(in_bands.disparity, at_once.disparity)
     np.testing.assert_array_equal(in_bands.confidence, at_once.confidence)
