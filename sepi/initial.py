@@ -10,6 +10,8 @@ the grid, and smooths the costs semi-globally (:mod:`sepi.matching.semi_global`)
 ``structure_tensor`` is the initial depth that the paper's ablation puts in its place
 (:mod:`sepi.matching.structure_tensor`).
 
+What every choice is given, and hands on: :class:`sepi.stage.Choice`.
+
 References
 ----------
 .. [1] Zhou, Shi, Liu, Jin, Zhang, Hou: Light Field Depth Estimation via Stitched Epipolar Plane Images.
@@ -34,26 +36,11 @@ def sepi(
 ) -> StageMaps:
     """Depth from full SEPIs: all views, every candidate (Eq. 1-5 of [1]_).
 
-    Parameters
-    ----------
-    light_field : LightField
-        With a known disparity range.
-    previous : None
-        The first stage builds on nothing.
-    parameters : SweepParameters
-    progress : callable
-        Called with the fraction done, 0..1.
-
     Returns
     -------
     StageMaps
         ``disparity`` and ``confidence``, shape (H, W), float32: the candidate of least colour variance, refined by a
         parabola, and ``1 - min / mean`` of the costs (Eq. 5).
-
-    Raises
-    ------
-    SepiError
-        If the disparity range is unknown.
 
     References
     ----------
@@ -81,25 +68,10 @@ def semi_global(
 ) -> StageMaps:
     """Depth from colours and detail of a few views, smoothed semi-globally: the first stage of variant ``best``.
 
-    Parameters
-    ----------
-    light_field : LightField
-        With a known disparity range.
-    previous : None
-        The first stage builds on nothing.
-    parameters : VisibilitySweepParameters
-    progress : callable
-        Called with the fraction done, 0..1.
-
     Returns
     -------
     StageMaps
         ``disparity`` and ``confidence``, shape (H, W), float32.
-
-    Raises
-    ------
-    SepiError
-        If the disparity range is unknown.
 
     References
     ----------
@@ -126,25 +98,10 @@ def structure_tensor(
 ) -> StageMaps:
     """Depth from the structure tensor of single EPIs, without stitching: for the ablation (table 4 of [1]_).
 
-    Parameters
-    ----------
-    light_field : LightField
-        With a known disparity range.
-    previous : None
-        The first stage builds on nothing.
-    parameters : StructureTensorParameters
-    progress : callable
-        Called with the fraction done, 0..1.
-
     Returns
     -------
     StageMaps
         ``disparity`` and ``confidence``, shape (H, W), float32.
-
-    Raises
-    ------
-    SepiError
-        If the disparity range is unknown.
 
     References
     ----------

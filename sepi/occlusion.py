@@ -17,6 +17,8 @@ orientation, and the half with the smaller cost is kept. ``none`` hands the init
 (:mod:`sepi.matching.visibility_sweep`); pixels that a depth discontinuity runs through then go to the surface that
 fills most of them (:mod:`sepi.boundaries.decision`).
 
+What every choice is given, and hands on: :class:`sepi.stage.Choice`.
+
 References
 ----------
 .. [1] Zhou, Shi, Liu, Jin, Zhang, Hou: Light Field Depth Estimation via Stitched Epipolar Plane Images.
@@ -99,26 +101,11 @@ def half_sepi(
 ) -> StageMaps:
     """Depth from half-SEPIs at occluded pixels (section IV-B of [1]_).
 
-    Parameters
-    ----------
-    light_field : LightField
-        With a known disparity range.
-    previous : StageMaps
-        Initial depth.
-    parameters : HalfSepiParameters
-    progress : callable
-        Called with the fraction done, 0..1.
-
     Returns
     -------
     StageMaps
         Adds ``occlusion_candidates`` and ``occluded``, bool, and ``view_subset``, uint8, the subset kept, a number
         of ``subset_names``: all views, a half, or a quarter.
-
-    Raises
-    ------
-    SepiError
-        If there are no maps to refine, or the disparity range is unknown.
 
     References
     ----------
@@ -172,26 +159,11 @@ def wang(
 ) -> StageMaps:
     """Depth from the half of the angular patch, split along the edge, with the smaller cost [1]_.
 
-    Parameters
-    ----------
-    light_field : LightField
-        With a known disparity range.
-    previous : StageMaps
-        Initial depth.
-    parameters : WangParameters
-    progress : callable
-        Called with the fraction done, 0..1.
-
     Returns
     -------
     StageMaps
         Adds ``occlusion_candidates`` and ``occluded``, bool, and ``view_subset``, uint8, the subset kept, a number
         of ``subset_names``: all views, or a half plane.
-
-    Raises
-    ------
-    SepiError
-        If there are no maps to refine, or the disparity range is unknown.
 
     References
     ----------
@@ -232,25 +204,10 @@ def visibility(
 ) -> StageMaps:
     """Depth from the views that see each pixel, as the map so far tells: the second stage of variant ``best``.
 
-    Parameters
-    ----------
-    light_field : LightField
-        With a known disparity range.
-    previous : StageMaps
-        Initial depth.
-    parameters : VisibilityParameters
-    progress : callable
-        Called with the fraction done, 0..1.
-
     Returns
     -------
     StageMaps
         Adds ``occluded``, bool: pixels that something nearer occludes in some view.
-
-    Raises
-    ------
-    SepiError
-        If there are no maps to refine, or the disparity range is unknown.
 
     Examples
     --------

@@ -9,6 +9,8 @@ smoothness on the 4-connected grid where the image is smooth (Eq. 11) and the de
 (:mod:`sepi.regularization.second_order`), which leaves planes free, weighs each pixel by how much the views know about
 it. ``none`` hands the depth on.
 
+What every choice is given, and hands on: :class:`sepi.stage.Choice`.
+
 References
 ----------
 .. [1] Zhou, Shi, Liu, Jin, Zhang, Hou: Light Field Depth Estimation via Stitched Epipolar Plane Images.
@@ -101,25 +103,13 @@ def wls(
 ) -> StageMaps:
     """Globally optimised depth: weighted least squares (section IV-D, Eq. 8-12 of [1]_).
 
-    Parameters
-    ----------
-    light_field : LightField
-    previous : StageMaps
-        Depth after the textureless stage, with the map ``textureless`` where that stage ran.
-    parameters : WlsParameters
-    progress : callable
-        Called with the fraction done, 0..1.
+    Takes the map ``textureless`` where that stage ran.
 
     Returns
     -------
     StageMaps
         With the error bars ``sigma``, ``low`` and ``high``; ``confidence`` is the probability of an error of at most
         :data:`sepi.stage.CLOSE`, not the rectified confidence c' of Eq. 10, which weighs the data.
-
-    Raises
-    ------
-    SepiError
-        If there are no maps to refine.
 
     References
     ----------
@@ -162,25 +152,13 @@ def second_order(
 ) -> StageMaps:
     """Depth refined on the views and smoothed, planes being free: the last stage of variant ``best``.
 
-    Parameters
-    ----------
-    light_field : LightField
-    previous : StageMaps
-        Depth after the textureless stage, with the map ``textureless`` where that stage ran.
-    parameters : SecondOrderParameters
-    progress : callable
-        Called with the fraction done, 0..1.
+    Takes the map ``textureless`` where that stage ran.
 
     Returns
     -------
     StageMaps
         With the error bars ``sigma``, ``low`` and ``high``; ``confidence`` is the probability of an error of at most
         :data:`sepi.stage.CLOSE`.
-
-    Raises
-    ------
-    SepiError
-        If there are no maps to refine.
 
     Examples
     --------

@@ -326,9 +326,13 @@ class Choice:
     parameters : type
         Model of its parameters, a subclass of :class:`Parameters`.
     function : callable
-        The stage function ``(light_field, previous, parameters, progress) -> StageMaps``, where ``previous`` is what
-        the stage before handed on (None for the first), and ``progress`` takes the fraction done, 0..1. It changes
-        none of its arguments, reads no ground truth and writes no file. View steps are such as :meth:`run` makes them.
+        The stage function ``(light_field, previous, parameters, progress) -> StageMaps``: pure, of a light field with a
+        known disparity range, and of the maps that the stage before handed on (None for the first stage). It takes
+        ``parameters`` of its model and tells ``progress`` the fraction done, 0..1. Its maps have ``disparity`` and
+        ``confidence`` of shape (H, W), float32, and more as its docstring says. It changes none of its arguments, reads
+        no ground truth and writes no file; view steps are such as :meth:`run` makes them. It raises
+        :class:`~sepi.errors.SepiError` where the range is unknown, or there are no maps to refine. Docstrings of
+        choices say what is particular to each.
     own_steps : bool
         Whether it is given the light field's own view steps, as choices that callers add are.
 

@@ -14,6 +14,8 @@ linearly, from the reliable edges of their neighbourhood:
 ``uniform_planes`` tells textureless regions by the noise and gives each the plane that its border supports
 (:mod:`sepi.regularization.uniform_regions`). ``none`` hands the depth on.
 
+What every choice is given, and hands on: :class:`sepi.stage.Choice`.
+
 References
 ----------
 .. [1] Zhou, Shi, Liu, Jin, Zhang, Hou: Light Field Depth Estimation via Stitched Epipolar Plane Images.
@@ -77,26 +79,11 @@ def lti(
 ) -> StageMaps:
     """Depth propagated into superpixels of little local texture information (section IV-C, Eq. 6-7 of [1]_).
 
-    Parameters
-    ----------
-    light_field : LightField
-        With a known disparity range.
-    previous : StageMaps
-        Depth after the occlusion stage.
-    parameters : LtiParameters
-    progress : callable
-        Called with the fraction done, 0..1.
-
     Returns
     -------
     StageMaps
         Adds ``superpixels``, int32 labels; ``lti``, float32, of each pixel's superpixel, 0..1; ``textureless``, bool,
         the pixels whose depth was replaced.
-
-    Raises
-    ------
-    SepiError
-        If there are no maps to refine, or the disparity range is unknown.
 
     References
     ----------
@@ -159,24 +146,10 @@ def uniform_planes(
 ) -> StageMaps:
     """Planes in regions whose texture is no more than noise: the third stage of variant ``best``.
 
-    Parameters
-    ----------
-    light_field : LightField
-    previous : StageMaps
-        Depth after the occlusion stage.
-    parameters : UniformPlanesParameters
-    progress : callable
-        Called with the fraction done, 0..1.
-
     Returns
     -------
     StageMaps
         Adds ``textureless``, bool: the regions that were given a plane.
-
-    Raises
-    ------
-    SepiError
-        If there are no maps to refine.
 
     Examples
     --------

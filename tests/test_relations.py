@@ -85,7 +85,7 @@ ESTIMATORS = [name for name in VARIANTS if name not in LEARNED]
 
 @cache
 def scene(name: str) -> LightField:
-    return replace(render(name, size=SIZE, views=5), ground_truth=None)
+    return replace(render(name, size=SIZE, views=5), ground_truth=None, masks={})
 
 
 def unlike(first: FloatMap, second: FloatMap) -> float:
@@ -103,6 +103,53 @@ def test_a_turned_light_field_has_the_turned_map(variant: str) -> None:
         turned = replace(light_field, views=np.ascontiguousarray(of_views(light_field.views)))
         found = estimate_depth(turned, variant).disparity
         assert unlike(found, of_map(expected)) <= most, turn
+
+
+# of these, others are parts switched off: what is left is in them
+WHOLE = [name for name in ESTIMATORS if not re.match("best_no|no_occ|no_tex", name)]
+# percent of the pixels of a crop, and of views that are darker, whose depth may be another one by 0.1 px; those of the
+# variants that are not named are the first
+CROPPED = {"": 3.0, "no_sepi": 8.0, "wang": 7.0, "best_wls": 5.0, "occ": 7.0, "pobr": 25.0}
+DARKER = {"": 2.0, **dict.fromkeys(("paper", "no_sepi", "wang"), 8.0), "best_wls": 3.0, "occ": 8.0, "pobr": 12.0}
+
+
+@pytest.mark.parametrize("variant", WHOLE)
+def test_a_crop_has_the_crop_of_the_map(variant: str) -> None:
+    """What is estimated over the whole picture, and what filters do at its border, must not reach far."""
+    light_field = scene("curved_occluders")
+    part = replace(light_field, views=np.ascontiguousarray(light_field.views[:, :, 8:56, 8:56]))
+    found, expected = (estimate_depth(one, variant).disparity for one in (part, light_field))
+    # where a pixel of no view lies outside
+    assert unlike(found[8:-8, 8:-8], expected[16:-16, 16:-16]) <= CROPPED.get(variant, CROPPED[""])
+
+
+@pytest.mark.parametrize("variant", WHOLE)
+def test_darker_views_have_nearly_the_same_map(variant: str) -> None:
+    """Colours are compared in units of white, so some weights change; a threshold that all pixels pass would show."""
+    light_field = scene("curved_occluders")
+    darker = replace(light_field, views=light_field.views * np.float32(0.8 / 255))
+    found, expected = (estimate_depth(one, variant).disparity for one in (darker, light_field))
+    assert unlike(found, expected) <= DARKER.get(variant, DARKER[""])
+
+
+# the more views, the more of them a curved surface hides, and not by the one straight edge that it knows
+FEWER_ARE_BETTER = {"occ"}
+
+
+@pytest.mark.parametrize("variant", WHOLE)
+def test_more_noise_and_fewer_views_are_no_better(variant: str) -> None:
+    """Whoever has more light, or more views, would rather throw some away."""
+    whole = render("curved_occluders", size=SIZE, views=5)
+    noise = np.random.default_rng(0).normal(0, 10, whole.views.shape)
+    noisy = replace(whole, views=np.clip(np.rint(whole.views + noise), 0, 255).astype(np.uint8))
+    few = LightField(np.ascontiguousarray(whole.views[1:4, 1:4]), "few", disparity_range=whole.disparity_range)
+
+    def wrong(light_field: LightField) -> float:
+        return unlike(estimate_depth(light_field, variant).disparity, np.asarray(whole.ground_truth))
+
+    usual = wrong(whole)
+    assert wrong(noisy) >= usual - 0.3
+    assert variant in FEWER_ARE_BETTER or wrong(few) >= usual - 0.3
 
 
 # denoised views keep as many bits as they had, so that other levels are rounded

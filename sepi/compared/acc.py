@@ -122,24 +122,10 @@ def acc(
 ) -> StageMaps:
     """Candidates of least filtered cost.
 
-    Parameters
-    ----------
-    light_field : LightField
-        With a known disparity range.
-    previous : None
-        The first stage builds on nothing.
-    parameters : AccParameters
-    progress : callable
-
     Returns
     -------
     StageMaps
         With the cost volume.
-
-    Raises
-    ------
-    SepiError
-        If the disparity range is unknown.
     """
     disparities = parameters.candidates(light_field)
     costs = phase_shift_costs(light_field, disparities, parameters, progress)
@@ -210,23 +196,12 @@ def confident_labels(
 ) -> StageMaps:
     """Labels of least energy, drawn to reliable pixels and matched features, refined to a continuous map.
 
-    Parameters
-    ----------
-    light_field : LightField
-    previous : StageMaps
-        With a cost volume.
-    parameters : ConfidentLabelsParameters
-    progress : callable
+    Builds on maps with a cost volume.
 
     Returns
     -------
     StageMaps
         Without the cost volume.
-
-    Raises
-    ------
-    SepiError
-        If there is no cost volume.
     """
     before, volume = require_costs(previous)
     costs = _data_terms(light_field, before.disparity, volume, parameters)

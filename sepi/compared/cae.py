@@ -95,24 +95,10 @@ def cae(
 ) -> StageMaps:
     """Filtered costs of every candidate, and the candidate of least cost.
 
-    Parameters
-    ----------
-    light_field : LightField
-        With a known disparity range.
-    previous : None
-        The first stage builds on nothing.
-    parameters : ConstrainedEntropyParameters
-    progress : callable
-
     Returns
     -------
     StageMaps
         With the cost volume.
-
-    Raises
-    ------
-    SepiError
-        If the disparity range is unknown.
     """
     disparities = parameters.candidates(light_field)
     entropies, responses = entropies_and_responses(light_field, disparities, parameters.colour_sigma, progress)

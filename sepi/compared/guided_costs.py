@@ -32,23 +32,12 @@ def guided_costs(
 ) -> StageMaps:
     """Candidates of least filtered cost.
 
-    Parameters
-    ----------
-    light_field : LightField
-    previous : StageMaps
-        With a cost volume.
-    parameters : GuidedCostsParameters
-    progress : callable
+    Builds on maps with a cost volume.
 
     Returns
     -------
     StageMaps
         Without the cost volume.
-
-    Raises
-    ------
-    SepiError
-        If there is no cost volume.
     """
     before, volume = require_costs(previous)
     smooth = GuidedFilter(light_field.reference_view, parameters.radius, parameters.epsilon)

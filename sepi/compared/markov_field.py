@@ -38,23 +38,12 @@ def markov_field(
 ) -> StageMaps:
     """Candidates of least energy.
 
-    Parameters
-    ----------
-    light_field : LightField
-    previous : StageMaps
-        With a cost volume.
-    parameters : MarkovFieldParameters
-    progress : callable
+    Builds on maps with a cost volume.
 
     Returns
     -------
     StageMaps
         Without the cost volume.
-
-    Raises
-    ------
-    SepiError
-        If there is no cost volume.
     """
     before, volume = require_costs(previous)
     across, down = contrast_weights(light_field.reference_view, parameters.contrast)

@@ -117,23 +117,9 @@ def mishiba(
 ) -> StageMaps:
     """Disparities of least cost of the one-bit features of few views.
 
-    Parameters
-    ----------
-    light_field : LightField
-        With a known disparity range.
-    previous : None
-        The first stage builds on nothing.
-    parameters : MishibaParameters
-    progress : callable
-
     Returns
     -------
     StageMaps
-
-    Raises
-    ------
-    SepiError
-        If the disparity range is unknown.
     """
     disparities = parameters.candidates(light_field)
     costs = lattice_costs(light_field, disparities, parameters)
@@ -147,13 +133,7 @@ def median_descent(
 ) -> StageMaps:
     """Disparities of little energy of absolute differences.
 
-    Parameters
-    ----------
-    light_field : LightField
-    previous : StageMaps
-        Its confidence weighs its disparity.
-    parameters : MedianDescentParameters
-    progress : callable
+    The confidence of the maps before weighs their disparity.
 
     Returns
     -------

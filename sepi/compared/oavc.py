@@ -104,14 +104,6 @@ def oavc(
 ) -> StageMaps:
     """Candidates of most votes.
 
-    Parameters
-    ----------
-    light_field : LightField
-        With a known disparity range.
-    previous : None
-    parameters : OavcParameters
-    progress : callable
-
     Returns
     -------
     StageMaps
@@ -190,23 +182,12 @@ def guided_median(
 ) -> StageMaps:
     """Candidates of least filtered cost, and the weighted median of their map.
 
-    Parameters
-    ----------
-    light_field : LightField
-    previous : StageMaps
-        With a cost volume.
-    parameters : GuidedMedianParameters
-    progress : callable
+    Builds on maps with a cost volume.
 
     Returns
     -------
     StageMaps
         Without the cost volume.
-
-    Raises
-    ------
-    SepiError
-        If there is no cost volume.
     """
     maps = guided_costs(light_field, previous, parameters, progress)
     equal = np.ones_like(maps.disparity)

@@ -144,23 +144,9 @@ def occ(
 ) -> StageMaps:
     """Depth from whole angular patches.
 
-    Parameters
-    ----------
-    light_field : LightField
-        With a known disparity range.
-    previous : None
-        The first stage builds on nothing.
-    parameters : OccParameters
-    progress : callable
-
     Returns
     -------
     StageMaps
-
-    Raises
-    ------
-    SepiError
-        If the disparity range is unknown.
     """
     from sepi.compared.occ_kernels import whole_patch_costs
 
@@ -178,14 +164,7 @@ def occ_split(
 ) -> StageMaps:
     """Depth of pixels near edges from the better halves of their angular patches, and predicted occlusions.
 
-    Parameters
-    ----------
-    light_field : LightField
-        With a known disparity range.
-    previous : StageMaps
-        Depth from whole patches.
-    parameters : OccSplitParameters
-    progress : callable
+    Builds on depth from whole patches.
 
     Returns
     -------
@@ -213,14 +192,7 @@ def occ_field(
 ) -> StageMaps:
     """Disparities of least energy.
 
-    Parameters
-    ----------
-    light_field : LightField
-        With a known disparity range.
-    previous : StageMaps
-        Depth, its confidence, and ``predicted_occlusion`` where there is one.
-    parameters : OccFieldParameters
-    progress : callable
+    Takes the map ``predicted_occlusion`` where there is one.
 
     Returns
     -------

@@ -92,14 +92,6 @@ def onnx(
 ) -> StageMaps:
     """Depth by a network.
 
-    Parameters
-    ----------
-    light_field : LightField
-    previous : None
-        The first stage builds on nothing.
-    parameters : OnnxParameters
-    progress : callable
-
     Returns
     -------
     StageMaps

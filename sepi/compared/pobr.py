@@ -128,24 +128,10 @@ def pobr_cost(
 ) -> StageMaps:
     """Labels of least photo-consistency cost, and their confidence.
 
-    Parameters
-    ----------
-    light_field : LightField
-        With a known disparity range.
-    previous : None
-        The first stage builds on nothing.
-    parameters : PobrCostParameters
-    progress : callable
-
     Returns
     -------
     StageMaps
         ``disparity`` and ``confidence``, shape (H, W), float32.
-
-    Raises
-    ------
-    SepiError
-        If the disparity range is unknown.
     """
     from sepi.compared.pobr_kernels import mean_truncated_differences
 
@@ -167,14 +153,6 @@ def pobr_regions(
     light_field: LightField, previous: StageMaps | None, parameters: PobrRegionParameters, progress: Progress
 ) -> StageMaps:
     """Label confidence and edge strength, manipulated over partially occluded boundary regions.
-
-    Parameters
-    ----------
-    light_field : LightField
-    previous : StageMaps
-        Initial depth.
-    parameters : PobrRegionParameters
-    progress : callable
 
     Returns
     -------
@@ -205,13 +183,7 @@ def pobr_smoothing(
 ) -> StageMaps:
     """Disparity of least energy.
 
-    Parameters
-    ----------
-    light_field : LightField
-    previous : StageMaps
-        With the map ``edge_strength`` where the occlusion stage made one; else the gradient of the view is taken.
-    parameters : PobrSmoothingParameters
-    progress : callable
+    Takes the map ``edge_strength`` where the occlusion stage made one; else the gradient of the view.
 
     Returns
     -------

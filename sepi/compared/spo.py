@@ -87,24 +87,10 @@ def spo(
 ) -> StageMaps:
     """Candidates whose lines have the most different sides.
 
-    Parameters
-    ----------
-    light_field : LightField
-        With a known disparity range.
-    previous : None
-        The first stage builds on nothing.
-    parameters : SpoParameters
-    progress : callable
-
     Returns
     -------
     StageMaps
         With the cost volume.
-
-    Raises
-    ------
-    SepiError
-        If the disparity range is unknown.
     """
     disparities = parameters.candidates(light_field)
     directions = views_of_directions(light_field)

@@ -84,6 +84,7 @@ def test_compiled_functions_use_their_own_file_only(file: Path) -> None:
     assert foreign_names(file.read_text()) == set()
 
 
+@pytest.mark.system
 @pytest.mark.slow
 def test_changed_source_is_compiled_anew(tmp_path: Path) -> None:
     """With old machine code a changed constant or function would have no effect, until somebody clears the cache."""
