@@ -32,6 +32,9 @@ LINTS := lint-style lint-types lint-imports lint-rules lint-project
 all: $(READY)
 	$(BIN)/snakemake all
 
+# hundreds of processes are started here: an environment that forbids it would have each of them compile the sources anew
+export PYTHONDONTWRITEBYTECODE :=
+
 # a worker of pytest for each core and one more, since tests of clusters and of killed runs wait most of the time; one thread
 # in each; of numba's threads tests/conftest.py takes care
 WORKERS = $(shell $(PYTHON) -c 'import os; print((os.cpu_count() or 1) + 1)')
@@ -55,8 +58,10 @@ CPU_SECONDS := 2400
 test: $(COMPARED)
 	$(TESTS) -m "not system and not faults" --cpu-budget $(CPU_SECONDS)
 
+# the files that have such tests: to look through the others takes longer than some of these
+SYSTEM_TESTS = $(shell grep --recursive --files-with-matches --include 'test_*.py' 'mark[.]system' tests)
 test-system: $(COMPARED)
-	$(TESTS) -m "system and not faults"
+	$(TESTS) -m "system and not faults" $(SYSTEM_TESTS)
 
 # what `make test` and `make test-system` do a few times, a hundred times; and what they leave to this
 faults: $(READY)
