@@ -54,7 +54,7 @@ long-tests: $(COMPARED)
 	$(TESTS) -m "$(QUICK) and not long" --note-long tests/long_tests.txt
 
 # of a core of the calibration loop in tests/cpu_budget.py: a fifth more than they take
-CPU_SECONDS := 2400
+CPU_SECONDS := 2250
 test: $(COMPARED)
 	$(TESTS) -m "not system and not faults" --cpu-budget $(CPU_SECONDS)
 
