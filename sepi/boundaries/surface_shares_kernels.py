@@ -56,7 +56,7 @@ class Background(NamedTuple):
     views: npt.NDArray[np.int32]
 
 
-@njit(inline="always")
+@njit(forceinline=True)
 def _sees(views: RimViews, view: int, d: Any, y: int, x: int) -> Any:
     """Whether a view shows a pixel of disparity ``d``, and where: row and column of the sample, and its fractions."""
     H, W = views.pixels.shape[2], views.pixels.shape[3]
@@ -70,7 +70,7 @@ def _sees(views: RimViews, view: int, d: Any, y: int, x: int) -> Any:
     return nearest <= d + views.margin, row, column, down - row, across - column
 
 
-@njit(inline="always")
+@njit(forceinline=True)
 def _cubic(f: Any) -> Any:
     """Weights of four neighbours, the second and third of which a sample lies between (Catmull and Rom's)."""
     return (
@@ -81,7 +81,7 @@ def _cubic(f: Any) -> Any:
     )
 
 
-@njit(inline="always")
+@njit(forceinline=True)
 def _sample(views: RimViews, view: int, row: int, column: int, fy: Any, fx: Any, out: Any) -> None:
     """Colour between pixels of a view into ``out (3,)``, 0..1; grey counts as three equal channels.
 
@@ -158,7 +158,7 @@ def brightness_of_views(views: RimViews, sides: Sides, missing: Any) -> Any:
     return brightness, residual
 
 
-@njit(inline="always")
+@njit(forceinline=True)
 def _median(values: Any, n: int) -> Any:
     """Median of the first ``n`` values, which it puts in another order.
 
@@ -239,7 +239,7 @@ def background_of(views: RimViews, layer: Any, wanted: Any, begin: int, end: int
     return Background(colour, variance, count)
 
 
-@njit(inline="always")
+@njit(forceinline=True)
 def _behind(background: Background, row: int, column: int, fy: Any, fx: Any, out: Any) -> Any:
     """Colour between pixels of the background into ``out (3,)``, and its variance; negative where it is not known."""
     for i in range(row, row + 2):
@@ -254,7 +254,7 @@ def _behind(background: Background, row: int, column: int, fy: Any, fx: Any, out
     return a * V[row, column] + b * V[row, column + 1] + c * V[row + 1, column] + d * V[row + 1, column + 1]
 
 
-@njit(inline="always")
+@njit(forceinline=True)
 def _nearer_colour(sides: Sides, near: Any, middle: Any, y: int, x: int, surface: Any) -> Any:
     """Fill in the nearer surface beside a pixel: clean pixels' colour, or else the pixel's own; its variance."""
     H, W = sides.disparity.shape
@@ -284,7 +284,7 @@ def _nearer_colour(sides: Sides, near: Any, middle: Any, y: int, x: int, surface
     return (max(variance, 0.0) / 3 + _CLEAN_DEVIATION**2) / _HELD
 
 
-@njit(inline="always")
+@njit(forceinline=True)
 def _along_near(views: RimViews, background: Background, near: Any, far: Any, y: int, x: int, samples: Any) -> int:
     """What the views show of a pixel that moves with ``near``, and what is behind it there; how many tell both."""
     H, W = background.views.shape
@@ -304,7 +304,7 @@ def _along_near(views: RimViews, background: Background, near: Any, far: Any, y:
     return n
 
 
-@njit(inline="always")
+@njit(forceinline=True)
 def _cost_of_share(share: Any, samples: Any, n: int, surface: Any, held: Any, scale2: Any) -> Any:
     """Mean robust residual of ``n`` views that show a share of one colour before the background, 0..1.
 
@@ -329,7 +329,7 @@ def _cost_of_share(share: Any, samples: Any, n: int, surface: Any, held: Any, sc
     return total / (3 * n)
 
 
-@njit(inline="always")
+@njit(forceinline=True)
 def _cost_alone(views: RimViews, own: Any, d: Any, y: int, x: int, scale2: Any, scratch: Any) -> Any:
     """Mean robust residual of a pixel of colour ``own (3,)`` that moves with ``d``, over views that see it."""
     total, n = 0.0, 0

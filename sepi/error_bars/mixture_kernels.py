@@ -22,20 +22,20 @@ _PRECISION = 1e-3
 """Of the bounds, relative."""
 
 
-@njit(inline="always")
+@njit(forceinline=True)
 def _beyond(x: float, width: float) -> float:
     """Share of a Laplace distribution about 0 that lies above ``x``."""
     half = float(0.5 * np.exp(-abs(x) / width))
     return half if x > 0 else 1 - half
 
 
-@njit(inline="always")
+@njit(forceinline=True)
 def _share_above(above: float, below: float) -> float:
     """Part of the probability of the other surface that the nearer one has: the farther away, the likelier."""
     return float((above * above + 1e-6) / (above * above + below * below + 2e-6))
 
 
-@njit(inline="always")
+@njit(forceinline=True)
 def _above(x: float, p: Any) -> float:
     """Probability that the true disparity is more than ``x >= 0`` above the map's."""
     scale, outlier_scale, outlier, rim, above, below = p
@@ -47,7 +47,7 @@ def _above(x: float, p: Any) -> float:
     return float(core + outliers + rim * other)
 
 
-@njit(inline="always")
+@njit(forceinline=True)
 def _bound(tail: float, p: Any) -> float:
     """Distance above the map beyond which the truth lies with probability ``tail``: regula falsi of logarithms."""
     low, at_low = 0.0, _above(0.0, p)
@@ -82,7 +82,7 @@ def _bound(tail: float, p: Any) -> float:
     return float(0.5 * (low + high))
 
 
-@njit(inline="always")
+@njit(forceinline=True)
 def _expected(p: Any) -> float:
     """Expected absolute error."""
     scale, outlier_scale, outlier, rim, above, below = p

@@ -122,7 +122,7 @@ _weighted_sum: Any = intrinsic(_typed_sum)
 """``sum_ij a[i] b[j] c[start + i stride + 4 j : ... + 4]`` over an array ``c`` of int16; four float32."""
 
 
-@njit(inline="always")
+@njit(forceinline=True)
 def _spline_weights(f: Any, unit: Any) -> Any:
     """Weights of the four coefficients round a position, a fraction ``f`` after the second, times ``unit``."""
     g = np.float32(1) - f
@@ -135,7 +135,7 @@ def _spline_weights(f: Any, unit: Any) -> Any:
     )
 
 
-@njit(inline="always")
+@njit(forceinline=True)
 def _is_seen(views: SplineViews, seeing: Seeing, n: int, shape: Any, fy: Any, fx: Any, d: Any) -> bool:
     """Whether position ``(fy, fx)`` lies in view ``n``, and nothing nearer than ``d`` occludes it."""
     H, W = shape
@@ -146,7 +146,7 @@ def _is_seen(views: SplineViews, seeing: Seeing, n: int, shape: Any, fy: Any, fx
     return bool(nearest[int(fy + half) - views.low, int(fx + half)] <= d + seeing.occlusion_margin)
 
 
-@njit(inline="always")
+@njit(forceinline=True)
 def _sample(views: SplineViews, n: int, fy: Any, fx: Any) -> Any:
     """Four channels of view ``n`` at a position inside it."""
     _, S, rows, columns, _ = views.splines.shape
@@ -159,14 +159,14 @@ def _sample(views: SplineViews, n: int, fy: Any, fx: Any) -> Any:
     return _weighted_sum(views.splines, start, stride, a, b)
 
 
-@njit(inline="always")
+@njit(forceinline=True)
 def _robust_weight(z: Any, scale2: Any) -> Any:
     """Derivative of ``z / (z + scale2)`` with respect to ``z``, times ``scale2``: 1 for 0."""
     w = scale2 / (scale2 + z)
     return w * w
 
 
-@njit(inline="always")
+@njit(forceinline=True)
 def _add_to_mean(views: SplineViews, n: int, y: int, seeing: Seeing, disparity: Any, sums: Any) -> None:
     """Add view ``n`` to a row of pixels; ``sums (W, 6)``: of the four channels, and of their weights."""
     v, u = views.baselines[n]
@@ -214,7 +214,7 @@ def mean_of_views(views: SplineViews, seeing: Seeing, disparity: Any, begin: int
                 out[y, x, c] = sums[x, c] / sums[x, 4 if c < 3 else 5]
 
 
-@njit(inline="always")
+@njit(forceinline=True)
 def _terms(views: SplineViews, n: int, at: Any, v: Any, u: Any, m: Any, p: Any, q: Any) -> Any:
     """What view ``n`` of baseline ``(v, u)`` adds for a pixel that it sees at ``at``: by the mean and its derivatives.
 
@@ -230,7 +230,7 @@ def _terms(views: SplineViews, n: int, at: Any, v: Any, u: Any, m: Any, p: Any, 
     return slope, curve, z, w, w3 * r3 * g3, w3 * g3 * g3, w3
 
 
-@njit(inline="always")
+@njit(forceinline=True)
 def _add_to_equations(
     views: SplineViews, n: int, y: int, seeing: Seeing, disparity: Any, image: Any, sums: Any
 ) -> None:
@@ -278,7 +278,7 @@ def normal_equations(
             curvature[y, x] = colour * sums[x, 1] + detail * sums[x, 3]
 
 
-@njit(inline="always")
+@njit(forceinline=True)
 def _add_to_evidence(
     views: SplineViews, n: int, y: int, seeing: Seeing, disparity: Any, image: Any, sums: Any, halves: Any, more: Any
 ) -> None:

@@ -122,15 +122,7 @@ def matrix_of_planes(stencil: Any, out: Any) -> None:
                 bx = x // BLOCK
                 s, r = y + m, x + m
                 _add_entry(out, by, bx, y, x, 0, 0, stencil[0, s, r])
-                _add_entry(out, by, bx, y, x, 0, 1, stencil[1, s, r])
-                _add_entry(out, by, bx, y, x, 0, -1, stencil[1, s, r - 1])
-                _add_entry(out, by, bx, y, x, 0, 2, stencil[2, s, r])
-                _add_entry(out, by, bx, y, x, 0, -2, stencil[2, s, r - 2])
-                _add_entry(out, by, bx, y, x, 1, 0, stencil[3, s, r])
-                _add_entry(out, by, bx, y, x, -1, 0, stencil[3, s - 1, r])
-                _add_entry(out, by, bx, y, x, 2, 0, stencil[4, s, r])
-                _add_entry(out, by, bx, y, x, -2, 0, stencil[4, s - 2, r])
-                _add_entry(out, by, bx, y, x, 1, 1, stencil[5, s, r])
-                _add_entry(out, by, bx, y, x, -1, -1, stencil[5, s - 1, r - 1])
-                _add_entry(out, by, bx, y, x, 1, -1, stencil[6, s, r])
-                _add_entry(out, by, bx, y, x, -1, 1, stencil[6, s - 1, r + 1])
+                # each entry as seen from either of its pixels
+                for k, dy, dx in ((1, 0, 1), (2, 0, 2), (3, 1, 0), (4, 2, 0), (5, 1, 1), (6, 1, -1)):
+                    _add_entry(out, by, bx, y, x, dy, dx, stencil[k, s, r])
+                    _add_entry(out, by, bx, y, x, -dy, -dx, stencil[k, s - dy, r - dx])
