@@ -195,5 +195,5 @@ $(READY): requirements.lock pyproject.toml
 
 # the kernels of the compared methods, and those for other views than 8-bit ones: only their target and the tests call them
 $(COMPARED): $(READY)
-	$(BIN)/python -m sepi.cli.warm_up --comparison --all-types --check
+	$(BIN)/python -m sepi.cli.warm_up --comparison --all-types
 	touch $@

@@ -406,7 +406,7 @@ def test_every_ray_of_a_scene_meets_something(name: str) -> None:
         assert world.at_far - slack <= disparity.min()
         # corners of so small pictures look far down
         assert disparity.max() <= world.at_near + slack or corner != (0, 0)
-    light = tracer.picture(tracer.position(0, 0), 0, 4)
+    light = tracer.picture(tracer.position(0, 0), 0, 16)
     assert 0.02 < np.median(light) < 0.6
     assert (light.max(axis=2) > 1).mean() < 0.08
 
