@@ -1,5 +1,6 @@
 # What all rules share: the checked configuration, and the names, threads and memory that follow from it.
 
+import atexit
 import json
 import os
 import re
@@ -13,7 +14,7 @@ from sepi.io.result_files import RESULT_FILES
 from sepi.variants import HANDED_ON, STAGES, VARIANTS, choice_of
 from sepi.report.plan import Plan
 from sepi.validation import require_known
-from sepi.workflow.code_digest import ROOT, code_digest, ingest_modules, render_modules, stage_modules
+from sepi.workflow.code_digest import ROOT, code_digest, ingest_modules, keep, remember, render_modules, stage_modules
 from sepi.workflow.candidates import candidates_factor, candidates_mb
 from sepi.workflow.config import load_settings
 from sepi.rendered import RENDERED
@@ -23,6 +24,10 @@ from sepi.workflow.result_paths import PARTS_ENDING, RESULTS, key_of, scene_file
 # where a module's `prefix` puts things, and whether this is a module at all, while the rules are read
 MODIFIER = workflow.modifier
 IS_MODULE = MODIFIER.base_snakefile is not None
+
+# what was read of the code by the start before
+remember(Path(".snakemake").absolute())
+atexit.register(keep, Path(".snakemake").absolute())
 
 # jobs are run by the Python that runs Snakemake, whether or not its environment is activated, with the package whose code
 # the digests are made of; jobs of a workflow that has this one as a module keep their own. They end with Snakemake, whatever

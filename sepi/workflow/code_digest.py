@@ -18,13 +18,19 @@ Snakemake sees the shell command of a rule, not the modules that the command imp
 - not other libraries: a new version of numpy reruns nothing.
 
 No stage imports another stage, so a change in one leaves the others' digests as they are.
+
+To read all of the code takes a second, a fifth of a start of Snakemake. What a source comes to is kept in Snakemake's
+own folder, by the source itself: a changed one is read, whatever its time says.
 """
 
 from __future__ import annotations
 
 import ast
 import hashlib
+import json
+import os
 from collections.abc import Iterator
+from contextlib import suppress
 from functools import cache
 from importlib.util import resolve_name
 from pathlib import Path
@@ -64,6 +70,15 @@ _ALTERNATIVES = (
 # what is told to people alone: words of calls, and what the rendered scenes are
 _TOLD = ("help", "description")
 _TELLING = "rendered.catalogue"
+
+Read = tuple[str, list[tuple[int, str, list[str]]]]
+"""What a source comes to: a digest of its code; level, module and names of what it imports, as they stand in it."""
+
+# in Snakemake's folder
+_KEPT = "sepi_code.json"
+# source, by its own digest, to what it comes to; and what of that no file has
+_read: dict[str, Read] = {}
+_new: list[str] = []
 
 
 def stage_modules(stage: str, choice: Choice) -> tuple[str, ...]:
@@ -136,22 +151,62 @@ def _file_of(module: str, root: Path) -> Path | None:
 
 @cache
 def _code_and_imports(module: str, root: Path) -> tuple[str, frozenset[str]]:
-    """The syntax tree of a module without docstrings, and the modules of its package that it imports."""
+    """A digest of the code of a module, and the modules of its package that it imports."""
     file = _file_of(module, root)
     if file is None:
         raise ModuleNotFoundError(f"no module {module} in {root}")
-    tree = ast.parse(file.read_bytes(), str(file))
-    tree.body = [node for node in tree.body if not (isinstance(node, ast.If) and ast.unparse(node.test) in _NOT_RUN)]
+    source = file.read_bytes()
+    key = hashlib.sha256(source).hexdigest()
+    if key not in _read:
+        _read[key] = _code_and_names(source, file)
+        _new.append(key)
+    code, named = _read[key]
     package = module if file.name == "__init__.py" else module.rpartition(".")[0]
-    imports: set[str] = set()
+    imports = {name for level, base, names in named for name in _imported(level, base, names, package, root)}
+    return code, frozenset(name for name in imports if name.split(".")[0] == module.split(".")[0])
+
+
+def _code_and_names(source: bytes, file: Path) -> Read:
+    """A digest of the syntax tree of a source without docstrings, and what its statements import as they stand."""
+    tree = ast.parse(source, str(file))
+    tree.body = [node for node in tree.body if not (isinstance(node, ast.If) and ast.unparse(node.test) in _NOT_RUN)]
+    named: list[tuple[int, str, list[str]]] = []
     for node in ast.walk(tree):
-        if isinstance(node, ast.Import | ast.ImportFrom):
-            imports.update(_imported(node, package, root))
+        if isinstance(node, ast.Import):
+            named += [(0, alias.name, []) for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            named.append((node.level, node.module or "", [alias.name for alias in node.names]))
         elif isinstance(node, _DOCUMENTED) and ast.get_docstring(node, clean=False) is not None:
             node.body = node.body[1:]
         elif isinstance(node, ast.Call):
             node.keywords = [keyword for keyword in node.keywords if keyword.arg not in _TOLD]
-    return _dumped(tree), frozenset(name for name in imports if name.split(".")[0] == module.split(".")[0])
+    return hashlib.sha256(_dumped(tree).encode()).hexdigest(), named
+
+
+def remember(folder: Path) -> None:
+    """Take over what earlier starts kept in a folder, where it is there and of this module as it is now."""
+    with suppress(OSError, ValueError, TypeError, KeyError):
+        kept = json.loads((folder / _KEPT).read_text(encoding="utf-8"))
+        if kept["by"] == _own_digest():
+            _read.update({key: (code, named) for key, (code, named) in kept["read"].items()})
+
+
+def keep(folder: Path) -> None:
+    """Keep what was read since, where the folder is there and can be written: the next start is as right without."""
+    if not _new or not folder.is_dir():
+        return
+    temporary = folder / f"{_KEPT}-{os.getpid()}"
+    with suppress(OSError):
+        temporary.write_text(json.dumps({"by": _own_digest(), "read": _read}), encoding="utf-8")
+        temporary.replace(folder / _KEPT)
+        _new.clear()
+    with suppress(OSError):
+        # where there was no room for it
+        temporary.unlink(missing_ok=True)
+
+
+def _own_digest() -> str:
+    return hashlib.sha256(Path(__file__).read_bytes()).hexdigest()
 
 
 def _dumped(node: Any) -> str:
@@ -166,12 +221,11 @@ def _dumped(node: Any) -> str:
     return f"{type(node).__name__}({', '.join(f'{name}={_dumped(value)}' for name, value in fields)})"
 
 
-def _imported(node: ast.Import | ast.ImportFrom, package: str, root: Path) -> Iterator[str]:
+def _imported(level: int, base: str, names: list[str], package: str, root: Path) -> Iterator[str]:
     """The modules that a statement imports: of ``from pkg import name``, ``pkg.name`` if that is one, else ``pkg``."""
-    if isinstance(node, ast.Import):
-        yield from (alias.name for alias in node.names)
-        return
-    base = resolve_name("." * node.level + (node.module or ""), package)
-    for alias in node.names:
-        inner = f"{base}.{alias.name}"
+    base = resolve_name("." * level + base, package)
+    if not names:
+        yield base
+    for name in names:
+        inner = f"{base}.{name}"
         yield inner if _file_of(inner, root) else base

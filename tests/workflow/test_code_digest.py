@@ -1,5 +1,7 @@
 """The digest of a stage's code: too coarse, and a changed comment costs hours; too fine, and results are stale."""
 
+import os
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -7,7 +9,16 @@ import pytest
 from sepi.compared.methods import METHODS
 from sepi.io.readers.formats import FORMATS
 from sepi.variants import STAGES
-from sepi.workflow.code_digest import code_digest, imported_modules, ingest_modules, render_modules, stage_modules
+from sepi.workflow import code_digest as module
+from sepi.workflow.code_digest import (
+    code_digest,
+    imported_modules,
+    ingest_modules,
+    keep,
+    remember,
+    render_modules,
+    stage_modules,
+)
 
 FILES = {
     "pkg/__init__.py": "from pkg import extra\n",
@@ -87,8 +98,8 @@ def test_what_changes_a_digest(tree: Path, file: str, old: str, new: str, change
 def test_every_version_of_python_gives_the_same(tree: Path) -> None:
     """Another environment would make everything again."""
     assert [code_digest(f"pkg.{name}", root=tree) for name in ("one", "deep")] == [
-        "312b952a5c632cca",
-        "005d5b49c3c126dc",
+        "30ce924585184b43",
+        "8b1590d2ae63072d",
     ]
 
 
@@ -186,3 +197,54 @@ def test_a_compared_method_is_run_again_for_its_own_code_alone(method: str) -> N
     compared = {name.removeprefix("sepi.compared.") for name in found if name.startswith("sepi.compared.")}
     assert method in compared
     assert not compared & (set(METHODS) - {method})
+
+
+@pytest.fixture
+def as_at_a_start(monkeypatch: pytest.MonkeyPatch) -> Callable[[], list[str]]:
+    """Forget what was read, as a new process has; gives what is read from then on, by its text."""
+
+    def start() -> list[str]:
+        found: list[str] = []
+        for cached in (module.code_digest, module._code_and_imports, module._file_of):
+            cached.cache_clear()
+        monkeypatch.setattr(module, "_read", {})
+        monkeypatch.setattr(module, "_new", [])
+        monkeypatch.setattr(module, "_code_and_names", lambda s, f: found.append(s.decode()) or reading(s, f))
+        return found
+
+    reading = module._code_and_names
+    return start
+
+
+def test_a_start_reads_what_changed_since_the_one_before(
+    tree: Path, tmp_path: Path, as_at_a_start: Callable[[], list[str]]
+) -> None:
+    """Stale digests would leave stale maps; a file that somebody damaged must stop nobody."""
+    (tmp_path / "kept").mkdir()
+    as_at_a_start()
+    before = code_digest("pkg.one", root=tree)
+    keep(tmp_path / "kept")
+    # an older time, and the same size
+    shared = tree / "pkg/shared.py"
+    shared.write_text("value = 3\n")
+    os.utime(shared, (0, 0))
+    read = as_at_a_start()
+    remember(tmp_path / "kept")
+    changed = code_digest("pkg.one", root=tree)
+    assert (changed != before, read) == (True, ["value = 3\n"])
+    # a name that becomes a module of its own is one, though the source that imports it is the same
+    (tree / "pkg/shared").mkdir()
+    (tree / "pkg/shared/value.py").write_text("x = 1\n")
+    (tree / "pkg/shared/__init__.py").write_text("")
+    shared.unlink()
+    as_at_a_start()
+    remember(tmp_path / "kept")
+    assert "pkg.shared.value" in imported_modules("pkg.two", root=tree)
+    for damage in ('{"by": "another version", "read": {}}', "[]", "{", '{"read": 1}'):
+        (tmp_path / "kept/sepi_code.json").write_text(damage)
+        read = as_at_a_start()
+        remember(tmp_path / "kept")
+        code_digest("pkg.one", root=tree)
+        assert len(read) == 4
+    keep(tmp_path / "nowhere")
+    assert not (tmp_path / "nowhere").exists()
