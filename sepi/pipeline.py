@@ -84,11 +84,13 @@ def estimate_depth(
         light_field = light_field.with_range(estimate_range(light_field))
     light_field.require_seen_range()
     tell_kernel_cache()
-    compared = replace(equally_bright(light_field), workspace=light_field.workspace or Workspace())
+    workspace = light_field.workspace or Workspace()
+    compared = replace(equally_bright(light_field), workspace=workspace)
     require_memory_of(compared, settings.values())
     if memory is not None:
-        own = bytes_of_bands(compared, settings.values(), memory)
-        compared = replace(compared, workspace=Workspace(own))
+        # what was made to tell what is needed stays
+        limited = replace(workspace, band_bytes=bytes_of_bands(compared, settings.values(), memory))
+        compared = replace(compared, workspace=limited)
     maps: StageMaps | None = None
     for number, (stage, choice) in enumerate(chosen.choices.items()):
 

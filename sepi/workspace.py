@@ -7,7 +7,7 @@ or where the views are others, everything is made anew: results are the same.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -19,13 +19,12 @@ USUAL_BAND_BYTES = 2**29
 """What bands of rows (:mod:`sepi.matching.row_bands`) may take unless somebody says otherwise."""
 
 
-class OfViews(Protocol):
-    """What is kept of some views: whose it is, and more that is empty at first."""
+@dataclass
+class OfViews:
+    """What is kept of some views, seen from a reference view; what a kind adds is empty at first."""
 
     views: npt.NDArray[np.generic]
     reference: tuple[int, int]
-
-    def __init__(self, views: npt.NDArray[np.generic], reference: tuple[int, int]) -> None: ...
 
 
 _Kept = TypeVar("_Kept", bound=OfViews)

@@ -33,8 +33,10 @@ TINY = {
 
 # in place of what renames a finished file: as many seconds later as the environment says, and not while a file is there
 SLOW_WRITING = """import os, time
-        time.sleep(float(os.environ.get("SLEEP", "0")))
-        while os.path.exists(os.environ.get("HOLD", "")):
+        # not what Snakemake itself keeps of the code
+        is_result = path.suffix == ".h5"
+        time.sleep(is_result * float(os.environ.get("SLEEP", "0")))
+        while is_result and os.path.exists(os.environ.get("HOLD", "")):
             time.sleep(0.05)
         temporary.replace(path)"""
 # what makes maps

@@ -88,7 +88,7 @@ def maps_of_kernels_on_disk(variants: tuple[str, ...], kind: str = "uint8") -> d
 
 
 def _digest(maps: StageMaps) -> str:
-    return hashlib.sha256(b"".join(values.tobytes() for values in (maps.disparity, maps.confidence))).hexdigest()
+    return hashlib.sha256(b"".join(values.tobytes() for values in maps.all().values())).hexdigest()
 
 
 def _light_field(kind: str) -> LightField:

@@ -25,7 +25,7 @@ from sepi.image.noise import noise_level, variance_of_residuals
 from sepi.lightfield import BoolMap, FloatMap, LightField, full_scale
 from sepi.matching.denoising import LEFT, DenoisedLightField, DenoisingParameters
 from sepi.matching.row_bands import Rows
-from sepi.workspace import kept_of
+from sepi.workspace import OfViews, kept_of
 
 DETAIL_UNIT = 1 / 32000
 """Unit of the detail, which is stored as int16: colours differ by at most 1."""
@@ -160,14 +160,12 @@ def base_detail_decomposition(
 
 
 @dataclass
-class _Kept:
+class _Kept(OfViews):
     """What is made of some views so far: the noise of the reference view, and the detail of some of them.
 
     Detail is kept of whole views; what is made in bands of rows, since memory is short, is not.
     """
 
-    views: npt.NDArray[np.generic]
-    reference: tuple[int, int]
     noise: float | None = None
     made_with: tuple[float, ...] = ()
     detail: npt.NDArray[np.int16] | None = None

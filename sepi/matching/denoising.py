@@ -29,7 +29,7 @@ from sepi.image.noise import noise_level
 from sepi.lightfield import FloatMap, LightField, full_scale
 from sepi.matching.view_noise import PARTS, ViewNoise, view_noise
 from sepi.stage import Parameters
-from sepi.workspace import kept_of
+from sepi.workspace import OfViews, kept_of
 
 LEAST_NOISE = 1.25 / 255
 """Noise that is worth it: less may be that of rounding, and what is left where texture does not fit at whole pixels."""
@@ -122,11 +122,9 @@ def _noise_of_parts(image: FloatMap) -> float:
 
 
 @dataclass
-class _Kept:
-    """What is known of the views of one light field: their noise, and what they are without it; None as they are."""
+class _Kept(OfViews):
+    """What is known of some views: their noise, and what they are without it; None as they are."""
 
-    views: npt.NDArray[Any]
-    reference: tuple[int, int]
     noise: ViewNoise | None = None
     least: float = 0.0
     made: npt.NDArray[Any] | None = None

@@ -28,13 +28,15 @@ from __future__ import annotations
 import ast
 import hashlib
 import json
-import os
 from collections.abc import Iterator
 from contextlib import suppress
 from functools import cache
 from importlib.util import resolve_name
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from sepi.errors import SepiError
+from sepi.io.files import atomic_path
 
 if TYPE_CHECKING:
     from sepi.stage import Choice
@@ -71,14 +73,13 @@ _ALTERNATIVES = (
 _TOLD = ("help", "description")
 _TELLING = "rendered.catalogue"
 
-Read = tuple[str, list[tuple[int, str, list[str]]]]
-"""What a source comes to: a digest of its code; level, module and names of what it imports, as they stand in it."""
+# what a source comes to: a digest of its code; level, module and names of what it imports, as they stand in it
+_Code = tuple[str, list[tuple[int, str, list[str]]]]
 
 # in Snakemake's folder
 _KEPT = "sepi_code.json"
-# source, by its own digest, to what it comes to; and what of that no file has
-_read: dict[str, Read] = {}
-_new: list[str] = []
+# module to the digest of its source, and what that comes to
+_read: dict[str, tuple[str, _Code]] = {}
 
 
 def stage_modules(stage: str, choice: Choice) -> tuple[str, ...]:
@@ -156,17 +157,16 @@ def _code_and_imports(module: str, root: Path) -> tuple[str, frozenset[str]]:
     if file is None:
         raise ModuleNotFoundError(f"no module {module} in {root}")
     source = file.read_bytes()
-    key = hashlib.sha256(source).hexdigest()
-    if key not in _read:
-        _read[key] = _code_and_names(source, file)
-        _new.append(key)
-    code, named = _read[key]
+    digest = hashlib.sha256(source).hexdigest()
+    if module not in _read or _read[module][0] != digest:
+        _read[module] = digest, _code_and_names(source, file)
+    code, named = _read[module][1]
     package = module if file.name == "__init__.py" else module.rpartition(".")[0]
     imports = {name for level, base, names in named for name in _imported(level, base, names, package, root)}
     return code, frozenset(name for name in imports if name.split(".")[0] == module.split(".")[0])
 
 
-def _code_and_names(source: bytes, file: Path) -> Read:
+def _code_and_names(source: bytes, file: Path) -> _Code:
     """A digest of the syntax tree of a source without docstrings, and what its statements import as they stand."""
     tree = ast.parse(source, str(file))
     tree.body = [node for node in tree.body if not (isinstance(node, ast.If) and ast.unparse(node.test) in _NOT_RUN)]
@@ -185,24 +185,20 @@ def _code_and_names(source: bytes, file: Path) -> Read:
 
 def remember(folder: Path) -> None:
     """Take over what earlier starts kept in a folder, where it is there and of this module as it is now."""
-    with suppress(OSError, ValueError, TypeError, KeyError):
+    with suppress(OSError, ValueError, TypeError, KeyError, AttributeError):
         kept = json.loads((folder / _KEPT).read_text(encoding="utf-8"))
         if kept["by"] == _own_digest():
-            _read.update({key: (code, named) for key, (code, named) in kept["read"].items()})
+            _read.update({module: (digest, (code, named)) for module, (digest, (code, named)) in kept["read"].items()})
 
 
 def keep(folder: Path) -> None:
-    """Keep what was read since, where the folder is there and can be written: the next start is as right without."""
-    if not _new or not folder.is_dir():
-        return
-    temporary = folder / f"{_KEPT}-{os.getpid()}"
-    with suppress(OSError):
-        temporary.write_text(json.dumps({"by": _own_digest(), "read": _read}), encoding="utf-8")
-        temporary.replace(folder / _KEPT)
-        _new.clear()
-    with suppress(OSError):
-        # where there was no room for it
-        temporary.unlink(missing_ok=True)
+    """Keep what was read, where the folder is there and can be written: the next start is as right without."""
+    file = folder / _KEPT
+    text = json.dumps({"by": _own_digest(), "read": _read})
+    with suppress(OSError, SepiError):
+        if folder.is_dir() and not (file.is_file() and file.read_text(encoding="utf-8") == text):
+            with atomic_path(file) as temporary:
+                temporary.write_text(text, encoding="utf-8")
 
 
 def _own_digest() -> str:
