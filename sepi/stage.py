@@ -1,4 +1,4 @@
-"""What every stage has in common: the maps that travel from stage to stage, and the command that a rule calls.
+"""What every stage has in common: parameters, the maps that travel from stage to stage, and what a choice must keep to.
 
 A stage module defines ``CHOICES``: for each choice that a variant may name, a parameter model and a pure function
 ``(light_field, previous, parameters, progress) -> StageMaps``. The Python API, the command line and the workflow's

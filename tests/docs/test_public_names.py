@@ -78,67 +78,66 @@ def test_the_list_names_everything_that_sepi_exports() -> None:
     assert len(NAMES) == len(set(NAMES))
 
 
-@pytest.mark.parametrize("dotted", [*NAMES, *MEMBERS])
-def test_there_is_a_docstring(dotted: str) -> None:
+def test_there_is_a_docstring() -> None:
     """Whoever asks for help gets none otherwise."""
-    summary = sections(text_of(dotted))[""].partition("\n\n")[0]
-    assert len(summary) > 10
-    assert summary.endswith((".", ":"))
+    for dotted in (*NAMES, *MEMBERS):
+        summary = sections(text_of(dotted))[""].partition("\n\n")[0]
+        assert len(summary) > 10, dotted
+        assert summary.endswith((".", ":")), dotted
 
 
-@pytest.mark.parametrize("dotted", [*FUNCTIONS, *METHODS])
-def test_parameters_and_result_are_described(dotted: str) -> None:
+def test_parameters_and_result_are_described() -> None:
     """The reference names an argument that there is not, keeps quiet about one, or about what comes back.
 
     What every stage function is given stands in one place.
     """
-    said, code = sections(text_of(dotted)), code_of(dotted)
-    assert names_in(said.get("Parameters", "")) == ([] if code in STAGE_FUNCTIONS else parameters_of(code))
-    returns = inspect.get_annotations(code)["return"]
-    assert ("Returns" in said or "Yields" in said) == (returns not in (None, "None"))
+    for dotted in (*FUNCTIONS, *METHODS):
+        said, code = sections(text_of(dotted)), code_of(dotted)
+        expected = [] if code in STAGE_FUNCTIONS else parameters_of(code)
+        assert names_in(said.get("Parameters", "")) == expected, dotted
+        returns = inspect.get_annotations(code)["return"]
+        assert ("Returns" in said or "Yields" in said) == (returns not in (None, "None")), dotted
 
 
-@pytest.mark.parametrize("dotted", CLASSES)
-def test_fields_are_described(dotted: str) -> None:
+def test_fields_are_described() -> None:
     """The reference keeps quiet about what an object holds, or is made of."""
-    said, cls = sections(docstring(dotted)), found(dotted)
-    fields = fields_of(cls)
-    if fields is None:
-        assert names_in(said["Parameters"]) == parameters_of(cls)
-    else:
-        assert names_in(said.get("Attributes", "")) == fields
+    for dotted in CLASSES:
+        said, cls = sections(docstring(dotted)), found(dotted)
+        fields = fields_of(cls)
+        heading, expected = ("Parameters", parameters_of(cls)) if fields is None else ("Attributes", fields)
+        assert names_in(said.get(heading, "")) == expected, dotted
 
 
-@pytest.mark.parametrize("dotted", [*FUNCTIONS, *METHODS, *CLASSES])
-def test_errors_are_described(dotted: str) -> None:
+def test_errors_are_described() -> None:
     """Nobody catches an error that the reference does not tell of."""
-    if dotted in CLASSES:
-        # a data class makes its own __init__, and goes on in __post_init__
-        made_by = "__init__" if fields_of(found(dotted)) is None else "__post_init__"
-        functions = [vars(found(dotted))[made_by]] if made_by in vars(found(dotted)) else []
-    else:
-        functions = [code_of(dotted)]
-    if any(raises_an_error(function) for function in functions if function not in STAGE_FUNCTIONS):
-        assert "SepiError" in names_in(sections(text_of(dotted)).get("Raises", ""))
+    for dotted in (*FUNCTIONS, *METHODS, *CLASSES):
+        if dotted in CLASSES:
+            # a data class makes its own __init__, and goes on in __post_init__
+            made_by = "__init__" if fields_of(found(dotted)) is None else "__post_init__"
+            functions = [vars(found(dotted))[made_by]] if made_by in vars(found(dotted)) else []
+        else:
+            functions = [code_of(dotted)]
+        if any(raises_an_error(function) for function in functions if function not in STAGE_FUNCTIONS):
+            assert "SepiError" in names_in(sections(text_of(dotted)).get("Raises", "")), dotted
 
 
-@pytest.mark.parametrize("dotted", NAMES)
-def test_there_is_an_example_of_it(dotted: str) -> None:
+def test_there_is_an_example_of_each() -> None:
     """An example that does not use the name teaches something else; one that is skipped teaches nothing."""
-    name = dotted.rpartition(".")[2]
-    text = home(dotted)[0].__doc__ or "" if is_constant(dotted) and name != "__version__" else docstring(dotted)
-    examples = doctest.DocTestParser().get_examples(sections(text)["Examples"])
-    assert any(re.search(rf"\b{name}\b", example.source) for example in examples)
-    assert any(example.want for example in examples)
-    assert not any(example.options.get(doctest.SKIP) for example in examples)
+    for dotted in NAMES:
+        name = dotted.rpartition(".")[2]
+        text = home(dotted)[0].__doc__ or "" if is_constant(dotted) and name != "__version__" else docstring(dotted)
+        examples = doctest.DocTestParser().get_examples(sections(text).get("Examples", ""))
+        assert any(re.search(rf"\b{name}\b", example.source) for example in examples), dotted
+        assert any(example.want for example in examples), dotted
+        assert not any(example.options.get(doctest.SKIP) for example in examples), dotted
 
 
-@pytest.mark.parametrize("dotted", [*NAMES, *MODULES])
-def test_examples_import_what_they_use(dotted: str) -> None:
+def test_examples_import_what_they_use() -> None:
     """``sepi.scenes`` is there in an example that runs after another; a user who pastes it gets an AttributeError."""
-    for _, text in examples_of(dotted):
-        source = "".join(example.source for example in doctest.DocTestParser().get_examples(text))
-        assert unimported(source) == set()
+    for dotted in (*NAMES, *MODULES):
+        for name, text in examples_of(dotted):
+            source = "".join(example.source for example in doctest.DocTestParser().get_examples(text))
+            assert unimported(source) == set(), name
 
 
 @pytest.fixture
@@ -154,7 +153,7 @@ def own_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None
 
 
 @pytest.mark.usefixtures("own_folder")
-@pytest.mark.parametrize("dotted", [*NAMES, *MODULES])
+@pytest.mark.parametrize("dotted", [dotted for dotted in (*NAMES, *MODULES) if examples_of(dotted)])
 def test_examples_run(dotted: str) -> None:
     """A user who pastes an example gets something else than the reference shows. Warnings are errors here, too."""
     for name, text in examples_of(dotted):
