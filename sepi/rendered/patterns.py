@@ -12,6 +12,7 @@ import numpy.typing as npt
 from scipy import fft
 
 from sepi.rendered.world import FloatArray, Pattern, Vector
+from sepi.threads import threads_used
 
 TEXELS = 1024
 Field = npt.NDArray[np.float64]
@@ -32,7 +33,9 @@ def field(seed: int, finest: float, coarsest: float, texels: int = TEXELS, stret
     """
     white = np.random.default_rng(seed).standard_normal((texels, texels), np.float32)
     amplitude = _amplitude(finest, coarsest, texels, stretch)
-    found: Field = fft.irfft2(fft.rfft2(white) * amplitude, s=(texels, texels)).astype(np.float64)
+    cores = threads_used()
+    spectrum = fft.rfft2(white, workers=cores) * amplitude
+    found: Field = fft.irfft2(spectrum, s=(texels, texels), workers=cores).astype(np.float64)
     found /= found.std()
     return found
 

@@ -2,10 +2,12 @@
 
 Light on a matte surface is gathered from all views (:mod:`sepi.rendered.shared_light`), so that a few paths in each
 will do. Pixels in which matte surfaces mix take a quarter of the samples, and what depends on where it is seen from
-takes all: gloss, mirrors, glass and their rims.
+takes all: gloss, mirrors and glass.
 """
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 import numpy.typing as npt
@@ -15,10 +17,12 @@ from sepi.rendered.surfaces import FirstSurface
 from sepi.rendered.tracing import Position, Tracer
 from sepi.rendered.world import FloatArray
 
-# sides of tiles in pixels: to make a camera for each takes as long as some 30 paths
-_NARROW, _WIDE = 2, 4
+# to make a camera for a tile takes as long as so many paths
+_CAMERA = 16
+# greatest side of a tile in pixels, a power of two
+_WIDEST = 8
 # rays of a pixel, across and down, that look for things in it
-_FINE = 2
+_FINE = 4
 # pixels per view step: how far a surface may bend from pixel to pixel to be one
 _BEND = 0.005
 # linear; on what is darker there is no telling the light
@@ -26,13 +30,13 @@ _DARKEST = 1e-3
 
 
 def shared_samples(samples: int, views: int) -> int:
-    """Paths of a pixel of a matte surface: with those of all views eight times ``samples``."""
-    return min(samples, -(-8 * samples // views))
+    """Paths of a pixel of a matte surface, a power of two: with those of all views about four times ``samples``."""
+    return min(samples, 2 ** max(0, round(math.log2(4 * samples / views))))
 
 
 def mixed_samples(samples: int) -> int:
     """Paths of a pixel in which matte surfaces mix: a quarter, but not so few that they show."""
-    return max(samples // 4, min(samples, 16))
+    return max(samples // 4, min(samples, 12))
 
 
 def sampled(
@@ -65,38 +69,54 @@ def sampled(
     whole : ndarray, shape (H, W), bool
         Pixels of known albedo that show one surface, and whose neighbours do.
     """
-    from scipy import ndimage
-
-    matte = tracer.surfaces.matte(seen.face)
     # what is narrower than a pixel may stand between rays through middles
-    beside = tracer.things(position, _FINE) == seen.thing[:, None, :, None]
-    whole = matte & beside.all(axis=(1, 3)) & _whole(disparity, seen.thing)
+    beside = tracer.things(position, _FINE)
+    matte = tracer.surfaces.matte(beside).all(axis=(1, 3))
+    whole = matte & (beside == seen.thing[:, None, :, None]).all(axis=(1, 3)) & _whole(disparity, seen.thing)
     albedo = np.zeros((*matte.shape, 3), np.float32)
     albedo[whole] = tracer.albedo(position, seen.face[whole], np.argwhere(whole))
     whole &= albedo.min(axis=-1) > _DARKEST
     few = shared_samples(samples, views)
-    picture = tracer.picture(position, seed, few)
-    # what is beside gloss may show some of it
-    own = ~whole & ~ndimage.binary_erosion(matte, np.ones((3, 3)), border_value=1)
-    mixed = ~whole & ~own
-    for number, (asked, side, paths) in enumerate(
-        ((mixed, _WIDE, max(few, mixed_samples(samples))), (own, _NARROW, samples)), start=1
-    ):
-        if paths > few:
-            tiles = _tiles(asked, side)
-            picture[tiles[..., 0], tiles[..., 1]] = tracer.tiles(position, tiles, seed + 4096 * number, paths)
+    first = tracer.picture(position, seed, few)
+    picture = first.copy()
+    mixing = mixed_samples(samples)
+    # the number of a tile's seed, whichever kind it is of
+    begun = 4096
+    for asked, paths, counted in ((matte & ~whole, mixing - few, few), (~matte, samples if samples > few else 0, 0)):
+        for tiles in _tiles(asked, paths) if paths > 0 else []:
+            rows, columns = tiles[..., 0], tiles[..., 1]
+            more = tracer.tiles(position, tiles, seed + begun, paths)
+            picture[rows, columns] = (counted * first[rows, columns] + paths * more) / np.float32(counted + paths)
+            begun += 4096
     return picture, np.where(whole[..., None], albedo, 0), whole
 
 
-def _tiles(asked: BoolMap, side: int) -> npt.NDArray[np.int64]:
-    """Pixels of the tiles in which any is asked for, ``(N, side, side, 2)``: rows and columns."""
+def _tiles(asked: BoolMap, paths: int) -> list[npt.NDArray[np.int64]]:
+    """Squares that hold all pixels asked for, and take least time; of each side ``(N, side, side, 2)``.
+
+    Four squares become one where its paths cost less than the cameras that it saves.
+    """
     height, width = asked.shape
-    padded = np.pad(asked, ((0, -height % side), (0, -width % side)))
-    corners = side * np.argwhere(padded.reshape(-(-height // side), side, -1, side).any(axis=(1, 3)))
-    # the last ones reach over those before
-    corners = np.minimum(corners, np.array([height, width]) - side)
-    tiles: npt.NDArray[np.int64] = corners[:, None, None] + np.moveaxis(np.mgrid[:side, :side], 0, -1)
-    return tiles
+    needed = np.pad(asked, ((0, -height % _WIDEST), (0, -width % _WIDEST)))
+    cost, side = np.where(needed, paths + _CAMERA, 0), 1
+    # by side, where each square is one, or made of lesser ones
+    whole = [needed]
+    while 2 * side <= min(_WIDEST, height, width):
+        side *= 2
+        apart = cost.reshape(cost.shape[0] // 2, 2, cost.shape[1] // 2, 2).sum(axis=(1, 3))
+        together = side**2 * paths + _CAMERA
+        whole.append(apart > together)
+        cost = np.minimum(apart, together)
+    found = []
+    taken = np.zeros_like(whole[-1])
+    for squares in reversed(whole):
+        corners = side * np.argwhere(squares & ~taken)
+        # the last ones reach over those before
+        corners = np.minimum(corners, np.array([height, width]) - side)
+        found.append(corners[:, None, None] + np.moveaxis(np.mgrid[:side, :side], 0, -1))
+        taken = np.kron(taken | squares, np.ones((2, 2), bool))
+        side //= 2
+    return [tiles for tiles in found if len(tiles)]
 
 
 def _whole(disparity: FloatMap, things: npt.NDArray[np.int64]) -> BoolMap:

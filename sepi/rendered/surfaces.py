@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sepi.lightfield import BoolMap
+from sepi.rendered.first_kernels import first_met
 from sepi.rendered.paint_kernels import painted
 from sepi.rendered.srgb import srgb_decoded
 from sepi.rendered.world import FloatArray, Material, Mesh, Pattern, Vector, World
@@ -72,7 +73,8 @@ class Surfaces:
             np.concatenate([mesh.uv / np.array(period) for _, mesh, period in parts]).astype(np.float32),
         )
         self.thing = np.concatenate([np.full(len(mesh.faces), number) for number, mesh, _ in parts])
-        first, second, third = (self.mesh.vertices.astype(np.float64)[self.mesh.faces[:, n]] for n in range(3))
+        self._corners = self.mesh.vertices.astype(np.float64)[self.mesh.faces]
+        first, second, third = np.moveaxis(self._corners, 1, 0)
         self._corner, self._normal = first, np.cross(second - first, third - first)
         # uv rises along the triangle by this much in each direction
         at, along, beyond = (self.mesh.uv.astype(np.float64)[self.mesh.faces[:, n]] for n in range(3))
@@ -83,9 +85,35 @@ class Surfaces:
         self._patterns = [thing.material.pattern for thing in world.things]
         self._matte = np.array([thing.material.kind == "matte" for thing in world.things] + [False])
 
-    def matte(self, faces: Faces) -> BoolMap:
-        """Whether triangles are of matte things."""
-        found: BoolMap = self._matte[self.thing[faces]]
+    def matte(self, things: npt.NDArray[np.int64]) -> BoolMap:
+        """Whether things are matte; lamps, and what is of no thing, are not."""
+        found: BoolMap = self._matte[things]
+        return found
+
+    def met(
+        self,
+        origin: npt.NDArray[np.float64],
+        rotation: npt.NDArray[np.float64],
+        frame: npt.NDArray[np.float64],
+        size: int,
+        near: float,
+    ) -> Faces:
+        """Triangles that the rays through the middles of a square picture's pixels meet first, ``(size, size)``.
+
+        Parameters
+        ----------
+        origin : ndarray, shape (3,), float64
+            Where the camera is.
+        rotation : ndarray, shape (3, 3), float64
+            Carries its directions into the world.
+        frame : ndarray, shape (3,), float64
+            Its focal length in pixels, and the row and column, in pixels from the upper left corner, that its axis
+            meets.
+        size : int
+        near : float
+            Metres along the axis from which on something is met.
+        """
+        found: Faces = first_met(self._corners, origin, rotation, frame, size, near)
         return found
 
     def first(self, faces: Faces, directions: npt.NDArray[np.float64], origin: Vector) -> FirstSurface:
@@ -136,22 +164,39 @@ class Surfaces:
             self._uv,
             self._gradient,
             self.thing,
-            *self._texels,
+            self._painted,
+            self._texels[1],
             _FINE,
         )
         return found
 
+    def linear(self, pattern: Pattern) -> FloatArray:
+        """The raster of a pattern of the world's things, linear."""
+        at, (height, width) = self._texels[0][id(pattern)], pattern.raster.shape[:2]
+        return self._texels[1][at : at + height * width].reshape(height, width, 3)
+
     @cached_property
-    def _texels(self) -> tuple[npt.NDArray[np.int64], FloatArray]:
-        """Where each thing's pattern begins in a list of all texels, how high and wide it is; and the texels."""
+    def _texels(self) -> tuple[dict[int, int], FloatArray]:
+        """Where each pattern, told by identity, begins in a list of all texels; and these, linear."""
         rasters: dict[int, FloatArray] = {}
         for pattern in self._patterns:
-            raster = pattern.raster if isinstance(pattern, Pattern) else np.array([[pattern]], np.float32)
-            rasters.setdefault(id(pattern), raster)
-        begin = dict(zip(rasters, np.cumsum([0, *(raster[..., 0].size for raster in rasters.values())]), strict=False))
-        starts = [(begin[id(pattern)], *rasters[id(pattern)].shape[:2]) for pattern in self._patterns]
-        texels = np.concatenate([srgb_decoded(raster).reshape(-1, 3) for raster in rasters.values()])
-        return np.array(starts), texels.astype(np.float32)
+            rasters.setdefault(id(pattern), _raster(pattern))
+        begins = np.cumsum([0, *(raster[..., 0].size for raster in rasters.values())]).tolist()
+        texels = np.empty((begins[-1], 3), np.float32)
+        for raster, first, after in zip(rasters.values(), begins, begins[1:], strict=False):
+            texels[first:after] = srgb_decoded(raster).reshape(-1, 3)
+        return dict(zip(rasters, begins, strict=False)), texels
+
+    @cached_property
+    def _painted(self) -> npt.NDArray[np.int64]:
+        """Of each thing's pattern: where it begins in the list of texels, its height and width."""
+        begins = self._texels[0]
+        return np.array([(begins[id(pattern)], *_raster(pattern).shape[:2]) for pattern in self._patterns])
+
+
+def _raster(pattern: Pattern | Vector) -> FloatArray:
+    """A pattern's; one texel of a colour."""
+    return pattern.raster if isinstance(pattern, Pattern) else np.array([[pattern]], np.float32)
 
 
 def period(material: Material) -> tuple[float, float]:

@@ -69,45 +69,43 @@ def gathered_light(
     result = light[view].copy()
     variance = np.zeros((height, width), np.float32)
     for y in prange(height):
+        # of each pixel of the row: views that count, sums of their colours, of the squares of what those sum to
+        seen, squares = np.ones(width), np.zeros(width)
+        total = light[view, y].astype(np.float64)
         for x in range(width):
-            if not whole[view, y, x]:
-                continue
-            own = disparities[view, y, x]
-            total = light[view, y, x].astype(np.float64)
-            squares = (light[view, y, x, 0] + light[view, y, x, 1] + light[view, y, x, 2]) ** 2
-            seen = 1
-            for other in range(count):
-                if other == view:
+            squares[x] = (total[x, 0] + total[x, 1] + total[x, 2]) ** 2
+        # view by view: pixels beside each other lie beside each other in all of them
+        for other in range(count):
+            shown, depth = light[other], disparities[other]
+            for x in range(width):
+                own, thing = disparities[view, y, x], things[view, y, x]
+                inside, row, column, i, j = _landing(y, x, own, baselines[other], height, width)
+                if not inside or other == view or not whole[view, y, x]:
                     continue
-                inside, row, column, top, left = _landing(y, x, own, baselines[other], height, width)
-                if not inside:
-                    continue
-                down, across = row - top, column - left
-                one = True
-                there = 0.0
-                for i in range(2):
-                    for j in range(2):
-                        weight = (down if i else 1 - down) * (across if j else 1 - across)
-                        there += weight * disparities[other, top + i, left + j]
-                        one &= whole[other, top + i, left + j]
-                        one &= things[other, top + i, left + j] == things[view, y, x]
+                one = whole[other, i, j] and whole[other, i, j + 1]
+                one &= whole[other, i + 1, j] and whole[other, i + 1, j + 1]
+                one &= things[other, i, j] == thing and things[other, i, j + 1] == thing
+                one &= things[other, i + 1, j] == thing and things[other, i + 1, j + 1] == thing
+                down, across = row - i, column - j
+                a, b, c, d = (1 - down) * (1 - across), (1 - down) * across, down * (1 - across), down * across
+                there = a * depth[i, j] + b * depth[i, j + 1] + c * depth[i + 1, j] + d * depth[i + 1, j + 1]
                 if not one or abs(there - own) > bend:
                     continue
-                seen += 1
                 grey = 0.0
-                for i in range(2):
-                    for j in range(2):
-                        weight = (down if i else 1 - down) * (across if j else 1 - across)
-                        for c in range(3):
-                            part = weight * light[other, top + i, left + j, c]
-                            total[c] += part
-                            grey += part
-                squares += grey * grey
-            for c in range(3):
-                result[y, x, c] = total[c] / seen
-            if seen > 1:
+                for k in range(3):
+                    part = a * shown[i, j, k] + b * shown[i, j + 1, k]
+                    part += c * shown[i + 1, j, k] + d * shown[i + 1, j + 1, k]
+                    total[x, k] += part
+                    grey += part
+                squares[x] += grey * grey
+                seen[x] += 1
+        for x in range(width):
+            if seen[x] > 1:
+                mean = (total[x, 0] + total[x, 1] + total[x, 2]) / seen[x]
                 # equal ones may differ by rounding
-                variance[y, x] = max(squares / seen - (total.sum() / seen) ** 2, 0.0) / (seen - 1)
+                variance[y, x] = max(squares[x] / seen[x] - mean**2, 0.0) / (seen[x] - 1)
+            for k in range(3):
+                result[y, x, k] = total[x, k] / seen[x]
     return result, variance
 
 

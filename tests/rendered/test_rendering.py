@@ -155,7 +155,7 @@ def test_paths_are_traced_where_views_differ() -> None:
         return picture(at, seed, paths)
 
     def some_tiles(at: Any, pixels: np.ndarray, seed: int, paths: int) -> np.ndarray:
-        taken[pixels[..., 0], pixels[..., 1]] = paths
+        taken[pixels[..., 0], pixels[..., 1]] += paths
         return tiles(at, pixels, seed, paths)
 
     tracer.picture, tracer.tiles = whole_picture, some_tiles  # type: ignore[method-assign]
@@ -164,8 +164,10 @@ def test_paths_are_traced_where_views_differ() -> None:
     disparity = rig.disparity(seen.depth).astype(np.float32)
     shown, _, whole = sampled(tracer, at, seen, disparity, samples, 81, 0)
     mirror = seen.thing == 2
-    assert (taken[mirror] == samples).all()
-    assert (taken == 7).mean() > 0.5
+    # beside the few that all pixels take
+    assert (taken[mirror] >= 4 + samples).all()
+    assert (taken[~whole] >= 16).all()
+    assert (taken == 4).mean() > 0.5
     assert taken.mean() < samples / 4
     # tiles lie where they belong
     assert np.corrcoef(shown[mirror].ravel(), picture(at, 9, 64)[mirror].ravel())[0, 1] > 0.9
@@ -283,7 +285,7 @@ def test_what_a_sensor_makes_of_the_light(plain: Render) -> None:
     assert shaded[centre][0, 0].mean() == pytest.approx(0.5, abs=0.01)
     assert shaded[centre][48, 48].mean() == pytest.approx(1.0, abs=0.01)
     spread = exposed(plain, Exposure(gamma=1.0, bits=16, exposure_spread=0.2)).views
-    dark = base < 30000
+    dark = (base > 0) & (base < 30000)
     stops = [np.log2(np.median(spread[view][dark[view]] / base[view][dark[view]])) for view in steps(plain)]
     assert 0.08 < np.std(stops) < 0.4
     assert np.array_equal(spread[centre], base[centre])
