@@ -288,6 +288,7 @@ VARIANT_ENTRIES: dict[str, dict[str, Any]] = {
     "best_no_shares": {"base": "best", "occlusion": {"use_shares": False}},
     "best_no_mixture": {"base": "best", "occlusion": {"use_mixture": False}},
     "best_no_light": {"base": "best", "textureless": {"light": False}},
+    "best_no_reflections": {"base": "best", "textureless": {"reflections": False}},
     "best_no_planes": {"base": "best", "textureless": "none"},
     "best_no_smoothing": {"base": "best", "optimize": {"refinements": 3, "solves": 0}},
     "best_wls": {"base": "best", "optimize": "wls"},
@@ -311,7 +312,8 @@ PARTS_OF_BEST: dict[str, str] = {
     "best_no_shares": "edges not decided by shares of the views",
     "best_no_mixture": "edges not decided by colours of the reference view",
     "best_no_light": "planes of uniform regions by their border alone",
-    "best_no_planes": "no planes in uniform regions",
+    "best_no_reflections": "floors as deep as what they mirror",
+    "best_no_planes": "no planes in uniform regions, nor of floors",
     "best_no_smoothing": "Gauss-Newton, no smoothing",
     "best_wls": "the paper's global optimisation",
 }

@@ -65,7 +65,7 @@ class BorderPlane:
         plane = ransac_plane(border, disparity, parameters)
         if plane is None:
             return None
-        residuals = _residuals(basis_of(border), disparity[border].astype(np.float64), plane[None])[0]
+        residuals = residuals_of(basis_of(border), disparity[border].astype(np.float64), plane[None])[0]
         return cls(plane, residuals.size, float((np.abs(residuals) < parameters.tolerance).mean()))
 
 
@@ -99,7 +99,7 @@ def ransac_plane(border: BoolMap, disparity: FloatMap, parameters: BorderPlanePa
         return None
     parts = np.array_split(planes, -(-len(planes) * values.size // _AT_ONCE))
     scores = np.concatenate([_scores(positions, values, part, parameters) for part in parts])
-    chosen = abs(_residuals(positions, values, planes[scores.argmax(), None])[0]) < parameters.tolerance
+    chosen = abs(residuals_of(positions, values, planes[scores.argmax(), None])[0]) < parameters.tolerance
     if chosen.sum() < max(3, parameters.min_inlier_ratio * values.size):
         return None
     return np.asarray(np.linalg.lstsq(positions[chosen], values[chosen], rcond=None)[0])
@@ -112,13 +112,13 @@ def _scores(
     parameters: BorderPlaneParameters,
 ) -> npt.NDArray[np.float64]:
     """How much of a border agrees with each of some planes (P, 3), less what lies behind it."""
-    residual = _residuals(positions, values, planes)
+    residual = residuals_of(positions, values, planes)
     agreeing = (abs(residual) < parameters.tolerance).sum(axis=1)
     behind = (residual < -parameters.tolerance).sum(axis=1)
     return np.asarray(agreeing - parameters.behind_penalty * behind)
 
 
-def _residuals(
+def residuals_of(
     positions: npt.NDArray[np.float64], values: npt.NDArray[np.float64], planes: npt.NDArray[np.float64]
 ) -> npt.NDArray[np.float64]:
     """By how much each of N values is above each of P planes, (P, N)."""

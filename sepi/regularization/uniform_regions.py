@@ -27,6 +27,7 @@ from sepi.matching.denoising import DenoisedLightField, DenoisingParameters, den
 from sepi.matching.view_noise import variance_map
 from sepi.matching.view_subsets import spread_views
 from sepi.regularization.border_planes import BorderPlane, BorderPlaneParameters
+from sepi.regularization.floor_reflections import FloorReflectionsParameters, without_reflections
 from sepi.regularization.lit_planes import LitPlane, lit_planes
 from sepi.regularization.plane_choice import LIT_AREA, chosen_plane, kept_pixels
 from sepi.regularization.regions import Region
@@ -45,7 +46,9 @@ LIT_SHARE = 0.01
 """Of the picture, below which nothing is asked: it takes as long as a round of the optimisation."""
 
 
-class UniformPlanesParameters(OcclusionMarginParameters, DenoisingParameters, BorderPlaneParameters):
+class UniformPlanesParameters(
+    OcclusionMarginParameters, DenoisingParameters, BorderPlaneParameters, FloorReflectionsParameters
+):
     """Parameters of uniform regions and their planes."""
 
     colour_scale: float = Field(
@@ -119,6 +122,9 @@ def fill_uniform_regions(
         # where noise hides faint texture, that may know the surface better than the plane of a border
         faint = noisy and chosen.source == "border" and 2 * core[place][pixels].sum() < pixels.sum()
         held[place] |= pixels & np.bool_(not faint)
+    if parameters.reflections:
+        disparity, mirrored = without_reflections(field.reference_view, disparity, known, parameters)
+        held |= mirrored
     return disparity, held
 
 
