@@ -3,8 +3,8 @@
 In a mirror lies another room: to the views, a reflection is a surface behind the one that it is seen in, and no cost
 tells them apart. What stands against it is that nobody sees through a floor. A plane that rises towards the camera, and
 that many edges of its own texture lie on, is one; what lies behind it, with the plane on three of its four sides, is
-seen in it and not through it. Where strong edges go behind the plane as often as they lie on it, it is no reflection but
-relief: of what a surface mirrors, its own colours leave little contrast.
+seen in it and not through it. Where strong edges go behind the plane nearly as often as they lie on it, that is relief
+and no reflection, which is faint beside the colours of the surface.
 
 Pictures are taken to be upright. What is seen at a slant through an opening lies behind a wall, whose plane falls
 sideways, or not at all.
@@ -35,6 +35,8 @@ _SIDEWAYS = 0.5
 _SIDES = 3
 # share of the pixels round a reflection that lie on the floor; the others lie before it
 _BESIDE = 0.2
+# share of strong edges in a reflection, times that of the floor, from which on it is none
+_FAINT = 0.7
 # times to fit a plane to the edges that lie on it
 _FITS = 3
 
@@ -53,7 +55,7 @@ class FloorReflectionsParameters(Parameters):
         0.05, gt=0, description="distance from a floor of what lies on it, pixels per view step"
     )
     reflection_depth: float = Field(
-        0.15, ge=0, description="how far behind a floor a reflection goes at least, pixels per view step"
+        0.1, ge=0, description="how far behind a floor a reflection lies on average at least, pixels per view step"
     )
 
 
@@ -162,8 +164,8 @@ def seen_in(floor: FloatMap, disparity: FloatMap, edges: BoolMap, parameters: Fl
     if not count:
         return np.zeros_like(on)
     numbers = np.arange(1, count + 1)
-    deep = ndimage.maximum(behind, labels, numbers) > parameters.reflection_depth
-    faint = ndimage.mean(edges, labels, numbers) < edges[on].mean()
+    deep = ndimage.mean(behind, labels, numbers) > parameters.reflection_depth
+    faint = ndimage.mean(edges, labels, numbers) < _FAINT * edges[on].mean()
     # whichever of two parts that meet in a corner has the pixels between them
     round_about = np.where(labels > 0, 0, ndimage.grey_dilation(labels, (3, 3)))
     beside = ndimage.mean(on, round_about, numbers) >= _BESIDE

@@ -31,7 +31,7 @@ _DARKEST = 1e-3
 
 def shared_samples(samples: int, views: int) -> int:
     """Paths of a pixel of a matte surface, a power of two: with those of all views about four times ``samples``."""
-    return min(samples, 2 ** max(0, round(math.log2(4 * samples / views))))
+    return min(samples, 1 << max(0, round(math.log2(4 * samples / views))))
 
 
 def mixed_samples(samples: int) -> int:
@@ -71,7 +71,7 @@ def sampled(
     """
     # what is narrower than a pixel may stand between rays through middles
     beside = tracer.things(position, _FINE)
-    matte = tracer.surfaces.matte(beside).all(axis=(1, 3))
+    matte: BoolMap = np.all(tracer.surfaces.matte(beside), axis=(1, 3))
     whole = matte & (beside == seen.thing[:, None, :, None]).all(axis=(1, 3)) & _whole(disparity, seen.thing)
     albedo = np.zeros((*matte.shape, 3), np.float32)
     albedo[whole] = tracer.albedo(position, seen.face[whole], np.argwhere(whole))

@@ -49,7 +49,7 @@ def test_tiles_that_mirror_the_wall_lie_on_the_floor() -> None:
 def test_what_is_no_reflection_stays(change: str) -> None:
     """Holes that show texture of their own, dents, and openings in a wall that one looks along."""
     view, true, tiles = hall()
-    depth = np.where(tiles, true - (0.1 if change == "shallow" else 0.6), true).astype(np.float32)
+    depth = np.where(tiles, true - (0.08 if change == "shallow" else 0.6), true).astype(np.float32)
     if change == "relief":
         view[tiles] = np.random.default_rng(1).uniform(0, 1, (tiles.sum(), 1))
     known = RANGE
