@@ -191,6 +191,8 @@ def has_dataset(path: Path, name: str, *, if_damaged: bool = False) -> bool:
 def read_light_field(path: Path) -> LightField:
     """Read a light field written by ``write_light_field``."""
     with open_hdf5(path, "light field of this package") as file:
+        if "render" in file.attrs:
+            raise SepiError(f"{path}: light of a path-traced scene, no light field; give the scene's folder beside it")
         known_arrays = ("views", "present", "missing", "positions", RIG)
         arrays = {name: read_dataset(path, file[name]) for name in known_arrays if name in file}
         ground_truth, masks = truth_in(path, file)
