@@ -129,8 +129,9 @@ def _denoise(light_field: LightField) -> None:
 
 
 def _share_light(light_field: LightField) -> None:
-    """Call what rendering calls of views together, and of what is painted."""
+    """Call what rendering calls of views together, of what rays meet, and of what is painted."""
     from sepi.rendered.masks import seen_bits
+    from sepi.rendered.first_kernels import first_met
     from sepi.rendered.paint_kernels import painted
     from sepi.rendered.shared_light import with_shared_light
 
@@ -144,6 +145,7 @@ def _share_light(light_field: LightField) -> None:
     space, plane = np.zeros((1, 3)), np.zeros((1, 2))
     texels = np.zeros((1, 3), np.int64), np.zeros((1, 3), np.float32)
     painted(none, np.zeros((0, 2), np.int64), np.zeros(5), space, space, plane, np.zeros((1, 2, 3)), number, *texels, 1)
+    first_met(np.zeros((1, 3, 3)), np.zeros(3), np.eye(3), np.ones(3), 1, 0.1)
 
 
 @click.command(name="python -m sepi.cli.warm_up", cls=SepiCommand)
