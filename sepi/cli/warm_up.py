@@ -130,8 +130,8 @@ def _denoise(light_field: LightField) -> None:
 
 def _share_light(light_field: LightField) -> None:
     """Call what rendering calls of views together, of what rays meet, and of what is painted."""
-    from sepi.rendered.masks import seen_bits
     from sepi.rendered.first_kernels import first_met
+    from sepi.rendered.masks import seen_bits
     from sepi.rendered.paint_kernels import painted
     from sepi.rendered.shared_light import with_shared_light
 
