@@ -11,20 +11,16 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
-import numpy.typing as npt
 from pydantic import Field
 
 from sepi.lightfield import BoolMap, FloatMap
+from sepi.regularization.plane_search import fitted, pixels_in_order, planes_through, residuals_of, support
 from sepi.regularization.regions import Plane, basis_of
 from sepi.stage import Parameters
 
 KNOWN_BORDER = 2.0
 """Pixels of border for each pixel of the side of a square of the region's area, from which it tells whether it is one
 plane: a quarter of the shortest way round, two pixels wide."""
-
-# residuals that are computed at once: enough to save calls, few enough for the cache
-_AT_ONCE = 2**17
-_PIXELS_OF_A_PLANE = 12  # least border to fit one to
 
 
 class BorderPlaneParameters(Parameters):
@@ -86,42 +82,12 @@ def ransac_plane(border: BoolMap, disparity: FloatMap, parameters: BorderPlanePa
     Plane or None
         None where too little of the border agrees.
     """
-    values = disparity[border].astype(np.float64)
-    if values.size < _PIXELS_OF_A_PLANE:
-        return None
-    positions = basis_of(border)
-    order = np.lexsort(((positions[:, 1:] ** 2).sum(axis=1), values))
-    positions, values = positions[order], values[order]
-    triples = np.random.default_rng(0).integers(values.size, size=(parameters.ransac_iterations, 3))
-    triples = triples[np.abs(np.linalg.det(positions[triples])) > 1e-9]
-    planes = np.linalg.solve(positions[triples], values[triples, None])[..., 0]
+    positions, values = pixels_in_order(border, disparity)
+    planes = planes_through(positions, values, parameters.ransac_iterations)
     if not len(planes):
         return None
-    parts = np.array_split(planes, -(-len(planes) * values.size // _AT_ONCE))
-    scores = np.concatenate([_scores(positions, values, part, parameters) for part in parts])
-    chosen = abs(residuals_of(positions, values, planes[scores.argmax(), None])[0]) < parameters.tolerance
-    if chosen.sum() < max(3, parameters.min_inlier_ratio * values.size):
+    plane = planes[support(positions, values, planes, parameters.tolerance, parameters.behind_penalty).argmax()]
+    agreeing = abs(residuals_of(positions, values, plane[None])[0]) < parameters.tolerance
+    if agreeing.sum() < max(3, parameters.min_inlier_ratio * values.size):
         return None
-    return np.asarray(np.linalg.lstsq(positions[chosen], values[chosen], rcond=None)[0])
-
-
-def _scores(
-    positions: npt.NDArray[np.float64],
-    values: npt.NDArray[np.float64],
-    planes: npt.NDArray[np.float64],
-    parameters: BorderPlaneParameters,
-) -> npt.NDArray[np.float64]:
-    """How much of a border agrees with each of some planes (P, 3), less what lies behind it."""
-    residual = residuals_of(positions, values, planes)
-    agreeing = (abs(residual) < parameters.tolerance).sum(axis=1)
-    behind = (residual < -parameters.tolerance).sum(axis=1)
-    return np.asarray(agreeing - parameters.behind_penalty * behind)
-
-
-def residuals_of(
-    positions: npt.NDArray[np.float64], values: npt.NDArray[np.float64], planes: npt.NDArray[np.float64]
-) -> npt.NDArray[np.float64]:
-    """By how much each of N values is above each of P planes, (P, N)."""
-    a, b, c = planes.T[..., None]
-    # term by term: a product of matrices rounds as the number of threads has it
-    return np.asarray(values - (a + b * positions[:, 1] + c * positions[:, 2]))
+    return fitted(positions, values, plane, parameters.tolerance)

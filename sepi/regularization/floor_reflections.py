@@ -14,19 +14,20 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
+import numpy.typing as npt
 from pydantic import Field
 
 from sepi.lightfield import BoolMap, DisparityRange, FloatMap
-from sepi.regularization.border_planes import residuals_of
-from sepi.regularization.regions import Plane, basis_of
+from sepi.regularization.plane_search import fitted, pixels_in_order, planes_through, residuals_of, support
+from sepi.regularization.regions import Plane
 from sepi.stage import Parameters
 
 # of the brightness before its slopes are taken, pixels
 _SMOOTHING = 0.8
 # edges that planes are tried on, and planes tried through three of them
 _EDGES, _TRIED = 3000, 4000
-# how many edges behind a plane speak against it as one on it does for it: some are reflections
-_BEHIND = 2
+# weight of an edge behind a plane against one on it: some are reflections
+_BEHIND = 0.5
 # least part of the range that a floor goes through from the upper border of the picture to the lower
 _RISE = 0.5
 # of that, how much it may go through sideways
@@ -112,28 +113,21 @@ def floor_plane(
     Plane or None
         None where no plane holds enough of the edges below its horizon, which is where it leaves the range.
     """
-    positions, values = basis_of(edges), disparity[edges].astype(np.float64)
-    # the same ones in a picture that is mirrored
-    order = np.lexsort(((positions[:, 1:] ** 2).sum(axis=1), values))
-    order = order[:: -(-len(order) // _EDGES) or 1]
-    positions, values = positions[order], values[order]
-    if len(values) < _SIDES:
-        return None
-    triples = np.random.default_rng(0).integers(len(values), size=(_TRIED, 3))
-    triples = triples[np.abs(np.linalg.det(positions[triples])) > 1]
-    planes = np.linalg.solve(positions[triples], values[triples, None])[..., 0]
-    planes = planes[[_rises(plane, disparity.shape[0], known) for plane in planes]]
+    positions, values = pixels_in_order(edges, disparity)
+    every = max(1, -(-len(values) // _EDGES))
+    positions, values = positions[::every], values[::every]
+    planes = planes_through(positions, values, _TRIED)
+    planes = planes[_rises(planes, disparity.shape[0], known)]
     if not len(planes):
         return None
-    above, near = residuals_of(positions, values, planes), parameters.floor_tolerance
-    scores = _BEHIND * (np.abs(above) < near).sum(axis=1) - (above < -near).sum(axis=1)
+    tolerance = parameters.floor_tolerance
+    scores = support(positions, values, planes, tolerance, _BEHIND)
     plane: Plane = planes[scores.argmax()]
     for _ in range(_FITS):
-        on = np.abs(residuals_of(positions, values, plane[None])[0]) < near
-        plane = np.linalg.lstsq(positions[on], values[on], rcond=None)[0]
+        plane = fitted(positions, values, plane, tolerance)
     above = residuals_of(positions, values, plane[None])[0]
     below_horizon = values - above > known.minimum
-    holds = (np.abs(above) < near).sum() >= parameters.floor_share * below_horizon.sum()
+    holds = (np.abs(above) < tolerance).sum() >= parameters.floor_share * below_horizon.sum()
     return plane if scores.max() > 0 and holds and _rises(plane, disparity.shape[0], known) else None
 
 
@@ -172,6 +166,8 @@ def seen_in(floor: FloatMap, disparity: FloatMap, edges: BoolMap, parameters: Fl
     return np.asarray(np.append(False, deep & faint & beside)[labels])
 
 
-def _rises(plane: Plane, height: int, known: DisparityRange) -> bool:
-    """Whether a plane is nearer the lower it is, as a floor is on which one could walk away from the camera."""
-    return bool(plane[2] * height > _RISE * (known.maximum - known.minimum) and abs(plane[1]) < _SIDEWAYS * plane[2])
+def _rises(planes: npt.NDArray[np.float64], height: int, known: DisparityRange) -> npt.NDArray[np.bool_]:
+    """Whether planes (..., 3) are nearer the lower they are, as a floor is that goes away from the camera."""
+    across, down = planes[..., 1], planes[..., 2]
+    rises = down * height > _RISE * (known.maximum - known.minimum)
+    return np.asarray(rises & (np.abs(across) < _SIDEWAYS * down))

@@ -5,7 +5,8 @@ gradients are no larger than that noise explains: then no view knows anything ab
 threshold on contrast says. (This takes the place of the paper's LTI, section IV-C of [1]_.)
 
 What is known lies on its border (:mod:`sepi.regularization.border_planes`), and in how the light changes over the whole
-of it (:mod:`sepi.regularization.lit_planes`).
+of it (:mod:`sepi.regularization.lit_planes`). What floors mirror is put back onto them afterwards
+(:mod:`sepi.regularization.floor_reflections`), since their planes may go through such regions.
 
 References
 ----------
@@ -74,7 +75,7 @@ class UniformPlanesParameters(
 def fill_uniform_regions(
     light_field: LightField, before: StageMaps, parameters: UniformPlanesParameters
 ) -> tuple[FloatMap, BoolMap]:
-    """Disparity with planes in uniform regions, and these regions.
+    """Disparity with planes in uniform regions and where floors mirror, and where that is.
 
     Parameters
     ----------
@@ -85,8 +86,8 @@ def fill_uniform_regions(
     Returns
     -------
     disparity : ndarray, shape (H, W), float32
-    uniform : ndarray, shape (H, W), bool
-        The regions that have a plane.
+    held : ndarray, shape (H, W), bool
+        What was given a plane.
 
     Raises
     ------

@@ -74,7 +74,8 @@ class Surfaces:
         )
         self.thing = np.concatenate([np.full(len(mesh.faces), number) for number, mesh, _ in parts])
         self._corners = self.mesh.vertices.astype(np.float64)[self.mesh.faces]
-        first, second, third = np.moveaxis(self._corners, 1, 0)
+        # one after the other in memory, as kernels are compiled for
+        first, second, third = np.ascontiguousarray(np.moveaxis(self._corners, 1, 0))
         self._corner, self._normal = first, np.cross(second - first, third - first)
         # uv rises along the triangle by this much in each direction
         at, along, beyond = (self.mesh.uv.astype(np.float64)[self.mesh.faces[:, n]] for n in range(3))

@@ -164,9 +164,9 @@ def test_paths_are_traced_where_views_differ() -> None:
     disparity = rig.disparity(seen.depth).astype(np.float32)
     shown, _, whole = sampled(tracer, at, seen, disparity, samples, 81, 0)
     mirror = seen.thing == 2
-    # beside the few that all pixels take
-    assert (taken[mirror] >= 4 + samples).all()
-    assert (taken[~whole] >= 16).all()
+    # beside the few that all pixels take; a tile of pixels that mix surfaces may hold some of the mirror
+    assert set(np.unique(taken[mirror])) <= {4 + samples, 4 + 12 + samples}
+    assert set(np.unique(taken[~whole])) <= {4 + 12, 4 + samples, 4 + 12 + samples}
     assert (taken == 4).mean() > 0.5
     assert taken.mean() < samples / 4
     # tiles lie where they belong

@@ -1,0 +1,66 @@
+"""The plane that most of some pixels lie on, among planes through three of them each (RANSAC [1]_).
+
+References
+----------
+.. [1] Fischler, Bolles: Random Sample Consensus. CACM 1981. doi:10.1145/358669.358692
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from sepi.lightfield import BoolMap, FloatMap
+from sepi.regularization.regions import Plane, basis_of
+
+# residuals that are computed at once: enough to save calls, few enough for the cache
+_AT_ONCE = 2**17
+_PIXELS_OF_A_PLANE = 12  # least to fit one to
+
+_Doubles = npt.NDArray[np.float64]
+
+
+def pixels_in_order(pixels: BoolMap, disparity: FloatMap) -> tuple[_Doubles, _Doubles]:
+    """1, x and y of some pixels, (N, 3), and their disparities; in the same order in a mirrored picture."""
+    positions, values = basis_of(pixels), disparity[pixels].astype(np.float64)
+    order = np.lexsort(((positions[:, 1:] ** 2).sum(axis=1), values))
+    return positions[order], values[order]
+
+
+def planes_through(positions: _Doubles, values: _Doubles, tried: int) -> _Doubles:
+    """At most so many planes through three pixels each, (P, 3); none for too few pixels.
+
+    The same ones every time, whatever else is asked.
+    """
+    if len(values) < _PIXELS_OF_A_PLANE:
+        return np.empty((0, 3))
+    triples = np.random.default_rng(0).integers(len(values), size=(tried, 3))
+    triples = triples[np.abs(np.linalg.det(positions[triples])) > 1e-9]
+    return np.asarray(np.linalg.solve(positions[triples], values[triples, None])[..., 0])
+
+
+def support(
+    positions: _Doubles, values: _Doubles, planes: _Doubles, tolerance: float, behind_penalty: float
+) -> _Doubles:
+    """How many of N pixels agree with each of P planes, less a weight for each that lies behind it; (P,)."""
+
+    def of(some: _Doubles) -> _Doubles:
+        residual = residuals_of(positions, values, some)
+        agreeing = (abs(residual) < tolerance).sum(axis=1)
+        return np.asarray(agreeing - behind_penalty * (residual < -tolerance).sum(axis=1))
+
+    parts = np.array_split(planes, -(-len(planes) * len(values) // _AT_ONCE))
+    return np.concatenate([of(part) for part in parts])
+
+
+def fitted(positions: _Doubles, values: _Doubles, plane: Plane, tolerance: float) -> Plane:
+    """The plane fitted to what agrees with a plane."""
+    agreeing = abs(residuals_of(positions, values, plane[None])[0]) < tolerance
+    return np.asarray(np.linalg.lstsq(positions[agreeing], values[agreeing], rcond=None)[0])
+
+
+def residuals_of(positions: _Doubles, values: _Doubles, planes: _Doubles) -> _Doubles:
+    """By how much each of N values is above each of P planes, (P, N)."""
+    a, b, c = planes.T[..., None]
+    # term by term: a product of matrices rounds as the number of threads has it
+    return np.asarray(values - (a + b * positions[:, 1] + c * positions[:, 2]))
