@@ -39,7 +39,9 @@ export PYTHONDONTWRITEBYTECODE :=
 # in each; of numba's threads tests/conftest.py takes care
 WORKERS = $(shell $(PYTHON) -c 'import os; print((os.cpu_count() or 1) + 1)')
 ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
-TESTS := $(ONE_THREAD) $(BIN)/python -m pytest --numprocesses $(WORKERS)
+# one that crashes fails its test and ends the run: in its place another would wait for ever for a second test
+AT_ONCE = --numprocesses $(WORKERS) --max-worker-restart 0
+TESTS = $(ONE_THREAD) $(BIN)/python -m pytest $(AT_ONCE)
 QUICK := not real and not workflow and not browser and not slow and not system and not faults
 
 # a quarter more than they take, too; tests that are not named in the file count as quick until they no longer fit
@@ -80,7 +82,7 @@ coverage: export COVERAGE_FILE := $(CURDIR)/build/coverage/data
 coverage: $(COMPARED)
 	rm -rf build/coverage
 	mkdir -p build/coverage
-	$(ONE_THREAD) $(BIN)/coverage run -m pytest --numprocesses $(WORKERS); status=$$?; \
+	$(ONE_THREAD) $(BIN)/coverage run -m pytest $(AT_ONCE); status=$$?; \
 	$(BIN)/coverage combine --quiet && $(BIN)/coverage report --skip-covered --skip-empty; exit $$status
 
 # each is a hook of .pre-commit-config.yaml, too

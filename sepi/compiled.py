@@ -7,12 +7,13 @@ nothing. Here that is left until something has to be compiled.
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable
 from typing import Any, TypeVar, cast
 
 import numba
 from numba import prange
-from numba.core.caching import FunctionCache
+from numba.core.caching import FunctionCache, IndexDataCacheFile
 from numba.core.runtime.nrt import rtsys
 
 __all__ = ["njit", "prange"]
@@ -20,8 +21,30 @@ __all__ = ["njit", "prange"]
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
 
+class _KernelFiles(IndexDataCacheFile):  # type: ignore[misc, unused-ignore]
+    """A file of compiled code for each signature, named by it, and the index of a function's.
+
+    Numba numbers them, and writes the index before the code: two processes that compile a function at once, for two
+    types, both write number 1, and the index of the one names the code of the other, which crashes or computes anything
+    until the cache is cleared. Here the worst that the one can do to the other is to have its code compiled once more.
+    """
+
+    def save(self, key: Any, data: Any) -> None:
+        """Keep compiled code for a signature, then say where it is."""
+        digest = hashlib.sha256(repr(key).encode()).hexdigest()[:16]
+        name = f"{self._index_name.removesuffix('nbi')}{digest}.nbc"
+        self._save_data(name, data)  # type: ignore[no-untyped-call, unused-ignore]
+        self._save_index(self._load_index() | {key: name})  # type: ignore[no-untyped-call, unused-ignore]
+
+
 class _KernelCache(FunctionCache):  # type: ignore[misc, unused-ignore]
     """Compiled code on disk, as numba keeps it. What is missing is compiled, and the compiler makes itself ready."""
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        super().__init__(function)  # type: ignore[no-untyped-call, unused-ignore]
+        place = self._impl.locator
+        where = place.get_cache_path(), self._impl.filename_base, place.get_source_stamp()
+        self._cache_file = _KernelFiles(*where)  # type: ignore[no-untyped-call, unused-ignore]
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """What was compiled for a signature; None where there is nothing."""

@@ -155,7 +155,10 @@ def _serve(address: str, program: str, tree: str = "") -> None:
         listener.bind(address)
         listener.listen(64)
         print("ready", os.getpid(), flush=True)
-        while listener in select.select([listener, sys.stdin], [], [])[0]:
+        # a second at a time: a fork's end just before a wait does not end it, and who waits for the fork calls no other
+        while sys.stdin not in (ready := select.select([listener, sys.stdin], [], [], 1.0)[0]):
+            if not ready:
+                continue
             called, _ = listener.accept()
             head, files, _, _ = socket.recv_fds(called, 8, 3)
             message = b""

@@ -123,13 +123,14 @@ def alike_light(
                 continue
             total = np.zeros(3)
             count = 0
-            for v in range(max(y - reach, 1), min(y + reach + 1, height - 1)):
-                for u in range(max(x - reach, 1), min(x + reach + 1, width - 1)):
+            for v in range(max(y - reach, 0), min(y + reach + 1, height)):
+                for u in range(max(x - reach, 0), min(x + reach + 1, width)):
                     if not whole[v, u] or things[v, u] != things[y, x]:
                         continue
                     apart, expected = 0.0, 0.0
-                    for i in range(-1, 2):
-                        for j in range(-1, 2):
+                    # those of the 3x3 that both have within the picture
+                    for i in range(-min(y, v, 1), min(height - y, height - v, 2)):
+                        for j in range(-min(x, u, 1), min(width - x, width - u, 2)):
                             if whole[y + i, x + j] and whole[v + i, u + j]:
                                 apart += (grey[y + i, x + j] - grey[v + i, u + j]) ** 2
                                 expected += variance[y + i, x + j] + variance[v + i, u + j]

@@ -6,10 +6,13 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 import sepi
+from sepi.compiled import _KernelFiles
+from sepi.regularization.second_order_kernels import onto_planes
 
 PACKAGE = Path(sepi.__file__).parent
 
@@ -82,6 +85,27 @@ def test_rule_sees_functions_constants_and_flags_of_other_files() -> None:
 def test_compiled_functions_use_their_own_file_only(file: Path) -> None:
     """When the file of a function changes, numba compiles it anew; of other files that it uses numba knows nothing."""
     assert foreign_names(file.read_text()) == set()
+
+
+def test_compiled_at_once_by_two_processes_for_two_types(tmp_path: Path) -> None:
+    """Either finds the code of its own type, or none: that of the other would crash, or compute anything."""
+    assert isinstance(onto_planes._cache._cache_file, _KernelFiles)
+    one, other = (_KernelFiles(str(tmp_path), "cost-1.py3", "of this source") for _ in range(2))
+    # as both read the index before either wrote it
+    known, save_data = iter([{}, {}]), one._save_data
+    one._load_index = other._load_index = lambda: next(known)
+
+    def save_other_meanwhile(*written: Any) -> None:
+        other.save("float", "code for floats")
+        save_data(*written)
+
+    one._save_data = save_other_meanwhile
+    one.save("integer", "code for integers")
+    del one._load_index, other._load_index
+    assert one.load("integer") in ("code for integers", None)
+    assert one.load("float") in ("code for floats", None)
+    one.save("integer", "code for integers")
+    assert (one.load("float"), one.load("integer")) == ("code for floats", "code for integers")
 
 
 @pytest.mark.system

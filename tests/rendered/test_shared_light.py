@@ -53,7 +53,8 @@ def test_equal_light_stays_as_it_is() -> None:
     gathered, variance = gathered_light(**plane, view=4, bend=0.02)
     assert variance.min() >= 0
     smoothed = alike_light(gathered, variance, plane["things"][4], plane["whole"][4], 3, 2.0)
-    np.testing.assert_allclose(smoothed[2:-2, 2:-2], plane["light"][4, 2:-2, 2:-2], rtol=1e-2)
+    # rims, too, whose neighbours are partly beyond the picture
+    np.testing.assert_allclose(smoothed, plane["light"][4], rtol=1e-2)
 
 
 def test_light_is_smoothed_where_it_may_be_the_same_and_not_across_a_shadow() -> None:
