@@ -20,11 +20,12 @@ from sepi.lightfield import BoolMap, FloatMap, LightField
 from sepi.matching.base_detail import BaseDetailParameters, ColourScale, base_detail_decomposition, reference_noise
 from sepi.matching.candidates import CandidateParameters, CandidateRule, number_field
 from sepi.matching.denoising import guide_of
+from sepi.matching.gaps import GapParameters, with_open_gaps
 from sepi.matching.nearest_surfaces import nearest_surfaces
 from sepi.matching.row_bands import Band, row_bands
 from sepi.matching.semi_global import SmallPenalty, SmoothedResult, SmoothingParameters, smooth_and_choose
 from sepi.matching.view_subsets import spread_views
-from sepi.stage import Needs, OcclusionMarginParameters, Progress
+from sepi.stage import Needs, Progress
 
 if TYPE_CHECKING:
     from sepi.matching.visibility_kernels import Visibility
@@ -67,7 +68,7 @@ class VisibilitySweepParameters(CandidateParameters, BaseDetailParameters, Smoot
         return max(2, round((self.number(light_field) - 1) / sampling) + 1)
 
 
-class VisibleViewsParameters(VisibilitySweepParameters, OcclusionMarginParameters):
+class VisibleViewsParameters(VisibilitySweepParameters, GapParameters):
     """Parameters of the sweep over the views that see a pixel."""
 
     views: int = Field(41, ge=2, description="views that the last map compares, at least")
@@ -135,11 +136,14 @@ def depth_from_visible_views(
         If the disparity range is unknown.
     """
     n = parameters.passes
+    few = spread_views(light_field, parameters.first_views)
+    if parameters.gaps:
+        disparity = with_open_gaps(light_field, disparity, few, parameters)
     for i in range(n):
         last = i == n - 1
         result = _sweep(
             light_field,
-            spread_views(light_field, parameters.views if last else parameters.first_views),
+            spread_views(light_field, parameters.views) if last else few,
             parameters.sampling if last else parameters.first_sampling,
             disparity,
             parameters,

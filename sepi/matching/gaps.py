@@ -1,0 +1,98 @@
+"""What is seen through gaps, told from what borders them.
+
+A gap between two things shows the wall behind, in each view another part of it. As long as a wall's colours hardly
+change, all views agree with a patch of such colours that fills the gap and moves with its borders; and once a map has
+that patch, it hides the wall from every view, so that no later sweep can find it. So before a map tells what is hidden,
+patches that are coloured as something farther is nearby are tried as that: in the views in which nothing else hides
+them there, they have to fit much better than where they are.
+
+Both depths are asked of the same views and pixels: noise, and colours that change slowly, count on either side alike.
+"""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from pydantic import Field
+
+from sepi.lightfield import BoolMap, FloatMap, LightField, full_scale
+from sepi.matching.denoising import guide_of
+from sepi.matching.nearest_surfaces import nearest_surfaces
+from sepi.matching.row_bands import row_bands
+from sepi.stage import OcclusionMarginParameters
+
+# of a pixel of a view: the z-buffer
+_BYTES_PER_PIXEL = 4
+# both depths are compared over so many pixels across and down
+_WINDOW = 7
+# share of those pixels that has to fit better at the farther one, and of the views that have to see it
+_MOST, _SEEING = 1 / 2, 1 / 8
+
+
+class GapParameters(OcclusionMarginParameters):
+    """Parameters of what is seen through gaps."""
+
+    gaps: bool = Field(True, description="whether what is seen through gaps is told from what borders them")
+    gap_step: float = Field(
+        0.6, gt=0, description="by how much a farther surface is farther at least, pixels per view step"
+    )
+    gap_reach: int = Field(
+        32, ge=1, le=200, description="how far away a farther surface of the same colour is looked for, pixels"
+    )
+    gap_colour: float = Field(0.06, gt=0, le=2, description="distance of colours that are the same; RGB, 0..1")
+    gap_gain: float = Field(
+        0.5, gt=0, lt=1, description="share of the squared residual that has to be left at the farther depth, at most"
+    )
+
+
+def with_open_gaps(
+    light_field: LightField, disparity: FloatMap, present: BoolMap, parameters: GapParameters
+) -> FloatMap:
+    """A map with what is seen through gaps as far away as it is.
+
+    Parameters
+    ----------
+    light_field : LightField
+    disparity : ndarray, shape (H, W), float32
+        Pixels per view step.
+    present : ndarray, shape (T, S), bool
+        The views that are compared.
+    parameters : GapParameters
+
+    Returns
+    -------
+    ndarray, shape (H, W), float32
+    """
+    from sepi.matching.gap_kernels import compare_depths, farther_alike
+
+    guide, reach = guide_of(light_field), parameters.gap_reach
+    lowest = cv2.erode(disparity, np.ones((2 * reach + 1, 1), np.uint8))
+    lowest = cv2.erode(lowest, np.ones((1, 2 * reach + 1), np.uint8))
+    step, distance2 = np.float32(parameters.gap_step), np.float32(parameters.gap_colour**2)
+    farther = farther_alike(disparity, lowest, guide, reach, step, distance2)
+    asked = farther != disparity
+    if not asked.any():
+        return disparity
+    views = light_field.rgb_views
+    unit = np.float32(1 / full_scale(views.dtype))
+    others = present.copy()
+    others[light_field.reference_position] = False
+    positions, baselines = np.argwhere(others), light_field.baselines[others]
+    sums = np.zeros((3, *disparity.shape), np.float32)
+    for begin, end, rows in row_bands(light_field, present, float(np.abs(disparity).max()), _BYTES_PER_PIXEL):
+        nearest = nearest_surfaces(light_field, farther, others, rows)
+        compare_depths(
+            views.transpose(0, 1, 4, 2, 3), unit, guide, disparity, farther, nearest, rows.low, begin, end,
+            positions, baselines, np.float32(parameters.occlusion_margin), sums,
+        )  # fmt: skip
+    there, here, seeing = sums
+    # amid like colours: at edges residuals are of interpolation
+    square = np.ones((3, 3), np.uint8)
+    plain = (cv2.dilate(guide, square) - cv2.erode(guide, square)).max(axis=2) < np.float32(parameters.gap_colour)
+    asked_amid = asked & plain
+    better = asked_amid & (there < np.float32(parameters.gap_gain) * here)
+    voting, voters, seen = (
+        cv2.blur(values.astype(np.float32), (_WINDOW, _WINDOW)) for values in (better, asked_amid, asked_amid * seeing)
+    )
+    opened = asked & (voting > _MOST * voters) & (seen >= _SEEING * len(positions) * voters)
+    return np.where(opened, farther, disparity)
