@@ -19,7 +19,7 @@ SLIT = (abs(Y - 32) < 3) & (abs(X - 32) < 15)
 
 
 def box_before_a_wall(panel: bool) -> LightField:
-    """A wall of colours that hardly change, a spotted box with a slit, and in it, if asked for, a panel of such colours."""
+    """A wall of colours that hardly change, a spotted box with a slit, and in it, if asked, a panel of such colours."""
     rng = np.random.default_rng(0)
     # beyond the picture, too: nobody sees its end
     wall = cv2.GaussianBlur(rng.normal(0, 1, (2 * SIZE, 2 * SIZE, 3)), (0, 0), 3)
