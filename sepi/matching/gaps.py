@@ -23,8 +23,8 @@ from sepi.stage import OcclusionMarginParameters
 
 # of a pixel of a view: the z-buffer
 _BYTES_PER_PIXEL = 4
-# both depths are compared over so many pixels across and down
-_WINDOW = 7
+# both depths are compared over so many pixels across and down, of which so many have to be asked: one may fit by chance
+_WINDOW, _ASKED = 7, 9
 # share of those pixels that has to fit better at the farther one, and of the views that have to see it
 _MOST, _SEEING = 1 / 2, 1 / 8
 
@@ -94,5 +94,6 @@ def with_open_gaps(
     voting, voters, seen = (
         cv2.blur(values.astype(np.float32), (_WINDOW, _WINDOW)) for values in (better, asked_amid, asked_amid * seeing)
     )
-    opened = asked & (voting > _MOST * voters) & (seen >= _SEEING * len(positions) * voters)
+    opened = asked & (voting > _MOST * voters) & (voters > (_ASKED - 0.5) / _WINDOW**2)
+    opened &= seen >= _SEEING * len(positions) * voters
     return np.where(opened, farther, disparity)
