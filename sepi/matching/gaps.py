@@ -26,7 +26,7 @@ _BYTES_PER_PIXEL = 4
 # both depths are compared over so many pixels across and down, of which so many have to be asked: one may fit by chance
 _WINDOW, _ASKED = 7, 9
 # share of those pixels that has to fit better at the farther one, and of the views that have to see it
-_MOST, _SEEING = 1 / 2, 1 / 8
+_MOST, _SEEING = 3 / 4, 1 / 8
 
 
 class GapParameters(OcclusionMarginParameters):
