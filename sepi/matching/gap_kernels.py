@@ -59,8 +59,7 @@ def farther_alike(disparity: Any, lowest: Any, colours: Any, reach: int, least_s
                     for c in range(3):
                         apart += (colours[row, column, c] - colours[y, x, c]) ** 2
                     if apart < distance2:
-                        known = farther[y, x] < limit
-                        farther[y, x] = min(d, farther[y, x]) if known and step == closest else d
+                        farther[y, x] = min(d, farther[y, x]) if step == closest else d
                         closest = step
                         break
     return farther

@@ -63,7 +63,7 @@ def with_open_gaps(
     -------
     ndarray, shape (H, W), float32
     """
-    from sepi.matching.gap_kernels import compare_depths, farther_alike
+    from sepi.matching.gap_kernels import farther_alike
 
     guide, reach = guide_of(light_field), parameters.gap_reach
     lowest = cv2.erode(disparity, np.ones((2 * reach + 1, 1), np.uint8))
@@ -73,27 +73,44 @@ def with_open_gaps(
     asked = farther != disparity
     if not asked.any():
         return disparity
-    views = light_field.rgb_views
-    unit = np.float32(1 / full_scale(views.dtype))
     others = present.copy()
     others[light_field.reference_position] = False
+    there, here, seeing = _residuals(light_field, disparity, farther, others, parameters.occlusion_margin)
+    better = there < np.float32(parameters.gap_gain) * here
+    # amid like colours: at edges residuals are of interpolation
+    voters = asked & _plain(guide, parameters.gap_colour)
+    return np.where(asked & _outvoted(voters, better, seeing / others.sum()), farther, disparity)
+
+
+def _residuals(
+    light_field: LightField, disparity: FloatMap, farther: FloatMap, others: BoolMap, occlusion_margin: float
+) -> FloatMap:
+    """Squared residuals at the farther depth and at the map's own, and of how many views they are; (3, H, W)."""
+    from sepi.matching.gap_kernels import compare_depths
+
+    views = light_field.rgb_views
+    colours, unit = views.transpose(0, 1, 4, 2, 3), np.float32(1 / full_scale(views.dtype))
     positions, baselines = np.argwhere(others), light_field.baselines[others]
     sums = np.zeros((3, *disparity.shape), np.float32)
-    for begin, end, rows in row_bands(light_field, present, float(np.abs(disparity).max()), _BYTES_PER_PIXEL):
+    for begin, end, rows in row_bands(light_field, others, float(np.abs(disparity).max()), _BYTES_PER_PIXEL):
         nearest = nearest_surfaces(light_field, farther, others, rows)
         compare_depths(
-            views.transpose(0, 1, 4, 2, 3), unit, guide, disparity, farther, nearest, rows.low, begin, end,
-            positions, baselines, np.float32(parameters.occlusion_margin), sums,
+            colours, unit, guide_of(light_field), disparity, farther, nearest, rows.low, begin, end,
+            positions, baselines, np.float32(occlusion_margin), sums,
         )  # fmt: skip
-    there, here, seeing = sums
-    # amid like colours: at edges residuals are of interpolation
+    return sums
+
+
+def _plain(guide: FloatMap, distance: float) -> BoolMap:
+    """Pixels with whose neighbours no channel changes by ``distance``."""
     square = np.ones((3, 3), np.uint8)
-    plain = (cv2.dilate(guide, square) - cv2.erode(guide, square)).max(axis=2) < np.float32(parameters.gap_colour)
-    asked_amid = asked & plain
-    better = asked_amid & (there < np.float32(parameters.gap_gain) * here)
-    voting, voters, seen = (
-        cv2.blur(values.astype(np.float32), (_WINDOW, _WINDOW)) for values in (better, asked_amid, asked_amid * seeing)
+    return np.asarray((cv2.dilate(guide, square) - cv2.erode(guide, square)).max(axis=2) < np.float32(distance))
+
+
+def _outvoted(voters: BoolMap, better: BoolMap, seeing: FloatMap) -> BoolMap:
+    """Where enough voters are about, enough views see what they vote on, and most find the farther depth better."""
+    voting, about, seen = (
+        cv2.blur(values.astype(np.float32), (_WINDOW, _WINDOW)) for values in (voters & better, voters, voters * seeing)
     )
-    opened = asked & (voting > _MOST * voters) & (voters > (_ASKED - 0.5) / _WINDOW**2)
-    opened &= seen >= _SEEING * len(positions) * voters
-    return np.where(opened, farther, disparity)
+    enough = (about > (_ASKED - 0.5) / _WINDOW**2) & (seen >= _SEEING * about)
+    return np.asarray(enough & (voting > _MOST * about))

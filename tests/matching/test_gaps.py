@@ -1,11 +1,11 @@
-"""What is seen through a gap is as far away as the wall, and a bright panel on a box stays on the box."""
+"""What is seen through a gap is as far away as the wall, and a plain panel of a box stays on the box."""
 
 from typing import Any
 
 import cv2
 import numpy as np
 
-from sepi.lightfield import DisparityRange, FloatMap, LightField
+from sepi.lightfield import BoolMap, DisparityRange, FloatMap, LightField
 from sepi.matching.gap_kernels import farther_alike
 from sepi.matching.gaps import GapParameters, with_open_gaps
 from sepi.matching.view_subsets import spread_views
@@ -13,21 +13,22 @@ from sepi.matching.view_subsets import spread_views
 SIZE, VIEWS = 64, 5
 WALL, BOX = -1.4, 0.8
 Y, X = np.mgrid[:SIZE, :SIZE]
-# the slit of a box that fills the picture's middle, and of which six pixels are open
+# a box, and five rows of it that are open, or a panel
 INSIDE = (abs(Y - 32) < 20) & (abs(X - 32) < 20)
 SLIT = (abs(Y - 32) < 3) & (abs(X - 32) < 15)
+NOTHING = np.zeros((SIZE, SIZE), bool)
 
 
-def box_before_a_wall(panel: bool) -> LightField:
-    """A wall of colours that hardly change, a spotted box with a slit, and in it, if asked, a panel of such colours."""
+def box_before_a_wall(opening: BoolMap = NOTHING, panel: BoolMap = NOTHING) -> LightField:
+    """A wall of colours that hardly change, a spotted box with an opening, and a panel of such colours on it."""
     rng = np.random.default_rng(0)
     # beyond the picture, too: nobody sees its end
     wall = cv2.GaussianBlur(rng.normal(0, 1, (2 * SIZE, 2 * SIZE, 3)), (0, 0), 3)
     wall = (0.5 + 0.012 / wall.std() * wall).astype(np.float32)
     spots = cv2.GaussianBlur(rng.uniform(-1, 1, (SIZE, SIZE, 3)).astype(np.float32), (0, 0), 1.0)
     spots += np.float32([0.8, 0.2, 0.2])
-    spots[SLIT] = wall[SIZE // 2 :, SIZE // 2 :][:SIZE, :SIZE][SLIT]
-    solid = (INSIDE if panel else INSIDE & ~SLIT).astype(np.float32)
+    spots[panel] = wall[SIZE // 2 : -SIZE // 2, SIZE // 2 : -SIZE // 2][panel]
+    solid = (INSIDE & ~opening).astype(np.float32)
     views = np.empty((VIEWS, VIEWS, SIZE, SIZE, 3), np.float32)
     for t, s in np.ndindex(VIEWS, VIEWS):
         down, across = float(t - VIEWS // 2), float(s - VIEWS // 2)
@@ -49,20 +50,20 @@ def opened(light_field: LightField) -> FloatMap:
 
 def test_a_wall_seen_through_a_slit_is_behind_it() -> None:
     """If this fails, gaps between near things that a plain wall shows through are filled, with full confidence."""
-    found = opened(box_before_a_wall(panel=False))
+    found = opened(box_before_a_wall(opening=SLIT))
     assert (found[SLIT] == np.float32(WALL)).mean() > 0.9
     assert np.array_equal(found[~SLIT], np.where(INSIDE, np.float32(BOX), np.float32(WALL))[~SLIT])
 
 
 def test_a_panel_of_the_walls_colours_stays_on_the_box() -> None:
     """If this fails, near things have holes wherever they are coloured like what is behind them."""
-    found = opened(box_before_a_wall(panel=True))
+    found = opened(box_before_a_wall(panel=SLIT))
     assert np.array_equal(found, np.where(INSIDE, np.float32(BOX), np.float32(WALL)))
 
 
 def test_a_plain_slit_that_says_nothing_stays_as_matching_has_it() -> None:
     """Where both depths fit as well the one is no better than the other, and maps must not flicker between them."""
-    field = box_before_a_wall(panel=False)
+    field = box_before_a_wall(opening=SLIT)
     pure = field.views.copy()
     # the wall, through the slit and beside the box
     pure[abs(pure - 0.5).max(axis=-1) < 0.06] = 0.5
