@@ -16,6 +16,7 @@ from sepi.report.plan import Plan
 from sepi.validation import require_known
 from sepi.workflow.code_digest import ROOT, code_digest, ingest_modules, keep, remember, render_modules, stage_modules
 from sepi.workflow.candidates import candidates_factor, candidates_mb
+from sepi.workflow import job_client
 from sepi.workflow.config import load_settings
 from sepi.rendered import RENDERED
 from sepi.workflow.rendered_scenes import rendered_scene
@@ -33,18 +34,21 @@ atexit.register(keep, Path(".snakemake").absolute())
 # the digests are made of; jobs of a workflow that has this one as a module keep their own. They end with Snakemake, whatever
 # ends it: what a job that nobody waits for goes on to write would meet the next run's. For this they take the place of
 # their shell (`exec`)
+PYTHON_PATH = os.pathsep.join([str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])])
 os.environ.update(
     {
         "SEPI_PYTHON": sys.executable,
-        "SEPI_PYTHONPATH": os.pathsep.join([str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])]),
+        "SEPI_PYTHONPATH": PYTHON_PATH,
+        "SEPI_JOB_CLIENT": job_client.__file__,
         WORKFLOW_PROCESS: str(os.getpid()),
     }
 )
 
 
 def command(words):
-    """The shell command that runs a module of the package."""
-    return f'PYTHONPATH="$SEPI_PYTHONPATH" exec "$SEPI_PYTHON" -m {words}'
+    """The shell command that runs a module of the package: in a fork of the job server, where there is one."""
+    client = f'${{{{{job_client.SERVER}:+-IS "$SEPI_JOB_CLIENT"}}}}'
+    return f'PYTHONPATH="$SEPI_PYTHONPATH" exec "$SEPI_PYTHON" {client} -m {words}'
 
 
 try:

@@ -6,6 +6,7 @@ import tempfile
 import time
 from shlex import quote
 
+from sepi.workflow.job_server import start_job_server
 from sepi.workflow.run_folder import note_run, put_away, say_if_full, say_so, take_over
 from sepi.workflow.run_log import show_progress, tell_nearest
 
@@ -55,8 +56,13 @@ def print_all_written():
 
 
 def run_begins():
-    """Note that what is made now is to be looked at, should the run be killed."""
+    """Note that what is made now is to be looked at, should the run be killed; have jobs be forks of a server."""
     note_run(well=False)
+    # Snakemake measures the memory of its own children. The user's word is an empty one, for jobs that load all by themselves
+    own_jobs = workflow.output_settings.benchmark_extended or job_client.SERVER in os.environ
+    server = None if own_jobs or not workflow.is_main_process else start_job_server(PYTHON_PATH)
+    if server is not None:
+        os.environ[job_client.SERVER] = server
 
 
 def run_ended_well():

@@ -14,9 +14,10 @@ from typing import Any, TypeVar, cast
 import numba
 from numba import prange
 from numba.core.caching import FunctionCache, IndexDataCacheFile
+from numba.core.registry import cpu_target
 from numba.core.runtime.nrt import rtsys
 
-__all__ = ["njit", "prange"]
+__all__ = ["njit", "prange", "prepare_loading"]
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
@@ -69,3 +70,10 @@ def njit(*, cache: bool = False, **options: Any) -> Callable[[_Function], _Funct
         return cast("_Function", kernel)
 
     return compiled
+
+
+def prepare_loading() -> None:
+    """Do what loading the first compiled kernel would begin with, for processes that are forks of this one."""
+    rtsys.initialize(cpu_target.target_context)
+    # all that it knows, since compiled code refers to some of it
+    cpu_target.target_context.refresh()

@@ -168,9 +168,12 @@ def _serve(address: str, program: str, tree: str = "") -> None:
             _load(words)
             if not os.fork():
                 listener.close()
-                called.send(os.getpid().to_bytes(8, "big"))
+                fork = os.getpid()
+                called.send(fork.to_bytes(8, "big"))
                 code = _become(words, environment, folder, files, path, program)
-                called.send(bytes([code]))
+                # not a fork of the fork
+                if os.getpid() == fork:
+                    called.send(bytes([code]))
                 os._exit(code)
             for file in (called.detach(), *files):
                 os.close(file)
