@@ -320,17 +320,13 @@ def _trusted(
 
 def _patches(trusted: BoolMap, disparity: FloatMap, tolerance: float) -> _Found:
     """Trusted pixels in patches that are large enough: neighbours whose disparities are close to each other's."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    numbers = np.arange(trusted.size).reshape(trusted.shape)
-    pairs = []
-    for one, other in ((np.s_[:, 1:], np.s_[:, :-1]), (np.s_[1:], np.s_[:-1])):
-        joined = trusted[one] & trusted[other] & (abs(disparity[one] - disparity[other]) < tolerance)
-        pairs.append(np.stack([numbers[one][joined], numbers[other][joined]]))
-    rows, columns = np.concatenate(pairs, axis=1)
-    graph = coo_array((np.ones(rows.size, np.int8), (rows, columns)), shape=(trusted.size, trusted.size))
-    _, labels = connected_components(graph, directed=False)
+    H, W = trusted.shape
+    # a pixel between any two neighbours says whether they are joined
+    joined = np.zeros((2 * H - 1, 2 * W - 1), np.uint8)
+    joined[::2, ::2] = trusted
+    joined[::2, 1::2] = trusted[:, 1:] & trusted[:, :-1] & (abs(np.diff(disparity, axis=1)) < tolerance)
+    joined[1::2, ::2] = trusted[1:] & trusted[:-1] & (abs(np.diff(disparity, axis=0)) < tolerance)
+    labels = cv2.connectedComponents(joined, connectivity=4)[1][::2, ::2].ravel()
     areas = np.bincount(labels[trusted.ravel()], minlength=int(labels.max()) + 1)
     kept = trusted.ravel() & (areas[labels] >= max(_FEWEST_PIXELS, _PATCH * trusted.size))
     labels, pixels = labels[kept], disparity.ravel()[kept]

@@ -1,8 +1,7 @@
-"""What stands before Python in a job's command where there is a :mod:`~sepi.workflow.job_server`: it has a fork of that
-do the work, and ends as the fork does.
+"""What stands between Python and a job's module where there is a :mod:`~sepi.workflow.job_server`.
 
-``python -IS job_client.py -m MODULE WORD ...``. It imports nothing but the standard library, which is all that it saves.
-Where nobody answers, it becomes Python.
+``python -IS job_client.py -m MODULE WORD ...`` has a fork of the server do what Python would, and ends as that does. It
+imports nothing but the standard library, which is all that it saves. Where nobody answers, it becomes Python.
 """
 
 from __future__ import annotations

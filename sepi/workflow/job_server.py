@@ -26,7 +26,7 @@ from sepi.openmp import wait_asleep
 from sepi.workflow.job_client import TAKEN
 
 # what most jobs import: libraries with parts that they import late, and what the stages have in common
-_LIBRARIES = ("cv2", "h5py", "skimage.segmentation", "scipy.sparse.linalg", "pydantic.fields", "pydantic.plugin._loader")
+_LIBRARIES = ("cv2", "h5py", "skimage.segmentation", "scipy.sparse.linalg", "pydantic.fields")
 _COMMON = ("sepi.command", "sepi.variants", "sepi.io.hdf5", "sepi.io.provenance", "sepi.exposure", "sepi.memory")
 _ALGORITHMS = ("sepi.matching", "sepi.boundaries", "sepi.regularization", "sepi.error_bars")
 
@@ -58,8 +58,8 @@ def start_job_server(python_path: str) -> str | None:
         listener.listen(1024)
         server = subprocess.Popen(
             [sys.executable, "-m", __name__, address],
-            stdin=listener,
-            stdout=given,
+            stdin=listener.fileno(),
+            stdout=given.fileno(),
             # threads do not outlive a fork
             env=os.environ | {"PYTHONPATH": python_path, "OPENBLAS_NUM_THREADS": "1"},
             # signals of a terminal reach a job by its client alone
@@ -226,6 +226,8 @@ def _load() -> None:
         for module in pkgutil.iter_modules(importlib.import_module(name).__path__, f"{name}."):
             importlib.import_module(module.name)
     importlib.import_module("sepi.compiled").prepare_loading()
+    # pydantic looks for plugins as it makes its first model
+    importlib.import_module("sepi.stage").NoParameters()
     # forks need not look through all that for what is not used, which would copy it
     gc.freeze()
 

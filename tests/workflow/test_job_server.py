@@ -107,7 +107,8 @@ def test_jobs_end_with_the_run_whatever_ends_it(modules: Path, tmp_path: Path) -
     """A run that was killed leaves nothing behind; a job that finds no server is one of Python's own."""
     program = f"""import os, sys; from sepi.workflow.job_server import start_job_server
 print(start_job_server(os.pathsep.join([{str(modules)!r}, *sys.path])), flush=True); sys.stdin.read()"""
-    with subprocess.Popen([sys.executable, "-c", program], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as run:
+    words, pipe = [sys.executable, "-c", program], subprocess.PIPE
+    with subprocess.Popen(words, stdin=pipe, stdout=pipe, text=True) as run:
         assert run.stdout is not None
         server = Server(run.stdout.readline().strip(), modules)
         with server.waiting(tmp_path) as job:
