@@ -15,7 +15,10 @@ from workflow_copy import wait_for
 
 from sepi.workflow import job_client, job_server
 
-pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="jobs are forks on Linux alone")
+pytestmark = [
+    pytest.mark.workflow,
+    pytest.mark.skipif(sys.platform != "linux", reason="jobs are forks on Linux alone"),
+]
 
 WORDS = {"WORD": "kälte\n=", "CODE": "3"}
 TOLD = """import json, os, sys
