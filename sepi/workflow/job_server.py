@@ -50,10 +50,20 @@ def start_job_server(python_path: str) -> str | None:
     if sys.platform != "linux":
         return None
     # in a folder that nobody else can enter: who connects has anything run
-    address = str(Path(tempfile.mkdtemp(prefix="sepi-jobs-"), "socket"))
+    try:
+        folder = tempfile.mkdtemp(prefix="sepi-jobs-")
+    except OSError:
+        return None
+    address = str(Path(folder, "socket"))
     own, given = socket.socketpair()
     with socket.socket(socket.AF_UNIX) as listener, given:
-        listener.bind(address)
+        try:
+            listener.bind(address)
+        except OSError:
+            # no sockets there, or the path is too long for one
+            own.close()
+            Path(folder).rmdir()
+            return None
         # jobs wait until the server is ready
         listener.listen(1024)
         server = subprocess.Popen(

@@ -5,6 +5,7 @@ import os
 import signal
 import subprocess
 import sys
+import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -104,6 +105,17 @@ def test_a_job_that_is_ended_puts_its_files_away(server: Server, tmp_path: Path,
     with server.waiting(tmp_path) as run:
         run.send_signal(number)
     assert run.returncode == code
+
+
+def test_a_folder_that_takes_no_socket_is_no_failure(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Else no workflow runs where the folder for temporary files is full, or has a long path."""
+    deep = tmp_path / ("deep" * 30)
+    deep.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(deep))
+    assert job_server.start_job_server("") is None
+    assert not list(deep.iterdir())
+    deep.rmdir()
+    assert job_server.start_job_server("") is None
 
 
 def test_jobs_end_with_the_run_whatever_ends_it(modules: Path, tmp_path: Path) -> None:
