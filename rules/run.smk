@@ -55,12 +55,18 @@ def print_all_written():
     print_written(every_file(), result_files(SETTINGS.variants))
 
 
+def jobs_are_forks():
+    """Whether jobs are left to a server: not on a cluster, which limits and ends its own processes, nor where Snakemake is to
+    measure their memory, which it can of its own alone. The user's word is the variable, empty.
+    """
+    asked = workflow.output_settings.benchmark_extended or job_client.SERVER in os.environ
+    return workflow.is_main_process and workflow.local_exec and not asked
+
+
 def run_begins():
     """Note that what is made now is to be looked at, should the run be killed; have jobs be forks of a server."""
     note_run(well=False)
-    # Snakemake measures the memory of its own children. The user's word is an empty one, for jobs that load all by themselves
-    own_jobs = workflow.output_settings.benchmark_extended or job_client.SERVER in os.environ
-    server = None if own_jobs or not workflow.is_main_process else start_job_server(PYTHON_PATH)
+    server = start_job_server(PYTHON_PATH) if jobs_are_forks() else None
     if server is not None:
         os.environ[job_client.SERVER] = server
 

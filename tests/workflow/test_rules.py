@@ -18,6 +18,7 @@ from sepi.variants import HANDED_ON, STAGES
 from sepi.workflow import run_folder
 from sepi.workflow.code_digest import code_digest, ingest_modules, render_modules, stage_modules
 from sepi.workflow.datasets import Scene
+from sepi.workflow.job_client import SERVER
 from sepi.workflow.settings import MOST_ON_PAGE, Report
 
 pytestmark = pytest.mark.workflow
@@ -54,6 +55,22 @@ def of_size(size: int, folder: Path, **more: Any) -> dict[str, Any]:
     config = {"builtin": {"scenes": ["dots"], "size": size}, **more}
     found: dict[str, Any] = Workflow(REPOSITORY, folder / "run", config).read().globals
     return found
+
+
+def test_jobs_of_a_cluster_are_its_own(read: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A fork of a server would run beside the cluster's limits, and its memory unseen by Snakemake."""
+    monkeypatch.delenv(SERVER, raising=False)
+    asked = read.globals["jobs_are_forks"]
+    assert asked()
+    with monkeypatch.context() as cluster:
+        settings = SimpleNamespace(common_settings=SimpleNamespace(local_exec=False))
+        cluster.setattr(read, "_executor_plugin", settings)
+        assert not asked()
+    with monkeypatch.context() as measured:
+        measured.setattr(read.output_settings, "benchmark_extended", True)
+        assert not asked()
+    monkeypatch.setenv(SERVER, "")
+    assert not asked()
 
 
 def test_every_job_is_made_again_for_its_own_code(read: Any) -> None:
