@@ -78,6 +78,8 @@ fuzz: $(READY)
 
 # absolute, since tests start processes elsewhere
 coverage: export COVERAGE_RCFILE := $(CURDIR)/pyproject.toml
+# a fork would lose what it has measured
+coverage: export SEPI_JOB_SERVER :=
 coverage: export COVERAGE_FILE := $(CURDIR)/build/coverage/data
 coverage: $(COMPARED)
 	rm -rf build/coverage

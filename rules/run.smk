@@ -68,7 +68,8 @@ def run_begins():
     note_run(well=False)
     server = start_job_server(PYTHON_PATH) if jobs_are_forks() else None
     if server is not None:
-        os.environ[job_client.SERVER] = server
+        os.environ[job_client.SERVER] = server.address
+        atexit.register(server.end)
 
 
 def run_ended_well():

@@ -1,46 +1,40 @@
-"""Python processes that wait for no library: forks of one that has loaded them.
+"""Python processes that wait for no library: forks of one that has loaded them, as the workflow's jobs are.
 
 A job of the workflow is a process of its own, which mostly waits for numba, and Snakemake takes seconds to be imported.
 What is tested is loaded after the fork, from ``PYTHONPATH`` as ever. Not for tests of how processes begin or are
-killed: a fork outlives its caller's SIGKILL.
+killed.
 """
 
 from __future__ import annotations
 
 import atexit
+import gc
 import importlib
-import json
 import os
 import runpy
-import select
 import signal
 import socket
-import subprocess
 import sys
-import tempfile
-import threading
-import time
-import traceback
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 
-# what takes the place of Python: it hands its words and files to the server, and ends as the fork does
+from sepi.workflow import job_client
+from sepi.workflow.job_server import Job, Server, end_forks_at_once, serve, start_server
+
+# what takes the place of Python
 _PROGRAM = """#!{python} -IS
-import json, os, signal, socket, sys
+import os, sys
 words = sys.argv[1:]
+code = None
 if words[:1] == ["-m"] or words and words[0].endswith(".py"):
-    server = socket.socket(socket.AF_UNIX)
-    server.connect({address!r})
-    message = json.dumps([words, dict(os.environ), os.getcwd()]).encode()
-    socket.send_fds(server, [len(message).to_bytes(8, "big")], [0, 1, 2])
-    server.sendall(message)
-    fork = int.from_bytes(server.recv(8), "big")
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        signal.signal(number, lambda number, _: os.kill(fork, number))
-    sys.exit(int.from_bytes(server.recv(1) or b"\\xff", "big"))
-os.execv({python!r}, [{python!r}, *words])
+    sys.path.insert(0, {client!r})
+    from job_client import call
+    code = call({address!r}, words)
+if code is None:
+    os.execv({python!r}, [{python!r}, *words])
+sys.exit(code)
 """
 
 # by the first part of a module's name, or the ending of a file
@@ -59,7 +53,7 @@ _LIBRARIES = {
 
 # this module, as the name of a program
 _SERVER = "warm_python"
-_servers: list[int] = []
+_servers: list[Server] = []
 
 
 @cache
@@ -70,30 +64,31 @@ def warm_python() -> str:
     """
     if "COVERAGE_RCFILE" in os.environ:
         return sys.executable
-    folder, address, program = _new_program()
-    # it ends with this process, which holds the other end of its input
-    server = subprocess.Popen(
-        [sys.executable, __file__, address, program],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        # forks draw without a display
-        env=os.environ | {"MPLBACKEND": "agg"},
-    )
-    assert server.stdin is not None
-    assert server.stdout is not None
-    assert server.stdout.readline().split() == [b"ready", str(server.pid).encode()]
-    _servers.append(server.pid)
-    atexit.register(_end, server, folder)
+    # it ends with this process; forks draw without a display
+    server = _started([sys.executable, __file__], {"MPLBACKEND": "agg"})
+    program = _program_for(server)
+    _servers.append(server)
+    atexit.register(server.end)
     return program
 
 
-def _new_program() -> tuple[Path, str, str]:
-    """A folder, and in it an address for a server and the program that asks it."""
-    folder = Path(tempfile.mkdtemp(prefix="sepi-python-"))
-    address, program = str(folder / "socket"), folder / "python"
-    program.write_text(_PROGRAM.format(python=sys.executable, address=address))
+def _started(command: list[str], environment: dict[str, str]) -> Server:
+    server = start_server(command, environment)
+    assert server is not None
+    return server
+
+
+def _program_in(folder: Path) -> Path:
+    return folder / "python"
+
+
+def _program_for(server: Server) -> str:
+    """Write the program that asks a server, beside its socket: it goes with that."""
+    program = _program_in(Path(server.address).parent)
+    client = str(Path(job_client.__file__).parent)
+    program.write_text(_PROGRAM.format(python=sys.executable, client=client, address=server.address))
     program.chmod(0o700)
-    return folder, address, str(program)
+    return str(program)
 
 
 @contextmanager
@@ -105,84 +100,38 @@ def python_that_has_read(tree: Path) -> Iterator[str]:
     if "COVERAGE_RCFILE" in os.environ:
         yield sys.executable
         return
-    folder, address, program = _new_program()
-    here = Path(__file__).parent
-    server = subprocess.Popen(
-        [warm_python(), "-m", _SERVER, address, program, str(tree)],
-        cwd=here,
-        env=os.environ | {"PYTHONPATH": str(here)},
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-    )
-    assert server.stdout is not None
-    ready, pid = server.stdout.readline().split()
-    assert ready == b"ready"
-    _servers.append(int(pid))
+    here = str(Path(__file__).parent)
+    server = _started([warm_python(), "-m", _SERVER, str(tree)], {"PYTHONPATH": here})
+    program = _program_for(server)
     try:
         yield program
     finally:
-        _end(server, folder)
-        # its time is told by the server that it is a fork of as soon as that has seen its end
-        while Path("/proc", pid.decode()).exists():
-            time.sleep(0.01)
-        _servers.remove(int(pid))
-
-
-def _end(server: subprocess.Popen[bytes], folder: Path) -> None:
-    server.communicate()
-    for path in folder.iterdir():
-        path.unlink()
-    folder.rmdir()
+        server.end()
 
 
 def forks_cpu_seconds() -> float:
     """What the server of this process has taken, with all its forks that have ended."""
     import psutil
 
-    return sum(sum(psutil.Process(pid).cpu_times()[:4]) for pid in _servers)
+    return sum(sum(psutil.Process(server.process.pid).cpu_times()[:4]) for server in _servers)
 
 
-def _serve(address: str, program: str, tree: str = "") -> None:
-    """Answer each connection by a fork that becomes what was called, until the input ends."""
+def _serve(tree: str = "") -> None:
+    """Answer each call by a fork that becomes what was called."""
+    end_forks_at_once()
+    # what is tested may be another copy of the package than the one whose server this is
+    for name in [name for name in sys.modules if name.partition(".")[0] == "sepi"]:
+        del sys.modules[name]
     if tree:
         _read(Path(tree))
     # the folder of this file, and what only the tests' own process was told to import from
     own = [str(Path(__file__).parent), *os.environ.get("PYTHONPATH", "").split(os.pathsep)]
     path = [entry for entry in sys.path if entry not in own]
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGCHLD, lambda *_: _reap())
-    with socket.socket(socket.AF_UNIX) as listener:
-        listener.bind(address)
-        listener.listen(64)
-        print("ready", os.getpid(), flush=True)
-        # a second at a time: a fork's end just before a wait does not end it, and who waits for the fork calls no other
-        while sys.stdin not in (ready := select.select([listener, sys.stdin], [], [], 1.0)[0]):
-            if not ready:
-                continue
-            called, _ = listener.accept()
-            head, files, _, _ = socket.recv_fds(called, 8, 3)
-            message = b""
-            while len(message) < int.from_bytes(head, "big"):
-                message += called.recv(1 << 20)
-            words, environment, folder = json.loads(message)
-            _load(words)
-            if not os.fork():
-                listener.close()
-                fork = os.getpid()
-                called.send(fork.to_bytes(8, "big"))
-                code = _become(words, environment, folder, files, path, program)
-                # not a fork of the fork
-                if os.getpid() == fork:
-                    called.send(bytes([code]))
-                os._exit(code)
-            for file in (called.detach(), *files):
-                os.close(file)
-
-
-def _reap() -> None:
-    with suppress(ChildProcessError):
-        while os.waitpid(-1, os.WNOHANG)[0]:
-            pass
+    with socket.socket(fileno=os.dup(0)) as listener:
+        program = _program_in(Path(listener.getsockname()).parent)
+    job = serve(_load)
+    if job is not None:
+        _become(job, path, program)
 
 
 @cache
@@ -192,6 +141,7 @@ def _loaded(name: str) -> None:
     if name == "sepi":
         # the compiler's own start
         sys.modules["numba"].njit(lambda x: x)(1.0)
+    gc.freeze()
 
 
 def _read(tree: Path) -> None:
@@ -204,7 +154,8 @@ def _read(tree: Path) -> None:
     digests.code_digest(*(".".join(file.parts) for file in files if file.name != "__init__"))
 
 
-def _load(words: list[str]) -> None:
+def _load(job: Job) -> None:
+    words = job.words
     if words[0] != "-m":
         _loaded("sepi")
         _loaded(".py")
@@ -214,45 +165,21 @@ def _load(words: list[str]) -> None:
             _loaded(name)
 
 
-def _become(
-    words: list[str], environment: dict[str, str], folder: str, files: list[int], path: list[str], program: str
-) -> int:
-    """Run what was called as Python would, in this process; the code with which it ends."""
-    signal.signal(signal.SIGCHLD, signal.SIG_DFL)
+def _become(job: Job, path: list[str], program: Path) -> None:
+    """Run what was called as Python would, in this process."""
     signal.signal(signal.SIGINT, signal.default_int_handler)
-    for number, file in enumerate(files):
-        os.dup2(file, number)
-        os.close(file)
-    os.chdir(folder)
-    os.environ.clear()
-    os.environ.update(environment)
-    if "numba" in sys.modules:
-        importlib.import_module("numba.core.config").reload_config()
     sys.dont_write_bytecode = False
-    sys.executable = program
-    start = folder if words[0] == "-m" else str(Path(words[0]).parent)
-    sys.path[:] = [start, *filter(None, environment.get("PYTHONPATH", "").split(os.pathsep)), *path]
-    importlib.invalidate_caches()
-    try:
-        if words[0] == "-m":
-            sys.argv = words[1:]
-            runpy.run_module(words[1], run_name="__main__", alter_sys=True)
+    sys.executable = str(program)
+    with job.entered():
+        start = job.folder if job.words[0] == "-m" else str(Path(job.words[0]).parent)
+        sys.path[:] = [start, *filter(None, os.environ.get("PYTHONPATH", "").split(os.pathsep)), *path]
+        importlib.invalidate_caches()
+        if job.words[0] == "-m":
+            sys.argv = job.words[1:]
+            runpy.run_module(job.words[1], run_name="__main__", alter_sys=True)
         else:
-            sys.argv = words
-            runpy.run_path(words[0], run_name="__main__")
-        code = 0
-    except SystemExit as end:
-        code = end.code if isinstance(end.code, int) else int(end.code is not None)
-        if isinstance(end.code, str):
-            print(end.code, file=sys.stderr)
-    except BaseException:
-        traceback.print_exc()
-        code = 1
-    threading._shutdown()  # type: ignore[attr-defined]
-    atexit._run_exitfuncs()
-    sys.stdout.flush()
-    sys.stderr.flush()
-    return code & 0xFF
+            sys.argv = job.words
+            runpy.run_path(job.words[0], run_name="__main__")
 
 
 if __name__ == "__main__":

@@ -6,6 +6,7 @@ elsewhere some libraries do not work in a fork.
 
 from __future__ import annotations
 
+import atexit
 import gc
 import importlib
 import os
@@ -18,7 +19,8 @@ import socket
 import subprocess
 import sys
 import tempfile
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import NamedTuple
 
@@ -30,12 +32,34 @@ _LIBRARIES = ("cv2", "h5py", "skimage.segmentation", "scipy.sparse.linalg", "pyd
 _COMMON = ("sepi.command", "sepi.variants", "sepi.io.hdf5", "sepi.io.provenance", "sepi.exposure", "sepi.memory")
 _ALGORITHMS = ("sepi.matching", "sepi.boundaries", "sepi.regularization", "sepi.error_bars")
 
-# a server, and what it waits for to be closed, as it is when this process ends, whatever ends it
-_servers: dict[str, tuple[subprocess.Popen[bytes], socket.socket]] = {}
+# how the work of this process ended
+_codes: list[int] = []
 
 
-def start_job_server(python_path: str) -> str | None:
-    """Start a server that ends when this process does, and its jobs with it.
+class Server(NamedTuple):
+    """A process that forks, seen from the one that started it and that it ends with.
+
+    Attributes
+    ----------
+    address : str
+        Its socket, for clients.
+    process : subprocess.Popen
+    alive : socket
+        It waits for this to be closed, as it is when this process ends, whatever ends it.
+    """
+
+    address: str
+    process: subprocess.Popen[bytes]
+    alive: socket.socket
+
+    def end(self) -> None:
+        """End it and its forks."""
+        self.alive.close()
+        self.process.wait()
+
+
+def start_job_server(python_path: str) -> Server | None:
+    """Start a server of the workflow's jobs.
 
     Parameters
     ----------
@@ -44,52 +68,77 @@ def start_job_server(python_path: str) -> str | None:
 
     Returns
     -------
-    str or None
-        Its socket, for :data:`sepi.workflow.job_client.SERVER`; None where jobs cannot be forks.
+    Server or None
+        None where jobs cannot be forks.
     """
     if sys.platform != "linux":
         return None
+    return start_server([sys.executable, "-m", __name__], {"PYTHONPATH": python_path})
+
+
+def start_server(command: Sequence[str], environment: Mapping[str, str]) -> Server | None:
+    """Start a process that calls :func:`serve`.
+
+    Parameters
+    ----------
+    command : sequence of str
+        Of the process.
+    environment : mapping of str to str
+        Added to this process's.
+
+    Returns
+    -------
+    Server or None
+        None where there is no place for a socket.
+    """
     # in a folder that nobody else can enter: who connects has anything run
     try:
         folder = tempfile.mkdtemp(prefix="sepi-jobs-")
     except OSError:
         return None
     address = str(Path(folder, "socket"))
-    own, given = socket.socketpair()
+    alive, given = socket.socketpair()
     with socket.socket(socket.AF_UNIX) as listener, given:
         try:
             listener.bind(address)
         except OSError:
             # no sockets there, or the path is too long for one
-            own.close()
+            alive.close()
             Path(folder).rmdir()
             return None
-        # jobs wait until the server is ready
+        # clients wait until the server is ready
         listener.listen(1024)
-        server = subprocess.Popen(
-            [sys.executable, "-m", __name__, address],
+        process = subprocess.Popen(
+            command,
             stdin=listener.fileno(),
             stdout=given.fileno(),
             # threads do not outlive a fork
-            env=os.environ | {"PYTHONPATH": python_path, "OPENBLAS_NUM_THREADS": "1"},
-            # signals of a terminal reach a job by its client alone
+            env={**os.environ, **environment, "OPENBLAS_NUM_THREADS": "1"},
+            # signals of a terminal reach a fork by its client alone
             start_new_session=True,
         )
-    _servers[address] = server, own
-    return address
+    return Server(address, process, alive)
 
 
-def end_job_server(address: str) -> None:
-    """End a server and its jobs before this process ends.
+def serve(prepare: Callable[[Job], None] | None = None) -> Job | None:
+    """Answer clients, in a process that :func:`start_server` started.
 
     Parameters
     ----------
-    address : str
-        Its socket.
+    prepare : callable, optional
+        What the server does before it forks for a job.
+
+    Returns
+    -------
+    Job or None
+        In each fork, its job; None in the server, at its end.
     """
-    server, own = _servers.pop(address)
-    own.close()
-    server.wait()
+    with socket.socket(fileno=os.dup(0)) as listener, socket.socket(fileno=os.dup(1)) as alive:
+        folder = Path(listener.getsockname()).parent
+        job = JobServer(listener, alive, prepare).serve()
+    if job is None:
+        shutil.rmtree(folder, ignore_errors=True)
+    return job
 
 
 class Job(NamedTuple):
@@ -114,20 +163,41 @@ class Job(NamedTuple):
         count = int(first)
         return cls(texts[:count], texts[count], dict(text.split("=", 1) for text in texts[count + 1 :]), files)
 
-    def run(self) -> None:
-        """Do in this process what Python would."""
+    @contextmanager
+    def entered(self) -> Iterator[None]:
+        """Work with the client's files, folder and environment; how that ends is noted."""
         for number, file in enumerate(self.files):
             os.dup2(file, number)
             os.close(file)
         os.chdir(self.folder)
         os.environ.clear()
         os.environ.update(self.environment)
-        wait_asleep()
-        importlib.import_module("numba.core.config").reload_config()
-        _, module, *sys.argv[1:] = self.words
-        # run anew as the main one, as ever, where others have imported it
-        sys.modules.pop(module, None)
-        runpy.run_module(module, run_name="__main__", alter_sys=True)
+        if "numba" in sys.modules:
+            importlib.import_module("numba.core.config").reload_config()
+        try:
+            yield
+            _codes.append(0)
+        except SystemExit as end:
+            _codes.append(end.code if isinstance(end.code, int) else int(end.code is not None))
+            raise
+        except KeyboardInterrupt:
+            _codes.append(128 + signal.SIGINT)
+            raise
+
+
+def end_forks_at_once() -> None:
+    """Have forks of this process end without taking apart all that it has loaded, which takes longer than many a job.
+
+    To be called before anything is loaded: what is to be done at a process's end is done first.
+    """
+    atexit.register(_end_at_once, os.getpid())
+
+
+def _end_at_once(server: int) -> None:
+    if os.getpid() != server:
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(_codes[-1] & 0xFF if _codes else 1)
 
 
 class JobServer:
@@ -139,12 +209,16 @@ class JobServer:
         What clients connect to.
     alive : socket
         Its other end is closed when nobody needs the server any longer.
+    prepare : callable, optional
+        What it does before it forks for a job.
     """
 
-    def __init__(self, listener: socket.socket, alive: socket.socket) -> None:
+    def __init__(
+        self, listener: socket.socket, alive: socket.socket, prepare: Callable[[Job], None] | None = None
+    ) -> None:
         # client to its fork
         self._forks: dict[socket.socket, int] = {}
-        self._listener, self._alive = listener, alive
+        self._listener, self._alive, self._prepare = listener, alive, prepare
         # readable when a fork has ended
         self._ended, self._waker = socket.socketpair()
         self._waker.setblocking(False)
@@ -183,10 +257,12 @@ class JobServer:
         client, _ = self._listener.accept()
         try:
             job = Job.received(client)
-            number = os.fork()
         except (OSError, ValueError):
             client.close()
             return None
+        if self._prepare is not None:
+            self._prepare(job)
+        number = os.fork()
         if number == 0:
             signal.set_wakeup_fd(-1)
             signal.signal(signal.SIGCHLD, signal.SIG_DFL)
@@ -242,11 +318,19 @@ def _load() -> None:
     gc.freeze()
 
 
+def _run(job: Job) -> None:
+    """Do a job in this process as Python would."""
+    _, module, *sys.argv[1:] = job.words
+    # run anew as the main one, as ever, where others have imported it
+    sys.modules.pop(module, None)
+    with job.entered():
+        wait_asleep()
+        runpy.run_module(module, run_name="__main__", alter_sys=True)
+
+
 if __name__ == "__main__":
-    with socket.socket(fileno=os.dup(0)) as listener, socket.socket(fileno=os.dup(1)) as alive:
-        _load()
-        job = JobServer(listener, alive).serve()
+    end_forks_at_once()
+    _load()
+    job = serve()
     if job is not None:
-        job.run()
-    else:
-        shutil.rmtree(Path(sys.argv[1]).parent, ignore_errors=True)
+        _run(job)

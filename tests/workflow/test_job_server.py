@@ -14,7 +14,8 @@ from typing import NamedTuple
 import pytest
 from workflow_copy import wait_for
 
-from sepi.workflow import job_client, job_server
+from sepi.workflow import job_client
+from sepi.workflow.job_server import start_job_server
 
 pytestmark = [
     pytest.mark.workflow,
@@ -40,7 +41,7 @@ finally:
 """
 
 
-class Server(NamedTuple):
+class Jobs(NamedTuple):
     """A server's socket, and where its jobs' modules are."""
 
     address: str
@@ -85,24 +86,24 @@ def modules(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def server(modules: Path) -> Iterator[Server]:
-    """A server of this process."""
-    address = job_server.start_job_server(os.pathsep.join([str(modules), *sys.path]))
-    assert address is not None
-    yield Server(address, modules)
-    job_server.end_job_server(address)
-    assert not Path(address).parent.exists()
+def jobs(modules: Path) -> Iterator[Jobs]:
+    """Those of a server of this process."""
+    server = start_job_server(os.pathsep.join([str(modules), *sys.path]))
+    assert server is not None
+    yield Jobs(server.address, modules)
+    server.end()
+    assert not Path(server.address).parent.exists()
 
 
-def test_a_job_is_run_as_python_would_run_it(server: Server, tmp_path: Path) -> None:
+def test_a_job_is_run_as_python_would_run_it(jobs: Jobs, tmp_path: Path) -> None:
     """Else a rule's command means something else where there is a server."""
-    server.told(tmp_path)
+    jobs.told(tmp_path)
 
 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGTERM, 143), (signal.SIGHUP, 129), (signal.SIGKILL, -9)])
-def test_a_job_that_is_ended_puts_its_files_away(server: Server, tmp_path: Path, number: int, code: int) -> None:
+def test_a_job_that_is_ended_puts_its_files_away(jobs: Jobs, tmp_path: Path, number: int, code: int) -> None:
     """A fork that goes on after its job has failed would write into the next run."""
-    with server.waiting(tmp_path) as run:
+    with jobs.waiting(tmp_path) as run:
         run.send_signal(number)
     assert run.returncode == code
 
@@ -112,22 +113,23 @@ def test_a_folder_that_takes_no_socket_is_no_failure(monkeypatch: pytest.MonkeyP
     deep = tmp_path / ("deep" * 30)
     deep.mkdir()
     monkeypatch.setattr(tempfile, "tempdir", str(deep))
-    assert job_server.start_job_server("") is None
+    assert start_job_server("") is None
     assert not list(deep.iterdir())
     deep.rmdir()
-    assert job_server.start_job_server("") is None
+    assert start_job_server("") is None
 
 
 def test_jobs_end_with_the_run_whatever_ends_it(modules: Path, tmp_path: Path) -> None:
     """A run that was killed leaves nothing behind; a job that finds no server is one of Python's own."""
     program = f"""import os, sys; from sepi.workflow.job_server import start_job_server
-print(start_job_server(os.pathsep.join([{str(modules)!r}, *sys.path])), flush=True); sys.stdin.read()"""
+server = start_job_server(os.pathsep.join([{str(modules)!r}, *sys.path]))
+print(server.address, flush=True); sys.stdin.read()"""
     words, pipe = [sys.executable, "-c", program], subprocess.PIPE
     with subprocess.Popen(words, stdin=pipe, stdout=pipe, text=True) as run:
         assert run.stdout is not None
-        server = Server(run.stdout.readline().strip(), modules)
-        with server.waiting(tmp_path) as job:
+        jobs = Jobs(run.stdout.readline().strip(), modules)
+        with jobs.waiting(tmp_path) as job:
             run.kill()
         assert job.returncode != 0
-    wait_for(lambda: not Path(server.address).parent.exists())
-    server.told(tmp_path)
+    wait_for(lambda: not Path(jobs.address).parent.exists())
+    jobs.told(tmp_path)
