@@ -139,7 +139,7 @@ def _share_light(light_field: LightField) -> None:
     flat = np.zeros((rows * columns, *light_field.shape), np.float32)
     grey, stands = np.ones((*flat.shape, 3), np.float32), light_field.baselines.reshape(-1, 2)
     with_shared_light(grey, grey, flat, flat.astype(np.int16), flat == 0, stands)
-    seen_bits(flat, stands, 0)
+    seen_bits(flat, stands)
     # one triangle, of one texel
     none, number = np.zeros(0, np.int32), np.zeros(1, np.int64)
     space, plane = np.zeros((1, 3)), np.zeros((1, 2))

@@ -88,6 +88,7 @@ def first_met(
             spans[n, 0], spans[n, 1] = _middles(top, bottom, middle_row, focal, size)
             spans[n, 2], spans[n, 3] = _middles(left, right, middle_column, focal, size)
     numbers, starts = _by_band(spans, size)
+    across = (np.arange(size) + 0.5 - middle_column) / focal
     found = np.zeros((size, size), np.int32)
     for band in prange(len(starts) - 1):
         first, last = band * _BAND, min((band + 1) * _BAND, size) - 1
@@ -104,7 +105,7 @@ def first_met(
                 y = (row + 0.5 - middle_row) / focal
                 af, bf, cf = ay * y + az, by * y + bz, cy * y + cz
                 for column in range(spans[n, 2], spans[n, 3] + 1):
-                    x = (column + 0.5 - middle_column) / focal
+                    x = across[column]
                     u, v, w = ax * x + af, bx * x + bf, cx * x + cf
                     if (u >= 0 and v >= 0 and w >= 0) or (u <= 0 and v <= 0 and w <= 0):
                         total = u + v + w

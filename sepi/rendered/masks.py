@@ -7,13 +7,14 @@ A pixel shows what the ray through its middle meets first. Masks of a view are b
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
 
 from sepi.lightfield import BoolMap, FloatMap
 from sepi.rendered.surfaces import FirstSurface
-from sepi.rendered.view_kernels import seen_elsewhere
+from sepi.rendered.view_kernels import farthest_of_four, seen_elsewhere
 from sepi.rendered.world import FloatArray, Pattern, Thing
 from sepi.scoring.edges import edges_of
 from sepi.scoring.regions import textureless
@@ -35,17 +36,20 @@ _SAME = 0.05
 
 def albedo_of(things: Sequence[Thing], seen: FirstSurface) -> FloatArray:
     """The colours of what a view shows, without light, ``(H, W, 3)``, as on a screen."""
-    colours = np.zeros((*seen.thing.shape, 3), np.float32)
-    for number in np.unique(seen.thing[seen.thing >= 0]):
-        pattern, here = things[number].material.pattern, seen.thing == number
+    colours, uv = np.zeros((seen.thing.size, 3), np.float32), seen.uv.reshape(-1, 2)
+    # thing by thing, without looking through the picture for each
+    order = np.argsort(seen.thing.astype(np.int16), axis=None, kind="stable")
+    ends = np.searchsorted(seen.thing.ravel()[order], np.arange(-1, len(things)), side="right")
+    for thing, (first, last) in zip(things, pairwise(ends), strict=True):
+        pattern, here = thing.material.pattern, order[first:last]
         if isinstance(pattern, Pattern):
             height, width = pattern.raster.shape[:2]
-            across, down = (seen.uv[here] % 1).T
+            across, down = (uv[here] % 1).T
             row, column = (down * height).astype(np.int64) % height, (across * width).astype(np.int64) % width
             colours[here] = pattern.raster[row, column]
         else:
             colours[here] = pattern
-    return colours
+    return colours.reshape(*seen.thing.shape, 3)
 
 
 def surface_bits(things: Sequence[Thing], seen: FirstSurface, disparity: FloatMap) -> Bits:
@@ -65,8 +69,8 @@ def surface_bits(things: Sequence[Thing], seen: FirstSurface, disparity: FloatMa
     return bits
 
 
-def seen_bits(disparities: FloatArray, positions: npt.NDArray[np.float64], view: int) -> Bits:
-    """Masks ``occluded`` and ``alone`` of one view.
+def seen_bits(disparities: FloatArray, positions: npt.NDArray[np.float64]) -> Bits:
+    """Masks ``occluded`` and ``alone`` of all views, ``(N, H, W)``.
 
     Parameters
     ----------
@@ -74,11 +78,12 @@ def seen_bits(disparities: FloatArray, positions: npt.NDArray[np.float64], view:
         Of all views, in pixels per view step.
     positions : ndarray, shape (N, 2), float64
         Where they stand, in view steps: down, across.
-    view : int
-        Whose masks are wanted.
     """
-    hidden, seen = seen_elsewhere(disparities, positions - positions[view], view, _SAME)
-    bits: Bits = hidden * np.uint16(_BIT["occluded"]) + ~seen * np.uint16(_BIT["alone"])
+    farthest = farthest_of_four(disparities)
+    bits = np.empty(disparities.shape, np.uint16)
+    for view, own in enumerate(disparities):
+        hidden, seen = seen_elsewhere(own, farthest, positions - positions[view], view, _SAME)
+        bits[view] = hidden * np.uint16(_BIT["occluded"]) + ~seen * np.uint16(_BIT["alone"])
     return bits
 
 

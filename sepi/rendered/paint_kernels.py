@@ -29,28 +29,32 @@ def painted(
     count = len(faces)
     found = np.zeros((count, 3), np.float32)
     for n in prange(count):
-        total = np.zeros(3)
         face = faces[n]
         one = thing[face]
-        height, width = starts[one, 1], starts[one, 2]
+        start, height, width = starts[one]
+        if height * width == 1:
+            found[n] = texels[start]
+            continue
+        a, b, c = normal[face]
+        left, top, near = corner[face, 0] - frame[0], corner[face, 1] - frame[1], corner[face, 2]
+        volume = a * left + b * top + c * near
+        ux, uy, uz = gradient[face, 0]
+        vx, vy, vz = gradient[face, 1]
+        u, v = uv[face]
+        red, green, blue = 0.0, 0.0, 0.0
         for i in range(fine):
+            down = (pixels[n, 0] + (i + 0.5) / fine - frame[2]) / frame[4]
             for j in range(fine):
                 right = (pixels[n, 1] + (j + 0.5) / fine - frame[3]) / frame[4]
-                down = (pixels[n, 0] + (i + 0.5) / fine - frame[2]) / frame[4]
-                away = (
-                    normal[face, 0] * (corner[face, 0] - frame[0])
-                    + normal[face, 1] * (corner[face, 1] - frame[1])
-                    + normal[face, 2] * corner[face, 2]
-                ) / (normal[face, 0] * right + normal[face, 1] * down + normal[face, 2])
-                x = frame[0] + away * right - corner[face, 0]
-                y = frame[1] + away * down - corner[face, 1]
-                z = away - corner[face, 2]
-                across = uv[face, 0] + gradient[face, 0, 0] * x + gradient[face, 0, 1] * y + gradient[face, 0, 2] * z
-                below = uv[face, 1] + gradient[face, 1, 0] * x + gradient[face, 1, 1] * y + gradient[face, 1, 2] * z
-                column = int((across - np.floor(across)) * width) % width
-                row = int((below - np.floor(below)) * height) % height
-                for c in range(3):
-                    total[c] += texels[starts[one, 0] + row * width + column, c]
-        for c in range(3):
-            found[n, c] = total[c] / (fine * fine)
+                away = volume / (a * right + b * down + c)
+                x, y, z = away * right - left, away * down - top, away - near
+                across, below = u + ux * x + uy * y + uz * z, v + vx * x + vy * y + vz * z
+                # what is left of a whole one may round to one
+                column = min(int((across - np.floor(across)) * width), width - 1)
+                row = min(int((below - np.floor(below)) * height), height - 1)
+                texel = start + row * width + column
+                red += texels[texel, 0]
+                green += texels[texel, 1]
+                blue += texels[texel, 2]
+        found[n, 0], found[n, 1], found[n, 2] = red / fine**2, green / fine**2, blue / fine**2
     return found

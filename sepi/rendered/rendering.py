@@ -6,10 +6,11 @@ import hashlib
 import json
 import math
 import shutil
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import fields, is_dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 from zipfile import BadZipFile
 
 import numpy as np
@@ -22,12 +23,12 @@ from sepi.rendered.masks import seen_bits, surface_bits
 from sepi.rendered.options import RenderOptions
 from sepi.rendered.render_file import Render, write_render
 from sepi.rendered.rig import Rig, rig_of
-from sepi.rendered.sampling import sampled
+from sepi.rendered.sampling import Plan, pictured, planned
 from sepi.rendered.shared_light import with_shared_light
-from sepi.rendered.tracing import Tracer, require_mitsuba
-from sepi.rendered.world import World
+from sepi.rendered.tracing import Position, Tracer, require_mitsuba
+from sepi.rendered.world import FloatArray, World
 from sepi.stage import no_progress
-from sepi.threads import available_cores, use_threads
+from sepi.threads import available_cores, threads_used, use_threads
 from sepi.validation import require_known
 
 # what is kept of a view until all are done
@@ -86,51 +87,66 @@ def render_world(
 ) -> None:
     """Render a world of one's own; see :func:`render_scene`."""
     rig = rig_of(world, options.size, options.grid, options.baseline)
-    positions, turns = _stand(rig, options)
     count = math.prod(options.grid)
     parts = path.with_name(f"{path.name}.parts")
     _take_over(parts, json.dumps({**made_by(name, options), "world": _digest(world)}, sort_keys=True))
-    tracer = Tracer(world, rig, options.lens * rig.baseline)
-    for number in range(count):
-        file = parts / f"view_{number:03d}.npz"
-        if not _is_whole(file):
-            at = divmod(number, options.grid[1])
-            values = _view(world, tracer, rig, options, positions[at], turns[at], number)
-            with atomic_path(file) as temporary, temporary.open("wb") as stream:
-                np.savez(stream, allow_pickle=False, **values)
-        progress((number + 1) / (count + 1))
-    write_render(path, _assembled(name, world, rig, options, parts))
+    files = [parts / f"view_{number:03d}.npz" for number in range(count)]
+    missing = [number for number, file in enumerate(files) if not _is_whole(file)]
+    for done, (number, values) in enumerate(_views(world, rig, options, missing), count - len(missing) + 1):
+        with atomic_path(files[number]) as temporary, temporary.open("wb") as stream:
+            np.savez(stream, allow_pickle=False, **values)
+        progress(done / (count + 1))
+    write_render(path, _assembled(name, world, rig, options, files))
     shutil.rmtree(parts)
     progress(1.0)
 
 
-def _view(
-    world: World,
-    tracer: Tracer,
-    rig: Rig,
-    options: RenderOptions,
-    position: npt.NDArray[np.float64],
-    turn: npt.NDArray[np.float64],
-    number: int,
-) -> dict[str, npt.NDArray[np.generic]]:
-    """Picture and truth of one view."""
-    x, y, z = map(float, turn)
-    count = math.prod(options.grid)
+class _View(NamedTuple):
+    """A view, all but its picture: its truth by the names of what is kept, where it stands, and how it is sampled."""
+
+    truth: dict[str, npt.NDArray[Any]]
+    position: Position
+    seed: int
+    plan: Plan | None
+
+
+def _views(
+    world: World, rig: Rig, options: RenderOptions, numbers: Sequence[int]
+) -> Iterator[tuple[int, dict[str, npt.NDArray[np.generic]]]]:
+    """Picture and truth of these views, in turn.
+
+    What the next view shows is found beside the renderer: all of its cores have work where that has for one alone.
+    """
+    if not numbers:
+        return
+    tracer = Tracer(world, rig, options.lens * rig.baseline)
+    with ThreadPoolExecutor(1, initializer=use_threads, initargs=(threads_used(),)) as beside:
+        coming = beside.submit(_looked_at, world, tracer, rig, options, numbers[0])
+        for number, following in zip(numbers, [*numbers[1:], None], strict=True):
+            view = coming.result()
+            if following is not None:
+                coming = beside.submit(_looked_at, world, tracer, rig, options, following)
+            found = {**view.truth, "views": _picture(tracer, options, view)}
+            yield number, {part: values.astype(_TYPES[part]) for part, values in found.items()}
+
+
+def _looked_at(world: World, tracer: Tracer, rig: Rig, options: RenderOptions, number: int) -> _View:
+    """What a view shows."""
+    positions, turns = _stand(rig, options)
+    (down, across), (x, y, z) = positions.reshape(-1, 2)[number].tolist(), turns.reshape(-1, 3)[number].tolist()
     # of its own for all that takes samples: a view's tiles ask for a few
     seed = int(np.random.SeedSequence([options.seed, number]).generate_state(1)[0])
-    at = tracer.position(float(position[0]), float(position[1]), (x, y, z))
+    at = tracer.position(down, across, (x, y, z))
     seen = tracer.first_surface(at)
     disparity = rig.disparity(seen.depth).astype(np.float32)
-    straight = seen if not turn.any() else tracer.first_surface(tracer.position(float(position[0]), float(position[1])))
+    straight = tracer.first_surface(tracer.position(down, across)) if any((x, y, z)) else seen
+    count = math.prod(options.grid)
+    plan = None
     if options.shares_light:
-        picture, albedo, whole = sampled(tracer, at, seen, disparity, options.samples, count, seed)
-    else:
-        picture = tracer.picture(at, seed, options.samples)
-        albedo, whole = np.zeros_like(picture), np.zeros(disparity.shape, bool)
-    found: dict[str, npt.NDArray[Any]] = {
-        "views": picture,
-        "albedo": albedo,
-        "whole": whole,
+        plan = planned(tracer, at, seen, disparity, options.samples, count, seed, world.paths)
+    truth = {
+        "albedo": plan.albedo if plan else np.zeros((*disparity.shape, 3)),
+        "whole": plan.whole if plan else np.zeros(disparity.shape),
         "things": seen.thing,
         "disparity": disparity,
         "normal": seen.normal,
@@ -138,7 +154,12 @@ def _view(
         # which views see a point is asked of cameras that are not turned
         "upright": rig.disparity(straight.depth),
     }
-    return {part: values.astype(_TYPES[part]) for part, values in found.items()}
+    return _View(truth, at, seed, plan)
+
+
+def _picture(tracer: Tracer, options: RenderOptions, view: _View) -> FloatArray:
+    """Of a view, ``(H, W, 3)``."""
+    return pictured(tracer, view.plan) if view.plan else tracer.picture(view.position, view.seed, options.samples)
 
 
 def _stand(rig: Rig, options: RenderOptions) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
@@ -151,10 +172,9 @@ def _stand(rig: Rig, options: RenderOptions) -> tuple[npt.NDArray[np.float64], n
     return positions + options.position_error * shift, np.radians(options.rotation_error) * turns
 
 
-def _assembled(name: str, world: World, rig: Rig, options: RenderOptions, parts: Path) -> Render:
+def _assembled(name: str, world: World, rig: Rig, options: RenderOptions, files: Sequence[Path]) -> Render:
     """The views together, and which views see what."""
     positions, turns = _stand(rig, options)
-    files = [parts / f"view_{number:03d}.npz" for number in range(len(positions.reshape(-1, 2)))]
     views: dict[str, npt.NDArray[Any]] = {}
     for number, file in enumerate(files):
         with np.load(file) as values:
@@ -169,8 +189,7 @@ def _assembled(name: str, world: World, rig: Rig, options: RenderOptions, parts:
     # beyond half precision is far beyond white
     views["views"] = np.minimum(views["views"], 60000.0).astype(np.float16)
     # of a turned view it is not told
-    for number in map(int, np.flatnonzero(~turned)):
-        views["masks"][number] |= seen_bits(upright, stands, number)
+    views["masks"][~turned] |= seen_bits(upright, stands)[~turned]
     return Render(
         name=name,
         **{part: values.reshape(*options.grid, *values.shape[1:]) for part, values in views.items()},

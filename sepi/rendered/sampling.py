@@ -1,26 +1,27 @@
 """How many paths of light each pixel of a view takes: as many as what it shows asks for.
 
 Light on a matte surface is gathered from all views (:mod:`sepi.rendered.shared_light`), so that a few paths in each
-will do. Pixels in which matte surfaces mix take a quarter of the samples, and what depends on where it is seen from
-takes all: gloss, mirrors and glass.
+will do. Pixels in which surfaces mix take some, and those that show mostly what depends on where it is seen from take
+all: gloss, mirrors and glass.
 """
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from sepi.lightfield import BoolMap, FloatMap
 from sepi.rendered.surfaces import FirstSurface
-from sepi.rendered.tracing import Position, Tracer
+from sepi.rendered.tracing import Position, Tiles, Tracer
 from sepi.rendered.world import FloatArray
 
 # to make a camera for a tile takes as long as so many paths
 _CAMERA = 16
 # greatest side of a tile in pixels, a power of two
-_WIDEST = 8
+_WIDEST = 64
 # rays of a pixel, across and down, that look for things in it
 _FINE = 4
 # pixels per view step: how far a surface may bend from pixel to pixel to be one
@@ -30,19 +31,45 @@ _DARKEST = 1e-3
 
 
 def shared_samples(samples: int, views: int) -> int:
-    """Paths of a pixel of a matte surface, a power of two: with those of all views about four times ``samples``."""
-    return min(samples, 1 << max(0, round(math.log2(4 * samples / views))))
+    """Paths of a pixel of a matte surface: with those of all views about three times ``samples``."""
+    return min(samples, math.ceil(3 * samples / views))
 
 
 def mixed_samples(samples: int) -> int:
-    """Paths of a pixel in which matte surfaces mix: a quarter, but not so few that they show."""
-    return max(samples // 4, min(samples, 12))
+    """Paths of a pixel in which surfaces mix: few, but not so few that they show."""
+    return max(samples // 6, min(samples, 12))
 
 
-def sampled(
-    tracer: Tracer, position: Position, seen: FirstSurface, disparity: FloatMap, samples: int, views: int, seed: int
-) -> tuple[FloatArray, FloatArray, BoolMap]:
-    """Picture of a view, the albedo of what is matte in it, and where that is one surface.
+@dataclass(frozen=True)
+class Plan:
+    """How a view is sampled.
+
+    Attributes
+    ----------
+    tiles : list of (Tiles, int)
+        In turn; and how many paths their pixels have taken before.
+    albedo : ndarray, shape (H, W, 3), float32
+        Linear; 0 where it is not known.
+    whole : ndarray, shape (H, W), bool
+        Pixels of known albedo that show one matte surface, about flat there.
+    """
+
+    tiles: list[tuple[Tiles, int]]
+    albedo: FloatArray
+    whole: BoolMap
+
+
+def planned(
+    tracer: Tracer,
+    position: Position,
+    seen: FirstSurface,
+    disparity: FloatMap,
+    samples: int,
+    views: int,
+    seed: int,
+    gloss: float = 1.0,
+) -> Plan:
+    """Which pixels of a view take how many paths.
 
     Parameters
     ----------
@@ -59,36 +86,39 @@ def sampled(
         That share light.
     seed : int
         Of the paths; with some of those that follow.
-
-    Returns
-    -------
-    picture : ndarray, shape (H, W, 3), float32
-        Linear, 1 is white.
-    albedo : ndarray, shape (H, W, 3), float32
-        Linear; 0 where it is not known.
-    whole : ndarray, shape (H, W), bool
-        Pixels of known albedo that show one surface, and whose neighbours do.
+    gloss : float, optional
+        What part of ``samples`` pixels of gloss need (:class:`sepi.rendered.world.World`).
     """
     # what is narrower than a pixel may stand between rays through middles
     beside = tracer.things(position, _FINE)
-    matte: BoolMap = np.all(tracer.surfaces.matte(beside), axis=(1, 3))
-    whole = matte & (beside == seen.thing[:, None, :, None]).all(axis=(1, 3)) & _whole(disparity, seen.thing)
-    albedo = np.zeros((*matte.shape, 3), np.float32)
+    matte = tracer.surfaces.matte(beside).mean(axis=(1, 3))
+    whole = (matte == 1) & (beside == seen.thing[:, None, :, None]).all(axis=(1, 3)) & _flat(disparity, seen.thing)
+    albedo = np.zeros((*whole.shape, 3), np.float32)
     albedo[whole] = tracer.albedo(position, seen.face[whole], np.argwhere(whole))
     whole &= albedo.min(axis=-1) > _DARKEST
-    few = shared_samples(samples, views)
-    first = tracer.picture(position, seed, few)
-    picture = first.copy()
-    mixing = mixed_samples(samples)
-    # the number of a tile's seed, whichever kind it is of
-    begun = 4096
-    for asked, paths, counted in ((matte & ~whole, mixing - few, few), (~matte, samples if samples > few else 0, 0)):
-        for tiles in _tiles(asked, paths) if paths > 0 else []:
-            rows, columns = tiles[..., 0], tiles[..., 1]
-            more = tracer.tiles(position, tiles, seed + begun, paths)
-            picture[rows, columns] = (counted * first[rows, columns] + paths * more) / np.float32(counted + paths)
-            begun += 4096
-    return picture, np.where(whole[..., None], albedo, 0), whole
+    albedo[~whole] = 0
+    few, differs = shared_samples(samples, views), matte < 0.5
+    kinds = (
+        (~differs, 0, few),
+        (~differs & ~whole, few, mixed_samples(samples) - few),
+        (differs, 0, max(few, round(gloss * samples))),
+    )
+    squares = [(tiles, taken, paths) for asked, taken, paths in kinds if paths > 0 for tiles in _tiles(asked, paths)]
+    tiles = [
+        (tracer.tiles(position, pixels, paths, seed + 4096 * number), taken)
+        for number, (pixels, taken, paths) in enumerate(squares)
+    ]
+    return Plan(tiles, albedo, whole)
+
+
+def pictured(tracer: Tracer, plan: Plan) -> FloatArray:
+    """The picture of a view, ``(H, W, 3)`` float32: linear, 1 is white."""
+    picture = np.zeros_like(plan.albedo)
+    for tiles, taken in plan.tiles:
+        rows, columns = tiles.pixels[..., 0], tiles.pixels[..., 1]
+        more = tiles.paths * tracer.seen(tiles)
+        picture[rows, columns] = (taken * picture[rows, columns] + more) / np.float32(taken + tiles.paths)
+    return picture
 
 
 def _tiles(asked: BoolMap, paths: int) -> list[npt.NDArray[np.int64]]:
@@ -119,16 +149,17 @@ def _tiles(asked: BoolMap, paths: int) -> list[npt.NDArray[np.int64]]:
     return [tiles for tiles in found if len(tiles)]
 
 
-def _whole(disparity: FloatMap, things: npt.NDArray[np.int64]) -> BoolMap:
-    """Pixels that show one surface, and whose neighbours do."""
-    whole = np.zeros(things.shape, bool)
-    middle = (slice(1, -1), slice(1, -1))
-    whole[middle] = True
-    height, width = things.shape
-    for down, across in ((0, 1), (1, 0), (1, 1), (1, -1)):
-        before = (slice(1 - down, height - 1 - down), slice(1 - across, width - 1 - across))
-        after = (slice(1 + down, height - 1 + down), slice(1 + across, width - 1 + across))
-        bend = np.abs(disparity[before] - 2 * disparity[middle] + disparity[after])
-        same = (things[before] == things[middle]) & (things[after] == things[middle])
-        whole[middle] &= same & (bend < _BEND)
-    return whole
+def _flat(disparity: FloatMap, things: npt.NDArray[np.int64]) -> BoolMap:
+    """Pixels about which a surface bends little: in each direction across them, or beside them where it ends."""
+    # nothing goes on beyond the border
+    shown, depth = np.pad(things, 1, constant_values=-2), np.pad(disparity, 1)
+    found = np.ones(shown.shape, bool)
+    for step in ((0, 1), (1, 0), (1, 1), (1, -1)):
+        back = (-step[0], -step[1])
+        from_before = shown == np.roll(shown, step, (0, 1))
+        to_next = np.roll(from_before, back, (0, 1))
+        bend = np.abs(np.roll(depth, step, (0, 1)) - 2 * depth + np.roll(depth, back, (0, 1)))
+        across = from_before & to_next & (bend < _BEND)
+        beside = (from_before & np.roll(across, step, (0, 1))) | (to_next & np.roll(across, back, (0, 1)))
+        found &= np.where(from_before & to_next, across, beside)
+    return found[1:-1, 1:-1]

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sepi.lightfield import BoolMap
-from sepi.rendered.view_kernels import alike_light, gathered_light, limit_bent
+from sepi.rendered.view_kernels import alike_light, gathered_light, limit_bent, one_of_four
 from sepi.rendered.world import FloatArray
 
 # pixels per view step: how far the disparities of one point may be apart
@@ -57,10 +57,12 @@ def with_shared_light(
     """
     # irradiance over pi
     light = (pictures / np.where(whole[..., None], albedo, 1)).astype(np.float32)
+    surface = np.where(whole, things, np.int16(-1))
+    around = one_of_four(surface)
     shown = np.empty_like(light)
-    for view in range(len(pictures)):
-        mean, variance = gathered_light(light, disparities, things, whole, positions - positions[view], view, _BEND)
-        mean = alike_light(mean, variance, things[view], whole[view], _REACH, _DOUBT)
+    for view, own in enumerate(surface):
+        mean, variance = gathered_light(light, disparities, own, around, positions - positions[view], view, _BEND)
+        mean = alike_light(mean, variance, own, _REACH, _DOUBT)
         picture = np.where(whole[view][..., None], mean * albedo[view], pictures[view])
         shown[view] = limit_bent(picture, things[view], whole[view], _BESIDE)
     return shown

@@ -1,5 +1,7 @@
 """Light that views share must be that of the same point, or a scene's shadows move with the camera."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from small_worlds import ball, bar, room, taking
@@ -8,7 +10,7 @@ from sepi.rendered.render_file import read_render
 from sepi.rendered.rendering import render_world
 from sepi.rendered.rig import rig_of
 from sepi.rendered.tracing import Tracer
-from sepi.rendered.view_kernels import alike_light, gathered_light
+from sepi.rendered.view_kernels import alike_light, gathered_light, one_of_four
 from sepi.rendered.world import Material
 
 SIZE, VIEWS = 48, 5
@@ -24,6 +26,12 @@ def falling_on_a_plane() -> dict[str, np.ndarray]:
     return {"light": light, "disparities": disparities, "things": things, "whole": things == 0, "baselines": positions}
 
 
+def gathered(light: Any, disparities: Any, things: Any, whole: Any, baselines: Any, view: int) -> Any:
+    """As :func:`sepi.rendered.shared_light.with_shared_light` asks for it."""
+    surface = np.where(whole, things, -1).astype(np.int16)
+    return gathered_light(light, disparities, surface[view], one_of_four(surface), baselines, view, 0.02)
+
+
 def test_a_plane_seen_by_all_views_has_the_mean_of_their_light() -> None:
     """What another thing, another depth, or gloss shows is not asked."""
     plane = falling_on_a_plane()
@@ -33,14 +41,14 @@ def test_a_plane_seen_by_all_views_has_the_mean_of_their_light() -> None:
         arrays = {key: values.copy() for key, values in kept.items()}
         if change:
             arrays[change][0] = value
-        gathered, variance = gathered_light(**arrays, view=4, bend=0.02)
+        mean, variance = gathered(**arrays, view=4)
         # the first view stands up and left of the others
         seen = [
             plane["light"][n, 10 - int(t), 10 - int(s)] for n, (t, s) in enumerate(positions) if n or change is None
         ]
-        assert np.allclose(gathered[10, 10], np.mean(seen, axis=0), rtol=1e-5), change
+        assert np.allclose(mean[10, 10], np.mean(seen, axis=0), rtol=1e-5), change
         assert variance[10, 10] == pytest.approx(np.var(np.sum(seen, axis=1), ddof=1) / len(seen), rel=1e-3)
-        own, _ = gathered_light(**{**arrays, "baselines": positions - positions[0]}, view=0, bend=0.02)
+        own, _ = gathered(**{**arrays, "baselines": positions - positions[0]}, view=0)
         assert change is None or np.allclose(own[5, 5], plane["light"][0, 5, 5], rtol=1e-5), change
 
 
@@ -50,9 +58,9 @@ def test_equal_light_stays_as_it_is() -> None:
     plane["light"] = np.broadcast_to(plane["light"][4, 10:11, :, :], plane["light"].shape).copy()
     # along the rows of a plane that stands still
     plane["disparities"] = np.zeros_like(plane["disparities"])
-    gathered, variance = gathered_light(**plane, view=4, bend=0.02)
+    mean, variance = gathered(**plane, view=4)
     assert variance.min() >= 0
-    smoothed = alike_light(gathered, variance, plane["things"][4], plane["whole"][4], 3, 2.0)
+    smoothed = alike_light(mean, variance, plane["things"][4], 3, 2.0)
     # rims, too, whose neighbours are partly beyond the picture
     np.testing.assert_allclose(smoothed, plane["light"][4], rtol=1e-2)
 
@@ -65,13 +73,13 @@ def test_light_is_smoothed_where_it_may_be_the_same_and_not_across_a_shadow() ->
     light = (true + rng.normal(0, 0.04, true.shape)).astype(np.float32)
     things, whole = np.zeros((40, 40), np.int16), np.pad(np.ones((38, 38), bool), 1)
     variance = np.full((40, 40), 3 * 0.04**2, np.float32)
-    smooth = alike_light(light, variance, things, whole, 3, 2.0)
+    smooth = alike_light(light, variance, np.where(whole, things, np.int16(-1)), 3, 2.0)
     assert (smooth - true)[4:-4, 4:16].std() < 0.04 / 4
     assert np.abs(smooth - true)[1:-1, 19:21].mean() < 0.03
     # not from another thing, nor from what is not whole
     things[:, 20:] = 1
     whole[20:] = False
-    apart = alike_light(light, 100 * variance, things, whole, 3, 2.0)
+    apart = alike_light(light, 100 * variance, np.where(whole, things, np.int16(-1)), 3, 2.0)
     assert abs((apart - true)[2:18, 18:20].mean()) < 0.01
     assert np.array_equal(apart[20:], light[20:])
 
