@@ -14,7 +14,7 @@ rule render:
         world="|".join(RENDERED),
     threads: 8
     resources:
-        mem_mb=of_render(lambda scene: scene.memory_mb(bytes_per_sample=20, bytes_per_pixel=2000)),
+        mem_mb=of_render(lambda scene: scene.memory_mb(bytes_per_sample=80, bytes_per_pixel=1000)),
         runtime=of_render(lambda scene: scene.minutes(2 * RENDERING.samples)),
     params:
         flags=f"--size {RENDERING.size} --views {RENDERING.views} --samples {RENDERING.samples}",
