@@ -132,7 +132,7 @@ class Tracer:
     def __init__(self, world: World, rig: Rig, lens: float = 0.0, lens_points: int = 32) -> None:
         self._mi = _mitsuba()
         self._rig, self._lens, self._lens_points = rig, lens, lens_points if lens else 1
-        self._exposure, self._lasts = world.exposure, {"max_depth": world.depth, "rr_depth": world.chance}
+        self._exposure, self._bounces = world.exposure, {"max_depth": world.depth, "rr_depth": world.roulette}
         self.surfaces = Surfaces(world)
         parts: dict[str, Any] = {}
         # things that share a material share its pictures
@@ -234,7 +234,7 @@ class Tracer:
         return np.array(self._mi.render(self._scene, sensor=camera, integrator=integrator, spp=samples, seed=seed))
 
     def _paths(self, block: int) -> Any:
-        return self._mi.load_dict({"type": "path", **self._lasts, "block_size": block})
+        return self._mi.load_dict({"type": "path", **self._bounces, "block_size": block})
 
     def _film(self, height: int, count: int = 1) -> dict[str, Any]:
         values = {"width": count * height, "height": height, "rfilter": {"type": "box"}}

@@ -158,11 +158,11 @@ class World:
         Light that the cameras get, as part of what they get in the other scenes: as much weaker it stands out of noise.
     depth : int
         How often light is reflected or refracted, at most.
-    chance : int
-        At which of these, and later ones, paths of light end by chance.
+    roulette : int
+        From which of these on paths of light end by Russian roulette.
     paths : float
         Those of a pixel of gloss, as part of the samples asked for: where paths that end later bring more, as many as
-        have the noise of all of those that end by chance at the second.
+        have the noise of all of those that may end at the second.
     """
 
     things: Sequence[Thing]
@@ -177,5 +177,5 @@ class World:
     field_of_view: float = 40.0
     light: float = 1.0
     depth: int = 8
-    chance: int = 2
+    roulette: int = 2
     paths: float = 1.0

@@ -179,7 +179,7 @@ def test_fewer_paths_of_gloss_have_no_more_noise() -> None:
     for name in ("floor", "chrome", "glass"):
         world = world_of(name)
         rig, deviations = rig_of(world, 40, (9, 9)), []
-        for tried, paths in ((replace(world, chance=2), 64), (world, round(64 * world.paths))):
+        for tried, paths in ((replace(world, roulette=2), 64), (world, round(64 * world.paths))):
             tracer = Tracer(tried, rig)
             at = tracer.position(0, 0)
             gloss = ~tracer.surfaces.matte(tracer.first_surface(at).thing)

@@ -67,7 +67,7 @@ def world() -> World:
         exposure=1.65,
         field_of_view=38,
         depth=6,
-        chance=4,
+        roulette=4,
         paths=0.55,
     )
 

@@ -29,7 +29,7 @@ def world() -> World:
         exposure=1.25,
         field_of_view=36,
         depth=7,
-        chance=4,
+        roulette=4,
         paths=0.31,
     )
     return seen_from(hall, (0.05, -0.95, 0.0), below=12)

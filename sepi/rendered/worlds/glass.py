@@ -62,7 +62,7 @@ def world() -> World:
         exposure=1.75,
         field_of_view=33,
         depth=10,
-        chance=6,
+        roulette=6,
         paths=0.66,
     )
 
