@@ -162,7 +162,7 @@ class World:
         From which of these on paths of light end by Russian roulette.
     paths : float
         Those of a pixel of gloss, as part of the samples asked for: where paths that end later bring more, as many as
-        have the noise of all of those that may end at the second.
+        have the noise, by its mean square, of all of those that may end at the second.
     """
 
     things: Sequence[Thing]
