@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from sepi.lightfield import BoolMap, FloatMap
 from sepi.rendered.surfaces import FirstSurface
-from sepi.rendered.tracing import Position, Tiles, Tracer
+from sepi.rendered.tracing import SPREAD, Position, Tiles, Tracer
 from sepi.rendered.world import FloatArray
 
 # to make a camera for a tile takes as long as so many paths
@@ -35,9 +35,14 @@ def shared_samples(samples: int, views: int) -> int:
     return min(samples, math.ceil(3 * samples / views))
 
 
-def mixed_samples(samples: int) -> int:
-    """Paths of a pixel in which surfaces mix: few, but not so few that they show."""
-    return max(samples // 6, min(samples, 12))
+def mixed_samples(samples: int, few: int) -> int:
+    """Paths of a pixel in which surfaces mix: few, but those after the first ``few`` are spread evenly."""
+    return max(samples // 6, min(samples, few + SPREAD))
+
+
+def gloss_samples(samples: int, part: float) -> int:
+    """Paths of a pixel of gloss where ``part`` of many do: so many that they are spread evenly."""
+    return max(round(part * samples), min(samples, SPREAD))
 
 
 @dataclass(frozen=True)
@@ -87,7 +92,7 @@ def planned(
     seed : int
         Of the paths; with some of those that follow.
     gloss : float, optional
-        What part of ``samples`` pixels of gloss need (:class:`sepi.rendered.world.World`).
+        What part of ``samples`` pixels of gloss need, of many (:class:`sepi.rendered.world.World`).
     """
     # what is narrower than a pixel may stand between rays through middles
     beside = tracer.things(position, _FINE)
@@ -100,8 +105,8 @@ def planned(
     few, differs = shared_samples(samples, views), matte < 0.5
     kinds = (
         (~differs, 0, few),
-        (~differs & ~whole, few, mixed_samples(samples) - few),
-        (differs, 0, max(few, round(gloss * samples))),
+        (~differs & ~whole, few, mixed_samples(samples, few) - few),
+        (differs, 0, max(few, gloss_samples(samples, gloss))),
     )
     squares = [(tiles, taken, paths) for asked, taken, paths in kinds if paths > 0 for tiles in _tiles(asked, paths)]
     tiles = [

@@ -28,7 +28,7 @@ _NEAR = 0.1
 # side of the blocks that Mitsuba renders; left to it, they would be smaller for many threads, and seeded otherwise
 _BLOCK = 16
 # samples of a pixel from which on it pays to spread them evenly
-_SPREAD = 9
+SPREAD = 9
 # how often paths ask the sky for light, for once that they ask a sun: noise where surfaces mix falls by a sixth
 _SKY_BESIDE_SUN = 0.3
 # Vogel's spiral: points that fill a disc evenly
@@ -341,7 +341,7 @@ class Tracer:
 def _sampler(samples: int) -> dict[str, Any]:
     """Few samples are independent: all pixels of a block spread theirs alike, which shows where there are few."""
     spread = "stratified" if samples == 4 ** round(math.log(samples, 4)) else "multijitter"
-    return {"sampler": {"type": spread if samples >= _SPREAD else "independent", "sample_count": samples}}
+    return {"sampler": {"type": spread if samples >= SPREAD else "independent", "sample_count": samples}}
 
 
 def _in_disc(radius: float, count: int) -> npt.NDArray[np.float64]:

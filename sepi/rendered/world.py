@@ -161,8 +161,9 @@ class World:
     roulette : int
         From which of these on paths of light end by Russian roulette.
     paths : float
-        Those of a pixel of gloss, as part of the samples asked for: where paths that end later bring more, as many as
-        have the noise, by its mean square, of all of those that may end at the second.
+        Those of a pixel of gloss, as part of the samples asked for, where these are many: where paths that end later
+        bring more, as many as have no more noise, by two renderings' mean distance, than all of those that may end at
+        the second.
     """
 
     things: Sequence[Thing]

@@ -29,8 +29,8 @@ def world() -> World:
         exposure=1.25,
         field_of_view=36,
         depth=7,
-        roulette=4,
-        paths=0.31,
+        roulette=5,
+        paths=0.39,
     )
     return seen_from(hall, (0.05, -0.95, 0.0), below=12)
 
@@ -44,7 +44,7 @@ def _hall() -> list[Thing]:
         Thing(rectangle((-4, 0, -1), wide, (0, 0, _WALL + 1.0)), Material(_tiles(), "glossy")),
         Thing(rectangle((-4, -4, _WALL), wide, (0, 4, 0)), Material(paper)),
         Thing(rectangle((-4, -0.98, _WALL - 0.006), wide, (0, 0.98, 0)), Material((0.66, 0.7, 0.68))),
-        Thing(joined(panels), Material((0.7, 0.74, 0.72), "glossy", 0.2)),
+        Thing(joined(panels), Material((0.7, 0.74, 0.72))),
     ]
 
 
