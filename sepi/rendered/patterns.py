@@ -40,14 +40,16 @@ def field(seed: int, finest: float, coarsest: float, texels: int = TEXELS, stret
     return found
 
 
-@lru_cache(maxsize=4)
+@lru_cache(maxsize=16)
 def _amplitude(finest: float, coarsest: float, texels: int, stretch: float) -> FloatArray:
-    frequency = np.hypot(np.fft.fftfreq(texels)[:, None], stretch * np.fft.rfftfreq(texels)[None, :])
+    # negative frequencies have what positive ones have
+    down = np.arange(texels)
+    frequency = np.hypot(np.fft.rfftfreq(texels)[:, None], stretch * np.fft.rfftfreq(texels)[None, :])
     fourth = np.square(np.square(frequency))
     with np.errstate(divide="ignore"):
         found = np.where(frequency > 0, 1 / frequency, 0)
     found *= np.exp(-fourth * finest**4) * (1 - np.exp(-fourth * coarsest**4))
-    return found.astype(np.float32)
+    return found.astype(np.float32)[np.minimum(down, texels - down)]
 
 
 def noise(

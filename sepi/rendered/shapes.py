@@ -41,23 +41,35 @@ def sheet(points: Points, *, smooth: bool = True) -> Mesh:
 
 def rectangle(corner: Vector, across: Vector, down: Vector) -> Mesh:
     """A flat rectangle, or parallelogram, from one corner along two edges."""
-    start, u, v = (np.array(values, float) for values in (corner, across, down))
-    return sheet(np.stack([np.stack([start, start + u]), np.stack([start + v, start + u + v])]), smooth=False)
+    return _rectangles(*(np.array([values], float) for values in (corner, across, down)))
+
+
+def _rectangles(corners: Points, across: Points, down: Points) -> Mesh:
+    """Flat rectangles as one mesh: a corner and two edges of each, ``(N, 3)``."""
+    right, below = corners + across, corners + down
+    points = np.stack([corners, right, below, below - corners + right], axis=1)
+    uv = np.zeros((len(corners), 4, 2))
+    uv[:, 1::2, 0] = np.linalg.norm(across, axis=1)[:, None]
+    uv[:, 2:, 1] = np.linalg.norm(down, axis=1)[:, None]
+    faces = np.array([[0, 1, 3], [0, 3, 2]]) + 4 * np.arange(len(corners))[:, None, None]
+    return _mesh(points.reshape(-1, 3), faces.reshape(-1, 3), uv.reshape(-1, 2), False)
 
 
 def box(centre: Vector, size: Vector, turn: Vector = (0, 0, 0)) -> Mesh:
     """A box, turned by angles about its own x, y and z axes, in radians."""
     w, h, d = size
     x, y, z = (-w / 2, -h / 2, -d / 2)
-    sides = [
-        rectangle((x, y, z), (w, 0, 0), (0, h, 0)),
-        rectangle((-x, y, -z), (-w, 0, 0), (0, h, 0)),
-        rectangle((x, y, -z), (0, 0, -d), (0, h, 0)),
-        rectangle((-x, y, z), (0, 0, d), (0, h, 0)),
-        rectangle((x, y, -z), (w, 0, 0), (0, 0, -d)),
-        rectangle((x, -y, z), (w, 0, 0), (0, 0, d)),
-    ]
-    return moved(joined(sides), turn, centre)
+    sides = np.array(
+        [
+            [(x, y, z), (w, 0, 0), (0, h, 0)],
+            [(-x, y, -z), (-w, 0, 0), (0, h, 0)],
+            [(x, y, -z), (0, 0, -d), (0, h, 0)],
+            [(-x, y, z), (0, 0, d), (0, h, 0)],
+            [(x, y, -z), (w, 0, 0), (0, 0, -d)],
+            [(x, -y, z), (w, 0, 0), (0, 0, d)],
+        ]
+    )
+    return moved(_rectangles(*np.moveaxis(sides, 1, 0)), turn, centre)
 
 
 def ball(
