@@ -7,6 +7,7 @@ import json
 import math
 import operator
 import os
+import re
 from collections.abc import Iterable, Mapping
 from numbers import Real
 from pathlib import Path
@@ -33,6 +34,17 @@ def value_of(text: str) -> Any:
         return json.loads(text)
     except (ValueError, RecursionError):
         return text
+
+
+def settings_of(texts: Iterable[str], example: str) -> dict[str, Any]:
+    """What a user gave by ``--set KEY=VALUE``, repeated."""
+    found = {}
+    for text in texts:
+        match = re.fullmatch(r"(\w+)=(.*)", text)
+        if match is None:
+            raise SepiError(f"--set {text}: expected KEY=VALUE, such as {example}")
+        found[match[1]] = value_of(match[2])
+    return found
 
 
 def require_known(where: str, names: Iterable[str], known: Iterable[str]) -> None:

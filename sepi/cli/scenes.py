@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Generator, Iterable, Sequence
+from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 import numpy as np
 
-from sepi.command import SepiCommand, progress_bar
+from sepi.command import SepiCommand
 from sepi.errors import SepiError
 from sepi.rendered.catalogue import NOISE_LEVELS, RENDERED, WITHOUT_NOISE, exposed_name
-from sepi.validation import require_known, validated, value_of
+from sepi.validation import require_known, settings_of, validated
 
 if TYPE_CHECKING:
     from sepi.rendered.options import Exposure, RenderOptions
@@ -75,7 +75,11 @@ def scenes(
         given: dict[str, Any] = {"grid": [views, views]}
         given |= {key: value for key, value in (("size", size), ("samples", samples)) if value is not None}
         _write_rendered(
-            names, output, given | _settings(settings), dict.fromkeys(levels or (WITHOUT_NOISE,)), all_views
+            names,
+            output,
+            given | settings_of(settings, "lens=0.5"),
+            dict.fromkeys(levels or (WITHOUT_NOISE,)),
+            all_views,
         )
     else:
         only = {"--samples": samples, "--noise": levels, "--set": settings, "--all-views": all_views}
@@ -126,27 +130,30 @@ def _write_rendered(
     folders = [exposed_name(name, one.noise, one.noise_seed) for name in chosen for one in exposures]
     _require_new(output, folders)
     require_mitsuba()
-    for name in chosen:
-        with progress_bar(name) as progress:
-            render = _rendered(name, options, output / f"{name}.h5", progress)
-        for exposure in exposures:
-            folder = output / exposed_name(name, exposure.noise, exposure.noise_seed)
-            _write_folder(render, exposure, folder, all_views)
-            click.echo(f"written: {folder}/")
+    with closing(_renders(chosen, options, output)) as renders:
+        for render in renders:
+            for exposure in exposures:
+                folder = output / exposed_name(render.name, exposure.noise, exposure.noise_seed)
+                _write_folder(render, exposure, folder, all_views)
+                click.echo(f"written: {folder}/")
 
 
-def _rendered(name: str, options: RenderOptions, path: Path, progress: Any) -> Render:
-    """A scene's render: of the file that is there already if it is of the same options, else made anew."""
+def _renders(names: Sequence[str], options: RenderOptions, output: Path) -> Generator[Render]:
+    """Of files that are there already if they are of the same options; the others are made."""
+    from sepi.cli.side_by_side import render_scenes
     from sepi.rendered.render_file import read_render
-    from sepi.rendered.rendering import made_by, render_scene
+    from sepi.rendered.rendering import made_by
 
-    if path.is_file():
-        known = read_render(path)
-        if known.made_by != made_by(name, options):
-            raise SepiError(f"{path}: was rendered with other options; remove it or choose another folder with -o")
-        return known
-    render_scene(name, options, path, progress)
-    return read_render(path)
+    files = {name: output / f"{name}.h5" for name in names}
+    missing = [name for name, path in files.items() if not path.is_file()]
+    for name, path in files.items():
+        if name not in missing:
+            known = read_render(path)
+            if known.made_by != made_by(name, options):
+                raise SepiError(f"{path}: was rendered with other options; remove it or choose another folder with -o")
+            yield known
+    with closing(render_scenes(missing, options, output)) as rendered:
+        yield from (read_render(files[name]) for name in rendered)
 
 
 def _write_folder(render: Render, exposure: Exposure, folder: Path, all_views: bool) -> None:
@@ -167,14 +174,3 @@ def _require_new(output: Path, folders: Iterable[str]) -> None:
     for name in folders:
         if (output / name).exists():
             raise SepiError(f"{output / name}: exists already; remove it or choose another folder with -o")
-
-
-def _settings(texts: Sequence[str]) -> dict[str, Any]:
-    """Options from ``KEY=VALUE``."""
-    found = {}
-    for text in texts:
-        match = re.fullmatch(r"(\w+)=(.*)", text)
-        if match is None:
-            raise SepiError(f"--set {text}: expected KEY=VALUE, such as lens=0.5")
-        found[match[1]] = value_of(match[2])
-    return found

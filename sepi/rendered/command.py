@@ -10,7 +10,7 @@ import click
 from sepi.command import SepiCommand, progress_bar, write_timing
 from sepi.rendered.options import RenderOptions
 from sepi.rendered.rendering import render_scene
-from sepi.validation import validated
+from sepi.validation import settings_of, validated
 
 _PATH = click.Path(path_type=Path)
 
@@ -20,13 +20,23 @@ _PATH = click.Path(path_type=Path)
 @click.option("--size", type=int, default=512, show_default=True, help="Height and width of a view in pixels.")
 @click.option("--views", type=int, default=9, show_default=True, help="Rows and columns of views.")
 @click.option("--samples", type=int, default=64, show_default=True, help="Paths of light for each pixel.")
+@click.option("--set", "settings", multiple=True, metavar="KEY=VALUE", help="What sepi.rendered.options has beside.")
 @click.option("--threads", type=click.IntRange(min=1), default=1, show_default=True, help="Threads to use.")
 @click.option("--output", type=_PATH, required=True, help="HDF5 file to write.")
 @click.option("--timing", type=_PATH, help="JSON file to write: seconds and peak memory.")
-def main(name: str, size: int, views: int, samples: int, threads: int, output: Path, timing: Path | None) -> None:
+def main(
+    name: str,
+    size: int,
+    views: int,
+    samples: int,
+    settings: tuple[str, ...],
+    threads: int,
+    output: Path,
+    timing: Path | None,
+) -> None:
     """Render the scene NAME; views that are done are kept if it is interrupted."""
     started = time.perf_counter()
-    values = {"size": size, "grid": [views, views], "samples": samples}
+    values = {"size": size, "grid": [views, views], "samples": samples, **settings_of(settings, "lens=0.5")}
     with progress_bar(name) as progress:
         render_scene(name, validated(RenderOptions, values, "rendered"), output, progress, threads)
     if timing is not None:

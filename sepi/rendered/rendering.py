@@ -88,7 +88,7 @@ def render_world(
     """Render a world of one's own; see :func:`render_scene`."""
     rig = rig_of(world, options.size, options.grid, options.baseline)
     count = math.prod(options.grid)
-    parts = path.with_name(f"{path.name}.parts")
+    parts = _parts(path)
     _take_over(parts, json.dumps({**made_by(name, options), "world": _digest(world)}, sort_keys=True))
     files = [parts / f"view_{number:03d}.npz" for number in range(count)]
     missing = [number for number, file in enumerate(files) if not _is_whole(file)]
@@ -99,6 +99,16 @@ def render_world(
     write_render(path, _assembled(name, world, rig, options, files))
     shutil.rmtree(parts)
     progress(1.0)
+
+
+def views_done(path: Path) -> int:
+    """How many views of a scene that is being rendered into this file are done."""
+    return len(list(_parts(path).glob("view_*.npz")))
+
+
+def _parts(path: Path) -> Path:
+    """The folder of what is done."""
+    return path.with_name(f"{path.name}.parts")
 
 
 class _View(NamedTuple):

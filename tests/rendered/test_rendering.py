@@ -2,6 +2,7 @@
 
 import hashlib
 import importlib.util
+import subprocess
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,7 +13,9 @@ from scipy import ndimage
 from small_worlds import ball, bar, depth_of_room, lamp_above, room, taking
 
 import sepi
+from sepi.cli import side_by_side
 from sepi.cli.main import main
+from sepi.cli.side_by_side import _started, render_scenes
 from sepi.errors import SepiError
 from sepi.rendered import NOISE_LEVELS, RENDERED, patterns, rendering, shapes, tracing
 from sepi.rendered.catalogue import world_of
@@ -20,13 +23,13 @@ from sepi.rendered.exposure import exposed
 from sepi.rendered.masks import MASKS, mask, seen_bits
 from sepi.rendered.options import NOISE, Exposure
 from sepi.rendered.render_file import Render, read_render
-from sepi.rendered.rendering import render_scene, render_world
+from sepi.rendered.rendering import made_by, render_scene, render_world
 from sepi.rendered.rig import rig_of
 from sepi.rendered.sampling import gloss_samples, pictured, planned
 from sepi.rendered.tracing import Tracer
 from sepi.rendered.world import Material, Sun, World
 from sepi.scenes.folder import write_hci
-from sepi.threads import use_threads
+from sepi.threads import available_cores, use_threads
 
 
 def rendered(folder: Path, world: World, **values: object) -> Render:
@@ -458,6 +461,27 @@ def test_a_scene_as_a_user_renders_it(tmp_path: Path) -> None:
     refused = CliRunner().invoke(main, [*words, "--samples", "4", "--noise", "low", "--set", "noise_seed=2"])
     assert refused.exit_code == 1
     assert "was rendered with other options" in refused.output
+
+
+@pytest.mark.system
+def test_scenes_side_by_side(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each has a process of its own, of the options given; an error is told and leaves no process."""
+    begun: list[subprocess.Popen[str]] = []
+
+    def started(*values: object) -> subprocess.Popen[str]:
+        begun.append(_started(*values))
+        return begun[-1]
+
+    monkeypatch.setattr(side_by_side, "_started", started)
+    options = taking(size=32, grid=(2, 3), samples=2, position_error=0.1)
+    assert list(render_scenes(["room"], options, tmp_path)) == ["room"]
+    assert read_render(tmp_path / "room.h5").made_by == made_by("room", options)
+    (tmp_path / "glass.h5.parts").touch()
+    with pytest.raises(SepiError, match=r"glass\.h5\.parts: File exists$"):
+        list(render_scenes(["glass", "cloth"], taking(size=256, grid=(9, 9)), tmp_path))
+    assert len(begun) == 1 + min(2, available_cores())
+    assert all(process.poll() is not None for process in begun)
+    assert not (tmp_path / "cloth.h5").exists()
 
 
 def test_a_light_field_needs_no_albedo_that_it_does_not_share(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
