@@ -96,13 +96,14 @@ def planned(
     """
     # what is narrower than a pixel may stand between rays through middles
     beside = tracer.things(position, _FINE)
-    matte = tracer.surfaces.matte(beside).mean(axis=(1, 3))
-    whole = (matte == 1) & (beside == seen.thing[:, None, :, None]).all(axis=(1, 3)) & _flat(disparity, seen.thing)
+    matte = _of_pixels(tracer.surfaces.matte(beside))
+    same = _of_pixels(beside == seen.thing[:, None, :, None])
+    whole = (matte == _FINE**2) & (same == _FINE**2) & _flat(disparity, seen.thing)
     albedo = np.zeros((*whole.shape, 3), np.float32)
     albedo[whole] = tracer.albedo(position, seen.face[whole], np.argwhere(whole))
     whole &= albedo.min(axis=-1) > _DARKEST
     albedo[~whole] = 0
-    few, differs = shared_samples(samples, views), matte < 0.5
+    few, differs = shared_samples(samples, views), 2 * matte < _FINE**2
     kinds = (
         (~differs, 0, few),
         (~differs & ~whole, few, mixed_samples(samples, few) - few),
@@ -114,6 +115,14 @@ def planned(
         for number, (pixels, taken, paths) in enumerate(squares)
     ]
     return Plan(tiles, albedo, whole)
+
+
+def _of_pixels(rays: npt.NDArray[np.bool_]) -> npt.NDArray[np.uint8]:
+    """Of how many rays of each pixel, ``(H, F, W, F)``, something is true."""
+    fine, found = rays.shape[1], np.zeros(rays.shape[::2], np.uint8)
+    for n in range(fine**2):
+        found += rays[:, n // fine, :, n % fine]
+    return found
 
 
 def pictured(tracer: Tracer, plan: Plan) -> FloatArray:
@@ -149,7 +158,7 @@ def _tiles(asked: BoolMap, paths: int) -> list[npt.NDArray[np.int64]]:
         # the last ones reach over those before
         corners = np.minimum(corners, np.array([height, width]) - side)
         found.append(corners[:, None, None] + np.moveaxis(np.mgrid[:side, :side], 0, -1))
-        taken = np.kron(taken | squares, np.ones((2, 2), bool))
+        taken = (taken | squares).repeat(2, axis=0).repeat(2, axis=1)
         side //= 2
     return [tiles for tiles in found if len(tiles)]
 

@@ -25,6 +25,8 @@ from sepi.threads import threads_used
 
 # metres at which rays begin; far less would cost digits of their directions
 _NEAR = 0.1
+# where a camera's square lies, as Mitsuba calls it
+_OFFSETS = ("principal_point_offset_x", "principal_point_offset_y")
 # side of the blocks that Mitsuba renders; left to it, they would be smaller for many threads, and seeded otherwise
 _BLOCK = 16
 # samples of a pixel from which on it pays to spread them evenly
@@ -218,16 +220,18 @@ class Tracer:
         for name, value in {**self._camera(position, side), **self._film(side)}.items():
             camera[name] = self._mi.load_dict(value) if isinstance(value, dict) else value
         windows = {}
-        for number, (top, left) in enumerate(pixels[:, 0, 0].tolist()):
-            for name, value in self._offsets(position, top, left, side).items():
-                camera[name] = value
+        right, down = self._offsets(position, pixels[:, 0, 0, 0], pixels[:, 0, 0, 1], side)
+        for number, (x, y) in enumerate(zip(right.tolist(), down.tolist(), strict=True)):
+            camera[_OFFSETS[0]], camera[_OFFSETS[1]] = x, y
             windows[f"tile{number:04d}"] = create(camera)
         return self._mi.load_dict({"type": "batch", **windows, **self._film(side, count), **_sampler(paths)})
 
     def _whole(self, position: Position) -> dict[str, Any]:
         """The camera of a whole picture."""
         size = self._rig.size
-        place = {**self._camera(position, size), **self._offsets(position, 0, 0, size)}
+        none = np.zeros(1, np.int64)
+        offsets = (float(values[0]) for values in self._offsets(position, none, none, size))
+        place = {**self._camera(position, size), **dict(zip(_OFFSETS, offsets, strict=True))}
         return {"type": "perspective", **place, **self._film(size)}
 
     def _seen(self, integrator: Any, camera: Any, samples: int, seed: int) -> FloatArray:
@@ -252,12 +256,13 @@ class Tracer:
             "far_clip": 1000.0,
         }
 
-    def _offsets(self, position: Position, top: int, left: int, side: int) -> dict[str, float]:
-        """Where that square lies; Mitsuba moves the window, not the picture."""
-        return {
-            f"principal_point_offset_{axis}": float((first + side / 2 - (0.5 + shear) * self._rig.size) / side)
-            for axis, first, shear in (("x", left, position.shear_right), ("y", top, position.shear_down))
-        }
+    def _offsets(
+        self, position: Position, top: npt.NDArray[np.int64], left: npt.NDArray[np.int64], side: int
+    ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+        """Where squares lie, to the right and down; Mitsuba moves the window, not the picture."""
+        shears = ((left, position.shear_right), (top, position.shear_down))
+        right, down = ((first + side / 2 - (0.5 + shear) * self._rig.size) / side for first, shear in shears)
+        return right, down
 
     def directions(self, position: Position) -> npt.NDArray[np.float64]:
         """Of the rays through the middles of the pixels, ``(H, W, 3)``, in the camera's own frame; 1 along its axis."""
