@@ -127,34 +127,35 @@ def brightness_of_views(views: RimViews, sides: Sides, missing: Any) -> Any:
     N = len(views.places)
     brightness, residual = np.ones(N), np.zeros(N)
     for view in prange(N):
-        colour = np.empty(3)
+        # of each pixel that the view shows: its colours there, and the reference's
+        shown = np.empty((((H - 1) // _STRIDE + 1) * ((W - 1) // _STRIDE + 1), 2, 3))
         of_view = missing[views.places[view, 0], views.places[view, 1]]
-        for turn in range(2):
-            own, other, rest, n = 1e-9, 1e-9, 0.0, 1
-            for y in range(0, H, _STRIDE):
-                for x in range(0, W, _STRIDE):
-                    down = y - disparity[y, x] * views.baselines[view, 0]
-                    across = x - disparity[y, x] * views.baselines[view, 1]
-                    if not clean[y, x] or down < 0 or across < 0 or down >= H - 1 or across >= W - 1:
-                        continue
-                    row, column = int(down), int(across)
-                    if of_view.size > 0 and (
-                        of_view[row, column]
-                        or of_view[row, column + 1]
-                        or of_view[row + 1, column]
-                        or of_view[row + 1, column + 1]
-                    ):
-                        continue
-                    _sample(views, view, row, column, down - row, across - column, colour)
-                    for c in range(3):
-                        own += guide[y, x, c]
-                        other += colour[c]
-                        rest += min(abs(colour[c] / brightness[view] - guide[y, x, c]), _MOST_DIFFERENCE)
-                        n += 1
-            if turn == 0:
-                brightness[view] = other / own
-            else:
-                residual[view] = rest / n if n > 1 else np.nan
+        own, other, rest, n = 1e-9, 1e-9, 0.0, 0
+        for y in range(0, H, _STRIDE):
+            for x in range(0, W, _STRIDE):
+                down = y - disparity[y, x] * views.baselines[view, 0]
+                across = x - disparity[y, x] * views.baselines[view, 1]
+                if not clean[y, x] or down < 0 or across < 0 or down >= H - 1 or across >= W - 1:
+                    continue
+                row, column = int(down), int(across)
+                if of_view.size > 0 and (
+                    of_view[row, column]
+                    or of_view[row, column + 1]
+                    or of_view[row + 1, column]
+                    or of_view[row + 1, column + 1]
+                ):
+                    continue
+                _sample(views, view, row, column, down - row, across - column, shown[n, 0])
+                for c in range(3):
+                    shown[n, 1, c] = guide[y, x, c]
+                    own += shown[n, 1, c]
+                    other += shown[n, 0, c]
+                n += 1
+        brightness[view] = other / own
+        for k in range(n):
+            for c in range(3):
+                rest += min(abs(shown[k, 0, c] / brightness[view] - shown[k, 1, c]), _MOST_DIFFERENCE)
+        residual[view] = rest / (3 * n + 1) if n > 0 else np.nan
     return brightness, residual
 
 

@@ -71,8 +71,8 @@ class BaseDetail(NamedTuple):
 
     Attributes
     ----------
-    colours : ndarray, shape (T, S, 3, H, W), uint8, uint16 or float32
-        In the views' own units; of grey views three times the same.
+    colours : ndarray, shape (T, S, H, W, 3), uint8, uint16 or float32
+        The views as they are in memory; of grey ones three times the same.
     colour_unit : float32
         What a colour value is multiplied with to span 0..1.
     detail : ndarray, shape (T, S, n or 0, W), int16
@@ -136,17 +136,15 @@ def base_detail_decomposition(
     views, guide = light_field.rgb_views, light_field.reference_view
     rows = rows or Rows(0, light_field.shape[0])
     present = light_field.present if present is None else present
-    # as they are in memory: nothing is copied
-    colours = views.transpose(0, 1, 4, 2, 3)
     unit = np.float32(1 / full_scale(views.dtype))
     noise = reference_noise(light_field)
     detail, missing = _detail_so_far(light_field, parameters, rows, present)
     if detail.size and missing.any():
         edge = float(np.hypot(parameters.base_sigma_colour, 3 * noise))
         radius, space = parameters.base_radius, parameters.base_sigma_space
-        detail_of_views(colours, unit, missing, rows.low, radius, edge, space, np.float32(DETAIL_UNIT), detail)
+        detail_of_views(views, unit, missing, rows.low, radius, edge, space, np.float32(DETAIL_UNIT), detail)
     return BaseDetail(
-        colours,
+        views,
         unit,
         detail,
         np.float32(DETAIL_UNIT),

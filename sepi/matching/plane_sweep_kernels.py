@@ -18,10 +18,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from numba import types
-from numba.extending import intrinsic
 
-from sepi.compiled import njit, prange
+from sepi.compiled import fma, njit, prange
 from sepi.lightfield import FloatMap
 from sepi.matching.sweep_arrays import BestMaps, Candidates, ViewStack, Window
 
@@ -71,18 +69,6 @@ class Rows(NamedTuple):
     runs: npt.NDArray[np.int64]
 
 
-def _multiply_add(_context: Any, _a: Any, _b: Any, _c: Any) -> Any:
-    """``a * b + c`` of float32, rounded once: the processor's own instruction, whatever the optimiser does."""
-
-    def code(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
-        return builder.fma(*arguments)
-
-    return types.float32(types.float32, types.float32, types.float32), code
-
-
-_fma: Any = intrinsic(_multiply_add)
-
-
 @njit(inline="always")
 def _weights(fy: Any, fx: Any) -> Any:
     """Bilinear weights of the pixel, its right neighbour, and the two below."""
@@ -100,13 +86,13 @@ def _channels(pixels: Any, row: int, begin: int, end: int) -> Any:
 @njit(inline="always")
 def _residual(a: Any, b: Any, reference: Any, w: Any, x: int) -> Any:
     """Difference of a sample and its reference pixel; ``a``, ``b``: rows above and below the samples."""
-    return _fma(w[3], b[x + 1], _fma(w[2], b[x], _fma(w[1], a[x + 1], _fma(w[0], a[x], -reference[x]))))
+    return fma(w[3], b[x + 1], fma(w[2], b[x], fma(w[1], a[x + 1], fma(w[0], a[x], -reference[x]))))
 
 
 @njit(inline="always")
 def _robust(r0: Any, r1: Any, r2: Any, scale2: Any) -> Any:
     """Robust residual of three channels, 0..1."""
-    z: Any = _fma(r2, r2, _fma(r1, r1, r0 * r0))
+    z: Any = fma(r2, r2, fma(r1, r1, r0 * r0))
     return z / (z + scale2)
 
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from sepi.compiled import njit, prange
+from sepi.compiled import fma, njit, prange
 
 EXACT = {"nnan", "ninf", "nsz"}
 """Fast-math flags that keep every rounding as written: see :mod:`sepi.matching.plane_sweep_kernels`."""
@@ -14,34 +14,65 @@ EXACT = {"nnan", "ninf", "nsz"}
 PATHS_AT_ONCE = 32
 """Paths from row to row that a thread follows together: their costs lie side by side, and fit in its cache."""
 
+CANDIDATES_AT_ONCE = 8
+"""Candidates whose means over windows are taken together."""
+
 _UNREACHABLE = np.float32(1e9)
+
+
+@njit(cache=True, fastmath=EXACT, error_model="numpy")
+def _window_weights(guide: Any, y: int, radius: int, variance: Any) -> Any:
+    """Weights of the windows of row ``y``, of sum 1, by place in the window; zero outside the picture."""
+    H, W, _ = guide.shape
+    size = 2 * radius + 1
+    weights, total = np.zeros((size, size, W), np.float32), np.zeros(W, np.float32)
+    for i in range(max(0, radius - y), min(size, H - y + radius)):
+        row = y + i - radius
+        for j in range(size):
+            dx = j - radius
+            for x in range(max(0, -dx), min(W, W - dx)):
+                distance = np.float32(0)
+                for c in range(3):
+                    distance += (guide[y, x, c] - guide[row, x + dx, c]) ** 2
+                weights[i, j, x] = np.exp(-distance / (2 * variance))
+                total[x] += weights[i, j, x]
+    for i in range(size):
+        for j in range(size):
+            for x in range(W):
+                weights[i, j, x] /= total[x]
+    return weights
+
+
+@njit(inline="always")
+def _add_weighted(costs: Any, weights: Any, out: Any) -> None:
+    for x in range(out.size):
+        out[x] = fma(weights[x], costs[x], out[x])
 
 
 @njit(parallel=True, cache=True, fastmath=EXACT, error_model="numpy")
 def aggregate(cost: Any, guide: Any, radius: int, variance: Any) -> Any:
     """Mean over a window with weights ``exp(-|colour difference|^2 / (2 variance))``; (K, H, W) to (H, W, K)."""
     K, H, W = cost.shape
+    size = 2 * radius + 1
     out = np.empty((H, W, K), np.float32)
     for y in prange(H):
-        total, sum_of_weights = np.zeros((K, W), np.float32), np.zeros(W, np.float32)
-        weight = np.empty(W, np.float32)
-        for row in range(max(0, y - radius), min(H, y + radius + 1)):
-            for dx in range(-radius, radius + 1):
-                # none where the window is wider than the picture: an end below 0 would count from the right
-                first, last = max(0, -dx), max(0, min(W, W - dx))
-                for x in range(first, last):
-                    distance = np.float32(0)
-                    for c in range(3):
-                        distance += (guide[y, x, c] - guide[row, x + dx, c]) ** 2
-                    weight[x] = np.exp(-distance / (2 * variance))
-                    sum_of_weights[x] += weight[x]
-                for k in range(K):
-                    source, target, w = cost[k, row, first + dx : last + dx], total[k, first:last], weight[first:last]
-                    for x in range(target.size):
-                        target[x] += w[x] * source[x]
-        for x in range(W):
-            for k in range(K):
-                out[y, x, k] = total[k, x] / sum_of_weights[x]
+        weights = _window_weights(guide, y, radius, variance)
+        # a few candidates at a time: their sums stay in the first cache
+        total = np.empty((CANDIDATES_AT_ONCE, W), np.float32)
+        for begin in range(0, K, CANDIDATES_AT_ONCE):
+            end = min(K, begin + CANDIDATES_AT_ONCE)
+            total[:] = 0
+            for k in range(begin, end):
+                for i in range(max(0, radius - y), min(size, H - y + radius)):
+                    for j in range(size):
+                        dx = j - radius
+                        # none where the window is wider than the picture: an end below 0 would count from the right
+                        first, last = max(0, -dx), max(0, min(W, W - dx))
+                        source = cost[k, y + i - radius, first + dx : last + dx]
+                        _add_weighted(source, weights[i, j, first:last], total[k - begin, first:last])
+            for x in range(W):
+                for k in range(begin, end):
+                    out[y, x, k] = total[k - begin, x]
     return out
 
 

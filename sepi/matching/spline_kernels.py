@@ -84,6 +84,15 @@ def _coefficient_row(rows: Any, padded: Any, out: Any) -> None:
 
 
 @njit(inline="always")
+def _load_colours(pixels: Any, unit: Any, r: Any, g: Any, b: Any) -> None:
+    """A row of a view ``(W, 3)``."""
+    for x in range(r.size):
+        r[x] = np.float32(pixels[x, 0]) * unit
+        g[x] = np.float32(pixels[x, 1]) * unit
+        b[x] = np.float32(pixels[x, 2]) * unit
+
+
+@njit(inline="always")
 def _load(row: Any, unit: Any, out: Any) -> None:
     for x in range(out.size):
         out[x] = np.float32(row[x]) * unit
@@ -112,7 +121,7 @@ def view_splines(
 
     Parameters
     ----------
-    colours : ndarray, shape (T, S, 3, H, W)
+    colours : ndarray, shape (T, S, H, W, 3)
     colour_unit : float32
         What the colours are multiplied with.
     detail : ndarray, shape (T, S, n or 0, W), int16
@@ -125,7 +134,7 @@ def view_splines(
     out : ndarray, shape (T, S, n + 2 MARGIN, W + 2 MARGIN, 4), int16
         Mirrored in the margins.
     """
-    T, S, _, H, W = colours.shape
+    T, S, H, W, _ = colours.shape
     n = out.shape[2]
     channels = 4 if detail.shape[2] > 0 else 3
     pieces = (n + ROWS_AT_ONCE - 1) // ROWS_AT_ONCE
@@ -138,8 +147,7 @@ def view_splines(
         rows = np.empty((channels, ROWS_AT_ONCE + 2 * REACH, W), np.float32)
         for i in range(last - first + 2 * REACH):
             y = _mirrored(low - MARGIN + first + i - REACH, H)
-            for c in range(3):
-                _load(colours[t, s, c, y], colour_unit / SPLINE_UNIT, rows[c, i])
+            _load_colours(colours[t, s, y], colour_unit / SPLINE_UNIT, rows[0, i], rows[1, i], rows[2, i])
             if channels > 3:
                 _load(detail[t, s, y - detail_low], detail_unit / SPLINE_UNIT, rows[3, i])
         padded, row = np.empty(W + 2 * (MARGIN + REACH), np.float32), np.empty(W + 2 * MARGIN, np.float32)

@@ -9,6 +9,8 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from sepi.compiled import njit, prange
 
 EXACT = {"nnan", "ninf", "nsz"}
@@ -58,15 +60,22 @@ def product(stencil: Any, vector: Any, out: Any) -> None:
 def onto_planes(vector: Any, out: Any) -> None:
     """Inner products of a picture with constant and slopes of each block; ``out (rows, columns of blocks, 3)``."""
     H, W = vector.shape[0] - 2 * MARGIN, vector.shape[1] - 2 * MARGIN
+    # sums over the rows of a block come first: so they vectorise
+    total, rising = np.empty(W), np.empty(W)
     for by in range(out.shape[0]):
+        total[:] = 0
+        rising[:] = 0
+        for y in range(by * BLOCK, min(H, (by + 1) * BLOCK)):
+            row, dy = vector[y + MARGIN, MARGIN : MARGIN + W], (y - by * BLOCK - _MIDDLE) / BLOCK
+            for x in range(W):
+                total[x] += row[x]
+                rising[x] += row[x] * dy
         for bx in range(out.shape[1]):
             constant, slope_x, slope_y = 0.0, 0.0, 0.0
-            for y in range(by * BLOCK, min(H, (by + 1) * BLOCK)):
-                for x in range(bx * BLOCK, min(W, (bx + 1) * BLOCK)):
-                    value = vector[y + MARGIN, x + MARGIN]
-                    constant += value
-                    slope_x += value * ((x - bx * BLOCK - _MIDDLE) / BLOCK)
-                    slope_y += value * ((y - by * BLOCK - _MIDDLE) / BLOCK)
+            for x in range(bx * BLOCK, min(W, (bx + 1) * BLOCK)):
+                constant += total[x]
+                slope_x += total[x] * ((x - bx * BLOCK - _MIDDLE) / BLOCK)
+                slope_y += rising[x]
             out[by, bx, 0], out[by, bx, 1], out[by, bx, 2] = constant, slope_x, slope_y
 
 
@@ -74,13 +83,22 @@ def onto_planes(vector: Any, out: Any) -> None:
 def diagonal_and_planes(inverse: Any, vector: Any, planes: Any, out: Any) -> None:
     """``inverse * vector``, plus the planes ``(rows, columns of blocks, 3)``; pictures with margins."""
     H, W = vector.shape[0] - 2 * MARGIN, vector.shape[1] - 2 * MARGIN
-    for y in range(H):
-        row = planes[y // BLOCK]
-        dy = (y % BLOCK - _MIDDLE) / BLOCK
+    # of the pictures' own type, which is computed with
+    level, rise, steps = np.empty(W, out.dtype), np.empty(W, out.dtype), np.empty(BLOCK, out.dtype)
+    for y in range(BLOCK):
+        steps[y] = y
+    for by in range(planes.shape[0]):
         for x in range(W):
-            p = row[x // BLOCK]
-            here = p[0] + p[1] * ((x % BLOCK - _MIDDLE) / BLOCK) + p[2] * dy
-            out[y + MARGIN, x + MARGIN] = inverse[y + MARGIN, x + MARGIN] * vector[y + MARGIN, x + MARGIN] + here
+            p = planes[by, x // BLOCK]
+            # where the block begins
+            level[x] = p[0] + p[1] * ((x % BLOCK - _MIDDLE) / BLOCK) - p[2] * _MIDDLE / BLOCK
+            rise[x] = p[2] / BLOCK
+        for y in range(by * BLOCK, min(H, (by + 1) * BLOCK)):
+            dy = steps[y - by * BLOCK]
+            row, own, target = vector[y + MARGIN], inverse[y + MARGIN], out[y + MARGIN]
+            for x in range(W):
+                i = x + MARGIN
+                target[i] = own[i] * row[i] + (level[x] + rise[x] * dy)
 
 
 @njit(inline="always")

@@ -105,7 +105,7 @@ def sweep_twin(light_field, views, nearest, disparities, margin, hidden, scales,
     t0, s0 = light_field.reference_position
     H, W = light_field.shape
     rows, columns = np.mgrid[:H, :W].astype(float)
-    planes = [views.colours * views.colour_unit]
+    planes = [views.colours.transpose(0, 1, 4, 2, 3) * views.colour_unit]
     if views.detail.shape[2]:
         # one channel that counts as three
         planes.append(np.repeat(views.detail[:, :, None] * DETAIL_UNIT, 3, axis=2))

@@ -51,7 +51,12 @@ def sums_twin(light_field, decomposed, parameters, disparity, margin):
     nearest = z_buffers(disparity, light_field.present, light_field.baselines, 0, H)
     means, gradient, curvature = [], np.zeros((H, W)), np.zeros((H, W))
     for values, unit, scale, share in (
-        (decomposed.colours, decomposed.colour_unit, parameters.colour_scale, parameters.shares[0]),
+        (
+            decomposed.colours.transpose(0, 1, 4, 2, 3),
+            decomposed.colour_unit,
+            parameters.colour_scale,
+            parameters.shares[0],
+        ),
         (
             np.repeat(decomposed.detail[:, :, None], 3, axis=2),
             DETAIL_UNIT,
