@@ -17,6 +17,8 @@ SERVER = "SEPI_JOB_SERVER"
 TAKEN = b"t"
 """What the server says when a fork has begun."""
 
+_ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
 
 def call(address: str, words: list[str]) -> int | None:
     """Have a fork run Python with these words, and this process's folder, environment and files.
@@ -37,16 +39,20 @@ def call(address: str, words: list[str]) -> int | None:
     request = b"\0".join(map(os.fsencode, [str(len(words)), *words, os.getcwd(), *environment]))
     with socket.socket(socket.AF_UNIX) as server:
         try:
+            # what comes before the fork can be told of it waits
+            signal.pthread_sigmask(signal.SIG_BLOCK, _ENDING)
             server.connect(address)
             socket.send_fds(server, [len(request).to_bytes(8, "big")], [0, 1, 2])
             server.sendall(request)
             if server.recv(1) != TAKEN:
                 return None
+            # the fork is told what this process is told; should this one be killed, the server sees it
+            for number in _ENDING:
+                signal.signal(number, lambda number, _: server.sendall(bytes([number])))
         except OSError:
             return None
-        # the fork is told what this process is told; should this one be killed, the server sees it
-        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-            signal.signal(number, lambda number, _: server.sendall(bytes([number])))
+        finally:
+            signal.pthread_sigmask(signal.SIG_UNBLOCK, _ENDING)
         # nothing where the server was killed: its forks go with it
         return (server.recv(1) or b"\1")[0]
 
