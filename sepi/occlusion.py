@@ -36,8 +36,8 @@ import numpy.typing as npt
 from pydantic import Field
 
 from sepi.boundaries.decision import assigned_to_surfaces
-from sepi.boundaries.isolated_pixels import join_isolated_pixels
 from sepi.boundaries.parameters import BoundaryParameters
+from sepi.boundaries.specks import join_specks
 from sepi.image.edges import CannyParameters, canny_edges, depth_discontinuities, edge_angle
 from sepi.lightfield import BoolMap, FloatMap, LightField
 from sepi.matching.denoising import denoised
@@ -227,7 +227,13 @@ def visibility(
     light_field = denoised(light_field, parameters.denoising)
     result = depth_from_visible_views(light_field, before.disparity, parameters, progress)
     disparity = assigned_to_surfaces(light_field, result.disparity, parameters)
-    disparity = join_isolated_pixels(disparity, light_field.reference_view, parameters.occlusion_margin)
+    disparity = join_specks(
+        disparity,
+        light_field.reference_view,
+        parameters.occlusion_margin,
+        parameters.speck_area,
+        parameters.hole_area,
+    )
     return before.updated(
         disparity,
         result.confidence,

@@ -64,6 +64,9 @@ WLS_VIEWS = 9
 LEAST_RELIABILITY = 1e-6
 LEAST_SMOOTHNESS = 1e-8
 
+THRESHOLDS = 0.01, 0.05
+"""Least and largest second difference that may mark a discontinuity after the first round, pixels per view step."""
+
 
 class SecondOrderParameters(BaseDetailParameters, OcclusionMarginParameters):
     """Parameters of Gauss-Newton refinement and second-order smoothing."""
@@ -79,7 +82,10 @@ class SecondOrderParameters(BaseDetailParameters, OcclusionMarginParameters):
     max_update: float = Field(0.05, gt=0, description="largest change by one Gauss-Newton step, pixels per view step")
     strength: float = Field(7.0, ge=0, description="weight of the smoothness; the best-known tenth of pixels weighs 1")
     second_difference_threshold: float = Field(
-        0.03, gt=0, description="second difference of the depth that marks a discontinuity, pixels per view step"
+        0.03, gt=0, description="second difference that marks a discontinuity in the first round, pixels per view step"
+    )
+    roughness_factor: float = Field(
+        40.0, ge=0, description="the same in later rounds, times the upper quartile of those that the map has"
     )
     smooth_colour: float = Field(
         0.1, gt=0, description="RGB distance at which smoothness falls, colours in 0..1; noise adds to it"
@@ -208,7 +214,8 @@ def second_order(
             unit = max(float(np.percentile(curvature, 90)), 1e-9)
             weight = np.minimum(curvature / unit, 1) * reliability
             weight = np.where(uniform, np.float32(UNIFORM_WEIGHT), weight)
-            smoothness = _smoothness(disparity, colours, reliability, colour_variance, parameters)
+            threshold = _threshold(disparity, parameters, first=i == parameters.refinements)
+            smoothness = _smoothness(disparity, colours, reliability, colour_variance, threshold, parameters.strength)
             target = _smoothed(
                 target, weight, smoothness, parameters.rtol if last else parameters.first_rtol, parameters
             )
@@ -250,19 +257,32 @@ def reliable(confidence: FloatMap, parameters: SecondOrderParameters) -> FloatMa
     return np.asarray(np.clip((best / parameters.reliable_confidence) ** 2, LEAST_RELIABILITY, 1), np.float32)
 
 
+def _threshold(disparity: FloatMap, parameters: SecondOrderParameters, first: bool) -> float:
+    """Second difference that marks a discontinuity: a part of curved leaves is no step, one of a bare wall is.
+
+    Before the first smoothing most of what a map has is noise.
+    """
+    from sepi.regularization.second_order import upper_quartile
+
+    if first:
+        return parameters.second_difference_threshold
+    low, high = THRESHOLDS
+    return min(max(parameters.roughness_factor * upper_quartile(disparity), low), high)
+
+
 def _smoothness(
     shape: FloatMap,
     colours: list[npt.NDArray[np.float64]],
     reliability: FloatMap,
     colour_variance: float,
-    parameters: SecondOrderParameters,
+    threshold: float,
+    strength: float,
 ) -> list[npt.NDArray[np.float64]]:
     """Weights of second differences: little where ``shape`` has a discontinuity, or the colours change."""
     from sepi.regularization.second_order import smoothness_weights
 
-    threshold = parameters.second_difference_threshold
     weights = smoothness_weights(shape, colours, reliability, threshold, colour_variance)
-    return [parameters.strength * weight + LEAST_SMOOTHNESS for weight in weights]
+    return [strength * weight + LEAST_SMOOTHNESS for weight in weights]
 
 
 def _smoothed(

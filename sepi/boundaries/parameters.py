@@ -41,3 +41,7 @@ class BoundaryParameters(OcclusionMarginParameters):
         description="squared colour difference of the two sides at which they speak half as loud, in units of their "
         "variance",
     )
+    speck_area: int = Field(
+        4, ge=0, le=100, description="parts of the map of at most so many pixels join what is beside them"
+    )
+    hole_area: int = Field(8, ge=0, le=100, description="the same where all that is beside them is nearer")

@@ -19,7 +19,7 @@ from pydantic import Field
 
 from sepi.lightfield import BoolMap, DisparityRange, FloatMap
 from sepi.regularization.plane_search import fitted, pixels_in_order, planes_through, residuals_of, support
-from sepi.regularization.regions import Plane
+from sepi.regularization.regions import Plane, parts_of
 from sepi.stage import Parameters
 
 # of the brightness before its slopes are taken, pixels
@@ -147,23 +147,28 @@ def seen_in(floor: FloatMap, disparity: FloatMap, edges: BoolMap, parameters: Fl
     -------
     ndarray, shape (H, W), bool
     """
-    from scipy import ndimage
-
     behind = floor - disparity
     on = np.abs(behind) < parameters.floor_tolerance
     down, up = np.maximum.accumulate(on), np.maximum.accumulate(on[::-1])[::-1]
     right, left = np.maximum.accumulate(on, axis=1), np.maximum.accumulate(on[:, ::-1], axis=1)[:, ::-1]
     sides = down.astype(np.uint8) + up + right + left
-    labels, count = ndimage.label((behind >= parameters.floor_tolerance) & (sides >= _SIDES))
-    if not count:
+    parts = parts_of((behind >= parameters.floor_tolerance) & (sides >= _SIDES))
+    if not parts.places:
         return np.zeros_like(on)
-    numbers = np.arange(1, count + 1)
-    deep = ndimage.mean(behind, labels, numbers) > parameters.reflection_depth
-    faint = ndimage.mean(edges, labels, numbers) < _FAINT * edges[on].mean()
-    # whichever of two parts that meet in a corner has the pixels between them
-    round_about = np.where(labels > 0, 0, ndimage.grey_dilation(labels, (3, 3)))
-    beside = ndimage.mean(on, round_about, numbers) >= _BESIDE
-    return np.asarray(np.append(False, deep & faint & beside)[labels])
+    deep = _means(parts.labels, behind) > parameters.reflection_depth
+    faint = _means(parts.labels, edges) < _FAINT * edges[on].mean()
+    # whichever of two parts that meet in a corner has the pixels between them; exact up to 2^24 parts
+    largest = cv2.dilate(parts.labels.astype(np.float32), np.ones((3, 3), np.uint8)).astype(np.int32)
+    # a part that has nothing beside it fills a picture
+    beside = _means(np.where(parts.labels > 0, 0, largest), on, len(parts.places)) >= _BESIDE
+    return np.asarray(np.append(False, deep & faint & beside)[parts.labels])
+
+
+def _means(labels: npt.NDArray[np.int32], values: FloatMap | BoolMap, parts: int = 0) -> npt.NDArray[np.float64]:
+    """Mean of the values with each label from 1 on; 0 where there are none."""
+    labels = labels.ravel()
+    sums = np.bincount(labels, values.ravel(), minlength=parts + 1)
+    return np.asarray((sums / np.maximum(np.bincount(labels, minlength=parts + 1), 1))[1:])
 
 
 def _rises(planes: npt.NDArray[np.float64], height: int, known: DisparityRange) -> npt.NDArray[np.bool_]:

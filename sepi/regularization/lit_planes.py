@@ -38,6 +38,9 @@ _SLOPE_RADIUS = 8
 _BEYOND = 0.1
 """Distance by which a plane may leave the range, on average, pixels per view step."""
 
+_MOST_SQUEEZED = 0.5
+"""Of its width, by which a view may see a plane narrower than the reference does: at 1 it is seen from behind."""
+
 _PART = 24
 """Width of the parts that are asked, pixels."""
 
@@ -97,7 +100,7 @@ def lit_planes(
     Returns
     -------
     list of LitPlane or None
-        None where nothing can be told, or what is told lies beyond the range.
+        None where nothing can be told, or what is told lies beyond the range or is no surface that all views see.
     """
     known = light_field.require_disparity_range()
     planes: list[Plane | None] = [start.copy() for start in starts]
@@ -126,7 +129,7 @@ def lit_planes(
                 spread = sums.spread(variance[place], slopes[:, *place], unlike, light_field, matching)
                 asked = region.basis @ (plane + moved)
                 beyond = asked - np.clip(asked, known.minimum, known.maximum)
-                if np.abs(beyond).mean() < _BEYOND:
+                if np.abs(beyond).mean() < _BEYOND and _squeezed(plane, light_field) < _MOST_SQUEEZED:
                     found[n] = LitPlane(plane, *spread)
     return found
 
@@ -137,6 +140,12 @@ def _within(region: Region, plane: Plane, known: DisparityRange) -> tuple[Plane,
     middle = float(np.mean(basis @ plane))
     plane = plane + np.array([np.clip(middle, known.minimum, known.maximum) - middle, 0, 0])
     return plane, np.clip(basis @ plane, known.minimum, known.maximum)
+
+
+def _squeezed(plane: Plane, light_field: LightField) -> float:
+    """By how much of its width, at most, some view sees a plane narrower than the reference: ``p - d(p) v`` tells."""
+    _, across, down = plane
+    return float(np.abs(light_field.baselines[light_field.present] @ np.array([down, across])).max())
 
 
 def _unlike(

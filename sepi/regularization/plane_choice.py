@@ -10,11 +10,12 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
+import numpy.typing as npt
 
 from sepi.lightfield import BoolMap, FloatMap
 from sepi.regularization.border_planes import BorderPlane
 from sepi.regularization.lit_planes import LitPlane
-from sepi.regularization.regions import Plane, Region
+from sepi.regularization.regions import Plane, Region, parts_of, widened
 
 LIT_AREA = 600
 """Regions of so many pixels are asked for how their light changes."""
@@ -31,6 +32,9 @@ STEP = 0.3
 
 MOST_MISFIT = 4.0
 """Times the variance that noise explains, beyond which a region is no plane."""
+
+CLEAR_SHARE = 0.9
+"""Of a border, that must agree about its plane where the light of the region has another."""
 
 CONFIRMS = 0.1
 """Standard deviation within which light has to know a plane to confirm one, pixels per view step."""
@@ -51,7 +55,7 @@ class Chosen(NamedTuple):
     source : str
         ``border``, ``light`` or ``own``.
     confirmed : bool
-        Whether the light of the region, as far as it is known, agrees.
+        Whether the light of the region, as far as it is known, agrees, or what the region has is no surface.
     """
 
     plane: Plane
@@ -67,7 +71,8 @@ def chosen_plane(
     That of its border, where its light does not contradict it. In noise only of a large region whose border is one
     plane, since faint texture, which noise hides, knows more than a few pixels beside it; and where what the region
     has lies about a plane, that one if it is nearer to the light's. Otherwise that of its light, where it contradicts
-    what the region has.
+    what the region has. Where the light is that of no plane, in noise that of a border that is clearly one, if what the
+    region has is no surface.
 
     Parameters
     ----------
@@ -87,9 +92,9 @@ def chosen_plane(
     beside = None if border is None else Chosen(border.plane, "border", False)
     if lit is None:
         return beside
-    # of a region of few parts nothing is known (NaN)
+    # of a region of few parts nothing is known (NaN); a real camera's views differ otherwise, too
     if lit.misfit >= MOST_MISFIT:
-        return None if noisy else beside
+        return beside if not noisy else _of_clear_border(region, disparity, beside, border)
     confirms = lit.deviation(region.basis) < CONFIRMS
     known = [] if border is None else [Chosen(border.plane, "border", confirms)]
     own = own_plane(region, disparity, lit) if noisy else None
@@ -102,6 +107,16 @@ def chosen_plane(
     if change > SURE * lit.deviation(region.basis):
         return Chosen(lit.plane, "light", True)
     return None if noisy else beside
+
+
+def _of_clear_border(
+    region: Region, disparity: FloatMap, beside: Chosen | None, border: BorderPlane | None
+) -> Chosen | None:
+    """The plane of a border that hardly anything contradicts, where what a region has is no surface; else None."""
+    if beside is None or border is None or border.share < CLEAR_SHARE:
+        return None
+    basis, own = region.basis, disparity[region.pixels].astype(np.float64)
+    return beside._replace(confirmed=True) if _spread(own, basis @ _plane_of(basis, own)) > STEP else None
 
 
 def own_plane(region: Region, disparity: FloatMap, lit: LitPlane) -> Plane | None:
@@ -125,11 +140,20 @@ def own_plane(region: Region, disparity: FloatMap, lit: LitPlane) -> Plane | Non
     if agreeing.sum() <= 0.5 * agreeing.size:
         return None
     basis, own = basis[agreeing], own[agreeing]
+    plane = _plane_of(basis, own)
+    return plane if _spread(own, basis @ plane) < _OWN_SPREAD * deviation else None
+
+
+def _plane_of(basis: npt.NDArray[np.float64], values: npt.NDArray[np.float64]) -> Plane:
+    """Of the least squares."""
     # a product of matrices would round as the number of threads has it
-    normal = np.einsum("ni,nj->ij", basis, basis), np.einsum("ni,n->i", basis, own)
-    plane: Plane = np.linalg.lstsq(*normal, rcond=None)[0]
-    spread = np.median(np.abs(own - basis @ plane)) / 0.6745
-    return plane if spread < _OWN_SPREAD * deviation else None
+    normal = np.einsum("ni,nj->ij", basis, basis), np.einsum("ni,n->i", basis, values)
+    return np.asarray(np.linalg.lstsq(*normal, rcond=None)[0])
+
+
+def _spread(values: npt.NDArray[np.float64], expected: npt.NDArray[np.float64]) -> float:
+    """Standard deviation about what is expected, by the median."""
+    return float(np.median(np.abs(values - expected)) / 0.6745)
 
 
 def kept_pixels(pixels: BoolMap, disparity: FloatMap, before: FloatMap, chosen: Chosen) -> BoolMap:
@@ -151,18 +175,13 @@ def kept_pixels(pixels: BoolMap, disparity: FloatMap, before: FloatMap, chosen: 
     -------
     ndarray, shape (h, w), bool
     """
-    from scipy import ndimage
-
     off = pixels & (np.abs(before - disparity) > STEP)
     kept = pixels & ~off if chosen.source == "own" else np.zeros_like(pixels)
     anything_known = off.sum() <= 0.5 * pixels.sum()
-    labels, _ = ndimage.label(off)
-    for number, (rows, columns) in enumerate(ndimage.find_objects(labels), start=1):
-        place = (
-            slice(max(rows.start - _RING, 0), rows.stop + _RING),
-            slice(max(columns.start - _RING, 0), columns.stop + _RING),
-        )
-        part, depth = labels[place] == number, before[place]
+    parts = parts_of(off)
+    for number, inner in enumerate(parts.places, start=1):
+        place = widened(inner, _RING)
+        part, depth = parts.labels[place] == number, before[place]
         ring = cv2.dilate(part.astype(np.uint8), np.ones((2 * _RING + 1,) * 2, np.uint8)).astype(bool) & ~part
         goes_on = np.mean(np.abs(depth[ring] - np.median(depth[part])) < STEP) >= _GOES_ON
         if (anything_known and goes_on) or (not chosen.confirmed and part.sum() >= LIT_AREA):

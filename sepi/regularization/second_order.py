@@ -65,6 +65,16 @@ def colour_changes(guide: FloatMap) -> list[FloatArray]:
     ]
 
 
+def upper_quartile(disparity: FloatMap) -> float:
+    """That of the second differences of a map (H, W) along x and y, without their signs; 0 of a map of few pixels."""
+    sizes = [
+        np.abs(disparity[first] - 2 * disparity[middle] + disparity[last]).ravel()
+        for first, middle, last in (_ALONG_X, _ALONG_Y)
+    ]
+    together = np.concatenate(sizes)
+    return float(np.partition(together, 3 * together.size // 4)[3 * together.size // 4]) if together.size else 0.0
+
+
 def smoothness_weights(
     disparity: FloatMap, colours: list[FloatArray], reliability: FloatMap, threshold: float, colour_variance: float
 ) -> list[FloatArray]:

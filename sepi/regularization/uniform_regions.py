@@ -31,7 +31,7 @@ from sepi.regularization.border_planes import BorderPlane, BorderPlaneParameters
 from sepi.regularization.floor_reflections import FloorReflectionsParameters, without_reflections
 from sepi.regularization.lit_planes import LitPlane, lit_planes
 from sepi.regularization.plane_choice import LIT_AREA, chosen_plane, kept_pixels
-from sepi.regularization.regions import Region
+from sepi.regularization.regions import Region, parts_of, widened
 from sepi.stage import OcclusionMarginParameters, StageMaps
 
 if TYPE_CHECKING:
@@ -142,16 +142,15 @@ def _with_borders(
     uniform: BoolMap, before: StageMaps, parameters: UniformPlanesParameters
 ) -> list[tuple[Region, BorderPlane | None]]:
     """The regions that are large enough, and the planes of their borders."""
-    from scipy import ndimage
-
-    labels, _ = ndimage.label(uniform)
-    uniform = uniform & (np.bincount(labels.ravel())[labels] >= parameters.min_area)
+    parts = parts_of(uniform)
+    large = np.append(False, parts.areas >= parameters.min_area)
+    uniform = large[parts.labels]
     found: list[tuple[Region, BorderPlane | None]] = []
-    for number, (rows, columns) in enumerate(ndimage.find_objects(labels), start=1):
-        place = slice(max(rows.start - 2, 0), rows.stop + 2), slice(max(columns.start - 2, 0), columns.stop + 2)
-        pixels = uniform[place] & (labels[place] == number)
-        if not pixels.any():
+    for number, inner in enumerate(parts.places, start=1):
+        if not large[number]:
             continue
+        place = widened(inner, 2)
+        pixels = parts.labels[place] == number
         border = cv2.dilate(pixels.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
         # what lies in another region is no border, whether or not that one gets a plane: their order must not matter
         border &= ~uniform[place] & (before.confidence[place] > parameters.border_confidence)

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from sepi.boundaries.colour_mixture import mixture_evidence
-from sepi.boundaries.isolated_pixels import join_isolated_pixels
 from sepi.boundaries.parameters import BoundaryParameters
 from sepi.boundaries.surroundings import surroundings
 from sepi.lightfield import FloatMap
@@ -15,22 +14,6 @@ pytestmark = pytest.mark.slow
 def evidence(disparity: FloatMap, guide: FloatMap) -> FloatMap:
     """That pixels are background, without noise."""
     return mixture_evidence(disparity, surroundings(disparity), guide, 0.0, BoundaryParameters())
-
-
-def test_a_pixel_that_stands_alone_joins_the_neighbour_of_its_colour() -> None:
-    """One pixel is no surface; two that lie side by side, or corner to corner, may be."""
-    disparity = np.zeros((8, 9), np.float32)
-    disparity[:, 5:] = 1
-    colours = np.repeat(disparity[..., None], 3, axis=2) * 0.5
-    found = disparity.copy()
-    # of the far surface's colour, at the edge; of the near one's, in the picture's corner
-    found[3, 4], found[0, 8] = 2, -2
-    np.testing.assert_array_equal(join_isolated_pixels(found, colours, 0.15), disparity)
-    pair = disparity.copy()
-    pair[3, 3] = pair[4, 2] = 2
-    np.testing.assert_array_equal(join_isolated_pixels(pair, colours, 0.15), pair)
-    slope = np.add.outer(np.arange(8), np.arange(9)).astype(np.float32) * 0.1
-    np.testing.assert_array_equal(join_isolated_pixels(slope, colours, 0.15), slope)
 
 
 def test_mixed_pixels_are_known_by_their_colour() -> None:

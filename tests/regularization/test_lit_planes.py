@@ -91,6 +91,20 @@ def test_what_is_bent_is_no_plane() -> None:
     assert straight.misfit < 4 < bent.misfit
 
 
+def test_a_plane_that_the_farthest_view_sees_from_behind_is_none() -> None:
+    """A few pixels of noise would otherwise put a ramp through the whole range into a shelf."""
+
+    def steep(slope: float) -> LightField:
+        views = wall_of(np.array([0.0, slope, 0.0]), 0.5).views
+        return LightField(views, "steep", disparity_range=DisparityRange(-40, 40, "given"))
+
+    lit = told_of(steep(0.2), 0.25)
+    assert lit is not None
+    assert lit.plane[1] == pytest.approx(0.2, abs=0.01)
+    # two steps away, such a plane has shrunk to a fifth
+    assert told_of(steep(0.4), 0.25) is None
+
+
 def test_without_light_or_within_another_range_nothing_is_told() -> None:
     """A plane by noise alone would lie anywhere."""
     even = wall_of(WALL)

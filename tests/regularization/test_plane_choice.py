@@ -91,6 +91,19 @@ def test_a_small_region_in_noise_keeps_what_it_has() -> None:
     assert chosen_plane(Region(ALL, SMALL), HERE, border, None, False) is not None
 
 
+def test_a_clear_border_fills_what_is_no_surface() -> None:
+    """Real views differ by more than light's model knows: a bare wall would keep depths all over the range."""
+    scattered = np.random.default_rng(2).uniform(-2, 2, (SIZE, SIZE)).astype(np.float32)
+    clear, unclear = (BorderPlane(np.array([0.0, 0, 0]), 300, share) for share in (0.95, 0.85))
+    lit = lit_at(-0.5, misfit=9.0)
+    found = chosen_plane(WHOLE, scattered, clear, lit, True)
+    assert found is not None
+    assert found.source == "border"
+    assert not kept_pixels(WHOLE.pixels, np.zeros_like(scattered), scattered, found).any()
+    assert chosen_plane(WHOLE, scattered, unclear, lit, True) is None
+    assert chosen_plane(WHOLE, HERE, clear, lit, True) is None
+
+
 def disparities(far: float, spread: float) -> tuple[FloatMap, npt.NDArray[np.float64]]:
     """A plane in noise of ``spread``, and a share ``far`` of it that lies 2 px off."""
     random = np.random.default_rng(5)
