@@ -69,9 +69,9 @@ def specks_of(disparity: Any, difference: Any, most_pixels: int, most_of_hole: i
     """
     H, W = disparity.shape
     specks = np.zeros((H, W), np.bool_)
-    most = max(most_pixels, most_of_hole)
+    most = max(most_pixels, most_of_hole, 1)
     for y in prange(H):
-        pixels = np.empty((max(most, 1), 2), np.int64)
+        pixels = np.empty((most, 2), np.int64)
         for x in range(W):
             n = _part_of(disparity, difference, y, x, pixels)
             specks[y, x] = n <= most_pixels or (n <= most_of_hole and _is_hole(disparity, pixels, n))

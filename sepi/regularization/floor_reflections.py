@@ -155,20 +155,21 @@ def seen_in(floor: FloatMap, disparity: FloatMap, edges: BoolMap, parameters: Fl
     parts = parts_of((behind >= parameters.floor_tolerance) & (sides >= _SIDES))
     if not parts.places:
         return np.zeros_like(on)
-    deep = _means(parts.labels, behind) > parameters.reflection_depth
-    faint = _means(parts.labels, edges) < _FAINT * edges[on].mean()
+    count = len(parts.places)
+    deep = _means(parts.labels, behind, count) > parameters.reflection_depth
+    faint = _means(parts.labels, edges, count) < _FAINT * edges[on].mean()
     # whichever of two parts that meet in a corner has the pixels between them; exact up to 2^24 parts
     largest = cv2.dilate(parts.labels.astype(np.float32), np.ones((3, 3), np.uint8)).astype(np.int32)
     # a part that has nothing beside it fills a picture
-    beside = _means(np.where(parts.labels > 0, 0, largest), on, len(parts.places)) >= _BESIDE
+    beside = _means(np.where(parts.labels > 0, 0, largest), on, count) >= _BESIDE
     return np.asarray(np.append(False, deep & faint & beside)[parts.labels])
 
 
-def _means(labels: npt.NDArray[np.int32], values: FloatMap | BoolMap, parts: int = 0) -> npt.NDArray[np.float64]:
-    """Mean of the values with each label from 1 on; 0 where there are none."""
+def _means(labels: npt.NDArray[np.int32], values: FloatMap | BoolMap, count: int) -> npt.NDArray[np.float64]:
+    """Mean of the values with each label of 1 to ``count``; 0 where there are none."""
     labels = labels.ravel()
-    sums = np.bincount(labels, values.ravel(), minlength=parts + 1)
-    return np.asarray((sums / np.maximum(np.bincount(labels, minlength=parts + 1), 1))[1:])
+    sums = np.bincount(labels, values.ravel(), minlength=count + 1)
+    return np.asarray((sums / np.maximum(np.bincount(labels, minlength=count + 1), 1))[1:])
 
 
 def _rises(planes: npt.NDArray[np.float64], height: int, known: DisparityRange) -> npt.NDArray[np.bool_]:

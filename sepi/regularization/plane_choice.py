@@ -92,9 +92,10 @@ def chosen_plane(
     beside = None if border is None else Chosen(border.plane, "border", False)
     if lit is None:
         return beside
-    # of a region of few parts nothing is known (NaN); a real camera's views differ otherwise, too
+    # of a region of few parts nothing is known (NaN)
     if lit.misfit >= MOST_MISFIT:
-        return beside if not noisy else _of_clear_border(region, disparity, beside, border)
+        # the region is no plane; or the views of a real camera differ by more than noise, which its border may tell
+        return _of_clear_border(region, disparity, border) if noisy else beside
     confirms = lit.deviation(region.basis) < CONFIRMS
     known = [] if border is None else [Chosen(border.plane, "border", confirms)]
     own = own_plane(region, disparity, lit) if noisy else None
@@ -109,14 +110,12 @@ def chosen_plane(
     return None if noisy else beside
 
 
-def _of_clear_border(
-    region: Region, disparity: FloatMap, beside: Chosen | None, border: BorderPlane | None
-) -> Chosen | None:
+def _of_clear_border(region: Region, disparity: FloatMap, border: BorderPlane | None) -> Chosen | None:
     """The plane of a border that hardly anything contradicts, where what a region has is no surface; else None."""
-    if beside is None or border is None or border.share < CLEAR_SHARE:
+    if border is None or border.share < CLEAR_SHARE:
         return None
     basis, own = region.basis, disparity[region.pixels].astype(np.float64)
-    return beside._replace(confirmed=True) if _spread(own, basis @ _plane_of(basis, own)) > STEP else None
+    return Chosen(border.plane, "border", True) if _spread(own, basis @ _plane_of(basis, own)) > STEP else None
 
 
 def own_plane(region: Region, disparity: FloatMap, lit: LitPlane) -> Plane | None:
@@ -184,6 +183,6 @@ def kept_pixels(pixels: BoolMap, disparity: FloatMap, before: FloatMap, chosen: 
         part, depth = parts.labels[place] == number, before[place]
         ring = cv2.dilate(part.astype(np.uint8), np.ones((2 * _RING + 1,) * 2, np.uint8)).astype(bool) & ~part
         goes_on = np.mean(np.abs(depth[ring] - np.median(depth[part])) < STEP) >= _GOES_ON
-        if (anything_known and goes_on) or (not chosen.confirmed and part.sum() >= LIT_AREA):
+        if (anything_known and goes_on) or (not chosen.confirmed and parts.areas[number - 1] >= LIT_AREA):
             kept[place] |= part
     return kept

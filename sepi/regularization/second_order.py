@@ -72,7 +72,8 @@ def upper_quartile(disparity: FloatMap) -> float:
         for first, middle, last in (_ALONG_X, _ALONG_Y)
     ]
     together = np.concatenate(sizes)
-    return float(np.partition(together, 3 * together.size // 4)[3 * together.size // 4]) if together.size else 0.0
+    place = 3 * together.size // 4
+    return float(np.partition(together, place)[place]) if together.size else 0.0
 
 
 def smoothness_weights(
