@@ -37,7 +37,7 @@ from pydantic import Field
 
 from sepi.boundaries.decision import assigned_to_surfaces
 from sepi.boundaries.parameters import BoundaryParameters
-from sepi.boundaries.specks import join_specks
+from sepi.boundaries.specks import without_specks
 from sepi.image.edges import CannyParameters, canny_edges, depth_discontinuities, edge_angle
 from sepi.lightfield import BoolMap, FloatMap, LightField
 from sepi.matching.denoising import denoised
@@ -227,19 +227,12 @@ def visibility(
     light_field = denoised(light_field, parameters.denoising)
     result = depth_from_visible_views(light_field, before.disparity, parameters, progress)
     disparity = assigned_to_surfaces(light_field, result.disparity, parameters)
-    disparity = join_specks(
-        disparity,
-        light_field.reference_view,
-        parameters.occlusion_margin,
-        parameters.speck_area,
-        parameters.hole_area,
-    )
+    views = spread_views(light_field, parameters.views)
+    disparity = without_specks(light_field, disparity, views, parameters)
     return before.updated(
         disparity,
         result.confidence,
-        occluded=occluded_in_any_view(
-            light_field, disparity, parameters.occlusion_margin, spread_views(light_field, parameters.views)
-        ),
+        occluded=occluded_in_any_view(light_field, disparity, parameters.occlusion_margin, views),
     )
 
 

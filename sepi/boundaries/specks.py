@@ -4,15 +4,73 @@ A surface is seen in more than a few pixels, but for the rare tip: a speck is wh
 an edge, where few views see a pixel, or on a plain surface, where a depth farther behind it is as good as any. Holes,
 with nothing but nearer pixels round them, may be larger: what is behind a hole hardly any view shows, so that hardly
 any contradicts it. The pixels of a speck join the neighbours whose colours are most like their own.
+
+What is behind a fence shows in gaps of a few pixels, too. Such a gap is as deep as something that is not far, and stays
+where no view says that it had better be closed.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from sepi.lightfield import FloatMap
+from sepi.boundaries.parameters import BoundaryParameters
+from sepi.lightfield import BoolMap, FloatMap, LightField
+from sepi.matching.gaps import compared_depths
+
+# a gap is as deep as so many pixels of larger parts, no farther away than so many pixels
+_AS_DEEP, _ABOUT = 3, 5
+# its squared residual is at most so many times that of the closed one, in this share of the views at least
+_WORSE, _SEEING = 2.0, 0.5
 
 _NEIGHBOURS = [(dy, dx) for dy in (-1, 0, 1) for dx in (-1, 0, 1) if dy or dx]
+
+
+def without_specks(
+    light_field: LightField, disparity: FloatMap, present: BoolMap, parameters: BoundaryParameters
+) -> FloatMap:
+    """A map without specks, gaps being none.
+
+    Parameters
+    ----------
+    light_field : LightField
+    disparity : ndarray, shape (H, W), float32
+        Pixels per view step.
+    present : ndarray, shape (T, S), bool
+        The views that are asked about gaps.
+    parameters : BoundaryParameters
+
+    Returns
+    -------
+    ndarray, shape (H, W), float32
+    """
+    margin, colours = parameters.occlusion_margin, light_field.reference_view
+    joined = join_specks(disparity, colours, margin, parameters.speck_area, parameters.hole_area)
+    asked = _deep_as_something_near(disparity, joined, margin)
+    if not asked.any():
+        return joined
+    others = present.copy()
+    others[light_field.reference_position] = False
+    closed, open_, seeing = compared_depths(light_field, np.where(asked, disparity, joined), joined, others, margin)
+    stays = asked & (open_ <= _WORSE * closed) & (seeing >= _SEEING * others.sum())
+    return np.where(stays, disparity, joined)
+
+
+def _deep_as_something_near(disparity: FloatMap, joined: FloatMap, difference: float) -> BoolMap:
+    """Pixels of specks that are farther than what they join, and as deep as a few that belong to larger parts."""
+    height, width = disparity.shape
+    farther = disparity < joined
+    y, x = np.nonzero(farther)
+    alike = np.zeros(len(y), np.int64)
+    around = np.arange(-_ABOUT, _ABOUT + 1)
+    for dy in around:
+        for dx in around:
+            i, j = y + dy, x + dx
+            inside = (i >= 0) & (i < height) & (j >= 0) & (j < width)
+            there = i.clip(0, height - 1), j.clip(0, width - 1)
+            of_part = inside & (disparity[there] == joined[there])
+            alike += of_part & (np.abs(disparity[there] - disparity[y, x]) <= difference)
+    farther[y, x] = alike >= _AS_DEEP
+    return farther
 
 
 def join_specks(

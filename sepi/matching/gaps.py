@@ -75,17 +75,34 @@ def with_open_gaps(
         return disparity
     others = present.copy()
     others[light_field.reference_position] = False
-    there, here, seeing = _residuals(light_field, disparity, farther, others, parameters.occlusion_margin)
+    there, here, seeing = compared_depths(light_field, disparity, farther, others, parameters.occlusion_margin)
     better = there < np.float32(parameters.gap_gain) * here
     # amid like colours: at edges residuals are of interpolation
     voters = asked & _plain(guide, parameters.gap_colour)
     return np.where(asked & _outvoted(voters, better, seeing / others.sum()), farther, disparity)
 
 
-def _residuals(
-    light_field: LightField, disparity: FloatMap, farther: FloatMap, others: BoolMap, occlusion_margin: float
+def compared_depths(
+    light_field: LightField, disparity: FloatMap, other: FloatMap, others: BoolMap, occlusion_margin: float
 ) -> FloatMap:
-    """Squared residuals at the farther depth and at the map's own, and of how many views they are; (3, H, W)."""
+    """Squared residuals at two depths, in the views in which nothing hides the second.
+
+    Parameters
+    ----------
+    light_field : LightField
+    disparity, other : ndarray, shape (H, W), float32
+        Pixels per view step; where they are equal nothing is compared.
+    others : ndarray, shape (T, S), bool
+        The views that are asked; not the reference view.
+    occlusion_margin : float
+        By how much an occluder in the map ``other`` must be nearer, pixels per view step.
+
+    Returns
+    -------
+    ndarray, shape (3, H, W), float32
+        Sums of the squared residuals at ``other`` and at ``disparity``, colours in 0..1, and of how many views they
+        are.
+    """
     from sepi.matching.gap_kernels import compare_depths
 
     views = light_field.rgb_views
@@ -93,9 +110,9 @@ def _residuals(
     positions, baselines = np.argwhere(others), light_field.baselines[others]
     sums = np.zeros((3, *disparity.shape), np.float32)
     for begin, end, rows in row_bands(light_field, others, float(np.abs(disparity).max()), _BYTES_PER_PIXEL):
-        nearest = nearest_surfaces(light_field, farther, others, rows)
+        nearest = nearest_surfaces(light_field, other, others, rows)
         compare_depths(
-            colours, unit, guide_of(light_field), disparity, farther, nearest, rows.low, begin, end,
+            colours, unit, guide_of(light_field), disparity, other, nearest, rows.low, begin, end,
             positions, baselines, np.float32(occlusion_margin), sums,
         )  # fmt: skip
     return sums

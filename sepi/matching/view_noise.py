@@ -80,8 +80,8 @@ class ViewNoise:
     share : float
         Of the variance by which views differ, at most, what is noise of each view.
     agreement : float
-        Ratio, at most 1, of the two standard deviations that are told within a view and between views; the median of
-        all brightnesses: 1 where nothing but noise can be what both see.
+        Ratio, at most 1, of the two standard deviations that are told within a view and between views, at the
+        brightness where they agree least: 1 where nothing but noise can be what both see.
     """
 
     brightness: FloatMap
@@ -136,7 +136,7 @@ def view_noise(light_field: LightField) -> ViewNoise:
     variance = np.minimum(variance, _BENT * _lower_line(brightness, variance))
     expected = np.interp(level, brightness, variance)
     by_place = _by_place(within / expected, between / expected, tells)
-    return ViewNoise(brightness, variance, by_place, float(np.median(shares)), float(np.median(agreements)))
+    return ViewNoise(brightness, variance, by_place, float(np.median(shares)), float(agreements.min()))
 
 
 def _lower_line(brightness: FloatMap, variance: FloatMap) -> FloatMap:
