@@ -223,10 +223,11 @@ def visibility(
     >>> bool(errors[1] < errors[0])
     True
     """
-    before = require_previous(previous)
+    before, given = require_previous(previous), light_field
     light_field = denoised(light_field, parameters.denoising)
     result = depth_from_visible_views(light_field, before.disparity, parameters, progress)
-    disparity = assigned_to_surfaces(light_field, result.disparity, parameters)
+    # at a rim denoising would mix the colours that have to be told apart
+    disparity = assigned_to_surfaces(given, result.disparity, parameters)
     views = spread_views(light_field, parameters.views)
     disparity = without_specks(light_field, disparity, views, parameters)
     return before.updated(

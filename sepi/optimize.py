@@ -32,7 +32,7 @@ from sepi.error_bars.cues import cues_of_map, cues_of_stage_before, cues_of_view
 from sepi.image.noise import residual_variance
 from sepi.lightfield import FloatMap, LightField
 from sepi.matching.base_detail import BaseDetailParameters
-from sepi.matching.denoising import denoised, measured_noise
+from sepi.matching.denoising import LEAST_FOR_SMOOTHING, denoised, measured_noise
 from sepi.matching.view_subsets import spread_views
 from sepi.regularization.wls import (
     WlsParameters,
@@ -184,7 +184,7 @@ def second_order(
     from sepi.regularization.second_order import colour_changes
 
     before, given = require_previous(previous), light_field
-    light_field = denoised(light_field, parameters.denoising)
+    light_field = denoised(light_field, parameters.denoising, LEAST_FOR_SMOOTHING)
     disparity = before.disparity
     uniform = before.mask("textureless")
     reliability = np.where(uniform, 1, reliable(before.confidence, parameters)).astype(np.float32)

@@ -40,6 +40,10 @@ LEAST_SURE_NOISE = 0.6 / 255
 LEAST_AGREEMENT = 0.7
 """Of what is told of the noise within a view and between views, from which on it cannot be else."""
 
+LEAST_FOR_SMOOTHING = 5 / 255
+"""Noise from which on it is worth it for a map that is nearly right already and will be smoothed: with less, what all
+views together tell of detail that is fainter than the noise of each is worth more."""
+
 LEAST_SHARE = 0.75
 """Of what views differ by that must be noise of each of them: where more is something else, detail is worth more."""
 
@@ -77,7 +81,7 @@ class DenoisedLightField(LightField):
     of_views: ViewNoise
 
 
-def denoised(light_field: LightField, least: float) -> LightField:
+def denoised(light_field: LightField, least: float, least_noise: float = 0.0) -> LightField:
     """The same light field with denoised views, where they are noisy.
 
     Parameters
@@ -86,6 +90,8 @@ def denoised(light_field: LightField, least: float) -> LightField:
         With a known disparity range.
     least : float
         Detail below so many times the noise's energy is left out.
+    least_noise : float
+        Standard deviation of the noise, colours in 0..1, below which views stay as they are, however sure it is.
 
     Returns
     -------
@@ -101,6 +107,8 @@ def denoised(light_field: LightField, least: float) -> LightField:
         return light_field
     kept = kept_of(light_field, _Kept)
     of_views = _noise(light_field, kept)
+    if of_views.usual < least_noise:
+        return light_field
     if kept.least != least:
         kept.least, kept.made = least, _denoised_views(light_field, of_views, least)
     if kept.made is None:
@@ -158,5 +166,5 @@ def guide_of(light_field: LightField) -> FloatMap:
     guide = light_field.reference_view
     if not isinstance(light_field, DenoisedLightField):
         return guide
-    colour = _GUIDE_COLOUR * light_field.of_views.usual
+    colour = _GUIDE_COLOUR * light_field.of_views.most
     return np.asarray(cv2.bilateralFilter(np.ascontiguousarray(guide), _GUIDE_SIZE, colour, _GUIDE_SPACE))

@@ -95,6 +95,11 @@ class ViewNoise:
         """Standard deviation at the brightness in the middle."""
         return float(np.sqrt(np.median(self.variance)))
 
+    @property
+    def most(self) -> float:
+        """Standard deviation at the noisiest brightness, in the part of the picture of which a tenth has more."""
+        return float(np.sqrt(self.variance.max() * np.quantile(self.by_place, 0.9)))
+
 
 def view_noise(light_field: LightField) -> ViewNoise:
     """Noise of the views of a light field.
