@@ -32,7 +32,7 @@ from sepi.error_bars.cues import cues_of_map, cues_of_stage_before, cues_of_view
 from sepi.image.noise import residual_variance
 from sepi.lightfield import FloatMap, LightField
 from sepi.matching.base_detail import BaseDetailParameters
-from sepi.matching.denoising import LEAST_FOR_SMOOTHING, denoised, measured_noise
+from sepi.matching.denoising import denoised, measured_noise
 from sepi.matching.view_subsets import spread_views
 from sepi.regularization.wls import (
     WlsParameters,
@@ -71,6 +71,13 @@ THRESHOLDS = 0.01, 0.05
 class SecondOrderParameters(BaseDetailParameters, OcclusionMarginParameters):
     """Parameters of Gauss-Newton refinement and second-order smoothing."""
 
+    least_noise: float = Field(
+        0.02,
+        ge=0,
+        le=1,
+        description="noise of one channel from which on views are denoised for this stage, colours in 0..1: with less, "
+        "what many views tell of fainter detail is worth more",
+    )
     views: int | None = Field(None, ge=2, description="views that the last step compares, at least; null: all")
     first_views: int | None = Field(
         25, ge=2, description="views that all steps but the last compare, at least; null: all"
@@ -184,7 +191,7 @@ def second_order(
     from sepi.regularization.second_order import colour_changes
 
     before, given = require_previous(previous), light_field
-    light_field = denoised(light_field, parameters.denoising, LEAST_FOR_SMOOTHING)
+    light_field = denoised(light_field, parameters.denoising, parameters.least_noise)
     disparity = before.disparity
     uniform = before.mask("textureless")
     reliability = np.where(uniform, 1, reliable(before.confidence, parameters)).astype(np.float32)

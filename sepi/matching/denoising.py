@@ -40,10 +40,6 @@ LEAST_SURE_NOISE = 0.6 / 255
 LEAST_AGREEMENT = 0.7
 """Of what is told of the noise within a view and between views, from which on it cannot be else."""
 
-LEAST_FOR_SMOOTHING = 5 / 255
-"""Noise from which on it is worth it for a map that is nearly right already and will be smoothed: with less, what all
-views together tell of detail that is fainter than the noise of each is worth more."""
-
 LEAST_SHARE = 0.75
 """Of what views differ by that must be noise of each of them: where more is something else, detail is worth more."""
 
@@ -53,7 +49,7 @@ LEFT = 0.375
 _NOISIEST = 0.9
 """Part of the parts of a picture that have no more noise than its scales bear with."""
 
-_GUIDE_SIZE, _GUIDE_SPACE, _GUIDE_COLOUR = 7, 3.0, 7.0
+_GUIDE_SIZE, _GUIDE_SPACE, _GUIDE_COLOUR = 7, 3.0, 8.0
 """Window and width of the bilateral filter, pixels, and sum of the channels' differences, in units of the noise."""
 
 

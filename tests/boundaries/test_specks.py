@@ -5,8 +5,9 @@ import pytest
 from scipy import ndimage
 
 from sepi.boundaries.speck_kernels import specks_of
-from sepi.boundaries.specks import join_specks
-from sepi.lightfield import BoolMap, FloatMap
+from sepi.boundaries.specks import join_specks, without_specks
+from sepi.lightfield import BoolMap, DisparityRange, FloatMap, LightField
+from sepi.occlusion import VisibilityParameters
 
 pytestmark = pytest.mark.slow
 
@@ -70,3 +71,28 @@ def test_specks_are_found_as_plain_labels_tell() -> None:
         expected = plain(most, most_of_hole)
         np.testing.assert_array_equal(specks_of(disparity, np.float32(0.5), most, most_of_hole), expected)
     assert plain(4, 8).sum() > plain(4, 0).sum() > 0
+
+
+def test_what_shows_in_small_gaps_stays() -> None:
+    """If this fails, a rack or a fence is closed where what is behind it shows in two pixels, or mismatches stay."""
+    views, size = 5, 48
+    rng = np.random.default_rng(3)
+    wall, fence = (rng.random((size, 2 * size, 3), np.float32) for _ in range(2))
+    truth = np.ones((size, size), np.float32)
+    # one large gap, two small ones beside it, and a small one that nothing near it is as deep as
+    truth[10:20, 10:20] = truth[12:14, 22:24] = truth[16:18, 22:24] = 0
+    pictures = np.empty((1, views, size, size, 3), np.float32)
+    for s in range(views):
+        left = size // 2 + s - views // 2
+        open_ = np.roll(truth == 0, -(s - views // 2), axis=1)
+        pictures[0, s] = np.where(open_[..., None], wall[:, size // 2 : size // 2 + size], fence[:, left : left + size])
+    light_field = LightField(pictures, "fence", disparity_range=DisparityRange(-0.5, 1.5, "given"))
+    found = truth.copy()
+    found[16:18, 22:24], found[40:42, 40:42], found[30, 12] = 0.02, 0, 0
+    parameters = VisibilityParameters()
+    left_over = without_specks(light_field, found, light_field.present, parameters)
+    expected = np.where(found == np.float32(0.02), found, truth)
+    np.testing.assert_array_equal(left_over, expected)
+    # where no view shows the wall there is no gap, however deep something near it is
+    found[24:26, 15:17] = 0
+    np.testing.assert_array_equal(without_specks(light_field, found, light_field.present, parameters), expected)
