@@ -31,8 +31,8 @@ from sepi.matching.view_noise import PARTS, ViewNoise, view_noise
 from sepi.stage import Parameters
 from sepi.workspace import OfViews, kept_of
 
-LEAST_NOISE = 2 / 255
-"""Noise that is worth it: less may be what is left of texture that does not fit at whole pixels."""
+LEAST_NOISE = 1.25 / 255
+"""Noise that is worth it: less may be that of rounding, and what is left where texture does not fit at whole pixels."""
 
 LEAST_SURE_NOISE = 0.6 / 255
 """The same where it cannot be else: faint noise takes dark walls to other depths, too."""
@@ -49,7 +49,7 @@ LEFT = 0.375
 _NOISIEST = 0.9
 """Part of the parts of a picture that have no more noise than its scales bear with."""
 
-_GUIDE_SIZE, _GUIDE_SPACE, _GUIDE_COLOUR = 7, 3.0, 8.0
+_GUIDE_SIZE, _GUIDE_SPACE, _GUIDE_COLOUR = 7, 3.0, 7.0
 """Window and width of the bilateral filter, pixels, and sum of the channels' differences, in units of the noise."""
 
 
@@ -162,5 +162,5 @@ def guide_of(light_field: LightField) -> FloatMap:
     guide = light_field.reference_view
     if not isinstance(light_field, DenoisedLightField):
         return guide
-    colour = _GUIDE_COLOUR * light_field.of_views.most
+    colour = _GUIDE_COLOUR * light_field.noise
     return np.asarray(cv2.bilateralFilter(np.ascontiguousarray(guide), _GUIDE_SIZE, colour, _GUIDE_SPACE))

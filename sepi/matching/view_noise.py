@@ -5,9 +5,6 @@ texture adds to it. Between views, by what a block differs from others at whole 
 interpolated: where texture fits, however strong, the noise of two pixels is left; where no whole pixel fits, or a
 surface is hidden or shines, or the cameras' pictures are not alike, more is left. So the best tenth of blocks tells.
 The mean of a block does not count, which exposure may change from view to view.
-
-Where texture is all over a brightness, both are too high. Photons that a tone curve of a power makes into values have
-noise that is a power of brightness, too; what lies far above the line of the lower brightnesses' noise is none.
 """
 
 from __future__ import annotations
@@ -45,15 +42,6 @@ _ROUNDING = 0.29
 
 _LEAST = 1e-5
 """The same of single precision."""
-
-_LOWER_SHARE = 0.25
-"""Of the brightnesses, those whose noise may be below the line."""
-
-_BENT = 1.5625
-"""Times the line that a variance may be: real tone curves are bent, and reading adds noise to the photons'."""
-
-_TRUSTED = 0.6
-"""Agreement of the two bounds from which on a part of the picture may have more noise than its brightness has."""
 
 _AROUND = 4
 """Radius of the window of a pixel's own noise."""
@@ -95,11 +83,6 @@ class ViewNoise:
         """Standard deviation at the brightness in the middle."""
         return float(np.sqrt(np.median(self.variance)))
 
-    @property
-    def most(self) -> float:
-        """Standard deviation at the noisiest brightness, in the part of the picture of which a tenth has more."""
-        return float(np.sqrt(self.variance.max() * np.quantile(self.by_place, 0.9)))
-
 
 def view_noise(light_field: LightField) -> ViewNoise:
     """Noise of the views of a light field.
@@ -135,26 +118,14 @@ def view_noise(light_field: LightField) -> ViewNoise:
     for low, high in pairwise(np.quantile(level[tells], np.linspace(0, 1, LEVELS + 1))):
         chosen = tells & (level >= low) & (level <= high)
         of_one, of_two = (max(bound, least) for bound in _bounds(within[chosen], between[chosen]))
-        share, agreement = min(of_one / of_two, 1), _agreement(of_one, of_two)
-        found.append((float(np.median(level[chosen])), min(of_one, of_two), share, agreement))
+        ratio = of_one / of_two
+        found.append(
+            (float(np.median(level[chosen])), min(of_one, of_two), min(ratio, 1), min(ratio, 1 / ratio) ** 0.5)
+        )
     brightness, variance, shares, agreements = np.array(found, np.float32).T
-    variance = np.minimum(variance, _BENT * _lower_line(brightness, variance))
     expected = np.interp(level, brightness, variance)
     by_place = _by_place(within / expected, between / expected, tells)
     return ViewNoise(brightness, variance, by_place, float(np.median(shares)), float(agreements.min()))
-
-
-def _lower_line(brightness: FloatMap, variance: FloatMap) -> FloatMap:
-    """Power of brightness that a quarter of the variances lie below: the best of the lines through two of them each."""
-    x, y = np.log(np.float64(brightness)), np.log(np.float64(variance))
-    one, other = np.triu_indices(len(x), 1)
-    apart = x[other] > x[one]
-    one, other = one[apart], other[apart]
-    slopes = (y[other] - y[one]) / (x[other] - x[one])
-    lines = np.vstack([y[one, None] + slopes[:, None] * (x - x[one, None]), np.full((1, len(x)), np.median(y))])
-    above = y - lines
-    loss = np.where(above > 0, _LOWER_SHARE * above, (_LOWER_SHARE - 1) * above).sum(axis=1)
-    return np.asarray(np.exp(lines[loss.argmin()]), np.float32)
 
 
 def _least_variance(dtype: npt.DTypeLike) -> float:
@@ -201,9 +172,8 @@ def _by_place(within: FloatMap, between: FloatMap, tells: BoolMap) -> FloatMap:
     for number in range(PARTS * PARTS):
         chosen = tells & (part == number)
         if chosen.sum() >= LEVELS:
-            bounds = _bounds(within[chosen], between[chosen])
-            most = _MOST_UNEVEN if _agreement(*bounds) >= _TRUSTED else 1
-            factors.flat[number] = np.clip(min(bounds), 1 / _MOST_UNEVEN, most)
+            bound = min(_bounds(within[chosen], between[chosen]))
+            factors.flat[number] = np.clip(bound, 1 / _MOST_UNEVEN, _MOST_UNEVEN)
     return factors
 
 
@@ -211,11 +181,6 @@ def _bounds(within: FloatMap, between: FloatMap) -> tuple[float, float]:
     """What the best blocks tell of the noise, within a view and between views."""
     of_one, of_two = (float(np.quantile(energy, BEST_SHARE)) for energy in (within, between))
     return _OF_ONE_VIEW * of_one, _OF_VIEWS * of_two
-
-
-def _agreement(of_one: float, of_two: float) -> float:
-    """Ratio, at most 1, of the standard deviations of two variances."""
-    return float((min(of_one, of_two) / max(of_one, of_two, 1e-12)) ** 0.5)
 
 
 def whole_pixel_moves(light_field: LightField) -> npt.NDArray[np.int64]:
