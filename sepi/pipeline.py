@@ -8,6 +8,8 @@ from numbers import Real
 from types import NoneType
 from typing import Any
 
+import numpy as np
+
 from sepi.exposure import equally_bright
 from sepi.kernel_cache import tell_kernel_cache
 from sepi.lightfield import LightField, require_light_field
@@ -84,6 +86,8 @@ def estimate_depth(
         light_field = light_field.with_range(estimate_range(light_field))
     light_field.require_seen_range()
     tell_kernel_cache()
+    # kernels are compiled for views without gaps in memory; those of a part of an array would be compiled anew
+    light_field = replace(light_field, views=np.ascontiguousarray(light_field.views))
     workspace = light_field.workspace or Workspace()
     compared = replace(equally_bright(light_field), workspace=workspace)
     require_memory_of(compared, settings.values())

@@ -3,7 +3,7 @@
 Compiled code is kept on disk, beside the package or in ``NUMBA_CACHE_DIR``, so this is done once in an environment.
 Without it the first jobs of a workflow compile what they need, several of them the same at the same time. Here every
 stage of enough variants runs on a tiny light field, in two processes, since one compiles one function at a time.
-Kernels for 16-bit and float views are compiled when they are first needed, or with ``--all-types``; those of the
+Kernels for 16-bit, float and grey views are compiled when they are first needed, or with ``--all-types``; those of the
 compared methods with ``--comparison``. ``--check`` looks whether what was just compiled computes what it computes once
 it is loaded from disk: else two machines would never agree.
 """
@@ -36,7 +36,10 @@ SHARES: tuple[tuple[str, ...], ...] = (("paper", "no_sepi", "wang"), ("best", "b
 COMPARED: tuple[tuple[str, ...], ...] = (("acc", "mishiba", "oavc", "pobr"), ("cae", "occ", "spo"))
 """The compared methods, whose kernels are compiled only when asked for: `snakemake all` runs none of them."""
 
-TYPES = ("uint16", "float32")
+GREY = "grey "
+"""Before a type: of one channel, which kernels read as three at the same place."""
+
+TYPES = ("uint16", "float32", *(GREY + kind for kind in ("uint8", "uint16", "float32")))
 """What views may be but 8-bit colours."""
 
 _SCENE, _SIZE, _VIEWS = "curved_occluders", 64, 3
@@ -45,7 +48,7 @@ _SCENE, _SIZE, _VIEWS = "curved_occluders", 64, 3
 def compile_kernels(variants: tuple[str, ...], kind: str = "uint8") -> dict[str, str]:
     """Call every kernel that these variants use, and those that reading and evaluating use, as their jobs do.
 
-    ``kind`` is the type of the views. Returns variant to a digest of its maps.
+    ``kind`` is the type of the views, one of uint8 and :data:`TYPES`. Returns variant to a digest of its maps.
     """
     from dataclasses import replace
 
@@ -108,11 +111,13 @@ def _look() -> None:
 
 
 def _of_type(light_field: LightField, kind: str) -> LightField:
-    """The same views as numbers of another type."""
+    """The same views as numbers of another type, or as grey ones."""
     from dataclasses import replace
 
     from sepi.lightfield import as_unit_float, full_scale
 
+    if kind.startswith(GREY):
+        light_field, kind = replace(light_field, views=light_field.views[..., :1].copy()), kind.removeprefix(GREY)
     if light_field.views.dtype == kind:
         return light_field
     return replace(light_field, views=(as_unit_float(light_field.views) * full_scale(np.dtype(kind))).astype(kind))
@@ -150,7 +155,7 @@ def _share_light(light_field: LightField) -> None:
 
 @click.command(name="python -m sepi.cli.warm_up", cls=SepiCommand)
 @click.option("--comparison", is_flag=True, help="Those of the compared methods, too.")
-@click.option("--all-types", is_flag=True, help="Those for 16-bit and float views, too.")
+@click.option("--all-types", is_flag=True, help="Those for 16-bit, float and grey views, too.")
 @click.option("--check", is_flag=True, help="Look whether they compute the same once they are loaded from disk.")
 def command(comparison: bool, all_types: bool, check: bool) -> None:
     """Compile the kernels, so that the first run need not."""
