@@ -5,6 +5,9 @@ texture adds to it. Between views, by what a block differs from others at whole 
 interpolated: where texture fits, however strong, the noise of two pixels is left; where no whole pixel fits, or a
 surface is hidden or shines, or the cameras' pictures are not alike, more is left. So the best tenth of blocks tells.
 The mean of a block does not count, which exposure may change from view to view.
+
+Where texture is all over a brightness, both are too high. Photons that a tone curve of a power makes into values have
+noise that is a power of brightness, too; what lies far above the line of the lower brightnesses' noise is none.
 """
 
 from __future__ import annotations
@@ -43,6 +46,20 @@ _ROUNDING = 0.29
 _LEAST = 1e-5
 """The same of single precision."""
 
+_LOWER_SHARE = 0.25
+"""Of the brightnesses, those whose noise may be below the line."""
+
+_BENT = 2.0
+"""Times the line that a variance may be: real tone curves are bent, and reading adds noise to the photons'."""
+
+_SLOPES = -1.5, 1.5
+"""Powers of brightness that a variance may go with: of noise of reading, seen through the usual tone curve of a power of
+1 / 2.2, and of pixels that are unlike in how much light they see."""
+
+_TRUSTED, _TRUSTED_PART = 0.85, 0.6
+"""Agreement of the two bounds from which on a brightness may have more noise than the line, a part of the picture more
+than its brightness."""
+
 _AROUND = 4
 """Radius of the window of a pixel's own noise."""
 
@@ -68,8 +85,8 @@ class ViewNoise:
     share : float
         Of the variance by which views differ, at most, what is noise of each view.
     agreement : float
-        Ratio, at most 1, of the two standard deviations that are told within a view and between views, at the
-        brightness where they agree least: 1 where nothing but noise can be what both see.
+        Ratio, at most 1, of the two standard deviations that are told within a view and between views; the median of
+        all brightnesses: 1 where nothing but noise can be what both see.
     """
 
     brightness: FloatMap
@@ -118,14 +135,27 @@ def view_noise(light_field: LightField) -> ViewNoise:
     for low, high in pairwise(np.quantile(level[tells], np.linspace(0, 1, LEVELS + 1))):
         chosen = tells & (level >= low) & (level <= high)
         of_one, of_two = (max(bound, least) for bound in _bounds(within[chosen], between[chosen]))
-        ratio = of_one / of_two
-        found.append(
-            (float(np.median(level[chosen])), min(of_one, of_two), min(ratio, 1), min(ratio, 1 / ratio) ** 0.5)
-        )
+        share, agreement = min(of_one / of_two, 1), _agreement(of_one, of_two)
+        found.append((float(np.median(level[chosen])), min(of_one, of_two), share, agreement))
     brightness, variance, shares, agreements = np.array(found, np.float32).T
+    most = np.where(agreements >= _TRUSTED, np.inf, _BENT * _lower_line(brightness, variance))
+    variance = np.minimum(variance, most).astype(np.float32)
     expected = np.interp(level, brightness, variance)
     by_place = _by_place(within / expected, between / expected, tells)
     return ViewNoise(brightness, variance, by_place, float(np.median(shares)), float(agreements.min()))
+
+
+def _lower_line(brightness: FloatMap, variance: FloatMap) -> FloatMap:
+    """Power of brightness that a quarter of the variances lie below: the best of the lines through two of them each."""
+    x, y = np.log(np.float64(brightness)), np.log(np.float64(variance))
+    one, other = np.triu_indices(len(x), 1)
+    apart = x[other] > x[one]
+    one, other = one[apart], other[apart]
+    slopes = np.clip((y[other] - y[one]) / (x[other] - x[one]), *_SLOPES)
+    lines = np.vstack([y[one, None] + slopes[:, None] * (x - x[one, None]), np.full((1, len(x)), np.median(y))])
+    above = y - lines
+    loss = np.where(above > 0, _LOWER_SHARE * above, (_LOWER_SHARE - 1) * above).sum(axis=1)
+    return np.asarray(np.exp(lines[loss.argmin()]), np.float32)
 
 
 def _least_variance(dtype: npt.DTypeLike) -> float:
@@ -172,8 +202,9 @@ def _by_place(within: FloatMap, between: FloatMap, tells: BoolMap) -> FloatMap:
     for number in range(PARTS * PARTS):
         chosen = tells & (part == number)
         if chosen.sum() >= LEVELS:
-            bound = min(_bounds(within[chosen], between[chosen]))
-            factors.flat[number] = np.clip(bound, 1 / _MOST_UNEVEN, _MOST_UNEVEN)
+            bounds = _bounds(within[chosen], between[chosen])
+            most = _MOST_UNEVEN if _agreement(*bounds) >= _TRUSTED_PART else 1
+            factors.flat[number] = np.clip(min(bounds), 1 / _MOST_UNEVEN, most)
     return factors
 
 
@@ -181,6 +212,11 @@ def _bounds(within: FloatMap, between: FloatMap) -> tuple[float, float]:
     """What the best blocks tell of the noise, within a view and between views."""
     of_one, of_two = (float(np.quantile(energy, BEST_SHARE)) for energy in (within, between))
     return _OF_ONE_VIEW * of_one, _OF_VIEWS * of_two
+
+
+def _agreement(of_one: float, of_two: float) -> float:
+    """Ratio, at most 1, of the standard deviations of two variances."""
+    return float((min(of_one, of_two) / max(of_one, of_two, 1e-12)) ** 0.5)
 
 
 def whole_pixel_moves(light_field: LightField) -> npt.NDArray[np.int64]:
