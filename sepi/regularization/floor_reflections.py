@@ -38,8 +38,8 @@ _SIDES = 3
 _BESIDE = 0.2
 # share of strong edges in a reflection, times that of the floor, from which on it is none
 _FAINT = 0.7
-# times to fit a plane to the edges that lie on it
-_FITS = 3
+# best planes that are fitted to the edges that lie on them, and how often
+_FITTED, _FITS = 25, 3
 
 
 class FloorReflectionsParameters(Parameters):
@@ -121,10 +121,12 @@ def floor_plane(
     if not len(planes):
         return None
     tolerance = parameters.floor_tolerance
-    scores = support(positions, values, planes, tolerance, _BEHIND)
-    plane: Plane = planes[scores.argmax()]
+    # a plane through three pixels is a little off, of a large one by more than the tolerance at its far end
+    best = planes[np.argsort(-support(positions, values, planes, tolerance, _BEHIND), kind="stable")[:_FITTED]]
     for _ in range(_FITS):
-        plane = fitted(positions, values, plane, tolerance)
+        best = np.array([fitted(positions, values, plane, tolerance) for plane in best])
+    scores = support(positions, values, best, tolerance, _BEHIND)
+    plane: Plane = best[scores.argmax()]
     above = residuals_of(positions, values, plane[None])[0]
     below_horizon = values - above > known.minimum
     holds = (np.abs(above) < tolerance).sum() >= parameters.floor_share * below_horizon.sum()
