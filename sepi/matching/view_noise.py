@@ -52,9 +52,9 @@ _LOWER_SHARE = 0.25
 _BENT = 2.0
 """Times the line that a variance may be: real tone curves are bent, and reading adds noise to the photons'."""
 
-_SLOPES = -1.5, 1.5
-"""Powers of brightness that a variance may go with: of noise of reading, seen through the usual tone curve of a power of
-1 / 2.2, and of pixels that are unlike in how much light they see."""
+_SLOPES = np.linspace(-1.5, 1.5, 13)
+"""Powers of brightness that a variance may go with: photons' noise and that of reading, seen through a camera's tone
+curve or as it is."""
 
 _TRUSTED, _TRUSTED_PART = 0.85, 0.6
 """Agreement of the two bounds from which on a brightness may have more noise than the line, a part of the picture more
@@ -146,16 +146,12 @@ def view_noise(light_field: LightField) -> ViewNoise:
 
 
 def _lower_line(brightness: FloatMap, variance: FloatMap) -> FloatMap:
-    """Power of brightness that a quarter of the variances lie below: the best of the lines through two of them each."""
+    """Power of brightness that a quarter of the variances lie below: the best of those through one of them each."""
     x, y = np.log(np.float64(brightness)), np.log(np.float64(variance))
-    one, other = np.triu_indices(len(x), 1)
-    apart = x[other] > x[one]
-    one, other = one[apart], other[apart]
-    slopes = np.clip((y[other] - y[one]) / (x[other] - x[one]), *_SLOPES)
-    lines = np.vstack([y[one, None] + slopes[:, None] * (x - x[one, None]), np.full((1, len(x)), np.median(y))])
+    lines = y[:, None, None] + _SLOPES[:, None] * (x - x[:, None, None])
     above = y - lines
-    loss = np.where(above > 0, _LOWER_SHARE * above, (_LOWER_SHARE - 1) * above).sum(axis=1)
-    return np.asarray(np.exp(lines[loss.argmin()]), np.float32)
+    loss = np.where(above > 0, _LOWER_SHARE * above, (_LOWER_SHARE - 1) * above).sum(axis=2)
+    return np.asarray(np.exp(lines.reshape(-1, len(x))[loss.argmin()]), np.float32)
 
 
 def _least_variance(dtype: npt.DTypeLike) -> float:

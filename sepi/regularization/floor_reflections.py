@@ -121,16 +121,19 @@ def floor_plane(
     if not len(planes):
         return None
     tolerance = parameters.floor_tolerance
+    scores = support(positions, values, planes, tolerance, _BEHIND)
     # a plane through three pixels is a little off, of a large one by more than the tolerance at its far end
-    best = planes[np.argsort(-support(positions, values, planes, tolerance, _BEHIND), kind="stable")[:_FITTED]]
+    best = planes[np.argsort(-scores, kind="stable")[:_FITTED]]
     for _ in range(_FITS):
         best = np.array([fitted(positions, values, plane, tolerance) for plane in best])
-    scores = support(positions, values, best, tolerance, _BEHIND)
-    plane: Plane = best[scores.argmax()]
+    best = best[_rises(best, disparity.shape[0], known)]
+    if not len(best) or scores.max() <= 0:
+        return None
+    plane: Plane = best[support(positions, values, best, tolerance, 0.0).argmax()]
     above = residuals_of(positions, values, plane[None])[0]
     below_horizon = values - above > known.minimum
     holds = (np.abs(above) < tolerance).sum() >= parameters.floor_share * below_horizon.sum()
-    return plane if scores.max() > 0 and holds and _rises(plane, disparity.shape[0], known) else None
+    return plane if holds else None
 
 
 def seen_in(floor: FloatMap, disparity: FloatMap, edges: BoolMap, parameters: FloorReflectionsParameters) -> BoolMap:
