@@ -56,9 +56,9 @@ _SLOPES = np.linspace(-1.5, 1.5, 13)
 """Powers of brightness that a variance may go with: photons' noise and that of reading, seen through a camera's tone
 curve or as it is."""
 
-_TRUSTED, _TRUSTED_PART = 0.85, 0.6
-"""Agreement of the two bounds from which on a brightness may have more noise than the line, a part of the picture more
-than its brightness."""
+_TRUSTED = 0.85
+"""Agreement of the two bounds from which on a brightness may have more noise than the line, and a part of the picture
+more than its brightness."""
 
 _AROUND = 4
 """Radius of the window of a pixel's own noise."""
@@ -199,7 +199,7 @@ def _by_place(within: FloatMap, between: FloatMap, tells: BoolMap) -> FloatMap:
         chosen = tells & (part == number)
         if chosen.sum() >= LEVELS:
             bounds = _bounds(within[chosen], between[chosen])
-            most = _MOST_UNEVEN if _agreement(*bounds) >= _TRUSTED_PART else 1
+            most = _MOST_UNEVEN if _agreement(*bounds) >= _TRUSTED else 1
             factors.flat[number] = np.clip(min(bounds), 1 / _MOST_UNEVEN, most)
     return factors
 
