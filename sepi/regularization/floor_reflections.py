@@ -38,8 +38,8 @@ _SIDES = 3
 _BESIDE = 0.2
 # share of strong edges in a reflection, times that of the floor, from which on it is none
 _FAINT = 0.7
-# best planes that are fitted to the edges that lie on them, and how often
-_FITTED, _FITS = 25, 3
+# times to fit a plane to the edges that lie on it
+_FITS = 3
 
 
 class FloorReflectionsParameters(Parameters):
@@ -122,18 +122,13 @@ def floor_plane(
         return None
     tolerance = parameters.floor_tolerance
     scores = support(positions, values, planes, tolerance, _BEHIND)
-    # a plane through three pixels is a little off, of a large one by more than the tolerance at its far end
-    best = planes[np.argsort(-scores, kind="stable")[:_FITTED]]
+    plane: Plane = planes[scores.argmax()]
     for _ in range(_FITS):
-        best = np.array([fitted(positions, values, plane, tolerance) for plane in best])
-    best = best[_rises(best, disparity.shape[0], known)]
-    if not len(best) or scores.max() <= 0:
-        return None
-    plane: Plane = best[support(positions, values, best, tolerance, 0.0).argmax()]
+        plane = fitted(positions, values, plane, tolerance)
     above = residuals_of(positions, values, plane[None])[0]
     below_horizon = values - above > known.minimum
     holds = (np.abs(above) < tolerance).sum() >= parameters.floor_share * below_horizon.sum()
-    return plane if holds else None
+    return plane if scores.max() > 0 and holds and _rises(plane, disparity.shape[0], known) else None
 
 
 def seen_in(floor: FloatMap, disparity: FloatMap, edges: BoolMap, parameters: FloorReflectionsParameters) -> BoolMap:
