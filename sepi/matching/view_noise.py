@@ -89,8 +89,8 @@ class ViewNoise:
     share : float
         Of the variance by which views differ, at most, what is noise of each view.
     agreement : float
-        Ratio, at most 1, of the two standard deviations that are told within a view and between views; the median of
-        all brightnesses: 1 where nothing but noise can be what both see.
+        Ratio, at most 1, of the two standard deviations that are told within a view and between views, at the
+        brightness where they agree least: 1 where nothing but noise can be what both see.
     """
 
     brightness: FloatMap
