@@ -9,7 +9,7 @@ from scipy import ndimage
 
 from sepi.lightfield import FloatMap, LightField
 from sepi.matching import denoising as module
-from sepi.matching.denoising import LEAST_SURE_NOISE, DenoisedLightField, denoised
+from sepi.matching.denoising import DenoisedLightField, denoised
 from sepi.matching.denoising_kernels import denoise_views
 from sepi.matching.view_noise import variance_map, view_noise
 from sepi.pipeline import estimate_depth
@@ -94,7 +94,7 @@ def test_faint_noise_is_taken_out_where_it_can_be_nothing_else() -> None:
     assert isinstance(denoised(faint, 1.5), DenoisedLightField)
     # what does not fit at whole pixels has as much, but flat parts do not
     clean = render("curved_occluders", size=128)
-    assert view_noise(clean).usual > LEAST_SURE_NOISE
+    assert view_noise(clean).usual > module.LEAST_SURE_NOISE
     assert view_noise(clean).agreement < 0.5
     assert denoised(clean, 1.5) is clean
 
