@@ -8,7 +8,8 @@ nothing. Here that is left until something has to be compiled.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from typing import Any, TypeVar, cast
 
 import numba
@@ -52,9 +53,40 @@ class _KernelCache(FunctionCache):  # type: ignore[misc, unused-ignore]
         """What was compiled for a signature; None where there is nothing."""
         # the functions of reference counts, which every kernel is linked with
         rtsys.initialize(target_context)
-        with self._guard_against_spurious_io_errors():
+        with self._guard_against_spurious_io_errors(), _names_unlisted(target_context.codegen()._engine):
             return self._load_overload(sig, target_context)  # type: ignore[no-untyped-call, unused-ignore]
         return None
+
+
+class _Names(set[str]):
+    """Names that compiled code defines: those that numba lists, and those of modules that are looked at when asked."""
+
+    def __init__(self, listed: Iterable[str]) -> None:
+        super().__init__(listed)
+        self.modules: list[Any] = []
+
+    def __contains__(self, name: object) -> bool:
+        """Whether one of them is that."""
+        return super().__contains__(name) or any(_defines(module, name) for module in reversed(self.modules))
+
+
+def _defines(module: Any, name: object) -> bool:
+    try:
+        return not module.get_function(name).is_declaration
+    except NameError:
+        return False
+
+
+@contextmanager
+def _names_unlisted(engine: Any) -> Iterator[None]:
+    """Have the engine list no names of code that is loaded: half of the time that it takes, for some that are asked."""
+    if not isinstance(engine._defined_symbols, _Names):
+        engine._defined_symbols = _Names(engine._defined_symbols)
+    engine._load_defined_symbols = engine._defined_symbols.modules.append
+    try:
+        yield
+    finally:
+        del engine._load_defined_symbols
 
 
 def njit(*, cache: bool = False, **options: Any) -> Callable[[_Function], _Function]:
