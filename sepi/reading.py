@@ -101,12 +101,16 @@ def read_light_field(
 
         light_field = arrange(light_field, in_grid(options))
     _require_contrast(path, light_field)
+    if check_order:
+        from sepi.inspection.view_layouts import Views
+
+        views = Views(light_field)
     if options.row_spacing is not None:
         light_field = with_row_spacing(light_field, options.row_spacing)
     elif check_order:
         from sepi.inspection.row_spacing import settle_row_spacing
 
-        light_field = settle_row_spacing(light_field)
+        light_field = settle_row_spacing(light_field, views)
     record = reading_record(options, file_format)
     if record:
         # a file of this package may be of other files that were read otherwise
@@ -117,7 +121,7 @@ def read_light_field(
     if check_order:
         from sepi.inspection.view_order import check_order as checked_order
 
-        found.append(checked_order(light_field, options.order).warning())
+        found.append(checked_order(light_field, options.order, views).warning())
     if light_field.rig is not None and found[1:] and found[1]:
         raise SepiError(
             f"{path}: the views do not fit the poses, but would turned over; expected poses of cameras that look along "

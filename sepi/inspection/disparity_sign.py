@@ -99,13 +99,13 @@ class Look(Enum):
     """Also views off them, which see more where there is noise or little texture."""
 
 
-def occlusion_evidence(light_field: LightField, trial: Trial, look: Look) -> Evidence:
+def occlusion_evidence(light_field: LightField, trial: Trial, look: Look, views: Views) -> Evidence:
     """Whether the surface of the greater disparity is the one in front.
 
-    The best layout of the trial is taken for right; the sign is that of the layout's first order. There is no evidence
+    ``views`` are those of the trial, whose best layout is taken for right; the sign is that of the layout's first order. There is no evidence
     where there are no views on opposite sides, or hardly any contrast.
     """
-    views = Views(light_field, _MOST_PIXELS)
+    views = views.again(light_field, _MOST_PIXELS)
     order = next(iter(trial.best))
     largest = trial.largest_disparity / views.factor
     reach, directions = _directions(views, largest)

@@ -53,14 +53,15 @@ _LEAST_DIFFERENCE = 0.04
 _DOUBTED = 1.25
 
 
-def settle_row_spacing(light_field: LightField) -> LightField:
+def settle_row_spacing(light_field: LightField, views: Views | None = None) -> LightField:
     """The light field with the row spacing that its views tell, and a note; as it is where they tell none.
 
-    Nothing is done where a spacing or positions of the views are known already.
+    Nothing is done where a spacing or positions of the views are known already. ``views``: its views, where they are
+    looked at otherwise, too.
     """
     if light_field.settled or light_field.positions is not None or light_field.row_spacing != 1:
         return light_field
-    spacing = estimate_row_spacing(Views(light_field))
+    spacing = estimate_row_spacing(views or Views(light_field))
     if spacing is None:
         return light_field
     spacing = round(spacing, 3)

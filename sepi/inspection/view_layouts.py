@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from copy import copy
 from typing import NamedTuple
 
 import cv2
@@ -63,8 +64,9 @@ class Views:
 
     def __init__(self, light_field: LightField, most_pixels: int = _MOST_PIXELS) -> None:
         self._views = light_field.rgb_views
-        self.factor = max(1, math.ceil(math.sqrt(math.prod(light_field.shape) / most_pixels)))
+        self.factor = _reduction(light_field, most_pixels)
         self._grey: dict[tuple[int, int, int], FloatMap] = {}
+        self._detail: dict[tuple[int, int, int], FloatMap] = {}
         self._worth: dict[Baseline, bool] = {}
         positions = np.argwhere(light_field.present)
         distance = abs(positions - np.array(light_field.grid) // 2).sum(axis=1)
@@ -75,6 +77,14 @@ class Views:
         height, width = light_field.shape
         self.shape = (height // self.factor, width // self.factor)
         self._positions = light_field.baselines
+
+    def again(self, light_field: LightField, most_pixels: int = _MOST_PIXELS) -> Views:
+        """The views of the same light field, or of one that only has them at other positions: what is made stays."""
+        if self.factor != _reduction(light_field, most_pixels):
+            return Views(light_field, most_pixels)
+        again = copy(self)
+        again._positions = light_field.baselines
+        return again
 
     @property
     def reference_view(self) -> FloatMap:
@@ -106,17 +116,21 @@ class Views:
 
     def _light(self, baseline: Baseline) -> tuple[float, float]:
         """Mean and contrast of a view as it is."""
-        grey = self._read(baseline, 1)
-        detail = grey - cv2.blur(grey, (_HIGH_PASS, _HIGH_PASS))
-        return float(grey.mean()), float(detail.std())
+        contrast = float(cv2.meanStdDev(self.detail(baseline, 1))[1][0, 0])
+        return self._mean(baseline, 1), contrast / self._gain(baseline, 1)
+
+    def _mean(self, baseline: Baseline, factor: int) -> float:
+        return float(cv2.mean(self._read(baseline, factor))[0])
+
+    def _gain(self, baseline: Baseline, factor: int) -> float:
+        """What makes a view as bright as the reference."""
+        mean = self._mean(baseline, factor)
+        return self._mean((0, 0), factor) / mean if mean > 0 else 1.0
 
     def plain(self, baseline: Baseline, factor: int = 1) -> FloatMap:
         """Grey, slightly blurred view, (H, W) float32, reduced by a further factor; as bright as the reference."""
         grey = self._read(baseline, factor)
-        if baseline == (0, 0):
-            return grey
-        mean = float(grey.mean())
-        return np.asarray(grey * np.float32(float(self._read((0, 0), factor).mean()) / mean if mean > 0 else 1))
+        return grey if baseline == (0, 0) else np.asarray(grey * np.float32(self._gain(baseline, factor)))
 
     def _read(self, baseline: Baseline, factor: int) -> FloatMap:
         key = (*baseline, factor)
@@ -131,8 +145,16 @@ class Views:
 
     def detail(self, baseline: Baseline, factor: int) -> FloatMap:
         """The same, high-pass filtered: differences of brightness between views do not count."""
-        grey = self.plain(baseline, factor)
-        return np.asarray(grey - cv2.blur(grey, (_HIGH_PASS, _HIGH_PASS)), np.float32)
+        key = (*baseline, factor)
+        if key not in self._detail:
+            grey = self.plain(baseline, factor)
+            self._detail[key] = np.asarray(grey - cv2.blur(grey, (_HIGH_PASS, _HIGH_PASS)), np.float32)
+        return self._detail[key]
+
+
+def _reduction(light_field: LightField, most_pixels: int) -> int:
+    """The whole factor by which pictures are reduced to at most so many pixels."""
+    return max(1, math.ceil(math.sqrt(math.prod(light_field.shape) / most_pixels)))
 
 
 class Trial(NamedTuple):

@@ -118,7 +118,7 @@ class OrderCheck:
         return f"{fault} (what hides what agrees in {self.agreeing} of {self.regions} regions of the picture): {advice}"
 
 
-def check_order(light_field: LightField, read_in: str = AS_GIVEN) -> OrderCheck:
+def check_order(light_field: LightField, read_in: str = AS_GIVEN, views: Views | None = None) -> OrderCheck:
     """Find out in which order the views fit together.
 
     Parameters
@@ -128,6 +128,8 @@ def check_order(light_field: LightField, read_in: str = AS_GIVEN) -> OrderCheck:
     read_in : str
         Order in which it was read, one of :data:`sepi.io.readers.options.ORDERS`; the orders of the result are to take
         its place.
+    views : Views, optional
+        Its views, where they were looked at before.
 
     Returns
     -------
@@ -149,7 +151,8 @@ def check_order(light_field: LightField, read_in: str = AS_GIVEN) -> OrderCheck:
     """
     require_light_field(light_field)
     require_known("order", [read_in], ORDERS)
-    trial = best_trial(Views(light_field))
+    views = views.again(light_field) if views else Views(light_field)
+    trial = best_trial(views)
     if trial is None:
         return OrderCheck(dict.fromkeys(ORDERS, 1.0), read_in, clear=False, sign_clear=False, read_in=read_in)
     costs = dict(trial.costs)
@@ -159,7 +162,7 @@ def check_order(light_field: LightField, read_in: str = AS_GIVEN) -> OrderCheck:
         kept = next((sign for order, sign in trial.best.items() if order == AS_GIVEN), None)
         # a glance may say that all is well; to say that it is not takes a closer look
         for look in Look if kept is not None else (Look.AXES, Look.MANY_VIEWS):
-            evidence = occlusion_evidence(light_field, trial, look)
+            evidence = occlusion_evidence(light_field, trial, look, views)
             doubted = kept is not None and kept * evidence.mean < 0
             sign_clear = _is_clear(evidence, plainly=doubted or look is Look.GLANCE)
             if sign_clear and not (look is Look.GLANCE and doubted):

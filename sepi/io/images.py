@@ -253,7 +253,9 @@ def _by_pillow(path: Path, data: bytes, header: Header) -> Pixels | None:
                     # whether all of it is there: OpenCV fills with grey what is missing
                     image.load()
                 return None
-            values = np.asarray(image.convert(_HELD_AS[image.mode]))
+            held = _HELD_AS[image.mode]
+            # what is held so already would be copied
+            values = np.asarray(image if image.mode == held else image.convert(held))
         except OSError as error:
             raise SepiError(f"damaged {header.kind}, perhaps cut off: its pixels cannot be decoded") from error
         if values.ndim == 2:

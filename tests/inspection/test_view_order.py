@@ -10,7 +10,7 @@ import pytest
 from real_scenes import views_of
 
 from sepi.inspection.disparity_sign import Evidence, Look, occlusion_evidence
-from sepi.inspection.view_layouts import Trial
+from sepi.inspection.view_layouts import Trial, Views
 from sepi.inspection.view_order import check_order
 from sepi.io.readers.options import ORDERS
 from sepi.lightfield import LightField
@@ -270,9 +270,9 @@ def test_a_glance_may_say_that_all_is_well_but_not_that_it_is_not(hci: Path, mon
     """Every run would wait for the closer look, or one third of the rows would have depth turned inside out."""
     looks: list[Look] = []
 
-    def noted(light_field: LightField, trial: Trial, look: Look) -> Evidence:
+    def noted(light_field: LightField, trial: Trial, look: Look, views: Views) -> Evidence:
         looks.append(look)
-        return occlusion_evidence(light_field, trial, look)
+        return occlusion_evidence(light_field, trial, look, views)
 
     monkeypatch.setattr("sepi.inspection.view_order.occlusion_evidence", noted)
     light_field = views_of(hci / "cotton")
