@@ -2,7 +2,8 @@
 
 A sample is a sum of 4x4 spline coefficients of four channels. The channels of a coefficient lie side by side, so that a
 row of four of them is one vector of sixteen numbers: :func:`_weighted_sum` writes it down as such, since the compiler
-does not find it.
+does not find it. All else is done for many pixels of a row at once, in loops that the compiler makes vectors of: what
+they read and write are lines of one array, since only then it knows that these do not overlap.
 """
 
 from __future__ import annotations
@@ -122,41 +123,72 @@ _weighted_sum: Any = intrinsic(_typed_sum)
 """``sum_ij a[i] b[j] c[start + i stride + 4 j : ... + 4]`` over an array ``c`` of int16; four float32."""
 
 
-@njit(forceinline=True)
-def _spline_weights(f: Any, unit: Any) -> Any:
-    """Weights of the four coefficients round a position, a fraction ``f`` after the second, times ``unit``."""
-    g = np.float32(1) - f
-    sixth, half, two_thirds = np.float32(1 / 6), np.float32(0.5), np.float32(2 / 3)
-    return (
-        g * g * g * sixth * unit,
-        (two_thirds - f * f * (np.float32(1) - f * half)) * unit,
-        (two_thirds - g * g * (np.float32(1) - g * half)) * unit,
-        f * f * f * sixth * unit,
-    )
+AT_ONCE = 128
+"""Pixels of a row that are done together; all that is known of them stays in the first cache."""
+
+# Lines of the scratch array, each a number of every pixel: where a view sees it, weights of the rows and columns of
+# coefficients there, the four channels there, and whether the view sees it...
+_Y, _X, _DOWN, _ACROSS, _VALUES, _SEEN = 0, 1, 2, 6, 10, 14
+# ...what the channels are compared with, and its derivatives...
+_OWN, _SLOPE_DOWN, _SLOPE_ACROSS = 15, 19, 23
+# ...and sums over the views: of the weighted channels and the weights, or of the equations and the evidence
+_SUMS = 27
+_HALVES = _SUMS + 4
+_REST = _HALVES + 8
+_LINES = _REST + 4
 
 
 @njit(forceinline=True)
-def _is_seen(views: SplineViews, seeing: Seeing, n: int, shape: Any, fy: Any, fx: Any, d: Any) -> bool:
-    """Whether position ``(fy, fx)`` lies in view ``n``, and nothing nearer than ``d`` occludes it."""
-    H, W = shape
-    half = np.float32(0.5)
-    if fy < 0 or fy > H - 1 or fx < 0 or fx > W - 1:
-        return False
-    nearest: Any = seeing.nearest[views.places[n, 0], views.places[n, 1]]
-    return bool(nearest[int(fy + half) - views.low, int(fx + half)] <= d + seeing.occlusion_margin)
+def _spline_weights(s: Any, where: int, first: int, unit: Any, count: int) -> None:
+    """Weights of the four coefficients round each position of line ``where``, times ``unit``: lines from ``first``."""
+    sixth, half, two_thirds, one = np.float32(1 / 6), np.float32(0.5), np.float32(2 / 3), np.float32(1)
+    for i in range(count):
+        position = s[where * AT_ONCE + i]
+        f = position - np.float32(np.int32(position))
+        g = one - f
+        s[first * AT_ONCE + i] = g * g * g * sixth * unit
+        s[(first + 1) * AT_ONCE + i] = (two_thirds - f * f * (one - f * half)) * unit
+        s[(first + 2) * AT_ONCE + i] = (two_thirds - g * g * (one - g * half)) * unit
+        s[(first + 3) * AT_ONCE + i] = f * f * f * sixth * unit
 
 
 @njit(forceinline=True)
-def _sample(views: SplineViews, n: int, fy: Any, fx: Any) -> Any:
-    """Four channels of view ``n`` at a position inside it."""
+def _four(s: Any, first: int, i: int) -> Any:
+    at = first * AT_ONCE + i
+    return s[at], s[at + AT_ONCE], s[at + 2 * AT_ONCE], s[at + 3 * AT_ONCE]
+
+
+@njit(cache=True, fastmath=EXACT, error_model="numpy")
+def _sample(views: SplineViews, n: int, y: int, x: int, seeing: Seeing, disparity: Any, s: Any, count: int) -> None:
+    """Where view ``n`` sees each pixel of a piece of row ``y``, its four channels there, and whether nothing hides it.
+
+    Zero where it does not see it. The piece begins at column ``x``.
+    """
+    H, W = disparity.shape
     _, S, rows, columns, _ = views.splines.shape
-    top, left, stride = int(fy), int(fx), 4 * columns
-    a = _spline_weights(fy - np.float32(top), views.unit)
-    b = _spline_weights(fx - np.float32(left), np.float32(1))
-    view = views.places[n, 0] * S + views.places[n, 1]
+    v, u = views.baselines[n]
+    for i in range(count):
+        s[_Y * AT_ONCE + i] = np.float32(y) - disparity[y, x + i] * v
+        s[_X * AT_ONCE + i] = np.float32(x + i) - disparity[y, x + i] * u
+    _spline_weights(s, _Y, _DOWN, views.unit, count)
+    _spline_weights(s, _X, _ACROSS, np.float32(1), count)
+    nearest: Any = seeing.nearest[views.places[n, 0], views.places[n, 1]]
+    half, stride, bottom, right = np.float32(0.5), 4 * columns, np.float32(H - 1), np.float32(W - 1)
     # the margin, less the one coefficient before
-    start = (view * rows + top - views.low + 1) * stride + 4 * (left + 1)
-    return _weighted_sum(views.splines, start, stride, a, b)
+    start = ((views.places[n, 0] * S + views.places[n, 1]) * rows + 1 - views.low) * stride + 4
+    for i in range(count):
+        fy, fx = s[_Y * AT_ONCE + i], s[_X * AT_ONCE + i]
+        seen = fy >= 0 and fy <= bottom and fx >= 0 and fx <= right
+        if seen:
+            limit = disparity[y, x + i] + seeing.occlusion_margin
+            seen = nearest[int(fy + half) - views.low, int(fx + half)] <= limit
+        values = np.float32(0), np.float32(0), np.float32(0), np.float32(0)
+        if seen:
+            at = start + int(fy) * stride + 4 * int(fx)
+            values = _weighted_sum(views.splines, at, stride, _four(s, _DOWN, i), _four(s, _ACROSS, i))
+        s[_SEEN * AT_ONCE + i] = np.float32(1) if seen else np.float32(0)
+        for c in range(4):
+            s[(_VALUES + c) * AT_ONCE + i] = values[c]
 
 
 @njit(forceinline=True)
@@ -167,24 +199,33 @@ def _robust_weight(z: Any, scale2: Any) -> Any:
 
 
 @njit(forceinline=True)
-def _add_to_mean(views: SplineViews, n: int, y: int, seeing: Seeing, disparity: Any, sums: Any) -> None:
-    """Add view ``n`` to a row of pixels; ``sums (W, 6)``: of the four channels, and of their weights."""
-    v, u = views.baselines[n]
-    for x in range(disparity.shape[1]):
-        d = disparity[y, x]
-        fy, fx = np.float32(y) - d * v, np.float32(x) - d * u
-        if not _is_seen(views, seeing, n, disparity.shape, fy, fx, d):
-            continue
-        v0, v1, v2, v3 = _sample(views, n, fy, fx)
-        own, total = views.reference[y, x], sums[x]
-        w = _robust_weight((v0 - own[0]) ** 2 + (v1 - own[1]) ** 2 + (v2 - own[2]) ** 2, views.scales2[0])
-        total[0] += w * v0
-        total[1] += w * v1
-        total[2] += w * v2
-        total[4] += w
-        w = _robust_weight(np.float32(3) * (v3 - own[3]) ** 2, views.scales2[1])
-        total[3] += w * v3
-        total[5] += w
+def _residual(s: Any, c: int, i: int) -> Any:
+    return s[(_VALUES + c) * AT_ONCE + i] - s[(_OWN + c) * AT_ONCE + i]
+
+
+@njit(forceinline=True)
+def _load(image: Any, y: int, x: int, s: Any, first: int, count: int) -> None:
+    """The four channels of a piece of row ``y`` of an image (H, W, 4), as lines from ``first`` on."""
+    for i in range(count):
+        for c in range(4):
+            s[(first + c) * AT_ONCE + i] = image[y, x + i, c]
+
+
+@njit(cache=True, fastmath=EXACT, error_model="numpy")
+def _add_to_mean(s: Any, scales2: Any, count: int) -> None:
+    """Add the samples of a view to the sums: of the four channels, of the colours' weights, and of the detail's."""
+    colour, detail, three = scales2[0], scales2[1], np.float32(3)
+    for i in range(count):
+        r0, r1, r2, r3 = _residual(s, 0, i), _residual(s, 1, i), _residual(s, 2, i), _residual(s, 3, i)
+        seen = s[_SEEN * AT_ONCE + i]
+        w = seen * _robust_weight(r0 * r0 + r1 * r1 + r2 * r2, colour)
+        s[_SUMS * AT_ONCE + i] += w * s[_VALUES * AT_ONCE + i]
+        s[(_SUMS + 1) * AT_ONCE + i] += w * s[(_VALUES + 1) * AT_ONCE + i]
+        s[(_SUMS + 2) * AT_ONCE + i] += w * s[(_VALUES + 2) * AT_ONCE + i]
+        s[(_SUMS + 4) * AT_ONCE + i] += w
+        w = seen * _robust_weight(three * (r3 * r3), detail)
+        s[(_SUMS + 3) * AT_ONCE + i] += w * s[(_VALUES + 3) * AT_ONCE + i]
+        s[(_SUMS + 5) * AT_ONCE + i] += w
 
 
 @njit(parallel=True, cache=True, fastmath=EXACT, error_model="numpy")
@@ -204,52 +245,50 @@ def mean_of_views(views: SplineViews, seeing: Seeing, disparity: Any, begin: int
     """
     W = disparity.shape[1]
     for y in prange(begin, end):
-        # a view after the other: its four rows stay in the first cache
-        sums = np.ones((W, 6), np.float32)
-        sums[:, :4] = views.reference[y]
-        for n in range(len(views.places)):
-            _add_to_mean(views, n, y, seeing, disparity, sums)
-        for x in range(W):
-            for c in range(4):
-                out[y, x, c] = sums[x, c] / sums[x, 4 if c < 3 else 5]
+        s = np.empty(_LINES * AT_ONCE, np.float32)
+        for x in range(0, W, AT_ONCE):
+            count = min(AT_ONCE, W - x)
+            _load(views.reference, y, x, s, _OWN, count)
+            # the reference view itself counts in full
+            s[_SUMS * AT_ONCE : (_SUMS + 4) * AT_ONCE] = s[_OWN * AT_ONCE : (_OWN + 4) * AT_ONCE]
+            s[(_SUMS + 4) * AT_ONCE : (_SUMS + 6) * AT_ONCE] = np.float32(1)
+            for n in range(len(views.places)):
+                _sample(views, n, y, x, seeing, disparity, s, count)
+                _add_to_mean(s, views.scales2, count)
+            for i in range(count):
+                for c in range(4):
+                    out[y, x + i, c] = s[(_SUMS + c) * AT_ONCE + i] / s[(_SUMS + (4 if c < 3 else 5)) * AT_ONCE + i]
 
 
 @njit(forceinline=True)
-def _terms(views: SplineViews, n: int, at: Any, v: Any, u: Any, m: Any, p: Any, q: Any) -> Any:
-    """What view ``n`` of baseline ``(v, u)`` adds for a pixel that it sees at ``at``: by the mean and its derivatives.
+def _slope(s: Any, c: int, i: int, v: Any, u: Any) -> Any:
+    return s[(_SLOPE_DOWN + c) * AT_ONCE + i] * v + s[(_SLOPE_ACROSS + c) * AT_ONCE + i] * u
+
+
+@njit(forceinline=True)
+def _terms(s: Any, i: int, v: Any, u: Any, scales2: Any) -> Any:
+    """What a view of baseline ``(v, u)`` adds for a pixel.
 
     Slope, curvature, squared residual and weight of colours; slope, curvature and weight of detail.
     """
-    three = np.float32(3)
-    v0, v1, v2, v3 = _sample(views, n, at[0], at[1])
-    r0, r1, r2, r3 = v0 - m[0], v1 - m[1], v2 - m[2], v3 - m[3]
-    g0, g1, g2, g3 = p[0] * v + q[0] * u, p[1] * v + q[1] * u, p[2] * v + q[2] * u, p[3] * v + q[3] * u
+    three, seen = np.float32(3), s[_SEEN * AT_ONCE + i]
+    r0, r1, r2, r3 = _residual(s, 0, i), _residual(s, 1, i), _residual(s, 2, i), _residual(s, 3, i)
+    g0, g1, g2, g3 = _slope(s, 0, i, v, u), _slope(s, 1, i, v, u), _slope(s, 2, i, v, u), _slope(s, 3, i, v, u)
     z = r0 * r0 + r1 * r1 + r2 * r2
-    w, w3 = _robust_weight(z, views.scales2[0]), three * _robust_weight(three * r3 * r3, views.scales2[1])
+    w, w3 = seen * _robust_weight(z, scales2[0]), seen * (three * _robust_weight(three * r3 * r3, scales2[1]))
     slope, curve = w * (r0 * g0 + r1 * g1 + r2 * g2), w * (g0 * g0 + g1 * g1 + g2 * g2)
     return slope, curve, z, w, w3 * r3 * g3, w3 * g3 * g3, w3
 
 
-@njit(forceinline=True)
-def _add_to_equations(
-    views: SplineViews, n: int, y: int, seeing: Seeing, disparity: Any, image: Any, sums: Any
-) -> None:
-    """Add view ``n`` to a row of pixels; ``image``: the mean and its derivatives; ``sums (W, 4)``: slope and curvature
-    of colours and of detail.
-    """
-    mean, down, across = image
-    v, u = views.baselines[n]
-    for x in range(disparity.shape[1]):
-        d = disparity[y, x]
-        at = np.float32(y) - d * v, np.float32(x) - d * u
-        if not _is_seen(views, seeing, n, disparity.shape, at[0], at[1], d):
-            continue
-        slope, curve, _, _, slope3, curve3, _ = _terms(views, n, at, v, u, mean[y, x], down[y, x], across[y, x])
-        total = sums[x]
-        total[0] += slope
-        total[1] += curve
-        total[2] += slope3
-        total[3] += curve3
+@njit(cache=True, fastmath=EXACT, error_model="numpy")
+def _add_to_equations(s: Any, v: Any, u: Any, scales2: Any, count: int) -> None:
+    """Add the samples of a view to the sums: slope and curvature of colours and of detail."""
+    for i in range(count):
+        slope, curve, _, _, slope3, curve3, _ = _terms(s, i, v, u, scales2)
+        s[_SUMS * AT_ONCE + i] += slope
+        s[(_SUMS + 1) * AT_ONCE + i] += curve
+        s[(_SUMS + 2) * AT_ONCE + i] += slope3
+        s[(_SUMS + 3) * AT_ONCE + i] += curve3
 
 
 @njit(parallel=True, cache=True, fastmath=EXACT, error_model="numpy")
@@ -268,48 +307,50 @@ def normal_equations(
         Filled in these rows. Their ratio is the update towards less cost, in pixels per view step.
     """
     W = disparity.shape[1]
+    mean, down, across = image
     colour, detail = views.shares[0] / views.scales2[0], views.shares[1] / views.scales2[1]
     for y in prange(begin, end):
-        sums = np.zeros((W, 4), np.float32)
-        for n in range(len(views.places)):
-            _add_to_equations(views, n, y, seeing, disparity, image, sums)
-        for x in range(W):
-            gradient[y, x] = colour * sums[x, 0] + detail * sums[x, 2]
-            curvature[y, x] = colour * sums[x, 1] + detail * sums[x, 3]
+        s = np.empty(_LINES * AT_ONCE, np.float32)
+        for x in range(0, W, AT_ONCE):
+            count = min(AT_ONCE, W - x)
+            _load(mean, y, x, s, _OWN, count)
+            _load(down, y, x, s, _SLOPE_DOWN, count)
+            _load(across, y, x, s, _SLOPE_ACROSS, count)
+            s[_SUMS * AT_ONCE :] = np.float32(0)
+            for n in range(len(views.places)):
+                _sample(views, n, y, x, seeing, disparity, s, count)
+                _add_to_equations(s, views.baselines[n, 0], views.baselines[n, 1], views.scales2, count)
+            for i in range(count):
+                slope, curve, slope3, curve3 = _four(s, _SUMS, i)
+                gradient[y, x + i] = colour * slope + detail * slope3
+                curvature[y, x + i] = colour * curve + detail * curve3
 
 
-@njit(forceinline=True)
-def _add_to_evidence(
-    views: SplineViews, n: int, y: int, seeing: Seeing, disparity: Any, image: Any, sums: Any, halves: Any, more: Any
-) -> None:
-    """As :func:`_add_to_equations`; and to a row of the halves ``(W, 4, 2)``, and ``more (W, 4)``."""
-    mean, down, across = image
-    v, u = views.baselines[n]
-    zero, colour, detail = np.float32(0), views.shares[0] / views.scales2[0], views.shares[1] / views.scales2[1]
-    # left or right, above or below
-    side, end = 0 if u < zero else 1, 2 if v < zero else 3
-    for x in range(disparity.shape[1]):
-        d = disparity[y, x]
-        at = np.float32(y) - d * v, np.float32(x) - d * u
-        if not _is_seen(views, seeing, n, disparity.shape, at[0], at[1], d):
-            continue
-        slope, curve, z, w, slope3, curve3, w3 = _terms(views, n, at, v, u, mean[y, x], down[y, x], across[y, x])
-        total, rest = sums[x], more[x]
-        total[0] += slope
-        total[1] += curve
-        total[2] += slope3
-        total[3] += curve3
-        rest[0] += w * z
-        rest[1] += w
-        rest[2] += w3 / np.float32(3)
-        rest[3] += np.float32(1)
+@njit(cache=True, fastmath=EXACT, error_model="numpy")
+def _add_to_evidence(s: Any, v: Any, u: Any, scales2: Any, shares: Any, count: int) -> None:
+    """As :func:`_add_to_equations`; and to those of each half of the views, and to the rest of the evidence."""
+    three, colour, detail = np.float32(3), shares[0] / scales2[0], shares[1] / scales2[1]
+    # to which of the halves the view belongs: where lines begin must not depend on it
+    left, right, above, below = np.float32(u < 0), np.float32(u > 0), np.float32(v < 0), np.float32(v > 0)
+    for i in range(count):
+        slope, curve, z, w, slope3, curve3, w3 = _terms(s, i, v, u, scales2)
+        s[_SUMS * AT_ONCE + i] += slope
+        s[(_SUMS + 1) * AT_ONCE + i] += curve
+        s[(_SUMS + 2) * AT_ONCE + i] += slope3
+        s[(_SUMS + 3) * AT_ONCE + i] += curve3
+        s[_REST * AT_ONCE + i] += w * z
+        s[(_REST + 1) * AT_ONCE + i] += w
+        s[(_REST + 2) * AT_ONCE + i] += w3 / three
+        s[(_REST + 3) * AT_ONCE + i] += s[_SEEN * AT_ONCE + i]
         slope, curve = colour * slope + detail * slope3, colour * curve + detail * curve3
-        if u != zero:
-            halves[x, side, 0] += slope
-            halves[x, side, 1] += curve
-        if v != zero:
-            halves[x, end, 0] += slope
-            halves[x, end, 1] += curve
+        s[_HALVES * AT_ONCE + i] += left * slope
+        s[(_HALVES + 1) * AT_ONCE + i] += left * curve
+        s[(_HALVES + 2) * AT_ONCE + i] += right * slope
+        s[(_HALVES + 3) * AT_ONCE + i] += right * curve
+        s[(_HALVES + 4) * AT_ONCE + i] += above * slope
+        s[(_HALVES + 5) * AT_ONCE + i] += above * curve
+        s[(_HALVES + 6) * AT_ONCE + i] += below * slope
+        s[(_HALVES + 7) * AT_ONCE + i] += below * curve
 
 
 @njit(parallel=True, cache=True, fastmath=EXACT, error_model="numpy")
@@ -337,15 +378,24 @@ def equations_and_evidence(
         The other maps of it.
     """
     W = disparity.shape[1]
+    mean, down, across = image
     colour, detail = views.shares[0] / views.scales2[0], views.shares[1] / views.scales2[1]
     for y in prange(begin, end):
-        sums, halves = np.zeros((W, 4), np.float32), np.zeros((W, 4, 2), np.float32)
-        more = np.zeros((W, 4), np.float32)
-        for n in range(len(views.places)):
-            _add_to_evidence(views, n, y, seeing, disparity, image, sums, halves, more)
-        for x in range(W):
-            gradient[y, x] = colour * sums[x, 0] + detail * sums[x, 2]
-            curvature[y, x] = colour * sums[x, 1] + detail * sums[x, 3]
-            for i in range(4):
-                all_halves[i, 0, y, x], all_halves[i, 1, y, x] = halves[x, i, 0], halves[x, i, 1]
-                rest[i, y, x] = more[x, i]
+        s = np.empty(_LINES * AT_ONCE, np.float32)
+        for x in range(0, W, AT_ONCE):
+            count = min(AT_ONCE, W - x)
+            _load(mean, y, x, s, _OWN, count)
+            _load(down, y, x, s, _SLOPE_DOWN, count)
+            _load(across, y, x, s, _SLOPE_ACROSS, count)
+            s[_SUMS * AT_ONCE :] = np.float32(0)
+            for n in range(len(views.places)):
+                _sample(views, n, y, x, seeing, disparity, s, count)
+                _add_to_evidence(s, views.baselines[n, 0], views.baselines[n, 1], views.scales2, views.shares, count)
+            for i in range(count):
+                slope, curve, slope3, curve3 = _four(s, _SUMS, i)
+                gradient[y, x + i] = colour * slope + detail * slope3
+                curvature[y, x + i] = colour * curve + detail * curve3
+                for k in range(4):
+                    all_halves[k, 0, y, x + i] = s[(_HALVES + 2 * k) * AT_ONCE + i]
+                    all_halves[k, 1, y, x + i] = s[(_HALVES + 2 * k + 1) * AT_ONCE + i]
+                    rest[k, y, x + i] = s[(_REST + k) * AT_ONCE + i]
