@@ -16,6 +16,8 @@ from typing import Any
 
 import numpy as np
 
+from numpy.lib.stride_tricks import as_strided
+
 from sepi.compiled import njit, prange
 
 EXACT = {"nnan", "ninf", "nsz"}
@@ -49,14 +51,20 @@ def _mirrored(i: int, n: int) -> int:
     return min(i, period - i)
 
 
-@njit(inline="always")
-def _add_weighted(row: Any, weight: Any, out: Any) -> None:
+@njit(forceinline=True)
+def _weighted(lines: Any, out: Any, reach: int) -> None:
+    """The convolution across lines, by their numbers: ``lines[k, x]`` weighted with the filter, summed over ``k``."""
+    middle = np.int64(_FULL_REACH)
     for x in range(out.size):
-        out[x] += weight * np.float32(row[x])
+        total = _FILTER[middle - reach] * lines[0, x]
+        # how many is known when this is compiled, and all of it becomes one loop over vectors
+        for k in range(1, 2 * reach + 1):
+            total += _FILTER[middle - reach + k] * lines[k, x]
+        out[x] = total
 
 
-@njit(cache=True, fastmath=EXACT)
-def _coefficient_row(rows: Any, padded: Any, out: Any) -> None:
+@njit(forceinline=True)
+def _coefficient_row(rows: Any, padded: Any, out: Any, reach: int) -> None:
     """Coefficients of one row.
 
     Parameters
@@ -67,20 +75,18 @@ def _coefficient_row(rows: Any, padded: Any, out: Any) -> None:
         Scratch.
     out : ndarray, shape (W + 2 MARGIN,), float32
         Filled.
+    reach : int
+        A number that is known when this is compiled.
     """
-    taps, W = rows.shape
-    side = MARGIN + taps // 2
-    weights = _FILTER[_FULL_REACH - taps // 2 :]
+    W = rows.shape[1]
+    side = MARGIN + reach
     inner = padded[side : side + W]
-    inner[:] = 0
-    for k in range(taps):
-        _add_weighted(rows[k], weights[k], inner)
+    _weighted(rows, inner, reach)
     for x in range(side):
         padded[side - 1 - x] = inner[_mirrored(-1 - x, W)]
         padded[side + W + x] = inner[_mirrored(W + x, W)]
-    out[:] = 0
-    for k in range(taps):
-        _add_weighted(padded[k : k + out.size], weights[k], out)
+    shifted = as_strided(padded, (2 * reach + 1, out.size), (padded.itemsize, padded.itemsize))
+    _weighted(shifted, out, reach)
 
 
 @njit(inline="always")
@@ -108,7 +114,7 @@ def spline_coefficients(image: Any) -> Any:
     out = np.empty((H, W), np.float32)
     padded, row = np.empty(W + 2 * (MARGIN + _FULL_REACH), np.float32), np.empty(W + 2 * MARGIN, np.float32)
     for y in range(H):
-        _coefficient_row(rows[y : y + 2 * _FULL_REACH + 1], padded, row)
+        _coefficient_row(rows[y : y + 2 * _FULL_REACH + 1], padded, row, _FULL_REACH)
         out[y] = row[MARGIN : MARGIN + W]
     return out
 
@@ -150,9 +156,10 @@ def view_splines(
             _load_colours(colours[t, s, y], colour_unit / SPLINE_UNIT, rows[0, i], rows[1, i], rows[2, i])
             if channels > 3:
                 _load(detail[t, s, y - detail_low], detail_unit / SPLINE_UNIT, rows[3, i])
-        padded, row = np.empty(W + 2 * (MARGIN + REACH), np.float32), np.empty(W + 2 * MARGIN, np.float32)
+        padded, lines = np.empty(W + 2 * (MARGIN + REACH), np.float32), np.zeros((4, W + 2 * MARGIN), np.float32)
         for i in range(first, last):
             for c in range(channels):
-                _coefficient_row(rows[c, i - first : i - first + 2 * REACH + 1], padded, row)
-                for x in range(row.size):
-                    out[t, s, i, x, c] = np.int32(np.rint(row[x]))
+                _coefficient_row(rows[c, i - first : i - first + 2 * REACH + 1], padded, lines[c], REACH)
+            for x in range(W + 2 * MARGIN):
+                for c in range(4):
+                    out[t, s, i, x, c] = np.int32(np.rint(lines[c, x]))
