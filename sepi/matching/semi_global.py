@@ -34,6 +34,9 @@ HALF_CONFIDENT = 0.05
 ENOUGH_VIEWS = 25
 """Views from which on more make a mean cost no surer: what errs in it then errs in all of them."""
 
+BAND_BYTES = 2**22
+"""Of both volumes, in the rows that all paths go through before any goes on: they stay in the cache of all threads."""
+
 # times the radius of the window, where there are few
 _MOST_WIDENED = 2
 
@@ -130,7 +133,8 @@ def smooth_and_choose(
     # the volume is large: it goes, unless the caller holds it
     del cost
     penalties = parameters.small_penalty, parameters.large_penalty, parameters.colour_weakening
-    smoothed = semi_global(averaged, guide, *(np.float32(p) for p in penalties))
+    band = max(1, BAND_BYTES // (2 * averaged[0].nbytes))
+    smoothed = semi_global(averaged, guide, *(np.float32(p) for p in penalties), band)
     same = min(SAME_MINIMUM, SAME_SHARE * float(disparities[-1] - disparities[0]))
     disparity, margin = choose(smoothed, averaged, disparities, np.float32(same))
     margin = np.maximum(margin, 0)
