@@ -90,17 +90,24 @@ def _sample(views: RimViews, view: int, row: int, column: int, fy: Any, fx: Any,
     picture = views.pixels[views.places[view, 0], views.places[view, 1]]
     H, W, C = picture.shape
     down, across = _cubic(fy), _cubic(fx)
-    for c in range(C):
-        total = 0.0
-        for i in range(4):
-            line = picture[min(max(row - 1 + i, 0), H - 1)]
-            along = 0.0
-            for j in range(4):
-                along += across[j] * line[min(max(column - 1 + j, 0), W - 1), c]
-            total += down[i] * along
-        out[c] = total * views.units[view]
-    for c in range(C, 3):
-        out[c] = out[0]
+    rows = max(row - 1, 0), row, row + 1, min(row + 2, H - 1)
+    columns = max(column - 1, 0), column, column + 1, min(column + 2, W - 1)
+    red, green, blue = 0.0, 0.0, 0.0
+    # green and blue of a grey picture are its last channel, too
+    second, third = min(1, C - 1), min(2, C - 1)
+    for i in range(4):
+        line = picture[rows[i]]
+        r, g, b = 0.0, 0.0, 0.0
+        for j in range(4):
+            pixel = line[columns[j]]
+            r += across[j] * pixel[0]
+            g += across[j] * pixel[second]
+            b += across[j] * pixel[third]
+        red += down[i] * r
+        green += down[i] * g
+        blue += down[i] * b
+    unit = views.units[view]
+    out[0], out[1], out[2] = red * unit, green * unit, blue * unit
 
 
 @njit(parallel=True, cache=True)
