@@ -15,8 +15,14 @@ import numpy as np
 from sepi.compiled import njit, prange
 from sepi.lightfield import FloatMap
 
+# infinite costs are there, and stay
+EXACT = {"nnan", "nsz"}
+"""Fast-math flags that keep every rounding as written: see :mod:`sepi.matching.plane_sweep_kernels`."""
+
 # rows that one thread holds for all candidates: the volume of a block stays within a few MB
 _BLOCK = 16
+# columns whose costs are brought together
+_COLUMNS = 16
 
 
 @njit(parallel=True, cache=True)
@@ -66,28 +72,55 @@ def coarse_sweep(
         first = max(0, top - radius)
         last = min(H, bottom + radius)
         volume = np.empty((N, bottom - top, W), np.float32)
-        costs = np.empty((last - first, W), np.float32)
+        costs, sums = np.empty((last - first, W), np.float32), np.empty((last - first, W), np.float32)
+        seen = np.empty(W, np.float32)
         for n in range(N):
             for y in range(first, last):
-                _row_costs(reference, views, offsets, candidates[n], truncation, y, costs[y - first])
-            _box_mean(costs, first, top, H, radius, volume[n])
-        column = np.empty(N, np.float32)
+                _row_costs(reference, views, offsets, candidates[n], truncation, y, seen, costs[y - first])
+            _box_mean(costs, first, top, H, radius, sums, volume[n])
+        columns = np.empty((_COLUMNS, N), np.float32)
         for y in range(top, bottom):
-            for x in range(W):
-                column[:] = volume[:, y - top, x]
-                low, other, average, position = _valley(column)
-                lowest[y, x] = low
-                second[y, x] = other
-                mean[y, x] = average
-                disparity[y, x] = candidates[0] + position * sampling
+            for begin in range(0, W, _COLUMNS):
+                # what lies side by side in memory is fetched together
+                for n in range(N):
+                    for x in range(begin, min(W, begin + _COLUMNS)):
+                        columns[x - begin, n] = volume[n, y - top, x]
+                for x in range(begin, min(W, begin + _COLUMNS)):
+                    low, other, average, position = _valley(columns[x - begin])
+                    lowest[y, x] = low
+                    second[y, x] = other
+                    mean[y, x] = average
+                    disparity[y, x] = candidates[0] + position * sampling
     return lowest, second, mean, disparity
 
 
-@njit(cache=True)
-def _row_costs(reference: Any, views: Any, offsets: Any, candidate: Any, truncation: Any, y: int, cost: Any) -> None:
-    """Mean difference of a row over the views that see it; infinite where fewer than half do."""
+@njit(forceinline=True)
+def _add_level(here: Any, a: Any, b: Any, fx: Any, truncation: Any, out: Any, seen: Any) -> None:
+    """Add the differences of a run of pixels and samples on a row of a view; ``b`` begins one column after ``a``."""
+    for i in range(out.size):
+        out[i] += min(abs(here[i] - (a[i] + fx * (b[i] - a[i]))), truncation)
+        seen[i] += np.float32(1)
+
+
+@njit(forceinline=True)
+def _add_between(
+    here: Any, a: Any, b: Any, c: Any, d: Any, fy: Any, fx: Any, truncation: Any, out: Any, seen: Any
+) -> None:
+    """:func:`_add_level` of samples between two rows; ``c`` and ``d`` are below ``a`` and ``b``."""
+    for i in range(out.size):
+        upper = a[i] + fx * (b[i] - a[i])
+        lower = c[i] + fx * (d[i] - c[i])
+        out[i] += min(abs(here[i] - (upper + fy * (lower - upper))), truncation)
+        seen[i] += np.float32(1)
+
+
+@njit(cache=True, fastmath=EXACT, error_model="numpy")
+def _row_costs(
+    reference: Any, views: Any, offsets: Any, candidate: Any, truncation: Any, y: int, seen: Any, cost: Any
+) -> None:
+    """Mean difference of a row over the views that see it; infinite where fewer than half do. ``seen`` is scratch."""
     H, W = reference.shape
-    seen = np.zeros(W, np.float32)
+    seen[:] = 0
     cost[:] = 0
     for v in range(len(views)):
         down = y - candidate * offsets[v, 0]
@@ -101,46 +134,51 @@ def _row_costs(reference: Any, views: Any, offsets: Any, candidate: Any, truncat
             continue
         fy = np.float32(down - row)
         fx = np.float32(across - shift)
-        # slices, because indices with an offset keep the loop from being vectorised
-        part = cost[begin:end]
-        here = reference[y, begin:end]
-        a = views[v, row, begin + shift : end + shift]
-        b = views[v, row, begin + shift + 1 : end + shift + 1]
+        here, i, j = reference[y, begin:end], begin + shift, end + shift
+        part, number = cost[begin:end], seen[begin:end]
         if fy == 0:
-            for i in range(end - begin):
-                part[i] += min(abs(here[i] - (a[i] + fx * (b[i] - a[i]))), truncation)
+            _add_level(here, views[v, row, i:j], views[v, row, i + 1 : j + 1], fx, truncation, part, number)
+        elif fx == 0:
+            _add_level(here, views[v, row, i:j], views[v, row + 1, i:j], fy, truncation, part, number)
         else:
-            c = views[v, row + 1, begin + shift : end + shift]
-            d = views[v, row + 1, begin + shift + 1 : end + shift + 1]
-            for i in range(end - begin):
-                upper = a[i] + fx * (b[i] - a[i])
-                lower = c[i] + fx * (d[i] - c[i])
-                part[i] += min(abs(here[i] - (upper + fy * (lower - upper))), truncation)
-        seen[begin:end] += np.float32(1)
+            _add_between(
+                here, views[v, row, i:j], views[v, row, i + 1 : j + 1],
+                views[v, row + 1, i:j], views[v, row + 1, i + 1 : j + 1], fy, fx, truncation, part, number,
+            )  # fmt: skip
+    fewest, infinite = np.float32(len(views) / 2), np.float32(np.inf)
     for x in range(W):
-        cost[x] = cost[x] / seen[x] if 2 * seen[x] >= len(views) else np.float32(np.inf)
+        cost[x] = cost[x] / seen[x] if seen[x] >= fewest else infinite
 
 
-@njit(cache=True)
-def _box_mean(costs: Any, first: int, top: int, H: int, radius: int, out: Any) -> None:
-    """Mean of ``costs``, whose first row is row ``first`` of the picture, over the window; from row ``top`` on."""
+@njit(forceinline=True)
+def _add(row: Any, out: Any) -> None:
+    for x in range(out.size):
+        out[x] += row[x]
+
+
+@njit(cache=True, fastmath=EXACT, error_model="numpy")
+def _box_mean(costs: Any, first: int, top: int, H: int, radius: int, sums: Any, out: Any) -> None:
+    """Mean of ``costs``, whose first row is row ``first`` of the picture, over the window; from row ``top`` on.
+
+    ``sums``, of the shape of ``costs``, is scratch.
+    """
     rows, W = out.shape
-    sums = np.empty_like(costs)
     for r in range(costs.shape[0]):
         total = sums[r]
         total[:] = costs[r]
         for j in range(1, min(radius, W - 1) + 1):
-            total[j:] += costs[r, : W - j]
-            total[: W - j] += costs[r, j:]
+            _add(costs[r, : W - j], total[j:])
+            _add(costs[r, j:], total[: W - j])
     for r in range(rows):
         above = max(top + r - radius, 0)
         below = min(top + r + radius, H - 1)
-        out[r] = sums[above - first]
+        mean = out[r]
+        mean[:] = sums[above - first]
         for y in range(above + 1, below + 1):
-            out[r] += sums[y - first]
+            _add(sums[y - first], mean)
         for x in range(W):
             width = min(x + radius, W - 1) - max(x - radius, 0) + 1
-            out[r, x] /= np.float32((below - above + 1) * width)
+            mean[x] /= np.float32((below - above + 1) * width)
 
 
 @njit(cache=True)
