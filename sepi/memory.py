@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import ctypes
+import sys
+from contextlib import suppress
+
 import numpy as np
 
 BLAS_BUFFER = 64_000_000
@@ -33,3 +37,13 @@ def require_memory(number: int) -> None:
         np.empty(number, np.uint8)
     except MemoryError as error:
         raise MemoryError(f"{number // 10**6} MB more are needed than a limit on this process leaves") from error
+
+
+def give_back_memory() -> None:
+    """Have the C library give back what arrays have freed, as far as the system's can.
+
+    glibc keeps free what lies below something that is in use, and what is made next mostly does not fit in there.
+    """
+    if sys.platform == "linux":
+        with suppress(AttributeError, OSError):
+            ctypes.CDLL(None).malloc_trim(0)

@@ -211,6 +211,8 @@ def second_order(
             mean = matching.mean(disparity)
         if last:
             told = gradient, information, _ = matching.with_evidence(mean, disparity)
+            # the solver has use for their memory
+            del matching, mean
         else:
             gradient, information = matching.gradient_and_hessian(mean, disparity)
         radius = parameters.solve_radius if smooth else parameters.refinement_radius

@@ -13,6 +13,7 @@ import numpy as np
 from sepi.exposure import equally_bright
 from sepi.kernel_cache import tell_kernel_cache
 from sepi.lightfield import LightField, require_light_field
+from sepi.memory import give_back_memory
 from sepi.matching.memory_limit import bytes_of_bands, require_memory_of
 from sepi.matching.unknown import with_unknown
 from sepi.stage import MadeBy, Progress, StageMaps, entry, no_progress
@@ -103,6 +104,7 @@ def estimate_depth(
 
         maps = STAGES[stage][choice].run(compared, maps, settings[stage], of_all)
         of_all(1.0)
+        give_back_memory()
     assert maps is not None  # there are stages
     name = variant if isinstance(variant, str) else next((key for key, one in VARIANTS.items() if one == variant), "")
     history = tuple(

@@ -19,7 +19,7 @@ from sepi.io.readers.formats import read
 from sepi.io.readers.options import ReadOptions, in_grid
 from sepi.kernel_cache import tell_kernel_cache
 from sepi.lightfield import DisparityRange, LightField
-from sepi.memory import KERNELS, require_memory
+from sepi.memory import KERNELS, give_back_memory, require_memory
 from sepi.validation import described, require_type
 
 # 16-bit views darker than this, a sixteenth of the full scale, hold fewer bits or next to no light
@@ -122,6 +122,8 @@ def read_light_field(
         from sepi.inspection.view_order import check_order as checked_order
 
         found.append(checked_order(light_field, options.order, views).warning())
+        del views
+        give_back_memory()
     if light_field.rig is not None and found[1:] and found[1]:
         raise SepiError(
             f"{path}: the views do not fit the poses, but would turned over; expected poses of cameras that look along "
