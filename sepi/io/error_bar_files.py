@@ -60,9 +60,12 @@ def bars_in_metres(maps: StageMaps, camera: Camera | None) -> dict[str, FloatMap
     }
 
 
-def write_error_bars(
-    folder: Path, maps: StageMaps, metres: Mapping[str, FloatMap], unknown: BoolMap
-) -> tuple[str, ...]:
+def names_of_error_bars(*, in_metres: bool) -> tuple[str, ...]:
+    """Names of the files of maps that have error bars, those of the depth among them or not."""
+    return (SIGMA_PFM, SIGMA_PNG, INTERVAL, *((DEPTH_SIGMA,) if in_metres else ()))
+
+
+def write_error_bars(folder: Path, maps: StageMaps, metres: Mapping[str, FloatMap], unknown: BoolMap) -> None:
     """Write the error bars of maps, where they have any; equal content gives equal bytes.
 
     Parameters
@@ -74,18 +77,13 @@ def write_error_bars(
     unknown : ndarray, shape (H, W), bool
         Pixels that no view knows anything about.
 
-    Returns
-    -------
-    tuple of str
-        Names of the files.
-
     Raises
     ------
     SepiError
         If they cannot be written.
     """
     if maps.sigma is None or maps.low is None or maps.high is None:
-        return ()
+        return
     write_pfm(folder / SIGMA_PFM, maps.sigma)
     write_png(folder / SIGMA_PNG, sigma_picture(maps.sigma, unknown))
     bounds: dict[str, Any] = {"low": maps.low, "high": maps.high}
@@ -93,10 +91,8 @@ def write_error_bars(
     with atomic_path(folder / INTERVAL) as temporary, temporary.open("wb") as file:
         # by name NumPy would put its own end to the temporary file's; it stamps no time
         np.savez(file, **{name: values.astype("<f4") for name, values in bounds.items()})
-    if not metres:
-        return SIGMA_PFM, SIGMA_PNG, INTERVAL
-    write_pfm(folder / DEPTH_SIGMA, metres["depth_sigma"])
-    return SIGMA_PFM, SIGMA_PNG, INTERVAL, DEPTH_SIGMA
+    if metres:
+        write_pfm(folder / DEPTH_SIGMA, metres["depth_sigma"])
 
 
 def sigma_picture(sigma: FloatMap, unknown: BoolMap | None = None) -> Picture:

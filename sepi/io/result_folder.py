@@ -6,6 +6,7 @@ docs/reference/outputs.md describes the files.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from types import NoneType
@@ -17,7 +18,7 @@ import numpy.typing as npt
 
 from sepi.camera import Camera
 from sepi.errors import SepiError
-from sepi.io.error_bar_files import bars_in_metres, write_error_bars
+from sepi.io.error_bar_files import bars_in_metres, names_of_error_bars, write_error_bars
 from sepi.io.files import atomic_files, atomic_folder, atomic_path
 from sepi.io.hdf5 import Attribute, attribute, open_hdf5, read_camera, read_dataset, read_rig, write_stage
 from sepi.io.images import write_png
@@ -31,6 +32,7 @@ from sepi.io.sound_maps import UNKNOWN, sound_maps
 from sepi.lightfield import BoolMap, FloatMap, LightField, require_light_field
 from sepi.rig import Rig
 from sepi.stage import ERROR_BARS, StageMaps
+from sepi.threads import available_cores
 from sepi.validation import described, is_finite, require_map, require_path, require_type
 
 # neutral grey is none of the colours of the scale
@@ -305,38 +307,57 @@ def _write_files(
     metres = bars_in_metres(maps, camera)
     if camera is not None:
         more |= {"depth": camera.depth(maps.disparity), **metres}
-        write_pfm(folder / DEPTH, more["depth"])
+    bars = () if maps.sigma is None else names_of_error_bars(in_metres=bool(metres))
+    has_rig = camera is not None and light_field.rig is not None
+    original = names_as_taken(with_sigma=maps.sigma is not None) if has_rig else ()
+    given = [*([] if camera is None else [DEPTH]), *bars, *original, *([] if seconds is None else [RUNTIME])]
+    names = (*RESULT_FILES[:-1], *given, *masks, RESULT)
+    unknown = maps.mask(UNKNOWN)
+    # pictures are packed outside Python's lock
+    with ThreadPoolExecutor(min(4, available_cores())) as pool:
+        written = [
+            pool.submit(_write_16bit, folder / "disparity_16bit.png", maps.disparity),
+            pool.submit(write_error_bars, folder, maps, metres, unknown),
+            pool.submit(_write_pictures, folder, maps, masks, unknown),
+            pool.submit(_write_numbers, folder, light_field, maps, more.get("depth"), seconds),
+        ]
+        everything = maps.updated(maps.disparity, maps.confidence, **more)
+        # of these a later result is sure that they are not a user's own
+        write_stage(folder / RESULT, everything, {**attributes, "files": " ".join(sorted((*names, *beside)))})
+        for one in written:
+            one.result()
+    write_as_taken(folder, light_field, maps.disparity, sigma=maps.sigma)
+    return names
+
+
+def _write_pictures(folder: Path, maps: StageMaps, masks: Mapping[str, BoolMap], unknown: BoolMap) -> None:
+    write_png(folder / "disparity.png", colour_code(maps.disparity, unknown))
+    write_png(folder / "confidence.png", _levels(maps.confidence))
+    for name, mask in masks.items():
+        write_png(folder / name, mask, _MASK_TEXT)
+
+
+def _write_numbers(
+    folder: Path, light_field: LightField, maps: StageMaps, depth: FloatMap | None, seconds: float | None
+) -> None:
+    if depth is not None:
+        write_pfm(folder / DEPTH, depth)
     if seconds is not None:
         with atomic_path(folder / RUNTIME) as temporary:
             temporary.write_text(f"{seconds:.3f}\n", encoding="ascii")
     write_pfm(folder / "disparity.pfm", maps.disparity)
     with atomic_path(folder / "disparity.npy") as temporary, temporary.open("wb") as file:
         np.save(file, maps.disparity.astype("<f4"), allow_pickle=False)
-    _write_16bit(folder / "disparity_16bit.png", maps.disparity)
-    unknown = maps.mask(UNKNOWN)
-    write_png(folder / "disparity.png", colour_code(maps.disparity, unknown))
-    write_png(folder / "confidence.png", _levels(maps.confidence))
     cloud = point_cloud(
-        view,
+        light_field.views[light_field.reference_position],
         maps.disparity,
-        camera=camera,
+        camera=light_field.camera,
         from_centre=light_field.from_centre,
-        unknown=unknown,
+        unknown=maps.mask(UNKNOWN),
         rig=light_field.reference_rig,
         sigma=maps.sigma,
     )
     write_ply(folder / "points.ply", cloud)
-    bars = write_error_bars(folder, maps, metres, unknown)
-    for name, mask in masks.items():
-        write_png(folder / name, mask, _MASK_TEXT)
-    taken = write_as_taken(folder, light_field, maps.disparity, sigma=maps.sigma)
-    original = names_as_taken(with_sigma=maps.sigma is not None) if taken else ()
-    given = [*([] if camera is None else [DEPTH]), *bars, *original, *([] if seconds is None else [RUNTIME])]
-    names = (*RESULT_FILES[:-1], *given, *masks, RESULT)
-    everything = maps.updated(maps.disparity, maps.confidence, **more)
-    # of these a later result is sure that they are not a user's own
-    write_stage(folder / RESULT, everything, {**attributes, "files": " ".join(sorted((*names, *beside)))})
-    return names
 
 
 def write_as_taken(
