@@ -16,10 +16,13 @@ import numba
 from numba import prange, types
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 from numba.core.registry import cpu_target
+from numba.core.runtime import nrtdynmod
 from numba.core.runtime.nrt import rtsys
 from numba.extending import intrinsic
 
 __all__ = ["fma", "njit", "prange", "prepare_loading"]
+
+_compile_runtime: Any = nrtdynmod.compile_nrt_functions
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
@@ -51,11 +54,43 @@ class _KernelCache(FunctionCache):  # type: ignore[misc, unused-ignore]
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """What was compiled for a signature; None where there is nothing."""
-        # the functions of reference counts, which every kernel is linked with
-        rtsys.initialize(target_context)
+        _initialize(target_context)
         with self._guard_against_spurious_io_errors(), _names_unlisted(target_context.codegen()._engine):
             return self._load_overload(sig, target_context)  # type: ignore[no-untyped-call, unused-ignore]
         return None
+
+
+class _Runtime(type(rtsys)):  # type: ignore[misc, unused-ignore]
+    """Numba's functions of reference counts, which are compiled when a kernel is to be linked with them.
+
+    Compiled code has its own copy of those that it calls: a process that compiles nothing leaves out 30 ms and as many
+    megabytes.
+    """
+
+    _context: Any
+    _library: Any
+
+    @property
+    def library(self) -> Any:
+        """The library of these functions."""
+        self._init_guard()  # type: ignore[no-untyped-call, unused-ignore]
+        if self._library is None:
+            self._library = _compile_runtime(self._context)
+        return self._library
+
+
+def _initialize(context: Any) -> None:
+    """Make the functions of reference counts known to the compiler."""
+    runtime: Any = rtsys
+    if runtime._init:
+        return
+    runtime.__class__, runtime._context = _Runtime, context
+    compiler: Any = nrtdynmod
+    compiler.compile_nrt_functions = lambda _context: None
+    try:
+        runtime.initialize(context)
+    finally:
+        compiler.compile_nrt_functions = _compile_runtime
 
 
 class _Names(set[str]):
@@ -120,6 +155,6 @@ fma: Any = intrinsic(_multiply_add)
 
 def prepare_loading() -> None:
     """Do what loading the first compiled kernel would begin with, for processes that are forks of this one."""
-    rtsys.initialize(cpu_target.target_context)
+    _initialize(cpu_target.target_context)
     # all that it knows, since compiled code refers to some of it
     cpu_target.target_context.refresh()

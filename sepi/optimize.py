@@ -19,7 +19,7 @@ References
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, NamedTuple, Self
 
 import cv2
 import numpy as np
@@ -30,8 +30,8 @@ from sepi.error_bars.bars import error_bars
 from sepi.error_bars.calibration import SECOND_ORDER, WLS, Calibration
 from sepi.error_bars.cues import cues_of_map, cues_of_stage_before, cues_of_views
 from sepi.image.noise import residual_variance
-from sepi.lightfield import FloatMap, LightField
-from sepi.matching.base_detail import BaseDetailParameters
+from sepi.lightfield import BoolMap, FloatMap, LightField
+from sepi.matching.base_detail import BaseDetailParameters, forget_detail
 from sepi.matching.denoising import denoised, measured_noise
 from sepi.matching.view_subsets import spread_views
 from sepi.regularization.wls import (
@@ -187,17 +187,12 @@ def second_order(
     True
     """
     from sepi.matching.gauss_newton import GaussNewton, windowed_step
-    from sepi.regularization.local_inverse import inverse_diagonal
-    from sepi.regularization.second_order import colour_changes
 
     before, given = require_previous(previous), light_field
     light_field = denoised(light_field, parameters.denoising, parameters.least_noise)
     disparity = before.disparity
     uniform = before.mask("textureless")
-    reliability = np.where(uniform, 1, reliable(before.confidence, parameters)).astype(np.float32)
-    guide = light_field.reference_view
-    colours = colour_changes(guide)
-    colour_variance = parameters.smooth_colour**2 + 4 * residual_variance(guide)
+    prior, variance = _prior(light_field.reference_view, before.confidence, uniform, parameters), None
     lowest, highest = light_field.require_disparity_range().candidates(2)
     total = parameters.refinements + parameters.solves
     for i in range(total):
@@ -210,6 +205,7 @@ def second_order(
             # other steps are too small to change it
             mean = matching.mean(disparity)
         if last:
+            forget_detail(light_field)
             told = gradient, information, _ = matching.with_evidence(mean, disparity)
             # the solver has use for their memory
             del matching, mean
@@ -220,17 +216,9 @@ def second_order(
         # where no view knows anything, a step would follow the noise
         target = np.clip(disparity + np.where(uniform, np.float32(0), step), lowest, highest)
         if smooth:
-            unit = max(float(np.percentile(curvature, 90)), 1e-9)
-            weight = np.minimum(curvature / unit, 1) * reliability
-            weight = np.where(uniform, np.float32(UNIFORM_WEIGHT), weight)
             threshold = _threshold(disparity, parameters, first=i == parameters.refinements)
-            smoothness = _smoothness(disparity, colours, reliability, colour_variance, threshold, parameters.strength)
-            target = _smoothed(
-                target, weight, smoothness, parameters.rtol if last else parameters.first_rtol, parameters
-            )
+            target, variance = _smoothed(target, curvature, disparity, prior, threshold, parameters, last=last)
         disparity = np.clip(target, lowest, highest)
-    # of the last step
-    variance = inverse_diagonal(weight, smoothness) / np.float32(unit) if smooth else None
     return _with_bars(given, before, disparity, told, variance, SECOND_ORDER)
 
 
@@ -279,33 +267,63 @@ def _threshold(disparity: FloatMap, parameters: SecondOrderParameters, first: bo
     return min(max(parameters.roughness_factor * upper_quartile(disparity), low), high)
 
 
-def _smoothness(
-    shape: FloatMap,
-    colours: list[npt.NDArray[np.float64]],
-    reliability: FloatMap,
-    colour_variance: float,
-    threshold: float,
-    strength: float,
-) -> list[npt.NDArray[np.float64]]:
-    """Weights of second differences: little where ``shape`` has a discontinuity, or the colours change."""
-    from sepi.regularization.second_order import smoothness_weights
+class _Prior(NamedTuple):
+    """What is known of a map's smoothness in all rounds.
 
-    weights = smoothness_weights(shape, colours, reliability, threshold, colour_variance)
-    return [strength * weight + LEAST_SMOOTHNESS for weight in weights]
+    Attributes
+    ----------
+    uniform : ndarray, shape (H, W), bool
+        Pixels that no view knows anything about.
+    reliability : ndarray, shape (H, W), float32
+        0..1.
+    colours : list of ndarray
+        Of :func:`sepi.regularization.second_order.colour_changes`.
+    colour_variance : float
+        Squared change of colour that weakens smoothness.
+    """
+
+    uniform: BoolMap
+    reliability: FloatMap
+    colours: list[npt.NDArray[np.float64]]
+    colour_variance: float
+
+
+def _prior(guide: FloatMap, confidence: FloatMap, uniform: BoolMap, parameters: SecondOrderParameters) -> _Prior:
+    from sepi.regularization.second_order import colour_changes
+
+    reliability = np.where(uniform, 1, reliable(confidence, parameters)).astype(np.float32)
+    variance = parameters.smooth_colour**2 + 4 * residual_variance(guide)
+    return _Prior(uniform, reliability, colour_changes(guide), variance)
 
 
 def _smoothed(
     target: FloatMap,
-    weight: FloatMap,
-    smoothness: list[npt.NDArray[np.float64]],
-    rtol: float,
+    curvature: FloatMap,
+    shape: FloatMap,
+    prior: _Prior,
+    threshold: float,
     parameters: SecondOrderParameters,
-) -> FloatMap:
-    """Second-order smoothing of ``target``, weighted; the solver stops at the relative residual ``rtol``."""
-    from sepi.regularization.second_order import second_difference_stencil, solve_smooth
+    *,
+    last: bool,
+) -> tuple[FloatMap, FloatMap | None]:
+    """Second-order smoothing of ``target``, of inverse variance ``curvature``; and, the last time, its variance.
 
+    There is little of it where ``shape``, the map so far, has a second difference beyond the threshold, or the colours
+    change.
+    """
+    from sepi.regularization.local_inverse import inverse_diagonal
+    from sepi.regularization.second_order import second_difference_stencil, smoothness_weights, solve_smooth
+
+    unit = max(float(np.percentile(curvature, 90)), 1e-9)
+    weight = np.minimum(curvature / unit, 1) * prior.reliability
+    weight = np.where(prior.uniform, np.float32(UNIFORM_WEIGHT), weight)
+    changes = smoothness_weights(shape, prior.colours, prior.reliability, threshold, prior.colour_variance)
+    smoothness = [parameters.strength * change + LEAST_SMOOTHNESS for change in changes]
+    del changes
     stencil = second_difference_stencil(smoothness, target.shape)
-    return solve_smooth(stencil, weight, target, rtol, parameters.max_iterations)
+    rtol = parameters.rtol if last else parameters.first_rtol
+    solution = solve_smooth(stencil, weight, target, rtol, parameters.max_iterations)
+    return solution, inverse_diagonal(weight, smoothness) / np.float32(unit) if last else None
 
 
 CHOICES = {

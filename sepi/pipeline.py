@@ -13,9 +13,9 @@ import numpy as np
 from sepi.exposure import equally_bright
 from sepi.kernel_cache import tell_kernel_cache
 from sepi.lightfield import LightField, require_light_field
-from sepi.memory import give_back_memory
 from sepi.matching.memory_limit import bytes_of_bands, require_memory_of
 from sepi.matching.unknown import with_unknown
+from sepi.memory import give_back_memory
 from sepi.stage import MadeBy, Progress, StageMaps, entry, no_progress
 from sepi.validation import require_type
 from sepi.variants import DEFAULT_VARIANT, HANDED_ON, STAGES, VARIANTS, Variant, stage_parameters, variant_named

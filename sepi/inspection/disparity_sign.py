@@ -102,8 +102,8 @@ class Look(Enum):
 def occlusion_evidence(light_field: LightField, trial: Trial, look: Look, views: Views) -> Evidence:
     """Whether the surface of the greater disparity is the one in front.
 
-    ``views`` are those of the trial, whose best layout is taken for right; the sign is that of the layout's first order. There is no evidence
-    where there are no views on opposite sides, or hardly any contrast.
+    ``views`` are those of the trial, whose best layout is taken for right; the sign is that of the layout's first
+    order. There is no evidence where there are no views on opposite sides, or hardly any contrast.
     """
     views = views.again(light_field, _MOST_PIXELS)
     order = next(iter(trial.best))

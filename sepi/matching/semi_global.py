@@ -132,9 +132,11 @@ def smooth_and_choose(
     averaged = aggregate(cost, guide, parameters.window_radius, variance)
     # the volume is large: it goes, unless the caller holds it
     del cost
-    penalties = parameters.small_penalty, parameters.large_penalty, parameters.colour_weakening
+    small, large, weakening = map(
+        np.float32, (parameters.small_penalty, parameters.large_penalty, parameters.colour_weakening)
+    )
     band = max(1, BAND_BYTES // (2 * averaged[0].nbytes))
-    smoothed = semi_global(averaged, guide, *(np.float32(p) for p in penalties), band)
+    smoothed = semi_global(averaged, guide, small, large, weakening, band)
     same = min(SAME_MINIMUM, SAME_SHARE * float(disparities[-1] - disparities[0]))
     disparity, margin = choose(smoothed, averaged, disparities, np.float32(same))
     margin = np.maximum(margin, 0)

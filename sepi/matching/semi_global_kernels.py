@@ -28,6 +28,8 @@ VECTOR = 8
 
 _UNREACHABLE = np.float32(1e9)
 
+_cgutils: Any = cgutils
+
 
 @njit(forceinline=True)
 def _exp(x: Any) -> Any:
@@ -158,10 +160,10 @@ def _vector_next(context: Any, builder: Any, signature: Any, arguments: Any) -> 
         return builder.select(builder.fcmp_ordered("<", a, b, flags=flags), a, b)
 
     whole, jump, step = spread(least), spread(builder.fadd(least, large)), spread(small)
-    lowest = cgutils.alloca_once_value(builder, spread(ir.Constant(number, float(_UNREACHABLE))))
-    count = cgutils.unpack_tuple(builder, context.make_array(signature.args[2])(context, builder, cost).shape)[0]
+    lowest = _cgutils.alloca_once_value(builder, spread(ir.Constant(number, float(_UNREACHABLE))))
+    count = _cgutils.unpack_tuple(builder, context.make_array(signature.args[2])(context, builder, cost).shape)[0]
     zero, width = (ir.Constant(count.type, value) for value in (0, VECTOR))
-    with cgutils.for_range_slice(builder, zero, count, width, inc=True) as (k, _):
+    with _cgutils.for_range_slice(builder, zero, count, width, inc=True) as (k, _):
         following, beyond = (builder.add(k, ir.Constant(k.type, n)) for n in (1, 2))
         lower, same, higher = (builder.load(place(0, at), align=4) for at in (k, following, beyond))
         best = least_of(least_of(same, jump), builder.fadd(least_of(lower, higher), step))
@@ -183,9 +185,7 @@ def _vector_next(context: Any, builder: Any, signature: Any, arguments: Any) -> 
     return builder.extract_element(found, lane(0))
 
 
-def _typed_next(
-    _context: Any, before: Any, least: Any, cost: Any, small: Any, large: Any, path: Any, out: Any
-) -> Any:
+def _typed_next(_context: Any, before: Any, least: Any, cost: Any, small: Any, large: Any, path: Any, out: Any) -> Any:
     number = types.float32
     return number(before, number, cost, number, number, path, out), _vector_next
 

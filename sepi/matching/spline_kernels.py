@@ -15,7 +15,6 @@ import math
 from typing import Any
 
 import numpy as np
-
 from numpy.lib.stride_tricks import as_strided
 
 from sepi.compiled import njit, prange
