@@ -33,19 +33,15 @@ _cgutils: Any = cgutils
 
 @njit(forceinline=True)
 def _exp(x: Any) -> Any:
-    """``exp(x)`` of a number up to 0, to 2e-7 of it; 0 below -87. Of operations that there are on vectors, too."""
-    n = np.floor(x * np.float32(1.44269504) + np.float32(0.5))
-    f = fma(n, np.float32(-0.693359375), x)
-    f = fma(n, np.float32(2.12194440e-4), f)
-    p = fma(f, np.float32(1.9875691e-4), np.float32(1.3981999e-3))
-    p = fma(f, p, np.float32(8.3334519e-3))
-    p = fma(f, p, np.float32(4.1665796e-2))
-    p = fma(f, p, np.float32(1.6666666e-1))
-    p = fma(f, p, np.float32(0.5))
-    p = fma(f * f, p, f + np.float32(1))
+    """``exp(x)`` of a number up to 0, rounded to single precision; 0 below -87. Of what there is for vectors, too."""
+    n = np.floor(x * 1.4426950408889634 + 0.5)
+    f = (x - n * 0.693145751953125) - n * 1.42860682030941723212e-6
+    p = 1 + f * (1 / 8) * (1 + f * (1 / 9) * (1 + f * (1 / 10)))
+    p = 1 + f * (1 / 5) * (1 + f * (1 / 6) * (1 + f * (1 / 7) * p))
+    p = 1 + f * (1 + f * (1 / 2) * (1 + f * (1 / 3) * (1 + f * (1 / 4) * p)))
     # 2^n by its bits
-    power = np.int32((np.int32(max(n, np.float32(-126))) + np.int32(127)) << np.int32(23)).view(np.float32)
-    return p * power if x > np.float32(-87) else np.float32(0)
+    power = np.int32((np.int32(max(n, -126.0)) + np.int32(127)) << np.int32(23)).view(np.float32)
+    return np.float32(p * np.float64(power)) if x > -87 else np.float32(0)
 
 
 @njit(cache=True, fastmath=EXACT, error_model="numpy")
@@ -56,7 +52,7 @@ def _window_weights(guide: Any, y: int, radius: int, variance: Any, weights: Any
     """
     _, H, W = guide.shape
     size = 2 * radius + 1
-    falloff = np.float32(-0.5) / variance
+    width = 2 * np.float64(variance)
     weights[:] = 0
     total[:] = 0
     for i in range(max(0, radius - y), min(size, H - y + radius)):
@@ -70,7 +66,7 @@ def _window_weights(guide: Any, y: int, radius: int, variance: Any, weights: Any
             out, part = weights[i * size + j, first:last], total[first:last]
             for x in range(out.size):
                 distance = (r[x] - r2[x]) ** 2 + (g[x] - g2[x]) ** 2 + (b[x] - b2[x]) ** 2
-                out[x] = _exp(distance * falloff)
+                out[x] = _exp(-np.float64(distance) / width)
                 part[x] += out[x]
     for n in range(size * size):
         for x in range(W):
