@@ -62,9 +62,12 @@ def test_the_order_is_found_beside_the_spacing(order: str) -> None:
     numbers = ORDERS[order](np.arange(T * S).reshape(turned_grid))
     views = np.empty((T * S, *right.views.shape[2:]), right.views.dtype)
     views[numbers.ravel()] = right.views.reshape(views.shape)
-    read = settle_row_spacing(LightField(views.reshape(*turned_grid, *views.shape[1:]), "turned"))
+    turned = LightField(views.reshape(*turned_grid, *views.shape[1:]), "turned")
+    # as light fields are read: both look at the same views
+    looked_at = Views(turned)
+    read = settle_row_spacing(turned, looked_at)
     assert read.row_spacing == pytest.approx(0.5 if order.startswith("transpose") else 2, rel=0.03)
-    found = check_order(read)
+    found = check_order(read, views=looked_at)
     assert found.clear
     assert found.best == order
 

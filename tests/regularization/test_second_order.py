@@ -10,6 +10,7 @@ from scipy.sparse.linalg import spsolve
 from sepi.lightfield import DisparityRange, LightField
 from sepi.matching.base_detail import DETAIL_UNIT, BaseDetailParameters, base_detail_decomposition
 from sepi.matching.gauss_newton import GaussNewton, spline_derivatives, spline_views, windowed_step
+from sepi.matching.gauss_newton_kernels import AT_ONCE
 from sepi.matching.row_bands import Rows
 from sepi.matching.spline_kernels import MARGIN, SPLINE_UNIT, spline_coefficients
 from sepi.matching.visibility_kernels import z_buffers
@@ -101,13 +102,15 @@ def test_sums_over_the_views_equal_a_plain_twin(geometry: str) -> None:
     """Wrong visibility, weights or interpolation would bias the depth below the disparity sampling."""
     present = np.ones((3, 4), bool)
     present[1, 0] = False
-    colours = np.round(255 * np.random.default_rng(2).random((3, 4, 10, 12, 3))).astype(np.uint8)
+    # more than one piece of a row
+    shape = 10, AT_ONCE + 12
+    colours = np.round(255 * np.random.default_rng(2).random((3, 4, *shape, 3))).astype(np.uint8)
     known = DisparityRange(-1, 1, "given")
     standing_so = standing(geometry, (3, 4))
     light_field = LightField(colours, "random", present=present, disparity_range=known, **standing_so)
     parameters = BaseDetailParameters(colour_scale=0.3, detail_scale=0.2)
     decomposed = base_detail_decomposition(light_field, parameters)
-    disparity = np.random.default_rng(3).uniform(-0.9, 0.9, (10, 12)).astype(np.float32)
+    disparity = np.random.default_rng(3).uniform(-0.9, 0.9, shape).astype(np.float32)
     matching = GaussNewton(light_field, parameters, 0.2)
     mean = matching.mean(disparity)
     gradient, curvature = matching.gradient_and_hessian(mean, disparity)
