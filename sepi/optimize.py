@@ -205,6 +205,7 @@ def second_order(
             # other steps are too small to change it
             mean = matching.mean(disparity)
         if last:
+            # the splines have it
             forget_detail(light_field)
             told = gradient, information, _ = matching.with_evidence(mean, disparity)
             # the solver has use for their memory

@@ -60,8 +60,10 @@ def bars_in_metres(maps: StageMaps, camera: Camera | None) -> dict[str, FloatMap
     }
 
 
-def names_of_error_bars(*, in_metres: bool) -> tuple[str, ...]:
-    """Names of the files of maps that have error bars, those of the depth among them or not."""
+def names_of_error_bars(maps: StageMaps, *, in_metres: bool) -> tuple[str, ...]:
+    """Names of the files of error bars, those of the depth among them or not; none where maps have no bars."""
+    if maps.sigma is None or maps.low is None or maps.high is None:
+        return ()
     return (SIGMA_PFM, SIGMA_PNG, INTERVAL, *((DEPTH_SIGMA,) if in_metres else ()))
 
 

@@ -307,9 +307,9 @@ def _write_files(
     metres = bars_in_metres(maps, camera)
     if camera is not None:
         more |= {"depth": camera.depth(maps.disparity), **metres}
-    bars = () if maps.sigma is None else names_of_error_bars(in_metres=bool(metres))
-    has_rig = camera is not None and light_field.rig is not None
-    original = names_as_taken(with_sigma=maps.sigma is not None) if has_rig else ()
+    bars = names_of_error_bars(maps, in_metres=bool(metres))
+    taken = write_as_taken(folder, light_field, maps.disparity, sigma=maps.sigma)
+    original = names_as_taken(with_sigma=maps.sigma is not None) if taken else ()
     given = [*([] if camera is None else [DEPTH]), *bars, *original, *([] if seconds is None else [RUNTIME])]
     names = (*RESULT_FILES[:-1], *given, *masks, RESULT)
     unknown = maps.mask(UNKNOWN)
@@ -326,7 +326,6 @@ def _write_files(
         write_stage(folder / RESULT, everything, {**attributes, "files": " ".join(sorted((*names, *beside)))})
         for one in written:
             one.result()
-    write_as_taken(folder, light_field, maps.disparity, sigma=maps.sigma)
     return names
 
 

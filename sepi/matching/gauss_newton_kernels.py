@@ -291,6 +291,26 @@ def _add_to_equations(s: Any, v: Any, u: Any, scales2: Any, count: int) -> None:
         s[(_SUMS + 3) * AT_ONCE + i] += curve3
 
 
+@njit(forceinline=True)
+def _begin_equations(image: Any, y: int, x: int, s: Any, count: int) -> None:
+    """The mean of the views and its derivatives in a piece of row ``y``, and sums of nothing."""
+    mean, down, across = image
+    _load(mean, y, x, s, _OWN, count)
+    _load(down, y, x, s, _SLOPE_DOWN, count)
+    _load(across, y, x, s, _SLOPE_ACROSS, count)
+    s[_SUMS * AT_ONCE :] = np.float32(0)
+
+
+@njit(forceinline=True)
+def _write_equations(s: Any, views: SplineViews, y: int, x: int, count: int, gradient: Any, curvature: Any) -> None:
+    """The sums of a piece of row ``y``, colours and detail by their shares."""
+    colour, detail = views.shares[0] / views.scales2[0], views.shares[1] / views.scales2[1]
+    for i in range(count):
+        slope, curve, slope3, curve3 = _four(s, _SUMS, i)
+        gradient[y, x + i] = colour * slope + detail * slope3
+        curvature[y, x + i] = colour * curve + detail * curve3
+
+
 @njit(parallel=True, cache=True, fastmath=EXACT, error_model="numpy")
 def normal_equations(
     views: SplineViews, seeing: Seeing, disparity: Any, image: Any, begin: int, end: int, gradient: Any, curvature: Any
@@ -307,23 +327,15 @@ def normal_equations(
         Filled in these rows. Their ratio is the update towards less cost, in pixels per view step.
     """
     W = disparity.shape[1]
-    mean, down, across = image
-    colour, detail = views.shares[0] / views.scales2[0], views.shares[1] / views.scales2[1]
     for y in prange(begin, end):
         s = np.empty(_LINES * AT_ONCE, np.float32)
         for x in range(0, W, AT_ONCE):
             count = min(AT_ONCE, W - x)
-            _load(mean, y, x, s, _OWN, count)
-            _load(down, y, x, s, _SLOPE_DOWN, count)
-            _load(across, y, x, s, _SLOPE_ACROSS, count)
-            s[_SUMS * AT_ONCE :] = np.float32(0)
+            _begin_equations(image, y, x, s, count)
             for n in range(len(views.places)):
                 _sample(views, n, y, x, seeing, disparity, s, count)
                 _add_to_equations(s, views.baselines[n, 0], views.baselines[n, 1], views.scales2, count)
-            for i in range(count):
-                slope, curve, slope3, curve3 = _four(s, _SUMS, i)
-                gradient[y, x + i] = colour * slope + detail * slope3
-                curvature[y, x + i] = colour * curve + detail * curve3
+            _write_equations(s, views, y, x, count, gradient, curvature)
 
 
 @njit(cache=True, fastmath=EXACT, error_model="numpy")
@@ -378,23 +390,16 @@ def equations_and_evidence(
         The other maps of it.
     """
     W = disparity.shape[1]
-    mean, down, across = image
-    colour, detail = views.shares[0] / views.scales2[0], views.shares[1] / views.scales2[1]
     for y in prange(begin, end):
         s = np.empty(_LINES * AT_ONCE, np.float32)
         for x in range(0, W, AT_ONCE):
             count = min(AT_ONCE, W - x)
-            _load(mean, y, x, s, _OWN, count)
-            _load(down, y, x, s, _SLOPE_DOWN, count)
-            _load(across, y, x, s, _SLOPE_ACROSS, count)
-            s[_SUMS * AT_ONCE :] = np.float32(0)
+            _begin_equations(image, y, x, s, count)
             for n in range(len(views.places)):
                 _sample(views, n, y, x, seeing, disparity, s, count)
                 _add_to_evidence(s, views.baselines[n, 0], views.baselines[n, 1], views.scales2, views.shares, count)
+            _write_equations(s, views, y, x, count, gradient, curvature)
             for i in range(count):
-                slope, curve, slope3, curve3 = _four(s, _SUMS, i)
-                gradient[y, x + i] = colour * slope + detail * slope3
-                curvature[y, x + i] = colour * curve + detail * curve3
                 for k in range(4):
                     all_halves[k, 0, y, x + i] = s[(_HALVES + 2 * k) * AT_ONCE + i]
                     all_halves[k, 1, y, x + i] = s[(_HALVES + 2 * k + 1) * AT_ONCE + i]

@@ -94,18 +94,12 @@ def _add_weighted(costs: Any, weights: Any, out: Any) -> None:
 
 @njit(forceinline=True)
 def _any_window_sum(rows: Any, weights: Any, out: Any, radius: int) -> None:
-    """:func:`_window_sum` of a radius that nobody knew."""
+    """:func:`_window_sum` of any radius."""
     size = 2 * radius + 1
     out[:] = 0
     for i in range(size):
         for j in range(size):
             _add_weighted(rows[i, j : j + out.size], weights[i * size + j], out)
-
-
-@njit(forceinline=True)
-def _planes(guide: Any) -> Any:
-    """A picture (H, W, 3) as (3, H, W)."""
-    return np.ascontiguousarray(guide.transpose(2, 0, 1))
 
 
 @njit(parallel=True, cache=True, fastmath=EXACT, error_model="numpy")

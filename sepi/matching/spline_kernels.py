@@ -53,12 +53,11 @@ def _mirrored(i: int, n: int) -> int:
 @njit(forceinline=True)
 def _weighted(lines: Any, out: Any, reach: int) -> None:
     """The convolution across lines, by their numbers: ``lines[k, x]`` weighted with the filter, summed over ``k``."""
-    middle = np.int64(_FULL_REACH)
     for x in range(out.size):
-        total = _FILTER[middle - reach] * lines[0, x]
+        total = _FILTER[_FULL_REACH - reach] * lines[0, x]
         # how many is known when this is compiled, and all of it becomes one loop over vectors
         for k in range(1, 2 * reach + 1):
-            total += _FILTER[middle - reach + k] * lines[k, x]
+            total += _FILTER[_FULL_REACH - reach + k] * lines[k, x]
         out[x] = total
 
 
