@@ -106,7 +106,7 @@ class SmoothedResult:
 
 
 def smooth_and_choose(
-    cost: FloatMap, disparities: FloatMap, guide: FloatMap, noise: float, parameters: SmoothingParameters
+    cost: FloatMap, disparities: FloatMap, guide: FloatMap, contrast: float, parameters: SmoothingParameters
 ) -> SmoothedResult:
     """Average, smooth, and take the best candidate of each pixel.
 
@@ -118,8 +118,9 @@ def smooth_and_choose(
         Uniform, pixels per view step.
     guide : ndarray, shape (H, W, 3), float32
         Reference view, 0..1.
-    noise : float
-        Expected squared residual by noise, summed over RGB; widens the window's colour weights.
+    contrast : float
+        Expected squared difference of two pixels of one surface, summed over RGB: of noise, and of texture; widens the
+        window's colour weights.
     parameters : SmoothingParameters
 
     Returns
@@ -128,7 +129,7 @@ def smooth_and_choose(
     """
     from sepi.matching.semi_global_kernels import aggregate, choose, semi_global
 
-    variance = np.float32(parameters.window_sigma**2 + noise)
+    variance = np.float32(parameters.window_sigma**2 + contrast)
     averaged = aggregate(cost, guide, parameters.window_radius, variance)
     # the volume is large: it goes, unless the caller holds it
     del cost

@@ -19,7 +19,7 @@ from sepi.image.noise import variance_of_residuals
 from sepi.lightfield import BoolMap, FloatMap, LightField
 from sepi.matching.base_detail import BaseDetailParameters, ColourScale, base_detail_decomposition, reference_noise
 from sepi.matching.candidates import CandidateParameters, CandidateRule, number_field
-from sepi.matching.denoising import guide_of
+from sepi.matching.denoising import DenoisedLightField, guide_of
 from sepi.matching.gaps import GapParameters, with_open_gaps
 from sepi.matching.nearest_surfaces import nearest_surfaces
 from sepi.matching.row_bands import Band, row_bands
@@ -36,6 +36,12 @@ ROWS_PER_REPORT = 128
 
 CANDIDATES = CandidateRule(usual=91, finest=0.03, coarsest=0.4, volume_bytes=2**30)
 """The optimisation goes back to the views, so these need not be as fine as the paper's."""
+
+TEXTURE = 1.85
+"""Times what the noise mask sees of the reference view: by so much colours of one surface may differ in a window.
+
+In views without noise it sees texture, and in a window of pixels of one's own colour alone that tells little.
+"""
 
 BYTES_PER_CANDIDATE = 8
 """Of each pixel: two at a time of the costs, their averages, and these smoothed."""
@@ -215,14 +221,21 @@ def _sweep(
     # not held by a name: it goes as soon as it has been used
     volume = [cost]
     del cost
-    noise = variance_of_residuals(reference_noise(light_field), guide.shape[2])
+    variance = variance_of_residuals(_contrast_of_surfaces(light_field), guide.shape[2])
     shown = light_field.present
     if light_field.missing is not None:
         shown = shown & ~light_field.missing.all(axis=(2, 3))
     smoothing = parameters.for_views(int(shown.sum()))
-    result = smooth_and_choose(volume.pop(), disparities, guide, noise, smoothing)
+    result = smooth_and_choose(volume.pop(), disparities, guide, variance, smoothing)
     progress(1.0)
     return result
+
+
+def _contrast_of_surfaces(light_field: LightField) -> float:
+    """Standard deviation of one channel by which colours of a surface differ: what is left of noise, or texture."""
+    noise = reference_noise(light_field)
+    # the guide of denoised views is freed of both
+    return noise if isinstance(light_field, DenoisedLightField) else TEXTURE * noise
 
 
 def _add_costs(

@@ -36,6 +36,8 @@ _SIDEWAYS = 0.5
 _SIDES = 3
 # share of the pixels round a reflection that lie on the floor; the others lie before it
 _BESIDE = 0.2
+# share of them from which on they lie behind it, too: what goes on behind a plane on most sides is no picture in it
+_AROUND_BEHIND = 0.6
 # share of strong edges in a reflection, times that of the floor, from which on it is none
 _FAINT = 0.7
 # times to fit a plane to the edges that lie on it
@@ -160,9 +162,11 @@ def seen_in(floor: FloatMap, disparity: FloatMap, edges: BoolMap, parameters: Fl
     faint = _means(parts.labels, edges, count) < _FAINT * edges[on].mean()
     # whichever of two parts that meet in a corner has the pixels between them; exact up to 2^24 parts
     largest = cv2.dilate(parts.labels.astype(np.float32), np.ones((3, 3), np.uint8)).astype(np.int32)
+    around = np.where(parts.labels > 0, 0, largest)
     # a part that has nothing beside it fills a picture
-    beside = _means(np.where(parts.labels > 0, 0, largest), on, count) >= _BESIDE
-    return np.asarray(np.append(False, deep & faint & beside)[parts.labels])
+    beside = _means(around, on, count) >= _BESIDE
+    framed = _means(around, behind >= parameters.floor_tolerance, count) < _AROUND_BEHIND
+    return np.asarray(np.append(False, deep & faint & beside & framed)[parts.labels])
 
 
 def _means(labels: npt.NDArray[np.int32], values: FloatMap | BoolMap, count: int) -> npt.NDArray[np.float64]:

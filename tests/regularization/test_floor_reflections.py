@@ -71,3 +71,16 @@ def test_what_is_seen_past_the_edge_of_a_table_stays() -> None:
     found, mirrored = put_back(view, depth)
     assert mirrored[tiles & (X < 46)].any()
     assert np.array_equal(found[beyond], depth[beyond])
+
+
+def test_a_wall_behind_one_thing_on_the_ground_stays() -> None:
+    """The plane of what stands before a wall cuts the wall; what of it lies behind the plane is no picture in it."""
+    plane = (FLOOR + 0.015 * (X - SIZE / 2)).astype(np.float32)
+    thing = (Y >= 80) & (X >= 58) & (X < 80)
+    wall = np.full((SIZE, SIZE), -1, np.float32)
+    view = np.where(thing, np.random.default_rng(0).uniform(0, 1, (SIZE, SIZE)), 0.5)
+    view = np.repeat(view[..., None], 3, axis=2).astype(np.float32)
+    disparity = np.where(thing, plane, wall)
+    found, mirrored = put_back(view, disparity, DisparityRange(-1.3, 1.7, "given"))
+    assert not mirrored.any()
+    assert np.array_equal(found, disparity)
