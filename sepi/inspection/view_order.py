@@ -160,13 +160,18 @@ def check_order(light_field: LightField, read_in: str = AS_GIVEN, views: Views |
     if trial.clear:
         # near and far as they are, if the order is right but for them: to doubt that takes more
         kept = next((sign for order, sign in trial.best.items() if order == AS_GIVEN), None)
-        # a glance may say that all is well; to say that it is not takes a closer look
+        doubt: Evidence | None = None
+        # a glance may say that all is well; to say that it is not takes a closer look, and no closer one that denies it
         for look in Look if kept is not None else (Look.AXES, Look.MANY_VIEWS):
             evidence = occlusion_evidence(light_field, trial, look, views)
             doubted = kept is not None and kept * evidence.mean < 0
             sign_clear = _is_clear(evidence, plainly=doubted or look is Look.GLANCE)
-            if sign_clear and not (look is Look.GLANCE and doubted):
+            if sign_clear and not doubted:
                 break
+            if sign_clear and look is Look.AXES:
+                doubt = evidence
+        if doubt is not None and not sign_clear:
+            evidence, sign_clear = doubt, True
         if sign_clear:
             # at most half way to the next layout: the wrong sign is still the better layout
             for order, sign in trial.best.items():
