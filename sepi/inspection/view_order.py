@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sepi.inspection.disparity_sign import Evidence, Look, occlusion_evidence
-from sepi.inspection.view_layouts import Views, best_trial
+from sepi.inspection.view_layouts import Trial, Views, best_trial
 from sepi.io.readers.options import AS_GIVEN, ORDERS
 from sepi.lightfield import LightField, require_light_field
 from sepi.validation import require_known
@@ -160,18 +160,7 @@ def check_order(light_field: LightField, read_in: str = AS_GIVEN, views: Views |
     if trial.clear:
         # near and far as they are, if the order is right but for them: to doubt that takes more
         kept = next((sign for order, sign in trial.best.items() if order == AS_GIVEN), None)
-        doubt: Evidence | None = None
-        # a glance may say that all is well; to say that it is not takes a closer look, and no closer one that denies it
-        for look in Look if kept is not None else (Look.AXES, Look.MANY_VIEWS):
-            evidence = occlusion_evidence(light_field, trial, look, views)
-            doubted = kept is not None and kept * evidence.mean < 0
-            sign_clear = _is_clear(evidence, plainly=doubted or look is Look.GLANCE)
-            if sign_clear and not doubted:
-                break
-            if sign_clear and look is Look.AXES:
-                doubt = evidence
-        if doubt is not None and not sign_clear:
-            evidence, sign_clear = doubt, True
+        evidence, sign_clear = _evidence_of_sign(light_field, trial, kept, views)
         if sign_clear:
             # at most half way to the next layout: the wrong sign is still the better layout
             for order, sign in trial.best.items():
@@ -180,6 +169,23 @@ def check_order(light_field: LightField, read_in: str = AS_GIVEN, views: Views |
     fits = {order: costs[change_of_order(read_in, order)] for order in ORDERS}
     best = min(ORDERS, key=lambda order: (fits[order], order != read_in))
     return OrderCheck(fits, best, trial.clear, sign_clear, read_in, evidence.regions, evidence.agreeing)
+
+
+def _evidence_of_sign(light_field: LightField, trial: Trial, kept: int | None, views: Views) -> tuple[Evidence, bool]:
+    """What hides what, and whether it is clear; ``kept`` is the sign of the given order, where that may be right.
+
+    A glance may say that all is well. To say that it is not takes a closer look, and no closer one that denies it.
+    """
+    doubt: Evidence | None = None
+    for look in Look if kept is not None else (Look.AXES, Look.MANY_VIEWS):
+        evidence = occlusion_evidence(light_field, trial, look, views)
+        doubted = kept is not None and kept * evidence.mean < 0
+        clear = _is_clear(evidence, plainly=doubted or look is Look.GLANCE)
+        if clear and not doubted:
+            return evidence, True
+        if clear and look is Look.AXES:
+            doubt = evidence
+    return (evidence, clear) if doubt is None else (doubt, True)
 
 
 def _is_clear(evidence: Evidence, plainly: bool) -> bool:

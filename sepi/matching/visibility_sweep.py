@@ -40,7 +40,7 @@ CANDIDATES = CandidateRule(usual=91, finest=0.03, coarsest=0.4, volume_bytes=2**
 TEXTURE = 1.85
 """Times what the noise mask sees of the reference view: by so much colours of one surface may differ in a window.
 
-In views without noise it sees texture, and in a window of pixels of one's own colour alone that tells little.
+In views without noise the mask sees texture, and of strong texture few pixels of a window have nearly the same colour.
 """
 
 BYTES_PER_CANDIDATE = 8
