@@ -323,7 +323,7 @@ def _smoothed(
     del changes
     stencil = second_difference_stencil(smoothness, target.shape)
     rtol = parameters.rtol if last else parameters.first_rtol
-    solution = solve_smooth(stencil, weight, target, rtol, parameters.max_iterations)
+    solution = solve_smooth(stencil, weight, target, shape, rtol, parameters.max_iterations)
     return solution, inverse_diagonal(weight, smoothness) / np.float32(unit) if last else None
 
 

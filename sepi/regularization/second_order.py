@@ -4,25 +4,16 @@ knows.
 Minimises ``sum_p w_p (d_p - z_p)^2 + sum_q c_q (D_q d)^2`` over disparities ``d``, where ``z`` is the data, ``w`` its
 weight, and ``D_q`` the second differences along x, along y and across; ``c_q`` is small where that of the data is
 large, unless the data there is worth little, and where the colours change. The system has 13 entries a row, a stencil
-that is never put into a sparse matrix, and is solved by conjugate gradients; what those are slow at, curvature over
-long distances, is taken by a direct solve for one plane for each block of pixels, added to the diagonal as
-preconditioner (two-level Schwarz, [1]_). The compiled loops are in :mod:`sepi.regularization.second_order_kernels`.
-
-References
-----------
-.. [1] Toselli, Widlund: Domain Decomposition Methods. Springer 2005. doi:10.1007/b137868
+that is never put into a sparse matrix, and is solved by conjugate gradients, preconditioned by
+:mod:`sepi.regularization.multilevel`. The compiled loop is in :mod:`sepi.regularization.second_order_kernels`.
 """
 
 from __future__ import annotations
-
-from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from sepi.lightfield import FloatMap
-from sepi.memory import BLAS_BUFFER, require_memory
 
 FloatArray = npt.NDArray[np.float64]
 Corner = tuple[slice, slice]
@@ -155,7 +146,7 @@ def second_difference_stencil(weights: list[FloatArray], shape: tuple[int, int])
 
 
 def solve_smooth(
-    smoothness: FloatArray, weight: FloatMap, data: FloatMap, rtol: float, max_iterations: int
+    smoothness: FloatArray, weight: FloatMap, data: FloatMap, start: FloatMap, rtol: float, max_iterations: int
 ) -> FloatMap:
     """Disparities of least energy.
 
@@ -164,7 +155,9 @@ def solve_smooth(
     smoothness : ndarray, shape (7, H, W), float64
         From :func:`second_difference_stencil`, times the strength.
     weight, data : ndarray, shape (H, W), float32
-        ``w`` and ``z``; the data is also where the solver starts.
+        ``w`` and ``z``.
+    start : ndarray, shape (H, W), float32
+        Where the solver starts.
     rtol : float
         Residual, relative to the data's deviations from their mean, at which the solver stops.
     max_iterations : int
@@ -176,16 +169,15 @@ def solve_smooth(
     """
     from scipy.sparse.linalg import LinearOperator, cg
 
+    from sepi.regularization.multilevel import multilevel_inverse
     from sepi.regularization.second_order_kernels import MARGIN, product
 
     if not weight.any():
         # nothing holds any surface
         return data
     w = weight.astype(np.float64) + 1e-9
-    start = data.astype(np.float64)
     # smoothness does not know constants: without the mean, the rtol does not depend on where zero lies
-    mean = np.average(start, weights=w)
-    start -= mean
+    mean = np.average(data, weights=w)
     stencil = np.pad(smoothness, ((0, 0), (MARGIN, MARGIN), (MARGIN, MARGIN)))
     inside = np.s_[MARGIN:-MARGIN, MARGIN:-MARGIN]
     stencil[0][inside] += w
@@ -201,58 +193,8 @@ def solve_smooth(
 
     size = shape[0] * shape[1]
     matrix = LinearOperator((size, size), matvec=times, dtype=dtype)
-    inverse = LinearOperator((size, size), matvec=_two_levels(stencil, dtype), dtype=dtype)
+    inverse = LinearOperator((size, size), matvec=multilevel_inverse(stencil, dtype), dtype=dtype)
     del stencil
-    right, first = (np.pad(values, MARGIN).ravel().astype(dtype) for values in (w * start, start))
+    right, first = (np.pad(values, MARGIN).ravel().astype(dtype) for values in (w * (data - mean), start - mean))
     solution, _ = cg(matrix, right, x0=first, rtol=rtol, atol=0, maxiter=max_iterations, M=inverse)
     return np.asarray(solution.reshape(shape)[inside] + mean, np.float32)
-
-
-def _two_levels(stencil: FloatArray, dtype: npt.DTypeLike) -> Callable[[FloatArray], FloatArray]:
-    """Preconditioner: the diagonal, plus a direct solve for one plane for each block."""
-    from sepi.regularization.second_order_kernels import diagonal_and_planes, onto_planes
-
-    factors = _planes_system(stencil)
-    shape = stencil.shape[1:]
-    blocks = _blocks(stencil)
-    with np.errstate(divide="ignore"):
-        inverse = (1 / stencil[0]).astype(dtype)
-
-    def apply(residual: FloatArray) -> FloatArray:
-        vector, out, onto = residual.reshape(shape), np.zeros(shape, dtype), np.empty((*blocks, 3))
-        onto_planes(vector, onto)
-        diagonal_and_planes(inverse, vector, factors.solve(onto.ravel()).reshape(onto.shape), out)
-        return out.ravel()
-
-    return apply
-
-
-def _planes_system(stencil: FloatArray) -> Any:
-    """Factors of the system as one plane for each block sees it: constant, slope along x, slope along y."""
-    import scipy.sparse as sparse
-    from scipy.sparse.linalg import splu
-
-    from sepi.regularization.second_order_kernels import matrix_of_planes
-
-    rows, columns = _blocks(stencil)
-    entries = np.zeros((rows, columns, 9, 3, 3))
-    matrix_of_planes(stencil, entries)
-    by, bx, neighbour, i, j = np.ogrid[:rows, :columns, :9, :3, :3]
-    other_y, other_x = by + neighbour // 3 - 1, bx + neighbour % 3 - 1
-    there = (other_y >= 0) & (other_y < rows) & (other_x >= 0) & (other_x < columns)
-    there = np.broadcast_to(there, entries.shape)
-    row = np.broadcast_to(3 * (by * columns + bx) + i, entries.shape)[there]
-    column = np.broadcast_to(3 * (other_y * columns + other_x) + j, entries.shape)[there]
-    size = 3 * rows * columns
-    matrix = sparse.csc_matrix((entries[there], (row, column)), shape=(size, size))
-    # blocks of one pixel's width have slopes that do nothing
-    matrix = matrix + sparse.diags(np.full(size, 1e-9 * max(float(matrix.diagonal().max()), 1e-9)))
-    require_memory(BLAS_BUFFER)
-    return splu(matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
-
-
-def _blocks(stencil: FloatArray) -> tuple[int, int]:
-    """Rows and columns of blocks."""
-    from sepi.regularization.second_order_kernels import BLOCK, MARGIN
-
-    return tuple(-(-(n - 2 * MARGIN) // BLOCK) for n in stencil.shape[1:])

@@ -206,7 +206,7 @@ def test_planes_cost_nothing() -> None:
     """The smoothing may not flatten slanted surfaces: with hardly any data a plane stays what it is."""
     data = plane()
     matrix = 10 * second_difference_stencil(weights_of(data), data.shape)
-    solution = solve_smooth(matrix, np.full(data.shape, 1e-6, np.float32), data, 1e-10, 500)
+    solution = solve_smooth(matrix, np.full(data.shape, 1e-6, np.float32), data, data, 1e-10, 500)
     np.testing.assert_allclose(solution, data, atol=1e-5)
 
 
@@ -215,7 +215,7 @@ def test_a_hole_is_filled_by_the_plane_round_it() -> None:
     data[6:14, 8:16] += 0.05
     weight[6:14, 8:16] = 0
     matrix = second_difference_stencil(weights_of(plane()), data.shape)
-    solution = solve_smooth(matrix, weight, data, 1e-10, 1000)
+    solution = solve_smooth(matrix, weight, data, data, 1e-10, 1000)
     np.testing.assert_allclose(solution, plane(), atol=2e-4)
 
 
@@ -248,7 +248,7 @@ def test_solver_agrees_with_a_direct_one(shape, rtol, error) -> None:
     smooth = sum(d.T @ diags(w.ravel()) @ d for d, w in zip(second_differences(shape), weights, strict=True))
     system = (10 * smooth + diags(weight.ravel() + 1e-9)).tocsc()
     expected = spsolve(system, weight.ravel().astype(float) * data.ravel())
-    found = solve_smooth(10 * second_difference_stencil(weights, shape), weight, data, rtol, 2000)
+    found = solve_smooth(10 * second_difference_stencil(weights, shape), weight, data, data, rtol, 2000)
     np.testing.assert_allclose(found.ravel(), expected, atol=error)
 
 
@@ -257,7 +257,7 @@ def test_steps_stay_where_the_data_is_reliable_and_go_where_it_is_not() -> None:
     data[:, 8:] = 1
     half = np.full(data.shape, 0.5, np.float32)
     stencils = [5 * second_difference_stencil(weights_of(data, reliability), data.shape) for reliability in (1.0, 0.0)]
-    sure, unsure = (solve_smooth(stencil, half, data, 1e-8, 500) for stencil in stencils)
+    sure, unsure = (solve_smooth(stencil, half, data, data, 1e-8, 500) for stencil in stencils)
     np.testing.assert_allclose(sure, data, atol=1e-3)
     assert np.abs(np.diff(unsure, axis=1)).max() < 0.5
 
@@ -290,7 +290,7 @@ def test_pixels_that_nothing_holds_stay_as_they_are() -> None:
     """A picture of 2x2 pixels whose views tell nothing: rounding would leave the solver no direction, and NaN."""
     data = np.array([[0.01447258, -0.1234202], [-0.00083831, -0.13873109]], np.float32)
     stencil = second_difference_stencil([np.zeros((2, 0)), np.zeros((0, 2)), np.full((1, 1), 1.04)], (2, 2))
-    found = solve_smooth(stencil, np.zeros((2, 2), np.float32), data, 3e-3, 200)
+    found = solve_smooth(stencil, np.zeros((2, 2), np.float32), data, data, 3e-3, 200)
     np.testing.assert_array_equal(found, data)
 
 
