@@ -18,7 +18,10 @@ class RimViews(NamedTuple):
 
     Attributes
     ----------
-    pixels : ndarray, shape (T, S, H, W, C), uint8, uint16 or float32
+    lines : ndarray, shape (T, S, H, W C), uint8, uint16 or float32
+        Rows of the pixels, their channels side by side.
+    channels : int
+        C, 1 or 3.
     units : ndarray, shape (N,), float32
         What the pixels of each view that is compared are multiplied with to be 0..1, and as bright as the reference.
     places : ndarray, shape (N, 2), int64
@@ -33,7 +36,8 @@ class RimViews(NamedTuple):
         By how much an occluder must be nearer, pixels per view step.
     """
 
-    pixels: npt.NDArray[Any]
+    lines: npt.NDArray[Any]
+    channels: int
     units: FloatMap
     places: npt.NDArray[np.int64]
     baselines: npt.NDArray[np.float64]

@@ -100,8 +100,9 @@ def _views_alike(light_field: LightField, sides: Sides, parameters: BoundaryPara
     units = np.full(len(places), 1 / full_scale(light_field.views.dtype), np.float32)
     # a part of another array would have kernels of its own compiled, which takes a minute
     pixels = np.ascontiguousarray(light_field.views)
+    lines = pixels.reshape(*pixels.shape[:3], -1)
     margin = np.float32(parameters.occlusion_margin)
-    views = RimViews(pixels, units, places, baselines, np.empty((0, 0, 0, 0), np.float32), 0, margin)
+    views = RimViews(lines, pixels.shape[4], units, places, baselines, np.empty((0, 0, 0, 0), np.float32), 0, margin)
     missing = np.zeros((*light_field.grid, 0, 0), bool) if light_field.missing is None else light_field.missing
     brightness, residual = brightness_of_views(views, sides, missing)
     alike = (brightness > 1 / _MOST_DARKENING) & (brightness < _MOST_DARKENING)

@@ -18,6 +18,9 @@ FEWEST_VIEWS = 3
 FEWEST_SAMPLES = 8
 """Views from which a share is told."""
 
+TAPS = 12
+"""Values of a row, four neighbours of three channels, that a sample is made of."""
+
 SHARES = 12
 """That are tried, from 0 to 1; none is one half."""
 
@@ -59,7 +62,7 @@ class Background(NamedTuple):
 @njit(forceinline=True)
 def _sees(views: RimViews, view: int, d: Any, y: int, x: int) -> Any:
     """Whether a view shows a pixel of disparity ``d``, and where: row and column of the sample, and its fractions."""
-    H, W = views.pixels.shape[2], views.pixels.shape[3]
+    H, W = views.lines.shape[2], views.lines.shape[3] // views.channels
     down, across = y - d * views.baselines[view, 0], x - d * views.baselines[view, 1]
     if down < 0 or across < 0 or down >= H - 1 or across >= W - 1:
         return False, 0, 0, 0.0, 0.0
@@ -73,39 +76,44 @@ def _sees(views: RimViews, view: int, d: Any, y: int, x: int) -> Any:
 @njit(forceinline=True)
 def _cubic(f: Any) -> Any:
     """Weights of four neighbours, the second and third of which a sample lies between (Catmull and Rom's)."""
+    half, one, more = np.float32(0.5), np.float32(1), np.float32(1.5)
     return (
-        f * (-0.5 + f * (1 - 0.5 * f)),
-        1 + f * f * (-2.5 + 1.5 * f),
-        f * (0.5 + f * (2 - 1.5 * f)),
-        f * f * (-0.5 + 0.5 * f),
+        f * (f * (one - half * f) - half),
+        one + f * f * (more * f - np.float32(2.5)),
+        f * (half + f * (np.float32(2) - more * f)),
+        f * f * (half * f - half),
     )
 
 
 @njit(forceinline=True)
-def _sample(views: RimViews, view: int, row: int, column: int, fy: Any, fx: Any, out: Any) -> None:
+def _add_rows(a: Any, b: Any, c: Any, d: Any, down: Any, out: Any) -> None:
+    """Sums of values of four rows, by their weights; a loop of constant length, which vectorises."""
+    for k in range(TAPS):
+        out[k] = down[0] * a[k] + down[1] * b[k] + down[2] * c[k] + down[3] * d[k]
+
+
+@njit(forceinline=True)
+def _sample(views: RimViews, view: int, row: int, column: int, fy: Any, fx: Any, sums: Any, out: Any) -> None:
     """Colour between pixels of a view into ``out (3,)``, 0..1; grey counts as three equal channels.
 
-    Cubic, since a bilinear sample takes from the peak of what is two pixels wide.
+    Cubic, since a bilinear sample takes from the peak of what is two pixels wide. ``sums (TAPS,)`` is scratch.
     """
-    picture = views.pixels[views.places[view, 0], views.places[view, 1]]
-    H, W, C = picture.shape
-    down, across = _cubic(fy), _cubic(fx)
-    rows = max(row - 1, 0), row, row + 1, min(row + 2, H - 1)
-    columns = max(column - 1, 0), column, column + 1, min(column + 2, W - 1)
-    red, green, blue = 0.0, 0.0, 0.0
+    picture = views.lines[views.places[view, 0], views.places[view, 1]]
+    H, C = picture.shape[0], views.channels
+    down, across = _cubic(np.float32(fy)), _cubic(np.float32(fx))
+    a, b, c, d = picture[max(row - 1, 0)], picture[row], picture[row + 1], picture[min(row + 2, H - 1)]
     # green and blue of a grey picture are its last channel, too
     second, third = min(1, C - 1), min(2, C - 1)
-    for i in range(4):
-        line = picture[rows[i]]
-        r, g, b = 0.0, 0.0, 0.0
-        for j in range(4):
-            pixel = line[columns[j]]
-            r += across[j] * pixel[0]
-            g += across[j] * pixel[second]
-            b += across[j] * pixel[third]
-        red += down[i] * r
-        green += down[i] * g
-        blue += down[i] * b
+    first, last = (column - 1) * C, (column + 2) * C
+    red, green, blue = np.float32(0), np.float32(0), np.float32(0)
+    columns = max(first, 0), first + C, first + 2 * C, min(last, a.size - C)
+    for j in range(4):
+        i = columns[j]
+        red += across[j] * (down[0] * a[i] + down[1] * b[i] + down[2] * c[i] + down[3] * d[i])
+        i = columns[j] + second
+        green += across[j] * (down[0] * a[i] + down[1] * b[i] + down[2] * c[i] + down[3] * d[i])
+        i = columns[j] + third
+        blue += across[j] * (down[0] * a[i] + down[1] * b[i] + down[2] * c[i] + down[3] * d[i])
     unit = views.units[view]
     out[0], out[1], out[2] = red * unit, green * unit, blue * unit
 
@@ -137,7 +145,7 @@ def brightness_of_views(views: RimViews, sides: Sides, missing: Any) -> Any:
         # of each pixel that the view shows: its colours there, and the reference's
         shown = np.empty((((H - 1) // _STRIDE + 1) * ((W - 1) // _STRIDE + 1), 2, 3))
         of_view = missing[views.places[view, 0], views.places[view, 1]]
-        own, other, rest, n = 1e-9, 1e-9, 0.0, 0
+        own, other, rest, n, sums = 1e-9, 1e-9, 0.0, 0, np.empty(TAPS, np.float32)
         for y in range(0, H, _STRIDE):
             for x in range(0, W, _STRIDE):
                 down = y - disparity[y, x] * views.baselines[view, 0]
@@ -152,7 +160,7 @@ def brightness_of_views(views: RimViews, sides: Sides, missing: Any) -> Any:
                     or of_view[row + 1, column + 1]
                 ):
                     continue
-                _sample(views, view, row, column, down - row, across - column, shown[n, 0])
+                _sample(views, view, row, column, down - row, across - column, sums, shown[n, 0])
                 for c in range(3):
                     shown[n, 1, c] = guide[y, x, c]
                     own += shown[n, 1, c]
@@ -221,28 +229,32 @@ def background_of(views: RimViews, layer: Any, wanted: Any, begin: int, end: int
     colour, variance = np.empty((H, W, 3), np.float32), np.empty((H, W), np.float32)
     count = np.zeros((H, W), np.int32)
     for y in prange(begin, end):
-        samples, ordered, colour_there = np.empty((3, N), np.float32), np.empty(N, np.float32), np.empty(3)
-        for x in range(W):
-            if not wanted[y, x]:
-                continue
-            n = 0
-            for view in range(N):
+        columns = np.flatnonzero(wanted[y])
+        samples, ordered = np.empty((columns.size, 3, N), np.float32), np.empty(N, np.float32)
+        sums, colour_there = np.empty(TAPS, np.float32), np.empty(3, np.float32)
+        # view by view: neighbours are near each other in its memory
+        for view in range(N):
+            for i in range(columns.size):
+                x = columns[i]
                 seen, row, column, fy, fx = _sees(views, view, layer[y, x], y, x)
                 if seen:
-                    _sample(views, view, row, column, fy, fx, colour_there)
-                    samples[:, n] = colour_there
-                    n += 1
-            count[y, x] = n
+                    _sample(views, view, row, column, fy, fx, sums, colour_there)
+                    for c in range(3):
+                        samples[i, c, count[y, x]] = colour_there[c]
+                    count[y, x] += 1
+        for i in range(columns.size):
+            x = columns[i]
+            n = count[y, x]
             if n < FEWEST_VIEWS:
                 continue
             total = 0.0
             for c in range(3):
                 for v in range(n):
-                    ordered[v] = samples[c, v]
+                    ordered[v] = samples[i, c, v]
                 middle = _median(ordered, n)
                 colour[y, x, c] = middle
                 for v in range(n):
-                    total += min((samples[c, v] - middle) ** 2, _MOST_DEVIATION2)
+                    total += min((samples[i, c, v] - middle) ** 2, _MOST_DEVIATION2)
             variance[y, x] = total / (3 * n)
     return Background(colour, variance, count)
 
@@ -293,7 +305,7 @@ def _nearer_colour(sides: Sides, near: Any, middle: Any, y: int, x: int, surface
 
 
 @njit(forceinline=True)
-def _along_near(views: RimViews, background: Background, near: Any, far: Any, y: int, x: int, samples: Any) -> int:
+def _along_near(views: RimViews, background: Background, near: Any, far: Any, y: int, x: int, sums: Any, samples: Any) -> int:
     """What the views show of a pixel that moves with ``near``, and what is behind it there; how many tell both."""
     H, W = background.views.shape
     n = 0
@@ -307,7 +319,7 @@ def _along_near(views: RimViews, background: Background, near: Any, far: Any, y:
         i, j = int(down), int(across)
         samples[n, _NOISE] = _behind(background, i, j, down - i, across - j, samples[n, _BEHIND:_NOISE])
         if samples[n, _NOISE] >= 0:
-            _sample(views, view, row, column, fy, fx, samples[n])
+            _sample(views, view, row, column, fy, fx, sums, samples[n])
             n += 1
     return n
 
@@ -338,7 +350,7 @@ def _cost_of_share(share: Any, samples: Any, n: int, surface: Any, held: Any, sc
 
 
 @njit(forceinline=True)
-def _cost_alone(views: RimViews, own: Any, d: Any, y: int, x: int, scale2: Any, scratch: Any) -> Any:
+def _cost_alone(views: RimViews, own: Any, d: Any, y: int, x: int, scale2: Any, sums: Any, colour: Any) -> Any:
     """Mean robust residual of a pixel of colour ``own (3,)`` that moves with ``d``, over views that see it."""
     total, n = 0.0, 0
     for view in range(len(views.places)):
@@ -347,9 +359,9 @@ def _cost_alone(views: RimViews, own: Any, d: Any, y: int, x: int, scale2: Any, 
             continue
         seen, row, column, fy, fx = _sees(views, view, d, y, x)
         if seen:
-            _sample(views, view, row, column, fy, fx, scratch)
+            _sample(views, view, row, column, fy, fx, sums, colour)
             for c in range(3):
-                residual = (scratch[c] - own[c]) ** 2
+                residual = (colour[c] - own[c]) ** 2
                 total += residual / (residual + scale2)
             n += 1
     return total / (3 * n) if n >= FEWEST_VIEWS else _UNKNOWN
@@ -381,12 +393,13 @@ def evidence_of_shares(
     W = sides.disparity.shape[1]
     N = len(views.places)
     for y in prange(begin, end):
-        samples, surface, scratch = np.empty((N, 7)), np.empty((3, 3)), np.empty(3)
+        samples, surface = np.empty((N, 7)), np.empty((3, 3))
+        sums, colour = np.empty(TAPS, np.float32), np.empty(3)
         for x in range(W):
             if not rim.inside[y, x]:
                 continue
             near, far = rim.near[y, x], rim.far[y, x]
-            n = _along_near(views, background, near, far, y, x, samples)
+            n = _along_near(views, background, near, far, y, x, sums, samples)
             if n < FEWEST_SAMPLES:
                 continue
             variance = _nearer_colour(sides, near, (near + far) / 2, y, x, surface)
@@ -410,5 +423,5 @@ def evidence_of_shares(
             if rim.is_near[y, x]:
                 evidence[y, x] = high - low
             else:
-                alone = _cost_alone(views, sides.guide[y, x], far, y, x, scale2, scratch)
+                alone = _cost_alone(views, sides.guide[y, x], far, y, x, scale2, sums, colour)
                 evidence[y, x] = min(low, alone) - high

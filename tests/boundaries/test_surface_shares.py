@@ -175,7 +175,8 @@ class Twin:
 
     def __init__(self, views: RimViews, rim: Rim, sides: Sides) -> None:
         self.views, self.rim, self.sides = views, rim, sides
-        self.H, self.W = views.pixels.shape[2:4]
+        self.pixels = views.lines.reshape(*views.lines.shape[:3], -1, views.channels)
+        self.H, self.W = self.pixels.shape[2:4]
         # pixels that fit best as a whole pixel of the far surface
         self.decided_alone = 0
 
@@ -187,7 +188,7 @@ class Twin:
             if min(down, across) < 0 or down >= self.H - 1 or across >= self.W - 1:
                 continue
             if self.views.nearest[t, s, int(down + 0.5), int(across + 0.5)] <= d + self.views.margin:
-                found.append((n, cubic(self.views.pixels[t, s], down, across) * self.views.units[n]))
+                found.append((n, cubic(self.pixels[t, s], down, across) * self.views.units[n]))
         return found
 
     def background(self, d: float, y: int, x: int) -> tuple[npt.NDArray[np.float64], float, int]:
@@ -300,7 +301,7 @@ def test_kernels_equal_a_plain_twin(geometry: str, dtype: Any) -> None:
     units = random.uniform(0.9, 1.1, present.sum()).astype(np.float32) * unit
     # in the order in memory that they have for maps: no other kernels are compiled
     places = np.ascontiguousarray(np.argwhere(present))
-    rim_views = RimViews(views, units, places, field.baselines[present], nearest, 0, np.float32(0.15))
+    rim_views = RimViews(views.reshape(*views.shape[:3], -1), views.shape[4], units, places, field.baselines[present], nearest, 0, np.float32(0.15))
     clean = disparity - surroundings(disparity).farthest < 0.3
     sides = Sides(disparity, field.reference_view, clean, 4)
     twin = Twin(rim_views, rim, sides)
@@ -330,7 +331,7 @@ def test_brightness_is_told_view_by_view() -> None:
     field = LightField(views, "bright")
     still = np.zeros((40, 48), np.float32)
     rim_views = RimViews(
-        views, np.ones(3, np.float32), np.argwhere(field.present), field.baselines[field.present],
+        views.reshape(*views.shape[:3], -1), 3, np.ones(3, np.float32), np.argwhere(field.present), field.baselines[field.present],
         np.empty((0, 0, 0, 0), np.float32), 0, np.float32(0),
     )  # fmt: skip
     sides = Sides(still, field.reference_view, still == 0, 4)
