@@ -305,7 +305,9 @@ def _nearer_colour(sides: Sides, near: Any, middle: Any, y: int, x: int, surface
 
 
 @njit(forceinline=True)
-def _along_near(views: RimViews, background: Background, near: Any, far: Any, y: int, x: int, sums: Any, samples: Any) -> int:
+def _along_near(
+    views: RimViews, background: Background, near: Any, far: Any, y: int, x: int, sums: Any, samples: Any
+) -> int:
     """What the views show of a pixel that moves with ``near``, and what is behind it there; how many tell both."""
     H, W = background.views.shape
     n = 0

@@ -1,30 +1,77 @@
-"""Preconditioner of the second-order smoothing: its inverse as pixels, hats of two widths and planes see it, added up.
+"""Conjugate gradients for the second-order smoothing, preconditioned by hats of several widths.
 
-Conjugate gradients are slow at what bends over many pixels, the slower the farther. Each level takes what is as wide as
-its functions: the diagonal takes single pixels, bilinear hats from 2 and from 4 pixels to the next, each with its own
-diagonal, what is a few pixels wide [1]_, and a direct solve for one plane for each block the rest [2]_. Steps of the
-solver become a third of what the diagonal and the planes alone need.
+Conjugate gradients are slow at what bends over many pixels, the slower the farther. The preconditioner is the inverse
+as single pixels and as bilinear hats see it, 2, 8 and 32 pixels from node to node, each with its own diagonal, all
+added up [1]_: a third of the steps that the diagonal takes with a direct solve for planes in blocks beside it, and
+nothing to be factored. The system is a stencil, and stays one; the loop is short, and loading a library that has one
+takes longer than solving. Its compiled loops are in :mod:`sepi.regularization.multilevel_kernels`.
 
 References
 ----------
 .. [1] Bramble, Pasciak, Xu: Parallel multilevel preconditioners. Mathematics of Computation 1990. doi:10.2307/2008789
-.. [2] Toselli, Widlund: Domain Decomposition Methods. Springer 2005. doi:10.1007/b137868
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from sepi.memory import BLAS_BUFFER, require_memory
-
 FloatArray = npt.NDArray[np.float64]
+Operator = Callable[[FloatArray], FloatArray]
+
+LEVELS = 5
+"""Of hats, each with half the nodes of the one before, along either axis."""
+
+COUNTED = 2
+"""Every so many levels count; the others only lie between."""
 
 
-def multilevel_inverse(stencil: FloatArray, dtype: npt.DTypeLike) -> Callable[[FloatArray], FloatArray]:
+def conjugate_gradients(
+    times: Operator, inverse: Operator, right: FloatArray, start: FloatArray, rtol: float, max_iterations: int
+) -> FloatArray:
+    """Solve a symmetric, positive system.
+
+    Parameters
+    ----------
+    times, inverse : callable
+        The matrix times a vector, and what is near its inverse, symmetric and positive, times one; what they return may
+        be overwritten when they are called again.
+    right, start : ndarray, float32 or float64
+        The right side, and where to start.
+    rtol : float
+        Residual at which to stop, relative to the right side.
+    max_iterations : int
+        Steps after which to stop anyway.
+
+    Returns
+    -------
+    ndarray
+        As ``right``.
+    """
+    enough = rtol * float(np.linalg.norm(right))
+    if not enough:
+        return np.zeros_like(right)
+    number = right.dtype.type
+    solution, residual = start.copy(), right - times(start)
+    direction, before = np.zeros_like(right), 1.0
+    for _ in range(max_iterations):
+        if np.linalg.norm(residual) < enough:
+            break
+        ahead = inverse(residual)
+        along = float(np.vdot(residual, ahead))
+        direction *= number(along / before)
+        direction += ahead
+        bent = times(direction)
+        length = along / float(np.vdot(direction, bent))
+        solution += number(length) * direction
+        residual -= number(length) * bent
+        before = along
+    return solution
+
+
+def multilevel_inverse(stencil: FloatArray, dtype: npt.DTypeLike) -> Operator:
     """What is near the inverse of a matrix of the smoothing, symmetric and positive.
 
     Parameters
@@ -38,66 +85,54 @@ def multilevel_inverse(stencil: FloatArray, dtype: npt.DTypeLike) -> Callable[[F
     Returns
     -------
     callable
-        Takes and returns pictures with their margins, raveled, of that type.
+        Takes and returns pictures with their margins, of that type; what it returns holds until it is called again.
     """
-    from sepi.regularization.multilevel_kernels import SPACING, diagonal_of_hats, from_levels, onto_levels
-    from sepi.regularization.second_order_kernels import MARGIN
+    from sepi.regularization import multilevel_kernels as kernels
 
-    factors = _planes_system(stencil)
-    shape = stencil.shape[1:]
-    # each of the coarser nodes is one of the finer
-    coarse = tuple(-(-(n - 2 * MARGIN) // (2 * SPACING)) + 1 for n in shape)
-    fine = tuple(2 * n - 1 for n in coarse)
-    diagonals = [np.empty(fine), np.empty(coarse)]
-    for i, diagonal in enumerate(diagonals):
-        diagonal_of_hats(stencil, SPACING << i, diagonal)
-    inverse, *of_hats = (_inverse(diagonal, dtype) for diagonal in (stencil[0], *diagonals))
-    blocks = _blocks(stencil)
+    inverse = _inverse(stencil[0], dtype)
+    hats = [_inverse(diagonal, dtype) for diagonal in _diagonals(stencil)]
+    levels = [np.empty(shape, dtype) for shape in _shapes(stencil)]
+    out = np.zeros(stencil.shape[1:], dtype)
 
     def apply(residual: FloatArray) -> FloatArray:
-        vector, out = residual.reshape(shape), np.zeros(shape, dtype)
-        hats, onto = [np.empty(n, dtype) for n in (fine, coarse)], np.empty((*blocks, 3))
-        onto_levels(vector, *hats, onto)
-        for heights, own in zip(hats, of_hats, strict=True):
-            heights *= own
-        from_levels(inverse, vector, *hats, factors.solve(onto.ravel()).reshape(onto.shape), out)
-        return out.ravel()
+        kernels.onto_finest(residual, levels[0])
+        for i in range(1, LEVELS):
+            kernels.onto_coarser(levels[i - 1], levels[i])
+        for i in reversed(range(LEVELS)):
+            if i % COUNTED:
+                levels[i][:] = 0
+            else:
+                levels[i] *= hats[i // COUNTED]
+            if i + 1 < LEVELS:
+                kernels.add_coarser(levels[i + 1], levels[i])
+        kernels.diagonal_and_finest(inverse, residual, levels[0], out)
+        return out
 
     return apply
+
+
+def _shapes(stencil: FloatArray) -> list[tuple[int, int]]:
+    """Rows and columns of nodes of each level: each of a coarser level is one of the finer."""
+    from sepi.regularization.multilevel_kernels import SPACING
+    from sepi.regularization.second_order_kernels import MARGIN
+
+    widest = SPACING << (LEVELS - 1)
+    rows, columns = (-(-(n - 2 * MARGIN) // widest) for n in stencil.shape[1:])
+    return [((rows << i) + 1, (columns << i) + 1) for i in reversed(range(LEVELS))]
+
+
+def _diagonals(stencil: FloatArray) -> list[FloatArray]:
+    """What the matrix has on its diagonal as the hats of each level that counts see it."""
+    from sepi.regularization.multilevel_kernels import SPACING, diagonal_of_hats
+
+    found: list[FloatArray] = []
+    for i, shape in list(enumerate(_shapes(stencil)))[::COUNTED]:
+        diagonal = np.empty(shape)
+        diagonal_of_hats(stencil, SPACING << i, diagonal)
+        found.append(diagonal)
+    return found
 
 
 def _inverse(diagonal: FloatArray, dtype: npt.DTypeLike) -> FloatArray:
     """One by one; 0 of what no pixel is part of."""
     return np.divide(1, diagonal, out=np.zeros_like(diagonal), where=diagonal > 0).astype(dtype)
-
-
-def _planes_system(stencil: FloatArray) -> Any:
-    """Factors of the system as one plane for each block sees it: constant, slope along x, slope along y."""
-    import scipy.sparse as sparse
-    from scipy.sparse.linalg import splu
-
-    from sepi.regularization.multilevel_kernels import matrix_of_planes
-
-    rows, columns = _blocks(stencil)
-    entries = np.zeros((3, rows, columns, 3, 3, 3))
-    matrix_of_planes(stencil, entries)
-    down, by, bx, across, i, j = np.ogrid[-1:2, :rows, :columns, -1:2, :3, :3]
-    other_y, other_x = by + down, bx + across
-    there = (other_y >= 0) & (other_y < rows) & (other_x >= 0) & (other_x < columns)
-    there = np.broadcast_to(there, entries.shape)
-    row = np.broadcast_to(3 * (by * columns + bx) + i, entries.shape)[there]
-    column = np.broadcast_to(3 * (other_y * columns + other_x) + j, entries.shape)[there]
-    size = 3 * rows * columns
-    matrix = sparse.csc_matrix((entries[there], (row, column)), shape=(size, size))
-    # blocks of one pixel's width have slopes that do nothing
-    matrix = matrix + sparse.diags(np.full(size, 1e-9 * max(float(matrix.diagonal().max()), 1e-9)))
-    require_memory(BLAS_BUFFER)
-    return splu(matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
-
-
-def _blocks(stencil: FloatArray) -> tuple[int, int]:
-    """Rows and columns of blocks."""
-    from sepi.regularization.multilevel_kernels import BLOCK
-    from sepi.regularization.second_order_kernels import MARGIN
-
-    return tuple(-(-(n - 2 * MARGIN) // BLOCK) for n in stencil.shape[1:])

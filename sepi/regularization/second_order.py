@@ -4,11 +4,13 @@ knows.
 Minimises ``sum_p w_p (d_p - z_p)^2 + sum_q c_q (D_q d)^2`` over disparities ``d``, where ``z`` is the data, ``w`` its
 weight, and ``D_q`` the second differences along x, along y and across; ``c_q`` is small where that of the data is
 large, unless the data there is worth little, and where the colours change. The system has 13 entries a row, a stencil
-that is never put into a sparse matrix, and is solved by conjugate gradients, preconditioned by
-:mod:`sepi.regularization.multilevel`. The compiled loop is in :mod:`sepi.regularization.second_order_kernels`.
+that is never put into a sparse matrix, and is solved in :mod:`sepi.regularization.multilevel`. The compiled loop is in
+:mod:`sepi.regularization.second_order_kernels`.
 """
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -167,9 +169,7 @@ def solve_smooth(
     -------
     ndarray, shape (H, W), float32
     """
-    from scipy.sparse.linalg import LinearOperator, cg
-
-    from sepi.regularization.multilevel import multilevel_inverse
+    from sepi.regularization.multilevel import conjugate_gradients, multilevel_inverse
     from sepi.regularization.second_order_kernels import MARGIN, product
 
     if not weight.any():
@@ -181,20 +181,16 @@ def solve_smooth(
     stencil = np.pad(smoothness, ((0, 0), (MARGIN, MARGIN), (MARGIN, MARGIN)))
     inside = np.s_[MARGIN:-MARGIN, MARGIN:-MARGIN]
     stencil[0][inside] += w
-    shape = stencil.shape[1:]
     # half the memory to go through, a third of the time; the solution is the same to a hundredth of its own error
-    dtype = np.float32 if rtol >= LEAST_SINGLE_RTOL else np.float64
-    packed = stencil.astype(dtype)
+    dtype: Any = np.float32 if rtol >= LEAST_SINGLE_RTOL else np.float64
+    packed, out = stencil.astype(dtype), np.zeros(stencil.shape[1:], dtype)
 
     def times(vector: FloatArray) -> FloatArray:
-        out = np.zeros(shape, dtype)
-        product(packed, vector.reshape(shape), out)
-        return out.ravel()
+        product(packed, vector, out)
+        return out
 
-    size = shape[0] * shape[1]
-    matrix = LinearOperator((size, size), matvec=times, dtype=dtype)
-    inverse = LinearOperator((size, size), matvec=multilevel_inverse(stencil, dtype), dtype=dtype)
+    inverse = multilevel_inverse(stencil, dtype)
     del stencil
-    right, first = (np.pad(values, MARGIN).ravel().astype(dtype) for values in (w * (data - mean), start - mean))
-    solution, _ = cg(matrix, right, x0=first, rtol=rtol, atol=0, maxiter=max_iterations, M=inverse)
-    return np.asarray(solution.reshape(shape)[inside] + mean, np.float32)
+    right, first = (np.pad(values, MARGIN).astype(dtype) for values in (w * (data - mean), start - mean))
+    solution = conjugate_gradients(times, inverse, right, first, rtol, max_iterations)
+    return np.asarray(solution[inside] + mean, np.float32)
