@@ -21,6 +21,9 @@ FEWEST_SAMPLES = 8
 TAPS = 12
 """Values of a row, four neighbours of three channels, that a sample is made of."""
 
+EXACT = {"nnan", "ninf", "nsz"}
+"""Fast-math flags that keep every rounding as written: see :mod:`sepi.matching.plane_sweep_kernels`."""
+
 SHARES = 12
 """That are tried, from 0 to 1; none is one half."""
 
@@ -174,37 +177,39 @@ def brightness_of_views(views: RimViews, sides: Sides, missing: Any) -> Any:
     return brightness, residual
 
 
-@njit(forceinline=True)
-def _median(values: Any, n: int) -> Any:
-    """Median of the first ``n`` values, which it puts in another order.
+@njit(forceinline=True, fastmath=EXACT)
+def _median(values: Any) -> Any:
+    """Median of values, by halving the interval that it lies in: counting vectorises, and sorting does not.
 
     NumPy's, compiled, would have every process load SciPy's linear algebra.
     """
-    low, high, middle = 0, n - 1, n // 2
-    while low < high:
-        # what is less than the value in the middle to the left, what is more to the right
-        pivot, i, j = values[(low + high) // 2], low, high
-        while i <= j:
-            while values[i] < pivot:
-                i += 1
-            while values[j] > pivot:
-                j -= 1
-            if i <= j:
-                values[i], values[j] = values[j], values[i]
-                i += 1
-                j -= 1
-        if middle <= j:
-            high = j
-        elif middle >= i:
-            low = i
-        else:
+    n, middle = values.size, values.size // 2
+    low = high = values[0]
+    for v in range(1, n):
+        low, high = min(low, values[v]), max(high, values[v])
+    least, below = low, 0
+    while below != middle:
+        # as many or fewer lie below ``low``
+        half = low + (high - low) * np.float32(0.5)
+        if half <= low or half >= high:
             break
-    if n % 2 == 1:
-        return values[middle]
-    before = values[0]
-    for v in range(1, middle):
-        before = max(before, values[v])
-    return (before + values[middle]) / 2
+        below = 0
+        for v in range(n):
+            below += values[v] < half
+        if below <= middle:
+            low = half
+        else:
+            high = half
+    after, before, below = high, least, 0
+    for v in range(n):
+        if values[v] >= low:
+            after = min(after, values[v])
+    for v in range(n):
+        below += values[v] < after
+        if values[v] < after:
+            before = max(before, values[v])
+    # of an even number, the mean of both in the middle
+    return after if n % 2 == 1 or below < middle else (before + after) * np.float32(0.5)
 
 
 @njit(parallel=True, cache=True)
@@ -251,7 +256,7 @@ def background_of(views: RimViews, layer: Any, wanted: Any, begin: int, end: int
             for c in range(3):
                 for v in range(n):
                     ordered[v] = samples[i, c, v]
-                middle = _median(ordered, n)
+                middle = _median(ordered[:n])
                 colour[y, x, c] = middle
                 for v in range(n):
                     total += min((samples[i, c, v] - middle) ** 2, _MOST_DEVIATION2)

@@ -17,16 +17,17 @@ RIM_WIDTH = 0.2
 LEAST_RIM = 0.01
 """The least of it, pixels per view step."""
 
-_EVALUATIONS = 30
+_FARTHEST = 1e12
+_EVALUATIONS = 40
 _PRECISION = 1e-3
-"""Of the bounds, relative."""
+"""Of the bounds, relative; of the probability beyond them, too."""
 
 
 @njit(forceinline=True)
-def _beyond(x: float, width: float) -> float:
-    """Share of a Laplace distribution about 0 that lies above ``x``."""
+def _beyond(x: float, width: float) -> tuple[float, float]:
+    """Share of a Laplace distribution about 0 that lies above ``x``, and its density there."""
     half = float(0.5 * np.exp(-abs(x) / width))
-    return half if x > 0 else 1 - half
+    return half if x > 0 else 1 - half, half / width
 
 
 @njit(forceinline=True)
@@ -36,50 +37,47 @@ def _share_above(above: float, below: float) -> float:
 
 
 @njit(forceinline=True)
-def _above(x: float, p: Any) -> float:
-    """Probability that the true disparity is more than ``x >= 0`` above the map's."""
+def _above(x: float, p: Any) -> tuple[float, float]:
+    """Probability that the true disparity is more than ``x >= 0`` above the map's, and its density there."""
     scale, outlier_scale, outlier, rim, above, below = p
     core = (1 - outlier - rim) * 0.5 * np.exp(-x / scale)
     outliers = outlier * 0.5 * np.exp(-x / outlier_scale)
     share = _share_above(above, below)
-    other = share * _beyond(x - above, RIM_WIDTH * above + LEAST_RIM)
-    other += (1 - share) * _beyond(x + below, RIM_WIDTH * below + LEAST_RIM)
-    return float(core + outliers + rim * other)
+    beyond, density = _beyond(x - above, RIM_WIDTH * above + LEAST_RIM)
+    opposite, there = _beyond(x + below, RIM_WIDTH * below + LEAST_RIM)
+    tail = core + outliers + rim * (share * beyond + (1 - share) * opposite)
+    slope = core / scale + outliers / outlier_scale + rim * (share * density + (1 - share) * there)
+    return float(tail), float(slope)
 
 
 @njit(forceinline=True)
 def _bound(tail: float, p: Any) -> float:
-    """Distance above the map beyond which the truth lies with probability ``tail``: regula falsi of logarithms."""
-    low, at_low = 0.0, _above(0.0, p)
-    if at_low <= tail:
+    """Distance above the map beyond which the truth lies with probability ``tail``.
+
+    Newton's method for the logarithm, nearly a line, from where the heavier part alone would have its bound; halving
+    what is left where it leads astray.
+    """
+    if _above(0.0, p)[0] <= tail:
         return 0.0
-    high = 4 * p[0]
-    at_high = _above(high, p)
-    while at_high > tail:
-        low, at_low = high, at_high
-        high *= 2
-        at_high = _above(high, p)
-    goal = np.log(tail)
-    f_low, f_high = np.log(at_low) - goal, np.log(at_high) - goal
-    side = 0
+    scale, outlier_scale, outlier, rim = p[:4]
+    x = scale * np.log(max((1 - outlier - rim) * 0.5 / tail, 1.1))
+    x = max(x, outlier_scale * np.log(max(outlier * 0.5 / tail, 1e-9)))
+    low, high = 0.0, _FARTHEST
     for _ in range(_EVALUATIONS):
+        beyond, density = _above(x, p)
+        f = np.log(beyond / tail)
+        if abs(f) < _PRECISION:
+            break
+        if f > 0:
+            low = x
+        else:
+            high = x
         if high - low <= _PRECISION * high:
             break
-        x = (low * f_high - high * f_low) / (f_high - f_low)
-        f = np.log(_above(x, p)) - goal
-        if abs(f) < _PRECISION:
-            return float(x)
-        if f > 0:
-            low, f_low = x, f
-            if side == 1:
-                f_high *= 0.5
-            side = 1
-        else:
-            high, f_high = x, f
-            if side == -1:
-                f_low *= 0.5
-            side = -1
-    return float(0.5 * (low + high))
+        x += f * beyond / density
+        if not low < x < high:
+            x = 2 * low if high == _FARTHEST else 0.5 * (low + high)
+    return float(x)
 
 
 @njit(forceinline=True)
@@ -117,4 +115,4 @@ def describe(parameters: Any, tail: float, close: float, out: Any) -> None:
             out[0, y, x] = NORMAL * _expected(upwards)
             out[1, y, x] = _bound(tail, downwards)
             out[2, y, x] = _bound(tail, upwards)
-            out[3, y, x] = max(0.0, 1 - _above(close, upwards) - _above(close, downwards))
+            out[3, y, x] = max(0.0, 1 - _above(close, upwards)[0] - _above(close, downwards)[0])

@@ -67,6 +67,7 @@ class Views:
         self.factor = _reduction(light_field, most_pixels)
         self._grey: dict[tuple[int, int, int], FloatMap] = {}
         self._detail: dict[tuple[int, int, int], FloatMap] = {}
+        self._means: dict[tuple[int, int, int], float] = {}
         self._worth: dict[Baseline, bool] = {}
         positions = np.argwhere(light_field.present)
         distance = abs(positions - np.array(light_field.grid) // 2).sum(axis=1)
@@ -120,7 +121,10 @@ class Views:
         return self._mean(baseline, 1), contrast / self._gain(baseline, 1)
 
     def _mean(self, baseline: Baseline, factor: int) -> float:
-        return float(cv2.mean(self._read(baseline, factor))[0])
+        key = (*baseline, factor)
+        if key not in self._means:
+            self._means[key] = float(cv2.mean(self._read(baseline, factor))[0])
+        return self._means[key]
 
     def _gain(self, baseline: Baseline, factor: int) -> float:
         """What makes a view as bright as the reference."""

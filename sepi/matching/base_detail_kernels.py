@@ -29,21 +29,27 @@ def _mirrored(i: int, n: int) -> int:
 
 
 @njit(inline="always")
-def _add_neighbour(here: Any, there: Any, falloff: Any, nearness: Any, total: Any, weights: Any) -> None:
-    """Add one pixel of the window to every pixel of a row; ``there``: with its mean, too."""
+def _weights_between(here: Any, there: Any, falloff: Any, nearness: Any, out: Any) -> None:
+    """Weights of the pixels of a row with those of another."""
     a0, a1, a2 = here
-    b0, b1, b2, mean = there
+    b0, b1, b2 = there
     one, zero = np.float32(1), np.float32(0)
-    for x in range(total.size):
+    for x in range(out.size):
         difference = abs(a0[x] - b0[x]) + abs(a1[x] - b1[x]) + abs(a2[x] - b2[x])
         w = max(zero, one - falloff * difference * difference)
         w *= w
         w *= w
         w *= w
         w *= w
-        w *= w * nearness
-        total[x] += w * mean[x]
-        weights[x] += w
+        out[x] = w * (w * nearness)
+
+
+@njit(inline="always")
+def _add_weighted(w: Any, mean: Any, total: Any, weights: Any) -> None:
+    """Add pixels of the window, one to every pixel of a row."""
+    for x in range(w.size):
+        total[x] += w[x] * mean[x]
+        weights[x] += w[x]
 
 
 @njit(inline="always")
@@ -103,21 +109,35 @@ def detail_of_views(
         rows = np.empty((ROWS_AT_ONCE + 2 * radius, 4, W + 2 * radius), np.float32)
         for i in range(last - first + 2 * radius):
             _load_row(colours[t, s, _mirrored(low + first + i - radius, H)], unit, radius, rows[i])
-        total, weights = np.empty(W, np.float32), np.empty(W, np.float32)
-        for y in range(first, last):
-            a = rows[y - first + radius]
-            total[:] = 0
-            weights[:] = 0
-            for dy in range(-radius, radius + 1):
-                b = rows[y - first + radius + dy]
+        P = W + 2 * radius
+        total, weights, w = (
+            np.empty((last - first, P), np.float32),
+            np.ones((last - first, P), np.float32),
+            np.empty(P, np.float32),
+        )
+        for y in range(last - first):
+            # the pixel itself
+            total[y] = rows[y + radius, 3]
+        # each pair of pixels once, for both
+        for y in range(-radius, last - first):
+            a = rows[y + radius]
+            for dy in range(radius + 1):
+                b = rows[y + radius + dy]
+                of_a, of_b = y >= 0, 0 <= y + dy < last - first
                 for dx in range(-radius, radius + 1):
-                    if dy * dy + dx * dx > radius * radius:
+                    if dy * dy + dx * dx > radius * radius or (dy == 0 and dx <= 0) or not (of_a or of_b):
                         continue
                     nearness = np.float32(math.exp(-0.5 * (dy * dy + dx * dx) / (width * width)))
-                    i, j = radius + dx, radius + dx + W
-                    here = a[0, radius : radius + W], a[1, radius : radius + W], a[2, radius : radius + W]
-                    there = b[0, i:j], b[1, i:j], b[2, i:j], b[3, i:j]
-                    _add_neighbour(here, there, falloff, nearness, total, weights)
+                    begin, end = max(0, -dx), P - max(0, dx)
+                    i, j = begin + dx, end + dx
+                    here, there = (a[0, begin:end], a[1, begin:end], a[2, begin:end]), (b[0, i:j], b[1, i:j], b[2, i:j])
+                    _weights_between(here, there, falloff, nearness, w[begin:end])
+                    if of_a:
+                        _add_weighted(w[begin:end], b[3, i:j], total[y, begin:end], weights[y, begin:end])
+                    if of_b:
+                        _add_weighted(w[begin:end], a[3, begin:end], total[y + dy, i:j], weights[y + dy, i:j])
+        for y in range(last - first):
+            own = rows[y + radius, 3]
             for x in range(W):
-                value = (a[3, radius + x] - total[x] / weights[x]) / detail_unit
-                out[t, s, y, x] = np.int32(np.rint(value))
+                value = (own[radius + x] - total[y, radius + x] / weights[y, radius + x]) / detail_unit
+                out[t, s, first + y, x] = np.int32(np.rint(value))
