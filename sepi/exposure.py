@@ -29,7 +29,7 @@ _CLEAR = 5.0
 _ALONE = 64
 # least side of the small pictures that tell whether there is a difference, and of those that tell it, pixels
 _SIDE, _FINE_SIDE = 96, 192
-# every so many pixels count in means over whole views
+# every so many rows count in means over whole views
 _STRIDE = 4
 
 
@@ -133,10 +133,15 @@ def _means_are_alike(light_field: LightField) -> bool:
     """Whether the views are as bright on average, at a glance; not told where they do not show all of their pixels."""
     if light_field.missing is not None:
         return False
-    means = light_field.views[:, :, ::_STRIDE, ::_STRIDE].mean(axis=(2, 3), dtype=np.float64)
-    own = means[light_field.reference_position]
-    off = np.abs(means[light_field.present] - own)
-    return bool((off <= _MEANS_ALIKE * own).all())
+    own = _mean(light_field, light_field.reference_position)
+    places = map(tuple, np.argwhere(light_field.present).tolist())
+    return all((np.abs(_mean(light_field, place) - own) <= _MEANS_ALIKE * own).all() for place in places)
+
+
+def _mean(light_field: LightField, place: tuple[int, ...]) -> npt.NDArray[np.float64]:
+    """Mean colour of a view, of some of its rows."""
+    view = light_field.views[place][::_STRIDE]
+    return np.array(cv2.mean(view)[: view.shape[2]])
 
 
 def _small(light_field: LightField, place: tuple[int, int], step: int) -> tuple[FloatMap, BoolMap]:

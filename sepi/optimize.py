@@ -29,7 +29,7 @@ from pydantic import Field, model_validator
 from sepi.error_bars.bars import error_bars
 from sepi.error_bars.calibration import SECOND_ORDER, WLS, Calibration
 from sepi.error_bars.cues import cues_of_map, cues_of_stage_before, cues_of_views
-from sepi.image.noise import residual_variance
+from sepi.image.noise import noise_of_reference_view, variance_of_residuals
 from sepi.lightfield import BoolMap, FloatMap, LightField
 from sepi.matching.base_detail import BaseDetailParameters, forget_detail
 from sepi.matching.denoising import denoised, measured_noise
@@ -192,7 +192,7 @@ def second_order(
     light_field = denoised(light_field, parameters.denoising, parameters.least_noise)
     disparity = before.disparity
     uniform = before.mask("textureless")
-    prior, variance = _prior(light_field.reference_view, before.confidence, uniform, parameters), None
+    prior, variance = _prior(light_field, before.confidence, uniform, parameters), None
     lowest, highest = light_field.require_disparity_range().candidates(2)
     total = parameters.refinements + parameters.solves
     for i in range(total):
@@ -289,11 +289,15 @@ class _Prior(NamedTuple):
     colour_variance: float
 
 
-def _prior(guide: FloatMap, confidence: FloatMap, uniform: BoolMap, parameters: SecondOrderParameters) -> _Prior:
+def _prior(
+    light_field: LightField, confidence: FloatMap, uniform: BoolMap, parameters: SecondOrderParameters
+) -> _Prior:
     from sepi.regularization.second_order import colour_changes
 
     reliability = np.where(uniform, 1, reliable(confidence, parameters)).astype(np.float32)
-    variance = parameters.smooth_colour**2 + 4 * residual_variance(guide)
+    guide = light_field.reference_view
+    noise = variance_of_residuals(noise_of_reference_view(light_field), guide.shape[2])
+    variance = parameters.smooth_colour**2 + 4 * noise
     return _Prior(uniform, reliability, colour_changes(guide), variance)
 
 

@@ -17,7 +17,7 @@ import numpy as np
 from sepi.boundaries.arrays import RimViews, Sides
 from sepi.boundaries.parameters import BoundaryParameters
 from sepi.boundaries.surroundings import Surroundings
-from sepi.image.noise import noise_level
+from sepi.image.noise import noise_of_reference_view
 from sepi.lightfield import FloatMap, LightField, full_scale
 from sepi.matching.nearest_surfaces import nearest_surfaces
 from sepi.matching.row_bands import row_bands
@@ -68,7 +68,7 @@ def share_evidence(
         # they say nothing for either surface
         return np.zeros_like(disparity)
     layer, distance = _more_distant_layer(disparity, rim, views.margin)
-    scales2 = _LEAST_SCALE**2 + 2 * noise_level(guide) ** 2, parameters.share_scale**2
+    scales2 = _LEAST_SCALE**2 + 2 * noise_of_reference_view(light_field) ** 2, parameters.share_scale**2
     present = np.zeros(light_field.grid, bool)
     present[tuple(views.places.T)] = True
     # how far from a pixel the pieces of background lie that views show with it

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import cv2
 import numpy as np
 
-from sepi.lightfield import BoolMap, FloatMap
+from sepi.lightfield import BoolMap, FloatMap, LightField
+from sepi.workspace import OfViews, kept_of
 
 BLACK, SATURATED = 0.01, 254 / 255
 """As dark and as bright as can be told: beyond, noise is cut off."""
@@ -44,6 +47,21 @@ def noise_level(image: FloatMap, region: BoolMap | None = None) -> float:
     if not response.size:
         return 0.0
     return float(np.median(response).item() * _MEDIAN_TO_SIGMA / 6)
+
+
+@dataclass
+class _Kept(OfViews):
+    """The noise of the reference view."""
+
+    noise: float | None = None
+
+
+def noise_of_reference_view(light_field: LightField) -> float:
+    """:func:`noise_level` of the reference view; in a workspace found once."""
+    kept = kept_of(light_field, _Kept)
+    if kept.noise is None:
+        kept.noise = noise_level(light_field.reference_view)
+    return kept.noise
 
 
 def mask_energy(image: FloatMap) -> FloatMap:

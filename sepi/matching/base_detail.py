@@ -21,7 +21,7 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import Field
 
-from sepi.image.noise import noise_level, variance_of_residuals
+from sepi.image.noise import noise_of_reference_view, variance_of_residuals
 from sepi.lightfield import BoolMap, FloatMap, LightField, full_scale
 from sepi.matching.denoising import LEFT, DenoisedLightField, DenoisingParameters
 from sepi.matching.row_bands import Rows
@@ -159,12 +159,11 @@ def base_detail_decomposition(
 
 @dataclass
 class _Kept(OfViews):
-    """What is made of some views so far: the noise of the reference view, and the detail of some of them.
+    """The detail of some views so far.
 
     Detail is kept of whole views; what is made in bands of rows, since memory is short, is not.
     """
 
-    noise: float | None = None
     made_with: tuple[float, ...] = ()
     detail: npt.NDArray[np.int16] | None = None
     made: BoolMap | None = None
@@ -197,13 +196,10 @@ def _detail_so_far(
 
 
 def reference_noise(light_field: LightField) -> float:
-    """Noise of the reference view (:func:`sepi.image.noise.noise_level`); in a workspace found once.
+    """Noise of the reference view (:func:`sepi.image.noise.noise_of_reference_view`).
 
     Of denoised views what is left where nothing but noise was: the mask would not see it, since it is smooth.
     """
     if isinstance(light_field, DenoisedLightField):
         return LEFT * light_field.noise
-    kept = kept_of(light_field, _Kept)
-    if kept.noise is None:
-        kept.noise = noise_level(light_field.reference_view)
-    return kept.noise
+    return noise_of_reference_view(light_field)

@@ -13,11 +13,13 @@ A bare wall is none of these: it is neither black nor overexposed, and what it b
 
 from __future__ import annotations
 
+from typing import Any
+
 import cv2
 import numpy as np
 import numpy.typing as npt
 
-from sepi.image.noise import SATURATED, noise_level
+from sepi.image.noise import SATURATED, noise_level, noise_of_reference_view
 from sepi.lightfield import BoolMap, FloatMap, LightField, as_unit_float, full_scale, require_light_field
 from sepi.stage import HIGH, LOW, SIGMA, StageMaps
 from sepi.validation import require_map
@@ -133,13 +135,15 @@ def without_signal(light_field: LightField, disparity: FloatMap) -> BoolMap:
     """
     view, dtype = light_field.reference_view, light_field.views.dtype
     rounding = _FLOAT_ROUNDING if dtype == np.float32 else _ROUNDING / full_scale(dtype)
-    energy, brightness = _energy(view), view.max(axis=2)
-    bright = view.min(axis=2) >= SATURATED
+    # plane by plane: along the channels, NumPy is slow
+    channels = cv2.split(view)
+    energy, brightness = _energy(view), np.maximum.reduce(channels)
+    bright = np.minimum.reduce(channels) >= SATURATED
     found = _large(_beside(bright & (energy < _of_noise(rounding)), bright))
     white = float(np.quantile(brightness, 0.999))
     # without the noise of single pixels
-    level = cv2.blur(view, (3, 3)).max(axis=2)
-    most = min(noise_level(view), _MOST_NOISE * white)
+    level = np.maximum.reduce(cv2.split(cv2.blur(view, (3, 3))))
+    most = min(noise_of_reference_view(light_field), _MOST_NOISE * white)
     for share, at_corners in ((BLACK, False), (LENS_CORNER, True)):
         limit = share * white
         # texture passes for noise; where it is dark there may be less of both
@@ -214,7 +218,8 @@ def _mean_of_dark(light_field: LightField, disparity: FloatMap, limit: float) ->
 def _energy(image: FloatMap) -> FloatMap:
     """Squared gradients of an image (H, W, 3), summed over channels, mean over a window; shape (H, W)."""
     down, across = np.gradient(image, axis=(0, 1))
-    return np.asarray(cv2.blur((down**2 + across**2).sum(axis=2), (_WINDOW, _WINDOW)))
+    squares: Any = down**2 + across**2
+    return np.asarray(cv2.blur(np.add.reduce(cv2.split(squares)), (_WINDOW, _WINDOW)), np.float32)
 
 
 def _of_noise(noise: float) -> float:

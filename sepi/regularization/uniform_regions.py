@@ -21,7 +21,7 @@ import cv2
 import numpy as np
 from pydantic import Field
 
-from sepi.image.noise import noise_level
+from sepi.image.noise import noise_of_reference_view
 from sepi.lightfield import BoolMap, FloatMap, LightField, full_scale
 from sepi.matching.base_detail import BaseDetailParameters
 from sepi.matching.denoising import DenoisedLightField, DenoisingParameters, denoised
@@ -134,7 +134,7 @@ def _variance_of_views(light_field: LightField, field: LightField, compared: Boo
     if isinstance(field, DenoisedLightField):
         return variance_map(light_field, field.of_views, compared)
     rounding = 0.3 / full_scale(light_field.views.dtype) if light_field.views.dtype != np.float32 else 0.0
-    noise = max(noise_level(light_field.reference_view), rounding, LEAST_NOISE)
+    noise = max(noise_of_reference_view(light_field), rounding, LEAST_NOISE)
     return np.full(light_field.shape, noise**2, np.float32)
 
 
