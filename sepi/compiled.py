@@ -12,8 +12,10 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any, TypeVar, cast
 
+import llvmlite.binding
 import numba
 from numba import prange, types
+from numba.core import codegen
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 from numba.core.registry import cpu_target
 from numba.core.runtime import nrtdynmod
@@ -55,7 +57,8 @@ class _KernelCache(FunctionCache):  # type: ignore[misc, unused-ignore]
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """What was compiled for a signature; None where there is nothing."""
         _initialize(target_context)
-        with self._guard_against_spurious_io_errors(), _names_unlisted(target_context.codegen()._engine):
+        engine = target_context.codegen()._engine
+        with self._guard_against_spurious_io_errors(), _names_unlisted(engine), _bitcode_unparsed():
             return self._load_overload(sig, target_context)  # type: ignore[no-untyped-call, unused-ignore]
         return None
 
@@ -93,6 +96,10 @@ def _initialize(context: Any) -> None:
         compiler.compile_nrt_functions = _compile_runtime
 
 
+_FROM_PYTHON = "_ZN7cpython"
+"""Names begin with it of the functions that Python calls."""
+
+
 class _Names(set[str]):
     """Names that compiled code defines: those that numba lists, and those of modules that are looked at when asked."""
 
@@ -102,10 +109,13 @@ class _Names(set[str]):
 
     def __contains__(self, name: object) -> bool:
         """Whether one of them is that."""
-        return super().__contains__(name) or any(_defines(module, name) for module in reversed(self.modules))
+        return super().__contains__(name) or any(_defines(module, str(name)) for module in reversed(self.modules))
 
 
-def _defines(module: Any, name: object) -> bool:
+def _defines(module: Any, name: str) -> bool:
+    if isinstance(module, _Bitcode) and name.startswith(_FROM_PYTHON):
+        # nothing but the code that it is part of names such a function
+        return module.mentions(name)
     try:
         return not module.get_function(name).is_declaration
     except NameError:
@@ -122,6 +132,46 @@ def _names_unlisted(engine: Any) -> Iterator[None]:
         yield
     finally:
         del engine._load_defined_symbols
+
+
+class _Bitcode:
+    """A module of compiled code as it is kept beside it: parsed when it is asked for anything.
+
+    Whoever compiles something that calls the code asks; a process that only loads and runs it does not.
+    """
+
+    def __init__(self, packed: bytes) -> None:
+        self._packed = packed
+
+    def mentions(self, name: str) -> bool:
+        """Whether it defines something of that name, or calls it: names are kept as they are."""
+        return name.encode() in self._packed
+
+    def __getattr__(self, name: str) -> Any:
+        """What the parsed module has."""
+        if "_module" not in self.__dict__:
+            self._module: Any = llvmlite.binding.parse_bitcode(self._packed)  # type: ignore[no-untyped-call, unused-ignore]
+        return getattr(self._module, name)
+
+
+class _Binding:
+    """LLVM as numba knows it, but for the parsing of bitcode."""
+
+    parse_bitcode = _Bitcode
+
+    def __getattr__(self, name: str) -> Any:
+        """What LLVM has."""
+        return getattr(llvmlite.binding, name)
+
+
+@contextmanager
+def _bitcode_unparsed() -> Iterator[None]:
+    """Have code be loaded without parsing what it was made of: a quarter of the time of all loading."""
+    codegen.__dict__["ll"] = _Binding()
+    try:
+        yield
+    finally:
+        codegen.__dict__["ll"] = llvmlite.binding
 
 
 def njit(*, cache: bool = False, **options: Any) -> Callable[[_Function], _Function]:

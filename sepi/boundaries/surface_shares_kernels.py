@@ -234,12 +234,17 @@ def background_of(views: RimViews, layer: Any, wanted: Any, begin: int, end: int
     colour, variance = np.empty((H, W, 3), np.float32), np.empty((H, W), np.float32)
     count = np.zeros((H, W), np.int32)
     for y in prange(begin, end):
-        columns = np.flatnonzero(wanted[y])
-        samples, ordered = np.empty((columns.size, 3, N), np.float32), np.empty(N, np.float32)
+        # not NumPy's: where it is compiled, every process loads SciPy
+        columns, few = np.empty(W, np.int64), 0
+        for x in range(W):
+            if wanted[y, x]:
+                columns[few] = x
+                few += 1
+        samples, ordered = np.empty((few, 3, N), np.float32), np.empty(N, np.float32)
         sums, colour_there = np.empty(TAPS, np.float32), np.empty(3, np.float32)
         # view by view: neighbours are near each other in its memory
         for view in range(N):
-            for i in range(columns.size):
+            for i in range(few):
                 x = columns[i]
                 seen, row, column, fy, fx = _sees(views, view, layer[y, x], y, x)
                 if seen:
@@ -247,7 +252,7 @@ def background_of(views: RimViews, layer: Any, wanted: Any, begin: int, end: int
                     for c in range(3):
                         samples[i, c, count[y, x]] = colour_there[c]
                     count[y, x] += 1
-        for i in range(columns.size):
+        for i in range(few):
             x = columns[i]
             n = count[y, x]
             if n < FEWEST_VIEWS:
