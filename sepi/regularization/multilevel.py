@@ -4,7 +4,7 @@ Conjugate gradients are slow at what bends over many pixels, the slower the fart
 as single pixels and as bilinear hats see it, 2, 8 and 32 pixels from node to node, each with its own diagonal, all
 added up [1]_: a third of the steps that the diagonal takes with a direct solve for planes in blocks beside it, and
 nothing to be factored. The system is a stencil, and stays one; the loop is short, and loading a library that has one
-takes longer than solving. Its compiled loops are in :mod:`sepi.regularization.multilevel_kernels`.
+takes longer than solving. Its compiled loops are in :mod:`sepi.regularization.second_order_kernels`.
 
 References
 ----------
@@ -87,7 +87,7 @@ def multilevel_inverse(stencil: FloatArray, dtype: npt.DTypeLike) -> Operator:
     callable
         Takes and returns pictures with their margins, of that type; what it returns holds until it is called again.
     """
-    from sepi.regularization import multilevel_kernels as kernels
+    from sepi.regularization import second_order_kernels as kernels
 
     inverse = _inverse(stencil[0], dtype)
     hats = [_inverse(diagonal, dtype) for diagonal in _diagonals(stencil)]
@@ -113,8 +113,7 @@ def multilevel_inverse(stencil: FloatArray, dtype: npt.DTypeLike) -> Operator:
 
 def _shapes(stencil: FloatArray) -> list[tuple[int, int]]:
     """Rows and columns of nodes of each level: each of a coarser level is one of the finer."""
-    from sepi.regularization.multilevel_kernels import SPACING
-    from sepi.regularization.second_order_kernels import MARGIN
+    from sepi.regularization.second_order_kernels import MARGIN, SPACING
 
     widest = SPACING << (LEVELS - 1)
     rows, columns = (-(-(n - 2 * MARGIN) // widest) for n in stencil.shape[1:])
@@ -123,7 +122,7 @@ def _shapes(stencil: FloatArray) -> list[tuple[int, int]]:
 
 def _diagonals(stencil: FloatArray) -> list[FloatArray]:
     """What the matrix has on its diagonal as the hats of each level that counts see it."""
-    from sepi.regularization.multilevel_kernels import SPACING, diagonal_of_hats
+    from sepi.regularization.second_order_kernels import SPACING, diagonal_of_hats
 
     found: list[FloatArray] = []
     for i, shape in list(enumerate(_shapes(stencil)))[::COUNTED]:

@@ -1,21 +1,33 @@
-"""Compiled loop of the second-order smoothing: its matrix, as a stencil.
+"""Compiled loops of the second-order smoothing: its matrix, as a stencil, and the hats of its preconditioner.
 
-Pictures have a margin of :data:`MARGIN` pixels of zeros on each side, so that no loop has to look where it is. What
-is called in every step of the solver takes a millisecond, and threads that wait for each other take longer than that
-where another program has one of the cores: it runs on one.
+Pictures have a margin of :data:`MARGIN` pixels of zeros on each side, so that no loop has to look where it is; hats
+have none. Their nodes lie between pixels: that of number ``i`` of the finest, :data:`SPACING` pixels apart, at
+``SPACING i - 0.5``. A coarser level has every other node, and each of its hats is one of the finer level and half of
+each of its neighbours.
+
+What is called in every step of the solver takes a millisecond, and threads that wait for each other take longer than
+that where another program has one of the cores: it runs on one.
 """
 
 from __future__ import annotations
 
 from typing import Any
 
-from sepi.compiled import njit
+import numpy as np
+
+from sepi.compiled import njit, prange
 
 EXACT = {"nnan", "ninf", "nsz"}
 """Fast-math flags that keep every rounding as written: see :mod:`sepi.matching.plane_sweep_kernels`."""
 
 MARGIN = 2
 """How far second differences reach, pixels."""
+
+SPACING = 2
+"""Pixels from node to node of the finest hats."""
+
+_NEAR, _FAR = 0.75, 0.25
+"""The finest hats at the pixels beside a node and at the next ones."""
 
 
 @njit(inline="always")
@@ -47,3 +59,131 @@ def product(stencil: Any, vector: Any, out: Any) -> None:
                 stencil[k, y, m : m + n], vector[y + dy, m + dx : m + dx + n],
                 stencil[k, y - dy, m - dx : m - dx + n], vector[y - dy, m - dx : m - dx + n], target,
             )  # fmt: skip
+
+
+@njit(cache=True, fastmath=EXACT)
+def onto_finest(vector: Any, out: Any) -> None:
+    """Inner products of a picture with the finest hats.
+
+    Parameters
+    ----------
+    vector : ndarray, shape (H + 2 MARGIN, W + 2 MARGIN), float32 or float64
+    out : ndarray, shape (h, w), of the same type
+        Filled.
+    """
+    H, W = vector.shape[0] - 2 * MARGIN, vector.shape[1] - 2 * MARGIN
+    near, far = vector.dtype.type(_NEAR), vector.dtype.type(_FAR)
+    # with zeros round the picture, as wide as the hats reach
+    line = np.zeros(2 * out.shape[1] + 2, vector.dtype)
+    for i in range(out.shape[0]):
+        line[:] = 0
+        within = line[2 : 2 + W]
+        for dy, share in ((-2, far), (-1, near), (0, near), (1, far)):
+            y = 2 * i + dy
+            if 0 <= y < H:
+                row = vector[y + MARGIN, MARGIN : MARGIN + W]
+                for x in range(W):
+                    within[x] += share * row[x]
+        for j in range(out.shape[1]):
+            x = 2 * j
+            out[i, j] = far * (line[x] + line[x + 3]) + near * (line[x + 1] + line[x + 2])
+
+
+@njit(cache=True, fastmath=EXACT)
+def onto_coarser(fine: Any, out: Any) -> None:
+    """Inner products with the hats ``(h, w)`` of the next level from those ``(2 h - 1, 2 w - 1)`` with finer ones."""
+    half = fine.dtype.type(0.5)
+    line = np.zeros(fine.shape[1] + 2, fine.dtype)
+    for i in range(out.shape[0]):
+        within = line[1 : 1 + fine.shape[1]]
+        within[:] = fine[2 * i]
+        for y in (2 * i - 1, 2 * i + 1):
+            if 0 <= y < fine.shape[0]:
+                row = fine[y]
+                for x in range(row.size):
+                    within[x] += half * row[x]
+        for j in range(out.shape[1]):
+            x = 2 * j + 1
+            out[i, j] = line[x] + half * (line[x - 1] + line[x + 1])
+
+
+@njit(cache=True, fastmath=EXACT)
+def add_coarser(coarse: Any, fine: Any) -> None:
+    """Add hats of heights ``coarse (h, w)`` to those of the finer level, ``fine (2 h - 1, 2 w - 1)``."""
+    half = fine.dtype.type(0.5)
+    line = np.empty(coarse.shape[1], fine.dtype)
+    for i in range(fine.shape[0]):
+        above, below = coarse[i // 2], coarse[(i + 1) // 2]
+        for j in range(line.size):
+            line[j] = half * (above[j] + below[j])
+        target = fine[i]
+        for j in range(line.size - 1):
+            target[2 * j] += line[j]
+            target[2 * j + 1] += half * (line[j] + line[j + 1])
+        target[2 * line.size - 2] += line[line.size - 1]
+
+
+@njit(cache=True, fastmath=EXACT)
+def diagonal_and_finest(inverse: Any, vector: Any, fine: Any, out: Any) -> None:
+    """``inverse * vector``, plus the finest hats.
+
+    Parameters
+    ----------
+    inverse, vector, out : ndarray, shape (H + 2 MARGIN, W + 2 MARGIN), float32 or float64
+        ``out`` is filled but for its margin.
+    fine : ndarray, shape (h, w), of the same type
+        Heights of the hats.
+    """
+    H, W = vector.shape[0] - 2 * MARGIN, vector.shape[1] - 2 * MARGIN
+    near, far = out.dtype.type(_NEAR), out.dtype.type(_FAR)
+    line, hats = np.empty(fine.shape[1], out.dtype), np.empty(2 * fine.shape[1], out.dtype)
+    for y in range(H):
+        first, second = (near, far) if y % 2 == 0 else (far, near)
+        above, below = fine[y // 2], fine[y // 2 + 1]
+        for j in range(line.size):
+            line[j] = first * above[j] + second * below[j]
+        for j in range(line.size - 1):
+            hats[2 * j] = near * line[j] + far * line[j + 1]
+            hats[2 * j + 1] = far * line[j] + near * line[j + 1]
+        row, own, target = vector[y + MARGIN], inverse[y + MARGIN], out[y + MARGIN]
+        for x in range(W):
+            target[x + MARGIN] = own[x + MARGIN] * row[x + MARGIN] + hats[x]
+
+
+@njit(parallel=True, cache=True, fastmath=EXACT)
+def diagonal_of_hats(stencil: Any, spacing: int, out: Any) -> None:
+    """What the matrix has on its diagonal as hats see it.
+
+    Parameters
+    ----------
+    stencil : ndarray, as in :func:`product`
+    spacing : int
+        Pixels from node to node.
+    out : ndarray, shape (h, w), float64
+        Filled.
+    """
+    H, W = stencil.shape[1] - 2 * MARGIN, stencil.shape[2] - 2 * MARGIN
+    m, reach = MARGIN, 2 * spacing
+    # a hat at its own pixels, and zeros, to where entries lead that leave it
+    hat = np.zeros(reach + 2 * MARGIN)
+    for p in range(reach):
+        hat[p + MARGIN] = 1 - abs(p + 0.5 - spacing) / spacing
+    for i in prange(out.shape[0]):
+        line = np.zeros(spacing * (out.shape[1] + 1))
+        out[i] = 0
+        for k, dy, dx in ((0, 0, 0), (1, 0, 1), (2, 0, 2), (3, 1, 0), (4, 2, 0), (5, 1, 1), (6, 1, -1)):
+            line[:] = 0
+            within = line[spacing : spacing + W]
+            for p in range(reach):
+                y, share = spacing * (i - 1) + p, hat[p + m] * hat[p + dy + m]
+                if 0 <= y < H and share > 0:
+                    row = stencil[k, y + m, m : m + W]
+                    for x in range(W):
+                        within[x] += share * row[x]
+            # each entry as seen from either of its pixels
+            times = 1.0 if k == 0 else 2.0
+            for p in range(reach):
+                share = times * hat[p + m] * hat[p + dx + m]
+                if share > 0:
+                    for j in range(out.shape[1]):
+                        out[i, j] += share * line[spacing * j + p]

@@ -301,7 +301,16 @@ def test_kernels_equal_a_plain_twin(geometry: str, dtype: Any) -> None:
     units = random.uniform(0.9, 1.1, present.sum()).astype(np.float32) * unit
     # in the order in memory that they have for maps: no other kernels are compiled
     places = np.ascontiguousarray(np.argwhere(present))
-    rim_views = RimViews(views.reshape(*views.shape[:3], -1), views.shape[4], units, places, field.baselines[present], nearest, 0, np.float32(0.15))
+    rim_views = RimViews(
+        views.reshape(*views.shape[:3], -1),
+        views.shape[4],
+        units,
+        places,
+        field.baselines[present],
+        nearest,
+        0,
+        np.float32(0.15),
+    )
     clean = disparity - surroundings(disparity).farthest < 0.3
     sides = Sides(disparity, field.reference_view, clean, 4)
     twin = Twin(rim_views, rim, sides)
@@ -331,8 +340,8 @@ def test_brightness_is_told_view_by_view() -> None:
     field = LightField(views, "bright")
     still = np.zeros((40, 48), np.float32)
     rim_views = RimViews(
-        views.reshape(*views.shape[:3], -1), 3, np.ones(3, np.float32), np.argwhere(field.present), field.baselines[field.present],
-        np.empty((0, 0, 0, 0), np.float32), 0, np.float32(0),
+        views.reshape(*views.shape[:3], -1), 3, np.ones(3, np.float32), np.argwhere(field.present),
+        field.baselines[field.present], np.empty((0, 0, 0, 0), np.float32), 0, np.float32(0),
     )  # fmt: skip
     sides = Sides(still, field.reference_view, still == 0, 4)
     brightness, residual = kernels.brightness_of_views(rim_views, sides, np.zeros((*field.grid, 0, 0), bool))

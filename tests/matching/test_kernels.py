@@ -12,7 +12,7 @@ import pytest
 
 import sepi
 from sepi.compiled import _KernelFiles
-from sepi.regularization.second_order_kernels import onto_planes
+from sepi.regularization.second_order_kernels import product
 
 PACKAGE = Path(sepi.__file__).parent
 
@@ -89,7 +89,7 @@ def test_compiled_functions_use_their_own_file_only(file: Path) -> None:
 
 def test_compiled_at_once_by_two_processes_for_two_types(tmp_path: Path) -> None:
     """Either finds the code of its own type, or none: that of the other would crash, or compute anything."""
-    assert isinstance(onto_planes._cache._cache_file, _KernelFiles)
+    assert isinstance(product._cache._cache_file, _KernelFiles)
     one, other = (_KernelFiles(str(tmp_path), "cost-1.py3", "of this source") for _ in range(2))
     # as both read the index before either wrote it
     known, save_data = iter([{}, {}]), one._save_data

@@ -16,6 +16,7 @@ from sepi.matching.spline_kernels import MARGIN, SPLINE_UNIT, spline_coefficient
 from sepi.matching.visibility_kernels import z_buffers
 from sepi.optimize import SecondOrderParameters, second_order
 from sepi.pipeline import estimate_depth
+from sepi.regularization.multilevel import multilevel_inverse
 from sepi.regularization.second_order import (
     LEAST_SINGLE_RTOL,
     colour_changes,
@@ -24,6 +25,7 @@ from sepi.regularization.second_order import (
     solve_smooth,
     upper_quartile,
 )
+from sepi.regularization.second_order_kernels import MARGIN as MARGIN_OF_STENCIL
 from sepi.scenes import render
 from sepi.stage import StageMaps, no_progress
 
@@ -250,6 +252,32 @@ def test_solver_agrees_with_a_direct_one(shape, rtol, error) -> None:
     expected = spsolve(system, weight.ravel().astype(float) * data.ravel())
     found = solve_smooth(10 * second_difference_stencil(weights, shape), weight, data, data, rtol, 2000)
     np.testing.assert_allclose(found.ravel(), expected, atol=error)
+
+
+@pytest.mark.parametrize("shape", [(20, 24), (3, 3), (70, 9)])
+def test_preconditioner_adds_what_hats_of_each_width_see(shape) -> None:
+    """With a wrong one the solver still gets there, in several times the steps, or stops short of it."""
+    random = np.random.default_rng(8)
+    weights = [random.uniform(0, 1, w.shape) for w in weights_of(plane(shape))]
+    smooth = sum(d.T @ diags(w.ravel()) @ d for d, w in zip(second_differences(shape), weights, strict=True))
+    held = random.uniform(0, 1, shape)
+    matrix = smooth + diags(held.ravel())
+    residual = random.normal(size=shape)
+    expected = residual.ravel() / matrix.diagonal()
+    for spacing in (2, 8, 32):
+        hats = [
+            np.maximum(0, 1 - np.abs(np.arange(n)[:, None] + 0.5 - spacing * np.arange(n // spacing + 2)) / spacing)
+            for n in shape
+        ]
+        both = np.kron(*hats)
+        both = both[:, both.any(axis=0)]
+        expected += both @ (both.T @ residual.ravel() / np.diag(both.T @ (matrix @ both)))
+    margins = ((MARGIN_OF_STENCIL,) * 2,) * 2
+    stencil = np.pad(second_difference_stencil(weights, shape), ((0, 0), *margins))
+    inside = np.s_[MARGIN_OF_STENCIL:-MARGIN_OF_STENCIL, MARGIN_OF_STENCIL:-MARGIN_OF_STENCIL]
+    stencil[0][inside] += held
+    found = multilevel_inverse(stencil, np.float64)(np.pad(residual, margins))
+    np.testing.assert_allclose(found[inside].ravel(), expected, rtol=1e-9, atol=1e-12)
 
 
 def test_steps_stay_where_the_data_is_reliable_and_go_where_it_is_not() -> None:
