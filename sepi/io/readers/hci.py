@@ -2,7 +2,7 @@
 
 ``input_CamNNN.png`` is view ``NNN = S * t + s``. Views may be missing, but for the one whose depth is made.
 ``parameters.cfg``, ``gt_disp_lowres.pfm`` (disparity of the centre view) and ``mask_NAME.png`` (white regions) are read
-where present.
+where present. ``baseline_mm`` is the distance of neighbouring cameras, of rows as of columns.
 
 References
 ----------
@@ -138,6 +138,8 @@ def _read(path: Path, options: ReadOptions, with_truth: bool) -> LightField:
         ground_truth=ground_truth,
         masks=masks,
         camera=known_camera,
+        # one number for both directions: rows are as far apart as columns
+        settled=parameters.baseline_mm is not None,
     )
 
 
