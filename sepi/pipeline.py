@@ -88,9 +88,9 @@ def estimate_depth(
     light_field.require_seen_range()
     tell_kernel_cache()
     # kernels are compiled for views without gaps in memory; those of a part of an array would be compiled anew
-    light_field = replace(light_field, views=np.ascontiguousarray(light_field.views))
-    workspace = light_field.workspace or Workspace()
-    compared = replace(equally_bright(light_field), workspace=workspace)
+    views, workspace = np.ascontiguousarray(light_field.views), light_field.workspace or Workspace()
+    light_field = replace(light_field, views=views, workspace=workspace)
+    compared = equally_bright(light_field)
     require_memory_of(compared, settings.values())
     if memory is not None:
         # what was made to tell what is needed stays
