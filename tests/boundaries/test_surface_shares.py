@@ -17,6 +17,7 @@ from sepi.boundaries.arrays import RimViews, Sides
 from sepi.boundaries.decision import assigned_to_surfaces
 from sepi.boundaries.parameters import BoundaryParameters
 from sepi.boundaries.rim_kernels import Rim, rim_of
+from sepi.boundaries.surface_shares import _views_alike as views_alike
 from sepi.boundaries.surroundings import surroundings
 from sepi.lightfield import LightField
 from sepi.matching.visibility_kernels import z_buffers
@@ -347,6 +348,20 @@ def test_brightness_is_told_view_by_view() -> None:
     brightness, residual = kernels.brightness_of_views(rim_views, sides, np.zeros((*field.grid, 0, 0), bool))
     np.testing.assert_allclose(brightness, factors[0], rtol=0.02)
     assert (residual < 0.01).all()
+
+
+def test_brightness_is_that_of_what_a_view_shows() -> None:
+    """What lies beyond a camera's picture is none of its light; the view would be left out as another exposure."""
+    picture = cv2.GaussianBlur(np.random.default_rng(4).random((40, 48, 3), np.float32), (0, 0), 3)
+    views = np.stack([picture] * 3)[None].copy()
+    missing = np.zeros((1, 3, 40, 48), bool)
+    missing[0, 2, :, 20:] = True
+    views[missing] = 1
+    still = np.zeros((40, 48), np.float32)
+    sides = Sides(still, picture, still == 0, 4)
+    for marked, kept in ((missing, 3), (None, 2)):
+        field = LightField(views, "half shown", missing=marked)
+        assert len(views_alike(field, sides, USUAL).places) == kept
 
 
 @pytest.mark.parametrize("grid", [(1, 9), (9, 9)])
