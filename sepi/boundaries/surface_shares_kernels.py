@@ -18,9 +18,6 @@ FEWEST_VIEWS = 3
 FEWEST_SAMPLES = 8
 """Views from which a share is told."""
 
-TAPS = 12
-"""Values of a row, four neighbours of three channels, that a sample is made of."""
-
 EXACT = {"nnan", "ninf", "nsz"}
 """Fast-math flags that keep every rounding as written: see :mod:`sepi.matching.plane_sweep_kernels`."""
 
@@ -89,17 +86,10 @@ def _cubic(f: Any) -> Any:
 
 
 @njit(forceinline=True)
-def _add_rows(a: Any, b: Any, c: Any, d: Any, down: Any, out: Any) -> None:
-    """Sums of values of four rows, by their weights; a loop of constant length, which vectorises."""
-    for k in range(TAPS):
-        out[k] = down[0] * a[k] + down[1] * b[k] + down[2] * c[k] + down[3] * d[k]
-
-
-@njit(forceinline=True)
-def _sample(views: RimViews, view: int, row: int, column: int, fy: Any, fx: Any, sums: Any, out: Any) -> None:
+def _sample(views: RimViews, view: int, row: int, column: int, fy: Any, fx: Any, out: Any) -> None:
     """Colour between pixels of a view into ``out (3,)``, 0..1; grey counts as three equal channels.
 
-    Cubic, since a bilinear sample takes from the peak of what is two pixels wide. ``sums (TAPS,)`` is scratch.
+    Cubic, since a bilinear sample takes from the peak of what is two pixels wide.
     """
     picture = views.lines[views.places[view, 0], views.places[view, 1]]
     H, C = picture.shape[0], views.channels
@@ -148,7 +138,7 @@ def brightness_of_views(views: RimViews, sides: Sides, missing: Any) -> Any:
         # of each pixel that the view shows: its colours there, and the reference's
         shown = np.empty((((H - 1) // _STRIDE + 1) * ((W - 1) // _STRIDE + 1), 2, 3))
         of_view = missing[views.places[view, 0], views.places[view, 1]]
-        own, other, rest, n, sums = 1e-9, 1e-9, 0.0, 0, np.empty(TAPS, np.float32)
+        own, other, rest, n = 1e-9, 1e-9, 0.0, 0
         for y in range(0, H, _STRIDE):
             for x in range(0, W, _STRIDE):
                 down = y - disparity[y, x] * views.baselines[view, 0]
@@ -163,7 +153,7 @@ def brightness_of_views(views: RimViews, sides: Sides, missing: Any) -> Any:
                     or of_view[row + 1, column + 1]
                 ):
                     continue
-                _sample(views, view, row, column, down - row, across - column, sums, shown[n, 0])
+                _sample(views, view, row, column, down - row, across - column, shown[n, 0])
                 for c in range(3):
                     shown[n, 1, c] = guide[y, x, c]
                     own += shown[n, 1, c]
@@ -241,14 +231,14 @@ def background_of(views: RimViews, layer: Any, wanted: Any, begin: int, end: int
                 columns[few] = x
                 few += 1
         samples, ordered = np.empty((few, 3, N), np.float32), np.empty(N, np.float32)
-        sums, colour_there = np.empty(TAPS, np.float32), np.empty(3, np.float32)
+        colour_there = np.empty(3, np.float32)
         # view by view: neighbours are near each other in its memory
         for view in range(N):
             for i in range(few):
                 x = columns[i]
                 seen, row, column, fy, fx = _sees(views, view, layer[y, x], y, x)
                 if seen:
-                    _sample(views, view, row, column, fy, fx, sums, colour_there)
+                    _sample(views, view, row, column, fy, fx, colour_there)
                     for c in range(3):
                         samples[i, c, count[y, x]] = colour_there[c]
                     count[y, x] += 1
@@ -315,9 +305,7 @@ def _nearer_colour(sides: Sides, near: Any, middle: Any, y: int, x: int, surface
 
 
 @njit(forceinline=True)
-def _along_near(
-    views: RimViews, background: Background, near: Any, far: Any, y: int, x: int, sums: Any, samples: Any
-) -> int:
+def _along_near(views: RimViews, background: Background, near: Any, far: Any, y: int, x: int, samples: Any) -> int:
     """What the views show of a pixel that moves with ``near``, and what is behind it there; how many tell both."""
     H, W = background.views.shape
     n = 0
@@ -331,7 +319,7 @@ def _along_near(
         i, j = int(down), int(across)
         samples[n, _NOISE] = _behind(background, i, j, down - i, across - j, samples[n, _BEHIND:_NOISE])
         if samples[n, _NOISE] >= 0:
-            _sample(views, view, row, column, fy, fx, sums, samples[n])
+            _sample(views, view, row, column, fy, fx, samples[n])
             n += 1
     return n
 
@@ -362,7 +350,7 @@ def _cost_of_share(share: Any, samples: Any, n: int, surface: Any, held: Any, sc
 
 
 @njit(forceinline=True)
-def _cost_alone(views: RimViews, own: Any, d: Any, y: int, x: int, scale2: Any, sums: Any, colour: Any) -> Any:
+def _cost_alone(views: RimViews, own: Any, d: Any, y: int, x: int, scale2: Any, colour: Any) -> Any:
     """Mean robust residual of a pixel of colour ``own (3,)`` that moves with ``d``, over views that see it."""
     total, n = 0.0, 0
     for view in range(len(views.places)):
@@ -371,7 +359,7 @@ def _cost_alone(views: RimViews, own: Any, d: Any, y: int, x: int, scale2: Any, 
             continue
         seen, row, column, fy, fx = _sees(views, view, d, y, x)
         if seen:
-            _sample(views, view, row, column, fy, fx, sums, colour)
+            _sample(views, view, row, column, fy, fx, colour)
             for c in range(3):
                 residual = (colour[c] - own[c]) ** 2
                 total += residual / (residual + scale2)
@@ -405,13 +393,12 @@ def evidence_of_shares(
     W = sides.disparity.shape[1]
     N = len(views.places)
     for y in prange(begin, end):
-        samples, surface = np.empty((N, 7)), np.empty((3, 3))
-        sums, colour = np.empty(TAPS, np.float32), np.empty(3)
+        samples, surface, colour = np.empty((N, 7)), np.empty((3, 3)), np.empty(3)
         for x in range(W):
             if not rim.inside[y, x]:
                 continue
             near, far = rim.near[y, x], rim.far[y, x]
-            n = _along_near(views, background, near, far, y, x, sums, samples)
+            n = _along_near(views, background, near, far, y, x, samples)
             if n < FEWEST_SAMPLES:
                 continue
             variance = _nearer_colour(sides, near, (near + far) / 2, y, x, surface)
@@ -435,5 +422,5 @@ def evidence_of_shares(
             if rim.is_near[y, x]:
                 evidence[y, x] = high - low
             else:
-                alone = _cost_alone(views, sides.guide[y, x], far, y, x, scale2, sums, colour)
+                alone = _cost_alone(views, sides.guide[y, x], far, y, x, scale2, colour)
                 evidence[y, x] = min(low, alone) - high

@@ -17,8 +17,9 @@ RIM_WIDTH = 0.2
 LEAST_RIM = 0.01
 """The least of it, pixels per view step."""
 
-_FARTHEST = 1e12
 _EVALUATIONS = 40
+_FARTHEST = 1e12
+"""No bound is farther away, pixels."""
 _PRECISION = 1e-3
 """Of the bounds, relative; of the probability beyond them, too."""
 

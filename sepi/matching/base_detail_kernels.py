@@ -110,11 +110,8 @@ def detail_of_views(
         for i in range(last - first + 2 * radius):
             _load_row(colours[t, s, _mirrored(low + first + i - radius, H)], unit, radius, rows[i])
         P = W + 2 * radius
-        total, weights, w = (
-            np.empty((last - first, P), np.float32),
-            np.ones((last - first, P), np.float32),
-            np.empty(P, np.float32),
-        )
+        total, weights = np.empty((last - first, P), np.float32), np.ones((last - first, P), np.float32)
+        w = np.empty(P, np.float32)
         for y in range(last - first):
             # the pixel itself
             total[y] = rows[y + radius, 3]
