@@ -29,7 +29,7 @@ from pydantic import Field, model_validator
 from sepi.error_bars.bars import error_bars
 from sepi.error_bars.calibration import SECOND_ORDER, WLS, Calibration
 from sepi.error_bars.cues import cues_of_map, cues_of_stage_before, cues_of_views
-from sepi.image.noise import noise_of_reference_view, variance_of_residuals
+from sepi.image.noise import reference_residual_variance
 from sepi.lightfield import BoolMap, FloatMap, LightField
 from sepi.matching.base_detail import BaseDetailParameters, forget_detail
 from sepi.matching.denoising import denoised, measured_noise
@@ -295,10 +295,8 @@ def _prior(
     from sepi.regularization.second_order import colour_changes
 
     reliability = np.where(uniform, 1, reliable(confidence, parameters)).astype(np.float32)
-    guide = light_field.reference_view
-    noise = variance_of_residuals(noise_of_reference_view(light_field), guide.shape[2])
-    variance = parameters.smooth_colour**2 + 4 * noise
-    return _Prior(uniform, reliability, colour_changes(guide), variance)
+    variance = parameters.smooth_colour**2 + 4 * reference_residual_variance(light_field)
+    return _Prior(uniform, reliability, colour_changes(light_field.reference_view), variance)
 
 
 def _smoothed(

@@ -16,7 +16,7 @@ from sepi.boundaries.colour_mixture import mixture_evidence
 from sepi.boundaries.parameters import BoundaryParameters
 from sepi.boundaries.surface_shares import share_evidence
 from sepi.boundaries.surroundings import surroundings
-from sepi.image.noise import noise_of_reference_view, variance_of_residuals
+from sepi.image.noise import reference_residual_variance
 from sepi.lightfield import FloatMap, LightField
 
 _CERTAIN = np.float32(0.0075)
@@ -58,7 +58,7 @@ def assigned_to_surfaces(light_field: LightField, disparity: FloatMap, parameter
     votes = np.tanh(evidence / _CERTAIN)
     if parameters.use_mixture:
         colours = light_field.reference_view
-        variance = variance_of_residuals(noise_of_reference_view(light_field), colours.shape[2])
+        variance = reference_residual_variance(light_field)
         votes += _MIXTURE_WEIGHT * mixture_evidence(disparity, around, colours, variance, parameters)
     leaves = rim.is_near & rim.inside & (votes > _MAJORITY)
     joins = ~rim.is_near & (evidence > parameters.share_evidence)

@@ -86,6 +86,11 @@ def residual_variance(image: FloatMap) -> float:
     return variance_of_residuals(noise_level(image), image.shape[2])
 
 
+def reference_residual_variance(light_field: LightField) -> float:
+    """:func:`residual_variance` of the reference view; in a workspace its noise is found once."""
+    return variance_of_residuals(noise_of_reference_view(light_field), light_field.reference_view.shape[2])
+
+
 def variance_of_residuals(noise: float, channels: int) -> float:
     """The same of views with this noise and so many channels."""
     return float(2 * channels * noise**2)
