@@ -8,14 +8,16 @@ nothing. Here that is left until something has to be compiled.
 from __future__ import annotations
 
 import hashlib
+import os
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any, TypeVar, cast
 
 import llvmlite.binding
 import numba
+from llvmlite import ir
 from numba import prange, types
-from numba.core import codegen
+from numba.core import cgutils, codegen
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 from numba.core.registry import cpu_target
 from numba.core.runtime import nrtdynmod
@@ -23,6 +25,8 @@ from numba.core.runtime.nrt import rtsys
 from numba.extending import intrinsic
 
 __all__ = ["fma", "njit", "prange", "prepare_loading"]
+
+_cgutils: Any = cgutils
 
 _compile_runtime: Any = nrtdynmod.compile_nrt_functions
 
@@ -51,7 +55,8 @@ class _KernelCache(FunctionCache):  # type: ignore[misc, unused-ignore]
     def __init__(self, function: Callable[..., Any]) -> None:
         super().__init__(function)  # type: ignore[no-untyped-call, unused-ignore]
         place = self._impl.locator
-        where = place.get_cache_path(), self._impl.filename_base, place.get_source_stamp()
+        stamp = place.get_source_stamp(), *_stamps_of_others(function)
+        where = place.get_cache_path(), self._impl.filename_base, stamp
         self._cache_file = _KernelFiles(*where)  # type: ignore[no-untyped-call, unused-ignore]
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
@@ -61,6 +66,24 @@ class _KernelCache(FunctionCache):  # type: ignore[misc, unused-ignore]
         with self._guard_against_spurious_io_errors(), _names_unlisted(engine), _bitcode_unparsed():
             return self._load_overload(sig, target_context)  # type: ignore[no-untyped-call, unused-ignore]
         return None
+
+
+def _stamps_of_others(function: Callable[..., Any]) -> tuple[tuple[str, int, int], ...]:
+    """What tells a change of the other files whose compiled functions those of this file may call.
+
+    Numba looks at the file of a function alone, and would go on with code that has old ones of other files in it.
+    """
+    files = {function.__code__.co_filename}
+    others = [function.__globals__]
+    while others:
+        for found in list(others.pop().values()):
+            called = getattr(found, "py_func", None) or getattr(found, "_defn", None)
+            code = getattr(called, "__code__", None)
+            if code is not None and code.co_filename not in files:
+                files.add(code.co_filename)
+                others.append(called.__globals__)
+    states = ((name, os.stat(name)) for name in sorted(files - {function.__code__.co_filename}))
+    return tuple((os.path.basename(name), state.st_mtime_ns, state.st_size) for name, state in states)
 
 
 class _Runtime(type(rtsys)):  # type: ignore[misc, unused-ignore]
@@ -174,11 +197,22 @@ def _bitcode_unparsed() -> Iterator[None]:
         codegen.__dict__["ll"] = llvmlite.binding
 
 
-def njit(*, cache: bool = False, **options: Any) -> Callable[[_Function], _Function]:
-    """``numba.njit`` with these options; ``cache`` keeps the compiled code, for processes to come.
+def njit(*, cache: bool = False, borrows: bool = False, **options: Any) -> Callable[[_Function], _Function]:
+    """``numba.njit`` with these options.
 
-    A function with it may call compiled functions of its own file only: numba does not see changes in others.
+    Parameters
+    ----------
+    cache : bool
+        Keep the compiled code for processes to come. Of other files such a function may use compiled functions, and
+        nothing else that may change: of a constant numba would not see it.
+    borrows : bool
+        The function makes no arrays, and only works on its caller's. Nobody then has to count how many hold each:
+        what numba does whenever a function gives an array, or a part of one, a name, and what all threads wait for.
+    **options
+        Of ``numba.njit``.
     """
+    if borrows:
+        options["_nrt"] = False
 
     def compiled(function: _Function) -> _Function:
         kernel = numba.njit(**options)(function)
@@ -190,17 +224,24 @@ def njit(*, cache: bool = False, **options: Any) -> Callable[[_Function], _Funct
     return compiled
 
 
-def _multiply_add(_context: Any, _a: Any, _b: Any, _c: Any) -> Any:
+def _multiply_add(_context: Any, a: Any, _b: Any, _c: Any) -> Any:
     """LLVM code of :func:`fma`."""
 
     def code(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
-        return builder.fma(*arguments)
+        kind = arguments[0].type
+        name = f"llvm.fma.v{kind.count}f32" if isinstance(kind, ir.VectorType) else "llvm.fma.f32"
+        function = ir.FunctionType(kind, [kind, kind, kind])
+        return builder.call(_cgutils.get_or_insert_function(builder.module, function, name), arguments)
 
-    return types.float32(types.float32, types.float32, types.float32), code
+    kind = types.float32 if isinstance(a, types.Number) else a
+    return kind(kind, kind, kind), code
 
 
 fma: Any = intrinsic(_multiply_add)
-"""``a * b + c`` of float32, rounded once: the processor's own instruction, whatever the optimiser does."""
+"""``a * b + c`` of float32, rounded once: the processor's own instruction, whatever the optimiser does.
+
+Of vectors (:mod:`sepi.vectors`) for each element.
+"""
 
 
 def prepare_loading() -> None:

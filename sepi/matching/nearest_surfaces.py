@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import cv2
 import numpy as np
 import numpy.typing as npt
@@ -29,10 +31,11 @@ def nearest_surfaces(light_field: LightField, disparity: FloatMap | None, presen
         From :func:`sepi.matching.visibility_kernels.z_buffers`, with ``MISSING`` at pixels that a view does not show,
         and beside them, since a sample that lies between pixels reads them, too.
     """
-    from sepi.matching.visibility_kernels import EMPTY, MISSING, z_buffers
+    from sepi.matching.visibility_kernels import EMPTY, MARGIN, MISSING, z_buffers
 
     if disparity is None:
-        nearest = np.full((*light_field.grid, rows.high - rows.low, light_field.shape[1]), EMPTY, np.float32)
+        shape = *light_field.grid, rows.high - rows.low, light_field.shape[1]
+        nearest = np.full(math.prod(shape) + MARGIN, EMPTY, np.float32)[:-MARGIN].reshape(shape)
     else:
         nearest = z_buffers(disparity, present, light_field.baselines, *rows)
     if light_field.missing is not None:

@@ -26,7 +26,7 @@ from sepi.image.noise import residual_variance
 from sepi.lightfield import BoolMap, FloatMap, LightField, full_scale
 from sepi.matching.candidates import CandidateParameters, CandidateRule, number_field
 from sepi.matching.nearest_surfaces import shown_columns
-from sepi.matching.sweep_arrays import BestMaps, Candidates, ViewStack, Window
+from sepi.matching.sweep_arrays import BestMaps, ViewStack, Window, sampled_candidates
 from sepi.stage import Progress, no_progress
 
 CANDIDATES = CandidateRule(usual=181, finest=0.02, coarsest=0.5)
@@ -34,6 +34,10 @@ CANDIDATES = CandidateRule(usual=181, finest=0.02, coarsest=0.5)
 
 TILE_WIDTH = 512
 """Columns done at a time: bounds what a thread holds, whatever the width of the picture, and keeps it in the cache."""
+
+
+MARGIN = 8
+"""Columns beyond the picture that vectors reach into: see :mod:`sepi.vectors`."""
 
 
 class SweepParameters(CandidateParameters):
@@ -104,8 +108,12 @@ class SweepResult:
 
 
 def planar(light_field: LightField) -> npt.NDArray[np.generic]:
-    """Views as ``(T, S, 3, H, W)``, each channel's rows contiguous, in their own number type."""
-    return np.ascontiguousarray(light_field.rgb_views.transpose(0, 1, 4, 2, 3))
+    """Views as ``(T, S, 3, H, W + MARGIN)``, each channel's rows contiguous, in their own number type."""
+    views = light_field.rgb_views
+    T, S, H, W, _ = views.shape
+    planes = np.zeros((T, S, 3, H, W + MARGIN), views.dtype)
+    planes[..., :W] = views.transpose(0, 1, 4, 2, 3)
+    return planes
 
 
 def sweep(
@@ -173,35 +181,6 @@ def sweep(
         sweep_plane_rows(views, candidates, window, mask, begin, end, height, TILE_WIDTH, maps)
         progress(end / H)
     return result
-
-
-def sampled_candidates(disparities: FloatMap, baselines: npt.NDArray[np.float64]) -> Candidates:
-    """Candidates ``(K,)`` and where views of these baselines ``(T, S, 2)`` have the samples of a reference pixel."""
-    (down, row), (across, column) = (np.unique(baselines[..., axis], return_inverse=True) for axis in (0, 1))
-    entries = (*sample_offsets(disparities, down), *sample_offsets(disparities, across))
-    reach = float(np.abs(disparities[[0, -1]]).max() * np.abs(baselines).max())
-    grid = baselines.shape[:2]
-    return Candidates(disparities, row.reshape(grid), column.reshape(grid), *entries, reach)
-
-
-def sample_offsets(disparities: FloatMap, baselines: npt.NDArray[np.float64]) -> tuple[npt.NDArray[np.int64], FloatMap]:
-    """Whole and fractional pixels from a reference pixel to its sample, along one axis: ``-d`` times the baseline.
-
-    Parameters
-    ----------
-    disparities : ndarray, shape (K,), float32
-    baselines : ndarray, shape (...), float64
-        Of each view from the reference view, along the axis, in view steps.
-
-    Returns
-    -------
-    whole : ndarray, shape (..., K), int64
-    fraction : ndarray, shape (..., K), float32
-        0..1.
-    """
-    offset = -disparities.astype(np.float64) * baselines[..., None]
-    whole = np.floor(offset)
-    return whole.astype(np.int64), (offset - whole).astype(np.float32)
 
 
 def _rows_at_a_stretch(height: int, threads: int) -> int:

@@ -1,7 +1,8 @@
 """Compiled loops of the plane sweep: photo-consistency, its aggregation over windows, and the best candidate.
 
-One ``(candidate, view)`` has one sub-pixel weight for the whole picture, so a row is a run of contiguous multiply-adds
-that vectorises. Candidates next to each other mostly read the same pixels with other weights: two are done at once.
+One ``(candidate, view)`` has one sub-pixel weight for the whole picture, so a row is a run of contiguous multiply-adds.
+Candidates next to each other mostly have their samples between the same four pixels. What lies between these is a
+polynomial of the disparity: eight pixels' coefficients stay in registers while the candidates are gone through.
 
 No cost volume is ever held: a thread keeps the cost rows of one aggregation window, and the minimum is taken as soon as
 a pixel is aggregated. There the candidates of all groups of a pixel lie side by side: a window's weight is loaded once
@@ -21,7 +22,9 @@ import numpy.typing as npt
 
 from sepi.compiled import fma, njit, prange
 from sepi.lightfield import FloatMap
+from sepi.matching.sample_polynomials import between_same_pixels, difference, from_origin, of_first, upper_row, value
 from sepi.matching.sweep_arrays import BestMaps, Candidates, ViewStack, Window
+from sepi.vectors import load, spread, spread_from, store
 
 EXACT = {"nnan", "ninf", "nsz"}
 """Fast-math flags that keep every rounding as written.
@@ -29,6 +32,9 @@ EXACT = {"nnan", "ninf", "nsz"}
 Code that was just compiled is not optimised as the same code loaded from disk: with sums reordered or fused at will,
 the first run would give other last digits than later ones.
 """
+
+VECTOR = 8
+"""Pixels that are done together: see :mod:`sepi.vectors`."""
 
 SHORTEST_GAP = 128
 """Columns between pixels of the mask that are done rather than skipped: starting anew costs as much."""
@@ -59,7 +65,7 @@ class Rows(NamedTuple):
     ----------
     ring, counts : ndarray, shape (size, n, G K), float32
         Row ``r`` at ``r % size``, column ``x - radius`` of the tile at ``x``; zero outside the picture.
-    costs : ndarray, shape (G, K, n), float32
+    costs : ndarray, shape (G, K, n + VECTOR), float32
     runs : ndarray, shape (N, 2), int64
     """
 
@@ -69,110 +75,48 @@ class Rows(NamedTuple):
     runs: npt.NDArray[np.int64]
 
 
-@njit(inline="always")
-def _weights(fy: Any, fx: Any) -> Any:
-    """Bilinear weights of the pixel, its right neighbour, and the two below."""
-    # a plain 1 is a 64-bit number, and would make all that follows 64 bits wide
-    ry, rx = np.float32(1) - fy, np.float32(1) - fx
-    return ry * rx, ry * fx, fy * rx, fy * fx
-
-
-@njit(inline="always")
-def _channels(pixels: Any, row: int, begin: int, end: int) -> Any:
-    """Columns ``begin..end`` of a row of ``pixels (3, rows, W)``, for each channel."""
-    return pixels[0, row, begin:end], pixels[1, row, begin:end], pixels[2, row, begin:end]
-
-
-@njit(inline="always")
-def _residual(a: Any, b: Any, reference: Any, w: Any, x: int) -> Any:
-    """Difference of a sample and its reference pixel; ``a``, ``b``: rows above and below the samples."""
-    return fma(w[3], b[x + 1], fma(w[2], b[x], fma(w[1], a[x + 1], fma(w[0], a[x], -reference[x]))))
-
-
-@njit(inline="always")
-def _robust(r0: Any, r1: Any, r2: Any, scale2: Any) -> Any:
-    """Robust residual of three channels, 0..1."""
-    z: Any = fma(r2, r2, fma(r1, r1, r0 * r0))
-    return z / (z + scale2)
-
-
-@njit(inline="always")
-def _add_one(out: Any, a: Any, b: Any, reference: Any, w: Any, scale2: Any) -> None:
-    """Add the robust residuals of one run of pixels; ``a``, ``b``, ``reference``: a row for each channel."""
-    a0, a1, a2 = a
-    b0, b1, b2 = b
-    g0, g1, g2 = reference
-    for x in range(out.size):
-        r0, r1, r2 = _residual(a0, b0, g0, w, x), _residual(a1, b1, g1, w, x), _residual(a2, b2, g2, w, x)
-        out[x] += _robust(r0, r1, r2, scale2)
-
-
-@njit(inline="always")
-def _add_two(out: Any, other: Any, a: Any, b: Any, reference: Any, w: Any, v: Any, scale2: Any) -> None:
-    """:func:`_add_one` of two candidates that read the same pixels: each is loaded once for both."""
-    a0, a1, a2 = a
-    b0, b1, b2 = b
-    g0, g1, g2 = reference
-    for x in range(out.size):
-        r0, r1, r2 = _residual(a0, b0, g0, w, x), _residual(a1, b1, g1, w, x), _residual(a2, b2, g2, w, x)
-        q0, q1, q2 = _residual(a0, b0, g0, v, x), _residual(a1, b1, g1, v, x), _residual(a2, b2, g2, v, x)
-        out[x] += _robust(r0, r1, r2, scale2)
-        other[x] += _robust(q0, q1, q2, scale2)
-
-
-@njit(inline="always")
-def _seen_run(views: ViewStack, candidates: Candidates, t: int, s: int, run: Run, k: int) -> Any:
-    """Row above the samples of a run of pixels in a view and its distance, and the columns whose samples it shows."""
-    H, W = views.colours.shape[3:]
-    r, c = candidates.row[t, s], candidates.column[t, s]
-    top, below = run.y + candidates.down[r, k], candidates.fy[r, k]
-    if top == H - 1 and below == 0:
-        # the last row has none below: seen from the one above
-        top, below = H - 2, np.float32(1)
-    left = candidates.across[c, k]
+@njit(forceinline=True)
+def _seen_run(shown: Any, W: int, run: Run, top: int, left: int, fx: Any) -> Any:
+    """Columns of a run whose samples, below row ``top`` and ``left`` columns on, are in ``shown (H or 0, 2)``."""
     low, high = 0, W
-    if views.shown.shape[2] > 0 and 0 <= top <= H - 2:
-        low = max(views.shown[t, s, top, 0], views.shown[t, s, top + 1, 0])
-        high = min(views.shown[t, s, top, 1], views.shown[t, s, top + 1, 1])
+    if shown.shape[0] > 0 and 0 <= top <= shown.shape[0] - 2:
+        low, high = max(shown[top, 0], shown[top + 1, 0]), min(shown[top, 1], shown[top + 1, 1])
     # on the last column nothing beyond it has a weight
-    return top, below, max(run.begin, low - left), min(run.end, (high if candidates.fx[c, k] == 0 else high - 1) - left)
+    return max(run.begin, low - left), min(run.end, (high if fx == 0 else high - 1) - left)
 
 
-@njit(cache=True, fastmath=EXACT, error_model="numpy")
-def _add_view(
-    views: ViewStack, candidates: Candidates, t: int, s: int, run: Run, low: int, band: Any, cost: Any
-) -> None:
-    """Add the residuals of one view to ``cost (K, n)``; ``band``: its rows from ``low`` on, and the reference row."""
-    H = views.colours.shape[3]
-    y, begin, _ = run
+@njit(cache=True, fastmath=EXACT, error_model="numpy", borrows=True)
+def _add_view(views: ViewStack, candidates: Candidates, t: int, s: int, run: Run, distances: Any, cost: Any) -> None:
+    """Add the residuals of one view to ``cost (K, n)``; ``distances (K,)`` is scratch."""
+    H, W = views.colours.shape[3], views.colours.shape[4] - VECTOR
+    colours, reference, shown = views.colours[t, s], views.colours[views.t0, views.s0, :, run.y], views.shown[t, s]
     r, c = candidates.row[t, s], candidates.column[t, s]
     down, fy, across, fx = candidates.down[r], candidates.fy[r], candidates.across[c], candidates.fx[c]
-    pixels, reference = band
-    K = down.size
+    moves, disparities, scale2 = (candidates.sy[r], candidates.sx[c]), candidates.disparities, spread(views.scale2)
     k = 0
-    while k < K:
+    while k < disparities.size:
         here = k
         k += 1
-        top, below, first, last = _seen_run(views, candidates, t, s, run, here)
-        left, whole = across[here], fx[here] == 0
+        top, below = upper_row(run.y, down[here], fy[here], H)
+        first, last = _seen_run(shown, W, run, top, across[here], fx[here])
         if top < 0 or top > H - 2 or last <= first:
             continue
-        n, i, j = top - low, first + left, last + left + 1
-        w = _weights(below, fx[here])
-        out = cost[here, first - begin : last - begin]
-        if k < K and across[k] == left and y + down[k] == top and (fx[k] == 0) == whole:
-            v = _weights(fy[k], fx[k])
-            _add_two(
-                out, cost[k, first - begin : last - begin], _channels(pixels, n, i, j), _channels(pixels, n + 1, i, j),
-                _channels(reference, 0, first, last), w, v, views.scale2,
-            )  # fmt: skip
+        while k < disparities.size and between_same_pixels(k, down, fy, across, fx):
             k += 1
-        else:
-            # made in each branch anew: numba drops their reference counts only where they are used at once
-            _add_one(
-                out, _channels(pixels, n, i, j), _channels(pixels, n + 1, i, j),
-                _channels(reference, 0, first, last), w, views.scale2,
-            )  # fmt: skip
+        origin = from_origin(disparities, here, k, distances)
+        place, at = (top, across[here]), (below if fy[here] == 0 else fy[origin], fx[origin])
+        for x in range(first, last, VECTOR):
+            red = difference(colours, reference, 0, place, x, at, moves)
+            green = difference(colours, reference, 1, place, x, at, moves)
+            blue = difference(colours, reference, 2, place, x, at, moves)
+            if last - x < VECTOR:
+                # differences of 0 add nothing to what others have added
+                red, green, blue = of_first(red, last - x), of_first(green, last - x), of_first(blue, last - x)
+            for n in range(here, k):
+                e = spread_from(distances, n)
+                r0, r1, r2 = value(red, e), value(green, e), value(blue, e)
+                z = fma(r2, r2, fma(r1, r1, r0 * r0))
+                store(cost, (n, x - run.begin), load(cost, (n, x - run.begin)) + z / (z + scale2))
 
 
 @njit(cache=True, fastmath=EXACT, error_model="numpy")
@@ -184,40 +128,23 @@ def cost_row(views: ViewStack, candidates: Candidates, run: Run, cost: Any) -> N
     views : ViewStack
     candidates : Candidates
     run : Run
-    cost : ndarray, shape (G, K, n), float32
+    cost : ndarray, shape (G, K, n + VECTOR), float32
         The first columns are filled with the sum of the robust residuals (each 0..1).
     """
-    T, S, _, H, W = views.colours.shape
-    y, begin, end = run
-    cost[:, :, : end - begin] = 0
-    reference = views.colours[views.t0, views.s0, :, y : y + 1].astype(np.float32)
-    # rows and columns that any candidate touches, converted once for all candidates
-    last = candidates.disparities.size - 1
-    rows = 2
-    for r in range(candidates.down.shape[0]):
-        rows = max(rows, abs(candidates.down[r, last] - candidates.down[r, 0]) + 2)
-    pixels = np.empty((3, min(H, rows), W + 1), np.float32)
-    pixels[:, :, W] = 0
+    T, S = views.groups.shape
+    cost[:, :, : run.end - run.begin] = 0
+    distances = np.empty(candidates.disparities.size, np.float32)
     for t in range(T):
         for s in range(S):
-            g = views.groups[t, s]
-            if g < 0:
-                continue
-            r, u = candidates.row[t, s], candidates.column[t, s]
-            one, other = y + candidates.down[r, 0], y + candidates.down[r, last]
-            low, high = max(0, min(H - 2, min(one, other))), max(0, min(H - 2, max(one, other))) + 1
-            one, other = candidates.across[u, 0], candidates.across[u, last]
-            leftmost, rightmost = max(0, begin + min(one, other)), min(W, end + max(one, other) + 1)
-            for c in range(3):
-                for row in range(low, high + 1):
-                    pixels[c, row - low, leftmost:rightmost] = views.colours[t, s, c, row, leftmost:rightmost]
-            _add_view(views, candidates, t, s, run, low, (pixels, reference), cost[g])
+            if views.groups[t, s] >= 0:
+                _add_view(views, candidates, t, s, run, distances, cost[views.groups[t, s]])
 
 
 @njit(cache=True, error_model="numpy")
 def _count_views(views: ViewStack, candidates: Candidates, run: Run, counts: Any) -> None:
     """Number of views of each group that see each pixel of a run at each candidate, into ``counts (n, G K)``."""
-    T, S, _, H, W = views.colours.shape
+    T, S, _, H, _ = views.colours.shape
+    W = views.colours.shape[4] - VECTOR
     K = candidates.disparities.size
     U = candidates.across.shape[0]
     G = counts.shape[1] // K
@@ -249,7 +176,8 @@ def _count_views(views: ViewStack, candidates: Candidates, run: Run, counts: Any
 @njit(cache=True, error_model="numpy")
 def _count_shown(views: ViewStack, candidates: Candidates, run: Run, counts: Any) -> None:
     """:func:`_count_views` of views that do not show all of the picture."""
-    T, S, _, H, _ = views.colours.shape
+    T, S = views.groups.shape
+    H, W = views.colours.shape[3], views.colours.shape[4] - VECTOR
     K = candidates.disparities.size
     counts[: run.end - run.begin] = 0
     for t in range(T):
@@ -257,8 +185,10 @@ def _count_shown(views: ViewStack, candidates: Candidates, run: Run, counts: Any
             g = views.groups[t, s]
             if g < 0:
                 continue
+            r, c, shown = candidates.row[t, s], candidates.column[t, s], views.shown[t, s]
             for k in range(K):
-                top, _, first, last = _seen_run(views, candidates, t, s, run, k)
+                top, _ = upper_row(run.y, candidates.down[r, k], candidates.fy[r, k], H)
+                first, last = _seen_run(shown, W, run, top, candidates.across[c, k], candidates.fx[c, k])
                 if 0 <= top <= H - 2:
                     for x in range(first - run.begin, last - run.begin):
                         counts[x, g * K + k] += np.float32(1)
@@ -465,7 +395,7 @@ def _sweep_tile(
     rows = Rows(
         np.zeros((size, width + 2 * radius, G * K), np.float32),
         np.zeros((size, width + 2 * radius, G * K), np.float32),
-        np.empty((G, K, width + 2 * radius), np.float32),
+        np.empty((G, K, width + 2 * radius + VECTOR), np.float32),
         np.empty((width // SHORTEST_GAP + 2, 2), np.int64),
     )
     weights = np.empty((size, size, width), np.float32)
@@ -507,7 +437,7 @@ def sweep_plane_rows(
     width: int, maps: BestMaps,
 ) -> None:  # fmt: skip
     """Sweep the rows ``begin..end`` of the ``mask (H, W)`` in tiles of at most ``height`` rows, ``width`` columns."""
-    H, W = views.colours.shape[3:]
+    H, W = mask.shape
     # where a view may show less than the picture, all pixels are as those near its border
     margin = H + W if views.shown.shape[2] > 0 else math.ceil(candidates.reach) + window.radius + 1
     for task in prange((end - begin + height - 1) // height):

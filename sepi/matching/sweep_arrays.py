@@ -1,4 +1,4 @@
-"""Arrays that the plane sweep works on, in named groups: what its kernels take.
+"""Arrays that plane sweeps work on, in named groups: what their kernels take.
 
 Compiled functions know their fields by name; they make none themselves.
 """
@@ -18,7 +18,8 @@ class ViewStack(NamedTuple):
 
     Attributes
     ----------
-    colours : ndarray, shape (T, S, 3, H, W), uint8, uint16 or float32
+    colours : ndarray, shape (T, S, 3, H, W + margin), uint8, uint16 or float32
+        The margin is that of :mod:`sepi.vectors`.
     t0, s0 : int
         Position of the reference view.
     groups : ndarray, shape (T, S), int64
@@ -55,6 +56,8 @@ class Candidates(NamedTuple):
         Whole pixels from a reference pixel to its sample; an entry never falls, or never rises, along the candidates.
     fy, fx : ndarray, shape (V, K) and (U, K), float32
         Fractional pixels beyond, 0..1.
+    sy, sx : ndarray, shape (V,) and (U,), float32
+        By how many pixels the sample moves as the disparity rises by one.
     reach : float
         Pixels to the farthest sample, along either axis.
     """
@@ -66,6 +69,8 @@ class Candidates(NamedTuple):
     fy: FloatMap
     across: npt.NDArray[np.int64]
     fx: FloatMap
+    sy: FloatMap
+    sx: FloatMap
     reach: float
 
 
@@ -92,3 +97,33 @@ class BestMaps(NamedTuple):
     disparity: FloatMap
     cost: FloatMap
     mean: FloatMap
+
+
+def sampled_candidates(disparities: FloatMap, baselines: npt.NDArray[np.float64]) -> Candidates:
+    """Candidates ``(K,)`` and where views of these baselines ``(T, S, 2)`` have the samples of a reference pixel."""
+    (down, row), (across, column) = (np.unique(baselines[..., axis], return_inverse=True) for axis in (0, 1))
+    entries = (*sample_offsets(disparities, down), *sample_offsets(disparities, across))
+    moves = (-down).astype(np.float32), (-across).astype(np.float32)
+    reach = float(np.abs(disparities[[0, -1]]).max() * np.abs(baselines).max())
+    grid = baselines.shape[:2]
+    return Candidates(disparities, row.reshape(grid), column.reshape(grid), *entries, *moves, reach)
+
+
+def sample_offsets(disparities: FloatMap, baselines: npt.NDArray[np.float64]) -> tuple[npt.NDArray[np.int64], FloatMap]:
+    """Whole and fractional pixels from a reference pixel to its sample, along one axis: ``-d`` times the baseline.
+
+    Parameters
+    ----------
+    disparities : ndarray, shape (K,), float32
+    baselines : ndarray, shape (...), float64
+        Of each view from the reference view, along the axis, in view steps.
+
+    Returns
+    -------
+    whole : ndarray, shape (..., K), int64
+    fraction : ndarray, shape (..., K), float32
+        0..1.
+    """
+    offset = -disparities.astype(np.float64) * baselines[..., None]
+    whole = np.floor(offset)
+    return whole.astype(np.int64), (offset - whole).astype(np.float32)

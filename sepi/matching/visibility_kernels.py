@@ -6,10 +6,23 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from sepi.compiled import fma, njit, prange
 from sepi.lightfield import FloatMap
 from sepi.matching.base_detail import BaseDetail
+from sepi.matching.sweep_arrays import Candidates
+from sepi.vectors import (
+    at_most,
+    first_elements,
+    load,
+    load_colours,
+    spread,
+    store,
+    store_rounded,
+    weighted_pairs,
+    weights,
+)
 
 EXACT = {"nnan", "ninf", "nsz"}
 """Fast-math flags that keep every rounding as written: see :mod:`sepi.matching.plane_sweep_kernels`."""
@@ -21,25 +34,39 @@ MISSING = np.float32(1e9)
 """The same where the view shows nothing: not even a view that hides a pixel counts less."""
 
 
+MARGIN = 8
+"""Columns beyond a run that vectors reach into: see :mod:`sepi.vectors`."""
+
+COLOUR_STEPS = 20_000
+"""Steps from black to white of colours as whole numbers; of 16 bits, with room for what float views have beyond."""
+
+ONE = 1 << 14
+"""The sum of a sample's weights, which are whole numbers of 16 bits."""
+
+
 class Visibility(NamedTuple):
     """In which views a pixel is seen.
 
     Attributes
     ----------
     nearest : ndarray, shape (T, S, n, W) or (T, S, n, 0), float32
-        From :func:`sepi.matching.nearest_surfaces.nearest_surfaces`; empty: all views see all pixels.
+        From :func:`sepi.matching.nearest_surfaces.nearest_surfaces`; empty: all views see all pixels. In memory there
+        are ``MARGIN`` numbers more behind it.
     low : int
         First row of ``nearest``.
     occlusion_margin : float32
         By how much an occluder must be nearer, pixels per view step.
     occluded_view_weight : float32
         Weight of a view in which the pixel is occluded; none where the view has no pixel.
+    some_missing : bool
+        Whether there are such places.
     """
 
     nearest: FloatMap
     low: int
     occlusion_margin: np.float32
     occluded_view_weight: np.float32
+    some_missing: bool
 
 
 class RobustCost(NamedTuple):
@@ -49,25 +76,29 @@ class RobustCost(NamedTuple):
     shares: FloatMap
 
 
-class _View(NamedTuple):
-    """A view of baseline ``(v, u)``, and the row ``y`` of the reference view whose costs are computed.
+class _Rows(NamedTuple):
+    """Rows of a view, and one of the reference view: colours and detail, as whole numbers.
 
-    ``band (3 or 4, rows, W + 1)`` holds the rows from ``low`` on of its colours and detail.
+    Attributes
+    ----------
+    pairs : ndarray, shape (4, n, W + margin), int32
+        Of the view: neighbours, for :func:`sepi.vectors.weighted_pairs`.
+    reference : ndarray, shape (4, W + margin), float32
+        Times ``ONE``.
+    channels : ndarray, shape (3, W + margin), int32
+        Scratch; 0 in the margin.
     """
 
-    v: float
-    u: float
-    y: int
-    low: int
-    band: FloatMap
+    pairs: npt.NDArray[np.int32]
+    reference: FloatMap
+    channels: npt.NDArray[np.int32]
 
 
 class _Sums(NamedTuple):
-    """Weighted sums of the residuals, and of the weights, of one row; (K, W), float32. ``seen (W,)`` is scratch."""
+    """Weighted sums of the residuals, and of the weights, of one row; (K, W + margin), float32."""
 
     cost: FloatMap
     weight: FloatMap
-    seen: FloatMap
 
 
 @njit(parallel=True, cache=True)
@@ -93,7 +124,9 @@ def z_buffers(disparity: Any, present: Any, baselines: Any, low: int, high: int)
     """
     T, S = present.shape
     H, W = disparity.shape
-    nearest = np.empty((T, S, high - low, W), np.float32)
+    # vectors reach beyond the last
+    size = T * S * (high - low) * W
+    nearest = np.empty(size + MARGIN, np.float32)[:size].reshape(T, S, high - low, W)
     least, most = float(disparity.min()), float(disparity.max())
     for view in prange(T * S):
         t, s = view // S, view % S
@@ -157,105 +190,140 @@ def occluded_in_any_view(
     return occluded
 
 
-@njit(inline="always")
-def _residual(a: Any, b: Any, reference: Any, w: Any, x: int) -> Any:
-    """Difference of a bilinear sample and its reference pixel; ``a``, ``b``: rows above and below the samples."""
-    return fma(w[3], b[x + 1], fma(w[2], b[x], fma(w[1], a[x + 1], fma(w[0], a[x], -reference[x]))))
+@njit(forceinline=True)
+def _bilinear_weights(fy: Any, fx: Any) -> Any:
+    """Weights of the pixel and its right neighbour, and of the two below; of sum ``ONE``."""
+    below = int(fy * ONE + np.float32(0.5))
+    right, lower_right = int((ONE - below) * fx + np.float32(0.5)), int(below * fx + np.float32(0.5))
+    return weights(ONE - below - right, right), weights(below - lower_right, lower_right)
 
 
-@njit(inline="always")
-def _add_colours(out: Any, a: Any, b: Any, reference: Any, seen: Any, w: Any, scale2: Any, share: Any) -> None:
-    """Add the robust residuals of one run of pixels; ``a``, ``b``, ``reference``: a row for each channel."""
-    a0, a1, a2 = a
-    b0, b1, b2 = b
-    g0, g1, g2 = reference
-    for x in range(out.size):
-        r0, r1, r2 = _residual(a0, b0, g0, w, x), _residual(a1, b1, g1, w, x), _residual(a2, b2, g2, w, x)
-        z = fma(r2, r2, fma(r1, r1, r0 * r0))
-        out[x] += share * seen[x] * z / (z + scale2)
-
-
-@njit(inline="always")
-def _add_detail(out: Any, a: Any, b: Any, reference: Any, seen: Any, w: Any, scale2: Any, share: Any) -> None:
-    """:func:`_add_colours` of the detail, which is one channel that counts as three equal ones."""
-    for x in range(out.size):
-        r = _residual(a, b, reference, w, x)
-        z = np.float32(3) * r * r
-        out[x] += share * seen[x] * z / (z + scale2)
-
-
-@njit(inline="always")
-def _channels(rows: Any, row: int, begin: int, end: int) -> Any:
-    """Columns ``begin..end`` of a row of ``rows (3, n, W)``, for each channel."""
-    return rows[0, row, begin:end], rows[1, row, begin:end], rows[2, row, begin:end]
-
-
-@njit(cache=True, fastmath=EXACT, error_model="numpy")
+@njit(cache=True, fastmath=EXACT, error_model="numpy", borrows=True)
 def _add_view(
-    view: _View, H: int, reference: Any, disparities: Any, nearest: Any, visibility: Visibility, robust: RobustCost,
-    sums: _Sums,
+    rows: _Rows, low: int, H: int, y: int, candidates: Candidates, r: int, c: int, nearest: Any,
+    visibility: Visibility, robust: RobustCost, sums: _Sums,
 ) -> None:  # fmt: skip
-    """Add one view at every candidate; ``reference (3 or 4, W)``, ``nearest``: the view's own z-buffer."""
-    W = reference.shape[1]
-    v, u, y, low, band = view
-    cost, weight, scratch = sums
-    margin, hidden = visibility.occlusion_margin, visibility.occluded_view_weight
-    one, none = np.float32(1), np.float32(0)
-    for k in range(disparities.size):
-        d = disparities[k]
-        down, across = y - d * v, -d * u
-        if down < 0 or down > H - 1:
-            continue
-        top, left = min(int(down), H - 2), math.floor(across)
-        fy, fx = np.float32(down - top), np.float32(across - left)
+    """Add one view, whose rows from ``low`` on are loaded, at every candidate of row ``y``.
+
+    ``r``, ``c`` are the view's entries of the candidates, ``nearest`` is its z-buffer.
+    """
+    pairs, reference = rows.pairs, rows.reference
+    W, one = reference.shape[1] - MARGIN, np.float32(1)
+    scale_of_colours, scale_of_detail = spread(robust.scales2[0]), spread(robust.scales2[1])
+    share_of_colours, share_of_detail = spread(robust.shares[0]), spread(robust.shares[1])
+    for k in range(candidates.disparities.size):
+        top, fy, left, fx = y + candidates.down[r, k], candidates.fy[r, k], candidates.across[c, k], candidates.fx[c, k]
+        if top == H - 1 and fy == 0:
+            # the last row has none below: seen from the one above
+            top, fy = H - 2, one
         # on the last column itself nothing beyond it is read with any weight
         first, last = max(0, -left), min(W, W - left if fx == 0 else W - 1 - left)
-        if last <= first:
+        if top < 0 or top > H - 2 or last <= first:
             continue
-        n, i, j = top - low, first + left, last + left + 1
-        seen = scratch[first:last]
-        if nearest.shape[1] == 0:
-            seen[:] = one
-        else:
-            right = 1 if fx > 0.5 else 0
-            before = nearest[top - visibility.low + (1 if fy > 0.5 else 0), i + right : last + left + right]
-            limit = np.float32(d + margin)
-            for x in range(seen.size):
-                seen[x] = one if before[x] <= limit else (hidden if before[x] < MISSING else none)
-        count = weight[k, first:last]
-        for x in range(seen.size):
-            count[x] += seen[x]
-        w = ((one - fy) * (one - fx), (one - fy) * fx, fy * (one - fx), fy * fx)
-        _add_colours(
-            cost[k, first:last], _channels(band, n, i, j), _channels(band, n + 1, i, j),
-            (reference[0, first:last], reference[1, first:last], reference[2, first:last]),
-            seen, w, robust.scales2[0], robust.shares[0],
-        )  # fmt: skip
-        if reference.shape[0] > 3:
-            _add_detail(
-                cost[k, first:last], band[3, n, i:j], band[3, n + 1, i:j], reference[3, first:last],
-                seen, w, robust.scales2[1], robust.shares[1],
-            )  # fmt: skip
+        upper, lower = _bilinear_weights(fy, fx)
+        limit = spread(candidates.disparities[k] + visibility.occlusion_margin)
+        row, column = top - visibility.low + (1 if fy > 0.5 else 0), left + (1 if fx > 0.5 else 0)
+        whole, hidden, n = spread(one), spread(visibility.occluded_view_weight), top - low
+        for x in range(first, last, MARGIN):
+            if last - x < MARGIN:
+                # pixels beyond the last add nothing to what others have added
+                whole, hidden = first_elements(whole, last - x), first_elements(hidden, last - x)
+            seen = whole
+            if nearest.shape[1] > 0:
+                before = load(nearest, (row, x + column))
+                seen = at_most(before, limit, whole, hidden)
+                if visibility.some_missing:
+                    seen = at_most(spread(MISSING), before, spread(np.float32(0)), seen)
+            i = x + left
+            red = weighted_pairs(pairs, (0, n, i), (0, n + 1, i), upper, lower) - load(reference, (0, x))
+            green = weighted_pairs(pairs, (1, n, i), (1, n + 1, i), upper, lower) - load(reference, (1, x))
+            blue = weighted_pairs(pairs, (2, n, i), (2, n + 1, i), upper, lower) - load(reference, (2, x))
+            detail = weighted_pairs(pairs, (3, n, i), (3, n + 1, i), upper, lower) - load(reference, (3, x))
+            colours2, detail2 = fma(blue, blue, fma(green, green, red * red)), detail * detail
+            # z / (z + scale) of either, by one division
+            of_colours, of_detail = colours2 + scale_of_colours, detail2 + scale_of_detail
+            both = fma(share_of_colours * colours2, of_detail, share_of_detail * detail2 * of_colours)
+            store(sums.cost, (k, x), fma(seen, both / (of_colours * of_detail), load(sums.cost, (k, x))))
+            store(sums.weight, (k, x), load(sums.weight, (k, x)) + seen)
+
+
+@njit(forceinline=True, borrows=True)
+def _load_colours(pixels: Any, t: int, s: int, row: int, scale: Any, channels: Any) -> None:
+    """Row of a view as whole numbers, each channel by itself: ``channels (3, W + margin)``, int32."""
+    W, factor = pixels.shape[3], spread(scale)
+    for x in range(0, W - MARGIN + 1, MARGIN):
+        red, green, blue = load_colours(pixels, (t, s, row, x, 0))
+        store_rounded(channels, (0, x), red * factor)
+        store_rounded(channels, (1, x), green * factor)
+        store_rounded(channels, (2, x), blue * factor)
+    for x in range(W - W % MARGIN, W):
+        for c in range(3):
+            channels[c, x] = np.rint(np.float32(pixels[t, s, row, x, c]) * scale)
 
 
 @njit(inline="always")
-def _load_colours(pixels: Any, unit: Any, r: Any, g: Any, b: Any) -> None:
-    """A row of a view ``(W, 3)``; three channels at once, so that the loop vectorises."""
-    for x in range(r.size):
-        r[x] = np.float32(pixels[x, 0]) * unit
-        g[x] = np.float32(pixels[x, 1]) * unit
-        b[x] = np.float32(pixels[x, 2]) * unit
-
-
-@njit(inline="always")
-def _load(row: Any, unit: Any, out: Any) -> None:
+def _pair(values: Any, out: Any) -> None:
+    """Each value and its right neighbour in one number: what :func:`sepi.vectors.weighted_pairs` takes."""
     for x in range(out.size):
-        out[x] = np.float32(row[x]) * unit
+        out[x] = (np.int32(values[x]) & np.int32(0xFFFF)) | (np.int32(values[x + 1]) << np.int32(16))
+
+
+@njit(cache=True, borrows=True)
+def _load_view(views: BaseDetail, t: int, s: int, begin: int, end: int, rows: _Rows) -> None:
+    """Rows ``begin..end`` of a view, colours and detail."""
+    W = views.colours.shape[3]
+    for row in range(begin, end):
+        n = row - begin
+        _load_colours(views.colours, t, s, row, views.colour_unit * np.float32(COLOUR_STEPS), rows.channels)
+        for c in range(3):
+            _pair(rows.channels[c], rows.pairs[c, n, :W])
+        if views.detail.shape[2] > 0:
+            detail = views.detail[t, s, row - views.low]
+            _pair(detail, rows.pairs[3, n, : W - 1])
+            rows.pairs[3, n, W - 1] = detail[W - 1]
+
+
+@njit(cache=True, borrows=True)
+def _load_reference(views: BaseDetail, y: int, rows: _Rows) -> None:
+    """Row ``y`` of the reference view, as far apart from the views' as :func:`sepi.vectors.weighted_pairs` are."""
+    W = views.colours.shape[3]
+    colour_scale = views.colour_unit * np.float32(COLOUR_STEPS)
+    _load_colours(views.colours, views.t0, views.s0, y, colour_scale, rows.channels)
+    for x in range(W):
+        for c in range(3):
+            rows.reference[c, x] = rows.channels[c, x] * ONE
+        if views.detail.shape[2] > 0:
+            rows.reference[3, x] = np.int32(views.detail[views.t0, views.s0, y - views.low, x]) * ONE
+
+
+@njit(cache=True, fastmath=EXACT, error_model="numpy", borrows=True)
+def _add_views(
+    views: BaseDetail, visibility: Visibility, robust: RobustCost, candidates: Candidates, y: int, rows: _Rows,
+    sums: _Sums,
+) -> None:  # fmt: skip
+    """Add all views to the sums of row ``y``."""
+    T, S, H, _, _ = views.colours.shape
+    _load_reference(views, y, rows)
+    for t in range(T):
+        for s in range(S):
+            if not views.present[t, s] or (t == views.t0 and s == views.s0):
+                continue
+            r, c = candidates.row[t, s], candidates.column[t, s]
+            one, other = y + candidates.down[r, 0], y + candidates.down[r, -1]
+            low, high = max(0, min(H - 2, min(one, other))), max(0, min(H - 2, max(one, other))) + 2
+            _load_view(views, t, s, low, high, rows)
+            _add_view(rows, low, H, y, candidates, r, c, visibility.nearest[t, s], visibility, robust, sums)
 
 
 @njit(parallel=True, cache=True, fastmath=EXACT, error_model="numpy")
 def sweep_visible_rows(
-    views: BaseDetail, visibility: Visibility, robust: RobustCost, disparities: Any, begin: int, end: int, cost: Any
+    views: BaseDetail,
+    visibility: Visibility,
+    robust: RobustCost,
+    candidates: Candidates,
+    begin: int,
+    end: int,
+    cost: Any,
 ) -> None:
     """Cost of every candidate for rows ``begin..end``, over the views in which nothing nearer occludes the pixel.
 
@@ -264,41 +332,30 @@ def sweep_visible_rows(
     views : BaseDetail
     visibility : Visibility
     robust : RobustCost
-    disparities : ndarray, shape (K,), float32
+    candidates : Candidates
     begin, end : int
     cost : ndarray, shape (K, H, W), float32
         Rows ``begin..end`` are filled with costs of 0..1; 1 where no view is left.
     """
-    T, S, H, W, _ = views.colours.shape
-    t0, s0 = views.t0, views.s0
-    K = disparities.size
-    with_detail = views.detail.shape[2] > 0
-    channels = 4 if with_detail else 3
-    reach = max(abs(disparities[0]), abs(disparities[K - 1])) * np.abs(views.baselines[:, :, 0]).max()
-    rows = min(H, 2 * math.ceil(reach) + 3)
+    H, W = views.colours.shape[2:4]
+    K = candidates.disparities.size
+    height = 2
+    for r in range(candidates.down.shape[0]):
+        height = min(H, max(height, abs(candidates.down[r, K - 1] - candidates.down[r, 0]) + 2))
+    # in steps of the whole numbers; the detail counts as three equal channels
+    scales2 = np.empty(2, np.float32)
+    scales2[0] = robust.scales2[0] * (COLOUR_STEPS * ONE) ** 2
+    scales2[1] = robust.scales2[1] * (ONE / views.detail_unit) ** 2 / 3
+    scaled = RobustCost(scales2, robust.shares)
     for y in prange(begin, end):
-        sums = _Sums(np.zeros((K, W), np.float32), np.zeros((K, W), np.float32), np.empty(W, np.float32))
-        reference = np.empty((channels, W), np.float32)
-        # one column more, which is read but weighs nothing
-        band = np.zeros((channels, rows, W + 1), np.float32)
-        _load_colours(views.colours[t0, s0, y], views.colour_unit, reference[0], reference[1], reference[2])
-        if with_detail:
-            _load(views.detail[t0, s0, y - views.low], views.detail_unit, reference[3])
-        for t in range(T):
-            for s in range(S):
-                if not views.present[t, s] or (t == t0 and s == s0):
-                    continue
-                v, u = views.baselines[t, s, 0], views.baselines[t, s, 1]
-                ends = (y - disparities[0] * v, y - disparities[K - 1] * v)
-                low = max(0, min(H - 2, math.floor(min(ends))))
-                high = max(0, min(H - 2, math.floor(max(ends)))) + 1
-                for row in range(low, high + 1):
-                    r, g, b = band[0, row - low, :W], band[1, row - low, :W], band[2, row - low, :W]
-                    _load_colours(views.colours[t, s, row], views.colour_unit, r, g, b)
-                    if with_detail:
-                        _load(views.detail[t, s, row - views.low], views.detail_unit, band[3, row - low, :W])
-                view = _View(v, u, y, low, band)
-                _add_view(view, H, reference, disparities, visibility.nearest[t, s], visibility, robust, sums)
+        sums = _Sums(np.zeros((K, W + MARGIN), np.float32), np.zeros((K, W + MARGIN), np.float32))
+        # where there is no detail it is 0, and fits
+        rows = _Rows(
+            np.zeros((4, height, W + MARGIN), np.int32),
+            np.zeros((4, W + MARGIN), np.float32),
+            np.zeros((3, W + MARGIN), np.int32),
+        )
+        _add_views(views, visibility, scaled, candidates, y, rows, sums)
         for k in range(K):
             for x in range(W):
                 cost[k, y, x] = sums.cost[k, x] / sums.weight[k, x] if sums.weight[k, x] > 0 else np.float32(1)

@@ -24,6 +24,7 @@ from sepi.matching.gaps import GapParameters, with_open_gaps
 from sepi.matching.nearest_surfaces import nearest_surfaces
 from sepi.matching.row_bands import Band, row_bands
 from sepi.matching.semi_global import SmallPenalty, SmoothedResult, SmoothingParameters, smooth_and_choose
+from sepi.matching.sweep_arrays import sampled_candidates
 from sepi.matching.view_subsets import spread_views
 from sepi.stage import Needs, Progress
 
@@ -255,9 +256,10 @@ def _add_costs(
     visibility = _visibility(light_field, present, disparity, parameters, band)
     scales2 = [views.squared_scale(s) for s in (parameters.colour_scale, parameters.detail_scale)]
     robust = RobustCost(np.array(scales2, np.float32), parameters.shares)
+    candidates = sampled_candidates(disparities, light_field.baselines)
     for begin in range(band.begin, band.end, ROWS_PER_REPORT):
         end = min(band.end, begin + ROWS_PER_REPORT)
-        sweep_visible_rows(views, visibility, robust, disparities, begin, end, cost)
+        sweep_visible_rows(views, visibility, robust, candidates, begin, end, cost)
         done(end)
 
 
@@ -276,7 +278,7 @@ def _visibility(
         everywhere = np.empty((*light_field.grid, high - low, 0), np.float32)
         if light_field.missing is not None:
             everywhere = nearest_surfaces(light_field, None, present, band.rows)
-        return Visibility(everywhere, low, np.float32(0), np.float32(1))
+        return Visibility(everywhere, low, np.float32(0), np.float32(1), light_field.missing is not None)
     nearest = nearest_surfaces(light_field, disparity, present, band.rows)
     margin, weight = np.float32(parameters.occlusion_margin), np.float32(parameters.occluded_view_weight)
-    return Visibility(nearest, low, margin, weight)
+    return Visibility(nearest, low, margin, weight, light_field.missing is not None)

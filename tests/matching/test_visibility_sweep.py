@@ -4,13 +4,13 @@ import numba
 import numpy as np
 import pytest
 from geometries import GEOMETRIES, standing
-from scipy.ndimage import map_coordinates
 from several_threads import several_threads
 
 from sepi.lightfield import DisparityRange, LightField
 from sepi.matching import visibility_kernels as kernels
 from sepi.matching.base_detail import DETAIL_UNIT, BaseDetailParameters, base_detail_decomposition
 from sepi.matching.semi_global_kernels import PATHS_AT_ONCE, aggregate, choose, semi_global
+from sepi.matching.sweep_arrays import sampled_candidates
 from sepi.matching.view_subsets import spread_views
 from sepi.matching.visibility_kernels import (
     EMPTY,
@@ -78,7 +78,7 @@ def test_all_maps_but_the_last_compare_few_views(monkeypatch) -> None:
         kernels,
         "sweep_visible_rows",
         lambda views, _visibility, _robust, candidates, *others: (
-            compared.append((int(views.present.sum()), candidates.size)) or others[-1].fill(0)
+            compared.append((int(views.present.sum()), candidates.disparities.size)) or others[-1].fill(0)
         ),
     )
     field = render("dots", size=64)
@@ -101,11 +101,22 @@ def z_buffer_twin(disparity, dt, ds):
     return nearest
 
 
+def sampled(values, y, x):
+    """Bilinear samples with weights in steps of 2^-14."""
+    H, W = values.shape
+    top, left = (np.floor(p).astype(int).clip(0, n - 2) for p, n in ((y, H), (x, W)))
+    below = np.floor((y - top) * 2**14 + 0.5).clip(0, 2**14)
+    right, lower_right = (np.floor(part * (x - left) + 0.5) for part in (2**14 - below, below))
+    weights = (2**14 - below - right, right), (below - lower_right, lower_right)
+    return sum(values[top + i, left + j] * weights[i][j] for i, j in np.ndindex(2, 2)) / 2**14
+
+
 def sweep_twin(light_field, views, nearest, disparities, margin, hidden, scales, shares):
     t0, s0 = light_field.reference_position
     H, W = light_field.shape
     rows, columns = np.mgrid[:H, :W].astype(float)
-    planes = [views.colours.transpose(0, 1, 4, 2, 3) * views.colour_unit]
+    # colours in whole steps
+    planes = [np.rint(views.colours.transpose(0, 1, 4, 2, 3) * views.colour_unit * 20_000) / 20_000]
     if views.detail.shape[2]:
         # one channel that counts as three
         planes.append(np.repeat(views.detail[:, :, None] * DETAIL_UNIT, 3, axis=2))
@@ -124,7 +135,7 @@ def sweep_twin(light_field, views, nearest, disparities, margin, hidden, scales,
                 near = np.ceil(np.stack([y, x]) - 0.5).astype(int).clip(0, [[[H - 1]], [[W - 1]]])
                 seen = np.where(nearest[t, s][near[0], near[1]] <= np.float32(d + margin), 1, hidden)
             for values, scale, share in zip(planes, scales, shares, strict=False):
-                sample = np.stack([map_coordinates(c, [y, x], order=1) for c in values[t, s].astype(float)])
+                sample = np.stack([sampled(c, y, x) for c in values[t, s]])
                 squared = ((sample - values[t0, s0]) ** 2).sum(axis=0)
                 total += inside * seen * share * squared / (squared + scale)
             weight += inside * seen
@@ -149,8 +160,9 @@ def test_costs_equal_a_plain_twin(channels: int, dtype: type, visible: bool, geo
     )
     scales, shares = np.array([0.02, 0.01], np.float32), np.array([0.4, 0.6], np.float32)
     cost = np.empty((7, 11, 13), np.float32)
-    visibility = Visibility(nearest, 0, np.float32(0.1), np.float32(0.05))
-    sweep_visible_rows(views, visibility, RobustCost(scales, shares), disparities, 0, 11, cost)
+    visibility = Visibility(nearest, 0, np.float32(0.1), np.float32(0.05), False)
+    candidates = sampled_candidates(disparities, light_field.baselines)
+    sweep_visible_rows(views, visibility, RobustCost(scales, shares), candidates, 0, 11, cost)
     expected = sweep_twin(
         light_field, views, nearest if visible else None, disparities, np.float32(0.1), 0.05, scales, shares
     )

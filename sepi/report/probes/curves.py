@@ -18,7 +18,8 @@ import numpy.typing as npt
 from sepi.errors import SepiError
 from sepi.image.noise import residual_variance
 from sepi.lightfield import FloatMap, LightField, as_unit_float
-from sepi.matching.plane_sweep import SweepParameters, sample_offsets
+from sepi.matching.plane_sweep import SweepParameters
+from sepi.matching.sweep_arrays import sample_offsets
 from sepi.matching.view_subsets import halves_and_quarters
 
 
