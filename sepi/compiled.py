@@ -219,6 +219,8 @@ def njit(*, cache: bool = False, borrows: bool = False, **options: Any) -> Calla
         # not with NUMBA_DISABLE_JIT
         if cache and kernel is not function:
             kernel._cache = _KernelCache(function)  # type: ignore[no-untyped-call, unused-ignore]
+            # extensions of numba add types, of which kernels take none: to look for them takes 25 ms of a process
+            kernel._compilation_chain_init_hook = lambda: None
         return cast("_Function", kernel)
 
     return compiled
