@@ -26,9 +26,11 @@ from numba.core.datamodel import models
 from numba.core.typing.templates import ConcreteTemplate, infer_global, signature
 from numba.extending import intrinsic, lower_builtin, register_model
 
+from sepi.compiled import fma, njit
+
 __all__ = [
-    "WIDTH", "at_most", "first_elements", "load", "load_colours", "minus", "spread", "spread_from", "store",
-    "store_rounded", "weighted_pairs", "weights",
+    "WIDTH", "at_most", "exp", "first_elements", "least_of", "load", "load_colours", "minus", "smaller", "spread",
+    "spread_from", "store", "store_columns", "store_rounded", "sum_of", "weighted_pairs", "weights",
 ]  # fmt: skip
 
 WIDTH = 8
@@ -147,15 +149,73 @@ def _spread_from(_context: Any, array: Any, index: Any) -> Any:
     return VECTOR(array, index), code
 
 
-def _first_elements(_context: Any, _vector: Any, number: Any) -> Any:
+def _first_elements(_context: Any, _vector: Any, number: Any, _others: Any) -> Any:
     """LLVM code of :func:`first_elements`."""
 
     def code(context: Any, builder: Any, given: Any, arguments: Any) -> Any:
-        number = _all_alike(builder, context.cast(builder, arguments[1], given.args[1], types.int32), _LANES)
+        vector, number, others = arguments
+        number = _all_alike(builder, context.cast(builder, number, given.args[1], types.int32), _LANES)
         within = builder.icmp_signed("<", ir.Constant(_LANES, [_LANE(i) for i in range(WIDTH)]), number)
-        return builder.select(within, arguments[0], ir.Constant(_VECTOR, [_NUMBER(0.0)] * WIDTH))
+        return builder.select(within, vector, _all_alike(builder, others, _VECTOR))
 
-    return VECTOR(VECTOR, number), code
+    return VECTOR(VECTOR, number, types.float32), code
+
+
+def _reduced(combine: Any) -> Any:
+    """LLVM code of what makes one number of a vector: halves are combined until one is left."""
+
+    def typed(_context: Any, _vector: Any) -> Any:
+        def code(_context: Any, builder: Any, _given: Any, arguments: Any) -> Any:
+            found, width = arguments[0], WIDTH
+            while width > 1:
+                width //= 2
+                lanes = ir.VectorType(_LANE, width)
+                halves = (ir.Constant(lanes, [_LANE(i + first) for i in range(width)]) for first in (0, width))
+                found = combine(builder, *(builder.shuffle_vector(found, found, half) for half in halves))
+            return builder.extract_element(found, _LANE(0))
+
+        return types.float32(VECTOR), code
+
+    return intrinsic(typed)
+
+
+def _lesser(builder: Any, a: Any, b: Any, greater: bool = False) -> Any:
+    return builder.select(builder.fcmp_ordered(">" if greater else "<", a, b, flags=_FLAGS), a, b)
+
+
+def _smaller(_context: Any, _a: Any, _b: Any) -> Any:
+    """LLVM code of :func:`smaller`."""
+
+    def code(_context: Any, builder: Any, _given: Any, arguments: Any) -> Any:
+        return _lesser(builder, *arguments)
+
+    return VECTOR(VECTOR, VECTOR), code
+
+
+def _store_columns(_context: Any, array: Any, index: Any, vectors: Any) -> Any:
+    """LLVM code of :func:`store_columns`."""
+
+    def code(context: Any, builder: Any, given: Any, arguments: Any) -> Any:
+        rows = _cgutils.unpack_tuple(builder, arguments[2], WIDTH)
+        for step in (1, 2, 4):
+            # of each pair of rows, one takes what has the step's bit in its number from the other, and the reverse
+            first = [i + (WIDTH - step if i & step else 0) for i in range(WIDTH)]
+            masks = (ir.Constant(_LANES, [_LANE(i + more) for i in first]) for more in (0, step))
+            low, high = masks
+            for i in (i for i in range(WIDTH) if not i & step):
+                a, b = rows[i], rows[i + step]
+                rows[i], rows[i + step] = builder.shuffle_vector(a, b, low), builder.shuffle_vector(a, b, high)
+        row, column = _cgutils.unpack_tuple(builder, arguments[1], 2)
+        for i, vector in enumerate(rows):
+            place = context.make_tuple(builder, index, (builder.add(row, row.type(i)), column))
+            builder.store(
+                vector,
+                builder.bitcast(_place(context, builder, given.args, (arguments[0], place)), _VECTOR.as_pointer()),
+                align=4,
+            )
+        return context.get_dummy_value()
+
+    return types.void(array, index, vectors), code
 
 
 def _at_most(_context: Any, _a: Any, _b: Any, _yes: Any, _no: Any) -> Any:
@@ -212,6 +272,29 @@ def _call(builder: Any, name: str, argument: Any) -> Any:
     """An intrinsic of LLVM, of one vector."""
     function = ir.FunctionType(_VECTOR, [_VECTOR])
     return builder.call(_cgutils.get_or_insert_function(builder.module, function, f"{name}.v{WIDTH}f32"), [argument])
+
+
+def _rounded(_context: Any, _vector: Any) -> Any:
+    """LLVM code of :func:`_whole`."""
+
+    def code(_context: Any, builder: Any, _given: Any, arguments: Any) -> Any:
+        return _call(builder, "llvm.nearbyint", arguments[0])
+
+    return VECTOR(VECTOR), code
+
+
+def _power_of_two(_context: Any, _vector: Any) -> Any:
+    """LLVM code of :func:`_two_to`."""
+
+    def code(_context: Any, builder: Any, _given: Any, arguments: Any) -> Any:
+        lowest = ir.Constant(_VECTOR, [_NUMBER(-126.0)] * WIDTH)
+        exponent = builder.fptosi(_lesser(builder, lowest, arguments[0], greater=True), _LANES)
+        bits = builder.shl(
+            builder.add(exponent, ir.Constant(_LANES, [_LANE(127)] * WIDTH)), ir.Constant(_LANES, [_LANE(23)] * WIDTH)
+        )
+        return builder.bitcast(bits, _VECTOR)
+
+    return VECTOR(VECTOR), code
 
 
 def _weights(_context: Any, _first: Any, _second: Any) -> Any:
@@ -287,10 +370,36 @@ spread_from: Any = intrinsic(_spread_from)
 """``spread_from(array, index)``: an element of an array of float32 throughout."""
 
 first_elements: Any = intrinsic(_first_elements)
-"""``first_elements(vector, number)``: so many of them, and zeros after those."""
+"""``first_elements(vector, number, others)``: so many of them, and after those a float32 instead."""
+
+sum_of: Any = _reduced(lambda builder, a, b: builder.fadd(a, b, flags=_FLAGS))
+"""``sum_of(vector)``: of its elements, halves first."""
+
+least_of: Any = _reduced(_lesser)
+"""``least_of(vector)``: of its elements."""
+
+smaller: Any = intrinsic(_smaller)
+"""``smaller(a, b)``: of each two elements."""
+
+store_columns: Any = intrinsic(_store_columns)
+"""``store_columns(array, index, vectors)``: eight vectors as columns of an array ``(y, x)``, from an index on."""
 
 minus: Any = intrinsic(_minus)
 """``minus(vector)``: the negative of each element."""
 
 at_most: Any = intrinsic(_at_most)
 """``at_most(a, b, yes, no)``: elements of ``yes`` where ``a <= b``, those of ``no`` elsewhere."""
+
+_whole: Any = intrinsic(_rounded)
+_two_to: Any = intrinsic(_power_of_two)
+
+
+@njit(inline="always")
+def exp(x: Any) -> Any:
+    """``exp`` of each element of a vector, of numbers up to 0; within some roundings, and next to nothing below -87."""
+    n = _whole(x * spread(np.float32(1.44269504)))
+    # the logarithm of two in two parts: products of the first with n are exact
+    f = fma(n, spread(np.float32(-1.42860682e-6)), fma(n, spread(np.float32(-0.693145752)), x))
+    p = fma(f, spread(np.float32(1 / 720)), spread(np.float32(1 / 120)))
+    p = fma(f, fma(f, fma(f, p, spread(np.float32(1 / 24))), spread(np.float32(1 / 6))), spread(np.float32(0.5)))
+    return fma(f, fma(f, p, spread(np.float32(1))), spread(np.float32(1))) * _two_to(n)

@@ -71,7 +71,7 @@ class SweepParameters(CandidateParameters):
         """What :func:`sweep` takes beside views and maps: the views by channel, and what each thread holds."""
         height, width = light_field.shape
         busy = min(threads, -(-height // _rows_at_a_stretch(height, threads)))
-        views = light_field.views.dtype.itemsize * 3 * math.prod(light_field.views.shape[:4])
+        views = light_field.views.dtype.itemsize * 3 * math.prod((*light_field.grid, height, width + MARGIN))
         return views + busy * self.thread_bytes(self.number(light_field), width)
 
     def thread_bytes(self, number: int, width: int) -> int:
@@ -80,8 +80,8 @@ class SweepParameters(CandidateParameters):
         Those are the costs and the numbers of samples in the rows of a window, and the costs of one row more, of every
         candidate and group; and the weights of the windows of a row.
         """
-        size, columns = 2 * self.window_radius + 1, min(width, TILE_WIDTH)
-        of_rows = (2 * size + 1) * (columns + 2 * self.window_radius) * self.groups * number
+        size, columns, vectors = 2 * self.window_radius + 1, min(width, TILE_WIDTH), -(-number // MARGIN)
+        of_rows = (2 * size + 1) * (columns + 2 * self.window_radius + MARGIN) * self.groups * vectors * MARGIN
         return 4 * (of_rows + size * size * columns)
 
 
@@ -109,10 +109,12 @@ class SweepResult:
 
 def planar(light_field: LightField) -> npt.NDArray[np.generic]:
     """Views as ``(T, S, 3, H, W + MARGIN)``, each channel's rows contiguous, in their own number type."""
+    from sepi.matching.plane_sweep_kernels import planes_of
+
     views = light_field.rgb_views
     T, S, H, W, _ = views.shape
     planes = np.zeros((T, S, 3, H, W + MARGIN), views.dtype)
-    planes[..., :W] = views.transpose(0, 1, 4, 2, 3)
+    planes_of(views, planes)
     return planes
 
 

@@ -24,7 +24,18 @@ from sepi.compiled import fma, njit, prange
 from sepi.lightfield import FloatMap
 from sepi.matching.sample_polynomials import between_same_pixels, difference, from_origin, of_first, upper_row, value
 from sepi.matching.sweep_arrays import BestMaps, Candidates, ViewStack, Window
-from sepi.vectors import load, spread, spread_from, store
+from sepi.vectors import (
+    at_most,
+    first_elements,
+    least_of,
+    load,
+    smaller,
+    spread,
+    spread_from,
+    store,
+    store_columns,
+    sum_of,
+)
 
 EXACT = {"nnan", "ninf", "nsz"}
 """Fast-math flags that keep every rounding as written.
@@ -63,9 +74,10 @@ class Rows(NamedTuple):
 
     Attributes
     ----------
-    ring, counts : ndarray, shape (size, n, G K), float32
-        Row ``r`` at ``r % size``, column ``x - radius`` of the tile at ``x``; zero outside the picture.
-    costs : ndarray, shape (G, K, n + VECTOR), float32
+    ring, counts : ndarray, shape (size, n + VECTOR, G K'), float32
+        Row ``r`` at ``r % size``, column ``x - radius`` of the tile at ``x``; zero outside the picture. ``K'`` is the
+        number of candidates, rounded up to whole vectors; those beyond cost nothing.
+    costs : ndarray, shape (G, K', n + VECTOR), float32
     runs : ndarray, shape (N, 2), int64
     """
 
@@ -128,11 +140,11 @@ def cost_row(views: ViewStack, candidates: Candidates, run: Run, cost: Any) -> N
     views : ViewStack
     candidates : Candidates
     run : Run
-    cost : ndarray, shape (G, K, n + VECTOR), float32
-        The first columns are filled with the sum of the robust residuals (each 0..1).
+    cost : ndarray, shape (G, K or more, n + VECTOR), float32
+        The first columns are filled with the sum of the robust residuals (each 0..1), those after them with 0.
     """
     T, S = views.groups.shape
-    cost[:, :, : run.end - run.begin] = 0
+    cost[:, :, : run.end - run.begin + VECTOR] = 0
     distances = np.empty(candidates.disparities.size, np.float32)
     for t in range(T):
         for s in range(S):
@@ -142,12 +154,13 @@ def cost_row(views: ViewStack, candidates: Candidates, run: Run, cost: Any) -> N
 
 @njit(cache=True, error_model="numpy")
 def _count_views(views: ViewStack, candidates: Candidates, run: Run, counts: Any) -> None:
-    """Number of views of each group that see each pixel of a run at each candidate, into ``counts (n, G K)``."""
+    """Number of views of each group that see each pixel of a run at each candidate, into ``counts (n, G K')``."""
     T, S, _, H, _ = views.colours.shape
     W = views.colours.shape[4] - VECTOR
     K = candidates.disparities.size
     U = candidates.across.shape[0]
-    G = counts.shape[1] // K
+    G = views.subsets.shape[1]
+    width = counts.shape[1] // G
     # views of each group, and equally far across, that have the row, at each candidate
     having = np.zeros((G, U, K), np.float32)
     some = np.zeros((G, U), np.bool_)
@@ -164,7 +177,7 @@ def _count_views(views: ViewStack, candidates: Candidates, run: Run, counts: Any
     for x in range(run.begin, run.end):
         counts[x - run.begin] = 0
         for g in range(G):
-            number = counts[x - run.begin, g * K : (g + 1) * K]
+            number = counts[x - run.begin, g * width : g * width + K]
             for u in range(U):
                 if some[g, u]:
                     left, fx, of_column = candidates.across[u], candidates.fx[u], having[g, u]
@@ -178,7 +191,7 @@ def _count_shown(views: ViewStack, candidates: Candidates, run: Run, counts: Any
     """:func:`_count_views` of views that do not show all of the picture."""
     T, S = views.groups.shape
     H, W = views.colours.shape[3], views.colours.shape[4] - VECTOR
-    K = candidates.disparities.size
+    K, width = candidates.disparities.size, counts.shape[1] // views.subsets.shape[1]
     counts[: run.end - run.begin] = 0
     for t in range(T):
         for s in range(S):
@@ -191,7 +204,7 @@ def _count_shown(views: ViewStack, candidates: Candidates, run: Run, counts: Any
                 first, last = _seen_run(shown, W, run, top, candidates.across[c, k], candidates.fx[c, k])
                 if 0 <= top <= H - 2:
                     for x in range(first - run.begin, last - run.begin):
-                        counts[x, g * K + k] += np.float32(1)
+                        counts[x, g * width + k] += np.float32(1)
 
 
 @njit(cache=True, fastmath=EXACT, error_model="numpy")
@@ -234,11 +247,11 @@ def _add_seven(target: Any, w: Any, a0: Any, a1: Any, a2: Any, a3: Any, a4: Any,
         )
 
 
-@njit(cache=True, fastmath=EXACT, error_model="numpy")
+@njit(cache=True, fastmath=EXACT, error_model="numpy", borrows=True)
 def _aggregate(ring: Any, y: int, x: int, H: int, weights: Any, sums: Any) -> None:
-    """Weighted sum over the window of pixel ``(y, x)``, of all groups and candidates at once, into ``sums (G K)``.
+    """Weighted sum over the window of pixel ``(y, x)``, of all groups and candidates at once, into ``sums (G K')``.
 
-    ``ring (size, n, G K)`` is one of :class:`Rows`, ``weights (size, size, n)`` are those of :func:`_window_weights`.
+    ``ring (size, n, G K')`` is one of :class:`Rows`, ``weights (size, size, n)`` are those of :func:`_window_weights`.
     """
     size = weights.shape[0]
     sums[:] = 0
@@ -260,55 +273,45 @@ def _aggregate(ring: Any, y: int, x: int, H: int, weights: Any, sums: Any) -> No
                     sums[k] += weight * source[k]
 
 
-@njit(cache=True, fastmath=EXACT, error_model="numpy")
-def _mean_costs(sums: Any, counts: Any, all_seen: bool, subset: Any, total: Any) -> None:
-    """Mean cost of each candidate over the views of one subset of groups.
+@njit(forceinline=True, borrows=True)
+def _mean_costs(sums: Any, counts: Any, all_seen: bool, subset: Any, k: int) -> Any:
+    """Mean cost of the candidates from ``k`` on over the views of one subset of groups.
+
+    ``sums``, ``counts (G, K')`` are of each group; where ``all_seen``, all candidates have the samples of the first.
+    """
+    total = number = spread(np.float32(0))
+    for g in range(subset.size):
+        if subset[g]:
+            total = total + load(sums, (g, k))
+            number = number + (spread_from(counts, (g, 0)) if all_seen else load(counts, (g, k)))
+    # a candidate that no view of the subset sees is no match
+    return at_most(number, spread(np.float32(0)), spread(np.float32(1)), total / number)
+
+
+@njit(cache=True, fastmath=EXACT, error_model="numpy", borrows=True)
+def _best_candidate(sums: Any, counts: Any, all_seen: bool, subset: Any, disparities: Any, costs: Any) -> Any:
+    """Disparity at the lowest of the costs, refined below the disparity sampling; that cost; the mean of all.
 
     Parameters
     ----------
-    sums : ndarray, shape (G, K), float32
-    counts : ndarray, shape (G, K), float32
-        Numbers of samples; of all candidates those of the first, where ``all_seen``.
-    all_seen : bool
-    subset : ndarray, shape (G,), bool
-    total : ndarray, shape (K,), float32
+    sums, counts, all_seen, subset
+        As in :func:`_mean_costs`.
+    disparities : ndarray, shape (K,), float32
+    costs : ndarray, shape (K',), float32
         Filled.
     """
-    G, K = sums.shape
-    total[:] = 0
-    number = np.float32(0)
-    for g in range(G):
-        if subset[g]:
-            number += counts[g, 0]
-            source = sums[g]
-            for k in range(K):
-                total[k] += source[k]
-    if all_seen:
-        for k in range(K):
-            # a subset without views matches nothing
-            total[k] = total[k] / number if number > 0 else np.float32(1)
-        return
-    for k in range(K):
-        number = np.float32(0)
-        for g in range(G):
-            if subset[g]:
-                number += counts[g, k]
-        # a candidate that no view of the subset sees is no match
-        total[k] = total[k] / number if number > 0 else np.float32(1)
-
-
-@njit(cache=True, fastmath=EXACT, error_model="numpy")
-def _best_candidate(costs: Any, disparities: Any) -> Any:
-    """Disparity at the lowest of the costs, refined below the disparity sampling; that cost; the mean of all."""
-    K = disparities.size
-    lowest, total = costs[0], np.float32(0)
-    for k in range(K):
-        lowest = min(lowest, costs[k])
-        total += costs[k]
+    K, none, most = disparities.size, np.float32(0), np.float32(1e9)
+    all_least, sums_of_all = spread(most), spread(none)
+    for k in range(0, K, VECTOR):
+        mean = _mean_costs(sums, counts, all_seen, subset, k)
+        store(costs, k, mean)
+        all_least = smaller(all_least, first_elements(mean, K - k, most))
+        sums_of_all = sums_of_all + first_elements(mean, K - k, none)
+    lowest = least_of(all_least)
     best = 0
     while best < K - 1 and costs[best] != lowest:
         best += 1
-    offset = np.float32(0)
+    offset = none
     # a perfect match needs no parabola, and the ends of the range allow none
     if lowest > 0 and 0 < best < K - 1:
         before, after = costs[best - 1], costs[best + 1]
@@ -316,7 +319,7 @@ def _best_candidate(costs: Any, disparities: Any) -> Any:
         if curvature > 0:
             offset = np.float32(0.5) * (before - after) / curvature
     sampling = (disparities[K - 1] - disparities[0]) / np.float32(K - 1)
-    return disparities[best] + offset * sampling, lowest, total / np.float32(K)
+    return disparities[best] + offset * sampling, lowest, sum_of(sums_of_all) / np.float32(K)
 
 
 @njit(cache=True)
@@ -342,18 +345,19 @@ def _needed_runs(mask: Any, row: int, tile: Tile, radius: int, runs: Any) -> int
     return number
 
 
-@njit(cache=True)
+@njit(cache=True, borrows=True)
 def _transpose(costs: Any, columns: int, target: Any) -> None:
-    """The first columns of ``costs (G, K, N)`` as ``target (n, G K)``."""
+    """The first columns of ``costs (G, K', n)``, and some zeros after them, as ``target (n, G K')``."""
     G, K, _ = costs.shape
-    # a few columns at a time: their pixels of the target stay in the first cache
-    for begin in range(0, columns, 16):
-        end = min(columns, begin + 16)
+    for x in range(0, columns, VECTOR):
         for g in range(G):
-            for k in range(K):
-                source = costs[g, k]
-                for x in range(begin, end):
-                    target[x, g * K + k] = source[x]
+            for k in range(0, K, VECTOR):
+                rows = (
+                    load(costs, (g, k, x)), load(costs, (g, k + 1, x)), load(costs, (g, k + 2, x)),
+                    load(costs, (g, k + 3, x)), load(costs, (g, k + 4, x)), load(costs, (g, k + 5, x)),
+                    load(costs, (g, k + 6, x)), load(costs, (g, k + 7, x)),
+                )  # fmt: skip
+                store_columns(target, (x, g * K + k), rows)
 
 
 @njit(cache=True, error_model="numpy")
@@ -381,30 +385,52 @@ def _fill_row(
                 _count_views(views, candidates, Run(row, begin, end), counts[begin - origin :])
 
 
+@njit(cache=True, error_model="numpy", borrows=True)
+def _sweep_row(
+    views: ViewStack, candidates: Candidates, mask: Any, y: int, tile: Tile, rows: Rows, weights: Any, maps: BestMaps,
+    sums: Any, all_of_group: Any, costs: Any,
+) -> None:  # fmt: skip
+    """Best candidates of the pixels of a row that are in the mask; ``sums (2, G, K')``, ``costs (K',)`` are scratch."""
+    H, W = mask.shape
+    cost, number = sums[0], sums[1]
+    for x in range(tile.begin, tile.end):
+        if not mask[y, x]:
+            continue
+        _aggregate(rows.ring, y, x - tile.begin, H, weights, cost.reshape(cost.size))
+        # away from the border every view sees every pixel of the window: nothing to count
+        all_seen = tile.margin <= y < H - tile.margin and tile.margin <= x < W - tile.margin
+        if not all_seen:
+            _aggregate(rows.counts, y, x - tile.begin, H, weights, number.reshape(number.size))
+        seen = all_of_group if all_seen else number
+        for n in range(views.subsets.shape[0]):
+            best = _best_candidate(cost, seen, all_seen, views.subsets[n], candidates.disparities, costs)
+            maps.disparity[n, y, x], maps.cost[n, y, x], maps.mean[n, y, x] = best
+
+
 @njit(cache=True, error_model="numpy")
 def _sweep_tile(
     views: ViewStack, candidates: Candidates, window: Window, mask: Any, tile: Tile, maps: BestMaps
 ) -> None:
     """Sweep the pixels of a tile that are in the mask."""
-    H, W = mask.shape
-    N, G = views.subsets.shape
-    K = candidates.disparities.size
-    radius, margin = window.radius, tile.margin
+    H = mask.shape[0]
+    G = views.subsets.shape[1]
+    K = (candidates.disparities.size + VECTOR - 1) // VECTOR * VECTOR
+    radius = window.radius
     size, width = 2 * radius + 1, tile.end - tile.begin
     # with the columns of the windows at both ends
+    columns = width + 2 * radius + VECTOR
     rows = Rows(
-        np.zeros((size, width + 2 * radius, G * K), np.float32),
-        np.zeros((size, width + 2 * radius, G * K), np.float32),
-        np.empty((G, K, width + 2 * radius + VECTOR), np.float32),
+        np.zeros((size, columns, G * K), np.float32),
+        np.zeros((size, columns, G * K), np.float32),
+        np.empty((G, K, columns), np.float32),
         np.empty((width // SHORTEST_GAP + 2, 2), np.int64),
     )
     weights = np.empty((size, size, width), np.float32)
-    sums, numbers = np.empty(G * K, np.float32), np.empty(G * K, np.float32)
-    group_sizes = np.zeros((G, K), np.float32)
+    sums, costs = np.empty((2, G, K), np.float32), np.empty(K, np.float32)
+    all_of_group = np.zeros((G, K), np.float32)
     for group in views.groups.flat:
         if group >= 0:
-            group_sizes[group] += 1
-    total = np.empty(K, np.float32)
+            all_of_group[group] += 1
     done = -1  # last row whose costs are in the ring
     for y in range(tile.top, tile.bottom):
         wanted = False
@@ -416,19 +442,24 @@ def _sweep_tile(
             _fill_row(views, candidates, mask, row, tile, radius, rows)
             done = row
         _window_weights(window, Run(y, tile.begin, tile.end), weights)
-        for x in range(tile.begin, tile.end):
-            if not mask[y, x]:
-                continue
-            _aggregate(rows.ring, y, x - tile.begin, H, weights, sums)
-            # away from the border every view sees every pixel of the window: nothing to count
-            all_seen = margin <= y < H - margin and margin <= x < W - margin
-            if not all_seen:
-                _aggregate(rows.counts, y, x - tile.begin, H, weights, numbers)
-            seen = group_sizes if all_seen else numbers.reshape(G, K)
-            for n in range(N):
-                _mean_costs(sums.reshape(G, K), seen, all_seen, views.subsets[n], total)
-                best = _best_candidate(total, candidates.disparities)
-                maps.disparity[n, y, x], maps.cost[n, y, x], maps.mean[n, y, x] = best
+        _sweep_row(views, candidates, mask, y, tile, rows, weights, maps, sums, all_of_group, costs)
+
+
+@njit(cache=True, borrows=True)
+def _add_planes(view: Any, planes: Any) -> None:
+    H, W, _ = view.shape
+    for y in range(H):
+        for x in range(W):
+            for c in range(3):
+                planes[c, y, x] = view[y, x, c]
+
+
+@njit(cache=True, parallel=True)
+def planes_of(views: Any, planes: Any) -> None:
+    """Fill ``planes (T, S, 3, H, W or more)`` with views ``(T, S, H, W, 3)``."""
+    T, S = views.shape[:2]
+    for view in prange(T * S):
+        _add_planes(views[view // S, view % S], planes[view // S, view % S])
 
 
 @njit(cache=True, parallel=True)

@@ -61,8 +61,9 @@ def value(coefficients: Any, distance: Any) -> Any:
 @njit(inline="always")
 def of_first(coefficients: Any, number: int) -> Any:
     """Coefficients of so many of the eight pixels; 0, for those of the others."""
-    constant, linear, quadratic = coefficients
-    return first_elements(constant, number), first_elements(linear, number), first_elements(quadratic, number)
+    a, b, c = coefficients
+    none = np.float32(0)
+    return first_elements(a, number, none), first_elements(b, number, none), first_elements(c, number, none)
 
 
 @njit(inline="always")

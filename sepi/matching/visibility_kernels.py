@@ -227,7 +227,8 @@ def _add_view(
         for x in range(first, last, MARGIN):
             if last - x < MARGIN:
                 # pixels beyond the last add nothing to what others have added
-                whole, hidden = first_elements(whole, last - x), first_elements(hidden, last - x)
+                whole = first_elements(whole, last - x, np.float32(0))
+                hidden = first_elements(hidden, last - x, np.float32(0))
             seen = whole
             if nearest.shape[1] > 0:
                 before = load(nearest, (row, x + column))
