@@ -12,6 +12,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from sepi.image.channels import mean_of_channels
 from sepi.lightfield import HIGHEST, LOWEST, BoolMap, FloatMap, LightField, full_scale
 
 # values that tell of brightness, full range = 1: neither black nor burnt out
@@ -157,4 +158,4 @@ def _small(light_field: LightField, place: tuple[int, int], step: int) -> tuple[
 
 
 def _grey(view: FloatMap) -> FloatMap:
-    return np.ascontiguousarray(view.mean(axis=2), np.float32)
+    return np.ascontiguousarray(mean_of_channels(view), np.float32)

@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 from pydantic import Field
 
+from sepi.image.channels import mean_of_channels
 from sepi.image.noise import noise_level
 from sepi.lightfield import BoolMap, FloatMap
 from sepi.stage import Parameters
@@ -79,4 +80,4 @@ def depth_discontinuities(disparity: FloatMap, threshold: float) -> BoolMap:
 
 
 def _smooth_grey(reference_view: FloatMap, sigma: float) -> FloatMap:
-    return np.asarray(cv2.GaussianBlur(reference_view.mean(axis=2), (0, 0), sigma), np.float32)
+    return np.asarray(cv2.GaussianBlur(mean_of_channels(reference_view), (0, 0), sigma), np.float32)

@@ -17,6 +17,7 @@ import cv2
 import numpy as np
 
 from sepi.errors import SepiError
+from sepi.image.channels import largest_channel, mean_of_channels
 from sepi.inspection.dark_corners import dark_corners
 from sepi.lightfield import BoolMap, DisparityRange, FloatMap, LightField, as_unit_float, require_light_field
 
@@ -171,7 +172,9 @@ class _Views:
         self.reference = self._view(self._own)
         self.seen = ~dark_corners(light_field.reference_view, self.reference.shape, _HIGH_PASS + _SEARCH_RADIUS)
         view = light_field.reference_view
-        self._flat = max(_FLAT * float(np.quantile(view.max(axis=2), 0.99)), _FLAT_BLOCKS if _has_blocks(view) else 0.0)
+        self._flat = max(
+            _FLAT * float(np.quantile(largest_channel(view), 0.99)), _FLAT_BLOCKS if _has_blocks(view) else 0.0
+        )
 
     def distances(self) -> tuple[int, int]:
         """Rows or columns from the reference view to the nearest and the farthest other view."""
@@ -220,12 +223,11 @@ class _Views:
 
     def _view(self, position: tuple[int, int]) -> FloatMap:
         if position not in self._prepared:
-            view = np.asarray(as_unit_float(self.light_field.rgb_views[position]).mean(axis=2), np.float32)
-            own = as_unit_float(self.light_field.rgb_views[self._own]).mean()
+            view = np.asarray(mean_of_channels(as_unit_float(self.light_field.rgb_views[position])), np.float32)
             # as bright as the reference: lenses darken the views towards the edge of the grid
             mean = float(view.mean())
             if position != self._own and mean > 0:
-                view *= np.float32(float(own) / mean)
+                view *= np.float32(self._brightness / mean)
             self._prepared[position] = _prepared(view, self._factor)
         return self._prepared[position]
 
@@ -294,7 +296,7 @@ def _prepared(grey: FloatMap, factor: int) -> FloatMap:
 
 def _has_blocks(view: FloatMap) -> bool:
     """Whether strong JPEG compression left its blocks in a picture, (H, W, 3)."""
-    grey = view.mean(axis=2)
+    grey = mean_of_channels(view)
     ratios = []
     for picture in (grey, grey.T):
         faint = np.minimum(abs(np.diff(picture, axis=1)), _FAINT).mean(axis=0)

@@ -15,6 +15,7 @@ import cv2
 import numpy as np
 from pydantic import Field
 
+from sepi.image.channels import largest_channel
 from sepi.lightfield import BoolMap, FloatMap, LightField, full_scale
 from sepi.matching.denoising import guide_of
 from sepi.matching.nearest_surfaces import nearest_surfaces
@@ -121,7 +122,7 @@ def compared_depths(
 def _plain(guide: FloatMap, distance: float) -> BoolMap:
     """Pixels with whose neighbours no channel changes by ``distance``."""
     square = np.ones((3, 3), np.uint8)
-    return np.asarray((cv2.dilate(guide, square) - cv2.erode(guide, square)).max(axis=2) < np.float32(distance))
+    return np.asarray(largest_channel(cv2.dilate(guide, square) - cv2.erode(guide, square)) < np.float32(distance))
 
 
 def _outvoted(voters: BoolMap, better: BoolMap, seeing: FloatMap) -> BoolMap:

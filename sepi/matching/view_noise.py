@@ -19,6 +19,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from sepi.image.channels import mean_of_channels
 from sepi.image.noise import BLACK, SATURATED, mask_energy
 from sepi.lightfield import BoolMap, FloatMap, LightField, full_scale
 
@@ -129,7 +130,9 @@ def view_noise(light_field: LightField) -> ViewNoise:
     place, moves = light_field.reference_position, whole_pixel_moves(light_field)
     # beyond the picture nothing is known
     between = np.minimum(least_differences(views.transpose(0, 1, 4, 2, 3), *place, moves) * unit**2 / 2, 1)
-    within, level = (_of_blocks(values, between.shape, BLOCK) for values in (mask_energy(image), image.mean(axis=2)))
+    within, level = (
+        _of_blocks(values, between.shape, BLOCK) for values in (mask_energy(image), mean_of_channels(image))
+    )
     # what is black, overexposed or flat has none of the noise that the rest has
     tells = (within > 0) & (level > BLACK) & (level < SATURATED)
     even = np.ones((PARTS, PARTS), np.float32)
@@ -188,7 +191,7 @@ def variance_map(light_field: LightField, noise: ViewNoise, views: BoolMap) -> F
     energies = [mask_energy(view * unit) for view in light_field.rgb_views[views]]
     energy = np.asarray(np.mean(energies, axis=0), np.float32)
     height, width = light_field.shape
-    level = cv2.blur(np.ascontiguousarray(light_field.reference_view.mean(axis=2)), window)
+    level = cv2.blur(np.ascontiguousarray(mean_of_channels(light_field.reference_view)), window)
     by_place = cv2.resize(noise.by_place, (width, height), interpolation=cv2.INTER_LINEAR)
     most = _MOST_OF_USUAL * np.interp(level, noise.brightness, noise.variance) * by_place
     own = np.minimum(cv2.blur(energy, window), most)

@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import Field
 
+from sepi.image.channels import sum_of_channels
 from sepi.lightfield import BoolMap, DisparityRange, FloatMap
 from sepi.regularization.plane_search import fitted, pixels_in_order, planes_through, residuals_of, support
 from sepi.regularization.regions import Plane, parts_of
@@ -95,7 +96,7 @@ def without_reflections(
 def strong_edges(view: FloatMap, contrast: float) -> BoolMap:
     """Where the colours of a view (H, W, 3) change by ``contrast`` per pixel or more."""
     down, across = np.gradient(cv2.GaussianBlur(view, (0, 0), _SMOOTHING), axis=(0, 1))
-    return np.asarray((down**2 + across**2).sum(axis=-1) >= contrast**2)
+    return np.asarray(sum_of_channels(down**2 + across**2) >= contrast**2)
 
 
 def floor_plane(
