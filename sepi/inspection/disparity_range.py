@@ -169,12 +169,12 @@ class _Views:
         self.light_field, self._factor = light_field, factor
         self._prepared: dict[tuple[int, int], FloatMap] = {}
         self._own = light_field.reference_position
+        self._brightness = float(light_field.reference_view.mean())
         self.reference = self._view(self._own)
         self.seen = ~dark_corners(light_field.reference_view, self.reference.shape, _HIGH_PASS + _SEARCH_RADIUS)
         view = light_field.reference_view
-        self._flat = max(
-            _FLAT * float(np.quantile(largest_channel(view), 0.99)), _FLAT_BLOCKS if _has_blocks(view) else 0.0
-        )
+        brightest = float(np.quantile(largest_channel(view), 0.99))
+        self._flat = max(_FLAT * brightest, _FLAT_BLOCKS if _has_blocks(view) else 0.0)
 
     def distances(self) -> tuple[int, int]:
         """Rows or columns from the reference view to the nearest and the farthest other view."""
