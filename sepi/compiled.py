@@ -7,6 +7,7 @@ nothing. Here that is left until something has to be compiled.
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import os
 from collections.abc import Callable, Iterable, Iterator
@@ -68,7 +69,13 @@ class _KernelCache(FunctionCache):  # type: ignore[misc, unused-ignore]
         return None
 
 
-def _stamps_of_others(function: Callable[..., Any]) -> tuple[tuple[str, int, int], ...]:
+@functools.cache
+def _digest(file: str) -> str:
+    with open(file, "rb") as source:
+        return hashlib.sha256(source.read()).hexdigest()
+
+
+def _stamps_of_others(function: Callable[..., Any]) -> tuple[tuple[str, str], ...]:
     """What tells a change of the other files whose compiled functions those of this file may call.
 
     Numba looks at the file of a function alone, and would go on with code that has old ones of other files in it.
@@ -82,8 +89,8 @@ def _stamps_of_others(function: Callable[..., Any]) -> tuple[tuple[str, int, int
             if code is not None and code.co_filename not in files:
                 files.add(code.co_filename)
                 others.append(called.__globals__)
-    states = ((name, os.stat(name)) for name in sorted(files - {function.__code__.co_filename}))
-    return tuple((os.path.basename(name), state.st_mtime_ns, state.st_size) for name, state in states)
+    others_files = sorted(files - {function.__code__.co_filename})
+    return tuple((os.path.basename(file), _digest(file)) for file in others_files)
 
 
 class _Runtime(type(rtsys)):  # type: ignore[misc, unused-ignore]
