@@ -29,8 +29,8 @@ from numba.extending import intrinsic, lower_builtin, register_model
 from sepi.compiled import fma, njit
 
 __all__ = [
-    "WIDTH", "at_most", "exp", "first_elements", "least_of", "load", "load_colours", "minus", "smaller", "spread",
-    "spread_from", "store", "store_columns", "store_rounded", "sum_of", "weighted_pairs", "weights",
+    "WIDTH", "at_most", "exp", "first_elements", "larger", "least_of", "load", "load_colours", "minus", "smaller",
+    "spread", "spread_from", "store", "store_columns", "store_rounded", "sum_of", "weighted_pairs", "weights",
 ]  # fmt: skip
 
 WIDTH = 8
@@ -188,6 +188,15 @@ def _smaller(_context: Any, _a: Any, _b: Any) -> Any:
 
     def code(_context: Any, builder: Any, _given: Any, arguments: Any) -> Any:
         return _lesser(builder, *arguments)
+
+    return VECTOR(VECTOR, VECTOR), code
+
+
+def _larger(_context: Any, _a: Any, _b: Any) -> Any:
+    """LLVM code of :func:`larger`."""
+
+    def code(_context: Any, builder: Any, _given: Any, arguments: Any) -> Any:
+        return _lesser(builder, *arguments, greater=True)
 
     return VECTOR(VECTOR, VECTOR), code
 
@@ -380,6 +389,9 @@ least_of: Any = _reduced(_lesser)
 
 smaller: Any = intrinsic(_smaller)
 """``smaller(a, b)``: of each two elements."""
+
+larger: Any = intrinsic(_larger)
+"""``larger(a, b)``: of each two elements."""
 
 store_columns: Any = intrinsic(_store_columns)
 """``store_columns(array, index, vectors)``: eight vectors as columns of an array ``(y, x)``, from an index on."""

@@ -2,8 +2,10 @@
 
 A sample is a sum of 4x4 spline coefficients of four channels. The channels of a coefficient lie side by side, so that a
 row of four of them is one vector of sixteen numbers: :func:`_weighted_sum` writes it down as such, since the compiler
-does not find it. All else is done for many pixels of a row at once, in loops that the compiler makes vectors of: what
-they read and write are lines of one array, since only then it knows that these do not overlap.
+does not find it. Coefficients and weights are whole numbers of 16 bits, of which processors multiply twice as many at
+once; what the rounding of the sums of columns leaves is a tenth of the steps of an 8-bit picture. All else is done for
+many pixels of a row at once, in loops that the compiler makes vectors of: what they read and write are lines of one
+array, since only then it knows that these do not overlap.
 """
 
 from __future__ import annotations
@@ -73,83 +75,137 @@ class Seeing(NamedTuple):
 
 
 _FOUR: Any = types.UniTuple(types.float32, 4)  # type: ignore[no-untyped-call]
-_declared: Any = cgutils.get_or_insert_function
 
 
 def _vector_sum(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
     """LLVM code of :func:`_weighted_sum`."""
-    splines, start, stride, a, b = arguments
-    number, sixteen = ir.FloatType(), ir.VectorType(ir.FloatType(), 16)
+    splines, start, stride, weights, first, unit = arguments
     lane = ir.IntType(32)
-    data = context.make_array(signature.args[0])(context, builder, splines).data
+    eight, short, long = (ir.VectorType(kind, n) for kind, n in ((lane, 8), (ir.IntType(16), 16), (lane, 16)))
+    data, lines = (
+        context.make_array(signature.args[n])(context, builder, array).data for n, array in ((0, splines), (3, weights))
+    )
 
-    def spread(values: list[Any], times: int) -> Any:
-        """A vector of the values, each so many times."""
-        few = ir.Constant(ir.VectorType(number, len(values)), ir.Undefined)
-        for i, value in enumerate(values):
-            few = builder.insert_element(few, value, lane(i))
-        mask = ir.Constant(ir.VectorType(lane, 16), [lane(i // times) for i in range(16)])
-        return builder.shuffle_vector(few, few, mask)
+    def of_line(i: int) -> Any:
+        """The weight of line ``i``, throughout."""
+        value = builder.load(builder.gep(lines, [builder.add(first, first.type(i * AT_ONCE))]))
+        one = builder.insert_element(ir.Constant(eight, ir.Undefined), value, lane(0))
+        return builder.shuffle_vector(one, one, ir.Constant(eight, [lane(0)] * 8))
 
-    def row(i: int) -> Any:
+    def product(a: Any, b: Any) -> Any:
+        """Of 16-bit numbers, with 32 bits."""
+        return builder.mul(*(builder.sext(builder.bitcast(vector, short), long) for vector in (a, b)), flags=("nsw",))
+
+    def each(vector: Any, mask: list[int]) -> Any:
+        return builder.shuffle_vector(
+            vector, vector, ir.Constant(ir.VectorType(lane, len(mask)), list(map(lane, mask)))
+        )
+
+    fast = None
+    if "+avx2" in context.codegen()._tm_features:
+        fast = cgutils.get_or_insert_function(
+            builder.module, ir.FunctionType(short, [short, short]), "llvm.x86.avx2.pmul.hr.sw"
+        )
+    total = None
+    for i in range(4):
         place = builder.gep(data, [builder.add(start, builder.mul(stride, stride.type(i)))])
-        packed = builder.load(builder.bitcast(place, ir.VectorType(ir.IntType(16), 16).as_pointer()), align=2)
-        return builder.sitofp(packed, sixteen)
-
-    multiply_add = _declared(builder.module, ir.FunctionType(sixteen, [sixteen] * 3), "llvm.fma.v16f32")
-    down = [builder.extract_value(a, i) for i in range(4)]
-    total = builder.fmul(spread(down[:1], 16), row(0))
-    for i in range(1, 4):
-        total = builder.call(multiply_add, [spread(down[i : i + 1], 16), row(i), total])
-    total = builder.fmul(total, spread([builder.extract_value(b, i) for i in range(4)], 4))
-    for half in (8, 4):
-        parts = [
-            builder.shuffle_vector(
-                total, total, ir.Constant(ir.VectorType(lane, half), [lane(i + first) for i in range(half)])
-            )
-            for first in (0, half)
-        ]
-        total = builder.fadd(*parts)
+        row = builder.load(builder.bitcast(place, short.as_pointer()), align=2)
+        if fast:
+            part = builder.call(fast, [row, builder.bitcast(of_line(i), short)])
+            total = part if total is None else builder.add(total, part)
+            continue
+        # rounded to whole numbers
+        half = builder.ashr(product(row, of_line(i)), ir.Constant(long, [lane(14)] * 16))
+        half = builder.ashr(builder.add(half, ir.Constant(long, [lane(1)] * 16)), ir.Constant(long, [lane(1)] * 16))
+        part = builder.trunc(half, short)
+        total = part if total is None else builder.add(total, part)
+    # neighbours of one channel side by side
+    total = each(total, [8 * (i // 8) + 4 * (i % 2) + i % 8 // 2 for i in range(16)])
+    across = builder.shuffle_vector(of_line(4), of_line(5), ir.Constant(eight, [lane(8 * (i // 4)) for i in range(8)]))
+    whole = product(total, across)
+    sums = builder.add(each(whole, list(range(0, 16, 2))), each(whole, list(range(1, 16, 2))))
+    sums = builder.add(each(sums, [0, 1, 2, 3]), each(sums, [4, 5, 6, 7]))
+    four = ir.VectorType(ir.FloatType(), 4)
+    one = builder.insert_element(ir.Constant(four, ir.Undefined), unit, lane(0))
+    values = builder.fmul(
+        builder.sitofp(sums, four), builder.shuffle_vector(one, one, ir.Constant(ir.VectorType(lane, 4), [lane(0)] * 4))
+    )
     return context.make_tuple(
-        builder, signature.return_type, [builder.extract_element(total, lane(i)) for i in range(4)]
+        builder, signature.return_type, [builder.extract_element(values, lane(i)) for i in range(4)]
     )
 
 
-def _typed_sum(_context: Any, splines: Any, start: Any, stride: Any, a: Any, b: Any) -> Any:
-    return _FOUR(splines, types.int64, types.int64, _FOUR, _FOUR), _vector_sum
+def _typed_sum(_context: Any, splines: Any, start: Any, stride: Any, weights: Any, first: Any, unit: Any) -> Any:
+    return _FOUR(splines, types.int64, types.int64, weights, types.int64, types.float32), _vector_sum
 
 
 _weighted_sum: Any = intrinsic(_typed_sum)
-"""``sum_ij a[i] b[j] c[start + i stride + 4 j : ... + 4]`` over an array ``c`` of int16; four float32."""
+"""``sum_ij a[i] b[j] c[start + i stride + 4 j : ... + 4]`` over an array ``c`` of int16, times a unit; four float32.
 
+The weights are in lines of an array, from an index on: see :func:`_spline_weights`.
+"""
+
+
+ONE = 1 << 15
+"""The sum of the weights of coefficients, along either axis."""
 
 AT_ONCE = 128
 """Pixels of a row that are done together; all that is known of them stays in the first cache."""
 
-# Lines of the scratch array, each a number of every pixel: where a view sees it, weights of the rows and columns of
-# coefficients there, the four channels there, and whether the view sees it...
-_Y, _X, _DOWN, _ACROSS, _VALUES, _SEEN = 0, 1, 2, 6, 10, 14
+# Lines of the scratch array, each a number of every pixel: where a view sees it, the four channels there, and whether
+# the view sees it...
+_Y, _X, _VALUES, _SEEN = 0, 1, 2, 6
+# (and, in another, of whole numbers, after six lines of weights: where its coefficients, and what hides it, are)
+_COEFFICIENT, _NEAREST = 6, 7
 # ...what the channels are compared with, and its derivatives...
-_OWN, _SLOPE_DOWN, _SLOPE_ACROSS = 15, 19, 23
+_OWN, _SLOPE_DOWN, _SLOPE_ACROSS = 7, 11, 15
 # ...and sums over the views: of the weighted channels and the weights, or of the equations and the evidence
-_SUMS = 27
+_SUMS = 19
 _HALVES = _SUMS + 4
 _REST = _HALVES + 8
 _LINES = _REST + 4
 
 
 @njit(forceinline=True)
-def _spline_weights(s: Any, where: int, first: int, unit: Any, count: int) -> None:
-    """Weights of the four coefficients round each position of line ``where``, times ``unit``: lines from ``first``."""
-    sixth, half, two_thirds, one = np.float32(1 / 6), np.float32(0.5), np.float32(2 / 3), np.float32(1)
+def _whole_weights(position: Any) -> Any:
+    """Weights of the four coefficients round a position, whole numbers of sum ``ONE``."""
+    scale, half = np.float32(ONE), np.float32(0.5)
+    f = position - np.float32(np.int32(position))
+    g = np.float32(1) - f
+    before = np.int32(g * g * g * (scale / np.float32(6)) + half)
+    after = np.int32(f * f * f * (scale / np.float32(6)) + half)
+    right = np.int32((np.float32(2 / 3) - g * g * (np.float32(1) - g * half)) * scale + half)
+    return before, np.int32(ONE) - before - right - after, right, after
+
+
+@njit(forceinline=True)
+def _spline_weights(s: Any, weights: Any, count: int) -> None:
+    """Lines of the weights, in pairs of 16-bit numbers.
+
+    Of the four rows each twice, and of the columns the first two and the other two.
+    """
+    low = np.int32(0xFFFF)
     for i in range(count):
-        position = s[where * AT_ONCE + i]
-        f = position - np.float32(np.int32(position))
-        g = one - f
-        s[first * AT_ONCE + i] = g * g * g * sixth * unit
-        s[(first + 1) * AT_ONCE + i] = (two_thirds - f * f * (one - f * half)) * unit
-        s[(first + 2) * AT_ONCE + i] = (two_thirds - g * g * (one - g * half)) * unit
-        s[(first + 3) * AT_ONCE + i] = f * f * f * sixth * unit
+        a, b, c, d = _whole_weights(s[_Y * AT_ONCE + i])
+        weights[i] = (a & low) | (a << np.int32(16))
+        weights[AT_ONCE + i] = (b & low) | (b << np.int32(16))
+        weights[2 * AT_ONCE + i] = (c & low) | (c << np.int32(16))
+        weights[3 * AT_ONCE + i] = (d & low) | (d << np.int32(16))
+        a, b, c, d = _whole_weights(s[_X * AT_ONCE + i])
+        weights[4 * AT_ONCE + i] = (a & low) | (b << np.int32(16))
+        weights[5 * AT_ONCE + i] = (c & low) | (d << np.int32(16))
+
+
+@njit(forceinline=True)
+def _find_places(s: Any, whole: Any, H: int, W: int, stride: Any, count: int) -> None:
+    """Lines of where each position is in a view's coefficients and z-buffer; there -1 outside the picture."""
+    half, four, width = np.float32(0.5), np.int32(4), np.int32(W)
+    bottom, right = np.float32(H - 1), np.float32(W - 1)
+    for i in range(count):
+        fy, fx = s[_Y * AT_ONCE + i], s[_X * AT_ONCE + i]
+        whole[_COEFFICIENT * AT_ONCE + i] = np.int32(fy) * stride + np.int32(fx) * four
+        inside = (fy >= 0) & (fy <= bottom) & (fx >= 0) & (fx <= right)
+        whole[_NEAREST * AT_ONCE + i] = np.int32(fy + half) * width + np.int32(fx + half) if inside else np.int32(-1)
 
 
 @njit(forceinline=True)
@@ -158,8 +214,10 @@ def _four(s: Any, first: int, i: int) -> Any:
     return s[at], s[at + AT_ONCE], s[at + 2 * AT_ONCE], s[at + 3 * AT_ONCE]
 
 
-@njit(cache=True, fastmath=EXACT, error_model="numpy")
-def _sample(views: SplineViews, n: int, y: int, x: int, seeing: Seeing, disparity: Any, s: Any, count: int) -> None:
+@njit(cache=True, fastmath=EXACT, error_model="numpy", borrows=True)
+def _sample(
+    views: SplineViews, n: int, y: int, x: int, seeing: Seeing, disparity: Any, s: Any, whole: Any, count: int
+) -> None:
     """Where view ``n`` sees each pixel of a piece of row ``y``, its four channels there, and whether nothing hides it.
 
     Zero where it does not see it. The piece begins at column ``x``.
@@ -167,26 +225,26 @@ def _sample(views: SplineViews, n: int, y: int, x: int, seeing: Seeing, disparit
     H, W = disparity.shape
     _, S, rows, columns, _ = views.splines.shape
     v, u = views.baselines[n]
+    t, c = views.places[n, 0], views.places[n, 1]
     for i in range(count):
         s[_Y * AT_ONCE + i] = np.float32(y) - disparity[y, x + i] * v
         s[_X * AT_ONCE + i] = np.float32(x + i) - disparity[y, x + i] * u
-    _spline_weights(s, _Y, _DOWN, views.unit, count)
-    _spline_weights(s, _X, _ACROSS, np.float32(1), count)
-    nearest: Any = seeing.nearest[views.places[n, 0], views.places[n, 1]]
-    half, stride, bottom, right = np.float32(0.5), 4 * columns, np.float32(H - 1), np.float32(W - 1)
-    # the margin, less the one coefficient before
-    start = ((views.places[n, 0] * S + views.places[n, 1]) * rows + 1 - views.low) * stride + 4
+    _spline_weights(s, whole, count)
+    _find_places(s, whole, H, W, np.int32(4 * columns), count)
+    nearest: Any = seeing.nearest.reshape(seeing.nearest.size)
+    # the first row of the picture, and the margin, less the one coefficient before
+    above = ((t * S + c) * seeing.nearest.shape[2] - views.low) * W
+    start = ((t * S + c) * rows + 1 - views.low) * 4 * columns + 4
     for i in range(count):
-        fy, fx = s[_Y * AT_ONCE + i], s[_X * AT_ONCE + i]
-        seen = fy >= 0 and fy <= bottom and fx >= 0 and fx <= right
-        if seen:
-            limit = disparity[y, x + i] + seeing.occlusion_margin
-            seen = nearest[int(fy + half) - views.low, int(fx + half)] <= limit
         values = np.float32(0), np.float32(0), np.float32(0), np.float32(0)
-        if seen:
-            at = start + int(fy) * stride + 4 * int(fx)
-            values = _weighted_sum(views.splines, at, stride, _four(s, _DOWN, i), _four(s, _ACROSS, i))
-        s[_SEEN * AT_ONCE + i] = np.float32(1) if seen else np.float32(0)
+        place = whole[_NEAREST * AT_ONCE + i]
+        seen = np.float32(0)
+        # without a sign it is not looked for from the end
+        if place >= 0 and nearest[np.uint64(above + place)] <= disparity[y, x + i] + seeing.occlusion_margin:
+            at = start + whole[_COEFFICIENT * AT_ONCE + i]
+            values = _weighted_sum(views.splines, at, 4 * columns, whole, i, views.unit / np.float32(ONE))
+            seen = np.float32(1)
+        s[_SEEN * AT_ONCE + i] = seen
         for c in range(4):
             s[(_VALUES + c) * AT_ONCE + i] = values[c]
 
@@ -245,7 +303,7 @@ def mean_of_views(views: SplineViews, seeing: Seeing, disparity: Any, begin: int
     """
     W = disparity.shape[1]
     for y in prange(begin, end):
-        s = np.empty(_LINES * AT_ONCE, np.float32)
+        s, whole = np.empty(_LINES * AT_ONCE, np.float32), np.empty(8 * AT_ONCE, np.int32)
         for x in range(0, W, AT_ONCE):
             count = min(AT_ONCE, W - x)
             _load(views.reference, y, x, s, _OWN, count)
@@ -253,7 +311,7 @@ def mean_of_views(views: SplineViews, seeing: Seeing, disparity: Any, begin: int
             s[_SUMS * AT_ONCE : (_SUMS + 4) * AT_ONCE] = s[_OWN * AT_ONCE : (_OWN + 4) * AT_ONCE]
             s[(_SUMS + 4) * AT_ONCE : (_SUMS + 6) * AT_ONCE] = np.float32(1)
             for n in range(len(views.places)):
-                _sample(views, n, y, x, seeing, disparity, s, count)
+                _sample(views, n, y, x, seeing, disparity, s, whole, count)
                 _add_to_mean(s, views.scales2, count)
             for i in range(count):
                 for c in range(4):
@@ -328,12 +386,12 @@ def normal_equations(
     """
     W = disparity.shape[1]
     for y in prange(begin, end):
-        s = np.empty(_LINES * AT_ONCE, np.float32)
+        s, whole = np.empty(_LINES * AT_ONCE, np.float32), np.empty(8 * AT_ONCE, np.int32)
         for x in range(0, W, AT_ONCE):
             count = min(AT_ONCE, W - x)
             _begin_equations(image, y, x, s, count)
             for n in range(len(views.places)):
-                _sample(views, n, y, x, seeing, disparity, s, count)
+                _sample(views, n, y, x, seeing, disparity, s, whole, count)
                 _add_to_equations(s, views.baselines[n, 0], views.baselines[n, 1], views.scales2, count)
             _write_equations(s, views, y, x, count, gradient, curvature)
 
@@ -391,12 +449,12 @@ def equations_and_evidence(
     """
     W = disparity.shape[1]
     for y in prange(begin, end):
-        s = np.empty(_LINES * AT_ONCE, np.float32)
+        s, whole = np.empty(_LINES * AT_ONCE, np.float32), np.empty(8 * AT_ONCE, np.int32)
         for x in range(0, W, AT_ONCE):
             count = min(AT_ONCE, W - x)
             _begin_equations(image, y, x, s, count)
             for n in range(len(views.places)):
-                _sample(views, n, y, x, seeing, disparity, s, count)
+                _sample(views, n, y, x, seeing, disparity, s, whole, count)
                 _add_to_evidence(s, views.baselines[n, 0], views.baselines[n, 1], views.scales2, views.shares, count)
             _write_equations(s, views, y, x, count, gradient, curvature)
             for i in range(count):

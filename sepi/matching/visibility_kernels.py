@@ -15,8 +15,11 @@ from sepi.matching.sweep_arrays import Candidates
 from sepi.vectors import (
     at_most,
     first_elements,
+    larger,
+    least_of,
     load,
     load_colours,
+    smaller,
     spread,
     store,
     store_rounded,
@@ -36,6 +39,9 @@ MISSING = np.float32(1e9)
 
 MARGIN = 8
 """Columns beyond a run that vectors reach into: see :mod:`sepi.vectors`."""
+
+ROUNDING = np.float32(1 / 512)
+"""How far a pixel's position in a view is from the same in single precision, at most, pixels."""
 
 COLOUR_STEPS = 20_000
 """Steps from black to white of colours as whole numbers; of 16 bits, with room for what float views have beyond."""
@@ -101,6 +107,40 @@ class _Sums(NamedTuple):
     weight: FloatMap
 
 
+@njit(forceinline=True, borrows=True)
+def _add_pixels(disparity: Any, y: int, begin: int, end: int, low: int, v: float, u: float, begun: Any) -> None:
+    """Add pixels ``begin..end`` of row ``y`` of the reference view, one by one, as :func:`_add_row` does."""
+    for x in range(begin, end):
+        d = disparity[y, x]
+        top, left = math.floor(y + 1 - low - d * v), math.floor(x + 1 - d * u)
+        if 0 <= top < begun.shape[0] and 0 <= left < begun.shape[1]:
+            begun[top, left] = max(begun[top, left], d)
+
+
+@njit(cache=True, borrows=True)
+def _add_row(disparity: Any, y: int, low: int, v: float, u: float, begun: Any) -> None:
+    """Add a row of the reference view to what is nearest of the pixels whose square begins at a position of a view.
+
+    Those of a smooth surface lie side by side in the view, too: eight are added at once.
+    """
+    W = disparity.shape[1]
+    down, across, one = spread(np.float32(v)), spread(np.float32(u)), spread(np.float32(1))
+    x = 0
+    while x <= W - MARGIN:
+        d = load(disparity, (y, x))
+        top, left = math.floor(y + 1 - low - disparity[y, x] * v), math.floor(x + 1 - disparity[y, x] * u)
+        # how far beyond where the first begins, of 0..1 if they lie side by side
+        dy = spread(np.float32(y + 1 - low - top)) - d * down
+        dx = spread(np.float32(x + 1 - left)) - d * across
+        clear = least_of(smaller(smaller(dy, one - dy), smaller(dx, one - dx))) > ROUNDING
+        if clear and 0 <= top < begun.shape[0] and left >= 0 and left + MARGIN <= begun.shape[1]:
+            store(begun, (top, left), larger(load(begun, (top, left)), d))
+        else:
+            _add_pixels(disparity, y, x, x + MARGIN, low, v, u, begun)
+        x += MARGIN
+    _add_pixels(disparity, y, x, W, low, v, u, begun)
+
+
 @njit(parallel=True, cache=True)
 def z_buffers(disparity: Any, present: Any, baselines: Any, low: int, high: int) -> Any:
     """Disparity map of the reference view as each view sees it: the nearest of the pixels that touch a position.
@@ -138,15 +178,8 @@ def z_buffers(disparity: Any, present: Any, baselines: Any, low: int, high: int)
         last = min(H, math.ceil(high + max(least * v, most * v)) + 1)
         # what is nearest of the pixels whose square begins here; of those that begin outside, too
         begun = np.full((high - low + 1, W + 1), EMPTY)
-        top, left = np.empty(W, np.int32), np.empty(W, np.int32)
         for y in range(first, last):
-            for x in range(W):
-                d = disparity[y, x]
-                top[x] = np.int32(np.floor(y + 1 - low - d * v))
-                left[x] = np.int32(np.floor(x + 1 - d * u))
-            for x in range(W):
-                if 0 <= top[x] <= high - low and 0 <= left[x] <= W:
-                    begun[top[x], left[x]] = max(begun[top[x], left[x]], disparity[y, x])
+            _add_row(disparity, y, low, v, u, begun)
         for row in range(high - low):
             above, here, out = begun[row], begun[row + 1], nearest[t, s, row]
             for x in range(W):
