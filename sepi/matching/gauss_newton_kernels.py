@@ -174,8 +174,12 @@ def _whole_weights(position: Any) -> Any:
     g = np.float32(1) - f
     before = np.int32(g * g * g * (scale / np.float32(6)) + half)
     after = np.int32(f * f * f * (scale / np.float32(6)) + half)
+    left = np.int32((np.float32(2 / 3) - f * f * (np.float32(1) - f * half)) * scale + half)
     right = np.int32((np.float32(2 / 3) - g * g * (np.float32(1) - g * half)) * scale + half)
-    return before, np.int32(ONE) - before - right - after, right, after
+    # what rounding leaves belongs to the larger, so that a mirrored picture is sampled alike
+    rest = np.int32(ONE) - before - left - right - after
+    nearer = left >= right
+    return before, left + (rest if nearer else np.int32(0)), right + (np.int32(0) if nearer else rest), after
 
 
 @njit(forceinline=True)

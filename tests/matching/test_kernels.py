@@ -1,6 +1,7 @@
 """Compiled code: the same bytes in the first run and in later ones, and never that of a source that has changed."""
 
 import ast
+import importlib
 import os
 import subprocess
 import sys
@@ -9,6 +10,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from numba.core.dispatcher import Dispatcher
+from numba.extending import _Intrinsic
 
 import sepi
 from sepi.compiled import _KernelFiles
@@ -40,10 +43,13 @@ def names_in(node: ast.AST) -> Iterator[str]:
         yield node.id
 
 
-def foreign_names(source: str) -> set[str]:
-    """Names of other modules of the package that compiled functions use, at first hand or through other definitions."""
+def foreign_names(source: str) -> dict[str, str]:
+    """Names of other modules of the package that compiled functions use, at first hand or through other definitions.
+
+    And the module of each.
+    """
     definitions: dict[str, ast.AST] = {}
-    imported: set[str] = set()
+    imported: dict[str, str] = {}
     for node in ast.parse(source).body:
         if isinstance(node, ast.FunctionDef | ast.ClassDef):
             definitions[node.name] = node
@@ -54,9 +60,9 @@ def foreign_names(source: str) -> set[str]:
             if node.module == "sepi.compiled":
                 # numba's own words
                 continue
-            imported |= {alias.asname or alias.name for alias in node.names}
+            imported |= {alias.asname or alias.name: node.module or "" for alias in node.names}
         elif isinstance(node, ast.Import):
-            imported |= {a.asname or "sepi" for a in node.names if a.name.startswith("sepi")}
+            imported |= {a.asname or "sepi": a.name for a in node.names if a.name.startswith("sepi")}
     used: set[str] = set()
     compiled = [
         name
@@ -68,7 +74,7 @@ def foreign_names(source: str) -> set[str]:
         if name not in used:
             used.add(name)
             compiled += names_in(definitions[name]) if name in definitions else ()
-    return used & imported
+    return {name: imported[name] for name in used & imported.keys()}
 
 
 def test_rule_sees_functions_constants_and_flags_of_other_files() -> None:
@@ -76,15 +82,20 @@ def test_rule_sees_functions_constants_and_flags_of_other_files() -> None:
         "from numba import njit\nfrom sepi.a import f, FLAGS, UNIT, Kind\nHALF = UNIT / 2\n"
         "@njit(fastmath=FLAGS)\ndef g(x: Kind) -> Kind:\n    return f(x) * HALF\n"
     )
-    assert foreign_names(source) == {"f", "FLAGS", "UNIT"}
+    assert foreign_names(source) == dict.fromkeys(("f", "FLAGS", "UNIT"), "sepi.a")
 
 
 @pytest.mark.parametrize(
     "file", [path for path in PACKAGE.rglob("*.py") if "njit" in path.read_text()], ids=lambda path: path.stem
 )
-def test_compiled_functions_use_their_own_file_only(file: Path) -> None:
-    """When the file of a function changes, numba compiles it anew; of other files that it uses numba knows nothing."""
-    assert foreign_names(file.read_text()) == set()
+def test_compiled_functions_use_compiled_functions_of_other_files_only(file: Path) -> None:
+    """Numba compiles a function anew when its own file changes, or that of a compiled function which it names.
+
+    Of other things in other files nobody sees that they have changed.
+    """
+    for name, module in foreign_names(file.read_text()).items():
+        kind = type(getattr(importlib.import_module(module), name))
+        assert issubclass(kind, Dispatcher | _Intrinsic), f"{module}.{name}"
 
 
 def test_compiled_at_once_by_two_processes_for_two_types(tmp_path: Path) -> None:
@@ -113,9 +124,14 @@ def test_compiled_at_once_by_two_processes_for_two_types(tmp_path: Path) -> None
 def test_changed_source_is_compiled_anew(tmp_path: Path) -> None:
     """With old machine code a changed constant or function would have no effect, until somebody clears the cache."""
     kernels = tmp_path / "kernels.py"
+    # of another file that it calls, and of one that this one calls
+    other, beyond = tmp_path / "other_kernels.py", tmp_path / "kernels_beyond.py"
+    head = "from sepi.compiled import njit\n"
+    beyond.write_text(head + "@njit(inline='always')\ndef same(z):\n    return z\n")
+    other.write_text(head + "from kernels_beyond import same\n@njit()\ndef alike(z):\n    return same(z)\n")
     source = (
-        "from sepi.compiled import njit\nSCALE = 2.0\nFLAGS = {'nnan', 'ninf'}\n"
-        "@njit(inline='always')\ndef robust(z):\n    return z / (z + SCALE)\n"
+        "from sepi.compiled import njit\nfrom other_kernels import alike\nSCALE = 2.0\nFLAGS = {'nnan', 'ninf'}\n"
+        "@njit(inline='always')\ndef robust(z):\n    return alike(z) / (z + SCALE)\n"
         "@njit(cache=True, fastmath=FLAGS)\ndef cost(x):\n    return robust(x * x)\n"
     )
     program = (
@@ -130,12 +146,14 @@ def test_changed_source_is_compiled_anew(tmp_path: Path) -> None:
     assert cost_misses_hits(source) == (4 / 6, 1, 0)
     for old, new, expected in (
         ("SCALE = 2.0", "SCALE = 12.0", 4 / 16),
-        ("z / (z", "2 * z / (z", 8 / 16),
+        ("alike(z) / (z", "2 * alike(z) / (z", 8 / 16),
         ("'nnan', 'ninf'", "'nnan'", 8 / 16),
     ):
         assert old in source
         source = source.replace(old, new)
         assert cost_misses_hits(source) == (expected, 1, 0), new
+    beyond.write_text(beyond.read_text().replace("return z", "return 2 * z"))
+    assert cost_misses_hits(source) == (16 / 16, 1, 0)
     assert run(program, PACKAGE, tmp_path / "cache").split()[1:] == [b"0", b"1"]
 
 
