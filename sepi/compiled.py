@@ -84,7 +84,7 @@ def _stamps_of_others(function: Callable[..., Any]) -> tuple[tuple[str, str], ..
     others = [function.__globals__]
     while others:
         for found in list(others.pop().values()):
-            called = getattr(found, "py_func", None) or getattr(found, "_defn", None)
+            called: Any = getattr(found, "py_func", None) or getattr(found, "_defn", None)
             code = getattr(called, "__code__", None)
             if code is not None and code.co_filename not in files:
                 files.add(code.co_filename)

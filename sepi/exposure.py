@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from sepi.image.channels import mean_of_channels
+from sepi.channels import mean_of_channels
 from sepi.lightfield import HIGHEST, LOWEST, BoolMap, FloatMap, LightField, full_scale
 
 # values that tell of brightness, full range = 1: neither black nor burnt out

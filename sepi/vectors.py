@@ -23,7 +23,7 @@ from llvmlite import ir
 from numba import types
 from numba.core import cgutils
 from numba.core.datamodel import models
-from numba.core.typing.templates import ConcreteTemplate, infer_global, signature
+from numba.core.typing import templates
 from numba.extending import intrinsic, lower_builtin, register_model
 
 from sepi.compiled import fma, njit
@@ -41,6 +41,8 @@ _NUMBER, _LANE = ir.FloatType(), ir.IntType(32)
 _VECTOR, _LANES = ir.VectorType(_NUMBER, WIDTH), ir.VectorType(_LANE, WIDTH)
 
 _cgutils: Any = cgutils
+_templates: Any = templates
+_lower: Any = lower_builtin
 
 
 class Vector(types.Type):
@@ -75,11 +77,11 @@ class _WeightsModel(models.PrimitiveModel):  # type: ignore[misc, unused-ignore]
 def _define(function: Any, instruction: str) -> None:
     """Have an operator of two vectors be one instruction."""
 
-    @infer_global(function)
-    class _Typing(ConcreteTemplate):  # type: ignore[misc, unused-ignore]
-        cases = (signature(VECTOR, VECTOR, VECTOR),)
+    @_templates.infer_global(function)
+    class _Typing(_templates.ConcreteTemplate):  # type: ignore[misc, unused-ignore]
+        cases = (_templates.signature(VECTOR, VECTOR, VECTOR),)
 
-    @lower_builtin(function, VECTOR, VECTOR)  # type: ignore[misc, unused-ignore]
+    @_lower(function, VECTOR, VECTOR)  # type: ignore[untyped-decorator, unused-ignore]
     def _code(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
         return getattr(builder, instruction)(*arguments, flags=_FLAGS)
 
@@ -103,7 +105,7 @@ def _place(context: Any, builder: Any, of: Any, values: Any) -> Any:
     array = context.make_array(of[0])(context, builder, values[0])
     parts, kinds = [values[1]], [of[1]]
     if isinstance(of[1], types.BaseTuple):
-        parts, kinds = _cgutils.unpack_tuple(builder, values[1], len(of[1])), list(of[1])
+        parts, kinds = _cgutils.unpack_tuple(builder, values[1], len(of[1])), [*of[1]]  # type: ignore[misc, unused-ignore]
     indices = [context.cast(builder, part, kind, types.intp) for part, kind in zip(parts, kinds, strict=True)]
     return _cgutils.get_item_pointer(context, builder, of[0], array, indices, wraparound=False)
 
@@ -196,7 +198,7 @@ def _larger(_context: Any, _a: Any, _b: Any) -> Any:
     """LLVM code of :func:`larger`."""
 
     def code(_context: Any, builder: Any, _given: Any, arguments: Any) -> Any:
-        return _lesser(builder, *arguments, greater=True)
+        return _lesser(builder, arguments[0], arguments[1], greater=True)
 
     return VECTOR(VECTOR, VECTOR), code
 
@@ -263,7 +265,7 @@ def _load_colours(_context: Any, array: Any, index: Any) -> Any:
         numbers = [channel if kind.element == _NUMBER else builder.uitofp(channel, _VECTOR) for channel in channels]
         return context.make_tuple(builder, given.return_type, numbers)
 
-    return types.UniTuple(VECTOR, 3)(array, index), code
+    return types.UniTuple(VECTOR, 3)(array, index), code  # type: ignore[no-untyped-call, unused-ignore]
 
 
 def _store_rounded(_context: Any, array: Any, index: Any, _vector: Any) -> Any:

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 from pydantic import Field
 
-from sepi.image.channels import mean_of_channels
+from sepi.channels import mean_of_channels
 from sepi.image.noise import noise_level
 from sepi.lightfield import BoolMap, FloatMap
 from sepi.stage import Parameters

@@ -9,7 +9,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from sepi.image.channels import largest_channel
+from sepi.channels import largest_channel
 from sepi.lightfield import BoolMap, FloatMap
 
 # What is black, as part of the brightest there is; how much of a picture a lens leaves black: more is background

@@ -16,8 +16,8 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
+from sepi.channels import largest_channel, mean_of_channels
 from sepi.errors import SepiError
-from sepi.image.channels import largest_channel, mean_of_channels
 from sepi.inspection.dark_corners import dark_corners
 from sepi.lightfield import BoolMap, DisparityRange, FloatMap, LightField, as_unit_float, require_light_field
 

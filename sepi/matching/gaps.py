@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 from pydantic import Field
 
-from sepi.image.channels import largest_channel
+from sepi.channels import largest_channel
 from sepi.lightfield import BoolMap, FloatMap, LightField, full_scale
 from sepi.matching.denoising import guide_of
 from sepi.matching.nearest_surfaces import nearest_surfaces

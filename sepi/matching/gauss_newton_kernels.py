@@ -1,11 +1,8 @@
 """Compiled loops of the Gauss-Newton refinement: sums over the views that see a pixel.
 
-A sample is a sum of 4x4 spline coefficients of four channels. The channels of a coefficient lie side by side, so that a
-row of four of them is one vector of sixteen numbers: :func:`_weighted_sum` writes it down as such, since the compiler
-does not find it. Coefficients and weights are whole numbers of 16 bits, of which processors multiply twice as many at
-once; what the rounding of the sums of columns leaves is a tenth of the steps of an 8-bit picture. All else is done for
-many pixels of a row at once, in loops that the compiler makes vectors of: what they read and write are lines of one
-array, since only then it knows that these do not overlap.
+Samples of splines are made pixel by pixel, in vectors of four channels (:mod:`sepi.matching.spline_sums`). All else is
+done for many pixels of a row at once, in loops that the compiler makes vectors of: what they read and write are lines
+of one array, since only then it knows that these do not overlap.
 """
 
 from __future__ import annotations
@@ -14,13 +11,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from llvmlite import ir
-from numba import types
-from numba.core import cgutils
-from numba.extending import intrinsic
 
 from sepi.compiled import njit, prange
 from sepi.lightfield import FloatMap
+from sepi.matching.spline_sums import weighted_sum
 
 EXACT = {"nnan", "ninf", "nsz"}
 """Fast-math flags that keep every rounding as written: see :mod:`sepi.matching.plane_sweep_kernels`."""
@@ -72,78 +66,6 @@ class Seeing(NamedTuple):
 
     nearest: FloatMap
     occlusion_margin: np.float32
-
-
-_FOUR: Any = types.UniTuple(types.float32, 4)  # type: ignore[no-untyped-call]
-
-
-def _vector_sum(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-    """LLVM code of :func:`_weighted_sum`."""
-    splines, start, stride, weights, first, unit = arguments
-    lane = ir.IntType(32)
-    eight, short, long = (ir.VectorType(kind, n) for kind, n in ((lane, 8), (ir.IntType(16), 16), (lane, 16)))
-    data, lines = (
-        context.make_array(signature.args[n])(context, builder, array).data for n, array in ((0, splines), (3, weights))
-    )
-
-    def of_line(i: int) -> Any:
-        """The weight of line ``i``, throughout."""
-        value = builder.load(builder.gep(lines, [builder.add(first, first.type(i * AT_ONCE))]))
-        one = builder.insert_element(ir.Constant(eight, ir.Undefined), value, lane(0))
-        return builder.shuffle_vector(one, one, ir.Constant(eight, [lane(0)] * 8))
-
-    def product(a: Any, b: Any) -> Any:
-        """Of 16-bit numbers, with 32 bits."""
-        return builder.mul(*(builder.sext(builder.bitcast(vector, short), long) for vector in (a, b)), flags=("nsw",))
-
-    def each(vector: Any, mask: list[int]) -> Any:
-        return builder.shuffle_vector(
-            vector, vector, ir.Constant(ir.VectorType(lane, len(mask)), list(map(lane, mask)))
-        )
-
-    fast = None
-    if "+avx2" in context.codegen()._tm_features:
-        fast = cgutils.get_or_insert_function(
-            builder.module, ir.FunctionType(short, [short, short]), "llvm.x86.avx2.pmul.hr.sw"
-        )
-    total = None
-    for i in range(4):
-        place = builder.gep(data, [builder.add(start, builder.mul(stride, stride.type(i)))])
-        row = builder.load(builder.bitcast(place, short.as_pointer()), align=2)
-        if fast:
-            part = builder.call(fast, [row, builder.bitcast(of_line(i), short)])
-            total = part if total is None else builder.add(total, part)
-            continue
-        # rounded to whole numbers
-        half = builder.ashr(product(row, of_line(i)), ir.Constant(long, [lane(14)] * 16))
-        half = builder.ashr(builder.add(half, ir.Constant(long, [lane(1)] * 16)), ir.Constant(long, [lane(1)] * 16))
-        part = builder.trunc(half, short)
-        total = part if total is None else builder.add(total, part)
-    # neighbours of one channel side by side
-    total = each(total, [8 * (i // 8) + 4 * (i % 2) + i % 8 // 2 for i in range(16)])
-    across = builder.shuffle_vector(of_line(4), of_line(5), ir.Constant(eight, [lane(8 * (i // 4)) for i in range(8)]))
-    whole = product(total, across)
-    sums = builder.add(each(whole, list(range(0, 16, 2))), each(whole, list(range(1, 16, 2))))
-    sums = builder.add(each(sums, [0, 1, 2, 3]), each(sums, [4, 5, 6, 7]))
-    four = ir.VectorType(ir.FloatType(), 4)
-    one = builder.insert_element(ir.Constant(four, ir.Undefined), unit, lane(0))
-    values = builder.fmul(
-        builder.sitofp(sums, four), builder.shuffle_vector(one, one, ir.Constant(ir.VectorType(lane, 4), [lane(0)] * 4))
-    )
-    return context.make_tuple(
-        builder, signature.return_type, [builder.extract_element(values, lane(i)) for i in range(4)]
-    )
-
-
-def _typed_sum(_context: Any, splines: Any, start: Any, stride: Any, weights: Any, first: Any, unit: Any) -> Any:
-    return _FOUR(splines, types.int64, types.int64, weights, types.int64, types.float32), _vector_sum
-
-
-_weighted_sum: Any = intrinsic(_typed_sum)
-"""``sum_ij a[i] b[j] c[start + i stride + 4 j : ... + 4]`` over an array ``c`` of int16, times a unit; four float32.
-
-The weights are in lines of an array, from an index on: see :func:`_spline_weights`.
-"""
 
 
 ONE = 1 << 15
@@ -246,7 +168,7 @@ def _sample(
         # without a sign it is not looked for from the end
         if place >= 0 and nearest[np.uint64(above + place)] <= disparity[y, x + i] + seeing.occlusion_margin:
             at = start + whole[_COEFFICIENT * AT_ONCE + i]
-            values = _weighted_sum(views.splines, at, 4 * columns, whole, i, views.unit / np.float32(ONE))
+            values = weighted_sum(views.splines, at, 4 * columns, whole, i, AT_ONCE, views.unit / np.float32(ONE))
             seen = np.float32(1)
         s[_SEEN * AT_ONCE + i] = seen
         for c in range(4):

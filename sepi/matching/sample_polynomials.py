@@ -67,7 +67,7 @@ def of_first(coefficients: Any, number: int) -> Any:
 
 
 @njit(inline="always")
-def between_same_pixels(k: int, down: Any, fy: Any, across: Any, fx: Any) -> bool:
+def between_same_pixels(k: int, down: Any, fy: Any, across: Any, fx: Any) -> Any:
     """Whether the samples of candidates ``k - 1`` and ``k`` are between the same four pixels, or the same of them."""
     same = down[k - 1] == down[k] and across[k - 1] == across[k]
     return same and (fy[k - 1] == 0) == (fy[k] == 0) and (fx[k - 1] == 0) == (fx[k] == 0)

@@ -19,7 +19,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from sepi.image.channels import largest_channel
+from sepi.channels import largest_channel
 from sepi.image.noise import SATURATED, noise_level, noise_of_reference_view
 from sepi.lightfield import BoolMap, FloatMap, LightField, as_unit_float, full_scale, require_light_field
 from sepi.stage import HIGH, LOW, SIGMA, StageMaps

@@ -19,7 +19,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from sepi.image.channels import mean_of_channels
+from sepi.channels import mean_of_channels
 from sepi.image.noise import BLACK, SATURATED, mask_energy
 from sepi.lightfield import BoolMap, FloatMap, LightField, full_scale
 

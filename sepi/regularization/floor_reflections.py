@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import Field
 
-from sepi.image.channels import sum_of_channels
+from sepi.channels import sum_of_channels
 from sepi.lightfield import BoolMap, DisparityRange, FloatMap
 from sepi.regularization.plane_search import fitted, pixels_in_order, planes_through, residuals_of, support
 from sepi.regularization.regions import Plane, parts_of

@@ -21,7 +21,7 @@ import cv2
 import numpy as np
 from pydantic import Field
 
-from sepi.image.channels import sum_of_channels
+from sepi.channels import sum_of_channels
 from sepi.image.noise import noise_of_reference_view
 from sepi.lightfield import BoolMap, FloatMap, LightField, full_scale
 from sepi.matching.base_detail import BaseDetailParameters

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import Field
 
-from sepi.image.channels import sum_of_channels
+from sepi.channels import sum_of_channels
 from sepi.lightfield import BoolMap, FloatMap
 from sepi.stage import Parameters, relative_confidence
 
