@@ -91,9 +91,9 @@ def _typed(
 
 
 weighted_sum: Any = intrinsic(_typed)
-"""``weighted_sum(c, start, stride, w, first, pitch, unit)``: ``unit sum_ij a[i] b[j] c[start + i stride + 4 j]``, and more.
+"""``weighted_sum(c, start, stride, w, first, pitch, unit)``: four samples, of a spline of four channels.
 
-
-Of an array ``c`` of int16, and the same of its three next elements: four float32. The weights, of sum 2^15, are in an array of int32, from ``first`` on and
-``pitch`` apart, as pairs of 16-bit numbers: of the four rows each twice, of the columns the first two and the others.
+``unit sum_ij a[i] b[j] c[start + i stride + 4 j]`` over an array ``c`` of int16, and the same of the three elements
+after; float32. The weights, of sum 2^15, are in an array of int32, from ``first`` on and ``pitch`` apart, as pairs of
+16-bit numbers: of the four rows each twice, of the columns the first two and the others.
 """
