@@ -1,4 +1,4 @@
-"""How the threads of compiled loops wait for each other."""
+"""How the threads of compiled loops and of linear algebra wait for each other."""
 
 from __future__ import annotations
 
@@ -15,3 +15,12 @@ def wait_asleep() -> None:
     compiled loop, hence when the package is imported; processes started from here do likewise.
     """
     os.environ.setdefault(VARIABLE, "PASSIVE")
+
+
+def one_thread_of_blas() -> None:
+    """Have OpenBLAS start no threads, unless the user's environment says otherwise.
+
+    Its products here are small: its threads would do little but spin. Before NumPy is imported, and by the command
+    only: who imports the package may have large ones.
+    """
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")

@@ -9,6 +9,9 @@ from typing import Any
 import click
 
 from sepi.command import SepiGroup
+from sepi.openmp import one_thread_of_blas
+
+one_thread_of_blas()
 
 _COMMANDS = {
     "calibrate": ("calibrate", "Find the cameras of pictures without poses, by COLMAP."),
