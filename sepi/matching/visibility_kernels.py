@@ -36,7 +36,6 @@ EMPTY = np.float32(-1e9)
 MISSING = np.float32(1e9)
 """The same where the view shows nothing: not even a view that hides a pixel counts less."""
 
-
 MARGIN = 8
 """Columns beyond a run that vectors reach into: see :mod:`sepi.vectors`."""
 
@@ -164,7 +163,8 @@ def z_buffers(disparity: Any, present: Any, baselines: Any, low: int, high: int)
     """
     T, S = present.shape
     H, W = disparity.shape
-    # vectors reach beyond the last
+    # pixels side by side are loaded at once; vectors reach beyond the last
+    disparity = np.ascontiguousarray(disparity)
     size = T * S * (high - low) * W
     nearest = np.empty(size + MARGIN, np.float32)[:size].reshape(T, S, high - low, W)
     least, most = float(disparity.min()), float(disparity.max())
@@ -319,7 +319,7 @@ def _load_view(views: BaseDetail, t: int, s: int, begin: int, end: int, rows: _R
 
 @njit(cache=True, borrows=True)
 def _load_reference(views: BaseDetail, y: int, rows: _Rows) -> None:
-    """Row ``y`` of the reference view, as far apart from the views' as :func:`sepi.vectors.weighted_pairs` are."""
+    """Row ``y`` of the reference view, times what the weights of samples sum to."""
     W = views.colours.shape[3]
     colour_scale = views.colour_unit * np.float32(COLOUR_STEPS)
     _load_colours(views.colours, views.t0, views.s0, y, colour_scale, rows.channels)
