@@ -92,17 +92,20 @@ def smoothness_weights(
     list of ndarray
         Of shapes (H, W - 2), (H - 2, W) and (H - 1, W - 1).
     """
+    from sepi.regularization.second_order_kernels import weights_of_differences
 
-    def weight(corners: tuple[Corner, ...], factors: tuple[float, ...], colour: FloatArray) -> FloatArray:
-        difference = np.asarray(sum(f * disparity[p].astype(np.float64) for f, p in zip(factors, corners, strict=True)))
-        trust = np.minimum.reduce([reliability[p] for p in corners])
-        exponent = (difference / threshold) ** 2 * trust + 2 * colour / colour_variance
-        return np.asarray(np.exp(-np.minimum(exponent, 30)))
+    disparity, reliability = (np.ascontiguousarray(each, np.float32) for each in (disparity, reliability))
+
+    def weight(corners: tuple[tuple[int, int], ...], factors: tuple[float, ...], colour: FloatArray) -> FloatArray:
+        out, apart = np.empty(colour.shape), np.ascontiguousarray(colour, np.float64)
+        where, how = np.array(corners), np.array(factors)
+        weights_of_differences(disparity, reliability, apart, where, how, float(threshold), float(colour_variance), out)
+        return out
 
     return [
-        weight(_ALONG_X, _SECOND, colours[0]),
-        weight(_ALONG_Y, _SECOND, colours[1]),
-        weight(_ACROSS, _MIXED, colours[2]),
+        weight(((0, 0), (0, 1), (0, 2)), _SECOND, colours[0]),
+        weight(((0, 0), (1, 0), (2, 0)), _SECOND, colours[1]),
+        weight(((0, 0), (0, 1), (1, 0), (1, 1)), _MIXED, colours[2]),
     ]
 
 
@@ -122,28 +125,11 @@ def second_difference_stencil(weights: list[FloatArray], shape: tuple[int, int])
         Entries of each pixel with itself and with those to the right by 1 and 2, below by 1 and 2, below to the right,
         and below to the left; the matrix is symmetric.
     """
+    from sepi.regularization.second_order_kernels import stencil_of
+
     stencil = np.zeros((7, *shape))
-    own, right, right2, below, below2, on, back = stencil
-    along_x, along_y, across = weights
-    for first, middle, last, weight, near, far in (
-        (*_ALONG_X, along_x, right, right2),
-        (*_ALONG_Y, along_y, below, below2),
-    ):
-        own[first] += weight
-        own[middle] += 4 * weight
-        own[last] += weight
-        near[first] -= 2 * weight
-        near[middle] -= 2 * weight
-        far[first] += weight
-    for corner in _ACROSS:
-        own[corner] += across
-    top_left, top_right, bottom_left, _ = _ACROSS
-    right[top_left] -= across
-    right[bottom_left] -= across
-    below[top_left] -= across
-    below[top_right] -= across
-    on[top_left] += across
-    back[top_right] += across
+    along_x, along_y, across = (np.ascontiguousarray(each, np.float64) for each in weights)
+    stencil_of(along_x, along_y, across, stencil)
     return stencil
 
 

@@ -30,6 +30,94 @@ _NEAR, _FAR = 0.75, 0.25
 """The finest hats at the pixels beside a node and at the next ones."""
 
 
+@njit(parallel=True, cache=True, fastmath=EXACT)
+def weights_of_differences(
+    disparity: Any,
+    reliability: Any,
+    colour: Any,
+    corners: Any,
+    factors: Any,
+    threshold: float,
+    variance: float,
+    out: Any,
+) -> None:
+    """Weights of second differences: :func:`sepi.regularization.second_order.smoothness_weights` in one direction.
+
+    Parameters
+    ----------
+    disparity, reliability : ndarray, shape (H, W), float32
+    colour : ndarray, shape (h, w), float64
+        Squared colour distance along each difference.
+    corners : ndarray, shape (n, 2), int64
+        Rows and columns from a difference's first pixel to those that it is made of.
+    factors : ndarray, shape (n,), float64
+        Theirs.
+    threshold, variance : float
+        Difference that counts as a discontinuity, and squared colour distance at which smoothness falls.
+    out : ndarray, shape (h, w), float64
+        Filled.
+    """
+    for y in prange(out.shape[0]):
+        for x in range(out.shape[1]):
+            difference, trust = 0.0, reliability[y, x]
+            for i in range(len(factors)):
+                row, column = y + corners[i, 0], x + corners[i, 1]
+                difference += factors[i] * disparity[row, column]
+                trust = min(trust, reliability[row, column])
+            difference /= threshold
+            out[y, x] = np.exp(-min(difference * difference * trust + 2 * colour[y, x] / variance, 30.0))
+
+
+@njit(forceinline=True, borrows=True)
+def _add(row: Any, begin: int, weights: Any, factor: float) -> None:
+    """Add weights, times a factor, to a row from a column on."""
+    for x in range(weights.size):
+        row[begin + x] += factor * weights[x]
+
+
+@njit(cache=True, fastmath=EXACT, borrows=True)
+def _stencil_row(y: int, along_x: Any, along_y: Any, across: Any, out: Any) -> None:
+    """Row ``y`` of :func:`stencil_of`."""
+    H = along_x.shape[0]
+    own, right, right2, below, below2 = out[0, y], out[1, y], out[2, y], out[3, y], out[4, y]
+    for first, factor in ((0, 1.0), (1, 4.0), (2, 1.0)):
+        _add(own, first, along_x[y], factor)
+    _add(right, 0, along_x[y], -2.0)
+    _add(right, 1, along_x[y], -2.0)
+    _add(right2, 0, along_x[y], 1.0)
+    for before, factor in ((0, 1.0), (1, 4.0), (2, 1.0)):
+        if 0 <= y - before < H - 2:
+            _add(own, 0, along_y[y - before], factor)
+    for before in range(2):
+        if 0 <= y - before < H - 2:
+            _add(below, 0, along_y[y - before], -2.0)
+    if y < H - 2:
+        _add(below2, 0, along_y[y], 1.0)
+    for before in range(2):
+        if 0 <= y - before < H - 1:
+            for first in range(2):
+                _add(own, first, across[y - before], 1.0)
+            _add(right, 0, across[y - before], -1.0)
+    if y < H - 1:
+        for first in range(2):
+            _add(below, first, across[y], -1.0)
+            _add(out[5 + first, y], first, across[y], 1.0)
+
+
+@njit(parallel=True, cache=True, fastmath=EXACT)
+def stencil_of(along_x: Any, along_y: Any, across: Any, out: Any) -> None:
+    """Add the weights of second differences to a matrix of zeros.
+
+    Parameters
+    ----------
+    along_x, along_y, across : ndarray, shape (H, W - 2), (H - 2, W) and (H - 1, W - 1), float64
+    out : ndarray, shape (7, H, W), float64
+        That of :func:`sepi.regularization.second_order.second_difference_stencil`.
+    """
+    for y in prange(out.shape[1]):
+        _stencil_row(y, along_x, along_y, across, out)
+
+
 @njit(inline="always")
 def _add_pair(forth: Any, there: Any, back: Any, before: Any, out: Any) -> None:
     """One entry and its mirror image; few arrays at a time, so that the loop vectorises."""
