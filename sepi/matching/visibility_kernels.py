@@ -11,6 +11,7 @@ import numpy.typing as npt
 from sepi.compiled import fma, njit, prange
 from sepi.lightfield import FloatMap
 from sepi.matching.base_detail import BaseDetail
+from sepi.matching.sample_polynomials import upper_row
 from sepi.matching.sweep_arrays import Candidates
 from sepi.vectors import (
     at_most,
@@ -245,10 +246,8 @@ def _add_view(
     scale_of_colours, scale_of_detail = spread(robust.scales2[0]), spread(robust.scales2[1])
     share_of_colours, share_of_detail = spread(robust.shares[0]), spread(robust.shares[1])
     for k in range(candidates.disparities.size):
-        top, fy, left, fx = y + candidates.down[r, k], candidates.fy[r, k], candidates.across[c, k], candidates.fx[c, k]
-        if top == H - 1 and fy == 0:
-            # the last row has none below: seen from the one above
-            top, fy = H - 2, one
+        top, fy = upper_row(y, candidates.down[r, k], candidates.fy[r, k], H)
+        left, fx = candidates.across[c, k], candidates.fx[c, k]
         # on the last column itself nothing beyond it is read with any weight
         first, last = max(0, -left), min(W, W - left if fx == 0 else W - 1 - left)
         if top < 0 or top > H - 2 or last <= first:
