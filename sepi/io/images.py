@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import logging
 import os
 import threading
 import warnings
@@ -19,7 +20,7 @@ import numpy.typing as npt
 from sepi.errors import SepiError
 from sepi.io.exr import exr_pixels
 from sepi.io.files import atomic_path, reading
-from sepi.io.picture_headers import Header, plain_png, read_header
+from sepi.io.picture_headers import Header, read_header
 from sepi.io.tiff import plain_pixels, unturned
 from sepi.lightfield import HIGHEST, LOWEST, BoolMap
 from sepi.threads import available_cores
@@ -30,8 +31,6 @@ SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".tif", ".tiff", ".exr", ".bmp", 
 """Ends of names, in small letters, of the pictures that can be read."""
 
 _MAX_BYTES = 2**32
-# sorts of pixels, as Pillow calls them, and as what sorts they are taken; transparency is left out
-_HELD_AS = {"1": "L", "L": "L", "LA": "LA", "P": "RGB", "RGB": "RGB", "RGBA": "RGBA", "I;16": "I;16"}
 
 
 def read_picture(path: Path, *, any_floats: bool = False) -> Pixels:
@@ -200,17 +199,18 @@ def _opened(path: Path) -> Iterator[IO[bytes]]:
 
 def _decoded(path: Path, data: bytes, header: Header) -> Pixels:
     """Pixels of a picture, in the order RGB."""
-    usual = _by_pillow(path, data, header)
-    if usual is not None:
-        return usual
+    if header.kind == "PNG":
+        return _of_png(path, data, header)
+    if header.kind == "JPEG":
+        usual = _by_pillow(path, data, header)
+        if usual is not None:
+            return usual
     with reading(path, header.kind):
         if header.kind == "OpenEXR":
             return exr_pixels(str(path))
         if header.plain:
             return plain_pixels(data)
-        if header.kind == "PNG":
-            data = plain_png(data)
-        elif header.kind == "TIFF":
+        if header.kind == "TIFF":
             data = unturned(data)
     # OpenCV wants something behind the last digit of a PNM
     data += b"\n" if header.white else b""
@@ -230,37 +230,39 @@ def _decoded(path: Path, data: bytes, header: Header) -> Pixels:
     return np.ascontiguousarray(channels[:, :, :1] if header.grey else channels)
 
 
-def _by_pillow(path: Path, data: bytes, header: Header) -> Pixels | None:
-    """Pixels of a PNG or JPEG; None for colours or transparency of 16 bit, and colours for printing.
+def _of_png(path: Path, data: bytes, header: Header) -> Pixels:
+    """Pixels of a PNG of any sort: in half of Pillow's time, outside Python's lock, and what is damaged is told."""
+    from imagecodecs import PngError, png_decode
 
-    They are those that OpenCV gives, in the same time, but damage is told and nothing is printed about it: the
-    libraries below OpenCV have their own way to the terminal.
-    """
-    if header.kind not in ("PNG", "JPEG"):
-        return None
-    from PIL.JpegImagePlugin import JpegImageFile
-    from PIL.PngImagePlugin import PngImageFile
-
-    with (
-        reading(path, header.kind),
-        (PngImageFile if header.kind == "PNG" else JpegImageFile)(io.BytesIO(data)) as image,
-    ):
-        # Pillow would halve their depth
-        wider = header.kind == "PNG" and "16" in str(image.tile[0].args) and image.mode != "I;16"
+    # what it warns of leaves the pixels as they are
+    logging.getLogger("imagecodecs").addHandler(logging.NullHandler())
+    with reading(path, header.kind):
         try:
-            if wider or image.mode not in _HELD_AS:
-                if header.kind == "JPEG":
-                    # whether all of it is there: OpenCV fills with grey what is missing
-                    image.load()
+            image = png_decode(data)
+        except PngError as error:
+            raise ValueError(f"its pixels cannot be decoded: {error}") from error
+    values = image[:, :, None] if image.ndim == 2 else image
+    return np.ascontiguousarray(values[:, :, :1] if header.grey else values[:, :, :3])
+
+
+def _by_pillow(path: Path, data: bytes, header: Header) -> Pixels | None:
+    """Pixels of a JPEG; None for colours for printing.
+
+    They are those that OpenCV gives, in the same time, but damage is told and nothing is printed about it: the library
+    below OpenCV has its own way to the terminal.
+    """
+    from PIL.JpegImagePlugin import JpegImageFile
+
+    with reading(path, header.kind), JpegImageFile(io.BytesIO(data)) as image:
+        try:
+            if image.mode not in ("L", "RGB"):
+                # whether all of it is there: OpenCV fills with grey what is missing
+                image.load()
                 return None
-            held = _HELD_AS[image.mode]
-            # what is held so already would be copied
-            values = np.asarray(image if image.mode == held else image.convert(held))
+            values = np.asarray(image)
         except OSError as error:
-            raise SepiError(f"damaged {header.kind}, perhaps cut off: its pixels cannot be decoded") from error
-        if values.ndim == 2:
-            values = values[:, :, None]
-        return np.ascontiguousarray(values[:, :, :1] if header.grey else values[:, :, :3])
+            raise SepiError("damaged JPEG, perhaps cut off: its pixels cannot be decoded") from error
+        return np.ascontiguousarray(values if values.ndim == 3 else values[:, :, None])
 
 
 def _stretched(path: Path, values: Pixels, white: int) -> Pixels:

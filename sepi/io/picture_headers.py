@@ -36,11 +36,6 @@ TIFF_SIGNATURES = (b"II*\0", b"II+\0", b"MM\0*", b"MM\0+")
 # more than any of the compressions reaches on pictures of 8 bit; small pictures of one colour may shrink further
 _PIXELS_PER_BYTE = 1100
 _SMALL = 2**24
-# chunks of a PNG that decide its colours, and its last one; bytes that are unpacked at a time
-_DECIDING = (b"IHDR", b"IDAT")
-_PNG_END = b"\0\0\0\0IEND" + zlib.crc32(b"IEND").to_bytes(4, "big")
-_PART = 2**20
-_INTERLACED = [(0, 0, 8, 8), (4, 0, 8, 8), (0, 4, 4, 8), (2, 0, 4, 4), (0, 2, 2, 4), (1, 0, 2, 2), (0, 1, 1, 2)]
 
 
 @dataclass(frozen=True)
@@ -125,47 +120,6 @@ def _png(file: IO[bytes], size: int, whole: bool) -> Header:
             if file.read(4) != zlib.crc32(b"IEND").to_bytes(4, "big"):
                 raise ValueError("bad checksum in its last chunk")
     return header
-
-
-def plain_png(data: bytes) -> bytes:
-    """A PNG without all that does not decide its colours, of which libpng prints lines of its own.
-
-    Parameters
-    ----------
-    data : bytes
-        A sound one of 16 bit, in colours or with transparency.
-
-    Raises
-    ------
-    zlib.error, ValueError
-        If its pixels cannot be unpacked, or are not as many as it says; of that, too, libpng would print a line.
-    """
-    kept, at, unpacking, unpacked = [data[:8]], 8, zlib.decompressobj(), 0
-    while at + 12 <= len(data):
-        length = int.from_bytes(data[at : at + 4], "big")
-        kind, end = data[at + 4 : at + 8], at + 12 + length
-        if kind in _DECIDING:
-            kept.append(data[at:end])
-        if kind == b"IDAT":
-            packed = data[at + 8 : end - 4]
-            while packed:
-                # a part at a time: what comes out is not needed
-                unpacked += len(unpacking.decompress(packed, _PART))
-                packed = unpacking.unconsumed_tail
-        at = end
-    if not unpacking.eof or unpacked != _png_bytes(data[16:29]):
-        raise ValueError("its pixels are cut off, or more than it says")
-    return b"".join([*kept, _PNG_END])
-
-
-def _png_bytes(header: bytes) -> int:
-    """Bytes of the rows of a PNG of 16 bit, by the body of its header; each row has one more for its filter."""
-    width, height = int.from_bytes(header[:4], "big"), int.from_bytes(header[4:8], "big")
-    pixel = 2 * {2: 3, 4: 2, 6: 4}[header[9]]
-    # an interlaced picture is stored as seven: the first column and row of each, and its steps
-    parts = _INTERLACED if header[12] else [(0, 0, 1, 1)]
-    sizes = [(-((left - width) // across), -((top - height) // down)) for left, top, across, down in parts]
-    return sum(rows * (1 + columns * pixel) for columns, rows in sizes if columns > 0 and rows > 0)
 
 
 def _jpeg(file: IO[bytes], size: int, whole: bool) -> Header:

@@ -152,7 +152,8 @@ def test_interlaced_pictures_of_16_bits(
     rows = b"".join(b"\0" + row.tobytes() for part in parts if part.size for row in part)
     (tmp_path / "a.png").write_bytes(png_16(2, rows, size, interlaced=True))
     np.testing.assert_array_equal(silent(tmp_path / "a.png", capfd), values)
-    # more, and fewer, than the header says
-    for wrong in (rows + bytes(9), rows[:-1]):
-        (tmp_path / "a.png").write_bytes(png_16(2, wrong, size, interlaced=True))
-        assert "not a PNG, or damaged" in str(silent(tmp_path / "a.png", capfd))
+    # more than the header says is no harm, fewer are damage
+    (tmp_path / "a.png").write_bytes(png_16(2, rows + bytes(9), size, interlaced=True))
+    np.testing.assert_array_equal(silent(tmp_path / "a.png", capfd), values)
+    (tmp_path / "a.png").write_bytes(png_16(2, rows[:-1], size, interlaced=True))
+    assert "not a PNG, or damaged" in str(silent(tmp_path / "a.png", capfd))
