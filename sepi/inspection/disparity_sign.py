@@ -19,7 +19,7 @@ import numpy.typing as npt
 from sepi.inspection.coarse_sweep import coarse_sweep
 from sepi.inspection.dark_corners import dark_corners
 from sepi.inspection.view_layouts import Baseline, Trial, Views, baselines_under
-from sepi.inspection.view_order_kernels import residuals
+from sepi.inspection.view_order_kernels import add_pairs, residuals
 from sepi.lightfield import BoolMap, FloatMap, LightField
 
 # A glance looks at bands of so many rows, one of so many; it tells little in pictures of fewer pixels
@@ -55,12 +55,6 @@ _SEEN = 0.3
 _HIDDEN = 4.0
 # So many of the farthest views on each side are asked what is hidden in them
 _HIDING_VIEWS = 2
-# Two surfaces count as two where they are this far apart in a view, pixels; they meet in it within this distance
-_LEAST_SHIFT = 1.5
-_MEETING = 0.75
-# Logarithm of the ratio of residuals that one pair counts at most; least that tells anything
-_MOST_EVIDENCE = 2.0
-_LEAST_EVIDENCE = 1.0
 # Side of a region, pixels, at most and as part of the picture's (pairs in one region are one observation); its pairs
 _REGION = 16
 _REGIONS_ACROSS = 16
@@ -136,9 +130,7 @@ def occlusion_evidence(light_field: LightField, trial: Trial, look: Look, views:
     surface = trusted & (_support(disparity, trusted, sampling) >= _LEAST_SUPPORT)
     surface &= ~dark_corners(views.reference_view, views.shape, movement)[rows]
     residual = {
-        at: residuals(
-            pictures[0, 0], pictures[at], float(positions[at][0]), float(positions[at][1]), disparity, _WINDOW_RADIUS
-        )
+        at: residuals(pictures[0, 0], pictures[at], positions[at], disparity, trusted, _WINDOW_RADIUS)
         for direction in directions
         for at in _at(direction, reach)
     }
@@ -167,29 +159,13 @@ def _add_pairs(
 
     ``residual`` is that of the view, ``opposite`` the mean of those on the other side, where both pixels are seen.
     """
-    H, W = disparity.shape
-    side = _side(disparity.shape)
     usable = surface & (opposite <= _SEEN) & np.isfinite(residual)
-    rise = np.zeros((H, W), np.float32)
+    rise = np.zeros(disparity.shape, np.float32)
     rise[usable] = np.log((residual[usable] + noise) / (opposite[usable] + noise))
-    length = float(np.abs(baseline).max())
     down, across = (int(n) for n in np.sign(baseline))
-    for distance in range(2, farthest + 1):
-        dy, dx = down * distance, across * distance
-        if abs(dy) >= H or abs(dx) >= W:
-            break
-        # the pixel that is farther away, and the nearer one that comes to lie before it
-        far = np.s_[max(0, -dy) : H - max(0, dy), max(0, -dx) : W - max(0, dx)]
-        near = np.s_[max(0, dy) : H - max(0, -dy), max(0, dx) : W - max(0, -dx)]
-        shift = (disparity[near] - disparity[far]) * length
-        meeting = usable[far] & usable[near] & (abs(shift - distance) <= _MEETING) & (shift >= _LEAST_SHIFT)
-        meeting &= np.maximum(residual[far], residual[near]) > _HIDDEN * noise
-        meeting &= np.maximum(rise[far], rise[near]) > _LEAST_EVIDENCE
-        y, x = np.nonzero(meeting)
-        region = (y + far[0].start) // side, (x + far[1].start) // side
-        evidence = np.clip(rise[far][meeting] - rise[near][meeting], -_MOST_EVIDENCE, _MOST_EVIDENCE)
-        np.add.at(total, region, evidence)
-        np.add.at(count, region, 1)
+    length, hidden = np.float32(np.abs(baseline).max()), np.float32(_HIDDEN * noise)
+    side = _side(disparity.shape)
+    add_pairs(rise, residual, disparity, usable, down, across, length, hidden, farthest, side, total, count)
 
 
 def _summary(total: npt.NDArray[np.float64], count: npt.NDArray[np.float64]) -> Evidence:

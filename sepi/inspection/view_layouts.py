@@ -68,7 +68,7 @@ class Views:
         self._grey: dict[tuple[int, int, int], FloatMap] = {}
         self._detail: dict[tuple[int, int, int], FloatMap] = {}
         self._means: dict[tuple[int, int, int], float] = {}
-        self._worth: dict[Baseline, bool] = {}
+        self._lights: dict[Baseline, tuple[float, float]] = {}
         positions = np.argwhere(light_field.present)
         distance = abs(positions - np.array(light_field.grid) // 2).sum(axis=1)
         t0, s0 = self.middle = tuple(map(int, positions[distance.argmin()]))
@@ -110,15 +110,15 @@ class Views:
         return kept if 2 * len(kept) >= min(len(baselines), 4) else baselines
 
     def _is_worth_matching(self, baseline: Baseline) -> bool:
-        if baseline not in self._worth:
-            (mean, contrast), (own_mean, own_contrast) = self._light(baseline), self._light((0, 0))
-            self._worth[baseline] = mean >= _LEAST_BRIGHTNESS * own_mean and contrast >= _LEAST_CONTRAST * own_contrast
-        return self._worth[baseline]
+        (mean, contrast), (own_mean, own_contrast) = self._light(baseline), self._light((0, 0))
+        return mean >= _LEAST_BRIGHTNESS * own_mean and contrast >= _LEAST_CONTRAST * own_contrast
 
     def _light(self, baseline: Baseline) -> tuple[float, float]:
         """Mean and contrast of a view as it is."""
-        contrast = float(cv2.meanStdDev(self.detail(baseline, 1))[1][0, 0])
-        return self._mean(baseline, 1), contrast / self._gain(baseline, 1)
+        if baseline not in self._lights:
+            contrast = float(cv2.meanStdDev(self.detail(baseline, 1))[1][0, 0])
+            self._lights[baseline] = self._mean(baseline, 1), contrast / self._gain(baseline, 1)
+        return self._lights[baseline]
 
     def _mean(self, baseline: Baseline, factor: int) -> float:
         key = (*baseline, factor)

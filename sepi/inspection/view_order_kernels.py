@@ -9,10 +9,16 @@ import numpy as np
 import numpy.typing as npt
 
 from sepi.compiled import njit, prange
-from sepi.lightfield import FloatMap
+from sepi.lightfield import BoolMap, FloatMap
 
 # difference of two patches that counts one half, as part of the patch's own variation
 _HALF = np.float32(0.25)
+# two surfaces count as two where they are this far apart in a view, pixels; they meet in it within this distance
+_LEAST_SHIFT = np.float32(1.5)
+_MEETING = np.float32(0.75)
+# logarithm of the ratio of residuals that one pair counts at most; least that tells anything
+_MOST_EVIDENCE = np.float32(2)
+_LEAST_EVIDENCE = np.float32(1)
 
 
 @njit(parallel=True, cache=True)
@@ -80,25 +86,87 @@ def layout_costs(
 
 @njit(parallel=True, cache=True)
 def residuals(
-    reference: FloatMap, view: FloatMap, down: float, across: float, disparity: FloatMap, radius: int
+    reference: FloatMap, view: FloatMap, baseline: FloatMap, disparity: FloatMap, asked: BoolMap, radius: int
 ) -> FloatMap:
     """Mean squared difference, shape (H, W) float32, of each pixel's window and where it should be seen in a view.
 
-    The view lies ``down`` and ``across`` view steps away. Infinite where the window leaves either picture.
+    ``baseline`` leads down and across to the view, in view steps. Infinite where it is not asked for, and where the
+    window leaves either picture.
     """
     H, W = reference.shape
     side = 2 * radius + 1
     out = np.full((H, W), np.inf, np.float32)
     for y in prange(H - side + 1):
         for x in range(W - side + 1):
+            if not asked[y + radius, x + radius]:
+                continue
             d = disparity[y + radius, x + radius]
-            v, u = y - d * down, x - d * across
+            v, u = y - float(d) * float(baseline[0]), x - float(d) * float(baseline[1])
             row, column = math.floor(v), math.floor(u)
             if row >= 0 and column >= 0 and row + side < H and column + side < W:
                 patch = reference[y : y + side, x : x + side]
                 squares = _squares(patch, view, row, column, np.float32(v - row), np.float32(u - column))
                 out[y + radius, x + radius] = squares / np.float32(side * side)
     return out
+
+
+@njit(parallel=True, cache=True)
+def add_pairs(
+    rise: FloatMap,
+    residual: FloatMap,
+    disparity: FloatMap,
+    usable: BoolMap,
+    down: int,
+    across: int,
+    length: np.float32,
+    hidden: np.float32,
+    farthest: int,
+    side: int,
+    total: npt.NDArray[np.float64],
+    count: npt.NDArray[np.float64],
+) -> None:
+    """Add what pairs of pixels that meet in a view say of which is in front, and their number, to those of regions.
+
+    Parameters
+    ----------
+    rise : ndarray, shape (H, W), float32
+        Logarithm of the residual in the view over the one on the other side.
+    residual : ndarray, shape (H, W), float32
+        That in the view.
+    disparity : ndarray, shape (H, W), float32
+        In pixels per view step.
+    usable : ndarray, shape (H, W), bool
+        Pixels that may be of a pair.
+    down, across : int
+        Direction to the view, -1, 0 or 1: the nearer pixel of a pair lies there from the other.
+    length : float32
+        Distance of the view, in view steps.
+    hidden : float32
+        Least residual of a pixel that is hidden.
+    farthest : int
+        Most pixels between those of a pair.
+    side : int
+        Side of a region, pixels.
+    total, count : ndarrays, shape (R, C), float64
+        Sums, and number of pairs, of each region; added to.
+    """
+    H, W = disparity.shape
+    for region in prange(len(total)):
+        for y in range(region * side, min(H, (region + 1) * side)):
+            for x in range(W):
+                if not usable[y, x]:
+                    continue
+                for distance in range(2, farthest + 1):
+                    i, j = y + down * distance, x + across * distance
+                    if i < 0 or i >= H or j < 0 or j >= W:
+                        break
+                    shift = (disparity[i, j] - disparity[y, x]) * length
+                    if abs(shift - np.float32(distance)) > _MEETING or shift < _LEAST_SHIFT or not usable[i, j]:
+                        continue
+                    if max(residual[y, x], residual[i, j]) > hidden and max(rise[y, x], rise[i, j]) > _LEAST_EVIDENCE:
+                        says = rise[y, x] - rise[i, j]
+                        total[region, x // side] += min(max(says, -_MOST_EVIDENCE), _MOST_EVIDENCE)
+                        count[region, x // side] += 1
 
 
 @njit(cache=True, inline="always")

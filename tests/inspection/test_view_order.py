@@ -1,5 +1,6 @@
 """The check of the views' order: what it names must set the views right, and it must not cry wolf."""
 
+import itertools
 from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
@@ -12,6 +13,7 @@ from real_scenes import views_of
 from sepi.inspection.disparity_sign import Evidence, Look, occlusion_evidence
 from sepi.inspection.view_layouts import Trial, Views
 from sepi.inspection.view_order import check_order
+from sepi.inspection.view_order_kernels import add_pairs
 from sepi.io.readers.options import ORDERS
 from sepi.lightfield import LightField
 from sepi.scenes import SCENES, render
@@ -305,3 +307,26 @@ def orders_are_named(light_field: LightField, orders: Iterable[str]) -> None:
         assert found.clear
         assert found.sign_clear
         assert found.best == word
+
+
+@pytest.mark.parametrize(("down", "across"), [(0, 1), (0, -1), (1, 0), (-1, 0)])
+def test_pairs_that_meet_in_a_view_are_counted_in_the_region_of_the_farther(down: int, across: int) -> None:
+    """What is in front would be told by other pixels, or the wrong way round."""
+    rng = np.random.default_rng(0)
+    disparity, rise, residual = rng.uniform((-2,), (2,), (3, 30, 40)).astype(np.float32)
+    usable = rng.random(disparity.shape) < 0.7
+    length, hidden, side, farthest = np.float32(3.5), np.float32(0.4), 8, 12
+    total, count = np.zeros((2, 4, 5))
+    add_pairs(rise, residual, disparity, usable, down, across, length, hidden, farthest, side, total, count)
+    expected = np.zeros((2, 4, 5))
+    for (y, x), distance in itertools.product(np.argwhere(usable).tolist(), range(2, farthest + 1)):
+        i, j = y + down * distance, x + across * distance
+        if not (0 <= i < 30 and 0 <= j < 40 and usable[i, j]):
+            continue
+        shift = float((disparity[i, j] - disparity[y, x]) * length)
+        hides = max(residual[y, x], residual[i, j]) > hidden and max(rise[y, x], rise[i, j]) > 1
+        if hides and shift >= 1.5 and abs(shift - distance) <= 0.75:
+            expected[:, y // side, x // side] += np.clip(rise[y, x] - rise[i, j], -2, 2), 1
+    np.testing.assert_array_equal(count, expected[1])
+    np.testing.assert_allclose(total, expected[0], atol=1e-6)
+    assert count.sum() > 30
