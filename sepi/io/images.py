@@ -166,7 +166,8 @@ def write_png(path: Path, pixels: Pixels | BoolMap, texts: Mapping[str, str] | N
             chunks = PngImagePlugin.PngInfo()
             for key, text in texts.items():
                 chunks.add_text(key, text)
-            Image.fromarray(values).save(temporary, "PNG", pnginfo=chunks)
+            # a quarter of the time for a twentieth more bytes; OpenCV packs so, too
+            Image.fromarray(values).save(temporary, "PNG", pnginfo=chunks, compress_level=1)
             return
         done, data = cv2.imencode(".png", values[:, :, ::-1] if values.ndim == 3 else values)
         if not done:

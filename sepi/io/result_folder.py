@@ -185,9 +185,8 @@ def write_result(
     # the folder itself may be a link to where there is room
     target = folder.resolve()
     existing = target.is_dir() and any(target.iterdir())
-    attributes = {**result_attributes(light_field, maps), **(attributes or {})}
     with atomic_files(target) if existing else atomic_folder(target) as temporary:
-        names = _write_files(temporary, light_field, maps, attributes, seconds, beside)
+        names = _write_files(temporary, light_field, maps, attributes or {}, seconds, beside)
     remove_files(target, earlier.difference(names))
     return names
 
@@ -323,7 +322,10 @@ def _write_files(
         ]
         everything = maps.updated(maps.disparity, maps.confidence, **more)
         # of these a later result is sure that they are not a user's own
-        write_stage(folder / RESULT, everything, {**attributes, "files": " ".join(sorted((*names, *beside)))})
+        files = {"files": " ".join(sorted((*names, *beside)))}
+        # a digest of all views is among them, which takes a while, but not Python's lock
+        told = {**result_attributes(light_field, maps), **attributes, **files}
+        write_stage(folder / RESULT, everything, told)
         for one in written:
             one.result()
     return names
