@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from sepi.boundaries.arrays import RimViews, Sides
 from sepi.boundaries.rim_kernels import Rim
-from sepi.compiled import njit, prange
-from sepi.lightfield import FloatMap
+from sepi.compiled import fma, njit, prange
+from sepi.vectors import WIDTH, first_elements, load, spread, store, sum_of
 
 FEWEST_VIEWS = 3
 """That see a piece of background, before its colour counts."""
+
+UNSEEN = np.float32(-1)
+"""In place of the variance of a background that fewer see."""
 
 FEWEST_SAMPLES = 8
 """Views from which a share is told."""
@@ -34,32 +36,16 @@ _UNKNOWN_DEVIATION = 1.0
 _MOST_DEVIATION2 = 0.01  # squared residual that one view counts at most in the background's variance
 _STRIDE = 4  # pixels from one to the next that tell the brightness of a view
 _MOST_DIFFERENCE = 0.1  # of one channel, that counts in a view's residual
-_UNKNOWN = 1e3  # cost where nothing tells
+_UNKNOWN = np.float32(1e3)  # cost where nothing tells
+_AT_ONCE = 64  # pixels that a thread does at a stretch
 
-# columns of what the views show of a pixel (N, 7): its colours, those behind it, and the variance of the latter
+# rows of what the views show of a pixel (7, N + WIDTH): its colours, those behind it, and the variance of the latter
 _BEHIND, _NOISE = 3, 6
-# rows of the nearer surface beside a pixel (3, 3): its colour, and the least and the most that it shows
-_OWN, _LEAST, _MOST = 0, 1, 2
+# rows of the nearer surface beside a pixel (4, 3): its colour, the least and the most that it shows, what fits best
+_OWN, _LEAST, _MOST, _FIT = 0, 1, 2, 3
 
 
-class Background(NamedTuple):
-    """What the views show behind the nearer surfaces.
-
-    Attributes
-    ----------
-    colour : ndarray, shape (H, W, 3), float32
-    variance : ndarray, shape (H, W), float32
-        Of the views' colours, mean of the channels.
-    views : ndarray, shape (H, W), int32
-        How many see it.
-    """
-
-    colour: FloatMap
-    variance: FloatMap
-    views: npt.NDArray[np.int32]
-
-
-@njit(forceinline=True)
+@njit(forceinline=True, borrows=True)
 def _sees(views: RimViews, view: int, d: Any, y: int, x: int) -> Any:
     """Whether a view shows a pixel of disparity ``d``, and where: row and column of the sample, and its fractions."""
     H, W = views.lines.shape[2], views.lines.shape[3] // views.channels
@@ -73,7 +59,7 @@ def _sees(views: RimViews, view: int, d: Any, y: int, x: int) -> Any:
     return nearest <= d + views.margin, row, column, down - row, across - column
 
 
-@njit(forceinline=True)
+@njit(forceinline=True, borrows=True)
 def _cubic(f: Any) -> Any:
     """Weights of four neighbours, the second and third of which a sample lies between (Catmull and Rom's)."""
     half, one, more = np.float32(0.5), np.float32(1), np.float32(1.5)
@@ -85,28 +71,39 @@ def _cubic(f: Any) -> Any:
     )
 
 
-@njit(forceinline=True)
-def _sample(views: RimViews, view: int, row: int, column: int, fy: Any, fx: Any, out: Any) -> None:
+@njit(forceinline=True, borrows=True)
+def _sample(views: RimViews, view: int, row: int, column: int, fy: Any, fx: Any, sums: Any, out: Any) -> None:
     """Colour between pixels of a view into ``out (3,)``, 0..1; grey counts as three equal channels.
 
-    Cubic, since a bilinear sample takes from the peak of what is two pixels wide.
+    Cubic, since a bilinear sample takes from the peak of what is two pixels wide. ``sums (4 + WIDTH,)`` is scratch.
     """
-    picture = views.lines[views.places[view, 0], views.places[view, 1]]
-    H, C = picture.shape[0], views.channels
+    lines, t, s, C = views.lines, views.places[view, 0], views.places[view, 1], views.channels
+    H, W = lines.shape[2], lines.shape[3] // C
     down, across = _cubic(np.float32(fy)), _cubic(np.float32(fx))
-    a, b, c, d = picture[max(row - 1, 0)], picture[row], picture[row + 1], picture[min(row + 2, H - 1)]
-    # green and blue of a grey picture are its last channel, too
-    second, third = min(1, C - 1), min(2, C - 1)
-    first, last = (column - 1) * C, (column + 2) * C
+    rows = max(row - 1, 0), row, row + 1, min(row + 2, H - 1)
     red, green, blue = np.float32(0), np.float32(0), np.float32(0)
-    columns = max(first, 0), first + C, first + 2 * C, min(last, a.size - C)
-    for j in range(4):
-        i = columns[j]
-        red += across[j] * (down[0] * a[i] + down[1] * b[i] + down[2] * c[i] + down[3] * d[i])
-        i = columns[j] + second
-        green += across[j] * (down[0] * a[i] + down[1] * b[i] + down[2] * c[i] + down[3] * d[i])
-        i = columns[j] + third
-        blue += across[j] * (down[0] * a[i] + down[1] * b[i] + down[2] * c[i] + down[3] * d[i])
+    if C == 3 and 1 <= column < W - 2:
+        # four pixels side by side, of which the first eight numbers and the last eight make up all twelve
+        for at in (0, 4):
+            i = 3 * (column - 1) + at
+            total = spread(down[0]) * load(lines, (t, s, rows[0], i))
+            total = fma(spread(down[1]), load(lines, (t, s, rows[1], i)), total)
+            total = fma(spread(down[2]), load(lines, (t, s, rows[2], i)), total)
+            store(sums, at, fma(spread(down[3]), load(lines, (t, s, rows[3], i)), total))
+        for j in range(4):
+            red += across[j] * sums[3 * j]
+            green += across[j] * sums[3 * j + 1]
+            blue += across[j] * sums[3 * j + 2]
+    else:
+        # green and blue of a grey picture are its last channel, too
+        second, third = min(1, C - 1), min(2, C - 1)
+        for j in range(4):
+            i = C * min(max(column - 1 + j, 0), W - 1)
+            for k in range(4):
+                weight = across[j] * down[k]
+                red += weight * lines[t, s, rows[k], i]
+                green += weight * lines[t, s, rows[k], i + second]
+                blue += weight * lines[t, s, rows[k], i + third]
     unit = views.units[view]
     out[0], out[1], out[2] = red * unit, green * unit, blue * unit
 
@@ -137,6 +134,7 @@ def brightness_of_views(views: RimViews, sides: Sides, missing: Any) -> Any:
     for view in prange(N):
         # of each pixel that the view shows: its colours there, and the reference's
         shown = np.empty((((H - 1) // _STRIDE + 1) * ((W - 1) // _STRIDE + 1), 2, 3))
+        sums = np.empty(4 + WIDTH, np.float32)
         of_view = missing[views.places[view, 0], views.places[view, 1]]
         own, other, rest, n = 1e-9, 1e-9, 0.0, 0
         for y in range(0, H, _STRIDE):
@@ -153,7 +151,7 @@ def brightness_of_views(views: RimViews, sides: Sides, missing: Any) -> Any:
                     or of_view[row + 1, column + 1]
                 ):
                     continue
-                _sample(views, view, row, column, down - row, across - column, shown[n, 0])
+                _sample(views, view, row, column, down - row, across - column, sums, shown[n, 0])
                 for c in range(3):
                     shown[n, 1, c] = guide[y, x, c]
                     own += shown[n, 1, c]
@@ -217,12 +215,13 @@ def background_of(views: RimViews, layer: Any, wanted: Any, begin: int, end: int
 
     Returns
     -------
-    Background
+    ndarray, shape (H, W, 4), float32
+        Colours, and the variance of the views' colours, mean of the channels; where fewer than ``FEWEST_VIEWS`` see it,
+        ``UNSEEN`` in its place.
     """
     H, W = layer.shape
     N = len(views.places)
-    colour, variance = np.empty((H, W, 3), np.float32), np.empty((H, W), np.float32)
-    count = np.zeros((H, W), np.int32)
+    background = np.empty((H, W, 4), np.float32)
     for y in prange(begin, end):
         # not NumPy's: where it is compiled, every process loads SciPy
         columns, few = np.empty(W, np.int64), 0
@@ -231,20 +230,21 @@ def background_of(views: RimViews, layer: Any, wanted: Any, begin: int, end: int
                 columns[few] = x
                 few += 1
         samples, ordered = np.empty((few, 3, N), np.float32), np.empty(N, np.float32)
-        colour_there = np.empty(3, np.float32)
+        colour_there, sums, count = np.empty(3, np.float32), np.empty(4 + WIDTH, np.float32), np.zeros(few, np.int64)
+        background[y, :, 3] = UNSEEN
         # view by view: neighbours are near each other in its memory
         for view in range(N):
             for i in range(few):
                 x = columns[i]
                 seen, row, column, fy, fx = _sees(views, view, layer[y, x], y, x)
                 if seen:
-                    _sample(views, view, row, column, fy, fx, colour_there)
+                    _sample(views, view, row, column, fy, fx, sums, colour_there)
                     for c in range(3):
-                        samples[i, c, count[y, x]] = colour_there[c]
-                    count[y, x] += 1
+                        samples[i, c, count[i]] = colour_there[c]
+                    count[i] += 1
         for i in range(few):
             x = columns[i]
-            n = count[y, x]
+            n = count[i]
             if n < FEWEST_VIEWS:
                 continue
             total = 0.0
@@ -252,29 +252,29 @@ def background_of(views: RimViews, layer: Any, wanted: Any, begin: int, end: int
                 for v in range(n):
                     ordered[v] = samples[i, c, v]
                 middle = _median(ordered[:n])
-                colour[y, x, c] = middle
+                background[y, x, c] = middle
                 for v in range(n):
                     total += min((samples[i, c, v] - middle) ** 2, _MOST_DEVIATION2)
-            variance[y, x] = total / (3 * n)
-    return Background(colour, variance, count)
+            background[y, x, 3] = total / (3 * n)
+    return background
 
 
-@njit(forceinline=True)
-def _behind(background: Background, row: int, column: int, fy: Any, fx: Any, out: Any) -> Any:
-    """Colour between pixels of the background into ``out (3,)``, and its variance; negative where it is not known."""
+@njit(forceinline=True, borrows=True)
+def _behind(background: Any, row: int, column: int, fy: Any, fx: Any, sums: Any) -> Any:
+    """Colour between pixels of the background, and its variance, into ``sums[:4]``; whether it is known."""
     for i in range(row, row + 2):
         for j in range(column, column + 2):
-            if background.views[i, j] < FEWEST_VIEWS:
-                return -1.0
-    a, b, c, d = (1 - fy) * (1 - fx), (1 - fy) * fx, fy * (1 - fx), fy * fx
-    for k in range(3):
-        B = background.colour[:, :, k]
-        out[k] = a * B[row, column] + b * B[row, column + 1] + c * B[row + 1, column] + d * B[row + 1, column + 1]
-    V = background.variance
-    return a * V[row, column] + b * V[row, column + 1] + c * V[row + 1, column] + d * V[row + 1, column + 1]
+            if background[i, j, 3] == UNSEEN:
+                return False
+    # two pixels side by side
+    upper, lower = load(background, (row, column, 0)), load(background, (row + 1, column, 0))
+    store(sums, 0, fma(spread(fy), lower - upper, upper))
+    for k in range(4):
+        sums[k] += fx * (sums[k + 4] - sums[k])
+    return True
 
 
-@njit(forceinline=True)
+@njit(forceinline=True, borrows=True)
 def _nearer_colour(sides: Sides, near: Any, middle: Any, y: int, x: int, surface: Any) -> Any:
     """Fill in the nearer surface beside a pixel: clean pixels' colour, or else the pixel's own; its variance."""
     H, W = sides.disparity.shape
@@ -295,7 +295,8 @@ def _nearer_colour(sides: Sides, near: Any, middle: Any, y: int, x: int, surface
                     out[c] += weight * sides.guide[i, j, c]
                     squares += weight * sides.guide[i, j, c] ** 2
     if weights == 0:
-        out[:] = sides.guide[y, x]
+        for c in range(3):
+            out[c] = sides.guide[y, x, c]
         return _UNKNOWN_DEVIATION**2
     variance = squares / weights
     for c in range(3):
@@ -304,10 +305,12 @@ def _nearer_colour(sides: Sides, near: Any, middle: Any, y: int, x: int, surface
     return (max(variance, 0.0) / 3 + _CLEAN_DEVIATION**2) / _HELD
 
 
-@njit(forceinline=True)
-def _along_near(views: RimViews, background: Background, near: Any, far: Any, y: int, x: int, samples: Any) -> int:
+@njit(forceinline=True, borrows=True)
+def _along_near(
+    views: RimViews, background: Any, near: Any, far: Any, y: int, x: int, sums: Any, colour: Any, samples: Any
+) -> int:
     """What the views show of a pixel that moves with ``near``, and what is behind it there; how many tell both."""
-    H, W = background.views.shape
+    H, W, _ = background.shape
     n = 0
     for view in range(len(views.places)):
         seen, row, column, fy, fx = _sees(views, view, near, y, x)
@@ -317,59 +320,104 @@ def _along_near(views: RimViews, background: Background, near: Any, far: Any, y:
         if not seen or down < 0 or across < 0 or down >= H - 1 or across >= W - 1:
             continue
         i, j = int(down), int(across)
-        samples[n, _NOISE] = _behind(background, i, j, down - i, across - j, samples[n, _BEHIND:_NOISE])
-        if samples[n, _NOISE] >= 0:
-            _sample(views, view, row, column, fy, fx, samples[n])
+        if _behind(background, i, j, np.float32(down - i), np.float32(across - j), sums):
+            for k in range(4):
+                samples[_BEHIND + k, n] = sums[k]
+            _sample(views, view, row, column, fy, fx, sums, colour)
+            for c in range(3):
+                samples[c, n] = colour[c]
             n += 1
     return n
 
 
-@njit(forceinline=True)
-def _cost_of_share(share: Any, samples: Any, n: int, surface: Any, held: Any, scale2: Any) -> Any:
+@njit(forceinline=True, borrows=True)
+def _summed(samples: Any, row: int, n: int) -> Any:
+    """Sum of the first ``n`` of a row."""
+    total = spread(np.float32(0))
+    for v in range(0, n, WIDTH):
+        total = total + first_elements(load(samples, (row, v)), n - v, np.float32(0))
+    return sum_of(total)
+
+
+@njit(forceinline=True, borrows=True)
+def _residual2(samples: Any, c: int, v: int, colour: Any, rest: Any) -> Any:
+    """Squared differences of eight views from ``colour``, and what is behind it with the weight ``rest``."""
+    apart = load(samples, (c, v)) - spread(colour) - spread(rest) * load(samples, (_BEHIND + c, v))
+    return apart * apart
+
+
+@njit(forceinline=True, borrows=True)
+def _robust(residual2: Any, half: Any) -> Any:
+    return residual2 / (residual2 + half)
+
+
+@njit(forceinline=True, borrows=True)
+def _cost_of_share(share: Any, samples: Any, n: int, summed: Any, surface: Any, held: Any, scale2: Any) -> Any:
     """Mean robust residual of ``n`` views that show a share of one colour before the background, 0..1.
 
     The colour is that which fits best within the surface's limits, and is held near its own with the weight of
-    ``held`` views.
+    ``held`` views. ``summed (6,)`` are the sums of the views' colours, and of those behind them.
     """
-    rest = 1 - share
-    fit = np.empty(3)
-    total = 0.0
+    rest = np.float32(1) - share
+    total = np.float32(0)
     for c in range(3):
-        along = 0.0
-        for v in range(n):
-            along += samples[v, c] - rest * samples[v, _BEHIND + c]
+        along = summed[c] - rest * summed[_BEHIND + c]
         best = (share * along + held * surface[_OWN, c]) / (share * share * n + held)
-        fit[c] = min(max(best, surface[_LEAST, c]), surface[_MOST, c])
-        total += held * (fit[c] - surface[_OWN, c]) ** 2 / scale2
-    for v in range(n):
-        half = scale2 + rest * rest * samples[v, _NOISE]
-        for c in range(3):
-            residual = (samples[v, c] - share * fit[c] - rest * samples[v, _BEHIND + c]) ** 2
-            total += residual / (residual + half)
-    return total / (3 * n)
+        surface[_FIT, c] = min(max(best, surface[_LEAST, c]), surface[_MOST, c])
+        total += np.float32(held * (surface[_FIT, c] - surface[_OWN, c]) ** 2 / scale2)
+    fit = surface[_FIT]
+    red, green, blue = np.float32(share * fit[0]), np.float32(share * fit[1]), np.float32(share * fit[2])
+    over_views = spread(np.float32(0))
+    for v in range(0, n, WIDTH):
+        half = fma(spread(rest * rest), load(samples, (_NOISE, v)), spread(scale2))
+        cost = _robust(_residual2(samples, 0, v, red, rest), half) + _robust(
+            _residual2(samples, 1, v, green, rest), half
+        )
+        cost = cost + _robust(_residual2(samples, 2, v, blue, rest), half)
+        over_views = over_views + first_elements(cost, n - v, np.float32(0))
+    return (total + sum_of(over_views)) / np.float32(3 * n)
 
 
-@njit(forceinline=True)
-def _cost_alone(views: RimViews, own: Any, d: Any, y: int, x: int, scale2: Any, colour: Any) -> Any:
+@njit(forceinline=True, borrows=True)
+def _cost_alone(
+    views: RimViews, own: Any, d: Any, y: int, x: int, scale2: Any, sums: Any, colour: Any, samples: Any
+) -> Any:
     """Mean robust residual of a pixel of colour ``own (3,)`` that moves with ``d``, over views that see it."""
-    total, n = 0.0, 0
+    n = 0
     for view in range(len(views.places)):
         if views.baselines[view, 0] == 0 and views.baselines[view, 1] == 0:
             # the reference view itself always fits
             continue
         seen, row, column, fy, fx = _sees(views, view, d, y, x)
         if seen:
-            _sample(views, view, row, column, fy, fx, colour)
+            _sample(views, view, row, column, fy, fx, sums, colour)
             for c in range(3):
-                residual = (colour[c] - own[c]) ** 2
-                total += residual / (residual + scale2)
+                samples[c, n] = colour[c]
             n += 1
-    return total / (3 * n) if n >= FEWEST_VIEWS else _UNKNOWN
+    if n < FEWEST_VIEWS:
+        return _UNKNOWN
+    total, half = spread(np.float32(0)), spread(scale2)
+    for v in range(0, n, WIDTH):
+        for c in range(3):
+            apart = load(samples, (c, v)) - spread(own[c])
+            total = total + first_elements(_robust(apart * apart, half), n - v, np.float32(0))
+    return sum_of(total) / np.float32(3 * n)
+
+
+@njit(forceinline=True, borrows=True)
+def _apart2(samples: Any, n: int, surface: Any) -> Any:
+    """Mean squared difference of the nearer surface's colour from what is behind it."""
+    total = spread(np.float32(0))
+    for v in range(0, n, WIDTH):
+        for c in range(3):
+            apart = load(samples, (_BEHIND + c, v)) - spread(np.float32(surface[_OWN, c]))
+            total = total + first_elements(apart * apart, n - v, np.float32(0))
+    return sum_of(total) / np.float32(3 * n)
 
 
 @njit(parallel=True, cache=True)
 def evidence_of_shares(
-    views: RimViews, rim: Rim, background: Background, sides: Sides, scales2: Any, begin: int, end: int, evidence: Any
+    views: RimViews, rim: Rim, background: Any, sides: Sides, scales2: Any, begin: int, end: int, evidence: Any
 ) -> None:
     """By how much the other surface explains the views better than the one that a pixel has.
 
@@ -380,7 +428,8 @@ def evidence_of_shares(
     ----------
     views : RimViews
     rim : Rim
-    background : Background
+    background : ndarray, shape (H, W, 4), float32
+        From :func:`background_of`.
     sides : Sides
     scales2 : tuple of float
         Square of the residual at which a view counts half: the least, and what the squared difference of both surfaces'
@@ -392,13 +441,24 @@ def evidence_of_shares(
     """
     W = sides.disparity.shape[1]
     N = len(views.places)
-    for y in prange(begin, end):
-        samples, surface, colour = np.empty((N, 7)), np.empty((3, 3)), np.empty(3)
+    # they are not spread evenly over the rows; not NumPy's: where it is compiled, every process loads SciPy
+    pixels, count = np.empty((end - begin) * W, np.int64), 0
+    for y in range(begin, end):
         for x in range(W):
-            if not rim.inside[y, x]:
-                continue
+            if rim.inside[y, x]:
+                pixels[count] = y * W + x
+                count += 1
+    for task in prange((count + _AT_ONCE - 1) // _AT_ONCE):
+        samples, surface, summed = (
+            np.zeros((7, N + WIDTH), np.float32),
+            np.empty((4, 3)),
+            np.empty(6, np.float32),
+        )
+        sums, colour = np.empty(4 + WIDTH, np.float32), np.empty(3, np.float32)
+        for i in range(task * _AT_ONCE, min(count, (task + 1) * _AT_ONCE)):
+            y, x = pixels[i] // W, pixels[i] % W
             near, far = rim.near[y, x], rim.far[y, x]
-            n = _along_near(views, background, near, far, y, x, samples)
+            n = _along_near(views, background, near, far, y, x, sums, colour, samples)
             if n < FEWEST_SAMPLES:
                 continue
             variance = _nearer_colour(sides, near, (near + far) / 2, y, x, surface)
@@ -406,15 +466,14 @@ def evidence_of_shares(
                 # surfaces get darker or brighter towards their edge: to be far, a pixel must be so whatever its colour.
                 # To be near it must have the surface's colour: before a bare background, any is a share of another
                 variance = _FREE_DEVIATION**2
-            apart2 = 0.0
-            for v in range(n):
-                for c in range(3):
-                    apart2 += (surface[_OWN, c] - samples[v, _BEHIND + c]) ** 2
-            scale2 = scales2[0] + scales2[1] * apart2 / (3 * n)
+            scale2 = np.float32(scales2[0] + scales2[1] * _apart2(samples, n, surface))
+            held = np.float32(scale2 / variance)
+            for c in range(6):
+                summed[c] = _summed(samples, c, n)
             low = high = _UNKNOWN
             for k in range(SHARES):
-                share = k / (SHARES - 1)
-                cost = _cost_of_share(share, samples, n, surface, scale2 / variance, scale2)
+                share = np.float32(k / (SHARES - 1))
+                cost = _cost_of_share(share, samples, n, summed, surface, held, scale2)
                 if 2 * k < SHARES - 1:
                     low = min(low, cost)
                 else:
@@ -422,5 +481,5 @@ def evidence_of_shares(
             if rim.is_near[y, x]:
                 evidence[y, x] = high - low
             else:
-                alone = _cost_alone(views, sides.guide[y, x], far, y, x, scale2, colour)
+                alone = _cost_alone(views, sides.guide[y, x], far, y, x, scale2, sums, colour, samples)
                 evidence[y, x] = min(low, alone) - high

@@ -199,7 +199,7 @@ class Twin:
         middle = np.median(colours, axis=0)
         return middle, float(np.minimum((colours - middle) ** 2, 0.01).mean()), len(colours)
 
-    def evidence(self, background: kernels.Background, scales2: tuple[float, float], y: int, x: int) -> float:
+    def evidence(self, background: npt.NDArray[np.float32], scales2: tuple[float, float], y: int, x: int) -> float:
         rim, (disparity, guide, clean, _) = self.rim, self.sides
         near, far = float(rim.near[y, x]), float(rim.far[y, x])
         colours, behind, noise = [], [], []
@@ -210,12 +210,12 @@ class Twin:
                 continue
             i, j = int(down), int(across)
             patch = np.s_[i : i + 2, j : j + 2]
-            if (background.views[patch] < kernels.FEWEST_VIEWS).any():
+            if (background[patch][..., 3] == kernels.UNSEEN).any():
                 continue
             weights = np.outer([1 - (down - i), down - i], [1 - (across - j), across - j])
             colours.append(colour)
-            behind.append(np.einsum("ij,ijc->c", weights, background.colour[patch]))
-            noise.append((weights * background.variance[patch]).sum())
+            behind.append(np.einsum("ij,ijc->c", weights, background[patch][..., :3]))
+            noise.append((weights * background[patch][..., 3]).sum())
         if len(colours) < kernels.FEWEST_SAMPLES:
             return 0.0
         C, B, N = np.array(colours), np.array(behind), np.array(noise)[:, None]
@@ -319,10 +319,10 @@ def test_kernels_equal_a_plain_twin(geometry: str, dtype: Any) -> None:
     background = kernels.background_of(rim_views, layer, np.ones_like(present, shape=layer.shape), 0, 12)
     for y, x in np.ndindex(disparity.shape):
         colour, variance, count = twin.background(float(layer[y, x]), y, x)
-        assert background.views[y, x] == count
+        assert (background[y, x, 3] != kernels.UNSEEN) == (count >= kernels.FEWEST_VIEWS)
         if count >= kernels.FEWEST_VIEWS:
-            np.testing.assert_allclose(background.colour[y, x], colour, atol=1e-6)
-            np.testing.assert_allclose(background.variance[y, x], variance, atol=1e-7)
+            np.testing.assert_allclose(background[y, x, :3], colour, atol=1e-6)
+            np.testing.assert_allclose(background[y, x, 3], variance, atol=1e-7)
     evidence = np.zeros_like(disparity)
     scales2 = (0.02**2, 0.3**2)
     kernels.evidence_of_shares(rim_views, rim, background, sides, scales2, 0, 12, evidence)
