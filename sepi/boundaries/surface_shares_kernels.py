@@ -9,7 +9,7 @@ import numpy as np
 from sepi.boundaries.arrays import RimViews, Sides
 from sepi.boundaries.rim_kernels import Rim
 from sepi.compiled import fma, njit, prange
-from sepi.vectors import WIDTH, first_elements, load, spread, store, sum_of
+from sepi.vectors import first_elements, load, spread, store, sum_of
 
 FEWEST_VIEWS = 3
 """That see a piece of background, before its colour counts."""
@@ -37,9 +37,10 @@ _MOST_DEVIATION2 = 0.01  # squared residual that one view counts at most in the 
 _STRIDE = 4  # pixels from one to the next that tell the brightness of a view
 _MOST_DIFFERENCE = 0.1  # of one channel, that counts in a view's residual
 _UNKNOWN = np.float32(1e3)  # cost where nothing tells
+VECTOR = 8  # numbers in a vector
 _AT_ONCE = 64  # pixels that a thread does at a stretch
 
-# rows of what the views show of a pixel (7, N + WIDTH): its colours, those behind it, and the variance of the latter
+# rows of what the views show of a pixel (7, N + VECTOR): its colours, those behind it, and the variance of the latter
 _BEHIND, _NOISE = 3, 6
 # rows of the nearer surface beside a pixel (4, 3): its colour, the least and the most that it shows, what fits best
 _OWN, _LEAST, _MOST, _FIT = 0, 1, 2, 3
@@ -75,7 +76,7 @@ def _cubic(f: Any) -> Any:
 def _sample(views: RimViews, view: int, row: int, column: int, fy: Any, fx: Any, sums: Any, out: Any) -> None:
     """Colour between pixels of a view into ``out (3,)``, 0..1; grey counts as three equal channels.
 
-    Cubic, since a bilinear sample takes from the peak of what is two pixels wide. ``sums (4 + WIDTH,)`` is scratch.
+    Cubic, since a bilinear sample takes from the peak of what is two pixels wide. ``sums (4 + VECTOR,)`` is scratch.
     """
     lines, t, s, C = views.lines, views.places[view, 0], views.places[view, 1], views.channels
     H, W = lines.shape[2], lines.shape[3] // C
@@ -134,7 +135,7 @@ def brightness_of_views(views: RimViews, sides: Sides, missing: Any) -> Any:
     for view in prange(N):
         # of each pixel that the view shows: its colours there, and the reference's
         shown = np.empty((((H - 1) // _STRIDE + 1) * ((W - 1) // _STRIDE + 1), 2, 3))
-        sums = np.empty(4 + WIDTH, np.float32)
+        sums = np.empty(4 + VECTOR, np.float32)
         of_view = missing[views.places[view, 0], views.places[view, 1]]
         own, other, rest, n = 1e-9, 1e-9, 0.0, 0
         for y in range(0, H, _STRIDE):
@@ -230,7 +231,7 @@ def background_of(views: RimViews, layer: Any, wanted: Any, begin: int, end: int
                 columns[few] = x
                 few += 1
         samples, ordered = np.empty((few, 3, N), np.float32), np.empty(N, np.float32)
-        colour_there, sums, count = np.empty(3, np.float32), np.empty(4 + WIDTH, np.float32), np.zeros(few, np.int64)
+        colour_there, sums, count = np.empty(3, np.float32), np.empty(4 + VECTOR, np.float32), np.zeros(few, np.int64)
         background[y, :, 3] = UNSEEN
         # view by view: neighbours are near each other in its memory
         for view in range(N):
@@ -334,7 +335,7 @@ def _along_near(
 def _summed(samples: Any, row: int, n: int) -> Any:
     """Sum of the first ``n`` of a row."""
     total = spread(np.float32(0))
-    for v in range(0, n, WIDTH):
+    for v in range(0, n, VECTOR):
         total = total + first_elements(load(samples, (row, v)), n - v, np.float32(0))
     return sum_of(total)
 
@@ -368,7 +369,7 @@ def _cost_of_share(share: Any, samples: Any, n: int, summed: Any, surface: Any, 
     fit = surface[_FIT]
     red, green, blue = np.float32(share * fit[0]), np.float32(share * fit[1]), np.float32(share * fit[2])
     over_views = spread(np.float32(0))
-    for v in range(0, n, WIDTH):
+    for v in range(0, n, VECTOR):
         half = fma(spread(rest * rest), load(samples, (_NOISE, v)), spread(scale2))
         cost = _robust(_residual2(samples, 0, v, red, rest), half) + _robust(
             _residual2(samples, 1, v, green, rest), half
@@ -397,7 +398,7 @@ def _cost_alone(
     if n < FEWEST_VIEWS:
         return _UNKNOWN
     total, half = spread(np.float32(0)), spread(scale2)
-    for v in range(0, n, WIDTH):
+    for v in range(0, n, VECTOR):
         for c in range(3):
             apart = load(samples, (c, v)) - spread(own[c])
             total = total + first_elements(_robust(apart * apart, half), n - v, np.float32(0))
@@ -408,7 +409,7 @@ def _cost_alone(
 def _apart2(samples: Any, n: int, surface: Any) -> Any:
     """Mean squared difference of the nearer surface's colour from what is behind it."""
     total = spread(np.float32(0))
-    for v in range(0, n, WIDTH):
+    for v in range(0, n, VECTOR):
         for c in range(3):
             apart = load(samples, (_BEHIND + c, v)) - spread(np.float32(surface[_OWN, c]))
             total = total + first_elements(apart * apart, n - v, np.float32(0))
@@ -450,11 +451,11 @@ def evidence_of_shares(
                 count += 1
     for task in prange((count + _AT_ONCE - 1) // _AT_ONCE):
         samples, surface, summed = (
-            np.zeros((7, N + WIDTH), np.float32),
+            np.zeros((7, N + VECTOR), np.float32),
             np.empty((4, 3)),
             np.empty(6, np.float32),
         )
-        sums, colour = np.empty(4 + WIDTH, np.float32), np.empty(3, np.float32)
+        sums, colour = np.empty(4 + VECTOR, np.float32), np.empty(3, np.float32)
         for i in range(task * _AT_ONCE, min(count, (task + 1) * _AT_ONCE)):
             y, x = pixels[i] // W, pixels[i] % W
             near, far = rim.near[y, x], rim.far[y, x]

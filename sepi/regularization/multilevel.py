@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 FloatArray = npt.NDArray[np.float64]
-Operator = Callable[[FloatArray], FloatArray]
+Inverse = Callable[[FloatArray], tuple[FloatArray, float]]
 
 LEVELS = 5
 """Of hats, each with half the nodes of the one before, along either axis."""
@@ -29,17 +29,18 @@ COUNTED = 2
 
 
 def conjugate_gradients(
-    times: Operator, inverse: Operator, right: FloatArray, start: FloatArray, rtol: float, max_iterations: int
+    stencil: FloatArray, inverse: Inverse, right: FloatArray, start: FloatArray, rtol: float, max_iterations: int
 ) -> FloatArray:
-    """Solve a symmetric, positive system.
+    """Solve a system of the smoothing.
 
     Parameters
     ----------
-    times, inverse : callable
-        The matrix times a vector, and what is near its inverse, symmetric and positive, times one; what they return may
-        be overwritten when they are called again.
-    right, start : ndarray, float32 or float64
-        The right side, and where to start.
+    stencil : ndarray, shape (7, H + 2 MARGIN, W + 2 MARGIN), float32 or float64
+        The matrix, as of :func:`multilevel_inverse`.
+    inverse : callable
+        Of :func:`multilevel_inverse`, in the same type.
+    right, start : ndarray, shape (H + 2 MARGIN, W + 2 MARGIN), of the same type
+        The right side, and where to start; with margins of zeros.
     rtol : float
         Residual at which to stop, relative to the right side.
     max_iterations : int
@@ -50,28 +51,28 @@ def conjugate_gradients(
     ndarray
         As ``right``.
     """
+    from sepi.regularization.second_order_kernels import step, turn_and_bend
+
     enough = rtol * float(np.linalg.norm(right))
     if not enough:
         return np.zeros_like(right)
     number = right.dtype.type
-    solution, residual = start.copy(), right - times(start)
-    direction, before = np.zeros_like(right), 1.0
+    direction, bent = np.zeros_like(right), np.zeros_like(right)
+    turn_and_bend(stencil, start, number(0), direction, bent)
+    solution, residual, before = start.copy(), right - bent, 1.0
+    left = float(np.linalg.norm(residual)) ** 2
+    direction[:] = 0
     for _ in range(max_iterations):
-        if np.linalg.norm(residual) < enough:
+        if left < enough**2:
             break
-        ahead = inverse(residual)
-        along = float(np.vdot(residual, ahead))
-        direction *= number(along / before)
-        direction += ahead
-        bent = times(direction)
-        length = along / float(np.vdot(direction, bent))
-        solution += number(length) * direction
-        residual -= number(length) * bent
+        ahead, along = inverse(residual)
+        curved = turn_and_bend(stencil, ahead, number(along / before), direction, bent)
+        left = step(number(along / curved), direction, bent, solution, residual)
         before = along
     return solution
 
 
-def multilevel_inverse(stencil: FloatArray, dtype: npt.DTypeLike) -> Operator:
+def multilevel_inverse(stencil: FloatArray, dtype: npt.DTypeLike) -> Inverse:
     """What is near the inverse of a matrix of the smoothing, symmetric and positive.
 
     Parameters
@@ -85,7 +86,8 @@ def multilevel_inverse(stencil: FloatArray, dtype: npt.DTypeLike) -> Operator:
     Returns
     -------
     callable
-        Takes and returns pictures with their margins, of that type; what it returns holds until it is called again.
+        Takes a picture with its margin, of that type, and returns one, which holds until it is called again, and the
+        inner product of both.
     """
     from sepi.regularization import second_order_kernels as kernels
 
@@ -94,7 +96,7 @@ def multilevel_inverse(stencil: FloatArray, dtype: npt.DTypeLike) -> Operator:
     levels = [np.empty(shape, dtype) for shape in _shapes(stencil)]
     out = np.zeros(stencil.shape[1:], dtype)
 
-    def apply(residual: FloatArray) -> FloatArray:
+    def apply(residual: FloatArray) -> tuple[FloatArray, float]:
         kernels.onto_finest(residual, levels[0])
         for i in range(1, LEVELS):
             kernels.onto_coarser(levels[i - 1], levels[i])
@@ -105,8 +107,7 @@ def multilevel_inverse(stencil: FloatArray, dtype: npt.DTypeLike) -> Operator:
                 levels[i] *= hats[i // COUNTED]
             if i + 1 < LEVELS:
                 kernels.add_coarser(levels[i + 1], levels[i])
-        kernels.diagonal_and_finest(inverse, residual, levels[0], out)
-        return out
+        return out, kernels.diagonal_and_finest(inverse, residual, levels[0], out)
 
     return apply
 

@@ -156,7 +156,7 @@ def solve_smooth(
     ndarray, shape (H, W), float32
     """
     from sepi.regularization.multilevel import conjugate_gradients, multilevel_inverse
-    from sepi.regularization.second_order_kernels import MARGIN, product
+    from sepi.regularization.second_order_kernels import MARGIN
 
     if not weight.any():
         # nothing holds any surface
@@ -169,14 +169,9 @@ def solve_smooth(
     stencil[0][inside] += w
     # half the memory to go through, a third of the time; the solution is the same to a hundredth of its own error
     dtype: Any = np.float32 if rtol >= LEAST_SINGLE_RTOL else np.float64
-    packed, out = stencil.astype(dtype), np.zeros(stencil.shape[1:], dtype)
-
-    def times(vector: FloatArray) -> FloatArray:
-        product(packed, vector, out)
-        return out
-
+    packed = stencil.astype(dtype)
     inverse = multilevel_inverse(stencil, dtype)
     del stencil
     right, first = (np.pad(values, MARGIN).astype(dtype) for values in (w * (data - mean), start - mean))
-    solution = conjugate_gradients(times, inverse, right, first, rtol, max_iterations)
+    solution = conjugate_gradients(packed, inverse, right, first, rtol, max_iterations)
     return np.asarray(solution[inside] + mean, np.float32)

@@ -118,6 +118,15 @@ def stencil_of(along_x: Any, along_y: Any, across: Any, out: Any) -> None:
         _stencil_row(y, along_x, along_y, across, out)
 
 
+@njit(forceinline=True, borrows=True, fastmath=EXACT | {"reassoc"})
+def _dot(a: Any, b: Any) -> Any:
+    """Inner product of two rows, in an order that vectorises."""
+    total = a.dtype.type(0)
+    for x in range(a.size):
+        total += a[x] * b[x]
+    return total
+
+
 @njit(inline="always")
 def _add_pair(forth: Any, there: Any, back: Any, before: Any, out: Any) -> None:
     """One entry and its mirror image; few arrays at a time, so that the loop vectorises."""
@@ -125,28 +134,87 @@ def _add_pair(forth: Any, there: Any, back: Any, before: Any, out: Any) -> None:
         out[x] += forth[x] * there[x] + back[x] * before[x]
 
 
-@njit(cache=True, fastmath=EXACT)
-def product(stencil: Any, vector: Any, out: Any) -> None:
-    """The matrix times a picture.
+@njit(forceinline=True, borrows=True, fastmath=EXACT)
+def _product_row(stencil: Any, vector: Any, y: int, out: Any) -> None:
+    """Row ``y``, margin counted, of the matrix times a picture."""
+    m = MARGIN
+    n = vector.shape[1] - 2 * m
+    c, v, target = stencil[0, y, m : m + n], vector[y, m : m + n], out[y, m : m + n]
+    for x in range(n):
+        target[x] = c[x] * v[x]
+    for k, dy, dx in ((1, 0, 1), (2, 0, 2), (3, 1, 0), (4, 2, 0), (5, 1, 1), (6, 1, -1)):
+        _add_pair(
+            stencil[k, y, m : m + n], vector[y + dy, m + dx : m + dx + n],
+            stencil[k, y - dy, m - dx : m - dx + n], vector[y - dy, m - dx : m - dx + n], target,
+        )  # fmt: skip
+
+
+@njit(forceinline=True, borrows=True, fastmath=EXACT)
+def _turn(row: Any, ratio: Any, ahead: Any) -> None:
+    for x in range(row.size):
+        row[x] = ratio * row[x] + ahead[x]
+
+
+@njit(cache=True, fastmath=EXACT, borrows=True)
+def turn_and_bend(stencil: Any, ahead: Any, ratio: Any, direction: Any, out: Any) -> float:
+    """Turn a direction, and take the matrix times it, in one go through memory.
 
     Parameters
     ----------
     stencil : ndarray, shape (7, H + 2 MARGIN, W + 2 MARGIN), float32 or float64
         Of :func:`sepi.regularization.second_order.second_difference_stencil`, with a margin.
-    vector, out : ndarray, shape (H + 2 MARGIN, W + 2 MARGIN), of the same type
-        With a margin of zeros; that of ``out`` is not touched.
+    ahead : ndarray, shape (H + 2 MARGIN, W + 2 MARGIN), of the same type
+        With a margin of zeros.
+    ratio : float32 or float64
+    direction, out : ndarray, as ``ahead``
+        ``direction`` becomes ``ratio * direction + ahead``, and ``out`` the matrix times that, but for its margin.
+
+    Returns
+    -------
+    float
+        Inner product of both.
     """
     m = MARGIN
-    n = vector.shape[1] - 2 * m
-    for y in range(m, vector.shape[0] - m):
-        c, v, target = stencil[0, y, m : m + n], vector[y, m : m + n], out[y, m : m + n]
-        for x in range(n):
-            target[x] = c[x] * v[x]
-        for k, dy, dx in ((1, 0, 1), (2, 0, 2), (3, 1, 0), (4, 2, 0), (5, 1, 1), (6, 1, -1)):
-            _add_pair(
-                stencil[k, y, m : m + n], vector[y + dy, m + dx : m + dx + n],
-                stencil[k, y - dy, m - dx : m - dx + n], vector[y - dy, m - dx : m - dx + n], target,
-            )  # fmt: skip
+    H, W = direction.shape[0] - 2 * m, direction.shape[1] - 2 * m
+    total = 0.0
+    for y in range(m, m + min(m, H)):
+        _turn(direction[y], ratio, ahead[y])
+    for y in range(m, m + H):
+        # as far as second differences reach
+        if y + m < m + H:
+            _turn(direction[y + m], ratio, ahead[y + m])
+        _product_row(stencil, direction, y, out)
+        total += _dot(direction[y, m : m + W], out[y, m : m + W])
+    return total
+
+
+@njit(forceinline=True, borrows=True, fastmath=EXACT)
+def _step(solution: Any, residual: Any, length: Any, direction: Any, bent: Any) -> None:
+    for x in range(solution.size):
+        solution[x] += length * direction[x]
+        residual[x] -= length * bent[x]
+
+
+@njit(cache=True, fastmath=EXACT, borrows=True)
+def step(length: Any, direction: Any, bent: Any, solution: Any, residual: Any) -> float:
+    """Add a direction, so many times, to a solution, and take what the matrix makes of it from the residual.
+
+    Parameters
+    ----------
+    length : float32 or float64
+    direction, bent, solution, residual : ndarray, shape (H + 2 MARGIN, W + 2 MARGIN), of the same type
+        With margins of zeros; ``bent`` is the matrix times ``direction``.
+
+    Returns
+    -------
+    float
+        Squared norm of the residual.
+    """
+    total = 0.0
+    for y in range(len(solution)):
+        _step(solution[y], residual[y], length, direction[y], bent[y])
+        total += _dot(residual[y], residual[y])
+    return total
 
 
 @njit(cache=True, fastmath=EXACT)
@@ -212,7 +280,7 @@ def add_coarser(coarse: Any, fine: Any) -> None:
 
 
 @njit(cache=True, fastmath=EXACT)
-def diagonal_and_finest(inverse: Any, vector: Any, fine: Any, out: Any) -> None:
+def diagonal_and_finest(inverse: Any, vector: Any, fine: Any, out: Any) -> float:
     """``inverse * vector``, plus the finest hats.
 
     Parameters
@@ -221,9 +289,15 @@ def diagonal_and_finest(inverse: Any, vector: Any, fine: Any, out: Any) -> None:
         ``out`` is filled but for its margin.
     fine : ndarray, shape (h, w), of the same type
         Heights of the hats.
+
+    Returns
+    -------
+    float
+        Inner product of ``vector`` and ``out``.
     """
     H, W = vector.shape[0] - 2 * MARGIN, vector.shape[1] - 2 * MARGIN
     near, far = out.dtype.type(_NEAR), out.dtype.type(_FAR)
+    total = 0.0
     line, hats = np.empty(fine.shape[1], out.dtype), np.empty(2 * fine.shape[1], out.dtype)
     for y in range(H):
         first, second = (near, far) if y % 2 == 0 else (far, near)
@@ -236,6 +310,8 @@ def diagonal_and_finest(inverse: Any, vector: Any, fine: Any, out: Any) -> None:
         row, own, target = vector[y + MARGIN], inverse[y + MARGIN], out[y + MARGIN]
         for x in range(W):
             target[x + MARGIN] = own[x + MARGIN] * row[x + MARGIN] + hats[x]
+        total += _dot(row[MARGIN : MARGIN + W], target[MARGIN : MARGIN + W])
+    return total
 
 
 @njit(parallel=True, cache=True, fastmath=EXACT)
@@ -244,7 +320,7 @@ def diagonal_of_hats(stencil: Any, spacing: int, out: Any) -> None:
 
     Parameters
     ----------
-    stencil : ndarray, as in :func:`product`
+    stencil : ndarray, as in :func:`turn_and_bend`
     spacing : int
         Pixels from node to node.
     out : ndarray, shape (h, w), float64

@@ -15,7 +15,7 @@ from numba.extending import _Intrinsic
 
 import sepi
 from sepi.compiled import _KernelFiles
-from sepi.regularization.second_order_kernels import product
+from sepi.regularization.second_order_kernels import step
 
 PACKAGE = Path(sepi.__file__).parent
 
@@ -100,7 +100,7 @@ def test_compiled_functions_use_compiled_functions_of_other_files_only(file: Pat
 
 def test_compiled_at_once_by_two_processes_for_two_types(tmp_path: Path) -> None:
     """Either finds the code of its own type, or none: that of the other would crash, or compute anything."""
-    assert isinstance(product._cache._cache_file, _KernelFiles)
+    assert isinstance(step._cache._cache_file, _KernelFiles)
     one, other = (_KernelFiles(str(tmp_path), "cost-1.py3", "of this source") for _ in range(2))
     # as both read the index before either wrote it
     known, save_data = iter([{}, {}]), one._save_data

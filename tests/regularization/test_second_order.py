@@ -276,8 +276,9 @@ def test_preconditioner_adds_what_hats_of_each_width_see(shape) -> None:
     stencil = np.pad(second_difference_stencil(weights, shape), ((0, 0), *margins))
     inside = np.s_[MARGIN_OF_STENCIL:-MARGIN_OF_STENCIL, MARGIN_OF_STENCIL:-MARGIN_OF_STENCIL]
     stencil[0][inside] += held
-    found = multilevel_inverse(stencil, np.float64)(np.pad(residual, margins))
+    found, product = multilevel_inverse(stencil, np.float64)(np.pad(residual, margins))
     np.testing.assert_allclose(found[inside].ravel(), expected, rtol=1e-9, atol=1e-12)
+    assert product == pytest.approx(expected @ residual.ravel())
 
 
 def test_steps_stay_where_the_data_is_reliable_and_go_where_it_is_not() -> None:
