@@ -13,8 +13,6 @@ import numpy.typing as npt
 from sepi.lightfield import BoolMap, FloatMap
 from sepi.regularization.regions import Plane, basis_of
 
-# residuals that are computed at once: enough to save calls, few enough for the cache
-_AT_ONCE = 2**17
 _PIXELS_OF_A_PLANE = 12  # least to fit one to
 
 _Doubles = npt.NDArray[np.float64]
@@ -43,14 +41,10 @@ def support(
     positions: _Doubles, values: _Doubles, planes: _Doubles, tolerance: float, behind_penalty: float
 ) -> _Doubles:
     """How many of N pixels agree with each of P planes, less a weight for each that lies behind it; (P,)."""
+    from sepi.regularization.plane_search_kernels import support_of
 
-    def of(some: _Doubles) -> _Doubles:
-        residual = residuals_of(positions, values, some)
-        agreeing = (abs(residual) < tolerance).sum(axis=1)
-        return np.asarray(agreeing - behind_penalty * (residual < -tolerance).sum(axis=1))
-
-    parts = np.array_split(planes, -(-len(planes) * len(values) // _AT_ONCE))
-    return np.concatenate([of(part) for part in parts])
+    places, levels = np.ascontiguousarray(positions.T), np.ascontiguousarray(values)
+    return np.asarray(support_of(places, levels, planes, float(tolerance), float(behind_penalty)))
 
 
 def fitted(positions: _Doubles, values: _Doubles, plane: Plane, tolerance: float) -> Plane:

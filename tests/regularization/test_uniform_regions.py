@@ -5,6 +5,7 @@ import pytest
 from scipy.ndimage import gaussian_filter
 
 from sepi.lightfield import DisparityRange, LightField
+from sepi.regularization.plane_search import support
 from sepi.regularization.uniform_regions import UniformPlanesParameters, fill_uniform_regions
 from sepi.stage import StageMaps
 
@@ -118,3 +119,14 @@ def test_what_is_found_in_one_region_does_not_move_the_plane_of_the_next() -> No
     maps.disparity[right] = 1
     moved, _ = fill_uniform_regions(light_field, maps, parameters)
     np.testing.assert_array_equal(moved[left], usual[left])
+
+
+def test_planes_are_held_by_the_pixels_that_lie_on_them() -> None:
+    """Where behind counts as before, or a pixel more or less, a wall gets the plane of what hangs on it."""
+    random = np.random.default_rng(5)
+    positions = np.column_stack([np.ones(200), random.uniform(0, 50, (200, 2))])
+    planes = random.normal(0, (1, 0.02, 0.02), (30, 3))
+    values = positions @ planes[0] + random.normal(0, 0.3, 200)
+    residual = values - planes @ positions.T
+    expected = (abs(residual) < 0.2).sum(axis=1) - 0.7 * (residual < -0.2).sum(axis=1)
+    np.testing.assert_allclose(support(positions, values, planes, 0.2, 0.7), expected)
