@@ -1,13 +1,14 @@
 """Score files: what the evaluation of a scene's disparity maps found.
 
-Layout: a group ``maps/NAME`` per map, in it a group ``scores/PROTOCOL/REGION`` per cell with one attribute per score,
-the signed error map ``error (H, W)`` and the masks ``regions/NAME (H, W)``; the masks are the same for every map, and
-stored once. A map with error bars has ``reliability (3, 10)``, too. Where the scene has no ground truth the groups of
-the maps are empty, and the root attribute ``ground_truth`` is False.
+Layout: a group ``maps/NAME`` per map, in it ``scores``, JSON that leads from protocol and region to scores, the signed
+error map ``error (H, W)`` and the masks ``regions/NAME (H, W)``; the masks are the same for every map, and stored once.
+A map with error bars has ``reliability (3, 10)``, too. Where the scene has no ground truth the groups of the maps are
+empty, and the root attribute ``ground_truth`` is False.
 """
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
@@ -20,10 +21,10 @@ import numpy.typing as npt
 
 from sepi.errors import SepiError
 from sepi.io.hdf5 import UNITS, Attribute, attribute, create_hdf5, open_hdf5, read_dataset
-from sepi.io.integrity import members, own_attributes
+from sepi.io.integrity import members
 from sepi.lightfield import BoolMap, FloatMap
 
-_MAPS = "maps"
+_MAPS, _SCORES = "maps", "scores"
 _RELIABILITY = "reliability"
 _KIND = "score file (written by python -m sepi.evaluate)"
 
@@ -150,9 +151,10 @@ def read_evaluations(path: Path, names: Collection[str] | None = None) -> dict[s
 
 def put_evaluation(group: h5py.Group, evaluation: Evaluation) -> None:
     """Write an evaluation into an empty group, or a file's root; once read and written again it is the same bytes."""
-    for protocol, regions in sorted(evaluation.scores.items()):
-        for region, scores in sorted(regions.items()):
-            group.create_group(f"scores/{protocol}/{region}").attrs.update(sorted(scores.items()))
+    if evaluation.scores:
+        # some thousand attributes in groups of their own would take seconds to read
+        text = json.dumps(evaluation.scores, sort_keys=True)
+        group.create_dataset(_SCORES, data=np.frombuffer(text.encode(), np.uint8))
     if evaluation.error is not None:
         group.create_dataset("error", data=evaluation.error)
         group["error"].attrs["units"] = UNITS["disparity"]
@@ -166,13 +168,10 @@ def put_evaluation(group: h5py.Group, evaluation: Evaluation) -> None:
 
 def scores_in(group: h5py.Group) -> AllScores:
     """The scores alone of what :func:`put_evaluation` wrote: protocol to region to scores."""
-    return {
-        protocol: {
-            region: {key: attribute(cell, key).item() for key in own_attributes(cell)}
-            for region, cell in members(regions)
-        }
-        for protocol, regions in members(group.get("scores", {}))
-    }
+    if _SCORES not in group:
+        return {}
+    found = json.loads(read_dataset(Path(group.file.filename), group[_SCORES]).tobytes())
+    return {protocol: {region: dict(cell) for region, cell in regions.items()} for protocol, regions in found.items()}
 
 
 def evaluation_in(group: h5py.Group) -> Evaluation:

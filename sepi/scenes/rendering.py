@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sepi.lightfield import BoolMap, FloatMap
-from sepi.scenes.rendering_kernels import FloatArray, IntArray, hide, nearest, shade
+from sepi.scenes.rendering_kernels import BEYOND, FloatArray, IntArray, hide, nearest, shade
 from sepi.scenes.surfaces import Surface
 
 # Sub-samples per pixel and direction.
@@ -34,7 +34,9 @@ class Drawing(NamedTuple):
     planes: FloatArray
     """``a, b, c`` of each surface, shape (P, 3)."""
     texels: FloatMap
-    """Spline coefficients of all textures, one after the other, shape (N, 3)."""
+    """Spline coefficients of all textures, one after the other, shape (N, 4): three colours, and 0.
+
+    Each row goes on periodically for :data:`sepi.scenes.rendering_kernels.BEYOND` texels."""
     first_texel: IntArray
     """Where the texture of each surface begins."""
     side: IntArray
@@ -52,7 +54,8 @@ def drawing(surfaces: Sequence[Surface], size: int) -> Drawing:
         b, c = across / size, down / size
         planes.append((at_centre - (b + c) * (size - 1) / 2, b, c))
     textures = {id(surface.texture): surface.texture for surface in surfaces}
-    begin = dict(zip(textures, np.cumsum([0, *(t.shape[0] ** 2 for t in textures.values())]), strict=False))
+    sizes = [len(texture) * (len(texture) + BEYOND) for texture in textures.values()]
+    begin = dict(zip(textures, np.cumsum([0, *sizes]), strict=False))
     return Drawing(
         edges=np.concatenate(edges) * size - 0.5,
         first_edge=np.cumsum([0, *map(len, edges)]).astype(np.int64),
@@ -100,13 +103,14 @@ def occluded(scene: Drawing, disparity: FloatArray, baselines: FloatArray) -> Bo
 
 
 def _coefficients(texture: FloatMap) -> FloatMap:
-    """Cubic B-spline coefficients of a periodic texture, shape (M * M, 3)."""
+    """Cubic B-spline coefficients of a periodic texture, shape (M * (M + BEYOND), 4), as a drawing has them."""
     from scipy import ndimage
 
     values = texture.astype(np.float64)
     for axis in (0, 1):
         values = ndimage.spline_filter1d(values, order=3, axis=axis, mode="grid-wrap")
-    return values.reshape(-1, 3).astype(np.float32)
+    further = np.pad(values.astype(np.float32), ((0, 0), (0, BEYOND), (0, 0)), "wrap")
+    return np.pad(further, ((0, 0), (0, 0), (0, 1))).reshape(-1, 4)
 
 
 def _seen_from(scene: Drawing, v: float, u: float) -> tuple[FloatArray, FloatArray]:

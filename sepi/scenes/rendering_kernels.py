@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import numpy.typing as npt
 
-from sepi.compiled import njit
+from sepi.compiled import fma, njit
 from sepi.lightfield import BoolMap, FloatMap
+from sepi.vectors import at_most, load, spread, store
 
 # A surface hides a point only if it is nearer by more than rounding (points on the edge between two faces).
 TOLERANCE = 1e-9
+
+BEYOND = 3
+"""Texels that follow those of each row of a texture, as it goes on periodically: as many as a sample reaches."""
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
@@ -22,11 +28,12 @@ def _fill_row(
     edges: FloatArray,
     y: float,
     samples: int,
+    places: FloatArray,
     crossings: FloatArray,
     depth: FloatArray,
     owner: IntArray,
 ) -> None:
-    """Nearest disparity and its surface at the sub-samples of one row at height ``y``.
+    """Nearest disparity and its surface at the sub-samples ``places`` of one row at height ``y``.
 
     Even-odd rule; intervals are closed on the left and open on the right, so that neighbours leave no gap.
     """
@@ -52,7 +59,7 @@ def _fill_row(
             first = max(0, int(np.ceil((max(crossings[i], -1.0) + 0.5) * samples - 0.5)))
             last = int(np.ceil((min(crossings[i + 1], float(width)) + 0.5) * samples - 0.5))
             for column in range(first, min(width, last)):
-                d = at_zero + planes[p, 1] * ((column + 0.5) / samples - 0.5)
+                d = at_zero + planes[p, 1] * places[column]
                 if d > depth[column]:
                     depth[column] = d
                     owner[column] = p
@@ -63,9 +70,29 @@ def nearest(
     first_edge: IntArray, planes: FloatArray, edges: FloatArray, disparity: FloatArray, owner: IntArray
 ) -> None:
     """Fill ``disparity`` and ``owner`` at the pixel centres."""
-    crossings = np.empty(edges.shape[0])
+    crossings, places = np.empty(edges.shape[0]), np.arange(disparity.shape[1]).astype(np.float64)
     for row in range(disparity.shape[0]):
-        _fill_row(first_edge, planes, edges, float(row), 1, crossings, disparity[row], owner[row])
+        _fill_row(first_edge, planes, edges, float(row), 1, places, crossings, disparity[row], owner[row])
+
+
+@njit(forceinline=True, borrows=True)
+def _added(total: Any, texels: FloatMap, first: int, side: int, x: float, y: float, halves: Any) -> Any:
+    """A sample of a texture, which goes on periodically, added to a vector: its colours are the sum of both halves.
+
+    ``halves`` is a vector of four numbers below, and four above zero.
+    """
+    ix, across = _spline_weights(x)
+    iy, down = _spline_weights(y)
+    column, row, stride, zero = ix % side, iy % side, side + BEYOND, spread(np.float32(0))
+    # two texels at once, each of four numbers
+    left = right = zero
+    for j in range(4):
+        here = first + row * stride + column
+        left = fma(spread(down[j]), load(texels, (here, 0)), left)
+        right = fma(spread(down[j]), load(texels, (here + 2, 0)), right)
+        row = row + 1 if row + 1 < side else 0
+    total = fma(at_most(halves, zero, spread(across[0]), spread(across[1])), left, total)
+    return fma(at_most(halves, zero, spread(across[2]), spread(across[3])), right, total)
 
 
 @njit(cache=True)
@@ -83,57 +110,43 @@ def shade(
 ) -> None:
     """Add up the textures under all sub-samples of each pixel, and average."""
     size = picture.shape[0]
-    crossings = np.empty(edges.shape[0])
+    crossings, places = np.empty(edges.shape[0]), (np.arange(size * samples) + 0.5) / samples - 0.5
     depth = np.empty(size * samples)
     owner = np.empty(size * samples, np.int64)
-    weight_x, weight_y = np.empty(4), np.empty(4)
-    column_of = np.empty(4, np.int64)
+    sums = np.array([-1, -1, -1, -1, 1, 1, 1, 1], np.float32)
+    halves = load(sums, 0)
     for row in range(size * samples):
-        y = (row + 0.5) / samples - 0.5
-        _fill_row(first_edge, planes, edges, y, samples, crossings, depth, owner)
-        for column in range(size * samples):
-            p = owner[column]
-            if p < 0:
-                continue
-            x = (column + 0.5) / samples - 0.5
-            m = side[p]
-            ix = _spline_weights(x + u * depth[column], weight_x)
-            iy = _spline_weights(y + v * depth[column], weight_y)
-            # the texture goes on periodically; a division for every texel would take longer than all the rest
-            at = ix % m
-            for i in range(4):
-                column_of[i] = first_texel[p] + at
-                at = at + 1 if at + 1 < m else 0
-            at = iy % m
-            red = green = blue = 0.0
-            for j in range(4):
-                line = at * m
-                at = at + 1 if at + 1 < m else 0
-                # along the row first: the four rows do not wait for each other
-                a, b = texels[line + column_of[0]], texels[line + column_of[1]]
-                c, d = texels[line + column_of[2]], texels[line + column_of[3]]
-                w0, w1, w2, w3 = weight_x[0], weight_x[1], weight_x[2], weight_x[3]
-                red += weight_y[j] * ((w0 * a[0] + w1 * b[0]) + (w2 * c[0] + w3 * d[0]))
-                green += weight_y[j] * ((w0 * a[1] + w1 * b[1]) + (w2 * c[1] + w3 * d[1]))
-                blue += weight_y[j] * ((w0 * a[2] + w1 * b[2]) + (w2 * c[2] + w3 * d[2]))
-            pixel = picture[row // samples, column // samples]
-            pixel[0] += red
-            pixel[1] += green
-            pixel[2] += blue
+        y = places[row]
+        _fill_row(first_edge, planes, edges, y, samples, places, crossings, depth, owner)
+        line = row // samples
+        for pixel in range(size):
+            total = spread(np.float32(0))
+            for column in range(pixel * samples, (pixel + 1) * samples):
+                p = owner[column]
+                if p >= 0:
+                    d = depth[column]
+                    x = places[column] + u * d
+                    total = _added(total, texels, first_texel[p], side[p], x, y + v * d, halves)
+            store(sums, 0, total)
+            for c in range(3):
+                picture[line, pixel, c] += sums[c] + sums[4 + c]
     picture /= samples * samples
 
 
-@njit(cache=True)
-def _spline_weights(position: float, weights: FloatArray) -> int:
-    """Cubic B-spline weights at ``position``; gives the index of the first of the four texels."""
+@njit(forceinline=True)
+def _spline_weights(position: float) -> Any:
+    """The index of the first of four texels, and their cubic B-spline weights at ``position``."""
     base = np.floor(position)
-    f = position - base
-    g = 1 - f
-    weights[0] = g * g * g / 6
-    weights[1] = 2 / 3 - 0.5 * f * f * (1 + g)
-    weights[2] = 2 / 3 - 0.5 * g * g * (1 + f)
-    weights[3] = f * f * f / 6
-    return int(base) - 1
+    f = np.float32(position - base)
+    g = np.float32(1) - f
+    sixth, most, half = np.float32(1 / 6), np.float32(2 / 3), np.float32(0.5)
+    weights = (
+        g * g * g * sixth,
+        most - half * f * f * (np.float32(1) + g),
+        most - half * g * g * (np.float32(1) + f),
+        f * f * f * sixth,
+    )
+    return int(base) - 1, weights
 
 
 @njit(cache=True)
@@ -228,17 +241,14 @@ def colours_at(
     texels: FloatMap, first_texel: IntArray, side: IntArray, owner: IntArray, hits: FloatArray, colours: FloatArray
 ) -> None:
     """Texture of the surface that each ray of :func:`cast` hits; black where there is none."""
-    weight_x, weight_y = np.empty(4), np.empty(4)
+    sums = np.array([-1, -1, -1, -1, 1, 1, 1, 1], np.float32)
+    halves = load(sums, 0)
     for i in range(owner.size):
         p = owner[i]
         colours[i] = 0
         if p < 0:
             continue
-        m = side[p]
-        ix = _spline_weights(hits[i, 1], weight_x)
-        iy = _spline_weights(hits[i, 2], weight_y)
-        for j in range(4):
-            line = first_texel[p] + (iy + j) % m * m
-            for k in range(4):
-                for c in range(3):
-                    colours[i, c] += weight_y[j] * weight_x[k] * texels[line + (ix + k) % m, c]
+        found = _added(spread(np.float32(0)), texels, first_texel[p], side[p], hits[i, 1], hits[i, 2], halves)
+        store(sums, 0, found)
+        for c in range(3):
+            colours[i, c] = sums[c] + sums[4 + c]

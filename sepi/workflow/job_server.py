@@ -28,7 +28,9 @@ from sepi.openmp import wait_asleep
 from sepi.workflow.job_client import TAKEN
 
 # what most jobs import: libraries with parts that they import late, and what the stages have in common
-_LIBRARIES = ("cv2", "h5py", "skimage.segmentation", "scipy.sparse.linalg", "pydantic.fields")
+_LIBRARIES = (
+    "cv2", "h5py", "skimage.segmentation.slic_superpixels", "scipy.sparse.linalg", "scipy.ndimage", "pydantic.fields",
+)  # fmt: skip
 _COMMON = ("sepi.command", "sepi.variants", "sepi.io.hdf5", "sepi.io.provenance", "sepi.exposure", "sepi.memory")
 _ALGORITHMS = ("sepi.matching", "sepi.boundaries", "sepi.regularization", "sepi.error_bars")
 

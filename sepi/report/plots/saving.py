@@ -32,6 +32,10 @@ def new_figure(width: float, height: float, layout: Literal["constrained"] | Non
 
 def save(figure: Figure, folder: Path, name: str, endings: Sequence[str] = BOTH) -> None:
     """Write a figure as ``NAME.ENDING`` for each of the endings ``png`` and ``pdf``, each whole or not at all."""
+    if figure.get_layout_engine() is not None:
+        # once for all endings: a layout takes longer than a drawing, and for each file there would be both, twice
+        figure.draw_without_rendering()
+        figure.set_layout_engine("none")
     for ending in endings:
         # in memory first: on a full disk matplotlib fails a second time while it closes its file
         content = BytesIO()
