@@ -32,6 +32,8 @@ _LIBRARIES = (
     "cv2", "h5py", "skimage.segmentation.slic_superpixels", "scipy.sparse.linalg", "scipy.ndimage", "pydantic.fields",
 )  # fmt: skip
 _COMMON = ("sepi.command", "sepi.variants", "sepi.io.hdf5", "sepi.io.provenance", "sepi.exposure", "sepi.memory")
+# what some jobs import beside, which is loaded when the first of them comes: start of a module's name to libraries
+_OF_SOME = {"sepi.report.": ("matplotlib.figure", "matplotlib.backends.backend_agg", "matplotlib.backends.backend_pdf")}
 _ALGORITHMS = ("sepi.matching", "sepi.boundaries", "sepi.regularization", "sepi.error_bars")
 
 # how the work of this process ended
@@ -320,6 +322,13 @@ def _load() -> None:
     gc.freeze()
 
 
+def _load_for(job: Job) -> None:
+    """Import what a job and others like it need."""
+    _, module, *_ = job.words
+    for name in (name for start, names in _OF_SOME.items() if module.startswith(start) for name in names):
+        importlib.import_module(name)
+
+
 def _run(job: Job) -> None:
     """Do a job in this process as Python would."""
     _, module, *sys.argv[1:] = job.words
@@ -333,6 +342,6 @@ def _run(job: Job) -> None:
 if __name__ == "__main__":
     end_forks_at_once()
     _load()
-    job = serve()
+    job = serve(_load_for)
     if job is not None:
         _run(job)
