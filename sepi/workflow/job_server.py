@@ -29,7 +29,8 @@ from sepi.workflow.job_client import TAKEN
 
 # what most jobs import: libraries with parts that they import late, and what the stages have in common
 _LIBRARIES = (
-    "cv2", "h5py", "skimage.segmentation.slic_superpixels", "scipy.sparse.linalg", "scipy.ndimage", "pydantic.fields",
+    "cv2", "h5py", "skimage.segmentation.slic_superpixels", "scipy.sparse.linalg", "scipy.fft", "scipy.ndimage",
+    "pyamg", "pydantic.fields",
 )  # fmt: skip
 _COMMON = ("sepi.command", "sepi.variants", "sepi.io.hdf5", "sepi.io.provenance", "sepi.exposure", "sepi.memory")
 # what some jobs import beside, which is loaded when the first of them comes: start of a module's name to libraries
@@ -318,6 +319,8 @@ def _load() -> None:
     importlib.import_module("sepi.compiled").prepare_loading()
     # pydantic looks for plugins as it makes its first model
     importlib.import_module("sepi.stage").NoParameters()
+    # which every job tells
+    importlib.import_module("sepi.machine").versions()
     # forks need not look through all that for what is not used, which would copy it
     gc.freeze()
 
