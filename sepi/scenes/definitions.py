@@ -10,8 +10,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from sepi.scenes import textures
 from sepi.scenes.surfaces import Plane, Surface, blob, everywhere, polygon, pyramid, rectangle, thread
-from sepi.scenes.textures import noise, photograph, shading
+
+# made when they are drawn: where surfaces are does not depend on them
+noise, photograph, shading = (textures.later(make) for make in (textures.noise, textures.photograph, textures.shading))
 
 
 class Scene(NamedTuple):

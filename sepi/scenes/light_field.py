@@ -96,7 +96,7 @@ def render(
 
 def scene_truth(name: str, size: int, views: int) -> Truth:
     """Ground truth and masks of what :func:`render` makes, without its pictures."""
-    _, light_field = _with_truth(name, size, views)
+    _, light_field = _with_truth(name, size, views, textured=False)
     return light_field.ground_truth, light_field.masks
 
 
@@ -106,14 +106,16 @@ def _with_truth(
     views: int,
     row_spacing: float = 1.0,
     positions: npt.NDArray[np.float64] | None = None,
+    *,
+    textured: bool = True,
 ) -> tuple[Drawing, LightField]:
-    """What is to be drawn, and the light field with all but its pictures."""
+    """What is to be drawn, with textures or only where, and the light field with all but its pictures."""
     from sepi.scenes.rendering import drawing, occluded, visible
 
     _require_scene(name, size)
     _require_whole(name, "views", views, 2, MOST_VIEWS)
     surfaces = DEFINITIONS[name].surfaces()
-    scene = drawing(surfaces, size)
+    scene = drawing(surfaces, size, textured=textured)
     disparity, owner = visible(scene, size)
     light_field = LightField(
         views=np.zeros((views, views, size, size, 3), np.uint8),

@@ -43,8 +43,8 @@ class Drawing(NamedTuple):
     """Its period in texels."""
 
 
-def drawing(surfaces: Sequence[Surface], size: int) -> Drawing:
-    """Put surfaces into pixels of a picture of ``size`` by ``size``."""
+def drawing(surfaces: Sequence[Surface], size: int, *, textured: bool = True) -> Drawing:
+    """Put surfaces into pixels of a picture of ``size`` by ``size``; without textures, where only their places count."""
     edges = [
         np.concatenate([np.hstack([outline, np.roll(outline, -1, axis=0)]) for outline in surface.outlines])
         for surface in surfaces
@@ -53,16 +53,18 @@ def drawing(surfaces: Sequence[Surface], size: int) -> Drawing:
     for at_centre, across, down in (surface.plane for surface in surfaces):
         b, c = across / size, down / size
         planes.append((at_centre - (b + c) * (size - 1) / 2, b, c))
-    textures = {id(surface.texture): surface.texture for surface in surfaces}
+    asked = {id(surface.texture): surface.texture for surface in surfaces} if textured else {}
+    textures = {key: texture() if callable(texture) else texture for key, texture in asked.items()}
     sizes = [len(texture) * (len(texture) + BEYOND) for texture in textures.values()]
     begin = dict(zip(textures, np.cumsum([0, *sizes]), strict=False))
+    own = [id(surface.texture) for surface in surfaces] if textured else []
     return Drawing(
         edges=np.concatenate(edges) * size - 0.5,
         first_edge=np.cumsum([0, *map(len, edges)]).astype(np.int64),
         planes=np.array(planes, np.float64),
-        texels=np.concatenate([_coefficients(texture) for texture in textures.values()]),
-        first_texel=np.array([begin[id(surface.texture)] for surface in surfaces], np.int64),
-        side=np.array([surface.texture.shape[0] for surface in surfaces], np.int64),
+        texels=np.concatenate([np.empty((0, 4), np.float32), *map(_coefficients, textures.values())]),
+        first_texel=np.array([begin[key] for key in own], np.int64),
+        side=np.array([len(textures[key]) for key in own], np.int64),
     )
 
 

@@ -6,7 +6,7 @@ left pixel, (1, 1) that of the bottom right pixel. Shapes therefore grow with th
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -39,8 +39,8 @@ class Surface(NamedTuple):
     outlines: Sequence[Outline]
     """A point inside an odd number of them belongs to the surface (a second outline cuts a hole)."""
     plane: Plane
-    texture: FloatMap
-    """Periodic, one texel per pixel, shape (M, M, 3) in 0..1."""
+    texture: FloatMap | Callable[[], FloatMap]
+    """Periodic, one texel per pixel, shape (M, M, 3) in 0..1; or what makes it."""
     textureless: bool = False
     """The texture carries no depth."""
 

@@ -6,6 +6,10 @@ only the shapes grow. The photographs are samples that scikit-image installs wit
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
 import numpy as np
 import numpy.typing as npt
 
@@ -59,6 +63,15 @@ def shading(colour: Colour, amplitude: float) -> FloatMap:
     phase = 2 * np.pi * np.arange(PERIOD) / PERIOD
     wave = 0.5 * amplitude * (np.sin(phase)[:, None] + np.sin(phase)[None, :])
     return _limited(np.array(colour) + wave[..., None])
+
+
+def later(make: Callable[..., FloatMap]) -> Callable[..., Callable[[], FloatMap]]:
+    """One of these functions as one that remembers what is asked of it, until the texture is called for."""
+
+    def asked(*given: Any, **named: Any) -> Callable[[], FloatMap]:
+        return partial(make, *given, **named)
+
+    return asked
 
 
 def _bands(rng: np.random.Generator, coarsest: float) -> npt.NDArray[np.float64]:
