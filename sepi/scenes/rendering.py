@@ -44,7 +44,7 @@ class Drawing(NamedTuple):
 
 
 def drawing(surfaces: Sequence[Surface], size: int, *, textured: bool = True) -> Drawing:
-    """Put surfaces into pixels of a picture of ``size`` by ``size``; without textures, where only their places count."""
+    """Put surfaces into pixels of a picture of ``size`` by ``size``; without textures where only their places count."""
     edges = [
         np.concatenate([np.hstack([outline, np.roll(outline, -1, axis=0)]) for outline in surface.outlines])
         for surface in surfaces

@@ -17,6 +17,9 @@ from sepi.lightfield import FloatMap
 Outline = npt.NDArray[np.float64]
 """Corners ``(N, 2)`` of a closed polygon as (x, y)."""
 
+Texture = FloatMap | Callable[[], FloatMap]
+"""Periodic, one texel per pixel, shape (M, M, 3) in 0..1; or what makes it."""
+
 # Corners of a circle: at 1024 pixels the polygon is nowhere 0.1 pixels from the circle.
 CIRCLE_CORNERS = 180
 
@@ -39,8 +42,7 @@ class Surface(NamedTuple):
     outlines: Sequence[Outline]
     """A point inside an odd number of them belongs to the surface (a second outline cuts a hole)."""
     plane: Plane
-    texture: FloatMap | Callable[[], FloatMap]
-    """Periodic, one texel per pixel, shape (M, M, 3) in 0..1; or what makes it."""
+    texture: Texture
     textureless: bool = False
     """The texture carries no depth."""
 
@@ -75,7 +77,7 @@ def thread(start: tuple[float, float], end: tuple[float, float], width: float) -
     return np.stack([a + side, b + side, b - side, a - side])
 
 
-def pyramid(base: Outline, apex: tuple[float, float], height: float, ground: Plane, texture: FloatMap) -> list[Surface]:
+def pyramid(base: Outline, apex: tuple[float, float], height: float, ground: Plane, texture: Texture) -> list[Surface]:
     """The faces of a pyramid that stands on ``ground``; its top is seen at ``apex`` in the centre view.
 
     ``height`` is the disparity by which the top is nearer than the ground; negative for a pyramid sunk into it.
