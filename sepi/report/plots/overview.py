@@ -7,6 +7,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from matplotlib.image import AxesImage
 
 from sepi.report.plots.pictures import Picture
 from sepi.report.plots.saving import BOTH, new_figure, save
@@ -32,6 +33,7 @@ def write_overview(
     sheet.set_axis_off()
     sheet.text(sheet_size[0] / 2, sheet_size[1] - 0.1, title, fontsize=12, ha="center", va="top", parse_math=False)
     dots = (round(size[0] * _DOTS), round(size[1] * _DOTS))
+    enlarged: list[tuple[AxesImage, Picture]] = []
     for number, row in enumerate(rows):
         bottom = sheet_size[1] - head - (number + 1) * row_height + _GAP / 2
         for column, (words, picture) in enumerate(row):
@@ -40,10 +42,16 @@ def write_overview(
             # in the size at which it is drawn; matplotlib would take longer, and once for each file
             way = cv2.INTER_AREA if dots[0] < width else cv2.INTER_LINEAR
             drawn = np.asarray(cv2.resize(picture, dots, interpolation=way), np.uint8)
-            sheet.imshow(drawn, extent=extent, aspect="auto", interpolation="none")
+            image = sheet.imshow(drawn, extent=extent, aspect="auto", interpolation="none")
+            if dots[0] > width:
+                enlarged.append((image, picture))
             place = (left + size[0] / 2, bottom + size[1] + 0.04)
             sheet.text(*place, words, fontsize=8, ha="center", va="bottom", parse_math=False)
     # pictures set limits of their own
     sheet.set_xlim(0, sheet_size[0])
     sheet.set_ylim(0, sheet_size[1])
-    save(figure, folder, name, endings)
+    save(figure, folder, name, [ending for ending in endings if ending != "pdf"])
+    # who looks at it enlarges a picture as well, and what is smaller is packed sooner
+    for image, picture in enlarged:
+        image.set_data(picture)
+    save(figure, folder, name, [ending for ending in endings if ending == "pdf"])
