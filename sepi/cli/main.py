@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 from collections import UserDict
 from importlib import import_module
 from typing import Any
@@ -12,6 +13,8 @@ from sepi.command import SepiGroup
 from sepi.openmp import one_thread_of_blas
 
 one_thread_of_blas()
+# libraries make some hundred thousand objects that stay: to go through them again and again takes a tenth of importing
+gc.set_threshold(100_000)
 
 _COMMANDS = {
     "calibrate": ("calibrate", "Find the cameras of pictures without poses, by COLMAP."),
