@@ -36,6 +36,7 @@ TIFF_SIGNATURES = (b"II*\0", b"II+\0", b"MM\0*", b"MM\0+")
 # more than any of the compressions reaches on pictures of 8 bit; small pictures of one colour may shrink further
 _PIXELS_PER_BYTE = 1100
 _SMALL = 2**24
+_SILENT = logging.NullHandler()
 
 
 @dataclass(frozen=True)
@@ -159,7 +160,7 @@ def open_tiff(file: IO[bytes]) -> TiffFile:
     import tifffile
 
     # what it complains of is raised here
-    logging.getLogger("tifffile").addHandler(logging.NullHandler())
+    logging.getLogger("tifffile").addHandler(_SILENT)
     return tifffile.TiffFile(file)
 
 
