@@ -8,6 +8,7 @@ import numpy as np
 
 from sepi.boundaries.arrays import RimViews, Sides
 from sepi.boundaries.rim_kernels import Rim
+from sepi.boundaries.view_samples import sample, sees
 from sepi.compiled import fma, njit, prange
 from sepi.vectors import first_elements, load, spread, store, sum_of
 
@@ -44,69 +45,6 @@ _AT_ONCE = 64  # pixels that a thread does at a stretch
 _BEHIND, _NOISE = 3, 6
 # rows of the nearer surface beside a pixel (4, 3): its colour, the least and the most that it shows, what fits best
 _OWN, _LEAST, _MOST, _FIT = 0, 1, 2, 3
-
-
-@njit(forceinline=True, borrows=True)
-def _sees(views: RimViews, view: int, d: Any, y: int, x: int) -> Any:
-    """Whether a view shows a pixel of disparity ``d``, and where: row and column of the sample, and its fractions."""
-    H, W = views.lines.shape[2], views.lines.shape[3] // views.channels
-    down, across = y - d * views.baselines[view, 0], x - d * views.baselines[view, 1]
-    if down < 0 or across < 0 or down >= H - 1 or across >= W - 1:
-        return False, 0, 0, 0.0, 0.0
-    row, column = int(down), int(across)
-    nearest = views.nearest[
-        views.places[view, 0], views.places[view, 1], int(down + 0.5) - views.low, int(across + 0.5)
-    ]
-    return nearest <= d + views.margin, row, column, down - row, across - column
-
-
-@njit(forceinline=True, borrows=True)
-def _cubic(f: Any) -> Any:
-    """Weights of four neighbours, the second and third of which a sample lies between (Catmull and Rom's)."""
-    half, one, more = np.float32(0.5), np.float32(1), np.float32(1.5)
-    return (
-        f * (f * (one - half * f) - half),
-        one + f * f * (more * f - np.float32(2.5)),
-        f * (half + f * (np.float32(2) - more * f)),
-        f * f * (half * f - half),
-    )
-
-
-@njit(forceinline=True, borrows=True)
-def _sample(views: RimViews, view: int, row: int, column: int, fy: Any, fx: Any, sums: Any, out: Any) -> None:
-    """Colour between pixels of a view into ``out (3,)``, 0..1; grey counts as three equal channels.
-
-    Cubic, since a bilinear sample takes from the peak of what is two pixels wide. ``sums (4 + VECTOR,)`` is scratch.
-    """
-    lines, t, s, C = views.lines, views.places[view, 0], views.places[view, 1], views.channels
-    H, W = lines.shape[2], lines.shape[3] // C
-    down, across = _cubic(np.float32(fy)), _cubic(np.float32(fx))
-    rows = max(row - 1, 0), row, row + 1, min(row + 2, H - 1)
-    red, green, blue = np.float32(0), np.float32(0), np.float32(0)
-    if C == 3 and 1 <= column < W - 2:
-        # four pixels side by side, of which the first eight numbers and the last eight make up all twelve
-        for at in (0, 4):
-            i = 3 * (column - 1) + at
-            total = spread(down[0]) * load(lines, (t, s, rows[0], i))
-            total = fma(spread(down[1]), load(lines, (t, s, rows[1], i)), total)
-            total = fma(spread(down[2]), load(lines, (t, s, rows[2], i)), total)
-            store(sums, at, fma(spread(down[3]), load(lines, (t, s, rows[3], i)), total))
-        for j in range(4):
-            red += across[j] * sums[3 * j]
-            green += across[j] * sums[3 * j + 1]
-            blue += across[j] * sums[3 * j + 2]
-    else:
-        # green and blue of a grey picture are its last channel, too
-        second, third = min(1, C - 1), min(2, C - 1)
-        for j in range(4):
-            i = C * min(max(column - 1 + j, 0), W - 1)
-            for k in range(4):
-                weight = across[j] * down[k]
-                red += weight * lines[t, s, rows[k], i]
-                green += weight * lines[t, s, rows[k], i + second]
-                blue += weight * lines[t, s, rows[k], i + third]
-    unit = views.units[view]
-    out[0], out[1], out[2] = red * unit, green * unit, blue * unit
 
 
 @njit(parallel=True, cache=True)
@@ -152,7 +90,7 @@ def brightness_of_views(views: RimViews, sides: Sides, missing: Any) -> Any:
                     or of_view[row + 1, column + 1]
                 ):
                     continue
-                _sample(views, view, row, column, down - row, across - column, sums, shown[n, 0])
+                sample(views, view, row, column, down - row, across - column, sums, shown[n, 0])
                 for c in range(3):
                     shown[n, 1, c] = guide[y, x, c]
                     own += shown[n, 1, c]
@@ -237,9 +175,9 @@ def background_of(views: RimViews, layer: Any, wanted: Any, begin: int, end: int
         for view in range(N):
             for i in range(few):
                 x = columns[i]
-                seen, row, column, fy, fx = _sees(views, view, layer[y, x], y, x)
+                seen, row, column, fy, fx = sees(views, view, layer[y, x], y, x)
                 if seen:
-                    _sample(views, view, row, column, fy, fx, sums, colour_there)
+                    sample(views, view, row, column, fy, fx, sums, colour_there)
                     for c in range(3):
                         samples[i, c, count[i]] = colour_there[c]
                     count[i] += 1
@@ -314,7 +252,7 @@ def _along_near(
     H, W, _ = background.shape
     n = 0
     for view in range(len(views.places)):
-        seen, row, column, fy, fx = _sees(views, view, near, y, x)
+        seen, row, column, fy, fx = sees(views, view, near, y, x)
         # where the background that is there in the view is in the reference view
         down = y - (near - far) * views.baselines[view, 0]
         across = x - (near - far) * views.baselines[view, 1]
@@ -324,7 +262,7 @@ def _along_near(
         if _behind(background, i, j, np.float32(down - i), np.float32(across - j), sums):
             for k in range(4):
                 samples[_BEHIND + k, n] = sums[k]
-            _sample(views, view, row, column, fy, fx, sums, colour)
+            sample(views, view, row, column, fy, fx, sums, colour)
             for c in range(3):
                 samples[c, n] = colour[c]
             n += 1
@@ -389,9 +327,9 @@ def _cost_alone(
         if views.baselines[view, 0] == 0 and views.baselines[view, 1] == 0:
             # the reference view itself always fits
             continue
-        seen, row, column, fy, fx = _sees(views, view, d, y, x)
+        seen, row, column, fy, fx = sees(views, view, d, y, x)
         if seen:
-            _sample(views, view, row, column, fy, fx, sums, colour)
+            sample(views, view, row, column, fy, fx, sums, colour)
             for c in range(3):
                 samples[c, n] = colour[c]
             n += 1
