@@ -1,32 +1,41 @@
-"""Near or far beside a depth step, by the votes of all views and of the reference view's colours.
+"""Near or far beside a depth step, by all views and the reference view's colours, along straight edges.
 
 A pixel that an edge runs through shows a share of the nearer surface, and of what is behind it the rest. It moves with
 the nearer one and fits that one's disparity, however small its share is: by matching alone, surfaces are one pixel too
 wide, and narrow gaps between them close. Where the share is more than a half the pixel is near, else far. It is told by
 
 - all views, which show it before other and other pieces of background (:mod:`sepi.boundaries.surface_shares`),
-- its colour, between those of both surfaces (:mod:`sepi.boundaries.colour_mixture`).
+- its colour, between those of both surfaces (:mod:`sepi.boundaries.colour_mixture`),
+- its neighbours: the edge goes on through them (:mod:`sepi.boundaries.edge_lines`).
+
+Each share has a cost, by what the views and the colours say against it, and by how far it is from what the map has.
 """
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from sepi.boundaries.colour_mixture import mixture_evidence
+from sepi.boundaries.edge_lines import line_evidence
 from sepi.boundaries.parameters import BoundaryParameters
-from sepi.boundaries.surface_shares import share_evidence
-from sepi.boundaries.surroundings import surroundings
+from sepi.boundaries.surface_shares import ShareCosts, nothing_told, share_costs
+from sepi.boundaries.surroundings import Surroundings, surroundings
 from sepi.image.noise import reference_residual_variance
 from sepi.lightfield import FloatMap, LightField
 
-_CERTAIN = np.float32(0.0075)
-"""Difference of mean costs at which shares are rather sure that a pixel is the more distant surface's; 0..1."""
+if TYPE_CHECKING:
+    from sepi.boundaries.rim_kernels import Rim
 
-_MIXTURE_WEIGHT = np.float32(4.6)
-"""Of the colours' vote beside that of the shares, which is -1..1."""
+_UNTOLD = np.float32(4)
+"""How much more a pixel that the views do not tell of is held on the side that the map has."""
 
-_MAJORITY = 0.36
-"""Sum of votes with which a pixel leaves the nearer surface."""
+_MIXTURE_COST = np.float32(4)
+"""Of a whole share beyond the next where colours without doubt speak for the farther surface."""
+
+_FREE_SHARE = np.float32(0.4)
+"""Share of the nearer surface up to which colours that speak for the farther one cost nothing."""
 
 
 def assigned_to_surfaces(light_field: LightField, disparity: FloatMap, parameters: BoundaryParameters) -> FloatMap:
@@ -52,14 +61,37 @@ def assigned_to_surfaces(light_field: LightField, disparity: FloatMap, parameter
     if not rim.inside.any():
         return disparity
     around = surroundings(disparity)
-    evidence = np.zeros_like(disparity)
+    costs, told = _costs(light_field, disparity, around, rim, parameters)
+    evidence = line_evidence(disparity, rim, costs) if parameters.use_lines else _own_evidence(costs)
+    farther = evidence > 0
+    decided = disparity.copy()
+    is_near = rim.is_near[rim.inside]
+    other = np.where(is_near, rim.far[rim.inside], rim.near[rim.inside])
+    decided[rim.inside] = np.where(told & (farther == is_near), other, decided[rim.inside])
+    return decided
+
+
+def _costs(
+    light_field: LightField, disparity: FloatMap, around: Surroundings, rim: Rim, parameters: BoundaryParameters
+) -> ShareCosts:
+    """What views, colours and the map itself say against each share; told where views or colours say anything."""
     if parameters.use_shares:
-        evidence = share_evidence(light_field, disparity, around, rim, parameters)
-    votes = np.tanh(evidence / _CERTAIN)
+        costs, told = share_costs(light_field, disparity, around, rim, parameters)
+    else:
+        costs, told = nothing_told(int(rim.inside.sum()))
+    is_near = rim.is_near[rim.inside][:, None]
+    share = np.linspace(0, 1, costs.shape[1], dtype=np.float32)
+    held = np.float32(parameters.share_evidence) * np.where(told, np.float32(1), _UNTOLD)
+    costs += held[:, None] * np.where(is_near, 1 - share, share)
     if parameters.use_mixture:
-        colours = light_field.reference_view
-        variance = reference_residual_variance(light_field)
-        votes += _MIXTURE_WEIGHT * mixture_evidence(disparity, around, colours, variance, parameters)
-    leaves = rim.is_near & rim.inside & (votes > _MAJORITY)
-    joins = ~rim.is_near & (evidence > parameters.share_evidence)
-    return np.where(leaves, rim.far, np.where(joins, rim.near, disparity))
+        colours, variance = light_field.reference_view, reference_residual_variance(light_field)
+        mixture = mixture_evidence(disparity, around, colours, variance, parameters)[rim.inside]
+        costs += _MIXTURE_COST * mixture[:, None] * np.maximum(share - _FREE_SHARE, 0)
+        told |= mixture > 0
+    return ShareCosts(costs, told)
+
+
+def _own_evidence(costs: FloatMap) -> FloatMap:
+    """By how much the best share below one half costs less than the best above, of pixels alone; shape (n,)."""
+    half = costs.shape[1] // 2
+    return np.asarray(costs[:, half:].min(axis=1) - costs[:, :half].min(axis=1), np.float32)

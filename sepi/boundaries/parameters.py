@@ -12,6 +12,9 @@ class BoundaryParameters(OcclusionMarginParameters):
 
     use_shares: bool = Field(True, description="whether the shares of both surfaces that all views show have a vote")
     use_mixture: bool = Field(True, description="whether the mixture of colours in the reference view has a vote")
+    use_lines: bool = Field(
+        True, description="whether straight edges through its neighbours decide about a pixel, or the pixel alone"
+    )
     boundary_step: float = Field(
         0.3, gt=0, description="depth step beside which pixels may be of either surface, pixels per view step"
     )
@@ -19,7 +22,10 @@ class BoundaryParameters(OcclusionMarginParameters):
         4, ge=1, le=20, description="how far away clean colours of both surfaces are looked for, in pixels"
     )
     share_evidence: float = Field(
-        0.006, ge=0, lt=1, description="difference of mean costs, 0..1, that moves a pixel to the nearer surface"
+        0.015,
+        ge=0,
+        lt=1,
+        description="cost of a whole pixel's change to the other surface beside mean costs of what views show, 0..1",
     )
     share_radius: int = Field(2, ge=1, le=10, description="distance from the step within which views vote, in pixels")
     share_scale: float = Field(

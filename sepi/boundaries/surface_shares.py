@@ -1,4 +1,4 @@
-"""By how much the views say that a pixel beside a depth step belongs to the other of its two surfaces.
+"""How much of a pixel beside a depth step each view shows as the nearer of its two surfaces.
 
 A pixel that an edge runs through shows a share ``a`` of the nearer surface, of colour ``F``, and of the background the
 rest. It moves with the nearer surface: along that disparity every view ``v`` shows the same share before another piece
@@ -9,7 +9,7 @@ of background, ``I_v = a F + (1 - a) B_v``. Views that are not hidden show what 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import cv2
 import numpy as np
@@ -18,7 +18,7 @@ from sepi.boundaries.arrays import RimViews, Sides
 from sepi.boundaries.parameters import BoundaryParameters
 from sepi.boundaries.surroundings import Surroundings
 from sepi.image.noise import noise_of_reference_view
-from sepi.lightfield import FloatMap, LightField, full_scale
+from sepi.lightfield import BoolMap, FloatMap, LightField, full_scale
 from sepi.matching.nearest_surfaces import nearest_surfaces
 from sepi.matching.row_bands import row_bands
 from sepi.matching.view_subsets import spread_views
@@ -36,10 +36,32 @@ BYTES_PER_PIXEL = 4
 """Of a pixel of a view: the z-buffer."""
 
 
-def share_evidence(
+class ShareCosts(NamedTuple):
+    """How badly shares of the nearer surface explain what the views show of the pixels of a rim.
+
+    Attributes
+    ----------
+    costs : ndarray, shape (n, K), float32
+        Mean robust residuals of shares from 0 to 1, 0..1; 0 where the views do not tell.
+    told : ndarray, shape (n,), bool
+        Where they do.
+    """
+
+    costs: FloatMap
+    told: BoolMap
+
+
+def nothing_told(count: int) -> ShareCosts:
+    """Costs of so many pixels that no view was asked about."""
+    from sepi.boundaries.surface_shares_kernels import SHARES
+
+    return ShareCosts(np.zeros((count, SHARES), np.float32), np.zeros(count, bool))
+
+
+def share_costs(
     light_field: LightField, disparity: FloatMap, around: Surroundings, rim: Rim, parameters: BoundaryParameters
-) -> FloatMap:
-    """By how much the other surface explains the views better than the one that a pixel has.
+) -> ShareCosts:
+    """Costs of shares of the nearer surface by all views.
 
     Parameters
     ----------
@@ -49,16 +71,18 @@ def share_evidence(
     around : Surroundings
         Of the disparity.
     rim : Rim
-        The pixels that are looked at, and both surfaces.
+        Its ``n`` pixels inside are looked at.
     parameters : BoundaryParameters
 
     Returns
     -------
-    ndarray, shape (H, W), float32
-        Differences of mean costs, -1..1; 0 where the views do not tell.
+    ShareCosts
     """
-    from sepi.boundaries import surface_shares_kernels as kernels
+    from sepi.boundaries.background_kernels import background_of
+    from sepi.boundaries.surface_shares_kernels import costs_of_shares
 
+    pixels = np.flatnonzero(rim.inside)
+    found = nothing_told(len(pixels))
     guide = light_field.reference_view
     # no farther surface within a pixel: none shows through
     clean = disparity - around.farthest < parameters.boundary_step
@@ -66,7 +90,7 @@ def share_evidence(
     views = _views_alike(light_field, sides, parameters)
     if not len(views.places):
         # they say nothing for either surface
-        return np.zeros_like(disparity)
+        return found
     layer, distance = _more_distant_layer(disparity, rim, views.margin)
     scales2 = _LEAST_SCALE**2 + 2 * noise_of_reference_view(light_field) ** 2, parameters.share_scale**2
     present = np.zeros(light_field.grid, bool)
@@ -76,16 +100,18 @@ def share_evidence(
     moved = math.ceil(step * float(np.abs(views.baselines).max())) + 2
     rows_moved = math.ceil(step * float(np.abs(views.baselines[:, 0]).max())) + 1
     farthest = float(np.abs(disparity).max())
-    evidence = np.zeros_like(disparity)
-    height = light_field.shape[0]
+    height, width = light_field.shape
     for begin, end, rows in row_bands(light_field, present, farthest, BYTES_PER_PIXEL, rows_moved):
         nearest = nearest_surfaces(light_field, around.nearest, present, rows)
         views = views._replace(nearest=nearest, low=rows.low)
-        background = kernels.background_of(
+        background = background_of(
             views, layer, distance <= moved, max(0, begin - rows_moved), min(height, end + rows_moved)
         )
-        kernels.evidence_of_shares(views, rim, background, sides, scales2, begin, end, evidence)
-    return evidence
+        of_band = slice(*np.searchsorted(pixels, (begin * width, end * width)))
+        costs_of_shares(
+            views, rim, background, sides, scales2, pixels[of_band], found.costs[of_band], found.told[of_band]
+        )
+    return found
 
 
 def _views_alike(light_field: LightField, sides: Sides, parameters: BoundaryParameters) -> RimViews:
@@ -93,7 +119,7 @@ def _views_alike(light_field: LightField, sides: Sides, parameters: BoundaryPara
 
     Lenses darken and blur views towards the edge of the grid; shares would take that for another surface.
     """
-    from sepi.boundaries.surface_shares_kernels import brightness_of_views
+    from sepi.boundaries.background_kernels import brightness_of_views
 
     present = spread_views(light_field, parameters.share_views)
     places, baselines = np.argwhere(present), light_field.baselines[present]

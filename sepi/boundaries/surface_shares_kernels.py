@@ -12,31 +12,26 @@ from sepi.boundaries.view_samples import sample, sees
 from sepi.compiled import fma, njit, prange
 from sepi.vectors import first_elements, load, spread, store, sum_of
 
-FEWEST_VIEWS = 3
-"""That see a piece of background, before its colour counts."""
-
-UNSEEN = np.float32(-1)
-"""In place of the variance of a background that fewer see."""
-
 FEWEST_SAMPLES = 8
 """Views from which a share is told."""
 
-EXACT = {"nnan", "ninf", "nsz"}
-"""Fast-math flags that keep every rounding as written: see :mod:`sepi.matching.plane_sweep_kernels`."""
+FEWEST_ALONE = 3
+"""Views from which it is told whether a pixel moves with the more distant surface alone."""
 
 SHARES = 12
 """That are tried, from 0 to 1; none is one half."""
 
+_LITTLE = 3  # of them that a pixel may have which moves with the more distant surface
+
 _SAME_SURFACE = 0.25  # difference of disparity, pixels per view step
-# standard deviation of a surface's colour from its clean neighbours', beyond theirs; by what its square is divided, as
-# errors of views go together; the same where the colour is free, and where no clean one is known; colours in 0..1
+# standard deviation of a surface's colour from what its clean neighbours say, beyond what they differ by; the same
+# where the colour is free, and where no clean one is known; colours in 0..1
 _CLEAN_DEVIATION = 0.02
-_HELD = 4.0
-_FREE_DEVIATION = 0.3
+_FREE_DEVIATION = 0.2
 _UNKNOWN_DEVIATION = 1.0
-_MOST_DEVIATION2 = 0.01  # squared residual that one view counts at most in the background's variance
-_STRIDE = 4  # pixels from one to the next that tell the brightness of a view
-_MOST_DIFFERENCE = 0.1  # of one channel, that counts in a view's residual
+# of a change of colour towards the edge: what its slope is held by, square of pixels; the part of its square that adds
+# to the colour's variance; the least deviation of one channel about it
+_LEAST_EXTENT, _DOUBT, _LEAST_DEVIATION = 0.1, 0.1, 0.004
 _UNKNOWN = np.float32(1e3)  # cost where nothing tells
 VECTOR = 8  # numbers in a vector
 _AT_ONCE = 64  # pixels that a thread does at a stretch
@@ -47,163 +42,12 @@ _BEHIND, _NOISE = 3, 6
 _OWN, _LEAST, _MOST, _FIT = 0, 1, 2, 3
 
 
-@njit(parallel=True, cache=True)
-def brightness_of_views(views: RimViews, sides: Sides, missing: Any) -> Any:
-    """How bright each view is beside the reference, and how badly it shows the same.
-
-    Parameters
-    ----------
-    views : RimViews
-        Its z-buffers are not looked at.
-    sides : Sides
-        Some of its clean pixels are looked at.
-    missing : ndarray, shape (T, S, H, W) or (T, S, 0, 0), bool
-        Pixels that a view does not show; empty: none.
-
-    Returns
-    -------
-    brightness, residual : ndarray, shape (N,), float64
-        Ratio of the sums of the colours; mean absolute difference of one channel, 0..1, that is left, NaN of views that
-        show none of the pixels.
-    """
-    disparity, guide, clean = sides.disparity, sides.guide, sides.clean
-    H, W = disparity.shape
-    N = len(views.places)
-    brightness, residual = np.ones(N), np.zeros(N)
-    for view in prange(N):
-        # of each pixel that the view shows: its colours there, and the reference's
-        shown = np.empty((((H - 1) // _STRIDE + 1) * ((W - 1) // _STRIDE + 1), 2, 3))
-        sums = np.empty(4 + VECTOR, np.float32)
-        of_view = missing[views.places[view, 0], views.places[view, 1]]
-        own, other, rest, n = 1e-9, 1e-9, 0.0, 0
-        for y in range(0, H, _STRIDE):
-            for x in range(0, W, _STRIDE):
-                down = y - disparity[y, x] * views.baselines[view, 0]
-                across = x - disparity[y, x] * views.baselines[view, 1]
-                if not clean[y, x] or down < 0 or across < 0 or down >= H - 1 or across >= W - 1:
-                    continue
-                row, column = int(down), int(across)
-                if of_view.size > 0 and (
-                    of_view[row, column]
-                    or of_view[row, column + 1]
-                    or of_view[row + 1, column]
-                    or of_view[row + 1, column + 1]
-                ):
-                    continue
-                sample(views, view, row, column, down - row, across - column, sums, shown[n, 0])
-                for c in range(3):
-                    shown[n, 1, c] = guide[y, x, c]
-                    own += shown[n, 1, c]
-                    other += shown[n, 0, c]
-                n += 1
-        brightness[view] = other / own
-        for k in range(n):
-            for c in range(3):
-                rest += min(abs(shown[k, 0, c] / brightness[view] - shown[k, 1, c]), _MOST_DIFFERENCE)
-        residual[view] = rest / (3 * n + 1) if n > 0 else np.nan
-    return brightness, residual
-
-
-@njit(forceinline=True, fastmath=EXACT)
-def _median(values: Any) -> Any:
-    """Median of values, by halving the interval that it lies in: counting vectorises, and sorting does not.
-
-    NumPy's, compiled, would have every process load SciPy's linear algebra.
-    """
-    n, middle = values.size, values.size // 2
-    low = high = values[0]
-    for v in range(1, n):
-        low, high = min(low, values[v]), max(high, values[v])
-    least, below = low, 0
-    while below != middle:
-        # as many or fewer lie below ``low``
-        half = low + (high - low) * np.float32(0.5)
-        if half <= low or half >= high:
-            break
-        below = 0
-        for v in range(n):
-            below += values[v] < half
-        if below <= middle:
-            low = half
-        else:
-            high = half
-    after, before, below = high, least, 0
-    for v in range(n):
-        if values[v] >= low:
-            after = min(after, values[v])
-    for v in range(n):
-        below += values[v] < after
-        if values[v] < after:
-            before = max(before, values[v])
-    # of an even number, the mean of both in the middle
-    return after if n % 2 == 1 or below < middle else (before + after) * np.float32(0.5)
-
-
-@njit(parallel=True, cache=True)
-def background_of(views: RimViews, layer: Any, wanted: Any, begin: int, end: int) -> Any:
-    """Colours of the more distant surfaces, medians over the views that see them.
-
-    Parameters
-    ----------
-    views : RimViews
-    layer : ndarray, shape (H, W), float32
-        Disparity of the more distant surface, also where a nearer one hides it.
-    wanted : ndarray, shape (H, W), bool
-    begin, end : int
-        Rows that are made; others are left undefined.
-
-    Returns
-    -------
-    ndarray, shape (H, W, 4), float32
-        Colours, and the variance of the views' colours, mean of the channels; where fewer than ``FEWEST_VIEWS`` see it,
-        ``UNSEEN`` in its place.
-    """
-    H, W = layer.shape
-    N = len(views.places)
-    background = np.empty((H, W, 4), np.float32)
-    for y in prange(begin, end):
-        # not NumPy's: where it is compiled, every process loads SciPy
-        columns, few = np.empty(W, np.int64), 0
-        for x in range(W):
-            if wanted[y, x]:
-                columns[few] = x
-                few += 1
-        samples, ordered = np.empty((few, 3, N), np.float32), np.empty(N, np.float32)
-        colour_there, sums, count = np.empty(3, np.float32), np.empty(4 + VECTOR, np.float32), np.zeros(few, np.int64)
-        background[y, :, 3] = UNSEEN
-        # view by view: neighbours are near each other in its memory
-        for view in range(N):
-            for i in range(few):
-                x = columns[i]
-                seen, row, column, fy, fx = sees(views, view, layer[y, x], y, x)
-                if seen:
-                    sample(views, view, row, column, fy, fx, sums, colour_there)
-                    for c in range(3):
-                        samples[i, c, count[i]] = colour_there[c]
-                    count[i] += 1
-        for i in range(few):
-            x = columns[i]
-            n = count[i]
-            if n < FEWEST_VIEWS:
-                continue
-            total = 0.0
-            for c in range(3):
-                for v in range(n):
-                    ordered[v] = samples[i, c, v]
-                middle = _median(ordered[:n])
-                background[y, x, c] = middle
-                for v in range(n):
-                    total += min((samples[i, c, v] - middle) ** 2, _MOST_DEVIATION2)
-            background[y, x, 3] = total / (3 * n)
-    return background
-
-
 @njit(forceinline=True, borrows=True)
 def _behind(background: Any, row: int, column: int, fy: Any, fx: Any, sums: Any) -> Any:
     """Colour between pixels of the background, and its variance, into ``sums[:4]``; whether it is known."""
     for i in range(row, row + 2):
         for j in range(column, column + 2):
-            if background[i, j, 3] == UNSEEN:
+            if background[i, j, 3] < 0:
                 return False
     # two pixels side by side
     upper, lower = load(background, (row, column, 0)), load(background, (row + 1, column, 0))
@@ -214,13 +58,17 @@ def _behind(background: Any, row: int, column: int, fy: Any, fx: Any, sums: Any)
 
 
 @njit(forceinline=True, borrows=True)
-def _nearer_colour(sides: Sides, near: Any, middle: Any, y: int, x: int, surface: Any) -> Any:
-    """Fill in the nearer surface beside a pixel: clean pixels' colour, or else the pixel's own; its variance."""
+def _moments(sides: Sides, near: Any, middle: Any, y: int, x: int, surface: Any, moments: Any) -> Any:
+    """Weighted sums over the nearer surface's clean pixels about a pixel, and the limits of all that it shows there.
+
+    Returns the sums of the weights, of their squares, of the weights times ``(dy, dx)``, and times their products;
+    ``moments (3, 4)`` gets, for each channel, those times the colour, the colour and ``(dy, dx)``, and its square.
+    """
     H, W = sides.disparity.shape
-    radius, out = sides.clean_radius, surface[_OWN]
-    weights, squares = 0.0, 0.0
-    out[:] = 0
+    radius = sides.clean_radius
     surface[_LEAST], surface[_MOST] = 1.0, 0.0
+    moments[:] = 0
+    n, squares, at_y, at_x, yy, yx, xx = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(max(0, y - radius), min(H, y + radius + 1)):
         for j in range(max(0, x - radius), min(W, x + radius + 1)):
             if sides.disparity[i, j] > middle:
@@ -228,20 +76,54 @@ def _nearer_colour(sides: Sides, near: Any, middle: Any, y: int, x: int, surface
                     surface[_LEAST, c] = min(surface[_LEAST, c], sides.guide[i, j, c])
                     surface[_MOST, c] = max(surface[_MOST, c], sides.guide[i, j, c])
             if sides.clean[i, j] and abs(sides.disparity[i, j] - near) < _SAME_SURFACE:
-                weight = 1 / (1 + (i - y) ** 2 + (j - x) ** 2) ** 2
-                weights += weight
+                dy, dx = i - y, j - x
+                weight = 1 / (1 + dy**2 + dx**2) ** 2
+                n, squares = n + weight, squares + weight * weight
+                at_y, at_x = at_y + weight * dy, at_x + weight * dx
+                yy, yx, xx = yy + weight * dy * dy, yx + weight * dy * dx, xx + weight * dx * dx
                 for c in range(3):
-                    out[c] += weight * sides.guide[i, j, c]
-                    squares += weight * sides.guide[i, j, c] ** 2
-    if weights == 0:
+                    colour = weight * sides.guide[i, j, c]
+                    moments[c, 0] += colour
+                    moments[c, 1] += colour * dy
+                    moments[c, 2] += colour * dx
+                    moments[c, 3] += colour * sides.guide[i, j, c]
+    return n, squares, at_y, at_x, yy, yx, xx
+
+
+@njit(forceinline=True, borrows=True)
+def _nearer_colour(sides: Sides, near: Any, middle: Any, y: int, x: int, surface: Any, moments: Any) -> Any:
+    """Fill in the nearer surface at a pixel: what clean pixels' colours go on as, or else its own; its variance.
+
+    Surfaces get darker or brighter towards their edge. The colour is linear in the place as far as that is more than
+    its own doubt (James and Stein's estimate): texture has no slope that goes on.
+    """
+    out = surface[_OWN]
+    n, squares, at_y, at_x, yy, yx, xx = _moments(sides, near, middle, y, x, surface, moments)
+    if n == 0:
         for c in range(3):
             out[c] = sides.guide[y, x, c]
         return _UNKNOWN_DEVIATION**2
-    variance = squares / weights
+    at_y, at_x = at_y / n, at_x / n
+    yy, xx = yy / n - at_y * at_y + _LEAST_EXTENT, xx / n - at_x * at_x + _LEAST_EXTENT
+    yx = yx / n - at_y * at_x
+    determinant = yy * xx - yx * yx
+    plain, rest, change2 = 0.0, 0.0, 0.0
     for c in range(3):
-        out[c] /= weights
-        variance -= out[c] ** 2
-    return (max(variance, 0.0) / 3 + _CLEAN_DEVIATION**2) / _HELD
+        mean = moments[c, 0] / n
+        down, across = moments[c, 1] / n - mean * at_y, moments[c, 2] / n - mean * at_x
+        slope_y, slope_x = (xx * down - yx * across) / determinant, (yy * across - yx * down) / determinant
+        variance = max(moments[c, 3] / n - mean * mean, 0.0)
+        plain += variance
+        rest += max(variance - slope_y * down - slope_x * across, 0.0)
+        out[c], moments[c, 0] = mean, -slope_y * at_y - slope_x * at_x
+        change2 += moments[c, 0] ** 2
+    # variance of the change, by what is left beside it and where the clean pixels lie
+    lever = (xx * at_y * at_y - 2 * yx * at_y * at_x + yy * at_x * at_x) / determinant
+    doubt = (rest + 3 * _LEAST_DEVIATION**2) / max(n * n / squares - 3, 1.0) * lever
+    kept = max(0.0, 1 - doubt / (change2 + 1e-12))
+    for c in range(3):
+        out[c] += kept * moments[c, 0]
+    return (kept * (rest + _DOUBT * kept * change2) + (1 - kept) * plain) / 3 + _CLEAN_DEVIATION**2
 
 
 @njit(forceinline=True, borrows=True)
@@ -333,7 +215,7 @@ def _cost_alone(
             for c in range(3):
                 samples[c, n] = colour[c]
             n += 1
-    if n < FEWEST_VIEWS:
+    if n < FEWEST_ALONE:
         return _UNKNOWN
     total, half = spread(np.float32(0)), spread(scale2)
     for v in range(0, n, VECTOR):
@@ -355,70 +237,56 @@ def _apart2(samples: Any, n: int, surface: Any) -> Any:
 
 
 @njit(parallel=True, cache=True)
-def evidence_of_shares(
-    views: RimViews, rim: Rim, background: Any, sides: Sides, scales2: Any, begin: int, end: int, evidence: Any
+def costs_of_shares(
+    views: RimViews, rim: Rim, background: Any, sides: Sides, scales2: Any, pixels: Any, costs: Any, told: Any
 ) -> None:
-    """By how much the other surface explains the views better than the one that a pixel has.
+    """How badly each share of the nearer surface explains what the views show of a pixel beside a depth step.
 
     Along the nearer surface's disparity each view shows the same share of that surface before another piece of
-    background. More than half is near, less is far.
+    background.
 
     Parameters
     ----------
     views : RimViews
     rim : Rim
     background : ndarray, shape (H, W, 4), float32
-        From :func:`background_of`.
+        From :func:`sepi.boundaries.background_kernels.background_of`.
     sides : Sides
     scales2 : tuple of float
         Square of the residual at which a view counts half: the least, and what the squared difference of both surfaces'
         colours adds to it, times this; errors of samples grow with it.
-    begin, end : int
-        Rows that are made.
-    evidence : ndarray, shape (H, W), float32
-        Filled with differences of mean costs, -1..1; left alone where the views do not tell.
+    pixels : ndarray, shape (n,), int64
+        Places in the map, row after row, of pixels of the rim.
+    costs : ndarray, shape (n, SHARES), float32
+        Filled with mean robust residuals, 0..1, of shares from 0 to 1; left alone where the views do not tell.
+    told : ndarray, shape (n,), bool
+        Set where they do.
     """
     W = sides.disparity.shape[1]
-    N = len(views.places)
-    # they are not spread evenly over the rows; not NumPy's: where it is compiled, every process loads SciPy
-    pixels, count = np.empty((end - begin) * W, np.int64), 0
-    for y in range(begin, end):
-        for x in range(W):
-            if rim.inside[y, x]:
-                pixels[count] = y * W + x
-                count += 1
+    N, count = len(views.places), len(pixels)
     for task in prange((count + _AT_ONCE - 1) // _AT_ONCE):
-        samples, surface, summed = (
-            np.zeros((7, N + VECTOR), np.float32),
-            np.empty((4, 3)),
-            np.empty(6, np.float32),
-        )
-        sums, colour = np.empty(4 + VECTOR, np.float32), np.empty(3, np.float32)
+        samples, surface, moments = np.zeros((7, N + VECTOR), np.float32), np.empty((4, 3)), np.empty((3, 4))
+        sums, colour, summed = np.empty(4 + VECTOR, np.float32), np.empty(3, np.float32), np.empty(6, np.float32)
         for i in range(task * _AT_ONCE, min(count, (task + 1) * _AT_ONCE)):
             y, x = pixels[i] // W, pixels[i] % W
             near, far = rim.near[y, x], rim.far[y, x]
             n = _along_near(views, background, near, far, y, x, sums, colour, samples)
             if n < FEWEST_SAMPLES:
                 continue
-            variance = _nearer_colour(sides, near, (near + far) / 2, y, x, surface)
+            told[i] = True
+            variance = _nearer_colour(sides, near, (near + far) / 2, y, x, surface, moments)
             if rim.is_near[y, x]:
-                # surfaces get darker or brighter towards their edge: to be far, a pixel must be so whatever its colour.
-                # To be near it must have the surface's colour: before a bare background, any is a share of another
+                # to be far, a pixel must be so whatever its colour. To be near it must have the surface's colour:
+                # before a bare background, any is a share of another
                 variance = _FREE_DEVIATION**2
             scale2 = np.float32(scales2[0] + scales2[1] * _apart2(samples, n, surface))
             held = np.float32(scale2 / variance)
             for c in range(6):
                 summed[c] = _summed(samples, c, n)
-            low = high = _UNKNOWN
             for k in range(SHARES):
                 share = np.float32(k / (SHARES - 1))
-                cost = _cost_of_share(share, samples, n, summed, surface, held, scale2)
-                if 2 * k < SHARES - 1:
-                    low = min(low, cost)
-                else:
-                    high = min(high, cost)
-            if rim.is_near[y, x]:
-                evidence[y, x] = high - low
-            else:
+                costs[i, k] = _cost_of_share(share, samples, n, summed, surface, held, scale2)
+            if not rim.is_near[y, x]:
                 alone = _cost_alone(views, sides.guide[y, x], far, y, x, scale2, sums, colour, samples)
-                evidence[y, x] = min(low, alone) - high
+                for k in range(_LITTLE):
+                    costs[i, k] = min(costs[i, k], alone)

@@ -1,4 +1,4 @@
-"""Near or far beside a depth step by shares of the views: what it says of exact scenes, and equal to a plain twin."""
+"""Near or far beside a depth step: what views, colours and edges say of exact scenes, and equal to plain twins."""
 
 from dataclasses import replace
 from typing import Any
@@ -11,7 +11,7 @@ import pytest
 from geometries import GEOMETRIES, standing
 from several_threads import several_threads
 
-from sepi.boundaries import decision
+from sepi.boundaries import background_kernels, decision
 from sepi.boundaries import surface_shares_kernels as kernels
 from sepi.boundaries.arrays import RimViews, Sides
 from sepi.boundaries.decision import assigned_to_surfaces
@@ -69,9 +69,9 @@ def test_colours_have_a_vote(monkeypatch: pytest.MonkeyPatch) -> None:
     assert wrong(assigned_to_surfaces(scene, wide, alone), truth) < 0.1 * wrong(wide, truth)
     colours_say(np.zeros_like(wide))
     np.testing.assert_array_equal(assigned_to_surfaces(scene, wide, alone), wide)
-    # colours that hint at half of it do not move what views say
+    # colours that hint at half of what moves a pixel of which nothing else is known do not move what views say
     by_views = assigned_to_surfaces(scene, wide, USUAL)
-    colours_say(np.full_like(wide, 0.05))
+    colours_say(np.full_like(wide, 0.003))
     hinted = assigned_to_surfaces(scene, wide, BoundaryParameters())
     assert wrong(hinted, by_views) < 0.1 * wrong(wide, by_views)
 
@@ -178,8 +178,8 @@ class Twin:
         self.views, self.rim, self.sides = views, rim, sides
         self.pixels = views.lines.reshape(*views.lines.shape[:3], -1, views.channels)
         self.H, self.W = self.pixels.shape[2:4]
-        # pixels that fit best as a whole pixel of the far surface
-        self.decided_alone = 0
+        # pixels that fit best as a whole pixel of the far surface, and those beside which a colour goes on changing
+        self.decided_alone = self.went_on = 0
 
     def seen(self, d: float, y: int, x: int) -> list[tuple[int, npt.NDArray[np.float64]]]:
         """Views that show a pixel, and the colours they show."""
@@ -194,13 +194,38 @@ class Twin:
 
     def background(self, d: float, y: int, x: int) -> tuple[npt.NDArray[np.float64], float, int]:
         colours = np.array([colour for _, colour in self.seen(d, y, x)]).reshape(-1, 3).astype(np.float32)
-        if len(colours) < kernels.FEWEST_VIEWS:
+        if len(colours) < background_kernels.FEWEST_VIEWS:
             return np.zeros(3), 0.0, len(colours)
         middle = np.median(colours, axis=0)
         return middle, float(np.minimum((colours - middle) ** 2, 0.01).mean()), len(colours)
 
-    def evidence(self, background: npt.NDArray[np.float32], scales2: tuple[float, float], y: int, x: int) -> float:
-        rim, (disparity, guide, clean, _) = self.rim, self.sides
+    def own_colour(self, y: int, x: int) -> tuple[npt.NDArray[np.float64], float]:
+        """Colour of the nearer surface at a pixel, linear in the place as far as that is told, and its variance."""
+        disparity, guide, clean, _ = self.sides
+        yy, xx = np.mgrid[: self.H, : self.W]
+        pure = (abs(yy - y) <= 4) & (abs(xx - x) <= 4) & clean & (abs(disparity - self.rim.near[y, x]) < 0.25)
+        if not pure.any():
+            return guide[y, x].astype(np.float64), 1.0
+        place, colours = np.stack([yy - y, xx - x])[:, pure].astype(np.float64), guide[pure].astype(np.float64)
+        weight = 1 / (1 + (place**2).sum(axis=0)) ** 2
+        mean, middle = np.average(colours, axis=0, weights=weight), np.average(place, axis=1, weights=weight)
+        extent = np.cov(place, aweights=weight, ddof=0) + 0.1 * np.eye(2)
+        covariance = (place - middle[:, None]) * weight @ (colours - mean) / weight.sum()
+        slope = np.linalg.solve(extent, covariance)
+        plain = np.average((colours - mean) ** 2, axis=0, weights=weight)
+        rest = np.maximum(plain - (slope * covariance).sum(axis=0), 0).sum()
+        change = -middle @ slope
+        effective = max(weight.sum() ** 2 / (weight**2).sum() - 3, 1)
+        doubt = (rest + 3 * 0.004**2) / effective * (middle @ np.linalg.solve(extent, middle))
+        kept = max(0.0, 1 - doubt / ((change**2).sum() + 1e-12))
+        self.went_on += kept > 0.1
+        variance = (kept * rest + (1 - kept) * plain.sum() + 0.1 * kept**2 * (change**2).sum()) / 3 + 0.02**2
+        return mean + kept * change, variance
+
+    def costs(
+        self, background: npt.NDArray[np.float32], scales2: tuple[float, float], y: int, x: int
+    ) -> npt.NDArray[np.float64] | None:
+        rim, (disparity, guide, _, _) = self.rim, self.sides
         near, far = float(rim.near[y, x]), float(rim.far[y, x])
         colours, behind, noise = [], [], []
         for n, colour in self.seen(near, y, x):
@@ -210,49 +235,39 @@ class Twin:
                 continue
             i, j = int(down), int(across)
             patch = np.s_[i : i + 2, j : j + 2]
-            if (background[patch][..., 3] == kernels.UNSEEN).any():
+            if (background[patch][..., 3] == background_kernels.UNSEEN).any():
                 continue
             weights = np.outer([1 - (down - i), down - i], [1 - (across - j), across - j])
             colours.append(colour)
             behind.append(np.einsum("ij,ijc->c", weights, background[patch][..., :3]))
             noise.append((weights * background[patch][..., 3]).sum())
         if len(colours) < kernels.FEWEST_SAMPLES:
-            return 0.0
+            return None
         C, B, N = np.array(colours), np.array(behind), np.array(noise)[:, None]
         yy, xx = np.mgrid[: self.H, : self.W]
         window = (abs(yy - y) <= 4) & (abs(xx - x) <= 4)
         shown = guide[window & (disparity > (near + far) / 2)]
-        pure = window & clean & (abs(disparity - near) < 0.25)
-        if pure.any():
-            weight = 1 / (1 + (yy - y) ** 2 + (xx - x) ** 2)[pure] ** 2
-            own = np.average(guide[pure].astype(np.float64), axis=0, weights=weight)
-            spread = np.average((guide[pure].astype(np.float64) ** 2).sum(axis=1), weights=weight) - (own**2).sum()
-            variance = (max(spread, 0) / 3 + 0.02**2) / 4
-        else:
-            own, variance = guide[y, x].astype(np.float64), 1.0
+        own, variance = self.own_colour(y, x)
         if rim.is_near[y, x]:
-            variance = 0.3**2
+            variance = 0.2**2
         scale2 = scales2[0] + scales2[1] * ((own - B) ** 2).mean()
-        costs = []
-        for a in np.arange(kernels.SHARES) / (kernels.SHARES - 1):
+        costs = np.empty(kernels.SHARES)
+        for k, a in enumerate(np.arange(kernels.SHARES) / (kernels.SHARES - 1)):
             held = scale2 / variance
             F = (a * (C - (1 - a) * B).sum(axis=0) + held * own) / (a * a * len(C) + held)
             F = np.clip(F, shown.min(axis=0), shown.max(axis=0))
             residual2 = (C - a * F - (1 - a) * B) ** 2
             cost = (residual2 / (residual2 + scale2 + (1 - a) ** 2 * N)).sum() + held * ((F - own) ** 2).sum() / scale2
-            costs.append(cost / C.size)
-        half = kernels.SHARES // 2
-        low, high = min(costs[:half]), min(costs[half:])
-        if rim.is_near[y, x]:
-            return high - low
+            costs[k] = cost / C.size
         # but the reference view, which always fits
         alone = [colour for n, colour in self.seen(far, y, x) if self.views.baselines[n].any()]
-        if len(alone) >= kernels.FEWEST_VIEWS:
+        if not rim.is_near[y, x] and len(alone) >= kernels.FEWEST_ALONE:
             residual2 = (np.array(alone) - guide[y, x]) ** 2
             cost = (residual2 / (residual2 + scale2)).mean()
-            self.decided_alone += cost < low
-            low = min(low, cost)
-        return low - high
+            self.decided_alone += cost < costs.min()
+            # with less than a quarter of the nearer surface in it
+            costs[:3] = np.minimum(costs[:3], cost)
+        return costs
 
 
 def twin_rim(disparity: npt.NDArray[np.float32], y: int, x: int, radius: int) -> tuple[float, float, float]:
@@ -316,20 +331,24 @@ def test_kernels_equal_a_plain_twin(geometry: str, dtype: Any) -> None:
     sides = Sides(disparity, field.reference_view, clean, 4)
     twin = Twin(rim_views, rim, sides)
     layer = np.where(rim.is_near, rim.far, disparity)
-    background = kernels.background_of(rim_views, layer, np.ones_like(present, shape=layer.shape), 0, 12)
+    background = background_kernels.background_of(rim_views, layer, np.ones_like(present, shape=layer.shape), 0, 12)
     for y, x in np.ndindex(disparity.shape):
         colour, variance, count = twin.background(float(layer[y, x]), y, x)
-        assert (background[y, x, 3] != kernels.UNSEEN) == (count >= kernels.FEWEST_VIEWS)
-        if count >= kernels.FEWEST_VIEWS:
+        assert (background[y, x, 3] != background_kernels.UNSEEN) == (count >= background_kernels.FEWEST_VIEWS)
+        if count >= background_kernels.FEWEST_VIEWS:
             np.testing.assert_allclose(background[y, x, :3], colour, atol=1e-6)
             np.testing.assert_allclose(background[y, x, 3], variance, atol=1e-7)
-    evidence = np.zeros_like(disparity)
     scales2 = (0.02**2, 0.3**2)
-    kernels.evidence_of_shares(rim_views, rim, background, sides, scales2, 0, 12, evidence)
-    told = [(evidence[y, x], twin.evidence(background, scales2, y, x)) for y, x in np.argwhere(rim.inside)]
-    assert sum(value != 0 for value, _ in told) > 30
+    pixels = np.flatnonzero(rim.inside)
+    costs, told = np.zeros((len(pixels), kernels.SHARES), np.float32), np.zeros(len(pixels), bool)
+    kernels.costs_of_shares(rim_views, rim, background, sides, scales2, pixels, costs, told)
+    expected = [twin.costs(background, scales2, y, x) for y, x in np.argwhere(rim.inside)]
+    np.testing.assert_array_equal(told, [cost is not None for cost in expected])
+    assert told.sum() > 30
     assert twin.decided_alone > 10
-    np.testing.assert_allclose(*np.array(told).T, atol=2e-5)
+    assert twin.went_on > 10
+    np.testing.assert_allclose(costs[told], [cost for cost in expected if cost is not None], atol=2e-5)
+    assert (costs[~told] == 0).all()
 
 
 def test_brightness_is_told_view_by_view() -> None:
@@ -345,7 +364,7 @@ def test_brightness_is_told_view_by_view() -> None:
         field.baselines[field.present], np.empty((0, 0, 0, 0), np.float32), 0, np.float32(0),
     )  # fmt: skip
     sides = Sides(still, field.reference_view, still == 0, 4)
-    brightness, residual = kernels.brightness_of_views(rim_views, sides, np.zeros((*field.grid, 0, 0), bool))
+    brightness, residual = background_kernels.brightness_of_views(rim_views, sides, np.zeros((*field.grid, 0, 0), bool))
     np.testing.assert_allclose(brightness, factors[0], rtol=0.02)
     assert (residual < 0.01).all()
 
@@ -370,7 +389,7 @@ def test_bands_hold_every_row_that_is_looked_at(grid: tuple[int, int], monkeypat
     whole = render("curved_occluders", size=96)
     rows = slice(4, 5) if grid[0] == 1 else slice(None)
     light_field = LightField(whole.views[rows], "rows", disparity_range=whole.disparity_range)
-    background_of, asked = kernels.background_of, []
+    background_of, asked = background_kernels.background_of, []
 
     def checked(views, layer, wanted, begin, end):
         y, x = np.nonzero(wanted[begin:end])
@@ -382,7 +401,7 @@ def test_bands_hold_every_row_that_is_looked_at(grid: tuple[int, int], monkeypat
             asked.append(bool((number >= 0).all() and (number < views.nearest.shape[2]).all()))
         return background_of(views, layer, wanted, begin, end)
 
-    monkeypatch.setattr(kernels, "background_of", checked)
+    monkeypatch.setattr(background_kernels, "background_of", checked)
     assigned_to_surfaces(replace(light_field, workspace=Workspace(1)), whole.ground_truth, USUAL)
     assert asked
     assert all(asked)

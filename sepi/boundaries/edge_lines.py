@@ -1,0 +1,94 @@
+"""Edges through the pixels beside depth steps: what a pixel's neighbours say of it.
+
+A pixel's own share of the nearer surface is known badly where views show little contrast, and the pixels that decide
+are those that the edge runs right through. The edge goes on through their neighbours: each edge leaves a certain share
+of every pixel of a patch to the nearer surface, and costs what these shares cost. Of a patch about each pixel beside a
+step all edges are tried, in steps of direction and offset, straight ones and such as bend round something small; the
+pixel belongs to the surface that has its middle by the one that costs least.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from sepi.boundaries.rim_kernels import Rim
+from sepi.lightfield import BoolMap, FloatMap
+
+_DIRECTIONS = 16
+_OFFSETS = np.arange(-1.05, 1.06, 0.3)  # of the patch's middle from the edge, pixels; none is 0
+_BLUR = 1.2  # distance over which a share goes from 0 to 1, pixels
+_CURVATURE = 0.6  # of an edge that is not straight, per pixel: round what is three pixels across
+_CURVED = 0.003  # its cost, beside mean costs of what views show
+_WIDTH = 0.8  # standard deviation of the patch's weights, pixels
+
+
+def line_evidence(disparity: FloatMap, rim: Rim, costs: FloatMap) -> FloatMap:
+    """By how much the best edge that leaves a pixel to the farther surface costs less than the best that does not.
+
+    Parameters
+    ----------
+    disparity : ndarray, shape (H, W), float32
+        Pixels per view step.
+    rim : Rim
+        Its ``n`` pixels inside are looked at.
+    costs : ndarray, shape (n, K), float32
+        Of shares of the nearer surface in them, from 0 to 1.
+
+    Returns
+    -------
+    ndarray, shape (n,), float32
+        Positive: the farther surface's.
+    """
+    from sepi.boundaries.edge_lines_kernels import STEPS, evidence_of_lines
+
+    pixels, above = np.flatnonzero(rim.inside), costs - costs.min(axis=1, keepdims=True)
+    number = np.full(disparity.shape, -1, np.int64)
+    number[rim.inside] = np.arange(len(pixels))
+    edges = _edges()
+    shares = np.rint(edges.shares * STEPS * (costs.shape[1] - 1)).astype(np.uint8)
+    evidence = np.empty(len(pixels), np.float32)
+    middle = (rim.near + rim.far) / 2
+    evidence_of_lines(
+        disparity, middle, number, above, edges.weights, shares, edges.is_near, edges.costs, pixels, evidence
+    )
+    return evidence
+
+
+class _Edges(NamedTuple):
+    """Edges through a patch.
+
+    Attributes
+    ----------
+    shares : ndarray, shape (M, 9), float64
+        Of the nearer surface in its pixels, row after row, 0..1.
+    is_near : ndarray, shape (M,), bool
+        Whether its middle is the nearer surface's.
+    costs : ndarray, shape (M,), float32
+        Of each edge itself.
+    weights : ndarray, shape (9,), float32
+        Of the pixels.
+    """
+
+    shares: npt.NDArray[np.float64]
+    is_near: BoolMap
+    costs: FloatMap
+    weights: FloatMap
+
+
+def _edges() -> _Edges:
+    """Straight ones of all directions and offsets, and the same bent round the nearer surface."""
+    down, across = (part.ravel() for part in np.mgrid[-1:2, -1:2])
+    angle = 2 * np.pi * np.arange(_DIRECTIONS)[:, None] / _DIRECTIONS
+    along, beside = np.sin(angle) * down + np.cos(angle) * across, np.cos(angle) * down - np.sin(angle) * across
+    bent = along - np.array([0, _CURVATURE])[:, None, None] * beside**2 / 2
+    distance = bent[:, :, None] + _OFFSETS[:, None]
+    count = _DIRECTIONS * len(_OFFSETS)
+    return _Edges(
+        np.clip(0.5 + distance.reshape(-1, len(down)) / _BLUR, 0, 1),
+        np.tile(_OFFSETS > 0, 2 * _DIRECTIONS),
+        np.repeat(np.array([0, _CURVED], np.float32), count),
+        np.exp(-(down**2 + across**2) / (2 * _WIDTH**2)).astype(np.float32),
+    )
