@@ -130,9 +130,12 @@ def test_error_bars_have_the_unit_of_the_view_step(variant: str) -> None:
 
 
 def test_doubt_is_where_the_errors_are() -> None:
-    """Who keeps the surer half of the pixels must get the better half."""
+    """Who leaves the less sure half of the pixels out must be rid of nearly what the worse half has.
+
+    Not held against the error of the surer half: that ratio rises where outlines get better.
+    """
     for name in NAMES:
         maps, light_field = maps_of(name, 3.0, "best"), noisy(name, 3.0)
         error = np.abs(maps.disparity - light_field.ground_truth)
         surer = maps.sigma <= np.median(maps.sigma)
-        assert error[surer].mean() < 0.35 * error[~surer].mean(), name
+        assert error[~surer].sum() > 0.8 * np.sort(error, axis=None)[surer.sum() :].sum(), name
