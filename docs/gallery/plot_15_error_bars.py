@@ -133,7 +133,7 @@ for name, found in {"without noise": maps, "with noise": in_noise}.items():
 
 side = np.linspace(0.02, 0.12, 96)
 first = sepi.estimate_depth(noisy(light_field, side, seed=2))
-second = sepi.estimate_depth(noisy(light_field, side[::-1], seed=3))
+second = sepi.estimate_depth(noisy(light_field, side[::-1], seed=4))
 
 
 def fuse(first, second):

@@ -16,7 +16,7 @@ from sepi.boundaries.parameters import BoundaryParameters
 from sepi.boundaries.surroundings import Surroundings
 from sepi.lightfield import FloatMap
 
-_GREY_TRUST = 0.12
+_GREY_TRUST = 0.105
 """Of colours in a grey picture."""
 
 _COLOURED = 0.02
