@@ -9,13 +9,15 @@ pixel belongs to the surface that has its middle by the one that costs least.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from sepi.boundaries.rim_kernels import Rim
 from sepi.lightfield import BoolMap, FloatMap
+
+if TYPE_CHECKING:
+    from sepi.boundaries.rim_kernels import Rim
 
 _DIRECTIONS = 16
 _OFFSETS = np.arange(-1.05, 1.06, 0.3)  # of the patch's middle from the edge, pixels; none is 0
