@@ -1,4 +1,4 @@
-"""Near or far beside a depth step, by all views and the reference view's colours, along straight edges.
+"""Near or far beside a depth step, by all views and the reference view's colours, along edges.
 
 A pixel that an edge runs through shows a share of the nearer surface, and of what is behind it the rest. It moves with
 the nearer one and fits that one's disparity, however small its share is: by matching alone, surfaces are one pixel too
