@@ -132,10 +132,11 @@ def test_error_bars_have_the_unit_of_the_view_step(variant: str) -> None:
 def test_doubt_is_where_the_errors_are() -> None:
     """Who leaves the less sure half of the pixels out must be rid of nearly what the worse half has.
 
-    Not held against the error of the surer half: that ratio rises where outlines get better.
+    That half's error is a third of the other's, too, but on stripes: their outlines are so good that it says little.
     """
     for name in NAMES:
         maps, light_field = maps_of(name, 3.0, "best"), noisy(name, 3.0)
         error = np.abs(maps.disparity - light_field.ground_truth)
         surer = maps.sigma <= np.median(maps.sigma)
+        assert name == "stripes" or error[surer].mean() < 0.35 * error[~surer].mean(), name
         assert error[~surer].sum() > 0.8 * np.sort(error, axis=None)[surer.sum() :].sum(), name
