@@ -187,6 +187,7 @@ def second_order(
     True
     """
     from sepi.matching.gauss_newton import GaussNewton, windowed_step
+    from sepi.matching.spline_views import forget_splines
 
     before, given = require_previous(previous), light_field
     light_field = denoised(light_field, parameters.denoising, parameters.least_noise)
@@ -210,6 +211,7 @@ def second_order(
             told = gradient, information, _ = matching.with_evidence(mean, disparity)
             # the solver has use for their memory
             del matching, mean
+            forget_splines(light_field)
         else:
             gradient, information = matching.gradient_and_hessian(mean, disparity)
         radius = parameters.solve_radius if smooth else parameters.refinement_radius
@@ -323,9 +325,10 @@ def _smoothed(
     changes = smoothness_weights(shape, prior.colours, prior.reliability, threshold, prior.colour_variance)
     smoothness = [parameters.strength * change + LEAST_SMOOTHNESS for change in changes]
     del changes
-    stencil = second_difference_stencil(smoothness, target.shape)
     rtol = parameters.rtol if last else parameters.first_rtol
-    solution = solve_smooth(stencil, weight, target, shape, rtol, parameters.max_iterations)
+    solution = solve_smooth(
+        second_difference_stencil(smoothness, target.shape), weight, target, shape, rtol, parameters.max_iterations
+    )
     return solution, inverse_diagonal(weight, smoothness) / np.float32(unit) if last else None
 
 

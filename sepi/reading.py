@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import os
 import warnings
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from types import NoneType
@@ -19,6 +20,7 @@ from sepi.io.readers.formats import read
 from sepi.io.readers.options import ReadOptions, in_grid
 from sepi.kernel_cache import tell_kernel_cache
 from sepi.lightfield import DisparityRange, LightField
+from sepi.meanwhile import do_meanwhile
 from sepi.memory import KERNELS, give_back_memory, require_memory
 from sepi.validation import described, require_type
 
@@ -91,6 +93,8 @@ def read_light_field(
     require_type(f"{path}: options", options, (ReadOptions, NoneType), "sepi.ReadOptions")
     options = options or ReadOptions()
     given = None if disparity_range is None else _given_range(path, disparity_range)
+    if check_order:
+        do_meanwhile(_import_checks)
     light_field = read(path, options, file_format, truth=truth)
     if light_field.rig is not None and light_field.disparity_range is None:
         light_field = _with_depths(path, light_field, options, given)
@@ -206,6 +210,14 @@ def read_cameras(
     """
     options = ReadOptions(images=None if images is None else str(images), reference=reference, exclude=exclude)
     return read_light_field(path, disparity_range=disparity_range, file_format="cameras", options=options)
+
+
+def _import_checks() -> None:
+    """Import what the checks of the views do, numba above all; where memory is short, that is told when they begin."""
+    with suppress(MemoryError):
+        require_memory(KERNELS)
+        import sepi.inspection.view_layouts
+        import sepi.inspection.view_order  # noqa: F401
 
 
 def _given_range(path: Path, bounds: tuple[float, float]) -> DisparityRange:

@@ -23,6 +23,7 @@ from sepi.io.files import atomic_path, reading
 from sepi.io.picture_headers import Header, read_header
 from sepi.io.tiff import plain_pixels, unturned
 from sepi.lightfield import HIGHEST, LOWEST, BoolMap
+from sepi.meanwhile import wait_usefully
 from sepi.threads import available_cores
 
 Pixels = npt.NDArray[np.integer[Any] | np.floating[Any]]
@@ -121,7 +122,9 @@ def read_views(
 
     # decoding runs outside Python's lock, so threads share the work
     with _no_warnings(), ThreadPoolExecutor(min(8, available_cores())) as pool:
-        for _ in pool.map(fill, range(len(paths))):
+        filled = pool.map(fill, range(len(paths)))
+        wait_usefully()
+        for _ in filled:
             pass
     return views
 

@@ -18,7 +18,7 @@ import numpy as np
 
 from sepi.image.noise import variance_of_residuals
 from sepi.lightfield import BoolMap, FloatMap, LightField
-from sepi.matching.base_detail import BaseDetailParameters, base_detail_decomposition, forget_detail, reference_noise
+from sepi.matching.base_detail import BaseDetailParameters, reference_noise
 from sepi.matching.gauss_newton_kernels import (
     Seeing,
     SplineViews,
@@ -27,8 +27,9 @@ from sepi.matching.gauss_newton_kernels import (
     normal_equations,
 )
 from sepi.matching.nearest_surfaces import nearest_surfaces
-from sepi.matching.row_bands import Band, Rows, row_bands
-from sepi.matching.spline_kernels import MARGIN, REACH, SPLINE_UNIT, spline_coefficients, view_splines
+from sepi.matching.row_bands import Band, row_bands
+from sepi.matching.spline_kernels import spline_coefficients
+from sepi.matching.spline_views import forget_splines, spline_views
 
 _SMOOTH = np.array([1, 4, 1], np.float32) / 6
 _DIFFERENCE = np.array([-1, 0, 1], np.float32) / 2
@@ -180,46 +181,10 @@ class GaussNewton:
                 self._nearest = disparity, nearest_surfaces(field, disparity, self.present, bands[0].rows)
             add(self._splines, Seeing(self._nearest[1], self._margin), bands[0])
             return
+        forget_splines(field)
         for band in bands:
             nearest = nearest_surfaces(field, disparity, self.present, band.rows)
             add(spline_views(field, self._parameters, band.rows, self.present), Seeing(nearest, self._margin), band)
-
-
-def spline_views(
-    light_field: LightField, parameters: BaseDetailParameters, rows: Rows, present: BoolMap
-) -> SplineViews:
-    """Splines of some rows of the views' colours and, where it has a share, detail."""
-    height, width = light_field.shape
-    # what the convolution reaches; mirrored at the picture's ends
-    reach = MARGIN + REACH
-    wider = Rows(max(0, min(rows.low - reach, height - reach - 1)), min(height, rows.high + reach + 1))
-    views = base_detail_decomposition(light_field, parameters, wider, present)
-    shape = (rows.high - rows.low + 2 * MARGIN, width + 2 * MARGIN, 4)
-    splines = np.zeros((*light_field.grid, *shape), np.int16)
-    view_splines(
-        views.colours, views.colour_unit, views.detail, views.detail_unit, wider.low, present, rows.low,
-        splines,
-    )  # fmt: skip
-    if (present == light_field.present).all():
-        # the splines of all views take its place
-        forget_detail(light_field)
-    others = present.copy()
-    others[light_field.reference_position] = False
-    own = np.zeros((height, width, 4), np.float32)
-    own[..., :3] = views.guide
-    if views.detail.size:
-        own[wider.low : wider.high, :, 3] = views.detail[light_field.reference_position] * views.detail_unit
-    scales = parameters.colour_scale, parameters.detail_scale
-    return SplineViews(
-        splines,
-        SPLINE_UNIT,
-        rows.low,
-        own,
-        np.argwhere(others),
-        light_field.baselines[others].astype(np.float32),
-        np.array([views.squared_scale(scale) for scale in scales], np.float32),
-        parameters.shares,
-    )
 
 
 def windowed_step(gradient: FloatMap, curvature: FloatMap, radius: int, max_update: float) -> tuple[FloatMap, FloatMap]:

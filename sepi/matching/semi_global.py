@@ -34,7 +34,7 @@ HALF_CONFIDENT = 0.05
 ENOUGH_VIEWS = 25
 """Views from which on more make a mean cost no surer: what errs in it then errs in all of them."""
 
-BAND_BYTES = 2**22
+BAND_BYTES = 2**24
 """Of both volumes, in the rows that all paths go through before any goes on: they stay in the cache of all threads."""
 
 # times the radius of the window, where there are few

@@ -119,9 +119,10 @@ def spline_coefficients(image: Any) -> Any:
 
 @njit(parallel=True, cache=True, fastmath=EXACT)
 def view_splines(
-    colours: Any, colour_unit: Any, detail: Any, detail_unit: Any, detail_low: int, present: Any, low: int, out: Any
-) -> None:
-    """Coefficients of every view's colours and detail.
+    colours: Any, colour_unit: Any, detail: Any, detail_unit: Any, detail_low: int, of_colours: Any, of_detail: Any,
+    low: int, out: Any,
+) -> None:  # fmt: skip
+    """Coefficients of views' colours and detail.
 
     Parameters
     ----------
@@ -132,7 +133,8 @@ def view_splines(
         Rows from ``detail_low`` on, which reach ``REACH`` farther than those that are wanted, or to the picture's end.
     detail_unit : float32
     detail_low : int
-    present : ndarray, shape (T, S), bool
+    of_colours, of_detail : ndarray, shape (T, S), bool
+        The views whose colours, and whose detail, are wanted; what ``out`` has of others stays.
     low : int
         The row after the first ``MARGIN`` ones.
     out : ndarray, shape (T, S, n + 2 MARGIN, W + 2 MARGIN, 4), int16
@@ -140,24 +142,29 @@ def view_splines(
     """
     T, S, H, W, _ = colours.shape
     n = out.shape[2]
-    channels = 4 if detail.shape[2] > 0 else 3
     pieces = (n + ROWS_AT_ONCE - 1) // ROWS_AT_ONCE
     for task in prange(T * S * pieces):
         view, first = task // pieces, (task % pieces) * ROWS_AT_ONCE
         t, s = view // S, view % S
-        if not present[t, s]:
+        begin, end = 0 if of_colours[t, s] else 3, 4 if of_detail[t, s] else 3
+        if begin == end:
             continue
         last = min(n, first + ROWS_AT_ONCE)
-        rows = np.empty((channels, ROWS_AT_ONCE + 2 * REACH, W), np.float32)
+        rows = np.empty((4, ROWS_AT_ONCE + 2 * REACH, W), np.float32)
         for i in range(last - first + 2 * REACH):
             y = _mirrored(low - MARGIN + first + i - REACH, H)
-            _load_colours(colours[t, s, y], colour_unit / SPLINE_UNIT, rows[0, i], rows[1, i], rows[2, i])
-            if channels > 3:
+            if begin == 0:
+                _load_colours(colours[t, s, y], colour_unit / SPLINE_UNIT, rows[0, i], rows[1, i], rows[2, i])
+            if end == 4:
                 _load(detail[t, s, y - detail_low], detail_unit / SPLINE_UNIT, rows[3, i])
         padded, lines = np.empty(W + 2 * (MARGIN + REACH), np.float32), np.zeros((4, W + 2 * MARGIN), np.float32)
         for i in range(first, last):
-            for c in range(channels):
+            for c in range(begin, end):
                 _coefficient_row(rows[c, i - first : i - first + 2 * REACH + 1], padded, lines[c], REACH)
+            if begin == 3:
+                for x in range(W + 2 * MARGIN):
+                    out[t, s, i, x, 3] = np.int32(np.rint(lines[3, x]))
+                continue
             for x in range(W + 2 * MARGIN):
                 for c in range(4):
                     out[t, s, i, x, c] = np.int32(np.rint(lines[c, x]))

@@ -121,13 +121,14 @@ def second_difference_stencil(weights: list[FloatArray], shape: tuple[int, int])
 
     Returns
     -------
-    ndarray, shape (7, H, W), float64
+    ndarray, shape (7, H + 2 MARGIN, W + 2 MARGIN), float64
         Entries of each pixel with itself and with those to the right by 1 and 2, below by 1 and 2, below to the right,
-        and below to the left; the matrix is symmetric.
+        and below to the left; the matrix is symmetric. With a margin of zeros of
+        :data:`sepi.regularization.second_order_kernels.MARGIN` pixels.
     """
-    from sepi.regularization.second_order_kernels import stencil_of
+    from sepi.regularization.second_order_kernels import MARGIN, stencil_of
 
-    stencil = np.zeros((7, *shape))
+    stencil = np.zeros((7, shape[0] + 2 * MARGIN, shape[1] + 2 * MARGIN))
     along_x, along_y, across = (np.ascontiguousarray(each, np.float64) for each in weights)
     stencil_of(along_x, along_y, across, stencil)
     return stencil
@@ -140,8 +141,8 @@ def solve_smooth(
 
     Parameters
     ----------
-    smoothness : ndarray, shape (7, H, W), float64
-        From :func:`second_difference_stencil`, times the strength.
+    smoothness : ndarray, shape (7, H + 2 MARGIN, W + 2 MARGIN), float64
+        From :func:`second_difference_stencil`, times the strength; the data's weights are added to it.
     weight, data : ndarray, shape (H, W), float32
         ``w`` and ``z``.
     start : ndarray, shape (H, W), float32
@@ -156,7 +157,7 @@ def solve_smooth(
     ndarray, shape (H, W), float32
     """
     from sepi.regularization.multilevel import conjugate_gradients, multilevel_inverse
-    from sepi.regularization.second_order_kernels import MARGIN
+    from sepi.regularization.second_order_kernels import MARGIN, add_data
 
     if not weight.any():
         # nothing holds any surface
@@ -164,14 +165,15 @@ def solve_smooth(
     w = weight.astype(np.float64) + 1e-9
     # smoothness does not know constants: without the mean, the rtol does not depend on where zero lies
     mean = np.average(data, weights=w)
-    stencil = np.pad(smoothness, ((0, 0), (MARGIN, MARGIN), (MARGIN, MARGIN)))
     inside = np.s_[MARGIN:-MARGIN, MARGIN:-MARGIN]
-    stencil[0][inside] += w
     # half the memory to go through, a third of the time; the solution is the same to a hundredth of its own error
     dtype: Any = np.float32 if rtol >= LEAST_SINGLE_RTOL else np.float64
-    packed = stencil.astype(dtype)
-    inverse = multilevel_inverse(stencil, dtype)
-    del stencil
-    right, first = (np.pad(values, MARGIN).astype(dtype) for values in (w * (data - mean), start - mean))
+    packed = np.empty(smoothness.shape, dtype)
+    add_data(w, smoothness, packed)
+    inverse = multilevel_inverse(smoothness, dtype)
+    # it is large, and goes unless the caller holds it
+    del smoothness
+    right, first = np.zeros((2, *packed.shape[1:]), dtype)
+    right[inside], first[inside] = w * (data - mean), start - mean
     solution = conjugate_gradients(packed, inverse, right, first, rtol, max_iterations)
     return np.asarray(solution[inside] + mean, np.float32)

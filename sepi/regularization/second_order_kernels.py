@@ -79,7 +79,9 @@ def _add(row: Any, begin: int, weights: Any, factor: float) -> None:
 def _stencil_row(y: int, along_x: Any, along_y: Any, across: Any, out: Any) -> None:
     """Row ``y`` of :func:`stencil_of`."""
     H = along_x.shape[0]
-    own, right, right2, below, below2 = out[0, y], out[1, y], out[2, y], out[3, y], out[4, y]
+    row, m, end = y + MARGIN, MARGIN, out.shape[2] - MARGIN
+    own, right, right2 = out[0, row, m:end], out[1, row, m:end], out[2, row, m:end]
+    below, below2 = out[3, row, m:end], out[4, row, m:end]
     for first, factor in ((0, 1.0), (1, 4.0), (2, 1.0)):
         _add(own, first, along_x[y], factor)
     _add(right, 0, along_x[y], -2.0)
@@ -101,7 +103,7 @@ def _stencil_row(y: int, along_x: Any, along_y: Any, across: Any, out: Any) -> N
     if y < H - 1:
         for first in range(2):
             _add(below, first, across[y], -1.0)
-            _add(out[5 + first, y], first, across[y], 1.0)
+            _add(out[5 + first, row, m:end], first, across[y], 1.0)
 
 
 @njit(parallel=True, cache=True, fastmath=EXACT)
@@ -111,11 +113,22 @@ def stencil_of(along_x: Any, along_y: Any, across: Any, out: Any) -> None:
     Parameters
     ----------
     along_x, along_y, across : ndarray, shape (H, W - 2), (H - 2, W) and (H - 1, W - 1), float64
-    out : ndarray, shape (7, H, W), float64
+    out : ndarray, shape (7, H + 2 MARGIN, W + 2 MARGIN), float64
         That of :func:`sepi.regularization.second_order.second_difference_stencil`.
     """
-    for y in prange(out.shape[1]):
+    for y in prange(along_x.shape[0]):
         _stencil_row(y, along_x, along_y, across, out)
+
+
+@njit(parallel=True, cache=True, fastmath=EXACT)
+def add_data(weight: Any, stencil: Any, packed: Any) -> None:
+    """Add the data's weights ``(H, W)`` to a matrix with its margin; ``packed``, of any type, becomes the same."""
+    m = MARGIN
+    for y in prange(stencil.shape[1]):
+        if m <= y < m + weight.shape[0]:
+            _add(stencil[0, y], m, weight[y - m], 1.0)
+        for k in range(7):
+            packed[k, y] = stencil[k, y]
 
 
 @njit(forceinline=True, borrows=True, fastmath=EXACT | {"reassoc"})

@@ -6,6 +6,7 @@ from scipy.sparse import diags
 
 from sepi.regularization.local_inverse import inverse_diagonal
 from sepi.regularization.second_order import second_difference_stencil
+from sepi.regularization.second_order_kernels import MARGIN
 
 SIZE = 40
 INNER = np.s_[7:-7, 7:-7]
@@ -13,7 +14,7 @@ INNER = np.s_[7:-7, 7:-7]
 
 def exact_diagonal(weight: np.ndarray, smoothness: list[np.ndarray]) -> np.ndarray:
     """By the dense inverse."""
-    stencil = second_difference_stencil(smoothness, weight.shape)
+    stencil = second_difference_stencil(smoothness, weight.shape)[:, MARGIN:-MARGIN, MARGIN:-MARGIN]
     size, width = weight.size, weight.shape[1]
     matrix = diags(stencil[0].ravel() + weight.ravel()).toarray()
     for values, offset in zip(stencil[1:], (1, 2, width, 2 * width, width + 1, width - 1), strict=True):

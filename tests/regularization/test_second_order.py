@@ -1,5 +1,7 @@
 """Gauss-Newton refinement and second-order smoothing against plain NumPy and SciPy, and on exact truth."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from geometries import GEOMETRIES, standing
@@ -9,10 +11,12 @@ from scipy.sparse.linalg import spsolve
 
 from sepi.lightfield import DisparityRange, LightField
 from sepi.matching.base_detail import DETAIL_UNIT, BaseDetailParameters, base_detail_decomposition
-from sepi.matching.gauss_newton import GaussNewton, spline_derivatives, spline_views, windowed_step
+from sepi.matching.gauss_newton import GaussNewton, spline_derivatives, windowed_step
 from sepi.matching.gauss_newton_kernels import AT_ONCE
 from sepi.matching.row_bands import Rows
 from sepi.matching.spline_kernels import MARGIN, SPLINE_UNIT, spline_coefficients
+from sepi.matching.spline_views import spline_views
+from sepi.matching.view_subsets import spread_views
 from sepi.matching.visibility_kernels import z_buffers
 from sepi.optimize import SecondOrderParameters, second_order
 from sepi.pipeline import estimate_depth
@@ -28,6 +32,7 @@ from sepi.regularization.second_order import (
 from sepi.regularization.second_order_kernels import MARGIN as MARGIN_OF_STENCIL
 from sepi.scenes import render
 from sepi.stage import StageMaps, no_progress
+from sepi.workspace import Workspace
 
 
 @pytest.mark.parametrize("shape", [(9, 14), (2, 2), (2, 30), (40, 3)])
@@ -156,6 +161,19 @@ def test_margin_of_the_splines_is_mirrored() -> None:
     np.testing.assert_array_equal(splines, np.pad(inner, MARGIN, mode="reflect"))
 
 
+def test_splines_that_are_kept_are_those_made_anew() -> None:
+    """A stage that finds splines of the one before, of other views or without detail, computes with theirs."""
+    scene = render("dots", size=64, views=5)
+    rows, usual = Rows(0, scene.shape[0]), BaseDetailParameters()
+    colours, other = usual.model_copy(update={"use_detail": False}), usual.model_copy(update={"base_radius": 2})
+    keeping = replace(scene, workspace=Workspace())
+    few, all_views = spread_views(scene, 9), scene.present
+    for parameters, present in ((colours, few), (usual, few), (usual, all_views), (other, few), (colours, all_views)):
+        found, anew = (spline_views(field, parameters, rows, present) for field in (keeping, scene))
+        np.testing.assert_array_equal(found.splines[present], anew.splines[present])
+        np.testing.assert_array_equal(found.reference, anew.reference)
+
+
 def test_coefficients_of_the_strongest_pattern_do_not_wrap_round() -> None:
     """Single black and white pixels side by side have coefficients far outside 0..1."""
     y, x = np.mgrid[:16, :16]
@@ -273,7 +291,7 @@ def test_preconditioner_adds_what_hats_of_each_width_see(shape) -> None:
         both = both[:, both.any(axis=0)]
         expected += both @ (both.T @ residual.ravel() / np.diag(both.T @ (matrix @ both)))
     margins = ((MARGIN_OF_STENCIL,) * 2,) * 2
-    stencil = np.pad(second_difference_stencil(weights, shape), ((0, 0), *margins))
+    stencil = second_difference_stencil(weights, shape)
     inside = np.s_[MARGIN_OF_STENCIL:-MARGIN_OF_STENCIL, MARGIN_OF_STENCIL:-MARGIN_OF_STENCIL]
     stencil[0][inside] += held
     found, product = multilevel_inverse(stencil, np.float64)(np.pad(residual, margins))

@@ -1,0 +1,103 @@
+"""Cubic splines of the views, kept from stage to stage: colours are made once for planes and refinement."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from sepi.lightfield import BoolMap, LightField
+from sepi.matching.base_detail import BaseDetailParameters, base_detail_decomposition, forget_detail
+from sepi.matching.gauss_newton_kernels import SplineViews
+from sepi.matching.row_bands import Rows
+from sepi.matching.spline_kernels import MARGIN, REACH, SPLINE_UNIT, view_splines
+from sepi.workspace import OfViews, kept_of
+
+
+def spline_views(
+    light_field: LightField, parameters: BaseDetailParameters, rows: Rows, present: BoolMap
+) -> SplineViews:
+    """Splines of some rows of the views' colours and, where it has a share, detail."""
+    height, width = light_field.shape
+    # what the convolution reaches; mirrored at the picture's ends
+    reach = MARGIN + REACH
+    wider = Rows(max(0, min(rows.low - reach, height - reach - 1)), min(height, rows.high + reach + 1))
+    splines, colours, detail = _splines_so_far(light_field, parameters, rows, present)
+    reference = light_field.reference_position
+    wanted = detail.copy()
+    # which is compared with the mean
+    wanted[reference] = True
+    views = base_detail_decomposition(light_field, parameters, wider, wanted)
+    view_splines(
+        views.colours, views.colour_unit, views.detail, views.detail_unit, wider.low, colours, detail, rows.low, splines
+    )
+    own = np.zeros((height, width, 4), np.float32)
+    own[..., :3] = views.guide
+    if views.detail.size:
+        own[wider.low : wider.high, :, 3] = views.detail[reference] * views.detail_unit
+    if parameters.use_detail and (present == light_field.present).all():
+        # the splines of all views take its place
+        forget_detail(light_field)
+    others = present.copy()
+    others[reference] = False
+    scales = parameters.colour_scale, parameters.detail_scale
+    return SplineViews(
+        splines,
+        SPLINE_UNIT,
+        rows.low,
+        own,
+        np.argwhere(others),
+        light_field.baselines[others].astype(np.float32),
+        np.array([views.squared_scale(scale) for scale in scales], np.float32),
+        parameters.shares,
+    )
+
+
+@dataclass
+class _Kept(OfViews):
+    """The splines of some views so far; of whole views alone, as detail is kept.
+
+    Attributes
+    ----------
+    made_with : tuple of float
+        How the detail is made.
+    splines : ndarray, shape (T, S, H + 2 MARGIN, W + 2 MARGIN, 4), int16
+    colours, detail : ndarray, shape (T, S), bool
+        The views of which they have them.
+    """
+
+    made_with: tuple[float, ...] = ()
+    splines: npt.NDArray[np.int16] | None = None
+    colours: BoolMap | None = None
+    detail: BoolMap | None = None
+
+
+def forget_splines(light_field: LightField) -> None:
+    """Give back the splines that are kept, which are made again if they are asked for."""
+    kept = kept_of(light_field, _Kept)
+    kept.splines = kept.colours = kept.detail = None
+
+
+def _splines_so_far(
+    light_field: LightField, parameters: BaseDetailParameters, rows: Rows, present: BoolMap
+) -> tuple[npt.NDArray[np.int16], BoolMap, BoolMap]:
+    """Room for splines, with those that are made already, and the views whose colours and detail are yet to be made."""
+    height, width = light_field.shape
+    # pages that nobody writes to take no memory
+    shape = (*light_field.grid, rows.high - rows.low + 2 * MARGIN, width + 2 * MARGIN, 4)
+    with_detail = present if parameters.use_detail else np.zeros_like(present)
+    if rows != (0, height):
+        return np.zeros(shape, np.int16), present, with_detail
+    kept = kept_of(light_field, _Kept)
+    made_with = (parameters.base_radius, parameters.base_sigma_colour, parameters.base_sigma_space)
+    # who does without detail takes its channel for empty
+    other = (
+        kept.detail is not None and kept.detail.any() and not (parameters.use_detail and kept.made_with == made_with)
+    )
+    if kept.splines is None or kept.colours is None or kept.detail is None or other:
+        kept.splines, kept.colours, kept.detail = np.zeros(shape, np.int16), *np.zeros((2, *light_field.grid), bool)
+    kept.made_with = made_with
+    missing = present & ~kept.colours, with_detail & ~kept.detail
+    kept.colours, kept.detail = kept.colours | present, kept.detail | with_detail
+    return kept.splines, *missing

@@ -1,0 +1,25 @@
+"""What a process needs soon, done while its threads decode pictures: they leave Python's lock to whoever imports."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+_SOON: list[Callable[[], None]] = []
+
+
+def do_meanwhile(task: Callable[[], None]) -> None:
+    """Have something done that does not depend on the pictures: when they are decoded next, or never.
+
+    Parameters
+    ----------
+    task : callable
+        Such as one that imports a library; whoever needs what it does must do with its not having been called.
+    """
+    if task not in _SOON:
+        _SOON.append(task)
+
+
+def wait_usefully() -> None:
+    """Do what was given to :func:`do_meanwhile`, for the caller has to wait anyway."""
+    while _SOON:
+        _SOON.pop()()
