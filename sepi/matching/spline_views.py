@@ -92,10 +92,10 @@ def _splines_so_far(
     kept = kept_of(light_field, _Kept)
     made_with = (parameters.base_radius, parameters.base_sigma_colour, parameters.base_sigma_space)
     # who does without detail takes its channel for empty
-    other = (
-        kept.detail is not None and kept.detail.any() and not (parameters.use_detail and kept.made_with == made_with)
-    )
-    if kept.splines is None or kept.colours is None or kept.detail is None or other:
+    same_detail = parameters.use_detail and kept.made_with == made_with
+    if kept.detail is not None and kept.detail.any() and not same_detail:
+        kept.splines = None
+    if kept.splines is None or kept.colours is None or kept.detail is None:
         kept.splines, kept.colours, kept.detail = np.zeros(shape, np.int16), *np.zeros((2, *light_field.grid), bool)
     kept.made_with = made_with
     missing = present & ~kept.colours, with_detail & ~kept.detail
