@@ -168,7 +168,8 @@ def test_splines_that_are_kept_are_those_made_anew() -> None:
     colours, other = usual.model_copy(update={"use_detail": False}), usual.model_copy(update={"base_radius": 2})
     keeping = replace(scene, workspace=Workspace())
     few, all_views = spread_views(scene, 9), scene.present
-    for parameters, present in ((colours, few), (usual, few), (other, few), (usual, all_views), (colours, all_views)):
+    made = ((colours, few), (usual, few), (usual, all_views), (other, few), (usual, few), (colours, all_views))
+    for parameters, present in made:
         found, anew = (spline_views(field, parameters, rows, present) for field in (keeping, scene))
         np.testing.assert_array_equal(found.splines[present], anew.splines[present])
         np.testing.assert_array_equal(found.reference, anew.reference)
