@@ -1,5 +1,5 @@
 """``python -m sepi``: the same as the command ``sepi``."""
 
-from sepi.cli.main import main
+from sepi.cli.main import run
 
-main(prog_name="sepi")
+run()

@@ -14,8 +14,13 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any, TypeVar, cast
 
+from sepi.absent import absent
+
+# of which numba asks the one whether it is running and the other for its version: a third of importing numba
+with absent("coverage", "scipy"):
+    import numba
+
 import llvmlite.binding
-import numba
 from llvmlite import ir
 from numba import prange, types
 from numba.core import cgutils, codegen

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
+
+_SHORTLY = 0.0002
+"""So long Python's lock is kept from a thread that needs it between two pictures, seconds; usual are 5 ms."""
 
 _SOON: list[Callable[[], None]] = []
 
@@ -21,5 +25,10 @@ def do_meanwhile(task: Callable[[], None]) -> None:
 
 def wait_usefully() -> None:
     """Do what was given to :func:`do_meanwhile`, for the caller has to wait anyway."""
-    while _SOON:
-        _SOON.pop()()
+    usual = sys.getswitchinterval()
+    sys.setswitchinterval(_SHORTLY)
+    try:
+        while _SOON:
+            _SOON.pop()()
+    finally:
+        sys.setswitchinterval(usual)

@@ -6,6 +6,7 @@ import re
 import time
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -87,12 +88,8 @@ def depth(
       sepi depth views --grid 5x5 --exclude 0,0 --exclude 0,4
       sepi depth cotton --variant paper --set initial.sepi.num_disparities=91
     """
-    from sepi.inspection.disparity_range import settle_range
-    from sepi.io.provenance import result_attributes
     from sepi.io.result_files import ALL_VIEWS, names_of_others, require_own, require_target
-    from sepi.io.result_folder import write_result
-    from sepi.matching.unknown import UNKNOWN
-    from sepi.pipeline import estimate_depth
+    from sepi.meanwhile import do_meanwhile
     from sepi.threads import available_cores, use_threads
     from sepi.variants import stage_parameters, variant_named
 
@@ -105,7 +102,14 @@ def depth(
     require_target(folder)
     if light_field_path.resolve() == folder.resolve():
         raise SepiError(f"{folder}: is the light field itself; choose another folder for the result")
+    do_meanwhile(_import_what_follows)
     light_field = reading.read(light_field_path, disparity_range=disparity_range)
+    from sepi.inspection.disparity_range import settle_range
+    from sepi.io.provenance import result_attributes
+    from sepi.io.result_folder import write_result
+    from sepi.matching.unknown import UNKNOWN
+    from sepi.pipeline import estimate_depth
+
     require_own(folder, light_field, force=force)
     if geometry is not None:
         # another camera than the calibrated one: its rig's lengths mean nothing
@@ -133,6 +137,12 @@ def depth(
         click.echo(f"unknown: {100 * unknown:.2g} % of the pixels; no view knows anything about them")
     click.echo(_interval(maps, variant))
     click.echo(f"written to {folder}/: {' '.join(files)}")
+
+
+def _import_what_follows() -> None:
+    """Import what works on the light field and writes the result."""
+    for name in ("sepi.inspection.disparity_range", "sepi.pipeline", "sepi.io.result_folder", "PIL.PngImagePlugin"):
+        import_module(name)
 
 
 def _also_as_taken(
