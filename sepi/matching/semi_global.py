@@ -13,6 +13,7 @@ References
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Annotated, Self
 
@@ -105,15 +106,49 @@ class SmoothedResult:
     confidence: FloatMap
 
 
+class CostVolumes:
+    """Memory for the costs of a sweep and for what smoothing makes of them, which the next sweep uses again.
+
+    To be given new memory takes a process as long as to fill it.
+
+    Parameters
+    ----------
+    candidates : int
+        Most of a sweep, ``K``.
+    shape : (int, int)
+        Height and width.
+    """
+
+    def __init__(self, candidates: int, shape: tuple[int, int]) -> None:
+        from sepi.matching.semi_global_kernels import VECTOR
+
+        self._shape, self._vector = shape, VECTOR
+        self._costs, self._averaged = np.empty((2, self._padded(candidates) * shape[0] * shape[1]), np.float32)
+
+    def _padded(self, candidates: int) -> int:
+        return -(-candidates // self._vector) * self._vector
+
+    def costs(self, candidates: int) -> FloatMap:
+        """Room for the costs of so many candidates, (K, H, W)."""
+        height, width = self._shape
+        return self._costs[: candidates * height * width].reshape(candidates, height, width)
+
+    def averaged_and_smoothed(self, candidates: int) -> tuple[FloatMap, FloatMap]:
+        """Room for averaged costs and for smoothed ones, which takes the place of :meth:`costs`; (H, W, K')."""
+        shape = (*self._shape, self._padded(candidates))
+        averaged, smoothed = (room[: math.prod(shape)].reshape(shape) for room in (self._averaged, self._costs))
+        return averaged, smoothed
+
+
 def smooth_and_choose(
-    cost: FloatMap, disparities: FloatMap, guide: FloatMap, contrast: float, parameters: SmoothingParameters
+    volumes: CostVolumes, disparities: FloatMap, guide: FloatMap, contrast: float, parameters: SmoothingParameters
 ) -> SmoothedResult:
     """Average, smooth, and take the best candidate of each pixel.
 
     Parameters
     ----------
-    cost : ndarray, shape (K, H, W), float32
-        0..1.
+    volumes : CostVolumes
+        Its costs, 0..1, of so many candidates as there are disparities; they are overwritten.
     disparities : ndarray, shape (K,), float32
         Uniform, pixels per view step.
     guide : ndarray, shape (H, W, 3), float32
@@ -130,14 +165,13 @@ def smooth_and_choose(
     from sepi.matching.semi_global_kernels import aggregate, choose, semi_global
 
     variance = np.float32(parameters.window_sigma**2 + contrast)
-    averaged = aggregate(cost, guide, parameters.window_radius, variance)
-    # the volume is large: it goes, unless the caller holds it
-    del cost
+    averaged, smoothed = volumes.averaged_and_smoothed(len(disparities))
+    aggregate(volumes.costs(len(disparities)), guide, parameters.window_radius, variance, averaged)
     small, large, weakening = map(
         np.float32, (parameters.small_penalty, parameters.large_penalty, parameters.colour_weakening)
     )
     band = max(1, BAND_BYTES // (2 * averaged[0].nbytes))
-    smoothed = semi_global(averaged, guide, small, large, weakening, band)
+    semi_global(averaged, guide, small, large, weakening, band, smoothed)
     same = min(SAME_MINIMUM, SAME_SHARE * float(disparities[-1] - disparities[0]))
     disparity, margin = choose(smoothed, averaged, disparities, np.float32(same))
     margin = np.maximum(margin, 0)

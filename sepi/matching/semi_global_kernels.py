@@ -103,12 +103,11 @@ def _any_window_sum(rows: Any, weights: Any, out: Any, radius: int) -> None:
 
 
 @njit(parallel=True, cache=True, fastmath=EXACT, error_model="numpy")
-def aggregate(cost: Any, guide: Any, radius: int, variance: Any) -> Any:
+def aggregate(cost: Any, guide: Any, radius: int, variance: Any, out: Any) -> None:
     """Mean over a window with weights ``exp(-|colour difference|^2 / (2 variance))``; (K, H, W) to (H, W, K')."""
     K, H, W = cost.shape
     size = 2 * radius + 1
     colours = np.ascontiguousarray(guide.transpose(2, 0, 1))
-    out = np.empty((H, W, -(-K // VECTOR) * VECTOR), np.float32)
     for y in prange(H):
         weights, sums = np.empty((size * size, W), np.float32), np.empty(W, np.float32)
         _window_weights(colours, y, radius, variance, weights, sums)
@@ -128,7 +127,6 @@ def aggregate(cost: Any, guide: Any, radius: int, variance: Any) -> Any:
             for x in range(W):
                 for k in range(VECTOR):
                     out[y, x, begin + k] = total[k, x]
-    return out
 
 
 def _vector_next(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
@@ -239,14 +237,13 @@ def _along_lines(
 
 
 @njit(parallel=True, cache=True, fastmath=EXACT)
-def semi_global(cost: Any, guide: Any, small: Any, large: Any, weakening: Any, band: int) -> Any:
-    """Sum of the smoothed costs along eight paths; shapes (H, W, K'), float32.
+def semi_global(cost: Any, guide: Any, small: Any, large: Any, weakening: Any, band: int, out: Any) -> None:
+    """Sum of the smoothed costs along eight paths, into ``out``; shapes (H, W, K'), float32.
 
     Paths of one direction do not meet, so a thread goes through many of them by itself. All go through ``band`` rows
     before any goes on, so that costs and sums come from memory once for the paths down and once for those up.
     """
     H, W, K = cost.shape
-    out = np.zeros((H, W, K), np.float32)
     penalties = small, large, weakening
     pieces = -(-W // PATHS_AT_ONCE)
     for dy in (1, -1):
@@ -256,6 +253,7 @@ def semi_global(cost: Any, guide: Any, small: Any, large: Any, weakening: Any, b
             rows = begin, min(H, begin + band)
             if dy > 0:
                 for y in prange(rows[0], rows[1]):
+                    out[y] = 0
                     _along_row(cost, guide, y, 1, penalties, out)
                     _along_row(cost, guide, y, -1, penalties, out)
             for direction in range(3):
@@ -265,7 +263,6 @@ def semi_global(cost: Any, guide: Any, small: Any, large: Any, weakening: Any, b
                         paths[direction, piece], least[direction, piece], piece * PATHS_AT_ONCE,
                         cost, guide, rows, dy, dx, penalties, out,
                     )  # fmt: skip
-    return out
 
 
 @njit(forceinline=True)

@@ -23,7 +23,7 @@ from sepi.matching.denoising import DenoisedLightField, guide_of
 from sepi.matching.gaps import GapParameters, with_open_gaps
 from sepi.matching.nearest_surfaces import nearest_surfaces
 from sepi.matching.row_bands import Band, row_bands
-from sepi.matching.semi_global import SmallPenalty, SmoothedResult, SmoothingParameters, smooth_and_choose
+from sepi.matching.semi_global import CostVolumes, SmallPenalty, SmoothedResult, SmoothingParameters, smooth_and_choose
 from sepi.matching.sweep_arrays import sampled_candidates
 from sepi.matching.view_subsets import spread_views
 from sepi.stage import Needs, Progress
@@ -116,7 +116,8 @@ def first_depth(light_field: LightField, parameters: VisibilitySweepParameters, 
         If the disparity range is unknown.
     """
     views = spread_views(light_field, parameters.first_views)
-    return _sweep(light_field, views, parameters.first_sampling, None, parameters, progress)
+    volumes = _volumes(light_field, parameters, parameters.first_sampling)
+    return _sweep(light_field, views, parameters.first_sampling, None, parameters, volumes, progress)
 
 
 def depth_from_visible_views(
@@ -146,6 +147,7 @@ def depth_from_visible_views(
     few = spread_views(light_field, parameters.first_views)
     if parameters.gaps:
         disparity = with_open_gaps(light_field, disparity, few, parameters)
+    volumes = _volumes(light_field, parameters, *([parameters.first_sampling] * (n > 1)), parameters.sampling)
     for i in range(n):
         last = i == n - 1
         result = _sweep(
@@ -154,6 +156,7 @@ def depth_from_visible_views(
             parameters.sampling if last else parameters.first_sampling,
             disparity,
             parameters,
+            volumes,
             lambda fraction, i=i: progress((i + fraction) / n),  # type: ignore[misc]
         )
         disparity = result.disparity
@@ -194,18 +197,25 @@ def occluded_in_any_view(
     return occluded
 
 
+def _volumes(light_field: LightField, parameters: VisibilitySweepParameters, *samplings: float) -> CostVolumes:
+    """Room for sweeps of candidates so many times as far apart as usual."""
+    light_field.require_disparity_range()
+    return CostVolumes(max(parameters.fewer(light_field, sampling) for sampling in samplings), light_field.shape)
+
+
 def _sweep(
     light_field: LightField,
     present: BoolMap,
     sampling: float,
     disparity: FloatMap | None,
     parameters: VisibilitySweepParameters,
+    volumes: CostVolumes,
     progress: Progress,
 ) -> SmoothedResult:
     """A map over some of the views, of candidates ``sampling`` times as far apart as usual."""
     disparities = light_field.require_disparity_range().candidates(parameters.fewer(light_field, sampling))
-    height, width = light_field.shape
-    cost = np.empty((len(disparities), height, width), np.float32)
+    height = light_field.shape[0]
+    cost = volumes.costs(len(disparities))
     for band in row_bands(light_field, present, float(np.abs(disparities).max()), BYTES_PER_PIXEL):
         # the smoothing takes about a fifth of the time
         _add_costs(
@@ -219,15 +229,12 @@ def _sweep(
             lambda row: progress(0.8 * row / height),
         )
     guide = guide_of(light_field)
-    # not held by a name: it goes as soon as it has been used
-    volume = [cost]
-    del cost
     variance = variance_of_residuals(_contrast_of_surfaces(light_field), guide.shape[2])
     shown = light_field.present
     if light_field.missing is not None:
         shown = shown & ~light_field.missing.all(axis=(2, 3))
     smoothing = parameters.for_views(int(shown.sum()))
-    result = smooth_and_choose(volume.pop(), disparities, guide, variance, smoothing)
+    result = smooth_and_choose(volumes, disparities, guide, variance, smoothing)
     progress(1.0)
     return result
 
