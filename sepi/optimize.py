@@ -207,11 +207,12 @@ def second_order(
             mean = matching.mean(disparity)
         if last:
             # the splines have it
-            forget_detail(light_field)
+            matching.forget_detail()
             told = gradient, information, _ = matching.with_evidence(mean, disparity)
             # the solver has use for their memory
             del matching, mean
             forget_splines(light_field)
+            forget_detail(light_field)
         else:
             gradient, information = matching.gradient_and_hessian(mean, disparity)
         radius = parameters.solve_radius if smooth else parameters.refinement_radius

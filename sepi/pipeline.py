@@ -13,7 +13,7 @@ import numpy as np
 from sepi.exposure import equally_bright
 from sepi.kernel_cache import tell_kernel_cache
 from sepi.lightfield import LightField, require_light_field
-from sepi.matching.memory_limit import bytes_of_bands, require_memory_of
+from sepi.matching.memory_limit import bytes_of_bands, bytes_of_volumes, require_memory_of
 from sepi.matching.unknown import with_unknown
 from sepi.memory import give_back_memory
 from sepi.stage import MadeBy, Progress, StageMaps, entry, no_progress
@@ -92,10 +92,11 @@ def estimate_depth(
     light_field = replace(light_field, views=views, workspace=workspace)
     compared = equally_bright(light_field)
     require_memory_of(compared, settings.values())
+    # what was made to tell what is needed stays
+    workspace = replace(workspace, detail_bytes=bytes_of_volumes(compared, settings.values()))
     if memory is not None:
-        # what was made to tell what is needed stays
-        limited = replace(workspace, band_bytes=bytes_of_bands(compared, settings.values(), memory))
-        compared = replace(compared, workspace=limited)
+        workspace = replace(workspace, band_bytes=bytes_of_bands(compared, settings.values(), memory))
+    compared = replace(compared, workspace=workspace)
     maps: StageMaps | None = None
     for number, (stage, choice) in enumerate(chosen.choices.items()):
 

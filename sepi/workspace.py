@@ -38,11 +38,14 @@ class Workspace:
     ----------
     band_bytes : int
         What bands of rows take at a time, about, or as little as they can.
+    detail_bytes : int
+        What the detail of all views may take beside bands that need it again and again.
     kept : mapping of type to object
         One of a kind: what is kept of other views goes.
     """
 
     band_bytes: int = USUAL_BAND_BYTES
+    detail_bytes: int = 0
     kept: dict[type, Any] = field(default_factory=dict)
 
 

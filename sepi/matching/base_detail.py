@@ -115,6 +115,8 @@ def base_detail_decomposition(
     parameters: BaseDetailParameters,
     rows: Rows | None = None,
     present: BoolMap | None = None,
+    *,
+    again: bool = False,
 ) -> BaseDetail:
     """Colours and detail of a light field; missing views stay empty.
 
@@ -126,6 +128,8 @@ def base_detail_decomposition(
         The rows whose detail is wanted; all unless given.
     present : ndarray, shape (T, S), bool, optional
         The views that are wanted; all that are present unless given.
+    again : bool
+        The same views will be asked for again, in other rows: all rows are made and kept, where there is memory for it.
 
     Returns
     -------
@@ -134,7 +138,8 @@ def base_detail_decomposition(
     from sepi.matching.base_detail_kernels import detail_of_views
 
     views, guide = light_field.rgb_views, light_field.reference_view
-    rows = rows or Rows(0, light_field.shape[0])
+    if rows is None or (again and _all_rows_fit(light_field)):
+        rows = Rows(0, light_field.shape[0])
     present = light_field.present if present is None else present
     unit = np.float32(1 / full_scale(views.dtype))
     noise = reference_noise(light_field)
@@ -173,6 +178,13 @@ def forget_detail(light_field: LightField) -> None:
     """Give back the detail that is kept, which is made again if it is asked for."""
     kept = kept_of(light_field, _Kept)
     kept.detail = kept.made = None
+
+
+def _all_rows_fit(light_field: LightField) -> bool:
+    """Whether there is memory for the detail of all views."""
+    height, width = light_field.shape
+    taken = np.dtype(np.int16).itemsize * int(light_field.present.sum()) * height * width
+    return light_field.workspace is not None and taken <= light_field.workspace.detail_bytes
 
 
 def _detail_so_far(

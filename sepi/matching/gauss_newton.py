@@ -18,7 +18,7 @@ import numpy as np
 
 from sepi.image.noise import variance_of_residuals
 from sepi.lightfield import BoolMap, FloatMap, LightField
-from sepi.matching.base_detail import BaseDetailParameters, reference_noise
+from sepi.matching.base_detail import BaseDetailParameters, forget_detail, reference_noise
 from sepi.matching.gauss_newton_kernels import (
     Seeing,
     SplineViews,
@@ -27,7 +27,7 @@ from sepi.matching.gauss_newton_kernels import (
     normal_equations,
 )
 from sepi.matching.nearest_surfaces import nearest_surfaces
-from sepi.matching.row_bands import Band, row_bands
+from sepi.matching.row_bands import Band, Rows, row_bands
 from sepi.matching.spline_kernels import spline_coefficients
 from sepi.matching.spline_views import forget_splines, spline_views
 
@@ -182,9 +182,20 @@ class GaussNewton:
             add(self._splines, Seeing(self._nearest[1], self._margin), bands[0])
             return
         forget_splines(field)
+        # as tall as the tallest, so that each takes the place of the one before
+        height, tallest = field.shape[0], max(band.rows.high - band.rows.low for band in bands)
+        room = None
         for band in bands:
-            nearest = nearest_surfaces(field, disparity, self.present, band.rows)
-            add(spline_views(field, self._parameters, band.rows, self.present), Seeing(nearest, self._margin), band)
+            low = min(band.rows.low, height - tallest)
+            rows = Rows(low, low + tallest)
+            splines = spline_views(field, self._parameters, rows, self.present, room)
+            room = splines.splines
+            add(splines, Seeing(nearest_surfaces(field, disparity, self.present, rows), self._margin), band)
+
+    def forget_detail(self) -> None:
+        """Give back the detail of the views, where what is to come needs their splines alone."""
+        if self._splines is not None:
+            forget_detail(self._light_field)
 
 
 def windowed_step(gradient: FloatMap, curvature: FloatMap, radius: int, max_update: float) -> tuple[FloatMap, FloatMap]:

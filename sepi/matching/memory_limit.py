@@ -76,16 +76,21 @@ def bytes_of_bands(light_field: LightField, stages: Iterable[Parameters], memory
     return memory - whole
 
 
+def bytes_of_volumes(light_field: LightField, stages: Iterable[Parameters]) -> int:
+    """What cost volumes take as a whole, which other stages may use for something else; the range must be known."""
+    sweeps = [p.fewer(light_field, p.finest_sampling) for p in stages if isinstance(p, VisibilitySweepParameters)]
+    height, width = light_field.shape
+    return BYTES_PER_CANDIDATE * max(sweeps, default=0) * height * width
+
+
 def _bytes_taken(light_field: LightField, stages: Iterable[Parameters]) -> tuple[int, int]:
     """What is held as a whole, and that with the narrowest bands."""
     stages = list(stages)
     height, width = light_field.shape
-    sweeps = [p.fewer(light_field, p.finest_sampling) for p in stages if isinstance(p, VisibilitySweepParameters)]
-    volume = BYTES_PER_CANDIDATE * max(sweeps, default=0)
     rings = [p.sweep_bytes(light_field, threads_used()) for p in stages if isinstance(p, SweepParameters)]
     pixels, samples = height * width, height * width * int(light_field.present.sum())
     own = max((p.needs.bytes_per_sample * samples + p.needs.bytes_per_pixel * pixels for p in stages), default=0)
-    ours = _BYTES_OF_MAPS * pixels + max(volume * pixels, *rings, 0)
+    ours = _BYTES_OF_MAPS * pixels + max(bytes_of_volumes(light_field, stages), *rings, 0)
     least = max((p.denoising for p in stages if isinstance(p, DenoisingParameters)), default=0.0)
     copy = denoised(light_field, least)
     ours += 0 if copy is light_field else copy.views.nbytes

@@ -16,27 +16,46 @@ from sepi.workspace import OfViews, kept_of
 
 
 def spline_views(
-    light_field: LightField, parameters: BaseDetailParameters, rows: Rows, present: BoolMap
+    light_field: LightField,
+    parameters: BaseDetailParameters,
+    rows: Rows,
+    present: BoolMap,
+    room: npt.NDArray[np.int16] | None = None,
 ) -> SplineViews:
-    """Splines of some rows of the views' colours and, where it has a share, detail."""
+    """Splines of some rows of the views' colours and, where it has a share, detail.
+
+    Parameters
+    ----------
+    light_field : LightField
+    parameters : BaseDetailParameters
+    rows : Rows
+    present : ndarray, shape (T, S), bool
+        The views of which they are wanted.
+    room : ndarray, optional
+        Splines of as many rows of the same views that are needed no more, which these take the place of.
+
+    Returns
+    -------
+    SplineViews
+    """
     height, width = light_field.shape
     # what the convolution reaches; mirrored at the picture's ends
     reach = MARGIN + REACH
     wider = Rows(max(0, min(rows.low - reach, height - reach - 1)), min(height, rows.high + reach + 1))
-    splines, colours, detail = _splines_so_far(light_field, parameters, rows, present)
+    splines, colours, detail = _splines_so_far(light_field, parameters, rows, present, room)
     reference = light_field.reference_position
     wanted = detail.copy()
     # which is compared with the mean
     wanted[reference] = True
-    views = base_detail_decomposition(light_field, parameters, wider, wanted)
+    views = base_detail_decomposition(light_field, parameters, wider, wanted, again=True)
     view_splines(
-        views.colours, views.colour_unit, views.detail, views.detail_unit, wider.low, colours, detail, rows.low, splines
+        views.colours, views.colour_unit, views.detail, views.detail_unit, views.low, colours, detail, rows.low, splines
     )
     own = np.zeros((height, width, 4), np.float32)
     own[..., :3] = views.guide
     if views.detail.size:
-        own[wider.low : wider.high, :, 3] = views.detail[reference] * views.detail_unit
-    if parameters.use_detail and (present == light_field.present).all():
+        own[views.low : views.low + views.detail.shape[2], :, 3] = views.detail[reference] * views.detail_unit
+    if rows == (0, height) and parameters.use_detail and (present == light_field.present).all():
         # the splines of all views take its place
         forget_detail(light_field)
     others = present.copy()
@@ -80,7 +99,11 @@ def forget_splines(light_field: LightField) -> None:
 
 
 def _splines_so_far(
-    light_field: LightField, parameters: BaseDetailParameters, rows: Rows, present: BoolMap
+    light_field: LightField,
+    parameters: BaseDetailParameters,
+    rows: Rows,
+    present: BoolMap,
+    room: npt.NDArray[np.int16] | None,
 ) -> tuple[npt.NDArray[np.int16], BoolMap, BoolMap]:
     """Room for splines, with those that are made already, and the views whose colours and detail are yet to be made."""
     height, width = light_field.shape
@@ -88,7 +111,7 @@ def _splines_so_far(
     shape = (*light_field.grid, rows.high - rows.low + 2 * MARGIN, width + 2 * MARGIN, 4)
     with_detail = present if parameters.use_detail else np.zeros_like(present)
     if rows != (0, height):
-        return np.zeros(shape, np.int16), present, with_detail
+        return np.zeros(shape, np.int16) if room is None else room, present, with_detail
     kept = kept_of(light_field, _Kept)
     made_with = (parameters.base_radius, parameters.base_sigma_colour, parameters.base_sigma_space)
     # who does without detail takes its channel for empty
