@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import sys
+import threading
 from collections.abc import Callable
 
 _SHORTLY = 0.0002
 """So long Python's lock is kept from a thread that needs it between two pictures, seconds; usual are 5 ms."""
 
 _SOON: list[Callable[[], None]] = []
+_BUSY = threading.Lock()
 
 
 def do_meanwhile(task: Callable[[], None]) -> None:
@@ -24,7 +26,9 @@ def do_meanwhile(task: Callable[[], None]) -> None:
 
 
 def wait_usefully() -> None:
-    """Do what was given to :func:`do_meanwhile`, for the caller has to wait anyway."""
+    """Do what was given to :func:`do_meanwhile`, for the caller has to wait anyway; nothing if a thread is at it."""
+    if not _BUSY.acquire(blocking=False):
+        return
     usual = sys.getswitchinterval()
     sys.setswitchinterval(_SHORTLY)
     try:
@@ -32,3 +36,4 @@ def wait_usefully() -> None:
             _SOON.pop()()
     finally:
         sys.setswitchinterval(usual)
+        _BUSY.release()

@@ -5,6 +5,7 @@ to be in the wrong order.
 from __future__ import annotations
 
 import os
+import sys
 import warnings
 from contextlib import suppress
 from dataclasses import replace
@@ -21,7 +22,7 @@ from sepi.io.readers.options import ReadOptions, in_grid
 from sepi.kernel_cache import tell_kernel_cache
 from sepi.lightfield import DisparityRange, LightField
 from sepi.meanwhile import do_meanwhile
-from sepi.memory import KERNELS, give_back_memory, require_memory
+from sepi.memory import KERNELS, MORE_KERNELS, give_back_memory, require_memory
 from sepi.validation import described, require_type
 
 # 16-bit views darker than this, a sixteenth of the full scale, hold fewer bits or next to no light
@@ -98,7 +99,7 @@ def read_light_field(
     light_field = read(path, options, file_format, truth=truth)
     if light_field.rig is not None and light_field.disparity_range is None:
         light_field = _with_depths(path, light_field, options, given)
-    require_memory(KERNELS)
+    require_memory(MORE_KERNELS if "numba" in sys.modules else KERNELS)
     tell_kernel_cache()
     if not light_field.arranged:
         from sepi.inspection.arrangement import arrange

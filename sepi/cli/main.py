@@ -103,7 +103,9 @@ def run() -> None:
         main(prog_name="sepi")
     except SystemExit as end:
         others = [thread for thread in threading.enumerate() if thread is not threading.main_thread()]
-        if isinstance(end.code, int) and all(thread.daemon for thread in others):
+        # profilers and the like write what they found when Python ends
+        watched = sys.gettrace() or sys.getprofile()
+        if isinstance(end.code, int) and all(thread.daemon for thread in others) and not watched:
             _end_at_once(end.code)
         raise
 

@@ -122,10 +122,15 @@ def read_views(
 
     # decoding runs outside Python's lock, so threads share the work
     with _no_warnings(), ThreadPoolExecutor(min(8, available_cores())) as pool:
-        filled = pool.map(fill, range(len(paths)))
-        wait_usefully()
-        for _ in filled:
-            pass
+        filled = [pool.submit(fill, index) for index in range(len(paths))]
+        try:
+            wait_usefully()
+            for one in filled:
+                one.result()
+        except BaseException:
+            # an interrupted command does not wait for the rest
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
     return views
 
 

@@ -166,7 +166,7 @@ def base_detail_decomposition(
 class _Kept(OfViews):
     """The detail of some views so far.
 
-    Detail is kept of whole views; what is made in bands of rows, since memory is short, is not.
+    Detail is kept of whole views; what is made in bands of rows, since memory is short, is not, unless all rows fit.
     """
 
     made_with: tuple[float, ...] = ()

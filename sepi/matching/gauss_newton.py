@@ -191,6 +191,8 @@ class GaussNewton:
             splines = spline_views(field, self._parameters, rows, self.present, room)
             room = splines.splines
             add(splines, Seeing(nearest_surfaces(field, disparity, self.present, rows), self._margin), band)
+        # a band may need all rows
+        forget_splines(field)
 
     def forget_detail(self) -> None:
         """Give back the detail of the views, where what is to come needs their splines alone."""

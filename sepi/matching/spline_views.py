@@ -110,8 +110,10 @@ def _splines_so_far(
     # pages that nobody writes to take no memory
     shape = (*light_field.grid, rows.high - rows.low + 2 * MARGIN, width + 2 * MARGIN, 4)
     with_detail = present if parameters.use_detail else np.zeros_like(present)
+    if room is not None:
+        return room, present, with_detail
     if rows != (0, height):
-        return np.zeros(shape, np.int16) if room is None else room, present, with_detail
+        return np.zeros(shape, np.int16), present, with_detail
     kept = kept_of(light_field, _Kept)
     made_with = (parameters.base_radius, parameters.base_sigma_colour, parameters.base_sigma_space)
     # who does without detail takes its channel for empty
