@@ -60,6 +60,11 @@ class BaseDetailParameters(DenoisingParameters):
     base_sigma_space: float = Field(4.0, gt=0, le=20, description="width of the base's window, in pixels")
 
     @property
+    def base(self) -> tuple[float, ...]:
+        """What the detail depends on, but for the views."""
+        return self.base_radius, self.base_sigma_colour, self.base_sigma_space
+
+    @property
     def shares(self) -> FloatMap:
         """Shares of colours and detail in the cost; shape (2,), float32."""
         share = self.detail_share if self.use_detail else 0.0
@@ -198,9 +203,8 @@ def _detail_so_far(
     if not with_detail or rows != (0, height):
         return np.zeros(shape, np.int16), present
     kept = kept_of(light_field, _Kept)
-    made_with = (parameters.base_radius, parameters.base_sigma_colour, parameters.base_sigma_space)
-    if kept.detail is None or kept.made is None or kept.made_with != made_with:
-        kept.made_with = made_with
+    if kept.detail is None or kept.made is None or kept.made_with != parameters.base:
+        kept.made_with = parameters.base
         kept.detail, kept.made = np.zeros(shape, np.int16), np.zeros(light_field.grid, bool)
     missing = present & ~kept.made
     kept.made |= present

@@ -47,10 +47,15 @@ def spline_views(
     wanted = detail.copy()
     # which is compared with the mean
     wanted[reference] = True
-    views = base_detail_decomposition(light_field, parameters, wider, wanted, again=True)
-    view_splines(
-        views.colours, views.colour_unit, views.detail, views.detail_unit, views.low, colours, detail, rows.low, splines
-    )
+    try:
+        views = base_detail_decomposition(light_field, parameters, wider, wanted, again=True)
+        numbers = views.colours, views.colour_unit, views.detail, views.detail_unit, views.low
+        view_splines(*numbers, colours, detail, rows.low, splines)
+    except BaseException:
+        # they are taken for made
+        forget_splines(light_field)
+        forget_detail(light_field)
+        raise
     own = np.zeros((height, width, 4), np.float32)
     own[..., :3] = views.guide
     if views.detail.size:
@@ -115,14 +120,13 @@ def _splines_so_far(
     if rows != (0, height):
         return np.zeros(shape, np.int16), present, with_detail
     kept = kept_of(light_field, _Kept)
-    made_with = (parameters.base_radius, parameters.base_sigma_colour, parameters.base_sigma_space)
     # who does without detail takes its channel for empty
-    same_detail = parameters.use_detail and kept.made_with == made_with
+    same_detail = parameters.use_detail and kept.made_with == parameters.base
     if kept.detail is not None and kept.detail.any() and not same_detail:
         kept.splines = None
     if kept.splines is None or kept.colours is None or kept.detail is None:
         kept.splines, kept.colours, kept.detail = np.zeros(shape, np.int16), *np.zeros((2, *light_field.grid), bool)
-    kept.made_with = made_with
+    kept.made_with = parameters.base
     missing = present & ~kept.colours, with_detail & ~kept.detail
     kept.colours, kept.detail = kept.colours | present, kept.detail | with_detail
     return kept.splines, *missing

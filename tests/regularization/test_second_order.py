@@ -175,6 +175,21 @@ def test_splines_that_are_kept_are_those_made_anew() -> None:
         np.testing.assert_array_equal(found.reference, anew.reference)
 
 
+def test_splines_that_failed_are_not_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Who goes on with a light field after memory ran out gets the maps of others, not those of empty views."""
+    scene = render("dots", size=64, views=3)
+    keeping, given = replace(scene, workspace=Workspace()), (BaseDetailParameters(), Rows(0, 64), scene.present)
+
+    def without_memory(*_: object) -> None:
+        raise MemoryError
+
+    with monkeypatch.context() as patched:
+        patched.setattr("sepi.matching.spline_views.view_splines", without_memory)
+        with pytest.raises(MemoryError):
+            spline_views(keeping, *given)
+    np.testing.assert_array_equal(spline_views(keeping, *given).splines, spline_views(scene, *given).splines)
+
+
 def test_coefficients_of_the_strongest_pattern_do_not_wrap_round() -> None:
     """Single black and white pixels side by side have coefficients far outside 0..1."""
     y, x = np.mgrid[:16, :16]
