@@ -140,8 +140,12 @@ def _temporary_beside(path: Path, suffix: str, target: Path) -> Iterator[Path]:
     # the token keeps two programs that write the same file apart; a long name is cut so that the whole fits
     temporary = path.parent / f".{path.stem[:40]}-{secrets.token_hex(_TOKEN_BYTES)}{suffix}"
     _unfinished.add(temporary)
+    interrupted = False
     try:
         yield temporary
+    except (KeyboardInterrupt, SystemExit):
+        interrupted = True
+        raise
     except OSError as error:
         raise SepiError(f"{target}: cannot be written ({error.strerror or error})") from error
     except SepiError as error:
@@ -149,6 +153,9 @@ def _temporary_beside(path: Path, suffix: str, target: Path) -> Iterator[Path]:
         raise SepiError(str(error).replace(str(temporary), str(target))) from error
     finally:
         remove_temporary(temporary)
+        if interrupted:
+            # of a thread that was being started nobody knows: it may write there yet, and is over when the program ends
+            _unfinished.add(temporary)
 
 
 def remove_temporary(temporary: Path) -> None:

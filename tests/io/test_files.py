@@ -245,6 +245,40 @@ def test_depth_stopped_at_any_time_leaves_all_of_the_maps_or_none(scene: Path, t
         assert left in ([], names_in(tmp_path / "whole")), (part, left)
 
 
+INTERRUPTED_WHILE_A_THREAD_STARTS = """
+import sys, threading, time
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from sepi.io.files import atomic_folder, atomic_path
+
+class Interrupted(threading.Event):
+    def wait(self, timeout=None):
+        super().wait(timeout)
+        raise KeyboardInterrupt
+
+def write(folder):
+    time.sleep(0.2)
+    with atomic_path(folder / "late") as temporary:
+        temporary.write_text("new")
+    print("written")
+
+try:
+    with atomic_folder(Path(sys.argv[1])) as folder, ThreadPoolExecutor() as pool:
+        threading.Event = Interrupted
+        pool.submit(write, folder)
+except KeyboardInterrupt:
+    print("interrupted")
+"""
+
+
+def test_a_thread_that_writes_after_the_interrupt_leaves_nothing(tmp_path: Path) -> None:
+    """Interrupted while it starts a thread, a pool does not know of it, and does not wait for it."""
+    program = [sys.executable, "-c", INTERRUPTED_WHILE_A_THREAD_STARTS, str(tmp_path / "out")]
+    done = subprocess.run(program, capture_output=True, text=True, env=os.environ | {"PYTHONPATH": str(SOURCE)})
+    assert done.stdout.split() == ["interrupted", "written"]
+    assert names_in(tmp_path) == []
+
+
 def test_an_error_is_one_line_whatever_is_in_a_name(tmp_path: Path) -> None:
     """A file's name may hold what clears a terminal, or ends a line of a log."""
     path = tmp_path / "a\x1b[2J\nb.pfm"
