@@ -32,7 +32,7 @@ from sepi.error_bars.cues import cues_of_map, cues_of_stage_before, cues_of_view
 from sepi.image.noise import reference_residual_variance
 from sepi.lightfield import BoolMap, FloatMap, LightField
 from sepi.matching.base_detail import BaseDetailParameters, forget_detail
-from sepi.matching.denoising import denoised, measured_noise
+from sepi.matching.denoising import DenoisedLightField, denoised, measured_noise
 from sepi.matching.view_subsets import spread_views
 from sepi.regularization.wls import (
     WlsParameters,
@@ -83,10 +83,13 @@ class SecondOrderParameters(BaseDetailParameters, OcclusionMarginParameters):
         25, ge=2, description="views that all steps but the last compare, at least; null: all"
     )
     refinements: int = Field(0, ge=0, le=20, description="Gauss-Newton steps before the first smoothing")
-    refinement_radius: int = Field(3, ge=0, le=20, description="window of these steps, 2 r + 1 pixels")
+    noisy_refinements: int = Field(
+        6, ge=0, le=20, description="the same of noisy views, in which matching ends farther from where it should"
+    )
+    refinement_radius: int = Field(6, ge=0, le=20, description="window of these steps, 2 r + 1 pixels")
     solves: int = Field(4, ge=0, le=10, description="rounds of one Gauss-Newton step and one smoothing")
     solve_radius: int = Field(1, ge=0, le=20, description="window of the steps of these rounds, 2 r + 1 pixels")
-    max_update: float = Field(0.05, gt=0, description="largest change by one Gauss-Newton step, pixels per view step")
+    max_update: float = Field(0.15, gt=0, description="largest change by one Gauss-Newton step, pixels per view step")
     strength: float = Field(7.0, ge=0, description="weight of the smoothness; the best-known tenth of pixels weighs 1")
     second_difference_threshold: float = Field(
         0.03, gt=0, description="second difference that marks a discontinuity in the first round, pixels per view step"
@@ -186,23 +189,26 @@ def second_order(
     >>> bool(errors[1] < 0.8 * errors[0])
     True
     """
-    from sepi.matching.gauss_newton import GaussNewton, windowed_step
+    from sepi.matching.gauss_newton import GaussNewton
     from sepi.matching.spline_views import forget_splines
+    from sepi.matching.surface_windows import windowed_step
 
     before, given = require_previous(previous), light_field
+    noisy = isinstance(denoised(light_field, parameters.denoising), DenoisedLightField)
     light_field = denoised(light_field, parameters.denoising, parameters.least_noise)
     disparity = before.disparity
     uniform = before.mask("textureless")
     prior, variance = _prior(light_field, before.confidence, uniform, parameters), None
     lowest, highest = light_field.require_disparity_range().candidates(2)
-    total = parameters.refinements + parameters.solves
+    refinements = max(parameters.refinements, parameters.noisy_refinements if noisy else 0)
+    total = refinements + parameters.solves
     for i in range(total):
         progress((i + 0.5) / (total + 1))
-        smooth, last = i >= parameters.refinements, i == total - 1
+        smooth, last = i >= refinements, i == total - 1
         if i == 0 or last:
             views = spread_views(light_field, parameters.views if last else parameters.first_views)
             matching = GaussNewton(light_field, parameters, parameters.occlusion_margin, views)
-        if i <= parameters.refinements or last:
+        if i <= refinements or last:
             # other steps are too small to change it
             mean = matching.mean(disparity)
         if last:
@@ -216,11 +222,13 @@ def second_order(
         else:
             gradient, information = matching.gradient_and_hessian(mean, disparity)
         radius = parameters.solve_radius if smooth else parameters.refinement_radius
-        step, curvature = windowed_step(gradient, information, radius, parameters.max_update)
+        step, curvature = windowed_step(
+            gradient, information, disparity, radius, parameters.max_update, parameters.occlusion_margin
+        )
         # where no view knows anything, a step would follow the noise
         target = np.clip(disparity + np.where(uniform, np.float32(0), step), lowest, highest)
         if smooth:
-            threshold = _threshold(disparity, parameters, first=i == parameters.refinements)
+            threshold = _threshold(disparity, parameters, first=i == refinements)
             target, variance = _smoothed(target, curvature, disparity, prior, threshold, parameters, last=last)
         disparity = np.clip(target, lowest, highest)
     return _with_bars(given, before, disparity, told, variance, SECOND_ORDER)

@@ -200,26 +200,6 @@ class GaussNewton:
             forget_detail(self._light_field)
 
 
-def windowed_step(gradient: FloatMap, curvature: FloatMap, radius: int, max_update: float) -> tuple[FloatMap, FloatMap]:
-    """Update of each pixel, and its curvature, over a window of ``2 radius + 1`` pixels.
-
-    Parameters
-    ----------
-    gradient, curvature : ndarray, shape (H, W), float32
-    radius : int
-    max_update : float
-        Updates are cut to this, pixels per view step: beyond it the linearisation does not hold.
-
-    Returns
-    -------
-    update, curvature : ndarray, shape (H, W), float32
-    """
-    size = (2 * radius + 1, 2 * radius + 1)
-    mean_gradient, mean_curvature = cv2.blur(gradient, size), cv2.blur(curvature, size)
-    update = mean_gradient / (mean_curvature + np.float32(1e-9))
-    return np.clip(update, -max_update, max_update).astype(np.float32), np.maximum(mean_curvature, 0)
-
-
 def spline_derivatives(image: FloatMap) -> tuple[FloatMap, FloatMap]:
     """Derivatives along y and x of the cubic spline through an image; shapes (H, W, C), float32."""
     down, across = np.empty_like(image), np.empty_like(image)

@@ -1,0 +1,69 @@
+"""Gauss-Newton steps over windows that hold one surface.
+
+A window makes a step surer, but only by pixels that move alike. Across a depth step it carries what the edge of the
+nearer surface tells, which is much, to pixels of the farther one, of which the views may know little: where these are
+wrong, they would be held there. Nor does a slope beside a nearer surface belong to the farther one: the mean of the
+views has the edge between the two, which the views that see the pixel have somewhere else.
+"""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from sepi.lightfield import FloatMap
+
+BESIDE_NEARER = 0.02
+"""What the equation of a pixel beside a nearer surface counts: enough to hold it where nothing else does."""
+
+
+def windowed_step(
+    gradient: FloatMap, curvature: FloatMap, disparity: FloatMap, radius: int, max_update: float, margin: float
+) -> tuple[FloatMap, FloatMap]:
+    """Update of each pixel, and its curvature, over what a window of ``2 radius + 1`` pixels has of its surface.
+
+    Parameters
+    ----------
+    gradient, curvature : ndarray, shape (H, W), float32
+        From :meth:`sepi.matching.gauss_newton.GaussNewton.gradient_and_hessian`.
+    disparity : ndarray, shape (H, W), float32
+        At which they are, pixels per view step.
+    radius : int
+    max_update : float
+        Updates are cut to this, pixels per view step: beyond it the linearisation does not hold.
+    margin : float
+        By how much disparities of another surface differ, pixels per view step.
+
+    Returns
+    -------
+    update, curvature : ndarray, shape (H, W), float32
+        The curvature is the window's mean, to which other surfaces add nothing.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from sepi.matching.surface_windows import windowed_step
+    >>> gradient, curvature = np.float32([[0.1, 0.1, 0.4, 0.4]]), np.ones((1, 4), np.float32)
+    >>> one = windowed_step(gradient, curvature, np.zeros((1, 4), np.float32), 1, 1.0, 0.15)[0]
+    >>> two = windowed_step(gradient, curvature, np.float32([[0, 0, 1, 1]]), 1, 1.0, 0.15)[0]
+    >>> (10 * one).round().tolist(), (10 * two).round().tolist()
+    ([[1.0, 2.0, 3.0, 4.0]], [[1.0, 1.0, 4.0, 4.0]])
+    """
+    from sepi.matching.surface_windows_kernels import sums_of_surface
+
+    beside = cv2.dilate(disparity, np.ones((3, 3), np.uint8)) > disparity + np.float32(margin)
+    share = np.where(beside, np.float32(BESIDE_NEARER), np.float32(1))
+    sums = np.zeros((2, *disparity.shape), np.float32)
+    sums_of_surface(gradient * share, curvature * share, disparity, radius, np.float32(margin), sums)
+    # as a window full of the surface would have them, but for what lies beyond the picture
+    rows, columns = (_within(length, radius) for length in disparity.shape)
+    sums /= rows[:, None] * columns
+    update = sums[0] / (sums[1] + np.float32(1e-9))
+    return np.clip(update, -max_update, max_update).astype(np.float32), np.maximum(sums[1], 0)
+
+
+def _within(length: int, radius: int) -> npt.NDArray[np.float32]:
+    """How many pixels of the window round each of so many lie in the picture, along one axis."""
+    at = np.arange(length)
+    return (np.minimum(at + radius + 1, length) - np.maximum(at - radius, 0)).astype(np.float32)

@@ -1,0 +1,70 @@
+"""Steps over windows of one surface: against plain NumPy, and at a depth step."""
+
+import numpy as np
+import pytest
+
+from sepi.matching.surface_windows import BESIDE_NEARER, windowed_step
+
+MARGIN = 0.15
+
+
+def plain_step(gradient, curvature, disparity, radius, max_update):
+    H, W = disparity.shape
+    share = np.ones((H, W))
+    for y, x in np.ndindex(H, W):
+        about = disparity[max(0, y - 1) : y + 2, max(0, x - 1) : x + 2]
+        share[y, x] = BESIDE_NEARER if about.max() > disparity[y, x] + MARGIN else 1
+    update, weight = np.zeros((2, H, W))
+    for y, x in np.ndindex(H, W):
+        window = np.s_[max(0, y - radius) : y + radius + 1, max(0, x - radius) : x + radius + 1]
+        alike = (np.abs(disparity[window] - disparity[y, x]) <= MARGIN) * share[window]
+        weight[y, x] = (alike * curvature[window]).mean()
+        update[y, x] = (alike * gradient[window]).mean() / (weight[y, x] + 1e-9)
+    return update.clip(-max_update, max_update), weight
+
+
+@pytest.mark.parametrize(
+    ("shape", "radius"), [((7, 19), 1), ((1, 5), 2), ((6, 1), 0), ((3, 4), 6)], ids=["inner", "row", "column", "all"]
+)
+def test_steps_are_those_of_the_pixels_of_one_surface(shape, radius) -> None:
+    """At any size, and beside every border."""
+    rng = np.random.default_rng(3)
+    gradient, curvature = rng.normal(size=shape).astype(np.float32), rng.uniform(1, 9, shape).astype(np.float32)
+    disparity = rng.choice(np.float32([0, 0.1, 1]), shape) + rng.uniform(0, 0.04, shape).astype(np.float32)
+    step, weight = windowed_step(gradient, curvature, disparity, radius, 0.2, MARGIN)
+    expected, expected_weight = plain_step(gradient, curvature, disparity, radius, 0.2)
+    np.testing.assert_allclose(step, expected, rtol=1e-4, atol=1e-6)
+    np.testing.assert_allclose(weight, expected_weight, rtol=1e-5)
+    assert {step.dtype, weight.dtype} == {np.dtype(np.float32)}
+
+
+def test_updates_are_those_of_newton_and_no_larger_than_allowed() -> None:
+    """Far from the minimum the linearisation does not hold: an uncut update would throw a pixel off its surface."""
+    gradient, curvature = np.full((9, 9), 0.3, np.float32), np.full((9, 9), 10.0, np.float32)
+    gradient[:, 5:] *= -100
+    flat = np.zeros((9, 9), np.float32)
+    update, curvature_there = windowed_step(gradient, curvature, flat, 0, 0.05, MARGIN)
+    np.testing.assert_allclose(update[:, :5], 0.03, rtol=1e-5)
+    np.testing.assert_allclose(update[:, 5:], -0.05, rtol=1e-5)
+    np.testing.assert_allclose(curvature_there, 10)
+    # a window takes the mean of both before they are divided
+    wide, _ = windowed_step(gradient, curvature, flat, 1, 9.0, MARGIN)
+    np.testing.assert_allclose(wide[4, 4], (2 * 0.3 - 30) / 3 / 10, rtol=1e-4)
+
+
+def test_a_well_known_edge_does_not_hold_the_wall_behind_it() -> None:
+    """A plain wall beside a box was held where matching had it wrong, as if the views knew it as well as the box."""
+    disparity = np.full((9, 20), -1, np.float32)
+    disparity[:, 10:] = 1
+    # the views know the wall faintly, the box well, and its edge reaches a pixel into the wall
+    curvature = np.where(disparity > 0, np.float32(100), np.float32(1))
+    curvature[:, 9] = 100
+    # by them the wall is 0.1 farther away; beside the box the slope is of the edge, and tells nothing
+    gradient = np.where(disparity > 0, np.float32(0), np.float32(-0.1))
+    gradient[:, 9] = 0
+    step, weight = windowed_step(gradient, curvature, disparity, 1, 0.2, MARGIN)
+    assert step[:, :8].max() < -0.09
+    assert step[4, 9] < -0.03
+    assert weight[4, 9] < 2
+    np.testing.assert_allclose(weight[4, 12:-1], 100, rtol=1e-5)
+    assert np.abs(step[:, 10:]).max() == 0
