@@ -80,7 +80,9 @@ class SecondOrderParameters(BaseDetailParameters, OcclusionMarginParameters):
     )
     views: int | None = Field(None, ge=2, description="views that the last step compares, at least; null: all")
     first_views: int | None = Field(
-        25, ge=2, description="views that all steps but the last compare, at least; null: all"
+        25,
+        ge=2,
+        description="views that all steps but the last compare, at least, unless they are noisy; null: all",
     )
     refinements: int = Field(0, ge=0, le=20, description="Gauss-Newton steps before the first smoothing")
     noisy_refinements: int = Field(
@@ -206,7 +208,7 @@ def second_order(
         progress((i + 0.5) / (total + 1))
         smooth, last = i >= refinements, i == total - 1
         if i == 0 or last:
-            views = spread_views(light_field, parameters.views if last else parameters.first_views)
+            views = spread_views(light_field, parameters.views if last or noisy else parameters.first_views)
             matching = GaussNewton(light_field, parameters, parameters.occlusion_margin, views)
         if i <= refinements or last:
             # other steps are too small to change it
