@@ -33,34 +33,33 @@ def windowed_step(
     max_update : float
         Updates are cut to this, pixels per view step: beyond it the linearisation does not hold.
     margin : float
-        By how much disparities of another surface differ, pixels per view step.
+        By how much disparities of another surface differ at least, pixels per view step; by three times as much they
+        surely do.
 
     Returns
     -------
     update, curvature : ndarray, shape (H, W), float32
         The curvature is the window's mean, to which other surfaces add nothing.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from sepi.matching.surface_windows import windowed_step
-    >>> gradient, curvature = np.float32([[0.1, 0.1, 0.4, 0.4]]), np.ones((1, 4), np.float32)
-    >>> one = windowed_step(gradient, curvature, np.zeros((1, 4), np.float32), 1, 1.0, 0.15)[0]
-    >>> two = windowed_step(gradient, curvature, np.float32([[0, 0, 1, 1]]), 1, 1.0, 0.15)[0]
-    >>> (10 * one).round().tolist(), (10 * two).round().tolist()
-    ([[1.0, 2.0, 3.0, 4.0]], [[1.0, 1.0, 4.0, 4.0]])
     """
     from sepi.matching.surface_windows_kernels import sums_of_surface
 
-    beside = cv2.dilate(disparity, np.ones((3, 3), np.uint8)) > disparity + np.float32(margin)
-    share = np.where(beside, np.float32(BESIDE_NEARER), np.float32(1))
+    nearer = cv2.dilate(disparity, np.ones((3, 3), np.uint8)) - disparity
+    share = np.maximum(alike(nearer, margin), np.float32(BESIDE_NEARER))
     sums = np.zeros((2, *disparity.shape), np.float32)
-    sums_of_surface(gradient * share, curvature * share, disparity, radius, np.float32(margin), sums)
+    sums_of_surface(gradient * share, curvature * share, disparity, radius, np.float32(2 * margin), sums)
     # as a window full of the surface would have them, but for what lies beyond the picture
     rows, columns = (_within(length, radius) for length in disparity.shape)
     sums /= rows[:, None] * columns
     update = sums[0] / (sums[1] + np.float32(1e-9))
     return np.clip(update, -max_update, max_update).astype(np.float32), np.maximum(sums[1], 0)
+
+
+def alike(apart: FloatMap, margin: float) -> FloatMap:
+    """How far pixels count as of one surface, 0..1, whose disparities are so far apart; float32.
+
+    Less and less from one margin on to three: in noise a map must not hang on what is just within.
+    """
+    return np.clip(np.float32(1.5) - np.abs(apart) / np.float32(2 * margin), np.float32(0), np.float32(1))
 
 
 def _within(length: int, radius: int) -> npt.NDArray[np.float32]:

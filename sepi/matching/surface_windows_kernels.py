@@ -13,17 +13,19 @@ EXACT = {"nnan", "ninf", "nsz"}
 
 
 @njit(forceinline=True, borrows=True)
-def _add_alike(own: Any, other: Any, margin: Any, gradient: Any, curvature: Any, sums: Any, weights: Any) -> None:
-    """Add what pixels of a row have to others where both are of one surface."""
+def _add_alike(own: Any, other: Any, width: Any, gradient: Any, curvature: Any, sums: Any, weights: Any) -> None:
+    """Add what pixels of a row have to others, as far as both are of one surface."""
+    one, most = np.float32(1), np.float32(1.5)
     for x in range(own.size):
-        alike = np.float32(abs(other[x] - own[x]) <= margin)
+        # as :func:`sepi.matching.surface_windows.alike` has it
+        alike = min(max(most - abs(other[x] - own[x]) / width, np.float32(0)), one)
         sums[x] += alike * gradient[x]
         weights[x] += alike * curvature[x]
 
 
 @njit(parallel=True, cache=True, fastmath=EXACT, borrows=True)
-def sums_of_surface(gradient: Any, curvature: Any, disparity: Any, radius: int, margin: Any, sums: Any) -> None:
-    """Sums over those pixels of a window whose disparity is that of its middle.
+def sums_of_surface(gradient: Any, curvature: Any, disparity: Any, radius: int, width: Any, sums: Any) -> None:
+    """Sums over those pixels of a window that are of the surface of its middle.
 
     Parameters
     ----------
@@ -33,8 +35,8 @@ def sums_of_surface(gradient: Any, curvature: Any, disparity: Any, radius: int, 
         Pixels per view step.
     radius : int
         Windows are of ``2 radius + 1`` pixels, as far as the picture goes.
-    margin : float32
-        How far disparities of a surface differ at most.
+    width : float32
+        Difference of disparity over which pixels count less and less, from half of it on, pixels per view step.
     sums : ndarray, shape (2, H, W), float32
         Zero; filled, of both.
     """
@@ -46,6 +48,6 @@ def sums_of_surface(gradient: Any, curvature: Any, disparity: Any, radius: int, 
                 begin, end = max(0, -step), W - max(0, step)
                 first, last = begin + step, end + step
                 _add_alike(
-                    disparity[y, begin:end], disparity[row, first:last], margin, gradient[row, first:last],
+                    disparity[y, begin:end], disparity[row, first:last], width, gradient[row, first:last],
                     curvature[row, first:last], sums[0, y, begin:end], sums[1, y, begin:end],
                 )  # fmt: skip

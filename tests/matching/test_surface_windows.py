@@ -8,18 +8,23 @@ from sepi.matching.surface_windows import BESIDE_NEARER, windowed_step
 MARGIN = 0.15
 
 
+def alike(apart):
+    """1 up to a margin, 0 from three on."""
+    return np.clip((3 * MARGIN - np.abs(apart)) / (2 * MARGIN), 0, 1)
+
+
 def plain_step(gradient, curvature, disparity, radius, max_update):
     H, W = disparity.shape
     share = np.ones((H, W))
     for y, x in np.ndindex(H, W):
         about = disparity[max(0, y - 1) : y + 2, max(0, x - 1) : x + 2]
-        share[y, x] = BESIDE_NEARER if about.max() > disparity[y, x] + MARGIN else 1
+        share[y, x] = max(alike(about.max() - disparity[y, x]), BESIDE_NEARER)
     update, weight = np.zeros((2, H, W))
     for y, x in np.ndindex(H, W):
         window = np.s_[max(0, y - radius) : y + radius + 1, max(0, x - radius) : x + radius + 1]
-        alike = (np.abs(disparity[window] - disparity[y, x]) <= MARGIN) * share[window]
-        weight[y, x] = (alike * curvature[window]).mean()
-        update[y, x] = (alike * gradient[window]).mean() / (weight[y, x] + 1e-9)
+        counting = alike(disparity[window] - disparity[y, x]) * share[window]
+        weight[y, x] = (counting * curvature[window]).mean()
+        update[y, x] = (counting * gradient[window]).mean() / (weight[y, x] + 1e-9)
     return update.clip(-max_update, max_update), weight
 
 
@@ -30,7 +35,7 @@ def test_steps_are_those_of_the_pixels_of_one_surface(shape, radius) -> None:
     """At any size, and beside every border."""
     rng = np.random.default_rng(3)
     gradient, curvature = rng.normal(size=shape).astype(np.float32), rng.uniform(1, 9, shape).astype(np.float32)
-    disparity = rng.choice(np.float32([0, 0.1, 1]), shape) + rng.uniform(0, 0.04, shape).astype(np.float32)
+    disparity = rng.choice(np.float32([0, 0.1, 0.3, 1]), shape) + rng.uniform(0, 0.04, shape).astype(np.float32)
     step, weight = windowed_step(gradient, curvature, disparity, radius, 0.2, MARGIN)
     expected, expected_weight = plain_step(gradient, curvature, disparity, radius, 0.2)
     np.testing.assert_allclose(step, expected, rtol=1e-4, atol=1e-6)
