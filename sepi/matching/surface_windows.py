@@ -17,6 +17,9 @@ from sepi.lightfield import FloatMap
 BESIDE_NEARER = 0.02
 """What the equation of a pixel beside a nearer surface counts: enough to hold it where nothing else does."""
 
+LEAST_WIDTH = 1e-6
+"""Where no margin is allowed; pixels per view step."""
+
 
 def windowed_step(
     gradient: FloatMap, curvature: FloatMap, disparity: FloatMap, radius: int, max_update: float, margin: float
@@ -43,23 +46,17 @@ def windowed_step(
     """
     from sepi.matching.surface_windows_kernels import sums_of_surface
 
+    # less and less from one margin on to three: in noise a map must not hang on what is just within
+    width = np.float32(max(2 * margin, LEAST_WIDTH))
     nearer = cv2.dilate(disparity, np.ones((3, 3), np.uint8)) - disparity
-    share = np.maximum(alike(nearer, margin), np.float32(BESIDE_NEARER))
+    share = np.clip(np.float32(1.5) - nearer / width, np.float32(BESIDE_NEARER), np.float32(1))
     sums = np.zeros((2, *disparity.shape), np.float32)
-    sums_of_surface(gradient * share, curvature * share, disparity, radius, np.float32(2 * margin), sums)
+    sums_of_surface(gradient * share, curvature * share, disparity, radius, width, sums)
     # as a window full of the surface would have them, but for what lies beyond the picture
     rows, columns = (_within(length, radius) for length in disparity.shape)
     sums /= rows[:, None] * columns
     update = sums[0] / (sums[1] + np.float32(1e-9))
     return np.clip(update, -max_update, max_update).astype(np.float32), np.maximum(sums[1], 0)
-
-
-def alike(apart: FloatMap, margin: float) -> FloatMap:
-    """How far pixels count as of one surface, 0..1, whose disparities are so far apart; float32.
-
-    Less and less from one margin on to three: in noise a map must not hang on what is just within.
-    """
-    return np.clip(np.float32(1.5) - np.abs(apart) / np.float32(2 * margin), np.float32(0), np.float32(1))
 
 
 def _within(length: int, radius: int) -> npt.NDArray[np.float32]:

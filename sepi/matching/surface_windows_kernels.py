@@ -17,7 +17,6 @@ def _add_alike(own: Any, other: Any, width: Any, gradient: Any, curvature: Any, 
     """Add what pixels of a row have to others, as far as both are of one surface."""
     one, most = np.float32(1), np.float32(1.5)
     for x in range(own.size):
-        # as :func:`sepi.matching.surface_windows.alike` has it
         alike = min(max(most - abs(other[x] - own[x]) / width, np.float32(0)), one)
         sums[x] += alike * gradient[x]
         weights[x] += alike * curvature[x]

@@ -52,6 +52,8 @@ def test_updates_are_those_of_newton_and_no_larger_than_allowed() -> None:
     np.testing.assert_allclose(update[:, :5], 0.03, rtol=1e-5)
     np.testing.assert_allclose(update[:, 5:], -0.05, rtol=1e-5)
     np.testing.assert_allclose(curvature_there, 10)
+    # a margin of nothing leaves a pixel what it has
+    np.testing.assert_array_equal(windowed_step(gradient, curvature, flat, 0, 0.05, 0.0), (update, curvature_there))
     # a window takes the mean of both before they are divided
     wide, _ = windowed_step(gradient, curvature, flat, 1, 9.0, MARGIN)
     np.testing.assert_allclose(wide[4, 4], (2 * 0.3 - 30) / 3 / 10, rtol=1e-4)
