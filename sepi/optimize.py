@@ -86,12 +86,12 @@ class SecondOrderParameters(BaseDetailParameters, OcclusionMarginParameters):
     )
     refinements: int = Field(0, ge=0, le=20, description="Gauss-Newton steps before the first smoothing")
     noisy_refinements: int = Field(
-        6, ge=0, le=20, description="the same of noisy views, in which matching ends farther from where it should"
+        4, ge=0, le=20, description="the same of noisy views, in which matching ends farther from where it should"
     )
-    refinement_radius: int = Field(6, ge=0, le=20, description="window of these steps, 2 r + 1 pixels")
+    refinement_radius: int = Field(3, ge=0, le=20, description="window of these steps, 2 r + 1 pixels")
     solves: int = Field(4, ge=0, le=10, description="rounds of one Gauss-Newton step and one smoothing")
     solve_radius: int = Field(1, ge=0, le=20, description="window of the steps of these rounds, 2 r + 1 pixels")
-    max_update: float = Field(0.15, gt=0, description="largest change by one Gauss-Newton step, pixels per view step")
+    max_update: float = Field(0.05, gt=0, description="largest change by one Gauss-Newton step, pixels per view step")
     strength: float = Field(7.0, ge=0, description="weight of the smoothness; the best-known tenth of pixels weighs 1")
     second_difference_threshold: float = Field(
         0.03, gt=0, description="second difference that marks a discontinuity in the first round, pixels per view step"

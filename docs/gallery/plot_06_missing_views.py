@@ -47,7 +47,7 @@ plt.show()
 # ----------------------
 #
 # A pixel counts as wrong when it is off by more than 0.07 px / step. A star of
-# 33 views does nearly as well as all 81: its views reach as far, and in more
+# 33 views does as well as all 81: its views reach as far, and in more
 # directions than two. With fewer views there is less to average the noise
 # with, and beside a pencil a pixel of the row is seen by half a row at best.
 

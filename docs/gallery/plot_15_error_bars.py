@@ -132,8 +132,8 @@ for name, found in {"without noise": maps, "with noise": in_noise}.items():
 # what sigma tells: each disparity counts by one over its sigma squared.
 
 side = np.linspace(0.02, 0.12, 96)
-first = sepi.estimate_depth(noisy(light_field, side, seed=8))
-second = sepi.estimate_depth(noisy(light_field, side[::-1], seed=9))
+first = sepi.estimate_depth(noisy(light_field, side, seed=2))
+second = sepi.estimate_depth(noisy(light_field, side[::-1], seed=4))
 
 
 def fuse(first, second):
