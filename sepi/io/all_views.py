@@ -27,6 +27,7 @@ from sepi.io.hdf5 import (
     read_dataset,
     read_rig,
 )
+from sepi.io.interrupts import interruptibly
 from sepi.io.origin import Origin, read_origin
 from sepi.io.result_files import ALL_VIEWS
 from sepi.io.result_folder import Result, read_result
@@ -78,7 +79,7 @@ def write_all_views(
         for key, value in attributes.items():
             file.attrs[key] = value
         file.attrs["view_position"] = light_field.reference_position
-        for position, maps in views:
+        for position, maps in interruptibly(views):
             for name, values in {**maps, "picture": light_field.views[position]}.items():
                 _dataset(file, name, light_field.grid, values)[position] = values
 

@@ -33,6 +33,7 @@ from sepi.io.integrity import (
     require_held,
     require_sound,
 )
+from sepi.io.interrupts import no_interrupt_lost
 from sepi.lightfield import RANGE_SOURCES, DisparityRange, LightField, Truth, require_light_field
 from sepi.rig import Rig
 from sepi.stage import ERROR_BARS, CostVolume, StageMaps
@@ -278,7 +279,7 @@ def open_hdf5(path: Path, kind: str = "readable HDF5 file", check: bool = True) 
     with reading(path, kind):
         if check:
             require_sound(path)
-        with h5py.File(path, "r") as file:
+        with no_interrupt_lost(), h5py.File(path, "r") as file:
             yield file
 
 
@@ -286,7 +287,7 @@ def open_hdf5(path: Path, kind: str = "readable HDF5 file", check: bool = True) 
 def create_hdf5(path: Path) -> Iterator[h5py.File]:
     """Write an HDF5 file, whole or not at all."""
     with atomic_path(path) as temporary:
-        with PatientFile(temporary, "w+") as disk:
+        with no_interrupt_lost(), PatientFile(temporary, "w+") as disk:
             with h5py.File(disk, "w", userblock_size=BLOCK) as file:
                 yield file
                 # what cannot be written cannot be read for its digest either

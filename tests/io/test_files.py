@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
 from pathlib import Path
 from types import FrameType
 from typing import Any
@@ -14,8 +15,9 @@ import pytest
 
 from sepi.errors import SepiError, SepiWarning
 from sepi.io import files
-from sepi.io.files import atomic_folder, atomic_path
-from sepi.io.hdf5 import create_hdf5
+from sepi.io.all_views import write_all_views
+from sepi.io.files import PatientFile, atomic_folder, atomic_path
+from sepi.io.hdf5 import create_hdf5, open_hdf5
 from sepi.io.pfm import read_pfm
 from sepi.io.result_files import RESULT_FILES
 from sepi.scenes import render, write_hci
@@ -276,6 +278,70 @@ def test_a_thread_that_writes_after_the_interrupt_leaves_nothing(tmp_path: Path)
     program = [sys.executable, "-c", INTERRUPTED_WHILE_A_THREAD_STARTS, str(tmp_path / "out")]
     done = subprocess.run(program, capture_output=True, text=True, env=os.environ | {"PYTHONPATH": str(SOURCE)})
     assert done.stdout.split() == ["interrupted", "written"]
+    assert names_in(tmp_path) == []
+
+
+def test_an_interrupt_while_hdf5_writes_is_not_lost(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """HDF5 calls Python to write, and forgets what is raised there: the program would go on after Ctrl-C."""
+    write, calls = PatientFile.write, 0
+
+    def interrupted(file: PatientFile, data: Any) -> int:
+        nonlocal calls
+        calls += 1
+        if calls == moment:
+            signal.raise_signal(signal.SIGINT)
+        return write(file, data)
+
+    def written() -> None:
+        nonlocal calls
+        calls = 0
+        with create_hdf5(tmp_path / "x.h5") as file:
+            file["x"] = np.arange(4)
+
+    monkeypatch.setattr(PatientFile, "write", interrupted)
+    moment = 0
+    written()
+    for moment in range(1, calls + 1):
+        (tmp_path / "x.h5").unlink(missing_ok=True)
+        with pytest.raises(KeyboardInterrupt):
+            written()
+        assert names_in(tmp_path) == [], moment
+    assert moment > 5
+
+
+def test_an_interrupt_waits_while_hdf5_reads_and_a_second_one_does_not(tmp_path: Path) -> None:
+    with create_hdf5(tmp_path / "x.h5") as file:
+        file["x"] = np.arange(4)
+    read: list[int] = []
+
+    def interrupted(times: int) -> None:
+        with open_hdf5(tmp_path / "x.h5") as file:
+            for _ in range(times):
+                signal.raise_signal(signal.SIGINT)
+            read.append(int(file["x"][3]))
+
+    for times, expected in ((1, [3]), (2, [3])):
+        with pytest.raises(KeyboardInterrupt):
+            interrupted(times)
+        assert read == expected
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_maps_of_all_views_can_be_interrupted(tmp_path: Path) -> None:
+    """They are written as they come: a Ctrl-C that waits for the last one waits for minutes."""
+    light_field, computed = render("dots", size=64, views=3), 0
+
+    def maps() -> Iterator[tuple[tuple[int, int], dict[str, np.ndarray]]]:
+        nonlocal computed
+        for position in np.ndindex(light_field.grid):
+            if computed == 2:
+                signal.raise_signal(signal.SIGINT)
+            computed += 1
+            yield position, {"disparity": np.zeros((64, 64), np.float32)}
+
+    with pytest.raises(KeyboardInterrupt):
+        write_all_views(tmp_path / "all.h5", light_field, maps(), {})
+    assert computed == 2
     assert names_in(tmp_path) == []
 
 
