@@ -281,6 +281,16 @@ def test_a_thread_that_writes_after_the_interrupt_leaves_nothing(tmp_path: Path)
     assert names_in(tmp_path) == []
 
 
+@pytest.fixture
+def ctrl_c() -> Iterator[None]:
+    """As at a terminal: a background process of a shell ignores SIGINT."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    found = signal.signal(signal.SIGINT, before)
+    assert found is signal.default_int_handler
+
+
+@pytest.mark.usefixtures("ctrl_c")
 def test_an_interrupt_while_hdf5_writes_is_not_lost(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """HDF5 calls Python to write, and forgets what is raised there: the program would go on after Ctrl-C."""
     write, calls = PatientFile.write, 0
@@ -309,6 +319,7 @@ def test_an_interrupt_while_hdf5_writes_is_not_lost(tmp_path: Path, monkeypatch:
     assert moment > 5
 
 
+@pytest.mark.usefixtures("ctrl_c")
 def test_an_interrupt_waits_while_hdf5_reads_and_a_second_one_does_not(tmp_path: Path) -> None:
     with create_hdf5(tmp_path / "x.h5") as file:
         file["x"] = np.arange(4)
@@ -324,9 +335,9 @@ def test_an_interrupt_waits_while_hdf5_reads_and_a_second_one_does_not(tmp_path:
         with pytest.raises(KeyboardInterrupt):
             interrupted(times)
         assert read == expected
-    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
+@pytest.mark.usefixtures("ctrl_c")
 def test_maps_of_all_views_can_be_interrupted(tmp_path: Path) -> None:
     """They are written as they come: a Ctrl-C that waits for the last one waits for minutes."""
     light_field, computed = render("dots", size=64, views=3), 0
