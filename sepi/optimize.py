@@ -32,7 +32,7 @@ from sepi.error_bars.cues import cues_of_map, cues_of_stage_before, cues_of_view
 from sepi.image.noise import reference_residual_variance
 from sepi.lightfield import BoolMap, FloatMap, LightField
 from sepi.matching.base_detail import BaseDetailParameters, forget_detail
-from sepi.matching.denoising import DenoisedLightField, denoised, measured_noise
+from sepi.matching.denoising import DenoisedLightField, denoised, guide_of, measured_noise
 from sepi.matching.view_subsets import spread_views
 from sepi.regularization.wls import (
     WlsParameters,
@@ -54,6 +54,7 @@ from sepi.stage import (
 
 if TYPE_CHECKING:
     from sepi.matching.gauss_newton import Evidence
+    from sepi.matching.surface_windows import Surfaces
 
 UNIFORM_WEIGHT = 0.05
 """Weight of a plane that was put into a region without texture; planes cost nothing, so little holds it."""
@@ -86,9 +87,9 @@ class SecondOrderParameters(BaseDetailParameters, OcclusionMarginParameters):
     )
     refinements: int = Field(0, ge=0, le=20, description="Gauss-Newton steps before the first smoothing")
     noisy_refinements: int = Field(
-        4, ge=0, le=20, description="the same of noisy views, in which matching ends farther from where it should"
+        6, ge=0, le=20, description="the same of noisy views, in which matching ends farther from where it should"
     )
-    refinement_radius: int = Field(3, ge=0, le=20, description="window of these steps, 2 r + 1 pixels")
+    refinement_radius: int = Field(4, ge=0, le=20, description="window of these steps, 2 r + 1 pixels")
     solves: int = Field(4, ge=0, le=10, description="rounds of one Gauss-Newton step and one smoothing")
     solve_radius: int = Field(1, ge=0, le=20, description="window of the steps of these rounds, 2 r + 1 pixels")
     max_update: float = Field(0.05, gt=0, description="largest change by one Gauss-Newton step, pixels per view step")
@@ -100,7 +101,9 @@ class SecondOrderParameters(BaseDetailParameters, OcclusionMarginParameters):
         40.0, ge=0, description="the same in later rounds, times the upper quartile of those that the map has"
     )
     smooth_colour: float = Field(
-        0.1, gt=0, description="RGB distance at which smoothness falls, colours in 0..1; noise adds to it"
+        0.1,
+        gt=0,
+        description="RGB distance at which smoothness falls and windows end, colours in 0..1; noise adds to it",
     )
     reliable_confidence: float = Field(
         0.5, gt=0, le=1, description="confidence within two pixels from which discontinuities in the data are believed"
@@ -193,7 +196,7 @@ def second_order(
     """
     from sepi.matching.gauss_newton import GaussNewton
     from sepi.matching.spline_views import forget_splines
-    from sepi.matching.surface_windows import windowed_step
+    from sepi.matching.surface_windows import Surfaces, windowed_step
 
     before, given = require_previous(previous), light_field
     noisy = isinstance(denoised(light_field, parameters.denoising), DenoisedLightField)
@@ -203,6 +206,9 @@ def second_order(
     prior, variance = _prior(light_field, before.confidence, uniform, parameters), None
     lowest, highest = light_field.require_disparity_range().candidates(2)
     refinements = max(parameters.refinements, parameters.noisy_refinements if noisy else 0)
+    by_depth = Surfaces(parameters.occlusion_margin)
+    # a map that was smoothed is told by itself
+    by_colour = _coloured(light_field, parameters) if refinements else by_depth
     total = refinements + parameters.solves
     for i in range(total):
         progress((i + 0.5) / (total + 1))
@@ -223,10 +229,9 @@ def second_order(
             forget_detail(light_field)
         else:
             gradient, information = matching.gradient_and_hessian(mean, disparity)
+        surfaces = by_depth if smooth else by_colour
         radius = parameters.solve_radius if smooth else parameters.refinement_radius
-        step, curvature = windowed_step(
-            gradient, information, disparity, radius, parameters.max_update, parameters.occlusion_margin
-        )
+        step, curvature = windowed_step(gradient, information, disparity, surfaces, radius, parameters.max_update)
         # where no view knows anything, a step would follow the noise
         target = np.clip(disparity + np.where(uniform, np.float32(0), step), lowest, highest)
         if smooth:
@@ -310,6 +315,14 @@ def _prior(
     reliability = np.where(uniform, 1, reliable(confidence, parameters)).astype(np.float32)
     variance = parameters.smooth_colour**2 + 4 * reference_residual_variance(light_field)
     return _Prior(uniform, reliability, colour_changes(light_field.reference_view), variance)
+
+
+def _coloured(light_field: LightField, parameters: SecondOrderParameters) -> Surfaces:
+    from sepi.matching.surface_windows import Surfaces
+
+    colours = np.ascontiguousarray(np.moveaxis(guide_of(light_field), 2, 0))
+    width = np.sqrt(parameters.smooth_colour**2 + reference_residual_variance(light_field))
+    return Surfaces(parameters.occlusion_margin, colours, float(width))
 
 
 def _smoothed(

@@ -4,9 +4,14 @@ A window makes a step surer, but only by pixels that move alike. Across a depth 
 nearer surface tells, which is much, to pixels of the farther one, of which the views may know little: where these are
 wrong, they would be held there. Nor does a slope beside a nearer surface belong to the farther one: the mean of the
 views has the edge between the two, which the views that see the pixel have somewhere else.
+
+Where a map has a surface too large, its disparity does not tell; its colour may: a wall beside a box that is drawn as
+near as the box still has the colours of the wall.
 """
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -17,12 +22,34 @@ from sepi.lightfield import FloatMap
 BESIDE_NEARER = 0.02
 """What the equation of a pixel beside a nearer surface counts: enough to hold it where nothing else does."""
 
+OF_OTHER_COLOUR = np.float32(0.1)
+"""What a pixel of the same disparity counts, whatever its colour: one surface may have many."""
+
 LEAST_WIDTH = 1e-6
 """Where no margin is allowed; pixels per view step."""
 
 
+class Surfaces(NamedTuple):
+    """What tells whether two pixels are of one surface.
+
+    Attributes
+    ----------
+    margin : float
+        By how much disparities of another surface differ at least, pixels per view step; by three times as much they
+        surely do.
+    colours : ndarray, shape (3, H, W), float32
+        Colours in 0..1; (3, 0, 0) where they are not asked.
+    colour_width : float
+        Colours differ clearly from 1.5 of it on, and hardly up to half of it.
+    """
+
+    margin: float
+    colours: FloatMap = np.zeros((3, 0, 0), np.float32)
+    colour_width: float = 1.0
+
+
 def windowed_step(
-    gradient: FloatMap, curvature: FloatMap, disparity: FloatMap, radius: int, max_update: float, margin: float
+    gradient: FloatMap, curvature: FloatMap, disparity: FloatMap, surfaces: Surfaces, radius: int, max_update: float
 ) -> tuple[FloatMap, FloatMap]:
     """Update of each pixel, and its curvature, over what a window of ``2 radius + 1`` pixels has of its surface.
 
@@ -32,12 +59,10 @@ def windowed_step(
         From :meth:`sepi.matching.gauss_newton.GaussNewton.gradient_and_hessian`.
     disparity : ndarray, shape (H, W), float32
         At which they are, pixels per view step.
+    surfaces : Surfaces
     radius : int
     max_update : float
         Updates are cut to this, pixels per view step: beyond it the linearisation does not hold.
-    margin : float
-        By how much disparities of another surface differ at least, pixels per view step; by three times as much they
-        surely do.
 
     Returns
     -------
@@ -47,11 +72,21 @@ def windowed_step(
     from sepi.matching.surface_windows_kernels import sums_of_surface
 
     # less and less from one margin on to three: in noise a map must not hang on what is just within
-    width = np.float32(max(2 * margin, LEAST_WIDTH))
+    width = np.float32(max(2 * surfaces.margin, LEAST_WIDTH))
     nearer = cv2.dilate(disparity, np.ones((3, 3), np.uint8)) - disparity
     share = np.clip(np.float32(1.5) - nearer / width, np.float32(BESIDE_NEARER), np.float32(1))
     sums = np.zeros((2, *disparity.shape), np.float32)
-    sums_of_surface(gradient * share, curvature * share, disparity, radius, width, sums)
+    sums_of_surface(
+        gradient * share,
+        curvature * share,
+        disparity,
+        surfaces.colours,
+        radius,
+        width,
+        np.float32(surfaces.colour_width),
+        OF_OTHER_COLOUR,
+        sums,
+    )
     # as a window full of the surface would have them, but for what lies beyond the picture
     rows, columns = (_within(length, radius) for length in disparity.shape)
     sums /= rows[:, None] * columns

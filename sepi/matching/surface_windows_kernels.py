@@ -22,8 +22,27 @@ def _add_alike(own: Any, other: Any, width: Any, gradient: Any, curvature: Any, 
         weights[x] += alike * curvature[x]
 
 
+@njit(forceinline=True, borrows=True)
+def _add_coloured_alike(
+    own: Any, other: Any, width: Any, red: Any, green: Any, blue: Any, colour_width: Any, least: Any,
+    gradient: Any, curvature: Any, sums: Any, weights: Any,
+) -> None:  # fmt: skip
+    """The same, as far as they are of one colour, too; colours are of both rows."""
+    zero, one, most = np.float32(0), np.float32(1), np.float32(1.5)
+    for x in range(own.size):
+        alike = min(max(most - abs(other[x] - own[x]) / width, zero), one)
+        apart2 = (red[1][x] - red[0][x]) ** 2 + (green[1][x] - green[0][x]) ** 2 + (blue[1][x] - blue[0][x]) ** 2
+        coloured = min(max(most - np.sqrt(apart2) / colour_width, zero), one)
+        share = alike * (least + (one - least) * coloured)
+        sums[x] += share * gradient[x]
+        weights[x] += share * curvature[x]
+
+
 @njit(parallel=True, cache=True, fastmath=EXACT, borrows=True)
-def sums_of_surface(gradient: Any, curvature: Any, disparity: Any, radius: int, width: Any, sums: Any) -> None:
+def sums_of_surface(
+    gradient: Any, curvature: Any, disparity: Any, colours: Any, radius: int, width: Any, colour_width: Any, least: Any,
+    sums: Any,
+) -> None:  # fmt: skip
     """Sums over those pixels of a window that are of the surface of its middle.
 
     Parameters
@@ -32,10 +51,14 @@ def sums_of_surface(gradient: Any, curvature: Any, disparity: Any, radius: int, 
         What is summed.
     disparity : ndarray, shape (H, W), float32
         Pixels per view step.
+    colours : ndarray, shape (3, H, W), float32
+        Or (3, 0, 0): they are not asked.
     radius : int
         Windows are of ``2 radius + 1`` pixels, as far as the picture goes.
-    width : float32
-        Difference of disparity over which pixels count less and less, from half of it on, pixels per view step.
+    width, colour_width : float32
+        Differences of disparity, and of colour, over which pixels count less and less, from half of it on.
+    least : float32
+        What a pixel of the same disparity counts, whatever its colour.
     sums : ndarray, shape (2, H, W), float32
         Zero; filled, of both.
     """
@@ -46,7 +69,17 @@ def sums_of_surface(gradient: Any, curvature: Any, disparity: Any, radius: int, 
                 # pixels x, and those beside them at x + step
                 begin, end = max(0, -step), W - max(0, step)
                 first, last = begin + step, end + step
-                _add_alike(
-                    disparity[y, begin:end], disparity[row, first:last], width, gradient[row, first:last],
-                    curvature[row, first:last], sums[0, y, begin:end], sums[1, y, begin:end],
-                )  # fmt: skip
+                if colours.shape[1] == 0:
+                    _add_alike(
+                        disparity[y, begin:end], disparity[row, first:last], width, gradient[row, first:last],
+                        curvature[row, first:last], sums[0, y, begin:end], sums[1, y, begin:end],
+                    )  # fmt: skip
+                else:
+                    _add_coloured_alike(
+                        disparity[y, begin:end], disparity[row, first:last], width,
+                        (colours[0, y, begin:end], colours[0, row, first:last]),
+                        (colours[1, y, begin:end], colours[1, row, first:last]),
+                        (colours[2, y, begin:end], colours[2, row, first:last]),
+                        colour_width, least, gradient[row, first:last], curvature[row, first:last],
+                        sums[0, y, begin:end], sums[1, y, begin:end],
+                    )  # fmt: skip

@@ -16,7 +16,7 @@ from sepi.matching.gauss_newton_kernels import AT_ONCE
 from sepi.matching.row_bands import Rows
 from sepi.matching.spline_kernels import MARGIN, SPLINE_UNIT, spline_coefficients
 from sepi.matching.spline_views import spline_views
-from sepi.matching.surface_windows import windowed_step
+from sepi.matching.surface_windows import Surfaces, windowed_step
 from sepi.matching.view_subsets import spread_views
 from sepi.matching.visibility_kernels import z_buffers
 from sepi.optimize import SecondOrderParameters, second_order
@@ -210,7 +210,7 @@ def test_iterations_end_at_the_true_disparity() -> None:
     disparity = (scene.ground_truth + 0.02).astype(np.float32)
     for _ in range(3):
         gradient, curvature = matching.gradient_and_hessian(matching.mean(disparity), disparity)
-        disparity = disparity + windowed_step(gradient, curvature, disparity, 3, 0.05, 0.15)[0]
+        disparity = disparity + windowed_step(gradient, curvature, disparity, Surfaces(0.15), 3, 0.05)[0]
     assert np.abs(disparity - scene.ground_truth)[8:-8, 8:-8].mean() < 1.5e-3
 
 
