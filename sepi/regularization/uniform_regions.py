@@ -31,7 +31,8 @@ from sepi.matching.view_subsets import spread_views
 from sepi.regularization.border_planes import BorderPlane, BorderPlaneParameters
 from sepi.regularization.floor_reflections import FloorReflectionsParameters, without_reflections
 from sepi.regularization.lit_planes import LitPlane, lit_planes
-from sepi.regularization.plane_choice import LIT_AREA, chosen_plane, kept_pixels
+from sepi.regularization.plane_choice import LIT_AREA, Chosen, chosen_plane, kept_pixels
+from sepi.regularization.pockets import with_pockets
 from sepi.regularization.regions import Region, parts_of, widened
 from sepi.stage import OcclusionMarginParameters, StageMaps
 
@@ -109,10 +110,10 @@ def fill_uniform_regions(
     found = _with_borders(uniform_regions(mean, core, of_mean, before.confidence, parameters), before, parameters)
     lit = _by_light(light_field, matching, before.disparity, found, variance, noisy) if parameters.light else {}
     known = light_field.require_disparity_range()
+    planes = _planes_of(found, lit, before.disparity, mean, noisy, parameters)
     disparity, held = before.disparity.copy(), np.zeros_like(core)
-    for n, (region, border) in enumerate(found):
+    for (region, _), chosen in zip(found, planes, strict=True):
         place, pixels = region
-        chosen = chosen_plane(region, before.disparity[place], border, lit.get(n), noisy)
         if chosen is None:
             continue
         # a plane that its border holds at one side only may lead anywhere
@@ -182,6 +183,26 @@ def _by_light(
         starts.append(middle if border is None else border.plane)
     told = lit_planes(light_field, matching, disparity, regions, starts, variance)
     return {n: plane for n, plane in zip(asked, told, strict=True) if plane is not None}
+
+
+def _planes_of(
+    found: list[tuple[Region, BorderPlane | None]],
+    lit: dict[int, LitPlane],
+    disparity: FloatMap,
+    mean: FloatMap,
+    noisy: bool,
+    parameters: UniformPlanesParameters,
+) -> list[Chosen | None]:
+    """What each region is given; of pockets that of the regions beside them."""
+    regions = [region for region, _ in found]
+    planes = [
+        chosen_plane(region, disparity[region.place], border, lit.get(n), noisy)
+        for n, (region, border) in enumerate(found)
+    ]
+    pockets = [n for n, (_, border) in enumerate(found) if border is None and planes[n] is None]
+    # no farther than regions grow
+    reach = parameters.window_radius + parameters.growth
+    return with_pockets(regions, planes, pockets, mean, reach, parameters.colour_tolerance)
 
 
 def plain_pixels(mean: FloatMap, variance: float | FloatMap, parameters: UniformPlanesParameters) -> BoolMap:

@@ -77,6 +77,33 @@ def test_a_refused_region_counts_the_same_before_and_after(refused: tuple[slice,
     np.testing.assert_allclose(np.flip(flipped, 0), disparity, atol=1e-5)
 
 
+@pytest.mark.parametrize(
+    ("colour", "known", "filled"),
+    [(120, 34, True), (123, 34, False), (120, 29, False)],
+    ids=["of the wall", "of another colour", "far from the wall"],
+)
+def test_a_pocket_of_a_wall_gets_the_plane_of_the_wall(colour: int, known: int, filled: bool) -> None:
+    """Between things before a wall nothing knows its depth: a guess of matching stood nearer than it by a pixel."""
+    wall, pocket = np.s_[10:known, 8:38], np.s_[36:46, 12:26]
+    light_field, maps = scene(wall, pocket)
+    light_field.views[(..., *pocket, slice(None))] = colour
+    # nothing beside the pocket lies on one plane
+    around = np.zeros(SHAPE, bool)
+    around[34:48, 10:28] = True
+    maps.disparity[around] = np.random.default_rng(2).uniform(-2, 2, around.sum())
+    before = maps.disparity.copy()
+    disparity, held = fill_uniform_regions(light_field, maps, PARAMETERS.model_copy(update={"growth": 3}))
+    assert held[wall].mean() > 0.7
+    assert held[pocket].any() == filled
+    if filled:
+        y, x = np.mgrid[: SHAPE[0], : SHAPE[1]]
+        plane = 0.004 * x - 0.003 * y
+        assert held[pocket].mean() > 0.7
+        assert np.abs(disparity - plane)[pocket][held[pocket]].max() < 0.05
+    else:
+        np.testing.assert_array_equal(disparity[pocket], before[pocket])
+
+
 def test_small_regions_are_left_alone() -> None:
     light_field, maps = scene(SMALL)
     disparity, filled = fill_uniform_regions(light_field, maps, PARAMETERS)
