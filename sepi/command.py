@@ -40,6 +40,8 @@ WORKFLOW_PROCESS = "SEPI_WORKFLOW_PROCESS"
 
 # Linux: the signal that a process gets when its parent is gone
 _PR_SET_PDEATHSIG = 1
+# glibc: how many heaps its threads have
+_M_ARENA_MAX = -8
 
 
 class _Shown(click.ClickException):
@@ -58,6 +60,7 @@ class SepiCommand(click.Command):
         # short job; the memory goes back to the system anyway
         atexit.register(gc.freeze)
         with shown_errors(), _rare_collections():
+            _have_one_heap()
             _end_with_the_workflow()
             return super().invoke(ctx)
 
@@ -90,6 +93,18 @@ def _end_with_the_workflow() -> None:
     # it may be gone already
     if os.getppid() == 1 and workflow != "1":
         sys.exit(128 + signal.SIGTERM)
+
+
+def _have_one_heap() -> None:
+    """Have all threads take memory from one heap, as far as the C library can.
+
+    glibc gives each its own, and what one has freed the others do not take again: 40 MB of a benchmark scene.
+    """
+    if sys.platform == "linux" and "MALLOC_ARENA_MAX" not in os.environ:
+        import ctypes
+
+        with suppress(OSError, AttributeError):
+            ctypes.CDLL(None).mallopt(_M_ARENA_MAX, 1)
 
 
 @contextmanager

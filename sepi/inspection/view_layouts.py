@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from copy import copy
 from typing import NamedTuple
 
@@ -19,6 +20,7 @@ import numpy.typing as npt
 from sepi.inspection.view_order_kernels import layout_costs
 from sepi.io.readers.options import ORDERS
 from sepi.lightfield import FloatMap, LightField, as_unit_float
+from sepi.threads import available_cores
 
 REACH = 8
 """Views up to this many rows or columns away are looked at."""
@@ -106,7 +108,11 @@ class Views:
 
         Lenses darken and blur the views towards the edge of the grid, so that hardly more than noise is left.
         """
-        kept = [baseline for baseline in baselines if self._is_worth_matching(baseline)]
+        self._light((0, 0))
+        # OpenCV works outside Python's lock, on one thread for pictures as small as these
+        with ThreadPoolExecutor(available_cores()) as pool:
+            worth = list(pool.map(self._is_worth_matching, baselines))
+        kept = [baseline for baseline, is_worth in zip(baselines, worth, strict=True) if is_worth]
         return kept if 2 * len(kept) >= min(len(baselines), 4) else baselines
 
     def _is_worth_matching(self, baseline: Baseline) -> bool:

@@ -62,22 +62,27 @@ UNITS = {
 def write_stage(path: Path, maps: StageMaps, attributes: Mapping[str, Attribute]) -> None:
     """Write a stage's maps and the attributes that say what made them."""
     with create_hdf5(path) as file:
-        # in the order in which they are read back: the file does not tell whether they came from one
-        for name, values in sorted(maps.all().items()):
-            # small integers and masks shrink to almost nothing; float maps hardly compress
-            compression = {"compression": "gzip", "compression_opts": 1} if values.dtype.itemsize < 4 else {}
-            dataset = file.create_dataset(name, data=values, **compression)
-            if name in UNITS:
-                dataset.attrs["units"] = UNITS[name]
-            if name == "view_subset":
-                dataset.attrs["names"] = [fixed_text(subset) for subset in maps.subset_names]
-        if maps.cost_volume is not None:
-            # half precision hardly compresses
-            file.create_dataset(_COSTS, data=maps.cost_volume.costs)
-            file.create_dataset(_CANDIDATES, data=maps.cost_volume.disparities)
-            file[_CANDIDATES].attrs["units"] = UNITS["disparity"]
+        put_maps(file, maps)
         for key, value in attributes.items():
             file.attrs[key] = value
+
+
+def put_maps(file: h5py.File, maps: StageMaps) -> None:
+    """Write a stage's maps."""
+    # in the order in which they are read back: the file does not tell whether they came from one
+    for name, values in sorted(maps.all().items()):
+        # small integers and masks shrink to almost nothing; float maps hardly compress
+        compression = {"compression": "gzip", "compression_opts": 1} if values.dtype.itemsize < 4 else {}
+        dataset = file.create_dataset(name, data=values, **compression)
+        if name in UNITS:
+            dataset.attrs["units"] = UNITS[name]
+        if name == "view_subset":
+            dataset.attrs["names"] = [fixed_text(subset) for subset in maps.subset_names]
+    if maps.cost_volume is not None:
+        # half precision hardly compresses
+        file.create_dataset(_COSTS, data=maps.cost_volume.costs)
+        file.create_dataset(_CANDIDATES, data=maps.cost_volume.disparities)
+        file[_CANDIDATES].attrs["units"] = UNITS["disparity"]
 
 
 def read_stage(path: Path) -> StageMaps:

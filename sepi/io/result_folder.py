@@ -20,7 +20,16 @@ from sepi.camera import Camera
 from sepi.errors import SepiError
 from sepi.io.error_bar_files import bars_in_metres, names_of_error_bars, write_error_bars
 from sepi.io.files import atomic_files, atomic_folder, atomic_path
-from sepi.io.hdf5 import Attribute, attribute, open_hdf5, read_camera, read_dataset, read_rig, write_stage
+from sepi.io.hdf5 import (
+    Attribute,
+    attribute,
+    create_hdf5,
+    open_hdf5,
+    put_maps,
+    read_camera,
+    read_dataset,
+    read_rig,
+)
 from sepi.io.images import write_png
 from sepi.io.origin import RESULT
 from sepi.io.pfm import write_pfm
@@ -314,18 +323,19 @@ def _write_files(
     unknown = maps.mask(UNKNOWN)
     # pictures are packed outside Python's lock
     with ThreadPoolExecutor(min(4, available_cores())) as pool:
+        # a digest of all views is among them, which takes longest, but not Python's lock
+        told = pool.submit(result_attributes, light_field, maps)
         written = [
             pool.submit(_write_16bit, folder / "disparity_16bit.png", maps.disparity),
             pool.submit(write_error_bars, folder, maps, metres, unknown),
             pool.submit(_write_pictures, folder, maps, masks, unknown),
             pool.submit(_write_numbers, folder, light_field, maps, more.get("depth"), seconds),
         ]
-        everything = maps.updated(maps.disparity, maps.confidence, **more)
         # of these a later result is sure that they are not a user's own
         files = {"files": " ".join(sorted((*names, *beside)))}
-        # a digest of all views is among them, which takes a while, but not Python's lock
-        told = {**result_attributes(light_field, maps), **attributes, **files}
-        write_stage(folder / RESULT, everything, told)
+        with create_hdf5(folder / RESULT) as file:
+            put_maps(file, maps.updated(maps.disparity, maps.confidence, **more))
+            file.attrs.update({**told.result(), **attributes, **files})
         for one in written:
             one.result()
     return names

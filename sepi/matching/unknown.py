@@ -13,6 +13,7 @@ A bare wall is none of these: it is neither black nor overexposed, and what it b
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import cv2
@@ -168,8 +169,14 @@ def held_by_few(light_field: LightField, disparity: FloatMap) -> BoolMap:
     least = min(LEAST_VIEWS, len(others))
     y, x = (side.ravel() for side in np.mgrid[:H, :W])
     d, held = disparity.ravel().astype(np.float64), np.zeros(H * W, np.int64)
-    left = np.arange(H * W)
-    # the nearest views hold almost every pixel
+    # the nearest views hold all that lies farther from the border than it moves in them
+    nearest = [light_field.baselines[t, s] for t, s in others[:least]]
+    moved = math.ceil(float(np.abs(disparity).max(initial=0)) * float(np.abs(nearest).max(initial=0)))
+    inside = np.zeros((H, W), bool)
+    if light_field.missing is None:
+        inside[moved : H - moved, moved : W - moved] = True
+    held[inside.ravel()] = least
+    left = np.flatnonzero(~inside)
     for t, s in others:
         down, across = light_field.baselines[t, s]
         row, column = y[left] - d[left] * down, x[left] - d[left] * across
@@ -218,9 +225,12 @@ def _mean_of_dark(light_field: LightField, disparity: FloatMap, limit: float) ->
 
 def _energy(image: FloatMap) -> FloatMap:
     """Squared gradients of an image (H, W, 3), summed over channels, mean over a window; shape (H, W)."""
-    down, across = np.gradient(image, axis=(0, 1))
-    squares: Any = down**2 + across**2
-    return np.asarray(cv2.blur(np.add.reduce(cv2.split(squares)), (_WINDOW, _WINDOW)), np.float32)
+    squares: Any = 0
+    # plane by plane: along the channels, NumPy is slow
+    for channel in cv2.split(image):
+        down, across = np.gradient(channel)
+        squares = squares + (down**2 + across**2)
+    return np.asarray(cv2.blur(squares, (_WINDOW, _WINDOW)), np.float32)
 
 
 def _of_noise(noise: float) -> float:

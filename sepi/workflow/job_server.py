@@ -29,6 +29,8 @@ from sepi.workflow.job_client import TAKEN
 
 # what most jobs import: libraries with parts that they import late, and what the stages have in common
 _LIBRARIES = (
+    # numba reads a file of a job's folder with it
+    "yaml",
     "cv2", "h5py", "skimage.segmentation.slic_superpixels", "scipy.sparse.linalg", "scipy.fft", "scipy.ndimage",
     "pyamg", "pydantic.fields",
 )  # fmt: skip
