@@ -272,5 +272,8 @@ def _finite(value: float) -> float | None:
 
 
 def _short(value: float | None) -> float | None:
-    """To four decimals, finer than any of the values is known; None where it is not a number."""
-    return None if value is None or not math.isfinite(value) else round(float(value), 4)
+    """To seven decimals; None where it is not a number.
+
+    The page shows three: had it four, what is rounded twice would not be what other tables show.
+    """
+    return None if value is None or not math.isfinite(value) else round(float(value), 7)
