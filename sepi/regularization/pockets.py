@@ -40,7 +40,7 @@ def with_pockets(
     Returns
     -------
     list of Chosen or None
-        Of several such regions, that with most pixels within reach is taken.
+        Of several such regions, that with most pixels within reach is taken; it has to be larger than the pocket.
     """
     found = list(chosen)
     if not any(chosen):
@@ -55,8 +55,10 @@ def with_pockets(
         beside = np.bincount(numbers[place][near], minlength=len(regions) + 1)[1:]
         colour = _colour(regions[n], mean)
         for other in np.argsort(-beside, kind="stable")[: np.count_nonzero(beside)].tolist():
-            plane = chosen[other]
-            if plane is not None and np.linalg.norm(_colour(regions[other], mean) - colour) <= tolerance:
+            plane, is_larger = chosen[other], regions[other].area > regions[n].area
+            if plane is None or not is_larger:
+                continue
+            if np.linalg.norm(_colour(regions[other], mean) - colour) <= tolerance:
                 found[n] = plane._replace(plane=seen_from(plane.plane, regions[other], regions[n]))
                 break
     return found

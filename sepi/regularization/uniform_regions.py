@@ -199,7 +199,8 @@ def _planes_of(
         chosen_plane(region, disparity[region.place], border, lit.get(n), noisy)
         for n, (region, border) in enumerate(found)
     ]
-    pockets = [n for n, (_, border) in enumerate(found) if border is None and planes[n] is None]
+    # in noise a region without a border's plane may have faint texture that knows its depth
+    pockets = [] if noisy else [n for n, (_, border) in enumerate(found) if border is None and planes[n] is None]
     # no farther than regions grow
     reach = parameters.window_radius + parameters.growth
     return with_pockets(regions, planes, pockets, mean, reach, parameters.colour_tolerance)

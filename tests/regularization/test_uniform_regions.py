@@ -5,8 +5,10 @@ import pytest
 from scipy.ndimage import gaussian_filter
 
 from sepi.lightfield import DisparityRange, LightField
+from sepi.regularization.border_planes import BorderPlane
 from sepi.regularization.plane_search import support
-from sepi.regularization.uniform_regions import UniformPlanesParameters, fill_uniform_regions
+from sepi.regularization.regions import Region
+from sepi.regularization.uniform_regions import UniformPlanesParameters, _planes_of, fill_uniform_regions
 from sepi.stage import StageMaps
 
 SHAPE = (60, 90)
@@ -102,6 +104,21 @@ def test_a_pocket_of_a_wall_gets_the_plane_of_the_wall(colour: int, known: int, 
         assert np.abs(disparity - plane)[pocket][held[pocket]].max() < 0.05
     else:
         np.testing.assert_array_equal(disparity[pocket], before[pocket])
+
+
+def test_a_wall_is_no_pocket_of_a_patch_before_it_nor_of_anything_in_noise() -> None:
+    """Half of a noisy picture got the plane of a patch beside it that had its colour."""
+    large, small = (Region(np.s_[0:60, 0:60], np.zeros((60, 60), bool)) for _ in range(2))
+    large.pixels[:, :30] = small.pixels[4:12, 32:] = True
+    known = BorderPlane(np.array([0.5, 0, 0]), 300, 0.9)
+    before, grey = np.ones((60, 60), np.float32), np.full((60, 60, 3), 0.5, np.float32)
+    for found, noisy, expected in (
+        ([(large, known), (small, None)], False, ["border", "border"]),
+        ([(large, None), (small, known)], False, [None, "border"]),
+        ([(large, known), (small, None)], True, ["border", None]),
+    ):
+        planes = _planes_of(found, {}, before, grey, noisy, PARAMETERS.model_copy(update={"growth": 3}))
+        assert [plane and plane.source for plane in planes] == expected
 
 
 def test_small_regions_are_left_alone() -> None:
