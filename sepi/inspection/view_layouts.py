@@ -20,7 +20,7 @@ import numpy.typing as npt
 from sepi.inspection.view_order_kernels import layout_costs
 from sepi.io.readers.options import ORDERS
 from sepi.lightfield import FloatMap, LightField, as_unit_float
-from sepi.threads import available_cores
+from sepi.threads import threads_used
 
 REACH = 8
 """Views up to this many rows or columns away are looked at."""
@@ -110,7 +110,7 @@ class Views:
         """
         self._light((0, 0))
         # OpenCV works outside Python's lock, on one thread for pictures as small as these
-        with ThreadPoolExecutor(available_cores()) as pool:
+        with ThreadPoolExecutor(threads_used()) as pool:
             worth = list(pool.map(self._is_worth_matching, baselines))
         kept = [baseline for baseline, is_worth in zip(baselines, worth, strict=True) if is_worth]
         return kept if 2 * len(kept) >= min(len(baselines), 4) else baselines

@@ -168,13 +168,14 @@ def held_by_few(light_field: LightField, disparity: FloatMap) -> BoolMap:
     others = _nearest_first(light_field)
     least = min(LEAST_VIEWS, len(others))
     y, x = (side.ravel() for side in np.mgrid[:H, :W])
-    d, held = disparity.ravel().astype(np.float64), np.zeros(H * W, np.int64)
+    finite = np.isfinite(disparity)
+    d, held = np.where(finite, disparity, np.nan).ravel().astype(np.float64), np.zeros(H * W, np.int64)
     # the nearest views hold all that lies farther from the border than it moves in them
     nearest = [light_field.baselines[t, s] for t, s in others[:least]]
-    moved = math.ceil(float(np.abs(disparity).max(initial=0)) * float(np.abs(nearest).max(initial=0)))
+    moved = math.ceil(float(np.abs(disparity[finite]).max(initial=0)) * float(np.abs(nearest).max(initial=0)))
     inside = np.zeros((H, W), bool)
     if light_field.missing is None:
-        inside[moved : H - moved, moved : W - moved] = True
+        inside[moved : H - moved, moved : W - moved] = finite[moved : H - moved, moved : W - moved]
     held[inside.ravel()] = least
     left = np.flatnonzero(~inside)
     for t, s in others:

@@ -155,6 +155,16 @@ def test_missing_views_hold_nothing() -> None:
     np.testing.assert_array_equal(found, np.broadcast_to((X < 10) | (X > W - 11), (H, W)))
 
 
+@pytest.mark.parametrize("nothing", [np.nan, np.inf])
+def test_what_has_no_disparity_is_held_by_no_view(nothing: float) -> None:
+    """Maps of other programs have holes: one of them must not stop everything, nor pass for known."""
+    scene = light_field(texture())
+    disparity = np.full((H, W), 5, np.float32)
+    disparity[30:34, 20:30] = nothing
+    found = held_by_few(scene, disparity)
+    np.testing.assert_array_equal(found[10:-10, 10:-10], ~np.isfinite(disparity)[10:-10, 10:-10])
+
+
 # --- in the final maps
 
 
