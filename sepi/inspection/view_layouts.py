@@ -108,6 +108,7 @@ class Views:
 
         Lenses darken and blur the views towards the edge of the grid, so that hardly more than noise is left.
         """
+        # which all are compared with: not to be made by each thread
         self._light((0, 0))
         # OpenCV works outside Python's lock, on one thread for pictures as small as these
         with ThreadPoolExecutor(threads_used()) as pool:

@@ -13,11 +13,16 @@ EXACT = {"nnan", "ninf", "nsz"}
 
 
 @njit(forceinline=True, borrows=True)
+def _alike(apart: Any, width: Any) -> Any:
+    """How far two things are alike, 1 up to half a width from each other, 0 from one and a half on."""
+    return min(max(np.float32(1.5) - apart / width, np.float32(0)), np.float32(1))
+
+
+@njit(forceinline=True, borrows=True)
 def _add_alike(own: Any, other: Any, width: Any, gradient: Any, curvature: Any, sums: Any, weights: Any) -> None:
     """Add what pixels of a row have to others, as far as both are of one surface."""
-    one, most = np.float32(1), np.float32(1.5)
     for x in range(own.size):
-        alike = min(max(most - abs(other[x] - own[x]) / width, np.float32(0)), one)
+        alike = _alike(abs(other[x] - own[x]), width)
         sums[x] += alike * gradient[x]
         weights[x] += alike * curvature[x]
 
@@ -28,12 +33,10 @@ def _add_coloured_alike(
     gradient: Any, curvature: Any, sums: Any, weights: Any,
 ) -> None:  # fmt: skip
     """The same, as far as they are of one colour, too; colours are of both rows."""
-    zero, one, most = np.float32(0), np.float32(1), np.float32(1.5)
     for x in range(own.size):
-        alike = min(max(most - abs(other[x] - own[x]) / width, zero), one)
         apart2 = (red[1][x] - red[0][x]) ** 2 + (green[1][x] - green[0][x]) ** 2 + (blue[1][x] - blue[0][x]) ** 2
-        coloured = min(max(most - np.sqrt(apart2) / colour_width, zero), one)
-        share = alike * (least + (one - least) * coloured)
+        of_colour = least + (np.float32(1) - least) * _alike(np.sqrt(apart2), colour_width)
+        share = _alike(abs(other[x] - own[x]), width) * of_colour
         sums[x] += share * gradient[x]
         weights[x] += share * curvature[x]
 
