@@ -18,12 +18,13 @@ from tqdm import tqdm
 from bench import tables
 from sepi.applications.all_views import EDGE_VIEWS, estimate_all_views
 from sepi.applications.carried_map import carried_map
+from sepi.built_in_variants import DEFAULT_VARIANT
 from sepi.command import SepiCommand
 from sepi.lightfield import FloatMap, LightField
 from sepi.pipeline import estimate_depth
 from sepi.scenes import SCENES, render, true_disparity
 from sepi.threads import use_threads
-from sepi.variants import DEFAULT_VARIANT, VARIANTS
+from sepi.variants import VARIANTS
 
 BAD = 0.07
 """Error from which a pixel is bad, pixels per view step."""

@@ -234,9 +234,9 @@ def stage_command(stage: str, own: Mapping[str, Choice]) -> click.Command:
     from sepi.io.provenance import history_of, stage_attributes
     from sepi.kernel_cache import tell_kernel_cache
     from sepi.memory import KERNELS, require_memory
+    from sepi.models import validated
     from sepi.stage import entry
     from sepi.threads import use_threads
-    from sepi.validation import validated
     from sepi.workspace import Workspace
 
     existing = click.Path(path_type=Path)

@@ -90,6 +90,7 @@ class SecondOrderParameters(BaseDetailParameters, OcclusionMarginParameters):
         6, ge=0, le=20, description="the same of noisy views, in which matching ends farther from where it should"
     )
     refinement_radius: int = Field(4, ge=0, le=20, description="window of these steps, 2 r + 1 pixels")
+    one_surface: bool = Field(True, description="whether windows end at another surface, by disparities and colours")
     solves: int = Field(4, ge=0, le=10, description="rounds of one Gauss-Newton step and one smoothing")
     solve_radius: int = Field(1, ge=0, le=20, description="window of the steps of these rounds, 2 r + 1 pixels")
     max_update: float = Field(0.05, gt=0, description="largest change by one Gauss-Newton step, pixels per view step")
@@ -196,7 +197,7 @@ def second_order(
     """
     from sepi.matching.gauss_newton import GaussNewton
     from sepi.matching.spline_views import forget_splines
-    from sepi.matching.surface_windows import Surfaces, windowed_step
+    from sepi.matching.surface_windows import ANY_SURFACE, Surfaces, windowed_step
 
     before, given = require_previous(previous), light_field
     noisy = isinstance(denoised(light_field, parameters.denoising), DenoisedLightField)
@@ -206,9 +207,9 @@ def second_order(
     prior, variance = _prior(light_field, before.confidence, uniform, parameters), None
     lowest, highest = light_field.require_disparity_range().candidates(2)
     refinements = max(parameters.refinements, parameters.noisy_refinements if noisy else 0)
-    by_depth = Surfaces(parameters.occlusion_margin)
+    by_depth = Surfaces(parameters.occlusion_margin if parameters.one_surface else ANY_SURFACE)
     # a map that was smoothed is told by itself
-    by_colour = _coloured(light_field, parameters) if refinements else by_depth
+    by_colour = _coloured(light_field, parameters) if refinements and parameters.one_surface else by_depth
     total = refinements + parameters.solves
     for i in range(total):
         progress((i + 0.5) / (total + 1))

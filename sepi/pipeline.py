@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from sepi.built_in_variants import DEFAULT_VARIANT
 from sepi.exposure import equally_bright
 from sepi.kernel_cache import tell_kernel_cache
 from sepi.lightfield import LightField, require_light_field
@@ -18,7 +19,7 @@ from sepi.matching.unknown import with_unknown
 from sepi.memory import give_back_memory
 from sepi.stage import MadeBy, Progress, StageMaps, entry, no_progress
 from sepi.validation import require_type
-from sepi.variants import DEFAULT_VARIANT, HANDED_ON, STAGES, VARIANTS, Variant, stage_parameters, variant_named
+from sepi.variants import HANDED_ON, STAGES, VARIANTS, Variant, stage_parameters, variant_named
 from sepi.workspace import Workspace
 
 

@@ -1,4 +1,4 @@
-"""Turn what a user wrote (config keys, flags, JSON) into checked models; each error is one line that names the key."""
+"""Checks of what a user wrote or passed; each error is one line that names it."""
 
 from __future__ import annotations
 
@@ -8,24 +8,15 @@ import math
 import operator
 import os
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from numbers import Real
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, ValidationError
 
 from sepi.errors import SepiError
 from sepi.renamed import new_name
-
-Model = TypeVar("Model", bound=BaseModel)
-
-
-class CheckedModel(BaseModel):
-    """Keys and values that a user writes: frozen, unknown keys refused, no value taken for one of another type."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, defer_build=True)
 
 
 def value_of(text: str) -> Any:
@@ -102,55 +93,3 @@ def described(value: object) -> str:
         return f"{value:g}"
     short = repr(value)
     return short if len(short) <= 40 and not isinstance(value, np.ndarray) else f"a {type(value).__name__}"
-
-
-def _plain(value: object) -> Any:
-    """A NumPy number as Python's, for JSON."""
-    if isinstance(value, np.generic):
-        return value.item()
-    raise TypeError
-
-
-def validated(model: type[Model], values: Mapping[str, Any], where: str) -> Model:
-    """Check ``values`` against ``model``.
-
-    Parameters
-    ----------
-    model : type
-        A pydantic model; its unknown keys are errors.
-    values : mapping
-        Keys and values as JSON has them (lists for tuples, no NaN).
-    where : str
-        The place the user wrote them, for the message: ``"stages.initial.sepi"``.
-
-    Raises
-    ------
-    SepiError
-        One line for the first key that is wrong: which, why, and what would be right.
-    """
-    _require_fields(model, values, where)
-    for key, value in values.items():
-        try:
-            json.dumps(value, default=_plain)
-        except TypeError as error:
-            # YAML can name Python objects
-            raise SepiError(f"{where}.{key}: expected numbers, text, lists or keys with values, got {value}") from error
-    try:
-        # by way of JSON, because strict models take a JSON list for a tuple but not a Python list
-        return model.model_validate_json(json.dumps(dict(values), allow_nan=False, default=_plain))
-    except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        key = ".".join([where, *map(str, first["loc"])])
-        got = "" if first["type"] == "missing" else f", got {first['input']!r}"
-        raise SepiError(f"{key}: {first['msg'][:1].lower()}{first['msg'][1:]}{got}") from error
-    except (TypeError, ValueError) as error:
-        raise SepiError(f"{where}: {error}") from error
-
-
-def _require_fields(model: type[BaseModel], values: Mapping[str, Any], where: str) -> None:
-    """Refuse unknown keys here rather than by pydantic, to suggest the nearest known one."""
-    require_known(where, values, model.model_fields)
-    for name, value in values.items():
-        inner = model.model_fields[name].annotation
-        if isinstance(inner, type) and issubclass(inner, BaseModel) and isinstance(value, Mapping):
-            _require_fields(inner, value, f"{where}.{name}")

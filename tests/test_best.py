@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from sepi.built_in_variants import PARTS_OF_BEST
 from sepi.lightfield import DisparityRange, LightField
 from sepi.matching.base_detail import (
     DETAIL_UNIT,
@@ -17,7 +18,7 @@ from sepi.regularization.uniform_regions import UniformPlanesParameters, plain_p
 from sepi.scenes import render
 from sepi.scoring.confidence import oracle, sparsification
 from sepi.scoring.scores import score
-from sepi.variants import PARTS_OF_BEST, VARIANTS
+from sepi.variants import VARIANTS
 
 pytestmark = pytest.mark.slow
 
@@ -124,6 +125,13 @@ def test_parts_of_best_differ_from_it_in_one_thing() -> None:
     for name in PARTS_OF_BEST:
         different = [s for s, c in VARIANTS[name].labels.items() if VARIANTS["best"].labels[s] != c]
         assert len(different) == {"best": 0, "best_no_detail": 3, "best_no_denoising": 4}.get(name, 1)
+
+
+@pytest.mark.parametrize("name", ["best_no_refinements", "best_no_surfaces"])
+def test_parts_that_noise_needs_change_maps_in_noise(name: str) -> None:
+    """A part that a row of the ablation does not switch off would pass for worth nothing."""
+    maps = [estimate_depth(render("dots", size=64, views=5), variant).disparity for variant in ("best", name)]
+    assert np.mean(np.abs(maps[1] - maps[0]) > 1e-3) > 0.05
 
 
 def test_sparsification_is_what_its_name_says() -> None:

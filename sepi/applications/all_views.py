@@ -24,12 +24,13 @@ import numpy as np
 import numpy.typing as npt
 
 from sepi.applications.carried_map import MOST_STRETCHED, TOLERANCE
+from sepi.built_in_variants import DEFAULT_VARIANT
 from sepi.errors import SepiError
 from sepi.lightfield import BoolMap, FloatMap, LightField, require_light_field
 from sepi.pipeline import estimate_depth
 from sepi.stage import ERROR_BARS, Progress, StageMaps, no_progress
 from sepi.validation import require_type
-from sepi.variants import DEFAULT_VARIANT, Variant
+from sepi.variants import Variant
 
 if TYPE_CHECKING:
     from sepi.applications.all_views_kernels import Sources

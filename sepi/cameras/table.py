@@ -22,8 +22,8 @@ from sepi.cameras.pictures import Pictures
 from sepi.errors import SepiError, one_line
 from sepi.io.files import reading
 from sepi.io.images import picture_header
+from sepi.models import CheckedModel, validated
 from sepi.rig import FISHEYE, METRES, MOST_COEFFICIENTS, PINHOLE, Floats, Lens, Shot
-from sepi.validation import CheckedModel, validated
 
 # a table is short; what is longer is something else
 _MOST_BYTES = 16 * 2**20

@@ -12,8 +12,9 @@ import numpy as np
 
 from sepi.command import SepiCommand
 from sepi.errors import SepiError
+from sepi.models import validated
 from sepi.rendered.catalogue import NOISE_LEVELS, RENDERED, WITHOUT_NOISE, exposed_name
-from sepi.validation import require_known, settings_of, validated
+from sepi.validation import require_known, settings_of
 
 if TYPE_CHECKING:
     from sepi.rendered.options import Exposure, RenderOptions

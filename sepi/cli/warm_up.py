@@ -54,11 +54,11 @@ def compile_kernels(variants: tuple[str, ...], kind: str = "uint8") -> dict[str,
 
     from sepi.applications.all_views import estimate_all_views
     from sepi.applications.refocusing import all_in_focus, refocus
+    from sepi.built_in_variants import DEFAULT_VARIANT
     from sepi.evaluate import evaluation_of
     from sepi.inspection.disparity_range import estimate_range
     from sepi.inspection.view_order import check_order
     from sepi.pipeline import estimate_depth
-    from sepi.variants import DEFAULT_VARIANT
 
     # one thread: compiling is all there is to do
     use_threads(1)

@@ -25,6 +25,9 @@ BESIDE_NEARER = 0.02
 OF_OTHER_COLOUR = np.float32(0.1)
 """What a pixel of the same disparity counts, whatever its colour: one surface may have many."""
 
+ANY_SURFACE = 1e6
+"""Margin by which no disparities differ: windows hold whatever is in them; pixels per view step."""
+
 LEAST_WIDTH = 1e-6
 """Where no margin is allowed; pixels per view step."""
 

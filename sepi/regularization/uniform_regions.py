@@ -72,6 +72,9 @@ class UniformPlanesParameters(
     min_area: int = Field(50, ge=1, description="smaller regions are left alone, in pixels")
     border_confidence: float = Field(0.3, ge=0, le=1, description="confidence from which a border pixel counts")
     light: bool = Field(True, description="whether planes are sought by how the light of a region changes, too")
+    pockets: bool = Field(
+        True, description="whether a region whose border tells no plane may get that of a larger one beside it"
+    )
 
 
 def fill_uniform_regions(
@@ -199,8 +202,10 @@ def _planes_of(
         chosen_plane(region, disparity[region.place], border, lit.get(n), noisy)
         for n, (region, border) in enumerate(found)
     ]
-    # in noise a region without a border's plane may have faint texture that knows its depth
-    pockets = [] if noisy else [n for n, (_, border) in enumerate(found) if border is None and planes[n] is None]
+    if noisy or not parameters.pockets:
+        # in noise a region without a border's plane may have faint texture that knows its depth
+        return planes
+    pockets = [n for n, (_, border) in enumerate(found) if border is None and planes[n] is None]
     # no farther than regions grow
     reach = parameters.window_radius + parameters.growth
     return with_pockets(regions, planes, pockets, mean, reach, parameters.colour_tolerance)

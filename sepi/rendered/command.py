@@ -8,9 +8,10 @@ from pathlib import Path
 import click
 
 from sepi.command import SepiCommand, progress_bar, write_timing
+from sepi.models import validated
 from sepi.rendered.options import RenderOptions
 from sepi.rendered.rendering import render_scene
-from sepi.validation import settings_of, validated
+from sepi.validation import settings_of
 
 _PATH = click.Path(path_type=Path)
 

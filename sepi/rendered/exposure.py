@@ -11,11 +11,11 @@ import numpy.typing as npt
 
 from sepi.camera import camera_from
 from sepi.lightfield import DisparityRange, LightField
+from sepi.models import validated
 from sepi.rendered.catalogue import exposed_name
 from sepi.rendered.options import NOISE, Exposure
 from sepi.rendered.render_file import Render, read_render
 from sepi.rendered.srgb import srgb_encoded
-from sepi.validation import validated
 
 
 def read_exposed(path: Path, noise: str = "off", seed: int = 1) -> LightField:

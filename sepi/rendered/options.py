@@ -7,8 +7,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from sepi.models import CheckedModel
 from sepi.rendered.catalogue import NoiseLevel
-from sepi.validation import CheckedModel
 
 _Share = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 _Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]

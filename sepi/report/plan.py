@@ -15,9 +15,10 @@ from typing import Annotated
 from pydantic import AfterValidator
 from pydantic.dataclasses import dataclass
 
+from sepi.built_in_variants import PARTS_OF_BEST
 from sepi.compared.methods import LEARNED, METHODS
 from sepi.errors import SepiError
-from sepi.variants import HANDED_ON, PARTS_OF_BEST, VARIANTS
+from sepi.variants import HANDED_ON, VARIANTS
 from sepi.workflow.rendered_scenes import DATASET, rendered_scene
 from sepi.workflow.result_paths import PARTS_ENDING, SceneFiles, key_of, scene_files
 

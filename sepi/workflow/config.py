@@ -13,15 +13,17 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
+from sepi.built_in_variants import VARIANT_ENTRIES
 from sepi.errors import SepiError
 from sepi.io.disparity_maps import SUFFIXES, TruthFile
 from sepi.io.external_maps import ExternalSource
 from sepi.io.readers.formats import FORMATS
 from sepi.io.readers.options import ORDERS
 from sepi.lightfield import DisparityRange
+from sepi.models import CheckedModel, validated
 from sepi.scenes import SCENES
-from sepi.validation import CheckedModel, require_known, validated
-from sepi.variants import VARIANT_ENTRIES, VARIANTS, Variant, variant_from
+from sepi.validation import require_known
+from sepi.variants import VARIANTS, Variant, variant_from
 from sepi.workflow.datasets import LONGEST_NAME, Scene, own_scene, require_plain_path, scenes_in
 from sepi.workflow.parameters import default_values, stage_settings
 from sepi.workflow.rendered_dataset import Rendered

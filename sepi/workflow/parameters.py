@@ -19,9 +19,10 @@ from sepi.matching.denoising import DenoisingParameters
 from sepi.matching.plane_sweep import SweepParameters
 from sepi.matching.semi_global import SmoothingParameters
 from sepi.matching.visibility_sweep import VisibilitySweepParameters
+from sepi.models import validated
 from sepi.occlusion import OcclusionParameters
 from sepi.stage import OcclusionMarginParameters, Parameters
-from sepi.validation import require_known, validated
+from sepi.validation import require_known
 from sepi.variants import STAGES, Variant
 
 SHARED = "shared"

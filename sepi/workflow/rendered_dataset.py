@@ -6,8 +6,9 @@ from typing import Any, Literal
 
 from pydantic import Field, field_validator
 
+from sepi.models import CheckedModel
 from sepi.rendered.catalogue import NOISE_LEVELS, RENDERED, WITHOUT_NOISE
-from sepi.validation import CheckedModel, require_known
+from sepi.validation import require_known
 from sepi.workflow.datasets import Scene
 from sepi.workflow.rendered_scenes import DATASET, RenderedScene
 from sepi.workflow.result_paths import render_file

@@ -14,8 +14,9 @@ from pydantic import Field
 from sepi.compared.methods import LEARNED
 from sepi.errors import SepiError
 from sepi.io.external_maps import ExternalSource
+from sepi.models import CheckedModel
 from sepi.stage import Parameters
-from sepi.validation import CheckedModel, require_known
+from sepi.validation import require_known
 from sepi.variants import VARIANTS, Variant
 from sepi.workflow.datasets import Scene
 from sepi.workflow.rendered_dataset import Rendered

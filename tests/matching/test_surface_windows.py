@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sepi.matching.surface_windows import BESIDE_NEARER, OF_OTHER_COLOUR, Surfaces, windowed_step
+from sepi.matching.surface_windows import ANY_SURFACE, BESIDE_NEARER, OF_OTHER_COLOUR, Surfaces, windowed_step
 
 MARGIN, COLOUR_WIDTH = 0.15, 0.1
 
@@ -89,6 +89,9 @@ def test_a_well_known_edge_does_not_hold_the_wall_behind_it() -> None:
     assert weight[4, 9] < 2
     np.testing.assert_allclose(weight[4, 12:-1], 100, rtol=1e-5)
     assert np.abs(step[:, 10:]).max() == 0
+    # that is what the ablation shows
+    held, _ = windowed_step(gradient, curvature, disparity, Surfaces(ANY_SURFACE), 1, 0.2)
+    assert held[4, 9] == pytest.approx(-0.3 / (6 * 100 + 3), rel=1e-4)
 
 
 def test_a_wall_drawn_as_near_as_the_box_before_it_is_led_by_its_own_colour() -> None:

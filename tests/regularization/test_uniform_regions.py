@@ -112,12 +112,14 @@ def test_a_wall_is_no_pocket_of_a_patch_before_it_nor_of_anything_in_noise() -> 
     large.pixels[:, :30] = small.pixels[4:12, 32:] = True
     known = BorderPlane(np.array([0.5, 0, 0]), 300, 0.9)
     before, grey = np.ones((60, 60), np.float32), np.full((60, 60, 3), 0.5, np.float32)
-    for found, noisy, expected in (
-        ([(large, known), (small, None)], False, ["border", "border"]),
-        ([(large, None), (small, known)], False, [None, "border"]),
-        ([(large, known), (small, None)], True, ["border", None]),
+    for found, noisy, pockets, expected in (
+        ([(large, known), (small, None)], False, True, ["border", "border"]),
+        ([(large, known), (small, None)], False, False, ["border", None]),
+        ([(large, None), (small, known)], False, True, [None, "border"]),
+        ([(large, known), (small, None)], True, True, ["border", None]),
     ):
-        planes = _planes_of(found, {}, before, grey, noisy, PARAMETERS.model_copy(update={"growth": 3}))
+        asked = PARAMETERS.model_copy(update={"growth": 3, "pockets": pockets})
+        planes = _planes_of(found, {}, before, grey, noisy, asked)
         assert [plane and plane.source for plane in planes] == expected
 
 

@@ -19,7 +19,7 @@ from sepi.io.readers.arrays import rearrange
 from sepi.io.readers.options import ReadOptions, in_grid, unarranged
 from sepi.io.readers.view_files import read_grid
 from sepi.lightfield import BoolMap, DisparityRange, LightField
-from sepi.validation import validated
+from sepi.models import validated
 
 MANIFEST = "light_field.json"
 

@@ -31,7 +31,7 @@ from sepi.io.pfm import read_pfm
 from sepi.io.readers.options import Numbers, ReadOptions, arrange_numbers, position_of
 from sepi.io.readers.view_files import read_grid
 from sepi.lightfield import BoolMap, DisparityRange, FloatMap, LightField, Truth
-from sepi.validation import validated
+from sepi.models import validated
 
 PARAMETERS = "parameters.cfg"
 TRUTH = "gt_disp_lowres.pfm"

@@ -1,0 +1,97 @@
+"""What the built-in variants choose for each stage.
+
+Variant ``best`` is what ``sepi depth`` uses, ``fast`` takes half its time, ``paper`` is the method as published; the
+others are rows of the ablations, and the methods that the paper compares with.
+
+Examples
+--------
+>>> from sepi.built_in_variants import VARIANT_ENTRIES
+>>> VARIANT_ENTRIES["no_sepi"]  # as users write theirs
+{'base': 'paper', 'initial': 'structure_tensor'}
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from sepi.compared.methods import LEARNED, METHODS
+
+VARIANT_ENTRIES: dict[str, dict[str, Any]] = {
+    "paper": {"initial": "sepi", "occlusion": "half_sepi", "textureless": "lti", "optimize": "wls"},
+    "no_sepi": {"base": "paper", "initial": "structure_tensor"},
+    "no_occlusion": {"base": "paper", "occlusion": "none"},
+    "no_textureless": {"base": "paper", "textureless": "none"},
+    "no_occlusion_no_textureless": {"base": "paper", "occlusion": "none", "textureless": "none"},
+    "wang": {"base": "paper", "occlusion": "wang"},
+    "best": {
+        "initial": "semi_global",
+        "occlusion": "visibility",
+        "textureless": "uniform_planes",
+        "optimize": "second_order",
+    },
+    # few views and candidates, and no more rounds than needed
+    "fast": {
+        "initial": {"choice": "semi_global", "first_views": 9, "first_sampling": 3},
+        "occlusion": {"choice": "visibility", "passes": 1, "views": 25, "sampling": 2},
+        "textureless": {"choice": "uniform_planes", "views": 9},
+        # of so few views faint detail in noise tells less than it harms
+        "optimize": {"choice": "second_order", "views": 25, "solves": 1, "least_noise": 0},
+    },
+    "best_paper_initial": {"base": "best", "initial": "sepi"},
+    # colours alone must tell surfaces apart: their scale is narrower than beside the detail
+    "best_no_detail": {
+        "base": "best",
+        "initial": {"use_detail": False},
+        "occlusion": {"use_detail": False, "colour_scale": 0.0164},
+        "optimize": {"use_detail": False, "colour_scale": 0.0164},
+    },
+    "best_no_denoising": {
+        "base": "best",
+        **{stage: {"denoising": 0} for stage in ("initial", "occlusion", "textureless", "optimize")},
+    },
+    "best_half_sepi": {"base": "best", "occlusion": "half_sepi"},
+    "best_no_gaps": {"base": "best", "occlusion": {"gaps": False}},
+    "best_no_specks": {"base": "best", "occlusion": {"speck_area": 0, "hole_area": 0}},
+    "best_no_shares": {"base": "best", "occlusion": {"use_shares": False}},
+    "best_no_mixture": {"base": "best", "occlusion": {"use_mixture": False}},
+    "best_no_lines": {"base": "best", "occlusion": {"use_lines": False}},
+    "best_no_light": {"base": "best", "textureless": {"light": False}},
+    "best_no_pockets": {"base": "best", "textureless": {"pockets": False}},
+    "best_no_reflections": {"base": "best", "textureless": {"reflections": False}},
+    "best_no_planes": {"base": "best", "textureless": "none"},
+    "best_no_refinements": {"base": "best", "optimize": {"noisy_refinements": 0}},
+    "best_no_surfaces": {"base": "best", "optimize": {"one_surface": False}},
+    "best_no_smoothing": {"base": "best", "optimize": {"refinements": 3, "solves": 0}},
+    "best_wls": {"base": "best", "optimize": "wls"},
+    **METHODS,
+    **LEARNED,
+}
+"""The built-in variants as :func:`sepi.variants.variant_from` reads them: the paper's method, the other four columns of
+its table 4 in their order, and the text's other occlusion stage; then the most accurate variant, a quick one, and the
+most accurate one with one part switched off or put back to the paper's; then the compared methods
+(:mod:`sepi.compared`)."""
+
+DEFAULT_VARIANT = "best"
+"""Variant of ``sepi depth``."""
+
+PARTS_OF_BEST: dict[str, str] = {
+    "best": "all parts",
+    "best_paper_initial": "the paper's initial depth",
+    "best_no_detail": "colours alone, no detail",
+    "best_no_denoising": "noisy views as they are",
+    "best_half_sepi": "half-SEPIs, no visibility",
+    "best_no_gaps": "what is seen through gaps as matching has it",
+    "best_no_specks": "single pixels and small holes as matching has them",
+    "best_no_shares": "edges not decided by shares of the views",
+    "best_no_mixture": "edges not decided by colours of the reference view",
+    "best_no_lines": "edges decided pixel by pixel",
+    "best_no_light": "planes of uniform regions by their border alone",
+    "best_no_pockets": "planes of no other region",
+    "best_no_reflections": "floors as deep as what they mirror",
+    "best_no_planes": "no planes in uniform regions, nor of floors",
+    "best_no_refinements": "no Gauss-Newton before smoothing in noise",
+    "best_no_surfaces": "windows across depth steps and colours",
+    "best_no_smoothing": "Gauss-Newton, no smoothing",
+    "best_wls": "the paper's global optimisation",
+}
+"""Rows of the ablation of ``best``, and what they leave out or put back."""
