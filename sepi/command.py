@@ -40,8 +40,13 @@ WORKFLOW_PROCESS = "SEPI_WORKFLOW_PROCESS"
 
 # Linux: the signal that a process gets when its parent is gone
 _PR_SET_PDEATHSIG = 1
-# glibc: how many heaps its threads have
-_M_ARENA_MAX = -8
+# glibc's settings, by their environment variables: how many heaps threads have; from how many bytes on what is freed
+# goes back to the system at once; from how many on what is free at the end of a heap does
+_HEAP = {
+    "MALLOC_ARENA_MAX": (-8, 1),
+    "MALLOC_MMAP_THRESHOLD_": (-3, 100_000_000),
+    "MALLOC_TRIM_THRESHOLD_": (-1, 2**30),
+}
 
 
 class _Shown(click.ClickException):
@@ -60,7 +65,7 @@ class SepiCommand(click.Command):
         # short job; the memory goes back to the system anyway
         atexit.register(gc.freeze)
         with shown_errors(), _rare_collections():
-            _have_one_heap()
+            _use_memory_again()
             _end_with_the_workflow()
             return super().invoke(ctx)
 
@@ -95,16 +100,19 @@ def _end_with_the_workflow() -> None:
         sys.exit(128 + signal.SIGTERM)
 
 
-def _have_one_heap() -> None:
-    """Have all threads take memory from one heap, as far as the C library can.
+def _use_memory_again() -> None:
+    """Have the C library give again what was freed, as far as it can and the user's environment does not say otherwise.
 
-    glibc gives each its own, and what one has freed the others do not take again: 40 MB of a benchmark scene.
+    glibc gives each thread a heap of its own, and what one has freed the others do not take again: 40 MB of a benchmark
+    scene. Arrays it gives back at once, and to clear the pages of others takes a thirtieth of ``sepi depth``.
     """
-    if sys.platform == "linux" and "MALLOC_ARENA_MAX" not in os.environ:
+    if sys.platform == "linux":
         import ctypes
 
         with suppress(OSError, AttributeError):
-            ctypes.CDLL(None).mallopt(_M_ARENA_MAX, 1)
+            for name, setting in _HEAP.items():
+                if name not in os.environ:
+                    ctypes.CDLL(None).mallopt(*setting)
 
 
 @contextmanager

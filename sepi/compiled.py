@@ -224,6 +224,8 @@ def njit(*, cache: bool = False, borrows: bool = False, **options: Any) -> Calla
     **options
         Of ``numba.njit``.
     """
+    # other threads may do something meanwhile: import what comes next, or decode pictures
+    options.setdefault("nogil", True)
     if borrows:
         options["_nrt"] = False
 

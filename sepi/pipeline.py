@@ -16,8 +16,10 @@ from sepi.kernel_cache import tell_kernel_cache
 from sepi.lightfield import LightField, require_light_field
 from sepi.matching.memory_limit import bytes_of_bands, bytes_of_volumes, require_memory_of
 from sepi.matching.unknown import with_unknown
+from sepi.meanwhile import importing_meanwhile
 from sepi.memory import give_back_memory
-from sepi.stage import MadeBy, Progress, StageMaps, entry, no_progress
+from sepi.stage import MadeBy, Parameters, Progress, StageMaps, entry, no_progress
+from sepi.threads import threads_used
 from sepi.validation import require_type
 from sepi.variants import HANDED_ON, STAGES, VARIANTS, Variant, stage_parameters, variant_named
 from sepi.workspace import Workspace
@@ -98,16 +100,9 @@ def estimate_depth(
     if memory is not None:
         workspace = replace(workspace, band_bytes=bytes_of_bands(compared, settings.values(), memory))
     compared = replace(compared, workspace=workspace)
-    maps: StageMaps | None = None
-    for number, (stage, choice) in enumerate(chosen.choices.items()):
-
-        def of_all(fraction: float, number: int = number) -> None:
-            progress((number + fraction) / len(STAGES))
-
-        maps = STAGES[stage][choice].run(compared, maps, settings[stage], of_all)
-        of_all(1.0)
-        give_back_memory()
-    assert maps is not None  # there are stages
+    libraries = [name for stage, choice in chosen.choices.items() for name in STAGES[stage][choice].libraries]
+    with importing_meanwhile(libraries if threads_used() > 1 else ()):
+        maps = _after_all_stages(compared, chosen, settings, progress)
     name = variant if isinstance(variant, str) else next((key for key, one in VARIANTS.items() if one == variant), "")
     history = tuple(
         entry(stage, choice, settings[stage], light_field)
@@ -116,3 +111,19 @@ def estimate_depth(
     )
     made_by = MadeBy(name, history, light_field.require_disparity_range())
     return replace(with_unknown(light_field, maps), made_by=made_by)
+
+
+def _after_all_stages(
+    light_field: LightField, chosen: Variant, settings: Mapping[str, Parameters], progress: Progress
+) -> StageMaps:
+    maps: StageMaps | None = None
+    for number, (stage, choice) in enumerate(chosen.choices.items()):
+
+        def of_all(fraction: float, number: int = number) -> None:
+            progress((number + fraction) / len(STAGES))
+
+        maps = STAGES[stage][choice].run(light_field, maps, settings[stage], of_all)
+        of_all(1.0)
+        give_back_memory()
+    assert maps is not None  # there are stages
+    return maps

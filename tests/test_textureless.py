@@ -8,6 +8,7 @@ from sepi.image.mean_shift import sample_modes
 from sepi.image.superpixels import Superpixels, adjacency, colour_modes, superpixels
 from sepi.lightfield import DisparityRange, LightField
 from sepi.regularization.planes import Coupling, basis, evaluate_planes, fit_planes, propagate
+from sepi.regularization.planes_kernels import add_normal_equations
 from sepi.scenes import render
 from sepi.stage import StageMaps, no_progress
 from sepi.textureless import (
@@ -124,6 +125,25 @@ def test_robust_fit_ignores_outliers():
     design = basis(segments)
     planes = fit_planes(segments, spoiled, np.ones_like(ground_truth), design, 0.05)
     assert np.abs(evaluate_planes(segments, planes, design) - ground_truth).max() < 0.02
+
+
+def test_sums_over_superpixels_are_those_of_numpy():
+    """To the last digit: sums in another order would give other maps than before."""
+    random = np.random.default_rng(4)
+    segments = tiles((31, 47), 12)
+    design, count = basis(segments), len(segments)
+    disparity, weight = random.normal(size=(2, 31, 47)).astype(np.float32)
+    left, right = np.zeros((count, 3, 3)), np.zeros((count, 3))
+    add_normal_equations(segments.labels.ravel(), design, weight.ravel(), disparity.ravel(), left, right)
+    weighted = design * weight.reshape(-1, 1)
+    for p in range(3):
+        np.testing.assert_array_equal(right[:, p], segments.sums(weighted[:, p] * disparity.ravel()))
+        for q in range(3):
+            expected = segments.sums(weighted[:, min(p, q)] * design[:, max(p, q)])
+            np.testing.assert_array_equal(left[:, p, q], expected)
+    planes = random.normal(size=(count, 3))
+    values = (design * planes[segments.labels.ravel()]).sum(axis=1).astype(np.float32)
+    np.testing.assert_array_equal(evaluate_planes(segments, planes, design).ravel(), values)
 
 
 def test_propagation_equals_the_plane_that_its_neighbours_lie_on():

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import time
 from collections.abc import Iterable, Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
@@ -27,6 +28,18 @@ if TYPE_CHECKING:
     from sepi.variants import Variant
 
 _PATH = click.Path(path_type=Path)
+
+# what is imported while pictures are decoded: in the order in which it is needed, the usual variant's kernels among it
+_LATER = (
+    "sepi.inspection.disparity_range", "sepi.pipeline", "numba.np.arrayobj", "sepi.matching.view_noise_kernels",
+    "sepi.matching.gauss_newton", "sepi.matching.visibility_kernels", "sepi.matching.semi_global_kernels",
+    "sepi.matching.base_detail_kernels", "sepi.matching.gap_kernels", "sepi.boundaries.background_kernels",
+    "sepi.boundaries.surface_shares_kernels", "sepi.boundaries.colour_mixture_kernels",
+    "sepi.boundaries.edge_lines_kernels", "sepi.boundaries.rim_kernels", "sepi.boundaries.speck_kernels",
+    "sepi.regularization.second_order", "sepi.regularization.local_inverse", "sepi.regularization.multilevel",
+    "sepi.matching.surface_windows_kernels", "sepi.error_bars.mixture_kernels", "sepi.io.result_folder",
+    "PIL.PngImagePlugin",
+)  # fmt: skip
 
 
 @click.command(cls=SepiCommand)
@@ -88,13 +101,15 @@ def depth(
       sepi depth views --grid 5x5 --exclude 0,0 --exclude 0,4
       sepi depth cotton --variant paper --set initial.sepi.num_disparities=91
     """
-    from sepi.io.result_files import ALL_VIEWS, names_of_others, require_own, require_target
-    from sepi.meanwhile import do_meanwhile
-    from sepi.threads import available_cores, use_threads
-    from sepi.variants import stage_parameters, variant_named
+    from sepi.threads import available_cores, threads_used, use_threads
 
     started = time.perf_counter()
     use_threads(threads or available_cores())
+    reading.begin(light_field_path)
+    from sepi.io.result_files import ALL_VIEWS, names_of_others, require_own, require_target
+    from sepi.meanwhile import do_meanwhile
+    from sepi.variants import stage_parameters, variant_named
+
     chosen = variant_named(variant)
     parameters = _parameters(settings, variant, chosen)
     stage_parameters(chosen, parameters)
@@ -105,11 +120,16 @@ def depth(
     do_meanwhile(_import_what_follows)
     light_field = reading.read(light_field_path, disparity_range=disparity_range)
     from sepi.inspection.disparity_range import settle_range
+    from sepi.io.origin import DIGEST, digest_of
     from sepi.io.provenance import result_attributes
     from sepi.io.result_folder import write_result
     from sepi.matching.unknown import UNKNOWN
     from sepi.pipeline import estimate_depth
 
+    # outside Python's lock, while the first stage gets ready
+    beside = ThreadPoolExecutor(1)
+    digest = beside.submit(digest_of, light_field) if threads_used() > 1 else None
+    beside.shutdown(wait=False)
     require_own(folder, light_field, force=force)
     if geometry is not None:
         # another camera than the calibrated one: its rig's lengths mean nothing
@@ -119,8 +139,9 @@ def depth(
         maps = estimate_depth(light_field, variant, parameters, progress, memory and memory * 2**20)
     seconds = time.perf_counter() - started if timing else None
     taken = names_of_others(light_field, with_sigma=maps.sigma is not None)
-    beside = (ALL_VIEWS, *taken) if all_views else ()
-    files = write_result(folder, light_field, maps, force=force, seconds=seconds, beside=beside)
+    others = (ALL_VIEWS, *taken) if all_views else ()
+    known = {} if digest is None else {DIGEST: digest.result()}
+    files = write_result(folder, light_field, maps, known, force=force, seconds=seconds, beside=others)
     if all_views:
         from sepi.applications.all_views import maps_of_all_views
         from sepi.io.all_views import write_all_views
@@ -129,7 +150,7 @@ def depth(
         with progress_bar(f"{light_field.name}, all views") as progress:
             views = maps_of_all_views(light_field, maps, chosen, parameters, progress, memory and memory * 2**20)
             write_all_views(folder / ALL_VIEWS, light_field, _also_as_taken(folder, light_field, views), made_by)
-        files = (*files, *beside)
+        files = (*files, *others)
     click.echo(f"{light_field.name}: {size_text(light_field)}")
     click.echo(f"disparity range: {range_text(light_field.require_disparity_range())}{_candidates(maps.made_by)}")
     unknown = float(maps.mask(UNKNOWN).mean())
@@ -141,7 +162,7 @@ def depth(
 
 def _import_what_follows() -> None:
     """Import what works on the light field and writes the result."""
-    for name in ("sepi.inspection.disparity_range", "sepi.pipeline", "sepi.io.result_folder", "PIL.PngImagePlugin"):
+    for name in _LATER:
         import_module(name)
 
 

@@ -37,6 +37,7 @@ def info(light_field_path: Path, geometry: Geometry | None, reading: Reading, as
 
     INPUT is anything that 'sepi depth' reads, with the same flags. Rows and columns of views are counted from 0.
     """
+    reading.begin(light_field_path)
     from sepi.inspection.disparity_range import estimate_range
     from sepi.io.readers.formats import FORMATS, format_of
 

@@ -14,9 +14,9 @@ from typing import Any
 import click
 
 from sepi.command import SepiGroup
-from sepi.openmp import one_thread_of_blas
+from sepi.openmp import prepare_numpy
 
-one_thread_of_blas()
+prepare_numpy()
 # libraries make some hundred thousand objects that stay: to go through them again and again takes a tenth of importing
 gc.set_threshold(100_000)
 

@@ -9,7 +9,7 @@ import threading
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO, Any
 
@@ -18,13 +18,14 @@ import numpy as np
 import numpy.typing as npt
 
 from sepi.errors import SepiError
+from sepi.io import ahead
 from sepi.io.exr import exr_pixels
 from sepi.io.files import atomic_path, reading
 from sepi.io.picture_headers import Header, read_header
 from sepi.io.tiff import plain_pixels, unturned
 from sepi.lightfield import HIGHEST, LOWEST, BoolMap
 from sepi.meanwhile import wait_usefully
-from sepi.threads import available_cores
+from sepi.threads import available_cores, threads_used
 
 Pixels = npt.NDArray[np.integer[Any] | np.floating[Any]]
 
@@ -32,6 +33,7 @@ SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".tif", ".tiff", ".exr", ".bmp", 
 """Ends of names, in small letters, of the pictures that can be read."""
 
 _MAX_BYTES = 2**32
+_USUAL_BYTES = 2**24
 _SILENT = logging.NullHandler()
 
 
@@ -61,18 +63,47 @@ def read_picture(path: Path, *, any_floats: bool = False) -> Pixels:
         return _read(path, any_floats)
 
 
+def decode_ahead(folder: Path) -> None:
+    """Begin to decode the pictures of a folder of views, if it is one, for whoever reads them in a moment.
+
+    Only PNG: what decodes others may have warnings to tell. It is over with :func:`sepi.io.ahead.end`.
+    """
+    threads = threads_used() - 1
+    if threads > 0 and folder.is_dir():
+        with suppress(OSError):
+            # of a link one has to know whether it is to be followed
+            paths = sorted(path for path in folder.glob("*.png") if path.is_file() and not path.is_symlink())
+            ahead.begin(paths, _pixels, min(8, threads))
+
+
 def _read(path: Path, any_floats: bool = False) -> Pixels:
-    with _opened(path) as file:
-        header = read_header(path, file, whole=True)
-        file.seek(0)
-        data = file.read()
-    image = _decoded(path, data, header)
-    if header.white:
-        image = _stretched(path, image, header.white)
+    decoded = ahead.taken(path)
+    image = _pixels(path) if decoded is None else decoded
     if image.dtype == np.float32 and not any_floats and not (image.min() >= LOWEST and image.max() <= HIGHEST):
         what = f"{image.min():g} to {image.max():g}" if np.isfinite(image).all() else "NaN or infinite ones"
         raise SepiError(f"{path}: float pixels must be finite and within 0..1, got {what}; --white says what white is")
     return image
+
+
+class _Held(io.BytesIO):
+    """What a file holds, and its name, by which OpenEXR opens it."""
+
+    def __init__(self, data: bytes, name: str) -> None:
+        super().__init__(data)
+        self.name = name
+
+
+def _pixels(path: Path) -> Pixels:
+    with _opened(path) as file:
+        # usually all of it, at once: each of many small reads would let go of Python's lock, for which others wait
+        usual = os.fstat(file.fileno()).st_size <= _USUAL_BYTES
+        data = file.read() if usual else b""
+        header = read_header(path, _Held(data, file.name) if usual else file, whole=True)
+        if not usual:
+            file.seek(0)
+            data = file.read()
+    image = _decoded(path, data, header)
+    return _stretched(path, image, header.white) if header.white else image
 
 
 def read_views(
@@ -112,7 +143,7 @@ def read_views(
     views = np.zeros((count, *first.shape), first.dtype)
 
     def fill(index: int) -> None:
-        image = _read(paths[index], any_floats)
+        image = _read(paths[index], any_floats) if index else first
         if image.shape != first.shape or image.dtype != first.dtype:
             raise SepiError(
                 f"{paths[index]}: {_described(image)}, but {paths[0].name} is {_described(first)}; "
@@ -201,9 +232,10 @@ def _opened(path: Path) -> Iterator[IO[bytes]]:
         # a pipe would be waited for
         if not path.is_file():
             raise SepiError("cannot be read: no plain file, or a link to nothing")
-        if path.stat().st_size > _MAX_BYTES:
-            raise SepiError(f"{path.stat().st_size} bytes are more than a picture has")
         with path.open("rb") as file:
+            size = os.fstat(file.fileno()).st_size
+            if size > _MAX_BYTES:
+                raise SepiError(f"{size} bytes are more than a picture has")
             yield file
 
 

@@ -94,14 +94,25 @@ class Origin:
         )
 
 
-def origin_attributes(light_field: LightField) -> dict[str, Attribute]:
-    """What a file of maps says of the light field that they were made from, as :func:`read_origin` reads it."""
+DIGEST = "light_field"
+"""Name of the attribute with the :func:`digest_of` a light field."""
+
+
+def origin_attributes(light_field: LightField, digest: str | None = None) -> dict[str, Attribute]:
+    """What a file of maps says of the light field that they were made from, as :func:`read_origin` reads it.
+
+    Parameters
+    ----------
+    light_field : LightField
+    digest : str, optional
+        Its :func:`digest_of`, where that is known.
+    """
     camera, rig = light_field.camera, light_field.reference_rig
     return {
         "view_position": light_field.reference_position,
         "grid": light_field.grid,
         "from_centre": light_field.from_centre,
-        "light_field": digest_of(light_field),
+        DIGEST: digest or digest_of(light_field),
         **({"reading": light_field.reading} if light_field.reading else {}),
         **({} if camera is None else {"camera": numbers_of(camera)}),
         **({} if rig is None else {RIG: rig.to_text()}),
@@ -139,7 +150,7 @@ def read_origin(path: Path) -> Origin | None:
             row_spacing=float(known["row_spacing"]) if on_grid else None,
             options=options,
             file_format=file_format,
-            digest=str(known.get("light_field", "")),
+            digest=str(known.get(DIGEST, "")),
             picture=read_dataset(path, file["view"]) if "view" in file else None,
             files=tuple(str(known.get("files", "")).split()),
         )

@@ -45,14 +45,22 @@ def stage_attributes(light_field: LightField, history: Sequence[Entry]) -> dict[
     }
 
 
-def result_attributes(light_field: LightField, maps: StageMaps) -> dict[str, Attribute]:
-    """Attributes of finished maps: of which light field, and what made them, as far as they say."""
+def result_attributes(light_field: LightField, maps: StageMaps, digest: str | None = None) -> dict[str, Attribute]:
+    """Attributes of finished maps: of which light field, and what made them, as far as they say.
+
+    Parameters
+    ----------
+    light_field : LightField
+    maps : StageMaps
+    digest : str, optional
+        As in :func:`sepi.io.origin.origin_attributes`.
+    """
     made_by, range_of = maps.made_by, light_field
     made: dict[str, Attribute] = {}
     if made_by is not None:
         range_of = light_field.with_range(made_by.disparity_range)
         made = {"variant": made_by.variant, "made_from": json.dumps(made_by.history, sort_keys=True)}
-    return {**scene_attributes(range_of), **made, **origin_attributes(light_field)}
+    return {**scene_attributes(range_of), **made, **origin_attributes(light_field, digest)}
 
 
 def history_of(path: Path | None) -> list[Entry]:

@@ -31,7 +31,7 @@ from sepi.io.hdf5 import (
     read_rig,
 )
 from sepi.io.images import write_png
-from sepi.io.origin import RESULT
+from sepi.io.origin import DIGEST, RESULT
 from sepi.io.pfm import write_pfm
 from sepi.io.ply import write_ply
 from sepi.io.point_cloud import point_cloud
@@ -320,11 +320,11 @@ def _write_files(
     original = names_as_taken(with_sigma=maps.sigma is not None) if taken else ()
     given = [*([] if camera is None else [DEPTH]), *bars, *original, *([] if seconds is None else [RUNTIME])]
     names = (*RESULT_FILES[:-1], *given, *masks, RESULT)
-    unknown = maps.mask(UNKNOWN)
+    unknown, digest = maps.mask(UNKNOWN), attributes.get(DIGEST)
     # pictures are packed outside Python's lock
     with ThreadPoolExecutor(min(4, available_cores())) as pool:
-        # a digest of all views is among them, which takes longest, but not Python's lock
-        told = pool.submit(result_attributes, light_field, maps)
+        # a digest of all views is among them unless it is known, which takes longest, but not Python's lock
+        told = pool.submit(result_attributes, light_field, maps, None if digest is None else str(digest))
         written = [
             pool.submit(_write_16bit, folder / "disparity_16bit.png", maps.disparity),
             pool.submit(write_error_bars, folder, maps, metres, unknown),

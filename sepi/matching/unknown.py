@@ -171,7 +171,8 @@ def held_by_few(light_field: LightField, disparity: FloatMap) -> BoolMap:
     finite = np.isfinite(disparity)
     d, held = np.where(finite, disparity, np.nan).ravel().astype(np.float64), np.zeros(H * W, np.int64)
     # the nearest views hold all that lies farther from the border than it moves in them
-    nearest = [light_field.baselines[t, s] for t, s in others[:least]]
+    baselines = light_field.baselines
+    nearest = [baselines[t, s] for t, s in others[:least]]
     moved = math.ceil(float(np.abs(disparity[finite]).max(initial=0)) * float(np.abs(nearest).max(initial=0)))
     inside = np.zeros((H, W), bool)
     if light_field.missing is None:
@@ -179,7 +180,7 @@ def held_by_few(light_field: LightField, disparity: FloatMap) -> BoolMap:
     held[inside.ravel()] = least
     left = np.flatnonzero(~inside)
     for t, s in others:
-        down, across = light_field.baselines[t, s]
+        down, across = baselines[t, s]
         row, column = y[left] - d[left] * down, x[left] - d[left] * across
         holds = (row >= -0.5) & (row <= H - 0.5) & (column >= -0.5) & (column <= W - 0.5)
         if light_field.missing is not None:

@@ -19,6 +19,7 @@ from scipy.sparse.linalg import spsolve
 from sepi.image.superpixels import Adjacency, FloatArray, Superpixels
 from sepi.lightfield import BoolMap, FloatMap
 from sepi.memory import BLAS_BUFFER, require_memory
+from sepi.regularization.planes_kernels import add_normal_equations, values_of_planes
 
 UNIT = 15.0
 """Length over which gradients are measured, pixels: about a superpixel, so that the three unknowns are alike."""
@@ -56,8 +57,9 @@ def basis(segments: Superpixels) -> FloatArray:
 
 def evaluate_planes(segments: Superpixels, planes: FloatArray, design: FloatArray) -> FloatMap:
     """Disparity of every pixel by the plane of its superpixel; shape (H, W), float32."""
-    values = (design * planes[segments.labels.ravel()]).sum(axis=1)
-    return np.asarray(values.reshape(segments.labels.shape), np.float32)
+    values = np.empty(segments.labels.shape, np.float32)
+    values_of_planes(segments.labels.ravel(), design, planes, values.reshape(-1))
+    return values
 
 
 def fit_planes(
@@ -137,11 +139,13 @@ def propagate(
     solution = planes.copy()
     trust = np.ones(len(affinity))
     data_weight = weight
+    blocks = np.arange(len(segments))
     require_memory(BLAS_BUFFER)
     for spread in _shrinking(coupling.tolerance):
         left, right = _normal_equations(segments, disparity, data_weight, design)
         continuity = _continuity(adjacent, at_first, at_second, strength * trust, coupling.slope, len(segments))
-        system = sparse.block_diag(left / UNIT**2, format="csr") + continuity + 1e-9 * sparse.eye_array(unknown.size)
+        data = sparse.bsr_array((left / UNIT**2, blocks, np.append(blocks, len(blocks)))).tocsr()
+        system = data + continuity + 1e-9 * sparse.eye_array(unknown.size)
         system = system.tocsr()[unknown]
         known = system[:, ~unknown] @ solution.ravel()[~unknown]
         solved = spsolve(system[:, unknown].tocsc(), right.ravel()[unknown] / UNIT**2 - known)
@@ -168,12 +172,9 @@ def _normal_equations(
     segments: Superpixels, disparity: FloatMap, weight: FloatMap, design: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Weighted least squares of each superpixel's data: matrices (N, 3, 3) and right sides (N, 3)."""
-    weighted = design * weight.reshape(-1, 1)
-    right = np.stack([segments.sums(weighted[:, p] * disparity.ravel()) for p in range(3)], axis=1)
-    left = np.empty((len(segments), 3, 3))
-    for p in range(3):
-        for q in range(p, 3):
-            left[:, p, q] = left[:, q, p] = segments.sums(weighted[:, p] * design[:, q])
+    left, right = np.zeros((len(segments), 3, 3)), np.zeros((len(segments), 3))
+    weights, values = (np.ascontiguousarray(of_pixels, np.float32).reshape(-1) for of_pixels in (weight, disparity))
+    add_normal_equations(segments.labels.ravel(), design, weights, values, left, right)
     return left, right
 
 

@@ -24,7 +24,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import NamedTuple
 
-from sepi.openmp import wait_asleep
+from sepi.openmp import FOR_NUMPY, wait_asleep
 from sepi.workflow.job_client import TAKEN
 
 # what most jobs import: libraries with parts that they import late, and what the stages have in common
@@ -120,7 +120,7 @@ def start_server(command: Sequence[str], environment: Mapping[str, str]) -> Serv
             stdin=listener.fileno(),
             stdout=given.fileno(),
             # threads do not outlive a fork
-            env={**os.environ, **environment, "OPENBLAS_NUM_THREADS": "1"},
+            env={**FOR_NUMPY, **os.environ, **environment, "OPENBLAS_NUM_THREADS": "1"},
             # signals of a terminal reach a fork by its client alone
             start_new_session=True,
         )
