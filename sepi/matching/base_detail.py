@@ -201,11 +201,11 @@ def _detail_so_far(
     # pages that nobody writes to take no memory
     shape = (*light_field.grid, rows.high - rows.low if with_detail else 0, width)
     if not with_detail or rows != (0, height):
-        return np.empty(shape, np.int16), present
+        return np.zeros(shape, np.int16), present
     kept = kept_of(light_field, _Kept)
     if kept.detail is None or kept.made is None or kept.made_with != parameters.base:
         kept.made_with = parameters.base
-        kept.detail, kept.made = np.empty(shape, np.int16), np.zeros(light_field.grid, bool)
+        kept.detail, kept.made = np.zeros(shape, np.int16), np.zeros(light_field.grid, bool)
     missing = present & ~kept.made
     kept.made |= present
     return kept.detail, missing
