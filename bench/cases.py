@@ -10,6 +10,7 @@ from typing import Any
 import h5py
 
 from bench import floor, plain, solvers
+from bench.busy import stages_beside_another_program
 from bench.measure import Case, Figures, Prepared, command
 from bench.scene import VARIANT, Scene, inputs, sweep_values
 from sepi.inspection.disparity_range import estimate_range
@@ -61,6 +62,8 @@ def _stage_cases(scene: Scene) -> Iterator[Case]:
     tiny, output = str(scene.grown(64, 3)), str(scene.folder / "tiny-initial.h5")
     job = ("sepi.initial", "--choice", "sepi", "--light-field", tiny, "--output", output)
     yield Case("whole", "start of a job", command, job)
+    yield Case("whole", "sepi --help", command, ("sepi", "--help"))
+    yield Case("whole", "sepi info", command, ("sepi", "info", str(scene.source)))
     for name in floor.KERNELS:
         yield Case("floor", name, floor.prepare, (name, scene.threads))
     yield Case("stages", "read the views", read, (scene.source,))
@@ -86,6 +89,12 @@ def _variant_cases(scene: Scene) -> Iterator[Case]:
         for name, choice in variant_named(variant).choices.items():
             if choice != HANDED_ON:
                 yield Case("variants", f"{variant}: {name}", stage_of_variant, (scene.path, variant, name))
+
+
+def _busy_cases(scene: Scene) -> Iterator[Case]:
+    """Stages beside a program that keeps one core busy."""
+    for variant in VARIANTS_BESIDE[: 1 if scene.small else None]:
+        yield Case("busy", variant, stages_beside_another_program, (scene.path, variant), most=1)
 
 
 def _growth_cases(scene: Scene) -> Iterator[Case]:
@@ -152,6 +161,7 @@ def _storage_cases(scene: Scene) -> Iterator[Case]:
 GROUPS: dict[str, Callable[[Scene], Iterator[Case]]] = {
     "stages": _stage_cases,
     "variants": _variant_cases,
+    "busy": _busy_cases,
     "growth": _growth_cases,
     "beside": _plain_cases,
     "solvers": _solver_cases,

@@ -16,8 +16,9 @@ from typing import Annotated, Any, Literal, NamedTuple
 
 from pydantic import Field, TypeAdapter, ValidationError
 
-from sepi.command import peak_memory_mb
+from sepi.command import peak_memory_mb, use_memory_again
 from sepi.errors import SepiError
+from sepi.openmp import prepare_numpy
 from sepi.threads import use_threads
 
 Figures = dict[str, float]
@@ -153,6 +154,7 @@ def measured(case: Case, repeats: int, threads: int = 1) -> Measurement:
         If the case fails; the message is that of its error.
     """
     # forked from a process that has imported what all cases need and done nothing: none inherits another's memory
+    prepare_numpy()
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload(
         ["bench.cases", "sepi.matching.plane_sweep_kernels", "sepi.image.mean_shift", "skimage.segmentation"]
@@ -173,6 +175,8 @@ def measured(case: Case, repeats: int, threads: int = 1) -> Measurement:
 
 def _measure(case: Case, repeats: int, threads: int) -> Measurement:
     """In the new process: prepare and call."""
+    # as the command does
+    use_memory_again()
     use_threads(case.threads or threads)
     prepared = case.prepare(*case.arguments)
     if case.most > 1:
@@ -190,7 +194,7 @@ def _measure(case: Case, repeats: int, threads: int) -> Measurement:
 # the module named first, as `python -m` runs it; the last thing it says is its peak memory
 _MODULE = """
 import atexit, runpy, sys
-from sepi.command import peak_memory_mb
+from sepi.command import peak_memory_mb, use_memory_again
 atexit.register(lambda: print(peak_memory_mb(), file=sys.stderr))
 del sys.argv[0]
 runpy.run_module(sys.argv[0], run_name="__main__", alter_sys=True)

@@ -40,6 +40,7 @@ def sections(result: Result) -> dict[str, list[Row]]:
     tables = {
         "Whole": [_row(m) for m in (result.group("whole") | result.group("large")).values()],
         "Variants": [_row(m, _scores(m)) for m in result.group("variants").values()],
+        "One core busy, times as long": [_row(m, m.figures) for m in result.group("busy").values()],
         "Steps": steps(result),
         **{f"Growth with {axis}, built-in scene": growth(result, axis) for axis in AXES},
         "Initial stage beside plain ones": beside(result),

@@ -65,7 +65,7 @@ class SepiCommand(click.Command):
         # short job; the memory goes back to the system anyway
         atexit.register(gc.freeze)
         with shown_errors(), _rare_collections():
-            _use_memory_again()
+            use_memory_again()
             _end_with_the_workflow()
             return super().invoke(ctx)
 
@@ -100,7 +100,7 @@ def _end_with_the_workflow() -> None:
         sys.exit(128 + signal.SIGTERM)
 
 
-def _use_memory_again() -> None:
+def use_memory_again() -> None:
     """Have the C library give again what was freed, as far as it can and the user's environment does not say otherwise.
 
     glibc gives each thread a heap of its own, and what one has freed the others do not take again: 40 MB of a benchmark

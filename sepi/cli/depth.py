@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import re
+import sys
 import time
 from collections.abc import Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
@@ -161,9 +163,13 @@ def depth(
 
 
 def _import_what_follows() -> None:
-    """Import what works on the light field and writes the result."""
-    for name in _LATER:
-        import_module(name)
+    """Import what works on the light field and writes the result; where memory is short, that is told later."""
+    from sepi.memory import KERNELS, MORE_KERNELS, require_memory
+
+    with suppress(MemoryError):
+        require_memory(MORE_KERNELS if "numba" in sys.modules else KERNELS)
+        for name in _LATER:
+            import_module(name)
 
 
 def _also_as_taken(

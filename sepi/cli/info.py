@@ -105,6 +105,7 @@ def check(context: click.Context, light_field_path: Path, reading: Reading, as_j
     is named that sets INPUT right. Exits with 1 where another order clearly fits better, with 2 where INPUT cannot be
     read.
     """
+    reading.begin(light_field_path)
     from sepi.inspection.row_spacing import settle_row_spacing
     from sepi.inspection.view_order import check_order
 

@@ -212,7 +212,7 @@ def test_small_run_measures_everything(tmp_path: Path) -> None:
     assert called.stderr == "", "quiet in a pipe"
     content = json.loads((tmp_path / "bench.json").read_text())
     groups = {m["group"] for m in content["measurements"]}
-    assert groups >= {"whole", "stages", "variants", "floor", "beside", "solvers"}
+    assert groups >= {"whole", "stages", "variants", "busy", "floor", "beside", "solvers"}
     assert groups >= {"growth, initial", "growth, all stages"}
     assert all(min(m["seconds"]) > 0 and m["peak_memory_mb"] > 0 for m in content["measurements"])
     stages = {m["name"]: m["figures"] for m in content["measurements"] if m["group"] == "stages"}
@@ -226,6 +226,7 @@ def test_small_run_measures_everything(tmp_path: Path) -> None:
     for heading in (
         "Whole",
         "Variants",
+        "One core busy, times as long",
         "Steps",
         "Growth with size, built-in scene",
         "Initial stage beside plain ones",
