@@ -2,12 +2,6 @@
 
 Variant ``best`` is what ``sepi depth`` uses, ``fast`` takes half its time, ``paper`` is the method as published; the
 others are rows of the ablations, and the methods that the paper compares with.
-
-Examples
---------
->>> from sepi.built_in_variants import VARIANT_ENTRIES
->>> VARIANT_ENTRIES["no_sepi"]  # as users write theirs
-{'base': 'paper', 'initial': 'structure_tensor'}
 """
 
 from __future__ import annotations
@@ -16,7 +10,7 @@ from typing import Any
 
 from sepi.compared.methods import LEARNED, METHODS
 
-VARIANT_ENTRIES: dict[str, dict[str, Any]] = {
+ENTRIES: dict[str, dict[str, Any]] = {
     "paper": {"initial": "sepi", "occlusion": "half_sepi", "textureless": "lti", "optimize": "wls"},
     "no_sepi": {"base": "paper", "initial": "structure_tensor"},
     "no_occlusion": {"base": "paper", "occlusion": "none"},
@@ -66,10 +60,7 @@ VARIANT_ENTRIES: dict[str, dict[str, Any]] = {
     **METHODS,
     **LEARNED,
 }
-"""The built-in variants as :func:`sepi.variants.variant_from` reads them: the paper's method, the other four columns of
-its table 4 in their order, and the text's other occlusion stage; then the most accurate variant, a quick one, and the
-most accurate one with one part switched off or put back to the paper's; then the compared methods
-(:mod:`sepi.compared`)."""
+"""Name to entry of each: :data:`sepi.variants.VARIANT_ENTRIES`."""
 
 DEFAULT_VARIANT = "best"
 """Variant of ``sepi depth``."""

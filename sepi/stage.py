@@ -345,8 +345,7 @@ class Choice:
     >>> import cv2
     >>> from pydantic import Field
     >>> from sepi import estimate_depth
-    >>> from sepi.built_in_variants import VARIANT_ENTRIES
-    >>> from sepi.variants import STAGES, variant_from
+    >>> from sepi.variants import STAGES, VARIANT_ENTRIES, variant_from
     >>> from sepi.scenes import render
     >>> from sepi.stage import Choice, Parameters, require_previous
     >>> class MedianParameters(Parameters):

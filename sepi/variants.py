@@ -4,11 +4,13 @@ What the built-in ones choose: :mod:`sepi.built_in_variants`.
 
 Examples
 --------
->>> from sepi.variants import STAGES, VARIANTS
+>>> from sepi.variants import STAGES, VARIANT_ENTRIES, VARIANTS
 >>> {"best", "fast", "paper", "spo"} <= set(VARIANTS)
 True
 >>> VARIANTS["paper"].choices
 {'initial': 'sepi', 'occlusion': 'half_sepi', 'textureless': 'lti', 'optimize': 'wls'}
+>>> VARIANT_ENTRIES["no_sepi"]  # as users write theirs
+{'base': 'paper', 'initial': 'structure_tensor'}
 >>> list(STAGES["textureless"])  # what a variant may choose there
 ['lti', 'uniform_planes', 'none']
 >>> STAGES["occlusion"]["half_sepi"].parameters.model_fields["side_reach"].description
@@ -25,7 +27,7 @@ from functools import cache
 from typing import Any
 
 from sepi import initial, occlusion, optimize, textureless
-from sepi.built_in_variants import VARIANT_ENTRIES
+from sepi.built_in_variants import ENTRIES
 from sepi.compared.methods import StageChoices
 from sepi.errors import SepiError
 from sepi.models import validated
@@ -208,8 +210,7 @@ def variant_from(name: str, entries: Mapping[str, Any], where: str, users: tuple
 
     Examples
     --------
-    >>> from sepi.built_in_variants import VARIANT_ENTRIES
-    >>> from sepi.variants import variant_from
+    >>> from sepi.variants import VARIANT_ENTRIES, variant_from
     >>> entries = {**VARIANT_ENTRIES, "smoother": {"base": "best", "optimize": {"strength": 12.0}}}
     >>> variant = variant_from("smoother", entries, "my variants")
     >>> variant.choices["initial"], variant.overrides
@@ -250,6 +251,13 @@ def _chosen(stage: str, given: Any, base: Variant | None, where: str) -> tuple[s
     checked = validated(STAGES[stage][choice].parameters, own, f"{where}.{stage}")
     # as the model holds them: where a number is a float, 0 is 0.0
     return choice, {key: getattr(checked, key) for key in own}
+
+
+VARIANT_ENTRIES: dict[str, dict[str, Any]] = ENTRIES
+"""The built-in variants as :func:`variant_from` reads them: the paper's method, the other four columns of its table 4
+in their order, and the text's other occlusion stage; then the most accurate variant, a quick one, and the most accurate
+one with one part switched off or put back to the paper's; then the compared methods
+(:mod:`sepi.compared`)."""
 
 
 def variant_named(name: str) -> Variant:

@@ -13,7 +13,6 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-from sepi.built_in_variants import VARIANT_ENTRIES
 from sepi.errors import SepiError
 from sepi.io.disparity_maps import SUFFIXES, TruthFile
 from sepi.io.external_maps import ExternalSource
@@ -23,7 +22,7 @@ from sepi.lightfield import DisparityRange
 from sepi.models import CheckedModel, validated
 from sepi.scenes import SCENES
 from sepi.validation import require_known
-from sepi.variants import VARIANTS, Variant, variant_from
+from sepi.variants import VARIANT_ENTRIES, VARIANTS, Variant, variant_from
 from sepi.workflow.datasets import LONGEST_NAME, Scene, own_scene, require_plain_path, scenes_in
 from sepi.workflow.parameters import default_values, stage_settings
 from sepi.workflow.rendered_dataset import Rendered
