@@ -28,6 +28,7 @@ from sepi.matching.candidates import CandidateParameters, CandidateRule, number_
 from sepi.matching.nearest_surfaces import shown_columns
 from sepi.matching.sweep_arrays import BestMaps, ViewStack, Window, sampled_candidates
 from sepi.stage import Progress, no_progress
+from sepi.threads import threads_used
 
 CANDIDATES = CandidateRule(usual=181, finest=0.02, coarsest=0.5)
 """The paper's number, for light fields like the paper's."""
@@ -154,8 +155,6 @@ def sweep(
     SepiError
         If the disparity range is unknown.
     """
-    from numba import get_num_threads
-
     from sepi.matching.plane_sweep_kernels import sweep_plane_rows
 
     H, W = light_field.shape
@@ -176,8 +175,8 @@ def sweep(
     window = Window(guide, parameters.window_radius, np.float32(parameters.window_sigma**2 + noise))
     result = SweepResult(*(np.full((len(subsets), H, W), np.nan, np.float32) for _ in range(3)))
     maps = BestMaps(result.disparity, result.cost, result.mean)
-    height = _rows_at_a_stretch(H, get_num_threads())
-    strip = height * get_num_threads()
+    height = _rows_at_a_stretch(H, threads_used())
+    strip = height * threads_used()
     for begin in range(0, H, strip):
         end = min(H, begin + strip)
         sweep_plane_rows(views, candidates, window, mask, begin, end, height, TILE_WIDTH, maps)
