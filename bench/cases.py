@@ -33,6 +33,8 @@ GROWTH_REPEATS = 3
 LARGE = (1024, 17)
 """Size and views a side of the large light field."""
 
+SNAKEFILE = Path(__file__).parents[1] / "Snakefile"
+
 VARIANTS_BESIDE = ("paper", "best", "fast")
 
 COMPRESSIONS: dict[str, dict[str, Any]] = {
@@ -132,6 +134,11 @@ def _large_case(scene: Scene) -> Iterator[Case]:
     yield Case("large", name, whole, (path, scene.num_disparities), most=1)
     whole_variant(scene.grown(64, 3), "best").call()
     yield Case("large", f"{name}, variant best", whole_variant, (path, "best"), most=1)
+    # in a folder of its own: all jobs are to be done
+    folder = scene.folder / "workflow"
+    folder.mkdir()
+    words = ("--snakefile", str(SNAKEFILE), "--directory", str(folder), "--cores", str(scene.threads), "--quiet", "all")
+    yield Case("large", "snakemake, built-in scenes", command, ("snakemake", *words, "--", "all"), most=1)
 
 
 def _plain_cases(scene: Scene) -> Iterator[Case]:
