@@ -15,6 +15,7 @@ from contextlib import contextmanager
 from typing import Any, TypeVar, cast
 
 from sepi.absent import absent
+from sepi.interrupts import no_interrupt_lost
 
 # of which numba asks the one whether it is running, the other for its version, and uses the third to read a file of the
 # user's: four tenths of importing numba
@@ -70,7 +71,13 @@ class _KernelCache(FunctionCache):  # type: ignore[misc, unused-ignore]
         """What was compiled for a signature; None where there is nothing."""
         _initialize(target_context)
         engine = target_context.codegen()._engine
-        with self._guard_against_spurious_io_errors(), _names_unlisted(engine), _bitcode_unparsed():
+        # LLVM calls Python, and forgets what is raised there
+        with (
+            no_interrupt_lost(),
+            self._guard_against_spurious_io_errors(),
+            _names_unlisted(engine),
+            _bitcode_unparsed(),
+        ):
             return self._load_overload(sig, target_context)  # type: ignore[no-untyped-call, unused-ignore]
         return None
 

@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sepi.errors import SepiError
+from sepi.interrupts import interruptibly
 from sepi.io.disparity_maps import read_disparity
 from sepi.io.error_bars import read_error_bars
 from sepi.io.hdf5 import (
@@ -27,7 +28,6 @@ from sepi.io.hdf5 import (
     read_dataset,
     read_rig,
 )
-from sepi.io.interrupts import interruptibly
 from sepi.io.origin import Origin, read_origin
 from sepi.io.result_files import ALL_VIEWS
 from sepi.io.result_folder import Result, read_result

@@ -20,6 +20,7 @@ import numpy.typing as npt
 
 from sepi.camera import Camera, numbers_of
 from sepi.errors import SepiError, printable
+from sepi.interrupts import no_interrupt_lost
 from sepi.io import apart
 from sepi.io.files import PatientFile, atomic_path, reading
 from sepi.io.integrity import (
@@ -33,7 +34,6 @@ from sepi.io.integrity import (
     require_held,
     require_sound,
 )
-from sepi.io.interrupts import no_interrupt_lost
 from sepi.lightfield import RANGE_SOURCES, DisparityRange, LightField, Truth, require_light_field
 from sepi.rig import Rig
 from sepi.stage import ERROR_BARS, CostVolume, StageMaps
