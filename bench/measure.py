@@ -194,7 +194,7 @@ def _measure(case: Case, repeats: int, threads: int) -> Measurement:
 # the module named first, as `python -m` runs it; the last thing it says is its peak memory
 _MODULE = """
 import atexit, runpy, sys
-from sepi.command import peak_memory_mb, use_memory_again
+from sepi.command import peak_memory_mb
 atexit.register(lambda: print(peak_memory_mb(), file=sys.stderr))
 del sys.argv[0]
 runpy.run_module(sys.argv[0], run_name="__main__", alter_sys=True)

@@ -148,7 +148,7 @@ def depth(
         from sepi.applications.all_views import maps_of_all_views
         from sepi.io.all_views import write_all_views
 
-        made_by = result_attributes(light_field, maps)
+        made_by = result_attributes(light_field, maps, known.get(DIGEST))
         with progress_bar(f"{light_field.name}, all views") as progress:
             views = maps_of_all_views(light_field, maps, chosen, parameters, progress, memory and memory * 2**20)
             write_all_views(folder / ALL_VIEWS, light_field, _also_as_taken(folder, light_field, views), made_by)
