@@ -32,7 +32,7 @@ from sepi.error_bars.cues import cues_of_map, cues_of_stage_before, cues_of_view
 from sepi.image.noise import reference_residual_variance
 from sepi.lightfield import BoolMap, FloatMap, LightField
 from sepi.matching.base_detail import BaseDetailParameters, forget_detail
-from sepi.matching.denoising import DenoisedLightField, denoised, guide_of, measured_noise
+from sepi.matching.denoising import DenoisedLightField, denoised, measured_noise
 from sepi.matching.view_subsets import spread_views
 from sepi.memory import give_back_memory
 from sepi.regularization.wls import (
@@ -209,8 +209,6 @@ def second_order(
     lowest, highest = light_field.require_disparity_range().candidates(2)
     refinements = max(parameters.refinements, parameters.noisy_refinements if noisy else 0)
     by_depth = Surfaces(parameters.occlusion_margin if parameters.one_surface else ANY_SURFACE)
-    # a map that was smoothed is told by itself
-    by_colour = _coloured(light_field, parameters) if refinements and parameters.one_surface else by_depth
     total = refinements + parameters.solves
     for i in range(total):
         progress((i + 0.5) / (total + 1))
@@ -221,6 +219,9 @@ def second_order(
         if i <= refinements or last:
             # other steps are too small to change it
             mean = matching.mean(disparity)
+        if i == 0:
+            # a map that was smoothed is told by itself
+            by_colour = _coloured(mean, light_field, parameters) if refinements and parameters.one_surface else by_depth
         if last:
             # the splines have it
             matching.forget_detail()
@@ -320,10 +321,10 @@ def _prior(
     return _Prior(uniform, reliability, colour_changes(light_field.reference_view), variance)
 
 
-def _coloured(light_field: LightField, parameters: SecondOrderParameters) -> Surfaces:
+def _coloured(mean: FloatMap, light_field: LightField, parameters: SecondOrderParameters) -> Surfaces:
     from sepi.matching.surface_windows import Surfaces
 
-    colours = np.ascontiguousarray(np.moveaxis(guide_of(light_field), 2, 0))
+    colours = np.ascontiguousarray(np.moveaxis(mean[..., :3], 2, 0))
     width = np.sqrt(parameters.smooth_colour**2 + reference_residual_variance(light_field))
     return Surfaces(parameters.occlusion_margin, colours, float(width))
 

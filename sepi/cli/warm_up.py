@@ -127,10 +127,14 @@ def _denoise(light_field: LightField) -> None:
     """Call what noisy views need: the scene has none."""
     from dataclasses import replace
 
+    from sepi.matching.base_detail import BaseDetailParameters, detail_of
     from sepi.matching.denoising import denoised
+    from sepi.matching.row_bands import Rows
 
     noise = np.random.default_rng(0).integers(0, 64, light_field.views.shape, np.uint8)
-    denoised(_of_type(replace(light_field, views=noise), str(light_field.views.dtype)), 1.0)
+    noisy = _of_type(replace(light_field, views=noise), str(light_field.views.dtype))
+    denoised(noisy, 1.0)
+    detail_of(noisy.reference_view, BaseDetailParameters(), 1.0, Rows(0, noisy.shape[0]))
 
 
 def _share_light(light_field: LightField) -> None:

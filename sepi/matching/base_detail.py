@@ -95,7 +95,11 @@ class BaseDetail(NamedTuple):
     noise : float
         Expected squared residual, summed over RGB, by noise alone.
     guide : ndarray, shape (H, W, 3), float32
-        Colours of the reference view, 0..1.
+        Colours that the views are compared with, 0..1: those of the reference view.
+    reference_detail : ndarray, shape (n or 0, W), int16
+        Detail of these.
+    edge : float
+        Sum of the RGB differences that counts as an edge in the base of all of them.
     """
 
     colours: npt.NDArray[np.generic]
@@ -109,6 +113,8 @@ class BaseDetail(NamedTuple):
     baselines: npt.NDArray[np.float64]
     noise: float
     guide: FloatMap
+    reference_detail: npt.NDArray[np.int16]
+    edge: float
 
     def squared_scale(self, scale: float) -> float:
         """Square of a robust scale, widened by the noise."""
@@ -140,8 +146,6 @@ def base_detail_decomposition(
     -------
     BaseDetail
     """
-    from sepi.matching.base_detail_kernels import detail_of_views
-
     views, guide = light_field.rgb_views, light_field.reference_view
     if rows is None or (again and _all_rows_fit(light_field)):
         rows = Rows(0, light_field.shape[0])
@@ -149,10 +153,9 @@ def base_detail_decomposition(
     unit = np.float32(1 / full_scale(views.dtype))
     noise = reference_noise(light_field)
     detail, missing = _detail_so_far(light_field, parameters, rows, present)
+    edge = float(np.hypot(parameters.base_sigma_colour, 3 * noise))
     if detail.size and missing.any():
-        edge = float(np.hypot(parameters.base_sigma_colour, 3 * noise))
-        radius, space = parameters.base_radius, parameters.base_sigma_space
-        detail_of_views(views, unit, missing, rows.low, radius, edge, space, np.float32(DETAIL_UNIT), detail)
+        _make_detail(views, unit, missing, parameters, edge, rows, detail)
     return BaseDetail(
         views,
         unit,
@@ -164,7 +167,48 @@ def base_detail_decomposition(
         light_field.baselines,
         variance_of_residuals(noise, guide.shape[2]),
         guide,
+        detail[light_field.reference_position],
+        edge,
     )
+
+
+def detail_of(picture: FloatMap, parameters: BaseDetailParameters, edge: float, rows: Rows) -> npt.NDArray[np.int16]:
+    """Detail of a picture, as that of a view is made.
+
+    Parameters
+    ----------
+    picture : ndarray, shape (H, W, 3), float32
+        Colours, 0..1.
+    parameters : BaseDetailParameters
+    edge : float
+        Sum of the RGB differences that counts as an edge of the base.
+    rows : Rows
+        That are wanted.
+
+    Returns
+    -------
+    ndarray, shape (n, W), int16
+        In :data:`DETAIL_UNIT`.
+    """
+    detail = np.zeros((1, 1, rows.high - rows.low, picture.shape[1]), np.int16)
+    _make_detail(picture[None, None], np.float32(1), np.ones((1, 1), bool), parameters, edge, rows, detail)
+    made: npt.NDArray[np.int16] = detail[0, 0]
+    return made
+
+
+def _make_detail(
+    views: npt.NDArray[np.generic],
+    unit: np.float32,
+    wanted: BoolMap,
+    parameters: BaseDetailParameters,
+    edge: float,
+    rows: Rows,
+    out: npt.NDArray[np.int16],
+) -> None:
+    from sepi.matching.base_detail_kernels import detail_of_views
+
+    radius, space = parameters.base_radius, parameters.base_sigma_space
+    detail_of_views(views, unit, wanted, rows.low, radius, edge, space, np.float32(DETAIL_UNIT), out)
 
 
 @dataclass

@@ -49,8 +49,9 @@ LEFT = 0.375
 _NOISIEST = 0.9
 """Part of the parts of a picture that have no more noise than its scales bear with."""
 
-_GUIDE_SIZE, _GUIDE_SPACE, _GUIDE_COLOUR = 7, 3.0, 7.0
-"""Window and width of the bilateral filter, pixels, and sum of the channels' differences, in units of the noise."""
+_GUIDE, _GUIDE_OF_MEAN = (7, 3.0, 7.0), (5, 2.0, 2.1)
+"""Window and width of the bilateral filter, pixels, and sum of the channels' differences, in units of the noise: of the
+reference view, and of the mean of many."""
 
 
 class DenoisingParameters(Parameters):
@@ -157,10 +158,22 @@ def _denoised_views(light_field: LightField, noise: ViewNoise, least: float) -> 
     return out
 
 
-def guide_of(light_field: LightField) -> FloatMap:
-    """Colours that tell where costs may be carried on: the reference view (H, W, 3), without noise at edges, too."""
-    guide = light_field.reference_view
+def guide_of(light_field: LightField, mean: FloatMap | None = None) -> FloatMap:
+    """Colours that tell where costs may be carried on, without noise at edges, too.
+
+    Parameters
+    ----------
+    light_field : LightField
+    mean : ndarray, shape (H, W, 3), float32, optional
+        Of many views (:mod:`sepi.matching.mean_reference`), which takes the reference view's place.
+
+    Returns
+    -------
+    ndarray, shape (H, W, 3), float32
+        Colours, 0..1; the reference view as it is where views are not denoised.
+    """
     if not isinstance(light_field, DenoisedLightField):
-        return guide
-    colour = _GUIDE_COLOUR * light_field.noise
-    return np.asarray(cv2.bilateralFilter(np.ascontiguousarray(guide), _GUIDE_SIZE, colour, _GUIDE_SPACE))
+        return light_field.reference_view
+    size, space, colour = _GUIDE if mean is None else _GUIDE_OF_MEAN
+    picture = np.ascontiguousarray(light_field.reference_view) if mean is None else mean
+    return np.asarray(cv2.bilateralFilter(picture, size, colour * light_field.noise, space))

@@ -319,14 +319,11 @@ def _load_view(views: BaseDetail, t: int, s: int, begin: int, end: int, rows: _R
 @njit(cache=True, borrows=True)
 def _load_reference(views: BaseDetail, y: int, rows: _Rows) -> None:
     """Row ``y`` of the reference view, times what the weights of samples sum to."""
-    W = views.colours.shape[3]
-    colour_scale = views.colour_unit * np.float32(COLOUR_STEPS)
-    _load_colours(views.colours, views.t0, views.s0, y, colour_scale, rows.channels)
-    for x in range(W):
+    for x in range(views.guide.shape[1]):
         for c in range(3):
-            rows.reference[c, x] = rows.channels[c, x] * ONE
-        if views.detail.shape[2] > 0:
-            rows.reference[3, x] = np.int32(views.detail[views.t0, views.s0, y - views.low, x]) * ONE
+            rows.reference[c, x] = np.rint(views.guide[y, x, c] * np.float32(COLOUR_STEPS)) * np.float32(ONE)
+        if views.reference_detail.shape[0] > 0:
+            rows.reference[3, x] = np.int32(views.reference_detail[y - views.low, x]) * ONE
 
 
 @njit(cache=True, fastmath=EXACT, error_model="numpy", borrows=True)

@@ -21,6 +21,7 @@ from sepi.matching.base_detail import BaseDetailParameters, ColourScale, base_de
 from sepi.matching.candidates import CandidateParameters, CandidateRule, number_field
 from sepi.matching.denoising import DenoisedLightField, guide_of
 from sepi.matching.gaps import GapParameters, with_open_gaps
+from sepi.matching.mean_reference import compared_with, mean_reference
 from sepi.matching.nearest_surfaces import nearest_surfaces
 from sepi.matching.row_bands import Band, row_bands
 from sepi.matching.semi_global import CostVolumes, SmallPenalty, SmoothedResult, SmoothingParameters, smooth_and_choose
@@ -81,6 +82,13 @@ class VisibleViewsParameters(VisibilitySweepParameters, GapParameters):
     views: int = Field(41, ge=2, description="views that the last map compares, at least")
     sampling: float = Field(1.0, ge=1, le=8, description="distance of its candidates; 1: as num_disparities says")
     passes: int = Field(3, ge=1, le=10, description="how often visibility and depth are computed anew")
+    mean_noise: float = Field(
+        0.02,
+        ge=0,
+        le=1,
+        description="noise of one channel from which on views are compared with the mean of others, instead of the "
+        "reference view, colours in 0..1",
+    )
     occluded_view_weight: float = Field(0.01, ge=0, le=1, description="weight of a view in which the pixel is occluded")
 
     @property
@@ -117,7 +125,7 @@ def first_depth(light_field: LightField, parameters: VisibilitySweepParameters, 
     """
     views = spread_views(light_field, parameters.first_views)
     volumes = _volumes(light_field, parameters, parameters.first_sampling)
-    return _sweep(light_field, views, parameters.first_sampling, None, parameters, volumes, progress)
+    return _sweep(light_field, views, parameters.first_sampling, None, None, parameters, volumes, progress)
 
 
 def depth_from_visible_views(
@@ -150,11 +158,16 @@ def depth_from_visible_views(
     volumes = _volumes(light_field, parameters, *([parameters.first_sampling] * (n > 1)), parameters.sampling)
     for i in range(n):
         last = i == n - 1
+        present = spread_views(light_field, parameters.views) if last else few
+        mean = None
+        if isinstance(light_field, DenoisedLightField) and light_field.of_views.usual >= parameters.mean_noise:
+            mean = mean_reference(light_field, disparity, present, parameters, parameters.occlusion_margin)
         result = _sweep(
             light_field,
-            spread_views(light_field, parameters.views) if last else few,
+            present,
             parameters.sampling if last else parameters.first_sampling,
             disparity,
+            mean,
             parameters,
             volumes,
             lambda fraction, i=i: progress((i + fraction) / n),  # type: ignore[misc]
@@ -208,11 +221,15 @@ def _sweep(
     present: BoolMap,
     sampling: float,
     disparity: FloatMap | None,
+    mean: FloatMap | None,
     parameters: VisibilitySweepParameters,
     volumes: CostVolumes,
     progress: Progress,
 ) -> SmoothedResult:
-    """A map over some of the views, of candidates ``sampling`` times as far apart as usual."""
+    """A map over some of the views, of candidates ``sampling`` times as far apart as usual.
+
+    Pixels are compared with their ``mean``, where there is one, instead of the reference view.
+    """
     disparities = light_field.require_disparity_range().candidates(parameters.fewer(light_field, sampling))
     height = light_field.shape[0]
     cost = volumes.costs(len(disparities))
@@ -222,13 +239,14 @@ def _sweep(
             light_field,
             present,
             disparity,
+            mean,
             parameters,
             band,
             disparities,
             cost,
             lambda row: progress(0.8 * row / height),
         )
-    guide = guide_of(light_field)
+    guide = guide_of(light_field, mean)
     variance = variance_of_residuals(_contrast_of_surfaces(light_field), guide.shape[2])
     shown = light_field.present
     if light_field.missing is not None:
@@ -250,6 +268,7 @@ def _add_costs(
     light_field: LightField,
     present: BoolMap,
     disparity: FloatMap | None,
+    mean: FloatMap | None,
     parameters: VisibilitySweepParameters,
     band: Band,
     disparities: FloatMap,
@@ -260,6 +279,8 @@ def _add_costs(
     from sepi.matching.visibility_kernels import RobustCost, sweep_visible_rows
 
     views = base_detail_decomposition(light_field, parameters, band.rows, present)
+    if mean is not None:
+        views = compared_with(views, mean, parameters, band.rows)
     visibility = _visibility(light_field, present, disparity, parameters, band)
     scales2 = [views.squared_scale(s) for s in (parameters.colour_scale, parameters.detail_scale)]
     robust = RobustCost(np.array(scales2, np.float32), parameters.shares)

@@ -1,0 +1,83 @@
+"""What other views say of a pixel, in place of the reference view, where these are noisy.
+
+The noise of the reference view is in every residual alike, so that no number of views averages it away. The mean of
+views that see a pixel, as the map so far has it, hardly has any. Views that are unlike the reference view count less
+in it, so that where the map is wrong it stays near that.
+
+No view is compared with a mean that it is part of: its own noise would make it fit best where the map has it already,
+and in strong noise whatever is wrong would stay.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sepi.lightfield import BoolMap, FloatMap
+from sepi.matching.base_detail import BaseDetail, BaseDetailParameters, detail_of
+from sepi.matching.denoising import DenoisedLightField
+from sepi.matching.row_bands import Rows
+
+LEAST_OTHERS = 8
+"""Views that are not compared: with the reference view, their mean has a ninth of the noise's variance."""
+
+
+def mean_reference(
+    light_field: DenoisedLightField,
+    disparity: FloatMap,
+    compared: BoolMap,
+    parameters: BaseDetailParameters,
+    occlusion_margin: float,
+) -> FloatMap | None:
+    """Mean of the views that see each pixel, of those that are not compared.
+
+    Parameters
+    ----------
+    light_field : DenoisedLightField
+    disparity : ndarray, shape (H, W), float32
+        By which they are aligned, pixels per view step.
+    compared : ndarray, shape (T, S), bool
+        The views that are to be compared with it.
+    parameters : BaseDetailParameters
+        How well colours must fit.
+    occlusion_margin : float
+        By how much an occluder must be nearer, pixels per view step.
+
+    Returns
+    -------
+    ndarray, shape (H, W, 3), float32, or None
+        Colours, 0..1; nothing where there are too few others.
+    """
+    from sepi.matching.gauss_newton import GaussNewton
+    from sepi.matching.spline_views import forget_splines
+
+    others = light_field.present & ~compared
+    if others.sum() < LEAST_OTHERS:
+        return None
+    colours_alone = parameters.model_copy(update={"use_detail": False})
+    mean = GaussNewton(light_field, colours_alone, occlusion_margin, others).mean(disparity)[..., :3]
+    # what is to come needs the memory
+    forget_splines(light_field)
+    return np.ascontiguousarray(mean)
+
+
+def compared_with(views: BaseDetail, picture: FloatMap, parameters: BaseDetailParameters, rows: Rows) -> BaseDetail:
+    """The same views, compared with a picture that has no noise in place of the reference view.
+
+    Parameters
+    ----------
+    views : BaseDetail
+    picture : ndarray, shape (H, W, 3), float32
+        Seen from the reference view; colours, 0..1.
+    parameters : BaseDetailParameters
+    rows : Rows
+        That the views' detail has.
+
+    Returns
+    -------
+    BaseDetail
+        Whose residuals have the noise of one view instead of two.
+    """
+    detail = views.reference_detail
+    if parameters.use_detail:
+        detail = detail_of(picture, parameters, views.edge, rows)
+    return views._replace(guide=picture, reference_detail=detail, noise=views.noise / 2)
