@@ -196,6 +196,29 @@ def detail_of(picture: FloatMap, parameters: BaseDetailParameters, edge: float, 
     return made
 
 
+def compared_with(views: BaseDetail, picture: FloatMap, parameters: BaseDetailParameters, rows: Rows) -> BaseDetail:
+    """The same views, compared with a picture that has no noise in place of the reference view.
+
+    Parameters
+    ----------
+    views : BaseDetail
+    picture : ndarray, shape (H, W, 3), float32
+        Seen from the reference view; colours, 0..1.
+    parameters : BaseDetailParameters
+    rows : Rows
+        That the views' detail has.
+
+    Returns
+    -------
+    BaseDetail
+        Whose residuals have the noise of one view instead of two.
+    """
+    detail = views.reference_detail
+    if parameters.use_detail:
+        detail = detail_of(picture, parameters, views.edge, rows)
+    return views._replace(guide=picture, reference_detail=detail, noise=views.noise / 2)
+
+
 def _make_detail(
     views: npt.NDArray[np.generic],
     unit: np.float32,

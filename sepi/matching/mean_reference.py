@@ -12,17 +12,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from sepi.lightfield import BoolMap, FloatMap
-from sepi.matching.base_detail import BaseDetail, BaseDetailParameters, detail_of
-from sepi.matching.denoising import DenoisedLightField
-from sepi.matching.row_bands import Rows
+from sepi.lightfield import BoolMap, FloatMap, LightField
+from sepi.matching.base_detail import BaseDetailParameters
 
 LEAST_OTHERS = 8
 """Views that are not compared: with the reference view, their mean has a ninth of the noise's variance."""
 
 
 def mean_reference(
-    light_field: DenoisedLightField,
+    light_field: LightField,
     disparity: FloatMap,
     compared: BoolMap,
     parameters: BaseDetailParameters,
@@ -32,7 +30,8 @@ def mean_reference(
 
     Parameters
     ----------
-    light_field : DenoisedLightField
+    light_field : LightField
+        Denoised.
     disparity : ndarray, shape (H, W), float32
         By which they are aligned, pixels per view step.
     compared : ndarray, shape (T, S), bool
@@ -47,37 +46,14 @@ def mean_reference(
     ndarray, shape (H, W, 3), float32, or None
         Colours, 0..1; nothing where there are too few others.
     """
-    from sepi.matching.gauss_newton import GaussNewton
+    from sepi.matching.aligned_views import AlignedViews
     from sepi.matching.spline_views import forget_splines
 
     others = light_field.present & ~compared
     if others.sum() < LEAST_OTHERS:
         return None
     colours_alone = parameters.model_copy(update={"use_detail": False})
-    mean = GaussNewton(light_field, colours_alone, occlusion_margin, others).mean(disparity)[..., :3]
+    mean = AlignedViews(light_field, colours_alone, occlusion_margin, others).mean(disparity)[..., :3]
     # what is to come needs the memory
     forget_splines(light_field)
     return np.ascontiguousarray(mean)
-
-
-def compared_with(views: BaseDetail, picture: FloatMap, parameters: BaseDetailParameters, rows: Rows) -> BaseDetail:
-    """The same views, compared with a picture that has no noise in place of the reference view.
-
-    Parameters
-    ----------
-    views : BaseDetail
-    picture : ndarray, shape (H, W, 3), float32
-        Seen from the reference view; colours, 0..1.
-    parameters : BaseDetailParameters
-    rows : Rows
-        That the views' detail has.
-
-    Returns
-    -------
-    BaseDetail
-        Whose residuals have the noise of one view instead of two.
-    """
-    detail = views.reference_detail
-    if parameters.use_detail:
-        detail = detail_of(picture, parameters, views.edge, rows)
-    return views._replace(guide=picture, reference_detail=detail, noise=views.noise / 2)

@@ -99,7 +99,7 @@ def _bytes_taken(light_field: LightField, stages: Iterable[Parameters]) -> tuple
     if not in_bands:
         return whole, whole
     # here, since it loads what compiles
-    from sepi.matching.gauss_newton import BYTES_PER_PIXEL
+    from sepi.matching.aligned_views import BYTES_PER_PIXEL
 
     # the optimisation holds most of a pixel
     return whole, whole + least_band_bytes(light_field, BYTES_PER_PIXEL)

@@ -17,11 +17,16 @@ from pydantic import Field
 
 from sepi.image.noise import variance_of_residuals
 from sepi.lightfield import BoolMap, FloatMap, LightField
-from sepi.matching.base_detail import BaseDetailParameters, ColourScale, base_detail_decomposition, reference_noise
+from sepi.matching.base_detail import (
+    BaseDetailParameters,
+    ColourScale,
+    base_detail_decomposition,
+    compared_with,
+    reference_noise,
+)
 from sepi.matching.candidates import CandidateParameters, CandidateRule, number_field
 from sepi.matching.denoising import DenoisedLightField, guide_of
 from sepi.matching.gaps import GapParameters, with_open_gaps
-from sepi.matching.mean_reference import compared_with, mean_reference
 from sepi.matching.nearest_surfaces import nearest_surfaces
 from sepi.matching.row_bands import Band, row_bands
 from sepi.matching.semi_global import CostVolumes, SmallPenalty, SmoothedResult, SmoothingParameters, smooth_and_choose
@@ -128,8 +133,20 @@ def first_depth(light_field: LightField, parameters: VisibilitySweepParameters, 
     return _sweep(light_field, views, parameters.first_sampling, None, None, parameters, volumes, progress)
 
 
+MeanOf = Callable[[LightField, FloatMap, BoolMap, BaseDetailParameters, float], FloatMap | None]
+"""What :func:`sepi.matching.mean_reference.mean_reference` is."""
+
+
+def _no_mean(*_: object) -> None:
+    return None
+
+
 def depth_from_visible_views(
-    light_field: LightField, disparity: FloatMap, parameters: VisibleViewsParameters, progress: Progress
+    light_field: LightField,
+    disparity: FloatMap,
+    parameters: VisibleViewsParameters,
+    progress: Progress,
+    mean_of: MeanOf = _no_mean,
 ) -> SmoothedResult:
     """Depth over the views that see a pixel, as a first map tells, in several passes.
 
@@ -141,6 +158,9 @@ def depth_from_visible_views(
         The first map, pixels per view step.
     parameters : VisibleViewsParameters
     progress : callable
+    mean_of : callable
+        :func:`sepi.matching.mean_reference.mean_reference`, for noisy views; without it they are compared with the
+        reference view.
 
     Returns
     -------
@@ -161,7 +181,7 @@ def depth_from_visible_views(
         present = spread_views(light_field, parameters.views) if last else few
         mean = None
         if isinstance(light_field, DenoisedLightField) and light_field.of_views.usual >= parameters.mean_noise:
-            mean = mean_reference(light_field, disparity, present, parameters, parameters.occlusion_margin)
+            mean = mean_of(light_field, disparity, present, parameters, parameters.occlusion_margin)
         result = _sweep(
             light_field,
             present,

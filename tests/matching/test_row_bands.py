@@ -53,7 +53,7 @@ def test_maps_are_the_same_for_any_number_of_bands(variant: str, geometry: str, 
     )
     numbers = []
     bands = module.row_bands
-    for name in ("sepi.matching.visibility_sweep", "sepi.boundaries.surface_shares", "sepi.matching.gauss_newton"):
+    for name in ("sepi.matching.visibility_sweep", "sepi.boundaries.surface_shares", "sepi.matching.aligned_views"):
         monkeypatch.setattr(
             f"{name}.row_bands", lambda *arguments: numbers.append(len(found := bands(*arguments))) or found
         )

@@ -1,0 +1,98 @@
+"""Views aligned with the reference view by a map, sampled in bands of rows: what any sum over views goes through."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from sepi.lightfield import BoolMap, FloatMap, LightField
+from sepi.matching.base_detail import BaseDetailParameters, forget_detail
+from sepi.matching.gauss_newton_kernels import Seeing, SplineViews, mean_of_views
+from sepi.matching.nearest_surfaces import nearest_surfaces
+from sepi.matching.row_bands import Band, Rows, row_bands
+from sepi.matching.spline_views import forget_splines, spline_views
+
+BYTES_PER_PIXEL = 2 * 4 + 2 + 4
+"""Of a pixel of a view: four coefficients, the detail, and the z-buffer."""
+
+
+class AlignedViews:
+    """Views of a light field, sampled where a map has the pixels of the reference view.
+
+    Parameters
+    ----------
+    light_field : LightField
+    parameters : BaseDetailParameters
+        How well colours and detail must fit.
+    occlusion_margin : float
+        By how much an occluder must be nearer, pixels per view step.
+    present : ndarray, shape (T, S), bool, optional
+        The views that are compared; all unless given.
+    """
+
+    def __init__(
+        self,
+        light_field: LightField,
+        parameters: BaseDetailParameters,
+        occlusion_margin: float,
+        present: BoolMap | None = None,
+    ) -> None:
+        self._light_field = light_field
+        self._parameters = parameters
+        self.present = light_field.present if present is None else present
+        self._margin = np.float32(occlusion_margin)
+        # of the whole picture, where there is memory for it
+        self._splines: SplineViews | None = None
+        self._nearest: tuple[FloatMap, FloatMap] | None = None
+
+    def mean(self, disparity: FloatMap) -> FloatMap:
+        """Mean of the views that see each pixel.
+
+        Parameters
+        ----------
+        disparity : ndarray, shape (H, W), float32
+            Pixels per view step.
+
+        Returns
+        -------
+        ndarray, shape (H, W, 4), float32
+            Colours, and detail or 0.
+        """
+        mean = np.empty((*disparity.shape, 4), np.float32)
+
+        def add(views: SplineViews, seeing: Seeing, band: Band) -> None:
+            mean_of_views(views, seeing, disparity, band.begin, band.end, mean)
+
+        self.in_bands(disparity, add)
+        return mean
+
+    def in_bands(self, disparity: FloatMap, add: Callable[[SplineViews, Seeing, Band], None]) -> None:
+        """Call ``add`` with the splines of the views, and what hides them, for each band of rows."""
+        field = self._light_field
+        bands = row_bands(field, self.present, float(np.abs(disparity).max()), BYTES_PER_PIXEL)
+        if len(bands) == 1:
+            if self._splines is None:
+                self._splines = spline_views(field, self._parameters, bands[0].rows, self.present)
+            if self._nearest is None or self._nearest[0] is not disparity:
+                self._nearest = None
+                self._nearest = disparity, nearest_surfaces(field, disparity, self.present, bands[0].rows)
+            add(self._splines, Seeing(self._nearest[1], self._margin), bands[0])
+            return
+        forget_splines(field)
+        # as tall as the tallest, so that each takes the place of the one before
+        height, tallest = field.shape[0], max(band.rows.high - band.rows.low for band in bands)
+        room = None
+        for band in bands:
+            low = min(band.rows.low, height - tallest)
+            rows = Rows(low, low + tallest)
+            splines = spline_views(field, self._parameters, rows, self.present, room)
+            room = splines.splines
+            add(splines, Seeing(nearest_surfaces(field, disparity, self.present, rows), self._margin), band)
+        # a band may need all rows
+        forget_splines(field)
+
+    def forget_detail(self) -> None:
+        """Give back the detail of the views, where what is to come needs their splines alone."""
+        if self._splines is not None:
+            forget_detail(self._light_field)
