@@ -55,7 +55,7 @@ class Evidence(NamedTuple):
 
 
 class GaussNewton(AlignedViews):
-    """Gauss-Newton sums over the views of a light field."""
+    """Gauss-Newton sums over the views of a light field; parameters as of :class:`AlignedViews`."""
 
     @cached_property
     def colour_variance(self) -> float:

@@ -137,16 +137,12 @@ MeanOf = Callable[[LightField, FloatMap, BoolMap, BaseDetailParameters, float], 
 """What :func:`sepi.matching.mean_reference.mean_reference` is."""
 
 
-def _no_mean(*_: object) -> None:
-    return None
-
-
 def depth_from_visible_views(
     light_field: LightField,
     disparity: FloatMap,
     parameters: VisibleViewsParameters,
     progress: Progress,
-    mean_of: MeanOf = _no_mean,
+    mean_of: MeanOf | None = None,
 ) -> SmoothedResult:
     """Depth over the views that see a pixel, as a first map tells, in several passes.
 
@@ -158,7 +154,7 @@ def depth_from_visible_views(
         The first map, pixels per view step.
     parameters : VisibleViewsParameters
     progress : callable
-    mean_of : callable
+    mean_of : callable, optional
         :func:`sepi.matching.mean_reference.mean_reference`, for noisy views; without it they are compared with the
         reference view.
 
@@ -171,7 +167,7 @@ def depth_from_visible_views(
     SepiError
         If the disparity range is unknown.
     """
-    n = parameters.passes
+    n, noise = parameters.passes, parameters.mean_noise
     few = spread_views(light_field, parameters.first_views)
     if parameters.gaps:
         disparity = with_open_gaps(light_field, disparity, few, parameters)
@@ -180,7 +176,7 @@ def depth_from_visible_views(
         last = i == n - 1
         present = spread_views(light_field, parameters.views) if last else few
         mean = None
-        if isinstance(light_field, DenoisedLightField) and light_field.of_views.usual >= parameters.mean_noise:
+        if mean_of and isinstance(light_field, DenoisedLightField) and light_field.of_views.usual >= noise:
             mean = mean_of(light_field, disparity, present, parameters, parameters.occlusion_margin)
         result = _sweep(
             light_field,
