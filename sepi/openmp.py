@@ -4,17 +4,22 @@ from __future__ import annotations
 
 import os
 
-VARIABLE = "OMP_WAIT_POLICY"
+FOR_THREADS = {"OMP_WAIT_POLICY": "PASSIVE", "GOMP_SPINCOUNT": "5000"}
+"""How threads wait for work: they look for it for some tenths of a millisecond, then sleep.
+
+They would go on looking for some milliseconds after each loop, which helps nobody where all cores are free, and takes
+them from whatever else runs where they are not: the other threads of this process, too. To wake one takes longer than
+the solver's loops do.
+"""
 
 
 def wait_asleep() -> None:
-    """Have threads that wait for work sleep, unless the user's environment says otherwise.
+    """Have threads that wait for work sleep soon, unless the user's environment says how they wait.
 
-    They would go on spinning for some milliseconds after each loop, which helps nobody where all cores are free, and
-    takes them from whatever else runs where they are not: the other threads of this process, too. Before the first
-    compiled loop, hence when the package is imported; processes started from here do likewise.
+    Before the first compiled loop, hence when the package is imported; processes started from here do likewise.
     """
-    os.environ.setdefault(VARIABLE, "PASSIVE")
+    if not FOR_THREADS.keys() & os.environ.keys():
+        os.environ.update(FOR_THREADS)
 
 
 FOR_NUMPY = {"OPENBLAS_NUM_THREADS": "1", "NUMPY_MADVISE_HUGEPAGE": "0"}

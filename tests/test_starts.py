@@ -11,6 +11,7 @@ import pytest
 
 from sepi.cli.main import main
 from sepi.io.hdf5 import write_light_field
+from sepi.openmp import FOR_THREADS
 from sepi.scenes import render, write_hci
 from sepi.threads import available_cores
 
@@ -267,6 +268,6 @@ print(time.process_time() - begun)
 def test_threads_that_wait_leave_the_processor_to_others() -> None:
     """Threads that spin make every run beside other work slower, tests that run side by side above all."""
     own = {"PYTHONPATH": str(Path(__file__).parents[1]), "NUMBA_NUM_THREADS": "2"}
-    environment = {name: value for name, value in os.environ.items() if name != "OMP_WAIT_POLICY"} | own
+    environment = {name: value for name, value in os.environ.items() if name not in FOR_THREADS} | own
     done = subprocess.run([sys.executable, "-c", WAITING], env=environment, capture_output=True, text=True, check=True)
     assert float(done.stdout) < 0.2

@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
+import numpy.typing as npt
 
 from sepi.image.noise import variance_of_residuals
 from sepi.lightfield import FloatMap
@@ -120,11 +121,12 @@ class GaussNewton(AlignedViews):
 
 def spline_derivatives(image: FloatMap) -> tuple[FloatMap, FloatMap]:
     """Derivatives along y and x of the cubic spline through an image; shapes (H, W, C), float32."""
-    down, across = np.empty_like(image), np.empty_like(image)
-    for c in range(image.shape[2]):
-        coefficients = spline_coefficients(np.ascontiguousarray(image[..., c]))
+    coefficients = spline_coefficients(image)
+
+    def filtered(along_x: npt.NDArray[np.floating], along_y: npt.NDArray[np.floating]) -> FloatMap:
         # mirrored as the splines are
         border = cv2.BORDER_REFLECT_101
-        across[..., c] = cv2.sepFilter2D(coefficients, -1, _DIFFERENCE, _SMOOTH, borderType=border)
-        down[..., c] = cv2.sepFilter2D(coefficients, -1, _SMOOTH, _DIFFERENCE, borderType=border)
-    return down, across
+        channels = [cv2.sepFilter2D(each, -1, along_x, along_y, borderType=border) for each in coefficients]
+        return np.asarray(cv2.merge(channels), np.float32).reshape(image.shape)
+
+    return filtered(_SMOOTH, _DIFFERENCE), filtered(_DIFFERENCE, _SMOOTH)

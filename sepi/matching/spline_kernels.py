@@ -102,18 +102,22 @@ def _load(row: Any, unit: Any, out: Any) -> None:
         out[x] = np.float32(row[x]) * unit
 
 
-@njit(cache=True, fastmath=EXACT)
+@njit(parallel=True, cache=True, fastmath=EXACT)
 def spline_coefficients(image: Any) -> Any:
-    """Cubic spline coefficients of an image (H, W), float32."""
-    H, W = image.shape
-    rows = np.empty((H + 2 * _FULL_REACH, W), np.float32)
-    for i in range(H + 2 * _FULL_REACH):
-        rows[i] = image[_mirrored(i - _FULL_REACH, H)]
-    out = np.empty((H, W), np.float32)
-    padded, row = np.empty(W + 2 * (MARGIN + _FULL_REACH), np.float32), np.empty(W + 2 * MARGIN, np.float32)
-    for y in range(H):
-        _coefficient_row(rows[y : y + 2 * _FULL_REACH + 1], padded, row, _FULL_REACH)
-        out[y] = row[MARGIN : MARGIN + W]
+    """Cubic spline coefficients ``(C, H, W)`` of an image ``(H, W, C)``, float32."""
+    H, W, C = image.shape
+    out = np.empty((C, H, W), np.float32)
+    for piece in prange((H + ROWS_AT_ONCE - 1) // ROWS_AT_ONCE):
+        begin = piece * ROWS_AT_ONCE
+        end = min(H, begin + ROWS_AT_ONCE)
+        rows = np.empty((end - begin + 2 * _FULL_REACH, W), np.float32)
+        padded, row = np.empty(W + 2 * (MARGIN + _FULL_REACH), np.float32), np.empty(W + 2 * MARGIN, np.float32)
+        for c in range(C):
+            for i in range(len(rows)):
+                rows[i] = image[_mirrored(begin + i - _FULL_REACH, H), :, c]
+            for y in range(begin, end):
+                _coefficient_row(rows[y - begin : y - begin + 2 * _FULL_REACH + 1], padded, row, _FULL_REACH)
+                out[c, y] = row[MARGIN : MARGIN + W]
     return out
 
 

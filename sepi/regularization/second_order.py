@@ -51,9 +51,10 @@ def colour_changes(guide: FloatMap) -> list[FloatArray]:
         difference = guide[one] - guide[other]
         return np.asarray(np.einsum("hwc,hwc->hw", difference, difference), np.float64)
 
+    right, down = distance((_ALL, _BACK), (_ALL, _ON)), distance((_BACK, _ALL), (_ON, _ALL))
     return [
-        distance(_ALONG_X[0], _ALONG_X[1]) + distance(_ALONG_X[2], _ALONG_X[1]),
-        distance(_ALONG_Y[0], _ALONG_Y[1]) + distance(_ALONG_Y[2], _ALONG_Y[1]),
+        right[:, :-1] + right[:, 1:],
+        down[:-1] + down[1:],
         distance(_ACROSS[0], _ACROSS[3]) + distance(_ACROSS[1], _ACROSS[2]),
     ]
 
@@ -128,7 +129,7 @@ def second_difference_stencil(weights: list[FloatArray], shape: tuple[int, int])
     """
     from sepi.regularization.second_order_kernels import MARGIN, stencil_of
 
-    stencil = np.zeros((7, shape[0] + 2 * MARGIN, shape[1] + 2 * MARGIN))
+    stencil = np.empty((7, shape[0] + 2 * MARGIN, shape[1] + 2 * MARGIN))
     along_x, along_y, across = (np.ascontiguousarray(each, np.float64) for each in weights)
     stencil_of(along_x, along_y, across, stencil)
     return stencil

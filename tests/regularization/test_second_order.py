@@ -36,10 +36,10 @@ from sepi.stage import StageMaps, no_progress
 from sepi.workspace import Workspace
 
 
-@pytest.mark.parametrize("shape", [(9, 14), (2, 2), (2, 30), (40, 3)])
-def test_spline_coefficients_equal_scipys(shape: tuple[int, int]) -> None:
+@pytest.mark.parametrize("shape", [(9, 14, 2), (2, 2, 1), (2, 30, 1), (140, 3, 1)])
+def test_spline_coefficients_equal_scipys(shape: tuple[int, int, int]) -> None:
     image = np.random.default_rng(0).random(shape).astype(np.float32)
-    expected = spline_filter(image.astype(float), order=3, mode="mirror")
+    expected = [spline_filter(channel, order=3, mode="mirror") for channel in np.moveaxis(image.astype(float), 2, 0)]
     np.testing.assert_allclose(spline_coefficients(image), expected, atol=2e-5)
 
 
