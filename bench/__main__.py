@@ -228,6 +228,9 @@ def sweep(
 def noise(scenes: tuple[str, ...], sigmas: tuple[float, ...], variants: tuple[str, ...], threads: int | None) -> None:
     """Print scores of variants on light fields with noise added: MSE x100 / Q25 x100 / BadPix 0.07 %.
 
+    Beside them what noise allows a pixel alone and in a window of its surface, by Cramer's and Rao's bound: Q25 and
+    BadPix of errors that are normal and no larger than they must be.
+
     \b
     Example:
       python -m bench noise --scene HCI/cotton --sigma 0 --sigma 3 --sigma 8

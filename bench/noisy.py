@@ -8,12 +8,20 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
+from bench.allowed import deviations_allowed, scores_allowed
 from sepi.lightfield import LightField, full_scale
 from sepi.matching.view_noise import view_noise
 from sepi.pipeline import estimate_depth
 from sepi.scoring.scores import score
 
 Row = dict[str, str]
+
+ALLOWED = {"allowed, a pixel alone": 0, "allowed, 5x5 pixels": 2}
+"""What noise allows whoever is asked, by how many pixels around tell: radius of the window."""
+
+
+NO_NOISE = 1e-9
+"""So that what no view tells stays unknown."""
 
 
 def with_noise(light_field: LightField, sigma: float) -> LightField:
@@ -29,15 +37,22 @@ def with_noise(light_field: LightField, sigma: float) -> LightField:
 
 
 def rows(light_fields: Iterable[LightField], sigmas: Sequence[float], variants: Sequence[str]) -> Iterator[Row]:
-    """A row for each light field and level of noise: the noise that is measured in it, and each variant's scores."""
+    """A row for each light field and level of noise: the noise that is measured in it, each variant's scores, and what
+    noise allows.
+    """
     for light_field in light_fields:
         assert light_field.ground_truth is not None
+        of_unit_noise = {name: deviations_allowed(light_field, 1.0, radius) for name, radius in ALLOWED.items()}
         for sigma in sigmas:
             noisy = with_noise(light_field, sigma) if sigma else light_field
-            row = {"scene": light_field.name, "added": f"{sigma:g}", "measured": f"{255 * view_noise(noisy).usual:.1f}"}
+            measured = view_noise(noisy).usual
+            row = {"scene": light_field.name, "added": f"{sigma:g}", "measured": f"{255 * measured:.1f}"}
             for variant in variants:
                 found = score(estimate_depth(noisy, variant).disparity, light_field.ground_truth)
                 row[variant] = " / ".join(
                     f"{found[name]:.{digits}f}" for name, digits in (("mse100", 2), ("q25", 2), ("badpix007", 1))
                 )
+            for name, deviations in of_unit_noise.items():
+                allowed = scores_allowed(max(measured, NO_NOISE) * deviations)
+                row[name] = f"{allowed['q25']:.2f} / {allowed['badpix007']:.1f}"
             yield row

@@ -75,3 +75,7 @@ def test_noise_is_added_measured_and_scored(monkeypatch: pytest.MonkeyPatch) -> 
     assert noisy[:2] == ["pyramids", "12"]
     assert float(noisy[2]) == pytest.approx(12, rel=0.12)
     assert float(clean[3].split(" / ")[1]) < float(noisy[3].split(" / ")[1])
+    # what noise allows grows with it, and neighbours know more than a pixel alone
+    of_clean, alone, together = (float(cell.split(" / ")[0]) for cell in (clean[4], noisy[4], noisy[5]))
+    assert together < alone
+    assert of_clean < 0.1 * alone

@@ -1,0 +1,127 @@
+"""What noise allows: by how much the disparity of a pixel must scatter, whoever estimates it.
+
+A view at ``b`` view steps from the reference view has at ``p - d b`` the colours ``c(p)`` and noise of its own. Of such
+samples neither the colours nor the disparity are known; what they tell of the latter is, in Fisher's sense,
+
+``J = sum_channels sum_views (g_v - mean g)^2 / sigma^2``, with ``g_v = b_v . grad c``,
+
+over the views that see the pixel, and no unbiased estimate has a smaller variance than ``1 / J`` (Cramer and Rao [1]_).
+Pixels of one surface tell of each other: over a window whose disparity is one, ``J`` adds up. What is assumed beyond it
+(smooth surfaces, as all maps assume) may do better where it holds.
+
+References
+----------
+.. [1] S. M. Kay: Fundamentals of Statistical Signal Processing: Estimation Theory. 1993, sections 3.4 and 3.7.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+from scipy.special import erf
+
+from sepi.lightfield import FloatMap, LightField
+from sepi.matching.aligned_views import AlignedViews
+from sepi.matching.base_detail import BaseDetailParameters
+from sepi.matching.gauss_newton import spline_derivatives
+from sepi.stage import OcclusionMarginParameters
+
+Deviations = npt.NDArray[np.float64]
+
+BAD = 0.07
+"""Error from which on a pixel is bad, pixels per view step."""
+
+
+def deviations_allowed(light_field: LightField, sigma: float, radius: int = 0) -> Deviations:
+    """Least standard deviation of a disparity that noise allows.
+
+    Parameters
+    ----------
+    light_field : LightField
+        With ground truth; its views are taken for free of noise, but for what their mean has.
+    sigma : float
+        Standard deviation of the noise of one channel of each view, colours in 0..1.
+    radius : int
+        What is told by the pixels of a window of ``2 radius + 1`` counts, too, where the truth has them on one surface.
+
+    Returns
+    -------
+    ndarray, shape (H, W), float64
+        Pixels per view step; infinite where no view tells anything, NaN where there is no truth.
+    """
+    truth = np.asarray(light_field.ground_truth, np.float32)
+    known = np.isfinite(truth)
+    disparity = np.where(known, truth, np.float32(np.median(truth[known])))
+    margin = OcclusionMarginParameters().occlusion_margin
+    mean = AlignedViews(light_field, BaseDetailParameters(use_detail=False), margin).mean(disparity)[..., :3]
+    down, across = (slope.astype(np.float64) for slope in spline_derivatives(np.ascontiguousarray(mean)))
+    information = sum(
+        spread * (one * other).sum(axis=2)
+        for spread, one, other in zip(
+            _spreads_of_baselines(light_field, disparity, margin),
+            (down, down, across),
+            (down, across, across),
+            strict=True,
+        )
+    )
+    told = _over_windows(np.where(known, np.maximum(information, 0.0), 0.0), disparity, radius, margin)
+    allowed = np.full(truth.shape, np.inf)
+    np.divide(sigma, np.sqrt(told), out=allowed, where=told > 0)
+    return np.where(known, allowed, np.nan)
+
+
+def scores_allowed(deviations: Deviations) -> dict[str, float]:
+    """Scores that a map has on average whose errors are normal, and have these standard deviations.
+
+    Returns
+    -------
+    dict
+        ``q25`` and ``badpix007`` as :func:`sepi.scoring.scores.score` has them.
+    """
+    known = deviations[~np.isnan(deviations)]
+
+    def share_within(error: float) -> float:
+        return float(erf(error / np.sqrt(2) / np.maximum(known, 1e-12)).mean())
+
+    low, high = 0.0, 10.0
+    while high - low > 1e-6:
+        middle = (low + high) / 2
+        low, high = (middle, high) if share_within(middle) < 0.25 else (low, middle)
+    return {"q25": 100 * high, "badpix007": 100 * (1 - share_within(BAD))}
+
+
+def _spreads_of_baselines(
+    light_field: LightField, disparity: FloatMap, margin: float
+) -> tuple[Deviations, Deviations, Deviations]:
+    """Of the views that see each pixel: sums of ``v^2``, ``2 v u`` and ``u^2``, from their means on."""
+    H, W = disparity.shape
+    y, x = np.mgrid[:H, :W]
+    number, sums, products = np.zeros((H, W)), np.zeros((2, H, W)), np.zeros((3, H, W))
+    for t, s in np.argwhere(light_field.present).tolist():
+        v, u = light_field.baselines[t, s]
+        row, column = np.floor(y - disparity * v + 0.5).astype(int), np.floor(x - disparity * u + 0.5).astype(int)
+        inside = (row >= 0) & (row < H) & (column >= 0) & (column < W)
+        row, column = row.clip(0, H - 1), column.clip(0, W - 1)
+        # only what lies right before it hides a pixel: a bound must not leave out a view that may see it
+        nearest = np.full((H, W), -np.inf, np.float32)
+        np.maximum.at(nearest, (row[inside], column[inside]), disparity[inside])
+        sees = inside & (nearest[row, column] <= disparity + margin)
+        number += sees
+        sums += sees * np.array([v, u])[:, None, None]
+        products += sees * np.array([v * v, 2 * v * u, u * u])[:, None, None]
+    of_mean = np.stack([sums[0] ** 2, 2 * sums[0] * sums[1], sums[1] ** 2]) / np.maximum(number, 1)
+    return tuple(products - of_mean)
+
+
+def _over_windows(information: Deviations, disparity: FloatMap, radius: int, margin: float) -> Deviations:
+    """Sums over the pixels of each window that are on the surface of the one in its middle."""
+    if not radius:
+        return information
+    padded, depths = np.pad(information, radius), np.pad(disparity, radius)
+    H, W = disparity.shape
+    total = np.zeros((H, W))
+    for dy in range(2 * radius + 1):
+        for dx in range(2 * radius + 1):
+            alike = np.abs(depths[dy : dy + H, dx : dx + W] - disparity) <= margin
+            total += alike * padded[dy : dy + H, dx : dx + W]
+    return total
