@@ -53,8 +53,10 @@ def deviations_allowed(light_field: LightField, sigma: float, radius: int = 0) -
     known = np.isfinite(truth)
     disparity = np.where(known, truth, np.float32(np.median(truth[known])))
     margin = OcclusionMarginParameters().occlusion_margin
-    mean = AlignedViews(light_field, BaseDetailParameters(use_detail=False), margin).mean(disparity)[..., :3]
-    down, across = (slope.astype(np.float64) for slope in spline_derivatives(np.ascontiguousarray(mean)))
+    mean = AlignedViews(light_field, BaseDetailParameters(use_detail=False), margin).mean(disparity)
+    # grey is there three times, with the same noise
+    mean = np.ascontiguousarray(mean[..., : light_field.views.shape[-1]])
+    down, across = (slope.astype(np.float64) for slope in spline_derivatives(mean))
     information = sum(
         spread * (one * other).sum(axis=2)
         for spread, one, other in zip(

@@ -183,7 +183,7 @@ def _turn(row: Any, ratio: Any, ahead: Any) -> None:
 
 @njit(parallel=True, cache=True, fastmath=EXACT)
 def turn_and_bend(stencil: Any, ahead: Any, ratio: Any, direction: Any, out: Any) -> float:
-    """Turn a direction, and take the matrix times it, in one go through memory.
+    """Turn a direction, and take the matrix times it.
 
     Parameters
     ----------

@@ -59,6 +59,8 @@ def test_pixels_of_one_surface_tell_of_each_other() -> None:
     truth[:, :20] = -1
     light_field = still(ramp, ground_truth=truth)
     alone, together = (deviations_allowed(light_field, SIGMA, radius)[SIZE // 2] for radius in (0, 2))
+    # one channel, and squares of u of -2..2 in five rows of views
+    assert alone[30] == pytest.approx(SIGMA / (0.6 / (SIZE - 1) * np.sqrt(50)), rel=0.05)
     assert together[30] == pytest.approx(alone[30] / 5, rel=0.02)
     # two of five columns of the window are of the other surface
     assert together[20] == pytest.approx(alone[30] / np.sqrt(15), rel=0.1)
