@@ -18,18 +18,20 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
+from scipy.optimize import brentq
 from scipy.special import erf
 
 from sepi.lightfield import FloatMap, LightField
 from sepi.matching.aligned_views import AlignedViews
 from sepi.matching.base_detail import BaseDetailParameters
 from sepi.matching.gauss_newton import spline_derivatives
+from sepi.scoring.scores import BAD_PIXEL
 from sepi.stage import OcclusionMarginParameters
 
 Deviations = npt.NDArray[np.float64]
 
-BAD = 0.07
-"""Error from which on a pixel is bad, pixels per view step."""
+_MOST = 1000.0
+"""Where the quartile of errors is looked for, pixels per view step."""
 
 
 def deviations_allowed(light_field: LightField, sigma: float, radius: int = 0) -> Deviations:
@@ -57,15 +59,8 @@ def deviations_allowed(light_field: LightField, sigma: float, radius: int = 0) -
     # grey is there three times, with the same noise
     mean = np.ascontiguousarray(mean[..., : light_field.views.shape[-1]])
     down, across = (slope.astype(np.float64) for slope in spline_derivatives(mean))
-    information = sum(
-        spread * (one * other).sum(axis=2)
-        for spread, one, other in zip(
-            _spreads_of_baselines(light_field, disparity, margin),
-            (down, down, across),
-            (down, across, across),
-            strict=True,
-        )
-    )
+    of_v, of_both, of_u = (each[..., None] for each in _spreads_of_baselines(light_field, disparity, margin))
+    information = (of_v * down**2 + of_both * down * across + of_u * across**2).sum(axis=2)
     told = _over_windows(np.where(known, np.maximum(information, 0.0), 0.0), disparity, radius, margin)
     allowed = np.full(truth.shape, np.inf)
     np.divide(sigma, np.sqrt(told), out=allowed, where=told > 0)
@@ -85,11 +80,8 @@ def scores_allowed(deviations: Deviations) -> dict[str, float]:
     def share_within(error: float) -> float:
         return float(erf(error / np.sqrt(2) / np.maximum(known, 1e-12)).mean())
 
-    low, high = 0.0, 10.0
-    while high - low > 1e-6:
-        middle = (low + high) / 2
-        low, high = (middle, high) if share_within(middle) < 0.25 else (low, middle)
-    return {"q25": 100 * high, "badpix007": 100 * (1 - share_within(BAD))}
+    quartile = brentq(lambda error: share_within(error) - 0.25, 0, _MOST) if share_within(_MOST) > 0.25 else np.inf
+    return {"q25": 100 * quartile, "badpix007": 100 * (1 - share_within(BAD_PIXEL["badpix007"]))}
 
 
 def _spreads_of_baselines(
