@@ -17,6 +17,11 @@ ENTRIES: dict[str, dict[str, Any]] = {
     "no_textureless": {"base": "paper", "textureless": "none"},
     "no_occlusion_no_textureless": {"base": "paper", "occlusion": "none", "textureless": "none"},
     "wang": {"base": "paper", "occlusion": "wang"},
+    "no_noise_correction": {
+        "base": "paper",
+        "initial": {"correct_noise": False},
+        "occlusion": {"correct_noise": False},
+    },
     "best": {
         "initial": "semi_global",
         "occlusion": "visibility",

@@ -64,7 +64,7 @@ TURNS: dict[str, tuple[Callable[[npt.NDArray[Any]], npt.NDArray[Any]], Callable[
 SUPERPIXELS = "superpixels begin at the upper left, and grow together row by row"
 Z_BUFFERS = "a pixel that falls on a pixel of a view also covers the next one, to the right and below"
 UNLIKE = {
-    **dict.fromkeys(("paper", "no_sepi", "wang"), (SUPERPIXELS, 4.0)),
+    **dict.fromkeys(("paper", "no_noise_correction", "no_sepi", "wang"), (SUPERPIXELS, 4.0)),
     "no_occlusion": (SUPERPIXELS, 8.0),
     **{name: (Z_BUFFERS, 1.5) for name in VARIANTS if re.match("best|fast", name) and name != "best_half_sepi"},
     "mishiba": ("what it computes costs of are every few rows and columns, from the upper left on", 20.0),
@@ -97,7 +97,7 @@ def test_a_turned_light_field_has_the_turned_map(variant: str) -> None:
 
 
 # of these, others are parts switched off: what is left is in them
-WHOLE = [name for name in ESTIMATORS if not re.match("best_no|no_occ|no_tex", name)]
+WHOLE = [name for name in ESTIMATORS if not re.match("best_no|no_noise|no_occ|no_tex", name)]
 # percent of the pixels of a crop, and of views that are darker, whose depth may be another one by 0.1 px; those of the
 # variants that are not named are the first
 CROPPED = {"": 3.0, "no_sepi": 8.0, "wang": 7.0, "best_wls": 5.0, "occ": 7.0, "pobr": 25.0}

@@ -120,6 +120,21 @@ def measured_noise(light_field: LightField) -> ViewNoise:
     return _noise(light_field, kept_of(light_field, _Kept))
 
 
+def sure_noise(light_field: LightField) -> ViewNoise | None:
+    """:func:`measured_noise` where views have noise, and what looks like it cannot be else; or None."""
+    noise = measured_noise(light_field)
+    return noise if _is_sure(noise) and not _is_little(noise) else None
+
+
+def _is_sure(noise: ViewNoise) -> bool:
+    return noise.agreement >= LEAST_AGREEMENT
+
+
+def _is_little(noise: ViewNoise) -> bool:
+    sure = _is_sure(noise)
+    return noise.usual < (LEAST_SURE_NOISE if sure else LEAST_NOISE) or noise.share < LEAST_SHARE
+
+
 def _noise_of_parts(image: FloatMap) -> float:
     """Noise of the parts of an image that have most: a scale that bears with it must bear with theirs."""
     parts = [part for band in np.array_split(image, PARTS) for part in np.array_split(band, PARTS, axis=1)]
@@ -142,8 +157,7 @@ def _noise(light_field: LightField, kept: _Kept) -> ViewNoise:
 
 
 def _denoised_views(light_field: LightField, noise: ViewNoise, least: float) -> npt.NDArray[Any] | None:
-    sure = noise.agreement >= LEAST_AGREEMENT
-    if noise.usual < (LEAST_SURE_NOISE if sure else LEAST_NOISE) or noise.share < LEAST_SHARE:
+    if _is_little(noise):
         return None
     from sepi.matching.denoising_kernels import denoise_views
 

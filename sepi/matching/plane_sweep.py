@@ -25,8 +25,11 @@ from pydantic import Field
 from sepi.image.noise import residual_variance
 from sepi.lightfield import BoolMap, FloatMap, LightField, full_scale
 from sepi.matching.candidates import CandidateParameters, CandidateRule, number_field
+from sepi.matching.denoising import sure_noise
+from sepi.matching.expected_costs import expected_costs
 from sepi.matching.nearest_surfaces import shown_columns
 from sepi.matching.sweep_arrays import BestMaps, ViewStack, Window, sampled_candidates
+from sepi.matching.view_noise import ViewNoise
 from sepi.stage import Progress, no_progress
 from sepi.threads import threads_used
 
@@ -36,9 +39,12 @@ CANDIDATES = CandidateRule(usual=181, finest=0.02, coarsest=0.5)
 TILE_WIDTH = 512
 """Columns done at a time: bounds what a thread holds, whatever the width of the picture, and keeps it in the cache."""
 
-
 MARGIN = 8
 """Columns beyond the picture that vectors reach into: see :mod:`sepi.vectors`."""
+
+NOISE_LEFT_OUT = 0.9
+"""Of the cost that noise alone makes, what confidence leaves out: with all of it, where there is nothing but noise the
+ratio of Eq. 5 would be one of two nothings."""
 
 
 class SweepParameters(CandidateParameters):
@@ -62,11 +68,20 @@ class SweepParameters(CandidateParameters):
         le=10,
         description="colour distance at which a window pixel's weight falls; RGB distance, colours in 0..1",
     )
+    correct_noise: bool = Field(
+        True,
+        description="whether costs are without what noise makes of interpolation, and confidence without most of what "
+        "noise alone costs",
+    )
 
     @property
     def groups(self) -> int:
         """Groups of views whose costs are summed apart, at most."""
         return 1
+
+    def noise_to_correct(self, light_field: LightField) -> ViewNoise | None:
+        """Noise whose costs are corrected; None where it may be texture, which would be corrected the wrong way."""
+        return sure_noise(light_field) if self.correct_noise else None
 
     def sweep_bytes(self, light_field: LightField, threads: int) -> int:
         """What :func:`sweep` takes beside views and maps: the views by channel, and what each thread holds."""
@@ -95,16 +110,23 @@ class SweepResult:
     disparity, cost, mean : ndarray, shape (N, H, W), float32
         Disparity at the minimum, refined below the disparity sampling by a parabola; the cost there (0..1); the mean
         cost over all candidates. NaN outside the mask.
+    of_noise : ndarray, shape (H, W), float32
+        Cost that noise alone makes; 0 where it is not corrected.
     """
 
     disparity: FloatMap
     cost: FloatMap
     mean: FloatMap
+    of_noise: FloatMap
 
     def confidence(self) -> FloatMap:
-        """Eq. 5, mean over minimum, brought from 1..inf to 0..1 as ``1 - min / mean``; 0 where all costs are zero."""
+        """Eq. 5, mean over minimum, brought from 1..inf to 0..1 as ``1 - min / mean``; 0 where all costs are zero.
+
+        Of both, most of what noise alone costs is left out.
+        """
+        of_noise = NOISE_LEFT_OUT * self.of_noise
         with np.errstate(divide="ignore", invalid="ignore"):
-            confidence = np.where(self.mean > 0, 1 - self.cost / self.mean, 0)
+            confidence = np.where(self.mean > of_noise, 1 - (self.cost - of_noise) / (self.mean - of_noise), 0)
         return np.clip(confidence, 0, 1).astype(np.float32)
 
 
@@ -131,7 +153,7 @@ def sweep(
     """Sweep the candidate disparities and keep the best one of each pixel and subset of views.
 
     Scale and window are widened by the noise of the reference view, so that noise alone neither looks like a mismatch
-    nor like another surface.
+    nor like another surface. Costs are without what noise makes of interpolation (:mod:`sepi.matching.expected_costs`).
 
     Parameters
     ----------
@@ -166,22 +188,24 @@ def sweep(
     mask = np.ones((H, W), bool) if mask is None else mask
     colours = planar(light_field)
     noise = residual_variance(light_field.reference_view)
-    scale2 = np.float32((parameters.scale**2 + noise) * full_scale(colours.dtype) ** 2)
+    squared_scale = parameters.scale**2 + noise
+    scale2 = np.float32(squared_scale * full_scale(colours.dtype) ** 2)
     shown = shown_columns(light_field)
     views = ViewStack(colours, *light_field.reference_position, groups, subsets, scale2, shown)
     disparities = parameters.candidates(light_field)
     candidates = sampled_candidates(disparities, light_field.baselines)
+    to_correct = parameters.noise_to_correct(light_field)
+    expected = expected_costs(light_field, to_correct, candidates, groups, subsets, squared_scale, MARGIN)
     guide = np.ascontiguousarray(light_field.reference_view.transpose(2, 0, 1))
     window = Window(guide, parameters.window_radius, np.float32(parameters.window_sigma**2 + noise))
-    result = SweepResult(*(np.full((len(subsets), H, W), np.nan, np.float32) for _ in range(3)))
-    maps = BestMaps(result.disparity, result.cost, result.mean)
+    maps = BestMaps(*(np.full((len(subsets), H, W), np.nan, np.float32) for _ in range(3)))
     height = _rows_at_a_stretch(H, threads_used())
     strip = height * threads_used()
     for begin in range(0, H, strip):
         end = min(H, begin + strip)
-        sweep_plane_rows(views, candidates, window, mask, begin, end, height, TILE_WIDTH, maps)
+        sweep_plane_rows(views, candidates, window, expected, mask, begin, end, height, TILE_WIDTH, maps)
         progress(end / H)
-    return result
+    return SweepResult(*maps, expected.anywhere)
 
 
 def _rows_at_a_stretch(height: int, threads: int) -> int:

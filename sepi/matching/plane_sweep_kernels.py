@@ -23,7 +23,7 @@ import numpy.typing as npt
 from sepi.compiled import fma, njit, prange
 from sepi.lightfield import FloatMap
 from sepi.matching.sample_polynomials import between_same_pixels, difference, from_origin, of_first, upper_row, value
-from sepi.matching.sweep_arrays import BestMaps, Candidates, ViewStack, Window
+from sepi.matching.sweep_arrays import BestMaps, Candidates, ExpectedCosts, ViewStack, Window
 from sepi.vectors import (
     at_most,
     first_elements,
@@ -289,21 +289,30 @@ def _mean_costs(sums: Any, counts: Any, all_seen: bool, subset: Any, k: int) -> 
 
 
 @njit(cache=True, fastmath=EXACT, error_model="numpy", borrows=True)
-def _best_candidate(sums: Any, counts: Any, all_seen: bool, subset: Any, disparities: Any, costs: Any) -> Any:
+def _best_candidate(
+    sums: Any, counts: Any, all_seen: bool, subset: Any, expected: Any, weights: Any, disparities: Any, costs: Any
+) -> Any:
     """Disparity at the lowest of the costs, refined below the disparity sampling; that cost; the mean of all.
 
     Parameters
     ----------
     sums, counts, all_seen, subset
         As in :func:`_mean_costs`.
+    expected : ndarray, shape (2, K'), float32
+        Moments of :class:`sepi.matching.sweep_arrays.ExpectedCosts`, of the subset.
+    weights : tuple of float32
+        Of the same, of the pixel.
     disparities : ndarray, shape (K,), float32
     costs : ndarray, shape (K',), float32
         Filled.
     """
     K, none, most = disparities.size, np.float32(0), np.float32(1e9)
     all_least, sums_of_all = spread(most), spread(none)
+    first, second, one = spread(weights[0]), spread(weights[1]), spread(np.float32(1))
     for k in range(0, K, VECTOR):
         mean = _mean_costs(sums, counts, all_seen, subset, k)
+        taken = fma(second, load(expected, (1, k)), first * load(expected, (0, k)))
+        mean = fma(mean - one, taken / (one - taken), mean)
         store(costs, k, mean)
         all_least = smaller(all_least, first_elements(mean, K - k, most))
         sums_of_all = sums_of_all + first_elements(mean, K - k, none)
@@ -313,7 +322,7 @@ def _best_candidate(sums: Any, counts: Any, all_seen: bool, subset: Any, dispari
         best += 1
     offset = none
     # a perfect match needs no parabola, and the ends of the range allow none
-    if lowest > 0 and 0 < best < K - 1:
+    if lowest != 0 and 0 < best < K - 1:
         before, after = costs[best - 1], costs[best + 1]
         curvature = before - 2 * lowest + after
         if curvature > 0:
@@ -387,8 +396,8 @@ def _fill_row(
 
 @njit(cache=True, error_model="numpy", borrows=True)
 def _sweep_row(
-    views: ViewStack, candidates: Candidates, mask: Any, y: int, tile: Tile, rows: Rows, weights: Any, maps: BestMaps,
-    sums: Any, all_of_group: Any, costs: Any,
+    views: ViewStack, candidates: Candidates, expected: ExpectedCosts, mask: Any, y: int, tile: Tile, rows: Rows,
+    weights: Any, maps: BestMaps, sums: Any, all_of_group: Any, costs: Any,
 ) -> None:  # fmt: skip
     """Best candidates of the pixels of a row that are in the mask; ``sums (2, G, K')``, ``costs (K',)`` are scratch."""
     H, W = mask.shape
@@ -403,13 +412,22 @@ def _sweep_row(
             _aggregate(rows.counts, y, x - tile.begin, H, weights, number.reshape(number.size))
         seen = all_of_group if all_seen else number
         for n in range(views.subsets.shape[0]):
-            best = _best_candidate(cost, seen, all_seen, views.subsets[n], candidates.disparities, costs)
+            moments, of_pixel = expected.moments[:, n], (expected.weights[0, y, x], expected.weights[1, y, x])
+            best = _best_candidate(
+                cost, seen, all_seen, views.subsets[n], moments, of_pixel, candidates.disparities, costs
+            )
             maps.disparity[n, y, x], maps.cost[n, y, x], maps.mean[n, y, x] = best
 
 
 @njit(cache=True, error_model="numpy")
 def _sweep_tile(
-    views: ViewStack, candidates: Candidates, window: Window, mask: Any, tile: Tile, maps: BestMaps
+    views: ViewStack,
+    candidates: Candidates,
+    window: Window,
+    expected: ExpectedCosts,
+    mask: Any,
+    tile: Tile,
+    maps: BestMaps,
 ) -> None:
     """Sweep the pixels of a tile that are in the mask."""
     H = mask.shape[0]
@@ -442,7 +460,7 @@ def _sweep_tile(
             _fill_row(views, candidates, mask, row, tile, radius, rows)
             done = row
         _window_weights(window, Run(y, tile.begin, tile.end), weights)
-        _sweep_row(views, candidates, mask, y, tile, rows, weights, maps, sums, all_of_group, costs)
+        _sweep_row(views, candidates, expected, mask, y, tile, rows, weights, maps, sums, all_of_group, costs)
 
 
 @njit(cache=True, borrows=True)
@@ -464,8 +482,8 @@ def planes_of(views: Any, planes: Any) -> None:
 
 @njit(cache=True, parallel=True)
 def sweep_plane_rows(
-    views: ViewStack, candidates: Candidates, window: Window, mask: Any, begin: int, end: int, height: int,
-    width: int, maps: BestMaps,
+    views: ViewStack, candidates: Candidates, window: Window, expected: ExpectedCosts, mask: Any, begin: int, end: int,
+    height: int, width: int, maps: BestMaps,
 ) -> None:  # fmt: skip
     """Sweep the rows ``begin..end`` of the ``mask (H, W)`` in tiles of at most ``height`` rows, ``width`` columns."""
     H, W = mask.shape
@@ -475,4 +493,4 @@ def sweep_plane_rows(
         top = begin + task * height
         for left in range(0, W, width):
             tile = Tile(top, min(end, top + height), left, min(W, left + width), margin)
-            _sweep_tile(views, candidates, window, mask, tile, maps)
+            _sweep_tile(views, candidates, window, expected, mask, tile, maps)

@@ -91,6 +91,25 @@ class Window(NamedTuple):
     variance: np.float32
 
 
+class ExpectedCosts(NamedTuple):
+    """What noise makes of costs: see :mod:`sepi.matching.expected_costs`.
+
+    Attributes
+    ----------
+    moments : ndarray, shape (2, N, K'), float32
+        Of each subset of the views, and candidate, means of the sum of squared weights, and of its square, less what
+        they are anywhere. ``K'`` is the number of candidates, rounded up to whole vectors.
+    weights : ndarray, shape (2, H, W), float32
+        Times them, of each pixel, and summed: the part of a match that noise takes more than anywhere.
+    anywhere : ndarray, shape (H, W), float32
+        Cost that noise alone makes anywhere.
+    """
+
+    moments: FloatMap
+    weights: FloatMap
+    anywhere: FloatMap
+
+
 class BestMaps(NamedTuple):
     """What is found of each subset of views: the best disparity, its cost, and the mean cost; (N, H, W), float32."""
 

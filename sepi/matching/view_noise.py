@@ -65,8 +65,8 @@ _ENOUGH = 25
 """Blocks of a brightness, or of a part of the picture, from which on it is told that they may not have more noise: the
 best tenth of fewer scatters by itself."""
 
-_AROUND = 4
-"""Radius of the window of a pixel's own noise."""
+_WINDOW = (9, 9)
+"""Of a pixel's own noise, and of its brightness, pixels."""
 
 _MOST_OF_USUAL = 4.0
 """Times the noise of its brightness and place that a pixel may have: beyond, it is texture."""
@@ -167,6 +167,25 @@ def _least_variance(dtype: npt.DTypeLike) -> float:
     return (_LEAST if dtype == np.float32 else _ROUNDING / full_scale(np.dtype(dtype))) ** 2
 
 
+def expected_variance(light_field: LightField, noise: ViewNoise) -> npt.NDArray[np.float64]:
+    """Variance of the noise of one channel that each pixel's brightness and place have.
+
+    Parameters
+    ----------
+    light_field : LightField
+    noise : ViewNoise
+
+    Returns
+    -------
+    ndarray, shape (H, W), float64
+        Colours in 0..1.
+    """
+    height, width = light_field.shape
+    level = cv2.blur(np.ascontiguousarray(mean_of_channels(light_field.reference_view)), _WINDOW)
+    by_place = cv2.resize(noise.by_place, (width, height), interpolation=cv2.INTER_LINEAR)
+    return np.asarray(np.interp(level, noise.brightness, noise.variance) * by_place, np.float64)
+
+
 def variance_map(light_field: LightField, noise: ViewNoise, views: BoolMap) -> FloatMap:
     """Variance of the noise of one channel of a view, pixel by pixel.
 
@@ -187,14 +206,10 @@ def variance_map(light_field: LightField, noise: ViewNoise, views: BoolMap) -> F
         Colours in 0..1.
     """
     unit = np.float32(1 / full_scale(light_field.views.dtype))
-    window = (2 * _AROUND + 1,) * 2
     energies = [mask_energy(view * unit) for view in light_field.rgb_views[views]]
     energy = np.asarray(np.mean(energies, axis=0), np.float32)
-    height, width = light_field.shape
-    level = cv2.blur(np.ascontiguousarray(mean_of_channels(light_field.reference_view)), window)
-    by_place = cv2.resize(noise.by_place, (width, height), interpolation=cv2.INTER_LINEAR)
-    most = _MOST_OF_USUAL * np.interp(level, noise.brightness, noise.variance) * by_place
-    own = np.minimum(cv2.blur(energy, window), most)
+    most = _MOST_OF_USUAL * expected_variance(light_field, noise)
+    own = np.minimum(cv2.blur(energy, _WINDOW), most)
     return np.asarray(np.maximum(own, _least_variance(light_field.views.dtype)), np.float32)
 
 

@@ -16,6 +16,7 @@ from several_threads import several_threads
 from sepi.errors import SepiError
 from sepi.image.noise import noise_level, residual_variance
 from sepi.lightfield import DisparityRange, LightField
+from sepi.matching.expected_costs import expected_costs
 from sepi.matching.nearest_surfaces import shown_columns
 from sepi.matching.plane_sweep import MARGIN, TILE_WIDTH, SweepParameters, planar, sweep
 from sepi.matching.plane_sweep_kernels import SHORTEST_GAP, Run, cost_row
@@ -60,7 +61,7 @@ def twin_sums(light_field, parameters, groups):
     return sums, counts
 
 
-def twin(light_field, parameters, of_groups, subset):
+def twin(light_field, parameters, of_groups, groups, subset):
     """The sweep of a subset of the groups in plain NumPy: the picture moved over itself, as far as the window goes."""
     H, W = light_field.shape
     candidates = light_field.require_disparity_range().candidates(parameters.num_disparities)
@@ -77,12 +78,17 @@ def twin(light_field, parameters, of_groups, subset):
         cost[:, *at] += weight * sums[:, *other]
         total[:, *at] += weight * counts[:, *other]
     cost = np.where(total > 0, cost / np.maximum(total, 1e-300), 1)
+    sampled = sampled_candidates(candidates.astype(np.float32), light_field.baselines)
+    to_correct = parameters.noise_to_correct(light_field)
+    of_noise = expected_costs(light_field, to_correct, sampled, groups, subset[None], parameters.scale**2 + noise, 1)
+    taken = np.einsum("pyx,pk->kyx", of_noise.weights, of_noise.moments[:, 0])
+    cost = 1 - (1 - cost) / (1 - taken)
     best = cost.argmin(axis=0)
     lowest = cost.min(axis=0)
     near = np.clip(best, 1, len(candidates) - 2)
     before, after = (np.take_along_axis(cost, near[None] + step, axis=0)[0] for step in (-1, 1))
     with np.errstate(all="ignore"):
-        offset = np.where((best == near) & (lowest > 0), 0.5 * (before - after) / (before - 2 * lowest + after), 0)
+        offset = np.where((best == near) & (lowest != 0), 0.5 * (before - after) / (before - 2 * lowest + after), 0)
     step = (candidates[-1] - candidates[0]) / (len(candidates) - 1)
     return candidates[best] + offset * step, lowest, cost.mean(axis=0)
 
@@ -98,7 +104,7 @@ def test_sweep_equals_its_numpy_twin(radius, channels, dtype):
     result = sweep(light_field, parameters, groups=views.groups, subsets=views.subsets)
     of_groups = twin_sums(light_field, parameters, views.groups)
     for n in (0, 1, 4, 6):
-        disparity, cost, mean = twin(light_field, parameters, of_groups, views.subsets[n])
+        disparity, cost, mean = twin(light_field, parameters, of_groups, views.groups, views.subsets[n])
         np.testing.assert_allclose(result.cost[n], cost, atol=2e-5)
         np.testing.assert_allclose(result.mean[n], mean, atol=2e-5)
         # two candidates may tie within rounding
@@ -115,7 +121,7 @@ def test_depth_of_another_view_than_the_centre(view, geometry):
     result = sweep(light_field, parameters, groups=views.groups, subsets=views.subsets)
     of_groups = twin_sums(light_field, parameters, views.groups)
     for n in range(len(views.names)):
-        _, cost, mean = twin(light_field, parameters, of_groups, views.subsets[n])
+        _, cost, mean = twin(light_field, parameters, of_groups, views.groups, views.subsets[n])
         np.testing.assert_allclose(result.cost[n], cost, atol=2e-5)
         np.testing.assert_allclose(result.mean[n], mean, atol=2e-5)
 
@@ -126,7 +132,8 @@ def test_tiles_of_a_wide_picture_fit_together():
     parameters = SweepParameters(num_disparities=5, scale=0.3, window_radius=2, window_sigma=0.5)
     groups = np.zeros(light_field.grid, int)
     result = sweep(light_field, parameters)
-    _, cost, mean = twin(light_field, parameters, twin_sums(light_field, parameters, groups), np.ones(1, bool))
+    of_groups = twin_sums(light_field, parameters, groups)
+    _, cost, mean = twin(light_field, parameters, of_groups, groups, np.ones(1, bool))
     np.testing.assert_allclose(result.cost[0], cost, atol=2e-5)
     np.testing.assert_allclose(result.mean[0], mean, atol=2e-5)
 

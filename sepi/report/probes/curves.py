@@ -18,8 +18,9 @@ import numpy.typing as npt
 from sepi.errors import SepiError
 from sepi.image.noise import residual_variance
 from sepi.lightfield import FloatMap, LightField, as_unit_float
+from sepi.matching.expected_costs import expected_costs
 from sepi.matching.plane_sweep import SweepParameters
-from sepi.matching.sweep_arrays import sample_offsets
+from sepi.matching.sweep_arrays import sample_offsets, sampled_candidates
 from sepi.matching.view_subsets import halves_and_quarters
 
 
@@ -76,7 +77,7 @@ class Curves:
         costs = self.costs[self.names.index(name)].astype(np.float64)
         best = int(costs.argmin())
         offset = 0.0
-        if costs[best] > 0 and 0 < best < len(costs) - 1:
+        if costs[best] != 0 and 0 < best < len(costs) - 1:
             before, lowest, after = costs[best - 1 : best + 2]
             curvature = before - 2 * lowest + after
             offset = 0.5 * (before - after) / curvature if curvature > 0 else 0.0
@@ -167,6 +168,10 @@ def cost_curves(light_field: LightField, y: int, x: int, parameters: SweepParame
         counts[group] += ((inside_y @ weights) * inside_x).sum(axis=1)
     total, number = views.subsets.astype(np.float32) @ sums, views.subsets.astype(np.float32) @ counts
     costs = np.divide(total, number, out=np.ones_like(total), where=number > 0)
+    sampled = sampled_candidates(disparities, baselines)
+    to_correct = parameters.noise_to_correct(light_field)
+    expected = expected_costs(light_field, to_correct, sampled, views.groups, views.subsets, float(scale2), 1)
+    costs = 1 - (1 - costs) / (1 - np.tensordot(expected.weights[:, y, x], expected.moments, 1))
     return Curves(disparities, views.names, costs)
 
 
