@@ -10,6 +10,9 @@ from typing import Any
 
 from sepi.compared.methods import LEARNED, METHODS
 
+UNCORRECTED = "no_noise_correction"
+"""The paper's method with costs as noise makes them, for light fields that have noise: no column of its tables."""
+
 ENTRIES: dict[str, dict[str, Any]] = {
     "paper": {"initial": "sepi", "occlusion": "half_sepi", "textureless": "lti", "optimize": "wls"},
     "no_sepi": {"base": "paper", "initial": "structure_tensor"},
@@ -17,7 +20,7 @@ ENTRIES: dict[str, dict[str, Any]] = {
     "no_textureless": {"base": "paper", "textureless": "none"},
     "no_occlusion_no_textureless": {"base": "paper", "occlusion": "none", "textureless": "none"},
     "wang": {"base": "paper", "occlusion": "wang"},
-    "no_noise_correction": {
+    UNCORRECTED: {
         "base": "paper",
         "initial": {"correct_noise": False},
         "occlusion": {"correct_noise": False},

@@ -15,7 +15,7 @@ from typing import Annotated
 from pydantic import AfterValidator
 from pydantic.dataclasses import dataclass
 
-from sepi.built_in_variants import PARTS_OF_BEST
+from sepi.built_in_variants import PARTS_OF_BEST, UNCORRECTED
 from sepi.compared.methods import LEARNED, METHODS
 from sepi.errors import SepiError
 from sepi.variants import HANDED_ON, VARIANTS
@@ -248,10 +248,10 @@ class Plan:
 
     @property
     def listed(self) -> list[str]:
-        """All variants but those with one part of the best one switched off, which have a table of their own, and the
-        compared methods, which have a report of their own.
+        """All variants but those with one part of the best one switched off, which have a table of their own, the
+        compared methods, which have a report of their own, and what is for noisy light fields alone.
         """
-        elsewhere = {*PARTS_OF_BEST, *METHODS, *LEARNED} - {BEST_VARIANT, *self.compared}
+        elsewhere = {*PARTS_OF_BEST, *METHODS, *LEARNED, UNCORRECTED} - {BEST_VARIANT, *self.compared}
         return [variant for variant in self.variants if variant not in elsewhere]
 
     def collected(self, parts: bool) -> list[str]:
