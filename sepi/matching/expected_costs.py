@@ -4,19 +4,22 @@ A sample between pixels averages their noise: its variance is that of a pixel ti
 squared weights, 1 at whole pixels and 1/4 amid four of them. Candidates at which most views are sampled between pixels
 would cost less whatever the depth, and faint texture in noise would go to them. So each candidate's match, what its
 cost (Eq. 3) is below 1, is divided by what noise leaves of one at such places, in units of what it leaves anywhere: a
-view that does not match has none. Without noise nothing changes.
+view that does not match has none. Without noise nothing changes. Near the border of the picture, too, all views count
+as if they saw the pixel.
 
 The paper, whose light fields have hardly any noise, does not have it.
 """
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 import numpy.typing as npt
 
-from sepi.lightfield import BoolMap, LightField
+from sepi.image.noise import BLACK, SATURATED
+from sepi.lightfield import BoolMap, FloatMap, LightField
 from sepi.matching.sweep_arrays import Candidates, ExpectedCosts
-from sepi.matching.view_noise import ViewNoise, expected_variance
+from sepi.matching.view_noise import WINDOW, ViewNoise, expected_variance
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -25,6 +28,9 @@ ANYWHERE = 4 / 9, 49 / 225
 
 _SUMS = np.array([0.25, 0.625, 1.0])
 """Sums of squared bilinear weights, from the least to the greatest, through which costs are a parabola."""
+
+_LEAST_LEFT = np.float32(1e-3)
+"""Of the noise's variance, where all samples are cut off."""
 
 _RATIOS = 256
 """Ratios of noise and robust scale at which costs are computed."""
@@ -101,7 +107,7 @@ def expected_costs(
         sums: FloatArray = down[candidates.row[chosen]] * across[candidates.column[chosen]]
         for power, anywhere in enumerate(ANYWHERE, start=1):
             moments[power - 1, n, : sums.shape[1]] = (sums**power).mean(axis=0) - anywhere
-    variance = expected_variance(light_field, noise) / squared_scale
+    variance = expected_variance(light_field, noise) * _not_cut_off(light_field) / squared_scale
     ratios = np.geomspace(variance.min(), variance.max(), _RATIOS)
     # grey stored as three channels is grey
     channels = 1 if not np.ptp(light_field.reference_view, axis=2).any() else 3
@@ -111,3 +117,14 @@ def expected_costs(
     maps = (np.interp(variance, ratios, values) for values in (linear / (1 - usual), quadratic / (1 - usual), usual))
     first, second, of_noise = (values.astype(np.float32) for values in maps)
     return ExpectedCosts(moments, np.stack([first, second]), of_noise)
+
+
+def _not_cut_off(light_field: LightField) -> FloatMap:
+    """What is left of the noise's variance where samples round a pixel are black or overexposed, (H, W).
+
+    Of a signal that is cut off in so much of its samples the square of the rest is, about; once more that, since the
+    noise is told less surely there, and too much corrected is worse than too little.
+    """
+    image = light_field.reference_view
+    told = ((image > BLACK) & (image < SATURATED)).mean(axis=2, dtype=np.float32)
+    return np.asarray(np.maximum(cv2.blur(told, WINDOW) ** 4, _LEAST_LEFT), np.float32)

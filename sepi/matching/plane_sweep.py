@@ -43,8 +43,8 @@ MARGIN = 8
 """Columns beyond the picture that vectors reach into: see :mod:`sepi.vectors`."""
 
 NOISE_LEFT_OUT = 0.9
-"""Of the cost that noise alone makes, what confidence leaves out: with all of it, where there is nothing but noise the
-ratio of Eq. 5 would be one of two nothings."""
+"""Of the cost that noise alone makes, what confidence leaves out, at most: with all of it, where there is nothing but
+noise the ratio of Eq. 5 would be one of two nothings."""
 
 
 class SweepParameters(CandidateParameters):
@@ -108,8 +108,8 @@ class SweepResult:
     Attributes
     ----------
     disparity, cost, mean : ndarray, shape (N, H, W), float32
-        Disparity at the minimum, refined below the disparity sampling by a parabola; the cost there (0..1); the mean
-        cost over all candidates. NaN outside the mask.
+        Disparity at the minimum, refined below the disparity sampling by a parabola; the cost there (0..1, or a little
+        below 0 where noise is corrected); the mean cost over all candidates. NaN outside the mask.
     of_noise : ndarray, shape (H, W), float32
         Cost that noise alone makes; 0 where it is not corrected.
     """
@@ -122,9 +122,10 @@ class SweepResult:
     def confidence(self) -> FloatMap:
         """Eq. 5, mean over minimum, brought from 1..inf to 0..1 as ``1 - min / mean``; 0 where all costs are zero.
 
-        Of both, most of what noise alone costs is left out.
+        Of both, :data:`NOISE_LEFT_OUT` of what noise alone costs is left out, where it is corrected.
         """
-        of_noise = NOISE_LEFT_OUT * self.of_noise
+        # at least as much of the mean stays as where there is nothing but noise
+        of_noise = np.minimum(NOISE_LEFT_OUT * self.of_noise, self.mean - (1 - NOISE_LEFT_OUT) * self.of_noise)
         with np.errstate(divide="ignore", invalid="ignore"):
             confidence = np.where(self.mean > of_noise, 1 - (self.cost - of_noise) / (self.mean - of_noise), 0)
         return np.clip(confidence, 0, 1).astype(np.float32)

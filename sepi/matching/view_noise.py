@@ -65,7 +65,7 @@ _ENOUGH = 25
 """Blocks of a brightness, or of a part of the picture, from which on it is told that they may not have more noise: the
 best tenth of fewer scatters by itself."""
 
-_WINDOW = (9, 9)
+WINDOW = (9, 9)
 """Of a pixel's own noise, and of its brightness, pixels."""
 
 _MOST_OF_USUAL = 4.0
@@ -181,7 +181,7 @@ def expected_variance(light_field: LightField, noise: ViewNoise) -> npt.NDArray[
         Colours in 0..1.
     """
     height, width = light_field.shape
-    level = cv2.blur(np.ascontiguousarray(mean_of_channels(light_field.reference_view)), _WINDOW)
+    level = cv2.blur(np.ascontiguousarray(mean_of_channels(light_field.reference_view)), WINDOW)
     by_place = cv2.resize(noise.by_place, (width, height), interpolation=cv2.INTER_LINEAR)
     return np.asarray(np.interp(level, noise.brightness, noise.variance) * by_place, np.float64)
 
@@ -209,7 +209,7 @@ def variance_map(light_field: LightField, noise: ViewNoise, views: BoolMap) -> F
     energies = [mask_energy(view * unit) for view in light_field.rgb_views[views]]
     energy = np.asarray(np.mean(energies, axis=0), np.float32)
     most = _MOST_OF_USUAL * expected_variance(light_field, noise)
-    own = np.minimum(cv2.blur(energy, _WINDOW), most)
+    own = np.minimum(cv2.blur(energy, WINDOW), most)
     return np.asarray(np.maximum(own, _least_variance(light_field.views.dtype)), np.float32)
 
 

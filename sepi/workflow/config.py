@@ -150,9 +150,10 @@ class Config(CheckedModel):
         VARIANT_ENTRIES,
         description="A choice for each stage, or {choice: CHOICE, PARAMETER: VALUE} with what it overrides; with base, "
         "only what differs from that variant. 'paper' is the method; 'paper' to 'no_occlusion_no_textureless' are the "
-        "columns of its table 4. 'best' is the most accurate variant, 'best_...' are the same with one part switched "
-        "off; 'oavc' to 'occ' are the compared methods, 'onnx' is a network of yours (docs/reproduce/compared.md). "
-        "These have fixed meanings; add variants of your own beside them.",
+        "columns of its table 4, 'no_noise_correction' is for noisy light fields. 'best' is the most accurate variant, "
+        "'best_...' are the same with one part switched off; 'oavc' to 'occ' are the compared methods, 'onnx' is a "
+        "network of yours (docs/reproduce/compared.md). These have fixed meanings; add variants of your own beside "
+        "them.",
     )
     stages: dict[str, dict[str, dict[str, Any] | None] | None] = Field(
         default_factory=default_values,

@@ -3,7 +3,9 @@
 from dataclasses import replace
 
 import numpy as np
+import numpy.typing as npt
 import pytest
+from geometries import standing
 
 from bench.noisy import with_noise
 from sepi.lightfield import DisparityRange, LightField
@@ -11,6 +13,7 @@ from sepi.matching.denoising import DenoisedLightField, denoised
 from sepi.matching.expected_costs import expected_costs, robust_cost_of_noise
 from sepi.matching.plane_sweep import SweepParameters, sweep
 from sepi.matching.sweep_arrays import sampled_candidates
+from sepi.matching.view_noise import ViewNoise
 from sepi.matching.view_subsets import halves_and_quarters
 from sepi.scenes import render
 
@@ -59,6 +62,63 @@ def test_noise_alone_costs_the_same_at_every_disparity(channels: int) -> None:
     np.testing.assert_array_equal(
         sweep(colours, parameters, groups=views.groups, subsets=views.subsets).mean, found.mean
     )
+
+
+def test_each_candidate_has_the_mean_of_what_its_views_make_of_noise() -> None:
+    """If this fails, halves of the views, odd arrays or cameras that look elsewhere lock to other disparities."""
+    grid = (3, 4)
+    views = np.random.default_rng(0).random((*grid, 12, 14, 3), np.float32) * 0.8 + 0.1
+    present, missing = np.ones(grid, bool), np.zeros(views.shape[:4], bool)
+    present[0, 1], missing[2, 3] = False, True
+    known = DisparityRange(-1.3, 1.2, "given")
+    light_field = LightField(
+        views, "noise", present=present, missing=missing, disparity_range=known, **standing("off the grid", grid)
+    )
+    groups, variance, squared_scale = np.arange(12).reshape(grid) % 4, 2e-4, 3e-4
+    subsets = np.array([[1, 1, 1, 1], [1, 0, 0, 1], [0, 1, 0, 0]], bool)
+    candidates = SweepParameters(num_disparities=9).candidates(light_field)
+    noise = ViewNoise(np.array([0.5]), np.array([variance]), np.ones((4, 4), np.float32), 1.0, 1.0)
+    sampled = sampled_candidates(candidates, light_field.baselines)
+    found = expected_costs(light_field, noise, sampled, groups, subsets, squared_scale, 8)
+
+    def cost(down: npt.NDArray[np.float64], across: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+        weights = [(1 - np.abs(f - np.floor(f))) ** 2 + (f - np.floor(f)) ** 2 for f in (down, across)]
+        return robust_cost_of_noise(variance / squared_scale * (1 + weights[0] * weights[1]), 3)
+
+    anywhere = cost(*np.meshgrid(*2 * [(np.arange(100) + 0.5) / 100])).mean()
+    np.testing.assert_allclose(found.anywhere, anywhere, rtol=2e-3)
+    compared = present & ~missing.all(axis=(2, 3))
+    compared[light_field.reference_position] = False
+    for n, subset in enumerate(subsets):
+        moves = light_field.baselines[compared & subset[groups]]
+        of_views = cost(*np.moveaxis(candidates[:, None, None] * moves, 2, 0)).mean(axis=1)
+        taken = np.tensordot(found.weights[:, 5, 5], found.moments[:, n, :9], 1)
+        np.testing.assert_allclose(taken, (of_views - anywhere) / (1 - anywhere), atol=3e-3)
+
+
+def test_what_is_overexposed_has_less_noise() -> None:
+    """If this fails, depth beside what is cut off is drawn away from where it was without any correction."""
+    scene = render("slanted_plane", size=96, views=7)
+    bright = np.minimum(scene.views / 255 * 1.2 + 0.4, 1)
+    noise = np.random.default_rng(0).standard_normal(bright.shape) * 6 / 255
+    light_field = replace(scene, views=np.clip(bright + noise, 0, 1).astype(np.float32))
+    assert scene.ground_truth is not None
+    wrong = []
+    for corrects in (True, False):
+        found = sweep(light_field, SweepParameters(correct_noise=corrects)).disparity[0]
+        wrong.append(np.mean(np.abs(found - scene.ground_truth)[12:-12, 12:-12] > 0.07))
+    assert wrong[0] < 1.1 * wrong[1]
+
+
+def test_texture_is_distinct_in_noise_and_noise_is_not() -> None:
+    """If this fails, bare walls take planes of edges nearby, or noise itself passes for texture."""
+    scene = render("slanted_plane", size=96, views=5)
+    views = scene.views / 255
+    views = 0.5 + np.where(np.arange(96) < 48, 0, 0.5)[:, None] * (views - views.mean())
+    noisy = views + np.random.default_rng(5).standard_normal(views.shape) * 4 / 255
+    confidence = sweep(replace(scene, views=noisy.astype(np.float32)), SweepParameters()).confidence()[0]
+    assert np.median(confidence[8:-8, 56:-8]) > 0.8
+    assert np.quantile(confidence[8:-8, 8:40], 0.95) < 0.4
 
 
 def test_faint_texture_in_noise_keeps_its_depth() -> None:

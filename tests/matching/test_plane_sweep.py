@@ -16,6 +16,7 @@ from several_threads import several_threads
 from sepi.errors import SepiError
 from sepi.image.noise import noise_level, residual_variance
 from sepi.lightfield import DisparityRange, LightField
+from sepi.matching.denoising import sure_noise
 from sepi.matching.expected_costs import expected_costs
 from sepi.matching.nearest_surfaces import shown_columns
 from sepi.matching.plane_sweep import MARGIN, TILE_WIDTH, SweepParameters, planar, sweep
@@ -109,6 +110,21 @@ def test_sweep_equals_its_numpy_twin(radius, channels, dtype):
         np.testing.assert_allclose(result.mean[n], mean, atol=2e-5)
         # two candidates may tie within rounding
         assert np.mean(np.abs(result.disparity[n] - disparity) > 2e-3) < 0.01
+
+
+@pytest.mark.parametrize("channels", [1, 3])
+def test_sweep_of_sure_noise_equals_its_numpy_twin(channels):
+    """What noise costs one half of the views, taken from another, would give bare walls the depth of neither."""
+    light_field = random_light_field((3, 4), (40, 44), channels=channels).seen_from((0, 1))
+    assert sure_noise(light_field) is not None
+    parameters = SweepParameters(num_disparities=11, scale=0.3, window_radius=1, window_sigma=0.5)
+    views = halves_and_quarters(light_field)
+    result = sweep(light_field, parameters, groups=views.groups, subsets=views.subsets)
+    of_groups = twin_sums(light_field, parameters, views.groups)
+    for n in (0, 1, 4, 6):
+        _, cost, mean = twin(light_field, parameters, of_groups, views.groups, views.subsets[n])
+        np.testing.assert_allclose(result.cost[n], cost, atol=2e-5)
+        np.testing.assert_allclose(result.mean[n], mean, atol=2e-5)
 
 
 @pytest.mark.parametrize("geometry", GEOMETRIES)

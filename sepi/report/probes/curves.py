@@ -35,7 +35,8 @@ class Curves:
     names : tuple of str, length N
         Subsets of the views, as :func:`sepi.matching.view_subsets.halves_and_quarters` names them.
     costs : ndarray, shape (N, K), float32
-        Aggregated mean of the robust photo-consistency (Eq. 3), 0..1; 1 where no view of the subset sees the pixel.
+        Aggregated mean of the robust photo-consistency (Eq. 3), 0..1 (or a little below 0, where noise is corrected); 1
+        where no view of the subset sees the pixel.
 
     Examples
     --------
@@ -72,7 +73,7 @@ class Curves:
         disparity : float
             Refined below the candidate step by a parabola; pixels per view step.
         cost : float
-            The lowest, 0..1.
+            The lowest.
         """
         costs = self.costs[self.names.index(name)].astype(np.float64)
         best = int(costs.argmin())

@@ -10,9 +10,11 @@ import numpy as np
 import pytest
 from geometries import GEOMETRIES, standing
 
+from bench.noisy import with_noise
 from sepi.errors import SepiError
 from sepi.exposure import equally_bright
 from sepi.lightfield import DisparityRange, LightField
+from sepi.matching.denoising import sure_noise
 from sepi.matching.plane_sweep import SweepParameters, sweep
 from sepi.matching.stitched_epi import stitched_epi
 from sepi.matching.view_subsets import half_planes, halves_and_quarters
@@ -90,13 +92,15 @@ def test_curves_are_what_the_sweep_minimises(settings, radius):
 
 def test_curves_of_a_scene_are_those_of_the_default_sweep():
     """Noise and colour scales of real use: a curve off by the noise would have its minimum elsewhere."""
-    light_field = render("dots", size=64, views=5)
     parameters = SweepParameters(num_disparities=61)
-    result = sweep(light_field, parameters)
-    for y, x in [(0, 0), (20, 31), (63, 40), (33, 33)]:
-        disparity, cost = cost_curves(light_field, y, x, parameters).minimum()
-        assert cost == pytest.approx(result.cost[0, y, x], abs=2e-5)
-        assert disparity == pytest.approx(result.disparity[0, y, x], abs=5e-3)
+    corrected = with_noise(render("pyramids", size=64, views=5), 8)
+    assert sure_noise(corrected) is not None
+    for light_field in (render("dots", size=64, views=5), corrected):
+        result = sweep(light_field, parameters)
+        for y, x in [(0, 0), (20, 31), (63, 40), (33, 33)]:
+            disparity, cost = cost_curves(light_field, y, x, parameters).minimum()
+            assert cost == pytest.approx(result.cost[0, y, x], abs=2e-5)
+            assert disparity == pytest.approx(result.disparity[0, y, x], abs=5e-3)
 
 
 def test_curves_of_a_scene_are_of_views_as_bright_as_the_stages_had_them(monkeypatch):
