@@ -2,7 +2,7 @@
 #
 #   snakemake all         tables, figures and maps of every configured dataset
 #   snakemake scenes      what is made of each scene, without the tables and the page that need all of them
-#   snakemake ablation    the paper's table 4, Wang's occlusion stage, noise that is not corrected, and the parts of variant best
+#   snakemake ablation    the paper's table 4, Wang's occlusion stage, noise uncorrected, and the parts of variant best
 #   snakemake comparison  the methods that the paper compares with, computed on the same scenes
 #   snakemake rendered    path-traced scenes in several levels of noise: rendered, computed, scored by property
 #   snakemake -- FILE     one file: results/DATASET/SCENE/VARIANT/disparity.pfm

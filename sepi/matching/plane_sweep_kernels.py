@@ -421,14 +421,9 @@ def _sweep_row(
 
 @njit(cache=True, error_model="numpy")
 def _sweep_tile(
-    views: ViewStack,
-    candidates: Candidates,
-    window: Window,
-    expected: ExpectedCosts,
-    mask: Any,
-    tile: Tile,
+    views: ViewStack, candidates: Candidates, window: Window, expected: ExpectedCosts, mask: Any, tile: Tile,
     maps: BestMaps,
-) -> None:
+) -> None:  # fmt: skip
     """Sweep the pixels of a tile that are in the mask."""
     H = mask.shape[0]
     G = views.subsets.shape[1]

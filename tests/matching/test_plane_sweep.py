@@ -23,7 +23,7 @@ from sepi.matching.plane_sweep import MARGIN, TILE_WIDTH, SweepParameters, plana
 from sepi.matching.plane_sweep_kernels import SHORTEST_GAP, Run, cost_row
 from sepi.matching.stitched_epi import line_cost, stitched_epi
 from sepi.matching.sweep_arrays import ViewStack, sampled_candidates
-from sepi.matching.view_subsets import halves_and_quarters
+from sepi.matching.view_subsets import HALVES_AND_QUARTERS, halves_and_quarters
 from sepi.scenes import render
 
 
@@ -94,6 +94,20 @@ def twin(light_field, parameters, of_groups, groups, subset):
     return candidates[best] + offset * step, lowest, cost.mean(axis=0)
 
 
+def sweep_and_twin(light_field, parameters, numbers):
+    """Disparities of the sweep and of its twin, of subsets of the views; their costs are the same."""
+    views = halves_and_quarters(light_field)
+    result = sweep(light_field, parameters, groups=views.groups, subsets=views.subsets)
+    of_groups = twin_sums(light_field, parameters, views.groups)
+    disparities = []
+    for n in numbers:
+        disparity, cost, mean = twin(light_field, parameters, of_groups, views.groups, views.subsets[n])
+        np.testing.assert_allclose(result.cost[n], cost, atol=2e-5)
+        np.testing.assert_allclose(result.mean[n], mean, atol=2e-5)
+        disparities.append((result.disparity[n], disparity))
+    return disparities
+
+
 @pytest.mark.parametrize("radius", [0, 2])
 @pytest.mark.parametrize("channels", [1, 3])
 @pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.float32])
@@ -101,15 +115,9 @@ def test_sweep_equals_its_numpy_twin(radius, channels, dtype):
     """Wrong sampling, borders, counts or weights would show as a wrong depth map."""
     light_field = random_light_field(channels=channels, dtype=dtype)
     parameters = SweepParameters(num_disparities=11, scale=0.3, window_radius=radius, window_sigma=0.5)
-    views = halves_and_quarters(light_field)
-    result = sweep(light_field, parameters, groups=views.groups, subsets=views.subsets)
-    of_groups = twin_sums(light_field, parameters, views.groups)
-    for n in (0, 1, 4, 6):
-        disparity, cost, mean = twin(light_field, parameters, of_groups, views.groups, views.subsets[n])
-        np.testing.assert_allclose(result.cost[n], cost, atol=2e-5)
-        np.testing.assert_allclose(result.mean[n], mean, atol=2e-5)
+    for own, of_twin in sweep_and_twin(light_field, parameters, (0, 1, 4, 6)):
         # two candidates may tie within rounding
-        assert np.mean(np.abs(result.disparity[n] - disparity) > 2e-3) < 0.01
+        assert np.mean(np.abs(own - of_twin) > 2e-3) < 0.01
 
 
 @pytest.mark.parametrize("channels", [1, 3])
@@ -118,13 +126,7 @@ def test_sweep_of_sure_noise_equals_its_numpy_twin(channels):
     light_field = random_light_field((3, 4), (40, 44), channels=channels).seen_from((0, 1))
     assert sure_noise(light_field) is not None
     parameters = SweepParameters(num_disparities=11, scale=0.3, window_radius=1, window_sigma=0.5)
-    views = halves_and_quarters(light_field)
-    result = sweep(light_field, parameters, groups=views.groups, subsets=views.subsets)
-    of_groups = twin_sums(light_field, parameters, views.groups)
-    for n in (0, 1, 4, 6):
-        _, cost, mean = twin(light_field, parameters, of_groups, views.groups, views.subsets[n])
-        np.testing.assert_allclose(result.cost[n], cost, atol=2e-5)
-        np.testing.assert_allclose(result.mean[n], mean, atol=2e-5)
+    sweep_and_twin(light_field, parameters, (0, 1, 4, 6))
 
 
 @pytest.mark.parametrize("geometry", GEOMETRIES)
@@ -133,13 +135,7 @@ def test_depth_of_another_view_than_the_centre(view, geometry):
     """Steps counted from the wrong view, or on a grid where there is none, would shift every sample of the map."""
     light_field = random_light_field(geometry=geometry).seen_from(view)
     parameters = SweepParameters(num_disparities=11, scale=0.3, window_radius=1, window_sigma=0.5)
-    views = halves_and_quarters(light_field)
-    result = sweep(light_field, parameters, groups=views.groups, subsets=views.subsets)
-    of_groups = twin_sums(light_field, parameters, views.groups)
-    for n in range(len(views.names)):
-        _, cost, mean = twin(light_field, parameters, of_groups, views.groups, views.subsets[n])
-        np.testing.assert_allclose(result.cost[n], cost, atol=2e-5)
-        np.testing.assert_allclose(result.mean[n], mean, atol=2e-5)
+    sweep_and_twin(light_field, parameters, range(len(HALVES_AND_QUARTERS)))
 
 
 def test_tiles_of_a_wide_picture_fit_together():
