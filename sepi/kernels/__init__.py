@@ -1,0 +1,19 @@
+"""Compiled loops: a submodule for each file ``sepi/*/kernels/NAME.cpp``, built for the kind of processor this is.
+
+Kernels look at arrays where they are: a wrong type, number of axes or memory order is a ``TypeError``, sizes are the
+caller's care. They run outside Python's lock, on as many threads as :func:`sepi.threads.use_threads` says, to the same
+bytes on any number of threads and on any processor.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from importlib.util import find_spec
+
+if find_spec(f"{__name__}.baseline") is None:
+    raise ImportError("sepi: its kernels are not built; `pip install --editable .` in the checkout, or `make`, builds them")
+
+_native = import_module(f"{__name__}.baseline._native")
+if _native.has_x86_64_v3() and find_spec(f"{__name__}.x86_64_v3"):
+    _native = import_module(f"{__name__}.x86_64_v3._native")
+globals().update({name: part for name, part in vars(_native).items() if not name.startswith("__")})

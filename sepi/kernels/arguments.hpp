@@ -1,0 +1,86 @@
+// How arguments of Python become what kernels take: arrays are looked at where they are, and never copied or converted.
+#pragma once
+
+#include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
+
+#include <tuple>
+
+#include "array.hpp"
+
+namespace nanobind::detail {
+
+template <class View, class T, int N>
+struct array_caster {
+    using Given = ndarray<T, numpy, ndim<N>, device::cpu>;
+    static constexpr bool any_strides = std::is_same_v<View, sepi::Strided<T, N>>;
+
+    NB_TYPE_CASTER(View, make_caster<Given>::Name)
+
+    bool from_python(handle source, uint32_t flags, cleanup_list *cleanup) noexcept {
+        make_caster<Given> caster;
+        if (!caster.from_python(source, flags & ~uint32_t(cast_flags::convert), cleanup)) return false;
+        value.data = caster.value.data();
+        for (int axis = 0; axis < N; ++axis) {
+            value.shape[axis] = sepi::Index(caster.value.shape(axis));
+            value.strides[axis] = caster.value.stride(axis);
+        }
+        // NumPy says of empty arrays that their strides are 0
+        return any_strides || value.strides[N - 1] == 1 || value.shape[N - 1] <= 1 || caster.value.size() == 0;
+    }
+};
+
+template <class T, int N>
+struct type_caster<sepi::Array<T, N>> : array_caster<sepi::Array<T, N>, T, N> {};
+template <class T, int N>
+struct type_caster<sepi::Strided<T, N>> : array_caster<sepi::Strided<T, N>, T, N> {};
+
+// A NamedTuple becomes a struct of the same fields in the same order, which its fields() lists.
+template <class Struct>
+struct named_tuple_caster {
+    Struct value;
+
+    template <class>
+    using Cast = Struct &;
+    template <class>
+    bool can_cast() const noexcept {
+        return true;
+    }
+    operator Struct &() { return value; }
+
+    bool from_python(handle source, uint32_t flags, cleanup_list *cleanup) noexcept {
+        auto fields = value.fields();
+        return PyTuple_Check(source.ptr()) && PyTuple_Size(source.ptr()) == Py_ssize_t(std::tuple_size_v<decltype(fields)>) &&
+               std::apply(
+                   [&](auto &...field) {
+                       Py_ssize_t i = 0;
+                       return (assign(field, PyTuple_GetItem(source.ptr(), i++), flags, cleanup) && ...);
+                   },
+                   fields);
+    }
+
+    template <class Field>
+    static bool assign(Field &field, handle source, uint32_t flags, cleanup_list *cleanup) noexcept {
+        make_caster<Field> caster;
+        // numbers may be NumPy's
+        if (!caster.from_python(source, flags | cast_flags::convert, cleanup)) return false;
+        field = caster.operator cast_t<Field>();
+        return true;
+    }
+};
+
+}  // namespace nanobind::detail
+
+// NAMED_TUPLE(sepi::Window, "sepi.matching.sweep_arrays.Window") lets kernels take it; templates stand before it:
+// template <class Colour> NAMED_TUPLE(sepi::ViewStack<Colour>, "..."), all else template <> NAMED_TUPLE(...).
+#define NAMED_TUPLE(Struct, python)                                                                    \
+    struct nanobind::detail::type_caster<Struct> : nanobind::detail::named_tuple_caster<Struct> {      \
+        static constexpr auto Name = nanobind::detail::const_name(python);                             \
+    }
+
+namespace sepi {
+
+// Kernels run outside Python's lock.
+using Unlocked = nanobind::call_guard<nanobind::gil_scoped_release>;
+
+}  // namespace sepi

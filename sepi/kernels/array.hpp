@@ -1,0 +1,107 @@
+// Views of arrays, and scratch memory: what kernels work on. Nothing here knows Python.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <type_traits>
+#include <utility>
+
+namespace sepi {
+
+using Index = std::ptrdiff_t;
+
+// Non-owning view of a strided array, as NumPy has them. Builds without NDEBUG check the indices of elements.
+template <class T, int N>
+struct Array {
+    T *data;
+    Index shape[N];
+    Index strides[N];  // in elements
+
+    // Where an element is, or where the rest of the axes begins if fewer indices than axes are given.
+    template <class... Indices>
+    T *at(Indices... indices) const {
+        static_assert(sizeof...(Indices) <= N);
+        T *place = data;
+        int axis = 0;
+        ((place += Index(indices) * strides[axis++]), ...);
+        return place;
+    }
+
+    template <class... Indices>
+    T &operator()(Indices... indices) const {
+        static_assert(sizeof...(Indices) == N);
+#ifndef NDEBUG
+        int axis = 0;
+        (check(Index(indices), axis++), ...);
+#endif
+        return *at(indices...);
+    }
+
+    Array<T, N - 1> operator[](Index i) const {
+        static_assert(N > 1);
+#ifndef NDEBUG
+        check(i, 0);
+#endif
+        Array<T, N - 1> part{at(i), {}, {}};
+        std::copy(shape + 1, shape + N, part.shape);
+        std::copy(strides + 1, strides + N, part.strides);
+        return part;
+    }
+
+    // Who may only read takes an array of who may write, too.
+    operator Array<const T, N>() const
+        requires(!std::is_const_v<T>)
+    {
+        Array<const T, N> same{data, {}, {}};
+        std::copy(shape, shape + N, same.shape);
+        std::copy(strides, strides + N, same.strides);
+        return same;
+    }
+
+  private:
+    void check(Index i, int axis) const {
+        if (i < 0 || i >= shape[axis]) throw std::out_of_range("index " + std::to_string(i) + " of an axis of " + std::to_string(shape[axis]));
+    }
+};
+
+// An array whose elements need not lie side by side along its last axis; those of Array do.
+template <class T, int N>
+struct Strided : Array<T, N> {};
+
+// Memory of a C-contiguous array, not initialised, that goes when its owner does.
+template <class T, int N>
+class Scratch {
+  public:
+    template <class... Sizes>
+    explicit Scratch(Sizes... sizes) : size_((Index(sizes) * ...)), memory_(new T[size_]), array_{memory_.get(), {Index(sizes)...}, {}} {
+        static_assert(sizeof...(Sizes) == N);
+        Index stride = 1;
+        for (int axis = N - 1; axis >= 0; --axis) {
+            array_.strides[axis] = stride;
+            stride *= array_.shape[axis];
+        }
+    }
+
+    Scratch &&filled(T value) && {
+        std::fill_n(memory_.get(), size_, value);
+        return std::move(*this);
+    }
+
+    const Array<T, N> &array() const { return array_; }
+
+  private:
+    Index size_;
+    std::unique_ptr<T[]> memory_;
+    Array<T, N> array_;
+};
+
+template <class T, int N, class... Sizes>
+Scratch<T, N> zeros(Sizes... sizes) {
+    return Scratch<T, N>(sizes...).filled(T(0));
+}
+
+}  // namespace sepi

@@ -1,0 +1,40 @@
+// The extension module: a submodule for each source of kernels, by the bindings that stand beside them.
+#include <nanobind/nanobind.h>
+
+#include "parallel.hpp"
+
+namespace nb = nanobind;
+using namespace nb::literals;
+
+void bind_sweeps(nb::module_ &);
+void bind_splines(nb::module_ &);
+void bind_views(nb::module_ &);
+void bind_boundaries(nb::module_ &);
+void bind_regularization(nb::module_ &);
+void bind_error_bars(nb::module_ &);
+void bind_image(nb::module_ &);
+void bind_inspection(nb::module_ &);
+void bind_scoring(nb::module_ &);
+void bind_scenes(nb::module_ &);
+void bind_compared(nb::module_ &);
+void bind_rendered(nb::module_ &);
+void bind_applications(nb::module_ &);
+
+// Whether the processor has what x86-64-v3 adds to the baseline, as far as kernels use it.
+static bool has_x86_64_v3() {
+#if defined(__x86_64__)
+    return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("bmi2") && __builtin_cpu_supports("fma");
+#else
+    return false;
+#endif
+}
+
+NB_MODULE(_native, m) {
+    m.doc() = "Compiled loops, for one kind of processor.";
+    m.def("has_x86_64_v3", &has_x86_64_v3, "Whether this processor can use kernels that are built for x86-64-v3.");
+    m.def("thread_count", &sepi::thread_count, "Threads of a loop, the caller's among them.");
+    m.def("set_thread_count", &sepi::set_thread_count, "count"_a, "Have each loop use so many threads.");
+    for (const auto bind : {bind_sweeps, bind_splines, bind_views, bind_boundaries, bind_regularization, bind_error_bars, bind_image, bind_inspection,
+                            bind_scoring, bind_scenes, bind_compared, bind_rendered, bind_applications})
+        bind(m);
+}

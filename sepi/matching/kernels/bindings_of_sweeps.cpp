@@ -1,0 +1,48 @@
+#include "kernels/arguments.hpp"
+#include "plane_sweep.hpp"
+#include "semi_global.hpp"
+#include "visibility.hpp"
+
+namespace nb = nanobind;
+using namespace nb::literals;
+using sepi::Unlocked;
+
+template <>
+NAMED_TUPLE(sepi::Candidates, "sepi.matching.sweep_arrays.Candidates");
+template <>
+NAMED_TUPLE(sepi::Window, "sepi.matching.sweep_arrays.Window");
+template <>
+NAMED_TUPLE(sepi::ExpectedCosts, "sepi.matching.sweep_arrays.ExpectedCosts");
+template <>
+NAMED_TUPLE(sepi::BestMaps, "sepi.matching.sweep_arrays.BestMaps");
+template <>
+NAMED_TUPLE(sepi::Visibility, "sepi.matching.sweep_arrays.Visibility");
+template <>
+NAMED_TUPLE(sepi::RobustCost, "sepi.matching.sweep_arrays.RobustCost");
+template <class Colour>
+NAMED_TUPLE(sepi::ViewStack<Colour>, "sepi.matching.sweep_arrays.ViewStack");
+template <class Colour>
+NAMED_TUPLE(sepi::BaseDetail<Colour>, "sepi.matching.base_detail.BaseDetail");
+
+// The kernels that look at the colours of views, of one type.
+template <class Colour>
+static void bind_of_colours(nb::module_ &plane_sweep, nb::module_ &visibility) {
+    plane_sweep.def("sweep_plane_rows", &sepi::sweep_plane_rows<Colour>, Unlocked(), "views"_a, "candidates"_a, "window"_a, "expected"_a, "mask"_a, "begin"_a,
+                    "end"_a, "height"_a, "width"_a, "maps"_a);
+    visibility.def("sweep_visible_rows", &sepi::sweep_visible_rows<Colour>, Unlocked(), "views"_a, "visibility"_a, "robust"_a, "candidates"_a, "begin"_a,
+                   "end"_a, "cost"_a);
+}
+
+void bind_sweeps(nb::module_ &kernels) {
+    auto plane_sweep = kernels.def_submodule("plane_sweep");
+    auto visibility = kernels.def_submodule("visibility");
+    bind_of_colours<std::uint8_t>(plane_sweep, visibility);
+    bind_of_colours<std::uint16_t>(plane_sweep, visibility);
+    bind_of_colours<float>(plane_sweep, visibility);
+    visibility.def("z_buffers", &sepi::z_buffers, Unlocked(), "disparity"_a, "present"_a, "baselines"_a, "low"_a, "high"_a, "out"_a);
+
+    auto semi_global = kernels.def_submodule("semi_global");
+    semi_global.def("aggregate", &sepi::aggregate, Unlocked(), "cost"_a, "guide"_a, "radius"_a, "variance"_a, "out"_a);
+    semi_global.def("semi_global", &sepi::semi_global, Unlocked(), "cost"_a, "guide"_a, "small"_a, "large"_a, "weakening"_a, "band"_a, "out"_a);
+    semi_global.def("choose", &sepi::choose, Unlocked(), "smoothed"_a, "averaged"_a, "disparities"_a, "same"_a, "disparity"_a, "margin"_a);
+}

@@ -1,0 +1,254 @@
+#include "semi_global.hpp"
+
+#include <bit>
+#include <cmath>
+#include <utility>
+
+#include "kernels/lanes.hpp"
+#include "kernels/parallel.hpp"
+
+namespace sepi {
+namespace {
+
+// Paths from row to row that a thread follows together: their costs lie side by side, and fit in its cache.
+constexpr Index PATHS_AT_ONCE = 32;
+
+constexpr float UNREACHABLE = 1e9f;
+
+// exp(x) of a number up to 0, rounded to single precision; 0 below -87.
+inline float exp_of_negative(double x) {
+    const double n = std::floor(x * 1.4426950408889634 + 0.5);
+    const double f = (x - n * 0.693145751953125) - n * 1.42860682030941723212e-6;
+    double p = 1 + f * (1.0 / 8) * (1 + f * (1.0 / 9) * (1 + f * (1.0 / 10)));
+    p = 1 + f * (1.0 / 5) * (1 + f * (1.0 / 6) * (1 + f * (1.0 / 7) * p));
+    p = 1 + f * (1 + f * (1.0 / 2) * (1 + f * (1.0 / 3) * (1 + f * (1.0 / 4) * p)));
+    // 2^n by its bits
+    const float power = std::bit_cast<float>((std::int32_t(std::max(n, -126.0)) + 127) << 23);
+    return x > -87 ? float(p * double(power)) : 0.0f;
+}
+
+// Weights of the windows of row y, of sum 1, into weights ((2 radius + 1)^2, W); zero outside the picture.
+// guide (3, H, W); total (W) is scratch.
+void window_weights(Array<const float, 3> guide, Index y, Index radius, float variance, Array<float, 2> weights, float *__restrict total) {
+    const Index H = guide.shape[1], W = guide.shape[2], size = 2 * radius + 1;
+    const double width = 2 * double(variance);
+    std::fill_n(weights.data, size * size * W, 0.0f);
+    std::fill_n(total, W, 0.0f);
+    for (Index i = std::max<Index>(0, radius - y); i < std::min(size, H - y + radius); ++i) {
+        const Index row = y + i - radius;
+        for (Index j = 0; j < size; ++j) {
+            const Index dx = j - radius, first = std::max<Index>(0, -dx), last = std::max<Index>(0, std::min(W, W - dx));
+            const float *here[3], *there[3];
+            for (Index c = 0; c < 3; ++c) here[c] = guide.at(c, y), there[c] = guide.at(c, row, dx);
+            float *__restrict out = weights.at(i * size + j);
+            for (Index x = first; x < last; ++x) {
+                const float r = here[0][x] - there[0][x], g = here[1][x] - there[1][x], b = here[2][x] - there[2][x];
+                out[x] = exp_of_negative(-double(r * r + g * g + b * b) / width);
+                total[x] += out[x];
+            }
+        }
+    }
+    for (Index n = 0; n < size * size; ++n) {
+        float *__restrict weight = weights.at(n);
+        for (Index x = 0; x < W; ++x) weight[x] /= total[x];
+    }
+}
+
+// Weighted sums over windows, of BLOCK vectors of pixels from x on: each waits for its last product, and the others need
+// not. rows (2 radius + 1, W + 2 radius + LANES), with a margin.
+template <int BLOCK, class Radius>
+void window_sum(Array<const float, 2> rows, Array<const float, 2> weights, Radius radius, Index x, float *out) {
+    const Index size = 2 * radius + 1;
+    Float8 totals[BLOCK] = {};
+    for (Index i = 0; i < size; ++i) {
+        for (Index j = 0; j < size; ++j) {
+            const float *weight = weights.at(i * size + j, x), *row = rows.at(i, x + j);
+            for (int n = 0; n < BLOCK; ++n) totals[n] = fma(load(weight + n * LANES), load(row + n * LANES), totals[n]);
+        }
+    }
+    for (int n = 0; n < BLOCK; ++n) store(out + x + n * LANES, totals[n]);
+}
+
+template <class Radius>
+void window_sums(Array<const float, 2> rows, Array<const float, 2> weights, Radius radius, float *out, Index W) {
+    constexpr int BLOCK = 4;
+    Index x = 0;
+    for (; x <= W - BLOCK * LANES; x += BLOCK * LANES) window_sum<BLOCK>(rows, weights, radius, x, out);
+    for (; x < W; x += LANES) window_sum<1>(rows, weights, radius, x, out);
+}
+
+// Rows of eight candidates (LANES, W) become those of a pixel each, into out (W, K'), of which the first are meant.
+void transpose_candidates(Array<const float, 2> rows, Index W, Array<float, 2> out) {
+    Index x = 0;
+    for (; x <= W - LANES; x += LANES) {
+        Float8 block[LANES];
+        for (Index k = 0; k < LANES; ++k) block[k] = load(rows.at(k, x));
+        transpose(block);
+        for (Index i = 0; i < LANES; ++i) store(out.at(x + i), block[i]);
+    }
+    for (; x < W; ++x)
+        for (Index k = 0; k < LANES; ++k) out(x, k) = rows(k, x);
+}
+
+template <class T>
+Array<const T, 2> const_view(const Scratch<T, 2> &scratch) {
+    const auto &a = scratch.array();
+    return {a.data, {a.shape[0], a.shape[1]}, {a.strides[0], a.strides[1]}};
+}
+
+struct Penalties {
+    float small, large, weakening;
+
+    // Of a change of more than one candidate between two pixels: weaker where the colours change.
+    float large_between(const float *here, const float *there) const {
+        float change = 0;
+        for (int c = 0; c < 3; ++c) change += std::abs(here[c] - there[c]);
+        return std::max(small * 1.5f, large / (1.0f + change * weakening));
+    }
+};
+
+// One pixel further along a path: path[1:-1] = cost + best - least, which is added to out (K'); the least of it.
+// The best of: before of the same candidate, of one beside it plus small, and the least of all plus large. before and
+// path have an unreachable candidate at either end.
+float next_pixel(const float *before, float least, const float *cost, float small, float large, float *path, float *out, Index K) {
+    const Float8 whole = spread(least), jump = spread(least + large), step = spread(small);
+    Float8 lowest = spread(UNREACHABLE);
+    for (Index k = 0; k < K; k += LANES) {
+        const Float8 best = smaller(smaller(load(before + k + 1), jump), smaller(load(before + k), load(before + k + 2)) + step);
+        const Float8 value = load(cost + k) + best - whole;
+        store(path + k + 1, value);
+        store(out + k, load(out + k) + value);
+        lowest = smaller(value, lowest);
+    }
+    return least_of(lowest);
+}
+
+// Add the smoothed costs of the path along row y.
+void along_row(Array<const float, 3> cost, Array<const float, 3> guide, Index y, Index dx, const Penalties &penalties, Array<float, 3> out) {
+    const Index W = cost.shape[1], K = cost.shape[2];
+    const auto both = Scratch<float, 2>(2, K + 2).filled(UNREACHABLE);
+    float *before = both.array().at(0), *path = both.array().at(1), least = 0;
+    // before the first pixel all candidates cost nothing: its costs are its own
+    std::fill_n(before + 1, K, 0.0f);
+    for (Index i = 0; i < W; ++i) {
+        const Index x = dx > 0 ? i : W - 1 - i;
+        const float large = i ? penalties.large_between(guide.at(y, x), guide.at(y, x - dx)) : 0.0f;
+        least = next_pixel(before, least, cost.at(y, x), penalties.small, large, path, out.at(y, x), K);
+        std::swap(before, path);
+    }
+}
+
+// Add the smoothed costs of paths from row to row in the rows begin..end: those that began in columns from first on.
+// One that leaves the picture at a side goes on, as a new one, at the other: all have a pixel in each row.
+// paths (2, n, K' + 2) are their costs in the row before and here, in turn, least (n) the least of the row before.
+void along_lines(Array<float, 3> paths, float *least, Index first, Array<const float, 3> cost, Array<const float, 3> guide, Index begin, Index end, Index dy,
+                 Index dx, const Penalties &penalties, Array<float, 3> out) {
+    const Index H = cost.shape[0], W = cost.shape[1], K = cost.shape[2];
+    for (Index i = begin; i < end; ++i) {
+        const Index y = dy > 0 ? i : H - 1 - i;
+        for (Index line = 0; line < std::min(PATHS_AT_ONCE, W - first); ++line) {
+            float *before = paths.at((i + 1) % 2, line), *path = paths.at(i % 2, line), large = 0;
+            const Index x = ((first + line + dx * i) % W + W) % W;
+            if (i == 0 || x - dx < 0 || x - dx >= W) {
+                std::fill_n(before + 1, K, 0.0f);
+                least[line] = 0;
+            } else {
+                large = penalties.large_between(guide.at(y, x), guide.at(y - dy, x - dx));
+            }
+            least[line] = next_pixel(before, least[line], cost.at(y, x), penalties.small, large, path, out.at(y, x), K);
+        }
+    }
+}
+
+}  // namespace
+
+void aggregate(Array<const float, 3> cost, Array<const float, 3> guide, Index radius, float variance, Array<float, 3> out) {
+    const Index K = cost.shape[0], H = cost.shape[1], W = cost.shape[2], size = 2 * radius + 1;
+    const Scratch<float, 3> by_channel(3, H, W);
+    for (Index c = 0; c < 3; ++c)
+        for (Index y = 0; y < H; ++y)
+            for (Index x = 0; x < W; ++x) by_channel.array()(c, y, x) = guide(y, x, c);
+    const Array<const float, 3> colours{by_channel.array().data, {3, H, W}, {H * W, W, 1}};
+    parallel_for(0, H, [&](Index y) {
+        const Scratch<float, 2> weights(size * size + 1, W);  // and a margin
+        const Scratch<float, 1> sums(W);
+        window_weights(colours, y, radius, variance, weights.array(), sums.array().data);
+        // what lies beyond the picture weighs nothing
+        const auto rows = zeros<float, 2>(size, W + 2 * radius + LANES);
+        // a few candidates at a time: each pixel's are written together
+        const Scratch<float, 2> total(LANES, W + LANES);
+        for (Index begin = 0; begin < K; begin += LANES) {
+            for (Index k = begin; k < std::min(K, begin + LANES); ++k) {
+                for (Index i = std::max<Index>(0, radius - y); i < std::min(size, H - y + radius); ++i) std::copy_n(cost.at(k, y + i - radius), W, rows.array().at(i, radius));
+                float *place = total.array().at(k - begin);
+                if (radius == 2) {
+                    // how many is known when this is compiled, and all of it becomes one loop
+                    window_sums(const_view(rows), const_view(weights), std::integral_constant<Index, 2>(), place, W);
+                } else {
+                    window_sums(const_view(rows), const_view(weights), radius, place, W);
+                }
+            }
+            for (Index k = K - begin; k < LANES; ++k) std::fill_n(total.array().at(k), W, UNREACHABLE);
+            Array<float, 2> pixels = out[y];
+            pixels.data += begin;
+            transpose_candidates(const_view(total), W, pixels);
+        }
+    });
+}
+
+void semi_global(Array<const float, 3> cost, Array<const float, 3> guide, float small, float large, float weakening, Index band, Array<float, 3> out) {
+    const Index H = cost.shape[0], W = cost.shape[1], K = cost.shape[2];
+    const Penalties penalties{small, large, weakening};
+    const Index pieces = (W + PATHS_AT_ONCE - 1) / PATHS_AT_ONCE;
+    for (const Index dy : {1, -1}) {
+        const auto paths = Scratch<float, 4>(3 * pieces, 2, PATHS_AT_ONCE, K + 2).filled(UNREACHABLE);
+        const auto least = zeros<float, 2>(3 * pieces, PATHS_AT_ONCE);
+        for (Index begin = 0; begin < H; begin += band) {
+            const Index end = std::min(H, begin + band);
+            if (dy > 0) {
+                parallel_for(begin, end, [&](Index y) {
+                    std::fill_n(out.at(y), W * K, 0.0f);
+                    along_row(cost, guide, y, 1, penalties, out);
+                    along_row(cost, guide, y, -1, penalties, out);
+                });
+            }
+            for (const Index direction : {0, 1, 2}) {
+                const Index dx = direction == 2 ? -1 : direction;
+                // paths of one direction do not meet
+                parallel_for(0, pieces, [&](Index piece) {
+                    const Index number = direction * pieces + piece;
+                    along_lines(paths.array()[number], least.array().at(number), piece * PATHS_AT_ONCE, cost, guide, begin, end, dy, dx, penalties, out);
+                });
+            }
+        }
+    }
+}
+
+void choose(Array<const float, 3> smoothed, Array<const float, 3> averaged, Array<const float, 1> disparities, float same, Array<float, 2> disparity,
+            Array<float, 2> margin) {
+    const Index H = smoothed.shape[0], W = smoothed.shape[1], K = disparities.shape[0];
+    const double spacing = double(disparities(K - 1) - disparities(0)) / double(K - 1);
+    parallel_for(0, H, [&](Index y) {
+        for (Index x = 0; x < W; ++x) {
+            const float *costs = smoothed.at(y, x), *before = averaged.at(y, x);
+            const Index best = std::min_element(costs, costs + K) - costs;
+            double offset = 0;
+            if (0 < best && best < K - 1) {
+                const float a = costs[best - 1], b = costs[best], c = costs[best + 1];
+                const double curvature = a - 2 * double(b) + c;
+                if (curvature > 1e-9) offset = 0.5f * (a - c) / curvature;
+            }
+            const float found = float(disparities(best) + offset * spacing);
+            float own = UNREACHABLE, other = UNREACHABLE;
+            for (Index k = 0; k < K; ++k) {
+                const bool is_own = (std::abs(disparities(k) - found) <= same) | (k == best);
+                own = std::min(own, is_own ? before[k] : UNREACHABLE);
+                other = std::min(other, is_own ? UNREACHABLE : before[k]);
+            }
+            disparity(y, x) = found;
+            margin(y, x) = other < UNREACHABLE ? other - own : 0.0f;
+        }
+    });
+}
+
+}  // namespace sepi

@@ -1,0 +1,64 @@
+// Arrays that plane sweeps work on, in named groups: the fields of sepi.matching.sweep_arrays, in their order.
+#pragma once
+
+#include <tuple>
+
+#include "kernels/array.hpp"
+
+namespace sepi {
+
+// The views that are compared.
+template <class Colour>
+struct ViewStack {
+    Array<const Colour, 5> colours;  // (T, S, 3, H, W + LANES)
+    Index t0, s0;
+    Array<const std::int64_t, 2> groups;  // (T, S); -1 leaves a view out
+    Array<const bool, 2> subsets;         // (N, G)
+    float scale2;
+    Array<const std::int64_t, 4> shown;  // (T, S, H or 0, 2)
+
+    auto fields() { return std::tie(colours, t0, s0, groups, subsets, scale2, shown); }
+};
+
+// Candidate disparities, and where the samples of a reference pixel lie in each view.
+struct Candidates {
+    Array<const float, 1> disparities;        // (K,)
+    Array<const std::int64_t, 2> row, column;  // (T, S)
+    Array<const std::int64_t, 2> down;         // (V, K)
+    Array<const float, 2> fy;                  // (V, K)
+    Array<const std::int64_t, 2> across;       // (U, K)
+    Array<const float, 2> fx;                  // (U, K)
+    Array<const float, 1> sy, sx;              // (V,) and (U,)
+    double reach;
+
+    auto fields() { return std::tie(disparities, row, column, down, fy, across, fx, sy, sx, reach); }
+
+    Index number() const { return disparities.shape[0]; }
+};
+
+// Aggregation window: 2 radius + 1 pixels wide, its weights narrow in colour.
+struct Window {
+    Array<const float, 3> guide;  // (3, H, W)
+    Index radius;
+    float variance;
+
+    auto fields() { return std::tie(guide, radius, variance); }
+};
+
+// What noise makes of costs.
+struct ExpectedCosts {
+    Array<const float, 3> moments;   // (2, N, K')
+    Array<const float, 3> weights;   // (2, H, W)
+    Array<const float, 2> anywhere;  // (H, W)
+
+    auto fields() { return std::tie(moments, weights, anywhere); }
+};
+
+// What is found of each subset of views; (N, H, W).
+struct BestMaps {
+    Array<float, 3> disparity, cost, mean;
+
+    auto fields() { return std::tie(disparity, cost, mean); }
+};
+
+}  // namespace sepi

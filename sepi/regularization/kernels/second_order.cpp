@@ -1,0 +1,277 @@
+#include "second_order.hpp"
+
+#include <cmath>
+
+#include "kernels/parallel.hpp"
+
+namespace sepi {
+namespace {
+
+constexpr Index MARGIN = 2;  // how far second differences reach, pixels
+
+// The finest hats at the pixels beside a node and at the next ones.
+template <class Number>
+constexpr Number NEAR = Number(0.75);
+template <class Number>
+constexpr Number FAR = Number(0.25);
+
+// Entries of the stencil: rows and columns from a pixel to the other that they belong to.
+struct Entry {
+    Index number, dy, dx;
+};
+constexpr Entry ENTRIES[] = {{0, 0, 0}, {1, 0, 1}, {2, 0, 2}, {3, 1, 0}, {4, 2, 0}, {5, 1, 1}, {6, 1, -1}};
+
+// Add values, times a factor, to a row.
+template <class Number>
+void add(Number *__restrict row, Number factor, const Number *values, Index n) {
+    for (Index x = 0; x < n; ++x) row[x] += factor * values[x];
+}
+
+// Inner product of two rows, in an order that vectorises: the same one on all processors.
+template <class Number>
+Number dot(const Number *a, const Number *b, Index n) {
+    constexpr Index PARTS = 128 / sizeof(Number);
+    Number sums[PARTS] = {};
+    Index x = 0;
+    for (; x <= n - PARTS; x += PARTS)
+        for (Index i = 0; i < PARTS; ++i) sums[i] += a[x + i] * b[x + i];
+    for (Index half = PARTS / 2; half > 0; half /= 2)
+        for (Index i = 0; i < half; ++i) sums[i] += sums[i + half];
+    for (; x < n; ++x) sums[0] += a[x] * b[x];
+    return sums[0];
+}
+
+// Sum over rows of what each adds, one after the other, whichever thread made them.
+template <class Number>
+double in_order(const Scratch<Number, 1> &rows) {
+    double total = 0;
+    for (Index y = 0; y < rows.array().shape[0]; ++y) total += double(rows.array()(y));
+    return total;
+}
+
+// Row y of stencil_of, of zeros so far.
+void stencil_row(Index y, Array<const double, 2> along_x, Array<const double, 2> along_y, Array<const double, 2> across, Array<double, 3> out) {
+    const Index H = along_x.shape[0], W = along_y.shape[1], row = y + MARGIN;
+    const auto entry = [&](Index k, Index first) { return out.at(k, row, MARGIN + first); };
+    constexpr double SQUARES[] = {1, 4, 1};
+    for (Index first = 0; first < 3; ++first) add(entry(0, first), SQUARES[first], along_x.at(y), W - 2);
+    add(entry(1, 0), -2.0, along_x.at(y), W - 2);
+    add(entry(1, 1), -2.0, along_x.at(y), W - 2);
+    add(entry(2, 0), 1.0, along_x.at(y), W - 2);
+    for (Index before = 0; before < 3; ++before)
+        if (0 <= y - before && y - before < H - 2) add(entry(0, 0), SQUARES[before], along_y.at(y - before), W);
+    for (Index before = 0; before < 2; ++before)
+        if (0 <= y - before && y - before < H - 2) add(entry(3, 0), -2.0, along_y.at(y - before), W);
+    if (y < H - 2) add(entry(4, 0), 1.0, along_y.at(y), W);
+    for (Index before = 0; before < 2; ++before) {
+        if (y - before < 0 || y - before >= H - 1) continue;
+        for (Index first = 0; first < 2; ++first) add(entry(0, first), 1.0, across.at(y - before), W - 1);
+        add(entry(1, 0), -1.0, across.at(y - before), W - 1);
+    }
+    if (y >= H - 1) return;
+    for (Index first = 0; first < 2; ++first) {
+        add(entry(3, first), -1.0, across.at(y), W - 1);
+        add(entry(5 + first, first), 1.0, across.at(y), W - 1);
+    }
+}
+
+// Row y, margin counted, of the matrix times a picture.
+template <class Number>
+void product_row(Array<const Number, 3> stencil, Array<const Number, 2> vector, Index y, Number *__restrict target) {
+    const Index n = vector.shape[1] - 2 * MARGIN;
+    const Number *own = stencil.at(0, y, MARGIN), *here = vector.at(y, MARGIN);
+    for (Index x = 0; x < n; ++x) target[x] = own[x] * here[x];
+    for (const auto [k, dy, dx] : ENTRIES) {
+        if (k == 0) continue;
+        // one entry and its mirror image; few arrays at a time, so that the loop vectorises
+        const Number *forth = stencil.at(k, y, MARGIN), *there = vector.at(y + dy, MARGIN + dx);
+        const Number *back = stencil.at(k, y - dy, MARGIN - dx), *before = vector.at(y - dy, MARGIN - dx);
+        for (Index x = 0; x < n; ++x) target[x] += forth[x] * there[x] + back[x] * before[x];
+    }
+}
+
+template <class T, int N>
+Array<const T, N> const_view(Array<T, N> a) {
+    Array<const T, N> view{a.data, {}, {}};
+    std::copy_n(a.shape, N, view.shape);
+    std::copy_n(a.strides, N, view.strides);
+    return view;
+}
+
+}  // namespace
+
+void weights_of_differences(Array<const float, 2> disparity, Array<const float, 2> reliability, Array<const double, 2> colour,
+                            Array<const std::int64_t, 2> corners, Array<const double, 1> factors, double threshold, double variance, Array<double, 2> out) {
+    parallel_for(0, out.shape[0], [&](Index y) {
+        for (Index x = 0; x < out.shape[1]; ++x) {
+            double difference = 0, trust = reliability(y, x);
+            for (Index i = 0; i < factors.shape[0]; ++i) {
+                const Index row = y + corners(i, 0), column = x + corners(i, 1);
+                difference += factors(i) * double(disparity(row, column));
+                trust = std::min(trust, double(reliability(row, column)));
+            }
+            difference /= threshold;
+            out(y, x) = std::exp(-std::min(difference * difference * trust + 2 * colour(y, x) / variance, 30.0));
+        }
+    });
+}
+
+void stencil_of(Array<const double, 2> along_x, Array<const double, 2> along_y, Array<const double, 2> across, Array<double, 3> out) {
+    parallel_for(0, out.shape[1], [&](Index row) {
+        for (Index k = 0; k < 7; ++k) std::fill_n(out.at(k, row), out.shape[2], 0.0);
+        const Index y = row - MARGIN;
+        if (0 <= y && y < along_x.shape[0]) stencil_row(y, along_x, along_y, across, out);
+    });
+}
+
+template <class Number>
+void add_data(Array<const double, 2> weight, Array<double, 3> stencil, Array<Number, 3> packed) {
+    parallel_for(0, stencil.shape[1], [&](Index y) {
+        if (MARGIN <= y && y < MARGIN + weight.shape[0]) add(stencil.at(0, y, MARGIN), 1.0, weight.at(y - MARGIN), weight.shape[1]);
+        for (Index k = 0; k < 7; ++k) std::copy_n(stencil.at(k, y), stencil.shape[2], packed.at(k, y));
+    });
+}
+
+template <class Number>
+double turn_and_bend(Array<const Number, 3> stencil, Array<const Number, 2> ahead, Number ratio, Array<Number, 2> direction, Array<Number, 2> out) {
+    const Index H = direction.shape[0] - 2 * MARGIN, W = direction.shape[1] - 2 * MARGIN;
+    for (Index y = MARGIN; y < MARGIN + H; ++y) {
+        Number *__restrict row = direction.at(y);
+        const Number *more = ahead.at(y);
+        for (Index x = 0; x < W + 2 * MARGIN; ++x) row[x] = ratio * row[x] + more[x];
+    }
+    const Scratch<Number, 1> along(H);
+    parallel_for(MARGIN, MARGIN + H, [&](Index y) {
+        product_row(stencil, const_view(direction), y, out.at(y, MARGIN));
+        along.array()(y - MARGIN) = dot(direction.at(y, MARGIN), out.at(y, MARGIN), W);
+    });
+    return in_order(along);
+}
+
+template <class Number>
+double step(Number length, Array<const Number, 2> direction, Array<const Number, 2> bent, Array<Number, 2> solution, Array<Number, 2> residual) {
+    const Scratch<Number, 1> squares(solution.shape[0]);
+    const Index n = solution.shape[1];
+    parallel_for(0, solution.shape[0], [&](Index y) {
+        add(solution.at(y), length, direction.at(y), n);
+        Number *__restrict left = residual.at(y);
+        const Number *taken = bent.at(y);
+        for (Index x = 0; x < n; ++x) left[x] -= length * taken[x];
+        squares.array()(y) = dot(residual.at(y), residual.at(y), n);
+    });
+    return in_order(squares);
+}
+
+template <class Number>
+void onto_finest(Array<const Number, 2> vector, Array<Number, 2> out) {
+    const Index H = vector.shape[0] - 2 * MARGIN, W = vector.shape[1] - 2 * MARGIN, w = out.shape[1];
+    constexpr Number near = NEAR<Number>, far = FAR<Number>;
+    constexpr Number shares[] = {far, near, near, far};
+    // with zeros round the picture, as wide as the hats reach
+    const Scratch<Number, 1> lines(2 * w + 2);
+    Number *line = lines.array().data;
+    for (Index i = 0; i < out.shape[0]; ++i) {
+        std::fill_n(line, 2 * w + 2, Number(0));
+        for (Index n = 0; n < 4; ++n)
+            if (const Index y = 2 * i + n - 2; 0 <= y && y < H) add(line + 2, shares[n], vector.at(y + MARGIN, MARGIN), W);
+        Number *__restrict target = out.at(i);
+        for (Index j = 0; j < w; ++j) target[j] = far * (line[2 * j] + line[2 * j + 3]) + near * (line[2 * j + 1] + line[2 * j + 2]);
+    }
+}
+
+template <class Number>
+void onto_coarser(Array<const Number, 2> fine, Array<Number, 2> out) {
+    constexpr Number half = Number(0.5);
+    const Index w = fine.shape[1];
+    const auto lines = zeros<Number, 1>(w + 2);
+    Number *line = lines.array().data;
+    for (Index i = 0; i < out.shape[0]; ++i) {
+        std::copy_n(fine.at(2 * i), w, line + 1);
+        for (const Index y : {2 * i - 1, 2 * i + 1})
+            if (0 <= y && y < fine.shape[0]) add(line + 1, half, fine.at(y), w);
+        Number *__restrict target = out.at(i);
+        for (Index j = 0; j < out.shape[1]; ++j) target[j] = line[2 * j + 1] + half * (line[2 * j] + line[2 * j + 2]);
+    }
+}
+
+template <class Number>
+void add_coarser(Array<const Number, 2> coarse, Array<Number, 2> fine) {
+    constexpr Number half = Number(0.5);
+    const Index w = coarse.shape[1];
+    const Scratch<Number, 1> lines(w);
+    Number *line = lines.array().data;
+    for (Index i = 0; i < fine.shape[0]; ++i) {
+        const Number *above = coarse.at(i / 2), *below = coarse.at((i + 1) / 2);
+        for (Index j = 0; j < w; ++j) line[j] = half * (above[j] + below[j]);
+        Number *__restrict target = fine.at(i);
+        for (Index j = 0; j < w - 1; ++j) {
+            target[2 * j] += line[j];
+            target[2 * j + 1] += half * (line[j] + line[j + 1]);
+        }
+        target[2 * w - 2] += line[w - 1];
+    }
+}
+
+template <class Number>
+double diagonal_and_finest(Array<const Number, 2> inverse, Array<const Number, 2> vector, Array<const Number, 2> fine, Array<Number, 2> out) {
+    const Index H = vector.shape[0] - 2 * MARGIN, W = vector.shape[1] - 2 * MARGIN, w = fine.shape[1];
+    constexpr Number near = NEAR<Number>, far = FAR<Number>;
+    const Scratch<Number, 1> lines(w), all_hats(2 * w);
+    Number *line = lines.array().data, *hats = all_hats.array().data;
+    double total = 0;
+    for (Index y = 0; y < H; ++y) {
+        const Number first = y % 2 ? far : near, second = y % 2 ? near : far;
+        const Number *above = fine.at(y / 2), *below = fine.at(y / 2 + 1);
+        for (Index j = 0; j < w; ++j) line[j] = first * above[j] + second * below[j];
+        for (Index j = 0; j < w - 1; ++j) {
+            hats[2 * j] = near * line[j] + far * line[j + 1];
+            hats[2 * j + 1] = far * line[j] + near * line[j + 1];
+        }
+        const Number *row = vector.at(y + MARGIN, MARGIN), *own = inverse.at(y + MARGIN, MARGIN);
+        Number *__restrict target = out.at(y + MARGIN, MARGIN);
+        for (Index x = 0; x < W; ++x) target[x] = own[x] * row[x] + hats[x];
+        total += double(dot<Number>(row, target, W));
+    }
+    return total;
+}
+
+void diagonal_of_hats(Array<const double, 3> stencil, Index spacing, Array<double, 2> out) {
+    const Index H = stencil.shape[1] - 2 * MARGIN, W = stencil.shape[2] - 2 * MARGIN, w = out.shape[1], reach = 2 * spacing;
+    // a hat at its own pixels, and zeros, to where entries lead that leave it
+    const auto hats = zeros<double, 1>(reach + 2 * MARGIN);
+    double *hat = hats.array().data + MARGIN;
+    for (Index p = 0; p < reach; ++p) hat[p] = 1 - std::abs(double(p) + 0.5 - double(spacing)) / double(spacing);
+    parallel_for(0, out.shape[0], [&](Index i) {
+        const Scratch<double, 1> lines(spacing * (w + 1));
+        double *line = lines.array().data, *__restrict target = out.at(i);
+        std::fill_n(target, w, 0.0);
+        for (const auto [k, dy, dx] : ENTRIES) {
+            std::fill_n(line, spacing * (w + 1), 0.0);
+            for (Index p = 0; p < reach; ++p) {
+                const Index y = spacing * (i - 1) + p;
+                const double share = hat[p] * hat[p + dy];
+                if (0 <= y && y < H && share > 0) add(line + spacing, share, stencil.at(k, y + MARGIN, MARGIN), W);
+            }
+            for (Index p = 0; p < reach; ++p) {
+                // each entry as seen from either of its pixels
+                const double share = (k == 0 ? 1.0 : 2.0) * hat[p] * hat[p + dx];
+                if (share > 0)
+                    for (Index j = 0; j < w; ++j) target[j] += share * line[spacing * j + p];
+            }
+        }
+    });
+}
+
+#define INSTANTIATE(Number)                                                                                                                          \
+    template void add_data(Array<const double, 2>, Array<double, 3>, Array<Number, 3>);                                                              \
+    template double turn_and_bend(Array<const Number, 3>, Array<const Number, 2>, Number, Array<Number, 2>, Array<Number, 2>);                        \
+    template double step(Number, Array<const Number, 2>, Array<const Number, 2>, Array<Number, 2>, Array<Number, 2>);                                 \
+    template void onto_finest(Array<const Number, 2>, Array<Number, 2>);                                                                             \
+    template void onto_coarser(Array<const Number, 2>, Array<Number, 2>);                                                                            \
+    template void add_coarser(Array<const Number, 2>, Array<Number, 2>);                                                                             \
+    template double diagonal_and_finest(Array<const Number, 2>, Array<const Number, 2>, Array<const Number, 2>, Array<Number, 2>);
+INSTANTIATE(float)
+INSTANTIATE(double)
+#undef INSTANTIATE
+
+}  // namespace sepi
