@@ -22,8 +22,6 @@ PYTHON := $(shell for p in python3 python3.11 python3.12 python3.13; do \
 BIN := .venv/bin
 READY := .venv/ready
 
-COMPARED := .venv/compared
-
 LINTS := lint-style lint-types lint-imports lint-rules lint-project
 
 .PHONY: all check long-tests test test-system faults fuzz coverage lint $(LINTS) actionlint docs docs-links demo bench dist release oldest clean
@@ -46,23 +44,23 @@ QUICK := not real and not workflow and not browser and not slow and not system a
 
 # a quarter more than they take, too; tests that are not named in the file count as quick until they no longer fit
 QUICK_CPU_SECONDS := 180
-check: $(COMPARED)
+check: $(READY)
 	$(TESTS) -m "$(QUICK) and not long" --cpu-budget $(QUICK_CPU_SECONDS)
 
 # twice: what tests share is made by the first of them that is left
-long-tests: $(COMPARED)
+long-tests: $(READY)
 	rm -f tests/long_tests.txt
 	$(TESTS) -m "$(QUICK)" --note-long tests/long_tests.txt
 	$(TESTS) -m "$(QUICK) and not long" --note-long tests/long_tests.txt
 
 # of a core of the calibration loop in tests/cpu_budget.py: a fifth more than they take
 CPU_SECONDS := 2250
-test: $(COMPARED)
+test: $(READY)
 	$(TESTS) -m "not system and not faults" --cpu-budget $(CPU_SECONDS)
 
 # the files that have such tests: to look through the others takes longer than some of these
 SYSTEM_TESTS = $(shell grep --recursive --files-with-matches --include 'test_*.py' 'mark[.]system' tests)
-test-system: $(COMPARED)
+test-system: $(READY)
 	$(TESTS) -m "system and not faults" $(SYSTEM_TESTS)
 
 # what `make test` and `make test-system` do a few times, a hundred times; and what they leave to this
@@ -81,7 +79,7 @@ coverage: export COVERAGE_RCFILE := $(CURDIR)/pyproject.toml
 # a fork would lose what it has measured
 coverage: export SEPI_JOB_SERVER :=
 coverage: export COVERAGE_FILE := $(CURDIR)/build/coverage/data
-coverage: $(COMPARED)
+coverage: $(READY)
 	rm -rf build/coverage
 	mkdir -p build/coverage
 	$(ONE_THREAD) $(BIN)/coverage run -m pytest $(AT_ONCE); status=$$?; \
@@ -184,8 +182,8 @@ clean:
 	rm -rf docs/_made docs/examples docs/reference/api docs/reference/api.md
 	rm -rf results logs benchmarks build dist *.egg-info .snakemake .pytest_cache .mypy_cache .ruff_cache .hypothesis
 
-# pinned versions, then the package itself in place and its kernels compiled; again only when one of these files changes
-$(READY): requirements.lock pyproject.toml
+# pinned versions, then the package itself in place and its kernels built; again only when one of these files changes
+.venv/installed: requirements.lock pyproject.toml
 	@test -n "$(PYTHON)" || { echo "make: Python 3.11 or newer is needed (as python3 or python3.11)" >&2; exit 1; }
 	@$(PYTHON) -c 'import venv, ensurepip' 2>/dev/null || { \
 		echo "make: $(PYTHON) lacks the module venv; on Debian: apt install python3-venv" >&2; exit 1; }
@@ -194,10 +192,12 @@ $(READY): requirements.lock pyproject.toml
 	@# what pip would do on one core; files that no Python can compile are none that anybody imports
 	-$(BIN)/python -m compileall -qq -j 0 .venv/lib
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
-	$(BIN)/python -m sepi.cli.warm_up --check
-	touch $@
+	touch $@ $(READY)
 
-# the kernels of the compared methods, and those for other views than 8-bit ones: only their target and the tests call them
-$(COMPARED): $(READY)
-	$(BIN)/python -m sepi.cli.warm_up --comparison --all-types
+# kernels that were edited are built again where pip put them
+BUILD = PATH="$(CURDIR)/$(BIN):$$PATH" cmake
+$(READY): .venv/installed CMakeLists.txt $(wildcard sepi/kernels/*.?pp sepi/*/kernels/*.?pp)
+	$(BUILD) -G Ninja -S . -B build/kernels -DCMAKE_BUILD_TYPE=Release -DPython_EXECUTABLE="$(CURDIR)/$(BIN)/python" >build/kernels.log
+	$(BUILD) --build build/kernels
+	$(BUILD) --install build/kernels --prefix .
 	touch $@

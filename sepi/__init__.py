@@ -22,9 +22,6 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
-from sepi.kernel_cache import provide_kernel_cache
-from sepi.openmp import wait_asleep
-
 if TYPE_CHECKING:
     from sepi.applications.all_views import AllViews, estimate_all_views
     from sepi.applications.refocusing import all_in_focus, refocus
@@ -87,9 +84,6 @@ _HOME = {
     "refocus": "sepi.applications.refocusing",
     "write_result": "sepi.io.result_folder",
 }
-
-provide_kernel_cache()
-wait_asleep()
 
 
 def __getattr__(name: str) -> Any:

@@ -6,9 +6,7 @@ workflow's rule calls.
 
 from __future__ import annotations
 
-import atexit
 import functools
-import gc
 import json
 import os
 import signal
@@ -61,10 +59,7 @@ class SepiCommand(click.Command):
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run the command."""
-        # at its end Python looks through all objects for cycles, which takes as long as a third of all the rest of a
-        # short job; the memory goes back to the system anyway
-        atexit.register(gc.freeze)
-        with shown_errors(), _rare_collections():
+        with shown_errors():
             use_memory_again()
             _end_with_the_workflow()
             return super().invoke(ctx)
@@ -113,22 +108,6 @@ def use_memory_again() -> None:
             for name, setting in _HEAP.items():
                 if name not in os.environ:
                     ctypes.CDLL(None).mallopt(*setting)
-
-
-@contextmanager
-def _rare_collections() -> Iterator[None]:
-    """Look for cycles a hundredth as often: libraries that are imported make objects that stay, and to look through
-    those again and again takes a twentieth of a short job.
-    """
-    before = gc.get_threshold()
-    gc.set_threshold(100 * before[0], *before[1:])
-    try:
-        yield
-    finally:
-        # all are old now: none is looked through at once, which would take 35 ms
-        gc.freeze()
-        gc.unfreeze()
-        gc.set_threshold(*before)
 
 
 @contextmanager
@@ -240,8 +219,6 @@ def stage_command(stage: str, own: Mapping[str, Choice]) -> click.Command:
     from sepi.exposure import equally_bright
     from sepi.io.hdf5 import read_light_field, read_stage, write_stage
     from sepi.io.provenance import history_of, stage_attributes
-    from sepi.kernel_cache import tell_kernel_cache
-    from sepi.memory import KERNELS, require_memory
     from sepi.models import validated
     from sepi.stage import entry
     from sepi.threads import use_threads
@@ -277,8 +254,6 @@ def stage_command(stage: str, own: Mapping[str, Choice]) -> click.Command:
             raise SepiError(
                 f"{previous}: maps of {maps.disparity.shape} do not belong to {light_field_path} of {light_field.shape}"
             )
-        require_memory(KERNELS)
-        tell_kernel_cache()
         compared = replace(equally_bright(light_field), workspace=Workspace())
         with progress_bar(f"{light_field.name} {stage}") as progress:
             result = chosen.run(compared, maps, settings, progress)

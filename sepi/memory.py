@@ -11,17 +11,11 @@ import numpy as np
 BLAS_BUFFER = 64_000_000
 """OpenBLAS takes 32 MB at its first call; bytes, with some to spare."""
 
-KERNELS = 384_000_000
-"""The first compiled kernels, the libraries that load them and what threads set aside; bytes, with some to spare."""
-
-MORE_KERNELS = 128_000_000
-"""Kernels of all stages, the libraries being there; bytes, with some to spare."""
-
 
 def require_memory(number: int) -> None:
     """See that there is memory where a limit on the process's address space is set (``ulimit -v``).
 
-    OpenBLAS asks for its buffer again and again, without end, where the limit is reached, and LLVM ends the process.
+    OpenBLAS asks for its buffer again and again, without end, where the limit is reached.
 
     Parameters
     ----------

@@ -361,7 +361,7 @@ def _smoothed(
 
 
 CHOICES = {
-    "wls": Choice(WlsParameters, wls, libraries=("scipy.sparse.linalg",)),
+    "wls": Choice(WlsParameters, wls),
     "second_order": Choice(SecondOrderParameters, second_order),
     "none": Choice(NoParameters, none),
 }

@@ -12,14 +12,11 @@ import numpy as np
 
 from sepi.built_in_variants import DEFAULT_VARIANT
 from sepi.exposure import equally_bright
-from sepi.kernel_cache import tell_kernel_cache
 from sepi.lightfield import LightField, require_light_field
 from sepi.matching.memory_limit import bytes_of_bands, bytes_of_volumes, require_memory_of
 from sepi.matching.unknown import with_unknown
-from sepi.meanwhile import importing_meanwhile
 from sepi.memory import give_back_memory
 from sepi.stage import MadeBy, Parameters, Progress, StageMaps, entry, no_progress
-from sepi.threads import threads_used
 from sepi.validation import require_type
 from sepi.variants import HANDED_ON, STAGES, VARIANTS, Variant, stage_parameters, variant_named
 from sepi.workspace import Workspace
@@ -89,8 +86,7 @@ def estimate_depth(
 
         light_field = light_field.with_range(estimate_range(light_field))
     light_field.require_seen_range()
-    tell_kernel_cache()
-    # kernels are compiled for views without gaps in memory; those of a part of an array would be compiled anew
+    # kernels read views without gaps in memory
     views, workspace = np.ascontiguousarray(light_field.views), light_field.workspace or Workspace()
     light_field = replace(light_field, views=views, workspace=workspace)
     compared = equally_bright(light_field)
@@ -100,9 +96,7 @@ def estimate_depth(
     if memory is not None:
         workspace = replace(workspace, band_bytes=bytes_of_bands(compared, settings.values(), memory))
     compared = replace(compared, workspace=workspace)
-    libraries = [name for stage, choice in chosen.choices.items() for name in STAGES[stage][choice].libraries]
-    with importing_meanwhile(libraries if threads_used() > 1 else ()):
-        maps = _after_all_stages(compared, chosen, settings, progress)
+    maps = _after_all_stages(compared, chosen, settings, progress)
     name = variant if isinstance(variant, str) else next((key for key, one in VARIANTS.items() if one == variant), "")
     history = tuple(
         entry(stage, choice, settings[stage], light_field)

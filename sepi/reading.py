@@ -5,9 +5,7 @@ to be in the wrong order.
 from __future__ import annotations
 
 import os
-import sys
 import warnings
-from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from types import NoneType
@@ -19,10 +17,8 @@ from sepi.io.origin import reading_record
 from sepi.io.readers.camera_positions import with_row_spacing
 from sepi.io.readers.formats import read
 from sepi.io.readers.options import ReadOptions, in_grid
-from sepi.kernel_cache import tell_kernel_cache
 from sepi.lightfield import DisparityRange, LightField
-from sepi.meanwhile import do_meanwhile
-from sepi.memory import KERNELS, MORE_KERNELS, give_back_memory, require_memory
+from sepi.memory import give_back_memory
 from sepi.validation import described, require_type
 
 # 16-bit views darker than this, a sixteenth of the full scale, hold fewer bits or next to no light
@@ -94,13 +90,9 @@ def read_light_field(
     require_type(f"{path}: options", options, (ReadOptions, NoneType), "sepi.ReadOptions")
     options = options or ReadOptions()
     given = None if disparity_range is None else _given_range(path, disparity_range)
-    if check_order:
-        do_meanwhile(_import_checks)
     light_field = read(path, options, file_format, truth=truth)
     if light_field.rig is not None and light_field.disparity_range is None:
         light_field = _with_depths(path, light_field, options, given)
-    require_memory(MORE_KERNELS if "numba" in sys.modules else KERNELS)
-    tell_kernel_cache()
     if not light_field.arranged:
         from sepi.inspection.arrangement import arrange
 
@@ -211,14 +203,6 @@ def read_cameras(
     """
     options = ReadOptions(images=None if images is None else str(images), reference=reference, exclude=exclude)
     return read_light_field(path, disparity_range=disparity_range, file_format="cameras", options=options)
-
-
-def _import_checks() -> None:
-    """Import what the checks of the views do, numba above all; where memory is short, that is told when they begin."""
-    with suppress(MemoryError):
-        require_memory(KERNELS)
-        import sepi.inspection.view_layouts
-        import sepi.inspection.view_order  # noqa: F401
 
 
 def _given_range(path: Path, bounds: tuple[float, float]) -> DisparityRange:

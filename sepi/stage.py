@@ -335,8 +335,6 @@ class Choice:
         choices say what is particular to each.
     own_steps : bool
         Whether it is given the light field's own view steps, as choices that callers add are.
-    libraries : tuple of str
-        Modules that it imports when it runs, and that take long: they may be imported while an earlier stage runs.
 
     Examples
     --------
@@ -365,7 +363,6 @@ class Choice:
     parameters: type[Parameters]
     function: StageFunction
     own_steps: bool = False
-    libraries: tuple[str, ...] = ()
 
     def run(
         self, light_field: LightField, previous: StageMaps | None, parameters: Parameters, progress: Progress

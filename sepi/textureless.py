@@ -269,7 +269,7 @@ def accepted(segments: Superpixels, free: BoolMap, resists: BoolMap, keep_share:
 
 
 CHOICES = {
-    "lti": Choice(LtiParameters, lti, libraries=("scipy.sparse.linalg", "skimage.segmentation.slic_superpixels")),
+    "lti": Choice(LtiParameters, lti),
     "uniform_planes": Choice(UniformPlanesParameters, uniform_planes),
     "none": Choice(NoParameters, none),
 }

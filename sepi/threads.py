@@ -1,4 +1,4 @@
-"""How many threads this process may use, and the libraries that keep to it."""
+"""How many threads this process may use: compiled loops and OpenCV keep to it."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import os
 import sys
 from numbers import Integral
 
+from sepi import kernels
 from sepi.errors import SepiError
 from sepi.validation import require_type
 
@@ -16,18 +17,12 @@ def available_cores() -> int:
 
 
 def threads_used() -> int:
-    """Threads of a compiled loop: as :func:`use_threads` said, else what numba takes by itself."""
-    if "numba" in sys.modules:
-        import numba
-
-        return int(numba.get_num_threads())
-    return int(os.environ.get("NUMBA_NUM_THREADS", available_cores()))
+    """Threads of a compiled loop: as :func:`use_threads` said, else one for each core."""
+    return kernels.thread_count()
 
 
 def use_threads(count: int) -> None:
-    """Let numba and OpenCV use at most so many threads, and never more than this process has cores.
-
-    Neither is imported for that, since not every job needs them: what is not there yet is told when it starts.
+    """Let compiled loops and OpenCV use at most so many threads, and never more than this process has cores.
 
     Parameters
     ----------
@@ -53,16 +48,8 @@ def use_threads(count: int) -> None:
     if count < 1:
         raise SepiError(f"threads: expected a whole number from 1 on, got {count}")
     count = min(int(count), available_cores())
-    if "numba" in sys.modules:
-        import numba
-
-        # numba refuses more threads than it started with
-        numba.set_num_threads(min(count, numba.config.NUMBA_NUM_THREADS))  # type: ignore[attr-defined]
-    else:
-        os.environ["NUMBA_NUM_THREADS"] = str(min(count, int(os.environ.get("NUMBA_NUM_THREADS", count))))
+    kernels.set_thread_count(count)
+    # OpenCV reads it when it is loaded
+    os.environ["OPENCV_FOR_THREADS_NUM"] = str(count)
     if "cv2" in sys.modules:
-        import cv2
-
-        cv2.setNumThreads(count)
-    else:
-        os.environ["OPENCV_FOR_THREADS_NUM"] = str(count)
+        sys.modules["cv2"].setNumThreads(count)

@@ -1,12 +1,20 @@
-"""Threads for tests that compare one with several."""
+"""Threads for tests that compare one with several, and back to one."""
 
-import numba
-import pytest
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from sepi import kernels
+
+SEVERAL = 3
+"""Loops share their turns among so many threads on any machine."""
 
 
-def several_threads() -> int:
-    """As many threads as numba has here; with one alone there is nothing to compare, and the test is skipped."""
-    threads = int(numba.config.NUMBA_NUM_THREADS)
-    if threads < 2:
-        pytest.skip("one thread alone")
-    return threads
+@contextmanager
+def threads(count: int) -> Iterator[None]:
+    """Let compiled loops use so many threads."""
+    before = kernels.thread_count()
+    kernels.set_thread_count(count)
+    try:
+        yield
+    finally:
+        kernels.set_thread_count(before)

@@ -31,18 +31,6 @@ if TYPE_CHECKING:
 
 _PATH = click.Path(path_type=Path)
 
-# what is imported while pictures are decoded: in the order in which it is needed, the usual variant's kernels among it
-_LATER = (
-    "sepi.inspection.disparity_range", "sepi.pipeline", "numba.np.arrayobj", "sepi.matching.view_noise_kernels",
-    "sepi.matching.gauss_newton", "sepi.matching.visibility_kernels", "sepi.matching.semi_global_kernels",
-    "sepi.matching.base_detail_kernels", "sepi.matching.gap_kernels", "sepi.boundaries.background_kernels",
-    "sepi.boundaries.surface_shares_kernels", "sepi.boundaries.colour_mixture_kernels",
-    "sepi.boundaries.edge_lines_kernels", "sepi.boundaries.rim_kernels", "sepi.boundaries.speck_kernels",
-    "sepi.regularization.second_order", "sepi.regularization.local_inverse", "sepi.regularization.multilevel",
-    "sepi.matching.surface_windows_kernels", "sepi.error_bars.mixture_kernels", "sepi.io.result_folder",
-    "PIL.PngImagePlugin",
-)  # fmt: skip
-
 
 @click.command(cls=SepiCommand)
 @click.argument("light_field_path", metavar="INPUT", type=_PATH)
@@ -108,9 +96,7 @@ def depth(
 
     started = time.perf_counter()
     use_threads(threads or available_cores())
-    reading.begin(light_field_path)
     from sepi.io.result_files import ALL_VIEWS, names_of_others, require_own, require_target
-    from sepi.meanwhile import do_meanwhile
     from sepi.variants import stage_parameters, variant_named
 
     chosen = variant_named(variant)
@@ -120,7 +106,6 @@ def depth(
     require_target(folder)
     if light_field_path.resolve() == folder.resolve():
         raise SepiError(f"{folder}: is the light field itself; choose another folder for the result")
-    do_meanwhile(_import_what_follows)
     light_field = reading.read(light_field_path, disparity_range=disparity_range)
     from sepi.inspection.disparity_range import settle_range
     from sepi.io.origin import DIGEST, digest_of
@@ -129,10 +114,6 @@ def depth(
     from sepi.matching.unknown import UNKNOWN
     from sepi.pipeline import estimate_depth
 
-    # outside Python's lock, while the first stage gets ready
-    beside = ThreadPoolExecutor(1)
-    digest = beside.submit(digest_of, light_field) if threads_used() > 1 else None
-    beside.shutdown(wait=False)
     require_own(folder, light_field, force=force)
     if geometry is not None:
         # another camera than the calibrated one: its rig's lengths mean nothing
@@ -143,8 +124,7 @@ def depth(
     seconds = time.perf_counter() - started if timing else None
     taken = names_of_others(light_field, with_sigma=maps.sigma is not None)
     others = (ALL_VIEWS, *taken) if all_views else ()
-    known = {} if digest is None else {DIGEST: digest.result()}
-    files = write_result(folder, light_field, maps, known, force=force, seconds=seconds, beside=others)
+    files = write_result(folder, light_field, maps, force=force, seconds=seconds, beside=others)
     if all_views:
         from sepi.applications.all_views import maps_of_all_views
         from sepi.io.all_views import write_all_views
@@ -161,16 +141,6 @@ def depth(
         click.echo(f"unknown: {100 * unknown:.2g} % of the pixels; no view knows anything about them")
     click.echo(_interval(maps, variant))
     click.echo(f"written to {folder}/: {' '.join(files)}")
-
-
-def _import_what_follows() -> None:
-    """Import what works on the light field and writes the result; where memory is short, that is told later."""
-    from sepi.memory import KERNELS, MORE_KERNELS, require_memory
-
-    with suppress(MemoryError):
-        require_memory(MORE_KERNELS if "numba" in sys.modules else KERNELS)
-        for name in _LATER:
-            import_module(name)
 
 
 def _also_as_taken(

@@ -52,7 +52,6 @@ def export(
       sepi export LF.mat lego --axes HWTSC --disparity-range -2 2
       sepi depth lego
     """
-    reading.begin(light_field_path)
     from sepi.inspection.disparity_range import settle_range
     from sepi.io.exported import require_room, write_exported
 

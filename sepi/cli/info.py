@@ -37,7 +37,6 @@ def info(light_field_path: Path, geometry: Geometry | None, reading: Reading, as
 
     INPUT is anything that 'sepi depth' reads, with the same flags. Rows and columns of views are counted from 0.
     """
-    reading.begin(light_field_path)
     from sepi.inspection.disparity_range import estimate_range
     from sepi.io.readers.formats import FORMATS, format_of
 
@@ -105,7 +104,6 @@ def check(context: click.Context, light_field_path: Path, reading: Reading, as_j
     is named that sets INPUT right. Exits with 1 where another order clearly fits better, with 2 where INPUT cannot be
     read.
     """
-    reading.begin(light_field_path)
     from sepi.inspection.row_spacing import settle_row_spacing
     from sepi.inspection.view_order import check_order
 

@@ -64,23 +64,11 @@ class Reading:
     file_format: str | None
     options: ReadOptions
 
-    def begin(self, path: Path) -> None:
-        """Have pictures decoded while Python imports what :meth:`read` needs, where all of a folder are read."""
-        from sepi.io.images import decode_ahead
-        from sepi.io.readers.options import ReadOptions
-
-        if self.file_format is None and self.options == ReadOptions():
-            decode_ahead(path)
-
     def read(self, path: Path, **more: Any) -> LightField:
         """The light field at ``path``, as :func:`sepi.read_light_field` reads it."""
-        from sepi.io import ahead
         from sepi.reading import read_light_field
 
-        try:
-            return read_light_field(path, file_format=self.file_format, options=self.options, **more)
-        finally:
-            ahead.end()
+        return read_light_field(path, file_format=self.file_format, options=self.options, **more)
 
 
 _FLAGS = (

@@ -2,11 +2,6 @@
 
 from __future__ import annotations
 
-import atexit
-import gc
-import os
-import sys
-import threading
 from collections import UserDict
 from importlib import import_module
 from typing import Any
@@ -14,11 +9,6 @@ from typing import Any
 import click
 
 from sepi.command import SepiGroup
-from sepi.openmp import prepare_numpy
-
-prepare_numpy()
-# libraries make some hundred thousand objects that stay: to go through them again and again takes a tenth of importing
-gc.set_threshold(100_000)
 
 _COMMANDS = {
     "calibrate": ("calibrate", "Find the cameras of pictures without poses, by COLMAP."),
@@ -94,29 +84,5 @@ def main() -> None:
 
 
 def run() -> None:
-    """The command as a process of its own, which is over as soon as everything is written.
-
-    Python would take apart what it has, object by object, whose memory goes back to the system anyway: a tenth of
-    ``sepi --help``.
-    """
-    try:
-        main(prog_name="sepi")
-    except SystemExit as end:
-        others = [thread for thread in threading.enumerate() if thread is not threading.main_thread()]
-        # profilers and the like write what they found when Python ends
-        watched = sys.gettrace() or sys.getprofile()
-        if isinstance(end.code, int) and all(thread.daemon for thread in others) and not watched:
-            _end_at_once(end.code)
-        raise
-
-
-def _end_at_once(code: int) -> None:
-    """End the process, or return where what was printed cannot be written, of which Python tells."""
-    # unfinished files are removed there, among others
-    atexit._run_exitfuncs()
-    try:
-        for stream in filter(None, (sys.stdout, sys.stderr)):
-            stream.flush()
-    except (OSError, ValueError):
-        return
-    os._exit(code)
+    """The command as a process of its own."""
+    main(prog_name="sepi")

@@ -18,14 +18,12 @@ import numpy as np
 import numpy.typing as npt
 
 from sepi.errors import SepiError
-from sepi.io import ahead
 from sepi.io.exr import exr_pixels
 from sepi.io.files import atomic_path, reading
 from sepi.io.picture_headers import Header, read_header
 from sepi.io.tiff import plain_pixels, unturned
 from sepi.lightfield import HIGHEST, LOWEST, BoolMap
-from sepi.meanwhile import wait_usefully
-from sepi.threads import available_cores, threads_used
+from sepi.threads import available_cores
 
 Pixels = npt.NDArray[np.integer[Any] | np.floating[Any]]
 
@@ -63,22 +61,8 @@ def read_picture(path: Path, *, any_floats: bool = False) -> Pixels:
         return _read(path, any_floats)
 
 
-def decode_ahead(folder: Path) -> None:
-    """Begin to decode the pictures of a folder of views, if it is one, for whoever reads them in a moment.
-
-    Only PNG: what decodes others may have warnings to tell. It is over with :func:`sepi.io.ahead.end`.
-    """
-    threads = threads_used() - 1
-    if threads > 0 and folder.is_dir():
-        with suppress(OSError):
-            # of a link one has to know whether it is to be followed
-            paths = sorted(path for path in folder.glob("*.png") if path.is_file() and not path.is_symlink())
-            ahead.begin(paths, _pixels, min(8, threads))
-
-
 def _read(path: Path, any_floats: bool = False) -> Pixels:
-    decoded = ahead.taken(path)
-    image = _pixels(path) if decoded is None else decoded
+    image = _pixels(path)
     if image.dtype == np.float32 and not any_floats and not (image.min() >= LOWEST and image.max() <= HIGHEST):
         what = f"{image.min():g} to {image.max():g}" if np.isfinite(image).all() else "NaN or infinite ones"
         raise SepiError(f"{path}: float pixels must be finite and within 0..1, got {what}; --white says what white is")
@@ -153,11 +137,9 @@ def read_views(
 
     # decoding runs outside Python's lock, so threads share the work
     with _no_warnings(), ThreadPoolExecutor(min(8, available_cores())) as pool:
-        filled = [pool.submit(fill, index) for index in range(len(paths))]
         try:
-            wait_usefully()
-            for one in filled:
-                one.result()
+            for _ in pool.map(fill, range(len(paths))):
+                pass
         except BaseException:
             # an interrupted command does not wait for the rest
             pool.shutdown(wait=False, cancel_futures=True)

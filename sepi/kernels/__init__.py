@@ -7,6 +7,7 @@ bytes on any number of threads and on any processor.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from importlib import import_module
 from importlib.util import find_spec
 
@@ -17,3 +18,9 @@ _native = import_module(f"{__name__}.baseline._native")
 if _native.has_x86_64_v3() and find_spec(f"{__name__}.x86_64_v3"):
     _native = import_module(f"{__name__}.x86_64_v3._native")
 globals().update({name: part for name, part in vars(_native).items() if not name.startswith("__")})
+
+thread_count: Callable[[], int] = _native.thread_count
+"""Threads of a loop, the caller's among them."""
+
+set_thread_count: Callable[[int], None] = _native.set_thread_count
+"""Have each loop use so many threads."""

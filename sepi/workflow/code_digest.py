@@ -15,6 +15,7 @@ Snakemake sees the shell command of a rule, not the modules that the command imp
 - not what is told of the rendered scenes, since to render them takes long;
 - the syntax tree without docstrings, texts of help and descriptions of parameters: neither these nor comments nor
   layout count, and every version of Python gives the same digest;
+- of kernels, the source of each that it imports and the headers which that includes, without comments and layout;
 - not other libraries: a new version of numpy reruns nothing.
 
 No stage imports another stage, so a change in one leaves the others' digests as they are.
@@ -28,6 +29,7 @@ from __future__ import annotations
 import ast
 import hashlib
 import json
+import re
 from collections.abc import Iterator
 from contextlib import suppress
 from functools import cache
@@ -69,6 +71,7 @@ _ALTERNATIVES = (
         )
     ),
 )
+_HEADER = ".hpp"
 # what is told to people alone: words of calls, and what the rendered scenes are
 _TOLD = ("help", "description")
 _TELLING = "rendered.catalogue"
@@ -146,8 +149,13 @@ def _is_alternative(module: str) -> bool:
 
 @cache
 def _file_of(module: str, root: Path) -> Path | None:
-    path = root.joinpath(*module.split("."))
-    return next(filter(Path.is_file, (path.with_name(f"{path.name}.py"), path / "__init__.py")), None)
+    *above, name = module.removesuffix(_HEADER).split(".")
+    folder = root.joinpath(*above)
+    if module.endswith(_HEADER):
+        return folder / f"{name}{_HEADER}"
+    # kernels stand beside what calls them, and are imported from one place
+    kernels = folder.parent.glob(f"*/kernels/{name}.cpp") if folder.name == "kernels" else ()
+    return next(filter(Path.is_file, (folder / f"{name}.py", folder / name / "__init__.py", *kernels)), None)
 
 
 @cache
@@ -159,11 +167,25 @@ def _code_and_imports(module: str, root: Path) -> tuple[str, frozenset[str]]:
     source = file.read_bytes()
     digest = hashlib.sha256(source).hexdigest()
     if module not in _read or _read[module][0] != digest:
-        _read[module] = digest, _code_and_names(source, file)
+        of_kind = _code_and_names if file.suffix == ".py" else _code_and_headers
+        _read[module] = digest, of_kind(source, file)
     code, named = _read[module][1]
     package = module if file.name == "__init__.py" else module.rpartition(".")[0]
     imports = {name for level, base, names in named for name in _imported(level, base, names, package, root)}
     return code, frozenset(name for name in imports if name.split(".")[0] == module.split(".")[0])
+
+
+def _code_and_headers(source: bytes, file: Path) -> _Code:
+    """A digest of a C++ source without comments and layout, and the headers of the project that it includes."""
+    text = re.sub(r"//[^\n]*|/\*.*?\*/", " ", source.decode(), flags=re.DOTALL)
+    package = next(folder for folder in file.parents if folder.name == "kernels").parents[1]
+    named: list[tuple[int, str, list[str]]] = []
+    for include in re.findall(r'^#include "(.+)\.hpp"', text, re.MULTILINE):
+        # beside it, or in the package
+        near = file.parent / f"{include}{_HEADER}"
+        place = near if near.is_file() else package / f"{include}{_HEADER}"
+        named.append((0, ".".join(place.relative_to(package.parent).with_suffix("").parts) + _HEADER, []))
+    return hashlib.sha256(" ".join(text.split()).encode()).hexdigest(), named
 
 
 def _code_and_names(source: bytes, file: Path) -> _Code:

@@ -10,7 +10,6 @@ import atexit
 import gc
 import importlib
 import os
-import pkgutil
 import runpy
 import selectors
 import shutil
@@ -24,20 +23,11 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import NamedTuple
 
-from sepi.openmp import FOR_NUMPY, wait_asleep
+from sepi.variants import STAGES
 from sepi.workflow.job_client import TAKEN
 
-# what most jobs import: libraries with parts that they import late, and what the stages have in common
-_LIBRARIES = (
-    # numba reads a file of a job's folder with it
-    "yaml",
-    "cv2", "h5py", "skimage.segmentation.slic_superpixels", "scipy.sparse.linalg", "scipy.fft", "scipy.ndimage",
-    "pyamg", "pydantic.fields",
-)  # fmt: skip
-_COMMON = ("sepi.command", "sepi.variants", "sepi.io.hdf5", "sepi.io.provenance", "sepi.exposure", "sepi.memory")
-# what some jobs import beside, which is loaded when the first of them comes: start of a module's name to libraries
-_OF_SOME = {"sepi.report.": ("matplotlib.figure", "matplotlib.backends.backend_agg", "matplotlib.backends.backend_pdf")}
-_ALGORITHMS = ("sepi.matching", "sepi.boundaries", "sepi.regularization", "sepi.error_bars")
+# what takes long to import, and stages import when they use it
+_LIBRARIES = ("skimage.segmentation.slic_superpixels", "scipy.sparse.linalg", "scipy.ndimage", "pyamg")
 
 # how the work of this process ended
 _codes: list[int] = []
@@ -120,7 +110,7 @@ def start_server(command: Sequence[str], environment: Mapping[str, str]) -> Serv
             stdin=listener.fileno(),
             stdout=given.fileno(),
             # threads do not outlive a fork
-            env={**FOR_NUMPY, **os.environ, **environment, "OPENBLAS_NUM_THREADS": "1"},
+            env={**os.environ, **environment, "OPENBLAS_NUM_THREADS": "1"},
             # signals of a terminal reach a fork by its client alone
             start_new_session=True,
         )
@@ -179,8 +169,6 @@ class Job(NamedTuple):
         os.chdir(self.folder)
         os.environ.clear()
         os.environ.update(self.environment)
-        if "numba" in sys.modules:
-            importlib.import_module("numba.core.config").reload_config()
         try:
             yield
             _codes.append(0)
@@ -313,12 +301,8 @@ class JobServer:
 
 def _load() -> None:
     """Import what jobs share, and start no thread, which would not outlive a fork."""
-    for name in (*_LIBRARIES, *_COMMON):
+    for name in (*_LIBRARIES, *(f"sepi.{stage}" for stage in STAGES)):
         importlib.import_module(name)
-    for name in _ALGORITHMS:
-        for module in pkgutil.iter_modules(importlib.import_module(name).__path__, f"{name}."):
-            importlib.import_module(module.name)
-    importlib.import_module("sepi.compiled").prepare_loading()
     # pydantic looks for plugins as it makes its first model
     importlib.import_module("sepi.stage").NoParameters()
     # which every job tells
@@ -327,26 +311,18 @@ def _load() -> None:
     gc.freeze()
 
 
-def _load_for(job: Job) -> None:
-    """Import what a job and others like it need."""
-    _, module, *_ = job.words
-    for name in (name for start, names in _OF_SOME.items() if module.startswith(start) for name in names):
-        importlib.import_module(name)
-
-
 def _run(job: Job) -> None:
     """Do a job in this process as Python would."""
     _, module, *sys.argv[1:] = job.words
     # run anew as the main one, as ever, where others have imported it
     sys.modules.pop(module, None)
     with job.entered():
-        wait_asleep()
         runpy.run_module(module, run_name="__main__", alter_sys=True)
 
 
 if __name__ == "__main__":
     end_forks_at_once()
     _load()
-    job = serve(_load_for)
+    job = serve()
     if job is not None:
         _run(job)
