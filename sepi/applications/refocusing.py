@@ -23,7 +23,7 @@ import numpy as np
 from sepi.errors import SepiError
 from sepi.image.noise import noise_level, variance_of_residuals
 from sepi.lightfield import BoolMap, FloatMap, LightField, as_unit_float, require_light_field
-from sepi.matching.nearest_surfaces import nearest_surfaces
+from sepi.matching.nearest_surfaces import EMPTY, nearest_surfaces, z_buffers
 from sepi.matching.row_bands import Rows
 from sepi.matching.sheared_views import ShearedViews
 from sepi.stage import Progress, StageMaps, no_progress
@@ -294,7 +294,6 @@ def _filled_between(
 ) -> FloatMap:
     """Sheared views ``(N, 3, H, W)`` of one row of the grid, each with the views round it."""
     from sepi.applications.refocusing_kernels import fill_between
-    from sepi.matching.visibility_kernels import z_buffers
 
     height, width = light_field.shape
     baselines, cell = light_field.baselines, _cell(light_field)
@@ -316,8 +315,6 @@ def _without_holes(nearest: FloatMap, otherwise: float) -> FloatMap:
 
     What is farther inside than holes usually reach gets the disparity ``otherwise``.
     """
-    from sepi.matching.visibility_kernels import EMPTY
-
     empty = nearest == EMPTY
     found = np.where(empty, np.float32(np.inf), nearest)
     if empty.any():

@@ -8,8 +8,16 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from sepi.kernels import LANES
+from sepi.kernels import visibility as kernels
 from sepi.lightfield import BoolMap, FloatMap, LightField
 from sepi.matching.row_bands import Rows
+
+EMPTY: float = kernels.EMPTY
+"""Disparity in a z-buffer where no pixel of the reference view falls: nothing is nearer."""
+
+MISSING: float = kernels.MISSING
+"""The same where the view shows nothing: not even a view that hides a pixel counts less."""
 
 
 def nearest_surfaces(light_field: LightField, disparity: FloatMap | None, present: BoolMap, rows: Rows) -> FloatMap:
@@ -28,21 +36,51 @@ def nearest_surfaces(light_field: LightField, disparity: FloatMap | None, presen
     Returns
     -------
     ndarray, shape (T, S, n, W), float32
-        From :func:`sepi.matching.visibility_kernels.z_buffers`, with ``MISSING`` at pixels that a view does not show,
-        and beside them, since a sample that lies between pixels reads them, too.
+        From :func:`z_buffers`, with ``MISSING`` at pixels that a view does not show, and beside them, since a sample
+        that lies between pixels reads them, too.
     """
-    from sepi.matching.visibility_kernels import EMPTY, MARGIN, MISSING, z_buffers
-
     if disparity is None:
-        shape = *light_field.grid, rows.high - rows.low, light_field.shape[1]
-        nearest = np.full(math.prod(shape) + MARGIN, EMPTY, np.float32)[:-MARGIN].reshape(shape)
+        nearest = _with_margin(*light_field.grid, rows.high - rows.low, light_field.shape[1])
+        nearest[:] = EMPTY
     else:
         nearest = z_buffers(disparity, present, light_field.baselines, *rows)
     if light_field.missing is not None:
         for t, s in np.argwhere(present & light_field.missing.any(axis=(2, 3))).tolist():
             beside = cv2.dilate(light_field.missing[t, s].astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
             nearest[t, s][beside[rows.low : rows.high]] = MISSING
-    return np.asarray(nearest)
+    return nearest
+
+
+def z_buffers(
+    disparity: FloatMap, present: BoolMap, baselines: npt.NDArray[np.float64], low: int, high: int
+) -> FloatMap:
+    """Disparity map of the reference view as each view sees it: the nearest of the pixels that touch a position.
+
+    Parameters
+    ----------
+    disparity : ndarray, shape (H, W), float32
+        Pixels per view step.
+    present : ndarray, shape (T, S), bool
+        Other views are left empty: their values are undefined.
+    baselines : ndarray, shape (T, S, 2), float64
+        Down and across from the reference view, in view steps.
+    low, high : int
+        The rows of the views that are wanted.
+
+    Returns
+    -------
+    ndarray, shape (T, S, high - low, W), float32
+        ``EMPTY`` where no pixel falls. A pixel occludes the up to four positions that its square touches, since a
+        bilinear sample beside it reads its colour too.
+    """
+    nearest = _with_margin(*present.shape, high - low, disparity.shape[1])
+    kernels.z_buffers(np.ascontiguousarray(disparity), present, baselines, low, high, nearest)
+    return nearest
+
+
+def _with_margin(*shape: int) -> FloatMap:
+    """An array, not initialised, and the numbers behind it that vectors reach into."""
+    return np.empty(math.prod(shape) + LANES, np.float32)[:-LANES].reshape(shape)
 
 
 def shown_columns(light_field: LightField) -> npt.NDArray[np.int64]:

@@ -5,7 +5,7 @@ The straight line through a SEPI meets one sample of every view, so Eq. 3 of [1]
 ``(y - d v, x - d u)``. One ``(d, view)`` has one sub-pixel weight for the whole image, so a row is a run
 of contiguous multiply-adds that vectorises. Views are summed in *groups* (all of them for a SEPI; the parts from which
 half-SEPIs are put together), so one pass serves full and half SEPIs alike.
-The compiled loops are in :mod:`sepi.matching.plane_sweep_kernels`.
+The compiled loops are in ``kernels/plane_sweep.cpp``.
 
 References
 ----------
@@ -23,6 +23,8 @@ import numpy.typing as npt
 from pydantic import Field
 
 from sepi.image.noise import residual_variance
+from sepi.kernels import LANES
+from sepi.kernels import plane_sweep as kernels
 from sepi.lightfield import BoolMap, FloatMap, LightField, full_scale
 from sepi.matching.candidates import CandidateParameters, CandidateRule, number_field
 from sepi.matching.denoising import sure_noise
@@ -38,9 +40,6 @@ CANDIDATES = CandidateRule(usual=181, finest=0.02, coarsest=0.5)
 
 TILE_WIDTH = 512
 """Columns done at a time: bounds what a thread holds, whatever the width of the picture, and keeps it in the cache."""
-
-MARGIN = 8
-"""Columns beyond the picture that vectors reach into: see :mod:`sepi.vectors`."""
 
 NOISE_LEFT_OUT = 0.9
 """Of the cost that noise alone makes, what confidence leaves out, at most: with all of it, where there is nothing but
@@ -87,7 +86,7 @@ class SweepParameters(CandidateParameters):
         """What :func:`sweep` takes beside views and maps: the views by channel, and what each thread holds."""
         height, width = light_field.shape
         busy = min(threads, -(-height // _rows_at_a_stretch(height, threads)))
-        views = light_field.views.dtype.itemsize * 3 * math.prod((*light_field.grid, height, width + MARGIN))
+        views = light_field.views.dtype.itemsize * 3 * math.prod((*light_field.grid, height, width + LANES))
         return views + busy * self.thread_bytes(self.number(light_field), width)
 
     def thread_bytes(self, number: int, width: int) -> int:
@@ -96,8 +95,8 @@ class SweepParameters(CandidateParameters):
         Those are the costs and the numbers of samples in the rows of a window, and the costs of one row more, of every
         candidate and group; and the weights of the windows of a row.
         """
-        size, columns, vectors = 2 * self.window_radius + 1, min(width, TILE_WIDTH), -(-number // MARGIN)
-        of_rows = (2 * size + 1) * (columns + 2 * self.window_radius + MARGIN) * self.groups * vectors * MARGIN
+        size, columns, vectors = 2 * self.window_radius + 1, min(width, TILE_WIDTH), -(-number // LANES)
+        of_rows = (2 * size + 1) * (columns + 2 * self.window_radius + LANES) * self.groups * vectors * LANES
         return 4 * (of_rows + size * size * columns)
 
 
@@ -132,13 +131,11 @@ class SweepResult:
 
 
 def planar(light_field: LightField) -> npt.NDArray[np.generic]:
-    """Views as ``(T, S, 3, H, W + MARGIN)``, each channel's rows contiguous, in their own number type."""
-    from sepi.matching.plane_sweep_kernels import planes_of
-
+    """Views as ``(T, S, 3, H, W + LANES)``, each channel's rows contiguous, in their own number type."""
     views = light_field.rgb_views
     T, S, H, W, _ = views.shape
-    planes = np.zeros((T, S, 3, H, W + MARGIN), views.dtype)
-    planes_of(views, planes)
+    planes = np.zeros((T, S, 3, H, W + LANES), views.dtype)
+    kernels.planes_of(views, planes)
     return planes
 
 
@@ -178,8 +175,6 @@ def sweep(
     SepiError
         If the disparity range is unknown.
     """
-    from sepi.matching.plane_sweep_kernels import sweep_plane_rows
-
     H, W = light_field.shape
     groups = np.zeros(light_field.grid, np.int64) if groups is None else groups
     groups = np.where(light_field.present, groups, -1)
@@ -196,7 +191,7 @@ def sweep(
     disparities = parameters.candidates(light_field)
     candidates = sampled_candidates(disparities, light_field.baselines)
     to_correct = parameters.noise_to_correct(light_field)
-    expected = expected_costs(light_field, to_correct, candidates, groups, subsets, squared_scale, MARGIN)
+    expected = expected_costs(light_field, to_correct, candidates, groups, subsets, squared_scale, LANES)
     guide = np.ascontiguousarray(light_field.reference_view.transpose(2, 0, 1))
     window = Window(guide, parameters.window_radius, np.float32(parameters.window_sigma**2 + noise))
     maps = BestMaps(*(np.full((len(subsets), H, W), np.nan, np.float32) for _ in range(3)))
@@ -204,7 +199,7 @@ def sweep(
     strip = height * threads_used()
     for begin in range(0, H, strip):
         end = min(H, begin + strip)
-        sweep_plane_rows(views, candidates, window, expected, mask, begin, end, height, TILE_WIDTH, maps)
+        kernels.sweep_plane_rows(views, candidates, window, expected, mask, begin, end, height, TILE_WIDTH, maps)
         progress(end / H)
     return SweepResult(*maps, expected.anywhere)
 

@@ -3,7 +3,7 @@
 The volume is averaged over a small window with weights that fall quickly with the difference of colour, so that edges
 stay where the colours change, and then smoothed along eight paths: a change by one candidate costs ``small_penalty``,
 a larger one ``large_penalty``, which is weakened where the colours change. The compiled loops are in
-:mod:`sepi.matching.semi_global_kernels`.
+``kernels/semi_global.cpp``.
 
 References
 ----------
@@ -20,6 +20,8 @@ from typing import Annotated, Self
 import numpy as np
 from pydantic import Field
 
+from sepi.kernels import LANES
+from sepi.kernels import semi_global as kernels
 from sepi.lightfield import FloatMap
 from sepi.stage import Parameters
 
@@ -120,13 +122,11 @@ class CostVolumes:
     """
 
     def __init__(self, candidates: int, shape: tuple[int, int]) -> None:
-        from sepi.matching.semi_global_kernels import VECTOR
-
-        self._shape, self._vector = shape, VECTOR
+        self._shape = shape
         self._costs, self._averaged = np.empty((2, self._padded(candidates) * shape[0] * shape[1]), np.float32)
 
     def _padded(self, candidates: int) -> int:
-        return -(-candidates // self._vector) * self._vector
+        return -(-candidates // LANES) * LANES
 
     def costs(self, candidates: int) -> FloatMap:
         """Room for the costs of so many candidates, (K, H, W)."""
@@ -162,17 +162,14 @@ def smooth_and_choose(
     -------
     SmoothedResult
     """
-    from sepi.matching.semi_global_kernels import aggregate, choose, semi_global
-
-    variance = np.float32(parameters.window_sigma**2 + contrast)
+    variance = parameters.window_sigma**2 + contrast
     averaged, smoothed = volumes.averaged_and_smoothed(len(disparities))
-    aggregate(volumes.costs(len(disparities)), guide, parameters.window_radius, variance, averaged)
-    small, large, weakening = map(
-        np.float32, (parameters.small_penalty, parameters.large_penalty, parameters.colour_weakening)
-    )
+    kernels.aggregate(volumes.costs(len(disparities)), guide, parameters.window_radius, variance, averaged)
+    penalties = parameters.small_penalty, parameters.large_penalty, parameters.colour_weakening
     band = max(1, BAND_BYTES // (2 * averaged[0].nbytes))
-    semi_global(averaged, guide, small, large, weakening, band, smoothed)
+    kernels.semi_global(averaged, guide, *penalties, band, smoothed)
     same = min(SAME_MINIMUM, SAME_SHARE * float(disparities[-1] - disparities[0]))
-    disparity, margin = choose(smoothed, averaged, disparities, np.float32(same))
+    disparity, margin = np.empty((2, *guide.shape[:2]), np.float32)
+    kernels.choose(smoothed, averaged, disparities, same, disparity, margin)
     margin = np.maximum(margin, 0)
     return SmoothedResult(disparity, (margin / (margin + np.float32(HALF_CONFIDENT))).astype(np.float32))

@@ -22,6 +22,7 @@ from collections.abc import Iterator
 import numpy as np
 import numpy.typing as npt
 
+from sepi.kernels import sheared_views as kernels
 from sepi.lightfield import BoolMap, FloatMap, LightField, as_unit_float, require_light_field
 
 
@@ -98,9 +99,7 @@ class ShearedViews:
         ndarray, shape (N, 3, H, W), float32
             Colours in 0..1 (cubic convolution overshoots a little). The array is made anew by the next call.
         """
-        from sepi.matching.sheared_views_kernels import shear
-
-        shear(self._colours, -disparity * self.baselines, self._cubic, self._sheared)
+        kernels.shear(self._colours, -disparity * self.baselines, self._cubic, self._sheared)
         return self._sheared
 
     def over(self, disparities: FloatMap) -> Iterator[tuple[int, FloatMap]]:

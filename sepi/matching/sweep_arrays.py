@@ -1,6 +1,6 @@
 """Arrays that plane sweeps work on, in named groups: what their kernels take.
 
-Compiled functions know their fields by name; they make none themselves.
+In C++ each is a struct of the same fields in the same order.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ class ViewStack(NamedTuple):
     Attributes
     ----------
     colours : ndarray, shape (T, S, 3, H, W + margin), uint8, uint16 or float32
-        The margin is that of :mod:`sepi.vectors`.
+        The margin is :data:`sepi.kernels.LANES`.
     t0, s0 : int
         Position of the reference view.
     groups : ndarray, shape (T, S), int64
@@ -116,6 +116,38 @@ class BestMaps(NamedTuple):
     disparity: FloatMap
     cost: FloatMap
     mean: FloatMap
+
+
+class Visibility(NamedTuple):
+    """In which views a pixel is seen.
+
+    Attributes
+    ----------
+    nearest : ndarray, shape (T, S, n, W) or (T, S, n, 0), float32
+        From :func:`sepi.matching.nearest_surfaces.nearest_surfaces`; empty: all views see all pixels. In memory there
+        are :data:`sepi.kernels.LANES` numbers more behind it.
+    low : int
+        First row of ``nearest``.
+    occlusion_margin : float32
+        By how much an occluder must be nearer, pixels per view step.
+    occluded_view_weight : float32
+        Weight of a view in which the pixel is occluded; none where the view has no pixel.
+    some_missing : bool
+        Whether there are such places.
+    """
+
+    nearest: FloatMap
+    low: int
+    occlusion_margin: np.float32
+    occluded_view_weight: np.float32
+    some_missing: bool
+
+
+class RobustCost(NamedTuple):
+    """Square of the robust scale, and share in the cost, of colours and of detail; shape (2,), float32."""
+
+    scales2: FloatMap
+    shares: FloatMap
 
 
 def sampled_candidates(disparities: FloatMap, baselines: npt.NDArray[np.float64]) -> Candidates:

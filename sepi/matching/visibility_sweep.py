@@ -4,18 +4,19 @@ A view sees pixel ``p`` at candidate ``d`` unless something nearer than ``d`` oc
 seen. What occludes it is known from a first depth map: each view gets a z-buffer of that map. This is the idea of the
 half-SEPI, with the part of the views chosen view by view. All maps but the last only tell what is hidden where: a few
 views, spread over the grid, and every other candidate are enough for them. The compiled loops are in
-:mod:`sepi.matching.visibility_kernels`.
+``kernels/visibility.cpp``.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from pydantic import Field
 
 from sepi.image.noise import variance_of_residuals
+from sepi.kernels import visibility as kernels
 from sepi.lightfield import BoolMap, FloatMap, LightField
 from sepi.matching.base_detail import (
     BaseDetailParameters,
@@ -27,15 +28,12 @@ from sepi.matching.base_detail import (
 from sepi.matching.candidates import CandidateParameters, CandidateRule, number_field
 from sepi.matching.denoising import DenoisedLightField, guide_of
 from sepi.matching.gaps import GapParameters, with_open_gaps
-from sepi.matching.nearest_surfaces import nearest_surfaces
+from sepi.matching.nearest_surfaces import EMPTY, nearest_surfaces, z_buffers
 from sepi.matching.row_bands import Band, row_bands
 from sepi.matching.semi_global import CostVolumes, SmallPenalty, SmoothedResult, SmoothingParameters, smooth_and_choose
-from sepi.matching.sweep_arrays import sampled_candidates
+from sepi.matching.sweep_arrays import RobustCost, Visibility, sampled_candidates
 from sepi.matching.view_subsets import spread_views
 from sepi.stage import Needs, Progress
-
-if TYPE_CHECKING:
-    from sepi.matching.visibility_kernels import Visibility
 
 ROWS_PER_REPORT = 128
 """Rows of the picture between two calls of the progress function."""
@@ -211,17 +209,15 @@ def occluded_in_any_view(
     -------
     ndarray, shape (H, W), bool
     """
-    from sepi.matching import visibility_kernels as kernels
-
     baselines = light_field.baselines
     occluded = np.empty(light_field.shape, bool)
     for begin, end, rows in row_bands(light_field, present, float(np.abs(disparity).max()), BYTES_PER_PIXEL):
-        nearest = kernels.z_buffers(disparity, present, baselines, *rows)
+        nearest = z_buffers(disparity, present, baselines, *rows)
         if light_field.missing is not None:
             # a view that does not show a place cannot see a pixel there
-            nearest[light_field.missing[:, :, rows.low : rows.high]] = kernels.EMPTY
-        occluded[begin:end] = kernels.occluded_in_any_view(
-            disparity, present, baselines, nearest, rows.low, np.float32(occlusion_margin), begin, end
+            nearest[light_field.missing[:, :, rows.low : rows.high]] = EMPTY
+        kernels.occluded_in_any_view(
+            disparity, present, baselines, nearest, rows.low, occlusion_margin, begin, end, occluded[begin:end]
         )
     return occluded
 
@@ -292,8 +288,6 @@ def _add_costs(
     done: Callable[[int], None],
 ) -> None:
     """Cost of every candidate, 0..1, for the rows of a band, into ``cost (K, H, W)``."""
-    from sepi.matching.visibility_kernels import RobustCost, sweep_visible_rows
-
     views = base_detail_decomposition(light_field, parameters, band.rows, present)
     if mean is not None:
         views = compared_with(views, mean, parameters, band.rows)
@@ -303,7 +297,7 @@ def _add_costs(
     candidates = sampled_candidates(disparities, light_field.baselines)
     for begin in range(band.begin, band.end, ROWS_PER_REPORT):
         end = min(band.end, begin + ROWS_PER_REPORT)
-        sweep_visible_rows(views, visibility, robust, candidates, begin, end, cost)
+        kernels.sweep_visible_rows(views, visibility, robust, candidates, begin, end, cost)
         done(end)
 
 
@@ -315,8 +309,6 @@ def _visibility(
     band: Band,
 ) -> Visibility:
     """In which views the pixels of a band are seen: in all of them where no map tells."""
-    from sepi.matching.visibility_kernels import Visibility
-
     low, high = band.rows
     if disparity is None or not isinstance(parameters, VisibleViewsParameters):
         everywhere = np.empty((*light_field.grid, high - low, 0), np.float32)

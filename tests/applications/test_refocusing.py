@@ -237,7 +237,7 @@ def test_gaps_are_as_wide_as_the_views_stand_apart(geometry: str) -> None:
 
 def test_holes_show_the_farthest_beside_them() -> None:
     """What comes into sight behind an object belongs to the background."""
-    from sepi.matching.visibility_kernels import EMPTY
+    from sepi.matching.nearest_surfaces import EMPTY
 
     nearest = np.full((9, 60), -0.5, np.float32)
     nearest[:, 30:] = 2

@@ -20,7 +20,7 @@ from sepi.boundaries.rim_kernels import Rim, rim_of
 from sepi.boundaries.surface_shares import _views_alike as views_alike
 from sepi.boundaries.surroundings import surroundings
 from sepi.lightfield import LightField
-from sepi.matching.visibility_kernels import z_buffers
+from sepi.matching.nearest_surfaces import z_buffers
 from sepi.scenes import render
 from sepi.workspace import Workspace
 

@@ -133,10 +133,10 @@ class Interpolated:
         self.pictures = pictures
 
     def by(self, offsets: np.ndarray) -> np.ndarray:
-        from sepi.matching.sheared_views_kernels import shear
+        from sepi.kernels import sheared_views
 
         out = np.empty((len(offsets), *self.pictures.shape), np.float32)
-        shear(np.broadcast_to(self.pictures, out.shape).copy(), offsets, self.cubic, out)
+        sheared_views.shear(np.broadcast_to(self.pictures, out.shape).copy(), offsets, self.cubic, out)
         return out
 
 

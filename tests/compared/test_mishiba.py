@@ -24,8 +24,8 @@ from sepi.compared.mishiba import (
     selected_views,
 )
 from sepi.compared.mishiba_kernels import keep_least, median_pass, pair_costs
+from sepi.kernels import sheared_views
 from sepi.lightfield import LightField
-from sepi.matching.sheared_views_kernels import shear
 from sepi.pipeline import estimate_depth
 from sepi.scenes import render
 from sepi.stage import StageMaps, no_progress
@@ -39,7 +39,7 @@ def bits(light_field: LightField, views: npt.NDArray[np.bool_], disparity: float
     """Features of the views sheared by a disparity, by a kernel that goes on beyond borders; (N, H, W)."""
     maps = details(light_field, views, PARAMETERS.feature_sigma)[:, None]
     sheared = np.empty_like(maps)
-    shear(maps, -disparity * light_field.baselines[views], True, sheared)
+    sheared_views.shear(maps, -disparity * light_field.baselines[views], True, sheared)
     return sheared[:, 0] > 0
 
 
@@ -232,7 +232,7 @@ def test_one_bit_features_do_not_see_brightness() -> None:
     maps = np.array([changed.views[t, s].transpose(2, 0, 1) for t, s in np.argwhere(views)])
     sheared, costs = np.empty_like(maps), []
     for disparity in disparities.tolist():
-        shear(maps, -disparity * changed.baselines[views], True, sheared)
+        sheared_views.shear(maps, -disparity * changed.baselines[views], True, sheared)
         costs.append(sheared.var(axis=0).sum(axis=0))
     plain = error_of_costs(np.array(costs), changed)
     assert plain > 8 * after

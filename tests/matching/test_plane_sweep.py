@@ -1,12 +1,7 @@
 """The plane sweep equals a plain NumPy twin, the paper's SEPI construction, and itself on any number of threads."""
 
-import os
-import subprocess
-import sys
 from itertools import product
-from pathlib import Path
 
-import numba
 import numpy as np
 import pytest
 from geometries import GEOMETRIES, standing
@@ -15,14 +10,13 @@ from several_threads import several_threads
 
 from sepi.errors import SepiError
 from sepi.image.noise import noise_level, residual_variance
+from sepi.kernels import plane_sweep, set_thread_count
 from sepi.lightfield import DisparityRange, LightField
 from sepi.matching.denoising import sure_noise
 from sepi.matching.expected_costs import expected_costs
-from sepi.matching.nearest_surfaces import shown_columns
-from sepi.matching.plane_sweep import MARGIN, TILE_WIDTH, SweepParameters, planar, sweep
-from sepi.matching.plane_sweep_kernels import SHORTEST_GAP, Run, cost_row
+from sepi.matching.plane_sweep import TILE_WIDTH, SweepParameters, sweep
 from sepi.matching.stitched_epi import line_cost, stitched_epi
-from sepi.matching.sweep_arrays import ViewStack, sampled_candidates
+from sepi.matching.sweep_arrays import sampled_candidates
 from sepi.matching.view_subsets import HALVES_AND_QUARTERS, halves_and_quarters
 from sepi.scenes import render
 
@@ -207,41 +201,28 @@ def test_equal_bytes_for_any_number_of_threads():
     parameters = SweepParameters(num_disparities=31)
     views = halves_and_quarters(light_field)
     scattered = np.random.default_rng(0).random(light_field.shape) < 0.01
-    before = numba.get_num_threads()
     for subsets, mask in ((None, None), (views.subsets, scattered)):
         results = []
         try:
             # the number of threads decides how the rows are shared out
             for number in (1, several_threads()):
-                numba.set_num_threads(number)
+                set_thread_count(number)
                 groups = None if subsets is None else views.groups
                 results.append(sweep(light_field, parameters, groups=groups, subsets=subsets, mask=mask))
         finally:
-            numba.set_num_threads(before)
+            set_thread_count(several_threads())
         for name in ("disparity", "cost", "mean"):
             np.testing.assert_array_equal(getattr(results[0], name), getattr(results[1], name))
 
 
-def test_candidates_done_together_equal_candidates_done_alone():
-    """Dense candidates share the pixels that they read: a weight of one used for the other would blur the minimum."""
+def test_dense_candidates_equal_the_numpy_twin():
+    """They share the pixels that they read: a weight of one used for the other would blur the minimum."""
     light_field = random_light_field(shape=(20, 40))
-    disparities = np.linspace(-1.3, 1.3, 61).astype(np.float32)
-    groups = halves_and_quarters(light_field).groups
-    views = ViewStack(
-        planar(light_field), 2, 2, groups, np.eye(9, dtype=bool), np.float32(900), shown_columns(light_field)
-    )
-    candidates = sampled_candidates(disparities, light_field.baselines)
+    parameters = SweepParameters(num_disparities=61, scale=0.3, window_radius=0, window_sigma=0.5)
+    candidates = sampled_candidates(parameters.candidates(light_field), light_field.baselines)
     shared = (np.diff(candidates.down) == 0).mean() * (np.diff(candidates.across) == 0).mean()
     assert 0.5 < shared < 1, "some candidates read the same pixels, some do not"
-    together, alone = np.empty((2, 9, 61, 40 + MARGIN), np.float32)
-    for y in (0, 9, 19):
-        run = Run(y, 0, 40)
-        cost_row(views, candidates, run, together)
-        for k in range(61):
-            single = np.empty((9, 1, 40 + MARGIN), np.float32)
-            cost_row(views, sampled_candidates(disparities[k : k + 1], light_field.baselines), run, single)
-            alone[:, k] = single[:, 0]
-        np.testing.assert_allclose(together[..., :40], alone[..., :40], rtol=1e-5, atol=1e-5)
+    sweep_and_twin(light_field, parameters, range(len(HALVES_AND_QUARTERS)))
 
 
 def test_pixels_outside_the_mask_stay_unknown_and_those_inside_unchanged():
@@ -256,10 +237,11 @@ def test_pixels_outside_the_mask_stay_unknown_and_those_inside_unchanged():
 
 def test_pixels_far_apart_equal_the_whole_picture():
     """Columns between are passed over: a window cut short there would change the depth of the pixels beside."""
-    light_field = random_light_field(grid=(3, 3), shape=(9, 4 * SHORTEST_GAP))
+    gap = plane_sweep.SHORTEST_GAP
+    light_field = random_light_field(grid=(3, 3), shape=(9, 4 * gap))
     parameters = SweepParameters(num_disparities=5, scale=0.3, window_radius=2, window_sigma=0.5)
     mask = np.zeros(light_field.shape, bool)
-    mask[[0, 3, 3, 8], [5, 4, 2 * SHORTEST_GAP, 4 * SHORTEST_GAP - 1]] = True
+    mask[[0, 3, 3, 8], [5, 4, 2 * gap, 4 * gap - 1]] = True
     some, whole = sweep(light_field, parameters, mask=mask), sweep(light_field, parameters)
     for name in ("disparity", "cost", "mean"):
         np.testing.assert_array_equal(getattr(some, name)[0][mask], getattr(whole, name)[0][mask])
@@ -296,22 +278,3 @@ def test_noise_level_is_the_noise_put_in():
             noisy[20:80, 3:97] = level
             assert noise_level(noisy) == pytest.approx(sigma, rel=0.1)
     assert noise_level(np.zeros_like(image)) == 0
-
-
-def test_kernels_are_compiled_once():
-    """A job that compiles takes half a minute instead of a second."""
-    # the same kernel: if nobody has compiled it yet, it is compiled now
-    sweep(random_light_field((3, 3), (8, 9), channels=1), SweepParameters(num_disparities=3))
-    program = (
-        "import numpy as np\n"
-        "from sepi.lightfield import DisparityRange, LightField\n"
-        "from sepi.matching.plane_sweep import SweepParameters, sweep\n"
-        "from sepi.matching.plane_sweep_kernels import sweep_plane_rows\n"
-        "views = np.random.default_rng(0).integers(0, 255, (3, 3, 8, 9, 1), np.uint8)\n"
-        "light_field = LightField(views, 'x', disparity_range=DisparityRange(-1, 1, 'given'))\n"
-        "sweep(light_field, SweepParameters(num_disparities=3))\n"
-        "print(sum(sweep_plane_rows.stats.cache_hits.values()), sum(sweep_plane_rows.stats.cache_misses.values()))\n"
-    )
-    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
-    said = subprocess.run([sys.executable, "-c", program], env=environment, check=True, capture_output=True, text=True)
-    assert said.stdout.split() == ["1", "0"]

@@ -1,13 +1,12 @@
 """The sheared views equal a plain NumPy twin, and show a plane's points where they are."""
 
-import numba
 import numpy as np
 import pytest
 from several_threads import several_threads
 
+from sepi.kernels import set_thread_count, sheared_views
 from sepi.lightfield import LightField, as_unit_float
 from sepi.matching.sheared_views import ShearedViews, refocused
-from sepi.matching.sheared_views_kernels import shear
 from sepi.scenes import render
 
 
@@ -33,7 +32,7 @@ def matrix_twin(length: int, offset: float, cubic: bool) -> np.ndarray:
 
 def sheared(views: np.ndarray, offsets: np.ndarray, cubic: bool = True) -> np.ndarray:
     out = np.full_like(views, np.nan)
-    shear(views, offsets, cubic, out)
+    sheared_views.shear(views, offsets, cubic, out)
     return out
 
 
@@ -94,11 +93,11 @@ def test_threads_do_not_change_the_bytes(random_views: np.ndarray) -> None:
     """Results must not depend on the machine."""
     threads = several_threads()
     several = sheared(random_views, OFFSETS)
-    numba.set_num_threads(1)
+    set_thread_count(1)
     try:
         np.testing.assert_array_equal(sheared(random_views, OFFSETS), several)
     finally:
-        numba.set_num_threads(threads)
+        set_thread_count(threads)
 
 
 @pytest.fixture(scope="module")

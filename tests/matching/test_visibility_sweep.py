@@ -1,24 +1,16 @@
 """The visibility sweep, its z-buffers and the semi-global smoothing equal plain NumPy twins."""
 
-import numba
 import numpy as np
 import pytest
 from geometries import GEOMETRIES, standing
 from several_threads import several_threads
 
+from sepi.kernels import LANES, semi_global, set_thread_count, visibility
 from sepi.lightfield import DisparityRange, LightField
-from sepi.matching import visibility_kernels as kernels
 from sepi.matching.base_detail import DETAIL_UNIT, BaseDetailParameters, base_detail_decomposition
-from sepi.matching.semi_global_kernels import PATHS_AT_ONCE, aggregate, choose, semi_global
-from sepi.matching.sweep_arrays import sampled_candidates
+from sepi.matching.nearest_surfaces import EMPTY, z_buffers
+from sepi.matching.sweep_arrays import RobustCost, Visibility, sampled_candidates
 from sepi.matching.view_subsets import spread_views
-from sepi.matching.visibility_kernels import (
-    EMPTY,
-    RobustCost,
-    Visibility,
-    sweep_visible_rows,
-    z_buffers,
-)
 from sepi.matching.visibility_sweep import (
     FirstDepthParameters,
     VisibleViewsParameters,
@@ -75,7 +67,7 @@ def test_all_maps_but_the_last_compare_few_views(monkeypatch) -> None:
     """They only tell what is hidden where; the last one is what the user gets."""
     compared = []
     monkeypatch.setattr(
-        kernels,
+        visibility,
         "sweep_visible_rows",
         lambda views, _visibility, _robust, candidates, *others: (
             compared.append((int(views.present.sum()), candidates.disparities.size)) or others[-1].fill(0)
@@ -160,9 +152,9 @@ def test_costs_equal_a_plain_twin(channels: int, dtype: type, visible: bool, geo
     )
     scales, shares = np.array([0.02, 0.01], np.float32), np.array([0.4, 0.6], np.float32)
     cost = np.empty((7, 11, 13), np.float32)
-    visibility = Visibility(nearest, 0, np.float32(0.1), np.float32(0.05), False)
+    seen = Visibility(nearest, 0, np.float32(0.1), np.float32(0.05), False)
     candidates = sampled_candidates(disparities, light_field.baselines)
-    sweep_visible_rows(views, visibility, RobustCost(scales, shares), candidates, 0, 11, cost)
+    visibility.sweep_visible_rows(views, seen, RobustCost(scales, shares), candidates, 0, 11, cost)
     expected = sweep_twin(
         light_field, views, nearest if visible else None, disparities, np.float32(0.1), 0.05, scales, shares
     )
@@ -224,14 +216,14 @@ def path_twin(cost, guide, dy, dx, small, large, weakening):
 
 def test_smoothing_equals_a_plain_twin() -> None:
     random = np.random.default_rng(3)
-    K, H, W = 6, 8, PATHS_AT_ONCE + 5
+    K, H, W = 6, 8, semi_global.PATHS_AT_ONCE + 5
     cost, guide = random.random((K, H, W)).astype(np.float32), random.random((H, W, 3)).astype(np.float32) * 0.1
     # what was there before must not matter
-    volume, smoothed = np.full((2, H, W, 8), 7, np.float32)
-    aggregate(cost, guide, 2, np.float32(0.01), volume)
+    volume, smoothed = np.full((2, H, W, LANES), 7, np.float32)
+    semi_global.aggregate(cost, guide, 2, 0.01, volume)
     averaged = volume[:, :, :K]
     np.testing.assert_allclose(averaged, aggregate_twin(cost, guide, 2, 0.01), atol=1e-5)
-    semi_global(volume, guide, np.float32(0.1), np.float32(0.5), np.float32(5), 3, smoothed)
+    semi_global.semi_global(volume, guide, 0.1, 0.5, 5, 3, smoothed)
     directions = [(0, 1), (0, -1), (1, 0), (-1, 0), (1, 1), (1, -1), (-1, 1), (-1, -1)]
     expected = sum(path_twin(averaged.astype(float), guide, *d, 0.1, 0.5, 5) for d in directions)
     np.testing.assert_allclose(smoothed[:, :, :K], expected, atol=1e-4)
@@ -242,8 +234,8 @@ def test_a_window_may_be_wider_than_the_picture(shape: tuple[int, int], radius: 
     """What is beyond the picture's ends is no part of it: a sliver of a picture had another depth in each run."""
     random = np.random.default_rng(4)
     cost, guide = random.random((5, *shape)).astype(np.float32), random.random((*shape, 3)).astype(np.float32) * 0.1
-    averaged = np.empty((*shape, 8), np.float32)
-    aggregate(cost, guide, radius, np.float32(0.01), averaged)
+    averaged = np.empty((*shape, LANES), np.float32)
+    semi_global.aggregate(cost, guide, radius, 0.01, averaged)
     np.testing.assert_allclose(averaged[:, :, :5], aggregate_twin(cost, guide, radius, 0.01), atol=1e-5)
 
 
@@ -252,8 +244,10 @@ def test_margin_tells_one_minimum_from_two() -> None:
     disparities = np.linspace(-1, 1, 21).astype(np.float32)
     one = np.minimum(1, np.abs(disparities - 0.5))
     two = np.minimum(one, np.abs(disparities + 0.5))
-    volume = np.stack([one, two, np.full(21, 0.3)]).astype(np.float32)[None]
-    disparity, margin = choose(volume, volume, disparities, np.float32(0.25))
+    volume = np.full((1, 3, 24), 1e9, np.float32)
+    volume[0, :, :21] = one, two, np.full(21, 0.3)
+    disparity, margin = np.empty((2, 1, 3), np.float32)
+    semi_global.choose(volume, volume, disparities, 0.25, disparity, margin)
     assert disparity[0, 0] == pytest.approx(0.5, abs=1e-6)
     assert margin[0, 0] == pytest.approx(0.3, abs=1e-6)
     np.testing.assert_allclose(margin[0, 1:], 0, atol=1e-6)
@@ -272,18 +266,17 @@ def test_grey_views_give_the_depth_of_equal_colours() -> None:
 
 def test_depth_is_the_same_on_any_number_of_threads() -> None:
     scene = render("fine_structures", size=64)
-    before = numba.get_num_threads()
     found = []
     try:
         for threads in (1, several_threads()):
-            numba.set_num_threads(threads)
+            set_thread_count(threads)
             first = first_depth(scene, FirstDepthParameters(num_disparities=21), lambda _: None)
             result = depth_from_visible_views(
                 scene, first.disparity, VisibleViewsParameters(num_disparities=21, passes=1), lambda _: None
             )
             found.append((result.disparity.tobytes(), result.confidence.tobytes()))
     finally:
-        numba.set_num_threads(before)
+        set_thread_count(several_threads())
     assert found[0] == found[1]
 
 

@@ -13,12 +13,12 @@ from sepi.lightfield import DisparityRange, LightField
 from sepi.matching.base_detail import DETAIL_UNIT, BaseDetailParameters, base_detail_decomposition
 from sepi.matching.gauss_newton import GaussNewton, spline_derivatives
 from sepi.matching.gauss_newton_kernels import AT_ONCE
+from sepi.matching.nearest_surfaces import z_buffers
 from sepi.matching.row_bands import Rows
 from sepi.matching.spline_kernels import MARGIN, SPLINE_UNIT, spline_coefficients
 from sepi.matching.spline_views import spline_views
 from sepi.matching.surface_windows import Surfaces, windowed_step
 from sepi.matching.view_subsets import spread_views
-from sepi.matching.visibility_kernels import z_buffers
 from sepi.optimize import SecondOrderParameters, second_order
 from sepi.pipeline import estimate_depth
 from sepi.regularization.multilevel import multilevel_inverse

@@ -17,9 +17,6 @@
 namespace sepi {
 namespace {
 
-// Columns between pixels of the mask that are done rather than skipped: starting anew costs as much.
-constexpr Index SHORTEST_GAP = 128;
-
 // Columns begin..end of row y.
 struct Run {
     Index y, begin, end;
@@ -300,16 +297,6 @@ void transpose_costs(Array<const float, 3> costs, Index columns, Array<float, 2>
             }
 }
 
-template <class T>
-Array<const T, 2> const_view(Array<T, 2> a) {
-    return {a.data, {a.shape[0], a.shape[1]}, {a.strides[0], a.strides[1]}};
-}
-
-template <class T>
-Array<const T, 3> const_view(Array<T, 3> a) {
-    return {a.data, {a.shape[0], a.shape[1], a.shape[2]}, {a.strides[0], a.strides[1], a.strides[2]}};
-}
-
 template <class Colour>
 class TileSweep {
   public:
@@ -347,7 +334,7 @@ class TileSweep {
         for (Index r = 0; r < number; ++r) {
             const auto [first, last] = runs_.array()(r);
             cost_row(views_, candidates_, {row, first, last}, distances_.array().data, costs_.array());
-            transpose_costs(const_view(costs_.array()), last - first, from(ring_, first));
+            transpose_costs(costs_.array(), last - first, from(ring_, first));
             // windows of pixels near the border reach this far
             const Index inner = tile_.margin + radius;
             Index left = last, right = last;
@@ -370,14 +357,14 @@ class TileSweep {
     void sweep_row(Index y) {
         const Index H = mask_.shape[0], W = mask_.shape[1];
         const auto sums = sums_.array(), numbers = numbers_.array();
-        const auto weights = const_view(weights_.array());
+        const auto weights = weights_.array();
         for (Index x = tile_.begin; x < tile_.end; ++x) {
             if (!mask_(y, x)) continue;
-            aggregate(const_view(ring_.array()), y, x - tile_.begin, H, weights, sums.data);
+            aggregate(ring_.array(), y, x - tile_.begin, H, weights, sums.data);
             // away from the border every view sees every pixel of the window: nothing to count
             const bool all_seen = tile_.margin <= y && y < H - tile_.margin && tile_.margin <= x && x < W - tile_.margin;
-            if (!all_seen) aggregate(const_view(counts_.array()), y, x - tile_.begin, H, weights, numbers.data);
-            const Aggregated found{const_view(sums), const_view(all_seen ? all_of_group_.array() : numbers), all_seen};
+            if (!all_seen) aggregate(counts_.array(), y, x - tile_.begin, H, weights, numbers.data);
+            const Aggregated found{sums, all_seen ? all_of_group_.array() : numbers, all_seen};
             for (Index n = 0; n < views_.subsets.shape[0]; ++n) {
                 const Best best = best_candidate(found, views_.subsets.at(n), expected_.moments.at(0, n), expected_.weights(0, y, x), expected_.moments.at(1, n),
                                                  expected_.weights(1, y, x), candidates_.disparities, pixel_costs_.array().data);
@@ -411,6 +398,21 @@ class TileSweep {
 }  // namespace
 
 template <class Colour>
+void planes_of(Strided<const Colour, 5> views, Array<Colour, 5> planes) {
+    const Index S = views.shape[1], H = views.shape[2], W = views.shape[3], step = views.strides[3], next = views.strides[4];
+    parallel_for(0, views.shape[0] * S, [&](Index view) {
+        const Index t = view / S, s = view % S;
+        for (Index y = 0; y < H; ++y) {
+            const Colour *pixels = views.at(t, s, y);
+            for (Index c = 0; c < 3; ++c) {
+                Colour *plane = planes.at(t, s, c, y);
+                for (Index x = 0; x < W; ++x) plane[x] = pixels[x * step + c * next];
+            }
+        }
+    });
+}
+
+template <class Colour>
 void sweep_plane_rows(const ViewStack<Colour> &views, const Candidates &candidates, const Window &window, const ExpectedCosts &expected,
                       Array<const bool, 2> mask, Index begin, Index end, Index height, Index width, const BestMaps &maps) {
     const Index H = mask.shape[0], W = mask.shape[1];
@@ -426,6 +428,7 @@ void sweep_plane_rows(const ViewStack<Colour> &views, const Candidates &candidat
 }
 
 #define INSTANTIATE(Colour)                                                                                                  \
+    template void planes_of(Strided<const Colour, 5>, Array<Colour, 5>);                                                     \
     template void sweep_plane_rows(const ViewStack<Colour> &, const Candidates &, const Window &, const ExpectedCosts &,      \
                                    Array<const bool, 2>, Index, Index, Index, Index, const BestMaps &);
 INSTANTIATE(std::uint8_t)

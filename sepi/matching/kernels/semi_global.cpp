@@ -10,9 +10,6 @@
 namespace sepi {
 namespace {
 
-// Paths from row to row that a thread follows together: their costs lie side by side, and fit in its cache.
-constexpr Index PATHS_AT_ONCE = 32;
-
 constexpr float UNREACHABLE = 1e9f;
 
 // exp(x) of a number up to 0, rounded to single precision; 0 below -87.
@@ -90,12 +87,6 @@ void transpose_candidates(Array<const float, 2> rows, Index W, Array<float, 2> o
         for (Index k = 0; k < LANES; ++k) out(x, k) = rows(k, x);
 }
 
-template <class T>
-Array<const T, 2> const_view(const Scratch<T, 2> &scratch) {
-    const auto &a = scratch.array();
-    return {a.data, {a.shape[0], a.shape[1]}, {a.strides[0], a.strides[1]}};
-}
-
 struct Penalties {
     float small, large, weakening;
 
@@ -160,6 +151,38 @@ void along_lines(Array<float, 3> paths, float *least, Index first, Array<const f
     }
 }
 
+// Number of the least cost of K', of the first of equal ones.
+Index first_least(const float *costs, Index K) {
+    Float8 least = load(costs);
+    Int8 begins{};  // of the vectors that each lane is from
+    for (Index k = LANES; k < K; k += LANES) {
+        const Float8 others = load(costs + k);
+        const Int8 less = others < least;
+        least = less ? others : least;
+        begins = less ? Int8{} + std::int32_t(k) : begins;
+    }
+    const Int8 numbers = begins + Int8{0, 1, 2, 3, 4, 5, 6, 7};
+    int first = 0;
+    for (int i = 1; i < LANES; ++i)
+        if (least[i] < least[first] || (least[i] == least[first] && numbers[i] < numbers[first])) first = i;
+    return numbers[first];
+}
+
+// By how much the least cost of other candidates exceeds that of those that belong to the winner's minimum; 0 where
+// there is no other.
+float margin_of(const float *costs, Index K, const float *disparities, float found, Index best, float same) {
+    Float8 own = spread(UNREACHABLE), other = own;
+    Int8 before_best = Int8{0, 1, 2, 3, 4, 5, 6, 7} - std::int32_t(best);
+    for (Index k = 0; k < K; k += LANES, before_best += LANES) {
+        const Float8 cost = load(costs + k), beyond = load(disparities + k) - found;
+        const Int8 is_own = (larger(beyond, -beyond) <= same) | (before_best == 0);
+        own = smaller(own, is_own ? cost : spread(UNREACHABLE));
+        other = smaller(other, is_own ? spread(UNREACHABLE) : cost);
+    }
+    const float least = least_of(other);
+    return least < UNREACHABLE ? least - least_of(own) : 0.0f;
+}
+
 }  // namespace
 
 void aggregate(Array<const float, 3> cost, Array<const float, 3> guide, Index radius, float variance, Array<float, 3> out) {
@@ -168,11 +191,10 @@ void aggregate(Array<const float, 3> cost, Array<const float, 3> guide, Index ra
     for (Index c = 0; c < 3; ++c)
         for (Index y = 0; y < H; ++y)
             for (Index x = 0; x < W; ++x) by_channel.array()(c, y, x) = guide(y, x, c);
-    const Array<const float, 3> colours{by_channel.array().data, {3, H, W}, {H * W, W, 1}};
     parallel_for(0, H, [&](Index y) {
         const Scratch<float, 2> weights(size * size + 1, W);  // and a margin
         const Scratch<float, 1> sums(W);
-        window_weights(colours, y, radius, variance, weights.array(), sums.array().data);
+        window_weights(by_channel.array(), y, radius, variance, weights.array(), sums.array().data);
         // what lies beyond the picture weighs nothing
         const auto rows = zeros<float, 2>(size, W + 2 * radius + LANES);
         // a few candidates at a time: each pixel's are written together
@@ -183,15 +205,15 @@ void aggregate(Array<const float, 3> cost, Array<const float, 3> guide, Index ra
                 float *place = total.array().at(k - begin);
                 if (radius == 2) {
                     // how many is known when this is compiled, and all of it becomes one loop
-                    window_sums(const_view(rows), const_view(weights), std::integral_constant<Index, 2>(), place, W);
+                    window_sums(rows.array(), weights.array(), std::integral_constant<Index, 2>(), place, W);
                 } else {
-                    window_sums(const_view(rows), const_view(weights), radius, place, W);
+                    window_sums(rows.array(), weights.array(), radius, place, W);
                 }
             }
             for (Index k = K - begin; k < LANES; ++k) std::fill_n(total.array().at(k), W, UNREACHABLE);
             Array<float, 2> pixels = out[y];
             pixels.data += begin;
-            transpose_candidates(const_view(total), W, pixels);
+            transpose_candidates(total.array(), W, pixels);
         }
     });
 }
@@ -226,12 +248,14 @@ void semi_global(Array<const float, 3> cost, Array<const float, 3> guide, float 
 
 void choose(Array<const float, 3> smoothed, Array<const float, 3> averaged, Array<const float, 1> disparities, float same, Array<float, 2> disparity,
             Array<float, 2> margin) {
-    const Index H = smoothed.shape[0], W = smoothed.shape[1], K = disparities.shape[0];
+    const Index H = smoothed.shape[0], W = smoothed.shape[1], K = disparities.shape[0], padded = smoothed.shape[2];
+    const auto of_candidates = zeros<float, 1>(padded);
+    std::copy_n(disparities.data, K, of_candidates.array().data);
     const double spacing = double(disparities(K - 1) - disparities(0)) / double(K - 1);
     parallel_for(0, H, [&](Index y) {
         for (Index x = 0; x < W; ++x) {
-            const float *costs = smoothed.at(y, x), *before = averaged.at(y, x);
-            const Index best = std::min_element(costs, costs + K) - costs;
+            const float *costs = smoothed.at(y, x);
+            const Index best = first_least(costs, padded);
             double offset = 0;
             if (0 < best && best < K - 1) {
                 const float a = costs[best - 1], b = costs[best], c = costs[best + 1];
@@ -239,14 +263,8 @@ void choose(Array<const float, 3> smoothed, Array<const float, 3> averaged, Arra
                 if (curvature > 1e-9) offset = 0.5f * (a - c) / curvature;
             }
             const float found = float(disparities(best) + offset * spacing);
-            float own = UNREACHABLE, other = UNREACHABLE;
-            for (Index k = 0; k < K; ++k) {
-                const bool is_own = (std::abs(disparities(k) - found) <= same) | (k == best);
-                own = std::min(own, is_own ? before[k] : UNREACHABLE);
-                other = std::min(other, is_own ? UNREACHABLE : before[k]);
-            }
             disparity(y, x) = found;
-            margin(y, x) = other < UNREACHABLE ? other - own : 0.0f;
+            margin(y, x) = margin_of(averaged.at(y, x), padded, of_candidates.array().data, found, best, same);
         }
     });
 }

@@ -6,6 +6,9 @@
 
 namespace sepi {
 
+// Paths from row to row that a thread follows together: their costs lie side by side, and fit in its cache.
+constexpr Index PATHS_AT_ONCE = 32;
+
 // Mean over a window with weights exp(-|colour difference|^2 / (2 variance)); cost (K, H, W), guide (H, W, 3), out (H, W, K').
 void aggregate(Array<const float, 3> cost, Array<const float, 3> guide, Index radius, float variance, Array<float, 3> out);
 
@@ -13,8 +16,9 @@ void aggregate(Array<const float, 3> cost, Array<const float, 3> guide, Index ra
 // band rows before any goes on, so that costs and sums come from memory once for the paths down and once for those up.
 void semi_global(Array<const float, 3> cost, Array<const float, 3> guide, float small, float large, float weakening, Index band, Array<float, 3> out);
 
-// Winner of each pixel, refined by a parabola, and by how much the averaged cost of other minima exceeds its own;
-// candidates closer than same to the winner belong to its minimum.
+// Winner of each pixel, refined by a parabola, and by how much the averaged cost of other minima exceeds its own:
+// negative where another minimum is lower before smoothing, 0 where there is no other. Candidates closer than same to
+// the winner belong to its minimum; smoothed and averaged (H, W, K'), disparities (K).
 void choose(Array<const float, 3> smoothed, Array<const float, 3> averaged, Array<const float, 1> disparities, float same, Array<float, 2> disparity,
             Array<float, 2> margin);
 

@@ -9,8 +9,6 @@
 namespace sepi {
 namespace {
 
-constexpr float EMPTY = -1e9f;        // in a z-buffer where no pixel of the reference view falls: nothing is nearer
-constexpr float MISSING = 1e9f;       // where the view shows nothing: not even a view that hides a pixel counts less
 constexpr float ROUNDING = 1.0f / 512;  // how far a position is from the same in single precision, at most, pixels
 constexpr float COLOUR_STEPS = 20000;   // from black to white, of colours as whole numbers of 16 bits
 constexpr std::int64_t ONE = 1 << 14;   // the sum of a sample's weights, which are whole numbers of 16 bits
@@ -240,6 +238,26 @@ void z_buffers(Array<const float, 2> disparity, Array<const bool, 2> present, St
             const float *above = begun.array().at(row), *here = begun.array().at(row + 1);
             float *target = out.at(t, s, row);
             for (Index x = 0; x < W; ++x) target[x] = std::max(std::max(above[x], above[x + 1]), std::max(here[x], here[x + 1]));
+        }
+    });
+}
+
+void occluded_in_any_view(Array<const float, 2> disparity, Array<const bool, 2> present, Strided<const double, 3> baselines, Array<const float, 4> nearest,
+                          Index low, float occlusion_margin, Index begin, Index end, Array<bool, 2> out) {
+    const Index S = present.shape[1], H = disparity.shape[0], W = disparity.shape[1];
+    parallel_for(begin, end, [&](Index y) {
+        bool *occluded = out.at(y - begin);
+        std::fill_n(occluded, W, false);
+        for (Index view = 0; view < present.shape[0] * S; ++view) {
+            const Index t = view / S, s = view % S;
+            if (!present(t, s)) continue;
+            const double v = baselines(t, s, 0), u = baselines(t, s, 1);
+            for (Index x = 0; x < W; ++x) {
+                const float d = disparity(y, x);
+                const double row = double(y) - d * v + 0.5, column = double(x) - d * u + 0.5;
+                if (row >= 0 && column >= 0 && row < double(H) && column < double(W))
+                    occluded[x] |= nearest(t, s, Index(row) - low, Index(column)) > d + occlusion_margin;
+            }
         }
     });
 }
