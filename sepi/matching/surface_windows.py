@@ -77,7 +77,7 @@ def windowed_step(
     width = np.float32(max(2 * surfaces.margin, LEAST_WIDTH))
     nearer = cv2.dilate(disparity, np.ones((3, 3), np.uint8)) - disparity
     share = np.clip(np.float32(1.5) - nearer / width, np.float32(BESIDE_NEARER), np.float32(1))
-    sums = np.zeros((2, *disparity.shape), np.float32)
+    sums = np.empty((2, *disparity.shape), np.float32)
     kernels.sums_of_surface(
         gradient * share,
         curvature * share,

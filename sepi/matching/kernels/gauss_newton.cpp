@@ -17,11 +17,13 @@ using Four = std::array<Float8, 4>;
 
 constexpr std::int32_t ONE = 1 << 15;  // the sum of the weights of coefficients, along either axis
 
-// Eight pixels of a row, what they are compared with, and sums over the views.
+// Eight pixels of a row, what they are compared with, and where the view at hand has them.
 struct Pixels {
     Float8 x, disparity;
-    Four own, down, across;
-    std::array<Float8, 16> sums;
+    Four own;
+    Int8 inside;
+    std::uint32_t nearest[LANES], coefficients[LANES];  // what hides them, and the first of their coefficients
+    std::int32_t weights[6][LANES];                     // of these, in pairs: of the four rows each twice, of the columns the first two and the others
 };
 
 // What a view shows of eight pixels: 1 where it sees them, and the four channels there; where it does not, anything.
@@ -56,44 +58,48 @@ Four transposed_halves(const Four &rows) {
     return {low(a, b), high(a, b), low(c, d), high(c, d)};
 }
 
-class View {
-  public:
+struct View {
+    float down, across;  // baseline
+
     View(const SplineViews &views, const Seeing &seeing, Index n, Index H, Index W)
-        : down_(views.baselines(n, 0)), across_(views.baselines(n, 1)), low_(float(views.low)), bottom_(float(H - 1)), right_(float(W - 1)),
-          margin_(seeing.occlusion_margin), unit_(views.unit / float(ONE)) {
-        const Index t = views.places(n, 0), s = views.places(n, 1);
-        // one coefficient before the picture
-        coefficients_ = views.splines.at(t, s, SPLINE_MARGIN - 1, SPLINE_MARGIN - 1), pitch_ = std::int32_t(views.splines.strides[2]);
-        nearest_ = seeing.nearest.at(t, s), width_ = std::int32_t(seeing.nearest.strides[2]);
+        : down(views.baselines(n, 0)), across(views.baselines(n, 1)), low_(std::int32_t(views.low)), bottom_(float(H - 1)), right_(float(W - 1)),
+          margin_(seeing.occlusion_margin), unit_(views.unit / float(ONE)), pitch_(std::int32_t(views.splines.strides[2])),
+          width_(std::int32_t(seeing.nearest.strides[2])), nearest_(seeing.nearest.at(views.places(n, 0), views.places(n, 1))),
+          // one before the picture
+          coefficients_(views.splines.at(views.places(n, 0), views.places(n, 1), SPLINE_MARGIN - 1, SPLINE_MARGIN - 1)) {}
+
+    // Find pixels of a row.
+    void find(Index row, Pixels &pixels) const {
+        Float8 y = float(row) - pixels.disparity * down, x = pixels.x - pixels.disparity * across;
+        pixels.inside = (y >= 0.0f) & (y <= bottom_) & (x >= 0.0f) & (x <= right_);
+        // of what is outside, a corner is looked at
+        y = pixels.inside ? y : spread(float(low_));
+        x = pixels.inside ? x : Float8{};
+        const Int8 top = truncated(y), left = truncated(x);
+        store(pixels.nearest, (truncated(y + 0.5f) - low_) * width_ + truncated(x + 0.5f));
+        store(pixels.coefficients, (top - low_) * pitch_ + left * 4);
+        const CoefficientWeights rows(y - __builtin_convertvector(top, Float8)), columns(x - __builtin_convertvector(left, Float8));
+        store(pixels.weights[0], rows.before | rows.before << 16);
+        store(pixels.weights[1], rows.left | rows.left << 16);
+        store(pixels.weights[2], rows.right | rows.right << 16);
+        store(pixels.weights[3], rows.after | rows.after << 16);
+        store(pixels.weights[4], columns.before | columns.left << 16);
+        store(pixels.weights[5], columns.right | columns.after << 16);
+        // they are asked for when others have been found, too
+        __builtin_prefetch(nearest_ + pixels.nearest[0]);
+        for (Index n = 0; n < 4; ++n) __builtin_prefetch(coefficients_ + pixels.coefficients[0] + n * pitch_);
     }
 
-    // Sample pixels of row y; false if the view sees none of them.
-    bool sample(Index row, const Pixels &pixels, Samples &samples) const {
-        Float8 y = float(row) - pixels.disparity * down_, x = pixels.x - pixels.disparity * across_;
-        const Int8 inside = (y >= 0.0f) & (y <= bottom_) & (x >= 0.0f) & (x <= right_);
-        // of what is outside, a corner is looked at
-        y = inside ? y : spread(low_);
-        x = inside ? x : Float8{};
-        const Int8 top = truncated(y), left = truncated(x), low = Int8{} + std::int32_t(low_);
-        std::int32_t places[LANES], pairs[6][LANES];
+    // Sample pixels that are found; false if the view sees none of them.
+    bool sample(const Pixels &pixels, Samples &samples) const {
         float found[LANES];
-        store(places, (truncated(y + 0.5f) - low) * width_ + truncated(x + 0.5f));
-        for (int i = 0; i < LANES; ++i) found[i] = nearest_[places[i]];
-        const Int8 seen = inside & (load(found) <= pixels.disparity + margin_);
+        for (int i = 0; i < LANES; ++i) found[i] = nearest_[pixels.nearest[i]];
+        const Int8 seen = pixels.inside & (load(found) <= pixels.disparity + margin_);
         if (!any(seen)) return false;
         samples.seen = seen ? spread(1) : Float8{};
-        // weights in pairs: of the rows each twice, of the columns the first two and the others
-        const CoefficientWeights rows(y - __builtin_convertvector(top, Float8)), columns(x - __builtin_convertvector(left, Float8));
-        store(pairs[0], rows.before | rows.before << 16);
-        store(pairs[1], rows.left | rows.left << 16);
-        store(pairs[2], rows.right | rows.right << 16);
-        store(pairs[3], rows.after | rows.after << 16);
-        store(pairs[4], columns.before | columns.left << 16);
-        store(pairs[5], columns.right | columns.after << 16);
-        store(places, (top - low) * pitch_ + left * 4);
         Four halves;
         for (int i = 0; i < 4; ++i) {
-            const Int8 a = products(places[i], pairs, i), b = products(places[i + 4], pairs, i + 4);
+            const Int8 a = products(pixels, i), b = products(pixels, i + 4);
             const Int8 first = __builtin_shufflevector(a, b, 0, 1, 2, 3, 8, 9, 10, 11), others = __builtin_shufflevector(a, b, 4, 5, 6, 7, 12, 13, 14, 15);
             halves[i] = __builtin_convertvector(first + others, Float8) * unit_;
         }
@@ -101,22 +107,22 @@ class View {
         return true;
     }
 
-    const float down_, across_;  // baseline
-
   private:
     // Sums of the first two columns of coefficients, of four channels, and of the others, weighted for pixel i.
-    Int8 products(Index place, const std::int32_t (&pairs)[6][LANES], int i) const {
-        const auto row = [&](Index n) { return rounded_products(load(coefficients_ + place + n * pitch_), Short16(Int8{} + pairs[n][i])); };
+    Int8 products(const Pixels &pixels, int i) const {
+        const auto line = [&](Index n) { return Int8{} + pixels.weights[n][i]; };
+        const auto row = [&](Index n) { return rounded_products(load(coefficients_ + pixels.coefficients[i] + n * pitch_), Short16(line(n))); };
         const Short16 sums = row(0) + row(1) + row(2) + row(3);
         // neighbours of one channel side by side
         const Short16 neighbours = __builtin_shufflevector(sums, sums, 0, 4, 1, 5, 2, 6, 3, 7, 8, 12, 9, 13, 10, 14, 11, 15);
-        return dot_of_pairs(Int8(neighbours), __builtin_shufflevector(Int8{} + pairs[4][i], Int8{} + pairs[5][i], 0, 1, 2, 3, 12, 13, 14, 15));
+        return dot_of_pairs(Int8(neighbours), __builtin_shufflevector(line(4), line(5), 0, 1, 2, 3, 12, 13, 14, 15));
     }
 
-    const float low_, bottom_, right_, margin_, unit_;
-    const std::int16_t *coefficients_;
-    const float *nearest_;
+    std::int32_t low_;
+    float bottom_, right_, margin_, unit_;
     std::int32_t pitch_, width_;
+    const float *nearest_;
+    const std::int16_t *coefficients_;
 };
 
 // Derivative of z / (z + scale2) with respect to z, times scale2: 1 for 0.
@@ -133,148 +139,153 @@ Four load_channels(Array<const float, 3> image, Index y, Index x, Index count) {
     return {load(channels[0]), load(channels[1]), load(channels[2]), load(channels[3])};
 }
 
-void store_first(float *place, Float8 lanes, Index count) { std::memcpy(place, &lanes, count * sizeof(float)); }
-
-// Of each eight pixels of the rows: begin them, add what each view that sees one of them shows, and write what comes of it.
-// Beginning and writing get the pixels' row, column and number.
-template <class Begin, class Add, class Write>
+// Of each eight pixels of the rows first..last: begin them, add what each view that sees one of them shows, and write what
+// comes of it, at their row, column and number.
+template <class Sums, class Begin, class Add, class Write>
 void over_views(const SplineViews &views, const Seeing &seeing, Array<const float, 2> disparity, Index first, Index last, Begin begin, Add add, Write write) {
     const Index H = disparity.shape[0], W = disparity.shape[1];
     parallel_for(first, last, [&](Index y) {
-        std::array<Pixels, AT_ONCE / LANES> all;
+        std::array<Sums, AT_ONCE / LANES> all;
         for (Index left = 0; left < W; left += AT_ONCE) {
             const Index number = std::min(AT_ONCE, W - left);
             const auto each = [&](auto action) {
                 for (Index i = 0; i < number; i += LANES) action(all[i / LANES], left + i, std::min<Index>(LANES, number - i));
             };
-            each([&](Pixels &pixels, Index x, Index count) {
-                float own[LANES] = {};
-                std::copy_n(disparity.at(y, x), count, own);
+            each([&](Sums &sums, Index x, Index count) {
+                sums = {};
+                sums.x = Float8{0, 1, 2, 3, 4, 5, 6, 7} + float(x);
                 // beyond the last, pixels lie outside all views
-                pixels = {Float8{0, 1, 2, 3, 4, 5, 6, 7} + float(x), load(own), {}, {}, {}, {}};
-                begin(pixels, y, x, count);
+                std::memcpy(&sums.disparity, disparity.at(y, x), count * sizeof(float));
+                begin(sums, y, x, count);
             });
             for (Index n = 0; n < views.places.shape[0]; ++n) {
                 const View view(views, seeing, n, H, W);
-                each([&](Pixels &pixels, Index, Index) {
-                    if (Samples samples; view.sample(y, pixels, samples)) add(pixels, view, samples);
+                each([&](Sums &sums, Index, Index) { view.find(y, sums); });
+                each([&](Sums &sums, Index, Index) {
+                    if (Samples samples; view.sample(sums, samples)) add(sums, view, samples);
                 });
             }
-            each([&](Pixels &pixels, Index x, Index count) { write(pixels, y, x, count); });
+            each([&](const Sums &sums, Index x, Index count) { write(sums, y, x, count); });
         }
     });
 }
 
-// What a view adds for a pixel.
-struct Terms {
-    Float8 slope, curve, residual2, weight;          // of colours
-    Float8 detail_slope, detail_curve, detail_weight;
+struct Mean : Pixels {
+    Four channels;           // times their weights
+    Float8 colours, detail;  // weights
+};
 
-    Terms(const Pixels &pixels, const View &view, const Samples &samples, Array<const float, 1> scales2) {
+// What a view adds for a pixel: slope and curvature, the colours' squared residual, and weights.
+struct Terms {
+    Float8 slope, curve, detail_slope, detail_curve, residual2, weight, detail_weight;
+};
+
+struct Equations : Pixels {
+    Four down, across;  // derivatives of what pixels are compared with
+    Float8 slope, curve, detail_slope, detail_curve;
+
+    void begin(const MeanView &image, Index y, Index x, Index count) {
+        own = load_channels(image.mean, y, x, count);
+        down = load_channels(image.down, y, x, count);
+        across = load_channels(image.across, y, x, count);
+    }
+
+    Terms add(const View &view, const Samples &samples, const SplineViews &views) {
         Four r, g;
         for (Index c = 0; c < 4; ++c) {
-            r[c] = samples.channels[c] - pixels.own[c];
-            g[c] = pixels.down[c] * view.down_ + pixels.across[c] * view.across_;
+            r[c] = samples.channels[c] - own[c];
+            g[c] = down[c] * view.down + across[c] * view.across;
         }
-        residual2 = r[0] * r[0] + r[1] * r[1] + r[2] * r[2];
-        weight = samples.seen * robust_weight(residual2, scales2(0));
-        detail_weight = samples.seen * (3.0f * robust_weight(3.0f * r[3] * r[3], scales2(1)));
-        slope = weight * (r[0] * g[0] + r[1] * g[1] + r[2] * g[2]);
-        curve = weight * (g[0] * g[0] + g[1] * g[1] + g[2] * g[2]);
-        detail_slope = detail_weight * r[3] * g[3];
-        detail_curve = detail_weight * g[3] * g[3];
-    }
-
-    // To sums of slope and curvature, of colours and of detail.
-    void add_to(std::array<Float8, 16> &sums) const {
-        sums[0] += slope;
-        sums[1] += curve;
-        sums[2] += detail_slope;
-        sums[3] += detail_curve;
+        const Float8 residual2 = r[0] * r[0] + r[1] * r[1] + r[2] * r[2];
+        const Float8 weight = samples.seen * robust_weight(residual2, views.scales2(0));
+        const Float8 detail_weight = samples.seen * (3.0f * robust_weight(3.0f * r[3] * r[3], views.scales2(1)));
+        const Terms terms{weight * (r[0] * g[0] + r[1] * g[1] + r[2] * g[2]), weight * (g[0] * g[0] + g[1] * g[1] + g[2] * g[2]),
+                          detail_weight * r[3] * g[3], detail_weight * g[3] * g[3], residual2, weight, detail_weight};
+        slope += terms.slope;
+        curve += terms.curve;
+        detail_slope += terms.detail_slope;
+        detail_curve += terms.detail_curve;
+        return terms;
     }
 };
 
-// How colours and detail are added up.
-struct Shares {
-    float colour, detail;
-
-    explicit Shares(const SplineViews &views) : colour(views.shares(0) / views.scales2(0)), detail(views.shares(1) / views.scales2(1)) {}
-
-    void write(const Pixels &pixels, Index count, float *gradient, float *curvature) const {
-        store_first(gradient, colour * pixels.sums[0] + detail * pixels.sums[2], count);
-        store_first(curvature, colour * pixels.sums[1] + detail * pixels.sums[3], count);
-    }
+struct Evidence : Equations {
+    std::array<std::array<Float8, 2>, 4> halves;
+    Four rest;
 };
 
-// Loads the mean of the views and its derivatives.
-auto compared_with(const MeanView &image) {
-    return [&](Pixels &pixels, Index y, Index x, Index count) {
-        pixels.own = load_channels(image.mean, y, x, count);
-        pixels.down = load_channels(image.down, y, x, count);
-        pixels.across = load_channels(image.across, y, x, count);
-    };
-}
+// Of colours and detail together, by their shares.
+struct Both {
+    Float8 slope, curve;
+
+    template <class Parts>
+    Both(const Parts &parts, const SplineViews &views) {
+        const float colour = views.shares(0) / views.scales2(0), detail = views.shares(1) / views.scales2(1);
+        slope = colour * parts.slope + detail * parts.detail_slope;
+        curve = colour * parts.curve + detail * parts.detail_curve;
+    }
+};
 
 }  // namespace
 
 void mean_of_views(const SplineViews &views, const Seeing &seeing, Array<const float, 2> disparity, Index begin, Index end, Array<float, 3> out) {
-    const float colour = views.scales2(0), detail = views.scales2(1);
-    over_views(
+    over_views<Mean>(
         views, seeing, disparity, begin, end,
-        [&](Pixels &pixels, Index y, Index x, Index count) {
-            const auto [red, green, blue, own] = pixels.own = load_channels(views.reference, y, x, count);
-            // the reference view itself counts in full: weighted channels, and the weights of colours and of detail
-            pixels.sums = {red, green, blue, own, spread(1), spread(1)};
+        [&](Mean &sums, Index y, Index x, Index count) {
+            // the reference view itself counts in full
+            sums.channels = sums.own = load_channels(views.reference, y, x, count);
+            sums.colours = sums.detail = spread(1);
         },
-        [=](Pixels &pixels, const View &, const Samples &samples) {
+        [&](Mean &sums, const View &, const Samples &samples) {
             Four r;
-            for (Index c = 0; c < 4; ++c) r[c] = samples.channels[c] - pixels.own[c];
-            const Float8 weight = samples.seen * robust_weight(r[0] * r[0] + r[1] * r[1] + r[2] * r[2], colour);
-            const Float8 detail_weight = samples.seen * robust_weight(3.0f * (r[3] * r[3]), detail);
-            for (Index c = 0; c < 3; ++c) pixels.sums[c] += weight * samples.channels[c];
-            pixels.sums[3] += detail_weight * samples.channels[3];
-            pixels.sums[4] += weight;
-            pixels.sums[5] += detail_weight;
+            for (Index c = 0; c < 4; ++c) r[c] = samples.channels[c] - sums.own[c];
+            const Float8 weight = samples.seen * robust_weight(r[0] * r[0] + r[1] * r[1] + r[2] * r[2], views.scales2(0));
+            const Float8 detail_weight = samples.seen * robust_weight(3.0f * (r[3] * r[3]), views.scales2(1));
+            for (Index c = 0; c < 4; ++c) sums.channels[c] += (c < 3 ? weight : detail_weight) * samples.channels[c];
+            sums.colours += weight;
+            sums.detail += detail_weight;
         },
-        [&](const Pixels &pixels, Index y, Index x, Index count) {
+        [&](const Mean &sums, Index y, Index x, Index count) {
             for (Index i = 0; i < count; ++i)
-                for (Index c = 0; c < 4; ++c) out(y, x + i, c) = pixels.sums[c][i] / pixels.sums[c < 3 ? 4 : 5][i];
+                for (Index c = 0; c < 4; ++c) out(y, x + i, c) = sums.channels[c][i] / (c < 3 ? sums.colours : sums.detail)[i];
         });
 }
 
 void normal_equations(const SplineViews &views, const Seeing &seeing, Array<const float, 2> disparity, const MeanView &image, Index begin, Index end,
                       Array<float, 2> gradient, Array<float, 2> curvature) {
-    const Shares shares(views);
-    over_views(
-        views, seeing, disparity, begin, end, compared_with(image),
-        [&](Pixels &pixels, const View &view, const Samples &samples) { Terms(pixels, view, samples, views.scales2).add_to(pixels.sums); },
-        [&](const Pixels &pixels, Index y, Index x, Index count) { shares.write(pixels, count, gradient.at(y, x), curvature.at(y, x)); });
+    over_views<Equations>(
+        views, seeing, disparity, begin, end, [&](Equations &sums, Index y, Index x, Index count) { sums.begin(image, y, x, count); },
+        [&](Equations &sums, const View &view, const Samples &samples) { sums.add(view, samples, views); },
+        [&](const Equations &sums, Index y, Index x, Index count) {
+            const Both both(sums, views);
+            store_first(gradient.at(y, x), both.slope, count);
+            store_first(curvature.at(y, x), both.curve, count);
+        });
 }
 
 void equations_and_evidence(const SplineViews &views, const Seeing &seeing, Array<const float, 2> disparity, const MeanView &image, Index begin, Index end,
                             Array<float, 2> gradient, Array<float, 2> curvature, Array<float, 4> halves, Array<float, 3> rest) {
-    const Shares shares(views);
-    over_views(
-        views, seeing, disparity, begin, end, compared_with(image),
-        [&](Pixels &pixels, const View &view, const Samples &samples) {
-            const Terms terms(pixels, view, samples, views.scales2);
-            terms.add_to(pixels.sums);
-            const Float8 evidence[] = {terms.weight * terms.residual2, terms.weight, terms.detail_weight / 3.0f, samples.seen};
-            for (Index k = 0; k < 4; ++k) pixels.sums[4 + k] += evidence[k];
-            const Float8 slope = shares.colour * terms.slope + shares.detail * terms.detail_slope;
-            const Float8 curve = shares.colour * terms.curve + shares.detail * terms.detail_curve;
-            const bool belongs[] = {view.across_ < 0, view.across_ > 0, view.down_ < 0, view.down_ > 0};
+    over_views<Evidence>(
+        views, seeing, disparity, begin, end, [&](Evidence &sums, Index y, Index x, Index count) { sums.begin(image, y, x, count); },
+        [&](Evidence &sums, const View &view, const Samples &samples) {
+            const Terms terms = sums.add(view, samples, views);
+            const Four rest_of_view{terms.weight * terms.residual2, terms.weight, terms.detail_weight / 3.0f, samples.seen};
+            const Both both(terms, views);
+            const bool belongs[] = {view.across < 0, view.across > 0, view.down < 0, view.down > 0};
             for (Index k = 0; k < 4; ++k) {
+                sums.rest[k] += rest_of_view[k];
                 if (!belongs[k]) continue;
-                pixels.sums[8 + 2 * k] += slope;
-                pixels.sums[9 + 2 * k] += curve;
+                sums.halves[k][0] += both.slope;
+                sums.halves[k][1] += both.curve;
             }
         },
-        [&](const Pixels &pixels, Index y, Index x, Index count) {
-            shares.write(pixels, count, gradient.at(y, x), curvature.at(y, x));
+        [&](const Evidence &sums, Index y, Index x, Index count) {
+            const Both both(sums, views);
+            store_first(gradient.at(y, x), both.slope, count);
+            store_first(curvature.at(y, x), both.curve, count);
             for (Index k = 0; k < 4; ++k) {
-                store_first(rest.at(k, y, x), pixels.sums[4 + k], count);
-                for (Index i = 0; i < 2; ++i) store_first(halves.at(k, i, y, x), pixels.sums[8 + 2 * k + i], count);
+                store_first(rest.at(k, y, x), sums.rest[k], count);
+                for (Index i = 0; i < 2; ++i) store_first(halves.at(k, i, y, x), sums.halves[k][i], count);
             }
         });
 }

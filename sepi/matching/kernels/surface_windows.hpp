@@ -6,7 +6,7 @@
 namespace sepi {
 
 // Sums of gradient and curvature (H, W) over those pixels of a window of 2 radius + 1 that are of the surface of its
-// middle, added to sums (2, H, W).
+// middle, into sums (2, H, W).
 //
 // Differences of disparity (H, W) over width, and of colours (3, H, W) over colour_width, make a pixel count less and
 // less, from half of it on; one of the same disparity counts least whatever its colour. Colours (3, 0, 0) are not asked.
