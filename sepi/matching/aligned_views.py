@@ -3,18 +3,35 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
+from sepi.kernels import gauss_newton as kernels
 from sepi.lightfield import BoolMap, FloatMap, LightField
 from sepi.matching.base_detail import BaseDetailParameters, forget_detail
-from sepi.matching.gauss_newton_kernels import Seeing, SplineViews, mean_of_views
 from sepi.matching.nearest_surfaces import nearest_surfaces
 from sepi.matching.row_bands import Band, Rows, row_bands
-from sepi.matching.spline_views import forget_splines, spline_views
+from sepi.matching.spline_views import SplineViews, forget_splines, spline_views
 
 BYTES_PER_PIXEL = 2 * 4 + 2 + 4
 """Of a pixel of a view: four coefficients, the detail, and the z-buffer."""
+
+
+class Seeing(NamedTuple):
+    """Where views are hidden.
+
+    Attributes
+    ----------
+    nearest : ndarray, shape (T, S, n, W), float32
+        What is nearest in the views (:func:`sepi.matching.nearest_surfaces.nearest_surfaces`), rows from the splines'
+        ``low`` on.
+    occlusion_margin : float32
+        By how much an occluder must be nearer, pixels per view step.
+    """
+
+    nearest: FloatMap
+    occlusion_margin: np.float32
 
 
 class AlignedViews:
@@ -62,7 +79,7 @@ class AlignedViews:
         mean = np.empty((*disparity.shape, 4), np.float32)
 
         def add(views: SplineViews, seeing: Seeing, band: Band) -> None:
-            mean_of_views(views, seeing, disparity, band.begin, band.end, mean)
+            kernels.mean_of_views(views, seeing, disparity, band.begin, band.end, mean)
 
         self.in_bands(disparity, add)
         return mean

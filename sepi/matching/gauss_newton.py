@@ -17,17 +17,13 @@ import numpy as np
 import numpy.typing as npt
 
 from sepi.image.noise import variance_of_residuals
+from sepi.kernels import gauss_newton as kernels
+from sepi.kernels import splines
 from sepi.lightfield import FloatMap
-from sepi.matching.aligned_views import AlignedViews
+from sepi.matching.aligned_views import AlignedViews, Seeing
 from sepi.matching.base_detail import reference_noise
-from sepi.matching.gauss_newton_kernels import (
-    Seeing,
-    SplineViews,
-    equations_and_evidence,
-    normal_equations,
-)
 from sepi.matching.row_bands import Band
-from sepi.matching.spline_kernels import spline_coefficients
+from sepi.matching.spline_views import SplineViews
 
 _SMOOTH = np.array([1, 4, 1], np.float32) / 6
 _DIFFERENCE = np.array([-1, 0, 1], np.float32) / 2
@@ -86,7 +82,7 @@ class GaussNewton(AlignedViews):
         image = mean, *(spline_derivatives(mean) if slopes is None else slopes)
 
         def add(views: SplineViews, seeing: Seeing, band: Band) -> None:
-            normal_equations(views, seeing, disparity, image, band.begin, band.end, gradient, curvature)
+            kernels.normal_equations(views, seeing, disparity, image, band.begin, band.end, gradient, curvature)
 
         self.in_bands(disparity, add)
         # the next map is another one
@@ -113,7 +109,7 @@ class GaussNewton(AlignedViews):
 
         def add(views: SplineViews, seeing: Seeing, band: Band) -> None:
             rows = band.begin, band.end
-            equations_and_evidence(views, seeing, disparity, image, *rows, gradient, curvature, halves, rest)
+            kernels.equations_and_evidence(views, seeing, disparity, image, *rows, gradient, curvature, halves, rest)
 
         self.in_bands(disparity, add)
         return gradient, curvature, Evidence(halves, *rest)
@@ -121,7 +117,8 @@ class GaussNewton(AlignedViews):
 
 def spline_derivatives(image: FloatMap) -> tuple[FloatMap, FloatMap]:
     """Derivatives along y and x of the cubic spline through an image; shapes (H, W, C), float32."""
-    coefficients = spline_coefficients(image)
+    coefficients = np.empty((image.shape[2], *image.shape[:2]), np.float32)
+    splines.spline_coefficients(image, coefficients)
 
     def filtered(along_x: npt.NDArray[np.floating], along_y: npt.NDArray[np.floating]) -> FloatMap:
         # mirrored as the splines are

@@ -3,16 +3,54 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from sepi.lightfield import BoolMap, LightField
+from sepi.kernels import splines as kernels
+from sepi.lightfield import BoolMap, FloatMap, LightField
 from sepi.matching.base_detail import BaseDetailParameters, base_detail_decomposition, forget_detail
-from sepi.matching.gauss_newton_kernels import SplineViews
 from sepi.matching.row_bands import Rows
-from sepi.matching.spline_kernels import MARGIN, REACH, SPLINE_UNIT, view_splines
 from sepi.workspace import OfViews, kept_of
+
+SPLINE_UNIT = np.float32(1 / 3400)
+"""Unit of the spline coefficients, stored as int16; a checkerboard of -0.5 and 1.5 has some of +-9.5."""
+
+MARGIN: int = kernels.MARGIN
+"""Coefficients beyond each side of a view."""
+
+
+class SplineViews(NamedTuple):
+    """What a Gauss-Newton iteration needs of the views, and of some of their rows.
+
+    Attributes
+    ----------
+    splines : ndarray, shape (T, S, n + 4, W + 4, 4), int16
+        Spline coefficients of colours and detail (``kernels/splines.hpp``), with a margin; zero where the detail has
+        no share.
+    unit : float32
+        What they are multiplied with.
+    low : int
+        The row after the margin.
+    reference : ndarray, shape (H, W, 4), float32
+        Colours and detail of the reference view.
+    places : ndarray, shape (N, 2), int64
+        Row and column in the grid of each view that is compared, but for the reference view.
+    baselines : ndarray, shape (N, 2), float32
+        Theirs, down and across, in view steps.
+    scales2, shares : ndarray, shape (2,), float32
+        Square of the robust scale, and share in the cost, of colours and of detail.
+    """
+
+    splines: npt.NDArray[np.int16]
+    unit: np.float32
+    low: int
+    reference: FloatMap
+    places: npt.NDArray[np.int64]
+    baselines: FloatMap
+    scales2: FloatMap
+    shares: FloatMap
 
 
 def spline_views(
@@ -40,7 +78,7 @@ def spline_views(
     """
     height, width = light_field.shape
     # what the convolution reaches; mirrored at the picture's ends
-    reach = MARGIN + REACH
+    reach = MARGIN + kernels.REACH
     wider = Rows(max(0, min(rows.low - reach, height - reach - 1)), min(height, rows.high + reach + 1))
     splines, colours, detail = _splines_so_far(light_field, parameters, rows, present, room)
     reference = light_field.reference_position
@@ -49,8 +87,9 @@ def spline_views(
     wanted[reference] = True
     try:
         views = base_detail_decomposition(light_field, parameters, wider, wanted, again=True)
-        numbers = views.colours, views.colour_unit, views.detail, views.detail_unit, views.low
-        view_splines(*numbers, colours, detail, rows.low, splines)
+        units = views.colour_unit / SPLINE_UNIT, views.detail_unit / SPLINE_UNIT
+        numbers = views.colours, units[0], views.detail, units[1], views.low
+        kernels.view_splines(*numbers, colours, detail, rows.low, splines)
     except BaseException:
         # they are taken for made
         forget_splines(light_field)

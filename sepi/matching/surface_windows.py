@@ -17,6 +17,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from sepi.kernels import surface_windows as kernels
 from sepi.lightfield import FloatMap
 
 BESIDE_NEARER = 0.02
@@ -72,14 +73,12 @@ def windowed_step(
     update, curvature : ndarray, shape (H, W), float32
         The curvature is the window's mean, to which other surfaces add nothing.
     """
-    from sepi.matching.surface_windows_kernels import sums_of_surface
-
     # less and less from one margin on to three: in noise a map must not hang on what is just within
     width = np.float32(max(2 * surfaces.margin, LEAST_WIDTH))
     nearer = cv2.dilate(disparity, np.ones((3, 3), np.uint8)) - disparity
     share = np.clip(np.float32(1.5) - nearer / width, np.float32(BESIDE_NEARER), np.float32(1))
-    sums = np.zeros((2, *disparity.shape), np.float32)
-    sums_of_surface(
+    sums = np.empty((2, *disparity.shape), np.float32)
+    kernels.sums_of_surface(
         gradient * share,
         curvature * share,
         disparity,

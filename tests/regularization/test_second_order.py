@@ -9,14 +9,13 @@ from scipy.ndimage import gaussian_filter, map_coordinates, spline_filter
 from scipy.sparse import coo_array, diags
 from scipy.sparse.linalg import spsolve
 
+from sepi.kernels import gauss_newton, splines
 from sepi.lightfield import DisparityRange, LightField
 from sepi.matching.base_detail import DETAIL_UNIT, BaseDetailParameters, base_detail_decomposition
 from sepi.matching.gauss_newton import GaussNewton, spline_derivatives
-from sepi.matching.gauss_newton_kernels import AT_ONCE
 from sepi.matching.nearest_surfaces import z_buffers
 from sepi.matching.row_bands import Rows
-from sepi.matching.spline_kernels import MARGIN, SPLINE_UNIT, spline_coefficients
-from sepi.matching.spline_views import spline_views
+from sepi.matching.spline_views import MARGIN, SPLINE_UNIT, spline_views
 from sepi.matching.surface_windows import Surfaces, windowed_step
 from sepi.matching.view_subsets import spread_views
 from sepi.optimize import SecondOrderParameters, second_order
@@ -40,7 +39,9 @@ from sepi.workspace import Workspace
 def test_spline_coefficients_equal_scipys(shape: tuple[int, int, int]) -> None:
     image = np.random.default_rng(0).random(shape).astype(np.float32)
     expected = [spline_filter(channel, order=3, mode="mirror") for channel in np.moveaxis(image.astype(float), 2, 0)]
-    np.testing.assert_allclose(spline_coefficients(image), expected, atol=2e-5)
+    found = np.empty((shape[2], *shape[:2]), np.float32)
+    splines.spline_coefficients(image, found)
+    np.testing.assert_allclose(found, expected, atol=2e-5)
 
 
 def test_derivatives_are_those_of_the_spline() -> None:
@@ -111,7 +112,7 @@ def test_sums_over_the_views_equal_a_plain_twin(geometry: str) -> None:
     present = np.ones((3, 4), bool)
     present[1, 0] = False
     # more than one piece of a row
-    shape = 10, AT_ONCE + 12
+    shape = 10, gauss_newton.AT_ONCE + 12
     colours = np.round(255 * np.random.default_rng(2).random((3, 4, *shape, 3))).astype(np.uint8)
     known = DisparityRange(-1, 1, "given")
     standing_so = standing(geometry, (3, 4))
@@ -185,7 +186,7 @@ def test_splines_that_failed_are_not_kept(monkeypatch: pytest.MonkeyPatch) -> No
         raise MemoryError
 
     with monkeypatch.context() as patched:
-        patched.setattr("sepi.matching.spline_views.view_splines", without_memory)
+        patched.setattr("sepi.matching.spline_views.kernels.view_splines", without_memory)
         with pytest.raises(MemoryError):
             spline_views(keeping, *given)
     np.testing.assert_array_equal(spline_views(keeping, *given).splines, spline_views(scene, *given).splines)
