@@ -39,7 +39,7 @@ _LATER = (
     "sepi.boundaries.surface_shares_kernels", "sepi.boundaries.colour_mixture_kernels",
     "sepi.boundaries.edge_lines_kernels", "sepi.boundaries.rim_kernels", "sepi.boundaries.speck_kernels",
     "sepi.regularization.second_order", "sepi.regularization.local_inverse", "sepi.regularization.multilevel",
-    "sepi.matching.surface_windows_kernels", "sepi.error_bars.mixture_kernels", "sepi.io.result_folder",
+    "sepi.matching.surface_windows_kernels", "sepi.error_bars.mixture", "sepi.io.result_folder",
     "PIL.PngImagePlugin",
 )  # fmt: skip
 

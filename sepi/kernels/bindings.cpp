@@ -3,6 +3,10 @@
 
 #include "parallel.hpp"
 
+#if defined(__x86_64__)
+#include <cpuid.h>
+#endif
+
 namespace nb = nanobind;
 using namespace nb::literals;
 
@@ -20,10 +24,16 @@ void bind_compared(nb::module_ &);
 void bind_rendered(nb::module_ &);
 void bind_applications(nb::module_ &);
 
-// Whether the processor has what x86-64-v3 adds to the baseline, as far as kernels use it.
+// Whether the processor has what x86-64-v3 adds to the baseline, as far as kernels use it, and the system keeps its
+// registers. Not by __builtin_cpu_supports: zig's own library, linked for that, brings an exp and a memcpy that are slow.
 static bool has_x86_64_v3() {
 #if defined(__x86_64__)
-    return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("bmi2") && __builtin_cpu_supports("fma");
+    constexpr unsigned of_1 = bit_AVX | bit_FMA | bit_OSXSAVE, of_7 = bit_AVX2 | bit_BMI | bit_BMI2, both_registers = 6;
+    unsigned a, b, c, d, kept, rest;
+    if (!__get_cpuid(1, &a, &b, &c, &d) || (c & of_1) != of_1) return false;
+    if (!__get_cpuid_count(7, 0, &a, &b, &c, &d) || (b & of_7) != of_7) return false;
+    __asm__("xgetbv" : "=a"(kept), "=d"(rest) : "c"(0));
+    return (kept & both_registers) == both_registers;
 #else
     return false;
 #endif

@@ -7,8 +7,6 @@
 namespace sepi {
 namespace {
 
-constexpr Index MARGIN = 2;  // how far second differences reach, pixels
-
 // The finest hats at the pixels beside a node and at the next ones.
 template <class Number>
 constexpr Number NEAR = Number(0.75);
@@ -90,14 +88,6 @@ void product_row(Array<const Number, 3> stencil, Array<const Number, 2> vector, 
     }
 }
 
-template <class T, int N>
-Array<const T, N> const_view(Array<T, N> a) {
-    Array<const T, N> view{a.data, {}, {}};
-    std::copy_n(a.shape, N, view.shape);
-    std::copy_n(a.strides, N, view.strides);
-    return view;
-}
-
 }  // namespace
 
 void weights_of_differences(Array<const float, 2> disparity, Array<const float, 2> reliability, Array<const double, 2> colour,
@@ -142,7 +132,7 @@ double turn_and_bend(Array<const Number, 3> stencil, Array<const Number, 2> ahea
     }
     const Scratch<Number, 1> along(H);
     parallel_for(MARGIN, MARGIN + H, [&](Index y) {
-        product_row(stencil, const_view(direction), y, out.at(y, MARGIN));
+        product_row<Number>(stencil, direction, y, out.at(y, MARGIN));
         along.array()(y - MARGIN) = dot(direction.at(y, MARGIN), out.at(y, MARGIN), W);
     });
     return in_order(along);
