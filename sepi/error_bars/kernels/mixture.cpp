@@ -23,26 +23,21 @@ Share laplace_above(double x, double width) {
     return {x > 0 ? half : 1 - half, half / width};
 }
 
-double rim_width(double distance) { return RIM_WIDTH * distance + LEAST_RIM; }
-
 // Error of one pixel in one direction.
 struct PixelError {
     float scale, outlier_scale, outlier, rim, above, below;
-
-    // Probability of an error of the map's own.
-    double core() const { return 1.0 - outlier - rim; }
-
+    double own = 1.0 - outlier - rim;
     // Part of the probability of the other surface that the nearer one has: the farther away, the likelier.
-    double share_above() const { return (above * above + 1e-6) / (above * above + below * below + 2e-6); }
+    double share = (above * above + 1e-6) / (above * above + below * below + 2e-6);
+    double wide = RIM_WIDTH * above + LEAST_RIM, deep = RIM_WIDTH * below + LEAST_RIM;
 
     // Probability that the true disparity is more than x >= 0 above the map's.
     Share beyond(double x) const {
-        const double usual = core() * 0.5 * std::exp(-x / scale), outliers = outlier * 0.5 * std::exp(-x / outlier_scale);
-        const double share = share_above();
-        const Share there = laplace_above(x - above, rim_width(above)), opposite = laplace_above(x + below, rim_width(below));
+        const double core = own * 0.5 * std::exp(-x / scale), outliers = outlier * 0.5 * std::exp(-x / outlier_scale);
+        const Share there = laplace_above(x - above, wide), opposite = laplace_above(x + below, deep);
         return {
-            usual + outliers + rim * (share * there.beyond + (1 - share) * opposite.beyond),
-            usual / scale + outliers / outlier_scale + rim * (share * there.density + (1 - share) * opposite.density),
+            core + outliers + rim * (share * there.beyond + (1 - share) * opposite.beyond),
+            core / scale + outliers / outlier_scale + rim * (share * there.density + (1 - share) * opposite.density),
         };
     }
 
@@ -50,7 +45,7 @@ struct PixelError {
     // a line, from where the heavier part alone would have its bound; halving what is left where it leads astray.
     double bound(double tail) const {
         if (beyond(0).beyond <= tail) return 0;
-        double x = scale * std::log(std::max(core() * 0.5 / tail, 1.1));
+        double x = scale * std::log(std::max(own * 0.5 / tail, 1.1));
         x = std::max(x, outlier_scale * std::log(std::max(outlier * 0.5 / tail, 1e-9)));
         double low = 0, high = FARTHEST;
         for (int i = 0; i < EVALUATIONS; ++i) {
@@ -67,9 +62,8 @@ struct PixelError {
 
     // Expected absolute error.
     double expected() const {
-        const double share = share_above(), wide = rim_width(above), deep = rim_width(below);
         const double other = share * (above + wide * std::exp(-above / wide)) + (1 - share) * (below + deep * std::exp(-below / deep));
-        return core() * scale + outlier * outlier_scale + rim * other;
+        return own * scale + outlier * outlier_scale + rim * other;
     }
 };
 
@@ -80,10 +74,11 @@ void describe(const ErrorMixture &mixture, double tail, double close, Array<floa
     const double normal = std::sqrt(std::numbers::pi / 2);
     parallel_for(0, out.shape[1], [&](Index y) {
         for (Index x = 0; x < out.shape[2]; ++x) {
-            const PixelError upwards{mixture.scale(y, x), mixture.outlier_scale(y, x), mixture.outlier(y, x),
-                                     mixture.rim(y, x),   mixture.above(y, x),         mixture.below(y, x)};
-            PixelError downwards = upwards;
-            std::swap(downwards.above, downwards.below);
+            const auto with_other = [&](float above, float below) {
+                return PixelError{mixture.scale(y, x), mixture.outlier_scale(y, x), mixture.outlier(y, x), mixture.rim(y, x), above, below};
+            };
+            const float above = mixture.above(y, x), below = mixture.below(y, x);
+            const PixelError upwards = with_other(above, below), downwards = with_other(below, above);
             out(0, y, x) = float(normal * upwards.expected());
             out(1, y, x) = float(downwards.bound(tail));
             out(2, y, x) = float(upwards.bound(tail));

@@ -16,9 +16,7 @@ constexpr double TOLERANCE = 1e-3;
 
 // exp of numbers up to 0; within some roundings, and next to nothing below -87.
 Float8 exp_of_negative(Float8 x) {
-    // to the nearest integer: numbers from 2^23 on have no fraction
-    constexpr float WHOLE = 1 << 23;
-    const Float8 power = x * spread(1.44269504f), n = power < spread(-WHOLE) ? power : (power - spread(WHOLE)) + spread(WHOLE);
+    const Float8 n = whole(x * spread(1.44269504f));
     // the logarithm of two in two parts: products of the first with n are exact
     const Float8 f = fma(n, spread(-1.42860682e-6f), fma(n, spread(-0.693145752f), x));
     Float8 p = spread(float(1.0 / 720));
@@ -40,8 +38,9 @@ struct Patches {
 
     Patches(Array<const float, 3> planes, Index y, Index x, Index size, const Pixels &where) {
         for (Index v = y; v < y + size; ++v) {
+            const float *rows[] = {planes.at(0, v), planes.at(1, v), planes.at(2, v), planes.at(3, v)};
             for (Index u = x; u < x + size; ++u) {
-                const Pixels there = load_pixels(planes, v, u);
+                const Pixels there{load(rows[0] + u), load(rows[1] + u), load(rows[2] + u), load(rows[3] + u)};
                 Float8 apart = there[0] - where[0], distance = apart * apart;
                 for (int c = 1; c < 4; ++c) {
                     apart = there[c] - where[c];

@@ -46,6 +46,9 @@ float squares_of(Array<const float, 2> patch, Array<const float, 2> view, const 
     return total;
 }
 
+// How many steps of -1, 0 or 1 lead from a place to the ends of n.
+Index steps_within(Index place, Index step, Index n) { return step > 0 ? n - 1 - place : step < 0 ? place : std::numeric_limits<Index>::max(); }
+
 }  // namespace
 
 void layout_costs(Array<const float, 2> reference, Array<const float, 3> views, Array<const float, 3> offsets, Array<const float, 1> candidates,
@@ -103,15 +106,16 @@ void residuals(Array<const float, 2> reference, Array<const float, 2> view, Arra
 
 void add_pairs(Array<const float, 2> rise, Array<const float, 2> residual, Array<const float, 2> disparity, Array<const bool, 2> usable, Index down,
                Index across, float length, float hidden, Index farthest, Index side, Array<double, 2> total, Array<double, 2> count) {
-    const Index H = disparity.shape[0], W = disparity.shape[1];
+    const Index H = disparity.shape[0], W = disparity.shape[1], ahead = down * disparity.strides[0] + across;
     parallel_for(0, total.shape[0], [&](Index region) {
         for (Index y = region * side; y < std::min(H, (region + 1) * side); ++y) {
             for (Index x = 0; x < W; ++x) {
                 if (!usable(y, x)) continue;
-                for (Index distance = 2; distance <= farthest; ++distance) {
+                const float *here = disparity.at(y, x);
+                const Index last = std::min({farthest, steps_within(y, down, H), steps_within(x, across, W)});
+                for (Index distance = 2; distance <= last; ++distance) {
                     const Index i = y + down * distance, j = x + across * distance;
-                    if (i < 0 || i >= H || j < 0 || j >= W) break;
-                    const float shift = (disparity(i, j) - disparity(y, x)) * length;
+                    const float shift = (here[ahead * distance] - *here) * length;
                     if (std::abs(shift - float(distance)) > MEETING || shift < LEAST_SHIFT || !usable(i, j)) continue;
                     if (std::max(residual(y, x), residual(i, j)) > hidden && std::max(rise(y, x), rise(i, j)) > LEAST_EVIDENCE) {
                         total(region, x / side) += std::clamp(rise(y, x) - rise(i, j), -MOST_EVIDENCE, MOST_EVIDENCE);
