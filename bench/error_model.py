@@ -17,8 +17,7 @@ from bench.error_samples import Sample
 from sepi.error_bars.bars import TAIL, mixture_of
 from sepi.error_bars.calibration import CONSTANT, Calibration
 from sepi.error_bars.cues import FLOORS
-from sepi.error_bars.mixture import described
-from sepi.error_bars.mixture_kernels import LEAST_RIM, RIM_WIDTH
+from sepi.error_bars.mixture import LEAST_RIM, RIM_WIDTH, described
 from sepi.scoring.error_bars import ause, reliability
 from sepi.stage import CLOSE
 

@@ -6,9 +6,9 @@ from scipy.ndimage import binary_erosion, gaussian_filter
 
 from sepi.image.mean_shift import sample_modes
 from sepi.image.superpixels import Superpixels, adjacency, colour_modes, superpixels
+from sepi.kernels import planes as kernels
 from sepi.lightfield import DisparityRange, LightField
 from sepi.regularization.planes import Coupling, basis, evaluate_planes, fit_planes, propagate
-from sepi.regularization.planes_kernels import add_normal_equations
 from sepi.scenes import render
 from sepi.stage import StageMaps, no_progress
 from sepi.textureless import (
@@ -134,7 +134,7 @@ def test_sums_over_superpixels_are_those_of_numpy():
     design, count = basis(segments), len(segments)
     disparity, weight = random.normal(size=(2, 31, 47)).astype(np.float32)
     left, right = np.zeros((count, 3, 3)), np.zeros((count, 3))
-    add_normal_equations(segments.labels.ravel(), design, weight.ravel(), disparity.ravel(), left, right)
+    kernels.add_normal_equations(segments.labels.ravel(), design, weight.ravel(), disparity.ravel(), left, right)
     weighted = design * weight.reshape(-1, 1)
     for p in range(3):
         np.testing.assert_array_equal(right[:, p], segments.sums(weighted[:, p] * disparity.ravel()))

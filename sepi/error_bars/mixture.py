@@ -18,7 +18,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from sepi.kernels import mixture as kernels
 from sepi.lightfield import FloatMap
+
+RIM_WIDTH: float = kernels.RIM_WIDTH
+"""Mean absolute deviation of the other surface's disparity, as part of its distance."""
+
+LEAST_RIM: float = kernels.LEAST_RIM
+"""The least of it, pixels per view step."""
 
 
 class Mixture(NamedTuple):
@@ -78,8 +85,6 @@ def described(mixture: Mixture, tail: float, close: float) -> Described:
     -------
     Described
     """
-    from sepi.error_bars.mixture_kernels import describe
-
     out = np.empty((4, *mixture.scale.shape), np.float32)
-    describe(tuple(mixture), tail, close, out)
+    kernels.describe(mixture, tail, close, out)
     return Described(*out)

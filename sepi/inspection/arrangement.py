@@ -17,8 +17,15 @@ import numpy as np
 import numpy.typing as npt
 
 from sepi.errors import SepiError, SepiWarning
-from sepi.inspection.view_layouts import FEWEST_POINTS, MOVEMENT, Baseline, Views, baselines_under, points_to_match
-from sepi.inspection.view_order_kernels import layout_costs
+from sepi.inspection.view_layouts import (
+    FEWEST_POINTS,
+    MOVEMENT,
+    Baseline,
+    Views,
+    baselines_under,
+    layout_costs,
+    points_to_match,
+)
 from sepi.io.readers.options import ReadOptions, arrange_numbers
 from sepi.lightfield import LightField
 
@@ -212,7 +219,7 @@ def _cost(views: Views, present: npt.NDArray[np.bool_], positions: Positions, re
         offsets = np.stack([baselines_under(order, positions[near] - positions[place]) for order in _ORDERS])
         steps = round(MOVEMENT / _SAMPLING)
         candidates = (np.arange(-steps, steps + 1) * (_SAMPLING / abs(offsets).max())).astype(np.float32)
-        cost, _ = layout_costs(reference, others, offsets.astype(np.float32), candidates, points, _RADIUS)
+        cost, _ = layout_costs(reference, others, offsets, candidates, points, _RADIUS)
         costs.append(cost.mean(axis=0))
     if not costs:
         return math.inf

@@ -18,6 +18,7 @@ import numpy as np
 
 from sepi.channels import largest_channel, mean_of_channels
 from sepi.errors import SepiError
+from sepi.inspection.coarse_sweep import coarse_sweep
 from sepi.inspection.dark_corners import dark_corners
 from sepi.lightfield import BoolMap, DisparityRange, FloatMap, LightField, as_unit_float, require_light_field
 
@@ -184,16 +185,12 @@ class _Views:
 
     def sweep(self, reach: int, distances: Iterable[int], candidates: FloatMap, radius: int) -> _Found:
         """Match the reference with views at some distances, ``reach`` at most; disparities that can be trusted."""
-        # here, since it brings the compiler with it, and most scenes name their range
-        from sepi.inspection.coarse_sweep import coarse_sweep
-
         positions = self._positions(reach, set(distances))
         if not positions:
             return _Found(np.empty(0, np.float32), np.empty(0, np.float32))
         views = np.stack([self._view(position) for position in positions])
         baselines = self.light_field.baselines[tuple(np.transpose(positions))].astype(np.float32)
-        limit = np.float32(_TRUNCATION)
-        sweep = coarse_sweep(self.reference, views, baselines, candidates, limit, radius)
+        sweep = coarse_sweep(self.reference, views, baselines, candidates, _TRUNCATION, radius)
         sampling = float(candidates[1] - candidates[0])
         # neighbours agree within a pixel of the most distant view, however finely it is searched
         tolerance = max(sampling, 1 / reach)

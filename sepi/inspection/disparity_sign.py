@@ -19,7 +19,7 @@ import numpy.typing as npt
 from sepi.inspection.coarse_sweep import coarse_sweep
 from sepi.inspection.dark_corners import dark_corners
 from sepi.inspection.view_layouts import Baseline, Trial, Views, baselines_under
-from sepi.inspection.view_order_kernels import add_pairs, residuals
+from sepi.kernels import view_order as kernels
 from sepi.lightfield import BoolMap, FloatMap, LightField
 
 # A glance looks at bands of so many rows, one of so many; it tells little in pictures of fewer pixels
@@ -130,7 +130,7 @@ def occlusion_evidence(light_field: LightField, trial: Trial, look: Look, views:
     surface = trusted & (_support(disparity, trusted, sampling) >= _LEAST_SUPPORT)
     surface &= ~dark_corners(views.reference_view, views.shape, movement)[rows]
     residual = {
-        at: residuals(pictures[0, 0], pictures[at], positions[at], disparity, trusted, _WINDOW_RADIUS)
+        at: _residual(pictures[0, 0], pictures[at], positions[at], disparity, trusted)
         for direction in directions
         for at in _at(direction, reach)
     }
@@ -142,6 +142,17 @@ def occlusion_evidence(light_field: LightField, trial: Trial, look: Look, views:
         for at in _at((t, s), reach)[-_HIDING_VIEWS:]:
             _add_pairs(residual[at], opposite, disparity, surface, positions[at], noise, 2 * movement, total, count)
     return _summary(total, count)
+
+
+def _residual(reference: FloatMap, view: FloatMap, baseline: FloatMap, disparity: FloatMap, asked: BoolMap) -> FloatMap:
+    """Mean squared difference, shape (H, W) float32, of each pixel's window and where it should be seen in a view.
+
+    ``baseline`` leads down and across to the view, in view steps. Infinite where it is not asked for, and where the
+    window leaves either picture.
+    """
+    out = np.empty_like(reference)
+    kernels.residuals(reference, view, baseline, disparity, asked, _WINDOW_RADIUS, out)
+    return out
 
 
 def _add_pairs(
@@ -163,9 +174,8 @@ def _add_pairs(
     rise = np.zeros(disparity.shape, np.float32)
     rise[usable] = np.log((residual[usable] + noise) / (opposite[usable] + noise))
     down, across = (int(n) for n in np.sign(baseline))
-    length, hidden = np.float32(np.abs(baseline).max()), np.float32(_HIDDEN * noise)
-    side = _side(disparity.shape)
-    add_pairs(rise, residual, disparity, usable, down, across, length, hidden, farthest, side, total, count)
+    length, hidden, side = np.abs(baseline).max(), _HIDDEN * noise, _side(disparity.shape)
+    kernels.add_pairs(rise, residual, disparity, usable, down, across, length, hidden, farthest, side, total, count)
 
 
 def _summary(total: npt.NDArray[np.float64], count: npt.NDArray[np.float64]) -> Evidence:
@@ -234,7 +244,7 @@ def _disparity(
     A pixel that is hidden on one side still shows its disparity on the other.
     """
     sweeps = [
-        coarse_sweep(reference, pictures, positions, candidates, np.float32(_TRUNCATION), _SWEEP_RADIUS)
+        coarse_sweep(reference, pictures, positions, candidates, _TRUNCATION, _SWEEP_RADIUS)
         for pictures, positions in sides
     ]
     chosen = np.stack([sweep[0] for sweep in sweeps]).argmin(axis=0)

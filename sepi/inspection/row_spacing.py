@@ -23,11 +23,11 @@ from sepi.inspection.view_layouts import (
     Views,
     baselines_under,
     is_clear,
+    layout_costs,
     points_to_match,
     ring,
     search_distances,
 )
-from sepi.inspection.view_order_kernels import layout_costs
 from sepi.lightfield import FloatMap, LightField
 
 # Spacings tried, and how many between one and its double
@@ -200,7 +200,7 @@ def _matched(
     offsets = np.stack([_in_units_of_the_farthest(baselines, order, spacing) for order, spacing in hypotheses])
     count = round(movement / sampling)
     candidates = (np.arange(-count, count + 1) * sampling).astype(np.float32)
-    cost, moved = layout_costs(reference, others, offsets.astype(np.float32), candidates, points, _RADIUS)
+    cost, moved = layout_costs(reference, others, offsets, candidates, points, _RADIUS)
     return cost, moved
 
 

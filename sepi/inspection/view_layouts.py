@@ -17,8 +17,8 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from sepi.inspection.view_order_kernels import layout_costs
 from sepi.io.readers.options import ORDERS
+from sepi.kernels import view_order as kernels
 from sepi.lightfield import FloatMap, LightField, as_unit_float
 from sepi.threads import threads_used
 
@@ -207,6 +207,41 @@ def baselines_under(order: str, baselines: npt.NDArray[np.float64]) -> npt.NDArr
     # where the views one row and one column after the centre go
     matrix = np.stack([np.argwhere(grid == view)[0] - 1 for view in (7, 5)])
     return np.asarray(baselines @ matrix)
+
+
+def layout_costs(
+    reference: FloatMap,
+    views: FloatMap,
+    offsets: npt.NDArray[np.floating],
+    candidates: FloatMap,
+    points: npt.NDArray[np.int64],
+    radius: int,
+) -> tuple[FloatMap, FloatMap]:
+    """How badly points of the reference view match the other views under several layouts of the views.
+
+    Parameters
+    ----------
+    reference : ndarray, shape (H, W), float32
+    views : ndarray, shape (V, H, W), float32
+    offsets : ndarray, shape (L, V, 2)
+        Baseline ``(down, across)`` of each view under each layout.
+    candidates : ndarray, shape (K,), float32
+        Disparities in pixels per unit of the baselines.
+    points : ndarray, shape (P, 2), int64
+        Pixels ``(y, x)``, more than ``radius`` from the border.
+    radius : int
+        Half width of the patch in pixels.
+
+    Returns
+    -------
+    cost, disparity : ndarrays, shape (P, L), float32
+        Lowest mean over the views of ``r^2 / (r^2 + s^2)``, 0..1, where ``s^2`` is a part of the patch's own variation;
+        1 where no candidate keeps half of the views in sight. The candidate of the lowest.
+    """
+    cost, disparity = np.empty((2, len(points), len(offsets)), np.float32)
+    positions = np.ascontiguousarray(offsets, np.float32)
+    kernels.layout_costs(reference, views, positions, candidates, points, radius, cost, disparity)
+    return cost, disparity
 
 
 def search_distances(views: Views) -> Iterator[tuple[int, int]]:

@@ -1,13 +1,12 @@
 // The extension module: a submodule for each source of kernels, by the bindings that stand beside them.
 #include <nanobind/nanobind.h>
 
-#if defined(__x86_64__)
-#include <cpuid.h>
-#include <immintrin.h>
-#endif
-
 #include "lanes.hpp"
 #include "parallel.hpp"
+
+#if defined(__x86_64__)
+#include <cpuid.h>
+#endif
 
 namespace nb = nanobind;
 using namespace nb::literals;
@@ -26,20 +25,20 @@ void bind_compared(nb::module_ &);
 void bind_rendered(nb::module_ &);
 void bind_applications(nb::module_ &);
 
-#if defined(__x86_64__)
 // Whether the processor has what x86-64-v3 adds to the baseline, as far as kernels use it, and the system keeps its
-// registers. Not by __builtin_cpu_supports: what it needs from Clang's runtime library comes with a memcpy, an exp and
-// others there, which take the place of the faster ones of the system.
-__attribute__((target("xsave"))) static bool has_x86_64_v3() {
-    constexpr unsigned FMA = 1u << 12, OSXSAVE = 1u << 27, AVX = 1u << 28, AVX2 = 1u << 5, BMI2 = 1u << 8, YMM = 6;
-    unsigned a, b, c, d;
-    const auto has = [](unsigned found, unsigned wanted) { return (found & wanted) == wanted; };
-    return __get_cpuid(1, &a, &b, &c, &d) && has(c, FMA | OSXSAVE | AVX) && has(unsigned(_xgetbv(0)), YMM) &&
-           __get_cpuid_count(7, 0, &a, &b, &c, &d) && has(b, AVX2 | BMI2);
-}
+// registers. Not by __builtin_cpu_supports: zig's own library, linked for that, brings an exp and a memcpy that are slow.
+static bool has_x86_64_v3() {
+#if defined(__x86_64__)
+    constexpr unsigned of_1 = bit_AVX | bit_FMA | bit_OSXSAVE, of_7 = bit_AVX2 | bit_BMI | bit_BMI2, both_registers = 6;
+    unsigned a, b, c, d, kept, rest;
+    if (!__get_cpuid(1, &a, &b, &c, &d) || (c & of_1) != of_1) return false;
+    if (!__get_cpuid_count(7, 0, &a, &b, &c, &d) || (b & of_7) != of_7) return false;
+    __asm__("xgetbv" : "=a"(kept), "=d"(rest) : "c"(0));
+    return (kept & both_registers) == both_registers;
 #else
-static bool has_x86_64_v3() { return false; }
+    return false;
 #endif
+}
 
 NB_MODULE(_native, m) {
     m.doc() = "Compiled loops, for one kind of processor.";

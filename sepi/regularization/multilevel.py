@@ -4,7 +4,7 @@ Conjugate gradients are slow at what bends over many pixels, the slower the fart
 as single pixels and as bilinear hats see it, 2, 8 and 32 pixels from node to node, each with its own diagonal, all
 added up [1]_: a third of the steps that the diagonal takes with a direct solve for planes in blocks beside it, and
 nothing to be factored. The system is a stencil, and stays one; the loop is short, and loading a library that has one
-takes longer than solving. Its compiled loops are in :mod:`sepi.regularization.second_order_kernels`.
+takes longer than solving.
 
 References
 ----------
@@ -17,6 +17,8 @@ from collections.abc import Callable
 
 import numpy as np
 import numpy.typing as npt
+
+from sepi.kernels import second_order as kernels
 
 FloatArray = npt.NDArray[np.float64]
 Inverse = Callable[[FloatArray], tuple[FloatArray, float]]
@@ -51,14 +53,11 @@ def conjugate_gradients(
     ndarray
         As ``right``.
     """
-    from sepi.regularization.second_order_kernels import step, turn_and_bend
-
     enough = rtol * float(np.linalg.norm(right))
     if not enough:
         return np.zeros_like(right)
-    number = right.dtype.type
     direction, bent = np.zeros_like(right), np.zeros_like(right)
-    turn_and_bend(stencil, start, number(0), direction, bent)
+    kernels.turn_and_bend(stencil, start, 0.0, direction, bent)
     solution, residual, before = start.copy(), right - bent, 1.0
     left = float(np.linalg.norm(residual)) ** 2
     direction[:] = 0
@@ -66,8 +65,8 @@ def conjugate_gradients(
         if left < enough**2:
             break
         ahead, along = inverse(residual)
-        curved = turn_and_bend(stencil, ahead, number(along / before), direction, bent)
-        left = step(number(along / curved), direction, bent, solution, residual)
+        curved = kernels.turn_and_bend(stencil, ahead, along / before, direction, bent)
+        left = kernels.step(along / curved, direction, bent, solution, residual)
         before = along
     return solution
 
@@ -79,7 +78,7 @@ def multilevel_inverse(stencil: FloatArray, dtype: npt.DTypeLike) -> Inverse:
     ----------
     stencil : ndarray, shape (7, H + 2 MARGIN, W + 2 MARGIN), float64
         Of :func:`sepi.regularization.second_order.second_difference_stencil` and the data's weights, with a margin of
-        zeros of :data:`sepi.regularization.second_order_kernels.MARGIN` pixels.
+        zeros.
     dtype : dtype
         float32 or float64, in which it is applied.
 
@@ -89,8 +88,6 @@ def multilevel_inverse(stencil: FloatArray, dtype: npt.DTypeLike) -> Inverse:
         Takes a picture with its margin, of that type, and returns one, which holds until it is called again, and the
         inner product of both.
     """
-    from sepi.regularization import second_order_kernels as kernels
-
     inverse = _inverse(stencil[0], dtype)
     hats = [_inverse(diagonal, dtype) for diagonal in _diagonals(stencil)]
     levels = [np.empty(shape, dtype) for shape in _shapes(stencil)]
@@ -114,21 +111,17 @@ def multilevel_inverse(stencil: FloatArray, dtype: npt.DTypeLike) -> Inverse:
 
 def _shapes(stencil: FloatArray) -> list[tuple[int, int]]:
     """Rows and columns of nodes of each level: each of a coarser level is one of the finer."""
-    from sepi.regularization.second_order_kernels import MARGIN, SPACING
-
-    widest = SPACING << (LEVELS - 1)
-    rows, columns = (-(-(n - 2 * MARGIN) // widest) for n in stencil.shape[1:])
+    widest = kernels.SPACING << (LEVELS - 1)
+    rows, columns = (-(-(n - 2 * kernels.MARGIN) // widest) for n in stencil.shape[1:])
     return [((rows << i) + 1, (columns << i) + 1) for i in reversed(range(LEVELS))]
 
 
 def _diagonals(stencil: FloatArray) -> list[FloatArray]:
     """What the matrix has on its diagonal as the hats of each level that counts see it."""
-    from sepi.regularization.second_order_kernels import SPACING, diagonal_of_hats
-
     found: list[FloatArray] = []
     for i, shape in list(enumerate(_shapes(stencil)))[::COUNTED]:
         diagonal = np.empty(shape)
-        diagonal_of_hats(stencil, SPACING << i, diagonal)
+        kernels.diagonal_of_hats(stencil, kernels.SPACING << i, diagonal)
         found.append(diagonal)
     return found
 

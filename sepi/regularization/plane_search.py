@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from sepi.kernels import plane_search as kernels
 from sepi.lightfield import BoolMap, FloatMap
 from sepi.regularization.regions import Plane, basis_of
 
@@ -41,10 +42,9 @@ def support(
     positions: _Doubles, values: _Doubles, planes: _Doubles, tolerance: float, behind_penalty: float
 ) -> _Doubles:
     """How many of N pixels agree with each of P planes, less a weight for each that lies behind it; (P,)."""
-    from sepi.regularization.plane_search_kernels import support_of
-
-    places, levels = np.ascontiguousarray(positions.T), np.ascontiguousarray(values)
-    return np.asarray(support_of(places, levels, planes, float(tolerance), float(behind_penalty)))
+    found = np.empty(len(planes))
+    kernels.support_of(np.ascontiguousarray(positions.T), values, planes, tolerance, behind_penalty, found)
+    return found
 
 
 def fitted(positions: _Doubles, values: _Doubles, plane: Plane, tolerance: float) -> Plane:

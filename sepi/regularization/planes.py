@@ -17,9 +17,9 @@ import scipy.sparse as sparse
 from scipy.sparse.linalg import spsolve
 
 from sepi.image.superpixels import Adjacency, FloatArray, Superpixels
+from sepi.kernels import planes as kernels
 from sepi.lightfield import BoolMap, FloatMap
 from sepi.memory import BLAS_BUFFER, require_memory
-from sepi.regularization.planes_kernels import add_normal_equations, values_of_planes
 
 UNIT = 15.0
 """Length over which gradients are measured, pixels: about a superpixel, so that the three unknowns are alike."""
@@ -58,7 +58,7 @@ def basis(segments: Superpixels) -> FloatArray:
 def evaluate_planes(segments: Superpixels, planes: FloatArray, design: FloatArray) -> FloatMap:
     """Disparity of every pixel by the plane of its superpixel; shape (H, W), float32."""
     values = np.empty(segments.labels.shape, np.float32)
-    values_of_planes(segments.labels.ravel(), design, planes, values.reshape(-1))
+    kernels.values_of_planes(segments.labels.ravel(), design, planes, values.reshape(-1))
     return values
 
 
@@ -174,7 +174,7 @@ def _normal_equations(
     """Weighted least squares of each superpixel's data: matrices (N, 3, 3) and right sides (N, 3)."""
     left, right = np.zeros((len(segments), 3, 3)), np.zeros((len(segments), 3))
     weights, values = (np.ascontiguousarray(of_pixels, np.float32).reshape(-1) for of_pixels in (weight, disparity))
-    add_normal_equations(segments.labels.ravel(), design, weights, values, left, right)
+    kernels.add_normal_equations(segments.labels.ravel(), design, weights, values, left, right)
     return left, right
 
 

@@ -4,8 +4,7 @@ knows.
 Minimises ``sum_p w_p (d_p - z_p)^2 + sum_q c_q (D_q d)^2`` over disparities ``d``, where ``z`` is the data, ``w`` its
 weight, and ``D_q`` the second differences along x, along y and across; ``c_q`` is small where that of the data is
 large, unless the data there is worth little, and where the colours change. The system has 13 entries a row, a stencil
-that is never put into a sparse matrix, and is solved in :mod:`sepi.regularization.multilevel`. The compiled loop is in
-:mod:`sepi.regularization.second_order_kernels`.
+that is never put into a sparse matrix, and is solved in :mod:`sepi.regularization.multilevel`.
 """
 
 from __future__ import annotations
@@ -15,7 +14,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from sepi.kernels import second_order as kernels
 from sepi.lightfield import FloatMap
+from sepi.regularization.multilevel import conjugate_gradients, multilevel_inverse
 
 FloatArray = npt.NDArray[np.float64]
 Corner = tuple[slice, slice]
@@ -26,6 +27,9 @@ _ALONG_X = ((_ALL, slice(None, -2)), (_ALL, slice(1, -1)), (_ALL, slice(2, None)
 _ALONG_Y = ((slice(None, -2), _ALL), (slice(1, -1), _ALL), (slice(2, None), _ALL))
 _BACK, _ON = slice(None, -1), slice(1, None)
 _ACROSS = ((_BACK, _BACK), (_BACK, _ON), (_ON, _BACK), (_ON, _ON))
+
+MARGIN: int = kernels.MARGIN
+"""How far second differences reach, pixels: so wide are the zeros round the pictures of the solver."""
 
 LEAST_SINGLE_RTOL = 1e-5
 """Residual down to which single precision is enough for the solver."""
@@ -93,14 +97,12 @@ def smoothness_weights(
     list of ndarray
         Of shapes (H, W - 2), (H - 2, W) and (H - 1, W - 1).
     """
-    from sepi.regularization.second_order_kernels import weights_of_differences
-
     disparity, reliability = (np.ascontiguousarray(each, np.float32) for each in (disparity, reliability))
 
     def weight(corners: tuple[tuple[int, int], ...], factors: tuple[float, ...], colour: FloatArray) -> FloatArray:
         out, apart = np.empty(colour.shape), np.ascontiguousarray(colour, np.float64)
         where, how = np.array(corners), np.array(factors)
-        weights_of_differences(disparity, reliability, apart, where, how, float(threshold), float(colour_variance), out)
+        kernels.weights_of_differences(disparity, reliability, apart, where, how, threshold, colour_variance, out)
         return out
 
     return [
@@ -124,14 +126,11 @@ def second_difference_stencil(weights: list[FloatArray], shape: tuple[int, int])
     -------
     ndarray, shape (7, H + 2 MARGIN, W + 2 MARGIN), float64
         Entries of each pixel with itself and with those to the right by 1 and 2, below by 1 and 2, below to the right,
-        and below to the left; the matrix is symmetric. With a margin of zeros of
-        :data:`sepi.regularization.second_order_kernels.MARGIN` pixels.
+        and below to the left; the matrix is symmetric. With a margin of zeros of :data:`MARGIN` pixels.
     """
-    from sepi.regularization.second_order_kernels import MARGIN, stencil_of
-
     stencil = np.empty((7, shape[0] + 2 * MARGIN, shape[1] + 2 * MARGIN))
     along_x, along_y, across = (np.ascontiguousarray(each, np.float64) for each in weights)
-    stencil_of(along_x, along_y, across, stencil)
+    kernels.stencil_of(along_x, along_y, across, stencil)
     return stencil
 
 
@@ -157,9 +156,6 @@ def solve_smooth(
     -------
     ndarray, shape (H, W), float32
     """
-    from sepi.regularization.multilevel import conjugate_gradients, multilevel_inverse
-    from sepi.regularization.second_order_kernels import MARGIN, add_data
-
     if not weight.any():
         # nothing holds any surface
         return data
@@ -170,7 +166,7 @@ def solve_smooth(
     # half the memory to go through, a third of the time; the solution is the same to a hundredth of its own error
     dtype: Any = np.float32 if rtol >= LEAST_SINGLE_RTOL else np.float64
     packed = np.empty(smoothness.shape, dtype)
-    add_data(w, smoothness, packed)
+    kernels.add_data(w, smoothness, packed)
     inverse = multilevel_inverse(smoothness, dtype)
     # it is large, and goes unless the caller holds it
     del smoothness

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import ndimage
 
-from sepi.compiled import njit
+from sepi.kernels import regions as kernels
 from sepi.lightfield import BoolMap, FloatMap
 from sepi.validation import require_map, require_type
 
@@ -23,11 +23,6 @@ ENERGY_THRESHOLD = 0.005
 
 MIN_AREA = 225
 """Pixels: smaller patches are dropped and smaller holes filled (one superpixel of the paper, 15 x 15)."""
-
-# half a pixel, and a little more so that rounding of float32 disparities decides no tie
-_HALF_PIXEL = 0.501
-# neighbours that land up to this many pixels apart in a view are still one surface
-_STRETCH = 2.0
 
 
 def occluded(
@@ -73,10 +68,10 @@ def occluded(
     # hide nothing
     order = np.argsort(-reach, kind="stable")[: np.count_nonzero(reach)]
     finite = np.isfinite(ground_truth)
-    if not finite.any():
-        return np.zeros(ground_truth.shape, bool)
-    filled = np.where(finite, ground_truth, -np.inf).astype(np.float64)
-    hidden: BoolMap = _hidden(filled, baselines.reshape(-1, 2)[order], float(ground_truth[finite].max()))
+    hidden = np.zeros(ground_truth.shape, bool)
+    if finite.any():
+        filled = np.where(finite, ground_truth, -np.inf).astype(np.float64)
+        kernels.occluded(filled, baselines.reshape(-1, 2)[order], ground_truth[finite].max(), hidden)
     return hidden
 
 
@@ -124,43 +119,3 @@ def _without_small(mask: BoolMap) -> BoolMap:
     large[0] = False
     kept: BoolMap = large[labels]
     return kept
-
-
-@njit(cache=True)
-def _hidden(ground_truth: npt.NDArray[np.float64], baselines: npt.NDArray[np.float64], nearest: float) -> BoolMap:
-    """``occluded`` with -inf for unknown disparities, baselines ``(N, 2)`` and the largest disparity."""
-    height, width = ground_truth.shape
-    result = np.zeros((height, width), np.bool_)
-    for y in range(height):
-        for x in range(width):
-            for n in range(len(baselines)):
-                if _hidden_in(ground_truth, y, x, baselines[n, 0], baselines[n, 1], nearest):
-                    result[y, x] = True
-                    break
-    return result
-
-
-@njit(cache=True)
-def _hidden_in(ground_truth: npt.NDArray[np.float64], y: int, x: int, v: float, u: float, nearest: float) -> bool:
-    """Whether the view of baseline ``(v, u)`` does not see the pixel ``(y, x)``."""
-    height, width = ground_truth.shape
-    own = ground_truth[y, x]
-    landing_y, landing_x = y - own * v, x - own * u
-    # also false for unknown disparities
-    if not (0 <= landing_y <= height - 1 and 0 <= landing_x <= width - 1):
-        return False
-    steps_per_disparity = max(abs(v), abs(u))
-    before = 0.0
-    # the sight line rises by one pixel along the longer axis per step; no surface is above `nearest`
-    for step in range(1, int((nearest - own) * steps_per_disparity + _HALF_PIXEL) + 1):
-        row = int(np.floor(y + step * v / steps_per_disparity + 0.5))
-        column = int(np.floor(x + step * u / steps_per_disparity + 0.5))
-        if not (0 <= row < height and 0 <= column < width):
-            return False
-        # pixels by which the surface here lands beyond the pixel looked at
-        beyond = (ground_truth[row, column] - own) * steps_per_disparity - step
-        crossed = step > 1 and before * beyond < 0 and abs(before - beyond) <= _STRETCH
-        if abs(beyond) <= _HALF_PIXEL or crossed:
-            return True
-        before = beyond
-    return False

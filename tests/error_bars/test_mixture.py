@@ -4,8 +4,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from sepi.error_bars.mixture import Mixture, described
-from sepi.error_bars.mixture_kernels import LEAST_RIM, RIM_WIDTH
+from sepi.error_bars.mixture import LEAST_RIM, RIM_WIDTH, Mixture, described
 
 
 def laplace(x: npt.NDArray[np.float64], middle: float, width: float) -> npt.NDArray[np.float64]:

@@ -263,7 +263,7 @@ def test_kernel_equals_its_plain_twin() -> None:
     views = rng.random((4, 37, 23), np.float32)
     offsets = np.array([[0, -2], [0, 1], [1, 0], [-1, 2]], np.float32)
     candidates = np.linspace(-3, 3, 13, dtype=np.float32)
-    lowest, second, mean, disparity = coarse_sweep(reference, views, offsets, candidates, np.float32(0.4), 2)
+    lowest, second, mean, disparity = coarse_sweep(reference, views, offsets, candidates, 0.4, 2)
     costs = sweep_in_numpy(reference, views, offsets, candidates, 0.4, 2)
     finite = np.isfinite(costs)
     np.testing.assert_allclose(mean, np.where(finite, costs, 0).sum(0) / np.maximum(finite.sum(0), 1), rtol=1e-4)

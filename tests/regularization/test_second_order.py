@@ -29,7 +29,7 @@ from sepi.regularization.second_order import (
     solve_smooth,
     upper_quartile,
 )
-from sepi.regularization.second_order_kernels import MARGIN as MARGIN_OF_STENCIL
+from sepi.regularization.second_order import MARGIN as MARGIN_OF_STENCIL
 from sepi.scenes import render
 from sepi.stage import StageMaps, no_progress
 from sepi.workspace import Workspace

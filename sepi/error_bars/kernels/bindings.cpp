@@ -1,6 +1,16 @@
 #include "kernels/arguments.hpp"
+#include "mixture.hpp"
 
 namespace nb = nanobind;
 using namespace nb::literals;
+using sepi::Unlocked;
 
-void bind_error_bars(nb::module_ &) {}
+template <>
+NAMED_TUPLE(sepi::ErrorMixture, "sepi.error_bars.mixture.Mixture");
+
+void bind_error_bars(nb::module_ &kernels) {
+    auto mixture = kernels.def_submodule("mixture");
+    mixture.attr("RIM_WIDTH") = sepi::RIM_WIDTH;
+    mixture.attr("LEAST_RIM") = sepi::LEAST_RIM;
+    mixture.def("describe", &sepi::describe, Unlocked(), "mixture"_a, "tail"_a, "close"_a, "out"_a);
+}

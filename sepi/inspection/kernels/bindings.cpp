@@ -1,6 +1,20 @@
+#include "coarse_sweep.hpp"
 #include "kernels/arguments.hpp"
+#include "view_order.hpp"
 
 namespace nb = nanobind;
 using namespace nb::literals;
+using sepi::Unlocked;
 
-void bind_inspection(nb::module_ &) {}
+void bind_inspection(nb::module_ &kernels) {
+    auto coarse_sweep = kernels.def_submodule("coarse_sweep");
+    coarse_sweep.def("coarse_sweep", &sepi::coarse_sweep, Unlocked(), "reference"_a, "views"_a, "offsets"_a, "candidates"_a, "truncation"_a, "radius"_a,
+                     "out"_a);
+
+    auto view_order = kernels.def_submodule("view_order");
+    view_order.def("layout_costs", &sepi::layout_costs, Unlocked(), "reference"_a, "views"_a, "offsets"_a, "candidates"_a, "points"_a, "radius"_a, "cost"_a,
+                   "disparity"_a);
+    view_order.def("residuals", &sepi::residuals, Unlocked(), "reference"_a, "view"_a, "baseline"_a, "disparity"_a, "asked"_a, "radius"_a, "out"_a);
+    view_order.def("add_pairs", &sepi::add_pairs, Unlocked(), "rise"_a, "residual"_a, "disparity"_a, "usable"_a, "down"_a, "across"_a, "length"_a,
+                   "hidden"_a, "farthest"_a, "side"_a, "total"_a, "count"_a);
+}

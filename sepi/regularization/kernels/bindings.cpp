@@ -1,4 +1,6 @@
 #include "kernels/arguments.hpp"
+#include "plane_search.hpp"
+#include "planes.hpp"
 #include "second_order.hpp"
 
 namespace nb = nanobind;
@@ -19,10 +21,19 @@ static void bind_of_numbers(nb::module_ &m) {
 
 void bind_regularization(nb::module_ &kernels) {
     auto second_order = kernels.def_submodule("second_order");
+    second_order.attr("MARGIN") = sepi::MARGIN;
+    second_order.attr("SPACING") = sepi::SPACING;
     second_order.def("weights_of_differences", &sepi::weights_of_differences, Unlocked(), "disparity"_a, "reliability"_a, "colour"_a, "corners"_a, "factors"_a,
                      "threshold"_a, "variance"_a, "out"_a);
     second_order.def("stencil_of", &sepi::stencil_of, Unlocked(), "along_x"_a, "along_y"_a, "across"_a, "out"_a);
     bind_of_numbers<float>(second_order);
     bind_of_numbers<double>(second_order);
     second_order.def("diagonal_of_hats", &sepi::diagonal_of_hats, Unlocked(), "stencil"_a, "spacing"_a, "out"_a);
+
+    auto plane_search = kernels.def_submodule("plane_search");
+    plane_search.def("support_of", &sepi::support_of, Unlocked(), "positions"_a, "values"_a, "planes"_a, "tolerance"_a, "behind_penalty"_a, "out"_a);
+
+    auto planes = kernels.def_submodule("planes");
+    planes.def("add_normal_equations", &sepi::add_normal_equations, Unlocked(), "labels"_a, "design"_a, "weight"_a, "disparity"_a, "left"_a, "right"_a);
+    planes.def("values_of_planes", &sepi::values_of_planes, Unlocked(), "labels"_a, "design"_a, "planes"_a, "out"_a);
 }

@@ -7,8 +7,6 @@
 namespace sepi {
 namespace {
 
-constexpr Index MARGIN = 2;  // how far second differences reach, pixels
-
 // The finest hats at the pixels beside a node and at the next ones.
 template <class Number>
 constexpr Number NEAR = Number(0.75);
@@ -30,11 +28,13 @@ void add(Number *__restrict row, Number factor, const Number *values, Index n) {
 // Inner product of two rows, in an order that vectorises: the same one on all processors.
 template <class Number>
 Number dot(const Number *a, const Number *b, Index n) {
-    constexpr Index PARTS = 128 / sizeof(Number);
+    constexpr Index PARTS = 128 / sizeof(Number), FEWER = PARTS / 4;
     Number sums[PARTS] = {};
     Index x = 0;
     for (; x <= n - PARTS; x += PARTS)
         for (Index i = 0; i < PARTS; ++i) sums[i] += a[x + i] * b[x + i];
+    for (; x <= n - FEWER; x += FEWER)
+        for (Index i = 0; i < FEWER; ++i) sums[i] += a[x + i] * b[x + i];
     for (Index half = PARTS / 2; half > 0; half /= 2)
         for (Index i = 0; i < half; ++i) sums[i] += sums[i + half];
     for (; x < n; ++x) sums[0] += a[x] * b[x];
@@ -90,14 +90,6 @@ void product_row(Array<const Number, 3> stencil, Array<const Number, 2> vector, 
     }
 }
 
-template <class T, int N>
-Array<const T, N> const_view(Array<T, N> a) {
-    Array<const T, N> view{a.data, {}, {}};
-    std::copy_n(a.shape, N, view.shape);
-    std::copy_n(a.strides, N, view.strides);
-    return view;
-}
-
 }  // namespace
 
 void weights_of_differences(Array<const float, 2> disparity, Array<const float, 2> reliability, Array<const double, 2> colour,
@@ -142,7 +134,7 @@ double turn_and_bend(Array<const Number, 3> stencil, Array<const Number, 2> ahea
     }
     const Scratch<Number, 1> along(H);
     parallel_for(MARGIN, MARGIN + H, [&](Index y) {
-        product_row(stencil, const_view(direction), y, out.at(y, MARGIN));
+        product_row<Number>(stencil, direction, y, out.at(y, MARGIN));
         along.array()(y - MARGIN) = dot(direction.at(y, MARGIN), out.at(y, MARGIN), W);
     });
     return in_order(along);
@@ -153,10 +145,12 @@ double step(Number length, Array<const Number, 2> direction, Array<const Number,
     const Scratch<Number, 1> squares(solution.shape[0]);
     const Index n = solution.shape[1];
     parallel_for(0, solution.shape[0], [&](Index y) {
-        add(solution.at(y), length, direction.at(y), n);
-        Number *__restrict left = residual.at(y);
-        const Number *taken = bent.at(y);
-        for (Index x = 0; x < n; ++x) left[x] -= length * taken[x];
+        Number *__restrict found = solution.at(y), *__restrict left = residual.at(y);
+        const Number *ahead = direction.at(y), *taken = bent.at(y);
+        for (Index x = 0; x < n; ++x) {
+            found[x] += length * ahead[x];
+            left[x] -= length * taken[x];
+        }
         squares.array()(y) = dot(residual.at(y), residual.at(y), n);
     });
     return in_order(squares);
@@ -199,14 +193,15 @@ void add_coarser(Array<const Number, 2> coarse, Array<Number, 2> fine) {
     constexpr Number half = Number(0.5);
     const Index w = coarse.shape[1];
     const Scratch<Number, 1> lines(w);
-    Number *line = lines.array().data;
+    Number *__restrict line = lines.array().data;
     for (Index i = 0; i < fine.shape[0]; ++i) {
         const Number *above = coarse.at(i / 2), *below = coarse.at((i + 1) / 2);
         for (Index j = 0; j < w; ++j) line[j] = half * (above[j] + below[j]);
         Number *__restrict target = fine.at(i);
         for (Index j = 0; j < w - 1; ++j) {
-            target[2 * j] += line[j];
+            // in this order the loop vectorises
             target[2 * j + 1] += half * (line[j] + line[j + 1]);
+            target[2 * j] += line[j];
         }
         target[2 * w - 2] += line[w - 1];
     }
@@ -217,7 +212,7 @@ double diagonal_and_finest(Array<const Number, 2> inverse, Array<const Number, 2
     const Index H = vector.shape[0] - 2 * MARGIN, W = vector.shape[1] - 2 * MARGIN, w = fine.shape[1];
     constexpr Number near = NEAR<Number>, far = FAR<Number>;
     const Scratch<Number, 1> lines(w), all_hats(2 * w);
-    Number *line = lines.array().data, *hats = all_hats.array().data;
+    Number *__restrict line = lines.array().data, *__restrict hats = all_hats.array().data;
     double total = 0;
     for (Index y = 0; y < H; ++y) {
         const Number first = y % 2 ? far : near, second = y % 2 ? near : far;

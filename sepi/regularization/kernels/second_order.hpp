@@ -1,13 +1,17 @@
 // Second-order smoothing: its matrix, as a stencil, and the hats of its preconditioner.
 //
 // Pictures have a margin of MARGIN pixels of zeros on each side, so that no loop has to look where it is; hats have
-// none. Node i of the finest lies at SPACING i - 0.5 pixels; a coarser level has every other node. Sums are those of
-// rows, taken one after the other, to the same bits on any number of threads. Number is float or double.
+// none. Node i of the finest lies at SPACING i - 0.5 pixels; a coarser level has every other node, and each of its hats
+// is one of the finer level and half of each of its neighbours. Sums are those of rows, taken one after the other, to
+// the same bits on any number of threads. Number is float or double.
 #pragma once
 
 #include "kernels/array.hpp"
 
 namespace sepi {
+
+constexpr Index MARGIN = 2;   // how far second differences reach, pixels
+constexpr Index SPACING = 2;  // pixels from node to node of the finest hats
 
 // Weights of second differences in one direction; corners (n, 2) and factors (n) say what pixels make a difference.
 void weights_of_differences(Array<const float, 2> disparity, Array<const float, 2> reliability, Array<const double, 2> colour,

@@ -1,0 +1,111 @@
+#include "mean_shift.hpp"
+
+#include <array>
+#include <cmath>
+
+#include "kernels/lanes.hpp"
+#include "kernels/parallel.hpp"
+
+namespace sepi {
+namespace {
+
+constexpr int ITERATIONS = 5;
+// Where the search for a mode of samples ends: iterations, or an update's part of the bandwidth.
+constexpr int MAX_ITERATIONS = 50;
+constexpr double TOLERANCE = 1e-3;
+
+// exp of numbers up to 0; within some roundings, and next to nothing below -87.
+Float8 exp_of_negative(Float8 x) {
+    const Float8 n = whole(x * spread(1.44269504f));
+    // the logarithm of two in two parts: products of the first with n are exact
+    const Float8 f = fma(n, spread(-1.42860682e-6f), fma(n, spread(-0.693145752f), x));
+    Float8 p = spread(float(1.0 / 720));
+    for (const double term : {1.0 / 120, 1.0 / 24, 1.0 / 6, 0.5, 1.0, 1.0}) p = fma(f, p, spread(float(term)));
+    return p * Float8((__builtin_convertvector(larger(spread(-126), n), Int8) + 127) << 23);
+}
+
+// Colours and disparity of eight pixels.
+using Pixels = std::array<Float8, 4>;
+
+Pixels load_pixels(Array<const float, 3> planes, Index y, Index x) {
+    return {load(planes.at(0, y, x)), load(planes.at(1, y, x)), load(planes.at(2, y, x)), load(planes.at(3, y, x))};
+}
+
+// Sums over patches of size pixels a side that begin at (y, x), of weights by how near each pixel is to where.
+struct Patches {
+    Float8 total{};
+    Pixels sums{};
+
+    Patches(Array<const float, 3> planes, Index y, Index x, Index size, const Pixels &where) {
+        for (Index v = y; v < y + size; ++v) {
+            const float *rows[] = {planes.at(0, v), planes.at(1, v), planes.at(2, v), planes.at(3, v)};
+            for (Index u = x; u < x + size; ++u) {
+                const Pixels there{load(rows[0] + u), load(rows[1] + u), load(rows[2] + u), load(rows[3] + u)};
+                Float8 apart = there[0] - where[0], distance = apart * apart;
+                for (int c = 1; c < 4; ++c) {
+                    apart = there[c] - where[c];
+                    distance = fma(apart, apart, distance);
+                }
+                const Float8 weight = exp_of_negative(-distance);
+                total += weight;
+                for (int c = 0; c < 4; ++c) sums[c] = fma(weight, there[c], sums[c]);
+            }
+        }
+    }
+};
+
+// Disparities of the modes of eight pixels.
+Float8 modes_of(Array<const float, 3> planes, Index y, Index x, Index radius) {
+    Pixels where = load_pixels(planes, y + radius, x + radius);
+    for (int i = 0; i < ITERATIONS; ++i) {
+        const Patches patches(planes, y, x, 2 * radius + 1, where);
+        // the pixel itself starts with weight one, so the total never vanishes at once
+        for (int c = 0; c < 4; ++c) where[c] = spread(1e-6f) <= patches.total ? patches.sums[c] / patches.total : where[c];
+    }
+    return where[3];
+}
+
+}  // namespace
+
+void patch_modes(Array<const float, 3> planes, Array<const bool, 2> mask, Index radius, float unit, Array<float, 2> modes) {
+    const Index W = mask.shape[1];
+    parallel_for(0, mask.shape[0], [&](Index y) {
+        for (Index x = 0; x < W; x += LANES) {
+            const bool *wanted = mask.at(y, x);
+            const Index number = std::min<Index>(LANES, W - x);
+            if (std::none_of(wanted, wanted + number, [](bool one) { return one; })) continue;
+            const Float8 found = modes_of(planes, y, x, radius) * spread(unit);
+            for (Index i = 0; i < number; ++i)
+                if (wanted[i]) modes(y, x + i) = found[i];
+        }
+    });
+}
+
+void sample_modes(Array<const double, 2> samples, double bandwidth, Array<double, 2> modes) {
+    const Index N = samples.shape[0], D = samples.shape[1];
+    const double factor = -0.5 / (bandwidth * bandwidth);
+    parallel_for(0, N, [&](Index n) {
+        const Scratch<double, 1> sums(D);
+        double *moved = sums.array().data, *mode = modes.at(n);
+        for (int i = 0; i < MAX_ITERATIONS; ++i) {
+            double total = 0, update = 0;
+            std::fill_n(moved, D, 0.0);
+            for (Index m = 0; m < N; ++m) {
+                const double *sample = samples.at(m);
+                double distance = 0;
+                for (Index d = 0; d < D; ++d) distance += (sample[d] - mode[d]) * (sample[d] - mode[d]);
+                const double weight = std::exp(factor * distance);
+                total += weight;
+                for (Index d = 0; d < D; ++d) moved[d] += weight * sample[d];
+            }
+            for (Index d = 0; d < D; ++d) {
+                moved[d] /= total;
+                update = std::max(update, std::abs(moved[d] - mode[d]));
+                mode[d] = moved[d];
+            }
+            if (update < TOLERANCE * bandwidth) break;
+        }
+    });
+}
+
+}  // namespace sepi

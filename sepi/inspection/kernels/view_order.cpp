@@ -1,0 +1,130 @@
+#include "view_order.hpp"
+
+#include <cmath>
+#include <limits>
+
+#include "kernels/parallel.hpp"
+
+namespace sepi {
+namespace {
+
+constexpr float HALF = 0.25f;  // difference of two patches that counts one half, as part of the patch's own variation
+// Two surfaces count as two where they are this far apart in a view, pixels; they meet in it within this distance.
+constexpr float LEAST_SHIFT = 1.5f, MEETING = 0.75f;
+// Logarithm of the ratio of residuals that one pair counts at most; least that tells anything.
+constexpr float MOST_EVIDENCE = 2, LEAST_EVIDENCE = 1;
+
+// Square part of a picture, which begins at (y, x).
+Array<const float, 2> patch_at(Array<const float, 2> picture, Index y, Index x, Index side) {
+    return {picture.at(y, x), {side, side}, {picture.strides[0], 1}};
+}
+
+// Where samples begin: a pixel, and fractions to the next ones.
+struct Place {
+    Index row, column;
+    float fy, fx;
+
+    Place(double y, double x) : row(Index(std::floor(y))), column(Index(std::floor(x))), fy(float(y - double(row))), fx(float(x - double(column))) {}
+
+    bool within(Array<const float, 2> view, Index side) const {
+        return row >= 0 && column >= 0 && row + side < view.shape[0] && column + side < view.shape[1];
+    }
+};
+
+// Sum of the squared differences of a patch and the samples of a view that begin at a place.
+float squares_of(Array<const float, 2> patch, Array<const float, 2> view, const Place &place) {
+    const auto [row, column, fy, fx] = place;
+    const float a = (1 - fy) * (1 - fx), b = (1 - fy) * fx, c = fy * (1 - fx), d = fy * fx;
+    float total = 0;
+    for (Index i = 0; i < patch.shape[0]; ++i) {
+        const float *own = patch.at(i), *above = view.at(row + i, column), *below = view.at(row + i + 1, column);
+        for (Index j = 0; j < patch.shape[1]; ++j) {
+            const float r = a * above[j] + b * above[j + 1] + c * below[j] + d * below[j + 1] - own[j];
+            total += r * r;
+        }
+    }
+    return total;
+}
+
+// How many steps of -1, 0 or 1 lead from a place to the ends of n.
+Index steps_within(Index place, Index step, Index n) { return step > 0 ? n - 1 - place : step < 0 ? place : std::numeric_limits<Index>::max(); }
+
+}  // namespace
+
+void layout_costs(Array<const float, 2> reference, Array<const float, 3> views, Array<const float, 3> offsets, Array<const float, 1> candidates,
+                  Array<const std::int64_t, 2> points, Index radius, Array<float, 2> cost, Array<float, 2> disparity) {
+    const Index L = offsets.shape[0], V = offsets.shape[1], side = 2 * radius + 1;
+    parallel_for(0, points.shape[0], [&](Index p) {
+        const Index y = points(p, 0) - radius, x = points(p, 1) - radius;
+        const auto patch = patch_at(reference, y, x, side);
+        float squares = 0;
+        for (Index i = 0; i < side; ++i)
+            for (Index j = 0; j < side; ++j) squares += patch(i, j) * patch(i, j);
+        // never zero, so that nothing is divided by it
+        const float variation = HALF * squares + 1e-12f;
+        for (Index n = 0; n < L; ++n) {
+            float least = 1, best = 0;
+            for (Index k = 0; k < candidates.shape[0]; ++k) {
+                float total = 0;
+                Index seen = 0;
+                for (Index v = 0; v < V; ++v) {
+                    const Place place(double(y) - double(candidates(k) * offsets(n, v, 0)), double(x) - double(candidates(k) * offsets(n, v, 1)));
+                    if (!place.within(reference, side)) continue;
+                    const float found = squares_of(patch, views[v], place);
+                    total += found / (found + variation);
+                    ++seen;
+                    // the mean stays above the lowest, whatever the views that are left say
+                    if (total >= least * double(seen + V - 1 - v)) break;
+                }
+                if (2 * seen >= V && total < least * double(seen)) {
+                    least = total / float(seen);
+                    best = candidates(k);
+                }
+            }
+            cost(p, n) = least;
+            disparity(p, n) = best;
+        }
+    });
+}
+
+void residuals(Array<const float, 2> reference, Array<const float, 2> view, Array<const float, 1> baseline, Array<const float, 2> disparity,
+               Array<const bool, 2> asked, Index radius, Array<float, 2> out) {
+    const Index H = reference.shape[0], W = reference.shape[1], side = 2 * radius + 1;
+    const float down = baseline(0), across = baseline(1);
+    parallel_for(0, H, [&](Index row) {
+        std::fill_n(out.at(row), W, std::numeric_limits<float>::infinity());
+        const Index y = row - radius;
+        if (y < 0 || y > H - side) return;
+        for (Index x = 0; x <= W - side; ++x) {
+            if (!asked(row, x + radius)) continue;
+            const float d = disparity(row, x + radius);
+            const Place place(double(y) - double(d * down), double(x) - double(d * across));
+            if (place.within(view, side)) out(row, x + radius) = squares_of(patch_at(reference, y, x, side), view, place) / float(side * side);
+        }
+    });
+}
+
+void add_pairs(Array<const float, 2> rise, Array<const float, 2> residual, Array<const float, 2> disparity, Array<const bool, 2> usable, Index down,
+               Index across, float length, float hidden, Index farthest, Index side, Array<double, 2> total, Array<double, 2> count) {
+    const Index H = disparity.shape[0], W = disparity.shape[1], ahead = down * disparity.strides[0] + across;
+    parallel_for(0, total.shape[0], [&](Index region) {
+        for (Index y = region * side; y < std::min(H, (region + 1) * side); ++y) {
+            for (Index x = 0; x < W; ++x) {
+                if (!usable(y, x)) continue;
+                const float *here = disparity.at(y, x);
+                const Index last = std::min({farthest, steps_within(y, down, H), steps_within(x, across, W)});
+                for (Index distance = 2; distance <= last; ++distance) {
+                    const Index i = y + down * distance, j = x + across * distance;
+                    const float shift = (here[ahead * distance] - *here) * length;
+                    if (std::abs(shift - float(distance)) > MEETING || shift < LEAST_SHIFT || !usable(i, j)) continue;
+                    if (std::max(residual(y, x), residual(i, j)) > hidden && std::max(rise(y, x), rise(i, j)) > LEAST_EVIDENCE) {
+                        total(region, x / side) += std::clamp(rise(y, x) - rise(i, j), -MOST_EVIDENCE, MOST_EVIDENCE);
+                        count(region, x / side) += 1;
+                    }
+                }
+            }
+        }
+    });
+}
+
+}  // namespace sepi

@@ -1,0 +1,47 @@
+#include "regions.hpp"
+
+#include <cmath>
+
+#include "kernels/parallel.hpp"
+
+namespace sepi {
+namespace {
+
+constexpr double HALF_PIXEL = 0.501;  // and a little more so that rounding of float32 disparities decides no tie
+constexpr double STRETCH = 2;         // neighbours that land up to this many pixels apart in a view are still one surface
+
+// Whether the view of baseline (v, u) does not see the pixel (y, x).
+bool hidden_in(Array<const double, 2> ground_truth, Index y, Index x, double v, double u, double nearest) {
+    const Index H = ground_truth.shape[0], W = ground_truth.shape[1];
+    const auto within = [](double place, Index n) { return 0 <= place && place <= double(n - 1); };
+    const double own = ground_truth(y, x);
+    // not of unknown disparities, either
+    if (!within(double(y) - own * v, H) || !within(double(x) - own * u, W)) return false;
+    const double steps_per_disparity = std::max(std::abs(v), std::abs(u));
+    double before = 0;
+    // the sight line rises by one pixel along the longer axis per step; no surface is above the nearest
+    for (Index step = 1; step <= Index((nearest - own) * steps_per_disparity + HALF_PIXEL); ++step) {
+        const auto row = Index(std::floor(double(y) + double(step) * v / steps_per_disparity + 0.5));
+        const auto column = Index(std::floor(double(x) + double(step) * u / steps_per_disparity + 0.5));
+        if (row < 0 || row >= H || column < 0 || column >= W) return false;
+        // pixels by which the surface here lands beyond the pixel looked at
+        const double beyond = (ground_truth(row, column) - own) * steps_per_disparity - double(step);
+        const bool crossed = step > 1 && before * beyond < 0 && std::abs(before - beyond) <= STRETCH;
+        if (std::abs(beyond) <= HALF_PIXEL || crossed) return true;
+        before = beyond;
+    }
+    return false;
+}
+
+}  // namespace
+
+void occluded(Array<const double, 2> ground_truth, Array<const double, 2> baselines, double nearest, Array<bool, 2> out) {
+    parallel_for(0, out.shape[0], [&](Index y) {
+        for (Index x = 0; x < out.shape[1]; ++x) {
+            out(y, x) = false;
+            for (Index n = 0; n < baselines.shape[0] && !out(y, x); ++n) out(y, x) = hidden_in(ground_truth, y, x, baselines(n, 0), baselines(n, 1), nearest);
+        }
+    });
+}
+
+}  // namespace sepi
