@@ -12,9 +12,9 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
+from sepi.kernels import reprojection as kernels
 from sepi.lightfield import BoolMap, FloatMap
 from sepi.rendered.surfaces import FirstSurface
-from sepi.rendered.view_kernels import farthest_of_four, seen_elsewhere
 from sepi.rendered.world import FloatArray, Pattern, Thing
 from sepi.scoring.edges import edges_of
 from sepi.scoring.regions import textureless
@@ -79,10 +79,11 @@ def seen_bits(disparities: FloatArray, positions: npt.NDArray[np.float64]) -> Bi
     positions : ndarray, shape (N, 2), float64
         Where they stand, in view steps: down, across.
     """
-    farthest = farthest_of_four(disparities)
-    bits = np.empty(disparities.shape, np.uint16)
+    farthest, bits = np.empty_like(disparities), np.empty(disparities.shape, np.uint16)
+    kernels.farthest_of_four(disparities, farthest)
+    hidden, seen = np.empty((2, *disparities.shape[1:]), bool)
     for view, own in enumerate(disparities):
-        hidden, seen = seen_elsewhere(own, farthest, positions - positions[view], view, _SAME)
+        kernels.seen_elsewhere(own, farthest, positions - positions[view], view, _SAME, hidden, seen)
         bits[view] = hidden * np.uint16(_BIT["occluded"]) + ~seen * np.uint16(_BIT["alone"])
     return bits
 

@@ -12,8 +12,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from sepi.kernels import reprojection as kernels
 from sepi.lightfield import BoolMap
-from sepi.rendered.view_kernels import alike_light, gathered_light, limit_bent, one_of_four
 from sepi.rendered.world import FloatArray
 
 # pixels per view step: how far the disparities of one point may be apart
@@ -58,11 +58,13 @@ def with_shared_light(
     # irradiance over pi
     light = (pictures / np.where(whole[..., None], albedo, 1)).astype(np.float32)
     surface = np.where(whole, things, np.int16(-1))
-    around = one_of_four(surface)
-    shown = np.empty_like(light)
+    around, shown = np.empty_like(surface), np.empty_like(light)
+    kernels.one_of_four(surface, around)
+    mean, alike, variance = np.empty_like(light[0]), np.empty_like(light[0]), np.empty_like(disparities[0])
     for view, own in enumerate(surface):
-        mean, variance = gathered_light(light, disparities, own, around, positions - positions[view], view, _BEND)
-        mean = alike_light(mean, variance, own, _REACH, _DOUBT)
-        picture = np.where(whole[view][..., None], mean * albedo[view], pictures[view])
-        shown[view] = limit_bent(picture, things[view], whole[view], _BESIDE)
+        baselines = positions - positions[view]
+        kernels.gathered_light(light, disparities, own, around, baselines, view, _BEND, mean, variance)
+        kernels.alike_light(mean, variance, own, _REACH, _DOUBT, alike)
+        shown[view] = np.where(whole[view][..., None], alike * albedo[view], pictures[view])
+        kernels.limit_bent(things[view], whole[view], _BESIDE, shown[view])
     return shown

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
+from sepi.kernels import triangles as kernels
 from sepi.lightfield import BoolMap
-from sepi.rendered.first_kernels import first_met
-from sepi.rendered.paint_kernels import painted
 from sepi.rendered.srgb import srgb_decoded
 from sepi.rendered.world import FloatArray, Material, Mesh, Pattern, Vector, World
 
@@ -18,6 +18,30 @@ from sepi.rendered.world import FloatArray, Material, Mesh, Pattern, Vector, Wor
 _FINE = 8
 
 Faces = npt.NDArray[np.int32]
+
+
+class Planes(NamedTuple):
+    """Planes of triangles, and where on its pattern each is, for the compiled kernels."""
+
+    corner: npt.NDArray[np.float64]
+    """The first one, shape (M, 3)."""
+    normal: npt.NDArray[np.float64]
+    """Shape (M, 3)."""
+    uv: npt.NDArray[np.float64]
+    """Of the corner, in periods, shape (M, 2)."""
+    gradient: npt.NDArray[np.float64]
+    """Of uv, shape (M, 2, 3)."""
+
+
+class Paint(NamedTuple):
+    """What triangles are painted with, for the compiled kernels."""
+
+    thing: npt.NDArray[np.int64]
+    """Whose each triangle is, shape (M,)."""
+    starts: npt.NDArray[np.int64]
+    """Of each thing's pattern: where it begins in the list of texels, its height and width."""
+    texels: FloatArray
+    """Of all patterns, linear, shape (N, 3)."""
 
 
 @dataclass(frozen=True)
@@ -74,15 +98,14 @@ class Surfaces:
         )
         self.thing = np.concatenate([np.full(len(mesh.faces), number) for number, mesh, _ in parts])
         self._corners = self.mesh.vertices.astype(np.float64)[self.mesh.faces]
-        # one after the other in memory, as kernels are compiled for
-        first, second, third = np.ascontiguousarray(np.moveaxis(self._corners, 1, 0))
-        self._corner, self._normal = first, np.cross(second - first, third - first)
+        first, second, third = np.moveaxis(self._corners, 1, 0)
+        normal = np.cross(second - first, third - first)
         # uv rises along the triangle by this much in each direction
         at, along, beyond = (self.mesh.uv.astype(np.float64)[self.mesh.faces[:, n]] for n in range(3))
-        square = np.maximum(np.sum(self._normal**2, axis=1), 1e-300)[:, None]
-        rise = [np.cross(third - first, self._normal) / square, np.cross(self._normal, second - first) / square]
-        self._uv = at
-        self._gradient = (along - at)[:, :, None] * rise[0][:, None] + (beyond - at)[:, :, None] * rise[1][:, None]
+        square = np.maximum(np.sum(normal**2, axis=1), 1e-300)[:, None]
+        rise = [np.cross(third - first, normal) / square, np.cross(normal, second - first) / square]
+        gradient = (along - at)[:, :, None] * rise[0][:, None] + (beyond - at)[:, :, None] * rise[1][:, None]
+        self._planes = Planes(first, normal, at, gradient)
         self._patterns = [thing.material.pattern for thing in world.things]
         self._matte = np.array([thing.material.kind == "matte" for thing in world.things] + [False])
 
@@ -114,7 +137,8 @@ class Surfaces:
         near : float
             Metres along the axis from which on something is met.
         """
-        found: Faces = first_met(self._corners, origin, rotation, frame, size, near)
+        found = np.zeros((size, size), np.int32)
+        kernels.first_met(self._corners, origin, rotation, frame, near, found)
         return found
 
     def first(self, faces: Faces, directions: npt.NDArray[np.float64], origin: Vector) -> FirstSurface:
@@ -128,14 +152,14 @@ class Surfaces:
         origin : (float, float, float)
             Where they begin.
         """
-        normal = self._normal[faces]
+        corner, normal, uv, gradient = (part[faces] for part in self._planes)
         with np.errstate(divide="ignore", invalid="ignore"):
-            depth = np.sum(normal * (self._corner[faces] - origin), axis=-1) / np.sum(normal * directions, axis=-1)
+            depth = np.sum(normal * (corner - origin), axis=-1) / np.sum(normal * directions, axis=-1)
             normal = normal / np.linalg.norm(normal, axis=-1, keepdims=True)
-            point = np.array(origin) + depth[..., None] * directions - self._corner[faces]
+            point = np.array(origin) + depth[..., None] * directions - corner
         hit = faces > 0
         towards = np.sum(normal * directions, axis=-1, keepdims=True) > 0
-        uv = self._uv[faces] + np.einsum("...ij,...j", self._gradient[faces], point)
+        uv = uv + np.einsum("...ij,...j", gradient, point)
         return FirstSurface(
             face=faces,
             depth=np.where(hit, depth, np.inf),
@@ -156,19 +180,8 @@ class Surfaces:
         frame : ndarray, shape (5,), float64
             Where the camera is (right, down), the row and column that its axis meets, its focal length in pixels.
         """
-        found: FloatArray = painted(
-            faces,
-            pixels,
-            frame,
-            self._corner,
-            self._normal,
-            self._uv,
-            self._gradient,
-            self.thing,
-            self._painted,
-            self._texels[1],
-            _FINE,
-        )
+        found = np.empty((len(faces), 3), np.float32)
+        kernels.painted(faces, pixels, frame, self._planes, self._paint, _FINE, found)
         return found
 
     def linear(self, pattern: Pattern) -> FloatArray:
@@ -189,10 +202,10 @@ class Surfaces:
         return dict(zip(rasters, begins, strict=False)), texels
 
     @cached_property
-    def _painted(self) -> npt.NDArray[np.int64]:
-        """Of each thing's pattern: where it begins in the list of texels, its height and width."""
-        begins = self._texels[0]
-        return np.array([(begins[id(pattern)], *_raster(pattern).shape[:2]) for pattern in self._patterns])
+    def _paint(self) -> Paint:
+        begins, texels = self._texels
+        starts = np.array([(begins[id(pattern)], *_raster(pattern).shape[:2]) for pattern in self._patterns])
+        return Paint(self.thing, starts, texels)
 
 
 def _raster(pattern: Pattern | Vector) -> FloatArray:

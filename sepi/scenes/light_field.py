@@ -6,7 +6,6 @@ import math
 import zlib
 from dataclasses import replace
 from functools import lru_cache
-from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -14,10 +13,8 @@ import numpy.typing as npt
 from sepi.errors import SepiError
 from sepi.lightfield import DisparityRange, FloatMap, LightField, Truth
 from sepi.scenes.definitions import DEFINITIONS
+from sepi.scenes.rendering import Drawing, drawing, occluded, render_view, visible
 from sepi.validation import require_known
-
-if TYPE_CHECKING:
-    from sepi.scenes.rendering import Drawing
 
 SMALLEST, LARGEST = 64, 1024
 MOST_VIEWS = 17
@@ -79,9 +76,6 @@ def render(
     >>> bool((left[:, 1:] == right[:, :-1]).all())
     True
     """
-    # brings the compiler with it
-    from sepi.scenes.rendering import render_view
-
     scene, light_field = _with_truth(name, size, views, row_spacing, positions)
     baselines = light_field.baselines
     rng = np.random.default_rng(zlib.crc32(name.encode()))
@@ -110,8 +104,6 @@ def _with_truth(
     textured: bool = True,
 ) -> tuple[Drawing, LightField]:
     """What is to be drawn, with textures or only where, and the light field with all but its pictures."""
-    from sepi.scenes.rendering import drawing, occluded, visible
-
     _require_scene(name, size)
     _require_whole(name, "views", views, 2, MOST_VIEWS)
     surfaces = DEFINITIONS[name].surfaces()
@@ -165,8 +157,6 @@ def true_disparity(name: str, *, size: int = 192, baseline: tuple[float, float] 
     >>> corner.shape, bool((corner == light_field.ground_truth).all())
     ((64, 64), False)
     """
-    from sepi.scenes.rendering import visible
-
     disparity, _ = visible(drawn(name, size), size, *map(float, baseline))
     return disparity.astype(np.float32)
 
@@ -174,8 +164,6 @@ def true_disparity(name: str, *, size: int = 192, baseline: tuple[float, float] 
 @lru_cache(maxsize=1)
 def drawn(name: str, size: int) -> Drawing:
     """A scene's surfaces, kept from view to view: their textures take longer than a view."""
-    from sepi.scenes.rendering import drawing
-
     _require_scene(name, size)
     return drawing(DEFINITIONS[name].surfaces(), size)
 

@@ -13,8 +13,11 @@ import numpy as np
 import numpy.typing as npt
 
 from sepi.camera import Camera
+from sepi.kernels import rendering as kernels
 from sepi.lightfield import FloatMap
 from sepi.rig import Shot
+from sepi.scenes.light_field import drawn
+from sepi.scenes.rendering import boxes_round
 
 # sub-samples per pixel and direction
 _SAMPLES = 4
@@ -74,18 +77,12 @@ def render_shot(name: str, shot: Shot, *, camera: Camera, size: int = 192) -> Po
     >>> int(abs(seen.picture.astype(int) - views[1, 2]).max()), float(seen.depth[0, 0])
     (0, 10.0)
     """
-    # brings the compiler with it
-    from sepi.scenes.light_field import drawn
-    from sepi.scenes.rendering_kernels import cast, colours_at
-
     scene = drawn(name, size)
     middle = (size - 1) / 2
     a, b, c = scene.planes.T
     across, down = camera.focal_px * b, camera.focal_px * c
     normals = np.column_stack([across, down, a + camera.offset + (b + c) * middle]) / camera.scale
-    first = scene.first_edge[:-1]
-    boxes = np.hstack([np.minimum.reduceat(scene.edges[:, :2], first), np.maximum.reduceat(scene.edges[:, :2], first)])
-    pinhole = np.array([camera.focal_px, middle, middle])
+    boxes, pinhole = boxes_round(scene), np.array([camera.focal_px, middle, middle])
 
     def hits(samples: int) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.float64]]:
         y, x = ((np.indices((shot.lens.height * samples, shot.lens.width * samples)) + 0.5) / samples - 0.5).reshape(
@@ -94,12 +91,12 @@ def render_shot(name: str, shot: Shot, *, camera: Camera, size: int = 192) -> Po
         rays = shot.lens.rays(np.column_stack([x, y])) @ shot.rotation
         owner, found = np.empty(len(rays), np.int64), np.full((len(rays), 3), np.inf)
         origin = np.ascontiguousarray(shot.centre, np.float64)
-        cast(scene.first_edge, scene.edges, boxes, normals, origin, rays, pinhole, owner, found)
+        kernels.cast(scene, boxes, normals, origin, rays, pinhole, owner, found)
         return owner, found
 
     owner, found = hits(_SAMPLES)
     colours = np.empty((owner.size, 3))
-    colours_at(scene.texels, scene.first_texel, scene.side, owner, found, colours)
+    kernels.colours_at(scene, owner, found, colours)
     shape = shot.lens.height, shot.lens.width
     mean = colours.reshape(shape[0], _SAMPLES, shape[1], _SAMPLES, 3).mean(axis=(1, 3))
     # rays have z = 1: their lengths are depths

@@ -4,7 +4,6 @@ A plane of disparity ``d(x, y) = a + b x + c y`` in the centre view is seen in t
 ``(x', y') = (x - u d, y - v d)``. Solved for the disparity, ``d = (a + b x' + c y') / (1 - b u - c v)``: it is a plane
 there, too, and a polygon stays a polygon. So each view is drawn by filling polygons along sub-pixel rows, the largest
 disparity wins, and the texture is looked up at ``(x' + u d, y' + v d)``; nothing is resampled from another view.
-The compiled loops are in :mod:`sepi.scenes.rendering_kernels`.
 """
 
 from __future__ import annotations
@@ -13,9 +12,10 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
+from sepi.kernels import rendering as kernels
 from sepi.lightfield import BoolMap, FloatMap
-from sepi.scenes.rendering_kernels import BEYOND, FloatArray, IntArray, hide, nearest, shade
 from sepi.scenes.surfaces import Surface
 
 # Sub-samples per pixel and direction.
@@ -23,9 +23,12 @@ SAMPLES = 4
 # A plane closer than this to edge-on counts as seen from its edge.
 EDGE_ON = 1e-9
 
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+
 
 class Drawing(NamedTuple):
-    """Surfaces as flat arrays in pixels of the centre view, for the compiled kernels."""
+    """Surfaces as flat arrays in pixels of the centre view, or of another, for the compiled kernels."""
 
     edges: FloatArray
     """Polygon edges ``x0, y0, x1, y1`` of all surfaces, shape (E, 4)."""
@@ -36,7 +39,7 @@ class Drawing(NamedTuple):
     texels: FloatMap
     """Spline coefficients of all textures, one after the other, shape (N, 4): three colours, and 0.
 
-    Each row goes on periodically for :data:`sepi.scenes.rendering_kernels.BEYOND` texels."""
+    Each row goes on periodically for ``sepi.kernels.rendering.BEYOND`` texels."""
     first_texel: IntArray
     """Where the texture of each surface begins."""
     side: IntArray
@@ -55,7 +58,7 @@ def drawing(surfaces: Sequence[Surface], size: int, *, textured: bool = True) ->
         planes.append((at_centre - (b + c) * (size - 1) / 2, b, c))
     asked = {id(surface.texture): surface.texture for surface in surfaces} if textured else {}
     textures = {key: texture() if callable(texture) else texture for key, texture in asked.items()}
-    sizes = [len(texture) * (len(texture) + BEYOND) for texture in textures.values()]
+    sizes = [len(texture) * (len(texture) + kernels.BEYOND) for texture in textures.values()]
     begin = dict(zip(textures, np.cumsum([0, *sizes]), strict=False))
     own = [id(surface.texture) for surface in surfaces] if textured else []
     return Drawing(
@@ -70,10 +73,8 @@ def drawing(surfaces: Sequence[Surface], size: int, *, textured: bool = True) ->
 
 def render_view(scene: Drawing, size: int, v: float, u: float) -> FloatMap:
     """The view ``v`` steps below and ``u`` steps to the right of the centre; shape (size, size, 3) in about 0..1."""
-    v, u = float(v), float(u)  # whole numbers would be compiled for anew
-    picture = np.zeros((size, size, 3), np.float32)
-    edges, planes = _seen_from(scene, v, u)
-    shade(scene.first_edge, scene.texels, scene.first_texel, scene.side, edges, planes, v, u, SAMPLES, picture)
+    picture = np.empty((size, size, 3), np.float32)
+    kernels.shade(_seen_from(scene, v, u), v, u, SAMPLES, picture)
     return picture
 
 
@@ -84,8 +85,7 @@ def visible(scene: Drawing, size: int, v: float = 0.0, u: float = 0.0) -> tuple[
     """
     disparity = np.empty((size, size))
     owner = np.empty((size, size), np.int64)
-    edges, planes = _seen_from(scene, v, u)
-    nearest(scene.first_edge, planes, edges, disparity, owner)
+    kernels.nearest(_seen_from(scene, v, u), disparity, owner)
     return disparity, owner
 
 
@@ -97,11 +97,15 @@ def occluded(scene: Drawing, disparity: FloatArray, baselines: FloatArray) -> Bo
     """
     hidden = np.zeros(disparity.shape, bool)
     for v, u in baselines.reshape(-1, 2):
-        edges, planes = _seen_from(scene, v, u)
-        first = scene.first_edge[:-1]
-        boxes = np.hstack([np.minimum.reduceat(edges[:, :2], first), np.maximum.reduceat(edges[:, :2], first)])
-        hide(scene.first_edge, planes, edges, boxes, disparity, v, u, hidden)
+        seen = _seen_from(scene, v, u)
+        kernels.hide(seen, boxes_round(seen), disparity, v, u, hidden)
     return hidden
+
+
+def boxes_round(scene: Drawing) -> FloatArray:
+    """Least and greatest x and y of the corners of each surface, ``x0, y0, x1, y1``."""
+    corners, first = scene.edges[:, :2], scene.first_edge[:-1]
+    return np.hstack([np.minimum.reduceat(corners, first), np.maximum.reduceat(corners, first)])
 
 
 def _coefficients(texture: FloatMap) -> FloatMap:
@@ -111,12 +115,12 @@ def _coefficients(texture: FloatMap) -> FloatMap:
     values = texture.astype(np.float64)
     for axis in (0, 1):
         values = ndimage.spline_filter1d(values, order=3, axis=axis, mode="grid-wrap")
-    further = np.pad(values.astype(np.float32), ((0, 0), (0, BEYOND), (0, 0)), "wrap")
+    further = np.pad(values.astype(np.float32), ((0, 0), (0, kernels.BEYOND), (0, 0)), "wrap")
     return np.pad(further, ((0, 0), (0, 0), (0, 1))).reshape(-1, 4)
 
 
-def _seen_from(scene: Drawing, v: float, u: float) -> tuple[FloatArray, FloatArray]:
-    """Edges and planes as they are in a view."""
+def _seen_from(scene: Drawing, v: float, u: float) -> Drawing:
+    """Surfaces as they are in a view."""
     of_edge = np.repeat(scene.planes, np.diff(scene.first_edge), axis=0)
     x, y = scene.edges[:, 0::2], scene.edges[:, 1::2]
     d = of_edge[:, :1] + of_edge[:, 1:2] * x + of_edge[:, 2:] * y
@@ -125,4 +129,4 @@ def _seen_from(scene: Drawing, v: float, u: float) -> tuple[FloatArray, FloatArr
     stretch = 1 - scene.planes[:, 1] * u - scene.planes[:, 2] * v
     # a plane seen exactly edge-on covers nothing
     stretch[np.abs(stretch) < EDGE_ON] = np.inf
-    return edges, scene.planes / stretch[:, None]
+    return scene._replace(edges=edges, planes=scene.planes / stretch[:, None])

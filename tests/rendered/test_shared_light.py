@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from small_worlds import ball, bar, room, taking
 
+from sepi.kernels import reprojection as kernels
 from sepi.rendered.render_file import read_render
 from sepi.rendered.rendering import render_world
 from sepi.rendered.rig import rig_of
 from sepi.rendered.tracing import Tracer
-from sepi.rendered.view_kernels import alike_light, gathered_light, one_of_four
 from sepi.rendered.world import Material
 
 SIZE, VIEWS = 48, 5
@@ -29,7 +29,16 @@ def falling_on_a_plane() -> dict[str, np.ndarray]:
 def gathered(light: Any, disparities: Any, things: Any, whole: Any, baselines: Any, view: int) -> Any:
     """As :func:`sepi.rendered.shared_light.with_shared_light` asks for it."""
     surface = np.where(whole, things, -1).astype(np.int16)
-    return gathered_light(light, disparities, surface[view], one_of_four(surface), baselines, view, 0.02)
+    around, mean, variance = np.empty_like(surface), np.empty_like(light[0]), np.empty_like(disparities[0])
+    kernels.one_of_four(surface, around)
+    kernels.gathered_light(light, disparities, surface[view], around, baselines, view, 0.02, mean, variance)
+    return mean, variance
+
+
+def alike_light(light: Any, variance: Any, surface: Any) -> Any:
+    found = np.empty_like(light)
+    kernels.alike_light(light, variance, surface, 3, 2.0, found)
+    return found
 
 
 def test_a_plane_seen_by_all_views_has_the_mean_of_their_light() -> None:
@@ -60,7 +69,7 @@ def test_equal_light_stays_as_it_is() -> None:
     plane["disparities"] = np.zeros_like(plane["disparities"])
     mean, variance = gathered(**plane, view=4)
     assert variance.min() >= 0
-    smoothed = alike_light(mean, variance, plane["things"][4], 3, 2.0)
+    smoothed = alike_light(mean, variance, plane["things"][4])
     # rims, too, whose neighbours are partly beyond the picture
     np.testing.assert_allclose(smoothed, plane["light"][4], rtol=1e-2)
 
@@ -73,13 +82,13 @@ def test_light_is_smoothed_where_it_may_be_the_same_and_not_across_a_shadow() ->
     light = (true + rng.normal(0, 0.04, true.shape)).astype(np.float32)
     things, whole = np.zeros((40, 40), np.int16), np.pad(np.ones((38, 38), bool), 1)
     variance = np.full((40, 40), 3 * 0.04**2, np.float32)
-    smooth = alike_light(light, variance, np.where(whole, things, np.int16(-1)), 3, 2.0)
+    smooth = alike_light(light, variance, np.where(whole, things, np.int16(-1)))
     assert (smooth - true)[4:-4, 4:16].std() < 0.04 / 4
     assert np.abs(smooth - true)[1:-1, 19:21].mean() < 0.03
     # not from another thing, nor from what is not whole
     things[:, 20:] = 1
     whole[20:] = False
-    apart = alike_light(light, 100 * variance, np.where(whole, things, np.int16(-1)), 3, 2.0)
+    apart = alike_light(light, 100 * variance, np.where(whole, things, np.int16(-1)))
     assert abs((apart - true)[2:18, 18:20].mean()) < 0.01
     assert np.array_equal(apart[20:], light[20:])
 

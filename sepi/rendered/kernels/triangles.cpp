@@ -1,0 +1,159 @@
+#include "triangles.hpp"
+
+#include <array>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "kernels/parallel.hpp"
+#include "kernels/sampling.hpp"
+
+namespace sepi {
+namespace {
+
+constexpr double INFINITE = std::numeric_limits<double>::infinity();
+
+// Rows of rays that are looked at together.
+constexpr Index BAND = 32;
+
+// Pixels: more than rounding moves a corner.
+constexpr double SLACK = 1e-4;
+
+// Triangles, or pixels, that a thread looks at together.
+constexpr Index AT_ONCE = 64;
+
+using Vector = std::array<double, 3>;  // right, down, away
+
+Vector cross(const Vector &a, const Vector &b) { return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]}; }
+
+struct Pixels {
+    Index first = 0, last = -1;
+};
+
+struct Interval {
+    double least = INFINITE, greatest = -INFINITE;
+
+    void add(double number) {
+        least = std::min(least, number);
+        greatest = std::max(greatest, number);
+    }
+
+    // The pixels whose middles lie between, of numbers per depth.
+    Pixels middles(double axis, double focal, Index size) const {
+        const double first = focal * least + axis - 0.5 - SLACK, last = focal * greatest + axis - 0.5 + SLACK;
+        return {Index(std::ceil(std::min(std::max(first, 0.0), double(size)))), Index(std::floor(std::max(std::min(last, double(size) - 1), -1.0)))};
+    }
+};
+
+// A triangle as the camera sees it, and the pixels at which it may be met.
+struct Triangle {
+    std::array<Vector, 3> corners;
+    Pixels rows, columns;
+
+    void find_pixels(double near, const double *frame, Index size) {
+        Interval down, across;
+        const auto add = [&](double x, double y, double z) {
+            down.add(y / z);
+            across.add(x / z);
+        };
+        for (Index k = 0; k < 3; ++k) {
+            const Vector &one = corners[k], &two = corners[(k + 1) % 3];
+            if (one[2] >= near) add(one[0], one[1], one[2]);
+            // where the side from it goes behind the camera
+            if ((one[2] >= near) != (two[2] >= near)) {
+                const double part = (near - one[2]) / (two[2] - one[2]);
+                add(one[0] + part * (two[0] - one[0]), one[1] + part * (two[1] - one[1]), near);
+            }
+        }
+        if (down.least > down.greatest) return;
+        rows = down.middles(frame[1], frame[0], size);
+        columns = across.middles(frame[2], frame[0], size);
+    }
+};
+
+// Triangle number n at the rays of the rows first..first + rows of depth, where it is nearer than what is there.
+void meet(const Triangle &triangle, Index n, double near, const double *frame, const double *across, Index first, Array<double, 2> depth,
+          Array<std::int32_t, 2> out) {
+    const auto &[a, b, c] = triangle.corners;
+    // of each side the normal of the plane through it and the camera
+    const Vector sides[] = {cross(b, c), cross(c, a), cross(a, b)};
+    const double volume = a[0] * sides[0][0] + a[1] * sides[0][1] + a[2] * sides[0][2];
+    for (Index row = std::max(triangle.rows.first, first); row <= std::min(triangle.rows.last, first + depth.shape[0] - 1); ++row) {
+        const double y = (double(row) + 0.5 - frame[1]) / frame[0];
+        double at_zero[3];
+        for (Index k = 0; k < 3; ++k) at_zero[k] = sides[k][1] * y + sides[k][2];
+        for (Index column = triangle.columns.first; column <= triangle.columns.last; ++column) {
+            const double x = across[column];
+            const double u = sides[0][0] * x + at_zero[0], v = sides[1][0] * x + at_zero[1], w = sides[2][0] * x + at_zero[2], total = u + v + w;
+            const bool inside = (u >= 0 && v >= 0 && w >= 0) || (u <= 0 && v <= 0 && w <= 0);
+            if (!inside || total == 0) continue;
+            double &nearest = depth(row - first, column);
+            if (const double away = volume / total; near < away && away < nearest) {
+                nearest = away;
+                out(row, column) = std::int32_t(n);
+            }
+        }
+    }
+}
+
+}  // namespace
+
+void first_met(Array<const double, 3> corners, Array<const double, 1> origin, Array<const double, 2> rotation, Array<const double, 1> frame, double near,
+               Array<std::int32_t, 2> out) {
+    const Index count = corners.shape[0], size = out.shape[0];
+    std::vector<Triangle> triangles(count);
+    parallel_for_blocks(1, count, AT_ONCE, [&](Index n) {
+        for (Index k = 0; k < 3; ++k) {
+            for (Index i = 0; i < 3; ++i) {
+                double &total = triangles[n].corners[k][i] = 0;
+                for (Index j = 0; j < 3; ++j) total += (corners(n, k, j) - origin(j)) * rotation(j, i);
+            }
+        }
+        triangles[n].find_pixels(near, frame.data, size);
+    });
+    std::vector<std::vector<Index>> bands((size + BAND - 1) / BAND);
+    for (Index n = 1; n < count; ++n) {
+        const auto &[_, rows, columns] = triangles[n];
+        if (rows.first > rows.last || columns.first > columns.last) continue;
+        for (Index band = rows.first / BAND; band <= rows.last / BAND; ++band) bands[band].push_back(n);
+    }
+    const Scratch<double, 1> across(size);
+    for (Index column = 0; column < size; ++column) across.array()(column) = (double(column) + 0.5 - frame(2)) / frame(0);
+    parallel_for(0, Index(bands.size()), [&](Index band) {
+        const auto depth = Scratch<double, 2>(std::min(BAND, size - band * BAND), size).filled(INFINITE);
+        for (const Index n : bands[band]) meet(triangles[n], n, near, frame.data, across.array().data, band * BAND, depth.array(), out);
+    });
+}
+
+void painted(Array<const std::int32_t, 1> faces, Strided<const std::int64_t, 2> pixels, Array<const double, 1> frame, const Planes &planes, const Paint &paint,
+             Index fine, Array<float, 2> out) {
+    // what is left of a whole one may round to one
+    const auto texel = [](double periods, Index size) { return clamped(Index((periods - std::floor(periods)) * double(size)), size); };
+    parallel_for_blocks(0, faces.shape[0], AT_ONCE, [&](Index n) {
+        const Index face = faces(n);
+        const std::int64_t *start = paint.starts.at(paint.thing(face)), height = start[1], width = start[2];
+        if (height * width == 1) {
+            std::copy_n(paint.texels.at(start[0]), 3, out.at(n));
+            return;
+        }
+        const double *normal = planes.normal.at(face), *corner = planes.corner.at(face), *uv = planes.uv.at(face);
+        const double *u = planes.gradient.at(face, 0), *v = planes.gradient.at(face, 1);
+        const double left = corner[0] - frame(0), top = corner[1] - frame(1), near = corner[2];
+        const double volume = normal[0] * left + normal[1] * top + normal[2] * near;
+        double total[3] = {};
+        for (Index i = 0; i < fine; ++i) {
+            const double down = (double(pixels(n, 0)) + (double(i) + 0.5) / double(fine) - frame(2)) / frame(4);
+            for (Index j = 0; j < fine; ++j) {
+                const double right = (double(pixels(n, 1)) + (double(j) + 0.5) / double(fine) - frame(3)) / frame(4);
+                const double away = volume / (normal[0] * right + normal[1] * down + normal[2]);
+                const double x = away * right - left, y = away * down - top, z = away - near;
+                const double across = uv[0] + u[0] * x + u[1] * y + u[2] * z, below = uv[1] + v[0] * x + v[1] * y + v[2] * z;
+                const float *colour = paint.texels.at(start[0] + texel(below, height) * width + texel(across, width));
+                for (Index c = 0; c < 3; ++c) total[c] += double(colour[c]);
+            }
+        }
+        for (Index c = 0; c < 3; ++c) out(n, c) = float(total[c] / double(fine * fine));
+    });
+}
+
+}  // namespace sepi

@@ -1,0 +1,187 @@
+#include "rendering.hpp"
+
+#include <cmath>
+#include <limits>
+
+#include "kernels/lanes.hpp"
+#include "kernels/parallel.hpp"
+
+namespace sepi {
+namespace {
+
+// A surface hides a point only if it is nearer by more than rounding: points on the edge between two faces.
+constexpr double TOLERANCE = 1e-9;
+
+constexpr double INFINITE = std::numeric_limits<double>::infinity();
+
+// Rays that a thread looks at together.
+constexpr Index RAYS_AT_ONCE = 256;
+
+// Whether an edge crosses a row, and where; of an outline as many do as close it.
+bool crosses(const double *edge, double y) { return (edge[1] <= y) != (edge[3] <= y); }
+
+double crossing(const double *edge, double y) { return edge[0] + (y - edge[1]) * (edge[2] - edge[0]) / (edge[3] - edge[1]); }
+
+// Even-odd rule: whether a ray to the right crosses the outline of a surface an odd number of times.
+bool covers(const Drawing &drawing, Array<const double, 2> boxes, Index p, double x, double y) {
+    const double *box = boxes.at(p);
+    if (!(box[0] <= x && x <= box[2] && box[1] <= y && y <= box[3])) return false;
+    bool odd = false;
+    for (Index e = drawing.first_edge(p); e < drawing.first_edge(p + 1); ++e)
+        if (const double *edge = drawing.edges.at(e); crosses(edge, y) && crossing(edge, y) > x) odd = !odd;
+    return odd;
+}
+
+// Centres of samples along a line, in pixels.
+Scratch<double, 1> places_of(Index number, Index samples) {
+    Scratch<double, 1> places(number);
+    for (Index i = 0; i < number; ++i) places.array()(i) = (double(i) + 0.5) / double(samples) - 0.5;
+    return places;
+}
+
+// Nearest disparity and its surface at the places of one row at height y; crossings (E) is scratch. Even-odd rule;
+// intervals are closed on the left and open on the right, so that neighbours leave no gap.
+void fill_row(const Drawing &drawing, double y, Index samples, Array<const double, 1> places, double *crossings, double *__restrict depth,
+              std::int64_t *__restrict owner) {
+    const Index width = places.shape[0];
+    std::fill_n(depth, width, -INFINITE);
+    std::fill_n(owner, width, -1);
+    const auto sample = [&](double x) { return Index(std::ceil((x + 0.5) * double(samples) - 0.5)); };
+    for (Index p = 0; p < drawing.planes.shape[0]; ++p) {
+        Index count = 0;
+        for (Index e = drawing.first_edge(p); e < drawing.first_edge(p + 1); ++e)
+            if (const double *edge = drawing.edges.at(e); crosses(edge, y)) crossings[count++] = crossing(edge, y);
+        std::sort(crossings, crossings + count);
+        const double at_zero = drawing.planes(p, 0) + drawing.planes(p, 2) * y, slope = drawing.planes(p, 1);
+        for (Index i = 0; i + 1 < count; i += 2) {
+            const Index first = std::max<Index>(0, sample(std::max(crossings[i], -1.0)));
+            const Index last = std::min(width, sample(std::min(crossings[i + 1], double(width))));
+            for (Index column = first; column < last; ++column) {
+                const double d = at_zero + slope * places.data[column];
+                const bool nearer = d > depth[column];
+                depth[column] = nearer ? d : depth[column];
+                owner[column] = nearer ? p : owner[column];
+            }
+        }
+    }
+}
+
+// The first of four texels, and their cubic B-spline weights.
+struct Spline {
+    Index first;
+    float weights[4];
+
+    explicit Spline(double position) {
+        const double base = std::floor(position);
+        const float f = float(position - base), g = 1 - f, sixth = float(1.0 / 6), most = float(2.0 / 3);
+        first = Index(base) - 1;
+        weights[0] = g * g * g * sixth;
+        weights[1] = most - 0.5f * f * f * (1 + g);
+        weights[2] = most - 0.5f * g * g * (1 + f);
+        weights[3] = f * f * f * sixth;
+    }
+};
+
+// Two numbers, four times each.
+Float8 halves(float low, float high) { return __builtin_shufflevector(spread(low), spread(high), 0, 1, 2, 3, 12, 13, 14, 15); }
+
+// A sample of a surface's texture, which goes on periodically, is added to a vector: colours are the sum of both halves.
+Float8 add_sample(const Drawing &drawing, Index p, double x, double y, Float8 total) {
+    const Spline across(x), down(y);
+    const Index side = drawing.side(p), column = ((across.first % side) + side) % side;
+    Index row = ((down.first % side) + side) % side;
+    // two texels at once, each of four numbers
+    Float8 left{}, right{};
+    for (const float weight : down.weights) {
+        const float *here = drawing.texels.at(drawing.first_texel(p) + row * (side + BEYOND) + column);
+        left = fma(spread(weight), load(here), left);
+        right = fma(spread(weight), load(here + LANES), right);
+        row = row + 1 < side ? row + 1 : 0;
+    }
+    total = fma(halves(across.weights[0], across.weights[1]), left, total);
+    return fma(halves(across.weights[2], across.weights[3]), right, total);
+}
+
+float colour_of(Float8 total, Index channel) { return total[channel] + total[4 + channel]; }
+
+}  // namespace
+
+void nearest(const Drawing &drawing, Array<double, 2> disparity, Array<std::int64_t, 2> owner) {
+    const auto places = places_of(disparity.shape[1], 1);
+    parallel_for(0, disparity.shape[0], [&](Index row) {
+        const Scratch<double, 1> crossings(drawing.edges.shape[0]);
+        fill_row(drawing, double(row), 1, places.array(), crossings.array().data, disparity.at(row), owner.at(row));
+    });
+}
+
+void shade(const Drawing &drawing, double v, double u, Index samples, Array<float, 3> picture) {
+    const Index size = picture.shape[0], width = size * samples;
+    const auto all_places = places_of(width, samples);
+    const double *places = all_places.array().data;
+    parallel_for(0, size, [&](Index line) {
+        const Scratch<double, 1> crossings(drawing.edges.shape[0]), depth(width);
+        const Scratch<std::int64_t, 1> owner(width);
+        std::fill_n(picture.at(line), 3 * size, 0.0f);
+        for (Index row = line * samples; row < (line + 1) * samples; ++row) {
+            const double y = places[row];
+            fill_row(drawing, y, samples, all_places.array(), crossings.array().data, depth.array().data, owner.array().data);
+            for (Index pixel = 0; pixel < size; ++pixel) {
+                Float8 total{};
+                for (Index column = pixel * samples; column < (pixel + 1) * samples; ++column) {
+                    const double d = depth.array()(column);
+                    if (const Index p = owner.array()(column); p >= 0) total = add_sample(drawing, p, places[column] + u * d, y + v * d, total);
+                }
+                for (Index c = 0; c < 3; ++c) picture(line, pixel, c) += colour_of(total, c);
+            }
+        }
+        for (Index i = 0; i < 3 * size; ++i) picture.at(line)[i] /= float(samples * samples);
+    });
+}
+
+void hide(const Drawing &drawing, Array<const double, 2> boxes, Array<const double, 2> disparity, double v, double u, Array<bool, 2> hidden) {
+    const Index H = disparity.shape[0], W = disparity.shape[1];
+    parallel_for(0, H, [&](Index row) {
+        for (Index column = 0; column < W; ++column) {
+            const double d = disparity(row, column), x = double(column) - u * d, y = double(row) - v * d;
+            if (hidden(row, column) || !(-0.5 <= x && x < double(W) - 0.5 && -0.5 <= y && y < double(H) - 0.5)) continue;
+            bool found = false;
+            for (Index p = 0; p < drawing.planes.shape[0] && !found; ++p) {
+                const double *plane = drawing.planes.at(p);
+                found = plane[0] + plane[1] * x + plane[2] * y > d + TOLERANCE && covers(drawing, boxes, p, x, y);
+            }
+            hidden(row, column) = found;
+        }
+    });
+}
+
+void cast(const Drawing &drawing, Array<const double, 2> boxes, Array<const double, 2> normals, Array<const double, 1> origin, Array<const double, 2> rays,
+          Array<const double, 1> pinhole, Array<std::int64_t, 1> owner, Array<double, 2> hits) {
+    const auto product = [](const double *a, const double *b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; };
+    const Scratch<double, 1> ahead(normals.shape[0]);
+    for (Index p = 0; p < normals.shape[0]; ++p) ahead.array()(p) = 1 - product(normals.at(p), origin.data);
+    parallel_for_blocks(0, rays.shape[0], RAYS_AT_ONCE, [&](Index i) {
+        const double *ray = rays.at(i);
+        double least = INFINITE;
+        owner(i) = -1;
+        for (Index p = 0; p < normals.shape[0]; ++p) {
+            const double along = product(normals.at(p), ray), away = ahead.array()(p);
+            if (along * away <= 0) continue;
+            const double t = away / along, z = origin(2) + t * ray[2];
+            if (t >= least - TOLERANCE * t || z <= 0) continue;
+            const double x = pinhole(1) + pinhole(0) * (origin(0) + t * ray[0]) / z, y = pinhole(2) + pinhole(0) * (origin(1) + t * ray[1]) / z;
+            if (!covers(drawing, boxes, p, x, y)) continue;
+            least = hits(i, 0) = t, hits(i, 1) = x, hits(i, 2) = y;
+            owner(i) = p;
+        }
+    });
+}
+
+void colours_at(const Drawing &drawing, Array<const std::int64_t, 1> owner, Array<const double, 2> hits, Array<double, 2> colours) {
+    parallel_for_blocks(0, owner.shape[0], RAYS_AT_ONCE, [&](Index i) {
+        const Index p = owner(i);
+        const Float8 found = p < 0 ? Float8{} : add_sample(drawing, p, hits(i, 1), hits(i, 2), Float8{});
+        for (Index c = 0; c < 3; ++c) colours(i, c) = double(colour_of(found, c));
+    });
+}
+
+}  // namespace sepi
