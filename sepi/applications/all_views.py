@@ -2,7 +2,7 @@
 
 A few maps tell what nearly all views see: that of the reference view, and those of the views that stand farthest from
 it in each diagonal direction, which see round the surfaces that hide something from it. Each of them is carried to a
-view as a surface (:mod:`sepi.applications.all_views_kernels`), and where they differ they vote: for a surface are the
+view as a surface (:mod:`sepi.applications.carried_map`), and where they differ they vote: for a surface are the
 maps that show it, against it those that see through it to what is behind, as in the fusion of [1]_. What no map shows
 takes the disparity of the farther of the surfaces beside it. At last each view decides which side its pixels at depth
 steps belong to (:mod:`sepi.boundaries.decision`), for a carried outline is only known to a pixel.
@@ -17,23 +17,21 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from types import NoneType
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
 import numpy.typing as npt
 
-from sepi.applications.carried_map import MOST_STRETCHED, TOLERANCE
+from sepi.applications.carried_map import MOST_STRETCHED, TOLERANCE, corner_disparities
 from sepi.built_in_variants import DEFAULT_VARIANT
 from sepi.errors import SepiError
+from sepi.kernels import all_views as kernels
 from sepi.lightfield import BoolMap, FloatMap, LightField, require_light_field
 from sepi.pipeline import estimate_depth
 from sepi.stage import ERROR_BARS, Progress, StageMaps, no_progress
 from sepi.validation import require_type
 from sepi.variants import Variant
-
-if TYPE_CHECKING:
-    from sepi.applications.all_views_kernels import Sources
 
 LEAST_WEIGHT = 0.05
 """Vote of a map where its confidence is 0, beside 1: beside depth steps all are small, and there they differ."""
@@ -43,6 +41,47 @@ EDGE_VIEWS = 25
 
 _AT_ONCE = 8  # views that are made at a time: so many maps are held beside the sources
 _CORNERS = ((-1, -1), (-1, 1), (1, -1), (1, 1))
+
+
+class Sources(NamedTuple):
+    """The maps that are carried.
+
+    Attributes
+    ----------
+    disparity, confidence : ndarray, shape (N, H, W), float32
+        Pixels per view step; 0..1.
+    bars : ndarray, shape (N, H, W, 3), float32
+        Standard deviation of the disparity, and how far the bounds of its interval lie below and above it; of no maps
+        where there are none.
+    corners : ndarray, shape (N, H, W, 4), float32
+        Disparity at the corners of each pixel, from :func:`sepi.applications.carried_map.corner_disparities`.
+    baselines : ndarray, shape (N, 2), float64
+        Of the views that the maps belong to, down and across, in view steps.
+    """
+
+    disparity: FloatMap
+    confidence: FloatMap
+    bars: FloatMap
+    corners: FloatMap
+    baselines: npt.NDArray[np.float64]
+
+
+class Rules(NamedTuple):
+    """When maps agree.
+
+    Attributes
+    ----------
+    most_stretched : float
+        A surface seen more than so many times larger than in its map's view is not carried.
+    tolerance : float
+        Disparities that differ by no more are of one surface, pixels per view step.
+    least_weight : float
+        Of a map where its confidence is 0.
+    """
+
+    most_stretched: float
+    tolerance: float
+    least_weight: float
 
 
 class ViewMaps(NamedTuple):
@@ -253,17 +292,19 @@ def anchor_views(light_field: LightField) -> list[tuple[int, int]]:
 
 def _sources(found: list[StageMaps], baselines: npt.NDArray[np.float64]) -> Sources:
     """The maps that are carried, with the surfaces that their pixels are parts of."""
-    from sepi.applications.all_views_kernels import Sources, corner_disparities
-
     bars = [offsets for offsets in map(_offsets, found) if offsets is not None]
     return Sources(
-        np.stack([maps.disparity for maps in found]),
-        np.stack([maps.confidence for maps in found]),
+        _stacked([maps.disparity for maps in found]),
+        _stacked([maps.confidence for maps in found]),
         # of all maps, or of none
-        np.stack(bars) if len(bars) == len(found) else np.empty((0, *found[0].disparity.shape, 3), np.float32),
-        np.stack([corner_disparities(maps.disparity, np.float32(TOLERANCE)) for maps in found]),
+        _stacked(bars) if len(bars) == len(found) else np.empty((0, *found[0].disparity.shape, 3), np.float32),
+        _stacked([corner_disparities(maps.disparity) for maps in found]),
         baselines,
     )
+
+
+def _stacked(maps: list[FloatMap]) -> FloatMap:
+    return np.ascontiguousarray(np.stack(maps), np.float32)
 
 
 def _offsets(maps: StageMaps) -> FloatMap | None:
@@ -277,15 +318,13 @@ def _offsets(maps: StageMaps) -> FloatMap | None:
 
 def _fused(light_field: LightField, sources: Sources, places: npt.NDArray[np.int64]) -> list[ViewMaps]:
     """What the carried maps say of some views."""
-    from sepi.applications.all_views_kernels import Rules, maps_of_views
-
     shape = (len(places), *light_field.shape)
     disparity, confidence, extended = np.empty(shape, np.float32), np.empty(shape, np.float32), np.empty(shape, bool)
-    rules = Rules(MOST_STRETCHED, np.float32(TOLERANCE), np.float32(LEAST_WEIGHT))
+    rules = Rules(MOST_STRETCHED, TOLERANCE, LEAST_WEIGHT)
     baselines = np.ascontiguousarray(light_field.baselines[tuple(places.T)])
     told = len(sources.bars) > 0
     bars = np.empty((*shape, 3) if told else (len(places), 0, 0, 3), np.float32)
-    maps_of_views(sources, rules, baselines, disparity, confidence, bars, extended)
+    kernels.maps_of_views(sources, rules, baselines, disparity, confidence, bars, extended)
     positions = [(int(t), int(s)) for t, s in places]
     views = [ViewMaps(*of_view) for of_view in zip(positions, disparity, confidence, extended, strict=True)]
     if not told:
@@ -328,11 +367,7 @@ def _with_own_edges(light_field: LightField, view: ViewMaps, edge_views: int) ->
 
 def torn_pixels(disparity: FloatMap) -> BoolMap:
     """Pixels at whose side the surface comes apart, beyond what slopes explain; shape (H, W), bool."""
-    from sepi.applications.all_views_kernels import corner_disparities
-
-    top_left, top_right, bottom_right, bottom_left = np.moveaxis(
-        corner_disparities(disparity, np.float32(TOLERANCE)), 2, 0
-    )
+    top_left, top_right, bottom_right, bottom_left = np.moveaxis(corner_disparities(disparity), 2, 0)
     torn = np.zeros(disparity.shape, bool)
     for first, second in ((top_right, top_left), (bottom_right, bottom_left)):
         apart = np.abs(first[:, :-1] - second[:, 1:]) > TOLERANCE

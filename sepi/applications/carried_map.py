@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from sepi.kernels import all_views as kernels
 from sepi.lightfield import BoolMap, FloatMap
 
 TOLERANCE = 0.1
@@ -53,19 +54,34 @@ def carried_values(
     return np.where(origin >= 0, values.ravel()[origin], np.float32(np.nan))
 
 
+def corner_disparities(disparity: FloatMap) -> FloatMap:
+    """Disparity at the corners of each pixel: what the pixels that meet there, and belong together, agree on.
+
+    Parameters
+    ----------
+    disparity : ndarray, shape (H, W), float32
+        Pixels per view step; H and W at least 2.
+
+    Returns
+    -------
+    ndarray, shape (H, W, 4), float32
+        Top left, top right, bottom right, bottom left.
+    """
+    corners = np.empty((*disparity.shape, 4), np.float32)
+    kernels.corner_disparities(np.ascontiguousarray(disparity, np.float32), TOLERANCE, corners)
+    return corners
+
+
 def _carried(
     disparity: FloatMap, baseline: tuple[float, float], known: BoolMap | None
 ) -> tuple[FloatMap, npt.NDArray[np.int32]]:
     """The map that :func:`carried_map` gives, and the number of the pixel that is seen, -1 where none is."""
-    from sepi.applications.all_views_kernels import carry, corner_disparities
-
-    nearest, origin = np.empty_like(disparity), np.empty(disparity.shape, np.int32)
+    nearest, origin = np.empty(disparity.shape, np.float32), np.empty(disparity.shape, np.int32)
     if known is not None:
         # compiled code knows no NaN; behind all else, what is unknown hides nothing
         disparity = np.where(known, disparity, disparity[known].min(initial=0) - np.float32(1))
-    corners = corner_disparities(disparity, np.float32(TOLERANCE))
-    down, across = map(float, baseline)
-    carry(disparity, corners, down, across, MOST_STRETCHED, nearest, origin)
+    disparity = np.ascontiguousarray(disparity, np.float32)
+    kernels.carry(disparity, corner_disparities(disparity), *baseline, MOST_STRETCHED, nearest, origin)
     if known is not None:
         origin[~known.ravel()[origin]] = -1
     nearest[origin < 0] = np.nan

@@ -22,6 +22,7 @@ import numpy as np
 
 from sepi.errors import SepiError
 from sepi.image.noise import noise_level, variance_of_residuals
+from sepi.kernels import refocusing as kernels
 from sepi.lightfield import BoolMap, FloatMap, LightField, as_unit_float, require_light_field
 from sepi.matching.nearest_surfaces import EMPTY, nearest_surfaces, z_buffers
 from sepi.matching.row_bands import Rows
@@ -269,7 +270,7 @@ def _disparity_of(light_field: LightField, maps: StageMaps | FloatMap) -> FloatM
     """The disparity of maps, which must have the views' shape."""
     disparity = maps.disparity if isinstance(maps, StageMaps) else maps
     require_map(f"{light_field.name}: map", disparity, light_field.shape)
-    return np.asarray(disparity, np.float32)
+    return np.ascontiguousarray(disparity, np.float32)
 
 
 def _surfaces(disparity: FloatMap) -> FloatMap | None:
@@ -293,8 +294,6 @@ def _filled_between(
     light_field: LightField, chosen: BoolMap, views: FloatMap, surfaces: FloatMap, focus: float
 ) -> FloatMap:
     """Sheared views ``(N, 3, H, W)`` of one row of the grid, each with the views round it."""
-    from sepi.applications.refocusing_kernels import fill_between
-
     height, width = light_field.shape
     baselines, cell = light_field.baselines, _cell(light_field)
     (t,) = np.flatnonzero(chosen.any(axis=1)).tolist()
@@ -306,7 +305,7 @@ def _filled_between(
         rows = np.clip(np.rint(np.arange(height) - down), 0, height - 1).astype(int)
         columns = np.clip(np.rint(np.arange(width) - across), 0, width - 1).astype(int)
         here = np.ascontiguousarray(seen[np.ix_(rows, columns)])
-        fill_between(views[n], here, np.float32(focus), cell, np.float32(OCCLUSION_MARGIN), filled[n])
+        kernels.fill_between(views[n], here, focus, cell, OCCLUSION_MARGIN, filled[n])
     return filled
 
 
@@ -354,8 +353,6 @@ def _add_row(
     mean: tuple[FloatMap, np.float32, FloatMap, FloatMap],
 ) -> None:
     """Add the chosen views of one row of the grid to a mean: its expected colours, squared scale, sums and weights."""
-    from sepi.applications.refocusing_kernels import add_view
-
     disparity, surfaces = disparities
     baselines = light_field.baselines[t : t + 1]
     of_row = np.zeros(light_field.grid, bool)
@@ -363,4 +360,4 @@ def _add_row(
     nearest = nearest_surfaces(light_field, surfaces, of_row, Rows(0, light_field.shape[0]))[t]
     for s in np.flatnonzero(chosen).tolist():
         view = as_unit_float(light_field.views[t, s])
-        add_view(view, baselines[0, s], disparity, nearest[s], np.float32(margin), *mean)
+        kernels.add_view(view, *baselines[0, s], disparity, nearest[s], margin, *mean)

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import cv2
 import h5py
-import numba
 import numpy as np
 import numpy.typing as npt
 import pytest
@@ -18,7 +17,6 @@ from several_threads import several_threads
 
 import sepi
 from bench.all_views import disagreement, moved_pixels
-from sepi.applications import all_views_kernels as kernels
 from sepi.applications.all_views import (
     AllViews,
     ViewMaps,
@@ -26,7 +24,7 @@ from sepi.applications.all_views import (
     anchor_views,
     estimate_all_views,
 )
-from sepi.applications.carried_map import TOLERANCE, carried_map
+from sepi.applications.carried_map import TOLERANCE, carried_map, corner_disparities
 from sepi.camera import Camera
 from sepi.cli.main import main
 from sepi.errors import SepiError
@@ -35,6 +33,8 @@ from sepi.io.hdf5 import read_attributes, write_light_field
 from sepi.io.pfm import read_pfm, write_pfm
 from sepi.io.provenance import result_attributes
 from sepi.io.result_folder import write_result
+from sepi.kernels import all_views as kernels
+from sepi.kernels import set_thread_count, thread_count
 from sepi.lightfield import FloatMap, LightField
 from sepi.scenes import render, true_disparity, write_hci
 from sepi.stage import StageMaps
@@ -133,7 +133,7 @@ def bumpy_map() -> FloatMap:
 def test_corners_are_what_plain_numpy_makes_of_them() -> None:
     """Otherwise slanted surfaces would tear, or depth steps be bridged, when they are carried."""
     disparity = bumpy_map()
-    found = kernels.corner_disparities(disparity, np.float32(TOLERANCE))
+    found = corner_disparities(disparity)
     np.testing.assert_allclose(found, plain_corners(disparity, TOLERANCE), atol=1e-5)
 
 
@@ -141,7 +141,7 @@ def test_corners_are_what_plain_numpy_makes_of_them() -> None:
 def test_carried_surfaces_are_what_plain_numpy_draws(v: float, u: float) -> None:
     """Otherwise views would show surfaces where they are not."""
     disparity = bumpy_map()
-    corners = kernels.corner_disparities(disparity, np.float32(TOLERANCE))
+    corners = corner_disparities(disparity)
     nearest, origin = np.empty_like(disparity), np.empty(disparity.shape, np.int32)
     kernels.carry(disparity, corners, v, u, 2.0, nearest, origin)
     np.testing.assert_allclose(nearest, plain_carry(disparity, corners, v, u, 2.0), atol=1e-4)
@@ -354,14 +354,14 @@ def test_threads_do_not_change_the_maps() -> None:
     """Equal input must give equal bytes on any machine."""
     light_field = render("curved_occluders", size=64, views=3)
     maps = sepi.estimate_depth(light_field, "fast")
-    before = numba.get_num_threads()
+    before = thread_count()
     found = []
     try:
         for threads in (1, several_threads()):
-            numba.set_num_threads(threads)
+            set_thread_count(threads)
             found.append(estimate_all_views(light_field, maps, "fast"))
     finally:
-        numba.set_num_threads(before)
+        set_thread_count(before)
     np.testing.assert_array_equal(found[0].disparity, found[1].disparity)
     np.testing.assert_array_equal(found[0].confidence, found[1].confidence)
 

@@ -4,7 +4,6 @@ import math
 from dataclasses import replace
 from typing import Any
 
-import numba
 import numpy as np
 import pytest
 from geometries import GEOMETRIES, standing
@@ -12,8 +11,9 @@ from several_threads import several_threads
 
 from sepi.applications import refocusing
 from sepi.applications.refocusing import all_in_focus, evenly_spaced, focal_stack, refocus, views_within
-from sepi.applications.refocusing_kernels import WIDEST, add_view, fill_between
 from sepi.errors import SepiError
+from sepi.kernels import refocusing as kernels
+from sepi.kernels import set_thread_count
 from sepi.lightfield import FloatMap, LightField
 from sepi.scenes import light_field, render
 from sepi.scenes.definitions import DEFINITIONS
@@ -149,8 +149,7 @@ def test_kernel_equals_a_plain_twin(channels: int) -> None:
     seen = 0
     for baseline in np.array([[0, 0], [1, -2], [-0.43, 0.7], [3, 3]]):
         sums, weights = np.ones_like(view), np.ones_like(disparity)
-        margin, scale2 = np.float32(0.15), np.float32(0.05)
-        add_view(view, baseline, disparity, nearest, margin, centre, scale2, sums, weights)
+        kernels.add_view(view, *baseline, disparity, nearest, 0.15, centre, 0.05, sums, weights)
         expected = add_view_twin(view, baseline, disparity, nearest, 0.15, centre, 0.05)
         np.testing.assert_allclose(sums - 1, expected[0], atol=1e-5)
         np.testing.assert_allclose(weights - 1, expected[1], atol=1e-5)
@@ -159,7 +158,7 @@ def test_kernel_equals_a_plain_twin(channels: int) -> None:
 
 
 def box_twin(disparity: float, focus: float, cell: np.ndarray) -> tuple[float, float]:
-    height, width = np.clip(abs(disparity - focus) * cell.astype(float), 1, float(WIDEST))
+    height, width = np.clip(abs(disparity - focus) * cell.astype(float), 1, kernels.WIDEST)
     return height, width
 
 
@@ -196,7 +195,7 @@ def test_filling_equals_a_plain_twin(cell: tuple[float, float]) -> None:
     surfaces = random.choice(np.array([-2.5, -0.3, -0.25, 0.7, 3.1], np.float32), (10, 12))
     for focus in (-0.3, 3.1, 30.0):
         out = np.full_like(sheared, np.nan)
-        fill_between(sheared, surfaces, np.float32(focus), np.array(cell, np.float32), np.float32(0.15), out)
+        kernels.fill_between(sheared, surfaces, focus, np.array(cell, np.float32), 0.15, out)
         expected = filled_twin(sheared, surfaces, focus, np.array(cell), 0.15)
         np.testing.assert_allclose(out, expected, atol=2e-6)
 
@@ -367,11 +366,11 @@ def test_any_number_of_threads_gives_the_same_bytes() -> None:
     found = []
     try:
         for count in (1, threads):
-            numba.set_num_threads(count)
+            set_thread_count(count)
             truth = truth_of(light_field)
             found.append((all_in_focus(light_field, truth), refocus(light_field, 0.3), refocus(light_field, 2, truth)))
     finally:
-        numba.set_num_threads(threads)
+        set_thread_count(threads)
     for one, several in zip(*found, strict=True):
         np.testing.assert_array_equal(one, several)
 

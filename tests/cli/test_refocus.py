@@ -6,7 +6,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numba
 import numpy as np
 import pytest
 from click.testing import CliRunner, Result
@@ -23,6 +22,7 @@ from sepi.io.images import read_picture
 from sepi.io.pfm import write_pfm
 from sepi.io.refocused_folder import stack_names
 from sepi.io.result_folder import write_result
+from sepi.kernels import set_thread_count
 from sepi.lightfield import LightField
 from sepi.scenes import render, write_hci
 from sepi.stage import StageMaps
@@ -199,7 +199,7 @@ def test_equal_input_gives_equal_bytes_for_any_number_of_threads(scene: LightFie
         for count in (1, threads):
             assert refocus(*words, "--threads", count, "-o", f"by {count}").exit_code == 0
     finally:
-        numba.set_num_threads(threads)
+        set_thread_count(threads)
     assert everything_in("by 1") == everything_in(f"by {threads}")
 
 

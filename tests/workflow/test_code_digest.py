@@ -170,7 +170,6 @@ NEVER = {
 }
 NEVER |= {
     "applications.refocusing",
-    "applications.refocusing_kernels",
     "io.readers.arrays",
     "io.readers.formats",
     "inspection.disparity_range",

@@ -1,0 +1,120 @@
+#include "refocusing.hpp"
+
+#include <cmath>
+
+#include "kernels/parallel.hpp"
+#include "kernels/sampling.hpp"
+
+namespace sepi {
+namespace {
+
+// The neighbours of a sample along an axis of n pixels, and their weights. Beyond its border a view goes on as it ends.
+struct Neighbours {
+    Index offsets[4];
+    std::array<float, 4> weights;
+
+    Neighbours(double position, Index n, Index stride) : weights(cubic_weights(position - std::floor(position))) {
+        for (Index i = 0; i < 4; ++i) offsets[i] = stride * clamped(Index(position) + i - 1, n);
+    }
+};
+
+// Sample of all channels, less a colour: exactly 0 where all pixels equal it.
+template <int C>
+std::array<float, C> difference(const float *view, const Neighbours &rows, const Neighbours &columns, const float *colour) {
+    std::array<float, C> total = {};
+    for (Index i = 0; i < 4; ++i) {
+        std::array<float, C> part = {};
+        for (Index j = 0; j < 4; ++j) {
+            const float *pixel = view + rows.offsets[i] + columns.offsets[j];
+            for (Index c = 0; c < C; ++c) part[c] += columns.weights[j] * (pixel[c] - colour[c]);
+        }
+        for (Index c = 0; c < C; ++c) total[c] += rows.weights[i] * part[c];
+    }
+    return total;
+}
+
+// Over which a point moves while the camera moves through its cell, pixels.
+struct Box {
+    float height, width;
+
+    Box(float off, Array<const float, 1> cell) : height(of(off * cell(0))), width(of(off * cell(1))) {}
+
+    static float of(float length) { return std::min(WIDEST, std::max(1.0f, length)); }
+
+    // Share of it that falls on a pixel this far away.
+    double share(Index dy, Index dx) const {
+        const auto part = [](float length, Index d) { return std::min(1.0, std::max(0.0, double(0.5f * length + 0.5f) - double(std::abs(d)))); };
+        return part(height, dy) * part(width, dx) / double(height * width);
+    }
+};
+
+template <int C>
+void add_of_channels(Array<const float, 3> view, double v, double u, Array<const float, 2> disparity, Array<const float, 2> nearest, float margin,
+                     Array<const float, 3> centre, float scale2, Array<float, 3> sums, Array<float, 2> weights) {
+    const Index H = view.shape[0], W = view.shape[1];
+    parallel_for(0, H, [&](Index y) {
+        for (Index x = 0; x < W; ++x) {
+            const float d = disparity(y, x);
+            const double down = y - d * v, across = x - d * u;
+            // also false for NaN
+            if (!(0 <= down && down <= H - 1 && 0 <= across && across <= W - 1)) continue;
+            if (nearest(Index(down + 0.5), Index(across + 0.5)) > d + margin) continue;
+            const Neighbours rows(down, H, view.strides[0]), columns(across, W, view.strides[1]);
+            const auto found = difference<C>(view.data, rows, columns, centre.at(y, x));
+            float z = 0;
+            for (Index c = 0; c < C; ++c) z += found[c] * found[c];
+            const float ratio = scale2 / (scale2 + z), weight = ratio * ratio;
+            for (Index c = 0; c < C; ++c) sums(y, x, c) += weight * found[c];
+            weights(y, x) += weight;
+        }
+    });
+}
+
+}  // namespace
+
+void add_view(Array<const float, 3> view, double v, double u, Array<const float, 2> disparity, Array<const float, 2> nearest, float margin,
+              Array<const float, 3> centre, float scale2, Array<float, 3> sums, Array<float, 2> weights) {
+    const auto add = view.shape[2] == 1 ? add_of_channels<1> : add_of_channels<3>;
+    add(view, v, u, disparity, nearest, margin, centre, scale2, sums, weights);
+}
+
+void fill_between(Array<const float, 3> sheared, Array<const float, 2> surfaces, float focus, Array<const float, 1> cell, float margin, Array<float, 3> out) {
+    const Index C = sheared.shape[0], H = sheared.shape[1], W = sheared.shape[2];
+    const auto box = [&](float disparity) { return Box(std::abs(disparity - focus), cell); };
+    float tallest = 1, widest = 1;
+    for (Index y = 0; y < H; ++y) {
+        for (Index x = 0; x < W; ++x) {
+            const Box each = box(surfaces(y, x));
+            tallest = std::max(tallest, each.height), widest = std::max(widest, each.width);
+        }
+    }
+    const Index rows = Index(std::ceil(0.5f * tallest - 0.5f)), columns = Index(std::ceil(0.5f * widest - 0.5f));
+    parallel_for(0, H, [&](Index y) {
+        // colours and shares of what is nearer, and of all else
+        const Scratch<float, 2> sums(2, C + 1);
+        float *near = sums.array().at(0), *rest = sums.array().at(1);
+        for (Index x = 0; x < W; ++x) {
+            std::fill_n(near, 2 * (C + 1), 0.0f);
+            const float own = surfaces(y, x);
+            const Box own_box = box(own);
+            for (Index i = std::max<Index>(0, y - rows); i < std::min(H, y + rows + 1); ++i) {
+                for (Index j = std::max<Index>(0, x - columns); j < std::min(W, x + columns + 1); ++j) {
+                    const float other = surfaces(i, j);
+                    // what is behind shows where the pixel's own surface moves away
+                    const double share = (other < own - margin ? own_box : box(other)).share(i - y, j - x);
+                    if (!(share > 0)) continue;
+                    float *total = other > own + margin ? near : rest;
+                    for (Index c = 0; c < C; ++c) total[c] = float(total[c] + share * sheared(c, i, j));
+                    total[C] = float(total[C] + share);
+                }
+            }
+            const float hidden = std::min(1.0f, near[C]);
+            for (Index c = 0; c < C; ++c) {
+                out(c, y, x) = (1 - hidden) * rest[c] / rest[C];
+                if (near[C] > 0) out(c, y, x) += hidden * near[c] / near[C];
+            }
+        }
+    });
+}
+
+}  // namespace sepi
