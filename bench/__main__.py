@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
-import numba
 from tqdm import tqdm
 
 from bench import plot, tables
@@ -56,7 +55,7 @@ def run(scene: str, repeats: int, threads: int | None, groups: tuple[str, ...], 
         raise SepiError(f"{scene}: neither a built-in scene ({', '.join(SCENES)}) nor a file or folder")
     if small and "large" in groups:
         raise click.UsageError("--small has no large light field; leave out --small or --group large")
-    most = numba.config.NUMBA_NUM_THREADS  # type: ignore[attr-defined]
+    most = available_cores()
     threads = threads or most
     if threads > most:
         raise SepiError(f"--threads {threads}: this machine runs at most {most} at once")
@@ -153,13 +152,12 @@ def estimates(benchmarks: Path) -> None:
 @click.option("--views", type=click.IntRange(min=3), default=7, show_default=True, help="Views in each direction.")
 @click.option("--threads", type=click.IntRange(min=1), multiple=True, default=(1, 2, 4, 8), show_default=True)
 @click.option("--variant", "variants", type=click.Choice(list(VARIANTS)), multiple=True, help="Only this; repeatable.")
-@click.option("--cold/--no-cold", default=True, show_default=True, help="Once more with the kernels compiled anew.")
-def digests(scene: str, size: int, views: int, threads: tuple[int, ...], variants: tuple[str, ...], cold: bool) -> None:
-    """Print a digest of the maps of every variant, and fail where numbers of threads or compiling anew change it."""
+def digests(scene: str, size: int, views: int, threads: tuple[int, ...], variants: tuple[str, ...]) -> None:
+    """Print a digest of the maps of every variant, and fail where threads or the kernels of this processor change it."""
     from bench.digests import Condition
     from bench.digests import digests as digests_of
 
-    conditions = [*map(Condition, threads), *([Condition(threads[-1], cold=True)] if cold else [])]
+    conditions = [*map(Condition, threads), Condition(threads[-1], baseline=True)]
     chosen = variants or tuple(VARIANTS)
     with tqdm(conditions, disable=None, leave=False, bar_format="{n}/{total} {desc} |{bar}|") as bar:
         found = [digests_of(condition, chosen, scene, size, views) for condition in bar]
@@ -170,7 +168,7 @@ def digests(scene: str, size: int, views: int, threads: tuple[int, ...], variant
     click.echo(f"{scene}, {views}x{views} views of {size}x{size}: {'; '.join(map(str, conditions))}\n")
     click.echo(tables.markdown(rows))
     if any(row["other with"] != "none" for row in rows):
-        raise SepiError("the maps depend on the threads or on when the kernels were compiled")
+        raise SepiError("the maps depend on the threads or on the processor")
 
 
 @main.command()

@@ -1,9 +1,8 @@
-"""Whether maps are the same, byte for byte, on any number of threads, with kernels compiled before or anew."""
+"""Whether maps are the same, byte for byte, on any number of threads, with the kernels of any processor."""
 
 from __future__ import annotations
 
 import os
-import tempfile
 from collections.abc import Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
@@ -11,19 +10,21 @@ from hashlib import sha256
 from multiprocessing import get_context
 from typing import NamedTuple
 
+from sepi import kernels
+from sepi.kernels import LEVEL
+
 # read when a library is loaded
-_THREADS = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "OPENCV_FOR_THREADS_NUM")
-_CACHE = "NUMBA_CACHE_DIR"
+_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "OPENCV_FOR_THREADS_NUM")
 
 
 class Condition(NamedTuple):
-    """How a process computes: threads, also more than there are cores, and whether it has to compile the kernels."""
+    """How a process computes: threads, also more than there are cores, and whether as any processor can."""
 
     threads: int
-    cold: bool = False
+    baseline: bool = False
 
     def __str__(self) -> str:
-        return f"{self.threads} thread{'s' * (self.threads > 1)}{', compiled anew' * self.cold}"
+        return f"{self.threads} thread{'s' * (self.threads > 1)}{', for any processor' * self.baseline}"
 
 
 def digests(condition: Condition, variants: Iterable[str], scene: str, size: int, views: int) -> dict[str, str]:
@@ -34,29 +35,27 @@ def digests(condition: Condition, variants: Iterable[str], scene: str, size: int
 
 @contextmanager
 def _environment(condition: Condition) -> Iterator[None]:
-    before = {name: os.environ.get(name) for name in (*_THREADS, _CACHE)}
-    with tempfile.TemporaryDirectory(prefix="sepi-kernels-") as empty:
-        os.environ.update(dict.fromkeys(_THREADS, str(condition.threads)))
-        if condition.cold:
-            os.environ[_CACHE] = empty
-        try:
-            yield
-        finally:
-            for name, value in before.items():
-                os.environ.pop(name, None)
-                if value is not None:
-                    os.environ[name] = value
+    before = {name: os.environ.get(name) for name in (*_THREADS, LEVEL)}
+    os.environ.update(dict.fromkeys(_THREADS, str(condition.threads)))
+    if condition.baseline:
+        os.environ[LEVEL] = "baseline"
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            os.environ.pop(name, None)
+            if value is not None:
+                os.environ[name] = value
 
 
 def _digests(threads: int, variants: tuple[str, ...], scene: str, size: int, views: int) -> dict[str, str]:
     import cv2
-    import numba
 
     from sepi.pipeline import estimate_depth
     from sepi.scenes import render
 
     # not by sepi.threads, which takes no more than there are cores
-    numba.set_num_threads(threads)
+    kernels.set_thread_count(threads)
     cv2.setNumThreads(threads)
     light_field = render(scene, size=size, views=views)
     found = {}

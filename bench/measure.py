@@ -18,7 +18,6 @@ from pydantic import Field, TypeAdapter, ValidationError
 
 from sepi.command import peak_memory_mb, use_memory_again
 from sepi.errors import SepiError
-from sepi.openmp import prepare_numpy
 from sepi.threads import use_threads
 
 Figures = dict[str, float]
@@ -58,8 +57,7 @@ class Case:
     threads : int or None
         None for those of the whole run.
     most : int
-        At most so many timed calls. A case of 1 is too long to be repeated: timed at its first call, which loads the
-        compiled kernels too.
+        At most so many timed calls. A case of 1 is too long to be repeated: timed at its first call,
     """
 
     group: str
@@ -154,11 +152,8 @@ def measured(case: Case, repeats: int, threads: int = 1) -> Measurement:
         If the case fails; the message is that of its error.
     """
     # forked from a process that has imported what all cases need and done nothing: none inherits another's memory
-    prepare_numpy()
     context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload(
-        ["bench.cases", "sepi.matching.plane_sweep_kernels", "sepi.image.mean_shift", "skimage.segmentation"]
-    )
+    context.set_forkserver_preload(["bench.cases", "sepi.kernels", "sepi.image.mean_shift", "skimage.segmentation"])
     try:
         with ProcessPoolExecutor(1, context) as pool:
             try:

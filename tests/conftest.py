@@ -11,6 +11,7 @@ import pytest
 from remembered_scenes import FOLDER, remembered
 
 import sepi.scenes
+from sepi import kernels
 from sepi.threads import available_cores
 
 if TYPE_CHECKING:
@@ -97,9 +98,7 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
 def one_thread() -> None:
     """One thread for each of several processes; a command under test, or a test of threads, asks for more by itself."""
     if "PYTEST_XDIST_WORKER" in os.environ:
-        import numba
-
-        numba.set_num_threads(1)
+        kernels.set_thread_count(1)
 
 
 @pytest.fixture(scope="session")

@@ -1,7 +1,6 @@
 """What a command loads before it does anything: a job of the workflow is often shorter than an import."""
 
 import os
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -10,13 +9,10 @@ import click
 import pytest
 
 from sepi.cli.main import main
-from sepi.io.hdf5 import write_light_field
-from sepi.openmp import FOR_THREADS
 from sepi.scenes import render, write_hci
-from sepi.threads import available_cores
 
 SLOW = (
-    *("numba", "scipy", "skimage", "matplotlib", "pyamg", "jinja2", "snakemake", "tqdm"),
+    *("scipy", "skimage", "matplotlib", "pyamg", "jinja2", "snakemake", "tqdm"),
     *("PIL", "tifffile", "tabulate", "networkx", "pandas", "psutil"),
 )
 """Libraries that take longer to import than many a job takes."""
@@ -44,14 +40,6 @@ MODULES = (
 )
 
 
-def loaded(program: str) -> set[str]:
-    """Those of :data:`SLOW` that a program has loaded at its end."""
-    told = f"{program}\nimport sys\nprint(*(name for name in {SLOW!r} if name in sys.modules))"
-    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[1])}
-    done = subprocess.run([sys.executable, "-c", told], env=environment, capture_output=True, text=True, check=True)
-    return set(done.stdout.splitlines()[-1].split())
-
-
 EACH = f"""
 import importlib, sys
 for module in {MODULES!r}:
@@ -64,18 +52,6 @@ def test_nothing_slow_is_imported_before_it_is_needed() -> None:
     environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[1])}
     done = subprocess.run([sys.executable, "-c", EACH], env=environment, capture_output=True, text=True, check=True)
     assert done.stdout.splitlines() == list(MODULES), done.stderr
-
-
-def test_pictures_can_be_decoded_before_the_rest_is_imported() -> None:
-    """Else one core waits for a quarter of a second, a tenth of `sepi depth --variant fast`."""
-    program = (
-        "from sepi.cli.input_options import Reading\nfrom sepi.io.readers.options import ReadOptions\nimport sys\n"
-        "Reading(None, ReadOptions()).begin(__import__('pathlib').Path('nowhere'))\n"
-        "print(*(name for name in ('pydantic', 'h5py', 'sepi.stage') if name in sys.modules))"
-    )
-    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[1])}
-    done = subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=True)
-    assert done.stdout.split() == []
 
 
 # words of `sepi`, in a process each
@@ -133,49 +109,9 @@ def test_depth_loads_what_it_uses(tmp_path: Path) -> None:
     words = [sys.executable, "-c", DEPTH, str(tmp_path / "dots"), str(tmp_path / "maps")]
     done = subprocess.run(words, env=environment, capture_output=True, text=True, check=True)
     assert [line for line in done.stdout.splitlines() if line.startswith("loaded ")] == [
-        "loaded no_occlusion_no_textureless PIL numba scipy",
-        "loaded paper PIL numba scipy skimage",
+        "loaded no_occlusion_no_textureless PIL scipy",
+        "loaded paper PIL scipy skimage",
     ]
-
-
-def test_a_stage_without_kernels_does_not_wait_for_numba(tmp_path: Path) -> None:
-    """The structure tensor is filters of OpenCV, milliseconds of work for a small scene."""
-    write_light_field(tmp_path / "lightfield.h5", render("dots", size=64, views=3))
-    files = {"--light-field": "lightfield.h5", "--output": "initial.h5"}
-    words = ["--choice", "structure_tensor", *(str(w) for name, file in files.items() for w in (name, tmp_path / file))]
-    imports = "from sepi.command import stage_command\nfrom sepi.initial import CHOICES"
-    program = f"{imports}\nstage_command('initial', CHOICES)({words!r}, standalone_mode=False)"
-    assert "numba" not in loaded(program)
-    assert (tmp_path / "initial.h5").is_file()
-
-
-@pytest.mark.parametrize("squatted", [False, True])
-def test_kernels_where_neither_package_nor_home_can_be_written(tmp_path: Path, squatted: bool) -> None:
-    """As in a container; numba would refuse every function, also if another's folder has the temporary name."""
-    shutil.copytree(Path(__file__).parents[1] / "sepi", tmp_path / "sepi", ignore=shutil.ignore_patterns("__pycache__"))
-    for folder in ("", "matching", "image"):
-        # a file holds for root, too
-        (tmp_path / "sepi" / folder / "__pycache__").touch()
-    usual = tmp_path / f"sepi-kernels-{os.getuid()}"
-    if squatted:
-        usual.mkdir()
-        usual.chmod(0o777)
-    program = (
-        f"import warnings, {'numba, sepi' if squatted else 'sepi, numba'}, sepi.matching.spline_kernels\n"
-        "from sepi.kernel_cache import tell_kernel_cache\n"
-        "print(numba.config.CACHE_DIR)\n"
-        "warnings.showwarning = lambda message, *_: print(message)\n"
-        "tell_kernel_cache(), tell_kernel_cache()\n"
-    )
-    nowhere = {"HOME": "/dev/null/home", "TMPDIR": str(tmp_path), "PYTHONPATH": str(tmp_path)}
-    free = {name: value for name, value in os.environ.items() if name not in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME")}
-    words = [sys.executable, "-B", "-c", program]
-    done = subprocess.run(words, env=free | nowhere, capture_output=True, text=True, check=False, cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
-    folder, told = done.stdout.splitlines()
-    assert (Path(folder) == usual) is not squatted
-    assert Path(folder).stat().st_mode & 0o077 == 0
-    assert f"compiled code is kept in {folder}; set NUMBA_CACHE_DIR" in told
 
 
 # what a scheduler does, or a container
@@ -191,25 +127,22 @@ def run_without_limits(program: str, **environment: str) -> None:
     assert done.returncode == 0, done.stderr
 
 
-@pytest.mark.parametrize("limit", ["environment", pytest.param("affinity", marks=needs_affinity)])
-def test_no_more_threads_than_were_given(limit: str) -> None:
+@needs_affinity
+def test_no_more_threads_than_were_given() -> None:
     """A scheduler gives a job one core of many: with more threads than that, its neighbours wait."""
-    program = (
-        f"{NARROW if limit == 'affinity' else ''}from sepi.threads import use_threads\nuse_threads(64)\nimport numba\n"
-        "assert numba.get_num_threads() == 1, numba.get_num_threads()"
+    run_without_limits(
+        f"{NARROW}from sepi.threads import threads_used, use_threads\nassert threads_used() == 1, threads_used()\n"
+        "use_threads(64)\nassert threads_used() == 1, threads_used()"
     )
-    run_without_limits(program, **({"NUMBA_NUM_THREADS": "1"} if limit == "environment" else {}))
 
 
-@pytest.mark.parametrize("before", ["", "import numba, cv2\n"])
+@pytest.mark.parametrize("before", ["", "import cv2\n"])
 def test_threads_are_kept_to_whether_or_not_libraries_are_there(before: str) -> None:
     """Asked for one thread, a job must not take the cores of the jobs beside it."""
-    program = (
-        f"{before}from sepi.threads import use_threads\nuse_threads(1)\nimport numba, cv2\n"
-        "assert numba.get_num_threads() == 1, numba.get_num_threads()\n"
-        "assert cv2.getNumThreads() == 1, cv2.getNumThreads()"
+    run_without_limits(
+        f"{before}from sepi.threads import threads_used, use_threads\nuse_threads(1)\nimport cv2\n"
+        "assert (threads_used(), cv2.getNumThreads()) == (1, 1)"
     )
-    run_without_limits(program)
 
 
 def test_the_api_can_be_imported_where_a_system_lacks_signals_and_limits() -> None:
@@ -242,32 +175,34 @@ def test_a_command_takes_the_cores_that_it_was_given(tmp_path: Path, command: st
     words = [command, str(tmp_path / "dots"), *(["-o", str(tmp_path / "out")] if command == "depth" else [])]
     program = (
         f"{NARROW}import sys\nfrom sepi.cli.main import main\nmain({words!r}, standalone_mode=False)\n"
-        f"assert {{name for name in {SLOW!r} if name in sys.modules}} == {{'numba', 'PIL'}}\n"
-        "import numba, cv2\nassert (numba.config.NUMBA_NUM_THREADS, cv2.getNumThreads()) == (1, 1)"
+        f"assert {{name for name in {SLOW!r} if name in sys.modules}} == {{'PIL'}}\n"
+        "import cv2\nfrom sepi.threads import threads_used\nassert (threads_used(), cv2.getNumThreads()) == (1, 1)"
     )
     run_without_limits(program)
 
 
 # loops of microseconds, and a rest after each that is longer than all of them
 WAITING = """
-import sys, time
+import time
 import numpy as np
-import sepi
-from sepi.boundaries.rim_kernels import rim_of
-disparity = np.zeros((8, 8), np.float32)
-rim_of(disparity, 1, np.float32(0.1))
+from sepi import kernels
+from sepi.kernels import semi_global
+kernels.set_thread_count(2)
+averaged, disparities = np.zeros((8, 8, 8), np.float32), np.linspace(0, 1, 8, dtype=np.float32)
+disparity, margin = np.empty((2, 8, 8), np.float32)
+def loop():
+    semi_global.choose(averaged, averaged, disparities, 0.1, disparity, margin)
+loop()
 begun = time.process_time()
 for _ in range(200):
-    rim_of(disparity, 1, np.float32(0.1))
+    loop()
     time.sleep(0.002)
 print(time.process_time() - begun)
 """
 
 
-@pytest.mark.skipif(available_cores() < 2, reason="one thread waits for nobody")
 def test_threads_that_wait_leave_the_processor_to_others() -> None:
     """Threads that spin make every run beside other work slower, tests that run side by side above all."""
-    own = {"PYTHONPATH": str(Path(__file__).parents[1]), "NUMBA_NUM_THREADS": "2"}
-    environment = {name: value for name, value in os.environ.items() if name not in FOR_THREADS} | own
+    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[1])}
     done = subprocess.run([sys.executable, "-c", WAITING], env=environment, capture_output=True, text=True, check=True)
     assert float(done.stdout) < 0.2

@@ -1,6 +1,6 @@
 """Python processes that wait for no library: forks of one that has loaded them, as the workflow's jobs are.
 
-A job of the workflow is a process of its own, which mostly waits for numba, and Snakemake takes seconds to be imported.
+A job of the workflow is a process of its own, which mostly waits for its imports, and Snakemake takes seconds to be imported.
 What is tested is loaded after the fork, from ``PYTHONPATH`` as ever. Not for tests of how processes begin or are
 killed.
 """
@@ -40,7 +40,7 @@ sys.exit(code)
 # by the first part of a module's name, or the ending of a file
 _LIBRARIES = {
     "sepi": (
-        *("numpy", "numba", "h5py", "cv2", "click", "pydantic", "yaml", "psutil", "PIL.Image"),
+        *("numpy", "h5py", "cv2", "click", "pydantic", "yaml", "psutil", "PIL.Image"),
         *("scipy.sparse.linalg", "scipy.ndimage", "skimage.segmentation"),
     ),
     "sepi.report": ("matplotlib.backends.backend_agg", "matplotlib.backends.backend_pdf", "jinja2"),
@@ -138,9 +138,6 @@ def _serve(tree: str = "") -> None:
 def _loaded(name: str) -> None:
     for library in _LIBRARIES[name]:
         importlib.import_module(library)
-    if name == "sepi":
-        # the compiler's own start
-        sys.modules["numba"].njit(lambda x: x)(1.0)
     gc.freeze()
 
 

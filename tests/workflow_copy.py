@@ -167,7 +167,7 @@ def of_stages(plan: dict[str, int]) -> dict[str, int]:
 
 
 def copy_of_the_project(folder: Path) -> Path:
-    """Snakefile, rules and package; numba's compiled code comes with the package's __pycache__."""
+    """Snakefile, rules and package; the package's kernels as they were built."""
     for name in ("sepi", "rules", "profiles"):
         shutil.copytree(REPOSITORY / name, folder / name)
     for name in ("Snakefile", "config.yaml"):

@@ -3,13 +3,9 @@
 from __future__ import annotations
 
 import re
-import sys
 import time
 from collections.abc import Iterable, Iterator, Mapping
-from concurrent.futures import ThreadPoolExecutor
-from contextlib import suppress
 from dataclasses import replace
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -92,7 +88,7 @@ def depth(
       sepi depth views --grid 5x5 --exclude 0,0 --exclude 0,4
       sepi depth cotton --variant paper --set initial.sepi.num_disparities=91
     """
-    from sepi.threads import available_cores, threads_used, use_threads
+    from sepi.threads import available_cores, use_threads
 
     started = time.perf_counter()
     use_threads(threads or available_cores())
@@ -108,7 +104,7 @@ def depth(
         raise SepiError(f"{folder}: is the light field itself; choose another folder for the result")
     light_field = reading.read(light_field_path, disparity_range=disparity_range)
     from sepi.inspection.disparity_range import settle_range
-    from sepi.io.origin import DIGEST, digest_of
+    from sepi.io.origin import DIGEST
     from sepi.io.provenance import result_attributes
     from sepi.io.result_folder import write_result
     from sepi.matching.unknown import UNKNOWN

@@ -7,15 +7,21 @@ bytes on any number of threads and on any processor.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from importlib import import_module
 from importlib.util import find_spec
 
+LEVEL = "SEPI_KERNELS"
+"""Environment variable: ``baseline`` for kernels that all processors can run, to compare them with this one's."""
+
 if find_spec(f"{__name__}.baseline") is None:
-    raise ImportError("sepi: its kernels are not built; `pip install --editable .` in the checkout, or `make`, builds them")
+    raise ImportError(
+        "sepi: its kernels are not built; `pip install --editable .` in the checkout, or `make`, builds them"
+    )
 
 _native = import_module(f"{__name__}.baseline._native")
-if _native.has_x86_64_v3() and find_spec(f"{__name__}.x86_64_v3"):
+if os.environ.get(LEVEL) != "baseline" and _native.has_x86_64_v3() and find_spec(f"{__name__}.x86_64_v3"):
     _native = import_module(f"{__name__}.x86_64_v3._native")
 globals().update({name: part for name, part in vars(_native).items() if not name.startswith("__")})
 

@@ -13,7 +13,7 @@ import pytest
 from click.testing import CliRunner
 from error_lines import error_of
 from geometries import standing
-from several_threads import several_threads
+from several_threads import SEVERAL, threads
 
 import sepi
 from bench.all_views import disagreement, moved_pixels
@@ -34,7 +34,6 @@ from sepi.io.pfm import read_pfm, write_pfm
 from sepi.io.provenance import result_attributes
 from sepi.io.result_folder import write_result
 from sepi.kernels import all_views as kernels
-from sepi.kernels import set_thread_count, thread_count
 from sepi.lightfield import FloatMap, LightField
 from sepi.scenes import render, true_disparity, write_hci
 from sepi.stage import StageMaps
@@ -354,14 +353,10 @@ def test_threads_do_not_change_the_maps() -> None:
     """Equal input must give equal bytes on any machine."""
     light_field = render("curved_occluders", size=64, views=3)
     maps = sepi.estimate_depth(light_field, "fast")
-    before = thread_count()
     found = []
-    try:
-        for threads in (1, several_threads()):
-            set_thread_count(threads)
+    for number in (1, SEVERAL):
+        with threads(number):
             found.append(estimate_all_views(light_field, maps, "fast"))
-    finally:
-        set_thread_count(before)
     np.testing.assert_array_equal(found[0].disparity, found[1].disparity)
     np.testing.assert_array_equal(found[0].confidence, found[1].confidence)
 

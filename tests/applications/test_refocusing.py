@@ -7,13 +7,12 @@ from typing import Any
 import numpy as np
 import pytest
 from geometries import GEOMETRIES, standing
-from several_threads import several_threads
+from several_threads import SEVERAL, threads
 
 from sepi.applications import refocusing
 from sepi.applications.refocusing import all_in_focus, evenly_spaced, focal_stack, refocus, views_within
 from sepi.errors import SepiError
 from sepi.kernels import refocusing as kernels
-from sepi.kernels import set_thread_count
 from sepi.lightfield import FloatMap, LightField
 from sepi.scenes import light_field, render
 from sepi.scenes.definitions import DEFINITIONS
@@ -361,16 +360,12 @@ def test_maps_are_taken_as_a_whole() -> None:
 
 
 def test_any_number_of_threads_gives_the_same_bytes() -> None:
-    threads = several_threads()
     light_field = render("pyramids", size=64, views=3)
     found = []
-    try:
-        for count in (1, threads):
-            set_thread_count(count)
+    for count in (1, SEVERAL):
+        with threads(count):
             truth = truth_of(light_field)
             found.append((all_in_focus(light_field, truth), refocus(light_field, 0.3), refocus(light_field, 2, truth)))
-    finally:
-        set_thread_count(threads)
     for one, several in zip(*found, strict=True):
         np.testing.assert_array_equal(one, several)
 

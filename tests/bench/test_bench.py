@@ -199,7 +199,7 @@ class TestCompare:
 def test_machine_names_no_host_and_no_user() -> None:
     """Results are passed on."""
     machine = this_machine()
-    assert {"processor", "cores", "python", "numba"} <= set(machine)
+    assert {"processor", "cores", "python", "numpy"} <= set(machine)
     assert not {"node", "host", "user", "path"} & set(machine)
 
 

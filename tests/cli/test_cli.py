@@ -13,11 +13,11 @@ from pathlib import Path
 import click
 import cv2
 import h5py
-import numba
 import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 from error_lines import error_of
+from several_threads import SEVERAL, threads
 
 import sepi
 from sepi import ingest, initial
@@ -232,12 +232,11 @@ def test_depth_within_a_limit_of_memory(scene: Path, result: Path) -> None:
 @pytest.fixture
 def many_threads() -> Iterator[None]:
     """More threads than one, which a command has to lower."""
-    before = numba.get_num_threads(), cv2.getNumThreads()
-    numba.set_num_threads(numba.config.NUMBA_NUM_THREADS)
+    before = cv2.getNumThreads()
     cv2.setNumThreads(3)
-    yield
-    numba.set_num_threads(before[0])
-    cv2.setNumThreads(before[1])
+    with threads(SEVERAL):
+        yield
+    cv2.setNumThreads(before)
 
 
 @pytest.mark.usefixtures("many_threads")

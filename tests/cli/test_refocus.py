@@ -11,7 +11,7 @@ import pytest
 from click.testing import CliRunner, Result
 from error_lines import error_of
 from PIL import Image
-from several_threads import several_threads
+from several_threads import threads
 
 import sepi
 from sepi.applications import refocusing
@@ -22,7 +22,6 @@ from sepi.io.images import read_picture
 from sepi.io.pfm import write_pfm
 from sepi.io.refocused_folder import stack_names
 from sepi.io.result_folder import write_result
-from sepi.kernels import set_thread_count
 from sepi.lightfield import LightField
 from sepi.scenes import render, write_hci
 from sepi.stage import StageMaps
@@ -193,14 +192,11 @@ def test_pictures_of_others_are_not_replaced(scene: LightField) -> None:
 
 
 def test_equal_input_gives_equal_bytes_for_any_number_of_threads(scene: LightField) -> None:
-    threads = several_threads()
     words = ("lf.h5", "maps", "--steps", 3, "--animation")
-    try:
-        for count in (1, threads):
+    for count in (1, available_cores()):
+        with threads(1):
             assert refocus(*words, "--threads", count, "-o", f"by {count}").exit_code == 0
-    finally:
-        set_thread_count(threads)
-    assert everything_in("by 1") == everything_in(f"by {threads}")
+    assert everything_in("by 1") == everything_in(f"by {available_cores()}")
 
 
 def test_an_animation_goes_there_and_back(scene: LightField) -> None:

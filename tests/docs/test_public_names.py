@@ -13,7 +13,6 @@ from pathlib import Path
 from types import FunctionType
 
 import cv2
-import numba
 import pytest
 from numpy_docstrings import (
     ROOT,
@@ -32,6 +31,7 @@ from numpy_docstrings import (
 )
 
 import sepi
+from sepi import kernels
 from sepi.variants import STAGES
 
 NAMES = listed_names()
@@ -146,10 +146,10 @@ def own_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None
     monkeypatch.chdir(tmp_path)
     for stage, choices in STAGES.items():
         monkeypatch.setitem(STAGES, stage, dict(choices))
-    threads = cv2.getNumThreads(), numba.get_num_threads()
+    threads = cv2.getNumThreads(), kernels.thread_count()
     yield
     cv2.setNumThreads(threads[0])
-    numba.set_num_threads(threads[1])
+    kernels.set_thread_count(threads[1])
 
 
 @pytest.mark.usefixtures("own_folder")

@@ -26,7 +26,7 @@ def test_too_little_memory_is_one_line(hci: Path, tmp_path: Path, limit: int) ->
     allowed = limit * 10**6
     result = subprocess.run(
         [*COMMAND, str(hci / "cotton"), "-o", str(tmp_path / "maps")],
-        env=os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "NUMBA_NUM_THREADS": "1"},
+        env=os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"},
         capture_output=True,
         text=True,
         check=False,

@@ -119,7 +119,7 @@ def test_jobs_that_get_too_little_memory(undisturbed: Workflow, tmp_path: Path) 
     write_hci(render("curved_occluders", size=3 * SIZE, views=9), tmp_path / "scenes" / "box")
     config = undisturbed.config | {"hci_root": str(tmp_path / "scenes")}
     poor = replace(undisturbed, folder=tmp_path / "poor", config=config, warm=False)
-    one_thread = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "NUMBA_NUM_THREADS": "1"}
+    one_thread = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
     imports = subprocess.run(
         [sys.executable, "-c", IMPORTS], env=os.environ | one_thread, check=True, capture_output=True, text=True
     )

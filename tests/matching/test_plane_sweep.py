@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from geometries import GEOMETRIES, standing
 from scipy.ndimage import map_coordinates
-from several_threads import several_threads
+from several_threads import SEVERAL, threads
 
 from sepi.errors import SepiError
 from sepi.image.noise import noise_level, residual_variance
-from sepi.kernels import plane_sweep, set_thread_count
+from sepi.kernels import plane_sweep
 from sepi.lightfield import DisparityRange, LightField
 from sepi.matching.denoising import sure_noise
 from sepi.matching.expected_costs import expected_costs
@@ -203,14 +203,11 @@ def test_equal_bytes_for_any_number_of_threads():
     scattered = np.random.default_rng(0).random(light_field.shape) < 0.01
     for subsets, mask in ((None, None), (views.subsets, scattered)):
         results = []
-        try:
-            # the number of threads decides how the rows are shared out
-            for number in (1, several_threads()):
-                set_thread_count(number)
+        # the number of threads decides how the rows are shared out
+        for number in (1, SEVERAL):
+            with threads(number):
                 groups = None if subsets is None else views.groups
                 results.append(sweep(light_field, parameters, groups=groups, subsets=subsets, mask=mask))
-        finally:
-            set_thread_count(several_threads())
         for name in ("disparity", "cost", "mean"):
             np.testing.assert_array_equal(getattr(results[0], name), getattr(results[1], name))
 

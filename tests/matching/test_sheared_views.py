@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from several_threads import several_threads
+from several_threads import SEVERAL, threads
 
-from sepi.kernels import set_thread_count, sheared_views
+from sepi.kernels import sheared_views
 from sepi.lightfield import LightField, as_unit_float
 from sepi.matching.sheared_views import ShearedViews, refocused
 from sepi.scenes import render
@@ -91,13 +91,10 @@ def test_cubic_keeps_more_detail_than_bilinear() -> None:
 
 def test_threads_do_not_change_the_bytes(random_views: np.ndarray) -> None:
     """Results must not depend on the machine."""
-    threads = several_threads()
-    several = sheared(random_views, OFFSETS)
-    set_thread_count(1)
-    try:
+    with threads(SEVERAL):
+        several = sheared(random_views, OFFSETS)
+    with threads(1):
         np.testing.assert_array_equal(sheared(random_views, OFFSETS), several)
-    finally:
-        set_thread_count(threads)
 
 
 @pytest.fixture(scope="module")

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 from geometries import GEOMETRIES, standing
-from several_threads import several_threads
+from several_threads import SEVERAL, threads
 
-from sepi.kernels import LANES, semi_global, set_thread_count, visibility
+from sepi.kernels import LANES, semi_global, visibility
 from sepi.lightfield import DisparityRange, LightField
 from sepi.matching.base_detail import DETAIL_UNIT, BaseDetailParameters, base_detail_decomposition
 from sepi.matching.nearest_surfaces import EMPTY, z_buffers
@@ -267,16 +267,13 @@ def test_grey_views_give_the_depth_of_equal_colours() -> None:
 def test_depth_is_the_same_on_any_number_of_threads() -> None:
     scene = render("fine_structures", size=64)
     found = []
-    try:
-        for threads in (1, several_threads()):
-            set_thread_count(threads)
+    for number in (1, SEVERAL):
+        with threads(number):
             first = first_depth(scene, FirstDepthParameters(num_disparities=21), lambda _: None)
             result = depth_from_visible_views(
                 scene, first.disparity, VisibleViewsParameters(num_disparities=21, passes=1), lambda _: None
             )
             found.append((result.disparity.tobytes(), result.confidence.tobytes()))
-    finally:
-        set_thread_count(several_threads())
     assert found[0] == found[1]
 
 
