@@ -1,0 +1,83 @@
+// Where views show a pixel of some disparity, and the colours between their pixels.
+#pragma once
+
+#include <array>
+#include <optional>
+
+#include "kernels/lanes.hpp"
+#include "kernels/sampling.hpp"
+#include "rim_arrays.hpp"
+
+namespace sepi {
+
+// Where a sample lies: a pixel, and how far below and to the right of it, 0..1.
+struct Place {
+    Index row, column;
+    double fy, fx;
+};
+
+// A place in a picture (H, W), unless a pixel beside it lies outside.
+inline std::optional<Place> place_within(double down, double across, Index H, Index W) {
+    if (down < 0 || across < 0 || down >= double(H - 1) || across >= double(W - 1)) return std::nullopt;
+    const auto row = Index(down), column = Index(across);
+    return Place{row, column, down - double(row), across - double(column)};
+}
+
+// Where a view shows a pixel of disparity d, if it does.
+template <class Colour>
+std::optional<Place> place_seen(const RimViews<Colour> &views, Index view, float d, Index y, Index x) {
+    const double down = double(y) - d * views.baselines(view, 0), across = double(x) - d * views.baselines(view, 1);
+    const auto place = place_within(down, across, views.lines.shape[2], views.lines.shape[3] / views.channels);
+    if (!place) return place;
+    const float nearest = views.nearest(views.places(view, 0), views.places(view, 1), Index(down + 0.5) - views.low, Index(across + 0.5));
+    return nearest <= d + views.margin ? place : std::nullopt;
+}
+
+inline std::array<float, 4> cubic(float f) {
+    return {
+        f * (f * (1 - 0.5f * f) - 0.5f),
+        1 + f * f * (1.5f * f - 2.5f),
+        f * (0.5f + f * (2 - 1.5f * f)),
+        f * f * (0.5f * f - 0.5f),
+    };
+}
+
+template <class Colour>
+using Sum = std::conditional_t<std::is_same_v<Colour, std::uint16_t>, double, float>;
+
+// Colour between pixels of a view, 0..1; grey counts as three equal channels. Cubic, since a bilinear sample takes from
+// the peak of what is two pixels wide.
+template <class Colour>
+std::array<Sum<Colour>, 3> sample(const RimViews<Colour> &views, Index view, const Place &place) {
+    const auto picture = views.lines[views.places(view, 0)][views.places(view, 1)];
+    const Index C = views.channels, H = picture.shape[0], W = picture.shape[1] / C, column = place.column;
+    const auto down = cubic(float(place.fy)), across = cubic(float(place.fx));
+    std::array<const Colour *, 4> rows;
+    for (Index k = 0; k < 4; ++k) rows[k] = picture.at(clamped(place.row - 1 + k, H));
+    std::array<Sum<Colour>, 3> colour{};
+    if (C == 3 && 1 <= column && column < W - 2) {
+        // four pixels side by side, of which the first eight numbers and the last eight make up all twelve
+        float numbers[4 + LANES];
+        for (const Index at : {0, 4}) {
+            const Index i = 3 * (column - 1) + at;
+            Float8 total = spread(down[0]) * load(rows[0] + i);
+            for (Index k = 1; k < 4; ++k) total = fma(spread(down[k]), load(rows[k] + i), total);
+            store(numbers + at, total);
+        }
+        for (Index c = 0; c < 3; ++c) {
+            float sum = 0;
+            for (Index j = 0; j < 4; ++j) sum += across[j] * numbers[3 * j + c];
+            colour[c] = sum;
+        }
+    } else {
+        for (Index j = 0; j < 4; ++j) {
+            const Index i = C * clamped(column - 1 + j, W);
+            for (Index k = 0; k < 4; ++k)
+                for (Index c = 0; c < 3; ++c) colour[c] += Sum<Colour>(across[j] * down[k]) * Sum<Colour>(rows[k][i + std::min(c, C - 1)]);
+        }
+    }
+    for (auto &channel : colour) channel *= views.units(view);
+    return colour;
+}
+
+}  // namespace sepi
