@@ -1,5 +1,6 @@
 #include "background.hpp"
 
+#include <cmath>
 #include <limits>
 #include <vector>
 
@@ -58,24 +59,22 @@ void brightness_of_views(const RimViews<Colour> &views, const Sides &sides, Arra
             return of_view.shape[0] == 0 || !(of_view(y, x) || of_view(y, x + 1) || of_view(y + 1, x) || of_view(y + 1, x + 1));
         };
         // colours of the pixels that the view shows, there and in the reference view
-        std::vector<std::pair<double, double>> shown;
+        std::vector<std::pair<std::array<Sum<Colour>, 3>, std::array<float, 3>>> shown;
         double own = 1e-9, other = 1e-9, rest = 0;
         for (Index y = 0; y < H; y += STRIDE) {
             for (Index x = 0; x < W; x += STRIDE) {
                 const float d = sides.disparity(y, x);
                 const auto place = place_within(double(y) - d * views.baselines(view, 0), double(x) - d * views.baselines(view, 1), H, W);
                 if (!sides.clean(y, x) || !place || !shows(*place)) continue;
-                const auto colour = sample(views, view, *place);
-                for (Index c = 0; c < 3; ++c) {
-                    shown.emplace_back(colour[c], sides.guide(y, x, c));
-                    other += shown.back().first;
-                    own += shown.back().second;
-                }
+                const auto &[there, here] = shown.emplace_back(sample(views, view, *place), sides.colour(y, x));
+                for (Index c = 0; c < 3; ++c) other += there[c], own += here[c];
             }
         }
-        brightness(view) = other / own;
-        for (const auto &[there, here] : shown) rest += std::min(std::abs(there / brightness(view) - here), MOST_DIFFERENCE);
-        residual(view) = shown.empty() ? std::numeric_limits<double>::quiet_NaN() : rest / double(shown.size() + 1);
+        const double ratio = other / own;
+        for (const auto &[there, here] : shown)
+            for (Index c = 0; c < 3; ++c) rest += std::min(std::abs(there[c] / ratio - here[c]), MOST_DIFFERENCE);
+        brightness(view) = ratio;
+        residual(view) = shown.empty() ? std::numeric_limits<double>::quiet_NaN() : rest / double(3 * shown.size() + 1);
     });
 }
 

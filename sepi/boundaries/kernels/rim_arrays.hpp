@@ -1,6 +1,7 @@
 // Arrays that the decision beside depth steps works on, in named groups: the fields of sepi.boundaries.arrays and rim.
 #pragma once
 
+#include <array>
 #include <tuple>
 
 #include "kernels/array.hpp"
@@ -32,6 +33,8 @@ struct Sides {
     Index clean_radius;
 
     auto fields() { return std::tie(disparity, guide, clean, clean_radius); }
+
+    std::array<float, 3> colour(Index y, Index x) const { return {guide(y, x, 0), guide(y, x, 1), guide(y, x, 2)}; }
 };
 
 // The pixels beside a depth step, and the two surfaces that may be theirs; (H, W).

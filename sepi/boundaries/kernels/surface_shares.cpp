@@ -44,8 +44,6 @@ struct Moments {
     }
 };
 
-std::array<float, 3> colour_at(const Strided<const float, 3> &guide, Index y, Index x) { return {guide(y, x, 0), guide(y, x, 1), guide(y, x, 2)}; }
-
 // Set the colour and its variance by what clean pixels' colours go on as.
 //
 // Surfaces get darker or brighter towards their edge. The colour is linear in the place as far as that is more than its
@@ -81,7 +79,7 @@ NearerSurface nearer_surface(const Sides &sides, float near, double middle, Inde
     for (Index i = std::max<Index>(0, y - radius); i < std::min(H, y + radius + 1); ++i) {
         for (Index j = std::max<Index>(0, x - radius); j < std::min(W, x + radius + 1); ++j) {
             const float d = sides.disparity(i, j);
-            const auto colour = colour_at(sides.guide, i, j);
+            const auto colour = sides.colour(i, j);
             for (Index c = 0; c < 3 && d > middle; ++c) {
                 surface.least[c] = std::min<double>(surface.least[c], colour[c]);
                 surface.most[c] = std::max<double>(surface.most[c], colour[c]);
@@ -92,7 +90,7 @@ NearerSurface nearer_surface(const Sides &sides, float near, double middle, Inde
     if (sums.weight > 0) {
         go_on(sums, surface);
     } else {
-        std::ranges::copy(colour_at(sides.guide, y, x), surface.own.begin());
+        std::ranges::copy(sides.colour(y, x), surface.own.begin());
         surface.variance = squared(UNKNOWN_DEVIATION);
     }
     return surface;
@@ -220,7 +218,7 @@ class ShownPixel {
             if (const auto place = place_seen(views_, view, far, y, x)) take(view, *place);
         }
         if (n_ < FEWEST_ALONE) return UNKNOWN;
-        const float sum = sum_over(n_, 3, [&, own = colour_at(sides_.guide, y, x)](Index v, Index c) {
+        const float sum = sum_over(n_, 3, [&, own = sides_.colour(y, x)](Index v, Index c) {
             const Float8 apart = samples(c, v) - spread(own[c]);
             return robust(apart * apart, spread(scale2_));
         });

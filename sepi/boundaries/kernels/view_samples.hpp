@@ -27,7 +27,7 @@ inline std::optional<Place> place_within(double down, double across, Index H, In
 template <class Colour>
 std::optional<Place> place_seen(const RimViews<Colour> &views, Index view, float d, Index y, Index x) {
     const double down = double(y) - d * views.baselines(view, 0), across = double(x) - d * views.baselines(view, 1);
-    const auto place = place_within(down, across, views.lines.shape[2], views.lines.shape[3] / views.channels);
+    const auto place = place_within(down, across, views.lines.shape[2], views.nearest.shape[3]);
     if (!place) return place;
     const float nearest = views.nearest(views.places(view, 0), views.places(view, 1), Index(down + 0.5) - views.low, Index(across + 0.5));
     return nearest <= d + views.margin ? place : std::nullopt;
@@ -50,16 +50,16 @@ using Sum = std::conditional_t<std::is_same_v<Colour, std::uint16_t>, double, fl
 template <class Colour>
 std::array<Sum<Colour>, 3> sample(const RimViews<Colour> &views, Index view, const Place &place) {
     const auto picture = views.lines[views.places(view, 0)][views.places(view, 1)];
-    const Index C = views.channels, H = picture.shape[0], W = picture.shape[1] / C, column = place.column;
+    const Index C = views.channels, H = picture.shape[0], first = place.column - 1;
     const auto down = cubic(float(place.fy)), across = cubic(float(place.fx));
     std::array<const Colour *, 4> rows;
     for (Index k = 0; k < 4; ++k) rows[k] = picture.at(clamped(place.row - 1 + k, H));
     std::array<Sum<Colour>, 3> colour{};
-    if (C == 3 && 1 <= column && column < W - 2) {
+    if (C == 3 && first >= 0 && 3 * (first + 4) <= picture.shape[1]) {
         // four pixels side by side, of which the first eight numbers and the last eight make up all twelve
         float numbers[4 + LANES];
         for (const Index at : {0, 4}) {
-            const Index i = 3 * (column - 1) + at;
+            const Index i = 3 * first + at;
             Float8 total = spread(down[0]) * load(rows[0] + i);
             for (Index k = 1; k < 4; ++k) total = fma(spread(down[k]), load(rows[k] + i), total);
             store(numbers + at, total);
@@ -71,7 +71,7 @@ std::array<Sum<Colour>, 3> sample(const RimViews<Colour> &views, Index view, con
         }
     } else {
         for (Index j = 0; j < 4; ++j) {
-            const Index i = C * clamped(column - 1 + j, W);
+            const Index i = C * clamped(first + j, picture.shape[1] / C);
             for (Index k = 0; k < 4; ++k)
                 for (Index c = 0; c < 3; ++c) colour[c] += Sum<Colour>(across[j] * down[k]) * Sum<Colour>(rows[k][i + std::min(c, C - 1)]);
         }
