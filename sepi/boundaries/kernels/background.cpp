@@ -66,8 +66,10 @@ void brightness_of_views(const RimViews<Colour> &views, const Sides &sides, Arra
                 const float d = sides.disparity(y, x);
                 const auto place = place_within(double(y) - d * views.baselines(view, 0), double(x) - d * views.baselines(view, 1), H, W);
                 if (!sides.clean(y, x) || !place || !shows(*place)) continue;
-                const auto &[there, here] = shown.emplace_back(sample(views, view, *place), sides.colour(y, x));
+                const auto there = sample(views, view, *place);
+                const auto here = sides.colour(y, x);
                 for (Index c = 0; c < 3; ++c) other += there[c], own += here[c];
+                shown.emplace_back(there, here);
             }
         }
         const double ratio = other / own;

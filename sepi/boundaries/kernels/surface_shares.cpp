@@ -21,26 +21,29 @@ constexpr Index AT_ONCE = 64;    // pixels that a thread does at a stretch
 
 double squared(double number) { return number * number; }
 
+// Three channels, and a number that is not looked at.
+using Channels = double __attribute__((vector_size(32)));
+
+double total_of(Channels numbers) { return numbers[0] + numbers[1] + numbers[2]; }
+
 // The nearer surface at a pixel: its colour and the variance of that, and the least and the most that it shows nearby.
 struct NearerSurface {
-    std::array<double, 3> own, least = {1, 1, 1}, most = {};
+    Channels own, least = {1, 1, 1}, most = {};
     double variance;
 };
 
 // Weighted sums over the nearer surface's clean pixels about a pixel.
 struct Moments {
     double weight = 0, weight2 = 0, at_y = 0, at_x = 0, yy = 0, yx = 0, xx = 0;
-    std::array<double, 3> colour = {}, down = {}, across = {}, colour2 = {};
+    Channels colour = {}, down = {}, across = {}, colour2 = {};
 
-    void add(double dy, double dx, const std::array<float, 3> &seen) {
+    void add(double dy, double dx, Channels seen) {
         const double w = 1 / squared(1 + dy * dy + dx * dx);
         weight += w, weight2 += w * w;
         at_y += w * dy, at_x += w * dx;
         yy += w * dy * dy, yx += w * dy * dx, xx += w * dx * dx;
-        for (Index c = 0; c < 3; ++c) {
-            const double weighted = w * seen[c];
-            colour[c] += weighted, down[c] += weighted * dy, across[c] += weighted * dx, colour2[c] += weighted * seen[c];
-        }
+        const Channels weighted = w * seen;
+        colour += weighted, down += weighted * dy, across += weighted * dx, colour2 += weighted * seen;
     }
 };
 
@@ -49,40 +52,35 @@ struct Moments {
 // Surfaces get darker or brighter towards their edge. The colour is linear in the place as far as that is more than its
 // own doubt (James and Stein's estimate): texture has no slope that goes on.
 void go_on(const Moments &sums, NearerSurface &surface) {
+    const auto positive = [](Channels numbers) { return numbers > 0.0 ? numbers : Channels{}; };
     const double n = sums.weight, at_y = sums.at_y / n, at_x = sums.at_x / n;
     const double yy = sums.yy / n - at_y * at_y + LEAST_EXTENT, xx = sums.xx / n - at_x * at_x + LEAST_EXTENT, yx = sums.yx / n - at_y * at_x;
     const double determinant = yy * xx - yx * yx;
-    std::array<double, 3> change;
-    double plain = 0, rest = 0, change2 = 0;
-    for (Index c = 0; c < 3; ++c) {
-        const double mean = sums.colour[c] / n, down = sums.down[c] / n - mean * at_y, across = sums.across[c] / n - mean * at_x;
-        const double slope_y = (xx * down - yx * across) / determinant, slope_x = (yy * across - yx * down) / determinant;
-        const double variance = std::max(sums.colour2[c] / n - mean * mean, 0.0);
-        plain += variance;
-        rest += std::max(variance - slope_y * down - slope_x * across, 0.0);
-        surface.own[c] = mean, change[c] = -slope_y * at_y - slope_x * at_x;
-        change2 += squared(change[c]);
-    }
+    const Channels mean = sums.colour / n, down = sums.down / n - mean * at_y, across = sums.across / n - mean * at_x;
+    const Channels slope_y = (xx * down - yx * across) / determinant, slope_x = (yy * across - yx * down) / determinant;
+    const Channels variance = positive(sums.colour2 / n - mean * mean), change = -slope_y * at_y - slope_x * at_x;
+    const double plain = total_of(variance), rest = total_of(positive(variance - slope_y * down - slope_x * across)), change2 = total_of(change * change);
     // variance of the change, by what is left beside it and where the clean pixels lie
     const double lever = (xx * at_y * at_y - 2 * yx * at_y * at_x + yy * at_x * at_x) / determinant;
     const double doubt = (rest + 3 * squared(LEAST_DEVIATION)) / std::max(n * n / sums.weight2 - 3, 1.0) * lever;
     const double kept = std::max(0.0, 1 - doubt / (change2 + 1e-12));
-    for (Index c = 0; c < 3; ++c) surface.own[c] += kept * change[c];
+    surface.own = mean + kept * change;
     surface.variance = (kept * (rest + DOUBT * kept * change2) + (1 - kept) * plain) / 3 + squared(CLEAN_DEVIATION);
 }
 
 // The nearer surface at a pixel: where no clean pixel tells of its colour, that is the pixel's own.
 NearerSurface nearer_surface(const Sides &sides, float near, double middle, Index y, Index x) {
     const Index H = sides.disparity.shape[0], W = sides.disparity.shape[1], radius = sides.clean_radius;
+    const auto colour_at = [&](Index i, Index j) { return Channels{sides.guide(i, j, 0), sides.guide(i, j, 1), sides.guide(i, j, 2)}; };
     NearerSurface surface;
     Moments sums;
     for (Index i = std::max<Index>(0, y - radius); i < std::min(H, y + radius + 1); ++i) {
         for (Index j = std::max<Index>(0, x - radius); j < std::min(W, x + radius + 1); ++j) {
             const float d = sides.disparity(i, j);
-            const auto colour = sides.colour(i, j);
-            for (Index c = 0; c < 3 && d > middle; ++c) {
-                surface.least[c] = std::min<double>(surface.least[c], colour[c]);
-                surface.most[c] = std::max<double>(surface.most[c], colour[c]);
+            const Channels colour = colour_at(i, j);
+            if (d > middle) {
+                surface.least = colour < surface.least ? colour : surface.least;
+                surface.most = colour > surface.most ? colour : surface.most;
             }
             if (sides.clean(i, j) && std::abs(d - near) < SAME_SURFACE) sums.add(double(i - y), double(j - x), colour);
         }
@@ -90,8 +88,7 @@ NearerSurface nearer_surface(const Sides &sides, float near, double middle, Inde
     if (sums.weight > 0) {
         go_on(sums, surface);
     } else {
-        std::ranges::copy(sides.colour(y, x), surface.own.begin());
-        surface.variance = squared(UNKNOWN_DEVIATION);
+        surface.own = colour_at(y, x), surface.variance = squared(UNKNOWN_DEVIATION);
     }
     return surface;
 }

@@ -25,7 +25,7 @@ inline std::optional<Place> place_within(double down, double across, Index H, In
 
 // Where a view shows a pixel of disparity d, if it does.
 template <class Colour>
-std::optional<Place> place_seen(const RimViews<Colour> &views, Index view, float d, Index y, Index x) {
+[[gnu::always_inline]] inline std::optional<Place> place_seen(const RimViews<Colour> &views, Index view, float d, Index y, Index x) {
     const double down = double(y) - d * views.baselines(view, 0), across = double(x) - d * views.baselines(view, 1);
     const auto place = place_within(down, across, views.lines.shape[2], views.nearest.shape[3]);
     if (!place) return place;
@@ -48,7 +48,7 @@ using Sum = std::conditional_t<std::is_same_v<Colour, std::uint16_t>, double, fl
 // Colour between pixels of a view, 0..1; grey counts as three equal channels. Cubic, since a bilinear sample takes from
 // the peak of what is two pixels wide.
 template <class Colour>
-std::array<Sum<Colour>, 3> sample(const RimViews<Colour> &views, Index view, const Place &place) {
+[[gnu::always_inline]] inline std::array<Sum<Colour>, 3> sample(const RimViews<Colour> &views, Index view, const Place &place) {
     const auto picture = views.lines[views.places(view, 0)][views.places(view, 1)];
     const Index C = views.channels, H = picture.shape[0], first = place.column - 1;
     const auto down = cubic(float(place.fy)), across = cubic(float(place.fx));
@@ -56,19 +56,16 @@ std::array<Sum<Colour>, 3> sample(const RimViews<Colour> &views, Index view, con
     for (Index k = 0; k < 4; ++k) rows[k] = picture.at(clamped(place.row - 1 + k, H));
     std::array<Sum<Colour>, 3> colour{};
     if (C == 3 && first >= 0 && 3 * (first + 4) <= picture.shape[1]) {
-        // four pixels side by side, of which the first eight numbers and the last eight make up all twelve
-        float numbers[4 + LANES];
-        for (const Index at : {0, 4}) {
-            const Index i = 3 * first + at;
+        const auto above_each_other = [&](Index i) {
             Float8 total = spread(down[0]) * load(rows[0] + i);
             for (Index k = 1; k < 4; ++k) total = fma(spread(down[k]), load(rows[k] + i), total);
-            store(numbers + at, total);
-        }
-        for (Index c = 0; c < 3; ++c) {
-            float sum = 0;
-            for (Index j = 0; j < 4; ++j) sum += across[j] * numbers[3 * j + c];
-            colour[c] = sum;
-        }
+            return total;
+        };
+        // four pixels side by side, of which the first eight numbers and the last eight make up all twelve
+        const Float8 left = above_each_other(3 * first), right = above_each_other(3 * first + 4);
+        const auto sum = across[0] * __builtin_shufflevector(left, left, 0, 1, 2, 2) + across[1] * __builtin_shufflevector(left, left, 3, 4, 5, 5) +
+                         across[2] * __builtin_shufflevector(right, right, 2, 3, 4, 4) + across[3] * __builtin_shufflevector(right, right, 5, 6, 7, 7);
+        for (Index c = 0; c < 3; ++c) colour[c] = sum[c];
     } else {
         for (Index j = 0; j < 4; ++j) {
             const Index i = C * clamped(first + j, picture.shape[1] / C);
