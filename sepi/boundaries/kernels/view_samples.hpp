@@ -48,7 +48,7 @@ using Sum = std::conditional_t<std::is_same_v<Colour, std::uint16_t>, double, fl
 // Colour between pixels of a view, 0..1; grey counts as three equal channels. Cubic, since a bilinear sample takes from
 // the peak of what is two pixels wide.
 template <class Colour>
-[[gnu::always_inline]] inline std::array<Sum<Colour>, 3> sample(const RimViews<Colour> &views, Index view, const Place &place) {
+std::array<Sum<Colour>, 3> sample(const RimViews<Colour> &views, Index view, const Place &place) {
     const auto picture = views.lines[views.places(view, 0)][views.places(view, 1)];
     const Index C = views.channels, H = picture.shape[0], first = place.column - 1;
     const auto down = cubic(float(place.fy)), across = cubic(float(place.fx));
