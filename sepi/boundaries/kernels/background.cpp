@@ -54,8 +54,7 @@ void brightness_of_views(const RimViews<Colour> &views, const Sides &sides, Arra
     const Index H = sides.disparity.shape[0], W = sides.disparity.shape[1];
     parallel_for(0, views.number(), [&](Index view) {
         const auto of_view = missing[views.places(view, 0)][views.places(view, 1)];
-        const auto shows = [&](const Place &place) {
-            const auto [y, x, _, __] = place;
+        const auto shows = [&](Index y, Index x) {
             return of_view.shape[0] == 0 || !(of_view(y, x) || of_view(y, x + 1) || of_view(y + 1, x) || of_view(y + 1, x + 1));
         };
         // colours of the pixels that the view shows, there and in the reference view
@@ -65,7 +64,7 @@ void brightness_of_views(const RimViews<Colour> &views, const Sides &sides, Arra
             for (Index x = 0; x < W; x += STRIDE) {
                 const float d = sides.disparity(y, x);
                 const auto place = place_within(double(y) - d * views.baselines(view, 0), double(x) - d * views.baselines(view, 1), H, W);
-                if (!sides.clean(y, x) || !place || !shows(*place)) continue;
+                if (!sides.clean(y, x) || !place || !shows(place->row, place->column)) continue;
                 const auto there = sample(views, view, *place);
                 const auto here = sides.colour(y, x);
                 for (Index c = 0; c < 3; ++c) other += there[c], own += here[c];

@@ -8,9 +8,9 @@
 namespace sepi {
 namespace {
 
-constexpr double WIDTH = 1;             // of the window's weights, pixels
-constexpr double APART = 0.019;         // squared distance of a colour from all mixtures at which it counts 1/e, in units of their variance
-constexpr double RAMP = 0.07;           // share below the threshold from which on there is no doubt
+constexpr double WIDTH = 1;            // of the window's weights, pixels
+constexpr double APART = 0.019;        // squared distance of a colour from all mixtures at which it counts 1/e, in units of their variance
+constexpr double RAMP = 0.07;          // share below the threshold from which on there is no doubt
 constexpr double LEAST_WEIGHT = 0.05;  // of clean pixels of each side, in pixels right beside
 
 // Weighted sums over the clean pixels of one side.
