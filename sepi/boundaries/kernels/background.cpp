@@ -58,7 +58,7 @@ void brightness_of_views(const RimViews<Colour> &views, const Sides &sides, Arra
             return of_view.shape[0] == 0 || !(of_view(y, x) || of_view(y, x + 1) || of_view(y + 1, x) || of_view(y + 1, x + 1));
         };
         // colours of the pixels that the view shows, there and in the reference view
-        std::vector<std::pair<std::array<Sum<Colour>, 3>, std::array<float, 3>>> shown;
+        std::vector<std::pair<std::array<float, 3>, std::array<float, 3>>> shown;
         double own = 1e-9, other = 1e-9, rest = 0;
         for (Index y = 0; y < H; y += STRIDE) {
             for (Index x = 0; x < W; x += STRIDE) {
@@ -99,7 +99,7 @@ void background_of(const RimViews<Colour> &views, Array<const float, 2> layer, A
                 const auto place = place_seen(views, view, layer(y, columns[i]), y, columns[i]);
                 if (!place) continue;
                 const auto colour = sample(views, view, *place);
-                for (Index c = 0; c < 3; ++c) samples(i, c, count[i]) = float(colour[c]);
+                for (Index c = 0; c < 3; ++c) samples(i, c, count[i]) = colour[c];
                 ++count[i];
             }
         }
@@ -120,7 +120,7 @@ void background_of(const RimViews<Colour> &views, Array<const float, 2> layer, A
     });
 }
 
-#define INSTANTIATE(Colour)                                                                                                                   \
+#define INSTANTIATE(Colour)                                                                                                               \
     template void brightness_of_views(const RimViews<Colour> &, const Sides &, Array<const bool, 4>, Array<double, 1>, Array<double, 1>); \
     template void background_of(const RimViews<Colour> &, Array<const float, 2>, Array<const bool, 2>, Index, Index, Array<float, 3>);
 INSTANTIATE(std::uint8_t)

@@ -153,7 +153,7 @@ class ShownPixel {
 
     void take(Index view, const Place &place) {
         const auto colour = sample(views_, view, place);
-        for (Index c = 0; c < 3; ++c) samples_.array()(c, n_) = float(colour[c]);
+        for (Index c = 0; c < 3; ++c) samples_.array()(c, n_) = colour[c];
         ++n_;
     }
 
@@ -247,7 +247,7 @@ void costs_of_shares(const RimViews<Colour> &views, const Rim &rim, Array<const 
     });
 }
 
-#define INSTANTIATE(Colour)                                                                                                                     \
+#define INSTANTIATE(Colour)                                                                                                    \
     template void costs_of_shares(const RimViews<Colour> &, const Rim &, Array<const float, 3>, const Sides &, double, double, \
                                   Array<const std::int64_t, 1>, Array<float, 2>, Array<bool, 1>);
 INSTANTIATE(std::uint8_t)

@@ -33,28 +33,16 @@ template <class Colour>
     return nearest <= d + views.margin ? place : std::nullopt;
 }
 
-inline std::array<float, 4> cubic(float f) {
-    return {
-        f * (f * (1 - 0.5f * f) - 0.5f),
-        1 + f * f * (1.5f * f - 2.5f),
-        f * (0.5f + f * (2 - 1.5f * f)),
-        f * f * (0.5f * f - 0.5f),
-    };
-}
-
-template <class Colour>
-using Sum = std::conditional_t<std::is_same_v<Colour, std::uint16_t>, double, float>;
-
 // Colour between pixels of a view, 0..1; grey counts as three equal channels. Cubic, since a bilinear sample takes from
 // the peak of what is two pixels wide.
 template <class Colour>
-std::array<Sum<Colour>, 3> sample(const RimViews<Colour> &views, Index view, const Place &place) {
+std::array<float, 3> sample(const RimViews<Colour> &views, Index view, const Place &place) {
     const auto picture = views.lines[views.places(view, 0)][views.places(view, 1)];
     const Index C = views.channels, H = picture.shape[0], first = place.column - 1;
-    const auto down = cubic(float(place.fy)), across = cubic(float(place.fx));
+    const auto down = cubic_weights(place.fy), across = cubic_weights(place.fx);
     std::array<const Colour *, 4> rows;
     for (Index k = 0; k < 4; ++k) rows[k] = picture.at(clamped(place.row - 1 + k, H));
-    std::array<Sum<Colour>, 3> colour{};
+    std::array<float, 3> colour{};
     if (C == 3 && first >= 0 && 3 * (first + 4) <= picture.shape[1]) {
         const auto above_each_other = [&](Index i) {
             Float8 total = spread(down[0]) * load(rows[0] + i);
@@ -70,7 +58,7 @@ std::array<Sum<Colour>, 3> sample(const RimViews<Colour> &views, Index view, con
         for (Index j = 0; j < 4; ++j) {
             const Index i = C * clamped(first + j, picture.shape[1] / C);
             for (Index k = 0; k < 4; ++k)
-                for (Index c = 0; c < 3; ++c) colour[c] += Sum<Colour>(across[j] * down[k]) * Sum<Colour>(rows[k][i + std::min(c, C - 1)]);
+                for (Index c = 0; c < 3; ++c) colour[c] += across[j] * down[k] * float(rows[k][i + std::min(c, C - 1)]);
         }
     }
     for (auto &channel : colour) channel *= views.units(view);
