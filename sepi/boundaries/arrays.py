@@ -1,7 +1,4 @@
-"""Arrays that the decision beside depth steps works on, in named groups: what its kernels take.
-
-No group holds another: numba compiles no parallel loop over such.
-"""
+"""Arrays that the decision beside depth steps works on, in named groups: what its kernels take."""
 
 from __future__ import annotations
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from sepi.boundaries.parameters import BoundaryParameters
 from sepi.boundaries.surroundings import Surroundings
+from sepi.kernels import colour_mixture as kernels
 from sepi.lightfield import FloatMap
 
 _GREY_TRUST = 0.105
@@ -45,9 +46,8 @@ def mixture_evidence(
     ndarray, shape (H, W), float32
         0..1; 0 away from depth discontinuities, and on their more distant side.
     """
-    from sepi.boundaries import colour_mixture_kernels as kernels
-
-    evidence: FloatMap = kernels.mixture_evidence(
+    evidence = np.zeros(disparity.shape, np.float32)
+    kernels.mixture_evidence(
         disparity,
         around,
         guide,
@@ -57,6 +57,7 @@ def mixture_evidence(
         parameters.alpha_threshold,
         # a hundredth of full scale counts as equal even without noise
         1e-4 + noise,
+        evidence,
     )
     return evidence * _trust(guide)
 

@@ -13,20 +13,16 @@ Each share has a cost, by what the views and the colours say against it, and by 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from sepi.boundaries.colour_mixture import mixture_evidence
 from sepi.boundaries.edge_lines import line_evidence
 from sepi.boundaries.parameters import BoundaryParameters
+from sepi.boundaries.rim import Rim, rim_of
 from sepi.boundaries.surface_shares import ShareCosts, nothing_told, share_costs
 from sepi.boundaries.surroundings import Surroundings, surroundings
 from sepi.image.noise import reference_residual_variance
 from sepi.lightfield import FloatMap, LightField
-
-if TYPE_CHECKING:
-    from sepi.boundaries.rim_kernels import Rim
 
 _UNTOLD = np.float32(4)
 """How much more a pixel that the views do not tell of is held on the side that the map has."""
@@ -55,8 +51,6 @@ def assigned_to_surfaces(light_field: LightField, disparity: FloatMap, parameter
     """
     if not (parameters.use_shares or parameters.use_mixture):
         return disparity
-    from sepi.boundaries.rim_kernels import rim_of
-
     rim = rim_of(disparity, parameters.share_radius, parameters.boundary_step)
     if not rim.inside.any():
         return disparity

@@ -9,15 +9,14 @@ pixel belongs to the surface that has its middle by the one that costs least.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
+from sepi.boundaries.rim import Rim
+from sepi.kernels import edge_lines as kernels
 from sepi.lightfield import BoolMap, FloatMap
-
-if TYPE_CHECKING:
-    from sepi.boundaries.rim_kernels import Rim
 
 _DIRECTIONS = 16
 _OFFSETS = np.arange(-1.05, 1.06, 0.3)  # of the patch's middle from the edge, pixels; none is 0
@@ -44,28 +43,23 @@ def line_evidence(disparity: FloatMap, rim: Rim, costs: FloatMap) -> FloatMap:
     ndarray, shape (n,), float32
         Positive: the farther surface's.
     """
-    from sepi.boundaries.edge_lines_kernels import STEPS, evidence_of_lines
-
     pixels, above = np.flatnonzero(rim.inside), costs - costs.min(axis=1, keepdims=True)
     number = np.full(disparity.shape, -1, np.int64)
     number[rim.inside] = np.arange(len(pixels))
-    edges = _edges()
-    shares = np.rint(edges.shares * STEPS * (costs.shape[1] - 1)).astype(np.uint8)
     evidence = np.empty(len(pixels), np.float32)
     middle = (rim.near + rim.far) / 2
-    evidence_of_lines(
-        disparity, middle, number, above, edges.weights, shares, edges.is_near, edges.costs, pixels, evidence
-    )
+    edges = _edges(kernels.STEPS * (costs.shape[1] - 1))
+    kernels.evidence_of_lines(disparity, middle, number, above, edges, pixels, evidence)
     return evidence
 
 
-class _Edges(NamedTuple):
+class Edges(NamedTuple):
     """Edges through a patch.
 
     Attributes
     ----------
-    shares : ndarray, shape (M, 9), float64
-        Of the nearer surface in its pixels, row after row, 0..1.
+    shares : ndarray, shape (M, 9), uint8
+        Of the nearer surface in its pixels, row after row, in steps.
     is_near : ndarray, shape (M,), bool
         Whether its middle is the nearer surface's.
     costs : ndarray, shape (M,), float32
@@ -74,22 +68,23 @@ class _Edges(NamedTuple):
         Of the pixels.
     """
 
-    shares: npt.NDArray[np.float64]
+    shares: npt.NDArray[np.uint8]
     is_near: BoolMap
     costs: FloatMap
     weights: FloatMap
 
 
-def _edges() -> _Edges:
-    """Straight ones of all directions and offsets, and the same bent round the nearer surface."""
+def _edges(steps: int) -> Edges:
+    """Straight ones of all directions and offsets, and the same bent round the nearer surface; so many steps are 1."""
     down, across = (part.ravel() for part in np.mgrid[-1:2, -1:2])
     angle = 2 * np.pi * np.arange(_DIRECTIONS)[:, None] / _DIRECTIONS
     along, beside = np.sin(angle) * down + np.cos(angle) * across, np.cos(angle) * down - np.sin(angle) * across
     bent = along - np.array([0, _CURVATURE])[:, None, None] * beside**2 / 2
     distance = bent[:, :, None] + _OFFSETS[:, None]
     count = _DIRECTIONS * len(_OFFSETS)
-    return _Edges(
-        np.clip(0.5 + distance.reshape(-1, len(down)) / _BLUR, 0, 1),
+    shares = np.clip(0.5 + distance.reshape(-1, len(down)) / _BLUR, 0, 1)
+    return Edges(
+        np.rint(shares * steps).astype(np.uint8),
         np.tile(_OFFSETS > 0, 2 * _DIRECTIONS),
         np.repeat(np.array([0, _CURVED], np.float32), count),
         np.exp(-(down**2 + across**2) / (2 * _WIDTH**2)).astype(np.float32),

@@ -14,6 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from sepi.boundaries.parameters import BoundaryParameters
+from sepi.kernels import specks as kernels
 from sepi.lightfield import BoolMap, FloatMap, LightField
 from sepi.matching.gaps import compared_depths
 
@@ -73,6 +74,13 @@ def _deep_as_something_near(disparity: FloatMap, joined: FloatMap, difference: f
     return farther
 
 
+def specks_of(disparity: FloatMap, difference: float, most_pixels: int, most_of_hole: int) -> BoolMap:
+    """Pixels (H, W) of parts of a map that are small; see :func:`join_specks`."""
+    specks = np.empty(disparity.shape, bool)
+    kernels.specks_of(disparity, difference, most_pixels, most_of_hole, specks)
+    return specks
+
+
 def join_specks(
     disparity: FloatMap, colours: FloatMap, difference: float, most_pixels: int, most_of_hole: int
 ) -> FloatMap:
@@ -94,9 +102,7 @@ def join_specks(
     ndarray, shape (H, W), float32
         ``disparity`` itself where all of it is specks, or nothing.
     """
-    from sepi.boundaries.speck_kernels import specks_of
-
-    left = specks_of(disparity, np.float32(difference), most_pixels, most_of_hole)
+    left = specks_of(disparity, difference, most_pixels, most_of_hole)
     if not left.any() or left.all():
         return disparity
     height, width = disparity.shape

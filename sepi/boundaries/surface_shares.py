@@ -9,22 +9,22 @@ of background, ``I_v = a F + (1 - a) B_v``. Views that are not hidden show what 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import cv2
 import numpy as np
 
 from sepi.boundaries.arrays import RimViews, Sides
 from sepi.boundaries.parameters import BoundaryParameters
+from sepi.boundaries.rim import Rim
 from sepi.boundaries.surroundings import Surroundings
 from sepi.image.noise import noise_of_reference_view
+from sepi.kernels import background as background_kernels
+from sepi.kernels import surface_shares as kernels
 from sepi.lightfield import BoolMap, FloatMap, LightField, full_scale
 from sepi.matching.nearest_surfaces import nearest_surfaces
 from sepi.matching.row_bands import row_bands
 from sepi.matching.view_subsets import spread_views
-
-if TYPE_CHECKING:
-    from sepi.boundaries.rim_kernels import Rim
 
 _LEAST_SCALE = 0.005
 """Of the residual at which a view counts half, beside noise; 0..1."""
@@ -53,9 +53,7 @@ class ShareCosts(NamedTuple):
 
 def nothing_told(count: int) -> ShareCosts:
     """Costs of so many pixels that no view was asked about."""
-    from sepi.boundaries.surface_shares_kernels import SHARES
-
-    return ShareCosts(np.zeros((count, SHARES), np.float32), np.zeros(count, bool))
+    return ShareCosts(np.zeros((count, kernels.SHARES), np.float32), np.zeros(count, bool))
 
 
 def share_costs(
@@ -78,9 +76,6 @@ def share_costs(
     -------
     ShareCosts
     """
-    from sepi.boundaries.background_kernels import background_of
-    from sepi.boundaries.surface_shares_kernels import costs_of_shares
-
     pixels = np.flatnonzero(rim.inside)
     found = nothing_told(len(pixels))
     guide = light_field.reference_view
@@ -101,15 +96,15 @@ def share_costs(
     rows_moved = math.ceil(step * float(np.abs(views.baselines[:, 0]).max())) + 1
     farthest = float(np.abs(disparity).max())
     height, width = light_field.shape
+    background = np.empty((height, width, 4), np.float32)
     for begin, end, rows in row_bands(light_field, present, farthest, BYTES_PER_PIXEL, rows_moved):
         nearest = nearest_surfaces(light_field, around.nearest, present, rows)
         views = views._replace(nearest=nearest, low=rows.low)
-        background = background_of(
-            views, layer, distance <= moved, max(0, begin - rows_moved), min(height, end + rows_moved)
-        )
+        first, last = max(0, begin - rows_moved), min(height, end + rows_moved)
+        background_kernels.background_of(views, layer, distance <= moved, first, last, background)
         of_band = slice(*np.searchsorted(pixels, (begin * width, end * width)))
-        costs_of_shares(
-            views, rim, background, sides, scales2, pixels[of_band], found.costs[of_band], found.told[of_band]
+        kernels.costs_of_shares(
+            views, rim, background, sides, *scales2, pixels[of_band], found.costs[of_band], found.told[of_band]
         )
     return found
 
@@ -119,18 +114,17 @@ def _views_alike(light_field: LightField, sides: Sides, parameters: BoundaryPara
 
     Lenses darken and blur views towards the edge of the grid; shares would take that for another surface.
     """
-    from sepi.boundaries.background_kernels import brightness_of_views
-
     present = spread_views(light_field, parameters.share_views)
     places, baselines = np.argwhere(present), light_field.baselines[present]
     units = np.full(len(places), 1 / full_scale(light_field.views.dtype), np.float32)
-    # a part of another array would have kernels of its own compiled, which takes a minute
+    # kernels take rows whose numbers lie side by side
     pixels = np.ascontiguousarray(light_field.views)
     lines = pixels.reshape(*pixels.shape[:3], -1)
     margin = np.float32(parameters.occlusion_margin)
     views = RimViews(lines, pixels.shape[4], units, places, baselines, np.empty((0, 0, 0, 0), np.float32), 0, margin)
     missing = np.zeros((*light_field.grid, 0, 0), bool) if light_field.missing is None else light_field.missing
-    brightness, residual = brightness_of_views(views, sides, missing)
+    brightness, residual = np.empty((2, len(places)))
+    background_kernels.brightness_of_views(views, sides, missing, brightness, residual)
     alike = (brightness > 1 / _MOST_DARKENING) & (brightness < _MOST_DARKENING)
     showing = np.isfinite(residual)
     usual = float(np.median(residual[showing])) if showing.any() else 0.0

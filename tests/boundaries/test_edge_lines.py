@@ -8,7 +8,7 @@ import numpy.typing as npt
 import pytest
 
 from sepi.boundaries.edge_lines import line_evidence
-from sepi.boundaries.rim_kernels import rim_of
+from sepi.boundaries.rim import rim_of
 
 SHARES = np.linspace(0, 1, 12, dtype=np.float32)
 

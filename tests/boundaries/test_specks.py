@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from sepi.boundaries.speck_kernels import specks_of
-from sepi.boundaries.specks import join_specks, without_specks
+from sepi.boundaries.specks import join_specks, specks_of, without_specks
 from sepi.lightfield import BoolMap, DisparityRange, FloatMap, LightField
 from sepi.occlusion import VisibilityParameters
 
@@ -69,7 +68,7 @@ def test_specks_are_found_as_plain_labels_tell() -> None:
 
     for most, most_of_hole in ((1, 1), (4, 8), (5, 0), (0, 6), (0, 0)):
         expected = plain(most, most_of_hole)
-        np.testing.assert_array_equal(specks_of(disparity, np.float32(0.5), most, most_of_hole), expected)
+        np.testing.assert_array_equal(specks_of(disparity, 0.5, most, most_of_hole), expected)
     assert plain(4, 8).sum() > plain(4, 0).sum() > 0
 
 

@@ -4,23 +4,24 @@ from dataclasses import replace
 from typing import Any
 
 import cv2
-import numba
 import numpy as np
 import numpy.typing as npt
 import pytest
 from geometries import GEOMETRIES, standing
-from several_threads import several_threads
 
-from sepi.boundaries import background_kernels, decision
-from sepi.boundaries import surface_shares_kernels as kernels
+from sepi.boundaries import decision
 from sepi.boundaries.arrays import RimViews, Sides
 from sepi.boundaries.decision import assigned_to_surfaces
 from sepi.boundaries.parameters import BoundaryParameters
-from sepi.boundaries.rim_kernels import Rim, rim_of
+from sepi.boundaries.rim import Rim, rim_of
 from sepi.boundaries.surface_shares import _views_alike as views_alike
 from sepi.boundaries.surroundings import surroundings
+from sepi.kernels import background as background_kernels
+from sepi.kernels import set_thread_count, thread_count
+from sepi.kernels import surface_shares as kernels
 from sepi.lightfield import LightField
-from sepi.matching.nearest_surfaces import z_buffers
+from sepi.matching.nearest_surfaces import nearest_surfaces
+from sepi.matching.row_bands import Rows
 from sepi.scenes import render
 from sepi.workspace import Workspace
 
@@ -161,12 +162,13 @@ def test_grey_bands_and_threads_change_nothing(geometry: str) -> None:
     np.testing.assert_array_equal(assigned_to_surfaces(threefold, wide, USUAL), expected)
     in_bands = replace(field, workspace=Workspace(1))
     np.testing.assert_array_equal(assigned_to_surfaces(in_bands, wide, USUAL), expected)
-    threads = several_threads()
-    numba.set_num_threads(1)
+    before = thread_count()
     try:
-        np.testing.assert_array_equal(assigned_to_surfaces(field, wide, USUAL), expected)
+        for count in (1, 3):
+            set_thread_count(count)
+            np.testing.assert_array_equal(assigned_to_surfaces(field, wide, USUAL), expected)
     finally:
-        numba.set_num_threads(threads)
+        set_thread_count(before)
 
 
 def cubic(picture: npt.NDArray[Any], y: float, x: float) -> npt.NDArray[np.float64]:
@@ -324,16 +326,14 @@ def test_kernels_equal_a_plain_twin(geometry: str, dtype: Any) -> None:
         if rim.inside[y, x]:
             np.testing.assert_allclose([rim.near[y, x], rim.far[y, x]], [near, far], rtol=1e-5)
             assert rim.is_near[y, x] == (disparity[y, x] > (near + far) / 2)
-    nearest = z_buffers(cv2.dilate(disparity, AROUND), present, field.baselines, 0, 12)
+    nearest = nearest_surfaces(field, cv2.dilate(disparity, AROUND), present, Rows(0, 12))
     unit = np.float32(1 / 255 if dtype == np.uint8 else 1)
     units = random.uniform(0.9, 1.1, present.sum()).astype(np.float32) * unit
-    # in the order in memory that they have for maps: no other kernels are compiled
-    places = np.ascontiguousarray(np.argwhere(present))
     rim_views = RimViews(
         views.reshape(*views.shape[:3], -1),
         views.shape[4],
         units,
-        places,
+        np.argwhere(present),
         field.baselines[present],
         nearest,
         0,
@@ -343,7 +343,8 @@ def test_kernels_equal_a_plain_twin(geometry: str, dtype: Any) -> None:
     sides = Sides(disparity, field.reference_view, clean, 4)
     twin = Twin(rim_views, rim, sides)
     layer = np.where(rim.is_near, rim.far, disparity)
-    background = background_kernels.background_of(rim_views, layer, np.ones_like(present, shape=layer.shape), 0, 12)
+    background = np.empty((*layer.shape, 4), np.float32)
+    background_kernels.background_of(rim_views, layer, np.ones(layer.shape, bool), 0, 12, background)
     for y, x in np.ndindex(disparity.shape):
         colour, variance, count = twin.background(float(layer[y, x]), y, x)
         assert (background[y, x, 3] != background_kernels.UNSEEN) == (count >= background_kernels.FEWEST_VIEWS)
@@ -353,7 +354,7 @@ def test_kernels_equal_a_plain_twin(geometry: str, dtype: Any) -> None:
     scales2 = (0.02**2, 0.3**2)
     pixels = np.flatnonzero(rim.inside)
     costs, told = np.zeros((len(pixels), kernels.SHARES), np.float32), np.zeros(len(pixels), bool)
-    kernels.costs_of_shares(rim_views, rim, background, sides, scales2, pixels, costs, told)
+    kernels.costs_of_shares(rim_views, rim, background, sides, *scales2, pixels, costs, told)
     expected = [twin.costs(background, scales2, y, x) for y, x in np.argwhere(rim.inside)]
     np.testing.assert_array_equal(told, [cost is not None for cost in expected])
     assert told.sum() > 30
@@ -376,7 +377,9 @@ def test_brightness_is_told_view_by_view() -> None:
         field.baselines[field.present], np.empty((0, 0, 0, 0), np.float32), 0, np.float32(0),
     )  # fmt: skip
     sides = Sides(still, field.reference_view, still == 0, 4)
-    brightness, residual = background_kernels.brightness_of_views(rim_views, sides, np.zeros((*field.grid, 0, 0), bool))
+    brightness, residual = np.empty((2, 3))
+    nothing = np.zeros((*field.grid, 0, 0), bool)
+    background_kernels.brightness_of_views(rim_views, sides, nothing, brightness, residual)
     np.testing.assert_allclose(brightness, factors[0], rtol=0.02)
     assert (residual < 0.01).all()
 
@@ -403,7 +406,7 @@ def test_bands_hold_every_row_that_is_looked_at(grid: tuple[int, int], monkeypat
     light_field = LightField(whole.views[rows], "rows", disparity_range=whole.disparity_range)
     background_of, asked = background_kernels.background_of, []
 
-    def checked(views, layer, wanted, begin, end):
+    def checked(views, layer, wanted, begin, end, background):
         y, x = np.nonzero(wanted[begin:end])
         d = layer[begin:end][y, x]
         for down, across in views.baselines:
@@ -411,7 +414,7 @@ def test_bands_hold_every_row_that_is_looked_at(grid: tuple[int, int], monkeypat
             inside = (row >= 0) & (row < 95) & (column >= 0) & (column < 95)
             number = (row[inside] + 0.5).astype(int) - views.low
             asked.append(bool((number >= 0).all() and (number < views.nearest.shape[2]).all()))
-        return background_of(views, layer, wanted, begin, end)
+        background_of(views, layer, wanted, begin, end, background)
 
     monkeypatch.setattr(background_kernels, "background_of", checked)
     assigned_to_surfaces(replace(light_field, workspace=Workspace(1)), whole.ground_truth, USUAL)

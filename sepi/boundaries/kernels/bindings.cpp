@@ -1,6 +1,59 @@
+#include "background.hpp"
+#include "colour_mixture.hpp"
+#include "edge_lines.hpp"
 #include "kernels/arguments.hpp"
+#include "rim.hpp"
+#include "specks.hpp"
+#include "surface_shares.hpp"
 
 namespace nb = nanobind;
 using namespace nb::literals;
+using sepi::Unlocked;
 
-void bind_boundaries(nb::module_ &) {}
+template <class Colour>
+NAMED_TUPLE(sepi::RimViews<Colour>, "sepi.boundaries.arrays.RimViews");
+template <>
+NAMED_TUPLE(sepi::Sides, "sepi.boundaries.arrays.Sides");
+template <>
+NAMED_TUPLE(sepi::Rim, "sepi.boundaries.rim.Rim");
+template <>
+NAMED_TUPLE(sepi::Surroundings, "sepi.boundaries.surroundings.Surroundings");
+template <>
+NAMED_TUPLE(sepi::Edges, "sepi.boundaries.edge_lines.Edges");
+
+// The kernels that look at the colours of views, of one type.
+template <class Colour>
+static void bind_of_colours(nb::module_ &background, nb::module_ &surface_shares) {
+    background.def("brightness_of_views", &sepi::brightness_of_views<Colour>, Unlocked(), "views"_a, "sides"_a, "missing"_a, "brightness"_a, "residual"_a);
+    background.def("background_of", &sepi::background_of<Colour>, Unlocked(), "views"_a, "layer"_a, "wanted"_a, "begin"_a, "end"_a, "background"_a);
+    surface_shares.def("costs_of_shares", &sepi::costs_of_shares<Colour>, Unlocked(), "views"_a, "rim"_a, "background"_a, "sides"_a, "scale2"_a,
+                       "contrast2"_a, "pixels"_a, "costs"_a, "told"_a);
+}
+
+void bind_boundaries(nb::module_ &kernels) {
+    auto background = kernels.def_submodule("background");
+    auto surface_shares = kernels.def_submodule("surface_shares");
+    bind_of_colours<std::uint8_t>(background, surface_shares);
+    bind_of_colours<std::uint16_t>(background, surface_shares);
+    bind_of_colours<float>(background, surface_shares);
+    background.attr("FEWEST_VIEWS") = sepi::FEWEST_VIEWS;
+    background.attr("UNSEEN") = sepi::UNSEEN;
+    surface_shares.attr("FEWEST_SAMPLES") = sepi::FEWEST_SAMPLES;
+    surface_shares.attr("FEWEST_ALONE") = sepi::FEWEST_ALONE;
+    surface_shares.attr("SHARES") = sepi::SHARES;
+
+    auto colour_mixture = kernels.def_submodule("colour_mixture");
+    colour_mixture.def("mixture_evidence", &sepi::mixture_evidence, Unlocked(), "disparity"_a, "around"_a, "guide"_a, "discontinuity"_a, "radius"_a,
+                       "contrast"_a, "threshold"_a, "least_variance"_a, "out"_a);
+
+    auto edge_lines = kernels.def_submodule("edge_lines");
+    edge_lines.def("evidence_of_lines", &sepi::evidence_of_lines, Unlocked(), "disparity"_a, "middle"_a, "number"_a, "costs"_a, "edges"_a, "pixels"_a,
+                   "evidence"_a);
+    edge_lines.attr("STEPS") = sepi::STEPS;
+
+    auto rim = kernels.def_submodule("rim");
+    rim.def("rim_of", &sepi::rim_of, Unlocked(), "disparity"_a, "radius"_a, "step"_a, "rim"_a);
+
+    auto specks = kernels.def_submodule("specks");
+    specks.def("specks_of", &sepi::specks_of, Unlocked(), "disparity"_a, "difference"_a, "most_pixels"_a, "most_of_hole"_a, "specks"_a);
+}

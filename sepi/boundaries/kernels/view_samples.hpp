@@ -1,0 +1,68 @@
+// Where views show a pixel of some disparity, and the colours between their pixels.
+#pragma once
+
+#include <array>
+#include <optional>
+
+#include "kernels/lanes.hpp"
+#include "kernels/sampling.hpp"
+#include "rim_arrays.hpp"
+
+namespace sepi {
+
+// Where a sample lies: a pixel, and how far below and to the right of it, 0..1.
+struct Place {
+    Index row, column;
+    double fy, fx;
+};
+
+// A place in a picture (H, W), unless a pixel beside it lies outside.
+inline std::optional<Place> place_within(double down, double across, Index H, Index W) {
+    if (down < 0 || across < 0 || down >= double(H - 1) || across >= double(W - 1)) return std::nullopt;
+    const auto row = Index(down), column = Index(across);
+    return Place{row, column, down - double(row), across - double(column)};
+}
+
+// Where a view shows a pixel of disparity d, if it does.
+template <class Colour>
+[[gnu::always_inline]] inline std::optional<Place> place_seen(const RimViews<Colour> &views, Index view, float d, Index y, Index x) {
+    const double down = double(y) - d * views.baselines(view, 0), across = double(x) - d * views.baselines(view, 1);
+    const auto place = place_within(down, across, views.lines.shape[2], views.nearest.shape[3]);
+    if (!place) return place;
+    const float nearest = views.nearest(views.places(view, 0), views.places(view, 1), Index(down + 0.5) - views.low, Index(across + 0.5));
+    return nearest <= d + views.margin ? place : std::nullopt;
+}
+
+// Colour between pixels of a view, 0..1; grey counts as three equal channels. Cubic, since a bilinear sample takes from
+// the peak of what is two pixels wide.
+template <class Colour>
+std::array<float, 3> sample(const RimViews<Colour> &views, Index view, const Place &place) {
+    const auto picture = views.lines[views.places(view, 0)][views.places(view, 1)];
+    const Index C = views.channels, H = picture.shape[0], first = place.column - 1;
+    const auto down = cubic_weights(place.fy), across = cubic_weights(place.fx);
+    std::array<const Colour *, 4> rows;
+    for (Index k = 0; k < 4; ++k) rows[k] = picture.at(clamped(place.row - 1 + k, H));
+    std::array<float, 3> colour{};
+    if (C == 3 && first >= 0 && 3 * (first + 4) <= picture.shape[1]) {
+        const auto above_each_other = [&](Index i) {
+            Float8 total = spread(down[0]) * load(rows[0] + i);
+            for (Index k = 1; k < 4; ++k) total = fma(spread(down[k]), load(rows[k] + i), total);
+            return total;
+        };
+        // four pixels side by side, of which the first eight numbers and the last eight make up all twelve
+        const Float8 left = above_each_other(3 * first), right = above_each_other(3 * first + 4);
+        const auto sum = across[0] * __builtin_shufflevector(left, left, 0, 1, 2, 2) + across[1] * __builtin_shufflevector(left, left, 3, 4, 5, 5) +
+                         across[2] * __builtin_shufflevector(right, right, 2, 3, 4, 4) + across[3] * __builtin_shufflevector(right, right, 5, 6, 7, 7);
+        for (Index c = 0; c < 3; ++c) colour[c] = sum[c];
+    } else {
+        for (Index j = 0; j < 4; ++j) {
+            const Index i = C * clamped(first + j, picture.shape[1] / C);
+            for (Index k = 0; k < 4; ++k)
+                for (Index c = 0; c < 3; ++c) colour[c] += across[j] * down[k] * float(rows[k][i + std::min(c, C - 1)]);
+        }
+    }
+    for (auto &channel : colour) channel *= views.units(view);
+    return colour;
+}
+
+}  // namespace sepi
