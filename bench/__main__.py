@@ -153,7 +153,7 @@ def estimates(benchmarks: Path) -> None:
 @click.option("--threads", type=click.IntRange(min=1), multiple=True, default=(1, 2, 4, 8), show_default=True)
 @click.option("--variant", "variants", type=click.Choice(list(VARIANTS)), multiple=True, help="Only this; repeatable.")
 def digests(scene: str, size: int, views: int, threads: tuple[int, ...], variants: tuple[str, ...]) -> None:
-    """Print a digest of the maps of every variant, and fail where threads or the kernels of this processor change it."""
+    """Print a digest of the maps of every variant, and fail where threads or the processor's kernels change it."""
     from bench.digests import Condition
     from bench.digests import digests as digests_of
 

@@ -1,6 +1,7 @@
 """Python processes that wait for no library: forks of one that has loaded them, as the workflow's jobs are.
 
-A job of the workflow is a process of its own, which mostly waits for its imports, and Snakemake takes seconds to be imported.
+A job of the workflow is a process of its own, which mostly waits for
+its imports, and Snakemake takes seconds to be imported.
 What is tested is loaded after the fork, from ``PYTHONPATH`` as ever. Not for tests of how processes begin or are
 killed.
 """

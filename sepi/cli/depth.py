@@ -104,7 +104,6 @@ def depth(
         raise SepiError(f"{folder}: is the light field itself; choose another folder for the result")
     light_field = reading.read(light_field_path, disparity_range=disparity_range)
     from sepi.inspection.disparity_range import settle_range
-    from sepi.io.origin import DIGEST
     from sepi.io.provenance import result_attributes
     from sepi.io.result_folder import write_result
     from sepi.matching.unknown import UNKNOWN
@@ -125,7 +124,7 @@ def depth(
         from sepi.applications.all_views import maps_of_all_views
         from sepi.io.all_views import write_all_views
 
-        made_by = result_attributes(light_field, maps, known.get(DIGEST))
+        made_by = result_attributes(light_field, maps)
         with progress_bar(f"{light_field.name}, all views") as progress:
             views = maps_of_all_views(light_field, maps, chosen, parameters, progress, memory and memory * 2**20)
             write_all_views(folder / ALL_VIEWS, light_field, _also_as_taken(folder, light_field, views), made_by)

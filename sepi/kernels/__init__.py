@@ -16,7 +16,7 @@ LEVEL = "SEPI_KERNELS"
 """Environment variable: ``baseline`` for kernels that all processors can run, to compare them with this one's."""
 
 if find_spec(f"{__name__}.baseline") is None:
-    raise ImportError(
+    raise ImportError("sepi: its kernels are not built: `make`, or `pip install --editable .`, builds them")
         "sepi: its kernels are not built; `pip install --editable .` in the checkout, or `make`, builds them"
     )
 

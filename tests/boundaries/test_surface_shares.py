@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from geometries import GEOMETRIES, standing
+from several_threads import SEVERAL, threads
 
 from sepi.boundaries import decision
 from sepi.boundaries.arrays import RimViews, Sides
@@ -17,7 +18,6 @@ from sepi.boundaries.rim import Rim, rim_of
 from sepi.boundaries.surface_shares import _views_alike as views_alike
 from sepi.boundaries.surroundings import surroundings
 from sepi.kernels import background as background_kernels
-from sepi.kernels import set_thread_count, thread_count
 from sepi.kernels import surface_shares as kernels
 from sepi.lightfield import LightField
 from sepi.matching.nearest_surfaces import nearest_surfaces
@@ -162,13 +162,9 @@ def test_grey_bands_and_threads_change_nothing(geometry: str) -> None:
     np.testing.assert_array_equal(assigned_to_surfaces(threefold, wide, USUAL), expected)
     in_bands = replace(field, workspace=Workspace(1))
     np.testing.assert_array_equal(assigned_to_surfaces(in_bands, wide, USUAL), expected)
-    before = thread_count()
-    try:
-        for count in (1, 3):
-            set_thread_count(count)
+    for count in (1, SEVERAL):
+        with threads(count):
             np.testing.assert_array_equal(assigned_to_surfaces(field, wide, USUAL), expected)
-    finally:
-        set_thread_count(before)
 
 
 def cubic(picture: npt.NDArray[Any], y: float, x: float) -> npt.NDArray[np.float64]:

@@ -25,6 +25,7 @@ from sepi.io.result_folder import write_result
 from sepi.lightfield import LightField
 from sepi.scenes import render, write_hci
 from sepi.stage import StageMaps
+from sepi.threads import available_cores
 
 SHAPE = (64, 64)
 
