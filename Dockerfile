@@ -20,12 +20,10 @@ COPY Snakefile config.yaml /opt/sepi/
 COPY rules /opt/sepi/rules
 COPY profiles /opt/sepi/profiles
 
-# Home and compiled kernels in a folder that any user may write to: `--user` can be one that the image does not know.
-# Such a user has no name either, which Snakemake asks for. Kernels fit the processor that they were compiled on; on another
-# kind the first run compiles them again.
-ENV HOME=/home/sepi USER=sepi NUMBA_CACHE_DIR=/home/sepi/kernels
+# Home in a folder that any user may write to: `--user` can be one that the image does not know. Such a user has no name either,
+# which Snakemake asks for.
+ENV HOME=/home/sepi USER=sepi
 RUN useradd --uid 1000 --create-home sepi \
-    && python -m sepi.cli.warm_up \
     && chmod -R a+rwX /home/sepi
 # by number: systems that refuse root cannot know the name
 USER 1000

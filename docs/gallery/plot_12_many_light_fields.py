@@ -3,8 +3,8 @@ Many light fields
 =================
 
 A folder of light fields, a loop, a folder of results. What matters in the long
-run: one that is broken must not end the loop, kernels are compiled once,
-memory has a bound, and cores are used well.
+run: one that is broken must not end the loop, memory has a bound, and cores
+are used well.
 """
 
 import shutil
@@ -44,9 +44,6 @@ for picture in (inputs / "broken").glob("*.png"):
 # - *Threads.* One light field on all cores, as here, or a process for each
 #   core with one thread each, which is faster for many small ones:
 #   ``use_threads(1)``.
-# - *Kernels.* Numba compiles at the first call and keeps the result on disk.
-#   ``python -m sepi.cli.warm_up`` does it ahead, so that several processes do
-#   not all compile at once.
 # - *Memory.* ``memory`` is the number of bytes that the process should stay
 #   within. The maps are the same; with little memory it takes longer.
 # - *Failures.* What a user can mend is a ``SepiError`` of one line, which

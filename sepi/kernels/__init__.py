@@ -17,8 +17,6 @@ LEVEL = "SEPI_KERNELS"
 
 if find_spec(f"{__name__}.baseline") is None:
     raise ImportError("sepi: its kernels are not built: `make`, or `pip install --editable .`, builds them")
-        "sepi: its kernels are not built; `pip install --editable .` in the checkout, or `make`, builds them"
-    )
 
 _native = import_module(f"{__name__}.baseline._native")
 if os.environ.get(LEVEL) != "baseline" and _native.has_x86_64_v3() and find_spec(f"{__name__}.x86_64_v3"):
