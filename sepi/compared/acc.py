@@ -54,6 +54,7 @@ from sepi.compared.cost_volumes import disparity_of, distinctness, least_costs
 from sepi.compared.guided_filter import GuidedFilter
 from sepi.compared.message_passing import labels_of_least_energy
 from sepi.compared.weighted_median import weighted_median
+from sepi.kernels import acc as kernels
 from sepi.lightfield import FloatMap, LightField, as_unit_float
 from sepi.matching.candidates import CandidateParameters, CandidateRule, number_field
 from sepi.stage import Choice, CostVolume, Needs, Parameters, Progress, StageMaps, require_costs
@@ -165,8 +166,6 @@ def phase_shift_costs(
     ndarray, shape (K, H, W), float32
         0..1.
     """
-    from sepi.compared.acc_kernels import add_differences
-
     share, colour, gradient = parameters.colour_share, parameters.colour_truncation, parameters.gradient_truncation
     reference = np.ascontiguousarray(light_field.reference_view.transpose(2, 0, 1))
     others = light_field.present.copy()
@@ -179,7 +178,7 @@ def phase_shift_costs(
         for begin in range(0, len(disparities), _AT_ONCE):
             part = slice(begin, begin + _AT_ONCE)
             moved = view.by(-disparities[part, None] * baseline)
-            add_differences(moved, reference, across_share(baseline), share, colour, gradient, costs[part])
+            kernels.add_differences(moved, reference, across_share(baseline), share, colour, gradient, costs[part])
         progress(0.9 * (n + 1) / others.sum())
     costs /= np.float32(others.sum() * (share * colour + (1 - share) * gradient))
     return costs

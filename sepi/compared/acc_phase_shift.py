@@ -11,6 +11,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from sepi.kernels import acc as kernels
+from sepi.kernels import thread_count
 from sepi.lightfield import FloatMap
 
 _SEAM = 16
@@ -49,15 +51,12 @@ class PhaseShift:
         ndarray, shape (M, C, H or more, W or more), float32
             What lies beyond the pictures' own height and width is of no use.
         """
-        from numba import get_num_threads
         from scipy import fft
-
-        from sepi.compared.acc_kernels import turn_phases
 
         rows, columns = (_phases(length, offsets[:, axis]) for axis, length in enumerate(self._size))
         turned = np.empty((len(offsets), *self._spectrum.shape), np.complex64)
-        turn_phases(self._spectrum, rows, columns, turned)
-        moved = fft.irfft2(turned, s=self._size, overwrite_x=True, workers=get_num_threads())
+        kernels.turn_phases(self._spectrum, rows, columns, turned)
+        moved = fft.irfft2(turned, s=self._size, overwrite_x=True, workers=thread_count())
         return np.asarray(moved, np.float32)
 
 

@@ -51,6 +51,7 @@ from pydantic import Field
 
 from sepi.compared.cost_volumes import disparity_of, distinctness, least_costs
 from sepi.compared.guided_filter import GuidedFilter
+from sepi.kernels import cae as kernels
 from sepi.lightfield import FloatMap, LightField
 from sepi.matching.candidates import CandidateParameters, CandidateRule, number_field
 from sepi.matching.sheared_views import ShearedViews, refocused
@@ -130,14 +131,12 @@ def entropies_and_responses(
     -------
     entropies, responses : ndarray, shape (K, H, W), float32
     """
-    from sepi.compared.cae_kernels import constrained_entropies
-
     views, weights = ShearedViews(light_field), level_weights(sigma)
     own = np.ascontiguousarray(light_field.reference_view.transpose(2, 0, 1))
     entropies, responses = (np.empty((len(disparities), *light_field.shape), np.float32) for _ in range(2))
     channels = np.empty_like(own)
     for k, sheared in views.over(disparities):
-        constrained_entropies(sheared, own, weights, channels)
+        kernels.constrained_entropies(sheared, own, weights, channels)
         entropies[k] = (channels.mean(axis=0) + channels.max(axis=0)) / 2
         responses[k] = np.abs(refocused(sheared) - own).mean(axis=0)
         progress(0.9 * (k + 1) / len(disparities))
@@ -146,9 +145,7 @@ def entropies_and_responses(
 
 def level_weights(sigma: float) -> FloatMap:
     """Weight of a view by the difference of its level to the pixel's, down to the least that counts; shape (n,)."""
-    from sepi.compared.cae_kernels import LEVELS
-
-    difference = np.arange(LEVELS) / (LEVELS - 1)
+    difference = np.arange(kernels.LEVELS) / (kernels.LEVELS - 1)
     weights = np.exp(-((difference / sigma) ** 2) / 2)
     return weights[weights >= LEAST_WEIGHT].astype(np.float32)
 
@@ -168,12 +165,10 @@ def constrained_defocus(responses: FloatMap, guide: FloatMap, parameters: Constr
     -------
     ndarray, shape (K, H, W), float32
     """
-    from sepi.compared.cae_kernels import constrained_least_patch
-
     by_pixel = np.ascontiguousarray(responses.transpose(1, 2, 0))
     least = np.empty_like(by_pixel)
-    sigma, constraint = np.float32(parameters.colour_sigma), np.float32(parameters.colour_constraint)
-    constrained_least_patch(by_pixel, np.ascontiguousarray(guide), sigma, constraint, least)
+    sigma, constraint = parameters.colour_sigma, parameters.colour_constraint
+    kernels.constrained_least_patch(by_pixel, np.ascontiguousarray(guide), sigma, constraint, least)
     return least.transpose(2, 0, 1)
 
 

@@ -19,6 +19,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from sepi.kernels import message_passing as kernels
 from sepi.lightfield import FloatMap
 
 
@@ -64,13 +65,12 @@ def labels_of_least_energy(
     ndarray, shape (H, W), int64
         0..K-1.
     """
-    from sepi.compared.message_passing_kernels import decode, pass_messages
-
     volume = np.ascontiguousarray(costs.transpose(1, 2, 0), np.float32)
-    messages = np.zeros((4, *volume.shape), np.float32)
+    messages, labels = np.zeros((4, *volume.shape), np.float32), np.empty(volume.shape[:2], np.int64)
     for _ in range(iterations):
-        pass_messages(volume, across, down, np.float32(truncation), messages)
-    return np.asarray(decode(volume, across, down, np.float32(truncation), messages))
+        kernels.pass_messages(volume, across, down, truncation, messages)
+    kernels.decode(volume, across, down, truncation, messages, labels)
+    return labels
 
 
 def energy(

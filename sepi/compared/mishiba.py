@@ -56,6 +56,7 @@ from pydantic import Field
 
 from sepi.compared.guided_filter import GuidedFilter
 from sepi.image.noise import residual_variance
+from sepi.kernels import mishiba as kernels
 from sepi.lightfield import BoolMap, FloatMap, LightField, as_unit_float
 from sepi.matching.candidates import CandidateParameters, CandidateRule, number_field
 from sepi.stage import Choice, Parameters, Progress, StageMaps, require_previous
@@ -140,18 +141,18 @@ def median_descent(
     StageMaps
         With the confidence as it was, without a cost volume.
     """
-    from sepi.compared.mishiba_kernels import median_pass
-
     before = require_previous(previous)
     guide = light_field.reference_view
     low, high = float(before.disparity.min()), float(before.disparity.max())
     unit = max(high - low, 1e-6) / (LEVELS - 1)
-    data = np.round((before.disparity.astype(np.float64) - low) / unit).astype(np.int32)
-    weights = np.round(before.confidence * FULL_WEIGHT).astype(np.int32)
+    data = np.round((before.disparity.astype(np.float64) - low) / unit).astype(np.int32, order="C")
+    weights = np.round(before.confidence * FULL_WEIGHT).astype(np.int32, order="C")
     table, per_entry = neighbour_weights(parameters, residual_variance(guide))
-    current = data
+    radius, gap = parameters.radius, parameters.gap
+    current, following = data.copy(), np.empty_like(data)
     for i in range(parameters.passes):
-        current = median_pass(current, data, weights, guide, parameters.radius, parameters.gap, table, per_entry)
+        kernels.median_pass(current, data, weights, guide, radius, gap, table, per_entry, following)
+        current, following = following, current
         progress((i + 1) / parameters.passes)
     disparity = (low + current * unit).astype(np.float32)
     return before.updated(disparity, before.confidence).without_costs()
@@ -177,21 +178,19 @@ def details(light_field: LightField, views: BoolMap, sigma: float) -> FloatMap:
 
 def lattice_costs(light_field: LightField, disparities: FloatMap, parameters: MishibaParameters) -> FloatMap:
     """Costs of all candidates on the lattice; shape (K, ceil(H / step), ceil(W / step)), float32, 0..1."""
-    from sepi.compared.mishiba_kernels import pair_costs
-
     views = selected_views(light_field)
     offsets = -disparities[:, None, None].astype(np.float64) * light_field.baselines[views]
     step = parameters.lattice_step
     height, width = light_field.shape
     costs = np.empty((len(disparities), -(-height // step), -(-width // step)), np.float32)
-    pair_costs(details(light_field, views, parameters.feature_sigma), offsets, step, costs)
+    kernels.pair_costs(details(light_field, views, parameters.feature_sigma), offsets, step, costs)
     return costs
 
 
 def least_interpolated(
     guide: FloatMap, costs: FloatMap, parameters: MishibaParameters, progress: Progress
 ) -> tuple[npt.NDArray[np.int64], FloatMap]:
-    """Candidates of least interpolated cost, and what :func:`sepi.compared.mishiba_kernels.keep_least` keeps.
+    """Candidates of least interpolated cost, and what ``keep_least`` (``kernels/mishiba.hpp``) keeps.
 
     Parameters
     ----------
@@ -207,14 +206,12 @@ def least_interpolated(
     labels : ndarray, shape (H, W), int64
     kept : ndarray, shape (H, W, 5), float32
     """
-    from sepi.compared.mishiba_kernels import keep_least
-
     step = parameters.lattice_step
     fit = LatticeFit(np.ascontiguousarray(guide[::step, ::step]), parameters.radius, parameters.epsilon)
     labels = np.zeros(guide.shape[:2], np.int64)
     kept = np.zeros((*guide.shape[:2], 5), np.float32)
     for k, cost in enumerate(costs):
-        keep_least(k, *fit.functions(cost), guide, step, labels, kept)
+        kernels.keep_least(k, *fit.functions(cost), guide, step, labels, kept)
         progress(0.4 + 0.6 * (k + 1) / len(costs))
     return labels, kept
 

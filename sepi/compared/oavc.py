@@ -58,6 +58,7 @@ from pydantic import Field
 from sepi.compared.cost_volumes import disparity_of, distinctness, least_costs
 from sepi.compared.guided_costs import GuidedCostsParameters, guided_costs
 from sepi.compared.weighted_median import weighted_median
+from sepi.kernels import oavc as kernels
 from sepi.lightfield import FloatMap, LightField
 from sepi.matching.candidates import CandidateParameters, CandidateRule, number_field
 from sepi.matching.sheared_views import ShearedViews
@@ -139,12 +140,10 @@ def vote_thresholds(
     ndarray, shape (H, W), float32
         Mean difference of the channels, colours in 0..1.
     """
-    from sepi.compared.oavc_kernels import lower_thresholds
-
     needed = max(1, math.ceil(parameters.agreeing_share * (len(views.positions) - 1)))
     thresholds = np.full(shape, np.inf, np.float32)
     for k, sheared in views.over(disparities):
-        lower_thresholds(sheared, views.reference, needed, thresholds)
+        kernels.lower_thresholds(sheared, views.reference, needed, thresholds)
         progress((k + 1) / len(disparities))
     return np.maximum(thresholds, np.float32(parameters.least_threshold))
 
@@ -166,12 +165,10 @@ def votes(views: ShearedViews, disparities: FloatMap, thresholds: FloatMap, prog
     -------
     CostVolume
     """
-    from sepi.compared.oavc_kernels import vote_costs
-
     costs = np.empty((len(disparities), *thresholds.shape), np.float16)
     of_one = np.empty(thresholds.shape, np.float32)
     for k, sheared in views.over(disparities):
-        vote_costs(sheared, views.reference, thresholds, of_one)
+        kernels.vote_costs(sheared, views.reference, thresholds, of_one)
         costs[k] = of_one
         progress((k + 1) / len(disparities))
     return CostVolume(disparities, costs)

@@ -64,6 +64,7 @@ from sepi.compared.cost_volumes import disparity_of
 from sepi.compared.message_passing import labels_of_least_energy
 from sepi.compared.occ_patches import Edges, colours_beside, edges_to_split, halves_of_views
 from sepi.image.edges import CannyParameters
+from sepi.kernels import occ as kernels
 from sepi.lightfield import FloatMap, LightField
 from sepi.matching.candidates import CandidateParameters, CandidateRule, number_field
 from sepi.matching.sheared_views import ShearedViews
@@ -148,13 +149,11 @@ def occ(
     -------
     StageMaps
     """
-    from sepi.compared.occ_kernels import whole_patch_costs
-
     disparities = parameters.candidates(light_field)
     reference = _channels_first(light_field.reference_view)
     costs = np.empty((len(disparities), *light_field.shape), np.float32)
     for k, sheared in ShearedViews(light_field).over(disparities):
-        whole_patch_costs(sheared, reference, costs[k])
+        kernels.whole_patch_costs(sheared, reference, costs[k])
         progress((k + 1) / len(disparities))
     return StageMaps(*least_cost(disparities, costs))
 
@@ -266,8 +265,6 @@ def split_costs(
     cues : ndarray, shape (P, 3), float32
         At the least cost: variances of the two halves, and the difference of their means; 0 where none is finite.
     """
-    from sepi.compared.occ_kernels import split_patch_costs
-
     views, reference = ShearedViews(light_field), _channels_first(light_field.reference_view)
     beside = colours_beside(light_field.reference_view, edges, max(1, round(light_field.reach)))
     halves = halves_of_views(views.baselines)
@@ -275,9 +272,7 @@ def split_costs(
     cues, of_candidate = (np.zeros((len(edges.places), 3), np.float32) for _ in range(2))
     least = np.full(len(edges.places), np.inf, np.float32)
     for k, sheared in views.over(disparities):
-        split_patch_costs(
-            sheared, reference, edges.places, halves, beside, np.float32(tolerance), costs[k], of_candidate
-        )
+        kernels.split_patch_costs(sheared, reference, edges.places, halves, beside, tolerance, costs[k], of_candidate)
         better = costs[k] < least
         least[better], cues[better] = costs[k][better], of_candidate[better]
         progress((k + 1) / len(disparities))

@@ -35,6 +35,7 @@ import numpy.typing as npt
 from pydantic import Field, model_validator
 
 from sepi.errors import SepiError
+from sepi.kernels import thread_count
 from sepi.lightfield import FloatMap, LightField, as_unit_float
 from sepi.matching.view_subsets import grid_steps
 from sepi.stage import Choice, Parameters, Progress, StageMaps
@@ -130,19 +131,13 @@ def _session(parameters: OnnxParameters) -> onnxruntime.InferenceSession:
         raise SepiError(f"initial.onnx needs the package {error.name}; install sepi[onnx]") from error
     options = onnxruntime.SessionOptions()
     options.use_deterministic_compute = True
-    options.intra_op_num_threads = _threads()
+    options.intra_op_num_threads = thread_count()
     # errors are told as exceptions
     options.log_severity_level = 4
     try:
         return onnxruntime.InferenceSession(parameters.model, options, providers=["CPUExecutionProvider"])
     except Exception as error:
         raise SepiError(f"{parameters.model}: not a network that ONNX Runtime reads ({error})") from error
-
-
-def _threads() -> int:
-    import numba
-
-    return int(numba.get_num_threads())
 
 
 def _chosen_views(light_field: LightField, parameters: OnnxParameters) -> tuple[FloatMap, tuple[int, int]]:

@@ -57,6 +57,7 @@ from sepi.compared.cost_volumes import disparity_of, distinctness, least_costs
 from sepi.compared.guided_filter import GuidedFilter
 from sepi.image.noise import noise_level
 from sepi.image.superpixels import Superpixels, superpixels
+from sepi.kernels import pobr as kernels
 from sepi.lightfield import FloatMap, LightField
 from sepi.matching.candidates import CandidateParameters, CandidateRule, number_field
 from sepi.matching.sheared_views import ShearedViews
@@ -133,15 +134,13 @@ def pobr_cost(
     StageMaps
         ``disparity`` and ``confidence``, shape (H, W), float32.
     """
-    from sepi.compared.pobr_kernels import mean_truncated_differences
-
     disparities = parameters.candidates(light_field)
     views = ShearedViews(light_field)
     smooth = GuidedFilter(light_field.reference_view, parameters.radius, parameters.epsilon)
     costs = np.empty((len(disparities), *light_field.shape), np.float16)
     difference = np.empty(light_field.shape, np.float32)
     for k, sheared in views.over(disparities):
-        mean_truncated_differences(sheared, views.reference, parameters.truncation, difference)
+        kernels.mean_truncated_differences(sheared, views.reference, parameters.truncation, difference)
         costs[k] = smooth(difference)
         progress((k + 1) / len(disparities))
     volume = CostVolume(disparities, costs)

@@ -17,7 +17,7 @@ would not agree. Noise changes both sides alike. The data cost is the initial ch
    pixel takes its best candidate.
 
 The EPIs are sheared by each candidate, so that its lines become columns and a histogram of one column serves all the
-parallelograms that it lies in (:mod:`sepi.compared.spo_kernels`).
+parallelograms that it lies in (``kernels/spo.cpp``).
 
 What the publication leaves open, or could not be confirmed, and what was chosen:
 
@@ -50,6 +50,7 @@ import numpy as np
 from pydantic import Field
 
 from sepi.compared.cost_volumes import disparity_of, least_costs
+from sepi.kernels import spo as kernels
 from sepi.lightfield import BoolMap, FloatMap, LightField
 from sepi.matching.candidates import CandidateParameters, CandidateRule, number_field
 from sepi.matching.sheared_views import ShearedViews
@@ -148,17 +149,15 @@ def side_distances(
     ndarray, shape (K, H, W), float32
         0..1.
     """
-    from sepi.compared.spo_kernels import half_distances
-
     weights = column_weights(parameters.scale)
     found = np.empty((len(disparities), *light_field.shape), np.float32)
     turned = np.empty(light_field.shape[::-1], np.float32)
     for k, sheared in ShearedViews(light_field, views).over(disparities):
         if down:
-            half_distances(np.ascontiguousarray(sheared.swapaxes(2, 3)), weights, parameters.bins, turned)
+            kernels.half_distances(np.ascontiguousarray(sheared.swapaxes(2, 3)), weights, parameters.bins, turned)
             found[k] = turned.T
         else:
-            half_distances(sheared, weights, parameters.bins, found[k])
+            kernels.half_distances(sheared, weights, parameters.bins, found[k])
         progress((k + 1) / len(disparities))
     return found
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from sepi.kernels import weighted_median as kernels
 from sepi.lightfield import FloatMap
 
 
@@ -54,6 +55,6 @@ def weighted_median(values: FloatMap, guide: FloatMap, radius: int, sigma: float
     >>> weighted_median(fattened, guide, radius=4, sigma=0.1, weight=np.ones((9, 12), np.float32))[4].tolist()
     [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0]
     """
-    from sepi.compared.weighted_median_kernels import weighted_medians
-
-    return np.asarray(weighted_medians(values, guide, radius, sigma, weight))
+    out = np.empty(values.shape, np.float32)
+    kernels.weighted_medians(values, guide, radius, sigma, weight, out)
+    return out

@@ -3,7 +3,6 @@
 from collections.abc import Iterator
 from dataclasses import replace
 
-import numba
 import numpy as np
 import pytest
 from geometries import GEOMETRIES, standing
@@ -12,10 +11,11 @@ from several_threads import several_threads
 from sepi.compared import acc
 from sepi.compared.acc import AccParameters, ConfidentLabelsParameters, confident_labels, phase_shift_costs
 from sepi.compared.acc_features import agreed, features_of, matched_disparities, mutual_matches
-from sepi.compared.acc_kernels import add_differences, turn_phases
 from sepi.compared.acc_phase_shift import PhaseShift
 from sepi.compared.cost_volumes import disparity_of, least_costs
 from sepi.compared.guided_filter import GuidedFilter
+from sepi.kernels import acc as kernels
+from sepi.kernels import set_thread_count
 from sepi.lightfield import DisparityRange, LightField
 from sepi.pipeline import estimate_depth
 from sepi.scenes import render
@@ -88,14 +88,14 @@ def test_kernels_equal_plain_twins() -> None:
     random = np.random.default_rng(2)
     moved, reference = random.random((4, 3, 14, 19), np.float32), random.random((3, 12, 17), np.float32)
     out = np.ones((4, 12, 17), np.float32)
-    add_differences(moved, reference, 0.7, 0.4, 0.3, 0.2, out)
+    kernels.add_differences(moved, reference, 0.7, 0.4, 0.3, 0.2, out)
     for found, one in zip(out, moved, strict=True):
         np.testing.assert_allclose(found, 1 + differences_twin(one, reference, 0.7, 0.4), rtol=1e-5)
     spectrum, rows, columns = (
         (random.random(shape) + 1j * random.random(shape)).astype(np.complex64) for shape in ((3, 5, 4), (2, 5), (2, 7))
     )
     turned = np.empty((2, 3, 5, 4), np.complex64)
-    turn_phases(spectrum, rows, columns, turned)
+    kernels.turn_phases(spectrum, rows, columns, turned)
     expected = spectrum * rows[:, None, :, None] * columns[:, None, None, :4]
     np.testing.assert_allclose(turned, expected, rtol=1e-5)
 
@@ -313,10 +313,10 @@ def test_threads_do_not_change_the_bytes() -> None:
     threads = several_threads()
     scene = render("curved_occluders", size=64, views=3)
     several = estimate_depth(scene, "acc", FEW)
-    numba.set_num_threads(1)
+    set_thread_count(1)
     try:
         one = estimate_depth(scene, "acc", FEW)
     finally:
-        numba.set_num_threads(threads)
+        set_thread_count(threads)
     np.testing.assert_array_equal(one.disparity, several.disparity)
     np.testing.assert_array_equal(one.confidence, several.confidence)

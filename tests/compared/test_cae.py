@@ -14,7 +14,7 @@ from sepi.compared.cae import (
     entropies_and_responses,
     level_weights,
 )
-from sepi.compared.cae_kernels import PATCH, constrained_entropies, constrained_least_patch
+from sepi.kernels import cae as kernels
 from sepi.lightfield import LightField
 from sepi.matching.sheared_views import ShearedViews
 from sepi.scenes import render
@@ -22,6 +22,7 @@ from sepi.stage import no_progress
 
 pytestmark = pytest.mark.slow
 
+PATCH = kernels.PATCH
 PARAMETERS = ConstrainedEntropyParameters(num_disparities=31)
 
 
@@ -130,7 +131,7 @@ def test_entropy_equals_a_plain_twin(sigma: float) -> None:
     own[:, 2, 3] = 0.0
     sheared[:, :, 2, 3] = 0.9
     found = np.empty_like(own)
-    constrained_entropies(sheared, own, level_weights(sigma), found)
+    kernels.constrained_entropies(sheared, own, level_weights(sigma), found)
     for place in np.ndindex(own.shape):
         expected = entropy_twin(sheared[(slice(None), *place)].astype(float), float(own[place]), sigma)
         assert found[place] == pytest.approx(expected, abs=2e-5)
@@ -141,7 +142,7 @@ def test_least_patch_equals_a_plain_twin() -> None:
     random = np.random.default_rng(3)
     response, guide = random.random((9, 7, 4)).astype(np.float32), random.random((9, 7, 3)).astype(np.float32)
     found = np.empty_like(response)
-    constrained_least_patch(response, guide, np.float32(0.3), np.float32(0.2), found)
+    kernels.constrained_least_patch(response, guide, 0.3, 0.2, found)
     reach = 3 * PATCH // 2
     wide, colours = (
         np.pad(a.astype(float), ((reach, reach), (reach, reach), (0, 0)), "edge") for a in (response, guide)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sepi.compared.message_passing import contrast_weights, energy, labels_of_least_energy
-from sepi.compared.message_passing_kernels import pass_messages
+from sepi.kernels import message_passing as kernels
 
 
 def problem(seed, labels, shape, strength=0.5):
@@ -149,7 +149,7 @@ def test_a_pass_equals_a_plain_twin(truncation) -> None:
     found = np.zeros((4, *volume.shape), np.float32)
     expected = np.zeros(found.shape)
     for _ in range(3):
-        pass_messages(volume, across, down, np.float32(truncation), found)
+        kernels.pass_messages(volume, across, down, truncation, found)
         pass_twin(volume.astype(float), across.astype(float), down.astype(float), truncation, expected)
     np.testing.assert_allclose(found, expected, atol=1e-5)
 

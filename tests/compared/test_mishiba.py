@@ -23,7 +23,7 @@ from sepi.compared.mishiba import (
     refined,
     selected_views,
 )
-from sepi.compared.mishiba_kernels import keep_least, median_pass, pair_costs
+from sepi.kernels import mishiba as kernels
 from sepi.kernels import sheared_views
 from sepi.lightfield import LightField
 from sepi.pipeline import estimate_depth
@@ -65,7 +65,7 @@ def test_counting_equals_the_sum_over_all_pairs_of_views(step: int) -> None:
     disparities = np.array([-0.7, 0.0, 0.43], np.float32)
     offsets = -disparities[:, None, None].astype(float) * scene.baselines[scene.present]
     found = np.empty((3, -(-64 // step), -(-64 // step)), np.float32)
-    pair_costs(details(scene, scene.present, 1.0), offsets, step, found)
+    kernels.pair_costs(details(scene, scene.present, 1.0), offsets, step, found)
     for disparity, costs in zip(disparities.tolist(), found, strict=True):
         of_view = bits(scene, scene.present, disparity)
         pairs = np.mean([a != b for a, b in combinations(of_view, 2)], axis=0) * (9 * 8 / 2) / (4 * 5)
@@ -84,7 +84,7 @@ def test_views_that_end_before_a_pixel_take_no_part() -> None:
     maps = generator.normal(size=(3, 8, 12)).astype(np.float32)
     offsets = np.array([[[0, 0], [0, 3], [-2, 0]]], float)
     found = np.empty((1, 8, 12), np.float32)
-    pair_costs(maps, offsets, 1, found)
+    kernels.pair_costs(maps, offsets, 1, found)
     for y, x in np.ndindex(8, 12):
         seen = [maps[0, y, x] > 0]
         seen += [maps[1, y, x + 3] > 0] if x + 3 < 12 else []
@@ -103,7 +103,7 @@ def test_interpolated_costs_equal_a_plain_computation() -> None:
     constants = generator.normal(size=(5, 4, 4)).astype(np.float32)
     labels, kept = np.zeros((height, width), np.int64), np.zeros((height, width, 5), np.float32)
     for k in range(5):
-        keep_least(k, slopes[k], constants[k], guide, step, labels, kept)
+        kernels.keep_least(k, slopes[k], constants[k], guide, step, labels, kept)
     y, x = np.arange(height) / step, np.arange(width) / step
     tent = np.arange(4)
     down, across = (np.maximum(0, 1 - np.abs(at[:, None].clip(0, 3) - tent)) for at in (y, x))
@@ -154,7 +154,9 @@ def test_bisection_finds_the_weighted_median(radius: int, gap: int) -> None:
     table = np.array([40, 20, 10], np.int32)
     # no squared distance of such colours lies on the limit between two entries
     arguments = (current, data, weights, guide, radius, gap, table, 0.3001)
-    np.testing.assert_array_equal(median_pass(*arguments), plain_median_pass(*arguments))
+    found = np.empty_like(data)
+    kernels.median_pass(*arguments, found)
+    np.testing.assert_array_equal(found, plain_median_pass(*arguments))
 
 
 def pairs_of(guide: npt.NDArray[np.float32], parameters: MedianDescentParameters) -> list[tuple[int, int, float]]:
@@ -272,7 +274,7 @@ def test_views_of_row_and_column_see_past_an_occluder_as_well_as_all() -> None:
     costs = {"cross": lattice_costs(scene, disparities, PARAMETERS)}
     every = np.empty_like(costs["cross"])
     offsets = -disparities[:, None, None].astype(float) * scene.baselines[scene.present]
-    pair_costs(details(scene, scene.present, 1.0), offsets, 2, every)
+    kernels.pair_costs(details(scene, scene.present, 1.0), offsets, 2, every)
     costs["all"] = every
     errors = {}
     for name, one in costs.items():

@@ -9,7 +9,7 @@ import pytest
 
 from sepi.compared import oavc
 from sepi.compared.cost_volumes import least_costs
-from sepi.compared.oavc_kernels import lower_thresholds, vote_costs
+from sepi.kernels import oavc as kernels
 from sepi.lightfield import DisparityRange, FloatMap, LightField
 from sepi.matching.sheared_views import ShearedViews
 from sepi.pipeline import estimate_depth
@@ -129,7 +129,7 @@ def test_thresholds_are_those_by_which_the_share_agrees(needed: int) -> None:
     thresholds = np.full(first.shape[2:], np.inf, np.float32)
     expected = thresholds.copy()
     for sheared in (first, second):
-        lower_thresholds(sheared, 2, needed, thresholds)
+        kernels.lower_thresholds(sheared, 2, needed, thresholds)
         expected = np.minimum(expected, np.sort(deviations(sheared, 2), axis=0)[needed - 1])
     np.testing.assert_allclose(thresholds, expected, rtol=1e-4, atol=1e-7)
 
@@ -139,7 +139,7 @@ def test_costs_are_votes_less_their_mean_difference(threshold: float) -> None:
     """Pixels without a vote, with some and with all."""
     sheared = sheared_example()
     out = np.empty(sheared.shape[2:], np.float32)
-    vote_costs(sheared, 2, np.full(out.shape, threshold, np.float32), out)
+    kernels.vote_costs(sheared, 2, np.full(out.shape, threshold, np.float32), out)
     difference = deviations(sheared, 2) / threshold
     votes = (difference <= 1).sum(axis=0)
     mean = np.where(difference <= 1, difference, 0).sum(axis=0) / np.maximum(votes, 1)
@@ -154,7 +154,7 @@ def test_a_vote_counts_for_more_than_any_mean_difference() -> None:
     sheared[:, :, 0, 0] = np.array([0.0099, 0.0099, 0, 0.0099, 0.9])[:, None]
     sheared[:, :, 0, 1] = np.array([0, 0, 0, 0.9, 0.9])[:, None]
     out = np.empty((1, 2), np.float32)
-    vote_costs(sheared, 2, np.full((1, 2), 0.01, np.float32), out)
+    kernels.vote_costs(sheared, 2, np.full((1, 2), 0.01, np.float32), out)
     assert out[0, 1] == pytest.approx(0.5)
     assert out[0, 0] < out[0, 1]
 

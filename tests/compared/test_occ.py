@@ -20,8 +20,8 @@ from sepi.compared.occ import (
     predicted_occlusion,
     smoothness_weights,
 )
-from sepi.compared.occ_kernels import split_patch_costs, whole_patch_costs
 from sepi.compared.occ_patches import LEAST_SHARE, ORIENTATIONS, Edges, colours_beside, edges_to_split, halves_of_views
+from sepi.kernels import occ as kernels
 from sepi.lightfield import BoolMap, DisparityRange, FloatMap, LightField
 from sepi.pipeline import estimate_depth
 from sepi.scenes import render
@@ -104,8 +104,7 @@ def test_patches_split_across_the_edge_see_no_more_than_whole_ones(monkeypatch: 
 
     def turned(view: FloatMap, parameters: OccSplitParameters, reach: float) -> Edges:
         edges = edges_to_split(view, parameters, reach)
-        # in the same order in memory: no other kernel is compiled
-        places = edges.places.copy(order="K")
+        places = edges.places.copy()
         places[:, 2] = (places[:, 2] + ORIENTATIONS // 2) % ORIENTATIONS
         return edges._replace(places=places)
 
@@ -157,13 +156,13 @@ def test_reversed_colours_leave_a_candidate_out() -> None:
     straight = np.broadcast_to(np.array([[0.3], [0.6]], np.float32), (2, 3))
     for beside, finite in ((straight, True), (straight[::-1], False)):
         costs, cues = np.empty(1, np.float32), np.empty((1, 3), np.float32)
-        split_patch_costs(
+        kernels.split_patch_costs(
             sheared,
             sheared[1],
             np.zeros((1, 3), np.int64, order="F"),
             halves,
             np.ascontiguousarray(beside[None]),
-            np.float32(0.02),
+            0.02,
             costs,
             cues,
         )
@@ -175,7 +174,7 @@ def test_whole_patch_costs_equal_numpy() -> None:
     rng = np.random.default_rng(0)
     sheared, reference = rng.random((7, 3, 6, 5), np.float32), rng.random((3, 6, 5), np.float32)
     out = np.empty((6, 5), np.float32)
-    whole_patch_costs(sheared, reference, out)
+    kernels.whole_patch_costs(sheared, reference, out)
     expected = (sheared.var(axis=0, ddof=1) + (sheared.mean(axis=0) - reference) ** 2).mean(axis=0)
     np.testing.assert_allclose(out, expected, rtol=1e-4, atol=1e-6)
 
@@ -189,7 +188,7 @@ def test_split_patch_costs_equal_numpy() -> None:
     halves[:, :, :2] = True
     beside = rng.random((8, 2, 3), np.float32)
     costs, cues = np.empty(8, np.float32), np.empty((8, 3), np.float32)
-    split_patch_costs(sheared, reference, places, halves, beside, np.float32(0.02), costs, cues)
+    kernels.split_patch_costs(sheared, reference, places, halves, beside, 0.02, costs, cues)
     for p, (y, x, orientation) in enumerate(places):
         parts = [sheared[halves[orientation, j], :, y, x] for j in (0, 1)]
         means = [part.mean(axis=0) for part in parts]

@@ -19,8 +19,8 @@ from sepi.compared.pobr import (
     squared_gradient,
     squared_steps,
 )
-from sepi.compared.pobr_kernels import mean_truncated_differences
 from sepi.image.superpixels import Superpixels, superpixels
+from sepi.kernels import pobr as kernels
 from sepi.lightfield import DisparityRange, LightField
 from sepi.matching.sheared_views import ShearedViews
 from sepi.pipeline import estimate_depth
@@ -151,7 +151,7 @@ def test_kernel_is_the_mean_truncated_difference():
     """The compiled loop is the formula of the docstring."""
     views = np.random.default_rng(0).random((4, 3, 5, 6), np.float32)
     out = np.empty((5, 6), np.float32)
-    mean_truncated_differences(views, 2, 0.3, out)
+    kernels.mean_truncated_differences(views, 2, 0.3, out)
     difference = np.abs(np.delete(views, 2, axis=0) - views[2]).mean(axis=1)
     assert_allclose(out, (np.minimum(difference, 0.3) / 0.3).mean(axis=0), rtol=1e-5)
 
@@ -223,7 +223,7 @@ def test_light_fields_of_other_kinds(changed):
 def test_views_sheared_at_the_true_disparity_cost_least(disc):
     """The data cost of an unoccluded pixel is zero at its disparity."""
     views, out = ShearedViews(disc), np.empty(disc.shape, np.float32)
-    mean_truncated_differences(views.at(2.0), views.reference, 0.1, out)
+    kernels.mean_truncated_differences(views.at(2.0), views.reference, 0.1, out)
     assert out[28:36, 28:36].max() < 1e-5
 
 

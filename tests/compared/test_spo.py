@@ -10,7 +10,8 @@ from geometries import GEOMETRIES, standing
 
 from sepi.compared.guided_costs import GuidedCostsParameters, guided_costs
 from sepi.compared.spo import SpoParameters, column_weights, peak_weight, side_distances, spo, views_of_directions
-from sepi.compared.spo_kernels import half_distances
+from sepi.kernels import set_thread_count, thread_count
+from sepi.kernels import spo as kernels
 from sepi.lightfield import BoolMap, DisparityRange, FloatMap, LightField
 from sepi.matching.sheared_views import ShearedViews
 from sepi.pipeline import estimate_depth
@@ -183,21 +184,19 @@ def test_distances_equal_a_plain_twin(scale: float, bins: int, width: int) -> No
     lines[1:3] = lines[:1]
     weights = column_weights(scale)
     found = np.full((4, width), np.nan, np.float32)
-    half_distances(lines, weights, bins, found)
+    kernels.half_distances(lines, weights, bins, found)
     assert np.allclose(found, twin_of_half_distances(lines, weights, bins), atol=1e-6)
 
 
 def test_distances_are_the_same_for_any_number_of_threads() -> None:
     """If this fails, two runs on the same scene differ."""
-    import numba
-
     lines = np.random.default_rng(5).random((5, 3, 16, 20), np.float32)
     found = np.empty((2, 16, 20), np.float32)
-    threads = numba.get_num_threads()
-    half_distances(lines, column_weights(0.8), 64, found[0])
-    numba.set_num_threads(1)
-    half_distances(lines, column_weights(0.8), 64, found[1])
-    numba.set_num_threads(threads)
+    threads = thread_count()
+    kernels.half_distances(lines, column_weights(0.8), 64, found[0])
+    set_thread_count(1)
+    kernels.half_distances(lines, column_weights(0.8), 64, found[1])
+    set_thread_count(threads)
     assert np.array_equal(*found)
 
 

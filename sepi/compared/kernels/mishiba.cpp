@@ -1,0 +1,138 @@
+#include "mishiba.hpp"
+
+#include <cmath>
+
+#include "kernels/parallel.hpp"
+#include "kernels/sampling.hpp"
+
+namespace sepi {
+namespace {
+
+// Row y of a view, that far down, interpolated, into row (W + 2 margin), which goes on as it ends.
+void interpolate_row(Array<const float, 2> view, Index y, double offset, Index margin, float *__restrict row) {
+    const Index H = view.shape[0], W = view.shape[1], down = Index(std::floor(offset));
+    const auto w = cubic_weights(offset - double(down));
+    const auto below = [&](Index n) { return view.at(clamped(y + down + n, H)); };
+    const float *a = below(-1), *b = below(0), *c = below(1), *d = below(2);
+    for (Index x = 0; x < W; ++x) row[margin + x] = w[0] * a[x] + w[1] * b[x] + w[2] * c[x] + w[3] * d[x];
+    std::fill_n(row, margin, row[margin]);
+    std::fill_n(row + margin + W, margin, row[margin + W - 1]);
+}
+
+// Least of the values up to which half of the weight lies, by bisection.
+std::int32_t weighted_median(const std::int32_t *values, const std::int32_t *weights, Index count) {
+    std::int32_t low = values[0], high = values[0], total = 0;
+    for (Index n = 0; n < count; ++n) {
+        low = std::min(low, values[n]), high = std::max(high, values[n]);
+        total += weights[n];
+    }
+    while (low < high) {
+        const std::int32_t middle = std::int32_t((Index(low) + high) >> 1);
+        std::int32_t up_to = 0;
+        for (Index n = 0; n < count; ++n) up_to += values[n] <= middle ? weights[n] : 0;
+        if (2 * Index(up_to) >= total) {
+            high = middle;
+        } else {
+            low = middle + 1;
+        }
+    }
+    return low;
+}
+
+}  // namespace
+
+void pair_costs(Array<const float, 3> details, Array<const double, 3> offsets, Index step, Array<float, 3> out) {
+    const Index N = details.shape[0], H = details.shape[1], W = details.shape[2], K = offsets.shape[0], columns = out.shape[2];
+    double farthest = 0;
+    for (Index k = 0; k < K; ++k)
+        for (Index n = 0; n < N; ++n) farthest = std::max({farthest, std::abs(offsets(k, n, 0)), std::abs(offsets(k, n, 1))});
+    const Index margin = Index(std::ceil(farthest)) + 3;
+    // by how many views see a pixel, and how many of them have a one
+    const auto shares = Scratch<float, 2>(N + 1, N + 1).filled(1.0f);
+    for (Index seen = 2; seen <= N; ++seen)
+        for (Index ones = 0; ones <= seen; ++ones) shares.array()(seen, ones) = float(double(ones * (seen - ones)) / double((seen / 2) * (seen - seen / 2)));
+    parallel_for(0, out.shape[1], [&](Index i) {
+        const Index y = i * step;
+        const Scratch<float, 1> rows(W + 2 * margin);
+        const Scratch<std::int32_t, 2> counts(2, columns);
+        float *row = rows.array().data;
+        std::int32_t *__restrict ones = counts.array().at(0), *__restrict seen = counts.array().at(1);
+        for (Index k = 0; k < K; ++k) {
+            std::fill_n(ones, 2 * columns, 0);
+            for (Index n = 0; n < N; ++n) {
+                const double down = offsets(k, n, 0), across = offsets(k, n, 1), left = std::floor(across);
+                if (!(0 <= double(y) + down && double(y) + down <= double(H - 1))) continue;
+                interpolate_row(details[n], y, down, margin, row);
+                const auto w = cubic_weights(across - left);
+                const Index low = std::max<Index>(0, Index(std::ceil(-across / double(step))));
+                const Index high = std::min(columns, Index(std::floor((double(W - 1) - across) / double(step))) + 1);
+                const float *sample = row + margin + Index(left) - 1;
+                for (Index j = low; j < high; ++j) {
+                    const float *at = sample + j * step;
+                    ones[j] += w[0] * at[0] + w[1] * at[1] + w[2] * at[2] + w[3] * at[3] > 0;
+                    ++seen[j];
+                }
+            }
+            for (Index j = 0; j < columns; ++j) out(k, i, j) = shares.array()(seen[j], ones[j]);
+        }
+    });
+}
+
+void keep_least(Index k, Array<const float, 3> slopes, Array<const float, 2> constants, Array<const float, 3> guide, Index step, Array<std::int64_t, 2> labels,
+                Array<float, 3> kept) {
+    const Index last_row = constants.shape[0] - 1, last_column = constants.shape[1] - 1;
+    parallel_for(0, labels.shape[0], [&](Index y) {
+        const Index i = std::min(y / step, last_row), below = std::min(i + 1, last_row), W = labels.shape[1];
+        const float fy = float(double(y % step) / double(step)), *upper = constants.at(i), *lower = constants.at(below);
+        const auto upper_slopes = slopes[i], lower_slopes = slopes[below], colours = guide[y];
+        const auto kept_in_row = kept[y];
+        std::int64_t *__restrict label = labels.at(y);
+        for (Index x = 0, j = 0, beyond = 0; x < W; ++x, ++beyond) {
+            if (beyond == step) ++j, beyond = 0;
+            const Index right = std::min(j + 1, last_column);
+            const float fx = float(double(beyond) / double(step));
+            const float a = (1 - fy) * (1 - fx), b = (1 - fy) * fx, c = fy * (1 - fx), d = fy * fx;
+            const float *colour = colours.at(x), *slope_a = upper_slopes.at(j), *slope_b = upper_slopes.at(right);
+            const float *slope_c = lower_slopes.at(j), *slope_d = lower_slopes.at(right);
+            float cost = a * upper[j] + b * upper[right] + c * lower[j] + d * lower[right];
+            for (Index m = 0; m < 3; ++m) cost += (a * slope_a[m] + b * slope_b[m] + (c * slope_c[m] + d * slope_d[m])) * colour[m];
+            float *own = kept_in_row.at(x);
+            if (k == 0 || cost < own[0]) {
+                label[x] = k;
+                own[0] = cost, own[1] = own[3], own[2] = cost;
+            } else if (label[x] == k - 1) {
+                own[2] = cost;
+            }
+            own[3] = cost;
+            own[4] += cost;
+        }
+    });
+}
+
+void median_pass(Array<const std::int32_t, 2> current, Array<const std::int32_t, 2> data, Array<const std::int32_t, 2> data_weights,
+                 Array<const float, 3> guide, Index radius, Index gap, Array<const std::int32_t, 1> table, double per_entry, Array<std::int32_t, 2> out) {
+    const Index H = current.shape[0], W = current.shape[1], most = (2 * radius + 1) * (2 * radius + 1) + 1, reach = radius * gap;
+    const float scale = float(1 / per_entry);
+    parallel_for(0, H, [&](Index y) {
+        const Scratch<std::int32_t, 2> entries(2, most);
+        std::int32_t *values = entries.array().at(0), *weights = entries.array().at(1);
+        for (Index x = 0; x < W; ++x) {
+            const float *own = guide.at(y, x);
+            values[0] = data(y, x), weights[0] = data_weights(y, x);
+            Index count = 1;
+            for (Index v = std::max(y - reach, y % gap); v < std::min(y + reach + 1, H); v += gap) {
+                for (Index u = std::max(x - reach, x % gap); u < std::min(x + reach + 1, W); u += gap) {
+                    const float *colour = guide.at(v, u);
+                    const float r = colour[0] - own[0], g = colour[1] - own[1], b = colour[2] - own[2];
+                    const Index entry = Index((r * r + g * g + b * b) * scale), last = table.shape[0] - 1;
+                    // written in any case, and kept where it counts: branches would be guessed wrong
+                    values[count] = current(v, u), weights[count] = table(std::min(entry, last));
+                    count += (entry <= last) & ((v != y) | (u != x));
+                }
+            }
+            out(y, x) = weighted_median(values, weights, count);
+        }
+    });
+}
+
+}  // namespace sepi

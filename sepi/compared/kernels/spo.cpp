@@ -1,0 +1,96 @@
+// An EPI is worked off along its columns. The histograms of the columns in reach are held in a ring, so that each column
+// is counted once for all the parallelograms that it lies in.
+#include "spo.hpp"
+
+#include "kernels/parallel.hpp"
+#include "kernels/sampling.hpp"
+
+namespace sepi {
+namespace {
+
+// Bins of one EPI (W, N C), those of all channels numbered through: the lower ones of two, and what counts for the upper ones.
+struct Quantised {
+    Scratch<std::int32_t, 2> bins;
+    Scratch<float, 2> shares;
+};
+
+Quantised quantised(Array<const float, 4> lines, Index y, Index bins) {
+    const Index N = lines.shape[0], C = lines.shape[1], W = lines.shape[3];
+    const float scale = float(bins), most = float(bins - 1);
+    Quantised found{Scratch<std::int32_t, 2>(W, N * C), Scratch<float, 2>(W, N * C)};
+    for (Index n = 0; n < N; ++n) {
+        for (Index c = 0; c < C; ++c) {
+            const float *row = lines.at(n, c, y);
+            for (Index x = 0; x < W; ++x) {
+                const float place = std::min(std::max(row[x] * scale - 0.5f, 0.0f), most);
+                const std::int32_t lower = std::min(std::int32_t(place), std::int32_t(bins - 2));
+                *found.bins.array().at(x, n * C + c) = std::int32_t(c * bins) + lower;
+                *found.shares.array().at(x, n * C + c) = place - float(lower);
+            }
+        }
+    }
+    return found;
+}
+
+// Histogram of column x of an EPI, in place of that of an earlier column.
+void count(const Quantised &epi, Index x, Index earlier, float *__restrict histogram) {
+    const Index number = epi.bins.array().shape[1];
+    const std::int32_t *before = epi.bins.array().at(earlier), *lower = epi.bins.array().at(x);
+    const float *share = epi.shares.array().at(x);
+    for (Index i = 0; i < number; ++i) histogram[before[i]] = histogram[before[i] + 1] = 0;
+    for (Index i = 0; i < number; ++i) {
+        histogram[lower[i]] += 1 - share[i];
+        histogram[lower[i] + 1] += share[i];
+    }
+}
+
+// Histograms of both sides of a column.
+void halves(Array<const float, 2> ring, Index centre, Array<const float, 1> shares, float *__restrict left, float *__restrict right) {
+    const Index size = ring.shape[0], bins = ring.shape[1];
+    for (Index k = 0; k < shares.shape[0]; ++k) {
+        const float *before = ring.at((centre + size - 1 - k) % size), *after = ring.at((centre + 1 + k) % size), share = shares(k);
+        if (k == 0) {
+            for (Index b = 0; b < bins; ++b) left[b] = share * before[b], right[b] = share * after[b];
+        } else {
+            for (Index b = 0; b < bins; ++b) left[b] += share * before[b], right[b] += share * after[b];
+        }
+    }
+}
+
+// Sum over the bins of all C channels of g h / (g + h); what left held is lost.
+float common(float *__restrict left, const float *right, Index C, Index bins) {
+    for (Index b = 0; b < C * bins; ++b) left[b] = left[b] * right[b] / (left[b] + right[b] + 1e-20f);
+    // over the channels first, since a sum over bins is a chain of additions that cannot run side by side
+    for (Index c = 1; c < C; ++c)
+        for (Index b = 0; b < bins; ++b) left[b] += left[c * bins + b];
+    float even = 0, odd = 0;
+    for (Index b = 0; b < bins - 1; b += 2) even += left[b], odd += left[b + 1];
+    if (bins % 2) even += left[bins - 1];
+    return even + odd;
+}
+
+}  // namespace
+
+void half_distances(Array<const float, 4> lines, Array<const float, 1> weights, Index bins, Array<float, 2> out) {
+    const Index N = lines.shape[0], C = lines.shape[1], W = lines.shape[3], R = weights.shape[0], size = 2 * R + 1;
+    float sum = 0;
+    for (Index k = 0; k < R; ++k) sum += weights(k);
+    const Scratch<float, 1> shares(R);
+    for (Index k = 0; k < R; ++k) shares.array()(k) = float(double(weights(k)) / (double(sum) * double(N)));
+    parallel_for(0, lines.shape[2], [&](Index y) {
+        const Quantised epi = quantised(lines, y, bins);
+        const auto ring = zeros<float, 2>(size, C * bins);
+        const Scratch<float, 2> sides(2, C * bins);
+        float *left = sides.array().at(0), *right = sides.array().at(1);
+        for (Index x = -R; x < W + R; ++x) {
+            count(epi, clamped(x, W), clamped(x - size, W), ring.array().at((x + size) % size));
+            const Index centre = x - R;
+            if (centre < 0) continue;
+            halves(ring.array(), centre, shares.array(), left, right);
+            // with sums of 1, half the sum of (g - h)^2 / (g + h) is 1 less twice that of g h / (g + h)
+            out(y, centre) = std::max(1 - 2 * common(left, right, C, bins) / float(C), 0.0f);
+        }
+    });
+}
+
+}  // namespace sepi
