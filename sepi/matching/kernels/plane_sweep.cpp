@@ -47,7 +47,8 @@ struct Sizes {
     Index T, S, H, W, K, G;
 
     Sizes(const ViewStack<Colour> &views, const Candidates &candidates)
-        : T(views.groups.shape[0]), S(views.groups.shape[1]), H(views.colours.shape[3]), W(views.colours.shape[4] - LANES), K(candidates.number()), G(views.subsets.shape[1]) {}
+        : T(views.groups.shape[0]), S(views.groups.shape[1]), H(views.colours.shape[3]), W(views.colours.shape[4] - LANES), K(candidates.number()),
+          G(views.subsets.shape[1]) {}
 };
 
 // Add the residuals of one view to cost (K, n); distances (K,) is scratch.
@@ -61,16 +62,15 @@ void add_view(const ViewStack<Colour> &views, const Candidates &candidates, Inde
     const float *fy = candidates.fy.at(r), *fx = candidates.fx.at(c), *disparities = candidates.disparities.data;
     const Float8 scale2 = spread(views.scale2);
     for (Index here = 0, next; here < sizes.K; here = next) {
-        const UpperRow above = upper_row(run.y, down[here], fy[here], sizes.H);
-        const auto top = above.top; const auto below = above.below;  // not a structured binding: Clang before 16 captures none in a lambda
-        const Index left = across[here];
+        const UpperRow upper = upper_row(run.y, down[here], fy[here], sizes.H);
+        const Index top = upper.top, left = across[here];
         const auto [first, last] = seen_run(shown, sizes.W, run, top, left, fx[here]);
         next = here + 1;
         if (top < 0 || top > sizes.H - 2 || last <= first) continue;
         next = end_of_same_pixels(here, sizes.K, down, fy, across, fx);
         const Index origin = origin_of(disparities, here, next);
         for (Index n = here; n < next; ++n) distances[n] = disparities[n] - disparities[origin];
-        const Motion at{fy[here] == 0 ? below : fy[origin], fx[origin], candidates.sy(r), candidates.sx(c)};
+        const Motion at{fy[here] == 0 ? upper.below : fy[origin], fx[origin], candidates.sy(r), candidates.sx(c)};
         for (Index x = first; x < last; x += LANES) {
             const auto of_channel = [&](Index channel) {
                 return difference(colours.at(channel, top, x + left), colours.at(channel, top + 1, x + left), reference.at(channel, run.y, x), at);
@@ -235,17 +235,23 @@ struct Aggregated {
     }
 };
 
-// Disparity at the lowest of the costs, refined below the disparity sampling; that cost; the mean of all. first and
-// second (K') are the moments of what noise makes of the costs, times their weights of the pixel; costs (K') is scratch.
-Best best_candidate(const Aggregated &found, const bool *subset, const float *first, float first_weight, const float *second, float second_weight,
-                    Array<const float, 1> disparities, float *costs) {
+// What noise takes of the costs of a pixel: moments of a subset of views (K'), times weights of the pixel.
+struct TakenByNoise {
+    const float *first, *second;
+    float first_weight, second_weight;
+
+    Float8 at(Index k) const { return fma(spread(second_weight), load(second + k), spread(first_weight) * load(first + k)); }
+};
+
+// Disparity at the lowest of the costs, refined below the disparity sampling; that cost; the mean of all. costs (K') is
+// scratch.
+Best best_candidate(const Aggregated &found, const bool *subset, const TakenByNoise &noise, Array<const float, 1> disparities, float *costs) {
     const Index K = disparities.shape[0];
     constexpr float MOST = 1e9f;
     Float8 all_least = spread(MOST), sum{};
     const Float8 one = spread(1);
     for (Index k = 0; k < K; k += LANES) {
-        const Float8 mean = found.mean(subset, k);
-        const Float8 taken = fma(spread(second_weight), load(second + k), spread(first_weight) * load(first + k));
+        const Float8 mean = found.mean(subset, k), taken = noise.at(k);
         const Float8 cost = fma(mean - one, taken / (one - taken), mean);
         store(costs + k, cost);
         all_least = smaller(all_least, first_lanes(cost, K - k, MOST));
@@ -366,8 +372,8 @@ class TileSweep {
             if (!all_seen) aggregate(counts_.array(), y, x - tile_.begin, H, weights, numbers.data);
             const Aggregated found{sums, all_seen ? all_of_group_.array() : numbers, all_seen};
             for (Index n = 0; n < views_.subsets.shape[0]; ++n) {
-                const Best best = best_candidate(found, views_.subsets.at(n), expected_.moments.at(0, n), expected_.weights(0, y, x), expected_.moments.at(1, n),
-                                                 expected_.weights(1, y, x), candidates_.disparities, pixel_costs_.array().data);
+                const TakenByNoise noise{expected_.moments.at(0, n), expected_.moments.at(1, n), expected_.weights(0, y, x), expected_.weights(1, y, x)};
+                const Best best = best_candidate(found, views_.subsets.at(n), noise, candidates_.disparities, pixel_costs_.array().data);
                 maps_.disparity(n, y, x) = best.disparity;
                 maps_.cost(n, y, x) = best.cost;
                 maps_.mean(n, y, x) = best.mean;
@@ -395,21 +401,30 @@ class TileSweep {
     const Scratch<Span, 1> runs_{width_ / SHORTEST_GAP + 2};
 };
 
+// The channels of a row of pixels, each by itself.
+template <class Colour, class Step, class Next>
+void split_channels(const Colour *pixels, Step step, Next next, Index W, Colour *__restrict red, Colour *__restrict green, Colour *__restrict blue) {
+    for (Index x = 0; x < W; ++x) red[x] = pixels[x * step], green[x] = pixels[x * step + next], blue[x] = pixels[x * step + 2 * next];
+}
+
 }  // namespace
 
 template <class Colour>
 void planes_of(Strided<const Colour, 5> views, Array<Colour, 5> planes) {
-    const Index S = views.shape[1], H = views.shape[2], W = views.shape[3], step = views.strides[3], next = views.strides[4];
-    parallel_for(0, views.shape[0] * S, [&](Index view) {
-        const Index t = view / S, s = view % S;
-        for (Index y = 0; y < H; ++y) {
-            const Colour *pixels = views.at(t, s, y);
-            for (Index c = 0; c < 3; ++c) {
-                Colour *plane = planes.at(t, s, c, y);
-                for (Index x = 0; x < W; ++x) plane[x] = pixels[x * step + c * next];
-            }
-        }
-    });
+    const Index S = views.shape[1], H = views.shape[2], W = views.shape[3];
+    const auto fill = [&](auto step, auto next) {
+        parallel_for(0, views.shape[0] * S, [&](Index view) {
+            const Index t = view / S, s = view % S;
+            for (Index y = 0; y < H; ++y)
+                split_channels(views.at(t, s, y), step, next, W, planes.at(t, s, 0, y), planes.at(t, s, 1, y), planes.at(t, s, 2, y));
+        });
+    };
+    if (views.strides[3] == 3 && views.strides[4] == 1) {
+        // known when this is compiled: several pixels at once
+        fill(std::integral_constant<Index, 3>(), std::integral_constant<Index, 1>());
+    } else {
+        fill(views.strides[3], views.strides[4]);
+    }
 }
 
 template <class Colour>

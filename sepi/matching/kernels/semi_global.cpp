@@ -6,6 +6,7 @@
 
 #include "kernels/lanes.hpp"
 #include "kernels/parallel.hpp"
+#include "kernels/sampling.hpp"
 
 namespace sepi {
 namespace {
@@ -24,12 +25,12 @@ inline float exp_of_negative(double x) {
     return x > -87 ? float(p * double(power)) : 0.0f;
 }
 
-// Weights of the windows of row y, of sum 1, into weights ((2 radius + 1)^2, W); zero outside the picture.
+// Weights of the windows of row y, of sum 1, into weights ((2 radius + 1)^2, W or more); zero outside the picture.
 // guide (3, H, W); total (W) is scratch.
 void window_weights(Array<const float, 3> guide, Index y, Index radius, float variance, Array<float, 2> weights, float *__restrict total) {
     const Index H = guide.shape[1], W = guide.shape[2], size = 2 * radius + 1;
     const double width = 2 * double(variance);
-    std::fill_n(weights.data, size * size * W, 0.0f);
+    std::fill_n(weights.data, size * size * weights.strides[0], 0.0f);
     std::fill_n(total, W, 0.0f);
     for (Index i = std::max<Index>(0, radius - y); i < std::min(size, H - y + radius); ++i) {
         const Index row = y + i - radius;
@@ -52,14 +53,14 @@ void window_weights(Array<const float, 3> guide, Index y, Index radius, float va
 }
 
 // Weighted sums over windows, of BLOCK vectors of pixels from x on: each waits for its last product, and the others need
-// not. rows (2 radius + 1, W + 2 radius + LANES), with a margin.
+// not. The rows of the windows begin radius columns left of the picture.
 template <int BLOCK, class Radius>
-void window_sum(Array<const float, 2> rows, Array<const float, 2> weights, Radius radius, Index x, float *out) {
+void window_sum(const float *const *rows, Array<const float, 2> weights, Radius radius, Index x, float *out) {
     const Index size = 2 * radius + 1;
     Float8 totals[BLOCK] = {};
     for (Index i = 0; i < size; ++i) {
         for (Index j = 0; j < size; ++j) {
-            const float *weight = weights.at(i * size + j, x), *row = rows.at(i, x + j);
+            const float *weight = weights.at(i * size + j, x), *row = rows[i] + x + j;
             for (int n = 0; n < BLOCK; ++n) totals[n] = fma(load(weight + n * LANES), load(row + n * LANES), totals[n]);
         }
     }
@@ -67,7 +68,7 @@ void window_sum(Array<const float, 2> rows, Array<const float, 2> weights, Radiu
 }
 
 template <class Radius>
-void window_sums(Array<const float, 2> rows, Array<const float, 2> weights, Radius radius, float *out, Index W) {
+void window_sums(const float *const *rows, Array<const float, 2> weights, Radius radius, float *out, Index W) {
     constexpr int BLOCK = 4;
     Index x = 0;
     for (; x <= W - BLOCK * LANES; x += BLOCK * LANES) window_sum<BLOCK>(rows, weights, radius, x, out);
@@ -192,22 +193,28 @@ void aggregate(Array<const float, 3> cost, Array<const float, 3> guide, Index ra
         for (Index y = 0; y < H; ++y)
             for (Index x = 0; x < W; ++x) by_channel.array()(c, y, x) = guide(y, x, c);
     parallel_for(0, H, [&](Index y) {
-        const Scratch<float, 2> weights(size * size + 1, W);  // and a margin
+        const Scratch<float, 2> weights(size * size, W + LANES);
         const Scratch<float, 1> sums(W);
         window_weights(by_channel.array(), y, radius, variance, weights.array(), sums.array().data);
-        // what lies beyond the picture weighs nothing
-        const auto rows = zeros<float, 2>(size, W + 2 * radius + LANES);
+        // what lies beyond the picture weighs nothing: it may be other rows, but for those with no memory beside them
+        const auto at_ends = zeros<float, 2>(size, W + 2 * radius + LANES);
+        const Scratch<const float *, 1> rows(size);
+        const float *first = cost.data, *last = first + K * H * W;
         // a few candidates at a time: each pixel's are written together
         const Scratch<float, 2> total(LANES, W + LANES);
         for (Index begin = 0; begin < K; begin += LANES) {
             for (Index k = begin; k < std::min(K, begin + LANES); ++k) {
-                for (Index i = std::max<Index>(0, radius - y); i < std::min(size, H - y + radius); ++i) std::copy_n(cost.at(k, y + i - radius), W, rows.array().at(i, radius));
+                for (Index i = 0; i < size; ++i) {
+                    const float *row = cost.at(k, clamped(y + i - radius, H));
+                    if (row - first < radius || last - row < W + radius + LANES) row = std::copy_n(row, W, at_ends.array().at(i, radius)) - W;
+                    rows.array()(i) = row - radius;
+                }
                 float *place = total.array().at(k - begin);
                 if (radius == 2) {
                     // how many is known when this is compiled, and all of it becomes one loop
-                    window_sums(rows.array(), weights.array(), std::integral_constant<Index, 2>(), place, W);
+                    window_sums(rows.array().data, weights.array(), std::integral_constant<Index, 2>(), place, W);
                 } else {
-                    window_sums(rows.array(), weights.array(), radius, place, W);
+                    window_sums(rows.array().data, weights.array(), radius, place, W);
                 }
             }
             for (Index k = K - begin; k < LANES; ++k) std::fill_n(total.array().at(k), W, UNREACHABLE);

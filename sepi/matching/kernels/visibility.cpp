@@ -81,7 +81,8 @@ template <class Colour>
 class VisibleRow {
   public:
     VisibleRow(const BaseDetail<Colour> &views, const Visibility &visibility, const RobustCost &robust, const Candidates &candidates, Index height)
-        : views_(views), visibility_(visibility), candidates_(candidates), shares_{robust.shares(0), robust.shares(1)}, pairs_(zeros<std::int32_t, 3>(4, height, W_ + LANES)) {
+        : views_(views), visibility_(visibility), candidates_(candidates), shares_{robust.shares(0), robust.shares(1)},
+          pairs_(zeros<std::int32_t, 3>(height, 4, width_)) {
         // in steps of the whole numbers; the detail counts as three equal channels
         const double colours = double(COLOUR_STEPS) * ONE, detail = ONE / double(views.detail_unit);
         scales2_[0] = float(robust.scales2(0) * (colours * colours));
@@ -102,7 +103,7 @@ class VisibleRow {
             }
         }
         for (Index k = 0; k < candidates_.number(); ++k) {
-            const float *sum = sums_.array().at(k), *weight = weights_.array().at(k);
+            const float *sum = sums_.array().at(k, 0), *weight = sums_.array().at(k, 1);
             float *out = cost.at(k, y);
             for (Index x = 0; x < W_; ++x) out[x] = weight[x] > 0 ? sum[x] / weight[x] : 1.0f;
         }
@@ -137,10 +138,10 @@ class VisibleRow {
     void load_view(Index t, Index s, Index begin, Index end) {
         for (Index row = begin; row < end; ++row) {
             load_colours(t, s, row, views_.colour_unit * COLOUR_STEPS);
-            for (Index c = 0; c < 3; ++c) pair(channels_.array().at(c), W_, pairs_.array().at(c, row - begin));
+            for (Index c = 0; c < 3; ++c) pair(channels_.array().at(c), W_, pairs_.array().at(row - begin, c));
             if (views_.detail.shape[2] > 0) {
                 const std::int16_t *detail = views_.detail.at(t, s, row - views_.low);
-                std::int32_t *out = pairs_.array().at(3, row - begin);
+                std::int32_t *out = pairs_.array().at(row - begin, 3);
                 pair(detail, W_ - 1, out);
                 out[W_ - 1] = detail[W_ - 1];
             }
@@ -160,6 +161,7 @@ class VisibleRow {
         const Index r = candidates_.row(t, s), c = candidates_.column(t, s);
         const auto nearest = visibility_.nearest[t][s];
         const bool some_hide = nearest.shape[1] > 0;
+        const Float8 hidden = spread(visibility_.occluded_view_weight);
         for (Index k = 0; k < candidates_.number(); ++k) {
             const auto [top, fy] = upper_row(y, candidates_.down(r, k), candidates_.fy(r, k), H_);
             const Index left = candidates_.across(c, k);
@@ -169,35 +171,39 @@ class VisibleRow {
             if (top < 0 || top > H_ - 2 || last <= first) continue;
             const BilinearWeights weights(fy, fx);
             const Float8 limit = spread(candidates_.disparities(k) + visibility_.occlusion_margin);
-            const float *before = some_hide ? nearest.at(top - visibility_.low + (fy > 0.5f), left + (fx > 0.5f)) : nullptr;
-            const auto seen_of = [&](Index x, Float8 whole, Float8 hidden) {
-                if (!some_hide) return whole;
-                const Float8 found = load(before + x), seen = found <= limit ? whole : hidden;
-                return visibility_.some_missing ? (spread(MISSING) <= found ? Float8{} : seen) : seen;
-            };
-            const Float8 whole = spread(1), hidden = spread(visibility_.occluded_view_weight);
-            Index x = first;
-            for (; x <= last - LANES; x += LANES) add_pixels(k, top - low, x, left, weights, seen_of(x, whole, hidden));
-            // pixels beyond the last add nothing to what others have added
-            if (x < last) add_pixels(k, top - low, x, left, weights, seen_of(x, first_lanes(whole, last - x, 0), first_lanes(hidden, last - x, 0)));
+            const float *before = some_hide ? nearest.at(top - visibility_.low + (fy > 0.5f), first + left + (fx > 0.5f)) : nullptr;
+            const std::int32_t *pairs = pairs_.array().at(top - low, 0, first + left);
+            const float *reference = reference_.array().data + first;
+            float *sum = sums_.array().at(k, 0, first);
+            for (Index rest = last - first; rest > 0; rest -= LANES, pairs += LANES, reference += LANES, sum += LANES) {
+                Float8 seen = spread(1);
+                if (some_hide) {
+                    const Float8 found = load(before);
+                    seen = found <= limit ? seen : hidden;
+                    if (visibility_.some_missing) seen = spread(MISSING) <= found ? Float8{} : seen;
+                    before += LANES;
+                }
+                // pixels beyond the last add nothing to what others have added
+                if (rest < LANES) seen = first_lanes(seen, rest, 0);
+                add_pixels(pairs, reference, weights, seen, sum);
+            }
         }
     }
 
     // Add eight pixels of a view at one candidate.
-    void add_pixels(Index k, Index row, Index x, Index left, const BilinearWeights &weights, Float8 seen) {
+    void add_pixels(const std::int32_t *pairs, const float *reference, const BilinearWeights &weights, Float8 seen, float *sum) {
         const auto residual = [&](Index channel) {
-            const std::int32_t *above = pairs_.array().at(channel, row, x + left), *below = pairs_.array().at(channel, row + 1, x + left);
-            const Int8 sample = dot_of_pairs(load_pairs(above), weights.upper) + dot_of_pairs(load_pairs(below), weights.lower);
-            return __builtin_convertvector(sample, Float8) - load(reference_.array().at(channel, x));
+            const Int8 above = load_pairs(pairs + channel * width_), below = load_pairs(pairs + (4 + channel) * width_);
+            const Int8 sample = dot_of_pairs(above, weights.upper) + dot_of_pairs(below, weights.lower);
+            return __builtin_convertvector(sample, Float8) - load(reference + channel * width_);
         };
         const Float8 red = residual(0), green = residual(1), blue = residual(2), detail = residual(3);
         const Float8 colours2 = fma(blue, blue, fma(green, green, red * red)), detail2 = detail * detail;
         // z / (z + scale) of either, by one division
         const Float8 of_colours = colours2 + spread(scales2_[0]), of_detail = detail2 + spread(scales2_[1]);
         const Float8 both = fma(spread(shares_[0]) * colours2, of_detail, spread(shares_[1]) * detail2 * of_colours);
-        float *sum = sums_.array().at(k, x), *weight = weights_.array().at(k, x);
         store(sum, fma(seen, both / (of_colours * of_detail), load(sum)));
-        store(weight, load(weight) + seen);
+        store(sum + width_, load(sum + width_) + seen);
     }
 
     static Int8 load_pairs(const std::int32_t *place) {
@@ -209,13 +215,13 @@ class VisibleRow {
     const BaseDetail<Colour> &views_;
     const Visibility &visibility_;
     const Candidates &candidates_;
-    const Index H_ = views_.colours.shape[2], W_ = views_.colours.shape[3];
+    const Index H_ = views_.colours.shape[2], W_ = views_.colours.shape[3], width_ = W_ + LANES;
     float scales2_[2], shares_[2];
 
-    const Scratch<std::int32_t, 3> pairs_;  // (4, n, W + LANES), of the view; where there is no detail it is 0, and fits
-    const Scratch<float, 2> reference_ = zeros<float, 2>(4, W_ + LANES);
-    const Scratch<std::int32_t, 2> channels_ = zeros<std::int32_t, 2>(3, W_ + LANES);
-    const Scratch<float, 2> sums_ = zeros<float, 2>(candidates_.number(), W_ + LANES), weights_ = zeros<float, 2>(candidates_.number(), W_ + LANES);
+    const Scratch<std::int32_t, 3> pairs_;  // of the rows of the view; where there is no detail it is 0, and fits
+    const Scratch<float, 2> reference_ = zeros<float, 2>(4, width_);
+    const Scratch<std::int32_t, 2> channels_ = zeros<std::int32_t, 2>(3, width_);
+    const Scratch<float, 3> sums_ = zeros<float, 3>(candidates_.number(), 2, width_);  // of the costs, and of their weights
 };
 
 }  // namespace
