@@ -9,7 +9,7 @@ namespace sepi {
 namespace {
 
 // Rows that a thread does at a stretch.
-constexpr Index ROWS_AT_ONCE = 16;
+constexpr Index ROWS_AT_ONCE = 32;
 
 // Differences of disparity and of colour over which pixels count less and less, and what one of the same disparity counts at least.
 struct Widths {
