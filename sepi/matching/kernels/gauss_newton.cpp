@@ -85,7 +85,7 @@ struct View {
         store(pixels.weights[3], rows.after | rows.after << 16);
         store(pixels.weights[4], columns.before | columns.left << 16);
         store(pixels.weights[5], columns.right | columns.after << 16);
-        // they are asked for when others have been found, too
+        // what sampling asks for comes while others are found
         __builtin_prefetch(nearest_ + pixels.nearest[0]);
         for (Index n = 0; n < 4; ++n) __builtin_prefetch(coefficients_ + pixels.coefficients[0] + n * pitch_);
     }
@@ -152,7 +152,7 @@ void over_views(const SplineViews &views, const Seeing &seeing, Array<const floa
                 for (Index i = 0; i < number; i += LANES) action(all[i / LANES], left + i, std::min<Index>(LANES, number - i));
             };
             each([&](Sums &sums, Index x, Index count) {
-                sums = {};
+                sums = Sums();
                 sums.x = Float8{0, 1, 2, 3, 4, 5, 6, 7} + float(x);
                 // beyond the last, pixels lie outside all views
                 std::memcpy(&sums.disparity, disparity.at(y, x), count * sizeof(float));

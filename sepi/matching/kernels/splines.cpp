@@ -78,7 +78,10 @@ void store_interleaved(Array<const float, 2> lines, Index number, std::int16_t *
     for (Index x = 0; x < number; x += LANES) {
         const auto pair = [&](Index c) { return (rounded(load(lines.at(c, x))) & 0xFFFF) | rounded(load(lines.at(c + 1, x))) << 16; };
         const Int8 first = pair(0), others = pair(2);
-        const Int8 pixels[] = {__builtin_shufflevector(first, others, 0, 8, 1, 9, 2, 10, 3, 11), __builtin_shufflevector(first, others, 4, 12, 5, 13, 6, 14, 7, 15)};
+        const Int8 pixels[] = {
+            __builtin_shufflevector(first, others, 0, 8, 1, 9, 2, 10, 3, 11),
+            __builtin_shufflevector(first, others, 4, 12, 5, 13, 6, 14, 7, 15),
+        };
         std::memcpy(out + 4 * x, pixels, std::min<Index>(LANES, number - x) * 4 * sizeof *out);
     }
 }
@@ -111,21 +114,24 @@ void view_splines(Strided<const Colour, 5> colours, float colour_unit, Array<con
         const Index t = task / pieces / S, s = task / pieces % S, first = task % pieces * ROWS_AT_ONCE, last = std::min(n, first + ROWS_AT_ONCE);
         const Index begin = of_colours(t, s) ? 0 : 3, end = of_detail(t, s) ? 4 : 3;
         if (begin == end) return;
-        const Scratch<float, 3> rows(4, ROWS_AT_ONCE + 2 * SPLINE_REACH, W + LANES);
+        const Scratch<float, 3> scratch(4, ROWS_AT_ONCE + 2 * SPLINE_REACH, W + LANES);
+        const Array<float, 3> rows = scratch.array();
         for (Index i = 0; i < last - first + 2 * SPLINE_REACH; ++i) {
             const Index y = mirrored(low - SPLINE_MARGIN + first + i - SPLINE_REACH, H);
-            const auto line = [&](Index c) { return rows.array().at(c, i); };
-            if (begin == 0) load_colours(colours.at(t, s, y), colours.strides[3], colours.strides[4], W, colour_unit, {line(0), line(1), line(2)});
-            if (end == 4) std::transform(detail.at(t, s, y - detail_low), detail.at(t, s, y - detail_low) + W, line(3), [&](float number) { return number * detail_unit; });
+            if (begin == 0)
+                load_colours(colours.at(t, s, y), colours.strides[3], colours.strides[4], W, colour_unit, {rows.at(0, i), rows.at(1, i), rows.at(2, i)});
+            if (end == 4)
+                for (Index x = 0; x < W; ++x) rows(3, i, x) = float(detail(t, s, y - detail_low, x)) * detail_unit;
         }
         const Scratch<float, 1> padded(W + 2 * (SPLINE_MARGIN + SPLINE_REACH) + LANES);
         const auto lines = zeros<float, 2>(4, width + LANES);
         for (Index i = first; i < last; ++i) {
-            for (Index c = begin; c < end; ++c) coefficient_row<SPLINE_REACH>(rows.array().at(c, i - first), W + LANES, W, padded.array().data, lines.array().at(c));
+            for (Index c = begin; c < end; ++c)
+                coefficient_row<SPLINE_REACH>(rows.at(c, i - first), W + LANES, W, padded.array().data, lines.array().at(c));
             if (begin == 0) {
                 store_interleaved(lines.array(), width, out.at(t, s, i));
             } else {
-                for (Index x = 0; x < width; ++x) out(t, s, i, x, 3) = std::int16_t(std::nearbyint(lines.array()(3, x)));
+                for (Index x = 0; x < width; ++x) out(t, s, i, x, 3) = std::int16_t(std::int32_t(std::nearbyint(lines.array()(3, x))));
             }
         }
     });
