@@ -42,8 +42,9 @@ def support(
     positions: _Doubles, values: _Doubles, planes: _Doubles, tolerance: float, behind_penalty: float
 ) -> _Doubles:
     """How many of N pixels agree with each of P planes, less a weight for each that lies behind it; (P,)."""
+    places, levels, tried = (np.ascontiguousarray(each) for each in (positions.T, values, planes))
     found = np.empty(len(planes))
-    kernels.support_of(np.ascontiguousarray(positions.T), values, planes, tolerance, behind_penalty, found)
+    kernels.support_of(places, levels, tried, tolerance, behind_penalty, found)
     return found
 
 
