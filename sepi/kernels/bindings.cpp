@@ -1,6 +1,6 @@
 // The extension module: a submodule for each source of kernels, by the bindings that stand beside them.
-#include <nanobind/nanobind.h>
-
+#include "arguments.hpp"
+#include "floor.hpp"
 #include "lanes.hpp"
 #include "parallel.hpp"
 
@@ -49,4 +49,8 @@ NB_MODULE(_native, m) {
     for (const auto bind : {bind_sweeps, bind_splines, bind_views, bind_boundaries, bind_regularization, bind_error_bars, bind_image, bind_inspection,
                             bind_scoring, bind_scenes, bind_compared, bind_rendered, bind_applications})
         bind(m);
+
+    auto floor = m.def_submodule("floor");
+    floor.def("samples", &sepi::samples, sepi::Unlocked(), "passes"_a, "data"_a, "out"_a);
+    floor.def("windows", &sepi::windows, sepi::Unlocked(), "passes"_a, "data"_a, "out"_a);
 }

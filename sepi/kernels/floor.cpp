@@ -1,0 +1,49 @@
+#include "floor.hpp"
+
+#include "lanes.hpp"
+#include "parallel.hpp"
+
+namespace sepi {
+namespace {
+
+// A thread adds what one makes of seven vectors, and of a weight that changes, as it does from candidate to candidate.
+template <class One>
+void add_passes(Index passes, Array<const float, 3> data, Array<float, 2> out, const One &one) {
+    parallel_for(0, out.shape[0], [=](Index thread) {
+        const Index N = out.shape[1];
+        const float *given = data.at(thread);
+        float *sums = out.at(thread);
+        for (Index n = 0; n < passes; ++n) {
+            const Float8 weight = spread(1e-6f * float(n));
+            for (Index x = 0; x < N; x += LANES) {
+                Float8 values[7];
+                for (Index k = 0; k < 7; ++k) values[k] = load(given + k * N + x);
+                store(sums + x, one(weight, values, load(sums + x)));
+            }
+        }
+    });
+}
+
+}  // namespace
+
+void samples(Index passes, Array<const float, 3> data, Array<float, 2> out) {
+    add_passes(passes, data, out, [](Float8 weight, const Float8 *values, Float8 total) {
+        Float8 z{};
+        for (int channel = 0; channel < 3; ++channel) {
+            const auto value = [&](int k) { return values[(channel + k) % 5]; };
+            const Float8 upper = fma(spread(0.2f), value(1), fma(weight, value(0), -value(4)));
+            const Float8 residual = fma(spread(0.4f), value(3), fma(spread(0.3f), value(2), upper));
+            z = fma(residual, residual, z);
+        }
+        return total + z / (z + spread(0.01f));
+    });
+}
+
+void windows(Index passes, Array<const float, 3> data, Array<float, 2> out) {
+    add_passes(passes, data, out, [](Float8 weight, const Float8 *values, Float8 total) {
+        for (int k = 0; k < 7; ++k) total = fma(weight + spread(0.01f * float(k)), values[k], total);
+        return total;
+    });
+}
+
+}  // namespace sepi
