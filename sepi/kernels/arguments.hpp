@@ -38,6 +38,7 @@ struct type_caster<sepi::Strided<T, N>> : array_caster<sepi::Strided<T, N>, T, N
 // A NamedTuple becomes a struct of the same fields in the same order, which its fields() lists.
 template <class Struct>
 struct named_tuple_caster {
+    static constexpr auto Name = const_name("tuple");
     Struct value;
 
     template <class>
@@ -69,14 +70,11 @@ struct named_tuple_caster {
     }
 };
 
-}  // namespace nanobind::detail
+template <class Struct>
+    requires requires(Struct one) { one.fields(); }
+struct type_caster<Struct> : named_tuple_caster<Struct> {};
 
-// NAMED_TUPLE(sepi::Window, "sepi.matching.sweep_arrays.Window") lets kernels take it; templates stand before it:
-// template <class Colour> NAMED_TUPLE(sepi::ViewStack<Colour>, "..."), all else template <> NAMED_TUPLE(...).
-#define NAMED_TUPLE(Struct, python)                                                                    \
-    struct nanobind::detail::type_caster<Struct> : nanobind::detail::named_tuple_caster<Struct> {      \
-        static constexpr auto Name = nanobind::detail::const_name(python);                             \
-    }
+}  // namespace nanobind::detail
 
 namespace sepi {
 

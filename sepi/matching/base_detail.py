@@ -22,6 +22,7 @@ import numpy.typing as npt
 from pydantic import Field
 
 from sepi.image.noise import noise_of_reference_view, variance_of_residuals
+from sepi.kernels import base_detail as kernels
 from sepi.lightfield import BoolMap, FloatMap, LightField, full_scale
 from sepi.matching.denoising import LEFT, DenoisedLightField, DenoisingParameters
 from sepi.matching.row_bands import Rows
@@ -228,10 +229,8 @@ def _make_detail(
     rows: Rows,
     out: npt.NDArray[np.int16],
 ) -> None:
-    from sepi.matching.base_detail_kernels import detail_of_views
-
-    radius, space = parameters.base_radius, parameters.base_sigma_space
-    detail_of_views(views, unit, wanted, rows.low, radius, edge, space, np.float32(DETAIL_UNIT), out)
+    window = (parameters.base_radius, edge, parameters.base_sigma_space)
+    kernels.detail_of_views(views, unit, wanted, rows.low, window, DETAIL_UNIT, out)
 
 
 @dataclass

@@ -26,6 +26,7 @@ import numpy.typing as npt
 from pydantic import Field
 
 from sepi.image.noise import noise_level
+from sepi.kernels import denoising as kernels
 from sepi.lightfield import FloatMap, LightField, full_scale
 from sepi.matching.view_noise import PARTS, ViewNoise, view_noise
 from sepi.stage import Parameters
@@ -159,16 +160,13 @@ def _noise(light_field: LightField, kept: _Kept) -> ViewNoise:
 def _denoised_views(light_field: LightField, noise: ViewNoise, least: float) -> npt.NDArray[Any] | None:
     if _is_little(noise):
         return None
-    from sepi.matching.denoising_kernels import denoise_views
-
     views = light_field.views
-    # levels of as many bits: what is left of the noise is more than their rounding, and kernels need no other version
+    # levels of as many bits: what is left of the noise is more than their rounding
     out = np.zeros_like(views)
-    full = np.float32(full_scale(views.dtype))
-    whole = views.dtype != np.float32
     height, width = light_field.shape
     by_place = cv2.resize(np.float32(least) * noise.by_place, (width, height), interpolation=cv2.INTER_LINEAR)
-    denoise_views(views, light_field.present, full, noise.brightness, noise.variance, by_place, whole, out)
+    white = full_scale(views.dtype)
+    kernels.denoise_views(views, light_field.present, white, noise.brightness, noise.variance, by_place, out)
     return out
 
 

@@ -16,6 +16,7 @@ import numpy as np
 from pydantic import Field
 
 from sepi.channels import largest_channel
+from sepi.kernels import gaps as kernels
 from sepi.lightfield import BoolMap, FloatMap, LightField, full_scale
 from sepi.matching.denoising import guide_of
 from sepi.matching.nearest_surfaces import nearest_surfaces
@@ -64,13 +65,11 @@ def with_open_gaps(
     -------
     ndarray, shape (H, W), float32
     """
-    from sepi.matching.gap_kernels import farther_alike
-
     guide, reach = guide_of(light_field), parameters.gap_reach
     lowest = cv2.erode(disparity, np.ones((2 * reach + 1, 1), np.uint8))
     lowest = cv2.erode(lowest, np.ones((1, 2 * reach + 1), np.uint8))
-    step, distance2 = np.float32(parameters.gap_step), np.float32(parameters.gap_colour**2)
-    farther = farther_alike(disparity, lowest, guide, reach, step, distance2)
+    farther = np.empty_like(disparity)
+    kernels.farther_alike(disparity, lowest, guide, reach, parameters.gap_step, parameters.gap_colour**2, farther)
     asked = farther != disparity
     if not asked.any():
         return disparity
@@ -104,18 +103,13 @@ def compared_depths(
         Sums of the squared residuals at ``other`` and at ``disparity``, colours in 0..1, and of how many views they
         are.
     """
-    from sepi.matching.gap_kernels import compare_depths
-
     views = light_field.rgb_views
-    colours, unit = views.transpose(0, 1, 4, 2, 3), np.float32(1 / full_scale(views.dtype))
-    positions, baselines = np.argwhere(others), light_field.baselines[others]
+    depths, unit = (disparity, other, guide_of(light_field)), 1 / full_scale(views.dtype)
     sums = np.zeros((3, *disparity.shape), np.float32)
     for begin, end, rows in row_bands(light_field, others, float(np.abs(disparity).max()), _BYTES_PER_PIXEL):
         nearest = nearest_surfaces(light_field, other, others, rows)
-        compare_depths(
-            colours, unit, guide_of(light_field), disparity, other, nearest, rows.low, begin, end,
-            positions, baselines, np.float32(occlusion_margin), sums,
-        )  # fmt: skip
+        asked = (others, light_field.baselines, nearest, rows.low, occlusion_margin)
+        kernels.compare_depths(views, unit, depths, asked, begin, end, sums)
     return sums
 
 

@@ -21,6 +21,7 @@ import numpy.typing as npt
 
 from sepi.channels import mean_of_channels
 from sepi.image.noise import BLACK, SATURATED, mask_energy
+from sepi.kernels import view_noise as kernels
 from sepi.lightfield import BoolMap, FloatMap, LightField, full_scale
 
 VIEWS = 16
@@ -123,15 +124,16 @@ def view_noise(light_field: LightField) -> ViewNoise:
     SepiError
         If the disparity range is unknown.
     """
-    from sepi.matching.view_noise_kernels import BLOCK, least_differences
-
     views, image = light_field.rgb_views, light_field.reference_view
     unit, least = 1 / full_scale(views.dtype), _least_variance(views.dtype)
     place, moves = light_field.reference_position, whole_pixel_moves(light_field)
     # beyond the picture nothing is known
-    between = np.minimum(least_differences(views.transpose(0, 1, 4, 2, 3), *place, moves) * unit**2 / 2, 1)
+    height, width = light_field.shape
+    differences = np.empty((height // kernels.BLOCK, width // kernels.BLOCK), np.float32)
+    kernels.least_differences(views, *place, moves, differences)
+    between = np.minimum(differences * unit**2 / 2, 1)
     within, level = (
-        _of_blocks(values, between.shape, BLOCK) for values in (mask_energy(image), mean_of_channels(image))
+        _of_blocks(values, between.shape, kernels.BLOCK) for values in (mask_energy(image), mean_of_channels(image))
     )
     # what is black, overexposed or flat has none of the noise that the rest has
     tells = (within > 0) & (level > BLACK) & (level < SATURATED)

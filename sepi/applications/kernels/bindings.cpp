@@ -6,11 +6,6 @@ namespace nb = nanobind;
 using namespace nb::literals;
 using sepi::Unlocked;
 
-template <>
-NAMED_TUPLE(sepi::Sources, "sepi.applications.all_views.Sources");
-template <>
-NAMED_TUPLE(sepi::Rules, "sepi.applications.all_views.Rules");
-
 void bind_applications(nb::module_ &kernels) {
     auto all_views = kernels.def_submodule("all_views");
     all_views.attr("EMPTY") = sepi::EMPTY;

@@ -10,17 +10,6 @@ namespace nb = nanobind;
 using namespace nb::literals;
 using sepi::Unlocked;
 
-template <class Colour>
-NAMED_TUPLE(sepi::RimViews<Colour>, "sepi.boundaries.arrays.RimViews");
-template <>
-NAMED_TUPLE(sepi::Sides, "sepi.boundaries.arrays.Sides");
-template <>
-NAMED_TUPLE(sepi::Rim, "sepi.boundaries.rim.Rim");
-template <>
-NAMED_TUPLE(sepi::Surroundings, "sepi.boundaries.surroundings.Surroundings");
-template <>
-NAMED_TUPLE(sepi::Edges, "sepi.boundaries.edge_lines.Edges");
-
 // The kernels that look at the colours of views, of one type.
 template <class Colour>
 static void bind_of_colours(nb::module_ &background, nb::module_ &surface_shares) {

@@ -5,9 +5,6 @@ namespace nb = nanobind;
 using namespace nb::literals;
 using sepi::Unlocked;
 
-template <>
-NAMED_TUPLE(sepi::ErrorMixture, "sepi.error_bars.mixture.Mixture");
-
 void bind_error_bars(nb::module_ &kernels) {
     auto mixture = kernels.def_submodule("mixture");
     mixture.attr("RIM_WIDTH") = sepi::RIM_WIDTH;

@@ -7,13 +7,6 @@ namespace nb = nanobind;
 using namespace nb::literals;
 using sepi::Unlocked;
 
-template <>
-NAMED_TUPLE(sepi::SplineViews, "sepi.matching.spline_views.SplineViews");
-template <>
-NAMED_TUPLE(sepi::Seeing, "sepi.matching.aligned_views.Seeing");
-template <>
-NAMED_TUPLE(sepi::MeanView, "tuple");
-
 // The kernel that looks at the colours of views, of one type.
 template <class Colour>
 static void bind_of_colours(nb::module_ &splines) {

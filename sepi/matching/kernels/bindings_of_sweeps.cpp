@@ -8,23 +8,6 @@ namespace nb = nanobind;
 using namespace nb::literals;
 using sepi::Unlocked;
 
-template <>
-NAMED_TUPLE(sepi::Candidates, "sepi.matching.sweep_arrays.Candidates");
-template <>
-NAMED_TUPLE(sepi::Window, "sepi.matching.sweep_arrays.Window");
-template <>
-NAMED_TUPLE(sepi::ExpectedCosts, "sepi.matching.sweep_arrays.ExpectedCosts");
-template <>
-NAMED_TUPLE(sepi::BestMaps, "sepi.matching.sweep_arrays.BestMaps");
-template <>
-NAMED_TUPLE(sepi::Visibility, "sepi.matching.sweep_arrays.Visibility");
-template <>
-NAMED_TUPLE(sepi::RobustCost, "sepi.matching.sweep_arrays.RobustCost");
-template <class Colour>
-NAMED_TUPLE(sepi::ViewStack<Colour>, "sepi.matching.sweep_arrays.ViewStack");
-template <class Colour>
-NAMED_TUPLE(sepi::BaseDetail<Colour>, "sepi.matching.base_detail.BaseDetail");
-
 // The kernels that look at the colours of views, of one type.
 template <class Colour>
 static void bind_of_colours(nb::module_ &plane_sweep, nb::module_ &visibility) {

@@ -6,11 +6,6 @@ namespace nb = nanobind;
 using namespace nb::literals;
 using sepi::Unlocked;
 
-template <>
-NAMED_TUPLE(sepi::Planes, "sepi.rendered.surfaces.Planes");
-template <>
-NAMED_TUPLE(sepi::Paint, "sepi.rendered.surfaces.Paint");
-
 void bind_rendered(nb::module_ &kernels) {
     auto triangles = kernels.def_submodule("triangles");
     triangles.def("first_met", &sepi::first_met, Unlocked(), "corners"_a, "origin"_a, "rotation"_a, "frame"_a, "near"_a, "out"_a);

@@ -5,9 +5,6 @@ namespace nb = nanobind;
 using namespace nb::literals;
 using sepi::Unlocked;
 
-template <>
-NAMED_TUPLE(sepi::Drawing, "sepi.scenes.rendering.Drawing");
-
 void bind_scenes(nb::module_ &kernels) {
     auto rendering = kernels.def_submodule("rendering");
     rendering.attr("BEYOND") = sepi::BEYOND;

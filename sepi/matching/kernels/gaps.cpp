@@ -1,0 +1,115 @@
+#include "gaps.hpp"
+
+#include <vector>
+
+#include "kernels/parallel.hpp"
+
+namespace sepi {
+namespace {
+
+// Of a bilinear sample of a view (H, W, 3), from reference (3,). Products of 16 bits and a weight are exact as double.
+template <class Colour>
+auto squared_residual(Array<const Colour, 3> view, float unit, double row, double column, Array<const float, 1> reference) {
+    using Number = std::conditional_t<std::is_same_v<Colour, std::uint16_t>, double, float>;
+    const Index top = Index(row), left = Index(column), down = view.strides[0], right = view.strides[1];
+    const float fy = float(row - double(top)), fx = float(column - double(left));
+    const Colour *place = view.at(top, left);
+    Number total = 0;
+    for (Index c = 0; c < 3; ++c, place += view.strides[2]) {
+        const Number above = (1 - fx) * Number(place[0]) + fx * Number(place[right]);
+        const Number below = (1 - fx) * Number(place[down]) + fx * Number(place[down + right]);
+        const Number residual = ((1 - fy) * above + fy * below) * unit - reference(c);
+        total += residual * residual;
+    }
+    return total;
+}
+
+// How many steps from i stay in a line of n.
+Index steps_within(Index i, Index direction, Index n) { return direction < 0 ? i : direction > 0 ? n - 1 - i : n; }
+
+}  // namespace
+
+void farther_alike(Array<const float, 2> disparity, Array<const float, 2> lowest, Strided<const float, 3> colours, Index reach, float least_step,
+                   float distance2, Array<float, 2> farther) {
+    const Index H = disparity.shape[0], W = disparity.shape[1];
+    const auto alike = [distance2, step = colours.strides[2]](const float *a, const float *b) {
+        float apart = 0;
+        for (Index c = 0; c < 3; ++c) {
+            const float e = b[c * step] - a[c * step];
+            apart += e * e;
+        }
+        return apart < distance2;
+    };
+    const auto farther_of = [&](Index y, Index x) {
+        float found = disparity(y, x);
+        const float limit = found - least_step;
+        if (lowest(y, x) >= limit) return found;
+        const float *here = colours.at(y, x);
+        Index closest = reach;
+        for (Index dy = -1; dy <= 1; ++dy) {
+            for (Index dx = -1; dx <= 1; ++dx) {
+                if (dy == 0 && dx == 0) continue;
+                const Index end = std::min(closest, std::min(steps_within(y, dy, H), steps_within(x, dx, W)));
+                const Index next = dy * disparity.strides[0] + dx, onward = dy * colours.strides[0] + dx * colours.strides[1];
+                const float *there = disparity.at(y, x);
+                for (Index step = 1; step <= end; ++step) {
+                    there += next;
+                    if (*there >= limit || !alike(here, here + step * onward)) continue;
+                    found = step == closest ? std::min(*there, found) : *there;
+                    closest = step;
+                    break;
+                }
+            }
+        }
+        return found;
+    };
+    parallel_for(0, H, [&](Index y) {
+        for (Index x = 0; x < W; ++x) farther(y, x) = farther_of(y, x);
+    });
+}
+
+template <class Colour>
+void compare_depths(Strided<const Colour, 5> views, float unit, const TwoDepths &depths, const AskedViews &asked, Index begin, Index end, Array<float, 3> sums) {
+    struct View {
+        Array<const Colour, 3> pixels;
+        Array<const float, 2> nearest;
+        double down, across;
+    };
+    std::vector<View> others;
+    for (Index t = 0; t < views.shape[0]; ++t)
+        for (Index s = 0; s < views.shape[1]; ++s)
+            if (asked.others(t, s)) others.push_back({views[t][s], asked.nearest[t][s], asked.baselines(t, s, 0), asked.baselines(t, s, 1)});
+    const Index H = depths.disparity.shape[0], W = depths.disparity.shape[1];
+    const double bottom = double(H - 1), right = double(W - 1);
+    parallel_for(begin, end, [&](Index y) {
+        for (Index x = 0; x < W; ++x) {
+            const float d = depths.disparity(y, x), f = depths.farther(y, x);
+            if (d == f) continue;
+            const auto colour = depths.reference[y][x];
+            float at_farther = 0, at_own = 0, number = 0;
+            for (const View &view : others) {
+                const double row = double(y) - f * view.down, column = double(x) - f * view.across;
+                const double own_row = double(y) - d * view.down, own_column = double(x) - d * view.across;
+                if (std::min(row, own_row) < 0 || std::min(column, own_column) < 0) continue;
+                if (std::max(row, own_row) >= bottom || std::max(column, own_column) >= right) continue;
+                const float *above = view.nearest.at(Index(row) - asked.low, Index(column)), *below = above + view.nearest.strides[0];
+                if (std::max(std::max(above[0], above[1]), std::max(below[0], below[1])) > f + asked.margin) continue;
+                at_farther = float(at_farther + squared_residual(view.pixels, unit, row, column, colour));
+                at_own = float(at_own + squared_residual(view.pixels, unit, own_row, own_column, colour));
+                ++number;
+            }
+            sums(0, y, x) = at_farther;
+            sums(1, y, x) = at_own;
+            sums(2, y, x) = number;
+        }
+    });
+}
+
+#define INSTANTIATE(Colour) \
+    template void compare_depths(Strided<const Colour, 5>, float, const TwoDepths &, const AskedViews &, Index, Index, Array<float, 3>);
+INSTANTIATE(std::uint8_t)
+INSTANTIATE(std::uint16_t)
+INSTANTIATE(float)
+#undef INSTANTIATE
+
+}  // namespace sepi
