@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from geometries import GEOMETRIES, standing
-from several_threads import several_threads
+from several_threads import SEVERAL, threads
 
 from sepi.compared import acc
 from sepi.compared.acc import AccParameters, ConfidentLabelsParameters, confident_labels, phase_shift_costs
@@ -15,7 +15,6 @@ from sepi.compared.acc_phase_shift import PhaseShift
 from sepi.compared.cost_volumes import disparity_of, least_costs
 from sepi.compared.guided_filter import GuidedFilter
 from sepi.kernels import acc as kernels
-from sepi.kernels import set_thread_count
 from sepi.lightfield import DisparityRange, LightField
 from sepi.pipeline import estimate_depth
 from sepi.scenes import render
@@ -310,13 +309,10 @@ def test_a_plane_gets_its_disparity(stage: str) -> None:
 
 def test_threads_do_not_change_the_bytes() -> None:
     """Results must not depend on the machine."""
-    threads = several_threads()
     scene = render("curved_occluders", size=64, views=3)
-    several = estimate_depth(scene, "acc", FEW)
-    set_thread_count(1)
-    try:
+    with threads(SEVERAL):
+        several = estimate_depth(scene, "acc", FEW)
+    with threads(1):
         one = estimate_depth(scene, "acc", FEW)
-    finally:
-        set_thread_count(threads)
     np.testing.assert_array_equal(one.disparity, several.disparity)
     np.testing.assert_array_equal(one.confidence, several.confidence)

@@ -7,10 +7,10 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from geometries import GEOMETRIES, standing
+from several_threads import SEVERAL, threads
 
 from sepi.compared.guided_costs import GuidedCostsParameters, guided_costs
 from sepi.compared.spo import SpoParameters, column_weights, peak_weight, side_distances, spo, views_of_directions
-from sepi.kernels import set_thread_count, thread_count
 from sepi.kernels import spo as kernels
 from sepi.lightfield import BoolMap, DisparityRange, FloatMap, LightField
 from sepi.matching.sheared_views import ShearedViews
@@ -192,11 +192,9 @@ def test_distances_are_the_same_for_any_number_of_threads() -> None:
     """If this fails, two runs on the same scene differ."""
     lines = np.random.default_rng(5).random((5, 3, 16, 20), np.float32)
     found = np.empty((2, 16, 20), np.float32)
-    threads = thread_count()
-    kernels.half_distances(lines, column_weights(0.8), 64, found[0])
-    set_thread_count(1)
-    kernels.half_distances(lines, column_weights(0.8), 64, found[1])
-    set_thread_count(threads)
+    for count, distances in zip((1, SEVERAL), found, strict=True):
+        with threads(count):
+            kernels.half_distances(lines, column_weights(0.8), 64, distances)
     assert np.array_equal(*found)
 
 

@@ -7,10 +7,10 @@ import numpy.typing as npt
 import pytest
 from scipy import ndimage
 
+from sepi.kernels import denoising as kernels
 from sepi.lightfield import FloatMap, LightField
 from sepi.matching import denoising as module
 from sepi.matching.denoising import DenoisedLightField, denoised
-from sepi.matching.denoising_kernels import denoise_views
 from sepi.matching.view_noise import variance_map, view_noise
 from sepi.pipeline import estimate_depth
 from sepi.scenes import render
@@ -121,12 +121,12 @@ def test_kernel_equals_plain_means(channels: int) -> None:
     least = rng.uniform(1, 2, views.shape[2:4]).astype(np.float32)
     present = np.array([[True, False]])
     out = np.zeros_like(views)
-    denoise_views(views, present, np.float32(1), levels, variances, least, False, out)
+    kernels.denoise_views(views, present, 1, levels, variances, least, out)
     np.testing.assert_allclose(out[0, 0], plain_denoised(views[0, 0], levels, variances, least), atol=2e-6)
     assert not out[0, 1].any()
     levels_of_bytes = np.rint(255 * views).astype(np.uint8)
     rounded = np.zeros_like(levels_of_bytes)
-    denoise_views(levels_of_bytes, present, np.float32(255), levels, variances, least, True, rounded)
+    kernels.denoise_views(levels_of_bytes, present, 255, levels, variances, least, rounded)
     expected = plain_denoised((levels_of_bytes[0, 0] / np.float32(255)), levels, variances, least)
     np.testing.assert_allclose(rounded[0, 0], 255 * np.clip(expected, 0, 1), atol=0.51)
 

@@ -5,8 +5,8 @@ from typing import Any
 import cv2
 import numpy as np
 
+from sepi.kernels import gaps
 from sepi.lightfield import BoolMap, DisparityRange, FloatMap, LightField
-from sepi.matching.gap_kernels import farther_alike
 from sepi.matching.gaps import GapParameters, with_open_gaps
 from sepi.matching.view_subsets import spread_views
 
@@ -96,7 +96,8 @@ def test_closest_farther_pixels_of_a_like_colour_are_found() -> None:
     colours = rng.choice([0.2, 0.25, 0.7], (13, 17, 3)).astype(np.float32)
     reach = 5
     lowest = cv2.erode(disparity, np.ones((2 * reach + 1, 2 * reach + 1), np.uint8))
-    found = farther_alike(disparity, lowest, colours, reach, np.float32(0.6), np.float32(0.03))
+    found = np.empty_like(disparity)
+    gaps.farther_alike(disparity, lowest, colours, reach, 0.6, 0.03, found)
     expected = closest_farther(disparity, colours, reach, 0.6, 0.03)
     assert 0.2 < (expected != disparity).mean() < 0.9
     np.testing.assert_array_equal(found, expected)

@@ -10,8 +10,8 @@ import pytest
 from geometries import GEOMETRIES, standing
 
 from sepi.errors import SepiError
+from sepi.kernels import base_detail
 from sepi.lightfield import DisparityRange, LightField
-from sepi.matching import base_detail_kernels
 from sepi.matching import row_bands as module
 from sepi.matching.memory_limit import bytes_of_bands
 from sepi.matching.row_bands import FEWEST_ROWS, row_bands
@@ -76,13 +76,13 @@ def test_maps_are_the_same_for_any_number_of_bands(variant: str, geometry: str, 
 def test_refinement_in_bands_makes_detail_once(monkeypatch: Any) -> None:
     """Where there is memory for it; else large light fields take half as long again."""
     made: list[int] = []
-    detail_of_views = base_detail_kernels.detail_of_views
+    detail_of_views = base_detail.detail_of_views
 
     def counting(*given: Any) -> None:
         made[-1] += given[2].sum() * given[-1].shape[2]
         detail_of_views(*given)
 
-    monkeypatch.setattr(base_detail_kernels, "detail_of_views", counting)
+    monkeypatch.setattr(base_detail, "detail_of_views", counting)
     scene = render("wall", size=64, views=5)
     before = StageMaps(scene.ground_truth, np.ones_like(scene.ground_truth))
     for workspace in (Workspace(1, detail_bytes=2 * 25 * 64 * 64), Workspace(1)):

@@ -49,13 +49,22 @@ def mutants(words: list[str]) -> Iterator[Mutant]:
 
 
 def copy_to(tree: Path) -> None:
-    """Copy what git knows or would, and the compiled kernels, whose times must stay."""
+    """Copy what git knows or would, and the built kernels."""
     words = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
     names = subprocess.run(words, cwd=ROOT, stdout=subprocess.PIPE, check=True).stdout.decode().split("\0")[:-1]
-    kernels = [str(path.relative_to(ROOT)) for path in ROOT.glob("sepi/**/__pycache__/*.nb[ci]")]
+    kernels = [str(path.relative_to(ROOT)) for path in ROOT.glob("sepi/kernels/*/*.so")]
     for name in filter(lambda name: (ROOT / name).is_file(), names + kernels):
         (tree / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy2(ROOT / name, tree / name)
+
+
+def build(tree: Path) -> None:
+    """Build the kernels of a tree from its own sources: seconds, after the first time."""
+    cmake = [f"{Path(sys.executable).parent}/cmake"]
+    environment = {**os.environ, "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"}
+    settings = ["-G", "Ninja", "-DCMAKE_BUILD_TYPE=Release", f"-DPython_EXECUTABLE={sys.executable}"]
+    for words in (["-S", ".", "-B", "build", *settings], ["--build", "build"], ["--install", "build", "--prefix", "."]):
+        subprocess.run(cmake + words, cwd=tree, env=environment, stdout=subprocess.DEVNULL, check=True)
 
 
 def failing(tree: Path, tests: tuple[str, ...]) -> bool:
@@ -88,9 +97,14 @@ def main(words: list[str]) -> int:
             if text is None:
                 state = "absent"
             else:
+                compiled = mutant.file.endswith(("cpp", "hpp"))
                 (tree / mutant.file).write_text(text, encoding="utf-8")
+                if compiled:
+                    build(tree)
                 state = "caught" if failing(tree, mutant.tests) else "lives"
-                shutil.copy2(ROOT / mutant.file, tree / mutant.file)
+                (tree / mutant.file).write_text((ROOT / mutant.file).read_text(encoding="utf-8"), encoding="utf-8")
+                if compiled:
+                    build(tree)
             missed += state != "caught"
             print(f"{state}: {mutant.file}: {mutant.breaks}", flush=True)
     print(f"{len(chosen) - missed} of {len(chosen)} caught")

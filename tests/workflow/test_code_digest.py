@@ -37,6 +37,12 @@ FILES = {
     "pkg/io/__init__.py": "from pkg.io.reader import read\n",
     "pkg/io/reader.py": "from pkg.io.files import path\n\ndef read():\n    return path\n",
     "pkg/io/files.py": "path = 1\n",
+    "pkg/loops.py": "from pkg.kernels import sums\n",
+    "pkg/kernels/__init__.py": "native = 1\n",
+    "pkg/kernels/lanes.hpp": "// Eight at once.\nint lanes = 8;\n",
+    "pkg/io/kernels/sums.cpp": '#include <cmath>\n#include "sums.hpp"\n\nint sum() { return lanes; /* all */ }\n',
+    "pkg/io/kernels/sums.hpp": '#pragma once\n#include "kernels/lanes.hpp"\n',
+    "pkg/io/kernels/others.cpp": "int other;\n",
 }
 
 
@@ -49,8 +55,8 @@ def tree(tmp_path: Path) -> Path:
 
 
 def changed_by(tree: Path, file: str, old: str, new: str) -> set[str]:
-    """Which of the modules one, two, lazy and names have another digest after the replacement."""
-    modules = ["pkg.one", "pkg.two", "pkg.lazy", "pkg.names"]
+    """Which of the modules one, two, lazy, names and loops have another digest after the replacement."""
+    modules = ["pkg.one", "pkg.two", "pkg.lazy", "pkg.names", "pkg.loops"]
     before = {module: code_digest(module, root=tree) for module in modules}
     text = (tree / file).read_text()
     assert old in text
@@ -89,6 +95,13 @@ def test_imports_are_followed(tree: Path) -> None:
         ("pkg/io/__init__.py", "\n", "\nx = 1\n", {"names"}),
         ("pkg/extra.py", "extra = 1", "extra = 2", {"lazy"}),
         ("pkg/__init__.py", "extra", "shared", set()),
+        ("pkg/io/kernels/sums.cpp", "return lanes", "return 2 * lanes", {"loops"}),
+        ("pkg/io/kernels/sums.cpp", "/* all */ ", "", set()),
+        ("pkg/io/kernels/sums.cpp", " }", "\n}", set()),
+        ("pkg/io/kernels/sums.hpp", "lanes.hpp", 'lanes.hpp"\n#define SUMS "', {"loops"}),
+        ("pkg/kernels/lanes.hpp", "8", "4", {"loops"}),
+        ("pkg/kernels/lanes.hpp", "Eight at once.", "Side by side.", set()),
+        ("pkg/io/kernels/others.cpp", "other", "another", set()),
     ],
 )
 def test_what_changes_a_digest(tree: Path, file: str, old: str, new: str, changed: set[str]) -> None:
@@ -136,24 +149,31 @@ def test_a_module_that_does_not_exist_is_an_error(tree: Path) -> None:
 # modules that can change the maps of a stage, and modules that cannot
 COVERED = {
     "initial": (
-        {"matching.plane_sweep_kernels", "matching.visibility_kernels", "matching.structure_tensor", "image.noise"},
+        {"kernels.plane_sweep", "kernels.visibility", "matching.structure_tensor", "image.noise"},
         {"boundaries.decision", "image.edges", "regularization.planes", "matching.gauss_newton"},
     ),
     "occlusion": (
         {
-            "matching.plane_sweep_kernels",
+            "kernels.plane_sweep",
+            "matching.kernels.sweep_arrays.hpp",
             "matching.visibility_sweep",
-            "boundaries.colour_mixture_kernels",
+            "kernels.colour_mixture",
             "image.edges",
         },
         {"matching.structure_tensor", "image.superpixels", "regularization.planes", "matching.gauss_newton"},
     ),
     "textureless": (
         {"image.superpixels", "regularization.planes", "regularization.uniform_regions", "matching.gauss_newton"},
-        {"matching.plane_sweep", "matching.plane_sweep_kernels", "matching.semi_global", "boundaries.decision"},
+        {"matching.plane_sweep", "kernels.plane_sweep", "matching.semi_global", "boundaries.decision"},
     ),
     "optimize": (
-        {"regularization.wls", "regularization.second_order", "matching.gauss_newton_kernels", "lightfield"},
+        {
+            "regularization.wls",
+            "regularization.second_order",
+            "kernels.gauss_newton",
+            "kernels.lanes.hpp",
+            "lightfield",
+        },
         {"matching.plane_sweep", "regularization.planes", "image.superpixels", "image.edges"},
     ),
 }
