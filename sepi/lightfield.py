@@ -16,7 +16,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from types import NoneType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -178,7 +178,7 @@ class LightField:
     [-2.0, 2.0]
     """
 
-    views: npt.NDArray[np.generic]
+    views: npt.NDArray[Any]
     name: str
     source: str = ""
     present: BoolMap = field(default=None)  # type: ignore[arg-type]
@@ -361,7 +361,7 @@ class LightField:
         return float(np.abs(self.baselines).max())
 
     @property
-    def rgb_views(self) -> npt.NDArray[np.generic]:
+    def rgb_views(self) -> npt.NDArray[Any]:
         """The views with three channels, ``(T, S, H, W, 3)``: what all computation sees.
 
         Grey counts as three equal channels, so that a light field gives the same maps as grey and as RGB. They take no
@@ -440,14 +440,14 @@ def _shown(text: str) -> str:
     return one_line(text.encode("utf-8", "replace").decode())
 
 
-def _require_unit(name: str, values: npt.NDArray[np.generic]) -> None:
+def _require_unit(name: str, values: npt.NDArray[Any]) -> None:
     """Raise unless floats are finite and 0..1, but for what resampling overshoots."""
     low, high = float(values.min()), float(values.max())
     if not (low >= LOWEST and high <= HIGHEST):
         raise SepiError(f"{name}: float views must be finite and within 0..1, got {low:g} to {high:g}")
 
 
-def as_unit_float(values: npt.NDArray[np.generic]) -> FloatMap:
+def as_unit_float(values: npt.NDArray[Any]) -> FloatMap:
     """Pixel values as float32 in 0..1, rows contiguous; integers are divided by the largest value of their type.
 
     Parameters
@@ -468,7 +468,7 @@ def as_unit_float(values: npt.NDArray[np.generic]) -> FloatMap:
     """
     values = np.ascontiguousarray(values)
     if np.issubdtype(values.dtype, np.integer):
-        largest = np.iinfo(values.dtype).max  # type: ignore[type-var]
+        largest = np.iinfo(values.dtype).max
         return np.asarray(values.astype(np.float32) / np.float32(largest), np.float32)
     return values.astype(np.float32)
 

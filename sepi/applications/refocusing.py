@@ -198,7 +198,12 @@ def all_in_focus(
         sums *= weights[..., None]
         for t in np.flatnonzero(others.any(axis=1)).tolist():
             _add_row(
-                light_field, t, others[t], (disparity, surfaces), occlusion_margin, (centre, scale2, sums, weights)
+                light_field,
+                t,
+                others[t],
+                (disparity, surfaces),
+                occlusion_margin,
+                (centre, float(scale2), sums, weights),
             )
             progress((number + (t + 1) / light_field.grid[0]) / ROUNDS)
         centre = centre + sums / weights[..., None]
@@ -350,7 +355,7 @@ def _add_row(
     chosen: BoolMap,
     disparities: tuple[FloatMap, FloatMap],
     margin: float,
-    mean: tuple[FloatMap, np.float32, FloatMap, FloatMap],
+    mean: tuple[FloatMap, float, FloatMap, FloatMap],
 ) -> None:
     """Add the chosen views of one row of the grid to a mean: its expected colours, squared scale, sums and weights."""
     disparity, surfaces = disparities
@@ -360,4 +365,5 @@ def _add_row(
     nearest = nearest_surfaces(light_field, surfaces, of_row, Rows(0, light_field.shape[0]))[t]
     for s in np.flatnonzero(chosen).tolist():
         view = as_unit_float(light_field.views[t, s])
-        kernels.add_view(view, *baselines[0, s], disparity, nearest[s], margin, *mean)
+        v, u = baselines[0, s]
+        kernels.add_view(view, v, u, disparity, nearest[s], margin, *mean)

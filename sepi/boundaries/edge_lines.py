@@ -47,7 +47,7 @@ def line_evidence(disparity: FloatMap, rim: Rim, costs: FloatMap) -> FloatMap:
     number = np.full(disparity.shape, -1, np.int64)
     number[rim.inside] = np.arange(len(pixels))
     evidence = np.empty(len(pixels), np.float32)
-    middle = (rim.near + rim.far) / 2
+    middle = (rim.near + rim.far) * np.float32(0.5)
     edges = _edges(kernels.STEPS * (costs.shape[1] - 1))
     kernels.evidence_of_lines(disparity, middle, number, above, edges, pixels, evidence)
     return evidence

@@ -23,6 +23,9 @@ if os.environ.get(LEVEL) != "baseline" and _native.has_x86_64_v3() and find_spec
     _native = import_module(f"{__name__}.x86_64_v3._native")
 globals().update({name: part for name, part in vars(_native).items() if not name.startswith("__")})
 
+LANES: int = _native.LANES
+"""Numbers in a vector: as many lie behind arrays that kernels read as vectors."""
+
 thread_count: Callable[[], int] = _native.thread_count
 """Threads of a loop, the caller's among them."""
 

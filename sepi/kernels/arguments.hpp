@@ -38,7 +38,7 @@ struct type_caster<sepi::Strided<T, N>> : array_caster<sepi::Strided<T, N>, T, N
 // A NamedTuple becomes a struct of the same fields in the same order, which its fields() lists.
 template <class Struct>
 struct named_tuple_caster {
-    static constexpr auto Name = const_name("tuple");
+    static constexpr auto Name = const_name("tuple[typing.Any, ...]");
     Struct value;
 
     template <class>

@@ -15,7 +15,7 @@ References
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -103,7 +103,7 @@ class BaseDetail(NamedTuple):
         Sum of the RGB differences that counts as an edge in the base of all of them.
     """
 
-    colours: npt.NDArray[np.generic]
+    colours: npt.NDArray[Any]
     colour_unit: np.float32
     detail: npt.NDArray[np.int16]
     detail_unit: np.float32
@@ -221,7 +221,7 @@ def compared_with(views: BaseDetail, picture: FloatMap, parameters: BaseDetailPa
 
 
 def _make_detail(
-    views: npt.NDArray[np.generic],
+    views: npt.NDArray[Any],
     unit: np.float32,
     wanted: BoolMap,
     parameters: BaseDetailParameters,
@@ -230,7 +230,7 @@ def _make_detail(
     out: npt.NDArray[np.int16],
 ) -> None:
     window = (parameters.base_radius, edge, parameters.base_sigma_space)
-    kernels.detail_of_views(views, unit, wanted, rows.low, window, DETAIL_UNIT, out)
+    kernels.detail_of_views(views, float(unit), wanted, rows.low, window, DETAIL_UNIT, out)
 
 
 @dataclass

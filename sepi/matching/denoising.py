@@ -164,7 +164,7 @@ def _denoised_views(light_field: LightField, noise: ViewNoise, least: float) -> 
     # levels of as many bits: what is left of the noise is more than their rounding
     out = np.zeros_like(views)
     height, width = light_field.shape
-    by_place = cv2.resize(np.float32(least) * noise.by_place, (width, height), interpolation=cv2.INTER_LINEAR)
+    by_place = np.asarray(cv2.resize(np.float32(least) * noise.by_place, (width, height)), np.float32)
     white = full_scale(views.dtype)
     kernels.denoise_views(views, light_field.present, white, noise.brightness, noise.variance, by_place, out)
     return out

@@ -66,8 +66,8 @@ def with_open_gaps(
     ndarray, shape (H, W), float32
     """
     guide, reach = guide_of(light_field), parameters.gap_reach
-    lowest = cv2.erode(disparity, np.ones((2 * reach + 1, 1), np.uint8))
-    lowest = cv2.erode(lowest, np.ones((1, 2 * reach + 1), np.uint8))
+    lowest = np.asarray(cv2.erode(disparity, np.ones((2 * reach + 1, 1), np.uint8)), np.float32)
+    lowest = np.asarray(cv2.erode(lowest, np.ones((1, 2 * reach + 1), np.uint8)), np.float32)
     farther = np.empty_like(disparity)
     kernels.farther_alike(disparity, lowest, guide, reach, parameters.gap_step, parameters.gap_colour**2, farther)
     asked = farther != disparity

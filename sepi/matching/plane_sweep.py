@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -130,7 +130,7 @@ class SweepResult:
         return np.clip(confidence, 0, 1).astype(np.float32)
 
 
-def planar(light_field: LightField) -> npt.NDArray[np.generic]:
+def planar(light_field: LightField) -> npt.NDArray[Any]:
     """Views as ``(T, S, 3, H, W + LANES)``, each channel's rows contiguous, in their own number type."""
     views = light_field.rgb_views
     T, S, H, W, _ = views.shape

@@ -87,9 +87,10 @@ def spline_views(
     wanted[reference] = True
     try:
         views = base_detail_decomposition(light_field, parameters, wider, wanted, again=True)
-        units = views.colour_unit / SPLINE_UNIT, views.detail_unit / SPLINE_UNIT
-        numbers = views.colours, units[0], views.detail, units[1], views.low
-        kernels.view_splines(*numbers, colours, detail, rows.low, splines)
+        colour_unit, detail_unit = float(views.colour_unit / SPLINE_UNIT), float(views.detail_unit / SPLINE_UNIT)
+        kernels.view_splines(
+            views.colours, colour_unit, views.detail, detail_unit, views.low, colours, detail, rows.low, splines
+        )
     except BaseException:
         # they are taken for made
         forget_splines(light_field)

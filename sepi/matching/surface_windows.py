@@ -23,7 +23,7 @@ from sepi.lightfield import FloatMap
 BESIDE_NEARER = 0.02
 """What the equation of a pixel beside a nearer surface counts: enough to hold it where nothing else does."""
 
-OF_OTHER_COLOUR = np.float32(0.1)
+OF_OTHER_COLOUR = 0.1
 """What a pixel of the same disparity counts, whatever its colour: one surface may have many."""
 
 ANY_SURFACE = 1e6
@@ -84,8 +84,8 @@ def windowed_step(
         disparity,
         surfaces.colours,
         radius,
-        width,
-        np.float32(surfaces.colour_width),
+        float(width),
+        surfaces.colour_width,
         OF_OTHER_COLOUR,
         sums,
     )

@@ -5,7 +5,7 @@ In C++ each is a struct of the same fields in the same order.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -32,7 +32,7 @@ class ViewStack(NamedTuple):
         First column that each row of a view shows, and the one after the last; empty: all views show all.
     """
 
-    colours: npt.NDArray[np.generic]
+    colours: npt.NDArray[Any]
     t0: int
     s0: int
     groups: npt.NDArray[np.int64]
