@@ -41,6 +41,7 @@ os.environ.update(
         "SEPI_PYTHONPATH": PYTHON_PATH,
         "SEPI_JOB_CLIENT": job_client.__file__,
         WORKFLOW_PROCESS: str(os.getpid()),
+        "OPENBLAS_NUM_THREADS": "1",
     }
 )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections import UserDict
 from importlib import import_module
 from typing import Any
@@ -9,6 +10,11 @@ from typing import Any
 import click
 
 from sepi.command import SepiGroup
+
+# read when NumPy is imported. Threads of OpenBLAS would do little but spin, since products are small here; to find and
+# clear pages of 2 MB takes a twenty-fifth of `sepi depth`, and memory, since arrays are used up as fast as they are made
+for _name, _value in {"OPENBLAS_NUM_THREADS": "1", "NUMPY_MADVISE_HUGEPAGE": "0"}.items():
+    os.environ.setdefault(_name, _value)
 
 _COMMANDS = {
     "calibrate": ("calibrate", "Find the cameras of pictures without poses, by COLMAP."),
