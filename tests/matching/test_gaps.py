@@ -4,8 +4,9 @@ from typing import Any
 
 import cv2
 import numpy as np
+import pytest
 
-from sepi.kernels import gaps
+from sepi.kernels import gaps as kernels
 from sepi.lightfield import BoolMap, DisparityRange, FloatMap, LightField
 from sepi.matching.gaps import GapParameters, with_open_gaps
 from sepi.matching.view_subsets import spread_views
@@ -72,7 +73,7 @@ def test_a_plain_slit_that_says_nothing_stays_as_matching_has_it() -> None:
 
 
 def closest_farther(disparity: FloatMap, colours: FloatMap, reach: int, step: float, distance2: float) -> FloatMap:
-    """Plain loops over the definition of :func:`farther_alike`."""
+    """Plain loops over the definition of ``farther_alike``."""
     found = disparity.copy()
     height, width = disparity.shape
     for y, x in np.ndindex(height, width):
@@ -90,14 +91,15 @@ def closest_farther(disparity: FloatMap, colours: FloatMap, reach: int, step: fl
     return found
 
 
-def test_closest_farther_pixels_of_a_like_colour_are_found() -> None:
+# the second reaches farther than the picture is wide
+@pytest.mark.parametrize(("reach", "shape"), [(5, (13, 17)), (16, (40, 6))])
+def test_closest_farther_pixels_of_a_like_colour_are_found(reach: int, shape: tuple[int, int]) -> None:
     rng = np.random.default_rng(3)
-    disparity = rng.uniform(-1, 1, (13, 17)).astype(np.float32)
-    colours = rng.choice([0.2, 0.25, 0.7], (13, 17, 3)).astype(np.float32)
-    reach = 5
+    disparity = rng.uniform(-1, 1, shape).astype(np.float32)
+    colours = rng.choice([0.2, 0.25, 0.7], (*shape, 3)).astype(np.float32)
     lowest = cv2.erode(disparity, np.ones((2 * reach + 1, 2 * reach + 1), np.uint8))
     found = np.empty_like(disparity)
-    gaps.farther_alike(disparity, lowest, colours, reach, 0.6, 0.03, found)
+    kernels.farther_alike(disparity, lowest, colours, reach, 0.6, 0.03, found)
     expected = closest_farther(disparity, colours, reach, 0.6, 0.03)
     assert 0.2 < (expected != disparity).mean() < 0.9
     np.testing.assert_array_equal(found, expected)

@@ -14,7 +14,7 @@ namespace {
 // Rows that a thread does at a stretch: those of the windows are converted once for all of them.
 constexpr Index ROWS_AT_ONCE = 32;
 
-// Least root of a weight: lost in any sum as its 32nd power, which is no subnormal number. With these processors are slow.
+// Least root of a weight: its 32nd power is lost in any sum, and no subnormal number, with which processors are slow.
 constexpr float LEAST = 0.125f;
 
 // Some rows of a view, and the rows above and below that their windows reach.
@@ -126,7 +126,7 @@ class Stretch {
     const Index radius_, number_, width_, step_ = width_ + 2 * (radius_ + LANES);
     const float falloff_;
     // of the pixel dx across, at dx + radius
-    const Scratch<float, 2> pairs_ = zeros<float, 2>(2 * radius_ + 1, width_ + 2 * (radius_ + LANES));
+    const Scratch<float, 2> pairs_ = zeros<float, 2>(2 * radius_ + 1, step_);
     const Scratch<float, 2> nearness_{radius_ + 1, radius_ + 1};
     // the channels and their mean; weights look at twice the radius beyond the ends
     const Scratch<float, 3> rows_ = zeros<float, 3>(number_ + 2 * radius_, 4, width_ + 4 * radius_ + LANES);

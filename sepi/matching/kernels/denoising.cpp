@@ -151,7 +151,7 @@ void denoise_views(Array<const Colour, 5> views, Array<const bool, 2> present, f
     });
 }
 
-#define INSTANTIATE(Colour)                                                                                                                       \
+#define INSTANTIATE(Colour)                                                                                                            \
     template void denoise_views(Array<const Colour, 5>, Array<const bool, 2>, float, Strided<const float, 1>, Strided<const float, 1>, \
                                 Array<const float, 2>, Array<Colour, 5>);
 INSTANTIATE(std::uint8_t)

@@ -24,8 +24,8 @@ auto squared_residual(Array<const Colour, 3> view, float unit, double row, doubl
     return total;
 }
 
-// How many steps from i stay in a line of n.
-Index steps_within(Index i, Index direction, Index n) { return direction < 0 ? i : direction > 0 ? n - 1 - i : n; }
+// How many of most steps from i stay in a line of n.
+Index steps_within(Index i, Index direction, Index n, Index most) { return std::min(most, direction < 0 ? i : direction > 0 ? n - 1 - i : most); }
 
 }  // namespace
 
@@ -49,7 +49,7 @@ void farther_alike(Array<const float, 2> disparity, Array<const float, 2> lowest
         for (Index dy = -1; dy <= 1; ++dy) {
             for (Index dx = -1; dx <= 1; ++dx) {
                 if (dy == 0 && dx == 0) continue;
-                const Index end = std::min(closest, std::min(steps_within(y, dy, H), steps_within(x, dx, W)));
+                const Index end = steps_within(y, dy, H, steps_within(x, dx, W, closest));
                 const Index next = dy * disparity.strides[0] + dx, onward = dy * colours.strides[0] + dx * colours.strides[1];
                 const float *there = disparity.at(y, x);
                 for (Index step = 1; step <= end; ++step) {
@@ -78,7 +78,8 @@ void compare_depths(Strided<const Colour, 5> views, float unit, const TwoDepths 
     std::vector<View> others;
     for (Index t = 0; t < views.shape[0]; ++t)
         for (Index s = 0; s < views.shape[1]; ++s)
-            if (asked.others(t, s)) others.push_back({views[t][s], asked.nearest[t][s], asked.baselines(t, s, 0), asked.baselines(t, s, 1)});
+            if (asked.others(t, s))
+                others.push_back({views[t][s], asked.nearest[t][s], asked.baselines(t, s, 0), asked.baselines(t, s, 1)});
     const Index H = depths.disparity.shape[0], W = depths.disparity.shape[1];
     const double bottom = double(H - 1), right = double(W - 1);
     parallel_for(begin, end, [&](Index y) {

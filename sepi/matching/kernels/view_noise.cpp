@@ -8,6 +8,8 @@
 namespace sepi {
 namespace {
 
+static_assert(BLOCK == LANES);
+
 // The channels of rows y.. of a view (H, W, 3) into out (1 or 3, BLOCK, W): of grey views they are the same.
 template <class Colour>
 void load_rows(Array<const Colour, 3> view, Index y, Array<float, 3> out) {
@@ -53,12 +55,9 @@ void least_differences(Strided<const Colour, 5> colours, Index t0, Index s0, Arr
             for (Index j = 0; j < columns; ++j) {
                 const Index x = j * BLOCK;
                 if (x + across < 0 || x + across + BLOCK > W) continue;
-                float energy = 0;
-                for (Index c = 0; c < 3; ++c) {
-                    const Index channel = std::min(c, channels - 1);
-                    energy += energy_of(own.at(channel, 0, x), other.at(channel, 0, x + across), W);
-                }
-                found[j] = std::min(found[j], energy);
+                const auto energy = [&](Index c) { return energy_of(own.at(c, 0, x), other.at(c, 0, x + across), W); };
+                const float first = energy(0);
+                found[j] = std::min(found[j], channels == 1 ? first + first + first : first + energy(1) + energy(2));
             }
         }
         // less one degree of freedom: the mean, which exposure may change from view to view

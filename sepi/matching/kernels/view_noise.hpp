@@ -1,12 +1,12 @@
 // Noise of the views: blocks of the reference view against blocks of others, at whole pixels.
 #pragma once
 
-#include "kernels/lanes.hpp"
+#include "kernels/array.hpp"
 
 namespace sepi {
 
 // Width of a block, pixels.
-constexpr Index BLOCK = LANES;
+constexpr Index BLOCK = 8;
 
 // Least mean squared difference, in squared units of the colours, of each block of view (t0, s0) from what other views
 // have at some whole pixels from it; infinite where no other view holds the block. colours (T, S, H, W, 3); moves (N, 4):
