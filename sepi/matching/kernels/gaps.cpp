@@ -69,7 +69,8 @@ void farther_alike(Array<const float, 2> disparity, Array<const float, 2> lowest
 }
 
 template <class Colour>
-void compare_depths(Strided<const Colour, 5> views, float unit, const TwoDepths &depths, const AskedViews &asked, Index begin, Index end, Array<float, 3> sums) {
+void compare_depths(Strided<const Colour, 5> views, float unit, const TwoDepths &depths, const AskedViews &asked, Index begin, Index end,
+                    Array<float, 3> sums) {
     struct View {
         Array<const Colour, 3> pixels;
         Array<const float, 2> nearest;
