@@ -167,24 +167,24 @@ def _code_and_imports(module: str, root: Path) -> tuple[str, frozenset[str]]:
     source = file.read_bytes()
     digest = hashlib.sha256(source).hexdigest()
     if module not in _read or _read[module][0] != digest:
-        of_kind = _code_and_names if file.suffix == ".py" else _code_and_headers
-        _read[module] = digest, of_kind(source, file)
+        found = _code_and_names(source, file) if file.suffix == ".py" else _code_and_headers(source, file, root)
+        _read[module] = digest, found
     code, named = _read[module][1]
     package = module if file.name == "__init__.py" else module.rpartition(".")[0]
     imports = {name for level, base, names in named for name in _imported(level, base, names, package, root)}
     return code, frozenset(name for name in imports if name.split(".")[0] == module.split(".")[0])
 
 
-def _code_and_headers(source: bytes, file: Path) -> _Code:
+def _code_and_headers(source: bytes, file: Path, root: Path) -> _Code:
     """A digest of a C++ source without comments and layout, and the headers of the project that it includes."""
     text = re.sub(r"//[^\n]*|/\*.*?\*/", " ", source.decode(), flags=re.DOTALL)
-    package = next(folder for folder in file.parents if folder.name == "kernels").parents[1]
+    package = root / file.relative_to(root).parts[0]
     named: list[tuple[int, str, list[str]]] = []
     for include in re.findall(r'^#include "(.+)\.hpp"', text, re.MULTILINE):
         # beside it, or in the package
         near = file.parent / f"{include}{_HEADER}"
         place = near if near.is_file() else package / f"{include}{_HEADER}"
-        named.append((0, ".".join(place.relative_to(package.parent).with_suffix("").parts) + _HEADER, []))
+        named.append((0, ".".join(place.relative_to(root).with_suffix("").parts) + _HEADER, []))
     return hashlib.sha256(" ".join(text.split()).encode()).hexdigest(), named
 
 
