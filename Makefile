@@ -213,6 +213,6 @@ clean:
 BUILD = PATH="$(CURDIR)/$(BIN):$$PATH" cmake
 $(READY): .venv/installed CMakeLists.txt $(wildcard sepi/kernels/*.?pp sepi/*/kernels/*.?pp)
 	$(BUILD) -G Ninja -S . -B build/kernels -DCMAKE_BUILD_TYPE=Release -DPython_EXECUTABLE="$(CURDIR)/$(BIN)/python" >build/kernels.log
-	$(BUILD) --build build/kernels
-	$(BUILD) --install build/kernels --prefix .
+	$(BUILD) --build build/kernels >>build/kernels.log || { cat build/kernels.log; exit 1; }
+	$(BUILD) --install build/kernels --prefix . >>build/kernels.log
 	touch $@
