@@ -212,6 +212,7 @@ clean:
 # kernels that were edited are built again where pip put them
 BUILD = PATH="$(CURDIR)/$(BIN):$$PATH" cmake
 $(READY): .venv/installed CMakeLists.txt $(wildcard sepi/kernels/*.?pp sepi/*/kernels/*.?pp)
+	mkdir -p build
 	$(BUILD) -G Ninja -S . -B build/kernels -DCMAKE_BUILD_TYPE=Release -DPython_EXECUTABLE="$(CURDIR)/$(BIN)/python" >build/kernels.log
 	$(BUILD) --build build/kernels >>build/kernels.log || { cat build/kernels.log; exit 1; }
 	$(BUILD) --install build/kernels --prefix . >>build/kernels.log
