@@ -11,8 +11,8 @@ import click
 
 from sepi.command import SepiGroup
 
-# read when NumPy is imported. Threads of OpenBLAS would do little but spin, since products are small here. Pages of 2 MB
-# take time to find and clear, and memory, since arrays are used up as fast as they are made
+# read when NumPy is imported. Threads of OpenBLAS would do little but spin, since products are small here. Pages of 2
+# MB take time to find and clear, and memory, since arrays are used up as fast as they are made
 for _name, _value in {"OPENBLAS_NUM_THREADS": "1", "NUMPY_MADVISE_HUGEPAGE": "0"}.items():
     os.environ.setdefault(_name, _value)
 
