@@ -49,7 +49,8 @@ def use_threads(count: int) -> None:
         raise SepiError(f"threads: expected a whole number from 1 on, got {count}")
     count = min(int(count), available_cores())
     kernels.set_thread_count(count)
-    # OpenCV reads it when it is loaded
-    os.environ["OPENCV_FOR_THREADS_NUM"] = str(count)
     if "cv2" in sys.modules:
         sys.modules["cv2"].setNumThreads(count)
+    else:
+        # read when it is loaded
+        os.environ["OPENCV_FOR_THREADS_NUM"] = str(count)

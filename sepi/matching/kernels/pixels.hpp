@@ -5,9 +5,9 @@
 
 namespace sepi {
 
-// Each channel of a row (W, C) by itself into out (C, W or more), as what scale makes of numbers and of vectors.
-template <class Colour, class Scale>
-void split_channels(Array<const Colour, 2> row, Array<float, 2> out, Scale scale) {
+// Each channel of a row (W, C) by itself into out (C, W or more), as what scale makes of numbers and of vectors of float.
+template <class Colour, class Scale, class Number = float>
+void split_channels(Array<const Colour, 2> row, Array<Number, 2> out, Scale scale) {
     const Index W = row.shape[0], C = row.shape[1];
     Index x = 0;
     if (C == 3 && row.strides[0] == 3 && row.strides[1] == 1) {

@@ -1,9 +1,9 @@
 #include "semi_global.hpp"
 
-#include <bit>
 #include <cmath>
 #include <utility>
 
+#include "kernels/exponential.hpp"
 #include "kernels/lanes.hpp"
 #include "kernels/parallel.hpp"
 #include "kernels/sampling.hpp"
@@ -12,18 +12,6 @@ namespace sepi {
 namespace {
 
 constexpr float UNREACHABLE = 1e9f;
-
-// exp(x) of a number up to 0, rounded to single precision; 0 below -87.
-inline float exp_of_negative(double x) {
-    const double n = std::floor(x * 1.4426950408889634 + 0.5);
-    const double f = (x - n * 0.693145751953125) - n * 1.42860682030941723212e-6;
-    double p = 1 + f * (1.0 / 8) * (1 + f * (1.0 / 9) * (1 + f * (1.0 / 10)));
-    p = 1 + f * (1.0 / 5) * (1 + f * (1.0 / 6) * (1 + f * (1.0 / 7) * p));
-    p = 1 + f * (1 + f * (1.0 / 2) * (1 + f * (1.0 / 3) * (1 + f * (1.0 / 4) * p)));
-    // 2^n by its bits
-    const float power = std::bit_cast<float>((std::int32_t(std::max(n, -126.0)) + 127) << 23);
-    return x > -87 ? float(p * double(power)) : 0.0f;
-}
 
 // Weights of the windows of row y, of sum 1, into weights ((2 radius + 1)^2, W or more); zero outside the picture.
 // guide (3, H, W); total (W) is scratch.

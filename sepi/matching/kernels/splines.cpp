@@ -7,6 +7,7 @@
 #include "kernels/lanes.hpp"
 #include "kernels/parallel.hpp"
 #include "kernels/sampling.hpp"
+#include "pixels.hpp"
 
 namespace sepi {
 namespace {
@@ -57,22 +58,6 @@ void coefficient_row(const float *rows, Index stride, Index W, float *padded, fl
     weighted<REACH>(padded, 1, out, W + 2 * SPLINE_MARGIN);
 }
 
-// A row of a view, its pixels so many numbers apart and their channels so many, times a unit, into each channel's line.
-template <class Colour>
-void load_colours(const Colour *pixels, Index step, Index next, Index W, float unit, std::array<float *, 3> lines) {
-    Index x = 0;
-    if (step == 3 && next == 1) {
-        for (; x <= W - LANES; x += LANES) {
-            const auto [red, green, blue] = load_interleaved(pixels + 3 * x);
-            store(lines[0] + x, red * unit);
-            store(lines[1] + x, green * unit);
-            store(lines[2] + x, blue * unit);
-        }
-    }
-    for (; x < W; ++x)
-        for (Index c = 0; c < 3; ++c) lines[c][x] = float(pixels[step * x + next * c]) * unit;
-}
-
 // The four channels of pixels, rounded, side by side. Lines have LANES numbers behind them.
 void store_interleaved(Array<const float, 2> lines, Index number, std::int16_t *out) {
     for (Index x = 0; x < number; x += LANES) {
@@ -118,8 +103,7 @@ void view_splines(Strided<const Colour, 5> colours, float colour_unit, Array<con
         const Array<float, 3> rows = scratch.array();
         for (Index i = 0; i < last - first + 2 * SPLINE_REACH; ++i) {
             const Index y = mirrored(low - SPLINE_MARGIN + first + i - SPLINE_REACH, H);
-            if (begin == 0)
-                load_colours(colours.at(t, s, y), colours.strides[3], colours.strides[4], W, colour_unit, {rows.at(0, i), rows.at(1, i), rows.at(2, i)});
+            if (begin == 0) split_channels(colours[t][s][y], {rows.at(0, i), {3, W}, {rows.strides[0], 1}}, [=](auto colour) { return colour * colour_unit; });
             if (end == 4)
                 for (Index x = 0; x < W; ++x) rows(3, i, x) = float(detail(t, s, y - detail_low, x)) * detail_unit;
         }

@@ -4,6 +4,7 @@
 
 #include "kernels/lanes.hpp"
 #include "kernels/parallel.hpp"
+#include "pixels.hpp"
 #include "sample_polynomials.hpp"
 
 namespace sepi {
@@ -116,28 +117,11 @@ class VisibleRow {
         for (Index x = 0; x < number; ++x) out[x] = std::int32_t((std::uint32_t(values[x]) & 0xFFFFu) | (std::uint32_t(values[x + 1]) << 16));
     }
 
-    // Row of a view as whole numbers, each channel by itself.
-    void load_colours(Index t, Index s, Index row, float scale) {
-        const Index step = views_.colours.strides[3], next = views_.colours.strides[4];
-        const Colour *pixels = views_.colours.at(t, s, row);
-        const auto channels = channels_.array();
-        Index x = 0;
-        if (step == 3 && next == 1) {
-            for (; x <= W_ - LANES; x += LANES) {
-                const auto [red, green, blue] = load_interleaved(pixels + 3 * x);
-                store(channels.at(0, x), rounded(red * spread(scale)));
-                store(channels.at(1, x), rounded(green * spread(scale)));
-                store(channels.at(2, x), rounded(blue * spread(scale)));
-            }
-        }
-        for (; x < W_; ++x)
-            for (Index c = 0; c < 3; ++c) channels(c, x) = std::int32_t(std::nearbyint(float(pixels[step * x + next * c]) * scale));
-    }
-
     // Rows begin..end of a view, colours and detail, as pairs of neighbours.
     void load_view(Index t, Index s, Index begin, Index end) {
         for (Index row = begin; row < end; ++row) {
-            load_colours(t, s, row, views_.colour_unit * COLOUR_STEPS);
+            const float scale = views_.colour_unit * COLOUR_STEPS;
+            split_channels(views_.colours[t][s][row], channels_.array(), [=](auto colour) { return rounded(colour * scale); });
             for (Index c = 0; c < 3; ++c) pair(channels_.array().at(c), W_, pairs_.array().at(row - begin, c));
             if (views_.detail.shape[2] > 0) {
                 const std::int16_t *detail = views_.detail.at(t, s, row - views_.low);
