@@ -15,7 +15,7 @@ pytestmark = pytest.mark.system
 COMMAND = [sys.executable, "-c", "import sys; from sepi.cli.main import main; sys.exit(main())", "depth"]
 
 
-@pytest.mark.parametrize("limit", [800, 1000, *(pytest.param(n, marks=pytest.mark.faults) for n in (700, 900, 1100))])
+@pytest.mark.parametrize("limit", [500, 800, *(pytest.param(n, marks=pytest.mark.faults) for n in (400, 600, 700))])
 @pytest.mark.real
 @pytest.mark.skipif(sys.platform != "linux", reason="needs a limit on the address space that is kept")
 def test_too_little_memory_is_one_line(hci: Path, tmp_path: Path, limit: int) -> None:
