@@ -26,7 +26,7 @@ READY := .venv/ready
 
 LINTS := lint-style lint-types lint-imports lint-rules lint-project
 
-.PHONY: all check long-tests test test-system sanitize wheels faults fuzz coverage lint $(LINTS) actionlint docs docs-links demo bench dist release oldest clean
+.PHONY: all kernels check long-tests test test-system sanitize wheels faults fuzz coverage lint $(LINTS) actionlint docs docs-links demo bench dist release oldest clean
 .DEFAULT_GOAL := all
 
 all: $(READY)
@@ -197,7 +197,7 @@ clean:
 	rm -rf docs/_made docs/examples docs/reference/api docs/reference/api.md
 	rm -rf results logs benchmarks build dist *.egg-info .snakemake .pytest_cache .mypy_cache .ruff_cache .hypothesis
 
-# pinned versions, then the package itself in place and its kernels built; again only when one of these files changes
+# pinned versions; again only when one of these files changes
 .venv/installed: requirements.lock pyproject.toml
 	@test -n "$(PYTHON)" || { echo "make: Python 3.11 or newer is needed (as python3 or python3.11)" >&2; exit 1; }
 	@$(PYTHON) -c 'import venv, ensurepip' 2>/dev/null || { \
@@ -206,14 +206,18 @@ clean:
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile --requirement requirements.lock
 	@# what pip would do on one core; files that no Python can compile are none that anybody imports
 	-$(BIN)/python -m compileall -qq -j 0 .venv/lib
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
-	touch $@ $(READY)
+	rm -f .venv/placed
+	touch $@
 
-# kernels that were edited are built again where pip put them
+# then the package itself in place, and its kernels built; those that were edited are built again where pip put them
 BUILD = PATH="$(CURDIR)/$(BIN):$$PATH" cmake
 $(READY): .venv/installed CMakeLists.txt $(wildcard sepi/kernels/*.?pp sepi/*/kernels/*.?pp)
+	[ -f .venv/placed ] || $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
+	[ ! -f .venv/placed ] || $(MAKE) --no-print-directory kernels
+	touch .venv/placed $@
+
+kernels:
 	mkdir -p build
 	$(BUILD) -G Ninja -S . -B build/kernels -DCMAKE_BUILD_TYPE=Release -DPython_EXECUTABLE="$(CURDIR)/$(BIN)/python" >build/kernels.log
 	$(BUILD) --build build/kernels >>build/kernels.log || { cat build/kernels.log; exit 1; }
 	$(BUILD) --install build/kernels --prefix . >>build/kernels.log
-	touch $@

@@ -36,8 +36,8 @@ def _handlers() -> dict[int, object]:
 def no_interrupt_lost() -> Iterator[None]:
     """Let signals that raise an exception do so at the end of the block; a second one does at once.
 
-    For libraries that call Python from C, as h5py does when it lets go of an object or writes to a file of Python's: what
-    is raised there is reported and forgotten, and the program goes on as if nobody had pressed Ctrl-C.
+    For libraries that call Python from C, as h5py does when it lets go of an object or writes to a file of Python's:
+    what is raised there is reported and forgotten, and the program goes on as if nobody had pressed Ctrl-C.
     """
     came: list[int] = []
     # what is no function raises nothing
