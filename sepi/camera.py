@@ -6,7 +6,8 @@ zero. With the focal length ``f`` in pixels, a point at depth ``Z`` has the disp
     Z = b f / (d + b f / F).
 
 This is the formula of the HCI 4D light field benchmark [1]_, whose ``beta`` is ``b f F``; it gives the focal length and
-the sensor size in millimetres, the size being that of the longer side of the picture.
+the sensor size in millimetres, the size being that of the longer side of the picture that the sensor took: views that
+were cut out of it have its focal length, and a principal point aside.
 
 Disparities are in pixels per view step, so ``b`` is the distance from one column of cameras to the next, whatever that
 of rows; where there is one column only, that from one row to the next.
@@ -19,16 +20,25 @@ References
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import astuple, dataclass
 from numbers import Real
 
 import numpy as np
 import numpy.typing as npt
 
-from sepi.errors import SepiError
+from sepi.errors import SepiError, SepiWarning
 from sepi.validation import described, is_finite, whole_pair
 
 Map = npt.NDArray[np.float32]
+Flags = npt.NDArray[np.bool_]
+
+# part of a map beyond infinity that is told; by how many standard deviations, or where these are not known by how many
+# pixels per view step, a pixel must lie there
+_BEYOND, _SIGMAS, _UNSURE = 0.05, 3.0, 0.2
+
+Part = tuple[int, int, int, int]
+"""Width and height of a whole picture, and column and row in it of a part's first pixel."""
 
 
 @dataclass(frozen=True)
@@ -139,6 +149,7 @@ def camera_from(
     focus_distance_m: float,
     sensor_size_mm: float,
     shape: tuple[int, int],
+    crop_of: Part | None = None,
 ) -> Camera:
     """Camera from the numbers of the HCI 4D benchmark's ``parameters.cfg``.
 
@@ -151,9 +162,12 @@ def camera_from(
     focus_distance_m : float
         Depth at which the disparity is zero, in metres; infinite for cameras that look straight ahead.
     sensor_size_mm : float
-        Width or height of the sensor, whichever is longer, in millimetres.
+        Width or height of the sensor that took the whole picture, whichever is longer, in millimetres.
     shape : (int, int)
         Height and width of a view in pixels.
+    crop_of : (int, int, int, int), optional
+        Where the views are parts of what the sensor took: its width and height, and the column and row in it of their
+        first pixel.
 
     Returns
     -------
@@ -162,7 +176,7 @@ def camera_from(
     Raises
     ------
     SepiError
-        If a number is not positive.
+        If a number is not positive, or the whole picture has no such part.
 
     Examples
     --------
@@ -188,9 +202,49 @@ def camera_from(
             f"camera: expected positive numbers, got focal length {focal_length} mm, baseline {baseline} mm, "
             f"focus distance {distance} m, sensor size {size} mm"
         )
-    focal_px = focal_length_mm / sensor_size_mm * max(whole_pair("camera: shape", shape, "height and width of a view"))
+    height, width = whole_pair("camera: shape", shape, "height and width of a view")
+    part = crop_of or (width, height, 0, 0)
+    require_part(part, (height, width))
+    focal_px = focal_length_mm / sensor_size_mm * max(part[:2])
     scale = baseline_mm / 1000 * focal_px
-    return Camera(scale, scale / focus_distance_m, focal_px)
+    right, down = (part[0] - width) / 2 - part[2], (part[1] - height) / 2 - part[3]
+    return Camera(scale, scale / focus_distance_m, focal_px, right, down)
+
+
+def require_part(part: Part, shape: tuple[int, ...]) -> None:
+    """Raise unless a whole picture has a part of this height and width."""
+    (width, height, x, y), (rows, columns) = part, shape
+    if min(x, y) < 0 or x + columns > width or y + rows > height:
+        raise SepiError(
+            f"{columns}x{rows} pixels (width x height) from column {x}, row {y} on do not lie inside {width}x{height}"
+        )
+
+
+def warn_of_infinity(where: object, camera: Camera, disparity: Map, sigma: Map | None, unknown: Flags) -> None:
+    """Warn of a camera by which much of a map lies beyond infinity, more than the map's error explains.
+
+    Parameters
+    ----------
+    where : object
+        For the message.
+    camera : Camera
+    disparity : ndarray, shape (H, W), float32
+        Pixels per view step.
+    sigma : ndarray, shape (H, W), float32, or None
+        Its standard deviation, where that is known.
+    unknown : ndarray, shape (H, W), bool
+        Pixels that have no say.
+    """
+    farthest = disparity + (_UNSURE if sigma is None else _SIGMAS * sigma)
+    share = float(np.mean(farthest[~unknown] < -camera.offset)) if not unknown.all() else 0.0
+    if share > _BEYOND:
+        warnings.warn(
+            f"{where}: {100 * share:.0f} % of the pixels lie beyond infinity, where disparity is below "
+            f"{0.0 - camera.offset:.3g} by the camera: look at --baseline (millimetres), --focus-distance (metres; inf only "
+            "if no disparity is below 0), and whether near and far are exchanged (sepi check)",
+            SepiWarning,
+            stacklevel=3,
+        )
 
 
 def numbers_of(camera: Camera) -> tuple[float, ...]:

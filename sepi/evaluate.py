@@ -21,11 +21,7 @@ from sepi.lightfield import FloatMap, LightField, require_light_field
 from sepi.matching.unknown import with_unknown
 from sepi.scoring.edges import Edges, edges_of
 from sepi.scoring.error_bars import ErrorBars, reliability
-from sepi.scoring.scores import (
-    DISCONTINUITIES,
-    region_masks,
-    score_regions,
-)
+from sepi.scoring.scores import DISCONTINUITIES, region_masks, score_regions
 from sepi.stage import ERROR_BARS, StageMaps
 from sepi.validation import require_map, require_type
 

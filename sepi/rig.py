@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from sepi.camera import require_part
 from sepi.errors import SepiError
 
 Floats = npt.NDArray[np.float64]
@@ -93,6 +94,65 @@ class Lens:
                 f"lens: a {self.kind} has at most {MOST_COEFFICIENTS[self.kind]} coefficients of distortion, got "
                 f"{len(self.distortion)}"
             )
+
+    def scaled(self, width: int, height: int) -> Lens:
+        """The lens in its picture scaled to another size.
+
+        Parameters
+        ----------
+        width, height : int
+            Pixels; each side may be rounded by one.
+
+        Returns
+        -------
+        Lens
+
+        Raises
+        ------
+        SepiError
+            If one side is scaled otherwise than the other.
+
+        Examples
+        --------
+        >>> from sepi.rig import Lens
+        >>> half = Lens(640, 480, (500.0, 500.0), (319.5, 239.5)).scaled(320, 240)
+        >>> half.focal, half.principal
+        ((250.0, 250.0), (159.5, 119.5))
+        """
+        x, y = width / self.width, height / self.height
+        # whichever of the two pictures is smaller was rounded
+        if abs(x - y) >= max(1, x) / self.width + max(1, y) / self.height:
+            raise SepiError(
+                f"the picture is {width}x{height}, but its camera has {self.width}x{self.height}; expected pictures as "
+                "they were calibrated, or scaled alike both ways; where they were cut out of those, --crop-of "
+                f"{self.width}x{self.height}+X+Y tells where"
+            )
+        (fx, fy), (cx, cy) = self.focal, self.principal
+        principal = (cx + 0.5) * x - 0.5, (cy + 0.5) * y - 0.5
+        return replace(self, width=width, height=height, focal=(fx * x, fy * y), principal=principal)
+
+    def cropped(self, x: int, y: int, width: int, height: int) -> Lens:
+        """The lens in a part of its picture.
+
+        Parameters
+        ----------
+        x, y : int
+            Column and row of the part's first pixel.
+        width, height : int
+            Pixels of the part.
+
+        Returns
+        -------
+        Lens
+
+        Raises
+        ------
+        SepiError
+            If the picture has no such part.
+        """
+        require_part((self.width, self.height, x, y), (height, width))
+        principal = self.principal[0] - x, self.principal[1] - y
+        return replace(self, width=width, height=height, principal=principal)
 
     @property
     def matrix(self) -> Floats:

@@ -13,7 +13,7 @@ from sepi.cameras.model import CameraModel
 from sepi.cameras.pictures import Pictures, mask_of
 from sepi.errors import SepiError
 from sepi.io.files import reading
-from sepi.rig import FISHEYE, PINHOLE, Lens, Shot
+from sepi.rig import FISHEYE, PINHOLE, Shot
 
 # model to lens, and the places of its parameters: fx, fy, cx, cy, then OpenCV's coefficients; -1: zero
 _MODELS: dict[str, tuple[str, tuple[int, int, int, int], tuple[int, ...]]] = {
@@ -50,9 +50,12 @@ def read_colmap(folder: Path, pictures: Pictures) -> CameraModel:
             raise SepiError(f"not a COLMAP model, or damaged ({str(error).splitlines()[0][:120]})") from error
     if not images:
         raise SepiError(f"{folder}: a COLMAP model without pictures")
-    shots = tuple(_shot(folder, image, model.cameras[image.camera_id]) for image in images)
     points = np.array([point.xyz for point in model.points3D.values()], np.float64).reshape(-1, 3)
     files = tuple(pictures.find(image.name) for image in images)
+    shots = tuple(
+        _shot(folder, pictures, file, image, model.cameras[image.camera_id])
+        for file, image in zip(files, images, strict=True)
+    )
     masks = tuple(mask_of(file, image.name) for file, image in zip(files, images, strict=True))
     return CameraModel(folder, shots, files, points, masks=masks)
 
@@ -75,7 +78,7 @@ def require_pycolmap(where: str) -> Any:
     return pycolmap
 
 
-def _shot(folder: Path, image: Any, camera: Any) -> Shot:
+def _shot(folder: Path, pictures: Pictures, file: Path, image: Any, camera: Any) -> Shot:
     word = camera.model.name
     if word not in _MODELS:
         raise SepiError(f"{folder}: {image.name}: camera model {word}; expected one of {', '.join(_MODELS)}")
@@ -83,17 +86,8 @@ def _shot(folder: Path, image: Any, camera: Any) -> Shot:
     values = [float(value) for value in camera.params]
     # from the corner of the picture to the middle of its first pixel
     principal = values[cx] - 0.5, values[cy] - 0.5
-    try:
-        lens = Lens(
-            int(camera.width),
-            int(camera.height),
-            (values[fx], values[fy]),
-            principal,
-            kind,
-            tuple(values[place] for place in places),
-        )
-    except SepiError as error:
-        raise SepiError(f"{folder}: {image.name}: {error}") from error
+    distortion, size = tuple(values[place] for place in places), (camera.width, camera.height)
+    lens = pictures.lens(image.name, file, size, (values[fx], values[fy]), principal, kind, distortion)
     pose = image.cam_from_world()
     rotation = np.array(pose.rotation.matrix(), np.float64)
     return Shot(image.name, lens, rotation, -rotation.T @ np.array(pose.translation, np.float64))

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from sepi.camera import Part
     from sepi.cameras.model import CameraModel
 
 TABLES = ("cameras.csv", "cameras.yaml", "cameras.yml")
 """Names of tables in a folder."""
 
-TRANSFORMS = "transforms.json"
+TRANSFORMS = ("transforms.json", "transforms_train.json")
+"""Names of files of nerfstudio and NeRF in a folder: the first that is there has the cameras."""
 
 TABLE_SUFFIXES = tuple(Path(name).suffix for name in TABLES)
 
@@ -26,7 +29,7 @@ def cameras_in(path: Path) -> Path | None:
     """The file or folder that says of cameras at ``path``; None where there is none. Quick, and never raises."""
     try:
         if path.is_dir():
-            for name in (*TABLES, TRANSFORMS):
+            for name in (*TABLES, *TRANSFORMS):
                 if (path / name).is_file():
                     return path / name
             return model_in(path)
@@ -52,7 +55,7 @@ def described_by(found: Path) -> tuple[Path, ...]:
     return tuple(sorted(path for path in found.iterdir() if path.stem in MODEL_FILES)) if found.is_dir() else (found,)
 
 
-def read_model(path: Path, images: str | None = None) -> CameraModel:
+def read_model(path: Path, images: str | None = None, crop_of: Part | None = None) -> CameraModel:
     """Read calibrated cameras of any known format.
 
     Parameters
@@ -61,6 +64,8 @@ def read_model(path: Path, images: str | None = None) -> CameraModel:
         File or folder.
     images : str, optional
         Folder of the pictures.
+    crop_of : (int, int, int, int), optional
+        What the pictures are parts of, as :func:`sepi.camera.camera_from` takes it.
 
     Raises
     ------
@@ -75,17 +80,13 @@ def read_model(path: Path, images: str | None = None) -> CameraModel:
     if found is None:
         raise SepiError(
             f"{path}: no calibrated cameras; expected a COLMAP model (cameras, images and points3D, .txt or .bin), "
-            f"{TRANSFORMS}, or a table {', '.join(TABLES)}"
+            f"{TRANSFORMS[0]}, or a table {', '.join(TABLES)}"
         )
-    pictures = Pictures(found, None if images is None else Path(images).expanduser())
+    pictures = Pictures(found, None if images is None else Path(images).expanduser(), crop_of)
     if found.is_dir():
-        from sepi.cameras.colmap_model import read_colmap
-
-        return read_colmap(found, pictures)
-    if found.suffix.lower() == ".json":
-        from sepi.cameras.transforms import read_transforms
-
-        return read_transforms(found, pictures)
-    from sepi.cameras.table import read_table
-
-    return read_table(found, pictures)
+        from sepi.cameras.colmap_model import read_colmap as read
+    elif found.suffix.lower() == ".json":
+        from sepi.cameras.transforms import read_transforms as read
+    else:
+        from sepi.cameras.table import read_table as read
+    return replace(read(found, pictures), notes=pictures.notes)

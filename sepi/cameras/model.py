@@ -38,6 +38,8 @@ class CameraModel:
         What the world's lengths are.
     masks : tuple of Path or None
         Pictures that are black where those are not to be used, None for all of a picture; empty: there is none.
+    notes : tuple of str
+        What was assumed.
     """
 
     path: Path
@@ -46,6 +48,7 @@ class CameraModel:
     points: Floats
     units: str = UNITS_OF_MODEL
     masks: tuple[Path | None, ...] = ()
+    notes: tuple[str, ...] = ()
 
     @property
     def files(self) -> tuple[Path, ...]:

@@ -1,4 +1,4 @@
-"""Where the pictures of calibrated cameras are."""
+"""Where the pictures of calibrated cameras are, and what their lenses are in pictures of another size."""
 
 from __future__ import annotations
 
@@ -6,13 +6,22 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
+
+from sepi.camera import Part
 from sepi.errors import SepiError
+from sepi.io.files import naming
+from sepi.io.images import picture_header
+from sepi.rig import Lens
 
 # where COLMAP says it, and names of folders that it and others use
 PROJECT = "project.ini"
 """File of COLMAP that says where the pictures are."""
 
 _FOLDERS = ("images", ".")
+# how much larger or smaller, and how differently down and across, the picture is whose middle is the principal point,
+# where that cannot be the picture at hand
+_OTHER, _ALIKE = 1.4, 1.1
 
 
 class Pictures:
@@ -25,31 +34,95 @@ class Pictures:
     given : Path or None
         The folder that the user names; else it is the one that COLMAP's ``project.ini`` names, or ``images`` beside the
         model or above it, or the model's own.
+    crop_of : (int, int, int, int), optional
+        As :func:`sepi.camera.camera_from` takes it.
     """
 
-    def __init__(self, model: Path, given: Path | None) -> None:
-        self._model = model
+    def __init__(self, model: Path, given: Path | None, crop_of: Part | None = None) -> None:
+        self._model, self._crop = model, crop_of
+        self._scaled = ""
+        self._middles: list[list[float]] = []
         home = model if model.is_dir() else model.parent
         if given is not None and not given.is_dir():
             raise SepiError(f"{given}: no folder of pictures")
         self._places = [given] if given is not None else list(_around(home))
 
-    def find(self, name: str) -> Path:
-        """The file of a picture.
+    def find(self, *names: str) -> Path:
+        """The file of a picture, by the first of its names that leads to one.
 
         Raises
         ------
         SepiError
             If there is none.
         """
-        inside = Path(name.replace("\\", "/"))
-        if inside.is_absolute() or ".." in inside.parts or not name.isprintable():
-            raise SepiError(f"{self._model}: picture '{inside}': expected a path within the folder of pictures")
-        for place in self._places:
-            if (place / inside).is_file():
-                return place / inside
+        for inside in (Path(name.replace("\\", "/")) for name in names):
+            if inside.is_absolute() or ".." in inside.parts or not str(inside).isprintable():
+                raise SepiError(f"{self._model}: picture '{inside}': expected a path within the folder of pictures")
+            for place in self._places:
+                if (place / inside).is_file():
+                    return place / inside
         where = " nor ".join(map(str, self._places[:3]))
-        raise SepiError(f"{self._model}: no picture '{name}' in {where}; --images names the folder of the pictures")
+        raise SepiError(f"{self._model}: no picture '{names[0]}' in {where}; --images names the folder of the pictures")
+
+    def size(self, file: Path) -> tuple[int, int]:
+        """Width and height of a picture, or of that which it is a part of."""
+        header = picture_header(file)
+        return (header.width, header.height) if self._crop is None else self._crop[:2]
+
+    def lens(
+        self,
+        name: str,
+        file: Path,
+        size: tuple[float, float] | None,
+        focal: tuple[float, float],
+        principal: tuple[float, float] | None,
+        kind: str,
+        distortion: tuple[float, ...],
+    ) -> Lens:
+        """The lens of a picture as it lies here, which may be a scaled one, or a part, of that which was calibrated.
+
+        Parameters
+        ----------
+        name : str
+            What the model calls the picture.
+        file : Path
+        size : (float, float) or None
+            Width and height of the picture that was calibrated; those of the picture at hand where nothing says.
+        focal, principal, kind, distortion
+            As :class:`sepi.rig.Lens` has them, in that picture; the principal point is its middle unless given.
+
+        Raises
+        ------
+        SepiError
+            If they are of no lens, or the picture has other sides.
+        """
+        header, whole = picture_header(file), self.size(file)
+        width, height = map(int, size or whole)
+        with naming(f"{self._model}: {name}"):
+            lens = Lens(width, height, focal, principal or ((width - 1) / 2, (height - 1) / 2), kind, distortion)
+            if size is None:
+                self._middles.append([(2 * at + 1) / side for at, side in zip(lens.principal, whole, strict=True)])
+            elif (width, height) != whole:
+                self._scaled = f"lenses of {width}x{height} pixels scaled to pictures of {whole[0]}x{whole[1]}"
+            lens = lens.scaled(*whole)
+            return lens if self._crop is None else lens.cropped(*self._crop[2:], header.width, header.height)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was assumed of the lenses.
+
+        Raises
+        ------
+        SepiError
+            If they cannot be those of the pictures.
+        """
+        low, high = sorted(np.mean(self._middles or [(1.0, 1.0)], axis=0))
+        if 0 < low <= high < _ALIKE * low and not 1 / _OTHER < low < _OTHER:
+            raise SepiError(
+                f"{self._model}: the principal points are those of pictures {low:.2g} times as large; expected the "
+                "size of the pictures that were calibrated, w and h, or --crop-of where these are parts of them"
+            )
+        return (f"{self._scaled}; where they are cut, not scaled, --crop-of says so",) if self._scaled else ()
 
 
 def mask_of(picture: Path, name: str) -> Path | None:

@@ -65,7 +65,7 @@ def rectification_of(
         If the cameras make no light field.
     """
     model.require_sound()
-    notes: list[str] = []
+    notes = list(model.notes)
     while True:
         chosen = None if reference is None else _numbered(model, reference)
         plane = plane_through(model, chosen)

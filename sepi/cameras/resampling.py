@@ -61,13 +61,7 @@ def completed(view: FloatMap, missing: BoolMap) -> FloatMap:
 
 
 def _picture(seeing: Seeing, view: int) -> FloatMap:
-    path, lens = seeing.model.pictures[view], seeing.model.shots[view].lens
-    picture = read_picture(path)
-    if picture.shape[:2] != (lens.height, lens.width):
-        raise SepiError(
-            f"{path}: {picture.shape[1]}x{picture.shape[0]} pixels, but its camera has {lens.width}x{lens.height}; "
-            "expected the pictures that were calibrated, neither scaled nor turned"
-        )
+    picture = read_picture(seeing.model.pictures[view])
     return as_unit_float(picture if picture.ndim == 3 else picture[..., None])
 
 

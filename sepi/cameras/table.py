@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Mapping
+from math import prod
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -21,21 +22,21 @@ from sepi.cameras.model import UNITS_OF_MODEL, CameraModel
 from sepi.cameras.pictures import Pictures
 from sepi.errors import SepiError, one_line
 from sepi.io.files import reading
-from sepi.io.images import picture_header
-from sepi.models import CheckedModel, validated
-from sepi.rig import FISHEYE, METRES, MOST_COEFFICIENTS, PINHOLE, Floats, Lens, Shot
+from sepi.models import AS_PAIR, CheckedModel, validated
+from sepi.rig import FISHEYE, METRES, MOST_COEFFICIENTS, PINHOLE, Floats, Shot
 
 # a table is short; what is longer is something else
 _MOST_BYTES = 16 * 2**20
 # what a matrix may be from a rotation, and a quaternion's length from 1: what was typed with a few digits
 _NEARLY = 1e-2
 
-_Number = Annotated[float, Field(allow_inf_nan=False)]
-_Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+# numbers may be text: YAML takes 1e-4 for that
+_Number = Annotated[float, Field(allow_inf_nan=False, strict=False)]
+_Positive = Annotated[float, Field(gt=0, allow_inf_nan=False, strict=False)]
 _PLACE = ("x", "y", "z")
 _ROTATION = ("qw", "qx", "qy", "qz")
 _DISTORTION = {PINHOLE: ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"), FISHEYE: ("k1", "k2", "k3", "k4")}
-_COLUMNS = ("file", *_PLACE, *_ROTATION, "fx", "fy", "cx", "cy", "lens", *_DISTORTION[PINHOLE])
+_COLUMNS = ("file", *_PLACE, *_ROTATION, "fx", "fy", "cx", "cy", "w", "h", "lens", *_DISTORTION[PINHOLE])
 
 
 class _Camera(CheckedModel):
@@ -44,12 +45,14 @@ class _Camera(CheckedModel):
     rotation: list[_Number] | list[list[_Number]] = Field([1.0, 0.0, 0.0, 0.0])
     focal: _Positive | tuple[_Positive, _Positive]
     principal: tuple[_Number, _Number] | None = None
+    size: tuple[_Positive, _Positive] | None = None
     lens: Literal["pinhole", "fisheye"] = "pinhole"
     distortion: list[_Number] = Field([], max_length=MOST_COEFFICIENTS[PINHOLE])
 
 
 class _Table(CheckedModel):
     units: Literal["metres", "unknown"] = "unknown"
+    grid: Annotated[tuple[int, int] | None, AS_PAIR] = None
     shared: dict[str, Any] = Field({})
     cameras: list[dict[str, Any]] = Field(min_length=1)
 
@@ -69,6 +72,8 @@ def read_table(path: Path, pictures: Pictures) -> CameraModel:
     entries = _rows(path, text) if path.suffix.lower() == ".csv" else None
     if entries is None:
         table = validated(_Table, _loaded(path, text), str(path))
+        if table.grid is not None and prod(table.grid) != len(table.cameras):
+            raise SepiError(f"{path}: a grid of {prod(table.grid)} cameras, but {len(table.cameras)} are listed")
         entries, metres = [{**table.shared, **entry} for entry in table.cameras], table.units == "metres"
     else:
         metres = False
@@ -91,7 +96,10 @@ def _loaded(path: Path, text: str) -> Any:
 
 
 def _rows(path: Path, text: str) -> list[dict[str, Any]]:
-    rows = csv.DictReader(text.splitlines(), skipinitialspace=True)
+    lines = text.splitlines()
+    # as spreadsheets of countries write it whose numbers have commas
+    separator = next((mark for mark in ";\t" if lines and mark in lines[0]), ",")
+    rows = csv.DictReader(lines, delimiter=separator, skipinitialspace=True)
     try:
         named = list(rows)
         columns = [name.strip() for name in rows.fieldnames or ()]
@@ -104,38 +112,31 @@ def _rows(path: Path, text: str) -> list[dict[str, Any]]:
     for name in columns:
         if name not in _COLUMNS:
             raise SepiError(f"{path}: column '{name}' is unknown; expected {', '.join(_COLUMNS)}")
-    return [_entry(path, n, {(k or "").strip(): v for k, v in row.items()}) for n, row in enumerate(named, 1)]
+    return [_entry({(key or "").strip(): value for key, value in row.items()}) for row in named]
 
 
-def _entry(path: Path, line: int, row: Mapping[str, Any]) -> dict[str, Any]:
-    def numbers(names: tuple[str, ...]) -> list[float]:
-        told = [row.get(name) for name in names]
-        try:
-            return [float(value or 0) for value in told]
-        except (TypeError, ValueError) as error:
-            raise SepiError(f"{path}: camera {line}: expected numbers in {' '.join(names)}, got {told}") from error
+def _entry(row: Mapping[str, Any]) -> dict[str, Any]:
+    def numbers(*names: str, least: int = 1) -> list[str] | None:
+        told = [str(row.get(name) or "").strip().replace(",", ".") for name in names]
+        return [value or "0" for value in told] if sum(map(bool, told)) >= least else None
 
     lens = (row.get("lens") or PINHOLE).strip()
-    entry: dict[str, Any] = {"file": (row["file"] or "").strip(), "position": tuple(numbers(_PLACE)), "lens": lens}
-    (fx,), (fy,) = numbers(("fx",)), numbers(("fy",))
-    entry["focal"] = (fx, fy or fx)
-    if row.get("cx") and row.get("cy"):
-        entry["principal"] = tuple(numbers(("cx", "cy")))
-    if any(row.get(name) for name in _ROTATION):
-        entry["rotation"] = numbers(_ROTATION)
-    entry["distortion"] = numbers(_DISTORTION.get(lens, _DISTORTION[PINHOLE]))
-    return entry
+    entry = {
+        "file": (row["file"] or "").strip(),
+        "position": numbers(*_PLACE, least=0),
+        "rotation": numbers(*_ROTATION),
+        "focal": numbers("fx", "fy" if (row.get("fy") or "").strip() else "fx", least=0),
+        "principal": numbers("cx", "cy", least=2),
+        "size": numbers("w", "h", least=2),
+        "lens": lens,
+        "distortion": numbers(*_DISTORTION.get(lens, _DISTORTION[PINHOLE]), least=0),
+    }
+    return {key: value for key, value in entry.items() if value is not None}
 
 
 def _shot(path: Path, camera: _Camera, pictures: Pictures, file: Path) -> Shot:
-    header = picture_header(file)
-    height, width = header.height, header.width
     focal = camera.focal if isinstance(camera.focal, tuple) else (camera.focal, camera.focal)
-    principal = camera.principal or ((width - 1) / 2, (height - 1) / 2)
-    try:
-        lens = Lens(width, height, focal, principal, camera.lens, tuple(camera.distortion))
-    except SepiError as error:
-        raise SepiError(f"{path}: {camera.file}: {error}") from error
+    lens = pictures.lens(camera.file, file, camera.size, focal, camera.principal, camera.lens, tuple(camera.distortion))
     return Shot(camera.file, lens, rotation_of(path, camera.file, camera.rotation), np.array(camera.position))
 
 

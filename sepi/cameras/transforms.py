@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -19,8 +20,7 @@ from sepi.cameras.pictures import Pictures
 from sepi.cameras.table import rotation_of
 from sepi.errors import SepiError
 from sepi.io.files import reading
-from sepi.io.images import picture_header
-from sepi.rig import FISHEYE, METRES, PINHOLE, Lens, Shot
+from sepi.rig import FISHEYE, METRES, PINHOLE, Shot
 
 _MOST_BYTES = 256 * 2**20
 _MODELS = {"OPENCV": PINHOLE, "PINHOLE": PINHOLE, "SIMPLE_PINHOLE": PINHOLE, "OPENCV_FISHEYE": FISHEYE}
@@ -65,21 +65,11 @@ def read_transforms(path: Path, pictures: Pictures) -> CameraModel:
 
 
 def _found(pictures: Pictures, name: str) -> Path:
-    try:
-        return pictures.find(name)
-    except SepiError:
-        # the folder of pictures itself may be given
-        for other in (Path(name).name, f"{name}.png"):
-            try:
-                return pictures.find(other)
-            except SepiError:
-                continue
-        raise
+    # the folder of pictures itself may be given, and NeRF's files leave the ending out
+    return pictures.find(name, Path(name).name, f"{name}.png")
 
 
 def _shot(path: Path, name: str, entry: Mapping[str, Any], pictures: Pictures, file: Path) -> Shot:
-    header = picture_header(file)
-    height, width = header.height, header.width
     word = str(entry.get("camera_model", "OPENCV"))
     if word not in _MODELS:
         raise SepiError(f"{path}: camera_model '{word[:40]}'; expected one of {', '.join(_MODELS)}")
@@ -87,15 +77,17 @@ def _shot(path: Path, name: str, entry: Mapping[str, Any], pictures: Pictures, f
 
     def number(key: str, other: float | None = None) -> float:
         value = entry.get(key, other)
-        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-            raise SepiError(f"{path}: {name}: expected a number as {key}, got {str(value)[:40]}")
-        return float(value)
+        with suppress(TypeError, ValueError):
+            if not isinstance(value, bool) and math.isfinite(found := float(value)):
+                return found
+        raise SepiError(f"{path}: {name}: expected a number as {key}, got {str(value)[:40]}")
 
+    size = (number("w"), number("h")) if {"w", "h"} <= entry.keys() else None
+    width, height = size or pictures.size(file)
     if "fl_x" not in entry and "camera_angle_x" in entry:
         focal_x = width / 2 / math.tan(min(3.0, max(1e-3, number("camera_angle_x"))) / 2)
     else:
         focal_x = number("fl_x")
-    focal = focal_x, number("fl_y", focal_x)
     # from the corner to the middle of the first pixel
     principal = number("cx", width / 2) - 0.5, number("cy", height / 2) - 0.5
     coefficients = tuple(number(key, 0.0) for key in _COEFFICIENTS[kind])
@@ -105,10 +97,7 @@ def _shot(path: Path, name: str, entry: Mapping[str, Any], pictures: Pictures, f
         matrix = np.zeros(0)
     if matrix.shape not in ((4, 4), (3, 4)) or not np.isfinite(matrix).all():
         raise SepiError(f"{path}: {name}: expected 4 rows of 4 numbers as transform_matrix")
-    try:
-        lens = Lens(width, height, focal, principal, kind, coefficients)
-    except SepiError as error:
-        raise SepiError(f"{path}: {name}: {error}") from error
+    lens = pictures.lens(name, file, size, (focal_x, number("fl_y", focal_x)), principal, kind, coefficients)
     return Shot(name, lens, rotation_of(path, name, (matrix[:3, :3] @ _TURN).T), matrix[:3, 3].copy())
 
 

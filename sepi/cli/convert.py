@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from sepi.cli.input_options import Geometry, camera_flags, view_of_result
+from sepi.cli.scene_argument import camera_of
 from sepi.command import SepiCommand
 from sepi.errors import SepiError
 
@@ -86,7 +87,7 @@ def _maps(path: Path, view: tuple[int, int] | None, geometry: Geometry | None) -
     from sepi.io.all_views import read_result_at
 
     result = read_result_at(path, view)
-    camera = result.camera if geometry is None else geometry(shape=result.disparity.shape)
+    camera = camera_of(path, view, result, geometry)
     maps = {
         "disparity": result.disparity,
         "depth": None if camera is None else camera.depth(result.disparity),

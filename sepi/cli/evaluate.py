@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import warnings
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -14,7 +15,7 @@ import click
 from sepi.cli.input_options import Pair, Reading, reading_flags, truth_flags
 from sepi.cli.scene_argument import read_ground_truth
 from sepi.command import SepiCommand, bad_thresholds
-from sepi.errors import SepiError
+from sepi.errors import SepiError, SepiWarning
 
 if TYPE_CHECKING:
     from sepi.io.disparity_maps import TruthFile
@@ -85,6 +86,7 @@ def evaluate(
     from sepi.io.all_views import read_disparity_at, read_error_bars_at
     from sepi.io.files import naming
     from sepi.io.scores import without_nan
+    from sepi.scoring.conventions import misfit
     from sepi.scoring.crops import in_frame
     from sepi.scoring.error_bars import ErrorBars
     from sepi.scoring.scores import PROTOCOLS, region_masks, score_regions
@@ -107,6 +109,9 @@ def evaluate(
             f"{source}: ground truth is {values.shape}, the estimate {disparity.shape} (height, width)"
             + ("; --offset tells where a crop lies" if _fits(disparity.shape, values.shape) else "")
         )
+    doubt = misfit(disparity, values, None if light_field is None else light_field.grid)
+    if doubt is not None:
+        warnings.warn(f"{source}: ground truth would fit {estimate} far better {doubt}", SepiWarning, stacklevel=1)
     masks = None if light_field is None else region_masks(light_field)
     protocols = PROTOCOLS if border is None else {f"border {border}": border}
     if truth_step is None:

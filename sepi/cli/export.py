@@ -60,7 +60,7 @@ def export(
     require_room(output, force=force)
     light_field = reading.read(light_field_path, disparity_range=disparity_range)
     if geometry is not None:
-        light_field = replace(light_field, camera=geometry(shape=light_field.shape))
+        light_field = replace(light_field, camera=geometry(shape=light_field.shape), rig=None)
     if own is not None:
         light_field = replace(light_field, ground_truth=own.read(light_field.shape))
     # what was assumed is settled by now, and flags are of no more use

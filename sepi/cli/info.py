@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from sepi.lightfield import DisparityRange, LightField
 
 _PATH = click.Path(path_type=Path)
+# part of a range below which its margin may lie beyond infinity
+_BEYOND = 0.25
 _RANGE_SOURCES = {
     "parameters": "from the scene's parameters",
     "given": "as given",
@@ -79,7 +81,7 @@ def info(light_field_path: Path, geometry: Geometry | None, reading: Reading, as
         "pixels": _pixels(light_field),
         "disparity range": "none given; the estimate is used" if own is None else range_text(own),
         "estimated range": estimated if isinstance(estimated, str) else range_text(estimated),
-        "metric depth": _depth(light_field),
+        "metric depth": _depth(light_field, None if isinstance(estimated, str) else estimated),
         "ground truth": "none" if light_field.ground_truth is None else "yes",
         "masks": ", ".join(light_field.masks) or "none",
     }
@@ -152,7 +154,7 @@ def range_text(known: DisparityRange) -> str:
     return f"{known.minimum:g} to {known.maximum:g} pixels per view step ({_RANGE_SOURCES[known.source]})"
 
 
-def _depth(light_field: LightField) -> str:
+def _depth(light_field: LightField, estimated: DisparityRange | None) -> str:
     """How disparities become depth."""
     from sepi.rig import METRES
 
@@ -160,7 +162,10 @@ def _depth(light_field: LightField) -> str:
     if camera is None:
         return "unknown camera"
     units = "m" if rig is None or rig.units == METRES else rig.units
-    return f"{camera.scale:g} {units} / (disparity + {camera.offset:g})"
+    told = f"{camera.scale:g} {units} / (disparity + {camera.offset:g})"
+    if estimated is None or estimated.minimum + _BEYOND * (estimated.maximum - estimated.minimum) > -camera.offset:
+        return told
+    return f"{told}; much of the range lies beyond infinity: look at --baseline (mm) and --focus-distance (m)"
 
 
 def _pixels(light_field: LightField) -> str:

@@ -117,6 +117,12 @@ _FLAGS = (
         metavar="PICTURE",
         help="Calibrated camera whose depth is made; the most central one unless given.",
     ),
+    click.option(
+        "--crop-of",
+        metavar="WxH+X+Y",
+        help="Size of the pictures that the views were cut out of, and column and row in them of a view's first pixel: "
+        "sensor and calibration belong to those.",
+    ),
     click.option("--follow-links", is_flag=True, help="Read views that are links out of their folder."),
 )
 
@@ -212,8 +218,11 @@ def camera_flags(command: Callable[..., Any]) -> Callable[..., Any]:
         if 0 < len(missing) < len(flags):
             raise click.UsageError(f"metric depth needs {', '.join(map(_flag, flags))}; missing: {', '.join(missing)}")
         from sepi.camera import camera_from
+        from sepi.io.readers.options import ReadOptions
 
-        return command(*args, geometry=None if missing else functools.partial(camera_from, **flags), **values)
+        part = ReadOptions(crop_of=values.get("crop_of")).part
+        geometry = None if missing else functools.partial(camera_from, **flags, crop_of=part)
+        return command(*args, geometry=geometry, **values)
 
     for name, (unit, text) in reversed(_GEOMETRY.items()):
         with_geometry = click.option(_flag(name), name, type=float, metavar=unit, help=text)(with_geometry)
@@ -224,7 +233,7 @@ _GEOMETRY = {
     "focal_length_mm": ("MM", "Focal length, millimetres; with the next three: metric depth."),
     "baseline_mm": ("MM", "Distance from column to column of cameras (row to row, if one column), millimetres."),
     "focus_distance_m": ("M", "Depth at which nothing moves from view to view, metres; inf for parallel cameras."),
-    "sensor_size_mm": ("MM", "Longer side of the sensor, millimetres."),
+    "sensor_size_mm": ("MM", "Longer side of the sensor that took the whole picture (see --crop-of), millimetres."),
 }
 
 

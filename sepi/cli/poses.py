@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from sepi.cli.input_options import Geometry, Reading, camera_flags, default_folder, reading_flags
-from sepi.cli.scene_argument import read_light_field_of
+from sepi.cli.scene_argument import camera_of, read_light_field_of
 from sepi.command import SepiCommand, progress_bar
 
 _PATH = click.Path(path_type=Path)
@@ -70,7 +70,7 @@ def poses(
         result.disparity,
         result.confidence,
         unknown=result.unknown,
-        camera=result.camera if geometry is None else geometry(shape=light_field.shape),
+        camera=camera_of(result_path, reading.options.view, result, geometry),
         min_confidence=min_confidence,
         max_points=points,
         surfaces=surfaces_of(result_path),

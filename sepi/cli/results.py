@@ -9,6 +9,7 @@ from pathlib import Path
 import click
 
 from sepi.cli.input_options import Geometry, camera_flags, view_of_result
+from sepi.cli.scene_argument import camera_of
 from sepi.command import SepiCommand
 from sepi.errors import SepiError
 
@@ -68,7 +69,7 @@ def points(
         result.picture,
         result.disparity,
         result.confidence,
-        camera=result.camera if geometry is None else geometry(shape=result.disparity.shape),
+        camera=camera_of(result_path, view, result, geometry),
         from_centre=result.from_centre,
         min_confidence=min_confidence,
         max_depth=max_depth,

@@ -14,8 +14,11 @@ from sepi.cli.input_options import Reading
 from sepi.errors import SepiError
 
 if TYPE_CHECKING:
+    from sepi.camera import Camera
+    from sepi.cli.input_options import Geometry
     from sepi.io.disparity_maps import TruthFile
     from sepi.io.origin import Origin
+    from sepi.io.result_folder import Result
     from sepi.lightfield import FloatMap, LightField
 
 _BARE = "a map alone, such as its disparity.pfm, is taken for one of any light field"
@@ -115,6 +118,20 @@ def read_light_field_of(
             SepiError(f"{result}: {difference}, as {path} is read here; {advice}{f' ({_BARE})' if bare else ''}")
         )
     raise failures[0]
+
+
+def camera_of(path: Path, view: tuple[int, int] | None, result: Result, geometry: Geometry | None) -> Camera | None:
+    """The camera of a result: that of the flags, of views that are a part of pictures where the result says so."""
+    from sepi.camera import warn_of_infinity
+    from sepi.io.all_views import read_origin_at
+
+    if geometry is None:
+        return result.camera
+    origin = read_origin_at(path, view)
+    part = None if origin is None else origin.options.part
+    camera = geometry(shape=result.disparity.shape, **({} if part is None else {"crop_of": part}))
+    warn_of_infinity(path, camera, result.disparity, result.sigma, result.unknown)
+    return camera
 
 
 def _as_it_was(origin: Origin, reading: Reading) -> Reading:

@@ -39,7 +39,7 @@ def is_temporary(path: Path) -> bool:
 
 
 @contextmanager
-def naming(path: Path) -> Iterator[None]:
+def naming(path: Path | str) -> Iterator[None]:
     """Put the path before an error that does not begin with it."""
     try:
         yield

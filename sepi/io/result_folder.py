@@ -16,7 +16,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from sepi.camera import Camera
+from sepi.camera import Camera, warn_of_infinity
 from sepi.errors import SepiError
 from sepi.io.error_bar_files import bars_in_metres, names_of_error_bars, write_error_bars
 from sepi.io.files import atomic_files, atomic_folder, atomic_path
@@ -190,6 +190,8 @@ def write_result(
     if not (seconds is None or is_finite(seconds)):
         raise SepiError(f"{folder}: seconds: expected a number, got {described(seconds)}")
     maps = sound_maps(light_field, maps)
+    if light_field.camera is not None:
+        warn_of_infinity(folder, light_field.camera, maps.disparity, maps.sigma, maps.mask(UNKNOWN))
     earlier = require_own(folder, light_field, force=force)
     # the folder itself may be a link to where there is room
     target = folder.resolve()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sepi.errors import SepiError
+from sepi.camera import require_part
 from sepi.lightfield import BoolMap, FloatMap
 
 
@@ -33,11 +33,7 @@ def in_frame(crop: FloatMap, offset: tuple[int, int], shape: tuple[int, int]) ->
         If the crop does not lie inside the whole picture.
     """
     (row, column), (height, width) = offset, crop.shape
-    if row < 0 or column < 0 or row + height > shape[0] or column + width > shape[1]:
-        raise SepiError(
-            f"a map of {crop.shape} at offset {row},{column} does not lie inside the ground truth of {shape} "
-            "(height, width)"
-        )
+    require_part((shape[1], shape[0], column, row), crop.shape)
     whole, inside = np.full(shape, np.nan, np.float32), np.zeros(shape, bool)
     place = np.s_[row : row + height, column : column + width]
     whole[place], inside[place] = crop, True

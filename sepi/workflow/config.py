@@ -19,7 +19,7 @@ from sepi.io.external_maps import ExternalSource
 from sepi.io.readers.formats import FORMATS
 from sepi.io.readers.options import ORDERS
 from sepi.lightfield import DisparityRange
-from sepi.models import CheckedModel, validated
+from sepi.models import AS_PAIR, CheckedModel, validated
 from sepi.scenes import SCENES
 from sepi.validation import require_known
 from sepi.variants import VARIANT_ENTRIES, VARIANTS, Variant, variant_from
@@ -67,18 +67,19 @@ class OwnLightField(CheckedModel):
     truth: str | None = Field(None, min_length=1)
     truth_scale: _Positive | None = None
     format: str | None = None
-    grid: tuple[_Count, _Count] | None = None
+    grid: Annotated[tuple[_Count, _Count] | None, AS_PAIR] = None
     pattern: str | None = None
     axes: str | None = None
     variable: str | None = None
     central: _Count | None = None
     order: str | None = None
     exclude: list[str] = Field([])
-    view: tuple[Index, Index] | None = None
+    view: Annotated[tuple[Index, Index] | None, AS_PAIR] = None
     row_spacing: _Positive | None = None
     white: _Positive | None = None
     images: str | None = None
     reference: str | None = None
+    crop_of: str | None = None
     follow_links: bool = False
 
     @property
@@ -120,9 +121,9 @@ class Config(CheckedModel):
         {},
         description="Dataset 'own': light fields of any format that 'sepi depth' reads, by a name of yours, such as "
         "{lego: {path: /data/lego, grid: [17, 17]}}. Beside path: format, grid, pattern, axes, variable, central, "
-        "order, exclude, view, row_spacing, white, images, reference, follow_links, which mean what the flags of 'sepi "
-        "depth' mean; truth, a file of ground truth, and truth_scale, pixels per view step for each of its levels "
-        "(docs/reproduce/real_truth.md).",
+        "order, exclude, view, row_spacing, white, images, reference, crop_of, follow_links, which mean what the flags "
+        "of 'sepi depth' mean; truth, a file of ground truth, and truth_scale, pixels per view step for each of its "
+        "levels (docs/reproduce/real_truth.md).",
     )
     rendered: Rendered = Field(
         Rendered(),

@@ -20,6 +20,7 @@ from sepi.io.disparity_maps import TruthFile
 from sepi.io.images import SUFFIXES
 from sepi.io.readers import exported, hci, hci_2013
 from sepi.io.readers.formats import Format, format_of
+from sepi.io.readers.options import ReadOptions
 from sepi.io.readers.row_folders import view_files
 from sepi.io.readers.sizes import size_of
 from sepi.workflow.rendered_scenes import DATASET
@@ -236,7 +237,8 @@ def own_scene(name: str, source: Path, flags: tuple[str, ...], where: str, truth
     cameras = cameras_in(source) if word in (None, "cameras") and not exported.matches(source) else None
     if cameras is not None:
         # pictures may lie elsewhere
-        model = read_model(source, dict(pairwise(flags)).get("--images"))
+        given = dict(pairwise(flags))
+        model = read_model(source, given.get("--images"), ReadOptions(crop_of=given.get("--crop-of")).part)
         files = (*described_by(cameras), *model.files)
         return Scene("own", name, source, files, *size_of(model.pictures), flags=flags, own_truth=truth)
     inside = [path for path in view_files(source) if path.is_file()] if source.is_dir() else [source]

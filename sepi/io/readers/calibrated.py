@@ -32,6 +32,6 @@ def read(path: Path, options: ReadOptions, inverse_depths: tuple[float, float] |
 
     if options.order != AS_GIVEN or options.central is not None or options.row_spacing is not None:
         raise SepiError(f"{path}: --order, --central and --row-spacing do not apply: the cameras say where views stand")
-    model = read_model(path, options.images).without(options.exclude)
+    model = read_model(path, options.images, options.part).without(options.exclude)
     light_field = light_field_of(rectification_of(model, options.reference, inverse_depths))
     return replace(light_field, name=name_of(path).name, source=str(path))

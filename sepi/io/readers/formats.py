@@ -69,6 +69,9 @@ class Format:
 _LISTED = 5
 _DEPTH = 1
 
+# poses of LLFF, of parts of NeRF's sets, of Gaussian splatting and of NeuS
+_POSES = ("poses_bounds.npy", "transforms_test.json", "transforms_val.json", "cameras.json", "cameras_sphere.npz")
+
 # what Lytro's cameras and programs write
 _RAW = frozenset({".lfr", ".lfp", ".raw"})
 
@@ -171,6 +174,12 @@ def format_of(path: Path, file_format: str | None = None) -> Format:
     for known in FORMATS.values():
         if known.matches(path):
             return known
+    poses = next((one for one in (path, *map(path.joinpath, _POSES)) if one.name in _POSES and one.is_file()), None)
+    if poses is not None:
+        raise SepiError(
+            f"{path}: {poses.name} has camera poses of a kind that is not read; expected transforms.json, a COLMAP "
+            "model or a table of cameras; 'sepi calibrate' finds them anew, and a folder of a grid of views needs none"
+        )
     inner = list(islice(_inside(path), _LISTED + 1)) if path.is_dir() and not _is_result(path) else []
     if inner:
         found = f", such as {inner[0]}" if len(inner) == 1 else f": {', '.join(map(str, inner[:_LISTED]))}"

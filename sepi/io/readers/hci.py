@@ -2,7 +2,8 @@
 
 ``input_CamNNN.png`` is view ``NNN = S * t + s``. Views may be missing, but for the one whose depth is made.
 ``parameters.cfg``, ``gt_disp_lowres.pfm`` (disparity of the centre view) and ``mask_NAME.png`` (white regions) are read
-where present. ``baseline_mm`` is the distance of neighbouring cameras, of rows as of columns.
+where present. ``baseline_mm`` is the distance of neighbouring cameras, of rows as of columns. ``sensor_size_mm``
+belongs to the picture of ``image_resolution``, of which the views may be a part (``crop_of``).
 
 References
 ----------
@@ -117,14 +118,17 @@ def _read(path: Path, options: ReadOptions, with_truth: bool) -> LightField:
     files, grid = _views_in(path, options, parameters)
     views, present, numbers = read_grid(path, files, grid, options)
     shape = views.shape[2], views.shape[3]
-    if given_shape not in (None, shape):
+    whole = shape if options.part is None else options.part[1::-1]
+    if given_shape not in (None, whole):
+        size = f"{given_shape[1]}x{given_shape[0]}"
         raise SepiError(
-            f"{file}: image_resolution (y, x) = {given_shape}, but the views are {shape}; disparities change with the "
-            "size, so set image_resolution, disp_min and disp_max for these views"
+            f"{file}: image_resolution is {size}, but the pictures are {whole[1]}x{whole[0]} (x, y); where they were cut "
+            f"out of such pictures, --crop-of {size}+X+Y tells where, and all else holds; where they were scaled, set "
+            "image_resolution, disp_min and disp_max for them"
         )
     camera = parameters.model_dump(include=set(_CAMERA))
     with naming(file):
-        known_camera = None if None in camera.values() else camera_from(**camera, shape=shape)
+        known_camera = None if None in camera.values() else camera_from(**camera, shape=shape, crop_of=options.part)
     of = _view_of_truth(numbers, grid)
     has_truth = with_truth and of is not None and options.view in (None, of) and bool(truth_files(path))
     ground_truth, masks = _truth_of(path, shape) if has_truth else (None, {})

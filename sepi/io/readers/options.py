@@ -30,6 +30,7 @@ from types import NoneType
 import numpy as np
 import numpy.typing as npt
 
+from sepi.camera import Part
 from sepi.errors import SepiError
 from sepi.validation import described, is_finite, require_known, require_type, whole_pair
 
@@ -49,6 +50,7 @@ ORDERS: dict[str, Callable[[Numbers], Numbers]] = {
 }
 """The eight ways to lay out a grid: each takes the given grid to the light field's."""
 
+_PART = re.compile(r"(\d{1,6})[xX](\d{1,6})\+(\d{1,6})\+(\d{1,6})")
 _POSITION = re.compile(r"\s*(\d{1,6})\s*,\s*(\d{1,6})\s*")
 
 
@@ -84,6 +86,10 @@ class ReadOptions:
         Folder of the pictures of calibrated cameras, where the model's own folder does not lead to them.
     reference : str, optional
         Picture of a calibrated camera whose depth is made; that of the most central one unless given.
+    crop_of : str, optional
+        Where the views were cut out of the pictures that the camera took: the size of those, and the column and row in
+        them of a view's first pixel, ``"512x512+100+80"``. Sensor size, principal point and ``parameters.cfg`` belong
+        to the whole picture.
     follow_links : bool
         Read views that are links to files outside their folder.
 
@@ -126,23 +132,32 @@ class ReadOptions:
     white: float | None = None
     images: str | None = None
     reference: str | None = None
+    crop_of: str | None = None
     follow_links: bool = False
 
     def __post_init__(self) -> None:
         for name, example in (("grid", "(5, 7)"), ("view", "(2, 3)")):
             if (value := getattr(self, name)) is not None:
                 object.__setattr__(self, name, whole_pair(f"options: {name}", value, f"two whole numbers {example}"))
-        for name in ("pattern", "axes", "variable", "images", "reference"):
+        for name in ("pattern", "axes", "variable", "images", "reference", "crop_of"):
             require_type(f"options: {name}", getattr(self, name), (str, NoneType), "text")
         require_type("options: central", self.central, (int, np.integer, NoneType), "a whole number")
         require_type("options: exclude", self.exclude, (tuple, list), 'positions and names such as ("0,0", "a.png")')
         for view in self.exclude:
             require_type("options: exclude", view, str, 'positions "T,S" or names of files')
         object.__setattr__(self, "exclude", tuple(self.exclude))
+        if self.crop_of is not None and _PART.fullmatch(self.crop_of) is None:
+            raise SepiError(f"options: crop_of: expected WIDTHxHEIGHT+X+Y, got {described(self.crop_of)}")
         if self.row_spacing is not None and not is_finite(self.row_spacing):
             raise SepiError(f"options: row_spacing: expected a number, got {described(self.row_spacing)}")
         if self.white is not None and not (is_finite(self.white) and self.white > 0):
             raise SepiError(f"options: white: expected a number above 0, got {described(self.white)}")
+
+    @property
+    def part(self) -> Part | None:
+        """What ``crop_of`` says, as :func:`sepi.camera.camera_from` takes it."""
+        found = _PART.fullmatch(self.crop_of or "")
+        return None if found is None else (int(found[1]), int(found[2]), int(found[3]), int(found[4]))
 
 
 def arrange_numbers(
