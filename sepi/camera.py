@@ -240,8 +240,8 @@ def warn_of_infinity(where: object, camera: Camera, disparity: Map, sigma: Map |
     if share > _BEYOND:
         warnings.warn(
             f"{where}: {100 * share:.0f} % of the pixels lie beyond infinity, where disparity is below "
-            f"{0.0 - camera.offset:.3g} by the camera: look at --baseline (millimetres), --focus-distance (metres; inf only "
-            "if no disparity is below 0), and whether near and far are exchanged (sepi check)",
+            f"{0.0 - camera.offset:.3g} by the camera: look at --baseline (millimetres), --focus-distance (metres; inf "
+            "where no disparity is below 0), and whether near and far are exchanged (sepi check)",
             SepiWarning,
             stacklevel=3,
         )

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
+import numpy.typing as npt
 
-from sepi.lightfield import FloatMap
+from sepi.lightfield import BoolMap, FloatMap
 
-# an error counts up to this part of the range that nearly all of a map lies within, or so many pixels per view step
+# errors are close up to this part of the range that nearly all of a map lies within, or so many pixels per view step
 _PART, _LEAST = 0.05, 0.07
-# mean error, 1 being all that counts, from which a fit is in doubt, and how much better another must be
+# share of pixels with a larger error from which a fit is in doubt, and how much better another must be
 _POOR, _BETTER = 0.2, 0.25
 # rounds of reweighting, of so many pixels
 _ROUNDS, _PIXELS = 30, 20000
@@ -41,27 +42,32 @@ def misfit(estimate: FloatMap, truth: FloatMap, grid: tuple[int, int] | None = N
     'multiplied by 0.5, as one in steps of the whole grid (--truth FILE --truth-scale 0.5)'
     """
     known = np.isfinite(estimate) & np.isfinite(truth)
-    close = max(_LEAST, _PART * float(np.ptp(np.quantile(estimate[known], (0.02, 0.98))))) if known.any() else _LEAST
+    if not known.any():
+        return None
+    close = max(_LEAST, _PART * float(np.ptp(np.quantile(estimate[known], (0.02, 0.98)))))
 
-    def error(values: FloatMap, where: FloatMap = known) -> float:
-        missed = np.abs(estimate - values)[where & np.isfinite(values)]
-        return float(np.minimum(missed / close, 1).mean()) if missed.size else 1.0
+    def missed(values: FloatMap, where: BoolMap = known) -> npt.NDArray[np.float32]:
+        return np.minimum(np.abs(estimate - values)[where & np.isfinite(values)] / close, 1)
 
-    as_it_is, zero = error(truth), known & (truth == 0)
+    def off(values: FloatMap, where: BoolMap = known) -> float:
+        return float(np.mean(missed(values, where) == 1)) if where.any() else 1.0
+
+    as_it_is, zero = off(truth), known & (truth == 0)
     if as_it_is < _POOR:
         return None
-    if error(truth, zero) > 1 - _POOR and error(truth, known & ~zero) < _BETTER * as_it_is:
+    if off(truth, zero) > 1 - _POOR and off(truth, known & ~zero) < _BETTER * as_it_is:
         return f"without its zeros, {100 * zero.sum() / known.sum():.0f} % of it; where 0 is unknown, NaN says so"
-    tried = {"upside down (a PFM begins with its bottom row)": truth[::-1], "mirrored": truth[:, ::-1]}
-    tried["turned by half a turn"] = truth[::-1, ::-1]
-    with np.errstate(divide="ignore"):
-        inverse = 1 / truth
-    for values in (truth, inverse if (truth[known] > 0).all() else truth):
-        factor, more = _line(values[known & np.isfinite(values)], estimate[known & np.isfinite(values)])
+    tried = {
+        "upside down (a PFM begins with its bottom row)": truth[::-1],
+        "mirrored": truth[:, ::-1],
+        "turned by half a turn": truth[::-1, ::-1],
+    }
+    for values in (truth, 1 / truth) if (truth[known] > 0).all() else (truth,):
+        factor, more = _line(values[known], estimate[known])
         if abs(factor) * float(np.ptp(values[known])) > close:
-            tried[_line_text(factor, more, close, values is inverse, grid)] = factor * values + more
-    how = min(tried, key=lambda name: round(error(tried[name]), 2))
-    return how if error(tried[how]) < _BETTER * as_it_is else None
+            tried[_line_text(factor, more, close, values is not truth, grid)] = factor * values + more
+    how = min(tried, key=lambda name: (round(off(tried[name]), 2), float(missed(tried[name]).mean())))
+    return how if off(tried[how]) < _BETTER * as_it_is else None
 
 
 def _line(values: FloatMap, wanted: FloatMap) -> tuple[float, float]:

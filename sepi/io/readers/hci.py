@@ -122,8 +122,8 @@ def _read(path: Path, options: ReadOptions, with_truth: bool) -> LightField:
     if given_shape not in (None, whole):
         size = f"{given_shape[1]}x{given_shape[0]}"
         raise SepiError(
-            f"{file}: image_resolution is {size}, but the pictures are {whole[1]}x{whole[0]} (x, y); where they were cut "
-            f"out of such pictures, --crop-of {size}+X+Y tells where, and all else holds; where they were scaled, set "
+            f"{file}: image_resolution is {size}, but the pictures are {whole[1]}x{whole[0]} (x, y); where they were "
+            f"cut out of such, --crop-of {size}+X+Y tells where, and all else holds; where they were scaled, set "
             "image_resolution, disp_min and disp_max for them"
         )
     camera = parameters.model_dump(include=set(_CAMERA))
