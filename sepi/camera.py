@@ -249,5 +249,4 @@ def warn_of_infinity(where: object, camera: Camera, disparity: Map, sigma: Map |
 
 def numbers_of(camera: Camera) -> tuple[float, ...]:
     """What :class:`Camera` takes, as files keep it: three numbers, and two more where the principal point is aside."""
-    first, aside = astuple(camera)[:3], (camera.right, camera.down)
-    return (*first, *aside) if any(aside) else first
+    return astuple(camera)[: 5 if camera.right or camera.down else 3]

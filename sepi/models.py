@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Mapping
 from typing import Any, TypeVar
 
@@ -11,19 +10,13 @@ import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationError
 
 from sepi.errors import SepiError
-from sepi.validation import require_known
+from sepi.validation import pair_of, require_known
 
 Model = TypeVar("Model", bound=BaseModel)
 
 
-def _pair(value: object) -> object:
-    """Two numbers of a text such as ``5x7`` or ``2,3``; anything else as it is."""
-    match = re.fullmatch(r"\s*(\d{1,6})\s*[xX×,]\s*(\d{1,6})\s*", value) if isinstance(value, str) else None
-    return value if match is None else (int(match[1]), int(match[2]))
-
-
-AS_PAIR = BeforeValidator(_pair)
-"""Of a field of two numbers: takes them also as the command line does."""
+AS_PAIR = BeforeValidator(lambda value: pair_of(value) or (tuple(value) if isinstance(value, list) else value))
+"""Of a field of two numbers: takes them as the command line does, too."""
 
 
 class CheckedModel(BaseModel):

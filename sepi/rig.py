@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from sepi.camera import require_part
 from sepi.errors import SepiError
 
 Floats = npt.NDArray[np.float64]
@@ -130,29 +129,6 @@ class Lens:
         (fx, fy), (cx, cy) = self.focal, self.principal
         principal = (cx + 0.5) * x - 0.5, (cy + 0.5) * y - 0.5
         return replace(self, width=width, height=height, focal=(fx * x, fy * y), principal=principal)
-
-    def cropped(self, x: int, y: int, width: int, height: int) -> Lens:
-        """The lens in a part of its picture.
-
-        Parameters
-        ----------
-        x, y : int
-            Column and row of the part's first pixel.
-        width, height : int
-            Pixels of the part.
-
-        Returns
-        -------
-        Lens
-
-        Raises
-        ------
-        SepiError
-            If the picture has no such part.
-        """
-        require_part((self.width, self.height, x, y), (height, width))
-        principal = self.principal[0] - x, self.principal[1] - y
-        return replace(self, width=width, height=height, principal=principal)
 
     @property
     def matrix(self) -> Floats:
@@ -421,11 +397,11 @@ class Rig:
             views = {(int(t), int(s)): _rectified(view) for t, s, view in told["views"]}
             rotation, origin = np.array(told["rotation"], np.float64), np.array(told["origin"], np.float64)
             step, units = float(told["step"]), str(told["units"])
+            sound = (rotation.shape, origin.shape) == ((3, 3), (3,)) and step > 0
+            if not (sound and np.isfinite([*rotation.ravel(), *origin, step]).all()):
+                raise ValueError("no rotation, place and length")
         except (ValueError, KeyError, TypeError, AttributeError, RecursionError, OverflowError) as error:
             raise SepiError("damaged: it does not say where its cameras stood") from error
-        sound = rotation.shape == (3, 3) and origin.shape == (3,) and step > 0
-        if not (sound and np.isfinite(rotation).all() and np.isfinite([*origin, step]).all()):
-            raise SepiError("damaged: it does not say where its cameras stood")
         return Rig(rotation, origin, step, units, views)
 
 

@@ -87,6 +87,12 @@ def whole_pair(where: str, value: Any, expected: str) -> tuple[int, int]:
     return first, second
 
 
+def pair_of(text: object, signs: str = "xX×,") -> tuple[int, int] | None:
+    """Two whole numbers with a sign between them, such as 9x9 or 4,4; None for anything else."""
+    match = re.fullmatch(rf"\s*(\d{{1,6}})\s*[{signs}]\s*(\d{{1,6}})\s*", text) if isinstance(text, str) else None
+    return None if match is None else (int(match[1]), int(match[2]))
+
+
 def described(value: object) -> str:
     """A value for a message: itself where that is short, else what it is."""
     if isinstance(value, Real) and not isinstance(value, bool):

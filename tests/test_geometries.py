@@ -9,6 +9,7 @@ import pytest
 from geometries import ROW_SPACING, jittered, standing
 
 from sepi.camera import camera_from
+from sepi.errors import SepiError
 from sepi.initial import CHOICES
 from sepi.lightfield import LightField
 from sepi.pipeline import estimate_depth
@@ -91,6 +92,19 @@ def test_metres_are_right_where_rows_are_closer() -> None:
     moved = light_field.ground_truth * light_field.baselines[6, 3, 0]
     expected = apart * focal_px / (moved + apart * focal_px / focus)
     assert np.median(np.abs(depth / expected - 1)) < 5e-3
+
+
+def test_a_part_of_a_picture_has_the_camera_of_the_whole() -> None:
+    """The sensor's size is that of the whole picture: that of a part would be a longer lens, all depth too great."""
+    known = {"focal_length_mm": 50, "baseline_mm": 20, "focus_distance_m": 4, "sensor_size_mm": 32}
+    whole = camera_from(**known, shape=(64, 96))
+    part = camera_from(**known, shape=(40, 30), crop_of=(96, 64, 60, 2))
+    assert (part.focal_px, part.scale, part.offset) == (whole.focal_px, whole.scale, whole.offset)
+    # the same ray through the same pixel: its place from the picture's middle and the principal point's
+    assert (30 - 1) / 2 + part.right == (96 - 1) / 2 - 60
+    assert (40 - 1) / 2 + part.down == (64 - 1) / 2 - 2
+    with pytest.raises(SepiError, match="from column 67, row 2 on do not lie inside 96x64"):
+        camera_from(**known, shape=(40, 30), crop_of=(96, 64, 67, 2))
 
 
 def test_the_longer_side_of_a_picture_is_that_of_the_sensor() -> None:

@@ -12,8 +12,8 @@ import numpy as np
 from sepi.cameras.model import CameraModel
 from sepi.cameras.pictures import Pictures, mask_of
 from sepi.errors import SepiError
-from sepi.io.files import reading
-from sepi.rig import FISHEYE, PINHOLE, Shot
+from sepi.io.files import naming, reading
+from sepi.rig import FISHEYE, PINHOLE, Lens, Shot
 
 # model to lens, and the places of its parameters: fx, fy, cx, cy, then OpenCV's coefficients; -1: zero
 _MODELS: dict[str, tuple[str, tuple[int, int, int, int], tuple[int, ...]]] = {
@@ -31,7 +31,7 @@ LENS_MODELS = tuple(_MODELS)
 """COLMAP's names of the lens models that can be read."""
 
 
-def read_colmap(folder: Path, pictures: Pictures) -> CameraModel:
+def read_colmap(path: Path, pictures: Pictures) -> CameraModel:
     """Read the cameras of a COLMAP model.
 
     Raises
@@ -40,24 +40,24 @@ def read_colmap(folder: Path, pictures: Pictures) -> CameraModel:
         If pycolmap is not installed, the model is damaged or empty, a lens is of another kind, or a picture is not
         there.
     """
-    pycolmap = require_pycolmap(str(folder))
-    with reading(folder, "COLMAP model"):
+    pycolmap = require_pycolmap(str(path))
+    with reading(path, "COLMAP model"):
         try:
-            model = pycolmap.Reconstruction(str(folder))
+            model = pycolmap.Reconstruction(str(path))
             # names that are no text are errors, too
             images = sorted((image for image in model.images.values() if image.has_pose), key=lambda image: image.name)
         except (ValueError, RuntimeError, IndexError, KeyError) as error:
             raise SepiError(f"not a COLMAP model, or damaged ({str(error).splitlines()[0][:120]})") from error
     if not images:
-        raise SepiError(f"{folder}: a COLMAP model without pictures")
+        raise SepiError(f"{path}: a COLMAP model without pictures")
     points = np.array([point.xyz for point in model.points3D.values()], np.float64).reshape(-1, 3)
     files = tuple(pictures.find(image.name) for image in images)
-    shots = tuple(
-        _shot(folder, pictures, file, image, model.cameras[image.camera_id])
-        for file, image in zip(files, images, strict=True)
-    )
+    shots = []
+    for file, image in zip(files, images, strict=True):
+        with naming(f"{path}: {image.name}"):
+            shots.append(_shot(pictures, file, image, model.cameras[image.camera_id]))
     masks = tuple(mask_of(file, image.name) for file, image in zip(files, images, strict=True))
-    return CameraModel(folder, shots, files, points, masks=masks)
+    return CameraModel(path, tuple(shots), files, points, masks=masks)
 
 
 def require_pycolmap(where: str) -> Any:
@@ -78,16 +78,16 @@ def require_pycolmap(where: str) -> Any:
     return pycolmap
 
 
-def _shot(folder: Path, pictures: Pictures, file: Path, image: Any, camera: Any) -> Shot:
+def _shot(pictures: Pictures, file: Path, image: Any, camera: Any) -> Shot:
     word = camera.model.name
     if word not in _MODELS:
-        raise SepiError(f"{folder}: {image.name}: camera model {word}; expected one of {', '.join(_MODELS)}")
+        raise SepiError(f"camera model {word}; expected one of {', '.join(_MODELS)}")
     kind, (fx, fy, cx, cy), places = _MODELS[word]
     values = [float(value) for value in camera.params]
     # from the corner of the picture to the middle of its first pixel
     principal = values[cx] - 0.5, values[cy] - 0.5
-    distortion, size = tuple(values[place] for place in places), (camera.width, camera.height)
-    lens = pictures.lens(image.name, file, size, (values[fx], values[fy]), principal, kind, distortion)
+    size, distortion = (camera.width, camera.height), tuple(values[place] for place in places)
+    lens = pictures.fitted(file, Lens(*size, (values[fx], values[fy]), principal, kind, distortion), size)
     pose = image.cam_from_world()
     rotation = np.array(pose.rotation.matrix(), np.float64)
     return Shot(image.name, lens, rotation, -rotation.T @ np.array(pose.translation, np.float64))

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 TABLES = ("cameras.csv", "cameras.yaml", "cameras.yml")
 """Names of tables in a folder."""
 
-TRANSFORMS = ("transforms.json", "transforms_train.json")
+TRANSFORMS = tuple(f"transforms{part}.json" for part in ("", "_train", "_val", "_test"))
 """Names of files of nerfstudio and NeRF in a folder: the first that is there has the cameras."""
 
 TABLE_SUFFIXES = tuple(Path(name).suffix for name in TABLES)

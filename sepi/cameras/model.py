@@ -67,13 +67,16 @@ class CameraModel:
 
     def without(self, names: tuple[str, ...]) -> CameraModel:
         """The model without some of its pictures, by the names of their files with or without folders."""
-        known = {word for shot in self.shots for word in (shot.name, Path(shot.name).name)}
-        for name in names:
-            if name not in known:
-                some = ", ".join(sorted(known)[:3])
-                raise SepiError(f"{self.path}: picture '{name}' to exclude: there is none (found: {some}, ...)")
-        kept = [n for n, shot in enumerate(self.shots) if not {shot.name, Path(shot.name).name} & set(names)]
-        return self.of(kept)
+        left_out = {n for name in names for n in self.named(name)}
+        return self.of([n for n in range(len(self.shots)) if n not in left_out])
+
+    def named(self, name: str) -> list[int]:
+        """Numbers of the pictures whose file has a name, with or without folders; an error where there is none."""
+        found = [n for n, shot in enumerate(self.shots) if name in (shot.name, Path(shot.name).name)]
+        if not found:
+            some = ", ".join(shot.name for shot in self.shots[:3])
+            raise SepiError(f"{self.path}: no picture '{name}' (found: {some}, ...)")
+        return found
 
     def of(self, kept: list[int]) -> CameraModel:
         """The model with these cameras alone."""

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from sepi.camera import Part
+from sepi.camera import Part, require_part
 from sepi.errors import SepiError
-from sepi.io.files import naming
 from sepi.io.images import picture_header
 from sepi.rig import Lens
 
@@ -21,7 +21,7 @@ PROJECT = "project.ini"
 _FOLDERS = ("images", ".")
 # how much larger or smaller, and how differently down and across, the picture is whose middle is the principal point,
 # where that cannot be the picture at hand
-_OTHER, _ALIKE = 1.4, 1.1
+_OTHER, _ALIKE = 1.4, 1.3
 
 
 class Pictures:
@@ -69,43 +69,32 @@ class Pictures:
         header = picture_header(file)
         return (header.width, header.height) if self._crop is None else self._crop[:2]
 
-    def lens(
-        self,
-        name: str,
-        file: Path,
-        size: tuple[float, float] | None,
-        focal: tuple[float, float],
-        principal: tuple[float, float] | None,
-        kind: str,
-        distortion: tuple[float, ...],
-    ) -> Lens:
-        """The lens of a picture as it lies here, which may be a scaled one, or a part, of that which was calibrated.
+    def fitted(self, file: Path, lens: Lens, size: tuple[float, float] | None) -> Lens:
+        """The lens in a picture as it lies here, which may be a scaled one, or a part, of that which was calibrated.
 
         Parameters
         ----------
-        name : str
-            What the model calls the picture.
         file : Path
+        lens : Lens
+            As the model tells it.
         size : (float, float) or None
-            Width and height of the picture that was calibrated; those of the picture at hand where nothing says.
-        focal, principal, kind, distortion
-            As :class:`sepi.rig.Lens` has them, in that picture; the principal point is its middle unless given.
+            Width and height of the picture that was calibrated, where the model tells them.
 
         Raises
         ------
         SepiError
-            If they are of no lens, or the picture has other sides.
+            If the picture has other sides.
         """
-        header, whole = picture_header(file), self.size(file)
-        width, height = map(int, size or whole)
-        with naming(f"{self._model}: {name}"):
-            lens = Lens(width, height, focal, principal or ((width - 1) / 2, (height - 1) / 2), kind, distortion)
-            if size is None:
-                self._middles.append([(2 * at + 1) / side for at, side in zip(lens.principal, whole, strict=True)])
-            elif (width, height) != whole:
-                self._scaled = f"lenses of {width}x{height} pixels scaled to pictures of {whole[0]}x{whole[1]}"
-            lens = lens.scaled(*whole)
-            return lens if self._crop is None else lens.cropped(*self._crop[2:], header.width, header.height)
+        header, whole, told = picture_header(file), self.size(file), (lens.width, lens.height)
+        if size is None:
+            self._middles.append([(2 * at + 1) / side for at, side in zip(lens.principal, told, strict=True)])
+        elif told != whole:
+            self._scaled = f"lenses of {told[0]}x{told[1]} pixels scaled to pictures of {whole[0]}x{whole[1]}"
+        lens = lens.scaled(*whole)
+        part = self._crop or (*whole, 0, 0)
+        require_part(part, (header.height, header.width))
+        principal = lens.principal[0] - part[2], lens.principal[1] - part[3]
+        return replace(lens, width=header.width, height=header.height, principal=principal)
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -116,11 +105,11 @@ class Pictures:
         SepiError
             If they cannot be those of the pictures.
         """
-        low, high = sorted(np.mean(self._middles or [(1.0, 1.0)], axis=0))
+        low, high = sorted(np.mean(self._middles or [[1.0, 1.0]], axis=0))
         if 0 < low <= high < _ALIKE * low and not 1 / _OTHER < low < _OTHER:
             raise SepiError(
-                f"{self._model}: the principal points are those of pictures {low:.2g} times as large; expected the "
-                "size of the pictures that were calibrated, w and h, or --crop-of where these are parts of them"
+                f"{self._model}: the principal points are those of pictures about {low:.2g} times as large; expected "
+                "the size of the pictures that were calibrated, w and h, or --crop-of where these are parts of them"
             )
         return (f"{self._scaled}; where they are cut, not scaled, --crop-of says so",) if self._scaled else ()
 

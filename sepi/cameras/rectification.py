@@ -67,7 +67,7 @@ def rectification_of(
     model.require_sound()
     notes = list(model.notes)
     while True:
-        chosen = None if reference is None else _numbered(model, reference)
+        chosen = None if reference is None else model.named(reference)[0]
         plane = plane_through(model, chosen)
         known = inverse_depths or _of_points(model, plane)
         seeing = Seeing(model, plane, zooms(plane, known or (0.0, 0.0)))
@@ -98,15 +98,6 @@ def rectification_of(
         if len(model.shots) < 2:
             raise SepiError(f"{model.path}: too few cameras are left: {'; '.join(notes)}")
     return Rectification(model, plane, frame, seeing, known, errors, (*notes, *_told(plane, errors, known)))
-
-
-def _numbered(model: CameraModel, name: str) -> int:
-    for n, shot in enumerate(model.shots):
-        if name in (shot.name, shot.name.rpartition("/")[2]):
-            return n
-    raise SepiError(
-        f"{model.path}: no picture '{name}' (found: {', '.join(shot.name for shot in model.shots[:3])}, ...)"
-    )
 
 
 def _off(plane: Plane, view: int) -> str:

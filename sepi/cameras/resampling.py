@@ -33,7 +33,7 @@ def rectified_view(seeing: Seeing, frame: Frame, view: int) -> tuple[FloatMap, B
     at = seeing.pixels(view, pixels)[:, ::-1].T
     absent = np.isnan(at[0])
     at = np.where(absent, 0, at)
-    picture, unusable = _picture(seeing, view), _masked(seeing, view)
+    picture, unusable = as_unit_float(read_picture(seeing.model.pictures[view])), _masked(seeing, view)
     if np.abs(at - np.rint(at)).max() < _ON_PIXEL:
         row, column = np.rint(at).astype(int)
         found = picture[row, column]
@@ -58,11 +58,6 @@ def completed(view: FloatMap, missing: BoolMap) -> FloatMap:
 
     row, column = ndimage.distance_transform_edt(missing, return_distances=False, return_indices=True)
     return np.asarray(view[row, column])
-
-
-def _picture(seeing: Seeing, view: int) -> FloatMap:
-    picture = read_picture(seeing.model.pictures[view])
-    return as_unit_float(picture if picture.ndim == 3 else picture[..., None])
 
 
 def _masked(seeing: Seeing, view: int) -> npt.NDArray[np.uint8]:

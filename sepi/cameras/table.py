@@ -20,10 +20,11 @@ from scipy.spatial.transform import Rotation
 
 from sepi.cameras.model import UNITS_OF_MODEL, CameraModel
 from sepi.cameras.pictures import Pictures
-from sepi.errors import SepiError, one_line
-from sepi.io.files import reading
+from sepi.errors import SepiError
+from sepi.io.files import naming, reading
 from sepi.models import AS_PAIR, CheckedModel, validated
-from sepi.rig import FISHEYE, METRES, MOST_COEFFICIENTS, PINHOLE, Floats, Shot
+from sepi.rig import FISHEYE, METRES, MOST_COEFFICIENTS, PINHOLE, Floats, Lens, Shot
+from sepi.validation import require_known
 
 # a table is short; what is longer is something else
 _MOST_BYTES = 16 * 2**20
@@ -69,50 +70,34 @@ def read_table(path: Path, pictures: Pictures) -> CameraModel:
         if path.stat().st_size > _MOST_BYTES:
             raise SepiError("not a table of cameras: too long")
         text = path.read_text(encoding="utf-8-sig")
-    entries = _rows(path, text) if path.suffix.lower() == ".csv" else None
-    if entries is None:
-        table = validated(_Table, _loaded(path, text), str(path))
-        if table.grid is not None and prod(table.grid) != len(table.cameras):
-            raise SepiError(f"{path}: a grid of {prod(table.grid)} cameras, but {len(table.cameras)} are listed")
-        entries, metres = [{**table.shared, **entry} for entry in table.cameras], table.units == "metres"
-    else:
-        metres = False
+        told = {"cameras": _rows(text)} if path.suffix.lower() == ".csv" else yaml.safe_load(text)
+        if not isinstance(told, dict):
+            raise SepiError("expected a key 'cameras' with a list of cameras, and where needed 'shared' and 'units'")
+    table = validated(_Table, told, str(path))
+    if table.grid is not None and prod(table.grid) != len(table.cameras):
+        raise SepiError(f"{path}: a grid of {prod(table.grid)} cameras, but {len(table.cameras)} are listed")
+    entries = [{**table.shared, **entry} for entry in table.cameras]
     cameras = [validated(_Camera, entry, f"{path}: camera {n}") for n, entry in enumerate(entries, 1)]
     files = [pictures.find(camera.file) for camera in cameras]
-    shots = tuple(_shot(path, camera, pictures, file) for camera, file in zip(cameras, files, strict=True))
-    return CameraModel(path, shots, tuple(files), np.zeros((0, 3)), METRES if metres else UNITS_OF_MODEL)
+    shots = []
+    for camera, file in zip(cameras, files, strict=True):
+        with naming(f"{path}: {camera.file}"):
+            shots.append(_shot(camera, pictures, file))
+    units = METRES if table.units == "metres" else UNITS_OF_MODEL
+    return CameraModel(path, tuple(shots), tuple(files), np.zeros((0, 3)), units)
 
 
-def _loaded(path: Path, text: str) -> Any:
-    try:
-        loaded = yaml.safe_load(text)
-    except (yaml.YAMLError, RecursionError, ValueError) as error:
-        raise SepiError(f"{path}: not YAML: {one_line(str(error))[:120]}") from error
-    if not isinstance(loaded, dict):
-        raise SepiError(
-            f"{path}: expected a key 'cameras' with a list of cameras, and where needed 'shared' and 'units'"
-        )
-    return loaded
-
-
-def _rows(path: Path, text: str) -> list[dict[str, Any]]:
+def _rows(text: str) -> list[dict[str, Any]]:
     lines = text.splitlines()
     # as spreadsheets of countries write it whose numbers have commas
     separator = next((mark for mark in ";\t" if lines and mark in lines[0]), ",")
     rows = csv.DictReader(lines, delimiter=separator, skipinitialspace=True)
-    try:
-        named = list(rows)
-        columns = [name.strip() for name in rows.fieldnames or ()]
-    except csv.Error as error:
-        raise SepiError(f"{path}: not CSV: {error}") from error
-    rows.fieldnames = columns
+    rows.fieldnames = [name.strip() for name in rows.fieldnames or ()]
+    require_known("columns", rows.fieldnames, _COLUMNS)
     for name in ("file", *_PLACE, "fx"):
-        if name not in columns:
-            raise SepiError(f"{path}: no column '{name}'; expected {', '.join(_COLUMNS)}, those from qw on if needed")
-    for name in columns:
-        if name not in _COLUMNS:
-            raise SepiError(f"{path}: column '{name}' is unknown; expected {', '.join(_COLUMNS)}")
-    return [_entry({(key or "").strip(): value for key, value in row.items()}) for row in named]
+        if name not in rows.fieldnames:
+            raise SepiError(f"no column '{name}'; expected {', '.join(_COLUMNS)}, those from qw on if needed")
+    return [_entry(row) for row in rows]
 
 
 def _entry(row: Mapping[str, Any]) -> dict[str, Any]:
@@ -134,13 +119,16 @@ def _entry(row: Mapping[str, Any]) -> dict[str, Any]:
     return {key: value for key, value in entry.items() if value is not None}
 
 
-def _shot(path: Path, camera: _Camera, pictures: Pictures, file: Path) -> Shot:
+def _shot(camera: _Camera, pictures: Pictures, file: Path) -> Shot:
     focal = camera.focal if isinstance(camera.focal, tuple) else (camera.focal, camera.focal)
-    lens = pictures.lens(camera.file, file, camera.size, focal, camera.principal, camera.lens, tuple(camera.distortion))
-    return Shot(camera.file, lens, rotation_of(path, camera.file, camera.rotation), np.array(camera.position))
+    width, height = map(int, camera.size or pictures.size(file))
+    principal = camera.principal or ((width - 1) / 2, (height - 1) / 2)
+    lens = Lens(width, height, focal, principal, camera.lens, tuple(camera.distortion))
+    place = np.array(camera.position)
+    return Shot(camera.file, pictures.fitted(file, lens, camera.size), rotation_of(camera.rotation), place)
 
 
-def rotation_of(path: Path, name: str, told: Any) -> Floats:
+def rotation_of(told: Any) -> Floats:
     """A rotation matrix from a quaternion ``(w, x, y, z)`` or a matrix that was written down with a few digits."""
     values = np.array(told, np.float64) if len({np.size(row) for row in told}) == 1 else np.zeros(0)
     if values.shape == (4,) and abs(np.linalg.norm(values) - 1) < _NEARLY:
@@ -149,6 +137,6 @@ def rotation_of(path: Path, name: str, told: Any) -> Floats:
         left, _, right = np.linalg.svd(values)
         return np.asarray(left @ right, np.float64)
     raise SepiError(
-        f"{path}: {name}: rotation: expected a quaternion w x y z of length 1, or the 3x3 matrix of a rotation, "
+        "rotation: expected a quaternion w x y z of length 1, or the 3x3 matrix of a rotation, "
         "no mirror, from the world's axes to the camera's"
     )

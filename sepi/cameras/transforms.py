@@ -19,8 +19,8 @@ from sepi.cameras.model import UNITS_OF_MODEL, CameraModel
 from sepi.cameras.pictures import Pictures
 from sepi.cameras.table import rotation_of
 from sepi.errors import SepiError
-from sepi.io.files import reading
-from sepi.rig import FISHEYE, METRES, PINHOLE, Shot
+from sepi.io.files import naming, reading
+from sepi.rig import FISHEYE, METRES, PINHOLE, Lens, Shot
 
 _MOST_BYTES = 256 * 2**20
 _MODELS = {"OPENCV": PINHOLE, "PINHOLE": PINHOLE, "SIMPLE_PINHOLE": PINHOLE, "OPENCV_FISHEYE": FISHEYE}
@@ -40,10 +40,7 @@ def read_transforms(path: Path, pictures: Pictures) -> CameraModel:
     with reading(path, "transforms.json"):
         if path.stat().st_size > _MOST_BYTES:
             raise SepiError("not a transforms.json: too long")
-        try:
-            told = json.loads(path.read_bytes())
-        except (ValueError, RecursionError) as error:
-            raise SepiError(f"not a transforms.json: {error}") from error
+        told = json.loads(path.read_bytes())
     frames = told.get("frames") if isinstance(told, dict) else None
     if not isinstance(frames, list) or not frames or not all(isinstance(frame, dict) for frame in frames):
         raise SepiError(f"{path}: no cameras; expected a list 'frames'")
@@ -59,7 +56,8 @@ def read_transforms(path: Path, pictures: Pictures) -> CameraModel:
         files.append(file)
         mask = entry.get("mask_path")
         masks.append(_found(pictures, mask) if isinstance(mask, str) and mask else None)
-        shots.append(_shot(path, name, entry, pictures, file))
+        with naming(f"{path}: {name}"):
+            shots.append(_shot(name, entry, pictures, file))
     units = METRES if told.get("units") == METRES else UNITS_OF_MODEL
     return CameraModel(path, tuple(shots), tuple(files), _points(path, told), units, tuple(masks))
 
@@ -69,10 +67,10 @@ def _found(pictures: Pictures, name: str) -> Path:
     return pictures.find(name, Path(name).name, f"{name}.png")
 
 
-def _shot(path: Path, name: str, entry: Mapping[str, Any], pictures: Pictures, file: Path) -> Shot:
+def _shot(name: str, entry: Mapping[str, Any], pictures: Pictures, file: Path) -> Shot:
     word = str(entry.get("camera_model", "OPENCV"))
     if word not in _MODELS:
-        raise SepiError(f"{path}: camera_model '{word[:40]}'; expected one of {', '.join(_MODELS)}")
+        raise SepiError(f"camera_model '{word[:40]}'; expected one of {', '.join(_MODELS)}")
     kind = _MODELS[word]
 
     def number(key: str, other: float | None = None) -> float:
@@ -80,7 +78,7 @@ def _shot(path: Path, name: str, entry: Mapping[str, Any], pictures: Pictures, f
         with suppress(TypeError, ValueError):
             if not isinstance(value, bool) and math.isfinite(found := float(value)):
                 return found
-        raise SepiError(f"{path}: {name}: expected a number as {key}, got {str(value)[:40]}")
+        raise SepiError(f"expected a number as {key}, got {str(value)[:40]}")
 
     size = (number("w"), number("h")) if {"w", "h"} <= entry.keys() else None
     width, height = size or pictures.size(file)
@@ -96,9 +94,9 @@ def _shot(path: Path, name: str, entry: Mapping[str, Any], pictures: Pictures, f
     except (ValueError, TypeError):
         matrix = np.zeros(0)
     if matrix.shape not in ((4, 4), (3, 4)) or not np.isfinite(matrix).all():
-        raise SepiError(f"{path}: {name}: expected 4 rows of 4 numbers as transform_matrix")
-    lens = pictures.lens(name, file, size, (focal_x, number("fl_y", focal_x)), principal, kind, coefficients)
-    return Shot(name, lens, rotation_of(path, name, (matrix[:3, :3] @ _TURN).T), matrix[:3, 3].copy())
+        raise SepiError("expected 4 rows of 4 numbers as transform_matrix")
+    lens = Lens(int(width), int(height), (focal_x, number("fl_y", focal_x)), principal, kind, coefficients)
+    return Shot(name, pictures.fitted(file, lens, size), rotation_of((matrix[:3, :3] @ _TURN).T), matrix[:3, 3].copy())
 
 
 def _points(path: Path, told: Mapping[str, Any]) -> np.ndarray[Any, np.dtype[np.float64]]:

@@ -6,7 +6,6 @@ import json
 import math
 import warnings
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -35,7 +34,7 @@ NO_INTERVAL = "no interval: the map has no error bars"
 @click.option("--border", type=click.IntRange(min=0), help="Score with this many pixels left out on each side only.")
 @click.option(
     "--offset",
-    type=Pair("ROW,COLUMN", ","),
+    type=Pair("ROW,COLUMN"),
     metavar="ROW,COLUMN",
     help="ESTIMATE is a crop: where its top left pixel lies in the ground truth, counted from 0.",
 )
@@ -99,15 +98,16 @@ def evaluate(
     if values is None:
         view = "" if light_field is None else ",".join(map(str, light_field.reference_position))
         raise SepiError(f"{source}: no ground truth for view {view}")
-    crop = None if offset is None else _Crop(offset, (disparity.shape[0], disparity.shape[1]), values.shape)
+    crop = None if offset is None else {"offset": offset, "shape": disparity.shape, "whole": values.shape}
     inside = None
-    if crop is not None:
+    if offset is not None:
         with naming(estimate):
-            disparity, inside = in_frame(disparity, crop.offset, crop.whole)
+            disparity, inside = in_frame(disparity, offset, values.shape)
     elif values.shape != disparity.shape:
+        smaller = all(length <= whole for length, whole in zip(disparity.shape, values.shape, strict=True))
         raise SepiError(
             f"{source}: ground truth is {values.shape}, the estimate {disparity.shape} (height, width)"
-            + ("; --offset tells where a crop lies" if _fits(disparity.shape, values.shape) else "")
+            f"{'; --offset tells where a crop lies' if smaller else ''}"
         )
     doubt = misfit(disparity, values, None if light_field is None else light_field.grid)
     if doubt is not None:
@@ -118,38 +118,25 @@ def evaluate(
         truth_step = 0.0 if own is None else own.step
     maps = read_error_bars_at(estimate, reading.options.view)
     bars = None if maps is None else ErrorBars.of(maps, None if light_field is None else light_field.reach, truth_step)
-    if bars is not None and crop is not None:
-        bars = bars.in_frame(crop.offset, crop.whole)
+    if bars is not None and offset is not None:
+        bars = bars.in_frame(offset, values.shape)
     scores = score_regions(disparity, values, masks, protocols, within=inside, thresholds=thresholds, bars=bars)
     if as_json:
-        told = without_nan(scores) | ({} if crop is None else {"crop": asdict(crop)})
+        told = without_nan(scores) | ({} if crop is None else {"crop": crop})
         told |= {"truth_step": truth_step} if bars is not None and truth_step else {}
         click.echo(json.dumps(told, indent=2, sort_keys=True))
     else:
-        lines = [] if crop is None else [crop.described]
+        lines = [] if crop is None else [_described(**crop)]
         click.echo("\n".join([*lines, score_table(scores, thresholds, truth_step)]))
 
 
-@dataclass(frozen=True)
-class _Crop:
-    """The part of the ground truth that is scored: row and column of its top left pixel, and heights and widths."""
-
-    offset: tuple[int, int]
-    shape: tuple[int, int]
-    whole: tuple[int, int]
-
-    @property
-    def described(self) -> str:
-        """One line."""
-        (row, column), (height, width) = self.offset, self.shape
-        return (
-            f"crop: rows {row} to {row + height - 1}, columns {column} to {column + width - 1} of "
-            f"{self.whole[0]}x{self.whole[1]} (height x width); borders are counted from the edges of the whole"
-        )
-
-
-def _fits(shape: tuple[int, ...], whole: tuple[int, ...]) -> bool:
-    return all(length <= most for length, most in zip(shape, whole, strict=True))
+def _described(offset: tuple[int, int], shape: tuple[int, int], whole: tuple[int, int]) -> str:
+    """The part of the ground truth that is scored, in one line."""
+    (row, column), (height, width) = offset, shape
+    return (
+        f"crop: rows {row} to {row + height - 1}, columns {column} to {column + width - 1} of "
+        f"{whole[0]}x{whole[1]} (height x width); borders are counted from the edges of the whole"
+    )
 
 
 def score_table(scores: AllScores, thresholds: Sequence[float] = (), truth_step: float = 0.0) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -61,8 +61,8 @@ def info(light_field_path: Path, geometry: Geometry | None, reading: Reading, as
             "missing_views": missing,
             "reference_view": (t0, s0),
             "positions": _positions(light_field),
-            "disparity_range": None if own is None else _range_values(own),
-            "estimated_range": None if isinstance(estimated, str) else _range_values(estimated),
+            "disparity_range": None if own is None else asdict(own),
+            "estimated_range": None if isinstance(estimated, str) else asdict(estimated),
             "estimate_failure": estimated if isinstance(estimated, str) else None,
             "camera": None if camera is None else {"scale_m": camera.scale, "offset": camera.offset},
             "ground_truth": light_field.ground_truth is not None,
@@ -211,7 +211,3 @@ def _positions(light_field: LightField) -> list[list[list[float] | None]] | None
     return [
         [place if present else None for place, present in zip(places, there, strict=True)] for places, there in rows
     ]
-
-
-def _range_values(known: DisparityRange) -> dict[str, Any]:
-    return {"minimum": float(known.minimum), "maximum": float(known.maximum), "source": known.source}

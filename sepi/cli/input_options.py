@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import functools
 import math
-import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,31 +21,18 @@ if TYPE_CHECKING:
 class Pair(click.ParamType[tuple[int, int]]):
     """Two whole numbers with a sign between them, such as 9x9 or 4,4."""
 
-    def __init__(self, name: str, separators: str) -> None:
-        self.name = name
-        self._form = re.compile(rf"\s*(\d{{1,6}})\s*[{separators}]\s*(\d{{1,6}})\s*")
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[int, int]:
-        match = self._form.fullmatch(value) if isinstance(value, str) else None
-        if match is None:
-            self.fail(f"expected {self.name}, got {value!r}", param, ctx)
-        return int(match[1]), int(match[2])
-
-
-class _Positive(click.ParamType[float]):
-    """A number above zero."""
-
     def __init__(self, name: str) -> None:
         self.name = name
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        try:
-            number = float(value)
-        except ValueError:
-            number = math.nan
-        if not 0 < number < math.inf:
-            self.fail(f"expected a number above 0, got {value!r}", param, ctx)
-        return number
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[int, int]:
+        from sepi.validation import pair_of
+
+        return pair_of(value, "," if "," in self.name else "xX×") or self.fail(
+            f"expected {self.name}, got {value!r}", param, ctx
+        )
+
+
+_POSITIVE = click.FloatRange(0, math.inf, min_open=True, max_open=True)
 
 
 def default_folder(path: Path, kind: str) -> Path:
@@ -79,9 +65,7 @@ _FLAGS = (
         help="exported, cameras, hci, hci-2013, images, eslf, tiff-stack, matlab, numpy, openlf, hdf5 or sepi; found "
         "by looking unless given.",
     ),
-    click.option(
-        "--grid", type=Pair("ROWSxCOLUMNS", "xX×"), metavar="ROWSxCOLUMNS", help="Grid of views in the files."
-    ),
+    click.option("--grid", type=Pair("ROWSxCOLUMNS"), metavar="ROWSxCOLUMNS", help="Grid of views in the files."),
     click.option(
         "--pattern",
         help="Names of views in a folder: 'view_{row}_{column}.png' or 'img{number}.jpg'; * is anything.",
@@ -98,19 +82,17 @@ _FLAGS = (
     ),
     click.option(
         "--view",
-        type=Pair("ROW,COLUMN", ","),
+        type=Pair("ROW,COLUMN"),
         metavar="ROW,COLUMN",
         help="View whose depth is made; the centre unless given.",
     ),
     click.option(
         "--row-spacing",
-        type=_Positive("F"),
+        type=_POSITIVE,
         metavar="F",
         help="Distance of rows of views in steps of columns, if they differ.",
     ),
-    click.option(
-        "--white", type=_Positive("W"), metavar="W", help="Value of white: 1023 in files of 10 bits, 4095 of 12."
-    ),
+    click.option("--white", type=_POSITIVE, metavar="W", help="Value of white: 1023 in files of 10 bits, 4095 of 12."),
     click.option("--images", metavar="FOLDER", help="Pictures of calibrated cameras, if not beside the model."),
     click.option(
         "--reference",
@@ -127,6 +109,21 @@ _FLAGS = (
 )
 
 
+_TRUTH = (
+    click.option(
+        "--truth",
+        type=click.Path(path_type=Path),
+        metavar="FILE",
+        help="Ground truth of one's own: PFM, NumPy, HDF5, or a grey picture, in which 0 is unknown.",
+    ),
+    click.option(
+        "--truth-scale",
+        type=_POSITIVE,
+        metavar="K",
+        help="Pixels per view step that 1 in the file of --truth stands for; pictures of 8 and 16 bit need it.",
+    ),
+)
+
 _SCENES = (
     click.option("--builtin", help="Built-in scene, in place of PATH."),
     click.option("--size", type=click.IntRange(min=1), default=192, show_default=True, help="Built-in: pixels a side."),
@@ -136,7 +133,7 @@ _SCENES = (
 
 view_of_result = click.option(
     "--view",
-    type=Pair("ROW,COLUMN", ","),
+    type=Pair("ROW,COLUMN"),
     metavar="ROW,COLUMN",
     help="View to take, where 'sepi depth --all-views' made maps of all; that of the result unless given.",
 )
@@ -153,11 +150,15 @@ Geometry = Callable[..., "Camera"]
 """Makes the camera of views of a ``shape``."""
 
 
-def scene_flags(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Give a command the flags of a scene of this package, in place of one that is read."""
-    for flag in reversed(_SCENES):
+def _flagged(command: Callable[..., Any], flags: Iterable[Callable[..., Any]]) -> Callable[..., Any]:
+    for flag in reversed(list(flags)):
         command = flag(command)
     return command
+
+
+def scene_flags(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Give a command the flags of a scene of this package, in place of one that is read."""
+    return _flagged(command, _SCENES)
 
 
 def reading_flags(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -170,9 +171,7 @@ def reading_flags(command: Callable[..., Any]) -> Callable[..., Any]:
         options = ReadOptions(**{field.name: values.pop(field.name) for field in fields(ReadOptions)})
         return command(*args, reading=Reading(file_format, options), **values)
 
-    for flag in reversed(_FLAGS):
-        with_reading = flag(with_reading)
-    return with_reading
+    return _flagged(with_reading, _FLAGS)
 
 
 def truth_flags(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -187,22 +186,7 @@ def truth_flags(command: Callable[..., Any]) -> Callable[..., Any]:
         own = None if truth is None else TruthFile(truth, truth_scale)
         return command(*args, own=own, **values)
 
-    for flag in (
-        click.option(
-            "--truth-scale",
-            type=_Positive("K"),
-            metavar="K",
-            help="Pixels per view step that 1 in the file of --truth stands for; pictures of 8 and 16 bit need it.",
-        ),
-        click.option(
-            "--truth",
-            type=click.Path(path_type=Path),
-            metavar="FILE",
-            help="Ground truth of one's own: PFM, NumPy, HDF5, or a grey picture, in which 0 is unknown.",
-        ),
-    ):
-        with_truth = flag(with_truth)
-    return with_truth
+    return _flagged(with_truth, _TRUTH)
 
 
 def camera_flags(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -224,9 +208,10 @@ def camera_flags(command: Callable[..., Any]) -> Callable[..., Any]:
         geometry = None if missing else functools.partial(camera_from, **flags, crop_of=part)
         return command(*args, geometry=geometry, **values)
 
-    for name, (unit, text) in reversed(_GEOMETRY.items()):
-        with_geometry = click.option(_flag(name), name, type=float, metavar=unit, help=text)(with_geometry)
-    return with_geometry
+    flags = (
+        click.option(_flag(name), name, type=float, metavar=unit, help=text) for name, (unit, text) in _GEOMETRY.items()
+    )
+    return _flagged(with_geometry, flags)
 
 
 _GEOMETRY = {

@@ -163,7 +163,7 @@ def _write_folder(render: Render, exposure: Exposure, folder: Path, all_views: b
     from sepi.scenes.folder import write_hci
 
     light_field = exposed(render, exposure)
-    camera = camera_from(**render.settings, shape=light_field.shape)
+    camera = camera_from(**render.settings, shape=light_field.shape, crop_of=None)
     maps = {"gt_depth_lowres": camera.depth(render.disparity[render.centre])}
     if all_views:
         views = render.disparity.reshape(-1, *light_field.shape)

@@ -77,7 +77,7 @@ def exposed(render: Render, exposure: Exposure) -> LightField:
         disparity_range=_range_of(render.disparity),
         ground_truth=render.disparity[render.centre],
         masks=render.masks_of(render.centre),
-        camera=camera_from(**render.settings, shape=render.views.shape[2:4]),
+        camera=camera_from(**render.settings, shape=render.views.shape[2:4], crop_of=None),
     )
 
 

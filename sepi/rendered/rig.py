@@ -44,7 +44,7 @@ class Rig:
     @property
     def camera(self) -> Camera:
         """What turns disparity into depth."""
-        return camera_from(**self.settings, shape=(self.size, self.size))
+        return camera_from(**self.settings, shape=(self.size, self.size), crop_of=None)
 
     @property
     def settings(self) -> dict[str, float]:

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
 from sepi.lightfield import BoolMap, FloatMap
+from sepi.rig import Floats
 
 # errors are close up to this part of the range that nearly all of a map lies within, or so many pixels per view step
 _PART, _LEAST = 0.05, 0.07
 # share of pixels with a larger error from which a fit is in doubt, and how much better another must be
 _POOR, _BETTER = 0.2, 0.25
-# rounds of reweighting, of so many pixels
-_ROUNDS, _PIXELS = 30, 20000
+# errors that a fitted line should not exceed, pixels per view step; pixels that it is fitted to
+_CLOSE, _PIXELS = 0.003, 20000
 
 
 def misfit(estimate: FloatMap, truth: FloatMap, grid: tuple[int, int] | None = None) -> str | None:
@@ -46,38 +46,43 @@ def misfit(estimate: FloatMap, truth: FloatMap, grid: tuple[int, int] | None = N
         return None
     close = max(_LEAST, _PART * float(np.ptp(np.quantile(estimate[known], (0.02, 0.98)))))
 
-    def missed(values: FloatMap, where: BoolMap = known) -> npt.NDArray[np.float32]:
-        return np.minimum(np.abs(estimate - values)[where & np.isfinite(values)] / close, 1)
+    def off(values: FloatMap, where: BoolMap = known) -> tuple[float, float]:
+        missed = np.minimum(np.abs(estimate - values)[where & np.isfinite(values)] / close, 1)
+        return (round(float(np.mean(missed == 1)), 2), float(missed.mean())) if missed.size else (1.0, 1.0)
 
-    def off(values: FloatMap, where: BoolMap = known) -> float:
-        return float(np.mean(missed(values, where) == 1)) if where.any() else 1.0
-
-    as_it_is, zero = off(truth), known & (truth == 0)
+    (as_it_is, _), zero = off(truth), known & (truth == 0)
     if as_it_is < _POOR:
         return None
-    if off(truth, zero) > 1 - _POOR and off(truth, known & ~zero) < _BETTER * as_it_is:
+    if off(truth, zero)[0] > 1 - _POOR and off(truth, known & ~zero)[0] < _BETTER * as_it_is:
         return f"without its zeros, {100 * zero.sum() / known.sum():.0f} % of it; where 0 is unknown, NaN says so"
     tried = {
         "upside down (a PFM begins with its bottom row)": truth[::-1],
         "mirrored": truth[:, ::-1],
         "turned by half a turn": truth[::-1, ::-1],
     }
-    for values in (truth, 1 / truth) if (truth[known] > 0).all() else (truth,):
+    with np.errstate(divide="ignore"):
+        inverse: FloatMap = np.float32(1) / truth
+    for values in (truth, inverse) if (truth[known] > 0).all() else (truth,):
         factor, more = _line(values[known], estimate[known])
         if abs(factor) * float(np.ptp(values[known])) > close:
-            tried[_line_text(factor, more, close, values is not truth, grid)] = factor * values + more
-    how = min(tried, key=lambda name: (round(off(tried[name]), 2), float(missed(tried[name]).mean())))
-    return how if off(tried[how]) < _BETTER * as_it_is else None
+            tried[_line_text(factor, more, close, values is not truth, grid)] = np.float32(
+                factor
+            ) * values + np.float32(more)
+    how = min(tried, key=lambda name: off(tried[name]))
+    return how if off(tried[how])[0] < _BETTER * as_it_is else None
 
 
 def _line(values: FloatMap, wanted: FloatMap) -> tuple[float, float]:
-    """Factor and summand that bring most values closest to what is wanted: least absolute deviations."""
+    """Factor and summand that bring most values closest to what is wanted, whatever the others are."""
+    from scipy.optimize import least_squares
+
     every = max(1, len(values) // _PIXELS)
     x, y = values[::every].astype(np.float64), wanted[::every].astype(np.float64)
-    weights, design = np.ones(len(x)), np.column_stack([x, np.ones(len(x))])
-    for _ in range(_ROUNDS):
-        found = np.linalg.lstsq(design * weights[:, None], y * weights, rcond=None)[0]
-        weights = 1 / np.sqrt(np.maximum(np.abs(y - design @ found), 1e-4))
+
+    def errors(line: Floats) -> Floats:
+        return np.asarray(line[0] * x + line[1] - y)
+
+    found = least_squares(errors, (0.0, np.median(y)), x_scale="jac", loss="soft_l1", f_scale=_CLOSE).x
     return float(found[0]), float(found[1])
 
 
@@ -86,8 +91,10 @@ def _line_text(factor: float, more: float, close: float, inverse: bool, grid: tu
         return f"as depth, {factor:.3g} / it {more:+.3g}; disparity in pixels per view step is expected"
     if abs(more) > close:
         return f"as {factor:.3g} * it {more:+.3g}; disparity is 0 in focus, and in pixels per view step"
-    if abs(factor + 1) < _PART:
-        return "with its sign turned; disparity is greater where the scene is nearer"
-    steps = () if grid is None else (grid[1] - 1, grid[1], grid[0] - 1, grid[0])
-    whole = ", as one in steps of the whole grid" if any(abs(abs(factor) * n - 1) < _PART for n in steps) else ""
-    return f"multiplied by {factor:.3g}{whole} (--truth FILE --truth-scale {factor:.3g})"
+    counts = [count - less for count in grid or () for less in (0, 1)]
+    steps = next((n for n in counts if abs(abs(factor) * n - 1) < _PART), None)
+    size = f"{1 / steps if steps else abs(factor):.3g}"
+    whole = ", as one in steps of the whole grid" if steps else ""
+    signs = ["with its sign turned (greater is nearer)"] if factor < 0 else []
+    scaled = [f"multiplied by {size}{whole} (--truth FILE --truth-scale {size})"]
+    return " and ".join([*signs, *(scaled if abs(abs(factor) - 1) > _PART else [])])

@@ -7,26 +7,26 @@ import os
 import re
 from collections.abc import Collection, Mapping
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any, get_type_hints
 
-from pydantic import Field
+from pydantic import Field, create_model
 
 from sepi.errors import SepiError
 from sepi.io.disparity_maps import SUFFIXES, TruthFile
 from sepi.io.external_maps import ExternalSource
 from sepi.io.readers.formats import FORMATS
-from sepi.io.readers.options import ORDERS
+from sepi.io.readers.options import AS_GIVEN, ORDERS, Positive, ReadOptions
 from sepi.lightfield import DisparityRange
-from sepi.models import AS_PAIR, CheckedModel, validated
+from sepi.models import CheckedModel, validated
 from sepi.scenes import SCENES
 from sepi.validation import require_known
 from sepi.variants import VARIANT_ENTRIES, VARIANTS, Variant, variant_from
 from sepi.workflow.datasets import LONGEST_NAME, Scene, own_scene, require_plain_path, scenes_in
 from sepi.workflow.parameters import default_values, stage_settings
 from sepi.workflow.rendered_dataset import Rendered
-from sepi.workflow.settings import Index, Report, Settings
+from sepi.workflow.settings import Report, Settings
 
 # names of folders, panels and columns of tables that stand beside those of variants
 _RESERVED = ("stages", "complete", "external", "ground_truth", "reference_view", "dataset", "scene", "row", "region")
@@ -46,10 +46,6 @@ class Builtin(CheckedModel):
     size: int = Field(192, ge=64, le=1024, description="height and width of a view in pixels")
 
 
-_Count = Annotated[int, Field(ge=1)]
-_Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-
-
 class Root(CheckedModel):
     """A folder of scenes, and patterns of the names of those to take and to leave out."""
 
@@ -58,45 +54,37 @@ class Root(CheckedModel):
     exclude: list[str] = Field([])
 
 
-class OwnLightField(CheckedModel):
-    """Keys of one of the ``light_fields``: where it is, the flags of ``sepi depth`` that say how to read it, and its
-    ground truth.
-    """
+class _Own(CheckedModel):
+    """Keys of one of the ``light_fields`` beside those of :class:`ReadOptions`: where it is, and its ground truth."""
 
     path: str = Field(min_length=1)
     truth: str | None = Field(None, min_length=1)
-    truth_scale: _Positive | None = None
+    truth_scale: Positive | None = None
     format: str | None = None
-    grid: Annotated[tuple[_Count, _Count] | None, AS_PAIR] = None
-    pattern: str | None = None
-    axes: str | None = None
-    variable: str | None = None
-    central: _Count | None = None
-    order: str | None = None
-    exclude: list[str] = Field([])
-    view: Annotated[tuple[Index, Index] | None, AS_PAIR] = None
-    row_spacing: _Positive | None = None
-    white: _Positive | None = None
-    images: str | None = None
-    reference: str | None = None
-    crop_of: str | None = None
-    follow_links: bool = False
 
     @property
     def flags(self) -> tuple[str, ...]:
         """How to read it, as flags of the command line."""
         pairs = {"grid": "x", "view": ","}
         flags: list[str] = []
-        others = {"path", "truth", "truth_scale", "exclude", "follow_links"}
-        for key, value in self.model_dump(exclude=others, exclude_none=True).items():
+        given = self.model_dump(exclude={"path", "truth", "truth_scale"}, exclude_defaults=True)
+        last = [flag for view in given.pop("exclude", ()) for flag in ("--exclude", view)]
+        last += ["--follow-links"] * given.pop("follow_links", False)
+        for key, value in given.items():
             flags += [f"--{key.replace('_', '-')}", pairs[key].join(map(str, value)) if key in pairs else str(value)]
-        flags += [flag for view in self.exclude for flag in ("--exclude", view)]
-        return (*flags, "--follow-links") if self.follow_links else tuple(flags)
+        return (*flags, *last)
 
     @property
     def own_truth(self) -> TruthFile | None:
         """The file of ground truth, if there is one."""
         return None if self.truth is None else TruthFile(Path(self.truth).expanduser(), self.truth_scale)
+
+
+_HINTS = get_type_hints(ReadOptions, include_extras=True)
+OwnLightField: type[_Own] = create_model(  # type: ignore[call-overload]
+    "OwnLightField", __base__=_Own, **{field.name: (_HINTS[field.name], field.default) for field in fields(ReadOptions)}
+)
+"""Keys of one of the ``light_fields``: the flags of ``sepi depth`` that say how to read it are among them."""
 
 
 class Config(CheckedModel):
@@ -136,7 +124,7 @@ class Config(CheckedModel):
         "a folder with SCENE.pfm, .npy, .png or .h5, a file pattern such as {SPO: '/maps/{dataset}/{scene}/spo.pfm'}, "
         "or {path: ..., scale: ..., offset: ...} where disparity = value * scale + offset.",
     )
-    bad_thresholds: list[_Positive] = Field(
+    bad_thresholds: list[Positive] = Field(
         [],
         description="Errors in pixels per view step to score beside 0.07, 0.03 and 0.01: the percentage of the pixels "
         "with a larger one.",
@@ -249,7 +237,7 @@ def _scenes(config: Config) -> dict[str, Scene]:
     for name, values in config.light_fields.items():
         where = f"config.light_fields.{name}"
         own = validated(OwnLightField, values, where)
-        require_known(f"{where}.order", filter(None, [own.order]), ORDERS)
+        require_known(f"{where}.order", [values.get("order", AS_GIVEN)], ORDERS)
         require_known(f"{where}.format", filter(None, [own.format]), FORMATS)
         if own.truth is None and own.truth_scale is not None:
             raise SepiError(f"{where}.truth_scale: says what the numbers of a file mean; name it as truth")

@@ -7,13 +7,13 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
 
 from pydantic import Field
 
 from sepi.compared.methods import LEARNED
 from sepi.errors import SepiError
 from sepi.io.external_maps import ExternalSource
+from sepi.io.readers.options import Index
 from sepi.models import CheckedModel
 from sepi.stage import Parameters
 from sepi.validation import require_known
@@ -26,7 +26,6 @@ from sepi.workflow.result_paths import RESULTS
 _PICTURES = re.compile(r"reports/(?:comparison/|rendered/)?(?:maps/([^/]+)/([^/]+)|page/([^/]+)/([^/]+)\.json)")
 
 
-Index = Annotated[int, Field(ge=0)]
 PAGES = tuple(f"reports/{report}index.html" for report in ("", "comparison/", "rendered/"))
 
 MOST_ON_PAGE = 50

@@ -407,6 +407,119 @@ def test_csv_says_the_same_as_yaml(folder: Path, tmp_path: Path) -> None:
     assert model.shots[0].lens == Lens(64, 64, (80, 80), (31.5, 31.5), distortion=(0.01, *(0.0,) * 7))
 
 
+LENS = Lens(128, 96, (100.0, 110.0), (60.5, 40.5))
+KINDS = ("cameras.csv", "cameras.yaml", "transforms.json", "sparse/cameras.txt")
+
+
+def _told_at(folder: Path, kind: str, size: tuple[int, int], *, sized: bool = True) -> Path:
+    """Three cameras of :data:`LENS` in a file of one kind, and pictures of another size."""
+    (folder / kind).parent.mkdir(parents=True, exist_ok=True)
+    names = [f"{n}.png" for n in range(3)]
+    for name in names:
+        cv2.imwrite(str(folder / name), np.zeros(size[::-1], np.uint8))
+    (fx, fy), (cx, cy), (w, h) = LENS.focal, LENS.principal, (LENS.width, LENS.height)
+    if kind == "cameras.csv":
+        rows = [f"{name},{n},0,0,{fx},{fy},{cx},{cy}" + f",{w},{h}" * sized for n, name in enumerate(names)]
+        text = "\n".join(["file,x,y,z,fx,fy,cx,cy" + ",w,h" * sized, *rows])
+    elif kind == "cameras.yaml":
+        shared = {"focal": [fx, fy], "principal": [cx, cy], **({"size": [w, h]} if sized else {})}
+        cameras = [{"file": name, "position": [n, 0, 0]} for n, name in enumerate(names)]
+        text = json.dumps({"grid": "1x3", "shared": shared, "cameras": cameras})
+    elif kind == "transforms.json":
+        places = [[[1, 0, 0, n], [0, 1, 0, 0], [0, 0, 1, 0]] for n in range(3)]
+        frames = [{"file_path": name, "transform_matrix": at} for name, at in zip(names, places, strict=True)]
+        lens = {"fl_x": fx, "fl_y": fy, "cx": cx + 0.5, "cy": cy + 0.5, **({"w": w, "h": h} if sized else {})}
+        text = json.dumps({**lens, "frames": frames})
+    else:
+        text = f"1 PINHOLE {w} {h} {fx} {fy} {cx + 0.5} {cy + 0.5}\n"
+        images = "".join(f"{n + 1} 1 0 0 0 {-n} 0 0 1 {name}\n\n" for n, name in enumerate(names))
+        (folder / "sparse/images.txt").write_text(images)
+        (folder / "sparse/points3D.txt").write_text("")
+    (folder / kind).write_text(text)
+    return folder
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_lens_is_that_of_the_picture_at_hand_whoever_tells_it(tmp_path: Path, kind: str) -> None:
+    """Pictures of half the size with the lens of the whole ones give twice the depth, everywhere."""
+    if kind.endswith("txt"):
+        pytest.importorskip("pycolmap")
+    half = read_model(_told_at(tmp_path / "half", kind, (64, 48)))
+    assert {(shot.lens.width, shot.lens.height, shot.lens.focal, shot.lens.principal) for shot in half.shots} == {
+        (64, 48, (50.0, 55.0), (30.0, 20.0))
+    }
+    assert "128x96 pixels scaled to pictures of 64x48" in rectification_of(half).notes[0]
+    assert read_model(_told_at(tmp_path / "same", kind, (128, 96))).notes == ()
+    # neither scaled nor turned, but a part
+    cut = _told_at(tmp_path / "cut", kind, (64, 64))
+    with pytest.raises(SepiError, match=r"\.png: the picture is 64x64, .* 128x96; .* --crop-of 128x96\+X\+Y"):
+        read_model(cut)
+    model = read_model(cut, crop_of=(128, 96, 30, 20))
+    assert {(shot.lens.width, shot.lens.focal, shot.lens.principal) for shot in model.shots} == {
+        (64, LENS.focal, (30.5, 20.5))
+    }
+    with pytest.raises(SepiError, match="from column 70, row 20 on do not lie inside 128x96"):
+        read_model(cut, crop_of=(128, 96, 70, 20))
+
+
+@pytest.mark.parametrize("kind", KINDS[:3])
+def test_a_principal_point_of_other_pictures_is_told_where_no_size_is(tmp_path: Path, kind: str) -> None:
+    folder = _told_at(tmp_path, kind, (64, 48), sized=False)
+    with pytest.raises(SepiError, match=r"those of pictures about 1\.7 times as large; expected the size"):
+        read_model(folder)
+    assert read_model(folder, crop_of=(128, 96, 0, 0)).shots[0].lens.principal == LENS.principal
+
+
+def test_a_side_that_was_rounded_is_no_other_scale() -> None:
+    """Sets of pictures come at a quarter of 4946x3286, and cameras of the quarter with the whole pictures."""
+    whole, quarter = (4946, 3286), (1237, 822)
+    for told, here in ((whole, quarter), (quarter, whole)):
+        lens = Lens(*told, (1000.0, 1000.0), (told[0] / 2 - 0.5, told[1] / 2 - 0.5)).scaled(*here)
+        assert lens.principal == pytest.approx((here[0] / 2 - 0.5, here[1] / 2 - 0.5))
+    with pytest.raises(SepiError, match="scaled alike"):
+        lens.scaled(3286, 4946)
+
+
+@pytest.mark.parametrize("separator", [";", "\t"])
+def test_tables_of_spreadsheets_and_numbers_as_text_are_taken(tmp_path: Path, separator: str) -> None:
+    """Half of Europe's spreadsheets write ``0,5``; YAML takes 1e-4 for text, and programs quote what they print."""
+    plain = read_model(_told_at(tmp_path, "cameras.csv", (128, 96)))
+    text = (tmp_path / "cameras.csv").read_text().replace(",", separator)
+    (tmp_path / "cameras.csv").write_text(re.sub(r"(\d)\.(\d)", r"\1,\2", text))
+    again = read_model(tmp_path)
+    for kind in ("cameras.yaml", "transforms_train.json"):
+        other = _told_at(tmp_path / kind, kind.replace("_train", ""), (128, 96))
+        file = other / kind.replace("_train", "")
+        file.write_text(re.sub(r"(?<=[ \[])([\d.]+)(?=[,\]}])", r'"\1"', file.read_text()))
+        assert [shot.lens.focal for shot in read_model(file.rename(other / kind).parent).shots] == [LENS.focal] * 3
+    for one, two in zip(plain.shots, again.shots, strict=True):
+        assert one.lens == two.lens
+        assert one.centre.tolist() == two.centre.tolist()
+
+
+def test_poses_that_are_not_read_are_named(tmp_path: Path) -> None:
+    """Not offered as a light field beside the pictures."""
+    for n in range(4):
+        (tmp_path / "images").mkdir(exist_ok=True)
+        cv2.imwrite(str(tmp_path / f"images/{n}.png"), np.zeros((8, 8), np.uint8))
+    np.save(tmp_path / "K.npy", np.eye(3))
+    with pytest.raises(SepiError, match=r"give one of them, such as \S+/images"):
+        sepi.read_light_field(tmp_path)
+    np.save(tmp_path / "poses_bounds.npy", np.zeros((4, 17)))
+    for path in (tmp_path, tmp_path / "poses_bounds.npy"):
+        with pytest.raises(
+            SepiError, match=r"poses_bounds\.npy has camera poses .* expected transforms\.json, a COLMAP"
+        ):
+            sepi.read_light_field(path)
+
+
+def test_a_grid_that_the_cameras_do_not_make_is_told(tmp_path: Path) -> None:
+    file = _told_at(tmp_path, "cameras.yaml", (128, 96)) / "cameras.yaml"
+    file.write_text(file.read_text().replace("1x3", "2x2"))
+    with pytest.raises(SepiError, match="a grid of 4 cameras, but 3 are listed"):
+        read_model(tmp_path)
+
+
 def test_without_pycolmap_the_extra_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     import sys
 

@@ -200,6 +200,29 @@ def test_depth_in_metres_with_the_cameras_geometry(scene: Path) -> None:
 
 
 @pytest.mark.usefixtures("flat")
+def test_a_crop_is_remembered_by_its_result(scene: Path) -> None:
+    """Flags of a camera that come later are those of the whole picture, too."""
+    flags = ("--focal-length", 100, "--baseline", 50, "--focus-distance", 8, "--sensor-size", 36)
+    part = ("--crop-of", "128x96+10+20")
+    (scene / "parameters.cfg").unlink()
+    assert call("depth", scene, "-o", "now", *flags, *part, *FAST).exit_code == 0
+    assert call("depth", scene, "-o", "later", *part, *FAST).exit_code == 0
+    assert call("points", "later", "-o", "later.ply", *flags).exit_code == 0
+    assert Path("later.ply").read_bytes() == Path("now/points.ply").read_bytes()
+    assert call("convert", "later", "later.pfm", "--map", "depth", *flags).exit_code == 0
+    np.testing.assert_array_equal(read_pfm(Path("later.pfm")), read_pfm(Path("now/depth.pfm")))
+
+
+def test_a_camera_that_contradicts_the_disparities_is_told(pyramids: Path, result: Path) -> None:
+    """Metres for millimetres, or focus at infinity, put most of a scene beyond infinity."""
+    for baseline, focus, told in ((0.05, 8, True), (50, "inf", True), (50, 1.5, False)):
+        flags = ("--focal-length", 100, "--baseline", baseline, "--focus-distance", focus, "--sensor-size", 36)
+        called = call("points", result, "-o", "p.ply", *flags)
+        assert ("beyond infinity" in called.stderr and "--baseline" in called.stderr) == told
+        assert ("beyond infinity" in call("info", pyramids, *flags).stdout) == told
+
+
+@pytest.mark.usefixtures("flat")
 def test_a_file_name_that_is_no_text(scene: Path) -> None:
     """Old archives hold names in other encodings."""
     name = os.fsdecode(b"caf\xe9.npy")
@@ -537,7 +560,9 @@ def test_check_as_json_has_what_its_text_has(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("value", ["0", "-1", "nan", "inf", "wide"])
 def test_a_row_spacing_that_is_none_is_refused(scene: Path, value: str) -> None:
-    assert f"expected a number above 0, got '{value}'" in call("info", scene, "--row-spacing", value).stderr
+    called = call("info", scene, "--row-spacing", value)
+    assert called.exit_code != 0
+    assert re.search(r"row.spacing.*(0<x<inf|above 0|not a valid float)", called.stderr)
 
 
 def test_scenes_are_written_and_read_back(tmp_path: Path) -> None:

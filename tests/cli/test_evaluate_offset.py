@@ -109,9 +109,9 @@ def test_the_whole_map_at_offset_zero_is_the_whole_map(files: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (("crop.npy", "--offset", "25,17"), "crop.npy: a map of (40, 33) at offset 25,17 does not lie inside the gr"),
-        (("crop.npy", "--offset", "9,32"), "does not lie inside the ground truth of (64, 64) (height, width)"),
-        (("large.npy", "--offset", "0,0"), "large.npy: a map of (65, 64) at offset 0,0 does not lie inside"),
+        (("crop.npy", "--offset", "25,17"), "crop.npy: 33x40 pixels (width x height) from column 17, row 25 on do not"),
+        (("crop.npy", "--offset", "9,32"), "column 32, row 9 on do not lie inside 64x64"),
+        (("large.npy", "--offset", "0,0"), "large.npy: 64x65 pixels"),
         (("crop.npy",), "ground truth is (64, 64), the estimate (40, 33) (height, width); --offset tells where a crop"),
     ],
 )
@@ -128,5 +128,5 @@ def test_an_offset_is_two_whole_numbers(files: Path, text: str) -> None:
 
 
 def test_a_negative_offset_is_refused_in_python_too() -> None:
-    with pytest.raises(SepiError, match="at offset -1,0 does not lie inside"):
+    with pytest.raises(SepiError, match="row -1 on do not lie inside"):
         in_frame(np.zeros((4, 4), np.float32), (-1, 0), (8, 8))

@@ -103,13 +103,26 @@ def test_what_is_wrong_with_it_is_one_line(seen: LightField, words: tuple[object
     assert message in error_of(call("evaluate", *words))
 
 
+def test_truth_of_another_convention_is_told_beside_the_scores(seen: LightField) -> None:
+    """A map that is right looks hopeless when the truth is read upside down."""
+    assert seen.ground_truth is not None
+    known = np.nan_to_num(seen.ground_truth)
+    write_pfm(Path("upside.pfm"), known[::-1])
+    np.save("right.npy", known)
+    called = call("evaluate", "right.npy", "upside.pfm", "--json")
+    assert "upside.pfm: ground truth would fit right.npy far better upside down" in called.stderr
+    assert json.loads(called.stdout)["paper"]["all"]["pixels"] == 64 * 64
+    write_pfm(Path("upside.pfm"), known)
+    assert call("evaluate", "right.npy", "upside.pfm").stderr == ""
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [
         (("map",), "expected GROUND_TRUTH, a SCENE, or --truth FILE"),
         (("map", "truth.npy", "--truth", "truth.png"), "truth.npy is ground truth, and so is --truth FILE"),
         (("map", "plain.h5", "--truth-scale", 2), "--truth-scale says what the numbers of --truth FILE mean"),
-        (("map", "--truth", "truth.png", "--truth-scale", 0), "expected a number above 0, got '0'"),
+        (("map", "--truth", "truth.png", "--truth-scale", 0), "0.0 is not in the range 0<x<inf"),
         (("map", "--truth", "truth.png", "--bad", 0), "'--bad': 0.0 is not in the range x>0"),
     ],
 )

@@ -11,10 +11,11 @@ from hdf5_edits import changed
 from PIL import Image
 
 from sepi.camera import Camera
-from sepi.errors import SepiError
+from sepi.errors import SepiError, SepiWarning
 from sepi.io.result_files import RESULT_FILES
 from sepi.io.result_folder import colour_code, read_result, write_result
-from sepi.lightfield import DisparityRange, LightField
+from sepi.lightfield import DisparityRange, FloatMap, LightField
+from sepi.scenes import render
 from sepi.stage import StageMaps
 
 SHAPE = (12, 16)
@@ -545,3 +546,19 @@ def test_a_result_that_does_not_tell_what_is_unknown_can_be_read(
 ) -> None:
     write_result(tmp_path, light_field, maps)
     assert not read_result(tmp_path).unknown.any()
+
+
+def test_what_noise_puts_beyond_infinity_is_no_fault_of_the_camera(tmp_path: Path) -> None:
+    """A sky that scatters about infinity says nothing; one that lies well beyond it says that the camera is wrong."""
+    light_field = replace(render("dots", size=64, views=3), camera=Camera(8.0, 0.0, 100.0))
+    rng = np.random.default_rng(0)
+    sky = rng.normal(0, 0.1, (64, 64)).astype(np.float32)
+    sigma = np.full(sky.shape, 0.1, np.float32)
+
+    def maps(disparity: FloatMap) -> StageMaps:
+        bars = {"sigma": sigma, "low": disparity - 3 * sigma, "high": disparity + 3 * sigma}
+        return StageMaps(disparity, np.ones_like(disparity), bars)
+
+    write_result(tmp_path / "sky", light_field, maps(sky))
+    with pytest.warns(SepiWarning, match="98 % of the pixels lie beyond infinity, where disparity is below 0 by"):
+        write_result(tmp_path / "off", light_field, maps(sky - np.float32(0.5)))

@@ -368,18 +368,20 @@ class TestOwnLightFields:
         entry = {
             "path": str(tmp_path / "lego.mat"),
             "format": "matlab",
-            "grid": [9, 9],
+            "grid": "9x9",
             "central": 5,
             "order": "flip-rows",
             "exclude": ["0,0", "4,4"],
             "view": [2, 3],
             "row_spacing": 0.5,
             "white": 1023,
+            "crop_of": "128x96+1+2",
             "follow_links": True,
         }
         settings = load_settings({"light_fields": {"lego": entry}, "disparity_range": {"own/lego": [-1, 2]}})
         scene = settings.scene("own", "lego")
         words = "--format matlab --grid 9x9 --central 5 --order flip-rows --view 2,3 --row-spacing 0.5 --white 1023.0"
+        words += " --crop-of 128x96+1+2"
         assert scene.flags == (*words.split(), "--exclude", "0,0", "--exclude", "4,4", "--follow-links")
         assert scene.files == (tmp_path / "lego.mat",)
         assert scene.disparity_range == (-1, 2)
@@ -403,7 +405,10 @@ class TestOwnLightFields:
             ({"path": "/nowhere"}, "config.light_fields.a: no file or folder '/nowhere'"),
             ({}, "config.light_fields.a.path: field required"),
             ({"path": "/", "gird": [3, 3]}, "config.light_fields.a: unknown 'gird'; did you mean 'grid'?"),
-            ({"path": "/", "grid": "3x3"}, "config.light_fields.a.grid: input should be a valid array, got '3x3'"),
+            (
+                {"path": "/", "grid": "3 by 3"},
+                "config.light_fields.a.grid: input should be a valid array, got '3 by",
+            ),
             ({"path": ""}, "config.light_fields.a.path: string should have at least 1 character"),
             (
                 {"path": "/", "order": "flip-row"},

@@ -8,6 +8,7 @@ from itertools import islice
 from pathlib import Path
 
 from sepi.errors import SepiError
+from sepi.io.disparity_maps import is_disparity
 from sepi.io.files import naming
 from sepi.io.hdf5 import has_dataset, read_light_field
 from sepi.io.images import SUFFIXES
@@ -69,8 +70,8 @@ class Format:
 _LISTED = 5
 _DEPTH = 1
 
-# poses of LLFF, of parts of NeRF's sets, of Gaussian splatting and of NeuS
-_POSES = ("poses_bounds.npy", "transforms_test.json", "transforms_val.json", "cameras.json", "cameras_sphere.npz")
+# poses of LLFF, Gaussian splatting and NeuS
+_POSES = ("poses_bounds.npy", "cameras.json", "cameras_sphere.npz")
 
 # what Lytro's cameras and programs write
 _RAW = frozenset({".lfr", ".lfp", ".raw"})
@@ -172,7 +173,7 @@ def format_of(path: Path, file_format: str | None = None) -> Format:
     if file_format is not None:
         return FORMATS[file_format]
     for known in FORMATS.values():
-        if known.matches(path):
+        if known.matches(path) and path.name not in _POSES:
             return known
     poses = next((one for one in (path, *map(path.joinpath, _POSES)) if one.name in _POSES and one.is_file()), None)
     if poses is not None:
@@ -244,7 +245,7 @@ def _what_else(path: Path) -> str:
     """What a path that is no light field seems to be, for who gave the wrong one of several."""
     if _is_result(path):
         return "holds a disparity map, not a light field"
-    if any(map(_is_raw, [path, *path.glob("*")])):
+    if any(one.suffix.lower() in _RAW and one.is_file() for one in (path, *path.glob("*"))):
         return (
             "raw data of a Lytro camera, not yet views; decode it with the Light Field Toolbox (MATLAB) or PlenoptiCam "
             "(Python), and give what they write"
@@ -252,10 +253,6 @@ def _what_else(path: Path) -> str:
     if path.is_file() and path.suffix.lower() in SUFFIXES:
         return "a single picture; give the folder of all views"
     return "not a light field of a known format"
-
-
-def _is_raw(path: Path) -> bool:
-    return path.suffix.lower() in _RAW and path.is_file()
 
 
 def _is_result(path: Path) -> bool:
@@ -286,7 +283,8 @@ def _inside(folder: Path, depth: int = _DEPTH) -> Iterator[Path]:
     for entry in entries:
         if entry.name.startswith(".") or _is_empty(entry):
             continue
-        if any(known.matches(entry) for known in FORMATS.values()):
+        # tables of numbers are none, such as poses
+        if not is_disparity(entry) and any(known.matches(entry) for known in FORMATS.values()):
             yield entry
         elif depth and entry.is_dir() and not entry.is_symlink():
             yield from _inside(entry, depth - 1)

@@ -31,7 +31,7 @@ from sepi.io.images import picture_header, read_picture
 from sepi.io.pfm import read_pfm
 from sepi.io.readers.options import Numbers, ReadOptions, arrange_numbers, position_of
 from sepi.io.readers.view_files import read_grid
-from sepi.lightfield import BoolMap, DisparityRange, FloatMap, LightField, Truth
+from sepi.lightfield import BoolMap, DisparityRange, LightField, Truth
 from sepi.models import validated
 
 PARAMETERS = "parameters.cfg"
@@ -153,7 +153,12 @@ def _views_in(path: Path, options: ReadOptions, parameters: _Parameters) -> tupl
         given = parameters.pair("num_cams_y", "num_cams_x")
     files = _numbered_views(path)
     grid = options.grid or given or _square_grid(path, files)
-    _require_inside(files, grid, "--grid" if options.grid else PARAMETERS)
+    if max(files) >= grid[0] * grid[1]:
+        source = "--grid" if options.grid else PARAMETERS
+        raise SepiError(
+            f"{files[max(files)]}: beyond the {grid[0] * grid[1]} views of the {grid[0]}x{grid[1]} grid that {source} "
+            "gives"
+        )
     return files, grid
 
 
@@ -163,7 +168,11 @@ def _view_of_truth(numbers: Numbers, grid: tuple[int, int]) -> tuple[int, int] |
 
 
 def _truth_of(folder: Path, shape: tuple[int, int]) -> Truth:
-    return _read_truth(folder / TRUTH, shape), _read_masks(folder, shape)
+    path = folder / TRUTH
+    ground_truth = read_pfm(path) if path.is_file() else None
+    if ground_truth is not None and ground_truth.shape != shape:
+        raise SepiError(f"{path}: ground truth is {ground_truth.shape}, the views are {shape} (height, width)")
+    return ground_truth, _read_masks(folder, shape)
 
 
 def _numbered_views(folder: Path) -> dict[int, Path]:
@@ -195,15 +204,6 @@ def _square_grid(folder: Path, views: dict[int, Path]) -> tuple[int, int]:
     return side, side
 
 
-def _require_inside(views: dict[int, Path], grid: tuple[int, int], source: str) -> None:
-    highest = max(views)
-    count = grid[0] * grid[1]
-    if highest >= count:
-        raise SepiError(
-            f"{views[highest]}: beyond the {count} views of the {grid[0]}x{grid[1]} grid that {source} gives"
-        )
-
-
 def _parameters_of(folder: Path) -> _Parameters:
     """Keys of all sections together."""
     path = folder / PARAMETERS
@@ -221,15 +221,6 @@ def _parameters_of(folder: Path) -> _Parameters:
     values = {key: value for section in parser.sections() for key, value in parser.items(section)}
     used = {key: values[key] for key in _Parameters.model_fields if key in values}
     return validated(_Parameters, used, f"{path}: parameters")
-
-
-def _read_truth(path: Path, shape: tuple[int, int]) -> FloatMap | None:
-    if not path.is_file():
-        return None
-    ground_truth = read_pfm(path)
-    if ground_truth.shape != shape:
-        raise SepiError(f"{path}: ground truth is {ground_truth.shape}, the views are {shape} (height, width)")
-    return ground_truth
 
 
 def _read_masks(folder: Path, shape: tuple[int, int]) -> dict[str, BoolMap]:

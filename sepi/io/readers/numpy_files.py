@@ -25,13 +25,13 @@ _HEADERS = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0
 
 
 def matches(path: Path) -> bool:
-    """Whether ``path`` is a file with NumPy's header or an archive of such, with more than tables, or a damaged one."""
+    """Whether ``path`` is a file with NumPy's header, an archive of such, or has the ending ``.npy`` or ``.npz``."""
     if not path.is_file():
         return False
     try:
-        return any(len(shape) > 2 for shape, _ in array_shapes(path).values())
+        return path.suffix.lower() in (".npy", ".npz") or bool(array_shapes(path))
     except SepiError:
-        return path.suffix.lower() in (".npy", ".npz")
+        return False
 
 
 def read(path: Path, options: ReadOptions) -> LightField:

@@ -26,15 +26,22 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from types import NoneType
+from typing import Annotated
 
 import numpy as np
 import numpy.typing as npt
+from pydantic import Field
 
 from sepi.camera import Part
 from sepi.errors import SepiError
+from sepi.models import AS_PAIR
 from sepi.validation import described, is_finite, require_known, require_type, whole_pair
 
 Numbers = npt.NDArray[np.int64]
+
+Index = Annotated[int, Field(ge=0)]
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+_Count = Annotated[int, Field(ge=1)]
 
 AS_GIVEN = "as-given"
 
@@ -120,16 +127,16 @@ class ReadOptions:
     True
     """
 
-    grid: tuple[int, int] | None = None
+    grid: Annotated[tuple[_Count, _Count] | None, AS_PAIR] = None
     pattern: str | None = None
     axes: str | None = None
     variable: str | None = None
-    central: int | None = None
+    central: _Count | None = None
     order: str = AS_GIVEN
     exclude: tuple[str, ...] = ()
-    view: tuple[int, int] | None = None
-    row_spacing: float | None = None
-    white: float | None = None
+    view: Annotated[tuple[Index, Index] | None, AS_PAIR] = None
+    row_spacing: Positive | None = None
+    white: Positive | None = None
     images: str | None = None
     reference: str | None = None
     crop_of: str | None = None
@@ -148,10 +155,9 @@ class ReadOptions:
         object.__setattr__(self, "exclude", tuple(self.exclude))
         if self.crop_of is not None and _PART.fullmatch(self.crop_of) is None:
             raise SepiError(f"options: crop_of: expected WIDTHxHEIGHT+X+Y, got {described(self.crop_of)}")
-        if self.row_spacing is not None and not is_finite(self.row_spacing):
-            raise SepiError(f"options: row_spacing: expected a number, got {described(self.row_spacing)}")
-        if self.white is not None and not (is_finite(self.white) and self.white > 0):
-            raise SepiError(f"options: white: expected a number above 0, got {described(self.white)}")
+        for name in ("row_spacing", "white"):
+            if (number := getattr(self, name)) is not None and not (is_finite(number) and number > 0):
+                raise SepiError(f"options: {name}: expected a number above 0, got {described(number)}")
 
     @property
     def part(self) -> Part | None:

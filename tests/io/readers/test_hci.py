@@ -78,6 +78,29 @@ def test_view_number_is_columns_times_row_plus_column(square: Path) -> None:
             np.testing.assert_array_equal(light_field.views[t, s], pixels(3 * t + s))
 
 
+def test_a_crop_is_told_and_keeps_the_camera_of_the_scene(tmp_path: Path) -> None:
+    """Its disparities are those of the whole scene, and so are its metres; only the principal point moves."""
+    camera = {"focal_length_mm": 100, "baseline_mm": 40, "focus_distance_m": 4, "sensor_size_mm": 35}
+    scene = render("dots", size=64, views=3)
+    write_hci(scene, tmp_path / "scene", camera=camera)
+    whole = read_light_field(tmp_path / "scene")
+    for path in (tmp_path / "scene").glob("*.p[nf][gm]"):
+        path.unlink()
+    for number in range(9):
+        put(tmp_path / f"scene/input_Cam{number:03d}.png", scene.views[number // 3, number % 3, 10:50, 4:60])
+    message = reading_error(tmp_path / "scene")
+    assert "image_resolution is 64x64, but the pictures are 56x40" in message
+    assert "--crop-of 64x64+X+Y" in message
+    part = read_light_field(tmp_path / "scene", options=ReadOptions(crop_of="64x64+4+10"))
+    assert part.disparity_range == whole.disparity_range
+    assert part.camera is not None
+    assert part.camera == replace(whole.camera, right=0.0, down=2.0)
+    with pytest.raises(SepiError, match=r"parameters\.cfg: .* column 9, row 10 on do not lie inside 64x64"):
+        read_light_field(tmp_path / "scene", options=ReadOptions(crop_of="64x64+9+10"))
+    with pytest.raises(SepiError, match="crop_of: expected WIDTHxHEIGHT"):
+        ReadOptions(crop_of="64x64")
+
+
 def test_without_parameters_the_range_is_unknown(square: Path) -> None:
     light_field = read_light_field(square)
     assert light_field.disparity_range is None
