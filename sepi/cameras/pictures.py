@@ -55,12 +55,14 @@ class Pictures:
         SepiError
             If there is none.
         """
-        for inside in (Path(name.replace("\\", "/")) for name in names):
-            if inside.is_absolute() or ".." in inside.parts or not str(inside).isprintable():
-                raise SepiError(f"{self._model}: picture '{inside}': expected a path within the folder of pictures")
+        tried = [Path(name.replace("\\", "/")) for name in names]
+        within = [one for one in tried if not one.is_absolute() and ".." not in one.parts and str(one).isprintable()]
+        for inside in within:
             for place in self._places:
                 if (place / inside).is_file():
                     return place / inside
+        if tried[0] not in within:
+            raise SepiError(f"{self._model}: picture '{tried[0]}': expected a path within the folder of pictures")
         where = " nor ".join(map(str, self._places[:3]))
         raise SepiError(f"{self._model}: no picture '{names[0]}' in {where}; --images names the folder of the pictures")
 

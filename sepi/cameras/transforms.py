@@ -10,7 +10,7 @@ import json
 import math
 from collections.abc import Mapping
 from contextlib import suppress
-from pathlib import Path
+from pathlib import Path, PureWindowsPath
 from typing import Any
 
 import numpy as np
@@ -63,8 +63,8 @@ def read_transforms(path: Path, pictures: Pictures) -> CameraModel:
 
 
 def _found(pictures: Pictures, name: str) -> Path:
-    # the folder of pictures itself may be given, and NeRF's files leave the ending out
-    return pictures.find(name, Path(name).name, f"{name}.png")
+    # the folder of pictures itself may be given, or lie elsewhere; NeRF's files leave the ending out
+    return pictures.find(name, PureWindowsPath(name).name, f"{name}.png")
 
 
 def _shot(name: str, entry: Mapping[str, Any], pictures: Pictures, file: Path) -> Shot:
@@ -75,7 +75,7 @@ def _shot(name: str, entry: Mapping[str, Any], pictures: Pictures, file: Path) -
 
     def number(key: str, other: float | None = None) -> float:
         value = entry.get(key, other)
-        with suppress(TypeError, ValueError):
+        with suppress(TypeError, ValueError, OverflowError):
             if not isinstance(value, bool) and math.isfinite(found := float(value)):
                 return found
         raise SepiError(f"expected a number as {key}, got {str(value)[:40]}")

@@ -138,25 +138,16 @@ def _as_it_was(origin: Origin, reading: Reading) -> Reading:
     """The flags, and what a result says where they say nothing."""
     from sepi.io.readers.options import ReadOptions
 
-    given, usual = reading.options, ReadOptions()
-    changed = {
-        field.name: getattr(origin.options, field.name)
-        for field in fields(ReadOptions)
-        if getattr(given, field.name) == getattr(usual, field.name)
-    }
+    given, names = reading.options, [field.name for field in fields(ReadOptions)]
+    unsaid = [name for name in names if getattr(given, name) == getattr(ReadOptions(), name)]
+    changed = {name: getattr(origin.options, name) for name in unsaid}
     known = Reading(reading.file_format or origin.file_format, replace(given, **changed))
     return _as_it_is(origin, known)
 
 
 def _as_it_is(origin: Origin, reading: Reading) -> Reading:
     """The flags, and the view and row spacing of a result where they name none."""
-    options = reading.options
-    return replace(
-        reading,
-        options=replace(
-            options,
-            view=options.view or origin.view,
-            # found out from the views, perhaps
-            row_spacing=options.row_spacing or origin.row_spacing,
-        ),
-    )
+    given = reading.options
+    # the row spacing was found out from the views, perhaps
+    spacing = given.row_spacing or origin.row_spacing
+    return replace(reading, options=replace(given, view=given.view or origin.view, row_spacing=spacing))

@@ -497,6 +497,18 @@ def test_tables_of_spreadsheets_and_numbers_as_text_are_taken(tmp_path: Path, se
         assert one.centre.tolist() == two.centre.tolist()
 
 
+def test_pictures_are_found_that_moved_with_their_file(tmp_path: Path) -> None:
+    """Programs write where pictures lay on their own machine."""
+    file = _told_at(tmp_path, "transforms.json", (128, 96)) / "transforms.json"
+    for before in ("/home/me/", "..\\\\", "C:\\\\me\\\\"):
+        other = tmp_path / "other.json"
+        other.write_text(file.read_text().replace('"file_path": "', f'"file_path": "{before}'))
+        assert [path.name for path in read_model(other.rename(tmp_path / "transforms_o.json")).pictures][2] == "2.png"
+    file.write_text(file.read_text().replace("2.png", "../9.png"))
+    with pytest.raises(SepiError, match=r"9\.png': expected a path within the folder"):
+        read_model(file)
+
+
 def test_poses_that_are_not_read_are_named(tmp_path: Path) -> None:
     """Not offered as a light field beside the pictures."""
     for n in range(4):

@@ -213,11 +213,11 @@ def test_a_crop_is_remembered_by_its_result(scene: Path) -> None:
     np.testing.assert_array_equal(read_pfm(Path("later.pfm")), read_pfm(Path("now/depth.pfm")))
 
 
-def test_a_camera_that_contradicts_the_disparities_is_told(pyramids: Path, result: Path) -> None:
+def test_a_camera_that_contradicts_the_disparities_is_told(pyramids: Path, result: Path, tmp_path: Path) -> None:
     """Metres for millimetres, or focus at infinity, put most of a scene beyond infinity."""
     for baseline, focus, told in ((0.05, 8, True), (50, "inf", True), (50, 1.5, False)):
         flags = ("--focal-length", 100, "--baseline", baseline, "--focus-distance", focus, "--sensor-size", 36)
-        called = call("points", result, "-o", "p.ply", *flags)
+        called = call("points", result, "-o", tmp_path / "p.ply", *flags)
         assert ("beyond infinity" in called.stderr and "--baseline" in called.stderr) == told
         assert ("beyond infinity" in call("info", pyramids, *flags).stdout) == told
 

@@ -284,7 +284,8 @@ def _inside(folder: Path, depth: int = _DEPTH) -> Iterator[Path]:
         if entry.name.startswith(".") or _is_empty(entry):
             continue
         # tables of numbers are none, such as poses
-        if not is_disparity(entry) and any(known.matches(entry) for known in FORMATS.values()):
+        table = entry.suffix.lower() in (".npy", ".npz") and is_disparity(entry)
+        if not table and any(known.matches(entry) for known in FORMATS.values()):
             yield entry
         elif depth and entry.is_dir() and not entry.is_symlink():
             yield from _inside(entry, depth - 1)
