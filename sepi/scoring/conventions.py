@@ -8,9 +8,11 @@ from sepi.lightfield import BoolMap, FloatMap
 from sepi.rig import Floats
 
 # errors are close up to this part of the range that nearly all of a map lies within, or so many pixels per view step
-_PART, _LEAST = 0.05, 0.07
+_PART, _LEAST = 0.1, 0.07
 # share of pixels with a larger error from which a fit is in doubt, and how much better another must be
 _POOR, _BETTER = 0.2, 0.25
+# what a factor may be from the one that it is taken for
+_EQUAL = 0.05
 # errors that a fitted line should not exceed, pixels per view step; pixels that it is fitted to
 _CLOSE, _PIXELS = 0.003, 20000
 
@@ -92,9 +94,9 @@ def _line_text(factor: float, more: float, close: float, inverse: bool, grid: tu
     if abs(more) > close:
         return f"as {factor:.3g} * it {more:+.3g}; disparity is 0 in focus, and in pixels per view step"
     counts = [count - less for count in grid or () for less in (0, 1)]
-    steps = next((n for n in counts if abs(abs(factor) * n - 1) < _PART), None)
+    steps = next((n for n in counts if abs(abs(factor) * n - 1) < _EQUAL), None)
     size = f"{1 / steps if steps else abs(factor):.3g}"
     whole = ", as one in steps of the whole grid" if steps else ""
     signs = ["with its sign turned (greater is nearer)"] if factor < 0 else []
     scaled = [f"multiplied by {size}{whole} (--truth FILE --truth-scale {size})"]
-    return " and ".join([*signs, *(scaled if abs(abs(factor) - 1) > _PART else [])])
+    return " and ".join([*signs, *(scaled if abs(abs(factor) - 1) > _EQUAL else [])])
