@@ -14,9 +14,10 @@ import numpy as np
 
 from sepi.errors import SepiError, SepiWarning
 from sepi.io.origin import reading_record
+from sepi.io.readers.arrays import UnclearAxesError
 from sepi.io.readers.camera_positions import with_row_spacing
 from sepi.io.readers.formats import read
-from sepi.io.readers.options import ReadOptions, in_grid
+from sepi.io.readers.options import ReadOptions, in_grid, unarranged
 from sepi.lightfield import DisparityRange, LightField
 from sepi.memory import give_back_memory
 from sepi.validation import described, require_type
@@ -45,8 +46,9 @@ def read_light_field(
     disparity_range : tuple of float, optional
         ``(minimum, maximum)`` in pixels per view step, in place of the scene's own.
     file_format : str, optional
-        Word of a format: ``"exported"``, ``"hci"``, ``"images"``, ``"eslf"``, ``"tiff-stack"``, ``"matlab"``,
-        ``"numpy"``, ``"hci-2013"``, ``"openlf"``, ``"hdf5"`` or ``"sepi"``; found by looking unless given.
+        Word of a format: ``"exported"``, ``"hci"``, ``"images"``, ``"eslf"``, ``"mosaic"``, ``"tiff-stack"``,
+        ``"matlab"``, ``"numpy"``, ``"hci-2013"``, ``"openlf"``, ``"hdf5"`` or ``"sepi"``; found by looking unless
+        given.
     options : ReadOptions, optional
         What the files do not say: grid, name pattern, axes, order, views to leave out, reference view, row spacing,
         white.
@@ -90,7 +92,10 @@ def read_light_field(
     require_type(f"{path}: options", options, (ReadOptions, NoneType), "sepi.ReadOptions")
     options = options or ReadOptions()
     given = None if disparity_range is None else _given_range(path, disparity_range)
-    light_field = read(path, options, file_format, truth=truth)
+    try:
+        light_field = read(path, options, file_format, truth=truth)
+    except UnclearAxesError as unclear:
+        light_field = _with_axes(path, options, file_format, unclear)
     if light_field.rig is not None and light_field.disparity_range is None:
         light_field = _with_depths(path, light_field, options, given)
     if not light_field.arranged:
@@ -129,6 +134,19 @@ def read_light_field(
     for warning in filter(None, found):
         warnings.warn(f"{path}: {warning}", SepiWarning, stacklevel=2)
     return light_field
+
+
+def _with_axes(path: Path, options: ReadOptions, file_format: str | None, unclear: UnclearAxesError) -> LightField:
+    """An array whose sizes leave its axes open, read as its views fit together."""
+    from sepi.inspection.array_axes import fitting_axes
+
+    tried = {axes: read(path, replace(unarranged(options), axes=axes), file_format) for axes in unclear.readings}
+    axes = fitting_axes(tried)
+    if axes is None:
+        raise unclear
+    light_field = read(path, replace(options, axes=axes), file_format)
+    note = f"axes taken as {' '.join(axes)}, by how the views fit together; --axes sets them otherwise"
+    return replace(light_field, notes=(note, *light_field.notes))
 
 
 def _with_depths(path: Path, light_field: LightField, options: ReadOptions, given: DisparityRange | None) -> LightField:

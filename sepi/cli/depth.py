@@ -130,6 +130,8 @@ def depth(
             write_all_views(folder / ALL_VIEWS, light_field, _also_as_taken(folder, light_field, views), made_by)
         files = (*files, *others)
     click.echo(f"{light_field.name}: {size_text(light_field)}")
+    for note in light_field.notes:
+        click.echo(f"note: {note}")
     click.echo(f"disparity range: {range_text(light_field.require_disparity_range())}{_candidates(maps.made_by)}")
     unknown = float(maps.mask(UNKNOWN).mean())
     if unknown:

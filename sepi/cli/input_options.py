@@ -62,8 +62,8 @@ _FLAGS = (
         "--format",
         "file_format",
         metavar="FORMAT",
-        help="exported, cameras, hci, hci-2013, images, eslf, tiff-stack, matlab, numpy, openlf, hdf5 or sepi; found "
-        "by looking unless given.",
+        help="exported, cameras, hci, hci-2013, images, eslf, mosaic, tiff-stack, matlab, numpy, openlf, hdf5 or sepi; "
+        "found by looking unless given.",
     ),
     click.option("--grid", type=Pair("ROWSxCOLUMNS"), metavar="ROWSxCOLUMNS", help="Grid of views in the files."),
     click.option(

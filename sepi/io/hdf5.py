@@ -9,7 +9,7 @@ stage's own maps, and attributes that say what made them; where a later stage is
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -182,14 +182,14 @@ def truth_in(path: Path, file: h5py.File) -> Truth:
     return ground_truth, {name: read_dataset(path, mask).astype(bool) for name, mask in members(file.get("masks", {}))}
 
 
-def has_dataset(path: Path, name: str, *, if_damaged: bool = False) -> bool:
-    """Whether ``path`` is an HDF5 file with a dataset of this name; ``if_damaged`` where it cannot be told."""
+def has_dataset(path: Path, name: str, wanted: Callable[[Any], object] = bool, *, if_damaged: bool = False) -> bool:
+    """Whether ``path`` is an HDF5 file with an entry that is wanted; ``if_damaged`` where it cannot be told."""
     if not path.is_file() or not h5py.is_hdf5(path):
         return False
     try:
         require_sound(path)
         with h5py.File(path, "r") as file:
-            return name in file
+            return bool(wanted(file.get(name)))
     except (SepiError, OSError, LookupError, ValueError, RuntimeError):
         return if_damaged
 

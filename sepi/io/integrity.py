@@ -140,6 +140,11 @@ def has_digest(holder: h5py.Group | h5py.Dataset) -> bool:
         return file.read(len(_MARK)) == _MARK
 
 
+def is_own(entry: h5py.Group | h5py.Dataset | None) -> bool:
+    """Whether a group or dataset is in a file of this package: others may call theirs so, too."""
+    return entry is not None and _OWN in entry.file.attrs
+
+
 def digest_block(file: io.BufferedReader | io.BufferedRandom) -> bytes:
     """The user block for what follows in a file."""
     file.seek(BLOCK)

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import permutations
+from math import prod
 from pathlib import Path
 from typing import Any
 
@@ -19,11 +20,37 @@ from sepi.lightfield import BoolMap, LightField
 
 Array = npt.NDArray[np.generic]
 
-# "N" is the number t * S + s of a view
-_LAYOUTS = ("TSHWC", "TSHW", "NHWC")
-_AXES_HELP = "T, S: row and column of the view; H, W: of the pixel; C: colour"
+# orders of the axes that are looked for; "N" is the number t * S + s of a view
+_LAYOUTS = tuple(
+    "".join(order)
+    for axes in (("TS", "HW", "C"), ("TS", "HW"), ("N", "HW", "C"), ("N", "HW"))
+    for order in permutations(axes)
+)
+_MOST_AXES = 5
+_AXES_HELP = "T, S: row and column of the view, or N: its number; H, W: of the pixel; C: colour"
+_COLOURS = (1, 3, 4)
+# a narrower axis is rather a grid's than a picture's
+_NARROW = 4
 # positions that a note lists
 _LISTED = 12
+
+
+class UnclearAxesError(SepiError):
+    """An array whose sizes leave open which axis is which.
+
+    Attributes
+    ----------
+    readings : tuple of str
+        Orders of the axes that they allow, as ``ReadOptions.axes`` has them.
+    """
+
+    def __init__(self, source: str, shape: tuple[int, ...], readings: Sequence[str]) -> None:
+        self.readings = tuple(readings)
+        example = readings[0] if readings else "TSHWC" if len(shape) == _MOST_AXES else "TSHW"
+        super().__init__(
+            f"{source}: the shape {shape} does not tell which axis is which; say it with --axes, such as "
+            f"{' or '.join(f'--axes {letters}' for letters in readings or [example])} ({_AXES_HELP})"
+        )
 
 
 def light_field_from_array(array: Array, path: Path, options: ReadOptions, *, axes: str | None = None) -> LightField:
@@ -34,8 +61,9 @@ def light_field_from_array(array: Array, path: Path, options: ReadOptions, *, ax
 
     Parameters
     ----------
-    array : ndarray of 4 or 5 axes, integers or floats
-        uint8 and uint16 span their whole range; floats 0..1. Others are 0 to 255 or 65535, as 8 or 16 bit.
+    array : ndarray of 3 to 5 axes, integers or floats
+        uint8 and uint16 span their whole range; floats 0..1. Others are 0 to 255 or 65535, as 8 or 16 bit. Axes of one
+        may come before.
     path : Path
         Where it comes from: name and source of the light field.
     options : ReadOptions
@@ -52,6 +80,8 @@ def light_field_from_array(array: Array, path: Path, options: ReadOptions, *, ax
 
     Raises
     ------
+    UnclearAxesError
+        If several orders of the axes are as likely.
     SepiError
         If the axes cannot be told apart or contradict the options, the values are of another type or range, or a view
         that is not excluded holds some values that are not finite.
@@ -60,6 +90,8 @@ def light_field_from_array(array: Array, path: Path, options: ReadOptions, *, ax
     _require_pixel_type(source, array.dtype)
     given = axes or options.axes
     letters = _found_axes(source, array.shape, options.grid) if given is None else _checked_axes(source, array, given)
+    # a batch of one
+    array = array.reshape(array.shape[array.ndim - len(letters) :])
     stack, channel_notes = _as_stack(source, array, letters, options.grid)
     arranged = "N" not in letters or options.grid is not None
     if not arranged:
@@ -142,63 +174,66 @@ def _require_pixel_type(source: str, kind: np.dtype[Any]) -> None:
 
 def _checked_axes(source: str, array: Array, text: str) -> str:
     letters = text.upper()
-    if sorted(letters) not in [sorted(layout) for layout in _LAYOUTS]:
+    if sorted(letters) not in map(sorted, _LAYOUTS):
         raise SepiError(
             f"{source}: --axes {text}: expected T, S, H and W once each, and C where there are colours, in the array's "
             f"order, such as HWTSC ({_AXES_HELP})"
         )
-    if len(letters) != array.ndim:
+    spare = array.ndim - len(letters)
+    if spare < 0 or prod(array.shape[:spare]) != 1:
         raise SepiError(f"{source}: --axes {text} names {len(letters)} axes, the array has {array.ndim}: {array.shape}")
     return letters
 
 
 def _found_axes(source: str, shape: tuple[int, ...], grid: tuple[int, int] | None) -> str:
     """The order of the axes that the shape suggests."""
-    found: list[str] = []
-    if len(shape) == 5:
-        channel = _channel_axis(shape)
-        if channel is not None:
-            pair = _pairs_in_order((*shape[:channel], *shape[channel + 1 :]))
-            found = [letters[:channel] + "C" + letters[channel:] for letters in pair]
-    elif len(shape) == 4:
-        found = _pairs_in_order(shape)
-        # a narrow third axis is rather a grid's than a picture's
-        if shape[3] in (1, 3, 4) and shape[2] > 4:
-            if grid is not None and shape[0] == math.prod(grid):
-                return "NHWC"
-            if grid is None and (not found or math.isqrt(shape[0]) ** 2 == shape[0]):
-                found.append("NHWC")
-            elif not found and grid is not None:
-                raise SepiError(
-                    f"{source}: {shape[0]} views of shape {shape[1:]} make no grid of {grid[0]}x{grid[1]}; "
-                    "say their grid with --grid ROWSxCOLUMNS"
-                )
-    else:
-        raise SepiError(f"{source}: expected an array of 4 or 5 axes, got {len(shape)}: {shape}")
+    found = readings(shape, grid)
     if len(found) == 1:
         return found[0]
-    raise SepiError(
-        f"{source}: the shape {shape} does not tell which axis is which; say it with --axes, such as "
-        f"--axes {'TSHWC' if len(shape) == 5 else 'TSHW'} ({_AXES_HELP})"
-    )
+    if not found and not is_likely(shape):
+        raise SepiError(f"{source}: expected an array of views, of 4 or 5 axes, got {len(shape)}: {shape}")
+    raise UnclearAxesError(source, shape, found)
 
 
-def _channel_axis(shape: tuple[int, ...]) -> int | None:
-    """The axis of colours: the last one if it can be, else the only one that can be; None where that is not clear."""
-    if shape[-1] in (1, 3, 4):
-        # RGB and alpha, or a 4 x 4 grid of RGB views
-        return None if shape[-1] == 4 and 3 in shape[:-1] else len(shape) - 1
-    colours = [axis for axis, size in enumerate(shape) if size in (3, 4)]
-    fitting = colours or [axis for axis, size in enumerate(shape) if size == 1]
-    return fitting[0] if len(fitting) == 1 else None
+def is_likely(shape: tuple[int, ...]) -> bool:
+    """Whether an array has the number of axes of a light field; three are a picture where one has colours."""
+    axes = len(_without_batch(shape))
+    return axes in (4, 5) or (axes == 3 and bool(readings(shape)))
 
 
-def _pairs_in_order(shape: tuple[int, ...]) -> list[str]:
-    """TSHW where the first two of four axes are clearly smaller than the others, HWTS the other way round."""
-    first, last = shape[:2], shape[2:]
-    if 2 * max(first) <= min(last):
-        return ["TSHW"]
-    return ["HWTS"] if 2 * max(last) <= min(first) else []
+def _without_batch(shape: tuple[int, ...]) -> tuple[int, ...]:
+    """A shape without axes of one before it: a batch, or a single row of views, which are numbered."""
+    while len(shape) > len("TSHW") and shape[0] == 1:
+        shape = shape[1:]
+    return shape
+
+
+def readings(shape: tuple[int, ...], grid: tuple[int, int] | None = None) -> list[str]:
+    """The orders of the axes that sizes allow: a grid is smaller than pictures, colours are 1, 3 or 4.
+
+    Where an axis of 1, 3 or 4 beside another may be colours or a grid's, both are given.
+    """
+    shape = _without_batch(shape)
+    sizes = [dict(zip(axes, shape, strict=True)) for axes in _LAYOUTS if len(axes) == len(shape)]
+    sizes = [size for size in sizes if size.get("C", 1) in _COLOURS]
+    grids = [size for size in sizes if "T" in size and _is_small(size) and ("C" in size or 1 not in shape)]
+    rows = [size for size in sizes if size.get("N", 1) > 1 and min(size["H"], size["W"]) > _NARROW]
+    if len(shape) == len("NHW"):
+        # else a picture in colour
+        rows = [size for size in rows if size["N"] not in _COLOURS]
+    # pictures are larger than there are views; else views in colour come before pictures
+    rows = [size for size in rows if _is_small(size)] or [s for s in rows if "C" in s and s["N"] == shape[0]] or rows
+    found = [
+        size
+        for size in (*grids, *rows)
+        if grid in (None, (size.get("T"), size.get("S"))) or prod(grid) == size.get("N")
+    ]
+    return ["".join(size) for size in found or (*grids, *rows)]
+
+
+def _is_small(size: dict[str, int]) -> bool:
+    """Whether the axes of the grid are clearly smaller than those of a picture."""
+    return 2 * max(size.get(axis, 1) for axis in "TSN") <= min(size["H"], size["W"])
 
 
 def _as_stack(source: str, array: Array, letters: str, grid: tuple[int, int] | None) -> tuple[Array, list[str]]:
@@ -206,7 +241,7 @@ def _as_stack(source: str, array: Array, letters: str, grid: tuple[int, int] | N
     size = dict(zip(letters, array.shape, strict=True))
     if 0 in array.shape:
         raise SepiError(f"{source}: the array is empty: {array.shape}")
-    if size.setdefault("C", 1) not in (1, 3, 4):
+    if size.setdefault("C", 1) not in _COLOURS:
         raise SepiError(
             f"{source}: the axis of colours (axes {' '.join(letters)}) has size {size['C']}; expected 1, 3 or 4"
         )

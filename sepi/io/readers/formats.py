@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
+
+import h5py
 
 from sepi.errors import SepiError
 from sepi.io.disparity_maps import is_disparity
 from sepi.io.files import naming
 from sepi.io.hdf5 import has_dataset, read_light_field
 from sepi.io.images import SUFFIXES
+from sepi.io.integrity import is_own
 from sepi.io.readers import (
     calibrated,
     eslf,
@@ -21,11 +25,13 @@ from sepi.io.readers import (
     hdf5_arrays,
     image_folder,
     matlab,
+    mosaic,
     numpy_files,
     open_lf,
     tiff_stack,
 )
 from sepi.io.readers.arrays import rearrange, with_white
+from sepi.io.readers.named_arrays import no_light_field
 from sepi.io.readers.options import ReadOptions
 from sepi.io.readers.row_folders import has_rows
 from sepi.lightfield import LightField, Truth
@@ -116,6 +122,9 @@ FORMATS = {
         ("grid", "pattern", "follow_links"),
         True,
     ),
+    "mosaic": Format(
+        "picture of all views", "NAME_qs8x6a0.75.png, a quilt, or --grid", mosaic.matches, mosaic.read, ("grid",), True
+    ),
     "eslf": Format("Lytro lenslet picture", "NAME_eslf.png", eslf.matches, eslf.read, ("grid",)),
     "tiff-stack": Format("TIFF stack", "a page for each view", tiff_stack.matches, tiff_stack.read, ("grid",), True),
     # before the other kinds of HDF5: MATLAB's is told by its header or ending
@@ -139,7 +148,7 @@ FORMATS = {
     "sepi": Format(
         "sepi HDF5",
         "written by this package",
-        lambda path: has_dataset(path, "views", if_damaged=True),
+        lambda path: has_dataset(path, "views", is_own, if_damaged=True),
         lambda path, options: rearrange(_own(path), options),
         truth_files=lambda path: [path],
     ),
@@ -251,7 +260,13 @@ def _what_else(path: Path) -> str:
             "(Python), and give what they write"
         )
     if path.is_file() and path.suffix.lower() in SUFFIXES:
-        return "a single picture; give the folder of all views"
+        return (
+            "a single picture; give the folder of all views, or say how they all lie in it: --format mosaic, side by "
+            "side, or eslf, under lenslets, with --grid ROWSxCOLUMNS"
+        )
+    if path.is_file() and h5py.is_hdf5(path):
+        with suppress(SepiError):
+            return no_light_field(hdf5_arrays.array_shapes(path))
     return "not a light field of a known format"
 
 

@@ -37,8 +37,8 @@ _GEOMETRY = ("dH", "focalLength", "shift")
 
 
 def matches(path: Path) -> bool:
-    """Whether ``path`` is a readable HDF5 file with a dataset ``LF``."""
-    return has_dataset(path, VIEWS)
+    """Whether ``path`` is a readable HDF5 file with a dataset ``LF`` of that shape."""
+    return has_dataset(path, VIEWS, lambda views: isinstance(views, h5py.Dataset) and _is_layout(views.shape or ()))
 
 
 def read(path: Path, options: ReadOptions) -> LightField:
@@ -57,7 +57,7 @@ def read(path: Path, options: ReadOptions) -> LightField:
             )
         views = read_dataset(path, file[VIEWS])
         shape = views.shape
-        if len(shape) != 5 or shape[4] not in (1, 3):
+        if not _is_layout(shape):
             raise SepiError(
                 f"{path}: expected '{VIEWS}' of shape (T, S, H, W, 3), got {shape}; if it is a light field of other "
                 "axes, write it as .npy and name them with --axes"
@@ -72,6 +72,10 @@ def read(path: Path, options: ReadOptions) -> LightField:
         return replace(light_field, notes=(*light_field.notes, note))
     ground_truth = None if depth is None else _disparity(depth, camera)
     return replace(light_field, camera=camera, ground_truth=ground_truth)
+
+
+def _is_layout(shape: tuple[int, ...]) -> bool:
+    return len(shape) == len("TSHWC") and shape[4] in (1, 3)
 
 
 def _read_camera(file: h5py.File) -> tuple[Camera | None, str]:

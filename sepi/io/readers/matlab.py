@@ -25,18 +25,14 @@ import numpy as np
 
 from sepi.errors import SepiError
 from sepi.io.files import reading
-from sepi.io.hdf5 import attribute, open_hdf5, read_dataset
-from sepi.io.readers.arrays import Array
+from sepi.io.readers import hdf5_arrays
+from sepi.io.readers.arrays import Array, is_likely
 from sepi.io.readers.matlab_5 import BYTE_ORDERS, HEADER, nested_arrays, real_arrays
-from sepi.io.readers.named_arrays import Shapes, datasets_in, light_field_from_arrays
+from sepi.io.readers.named_arrays import Shapes, light_field_from_arrays
 from sepi.io.readers.options import ReadOptions
 from sepi.lightfield import LightField
 
 _KIND = "MATLAB file"
-
-# other classes are text, logical values, cells, ...
-_NUMBERS = ("uint8", "int8", "uint16", "int16", "uint32", "int32", "single", "uint64", "int64", "double")
-_TEXT_7_3 = b"MATLAB 7.3 MAT-file"
 
 
 def matches(path: Path) -> bool:
@@ -49,7 +45,7 @@ def matches(path: Path) -> bool:
         head = _head(path)
     except SepiError:
         return False
-    return head[-4:] in BYTE_ORDERS or head.startswith(_TEXT_7_3)
+    return head[-4:] in BYTE_ORDERS or head.startswith(hdf5_arrays.MATLAB)
 
 
 def read(path: Path, options: ReadOptions) -> LightField:
@@ -57,7 +53,7 @@ def read(path: Path, options: ReadOptions) -> LightField:
     shapes = array_shapes(path)
 
     def load(name: str) -> Array:
-        array = _read_7_3(path, name) if h5py.is_hdf5(path) else _read_5(path, name, shapes[name][1])
+        array = hdf5_arrays.read_named(path, name) if h5py.is_hdf5(path) else _read_5(path, name, shapes[name][1])
         # the axes that MATLAB dropped
         while array.ndim < len(options.axes or "") <= 5:
             array = array[..., None]
@@ -76,16 +72,12 @@ def array_shapes(path: Path) -> Shapes:
         with reading(path, _KIND), warnings.catch_warnings(action="ignore"):
             names = real_arrays(path)
             found = {name: (shape, np.dtype(kind)) for name, shape, kind in whosmat(path) if name in names}
-            if not any(len(shape) in (4, 5) for shape, _ in found.values()):
+            if not any(is_likely(shape) for shape, _ in found.values()):
                 found |= {name: (array.shape, array.dtype) for name, array in nested_arrays(path).items()}
             return found
     if h5py.is_hdf5(path):
-        with open_hdf5(path) as file:
-            # structures are groups
-            arrays = datasets_in(file, _is_numbers)
-            turn = {name: -1 if _is_turned(path, array) else 1 for name, array in arrays.items()}
-            return {name: (array.shape[:: turn[name]], array.dtype) for name, array in arrays.items()}
-    what = "is damaged" if head.startswith(_TEXT_7_3) else "is not a MATLAB file of version 5 or 7.3"
+        return hdf5_arrays.array_shapes(path)
+    what = "is damaged" if head.startswith(hdf5_arrays.MATLAB) else "is not a MATLAB file of version 5 or 7.3"
     raise SepiError(f"{path}: {what}; save it in MATLAB with -v7 or -v7.3")
 
 
@@ -98,25 +90,8 @@ def _read_5(path: Path, name: str, kind: np.dtype[Any]) -> Array:
     from scipy.io import loadmat
 
     with reading(path, _KIND), warnings.catch_warnings(action="ignore"):
-        if "/" in name:
+        if name not in real_arrays(path):
             return nested_arrays(path)[name]
         values: Array = loadmat(path, variable_names=[name])[name]
         # MATLAB saves doubles that are small whole numbers as bytes
         return values.astype(kind, copy=False)
-
-
-def _read_7_3(path: Path, name: str) -> Array:
-    with open_hdf5(path) as file:
-        array = read_dataset(path, file[name])
-        return array.T if _is_turned(path, file[name]) else array
-
-
-def _is_turned(path: Path, dataset: h5py.Dataset) -> bool:
-    """Whether the axes are in reverse, as MATLAB writes them; other programs do not."""
-    return "MATLAB_class" in dataset.attrs or _head(path).startswith(_TEXT_7_3)
-
-
-def _is_numbers(entry: Any) -> bool:
-    if not isinstance(entry, h5py.Dataset) or entry.dtype.kind not in "iuf" or entry.shape is None:
-        return False
-    return "MATLAB_class" not in entry.attrs or attribute(entry, "MATLAB_class") in _NUMBERS

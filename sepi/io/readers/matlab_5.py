@@ -29,8 +29,8 @@ BYTE_ORDERS = {b"\x00\x01IM": "<", b"\x01\x00MI": ">"}
 
 _MATRIX, _COMPRESSED = 14, 15
 _COMPLEX, _LOGICAL = 0x800, 0x200
-# classes of variables: structures, and arrays of numbers, as which the values are read
-_STRUCTURE = 2
+# classes of variables: cell arrays, structures, and arrays of numbers, as which the values are read
+_CELLS, _STRUCTURE = 1, 2
 _CLASSES = dict(zip(range(6, 16), ("f8", "f4", "i1", "u1", "i2", "u2", "i4", "u4", "i8", "u8"), strict=True))
 # types in which values may be stored
 _TYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
@@ -95,6 +95,8 @@ def real_arrays(path: Path) -> set[str]:
 def nested_arrays(path: Path) -> dict[str, npt.NDArray[Any]]:
     """Arrays of real numbers in structures, as MATLAB shows them, by names such as ``scene/LF`` or ``scene(2)/LF``.
 
+    A cell array of pictures that are alike is one of them.
+
     Raises
     ------
     SepiError, ValueError
@@ -103,14 +105,14 @@ def nested_arrays(path: Path) -> dict[str, npt.NDArray[Any]]:
     found: dict[str, npt.NDArray[Any]] = {}
     with path.open("rb") as file:
         for variable in _variables(path, file):
-            if variable.flags & 0xFF == _STRUCTURE:
+            if variable.flags & 0xFF in (_CELLS, _STRUCTURE):
                 content = memoryview(variable.content())
                 found.update(_fields(variable.order, content, _text(variable.parts[2])))
     return found
 
 
 def _fields(order: str, data: memoryview, name: str) -> Iterator[tuple[str, npt.NDArray[Any]]]:
-    """Arrays in a matrix element, which a structure may be."""
+    """Arrays in a matrix element, which a structure or a cell array may be."""
     parts = _parts(order, data)
     if any(part.length != len(part.data) for part in parts):
         raise ValueError(f"{name} is cut off")
@@ -126,9 +128,19 @@ def _fields(order: str, data: memoryview, name: str) -> Iterator[tuple[str, npt.
             if value.kind == _MATRIX and value.length:
                 which = f"({element + 1})" if len(values) > len(fields) else ""
                 yield from _fields(order, memoryview(value.data), f"{name}{which}/{fields[field]}")
+        return
+    shape = np.frombuffer(parts[1].data, order + "i4").tolist()
+    if flags & 0xFF == _CELLS:
+        cells = [
+            array
+            for value in parts[_BEFORE:]
+            if value.length
+            for _, array in _fields(order, memoryview(value.data), name)
+        ]
+        if len(cells) == math.prod(shape) and len({(cell.shape, cell.dtype) for cell in cells}) == 1:
+            yield name, np.stack(cells)[np.arange(len(cells)).reshape(shape, order="F").squeeze()]
     elif _is_real(flags):
-        _, dimensions, _, numbers = parts[: _BEFORE + 1]
-        shape = np.frombuffer(dimensions.data, order + "i4").tolist()
+        numbers = parts[_BEFORE]
         stored = np.dtype(order + _TYPES[numbers.kind])
         if math.prod(shape) * stored.itemsize != numbers.length:
             raise ValueError(f"{name} of {numbers.length} bytes for {shape}")

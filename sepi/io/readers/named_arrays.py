@@ -8,11 +8,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import h5py
 import numpy as np
 
 from sepi.errors import SepiError, printable
-from sepi.io.readers.arrays import Array, light_field_from_array
+from sepi.io.readers.arrays import Array, is_likely, light_field_from_array
 from sepi.io.readers.options import ReadOptions
 from sepi.lightfield import LightField
 from sepi.validation import require_known
@@ -57,14 +56,6 @@ def light_field_from_arrays(
     return replace(light_field, notes=(note, *light_field.notes))
 
 
-def datasets_in(file: h5py.File, wanted: Callable[[object], bool]) -> dict[str, h5py.Dataset]:
-    """Datasets of some sort by their paths: those in groups only where none outside of them has 4 or 5 axes."""
-    found = {name: file[name] for name in file if wanted(file.get(name))}
-    if not any(array.ndim in (4, 5) for array in found.values()):
-        file.visititems(lambda name, entry: found.update({name: entry}) if wanted(entry) else None)
-    return found
-
-
 def _channels_from(red: str) -> Iterator[tuple[str, ...]]:
     """Names of three channels of which the first is this one: ``lfr lfg lfb``, ``LF_Red LF_Green LF_Blue``."""
     for red_word, *others in dict.fromkeys((*map(style, words),) for words in _COLOURS for style in _STYLES):
@@ -75,14 +66,16 @@ def _channels_from(red: str) -> Iterator[tuple[str, ...]]:
 def _arrays_of(path: Path, arrays: Shapes, requested: str | None) -> tuple[str, ...]:
     """Name of the array that is the light field, of those in a file, or names of its red, green and blue one.
 
-    Without the user's choice it is the only array of numbers of 4 or 5 axes, or among several the only ``LF``, or three
-    channels.
+    Without the user's choice it is the only array that may be one by its axes, or among several the only ``LF``, or
+    three channels.
     """
     shapes = {name: shape for name, (shape, kind) in arrays.items() if kind.kind in "iuf" or name == requested}
     if requested is not None:
         require_known(f"{path}: --variable", [requested], shapes)
         return (requested,)
-    fitting = [name for name, shape in shapes.items() if len(shape) in (4, 5)]
+    likely = [name for name, shape in shapes.items() if is_likely(shape)]
+    # a stack of grey pictures beside one of light fields may be anything
+    fitting = [name for name in likely if len(shapes[name]) > len("NHW")] or likely
     if len(fitting) == 1:
         return (fitting[0],)
     called = [name for name in fitting if name.rpartition("/")[2] == "LF"]
@@ -92,9 +85,24 @@ def _arrays_of(path: Path, arrays: Shapes, requested: str | None) -> tuple[str, 
     triples = [names for names in triples if len({arrays[name] for name in names}) == 1 and len(shapes[names[0]]) == 4]
     if len(triples) == 1:
         return triples[0]
-    listed = ", ".join(
-        f"{printable(name)} {'x'.join(map(str, shapes[name]))}" for name in list(fitting or shapes)[:_LISTED]
-    )
     if fitting:
-        raise SepiError(f"{path}: holds several arrays of 4 or 5 axes; choose one with --variable: {listed}")
-    raise SepiError(f"{path}: holds no array of numbers of 4 or 5 axes (found: {listed or 'nothing'})")
+        raise SepiError(
+            f"{path}: holds several arrays that may be a light field; choose one with --variable: "
+            f"{_listed({name: arrays[name] for name in fitting})}"
+        )
+    raise SepiError(f"{path}: {no_light_field(arrays)}")
+
+
+def no_light_field(arrays: Shapes) -> str:
+    """What to say of a file whose arrays are no light field: what they are."""
+    return (
+        f"holds no array of numbers of 4 or 5 axes (found: {_listed(arrays) or 'nothing'}); a single picture of all "
+        "views is read as PNG or TIFF with --format mosaic --grid ROWSxCOLUMNS"
+    )
+
+
+def _listed(arrays: Shapes) -> str:
+    return ", ".join(
+        f"{printable(name)} {'x'.join(map(str, shape))}{'' if kind.kind in 'iuf' else f' of {kind}'}"
+        for name, (shape, kind) in list(arrays.items())[:_LISTED]
+    )

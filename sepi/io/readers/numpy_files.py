@@ -13,7 +13,7 @@ from numpy.lib import format as npy
 
 from sepi.errors import SepiError, printable
 from sepi.io.files import DEFLATE_RATIO, reading
-from sepi.io.readers.arrays import Array, light_field_from_array
+from sepi.io.readers.arrays import Array
 from sepi.io.readers.named_arrays import Shapes, light_field_from_arrays
 from sepi.io.readers.options import ReadOptions
 from sepi.lightfield import LightField
@@ -36,8 +36,6 @@ def matches(path: Path) -> bool:
 
 def read(path: Path, options: ReadOptions) -> LightField:
     """Read the array of a NumPy file; of an archive, ``options.variable`` or what can be a light field."""
-    if not _is_zipped(path) and options.variable is None:
-        return light_field_from_array(read_array(path), path, options)
     return light_field_from_arrays(path, array_shapes(path), options, functools.partial(read_named, path))
 
 
@@ -45,6 +43,10 @@ def read_array(path: Path) -> Array:
     """The array of a ``.npy`` file, mapped: its values are read when they are used."""
     with reading(path, _KIND), warnings.catch_warnings(action="ignore"):
         _require_header(path)
+        with path.open("rb") as file:
+            _, _, kind = _HEADERS[npy.read_magic(file)](file)
+        if kind.hasobject:
+            raise SepiError("Python objects, which may be any program; save pictures as one array, numpy.stack(them)")
         return npy.open_memmap(path, mode="r")
 
 

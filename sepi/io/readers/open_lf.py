@@ -22,7 +22,7 @@ import h5py
 import numpy as np
 
 from sepi.errors import SepiError, printable
-from sepi.io.hdf5 import attribute, open_hdf5, read_dataset
+from sepi.io.hdf5 import attribute, has_dataset, open_hdf5, read_dataset
 from sepi.io.readers.arrays import Array, light_field_from_array
 from sepi.io.readers.options import ReadOptions
 from sepi.lightfield import LightField
@@ -35,14 +35,9 @@ _COUNTS = ("LF_TYPE", "cams_h", "cams_v", "height", "width")
 
 
 def matches(path: Path) -> bool:
-    """Whether ``path`` is a readable HDF5 file with a group ``LF``."""
-    if not path.is_file() or not h5py.is_hdf5(path):
-        return False
-    try:
-        with h5py.File(path, "r") as file:
-            return isinstance(file.get(GROUP), h5py.Group)
-    except (OSError, LookupError, ValueError, RuntimeError):
-        return False
+    """Whether ``path`` is a readable HDF5 file with a group ``LF`` of OpenLF's attributes or channels."""
+    known = {*_COLOURS, *_GREY, *_COUNTS}
+    return has_dataset(path, GROUP, lambda lf: isinstance(lf, h5py.Group) and known.intersection((*lf, *lf.attrs)))
 
 
 def read(path: Path, options: ReadOptions) -> LightField:

@@ -7,14 +7,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-import h5py
-
 from sepi.errors import SepiError
 from sepi.io.files import DEFLATE_RATIO
-from sepi.io.hdf5 import open_hdf5
 from sepi.io.images import SUFFIXES, picture_header
-from sepi.io.readers import eslf, matlab, numpy_files, open_lf, tiff_stack
-from sepi.io.readers.named_arrays import datasets_in
+from sepi.io.readers import eslf, hdf5_arrays, matlab, numpy_files, open_lf, tiff_stack
+from sepi.io.readers.arrays import is_likely
 
 # what is taken where no header tells: a view of the benchmark
 _USUAL_SIDE = 512
@@ -99,11 +96,9 @@ def _arrays(path: Path) -> list[tuple[tuple[int, ...], int]]:
             arrays = [open_lf.views_shape(path)]
         else:
             # the size alone, of many: whoever reads the views checks the file
-            with open_hdf5(path, check=False) as file:
-                entries = datasets_in(file, lambda entry: isinstance(entry, h5py.Dataset)).values()
-                arrays = [(entry.shape or (), entry.dtype) for entry in entries]
+            arrays = list(hdf5_arrays.array_shapes(path, check=False).values())
     except SepiError:
         return []
     most = path.stat().st_size * DEFLATE_RATIO
-    sized = [(shape, kind.itemsize) for shape, kind in arrays if len(shape) in (4, 5)]
+    sized = [(shape, kind.itemsize) for shape, kind in arrays if is_likely(shape)]
     return [(shape, itemsize) for shape, itemsize in sized if 0 < math.prod(shape) * itemsize <= most]

@@ -15,12 +15,12 @@ from hypothesis import strategies as st
 from sepi.errors import SepiError
 from sepi.io.hdf5 import write_light_field
 from sepi.io.images import write_png
-from sepi.io.readers.arrays import light_field_from_array
+from sepi.io.readers.arrays import UnclearAxesError, light_field_from_array
 from sepi.io.readers.formats import FORMATS, read
 from sepi.io.readers.options import ReadOptions
 from sepi.lightfield import LightField
 
-T, S, H, W = 2, 3, 8, 10
+T, S, H, W = 2, 5, 12, 14
 RNG = np.random.default_rng(7)
 # no zeros: a view of zeros counts as missing
 RGB = RNG.integers(1, 256, (T, S, H, W, 3), np.uint8)
@@ -71,10 +71,47 @@ def test_axes_of_grey_arrays_are_found(axes: str) -> None:
     np.testing.assert_array_equal(light_field.views, GREY[..., None])
 
 
-def test_a_small_grid_of_grey_views_is_no_row_of_colour_pictures() -> None:
-    """The shape (16, 16, 3, 3) looks like 16 pictures in colour, 3 pixels wide."""
-    views = RNG.integers(1, 256, (3, 3, 16, 16), np.uint8)
-    np.testing.assert_array_equal(taken(laid_out(views, "HWTS")).views, views[..., None])
+@pytest.mark.parametrize(
+    ("shape", "expected"),
+    [
+        ((16, 16, 3, 3), {"HWTS", "HWNC", "HWCN"}),
+        ((25, 3, 64, 80), {"TSHW", "NCHW"}),
+        ((64, 80, 4, 25), {"HWTS", "HWCN"}),
+        ((3, 3, 3, 20, 20), {"TSCHW", "CTSHW"}),
+        ((1, 25, 3, 64, 80), {"TSHW", "NCHW"}),
+    ],
+)
+def test_an_axis_that_may_be_colours_or_a_row_of_views_is_left_open(shape: tuple[int, ...], expected: set[str]) -> None:
+    """Pictures tell, sizes do not: 25 torch pictures in colour were read as 25x3 grey views."""
+    with pytest.raises(UnclearAxesError) as caught:
+        taken(np.ones(shape, np.uint8))
+    assert set(caught.value.readings) == expected
+
+
+@pytest.mark.parametrize(
+    ("axes", "shape", "views"),
+    [
+        ("NCHW", (81, 3, 64, 80), (1, 81, 64, 80, 3)),
+        ("HWCN", (64, 80, 3, 81), (1, 81, 64, 80, 3)),
+        ("CHWN", (3, 64, 80, 25), (1, 25, 64, 80, 3)),
+        ("NCHW", (25, 1, 64, 80), (1, 25, 64, 80, 1)),
+        ("HWN", (64, 80, 25), (1, 25, 64, 80, 1)),
+        ("NHW", (25, 64, 80), (1, 25, 64, 80, 1)),
+        ("TSHWC", (1, 5, 5, 64, 80, 3), (5, 5, 64, 80, 3)),
+        ("TSCHW", (1, 1, 5, 5, 3, 64, 80), (5, 5, 64, 80, 3)),
+        ("NHWC", (1, 81, 64, 80, 3), (1, 81, 64, 80, 3)),
+    ],
+)
+def test_stacks_of_views_and_batches_of_one(axes: str, shape: tuple[int, ...], views: tuple[int, ...]) -> None:
+    """As torch, MATLAB and networks' data sets have them."""
+    light_field = taken(np.ones(shape, np.uint8))
+    assert (light_field.views.shape, light_field.arranged) == (views, "N" not in axes)
+    assert f"axes taken as {' '.join(axes)}; --axes sets them otherwise" in light_field.notes
+
+
+def test_a_grid_that_is_given_tells_colours_from_a_row_of_views() -> None:
+    assert taken(np.ones((25, 3, 64, 80), np.uint8), grid=(5, 5)).views.shape == (5, 5, 64, 80, 3)
+    assert taken(np.ones((25, 3, 64, 80), np.uint8), grid=(25, 3)).views.shape == (25, 3, 64, 80, 1)
 
 
 def test_axes_may_be_lower_case() -> None:
@@ -83,7 +120,7 @@ def test_axes_may_be_lower_case() -> None:
 
 @pytest.mark.parametrize(
     "shape",
-    [(9, 9, 9, 9, 3), (5, 5, 9, 9), (3, 3, 3, 20, 20), (3, 3, 20, 20, 4), (20, 5, 5, 20, 3), (8, 9, 10, 11, 12)],
+    [(9, 9, 9, 9, 3), (5, 5, 9, 9), (3, 3, 3, 20, 20), (20, 5, 5, 20, 3), (8, 9, 10, 11, 12)],
 )
 def test_shapes_that_do_not_tell_ask_for_axes(shape: tuple[int, ...]) -> None:
     """A guess here would be wrong half the time."""
@@ -102,9 +139,9 @@ def test_axes_must_be_as_many_as_the_array_has() -> None:
     assert "--axes TSHWC names 5 axes, the array has 4" in refused(GREY, axes="TSHWC")
 
 
-@pytest.mark.parametrize("shape", [(8, 10, 3), (8,), (), (1, 2, 3, 8, 10, 3)])
+@pytest.mark.parametrize("shape", [(8, 10, 3), (8,), (), (2, 2, 3, 8, 10, 3)])
 def test_other_numbers_of_axes_are_refused(shape: tuple[int, ...]) -> None:
-    assert "expected an array of 4 or 5 axes" in refused(np.ones(shape, np.uint8))
+    assert "expected an array of views, of 4 or 5 axes" in refused(np.ones(shape, np.uint8))
 
 
 def test_two_channels_are_no_colours() -> None:
@@ -151,7 +188,7 @@ def test_axis_n_is_the_number_of_the_view() -> None:
 
 
 def test_a_grid_that_contradicts_the_array_is_refused() -> None:
-    assert "--grid 3x2, but the array has 2x3 views" in refused(RGB, grid=(3, 2))
+    assert "--grid 3x2, but the array has 2x5 views" in refused(RGB, grid=(3, 2))
     np.testing.assert_array_equal(taken(RGB, grid=(T, S)).views, RGB)
 
 

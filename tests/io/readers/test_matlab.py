@@ -18,7 +18,7 @@ from sepi.io.readers.sizes import size_of
 from sepi.lightfield import LightField
 
 RNG = np.random.default_rng(3)
-LF = RNG.integers(1, 256, (2, 3, 8, 10, 3), np.uint8)
+LF = RNG.integers(1, 256, (2, 5, 12, 14, 3), np.uint8)
 
 
 def taken(path: Path, **options: object) -> LightField:
@@ -116,7 +116,7 @@ def test_one_of_several_arrays(tmp_path: Path, save) -> None:
     np.testing.assert_array_equal(taken(tmp_path / "two.mat", variable="before").views, other)
     assert "did you mean 'before'?" in refused(tmp_path / "two.mat", variable="befor")
     save(tmp_path / "unclear.mat", {"left": LF, "right": other})
-    assert "--variable: left 2x3x8x10x3, right 2x3x8x10x3" in refused(tmp_path / "unclear.mat")
+    assert "--variable: left 2x5x12x14x3, right 2x5x12x14x3" in refused(tmp_path / "unclear.mat")
     save(tmp_path / "none.mat", {"matrix": np.ones((3, 3))})
     assert "no array of numbers of 4 or 5 axes (found: matrix 3x3)" in refused(tmp_path / "none.mat")
 
@@ -165,13 +165,15 @@ def test_structures_hold_the_light_field(tmp_path: Path, kind: str) -> None:
     small = {"scene/time": np.ones((1, 1)), "scene/lf/dark": np.zeros((8, 10), np.uint8), "matrix": np.eye(3)}
     put({**small, "scene/lf/views": LF / 255})
     np.testing.assert_array_equal(taken(path).views, (LF / 255).astype(np.float32))
-    assert size_of([path]) == (6, 8, 10, 24)
+    assert size_of([path]) == (10, 12, 14, 24)
     other = LF[::-1, ..., 0].astype(np.uint16) * 257
     put({**small, "scene/lf/views": LF, "scene/lf/right": other})
     np.testing.assert_array_equal(taken(path, variable="scene/lf/right").views[..., 0], other)
     listed = refused(path)
     assert "choose one with --variable" in listed
-    assert {"scene/lf/views 2x3x8x10x3", "scene/lf/right 2x3x8x10"} == set(listed.split("--variable: ")[1].split(", "))
+    assert {"scene/lf/views 2x5x12x14x3", "scene/lf/right 2x5x12x14"} == set(
+        listed.split("--variable: ")[1].split(", ")
+    )
     put({**small, "scene/LF": LF, "scene/GT": other})
     np.testing.assert_array_equal(taken(path).views, LF)
 
@@ -185,7 +187,7 @@ def test_structures_of_version_5_hold_anything(tmp_path: Path) -> None:
     several = np.zeros((1, 2), [("v", object), ("n", object)])
     several[0, 0], several[0, 1] = (LF, 1), (LF[::-1], "b")
     scipy.io.savemat(tmp_path / "a.mat", {"scenes": several})
-    assert "--variable: scenes(1)/v 2x3x8x10x3, scenes(2)/v 2x3x8x10x3" in refused(tmp_path / "a.mat")
+    assert "--variable: scenes(1)/v 2x5x12x14x3, scenes(2)/v 2x5x12x14x3" in refused(tmp_path / "a.mat")
     np.testing.assert_array_equal(taken(tmp_path / "a.mat", variable="scenes(2)/v").views, LF[::-1])
     content = (tmp_path / "a.mat").read_bytes()
     dims = struct.pack("<5i", *LF.shape)
@@ -201,7 +203,7 @@ def test_hdf5_of_other_programs_with_one_array(tmp_path: Path, name: str) -> Non
         file["calibration"] = np.ones((3, 3))
     assert format_of(tmp_path / "a.h5").name == "HDF5 file"
     np.testing.assert_array_equal(read(tmp_path / "a.h5", ReadOptions()).views, LF)
-    assert size_of([tmp_path / "a.h5"]) == (6, 8, 10, 3)
+    assert size_of([tmp_path / "a.h5"]) == (10, 12, 14, 3)
     with h5py.File(tmp_path / "a.h5", "a") as file:
         file[f"{name}2"] = LF[::-1]
     assert "choose one with --variable" in refused(tmp_path / "a.h5")
@@ -253,7 +255,7 @@ def test_big_endian_values(tmp_path: Path, packed: bool) -> None:
 
 
 @pytest.mark.parametrize("packed", [False, True])
-@pytest.mark.parametrize("dims", [(9, 9, 30000, 30000, 3), (2, 3, 8, 10, 4), (2, 3, -8, -10, 3), (2,) * 5])
+@pytest.mark.parametrize("dims", [(9, 9, 30000, 30000, 3), (2, 5, 12, 14, 4), (2, 5, -12, -14, 3), (2,) * 5])
 def test_shapes_that_the_values_do_not_have(tmp_path: Path, dims: tuple[int, ...], packed: bool) -> None:
     """No memory may be taken on the word of a shape."""
     content = version_5("<", dims=dims, kind=9, stored=2, data=LF.tobytes("F"), packed=packed)
@@ -336,7 +338,7 @@ CHANNELS = {
 def test_three_arrays_may_be_the_colours_of_one_light_field(tmp_path: Path, case: str) -> None:
     """Taken one by one they are three grey light fields, each with a third of what tells surfaces apart."""
     names = CHANNELS[case]
-    views = np.random.default_rng(1).integers(1, 255, (3, 4, 12, 14, 3), np.uint8)
+    views = np.random.default_rng(1).integers(1, 255, (2, 5, 12, 14, 3), np.uint8)
     # not in the order of the channels
     arrays = {name: views[..., channel].astype(float) for channel, name in reversed(list(enumerate(names)))}
     scipy.io.savemat(tmp_path / "a.mat", arrays)

@@ -1,0 +1,80 @@
+"""Which axis of an array is which, where its sizes leave it open, found from its pictures.
+
+An axis of 3 or 4 beside one of views may hold colours or a row of the grid: colours show no parallax against each
+other, views do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import numpy.typing as npt
+
+from sepi.inspection.view_layouts import FEWEST_POINTS, MOVEMENT, Views, layout_costs, points_to_match
+from sepi.lightfield import LightField
+
+# sequences of pictures that are looked at, reductions by which movement is searched, and its spacing
+_SEQUENCES = 8
+_REDUCTIONS = (1, 2, 4)
+_SPACING = 0.3
+_RADIUS = 2
+# matching cost in place over the least that movement gives: at most of colours, at least of views
+_COLOURS = 1.2
+_VIEWS = 1.4
+_COLOUR_COUNTS = (3, 4)
+
+
+def fitting_axes(readings: Mapping[str, LightField]) -> str | None:
+    """The order of an array's axes in which its pictures fit together; None where they do not tell.
+
+    Parameters
+    ----------
+    readings : mapping of str to LightField
+        Orders of the axes, and the light field that the array is in each.
+    """
+    kept = [axes for axes, light_field in readings.items() if _is_consistent(light_field)]
+    return kept[0] if len(kept) == 1 else None
+
+
+def _is_consistent(light_field: LightField) -> bool:
+    """Whether colours stay where they are, and the views of a row or column that is as short do not."""
+    views = light_field.views
+    T, S, _, _, C = views.shape
+    return (C == 1 or _parallax(np.moveaxis(views, 4, 2).reshape(T * S, C, *views.shape[2:4])) <= _COLOURS) and all(
+        _parallax(np.moveaxis(views[..., C // 2], axis, 1).reshape(-1, count, *views.shape[2:4])) >= _VIEWS
+        for axis, count in enumerate((T, S))
+        if count in _COLOUR_COUNTS
+    )
+
+
+def _parallax(pictures: npt.NDArray[np.generic]) -> float:
+    """By how much pictures fit better in a row or column of views than in one place; NaN where they do not tell.
+
+    ``pictures`` are (K, M, H, W), K sequences of M.
+    """
+    pictures = pictures[:: max(1, len(pictures) // _SEQUENCES), ..., None]
+    views = Views(LightField(pictures, "pictures", arranged=False))
+    middle = pictures.shape[1] // 2
+    steps = np.array([step for step in range(-middle, pictures.shape[1] - middle) if step], np.float64)
+    offsets = np.stack([np.stack([0 * steps, steps], 1), np.stack([steps, 0 * steps], 1)])
+    count = round(MOVEMENT / _SPACING)
+    candidates = (np.arange(-count, count + 1) * (_SPACING / abs(steps).max())).astype(np.float32)
+    ratios = [np.nan]
+    for factor in (factor for factor in _REDUCTIONS if not views.is_too_small(factor)):
+        costs = []
+        for k in range(len(pictures)):
+            reference, *others = (
+                views.detail((k - views.middle[0], int(m) + middle - views.middle[1]), factor) for m in (0, *steps)
+            )
+            points = points_to_match(reference)
+            if len(points) >= FEWEST_POINTS:
+                moved, still = (
+                    layout_costs(reference, np.stack(others), offsets, tried, points, _RADIUS)[0]
+                    for tried in (candidates, np.zeros(1, np.float32))
+                )
+                costs.append((*moved.mean(axis=0), still.mean()))
+        if costs:
+            *moved, still = np.mean(costs, axis=0)
+            ratios.append(still / max(min(moved), 1e-6))
+    return float(np.nanmax(ratios)) if len(ratios) > 1 else np.nan
