@@ -27,16 +27,35 @@ from sepi.threads import available_cores
 
 Pixels = npt.NDArray[np.integer[Any] | np.floating[Any]]
 
-SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".tif", ".tiff", ".exr", ".bmp", ".webp", ".pgm", ".ppm", ".pnm"})
+SUFFIXES = frozenset(
+    {
+        ".png",
+        ".jpg",
+        ".jpeg",
+        ".tif",
+        ".tiff",
+        ".exr",
+        ".bmp",
+        ".webp",
+        ".pgm",
+        ".ppm",
+        ".pnm",
+        ".gif",
+        ".jp2",
+        ".j2k",
+        ".avif",
+    }
+)
 """Ends of names, in small letters, of the pictures that can be read."""
 
 _MAX_BYTES = 2**32
 _USUAL_BYTES = 2**24
 _SILENT = logging.NullHandler()
+_CODECS = {"PNG": "png", "GIF": "gif", "JPEG 2000": "jpeg2k", "AVIF": "avif"}
 
 
 def read_picture(path: Path, *, any_floats: bool = False) -> Pixels:
-    """Read a PNG, JPEG, TIFF, OpenEXR, BMP, WebP, PGM or PPM; its content tells which, not its name.
+    """Read a picture of a kind in :data:`SUFFIXES`; its content tells which, not its name.
 
     Parameters
     ----------
@@ -223,8 +242,8 @@ def _opened(path: Path) -> Iterator[IO[bytes]]:
 
 def _decoded(path: Path, data: bytes, header: Header) -> Pixels:
     """Pixels of a picture, in the order RGB."""
-    if header.kind == "PNG":
-        return _of_png(path, data, header)
+    if header.kind in _CODECS:
+        return _by_imagecodecs(path, data, header)
     if header.kind == "JPEG":
         usual = _by_pillow(path, data, header)
         if usual is not None:
@@ -254,16 +273,16 @@ def _decoded(path: Path, data: bytes, header: Header) -> Pixels:
     return np.ascontiguousarray(channels[:, :, :1] if header.grey else channels)
 
 
-def _of_png(path: Path, data: bytes, header: Header) -> Pixels:
-    """Pixels of a PNG of any sort: in two thirds of Pillow's time, and what is damaged is told."""
-    from imagecodecs import PngError, png_decode
+def _by_imagecodecs(path: Path, data: bytes, header: Header) -> Pixels:
+    """Pixels of a PNG of any sort, in two thirds of Pillow's time, and of rarer kinds; what is damaged is told."""
+    import imagecodecs
 
     # what it warns of leaves the pixels as they are
     logging.getLogger("imagecodecs").addHandler(_SILENT)
     with reading(path, header.kind):
         try:
-            image = png_decode(data)
-        except PngError as error:
+            image: Pixels = getattr(imagecodecs, f"{_CODECS[header.kind]}_decode")(data)
+        except RuntimeError as error:
             raise ValueError(f"its pixels cannot be decoded: {error}") from error
     values = image[:, :, None] if image.ndim == 2 else image
     return np.ascontiguousarray(values[:, :, :1] if header.grey else values[:, :, :3])

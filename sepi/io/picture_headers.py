@@ -16,6 +16,8 @@ import re
 import zlib
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
+from importlib import import_module
 from pathlib import Path
 from typing import IO, TYPE_CHECKING
 
@@ -46,7 +48,7 @@ class Header:
     Attributes
     ----------
     kind : str
-        ``"PNG"``, ``"JPEG"``, ``"BMP"``, ``"TIFF"``, ``"OpenEXR"``, ``"WebP"`` or ``"PNM"``.
+        Such as ``"PNG"`` or ``"OpenEXR"``.
     height, width : int
         In pixels.
     pixel_bytes : int
@@ -91,10 +93,10 @@ def read_header(path: Path, file: IO[bytes], *, whole: bool = False) -> Header:
     """
     size = file.seek(0, io.SEEK_END)
     file.seek(0)
-    start = file.read(8)
+    start = file.read(12)
     kind = next((kind for kind, (signatures, _) in _KINDS.items() if start.startswith(signatures)), None)
     if kind is None:
-        raise SepiError(f"{path}: not a PNG, JPEG, TIFF, OpenEXR, BMP, WebP, PGM or PPM picture")
+        raise SepiError(f"{path}: not a {', '.join(_KINDS)} picture (PNM: PGM or PPM)")
     file.seek(0)
     with reading(path, kind):
         header = _KINDS[kind][1](file, size, whole)
@@ -123,18 +125,17 @@ def _png(file: IO[bytes], size: int, whole: bool) -> Header:
     return header
 
 
-def _jpeg(file: IO[bytes], size: int, whole: bool) -> Header:
-    from PIL.JpegImagePlugin import JpegImageFile
+def _by_pillow(kind: str, plugin: str, file: IO[bytes], size: int, whole: bool) -> Header:
+    with getattr(import_module(f"PIL.{plugin}ImagePlugin"), f"{plugin}ImageFile")(file) as image:
+        # a palette may have colours
+        grey, wide = image.mode in ("L", "LA", "I;16"), image.mode == "I;16"
+        return Header(kind, image.height, image.width, (1 if grey else 3) * (2 if wide else 1), grey)
 
-    with JpegImageFile(file) as image:
-        return Header("JPEG", image.height, image.width, 1 if image.mode == "L" else 3, image.mode == "L")
 
-
-def _bmp(file: IO[bytes], size: int, whole: bool) -> Header:
-    from PIL.BmpImagePlugin import BmpImageFile
-
-    with BmpImageFile(file) as image:
-        return Header("BMP", image.height, image.width)
+def _avif(file: IO[bytes], size: int, whole: bool) -> Header:
+    # the box with the size of the picture
+    _, _, box = file.read(4096).partition(b"ispe\0\0\0\0")
+    return Header("AVIF", int.from_bytes(box[4:8], "big"), int.from_bytes(box[:4], "big"))
 
 
 def _webp(file: IO[bytes], size: int, whole: bool) -> Header:
@@ -237,10 +238,14 @@ def _exr(file: IO[bytes], size: int, whole: bool) -> Header:
 
 _KINDS: dict[str, tuple[bytes | tuple[bytes, ...], Callable[[IO[bytes], int, bool], Header]]] = {
     "PNG": (b"\x89PNG\r\n\x1a\n", _png),
-    "JPEG": (b"\xff\xd8\xff", _jpeg),
+    "JPEG": (b"\xff\xd8\xff", partial(_by_pillow, "JPEG", "Jpeg")),
     "TIFF": (TIFF_SIGNATURES, _tiff),
     "OpenEXR": (SIGNATURE, _exr),
-    "BMP": (b"BM", _bmp),
+    "BMP": (b"BM", partial(_by_pillow, "BMP", "Bmp")),
+    "GIF": (b"GIF8", partial(_by_pillow, "GIF", "Gif")),
+    "JPEG 2000": ((b"\0\0\0\x0cjP  ", b"\xff\x4f\xff\x51"), partial(_by_pillow, "JPEG 2000", "Jpeg2K")),
+    # behind the length of its first box
+    "AVIF": (tuple(bytes((0, 0, 0, length)) + b"ftypavif" for length in range(16, 256, 4)), _avif),
     "WebP": (b"RIFF", _webp),
     "PNM": ((b"P2", b"P3", b"P5", b"P6"), _pnm),
 }

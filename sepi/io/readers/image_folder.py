@@ -24,7 +24,13 @@ from sepi.io.readers.odd_pictures import odd_pictures
 from sepi.io.readers.options import ReadOptions, is_position, unarranged
 from sepi.io.readers.row_folders import files_in, has_rows, numbered, view_files
 from sepi.io.readers.view_files import read_grid
-from sepi.io.readers.view_names import ViewNumbers, infer_view_numbers, parse_view_numbers, sorted_view_numbers
+from sepi.io.readers.view_names import (
+    ViewNumbers,
+    infer_view_numbers,
+    pair_view_numbers,
+    parse_view_numbers,
+    sorted_view_numbers,
+)
 from sepi.lightfield import LightField
 
 # steps by which cameras that stand on the grid may seem to miss it: decimals are rounded
@@ -105,7 +111,7 @@ def _named(folder: Path, names: Sequence[str], options: ReadOptions) -> ViewNumb
     if options.pattern is not None:
         return parse_view_numbers(str(folder), names, options.pattern)
     try:
-        return infer_view_numbers(str(folder), names)
+        return pair_view_numbers(names) or infer_view_numbers(str(folder), names)
     except SepiError:
         # a grid that is given and filled needs no more than an order
         if options.grid is None or math.prod(options.grid) != len(names):

@@ -10,10 +10,12 @@ from sepi.errors import SepiError
 from sepi.io.files import reading
 from sepi.io.images import SUFFIXES
 from sepi.io.readers.view_counts import Kind
-from sepi.io.readers.view_names import infer_view_numbers
+from sepi.io.readers.view_names import CAMERAS, infer_view_numbers, pair_view_numbers
 
 # the number of a row, or of a column, behind a word for it or alone
-_NAME = re.compile(r"(?:.*[^a-z])?(?:row|line|r|t|v|y|column|col|c|s|u|x)[^a-z0-9]*[0-9]+|([^a-z]*[0-9]+)")
+_NAME = re.compile(
+    rf"(?:.*[^a-z])?(?:row|line|r|t|v|y|column|col|c|s|u|x|{'|'.join(CAMERAS)})[^a-z0-9]*[0-9]+|([^a-z]*[0-9]+)"
+)
 # pictures in a folder from which on a square number of them is rather a grid of its own
 _SQUARE = 9
 
@@ -55,8 +57,10 @@ def files_in(folder: Path) -> list[Path]:
 
 
 def numbered(files: list[Path]) -> list[str]:
-    """Names of pictures that have numbers; several lenslet pictures are several light fields."""
+    """Names of pictures that have numbers, or of a pair; several lenslet pictures are several light fields."""
     names = [file.name for file in files if file.suffix.lower() in SUFFIXES]
+    if pair := pair_view_numbers(names):
+        return list(pair.numbers)
     return [name for name in names if re.search("[0-9]", Path(name).stem) and "eslf" not in name.lower()]
 
 
@@ -68,10 +72,14 @@ def _rows(folder: Path) -> list[Path]:
 
 
 def _is_row(folder: Path) -> bool:
-    if folder.is_symlink() or not _NAME.fullmatch(folder.name.lower()):
+    match = _NAME.fullmatch(folder.name.lower())
+    if folder.is_symlink() or match is None:
         return False
     try:
-        # whose names give row and column is a light field itself
-        return infer_view_numbers(str(folder), numbered(files_in(folder))).kind is not Kind.GRID
+        files = [file for file in files_in(folder) if file.suffix.lower() in SUFFIXES]
+        # one picture of each camera; whose names give row and column is a light field itself
+        return (len(files) == 1 and match[1] is None) or (
+            infer_view_numbers(str(folder), numbered(files)).kind is not Kind.GRID
+        )
     except (SepiError, OSError):
         return False

@@ -14,6 +14,9 @@ from sepi.io.readers.view_counts import Counting, Kind, Values, counting, fill, 
 
 EXAMPLES = "'view_{row}_{column}.png' or 'img{number}.jpg'"
 
+CAMERAS = ("cam", "camera")
+"""Words for a camera in names of folders and pictures."""
+
 _FIELDS = ("row", "column", "number")
 _MAX_DIGITS = 18
 # decimals of a decimal number that counts views
@@ -26,6 +29,10 @@ _WELL_FILLED = 0.5
 # last word before a number, and what says which number it is
 _WORD = re.compile(r"([A-Z]?[a-z]+|[A-Z]+)[ _.=(\[-]*$")
 _AXES = {"x": "column", "c": "column", "col": "column", "column": "column", "y": "row", "r": "row", "row": "row"}
+# of the word before a number that counts no views: one camera took several pictures
+_MOMENTS = frozenset({"frame", "frames", "fr", "time", "exp", "exposure"})
+# names of the two views of a pair
+_PAIRS = (("left", "right"), ("Left", "Right"), ("LEFT", "RIGHT"), ("l", "r"), ("L", "R"))
 # in place of a decimal number; no name has it
 _MARK = "\0"
 
@@ -137,6 +144,13 @@ def infer_view_numbers(source: str, names: Iterable[str]) -> ViewNumbers:
             f"{source}: no number in the names counts the views ({', '.join(names[:3])}); give --pattern, such as "
             f"{EXAMPLES}"
         )
+    moments = [at for at in counted.columns if group.is_moment(at)]
+    if moments and len(counted.columns) > 1:
+        one = group.pattern([at for at in counted.columns if at not in moments][:1], fixed=True)
+        raise SepiError(
+            f"{source}: several pictures of each camera ({group.names[0]}), not rows and columns of views; --pattern "
+            f"'{one}' takes one of each"
+        )
     columns, said = group.row_first(counted.columns)
     numbers = {name: group.numbers_of(name, columns) or () for name in group.names}
     numbers_of: Callable[[str], tuple[int, ...] | None] = functools.partial(group.numbers_of, columns=columns)
@@ -165,6 +179,19 @@ def sorted_view_numbers(names: Iterable[str]) -> ViewNumbers:
         return [(int(part), "") if at % 2 else (0, part) for at, part in enumerate(parts)], name
 
     return ViewNumbers({name: (rank,) for rank, name in enumerate(sorted(names, key=key))}, _no_numbers, kind=Kind.SORT)
+
+
+def pair_view_numbers(names: Iterable[str]) -> ViewNumbers | None:
+    """A left and a right view, ``left.png`` and ``right.png``, where there is one such pair among names."""
+    names = sorted(names)
+    swapped = [
+        (name, re.sub(rf"(?<![A-Za-z]){left}(?![A-Za-z])", right, name)) for name in names for left, right in _PAIRS
+    ]
+    pairs = [pair for pair in swapped if pair[0] != pair[1] in names]
+    if len(pairs) != 1:
+        return None
+    others = tuple(name for name in names if name not in pairs[0])
+    return ViewNumbers({name: (0, at) for at, name in enumerate(pairs[0])}, _no_numbers, others, Kind.GRID, said=True)
 
 
 def _no_numbers(_: str) -> None:
@@ -245,6 +272,14 @@ class _Group:
         words = [_WORD.search(self._texts[at]) for at in columns]
         said = [_AXES.get(word[1].lower(), "") if word else "" for word in words]
         return (columns[::-1] if said == ["column", "row"] else columns), sorted(said) == ["column", "row"]
+
+    def is_moment(self, at: int) -> bool:
+        """Whether the words before a number say that it counts pictures of one camera."""
+        word = _WORD.search(self._texts[at])
+        folder = _WORD.search(self._texts[0]) if at and "/" in self._texts[at] else None
+        return (word is not None and word[1].lower() in _MOMENTS) or (
+            folder is not None and folder[1].lower() in CAMERAS
+        )
 
     def varies_beside(self, counted: Counting) -> bool:
         """Whether other numbers differ, too."""
