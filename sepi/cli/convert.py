@@ -36,10 +36,16 @@ _PFM = ".pfm"
 @click.argument("result_path", metavar="RESULT", type=_PATH)
 @click.argument("output", metavar="FILE", type=_PATH)
 @click.option("--map", "name", type=click.Choice(list(_MAPS)), help="Map to write; in .exr all of them unless given.")
+@click.option("--to", "kind", type=click.Choice(["rgbd"]), help="Colour and depth side by side, as displays take it.")
 @view_of_result
 @camera_flags
 def convert(
-    result_path: Path, output: Path, name: str | None, view: tuple[int, int] | None, geometry: Geometry | None
+    result_path: Path,
+    output: Path,
+    name: str | None,
+    kind: str | None,
+    view: tuple[int, int] | None,
+    geometry: Geometry | None,
 ) -> None:
     """Write maps of RESULT as FILE, a picture of 32-bit floats: OpenEXR (.exr), TIFF (.tif, .tiff) or PFM (.pfm).
 
@@ -49,17 +55,30 @@ def convert(
     channel Y, which OpenCV reads. TIFF and PFM hold one map, the disparity unless --map names another. OpenEXR needs
     the package of that name: pip install 'sepi[exr]'.
 
+    With --to rgbd FILE is a PNG with the view on the left and its disparity on the right, from far, black, to near,
+    white, as displays of light fields take it.
+
     \b
     Examples:
       sepi convert cotton-depth cotton.exr
       sepi convert cotton-depth depth.tiff --map depth
       sepi convert cotton-depth sigma.tiff --map sigma
       sepi convert cotton-depth corner.pfm --view 0,0
+      sepi convert cotton-depth cotton.png --to rgbd
     """
+    from sepi.io.all_views import read_result_at
     from sepi.io.float_pictures import EXR, TIFF, write_exr, write_tiff
+    from sepi.io.images import write_png
     from sepi.io.pfm import write_pfm
+    from sepi.io.result_folder import colour_and_depth
 
     suffix = output.suffix.lower()
+    if kind is not None:
+        if suffix != ".png" or name is not None:
+            raise SepiError(f"{output}: --to rgbd is a PNG of view and disparity: expected NAME.png, and no --map")
+        write_png(output, colour_and_depth(read_result_at(result_path, view)))
+        click.echo(f"written: {output} (the view, and its disparity from far, black, to near, white)")
+        return
     if suffix not in (*EXR, *TIFF, _PFM):
         raise SepiError(f"{output}: expected a name that ends with .exr, .tif, .tiff or .pfm, the format of the file")
     maps = _maps(result_path, view, geometry)

@@ -27,25 +27,8 @@ from sepi.threads import available_cores
 
 Pixels = npt.NDArray[np.integer[Any] | np.floating[Any]]
 
-SUFFIXES = frozenset(
-    {
-        ".png",
-        ".jpg",
-        ".jpeg",
-        ".tif",
-        ".tiff",
-        ".exr",
-        ".bmp",
-        ".webp",
-        ".pgm",
-        ".ppm",
-        ".pnm",
-        ".gif",
-        ".jp2",
-        ".j2k",
-        ".avif",
-    }
-)
+_ENDS = ("png", "jpg", "jpeg", "tif", "tiff", "exr", "bmp", "webp", "pgm", "ppm", "pnm", "gif", "jp2", "j2k", "avif")
+SUFFIXES = frozenset(f".{end}" for end in _ENDS)
 """Ends of names, in small letters, of the pictures that can be read."""
 
 _MAX_BYTES = 2**32

@@ -38,7 +38,7 @@ from sepi.io.point_cloud import point_cloud
 from sepi.io.provenance import result_attributes
 from sepi.io.result_files import DEPTH, RESULT_FILES, RUNTIME, names_as_taken, remove_files, require_own
 from sepi.io.sound_maps import UNKNOWN, sound_maps
-from sepi.lightfield import BoolMap, FloatMap, LightField, require_light_field
+from sepi.lightfield import BoolMap, FloatMap, LightField, as_unit_float, require_light_field
 from sepi.rig import Rig
 from sepi.stage import ERROR_BARS, StageMaps
 from sepi.threads import available_cores
@@ -292,15 +292,26 @@ def colour_code(values: FloatMap, unknown: BoolMap | None = None) -> npt.NDArray
     finite = np.isfinite(values)
     # what is unknown takes no part of the scale
     counted = finite if unknown is None else finite & ~unknown
-    low, high = np.quantile(values[counted], (_BEYOND, 1 - _BEYOND)) if counted.any() else (0.0, 0.0)
-    # a constant map gets the middle colour
-    unit = (values - low) / (high - low) if high > low else np.full(values.shape, 0.5)
-    levels = _levels(np.where(finite, unit, 0))
+    levels = _spread(np.where(finite, values, 0), counted)
     colours = np.asarray(cv2.applyColorMap(levels, cv2.COLORMAP_VIRIDIS), np.uint8)[:, :, ::-1].copy()
     if unknown is not None:
         colours[unknown] = _GREY
     colours[~finite] = 0
     return colours
+
+
+def colour_and_depth(result: Result) -> npt.NDArray[np.uint8]:
+    """The view and, beside it, its disparity from far, black, to near, white: RGB (H, 2 W, 3), as displays take it."""
+    colours = np.broadcast_to(_levels(as_unit_float(result.picture)), (*result.disparity.shape, 3))
+    depth = _spread(result.disparity, ~result.unknown & np.isfinite(result.disparity))
+    return np.hstack([colours, np.repeat(depth[:, :, None], 3, axis=2)])
+
+
+def _spread(values: FloatMap, counted: BoolMap) -> npt.NDArray[np.uint8]:
+    """A map as levels that span what is counted of it, but for a few pixels."""
+    low, high = np.quantile(values[counted], (_BEYOND, 1 - _BEYOND)) if counted.any() else (0.0, 0.0)
+    # a constant map gets the middle one
+    return _levels((values - low) / (high - low) if high > low else np.full(values.shape, 0.5))
 
 
 def _write_files(

@@ -398,9 +398,11 @@ def test_the_reference_camera_is_chosen_by_its_picture(folder: Path) -> None:
         sepi.read_light_field(folder / "00.png", options=sepi.ReadOptions(reference="00.png"), file_format="numpy")
 
 
-def test_csv_says_the_same_as_yaml(folder: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize("spreadsheet", [str, lambda text: text.replace(",", ";").replace("0.01", "0,01")])
+def test_csv_says_the_same_as_yaml(folder: Path, tmp_path: Path, spreadsheet: Any) -> None:
+    """A spreadsheet in most of Europe writes semicolons, and decimal commas."""
     rows = ["file,x,y,z,fx,k1"] + [f"{n}{m}.png,{m},{n},0,80,0.01" for n in range(3) for m in range(3)]
-    (tmp_path / "cameras.csv").write_text("\n".join(rows))
+    (tmp_path / "cameras.csv").write_text(spreadsheet("\n".join(rows)))
     model = read_model(tmp_path, str(folder))
     assert len(model.shots) == 9
     assert model.shots[5].centre.tolist() == [2, 1, 0]

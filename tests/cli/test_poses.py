@@ -315,6 +315,22 @@ def test_convert_says_what_is_wrong(scene: LightField) -> None:
     assert "gone" in error_of(call("convert", "gone", "depth.tif"))
 
 
+def test_colour_and_depth_side_by_side(scene: LightField) -> None:
+    """Displays of light fields take one picture; near is white."""
+    called = call("convert", "maps", "rgbd.png", "--to", "rgbd")
+    assert called.exit_code == 0, called.output
+    picture = cv2.imread("rgbd.png")[:, :, ::-1]
+    width = scene.shape[1]
+    np.testing.assert_array_equal(picture[:, :width], np.rint(255 * scene.reference_view))
+    grey = picture[:, width:]
+    assert (np.ptp(grey, axis=2) == 0).all()
+    levels, disparity = grey[:-9, :, 0].astype(int).ravel(), np.load("maps/disparity.npy")[:-9].ravel()
+    assert levels[np.nanargmax(disparity)] == 255
+    assert levels[np.nanargmin(disparity)] == 0
+    assert (np.diff(levels[np.argsort(disparity)][:-1]) >= 0).all()
+    assert "expected NAME.png, and no --map" in error_of(call("convert", "maps", "rgbd.tif", "--to", "rgbd"))
+
+
 @pytest.mark.usefixtures("scene")
 def test_tiff_maps_are_scored_as_the_result_is() -> None:
     """A map that went to another program and back, or came from one."""

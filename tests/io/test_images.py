@@ -11,6 +11,7 @@ from functools import partial
 from pathlib import Path
 
 import cv2
+import imagecodecs
 import imageio.v3 as imageio
 import numpy as np
 import pytest
@@ -152,6 +153,23 @@ def test_jpeg_is_read_as_another_decoder_reads_it(tmp_path: Path, grey: bool, op
         np.testing.assert_allclose(flat(read).astype(int), np.asarray(image).astype(int), atol=2)
     assert read.shape == pixels.shape
     assert read.dtype == np.uint8
+
+
+@pytest.mark.parametrize("kind", ["jp2", "j2k", "avif", "gif"])
+def test_rarer_kinds_of_pictures_are_read(tmp_path: Path, kind: str) -> None:
+    pixels = RGB16 if kind.startswith("j") else smooth() if kind == "avif" else GREY8
+    if kind == "gif":
+        by_pillow(pixels)(tmp_path / "a.gif")
+    else:
+        encode = imagecodecs.avif_encode if kind == "avif" else imagecodecs.jpeg2k_encode
+        (tmp_path / f"a.{kind}").write_bytes(encode(pixels, **({"level": 100} if kind == "avif" else {})))
+    read = read_picture(tmp_path / f"a.{kind}")
+    assert (read.dtype, read.shape[:2]) == (pixels.dtype, (40, 50))
+    np.testing.assert_array_equal(read, np.broadcast_to(pixels, read.shape))
+    content = (tmp_path / f"a.{kind}").read_bytes()
+    (tmp_path / f"a.{kind}").write_bytes(content[: len(content) // 2])
+    with pytest.raises(SepiError, match=f"a.{kind}: not a .*damaged or cut off"):
+        read_picture(tmp_path / f"a.{kind}")
 
 
 def test_jpeg_with_a_thumbnail_and_bytes_after_its_end_is_whole(tmp_path: Path) -> None:
@@ -296,7 +314,9 @@ def webp(width: int, height: int) -> bytes:
 BAD: dict[str, tuple[bytes, str]] = {
     "empty": (b"", "not a PNG, JPEG"),
     "text": (b"hello, world; this is no picture of any kind at all", "not a PNG, JPEG"),
-    "GIF": (b"GIF89a" + bytes(100), "not a PNG, JPEG"),
+    "PSD": (b"8BPS" + bytes(100), "not a PNG, JPEG"),
+    "GIF without a picture": (b"GIF89a" + bytes(100), "not a GIF, or damaged"),
+    "AVIF without a size": (b"\0\0\0 ftypavif" + bytes(100), "pixels cannot be in a AVIF"),
     "huge PNG": (png(60_000, 60_000), "60000x60000"),
     "large PNG": (png(9000, 9000), "9000x9000"),
     "PNG without pixels": (png(0, 5), "not a PNG, or damaged"),

@@ -17,9 +17,9 @@ from pathlib import Path
 import numpy as np
 
 from sepi.errors import SepiError
-from sepi.io.files import name_of
 from sepi.io.images import SUFFIXES, read_picture
-from sepi.io.readers.options import ReadOptions, arrange_numbers
+from sepi.io.readers.arrays import light_field_from_array
+from sepi.io.readers.options import ReadOptions
 from sepi.io.readers.view_files import MAX_VIEWS
 from sepi.lightfield import MIN_SIZE, LightField
 
@@ -49,30 +49,22 @@ def read(path: Path, options: ReadOptions) -> LightField:
     if not 2 <= T * S <= MAX_VIEWS:
         raise SepiError(f"{path}: --grid {T}x{S}: expected a grid of 2 to {MAX_VIEWS} views")
     central = options.central or _usual_side(grid)
-    picture = read_picture(path)
+    picture = read_picture(path, any_floats=options.white is not None)
     height, width = picture.shape[0] // T, picture.shape[1] // S
     if min(height, width) < MIN_SIZE:
         raise SepiError(
             f"{path}: {picture.shape[1]}x{picture.shape[0]} pixels with {T}x{S} views under each lenslet make views of "
             f"{width}x{height} pixels; expected at least {MIN_SIZE}x{MIN_SIZE}"
         )
-    numbers = arrange_numbers(str(path), grid, replace(options, central=central))
-    present = numbers >= 0
-    blocks = picture[: height * T, : width * S].reshape(height, T, width, S, -1)
-    views = np.zeros((*numbers.shape, height, width, picture.shape[2]), picture.dtype)
-    for position in zip(*present.nonzero(), strict=True):
-        t, s = divmod(int(numbers[position]), S)
-        views[position] = blocks[:, t, :, s]
     notes = []
     if options.central is None and central is not None and (central, central) != grid:
         notes.append(f"the {central}x{central} views in the middle of {T}x{S}; --central N takes another odd number")
     cropped = picture.shape[0] - height * T, picture.shape[1] - width * S
     if any(cropped):
         notes.append(f"{cropped[0]} pixel rows and {cropped[1]} columns beyond the last whole lenslet were left out")
-    light_field = LightField(
-        views=views, name=name_of(path).stem, source=str(path), present=present, view=options.view, notes=tuple(notes)
-    )
-    return replace(light_field, notes=(*notes, *_dark_notes(light_field)))
+    blocks = picture[: height * T, : width * S].reshape(height, T, width, S, -1)
+    light_field = light_field_from_array(blocks, path, replace(options, grid=None, central=central), axes="HTWSC")
+    return replace(light_field, notes=(*notes, *light_field.notes, *_dark_notes(light_field)))
 
 
 def _usual_side(grid: tuple[int, int]) -> int | None:

@@ -125,7 +125,7 @@ FORMATS = {
     "mosaic": Format(
         "picture of all views", "NAME_qs8x6a0.75.png, a quilt, or --grid", mosaic.matches, mosaic.read, ("grid",), True
     ),
-    "eslf": Format("Lytro lenslet picture", "NAME_eslf.png", eslf.matches, eslf.read, ("grid",)),
+    "eslf": Format("Lytro lenslet picture", "NAME_eslf.png", eslf.matches, eslf.read, ("grid",), True),
     "tiff-stack": Format("TIFF stack", "a page for each view", tiff_stack.matches, tiff_stack.read, ("grid",), True),
     # before the other kinds of HDF5: MATLAB's is told by its header or ending
     "matlab": Format("MATLAB file", ".mat with an array such as LF", matlab.matches, matlab.read, _ARRAY_OPTIONS, True),

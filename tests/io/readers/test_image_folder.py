@@ -840,3 +840,35 @@ def test_names_that_command_a_terminal_are_shown_without(tmp_path: Path) -> None
     shown = (light_field.name, light_field.source, *light_field.notes)
     assert all(map(str.isprintable, shown))
     assert light_field.name == "two lines"
+
+
+@pytest.mark.parametrize("names", [("left.png", "right.png"), ("L.png", "R.png"), ("a_left_1.png", "a_right_1.png")])
+def test_a_pair_is_a_row_of_two_views(tmp_path: Path, names: tuple[str, str]) -> None:
+    put(tmp_path, names[::-1])
+    light_field = read(tmp_path, ReadOptions())
+    assert places_of(light_field) == [[1, 0]]
+    assert light_field.arranged
+
+
+def test_one_picture_of_each_camera_in_a_folder_of_its_own(tmp_path: Path) -> None:
+    """Recorders of camera arrays keep one folder for each."""
+    for camera in range(9):
+        put(tmp_path / f"cam_{camera:02d}", ["frame_0007.png"])
+        imageio.imwrite(tmp_path / f"cam_{camera:02d}/frame_0007.png", pixels(camera))
+    assert format_of(tmp_path).name == "folder of views"
+    assert places_of(read(tmp_path, ReadOptions())) == [list(range(9))]
+
+
+@pytest.mark.parametrize(
+    "form", ["cam_{:02d}/{:04d}.png", "cam_{:02d}/frame_{:04d}.png", "cam_{:02d}_frame_{:04d}.png"]
+)
+def test_pictures_at_several_times_are_no_columns_of_views(tmp_path: Path, form: str) -> None:
+    """9 cameras and 3 moments were read as 9x3 views: nearly every pixel of the map was wrong."""
+    names = by_place(form, range(9), range(3))
+    for name in names:
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+    put(tmp_path, names)
+    with pytest.raises(SepiError, match=r"several pictures of each camera .* --pattern '(.*)' takes one") as caught:
+        read(tmp_path, ReadOptions(), "images")
+    pattern = str(caught.value).split("'")[1]
+    assert places_of(read(tmp_path, ReadOptions(pattern=pattern), "images")) == [list(range(0, 27, 3))]

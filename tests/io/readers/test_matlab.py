@@ -178,6 +178,35 @@ def test_structures_hold_the_light_field(tmp_path: Path, kind: str) -> None:
     np.testing.assert_array_equal(taken(path).views, LF)
 
 
+def save_cells(path: Path, cells: np.ndarray) -> None:
+    """A cell array as MATLAB writes it in version 7.3: references, in reverse order as all axes are."""
+    save_7_3(path, {"gain": np.ones((2, 2))})
+    with h5py.File(path, "r+") as file:
+        entry = file.create_dataset("views", cells.shape[::-1], h5py.ref_dtype)
+        entry.attrs["MATLAB_class"] = np.bytes_("cell")
+        for place in np.ndindex(cells.shape):
+            name = "#refs#/" + "_".join(map(str, place))
+            file[name] = cells[place].T
+            file[name].attrs["MATLAB_class"] = np.bytes_("uint8")
+            entry[place[::-1]] = file[name].ref
+
+
+@pytest.mark.parametrize("save", [save_cells, lambda path, cells: scipy.io.savemat(path, {"views": cells})])
+@pytest.mark.parametrize("row", [False, True])
+def test_cells_of_pictures_are_a_light_field(tmp_path: Path, save, row: bool) -> None:
+    """MATLAB's users keep views so; each must come out at its own place."""
+    cells = np.empty((1, 10) if row else (2, 5), object)
+    for place in np.ndindex(2, 5):
+        cells[(0, place[0] * 5 + place[1]) if row else place] = LF[place]
+    save(tmp_path / "a.mat", cells)
+    light_field = taken(tmp_path / "a.mat")
+    np.testing.assert_array_equal(light_field.views, LF.reshape(1, 10, *LF.shape[2:]) if row else LF)
+    assert light_field.arranged is not row
+    cells[0, 1] = cells[0, 1][:-1]
+    save(tmp_path / "a.mat", cells)
+    assert "no array of numbers" in refused(tmp_path / "a.mat")
+
+
 def test_structures_of_version_5_hold_anything(tmp_path: Path) -> None:
     """Text, cells, empty and complex values, and several structures in one."""
     scene = {"text": "words", "cell": np.array([1, "a"], object), "none": np.zeros((0, 0)), "z": LF[..., 0] * 1j}
@@ -193,6 +222,19 @@ def test_structures_of_version_5_hold_anything(tmp_path: Path) -> None:
     dims = struct.pack("<5i", *LF.shape)
     (tmp_path / "a.mat").write_bytes(content.replace(dims, struct.pack("<5i", 9, *LF.shape[1:])))
     assert "damaged" in refused(tmp_path / "a.mat", variable="scenes(2)/v")
+
+
+@pytest.mark.parametrize("name", ["views", "disparity", "LF/data", "light_field"])
+def test_a_name_that_this_package_uses_is_no_sign_of_its_files(tmp_path: Path, name: str) -> None:
+    """Others call their arrays so; a file is known by its attributes, and with a map beside by its axes."""
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file[name] = LF.transpose(0, 1, 4, 2, 3)[None]
+        file["label"] = np.ones((1, 12, 14), np.float32)
+    np.testing.assert_array_equal(read(tmp_path / "a.h5", ReadOptions()).views, LF)
+    with h5py.File(tmp_path / "b.h5", "w") as file:
+        file["Hr_SAI_y"] = np.ones((60, 70), np.float32)
+    with pytest.raises(SepiError, match=r"b\.h5: holds no array .* Hr_SAI_y 60x70.* --format mosaic"):
+        format_of(tmp_path / "b.h5")
 
 
 @pytest.mark.parametrize("name", ["lightfield", "data/views"])
