@@ -122,9 +122,7 @@ FORMATS = {
         ("grid", "pattern", "follow_links"),
         True,
     ),
-    "mosaic": Format(
-        "picture of all views", "NAME_qs8x6a0.75.png, a quilt, or --grid", mosaic.matches, mosaic.read, ("grid",), True
-    ),
+    "mosaic": Format("mosaic of views", "NAME_qs8x6a0.75.png", mosaic.matches, mosaic.read, ("grid",), True),
     "eslf": Format("Lytro lenslet picture", "NAME_eslf.png", eslf.matches, eslf.read, ("grid",), True),
     "tiff-stack": Format("TIFF stack", "a page for each view", tiff_stack.matches, tiff_stack.read, ("grid",), True),
     # before the other kinds of HDF5: MATLAB's is told by its header or ending

@@ -4,9 +4,8 @@ The axes are those that MATLAB shows. It drops trailing axes of size 1, so grey 
 7.3 stores the axes in reverse. The Light Field Toolbox [1]_ saves ``LF`` with the axes T S H W C and a weight as the
 fourth channel.
 
-SciPy reads version 5. It ends the program with a segmentation fault where the type of the values is none that there is
-(such as code 60000 in place of 2, of bytes), so the types are looked at first. Arrays in structures it would read only
-with all else that is in there, so those are read without it.
+Version 5 is read without SciPy, which ends the program with a segmentation fault where the type of the values is none
+that there is, and reads an array in a structure only with all else that is in there.
 
 References
 ----------
@@ -16,18 +15,14 @@ References
 
 from __future__ import annotations
 
-import warnings
 from pathlib import Path
-from typing import Any
 
 import h5py
-import numpy as np
 
 from sepi.errors import SepiError
 from sepi.io.files import reading
-from sepi.io.readers import hdf5_arrays
-from sepi.io.readers.arrays import Array, is_likely
-from sepi.io.readers.matlab_5 import BYTE_ORDERS, HEADER, nested_arrays, real_arrays
+from sepi.io.readers import hdf5_arrays, matlab_5
+from sepi.io.readers.arrays import Array
 from sepi.io.readers.named_arrays import Shapes, light_field_from_arrays
 from sepi.io.readers.options import ReadOptions
 from sepi.lightfield import LightField
@@ -45,36 +40,30 @@ def matches(path: Path) -> bool:
         head = _head(path)
     except SepiError:
         return False
-    return head[-4:] in BYTE_ORDERS or head.startswith(hdf5_arrays.MATLAB)
+    return head[-4:] in matlab_5.BYTE_ORDERS or head.startswith(hdf5_arrays.MATLAB)
 
 
 def read(path: Path, options: ReadOptions) -> LightField:
     """Read the array ``options.variable`` of a MATLAB file; without it, what can be a light field."""
-    shapes = array_shapes(path)
 
     def load(name: str) -> Array:
-        array = hdf5_arrays.read_named(path, name) if h5py.is_hdf5(path) else _read_5(path, name, shapes[name][1])
+        with reading(path, _KIND):
+            array = (hdf5_arrays if h5py.is_hdf5(path) else matlab_5).read_named(path, name)
         # the axes that MATLAB dropped
         while array.ndim < len(options.axes or "") <= 5:
             array = array[..., None]
         return array
 
-    return light_field_from_arrays(path, shapes, options, load)
+    return light_field_from_arrays(path, array_shapes(path), options, load)
 
 
 def array_shapes(path: Path) -> Shapes:
     """Shape and type, as MATLAB shows them, of each array of real numbers in a file; their values are not read."""
     head = _head(path)
-    # what begins with a zero is of version 4 to SciPy, whatever else the header says
-    if head[-4:] in BYTE_ORDERS and 0 not in head[:4]:
-        from scipy.io import whosmat
-
-        with reading(path, _KIND), warnings.catch_warnings(action="ignore"):
-            names = real_arrays(path)
-            found = {name: (shape, np.dtype(kind)) for name, shape, kind in whosmat(path) if name in names}
-            if not any(is_likely(shape) for shape, _ in found.values()):
-                found |= {name: (array.shape, array.dtype) for name, array in nested_arrays(path).items()}
-            return found
+    # what begins with a zero is of version 4
+    if head[-4:] in matlab_5.BYTE_ORDERS and 0 not in head[:4]:
+        with reading(path, _KIND):
+            return matlab_5.array_shapes(path)
     if h5py.is_hdf5(path):
         return hdf5_arrays.array_shapes(path)
     what = "is damaged" if head.startswith(hdf5_arrays.MATLAB) else "is not a MATLAB file of version 5 or 7.3"
@@ -83,15 +72,4 @@ def array_shapes(path: Path) -> Shapes:
 
 def _head(path: Path) -> bytes:
     with reading(path, _KIND), path.open("rb") as file:
-        return file.read(HEADER)
-
-
-def _read_5(path: Path, name: str, kind: np.dtype[Any]) -> Array:
-    from scipy.io import loadmat
-
-    with reading(path, _KIND), warnings.catch_warnings(action="ignore"):
-        if name not in real_arrays(path):
-            return nested_arrays(path)[name]
-        values: Array = loadmat(path, variable_names=[name])[name]
-        # MATLAB saves doubles that are small whole numbers as bytes
-        return values.astype(kind, copy=False)
+        return file.read(matlab_5.HEADER)

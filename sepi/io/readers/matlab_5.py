@@ -20,6 +20,7 @@ import numpy.typing as npt
 
 from sepi.errors import SepiError
 from sepi.io.files import DEFLATE_RATIO
+from sepi.io.readers.arrays import is_likely
 
 HEADER = 128
 """Bytes before the first element; the last four are version and byte order."""
@@ -68,47 +69,62 @@ class _Variable(NamedTuple):
         """The data of the matrix element."""
         self.file.seek(self.start)
         stored = self.file.read(self.length)
-        return zlib.decompressobj().decompress(stored, self.most)[8:] if self.compressed else stored
+        if not self.compressed:
+            return stored
+        packed = zlib.decompressobj()
+        content = packed.decompress(stored, self.most)[8:]
+        if not packed.eof:
+            raise ValueError("a variable that is cut off")
+        return content
 
 
-def real_arrays(path: Path) -> set[str]:
-    """Names of the variables that are arrays of real numbers.
+def array_shapes(path: Path) -> dict[str, tuple[tuple[int, ...], np.dtype[Any]]]:
+    """Shape and type of the arrays of real numbers, as MATLAB shows them.
 
-    Raises
-    ------
-    SepiError, ValueError
-        If values are of a type that there is none of, with which SciPy ends the program, or cannot lie in the file.
-    """
-    names = set()
-    with path.open("rb") as file:
-        for variable in _variables(path, file):
-            if _is_real(variable.flags):
-                _, _, name, values = variable.parts
-                if values.kind not in _TYPES:
-                    raise SepiError(f"damaged MATLAB file: an array with values of type {values.kind}")
-                if values.length > variable.most:
-                    raise ValueError("an array that is longer than the file")
-                names.add(_text(name))
-    return names
-
-
-def nested_arrays(path: Path) -> dict[str, npt.NDArray[Any]]:
-    """Arrays of real numbers in structures, as MATLAB shows them, by names such as ``scene/LF`` or ``scene(2)/LF``.
-
-    A cell array of pictures that are alike is one of them.
+    Those in structures, ``scene/LF`` or ``scene(2)/LF``, and cell arrays of pictures that are alike, only where no
+    other may be a light field.
 
     Raises
     ------
     SepiError, ValueError
         If the file is damaged.
     """
-    found: dict[str, npt.NDArray[Any]] = {}
+    found = {}
     with path.open("rb") as file:
         for variable in _variables(path, file):
-            if variable.flags & 0xFF in (_CELLS, _STRUCTURE):
-                content = memoryview(variable.content())
-                found.update(_fields(variable.order, content, _text(variable.parts[2])))
+            if _is_real(variable.flags):
+                shape, kind, _ = _form(variable.order, variable.parts)
+                found[_text(variable.parts[2])] = shape, kind
+                if variable.parts[_BEFORE].length > variable.most:
+                    raise ValueError("an array that is longer than the file")
+    if not any(is_likely(shape) for shape, _ in found.values()):
+        found |= {name: (array.shape, array.dtype) for name, array in _arrays(path)}
     return found
+
+
+def read_named(path: Path, name: str) -> npt.NDArray[Any]:
+    """One of the arrays that :func:`array_shapes` found."""
+    return next(array for found, array in _arrays(path, name) if found == name)
+
+
+def _arrays(path: Path, wanted: str = "") -> Iterator[tuple[str, npt.NDArray[Any]]]:
+    """The arrays in structures and cells, and the one that is wanted."""
+    with path.open("rb") as file:
+        for variable in _variables(path, file):
+            name = _text(variable.parts[2]) if variable.parts else ""
+            if variable.flags & 0xFF in (_CELLS, _STRUCTURE) or name == wanted:
+                yield from _fields(variable.order, memoryview(variable.content()), name)
+
+
+def _form(order: str, parts: list[_Part]) -> tuple[tuple[int, ...], np.dtype[Any], np.dtype[Any]]:
+    """Shape and type of an array, and the type as which its values are stored."""
+    _, dimensions, name, values = parts[: _BEFORE + 1]
+    if values.kind not in _TYPES:
+        raise SepiError(f"damaged MATLAB file: an array with values of type {values.kind}")
+    shape, stored = tuple(np.frombuffer(dimensions.data, order + "i4").tolist()), np.dtype(order + _TYPES[values.kind])
+    if math.prod(shape) * stored.itemsize != values.length:
+        raise ValueError(f"{_text(name)} of {values.length} bytes for {shape}")
+    return shape, np.dtype(_CLASSES[_flags(order, parts) & 0xFF]), stored
 
 
 def _fields(order: str, data: memoryview, name: str) -> Iterator[tuple[str, npt.NDArray[Any]]]:
@@ -128,25 +144,15 @@ def _fields(order: str, data: memoryview, name: str) -> Iterator[tuple[str, npt.
             if value.kind == _MATRIX and value.length:
                 which = f"({element + 1})" if len(values) > len(fields) else ""
                 yield from _fields(order, memoryview(value.data), f"{name}{which}/{fields[field]}")
-        return
-    shape = np.frombuffer(parts[1].data, order + "i4").tolist()
-    if flags & 0xFF == _CELLS:
-        cells = [
-            array
-            for value in parts[_BEFORE:]
-            if value.length
-            for _, array in _fields(order, memoryview(value.data), name)
-        ]
+    elif flags & 0xFF == _CELLS:
+        shape = np.frombuffer(parts[1].data, order + "i4").tolist()
+        cells = [cell for part in parts[3:] if part.length for _, cell in _fields(order, memoryview(part.data), name)]
         if len(cells) == math.prod(shape) and len({(cell.shape, cell.dtype) for cell in cells}) == 1:
             yield name, np.stack(cells)[np.arange(len(cells)).reshape(shape, order="F").squeeze()]
     elif _is_real(flags):
-        numbers = parts[_BEFORE]
-        stored = np.dtype(order + _TYPES[numbers.kind])
-        if math.prod(shape) * stored.itemsize != numbers.length:
-            raise ValueError(f"{name} of {numbers.length} bytes for {shape}")
+        shape, kind, stored = _form(order, parts)
         # MATLAB saves doubles that are small whole numbers as bytes
-        array = np.frombuffer(numbers.data, stored).reshape(shape, order="F")
-        yield name, array.astype(_CLASSES[flags & 0xFF], copy=False)
+        yield name, np.frombuffer(parts[_BEFORE].data, stored).reshape(shape, order="F").astype(kind, copy=False)
 
 
 def _variables(path: Path, file: BinaryIO) -> Iterator[_Variable]:

@@ -31,9 +31,10 @@ def matches(path: Path) -> bool:
 def read(path: Path, options: ReadOptions) -> LightField:
     """Read a picture; its grid is that of the options, or of its name."""
     quilt = _QUILT.fullmatch(path.stem)
-    if options.grid is None and quilt is None:
+    grid = options.grid or (quilt and (int(quilt[2]), int(quilt[1])))
+    if grid is None:
         raise SepiError(f"{path}: --format mosaic needs --grid ROWSxCOLUMNS, how many views lie in the picture")
-    rows, columns = options.grid or (int(quilt[2]), int(quilt[1]))
+    rows, columns = grid
     picture = read_picture(path, any_floats=options.white is not None)
     height, width = picture.shape[:2]
     if 0 in (rows, columns) or height % rows or width % columns:

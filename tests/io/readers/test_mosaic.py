@@ -30,7 +30,7 @@ def test_a_mosaic_is_cut_into_the_grid_that_is_given(tmp_path: Path) -> None:
 def test_a_quilt_is_a_row_of_views_from_the_lower_left(tmp_path: Path, name: str) -> None:
     """From the upper left, as a mosaic, the upper row of views would be that on the left."""
     write_png(tmp_path / name, MOSAIC)
-    assert format_of(tmp_path / name).name == "picture of all views"
+    assert format_of(tmp_path / name).name == "mosaic of views"
     light_field = read(tmp_path / name, ReadOptions())
     np.testing.assert_array_equal(light_field.views, VIEWS[::-1].reshape(1, 12, 12, 14, 3))
     assert light_field.arranged
