@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -39,14 +39,7 @@ _PFM = ".pfm"
 @click.option("--to", "kind", type=click.Choice(["rgbd"]), help="Colour and depth side by side, as displays take it.")
 @view_of_result
 @camera_flags
-def convert(
-    result_path: Path,
-    output: Path,
-    name: str | None,
-    kind: str | None,
-    view: tuple[int, int] | None,
-    geometry: Geometry | None,
-) -> None:
+def convert(result_path: Path, output: Path, name: str | None, kind: str | None, **seen: Any) -> None:
     """Write maps of RESULT as FILE, a picture of 32-bit floats: OpenEXR (.exr), TIFF (.tif, .tiff) or PFM (.pfm).
 
     RESULT is a folder that 'sepi depth' wrote, its result.h5 or its all_views.h5. OpenEXR holds the channels disparity
@@ -76,12 +69,12 @@ def convert(
     if kind is not None:
         if suffix != ".png" or name is not None:
             raise SepiError(f"{output}: --to rgbd is a PNG of view and disparity: expected NAME.png, and no --map")
-        write_png(output, colour_and_depth(read_result_at(result_path, view)))
+        write_png(output, colour_and_depth(read_result_at(result_path, seen["view"])))
         click.echo(f"written: {output} (the view, and its disparity from far, black, to near, white)")
         return
     if suffix not in (*EXR, *TIFF, _PFM):
         raise SepiError(f"{output}: expected a name that ends with .exr, .tif, .tiff or .pfm, the format of the file")
-    maps = _maps(result_path, view, geometry)
+    maps = _maps(result_path, **seen)
     if name is None and suffix not in EXR:
         name = "disparity"
     if name is not None and name not in maps:

@@ -40,12 +40,12 @@ def fitting_axes(readings: Mapping[str, LightField]) -> str | None:
 def _is_consistent(light_field: LightField) -> bool:
     """Whether colours stay where they are, and the views of a row or column that is as short do not."""
     views = light_field.views
-    T, S, _, _, C = views.shape
-    return (C == 1 or _parallax(np.moveaxis(views, 4, 2).reshape(T * S, C, *views.shape[2:4])) <= _COLOURS) and all(
-        _parallax(np.moveaxis(views[..., C // 2], axis, 1).reshape(-1, count, *views.shape[2:4])) >= _VIEWS
-        for axis, count in enumerate((T, S))
-        if count in _COLOUR_COUNTS
-    )
+    T, S, H, W, C = views.shape
+    if C > 1 and not _parallax(np.moveaxis(views, 4, 2).reshape(-1, C, H, W)) <= _COLOURS:
+        return False
+    grey = views[..., C // 2]
+    short = [np.moveaxis(grey, axis, 1).reshape(-1, n, H, W) for axis, n in enumerate((T, S)) if n in _COLOUR_COUNTS]
+    return all(_parallax(pictures) >= _VIEWS for pictures in short)
 
 
 def _parallax(pictures: npt.NDArray[np.generic]) -> float:
@@ -54,27 +54,23 @@ def _parallax(pictures: npt.NDArray[np.generic]) -> float:
     ``pictures`` are (K, M, H, W), K sequences of M.
     """
     pictures = pictures[:: max(1, len(pictures) // _SEQUENCES), ..., None]
-    views = Views(LightField(pictures, "pictures", arranged=False))
-    middle = pictures.shape[1] // 2
+    views, middle = Views(LightField(pictures, "pictures", arranged=False)), pictures.shape[1] // 2
     steps = np.array([step for step in range(-middle, pictures.shape[1] - middle) if step], np.float64)
     offsets = np.stack([np.stack([0 * steps, steps], 1), np.stack([steps, 0 * steps], 1)])
     count = round(MOVEMENT / _SPACING)
     candidates = (np.arange(-count, count + 1) * (_SPACING / abs(steps).max())).astype(np.float32)
-    ratios = [np.nan]
+    best = np.nan
     for factor in (factor for factor in _REDUCTIONS if not views.is_too_small(factor)):
         costs = []
         for k in range(len(pictures)):
-            reference, *others = (
-                views.detail((k - views.middle[0], int(m) + middle - views.middle[1]), factor) for m in (0, *steps)
-            )
+            places = [(k - views.middle[0], int(step) + middle - views.middle[1]) for step in (0, *steps)]
+            reference, *others = (views.detail(place, factor) for place in places)
             points = points_to_match(reference)
             if len(points) >= FEWEST_POINTS:
-                moved, still = (
-                    layout_costs(reference, np.stack(others), offsets, tried, points, _RADIUS)[0]
-                    for tried in (candidates, np.zeros(1, np.float32))
-                )
-                costs.append((*moved.mean(axis=0), still.mean()))
+                tried = (candidates, np.zeros(1, np.float32))
+                matched = [layout_costs(reference, np.stack(others), offsets, d, points, _RADIUS)[0] for d in tried]
+                costs.append((*matched[0].mean(axis=0), matched[1].mean()))
         if costs:
             *moved, still = np.mean(costs, axis=0)
-            ratios.append(still / max(min(moved), 1e-6))
-    return float(np.nanmax(ratios)) if len(ratios) > 1 else np.nan
+            best = np.fmax(best, still / max(min(moved), 1e-6))
+    return float(best)

@@ -264,7 +264,9 @@ def _what_else(path: Path) -> str:
         )
     if path.is_file() and h5py.is_hdf5(path):
         with suppress(SepiError):
-            return no_light_field(hdf5_arrays.array_shapes(path))
+            arrays = hdf5_arrays.array_shapes(path)
+            if any(len(shape) > 1 for shape, _ in arrays.values()):
+                return no_light_field(arrays)
     return "not a light field of a known format"
 
 

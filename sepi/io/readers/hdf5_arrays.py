@@ -106,6 +106,5 @@ def _class(entry: h5py.Dataset) -> str:
 
 
 def _is_numbers(entry: Any) -> bool:
-    if not isinstance(entry, h5py.Dataset) or entry.dtype.kind not in "iuf" or entry.shape is None:
-        return False
-    return _class(entry) in ("", *_NUMBERS)
+    held = isinstance(entry, h5py.Dataset) and entry.shape is not None and entry.dtype.kind in "iuf"
+    return held and _class(entry) in ("", *_NUMBERS)

@@ -48,7 +48,7 @@ def read(path: Path, options: ReadOptions) -> LightField:
 
     def load(name: str) -> Array:
         with reading(path, _KIND):
-            array = (hdf5_arrays if h5py.is_hdf5(path) else matlab_5).read_named(path, name)
+            array: Array = (hdf5_arrays if h5py.is_hdf5(path) else matlab_5).read_named(path, name)
         # the axes that MATLAB dropped
         while array.ndim < len(options.axes or "") <= 5:
             array = array[..., None]
