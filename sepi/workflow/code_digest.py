@@ -65,6 +65,7 @@ _ALTERNATIVES = (
             "hdf5_arrays",
             "image_folder",
             "matlab",
+            "mosaic",
             "numpy_files",
             "open_lf",
             "tiff_stack",

@@ -23,6 +23,7 @@ from sepi.io.readers import (
     hci,
     hci_2013,
     hdf5_arrays,
+    hdf5_datasets,
     image_folder,
     matlab,
     mosaic,
@@ -264,7 +265,7 @@ def _what_else(path: Path) -> str:
         )
     if path.is_file() and h5py.is_hdf5(path):
         with suppress(SepiError):
-            arrays = hdf5_arrays.array_shapes(path)
+            arrays = hdf5_datasets.array_shapes(path)
             if any(len(shape) > 1 for shape, _ in arrays.values()):
                 return no_light_field(arrays)
     return "not a light field of a known format"

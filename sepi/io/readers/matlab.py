@@ -21,7 +21,7 @@ import h5py
 
 from sepi.errors import SepiError
 from sepi.io.files import reading
-from sepi.io.readers import hdf5_arrays, matlab_5
+from sepi.io.readers import hdf5_datasets, matlab_5
 from sepi.io.readers.arrays import Array
 from sepi.io.readers.named_arrays import Shapes, light_field_from_arrays
 from sepi.io.readers.options import ReadOptions
@@ -40,7 +40,7 @@ def matches(path: Path) -> bool:
         head = _head(path)
     except SepiError:
         return False
-    return head[-4:] in matlab_5.BYTE_ORDERS or head.startswith(hdf5_arrays.MATLAB)
+    return head[-4:] in matlab_5.BYTE_ORDERS or head.startswith(hdf5_datasets.MATLAB)
 
 
 def read(path: Path, options: ReadOptions) -> LightField:
@@ -48,7 +48,7 @@ def read(path: Path, options: ReadOptions) -> LightField:
 
     def load(name: str) -> Array:
         with reading(path, _KIND):
-            array: Array = (hdf5_arrays if h5py.is_hdf5(path) else matlab_5).read_named(path, name)
+            array: Array = (hdf5_datasets if h5py.is_hdf5(path) else matlab_5).read_named(path, name)
         # the axes that MATLAB dropped
         while array.ndim < len(options.axes or "") <= 5:
             array = array[..., None]
@@ -65,8 +65,8 @@ def array_shapes(path: Path) -> Shapes:
         with reading(path, _KIND):
             return matlab_5.array_shapes(path)
     if h5py.is_hdf5(path):
-        return hdf5_arrays.array_shapes(path)
-    what = "is damaged" if head.startswith(hdf5_arrays.MATLAB) else "is not a MATLAB file of version 5 or 7.3"
+        return hdf5_datasets.array_shapes(path)
+    what = "is damaged" if head.startswith(hdf5_datasets.MATLAB) else "is not a MATLAB file of version 5 or 7.3"
     raise SepiError(f"{path}: {what}; save it in MATLAB with -v7 or -v7.3")
 
 
