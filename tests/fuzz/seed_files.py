@@ -167,7 +167,14 @@ def npy_map_files(folder: Path) -> list[bytes]:
 def npy_files(folder: Path) -> list[bytes]:
     """Light fields as arrays: integers, floats, in Fortran's order, grey."""
     floats = (VIEWS / 255).astype(np.float32)
-    arrays = (VIEWS, floats, np.asfortranarray(VIEWS), VIEWS[..., 0], VIEWS.astype(">f8"), VIEWS.reshape(6, H, W, 3))
+    arrays = (
+        VIEWS,
+        floats,
+        np.asfortranarray(VIEWS),
+        VIEWS[:, :2, ..., 0],
+        VIEWS.astype(">f8"),
+        VIEWS.reshape(6, H, W, 3),
+    )
     return [_saved(folder, np.save, "a.npy", array) for array in arrays]
 
 
@@ -188,7 +195,7 @@ def mat_5_files(folder: Path) -> list[bytes]:
     found = []
     for packed, arrays in (
         (True, {"LF": VIEWS}),
-        (False, {"LF": VIEWS[..., 0] / 255}),
+        (False, {"LF": VIEWS[:, :2, ..., 0] / 255}),
         *((packed, {"a": {"name": "text", "b": {"LF": VIEWS}, "c": 1.5}}) for packed in (True, False)),
         (False, {"name": "text", "cells": np.array([1, "a"], object), "LF": VIEWS.astype(np.uint16), "m": MAP}),
     ):
