@@ -150,6 +150,11 @@ class LightField:
         Pixels that views do not show, since their cameras looked elsewhere; None: they show all. Views hold the nearest
         pixel there that they show, so that filters end there as at a picture's border, and nothing is compared with it.
         (Methods of others that know no border compare it, as they do beyond the border.)
+    files : ndarray, shape (T, S), str, or None
+        Name of each view's file in the folder that is the source; None where views have none of their own.
+    directions : tuple of int
+        1 or -1 where names of files tell that the coordinates of cameras grow or fall from row to row, and from column
+        to column; 0: nothing is known.
     workspace : Workspace or None
         What stages keep of the views for each other (:mod:`sepi.workspace`); None: nothing. No part of the light field.
 
@@ -195,6 +200,8 @@ class LightField:
     reading: str = ""
     rig: Rig | None = None
     missing: BoolMap | None = None
+    files: npt.NDArray[np.str_] | None = field(default=None, repr=False, compare=False)
+    directions: tuple[int, int] = (0, 0)
     workspace: Workspace | None = field(default=None, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -248,7 +255,8 @@ class LightField:
         which = "centre view" if self.reference_position == (v.shape[0] // 2, v.shape[1] // 2) else "view"
         if self.arranged and not self.present[self.reference_position]:
             raise SepiError(
-                f"{self.name}: the {which} (t, s) = {self.reference_position} is missing; depth is made for it"
+                f"{self.name}: the {which} (t, s) = {self.reference_position} is missing; depth is made for it "
+                "unless --view (view=) names another"
             )
         if self.missing is not None and (self.missing.shape != v.shape[:4] or self.missing.dtype != bool):
             raise SepiError(f"{self.name}: missing must be bool of shape {v.shape[:4]}, got {self.missing.shape}")

@@ -121,16 +121,22 @@ def read_light_field(
         light_field = light_field.with_range(given)
     found = [_depth_warning(light_field)]
     if check_order:
+        from sepi.inspection.odd_views import odd_views
+        from sepi.inspection.view_order import SIGN_OPEN
         from sepi.inspection.view_order import check_order as checked_order
 
-        found.append(checked_order(light_field, options.order, views).warning())
+        checked = checked_order(light_field, options.order, views)
         del views
         give_back_memory()
-    if light_field.rig is not None and found[1:] and found[1]:
-        raise SepiError(
-            f"{path}: the views do not fit the poses, but would turned over; expected poses of cameras that look along "
-            "their z axis, y pointing down, and rotations from the world to the camera (OpenCV, COLMAP)"
-        )
+        if light_field.rig is not None and checked.clear and checked.warning():
+            raise SepiError(
+                f"{path}: the views do not fit the poses, but would turned over; expected poses of cameras that look "
+                "along their z axis, y pointing down, and rotations from the world to the camera (OpenCV, COLMAP)"
+            )
+        found += [*odd_views(light_field), checked.warning()]
+        if light_field.rig is None and (note := checked.note()):
+            others = (note for note in light_field.notes if not note.startswith(SIGN_OPEN))
+            light_field = replace(light_field, notes=(*others, note))
     for warning in filter(None, found):
         warnings.warn(f"{path}: {warning}", SepiWarning, stacklevel=2)
     return light_field

@@ -103,9 +103,11 @@ def check(context: click.Context, light_field_path: Path, reading: Reading, as_j
 
     Software does not agree on whether rows of views go up or down, columns left or right, or which of the two comes
     first; in a wrong order depth is inside out or nonsense. The views tell: all eight orders are tried, and the flag
-    is named that sets INPUT right. Exits with 1 where another order clearly fits better, with 2 where INPUT cannot be
+    is named that sets INPUT right. Views that fit none of the others are named, too. Exits with 1 where another order
+    clearly fits better, the views fit in none, or some of them fit none of the others; with 2 where INPUT cannot be
     read.
     """
+    from sepi.inspection.odd_views import odd_views
     from sepi.inspection.row_spacing import settle_row_spacing
     from sepi.inspection.view_order import check_order
 
@@ -116,7 +118,7 @@ def check(context: click.Context, light_field_path: Path, reading: Reading, as_j
     except SepiError as error:
         click.echo(f"sepi: {error}", err=True)
         context.exit(2)
-    found = check_order(light_field, reading.options.order)
+    found, odd = check_order(light_field, reading.options.order), odd_views(light_field)
     if as_json:
         known = {
             **_described(light_field),
@@ -129,6 +131,8 @@ def check(context: click.Context, light_field_path: Path, reading: Reading, as_j
             "agreeing": found.agreeing,
             "verdict": found.verdict(),
             "warning": found.warning(),
+            "fits_none": bool(found.fits_none),
+            "odd_views": odd,
         }
         click.echo(json.dumps(known, allow_nan=False))
     else:
@@ -136,8 +140,9 @@ def check(context: click.Context, light_field_path: Path, reading: Reading, as_j
         click.echo("order, and how well the views match in it (matching cost, 0 to 1; less is better):")
         for order, cost in found.fits.items():
             click.echo(f"  {order:24}{cost:8.4f}{'  best' if order == found.best and found.clear else ''}")
-        click.echo(found.verdict())
-    if found.warning() is not None:
+        for line in (*odd, found.verdict()):
+            click.echo(line)
+    if odd or found.warning() is not None:
         context.exit(1)
 
 

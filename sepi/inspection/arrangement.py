@@ -17,15 +17,8 @@ import numpy as np
 import numpy.typing as npt
 
 from sepi.errors import SepiError, SepiWarning
-from sepi.inspection.view_layouts import (
-    FEWEST_POINTS,
-    MOVEMENT,
-    Baseline,
-    Views,
-    baselines_under,
-    layout_costs,
-    points_to_match,
-)
+from sepi.inspection.odd_views import odd_views
+from sepi.inspection.view_layouts import Baseline, Views, baselines_under, matched
 from sepi.io.readers.options import ReadOptions, arrange_numbers
 from sepi.lightfield import LightField
 
@@ -40,8 +33,6 @@ _REFERENCES = 24
 _NEIGHBOURS = 12
 _POINTS = 40
 _WORST = 3
-_RADIUS = 2
-_SAMPLING = 0.6
 # Distances to the others, and reductions by which movement is searched that is too large otherwise
 _DISTANCES = ((2, 1), (2, 2), (2, 4), (6, 1))
 # The rows of views may run up or down; near and far do not matter
@@ -108,9 +99,10 @@ def arrange(light_field: LightField, options: ReadOptions) -> LightField:
     ranked = sorted(range(len(tried)), key=lambda n: costs[n])
     names = ", ".join(way.name for way in tried)
     if math.isfinite(costs[ranked[0]]) and costs[ranked[0]] > _MOST_COST:
+        odd = "; ".join(odd_views(light_field)) or "leave pictures out that are no views with --exclude"
         raise SepiError(
             f"{source}: {count} views without row and column, and in no arrangement tried ({names}) they fit together; "
-            "give --grid ROWSxCOLUMNS, or leave pictures out that are no views with --exclude"
+            f"give --grid ROWSxCOLUMNS, or {odd}"
         )
     best, reason = tried[ranked[0]], "by how they fit together"
     if len(tried) > 1 and not _CLEAR_RATIO * costs[ranked[0]] + _LEAST_DIFFERENCE <= costs[ranked[1]] < math.inf:
@@ -159,17 +151,12 @@ def _crosses(count: int) -> Iterator[Arrangement]:
         return
     half = count // 4
     along = np.arange(2 * half + 1)
-    middle = np.full_like(along, half)
-    whole = np.stack([middle, along], axis=1)
-    rest = np.delete(whole[:, ::-1], half, axis=0)
-    side = 2 * half + 1
-    yield Arrangement(f"a cross of {side}x{side}, the row first", np.concatenate([whole, rest]))
-    yield Arrangement(f"a cross of {side}x{side}, the column first", np.concatenate([whole, rest])[:, ::-1])
-    # one view after the other as in the whole grid
-    cross = np.concatenate([whole, rest])
-    in_grid = cross[np.lexsort((cross[:, 1], cross[:, 0]))]
-    yield Arrangement(f"a cross of {side}x{side} row by row", in_grid)
-    yield Arrangement(f"a cross of {side}x{side} column by column", in_grid[:, ::-1])
+    whole = np.stack([np.full_like(along, half), along], axis=1)
+    cross = np.concatenate([whole, np.delete(whole[:, ::-1], half, axis=0)])
+    name = f"a cross of {len(along)}x{len(along)}"
+    yield Arrangement(f"{name}, the row first", cross)
+    yield Arrangement(f"{name}, the column first", cross[:, ::-1])
+    yield from _as_in_the_grid(name, cross)
 
 
 def _discs(count: int) -> Iterator[Arrangement]:
@@ -182,8 +169,14 @@ def _discs(count: int) -> Iterator[Arrangement]:
         if len(disc) == count and math.isqrt(count) ** 2 != count:
             positions = disc - disc.min(axis=0)
             side = int(positions.max()) + 1
-            yield Arrangement(f"a disc in {side}x{side} row by row", positions)
-            yield Arrangement(f"a disc in {side}x{side} column by column", positions[:, ::-1])
+            yield from _as_in_the_grid(f"a disc in {side}x{side}", positions)
+
+
+def _as_in_the_grid(name: str, positions: Positions) -> Iterator[Arrangement]:
+    """One view after the other as in the whole grid."""
+    ordered = positions[np.lexsort((positions[:, 1], positions[:, 0]))]
+    yield Arrangement(f"{name} row by row", ordered)
+    yield Arrangement(f"{name} column by column", ordered[:, ::-1])
 
 
 def _costs(views: Views, present: npt.NDArray[np.bool_], tried: list[Arrangement]) -> list[float]:
@@ -211,16 +204,11 @@ def _cost(views: Views, present: npt.NDArray[np.bool_], positions: Positions, re
         near = _neighbours(positions, present, place, reach)
         if not present[place] or not near:
             continue
-        reference = views.detail(_baseline(views, place), factor)
-        points = points_to_match(reference, _POINTS)
-        if len(points) < FEWEST_POINTS:
-            continue
-        others = np.stack([views.detail(_baseline(views, n), factor) for n in near])
         offsets = np.stack([baselines_under(order, positions[near] - positions[place]) for order in _ORDERS])
-        steps = round(MOVEMENT / _SAMPLING)
-        candidates = (np.arange(-steps, steps + 1) * (_SAMPLING / abs(offsets).max())).astype(np.float32)
-        cost, _ = layout_costs(reference, others, offsets, candidates, points, _RADIUS)
-        costs.append(cost.mean(axis=0))
+        here, *others = (_baseline(views, n) for n in (place, *near))
+        found = matched(views, here, others, factor, offsets, most_points=_POINTS)
+        if found is not None:
+            costs.append(found[0].mean(axis=0))
     if not costs:
         return math.inf
     worst = np.sort(np.stack(costs), axis=0)[-math.ceil(len(costs) / _WORST) :]
@@ -250,8 +238,10 @@ def _placed(light_field: LightField, way: Arrangement, options: ReadOptions, not
     # number in the grid to number in the sequence; -1 where there is no view, or it was left out
     order = np.where(numbers >= 0, sequence.ravel()[numbers], -1)
     present = (order >= 0) & light_field.present[0][order]
+    files = None if light_field.files is None else np.where(present, light_field.files[0][order], "")
     views = light_field.views[0][order]
     views[~present] = 0
+    notes = (*light_field.notes, note)
     return replace(
-        light_field, views=views, present=present, view=options.view, arranged=True, notes=(*light_field.notes, note)
+        light_field, views=views, present=present, view=options.view, arranged=True, files=files, notes=notes
     )

@@ -8,9 +8,10 @@ window, do; sub-pixel accuracy does not matter.
 from __future__ import annotations
 
 import numpy as np
+import numpy.typing as npt
 
 from sepi.kernels import coarse_sweep as kernels
-from sepi.lightfield import FloatMap
+from sepi.lightfield import BoolMap, FloatMap
 
 
 def coarse_sweep(
@@ -50,3 +51,13 @@ def coarse_sweep(
     kernels.coarse_sweep(reference, views, offsets, candidates, truncation, radius, out)
     lowest, second, mean, disparity = out
     return lowest, second, mean, disparity
+
+
+def agreeing(disparity: FloatMap, trusted: BoolMap, window: int, tolerance: float) -> npt.NDArray[np.int32]:
+    """Pixels of the window of so many about each that are trusted and have its disparity within a tolerance, (H, W)."""
+    H, W = disparity.shape
+    padded = np.pad(np.where(trusted, disparity, np.inf), window // 2, constant_values=np.inf)
+    count = np.zeros((H, W), np.int32)
+    for dy, dx in np.ndindex(window, window):
+        count += abs(padded[dy : dy + H, dx : dx + W] - disparity) < tolerance
+    return count

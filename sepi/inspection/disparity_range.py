@@ -18,7 +18,7 @@ import numpy as np
 
 from sepi.channels import largest_channel, mean_of_channels
 from sepi.errors import SepiError
-from sepi.inspection.coarse_sweep import coarse_sweep
+from sepi.inspection.coarse_sweep import agreeing, coarse_sweep
 from sepi.inspection.dark_corners import dark_corners
 from sepi.lightfield import BoolMap, DisparityRange, FloatMap, LightField, as_unit_float, require_light_field
 
@@ -60,7 +60,8 @@ _FLAT_BLOCKS = 3e-3
 _BLOCK = 8
 _BLOCKINESS = 1.9
 _FAINT = 4 / 255
-# pixels of the 5x5 neighbourhood, itself included, that agree within a candidate step
+# pixels of a window of so many, itself included, that agree within a candidate step
+_SUPPORT_WINDOW = 5
 _LEAST_SUPPORT = 13
 # pixels of a patch, as part of the picture, and at least
 _PATCH = 3e-4
@@ -309,12 +310,7 @@ def _trusted(
 ) -> BoolMap:
     """Pixels whose best candidate is clear, and has enough of the like about it, shape (H, W)."""
     clear = (lowest < _MOST_AMBIGUITY * second) & (mean - lowest > flat)
-    H, W = disparity.shape
-    padded = np.pad(np.where(clear, disparity, np.inf), 2, constant_values=np.inf)
-    support = np.zeros((H, W), np.int32)
-    for dy, dx in np.ndindex(5, 5):
-        support += abs(padded[dy : dy + H, dx : dx + W] - disparity) < tolerance
-    return clear & (support >= _LEAST_SUPPORT)
+    return clear & (agreeing(disparity, clear, _SUPPORT_WINDOW, tolerance) >= _LEAST_SUPPORT)
 
 
 def _patches(trusted: BoolMap, disparity: FloatMap, tolerance: float) -> _Found:

@@ -16,7 +16,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from sepi.inspection.coarse_sweep import coarse_sweep
+from sepi.inspection.coarse_sweep import agreeing, coarse_sweep
 from sepi.inspection.dark_corners import dark_corners
 from sepi.inspection.view_layouts import Baseline, Trial, Views, baselines_under
 from sepi.kernels import view_order as kernels
@@ -127,7 +127,8 @@ def occlusion_evidence(light_field: LightField, trial: Trial, look: Look, views:
         [(np.stack([pictures[v] for v in side]), np.stack([positions[v] for v in side])) for side in sides.values()],
         (np.arange(-movement, movement + 1) * sampling).astype(np.float32),
     )
-    surface = trusted & (_support(disparity, trusted, sampling) >= _LEAST_SUPPORT)
+    alike = agreeing(disparity, trusted, _SURFACE_WINDOW, sampling)
+    surface = trusted & (alike >= _LEAST_SUPPORT * _SURFACE_WINDOW**2)
     surface &= ~dark_corners(views.reference_view, views.shape, movement)[rows]
     residual = {
         at: _residual(pictures[0, 0], pictures[at], positions[at], disparity, trusted)
@@ -256,17 +257,6 @@ def _disparity(
     spacing = candidates[1] - candidates[0]
     trusted &= abs(disparity - cv2.medianBlur(disparity, 5)) < spacing
     return disparity, trusted
-
-
-def _support(disparity: FloatMap, trusted: BoolMap, sampling: float) -> FloatMap:
-    """Part of the window round each pixel that is trusted and has its disparity, 0..1, shape (H, W)."""
-    H, W = disparity.shape
-    radius = _SURFACE_WINDOW // 2
-    padded = np.pad(np.where(trusted, disparity, np.inf), radius, constant_values=np.inf)
-    alike = np.zeros((H, W), np.float32)
-    for dy, dx in np.ndindex(_SURFACE_WINDOW, _SURFACE_WINDOW):
-        alike += abs(padded[dy : dy + H, dx : dx + W] - disparity) < sampling
-    return alike / np.float32(_SURFACE_WINDOW**2)
 
 
 def _typical(parts: list[FloatMap]) -> float:

@@ -19,12 +19,12 @@ from sepi.inspection.view_layouts import (
     FEWEST_POINTS,
     MATCHED,
     MOVEMENT,
+    SAMPLING,
     Baseline,
     Views,
     baselines_under,
     is_clear,
-    layout_costs,
-    points_to_match,
+    matched,
     ring,
     search_distances,
 )
@@ -35,12 +35,10 @@ _MOST = 4.0
 _PER_OCTAVE = 4
 # Points that are enough to tell spacings apart, and to measure the one found; half width of a patch, pixels
 _POINTS_TO_TELL, _POINTS_TO_CHOOSE = 80, 150
-_RADIUS = 2
 # Layouts up to the sign
 _ORDERS = ("as-given", "flip-rows", "transpose", "transpose-flip-rows")
 # Movement in the farthest view, pixels: spacing of what is searched, spacing where movements are compared, and the most
 # when the spacing is measured
-_SAMPLING = 0.6
 _FINE_SAMPLING = 0.1
 _MOST_MOVEMENT = 80.0
 # Rounds of measuring, and spacings to each side of the last round's best
@@ -186,22 +184,14 @@ def _matched(
     hypotheses: list[tuple[str, float]],
     movement: float,
     most_points: int | None,
-    sampling: float = _SAMPLING,
+    sampling: float = SAMPLING,
 ) -> tuple[FloatMap, FloatMap] | None:
     """Matching cost of each point under each order and spacing, and its movement to the farthest view, pixels.
 
     Both of shape (P, L), float32; None where there are too few points.
     """
-    reference = views.detail((0, 0), factor)
-    points = points_to_match(reference, most_points)
-    if len(points) < FEWEST_POINTS:
-        return None
-    others = np.stack([views.detail(baseline, factor) for baseline in baselines])
     offsets = np.stack([_in_units_of_the_farthest(baselines, order, spacing) for order, spacing in hypotheses])
-    count = round(movement / sampling)
-    candidates = (np.arange(-count, count + 1) * sampling).astype(np.float32)
-    cost, moved = layout_costs(reference, others, offsets, candidates, points, _RADIUS)
-    return cost, moved
+    return matched(views, (0, 0), baselines, factor, offsets, movement, most_points, sampling)
 
 
 def _in_units_of_the_farthest(baselines: list[Baseline], order: str, spacing: float) -> npt.NDArray[np.float64]:

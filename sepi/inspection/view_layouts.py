@@ -17,6 +17,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from sepi.image.noise import noise_level
 from sepi.io.readers.options import ORDERS
 from sepi.kernels import view_order as kernels
 from sepi.lightfield import FloatMap, LightField, as_unit_float
@@ -39,7 +40,7 @@ _HIGH_PASS = 9
 _FIRST_REACH = 4
 _MOST_VIEWS = 16
 MOVEMENT = 10
-_MOVEMENT_SPACING = 0.6
+SAMPLING = 0.6
 _REDUCTIONS = (2, 4, 8)
 # Views that are worth nothing: brightness and contrast as part of the reference's
 _LEAST_BRIGHTNESS = 0.3
@@ -54,6 +55,8 @@ _CLEAR_ERRORS = 8.0
 # Matching cost of a point that is matched, and part of those that may lie at an end of the search
 MATCHED = 0.5
 AT_END = 0.02
+# Contrast of detail, as a multiple of the noise, that is texture: of noise alone a quarter is left
+_LEAST_TEXTURE = 1.5
 
 
 class Views:
@@ -189,16 +192,26 @@ class Trial(NamedTuple):
 
 def best_trial(views: Views) -> Trial | None:
     """The first trial that is clear and whose search is wide enough, or else the clearest; None if there is nothing."""
-    best: Trial | None = None
+    tried = []
     for reach, factor in search_distances(views):
         trial = _tried(views, reach, factor)
         if trial is None:
             continue
         if trial.clear and trial.within:
             return trial
-        if best is None or trial.errors > best.errors:
-            best = trial
-    return best
+        tried.append(trial)
+    return max(tried, key=lambda trial: trial.errors, default=None)
+
+
+def fit_in_none(views: Views) -> bool:
+    """Whether views that show texture beyond their noise match badly under every order, at any distance.
+
+    For views of which no trial is clear: where nothing moves between them, they match under all.
+    """
+    if views.detail((0, 0), 1).std() < _LEAST_TEXTURE * noise_level(views.reference_view):
+        return False
+    trials = [_tried(views, reach, factor) for reach, factor in search_distances(views) if factor == 1]
+    return all(trial is not None and min(trial.costs.values()) >= MATCHED for trial in trials)
 
 
 def baselines_under(order: str, baselines: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
@@ -263,20 +276,16 @@ def _tried(views: Views, reach: int, factor: int) -> Trial | None:
     layouts, offsets = _layouts(views.in_steps(baselines))
     if len(layouts) < 2 or views.is_too_small(factor):
         return None
-    reference = views.detail((0, 0), factor)
-    points = points_to_match(reference)
-    if len(points) < FEWEST_POINTS:
+    found = matched(views, (0, 0), baselines, factor, offsets)
+    if found is None:
         return None
-    count = round(MOVEMENT / _MOVEMENT_SPACING)
-    candidates = (np.arange(-count, count + 1) * (_MOVEMENT_SPACING / abs(offsets).max())).astype(np.float32)
-    others = np.stack([views.detail(baseline, factor) for baseline in baselines])
-    cost, disparity = layout_costs(reference, others, offsets, candidates, points, _PATCH_RADIUS)
+    cost, disparity = found
     mean = cost.mean(axis=0)
     best, following = mean.argsort(kind="stable")[:2]
     gap, errors = _difference(cost[:, best], cost[:, following])
-    matched = abs(factor * disparity[cost[:, best] < MATCHED, best])
-    extent = float(candidates[-1]) * factor
-    largest = float(np.quantile(matched, 1 - AT_END)) if matched.size else extent
+    sizes = abs(factor * disparity[cost[:, best] < MATCHED, best])
+    extent = factor * round(MOVEMENT / SAMPLING) * SAMPLING / float(abs(offsets).max())
+    largest = float(np.quantile(sizes, 1 - AT_END)) if sizes.size else extent
     return Trial(
         costs={order: float(mean[n]) for n, layout in enumerate(layouts) for order in layout},
         best=layouts[best],
@@ -286,6 +295,27 @@ def _tried(views: Views, reach: int, factor: int) -> Trial | None:
         largest_disparity=views.factor * largest,
         within=largest < 0.95 * extent,
     )
+
+
+def matched(
+    views: Views,
+    reference: Baseline,
+    baselines: list[Baseline],
+    factor: int,
+    offsets: npt.NDArray[np.floating],
+    movement: float = MOVEMENT,
+    most_points: int | None = None,
+    sampling: float = SAMPLING,
+) -> tuple[FloatMap, FloatMap] | None:
+    """:func:`layout_costs` of one view with others, by movements in the farthest; None where it has too few points."""
+    detail = views.detail(reference, factor)
+    points = points_to_match(detail, most_points)
+    if len(points) < FEWEST_POINTS:
+        return None
+    count = round(movement / sampling)
+    candidates = (np.arange(-count, count + 1) * (sampling / abs(offsets).max())).astype(np.float32)
+    others = np.stack([views.detail(baseline, factor) for baseline in baselines])
+    return layout_costs(detail, others, offsets, candidates, points, _PATCH_RADIUS)
 
 
 def is_clear(cost: FloatMap, other: FloatMap) -> bool:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sepi.inspection.disparity_sign import Evidence, Look, occlusion_evidence
-from sepi.inspection.view_layouts import Trial, Views, best_trial
+from sepi.inspection.view_layouts import Trial, Views, baselines_under, best_trial, fit_in_none
 from sepi.io.readers.options import AS_GIVEN, ORDERS
 from sepi.lightfield import LightField, require_light_field
 from sepi.validation import require_known
@@ -23,6 +23,9 @@ from sepi.validation import require_known
 _FEWEST_REGIONS = 5
 _LEAST_EVIDENCE, _LEAST_ERRORS = 0.75, 3.5
 _PLAIN_EVIDENCE, _PLAIN_ERRORS = 0.85, 3.75
+
+SIGN_OPEN = "near and far cannot be told apart here"
+"""How a note begins that depth may be inside out."""
 
 _FAULTS = {
     "flip-rows": "the rows of views run the other way",
@@ -55,7 +58,10 @@ class OrderCheck:
     read_in : str
         Order in which the light field was read.
     regions, agreeing : int
-        Regions of the picture where one surface is seen to hide another, and those that agree on the sign.
+        Regions of the picture where one surface is seen to hide another, and those that agree on the sign. No region
+        where camera positions in the names of files tell the sign.
+    fits_none : bool
+        Whether the views match badly in every order although they show texture.
 
     Examples
     --------
@@ -77,6 +83,7 @@ class OrderCheck:
     read_in: str
     regions: int = 0
     agreeing: int = 0
+    fits_none: bool = False
 
     def verdict(self) -> str:
         """One line for the user.
@@ -86,20 +93,28 @@ class OrderCheck:
         str
             Whether the order is right, which one is, or that the views do not tell.
         """
+        warning = self.warning()
+        if warning is not None:
+            return warning
         if not self.clear:
             return (
                 "cannot tell: no order fits clearly better than the others (too little texture, or too little movement "
                 "between the views)"
             )
-        warning = self.warning()
-        if warning is not None:
-            return warning
-        if self.sign_clear:
-            return "the views are in the right order"
-        return (
-            f"the views are in the right order, but near and far cannot be told apart here; if depth comes out inside "
-            f"out, read it with --order {turned_by_half(self.best)}"
-        )
+        note = self.note()
+        return f"the views are in the right order{'' if note is None else f', but {note}'}"
+
+    def note(self) -> str | None:
+        """What to do if near and far are exchanged.
+
+        Returns
+        -------
+        str or None
+            None where the views tell near from far, or their order is wrong or not clear.
+        """
+        if not self.clear or self.sign_clear or self.best != self.read_in:
+            return None
+        return f"{SIGN_OPEN}; if depth comes out inside out, read it with --order {turned_by_half(self.best)}"
 
     def warning(self) -> str | None:
         """What to read the light field with instead.
@@ -107,15 +122,21 @@ class OrderCheck:
         Returns
         -------
         str or None
-            None unless another order is clearly better.
+            None unless another order is clearly better, or the views fit together in none.
         """
+        if self.fits_none:
+            return (
+                "the views fit together in no order: they are of several moments or places, not rectified, or named "
+                "otherwise than 'sepi info' shows them read"
+            )
         if not self.clear or self.best == self.read_in:
             return None
         fault = _FAULTS[self.best] if self.read_in == AS_GIVEN else f"--order {self.read_in} does not fit"
         advice = f"read it with --order {self.best}"
         if not self.sign_clear:
             return f"{fault}: {advice}, or {turned_by_half(self.best)} if depth comes out inside out"
-        return f"{fault} (what hides what agrees in {self.agreeing} of {self.regions} regions of the picture): {advice}"
+        told = f"what hides what agrees in {self.agreeing} of {self.regions} regions of the picture"
+        return f"{fault} ({told if self.regions else 'so say the camera positions in the names'}): {advice}"
 
 
 def check_order(light_field: LightField, read_in: str = AS_GIVEN, views: Views | None = None) -> OrderCheck:
@@ -155,6 +176,7 @@ def check_order(light_field: LightField, read_in: str = AS_GIVEN, views: Views |
     trial = best_trial(views)
     if trial is None:
         return OrderCheck(dict.fromkeys(ORDERS, 1.0), read_in, clear=False, sign_clear=False, read_in=read_in)
+    fits_none = not trial.clear and fit_in_none(views)
     costs = dict(trial.costs)
     sign_clear, evidence = False, Evidence(0.0, 0.0, 0, 0)
     if trial.clear:
@@ -165,10 +187,17 @@ def check_order(light_field: LightField, read_in: str = AS_GIVEN, views: Views |
             # at most half way to the next layout: the wrong sign is still the better layout
             for order, sign in trial.best.items():
                 costs[order] += trial.gap / 2 * (0.5 - sign * evidence.mean / 4)
+        elif any(light_field.directions):
+            evidence = Evidence(0.0, 0.0, 0, 0)
+            for order in trial.best:
+                # whether coordinates grow or fall from column to column then, or nothing is known
+                right = int(baselines_under(order, np.eye(2))[:, 1] @ light_field.directions)
+                sign_clear = right != 0
+                costs[order] += trial.gap / 4 * (1 - right)
     # from changes of the light field available to orders that take the place of the given one
     fits = {order: costs[change_of_order(read_in, order)] for order in ORDERS}
     best = min(ORDERS, key=lambda order: (fits[order], order != read_in))
-    return OrderCheck(fits, best, trial.clear, sign_clear, read_in, evidence.regions, evidence.agreeing)
+    return OrderCheck(fits, best, trial.clear, sign_clear, read_in, evidence.regions, evidence.agreeing, fits_none)
 
 
 def _evidence_of_sign(light_field: LightField, trial: Trial, kept: int | None, views: Views) -> tuple[Evidence, bool]:

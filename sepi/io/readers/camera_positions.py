@@ -23,7 +23,7 @@ _SURPLUS = 2
 _CLEARLY = 2.0
 
 
-def positions_from_cameras(cameras: Positions, present: BoolMap) -> tuple[Positions, float] | None:
+def positions_from_cameras(cameras: Positions, present: BoolMap) -> tuple[Positions, float, tuple[int, int]] | None:
     """Positions of views in view steps, from coordinates of their cameras in any unit.
 
     A regular grid is fitted to the coordinates. It tells which of the two is which axis, which way it runs and how long
@@ -42,6 +42,8 @@ def positions_from_cameras(cameras: Positions, present: BoolMap) -> tuple[Positi
         Of a single row or column only the coordinate along it counts: nothing tells which way the other runs.
     row_spacing : float
         Distance of rows in steps of columns; 1 for a single row or column.
+    directions : tuple of int
+        1 or -1: whether the coordinates grow or fall with row and column; 0 across the only row or column.
 
     None where the coordinates do not fit a grid.
     """
@@ -66,7 +68,8 @@ def positions_from_cameras(cameras: Positions, present: BoolMap) -> tuple[Positi
     positions = np.zeros((*present.shape, 2))
     # one length for both axes, that of a step between columns, so that the picture's axes stay alike
     positions[..., axes] = filled * np.sign(step) / abs(step[-1])
-    return positions, float(abs(step[0] / step[-1]))
+    signs = dict(zip(axes, np.sign(step).astype(int).tolist(), strict=True))
+    return positions, float(abs(step[0] / step[-1])), (signs.get(0, 0), signs.get(1, 0))
 
 
 def _coordinates(slopes: npt.NDArray[np.floating[Any]]) -> list[int] | None:

@@ -89,7 +89,7 @@ def read(path: Path, options: ReadOptions) -> LightField:
     known = read_manifest(file)
     rows, columns = len(known.views), len(known.views[0])
     files = {number: path / name for number, name in enumerate(chain(*known.views)) if name is not None}
-    views, present, _ = read_grid(path, files, (rows, columns), unarranged(options))
+    views, present, *_ = read_grid(path, files, (rows, columns), unarranged(options))
     positions = None
     if known.positions is not None:
         places = [place or (np.nan, np.nan) for place in chain(*known.positions)]

@@ -128,8 +128,7 @@ def _by_row_and_column(folder: Path, named: ViewNumbers, numbers: Numbers, optio
     if named.said:
         notes = [f"the names say row and column{_like(named)}"]
     elif options.pattern is None:
-        like = f"as in '{named.pattern}'" if named.pattern else f"({next(iter(numbers))})"
-        notes = [f"names are taken for row and column, in that order {like}; --order transpose if the other way"]
+        notes = [f"names are taken for row and column, in that order{_like(named)}; --order transpose if the other way"]
     if top not in (0, 1) or left not in (0, 1):
         notes.append(f"the names count rows from {top}, columns from {left}")
     notes += _step_notes(step)

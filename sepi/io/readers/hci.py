@@ -116,7 +116,7 @@ def _read(path: Path, options: ReadOptions, with_truth: bool) -> LightField:
         limits = parameters.pair("disp_min", "disp_max")
         disparity_range = None if limits is None else DisparityRange(*limits, "parameters")
     files, grid = _views_in(path, options, parameters)
-    views, present, numbers = read_grid(path, files, grid, options)
+    views, present, numbers, names = read_grid(path, files, grid, options)
     shape = views.shape[2], views.shape[3]
     whole = shape if options.part is None else options.part[1::-1]
     if given_shape not in (None, whole):
@@ -144,6 +144,7 @@ def _read(path: Path, options: ReadOptions, with_truth: bool) -> LightField:
         camera=known_camera,
         # one number for both directions: rows are as far apart as columns
         settled=parameters.baseline_mm is not None,
+        files=names,
     )
 
 

@@ -69,7 +69,7 @@ def read(path: Path, options: ReadOptions) -> LightField:
     if not layout.arranged:
         options = unarranged(options)
     views = {layout.positions[name]: path / name for name in named.numbers}
-    pixels, present, numbers = read_grid(path, views, layout.grid, options)
+    pixels, present, numbers, names = read_grid(path, views, layout.grid, options)
     unmatched = [name for name in named.unmatched if _is_picture(name)]
     light_field = LightField(
         views=pixels,
@@ -83,6 +83,7 @@ def read(path: Path, options: ReadOptions) -> LightField:
             *layout.notes,
         ),
         arranged=layout.arranged,
+        files=names,
     )
     return _with_positions(light_field, named, layout, numbers) if layout.arranged else light_field
 
@@ -148,7 +149,7 @@ def _with_positions(
     for pair in combinations(range(count), 2):
         found = positions_from_cameras(given[numbers][..., pair], light_field.present)
         if found is not None:
-            positions, row_spacing = found
+            positions, row_spacing, directions = found
             strays = off_grid(positions, row_spacing, light_field.present)
             on_grid = strays < _ON_GRID
             apart = f"rows {row_spacing:.3g} steps apart, " if min(numbers.shape) > 1 else ""
@@ -157,6 +158,7 @@ def _with_positions(
                 light_field,
                 positions=None if on_grid else positions,
                 row_spacing=row_spacing,
+                directions=directions,
                 notes=(*light_field.notes, f"camera positions from the names; {apart}{where}"),
             )
     return light_field

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 
 from sepi.errors import SepiError
 from sepi.io.images import read_views
@@ -19,7 +20,7 @@ MAX_VIEWS = 10_000
 
 def read_grid(
     folder: Path, files: Mapping[int, Path], grid: tuple[int, int], options: ReadOptions
-) -> tuple[Array, BoolMap, Numbers]:
+) -> tuple[Array, BoolMap, Numbers, npt.NDArray[np.str_]]:
     """Read the views of a grid and put them in their positions; those left out are not even opened.
 
     Parameters
@@ -39,6 +40,8 @@ def read_grid(
     present : ndarray, shape (T, S), bool
     numbers : ndarray, shape (T, S), int64
         Number of each view in the given grid; -1 for excluded ones.
+    names : ndarray, shape (T, S), str
+        File of each view, as it is in the folder; empty where it is missing.
 
     Raises
     ------
@@ -63,7 +66,9 @@ def read_grid(
     places = [int(position) for position in positions]
     views: Array = read_views(paths, places, numbers.size, any_floats=white is not None)
     views = views.reshape(*numbers.shape, *views.shape[1:])
-    return views if white is None else with_white(views, present, folder, white), present, numbers
+    views = views if white is None else with_white(views, present, folder, white)
+    own = {number: name for name, number in names.items() if number >= 0}
+    return views, present, numbers, np.array([own.get(n, "") for n in numbers.ravel().tolist()]).reshape(numbers.shape)
 
 
 def _require_within(folder: Path, paths: Iterable[Path]) -> None:

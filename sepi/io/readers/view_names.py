@@ -7,10 +7,11 @@ import re
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import combinations, pairwise, takewhile
+from itertools import pairwise
+from os.path import commonprefix
 
 from sepi.errors import SepiError
-from sepi.io.readers.view_counts import Counting, Kind, Values, counting, fill, is_count, origin
+from sepi.io.readers.view_counts import Counting, Kind, Values, counting, fill, origin
 
 EXAMPLES = "'view_{row}_{column}.png' or 'img{number}.jpg'"
 
@@ -24,15 +25,12 @@ _FINE = 6
 _FINEST = 10**_FINE
 # part of the largest group of names from which on another group is as likely the views
 _RIVAL = 0.5
-# part of a grid that a suggested pattern must fill
-_WELL_FILLED = 0.5
-# last word before a number, and what says which number it is
+# last word before a number, what says which number it is, and what says that it is no place
 _WORD = re.compile(r"([A-Z]?[a-z]+|[A-Z]+)[ _.=(\[-]*$")
 _AXES = {"x": "column", "c": "column", "col": "column", "column": "column", "y": "row", "r": "row", "row": "row"}
-# of the word before a number that counts no views: one camera took several pictures
-_MOMENTS = frozenset({"frame", "frames", "fr", "time", "exp", "exposure"})
 # names of the two views of a pair
 _PAIRS = (("left", "right"), ("Left", "Right"), ("LEFT", "RIGHT"), ("l", "r"), ("L", "R"))
+_NO_PLACE = frozenset(["frame", "frm", "time", "t", "exp", "exposure", "ev", "iso", "focus", "ch", "channel"])
 # in place of a decimal number; no name has it
 _MARK = "\0"
 
@@ -64,7 +62,7 @@ class ViewNumbers:
     decimals : dict of str to tuple of float
         Name to the decimal numbers in it.
     pattern : str
-        Where the names hold other numbers that differ and count nothing, or say which is the row: which are taken.
+        What gives the same numbers; empty where the names only sort, or a pattern was given.
     said : bool
         Whether the names say which number is the row and which the column.
     """
@@ -136,20 +134,13 @@ def infer_view_numbers(source: str, names: Iterable[str]) -> ViewNumbers:
     group, counted = _best_reading(source, names)
     if counted is None:
         raise SepiError(
-            f"{source}: several numbers differ from name to name ({group.names[0]}), and no two of them alone fill a "
-            f"grid; give --pattern, such as {group.suggestion()}"
+            f"{source}: several numbers differ from name to name ({group.names[0]}), and {group.why_open()}; give "
+            f"--pattern, such as {group.suggestion()}"
         )
     if not counted.columns:
         raise SepiError(
             f"{source}: no number in the names counts the views ({', '.join(names[:3])}); give --pattern, such as "
             f"{EXAMPLES}"
-        )
-    moments = [at for at in counted.columns if group.is_moment(at)]
-    if moments and len(counted.columns) > 1:
-        one = group.pattern([at for at in counted.columns if at not in moments][:1], fixed=True)
-        raise SepiError(
-            f"{source}: several pictures of each camera ({group.names[0]}), not rows and columns of views; --pattern "
-            f"'{one}' takes one of each"
         )
     columns, said = group.row_first(counted.columns)
     numbers = {name: group.numbers_of(name, columns) or () for name in group.names}
@@ -166,7 +157,7 @@ def infer_view_numbers(source: str, names: Iterable[str]) -> ViewNumbers:
         tuple(name for name in names if name not in kept),
         counted.kind,
         {name: group.decimals_of(name) for name in group.names},
-        group.pattern(columns) if said or (counted.kind is not Kind.SORT and group.varies_beside(counted)) else "",
+        "" if counted.kind is Kind.SORT else group.pattern(columns),
         said,
     )
 
@@ -174,9 +165,8 @@ def infer_view_numbers(source: str, names: Iterable[str]) -> ViewNumbers:
 def sorted_view_numbers(names: Iterable[str]) -> ViewNumbers:
     """All names in their natural order, ``img9`` before ``img10``."""
 
-    def key(name: str) -> tuple[list[tuple[int, str]], str]:
-        parts = re.split(r"([0-9]+)", name)
-        return [(int(part), "") if at % 2 else (0, part) for at, part in enumerate(parts)], name
+    def key(name: str) -> tuple[list[int | str], str]:
+        return [int(part) if at % 2 else part for at, part in enumerate(re.split(r"([0-9]+)", name))], name
 
     return ViewNumbers({name: (rank,) for rank, name in enumerate(sorted(names, key=key))}, _no_numbers, kind=Kind.SORT)
 
@@ -203,7 +193,7 @@ def _best_reading(source: str, names: Sequence[str]) -> tuple[_Group, Counting |
     readings = []
     for form, decimals_count in _FORMS:
         group = _Group(source, names, form, decimals_count)
-        readings.append((group, counted := counting(group.columns)))
+        readings.append((group, counted := group.counting()))
         if counted is not None and counted.kind is Kind.GRID:
             row, column = (group.columns[at] for at in counted.columns)
             if fill(row, column):
@@ -240,15 +230,48 @@ class _Group:
         self._decimals_alike = len({tuple("." in text for _, text in name.numbers) for name in cuts}) == 1
         decimals = [[signs for signs, _ in name.decimals] for name in cuts] if self._decimals_alike else []
         self._decimal_hyphens = _separators(decimals)
-        everything = range(len(cuts[0].numbers))
         # decimals that count do so in steps of their own
-        self._origins = [(0, 1) for _ in everything]
-        read = [self.numbers_of(name, everything) or () for name in self.names]
-        counts = list(zip(*read, strict=True))
+        self._origins = [(0, 1)] * len(cuts[0].numbers)
+        self.columns = self._values()
         if decimals_count:
-            self._origins = [origin(values) for values in counts]
-            read = [self.numbers_of(name, everything) or () for name in self.names]
-        self.columns: list[Values] = list(zip(*read, strict=True))
+            self._origins = [origin(values) for values in self.columns]
+            self.columns = self._values()
+        self._words = [word[1].lower() if (word := _WORD.search(text)) else "" for text in self._texts[:-2]]
+        self._beside = self._no_places()
+        # what counts something else than places is the same for all of them
+        self.places = [(0,) * len(values) if at in self._beside else values for at, values in enumerate(self.columns)]
+
+    def _values(self) -> list[Values]:
+        columns = range(len(self._origins))
+        return list(zip(*(self.numbers_of(name, columns) or () for name in self.names), strict=True))
+
+    def _no_places(self) -> list[int]:
+        """Numbers that count frames, exposures and the like, where others differ, too.
+
+        A word at the start of the names is one of all numbers unless each has a word: ``frame_03_07``. Axes of a light
+        field may be called t and s. Pictures in a camera's folder are its own.
+        """
+        words = {at: self._words[at] for at, values in enumerate(self.columns) if len(set(values)) > 1}
+        other = _NO_PLACE - {"t"} if "s" in words.values() else _NO_PLACE
+        found = [
+            at
+            for at, word in words.items()
+            if (word in other and (at > 0 or all(words.values())))
+            or (at > 0 and "/" in self._texts[at] and self._words[0] in CAMERAS)
+        ]
+        return found if len(found) < len(words) else []
+
+    def counting(self) -> Counting | None:
+        """How its numbers count views; None where they leave it open, or views have several pictures."""
+        several = len(set(zip(*self.places, strict=True))) < len(set(zip(*self.columns, strict=True)))
+        return None if several else counting(self.places)
+
+    def why_open(self) -> str:
+        """What is unclear where nothing is counted."""
+        if not self._beside:
+            return "no two of them alone fill a grid"
+        words = " and ".join(f"'{self._words[at] or self._texts[at]}'" for at in self._beside)
+        return f"those after {words} count no views, so that one value of each is to be chosen"
 
     def numbers_of(self, name: str, columns: Sequence[int]) -> tuple[int, ...] | None:
         """Some of the numbers of a name; None where it is unlike those of the group."""
@@ -269,22 +292,8 @@ class _Group:
 
     def row_first(self, columns: tuple[int, ...]) -> tuple[tuple[int, ...], bool]:
         """Row and column in that order, and whether the words before them say so: ``x3_y7``, ``c3r7``."""
-        words = [_WORD.search(self._texts[at]) for at in columns]
-        said = [_AXES.get(word[1].lower(), "") if word else "" for word in words]
+        said = [_AXES.get(self._words[at], "") for at in columns]
         return (columns[::-1] if said == ["column", "row"] else columns), sorted(said) == ["column", "row"]
-
-    def is_moment(self, at: int) -> bool:
-        """Whether the words before a number say that it counts pictures of one camera."""
-        word = _WORD.search(self._texts[at])
-        folder = _WORD.search(self._texts[0]) if at and "/" in self._texts[at] else None
-        return (word is not None and word[1].lower() in _MOMENTS) or (
-            folder is not None and folder[1].lower() in CAMERAS
-        )
-
-    def varies_beside(self, counted: Counting) -> bool:
-        """Whether other numbers differ, too."""
-        known = {self.columns[at] for at in counted.columns}
-        return any(len(set(values)) > 1 and values not in known for values in self.columns)
 
     def pattern(self, columns: Sequence[int], fixed: bool = False) -> str:
         """The pattern that takes these numbers; others that differ are free, or ``fixed`` as in the first name."""
@@ -299,15 +308,11 @@ class _Group:
         return (self._texts[0] + "".join(parts) + ("." + ending if ending else "")).replace(_MARK, "*")
 
     def suggestion(self) -> str:
-        """A pattern that can be followed, in quotes; examples where there is none."""
-        numbers = range(len(self.columns))
-        pairs = sorted(combinations(numbers, 2), key=lambda pair: (-pair[1], -pair[0]))
-        for fixed in (False, True):
-            for columns in (*pairs, *((at,) for at in numbers)):
-                pattern = self.pattern(self.row_first(columns)[0], fixed)
-                if _works(pattern, self.names):
-                    return f"'{pattern}'"
-        return EXAMPLES
+        """A pattern in quotes: of the first number of which each picture has another, else of the last two places."""
+        varying = [at for at, values in enumerate(self.places) if len(set(values)) > 1]
+        single = [at for at in varying if len(set(self.places[at])) == len(self.names)]
+        columns = single[:1] or self.row_first(tuple(varying[-2:]))[0]
+        return f"'{self.pattern(columns, fixed=not single)}'"
 
     def _cut(self, name: str) -> _Cut:
         stem, dot, suffix = name.rpartition(".")
@@ -359,13 +364,8 @@ def _separators(signs: Sequence[Sequence[str]]) -> list[str]:
     """Of the signs before each number, those that all names have: hyphens, where no sign is a plus."""
     columns = [list(column) for column in zip(*signs, strict=True)]
     signed = any("+" in sign for column in columns for sign in column)
-    return [_common_start([sign[:-1] for sign in column] if signed else column) for column in columns]
-
-
-def _common_start(texts: Sequence[str]) -> str:
-    # the texts between the first and the last of them in order begin as both do
-    pairs = zip(min(texts), max(texts), strict=False)
-    return "".join(letter for letter, _ in takewhile(lambda pair: pair[0] == pair[1], pairs))
+    # of texts that are no paths
+    return [commonprefix([sign[:-1] for sign in column] if signed else column) for column in columns]  # noqa: RUF071
 
 
 def _is_minus(signs: str, separator: str) -> bool:
@@ -377,18 +377,6 @@ def _signed(signs: str, text: str, separator: str) -> int:
     whole, _, part = text.partition(".")
     value = int(whole) * _FINEST + int(part.ljust(_FINE, "0")[:_FINE]) if part else int(whole)
     return -value if _is_minus(signs, separator) else value
-
-
-def _works(pattern: str, names: Sequence[str]) -> bool:
-    """Whether a pattern gives each of several names a place of its own in a grid that they fill, or in a sequence."""
-    try:
-        found = parse_view_numbers("", names, pattern).numbers
-    except SepiError:
-        return False
-    columns = list(zip(*found.values(), strict=True))
-    if len(found) < 2 or len(set(found.values())) < len(found):
-        return False
-    return is_count(columns[0]) if len(columns) == 1 else fill(*columns) >= _WELL_FILLED
 
 
 def _compiled(source: str, pattern: str) -> re.Pattern[str]:

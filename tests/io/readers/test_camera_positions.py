@@ -31,7 +31,7 @@ EVERY = np.ones((T, S), bool)
 def test_positions_run_along_the_grid_in_steps_of_columns(down: float, across: float, exchanged: bool) -> None:
     """Whatever the unit, the directions and the order of the coordinates, disparity keeps its sign and scale."""
     coordinates = cameras(down, across)[..., :: -1 if exchanged else 1]
-    positions, row_spacing = positions_from_cameras(coordinates, EVERY)
+    positions, row_spacing, _ = positions_from_cameras(coordinates, EVERY)
     assert row_spacing == pytest.approx(abs(down / across), rel=0.05)
     expected = (np.indices((T, S)).transpose(1, 2, 0) + STRAYS) * (abs(down / across), 1)
     # the step is fitted, so that it differs by what the strays make of it
@@ -41,7 +41,7 @@ def test_positions_run_along_the_grid_in_steps_of_columns(down: float, across: f
 
 def test_a_turned_gantry_keeps_its_turn() -> None:
     """The pictures do not turn with it: a step along a row moves the camera down as well."""
-    positions, _ = positions_from_cameras(cameras(10, 10, 0.1, 0 * STRAYS), EVERY)
+    positions, _, _ = positions_from_cameras(cameras(10, 10, 0.1, 0 * STRAYS), EVERY)
     np.testing.assert_allclose(positions[0, 1] - positions[0, 0], [-np.tan(0.1), 1], atol=1e-9)
 
 
@@ -49,17 +49,17 @@ def test_missing_views_count_nothing_and_get_the_place_of_the_grid() -> None:
     coordinates, present = cameras(10, 10, 0, 0 * STRAYS), EVERY.copy()
     present[1, 2] = False
     coordinates[1, 2] = np.nan
-    positions, row_spacing = positions_from_cameras(coordinates, present)
+    positions, row_spacing, _ = positions_from_cameras(coordinates, present)
     assert row_spacing == pytest.approx(1)
     np.testing.assert_allclose(positions, np.indices((T, S)).transpose(1, 2, 0), atol=1e-9)
 
 
 def test_a_single_row_and_a_single_column_have_positions_along_them() -> None:
-    row, spacing = positions_from_cameras(cameras(9, -10)[1:2], EVERY[1:2])
+    row, spacing, _ = positions_from_cameras(cameras(9, -10)[1:2], EVERY[1:2])
     assert spacing == 1
     np.testing.assert_allclose(np.diff(row[0, :, 1]), np.diff(np.arange(S) + STRAYS[1, :, 1]), rtol=0.1)
     assert not row[..., 0].any()
-    column, spacing = positions_from_cameras(cameras(-9, 10)[:, :1], EVERY[:, :1])
+    column, spacing, _ = positions_from_cameras(cameras(-9, 10)[:, :1], EVERY[:, :1])
     assert spacing == 1
     np.testing.assert_allclose(np.diff(column[:, 0, 0]), np.diff(np.arange(T) + STRAYS[:, 0, 0]), rtol=0.1)
     assert not column[..., 1].any()
@@ -100,7 +100,7 @@ VIEWS = RNG.integers(1, 255, (T, S, 6, 8, 1), np.uint8)
 @pytest.mark.parametrize("central", [None, 3])
 def test_every_view_stays_where_it_was_taken_in_every_order(order: str, central: int | None) -> None:
     """Distances between the same two views, in millimetres, are the same however the grid is turned."""
-    positions, row_spacing = positions_from_cameras(cameras(5, 10), EVERY)
+    positions, row_spacing, _ = positions_from_cameras(cameras(5, 10), EVERY)
     given = LightField(VIEWS, "a", positions=positions, row_spacing=row_spacing)
     found = rearrange(given, ReadOptions(order=order, central=central))
     step = row_spacing if "transpose" in order else 1.0
@@ -127,7 +127,7 @@ def test_the_row_spacing_that_is_given_is_that_of_the_final_grid(tmp_path: Path,
 
 
 def test_the_row_spacing_that_is_given_stretches_known_positions() -> None:
-    positions, row_spacing = positions_from_cameras(cameras(5, 10), EVERY)
+    positions, row_spacing, _ = positions_from_cameras(cameras(5, 10), EVERY)
     given = LightField(VIEWS, "a", positions=positions, row_spacing=row_spacing)
     found = with_row_spacing(given, 2 * row_spacing)
     np.testing.assert_allclose(found.baselines, given.baselines * (2, 1))
