@@ -20,7 +20,7 @@ from sepi.lightfield import FloatMap, LightField
 Places = npt.NDArray[np.int64]
 
 # Pixels of the small pictures, at most
-_MOST_PIXELS = 10_000
+_MOST_PIXELS = 5_200
 # Movement to each side that is searched, as part of the shorter side; views nearest to each that it is compared with
 _MOVEMENT = 1 / 8
 _NEIGHBOURS = 4

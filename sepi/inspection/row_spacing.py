@@ -19,7 +19,6 @@ from sepi.inspection.view_layouts import (
     FEWEST_POINTS,
     MATCHED,
     MOVEMENT,
-    SAMPLING,
     Baseline,
     Views,
     baselines_under,
@@ -28,17 +27,16 @@ from sepi.inspection.view_layouts import (
     ring,
     search_distances,
 )
-from sepi.lightfield import FloatMap, LightField
+from sepi.lightfield import LightField
 
 # Spacings tried, and how many between one and its double
 _MOST = 4.0
 _PER_OCTAVE = 4
-# Points that are enough to tell spacings apart, and to measure the one found; half width of a patch, pixels
+# Points that are enough to tell spacings apart, and to measure the one found
 _POINTS_TO_TELL, _POINTS_TO_CHOOSE = 80, 150
 # Layouts up to the sign
 _ORDERS = ("as-given", "flip-rows", "transpose", "transpose-flip-rows")
-# Movement in the farthest view, pixels: spacing of what is searched, spacing where movements are compared, and the most
-# when the spacing is measured
+# Movement in the farthest view, pixels: spacing where movements are compared, and the most when the spacing is measured
 _FINE_SAMPLING = 0.1
 _MOST_MOVEMENT = 80.0
 # Rounds of measuring, and spacings to each side of the last round's best
@@ -114,12 +112,12 @@ def _tried(views: Views, reach: int, factor: int) -> _Trial | None:
     spacings = [2 ** (n / _PER_OCTAVE) for n in range(-count, count + 1)]
     # most light fields are in order, and their rows as far apart as their columns: a few hypotheses tell
     hypotheses = [(_ORDERS[0], spacing) for spacing in (0.5, 1.0, 2.0)]
-    found = _matched(views, baselines, factor, hypotheses, float(MOVEMENT), _POINTS_TO_TELL)
+    found = matched(views, (0, 0), baselines, factor, _offsets(baselines, hypotheses), MOVEMENT, _POINTS_TO_TELL)
     if found is None or not all(is_clear(found[0][:, 1], found[0][:, other]) for other in (0, 2)):
         hypotheses = [(order, spacing) for order in _ORDERS for spacing in spacings]
     else:
         hypotheses = [(_ORDERS[0], spacing) for spacing in spacings]
-    found = _matched(views, baselines, factor, hypotheses, float(MOVEMENT), _POINTS_TO_CHOOSE)
+    found = matched(views, (0, 0), baselines, factor, _offsets(baselines, hypotheses), MOVEMENT, _POINTS_TO_CHOOSE)
     if found is None:
         return None
     cost, movement = found
@@ -139,8 +137,8 @@ def _measured(views: Views, trial: _Trial) -> float:
     spacing, width = trial.spacing, 1 / _PER_OCTAVE
     for _ in range(_ROUNDS):
         tried = [spacing * 2 ** (width * n / _EACH_SIDE) for n in range(-_EACH_SIDE, _EACH_SIDE + 1)]
-        movement = min(trial.movement + 1, _MOST_MOVEMENT)
-        found = _matched(views, trial.baselines, 1, [(trial.order, one) for one in tried], movement, None)
+        offsets = _offsets(trial.baselines, [(trial.order, one) for one in tried])
+        found = matched(views, (0, 0), trial.baselines, 1, offsets, min(trial.movement + 1, _MOST_MOVEMENT))
         if found is None:
             return spacing
         spacing = tried[int(found[0].mean(axis=0).argmin())]
@@ -159,42 +157,27 @@ def _is_seen_in_movements(views: Views, trial: _Trial, spacing: float) -> bool:
     movements, fits = [], []
     for axis in (0, 1):
         along = [baseline for baseline in trial.baselines if baseline[1 - axis] == 0]
-        hypothesis = [(trial.order, 1.0)]
-        found = _matched(views, along, 1, hypothesis, trial.movement + 1, None, _FINE_SAMPLING) if along else None
+        if not along:
+            return False
+        offsets = _offsets(along, [(trial.order, 1.0)])
+        found = matched(views, (0, 0), along, 1, offsets, trial.movement + 1, sampling=_FINE_SAMPLING)
         if found is None:
             return False
         cost, moved = found
         movements.append(moved[:, 0] / max(abs(baseline[axis]) for baseline in along))
         fits.append(cost[:, 0] < MATCHED)
-    matched = fits[0] & fits[1]
-    if matched.sum() < FEWEST_POINTS or not np.ptp(movements[1][matched]):
+    both = fits[0] & fits[1]
+    if both.sum() < FEWEST_POINTS or not np.ptp(movements[1][both]):
         return False
     # where nearly all movements are the same its interval is none, and no number is nearer than that
     with np.errstate(invalid="ignore"):
-        line = theilslopes(movements[0][matched], movements[1][matched])
+        line = theilslopes(movements[0][both], movements[1][both])
     # all of the slope's interval of confidence is nearer to the spacing than to one
     middle = math.sqrt(spacing)
     return bool(line.low_slope > middle if spacing > 1 else line.low_slope > 0 and line.high_slope < middle)
 
 
-def _matched(
-    views: Views,
-    baselines: list[Baseline],
-    factor: int,
-    hypotheses: list[tuple[str, float]],
-    movement: float,
-    most_points: int | None,
-    sampling: float = SAMPLING,
-) -> tuple[FloatMap, FloatMap] | None:
-    """Matching cost of each point under each order and spacing, and its movement to the farthest view, pixels.
-
-    Both of shape (P, L), float32; None where there are too few points.
-    """
-    offsets = np.stack([_in_units_of_the_farthest(baselines, order, spacing) for order, spacing in hypotheses])
-    return matched(views, (0, 0), baselines, factor, offsets, movement, most_points, sampling)
-
-
-def _in_units_of_the_farthest(baselines: list[Baseline], order: str, spacing: float) -> npt.NDArray[np.float64]:
-    """Baselines (V, 2) in an order and a spacing, in units of the longest: all hypotheses search the same movement."""
-    offsets = baselines_under(order, np.array(baselines, np.float64) * (spacing, 1))
-    return np.asarray(offsets / abs(offsets).max())
+def _offsets(baselines: list[Baseline], hypotheses: list[tuple[str, float]]) -> npt.NDArray[np.float64]:
+    """Baselines (L, V, 2) under each order and spacing, in units of the longest: all search the same movement."""
+    laid = [baselines_under(order, np.array(baselines, np.float64) * (spacing, 1)) for order, spacing in hypotheses]
+    return np.stack([offsets / abs(offsets).max() for offsets in laid])

@@ -222,41 +222,6 @@ def baselines_under(order: str, baselines: npt.NDArray[np.float64]) -> npt.NDArr
     return np.asarray(baselines @ matrix)
 
 
-def layout_costs(
-    reference: FloatMap,
-    views: FloatMap,
-    offsets: npt.NDArray[np.floating],
-    candidates: FloatMap,
-    points: npt.NDArray[np.int64],
-    radius: int,
-) -> tuple[FloatMap, FloatMap]:
-    """How badly points of the reference view match the other views under several layouts of the views.
-
-    Parameters
-    ----------
-    reference : ndarray, shape (H, W), float32
-    views : ndarray, shape (V, H, W), float32
-    offsets : ndarray, shape (L, V, 2)
-        Baseline ``(down, across)`` of each view under each layout.
-    candidates : ndarray, shape (K,), float32
-        Disparities in pixels per unit of the baselines.
-    points : ndarray, shape (P, 2), int64
-        Pixels ``(y, x)``, more than ``radius`` from the border.
-    radius : int
-        Half width of the patch in pixels.
-
-    Returns
-    -------
-    cost, disparity : ndarrays, shape (P, L), float32
-        Lowest mean over the views of ``r^2 / (r^2 + s^2)``, 0..1, where ``s^2`` is a part of the patch's own variation;
-        1 where no candidate keeps half of the views in sight. The candidate of the lowest.
-    """
-    cost, disparity = np.empty((2, len(points), len(offsets)), np.float32)
-    positions = np.ascontiguousarray(offsets, np.float32)
-    kernels.layout_costs(reference, views, positions, candidates, points, radius, cost, disparity)
-    return cost, disparity
-
-
 def search_distances(views: Views) -> Iterator[tuple[int, int]]:
     """Baselines to the most distant view used, and further reduction: first a middle distance, then less, then more."""
     most_distant = min(REACH, max(max(map(abs, baseline)) for baseline in views.baselines))
@@ -307,7 +272,29 @@ def matched(
     most_points: int | None = None,
     sampling: float = SAMPLING,
 ) -> tuple[FloatMap, FloatMap] | None:
-    """:func:`layout_costs` of one view with others, by movements in the farthest; None where it has too few points."""
+    """How badly points of a view match other views under several layouts of these.
+
+    Parameters
+    ----------
+    views : Views
+    reference, baselines : pair of int, list of pairs of int
+        The view, and the others.
+    factor : int
+        By which the views are reduced further.
+    offsets : ndarray, shape (L, V, 2)
+        Baseline ``(down, across)`` to each of the others under each layout.
+    movement, sampling : float
+        Of points in the farthest view, pixels: the most that is searched, and in which steps.
+    most_points : int, optional
+        As in :func:`points_to_match`.
+
+    Returns
+    -------
+    cost, disparity : ndarrays, shape (P, L), float32
+        Lowest mean over the views of ``r^2 / (r^2 + s^2)``, 0..1, where ``s^2`` is a part of the patch's own variation;
+        1 where no candidate keeps half of the views in sight. The candidate of the lowest, in pixels per unit of the
+        baselines. None where there are too few points.
+    """
     detail = views.detail(reference, factor)
     points = points_to_match(detail, most_points)
     if len(points) < FEWEST_POINTS:
@@ -315,7 +302,10 @@ def matched(
     count = round(movement / sampling)
     candidates = (np.arange(-count, count + 1) * (sampling / abs(offsets).max())).astype(np.float32)
     others = np.stack([views.detail(baseline, factor) for baseline in baselines])
-    return layout_costs(detail, others, offsets, candidates, points, _PATCH_RADIUS)
+    positions = np.ascontiguousarray(offsets, np.float32)
+    cost, disparity = np.empty((2, len(points), len(offsets)), np.float32)
+    kernels.layout_costs(detail, others, positions, candidates, points, _PATCH_RADIUS, cost, disparity)
+    return cost, disparity
 
 
 def is_clear(cost: FloatMap, other: FloatMap) -> bool:
