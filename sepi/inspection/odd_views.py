@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import shlex
 from collections import Counter
+from collections.abc import Iterable
+from itertools import product
 
 import cv2
 import numpy as np
@@ -21,9 +23,11 @@ Places = npt.NDArray[np.int64]
 
 # Pixels of the small pictures, at most
 _MOST_PIXELS = 5_200
-# Movement to each side that is searched, as part of the shorter side; views nearest to each that it is compared with
+# Movement to each side, as part of the shorter side; how many views each is compared with: nearest ones
+# and, where it is like none of those, some from all over the grid
 _MOVEMENT = 1 / 8
 _NEIGHBOURS = 4
+_OTHERS = 32
 # Correlation from which on two views are alike, and of half of the views with the one most alike: with less, noise or
 # wide steps leave nothing to judge by. Views of other scenes have 0.17 at most, those of sound light fields 0.6 or so.
 _ALIKE = 0.3
@@ -52,7 +56,7 @@ def odd_views(light_field: LightField) -> list[str]:
     []
     >>> light_field.views[0, 2] = light_field.views[0, 2, ::-1]
     >>> odd_views(light_field)  # doctest: +ELLIPSIS
-    ['views that fit none of the others (...): --exclude 0,2']
+    ['views that fit none of the others (...), to leave out: --exclude 0,2']
     """
     views = Views(light_field, _MOST_PIXELS)
     baselines = [(0, 0), *views.baselines]
@@ -62,9 +66,9 @@ def odd_views(light_field: LightField) -> list[str]:
     times = Counter(looks)
     found = {
         "are the same picture as others": [n for n, look in enumerate(looks) if times[look] > 1 and small[n].any()],
-        "fit none of the others (black, of another scene, or turned: EXIF is not heeded)": _misfits(places, small),
+        "fit none of the others (black, of another scene, or turned, whatever EXIF says)": _misfits(places, small),
     }
-    return [f"views that {what}: {_flags(light_field, places[at])}" for what, at in found.items() if at]
+    return [f"views that {what}, to leave out: {_flags(light_field, places[at])}" for what, at in found.items() if at]
 
 
 def _flags(light_field: LightField, places: Places) -> str:
@@ -78,13 +82,23 @@ def _flags(light_field: LightField, places: Places) -> str:
 def _misfits(places: Places, small: list[FloatMap]) -> list[int]:
     """Views that are like none of most of the others; none where these are too little like each other."""
     group, best = np.arange(len(places)), np.zeros(len(places))
-    for first, place in enumerate(places):
-        away = abs(places - place)
-        for second in np.lexsort((away.min(axis=1), away.max(axis=1)))[1 : 1 + _NEIGHBOURS]:
+
+    def compare(pairs: Iterable[tuple[int, int]]) -> None:
+        for first, second in pairs:
             alike = _correlation(small[first], small[second])
             best[[first, second]] = np.maximum(best[[first, second]], alike)
             if alike >= _ALIKE:
                 group[group == group[second]] = group[first]
+
+    near = set()
+    for at, place in enumerate(places):
+        away = abs(places - place)
+        nearest = np.lexsort((away.min(axis=1), away.max(axis=1)))[1 : 1 + _NEIGHBOURS].tolist()
+        near |= {(min(at, other), max(at, other)) for other in nearest}
+    compare(near)
+    usual = group == np.bincount(group).argmax()
+    # in a wrong order neighbours are not
+    compare(product(np.flatnonzero(~usual).tolist(), np.flatnonzero(usual)[:: 1 + usual.sum() // _OTHERS].tolist()))
     odd = np.flatnonzero(group != np.bincount(group).argmax())
     return odd.tolist() if 2 * odd.size < len(places) and np.median(best) >= _USUAL else []
 
