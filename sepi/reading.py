@@ -121,11 +121,10 @@ def read_light_field(
         light_field = light_field.with_range(given)
     found = [_depth_warning(light_field)]
     if check_order:
+        from sepi.inspection import view_order
         from sepi.inspection.odd_views import odd_views
-        from sepi.inspection.view_order import SIGN_OPEN
-        from sepi.inspection.view_order import check_order as checked_order
 
-        checked = checked_order(light_field, options.order, views)
+        checked = view_order.check_order(light_field, options.order, views)
         del views
         give_back_memory()
         if light_field.rig is not None and checked.clear and checked.warning():
@@ -135,7 +134,7 @@ def read_light_field(
             )
         found += [*odd_views(light_field), checked.warning()]
         if light_field.rig is None and (note := checked.note()):
-            others = (note for note in light_field.notes if not note.startswith(SIGN_OPEN))
+            others = (note for note in light_field.notes if not note.startswith(view_order.SIGN_OPEN))
             light_field = replace(light_field, notes=(*others, note))
     for warning in filter(None, found):
         warnings.warn(f"{path}: {warning}", SepiWarning, stacklevel=2)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import shlex
 from collections import Counter
-from collections.abc import Iterable
 from itertools import product
 
 import cv2
@@ -23,15 +22,14 @@ Places = npt.NDArray[np.int64]
 
 # Pixels of the small pictures, at most
 _MOST_PIXELS = 5_200
-# Movement to each side, as part of the shorter side; how many views each is compared with: nearest ones
-# and, where it is like none of those, some from all over the grid
+# Movement to each side that is searched, as part of the shorter side; how many others from all over the grid a view is
+# compared with that is not like its neighbours
 _MOVEMENT = 1 / 8
-_NEIGHBOURS = 4
 _OTHERS = 32
-# Correlation from which on two views are alike, and of half of the views with the one most alike: with less, noise or
-# wide steps leave nothing to judge by. Views of other scenes have 0.17 at most, those of sound light fields 0.6 or so.
-_ALIKE = 0.3
-_USUAL = 0.45
+# Views are alike from this part on of the correlation that half of the views reach with another. They are not judged
+# where it is less than the least: noise or wide steps leave nothing to judge by then.
+_ALIKE = 0.4
+_LEAST = 0.18
 
 
 def odd_views(light_field: LightField) -> list[str]:
@@ -46,17 +44,6 @@ def odd_views(light_field: LightField) -> list[str]:
     -------
     list of str
         Lines for the user, which name the views by the flags that leave them out.
-
-    Examples
-    --------
-    >>> from sepi.inspection.odd_views import odd_views
-    >>> from sepi.scenes import render
-    >>> light_field = render("dots", size=96, views=3)
-    >>> odd_views(light_field)
-    []
-    >>> light_field.views[0, 2] = light_field.views[0, 2, ::-1]
-    >>> odd_views(light_field)  # doctest: +ELLIPSIS
-    ['views that fit none of the others (...), to leave out: --exclude 0,2']
     """
     views = Views(light_field, _MOST_PIXELS)
     baselines = [(0, 0), *views.baselines]
@@ -81,26 +68,25 @@ def _flags(light_field: LightField, places: Places) -> str:
 
 def _misfits(places: Places, small: list[FloatMap]) -> list[int]:
     """Views that are like none of most of the others; none where these are too little like each other."""
+    index = {(t, s): at for at, (t, s) in enumerate(places.tolist())}
+    pairs = [(at, index.get(next_to, at)) for (t, s), at in index.items() for next_to in ((t, s + 1), (t + 1, s))]
+    found = [(at, other, _correlation(small[at], small[other])) for at, other in pairs if at != other]
     group, best = np.arange(len(places)), np.zeros(len(places))
+    for at, other, alike in found:
+        best[[at, other]] = np.maximum(best[[at, other]], alike)
+    least = _ALIKE * float(np.median(best))
 
-    def compare(pairs: Iterable[tuple[int, int]]) -> None:
-        for first, second in pairs:
-            alike = _correlation(small[first], small[second])
-            best[[first, second]] = np.maximum(best[[first, second]], alike)
-            if alike >= _ALIKE:
-                group[group == group[second]] = group[first]
+    def odd() -> npt.NDArray[np.int64]:
+        for at, other, alike in found:
+            if alike >= least:
+                group[group == group[other]] = group[at]
+        return np.flatnonzero(group != np.bincount(group).argmax())
 
-    near = set()
-    for at, place in enumerate(places):
-        away = abs(places - place)
-        nearest = np.lexsort((away.min(axis=1), away.max(axis=1)))[1 : 1 + _NEIGHBOURS].tolist()
-        near |= {(min(at, other), max(at, other)) for other in nearest}
-    compare(near)
-    usual = group == np.bincount(group).argmax()
     # in a wrong order neighbours are not
-    compare(product(np.flatnonzero(~usual).tolist(), np.flatnonzero(usual)[:: 1 + usual.sum() // _OTHERS].tolist()))
-    odd = np.flatnonzero(group != np.bincount(group).argmax())
-    return odd.tolist() if 2 * odd.size < len(places) and np.median(best) >= _USUAL else []
+    usual = np.setdiff1d(np.arange(len(places)), odd())
+    others = product(odd().tolist(), usual[:: 1 + usual.size // _OTHERS].tolist())
+    found += [(at, other, _correlation(small[at], small[other])) for at, other in others]
+    return odd().tolist() if 2 * odd().size < len(places) and least >= _LEAST else []
 
 
 def _correlation(first: FloatMap, second: FloatMap) -> float:

@@ -322,6 +322,26 @@ def test_check_names_the_flag_that_sets_the_order_right(scene: Path) -> None:
     assert "--order" not in right.stdout.splitlines()[-1]
 
 
+@pytest.mark.usefixtures("flat")
+def test_depth_and_check_tell_that_near_and_far_are_open(scene: Path) -> None:
+    """Inside out, the map looks as good."""
+    np.save("plane.npy", render("slanted_plane", size=96, views=5).views)
+    said = "near and far cannot be told apart here; if depth comes out inside out, read it with --order flip-both"
+    assert call("check", "plane.npy").stdout.splitlines()[-1].endswith(said)
+    assert f"note: {said}\n" in call("depth", "plane.npy", "-o", "out", *FAST).stdout
+
+
+def test_check_fails_where_a_view_is_of_another_scene(scene: Path) -> None:
+    views = render("curved_occluders", size=96, views=5).views
+    views[0, 1] = render("dots", size=96, views=5).views[0, 1]
+    np.save("views.npy", views)
+    called = call("check", "--json", "views.npy")
+    assert called.exit_code == 1
+    (line,) = json.loads(called.stdout)["odd_views"]
+    assert line.endswith("--exclude 0,1")
+    assert call("check", "views.npy", "--exclude", "0,1").exit_code == 0
+
+
 # --- wrong usage
 
 

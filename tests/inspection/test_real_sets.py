@@ -93,6 +93,20 @@ def test_the_views_are_put_where_they_belong(real_data: Path, name: str) -> None
         assert known.warning in found[0]
 
 
+@pytest.mark.parametrize(
+    "folder",
+    [
+        *("hci_new/cotton", "hci_new/antinous", "lytro/2067", "rendered/bust", "rendered/desk", "rendered/mirrors"),
+        *("stereo/cones", "stereo/venus", "stereo/poster1", "stereo/tsukuba", "real/omnistic-views"),
+    ],
+)
+def test_nothing_is_warned_of_in_sound_sets(real_data: Path, folder: str) -> None:
+    """Of views on a disc, in one row, in noise, of mirrors: none is odd, and they fit together."""
+    if not (real_data / folder).exists():
+        pytest.skip(f"{folder} is absent")
+    assert not read_set(real_data / folder)[1]
+
+
 @pytest.mark.parametrize("name", ["legoknights3", "t_rex", "mansion51"])
 def test_near_and_far_are_told(real_data: Path, name: str) -> None:
     """A row of fifty views moves little from one to the next: what hides what shows between distant ones."""

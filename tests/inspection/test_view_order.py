@@ -2,6 +2,7 @@
 
 import itertools
 from collections.abc import Iterable
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -177,6 +178,39 @@ def test_pictures_of_noise_are_left_undecided() -> None:
     assert not found.clear
     assert "cannot tell" in found.verdict()
     assert found.warning() is None
+
+
+@pytest.mark.parametrize("kind", ["shuffled", "frames for columns", "not rectified"])
+def test_views_that_fit_together_in_no_order_are_told(kind: str) -> None:
+    """Too little texture is another matter: here depth would be made of nonsense without a word."""
+    rng = np.random.default_rng(9)
+    views = scene("curved_occluders").views[1:4, 1:4].reshape(9, 96, 96, 3)
+    if kind == "shuffled":
+        changed = views[rng.permutation(9)].reshape(3, 3, 96, 96, 3)
+    elif kind == "frames for columns":
+        changed = np.stack([np.roll(views, 3 * frame, axis=2) for frame in range(3)], axis=1)
+    else:
+        changed = np.stack([np.roll(view, rng.integers(-3, 4, 2), (0, 1)) for view in views]).reshape(3, 3, 96, 96, 3)
+    found = check_order(grey_field(changed))
+    assert found.fits_none
+    assert not found.clear
+    assert found.verdict() == found.warning()
+    assert "fit together in no order" in found.verdict()
+
+
+@pytest.mark.parametrize("word", ["as-given", "flip-columns", "transpose"])
+@pytest.mark.parametrize("turned", [1, -1])
+def test_camera_positions_tell_near_from_far_where_the_views_do_not(word: str, turned: int) -> None:
+    """X grows to the right; y may be either, and which coordinate is which axis the views tell."""
+    field = misread(scene("slanted_plane"), word)
+    rows, columns = (ORDERS[word](axis) for axis in np.mgrid[:5, :5])
+    # of the file at row 1 of column 0, and at row 0 of column 1, how far to the right it was taken
+    right = {(int(rows[t, s]), int(columns[t, s])): s * turned for t, s in np.ndindex(5, 5)}
+    directions = tuple(int(np.sign(right[at] - right[0, 0])) for at in ((1, 0), (0, 1)))
+    found = check_order(replace(field, directions=directions))
+    assert found.sign_clear
+    assert found.best == (word if turned == 1 else TURNED[word])
+    assert found.note() is None
 
 
 @pytest.mark.parametrize("level", [0, 1, 128, 255])

@@ -93,19 +93,14 @@ def _views(folder: Path, names: Sequence[str], options: ReadOptions) -> tuple[Vi
 
     They are set apart first: the name of a thumbnail may differ in a number that all views share.
     """
-    odd = _odd(folder, filter(_is_picture, names))
+    odd = odd_pictures(folder, filter(_is_picture, names))
     named = _named(folder, [name for name in names if name not in odd], options)
     if not odd:
         # among pictures of other names, such as small copies of all views, none may stand out
-        odd = _odd(folder, named.numbers)
+        odd = odd_pictures(folder, named.numbers)
         if odd:
             named = _named(folder, [name for name in names if name not in odd], options)
     return named, odd
-
-
-def _odd(folder: Path, names: Iterable[str]) -> dict[str, str]:
-    odd = odd_pictures([folder / name for name in names])
-    return {path.relative_to(folder).as_posix(): why for path, why in odd.items()}
 
 
 def _named(folder: Path, names: Sequence[str], options: ReadOptions) -> ViewNumbers:

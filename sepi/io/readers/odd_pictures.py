@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable
 from pathlib import Path
 
 from sepi.errors import SepiError
@@ -13,20 +13,20 @@ from sepi.io.images import picture_header
 _ODD = 0.1
 
 
-def odd_pictures(paths: Sequence[Path]) -> dict[Path, str]:
+def odd_pictures(folder: Path, names: Iterable[str]) -> dict[str, str]:
     """The few pictures of another size than all others, and what is odd about them; none where no size prevails.
 
     Pictures that cannot be read, and links, are left to those that read them.
     """
-    sizes = {path: size for path in paths if (size := _size(path)) is not None}
+    sizes = {name: size for name in names if (size := _size(folder / name)) is not None}
     if not sizes:
         return {}
     usual, count = Counter(sizes.values()).most_common(1)[0]
     if count < 2 or len(sizes) - count > max(1, _ODD * len(sizes)):
         return {}
     return {
-        path: f"{size[0]}x{size[1]} pixels, but all other views have {usual[0]}x{usual[1]}"
-        for path, size in sizes.items()
+        name: f"{size[0]}x{size[1]} pixels, but all other views have {usual[0]}x{usual[1]}"
+        for name, size in sizes.items()
         if size != usual
     }
 

@@ -238,6 +238,16 @@ NAMED: dict[str, tuple[list[str], ReadOptions, list[list[int]], str]] = {
         [[-1, 0, -1], [1, 2, 3], [-1, 4, -1]],
         "",
     ),
+    # --- words that say what a number counts
+    "a word before both": (by_place("frame_{:02d}_{:02d}.png", range(3), range(2)), ReadOptions(), grid_of(3, 2), ""),
+    "rows t and columns s": (by_place("t{}s{}.png", range(3), range(2)), ReadOptions(), grid_of(3, 2), ""),
+    "a time for each view": (
+        [f"r{t}_c{s}_time{100 + 7 * t + s}.png" for t, s in itertools.product(range(3), range(2))],
+        ReadOptions(),
+        grid_of(3, 2),
+        "as in 'r{row}_c{column}_time*.png'",
+    ),
+    "frames alone": (by_number("frame_{:04d}.png", range(5)), ReadOptions(), grid_of(1, 5), "numbered 0 to 4"),
     # --- more numbers than two
     "running number, row, column": (
         [f"IMG_{3 * t + s:04d}_{t:02d}_{s:02d}.png" for t, s in itertools.product(range(3), range(3))],
@@ -442,6 +452,18 @@ BAD: dict[str, tuple[list[str], ReadOptions, str]] = {
         ReadOptions(),
         "such as 'f0_{row}_{column}.png'",
     ),
+    "cameras and exposures": (
+        by_place("cam{:02d}_exp{}.png", range(9), range(3)),
+        ReadOptions(),
+        "after 'exp' count no",
+    ),
+    "frames of cameras": (by_place("frame_{}_cam_{}.png", range(9), range(9)), ReadOptions(), "after 'frame' count no"),
+    "times of cameras": (by_place("t{}_c{}.png", range(3), range(9)), ReadOptions(), "after 't' count no views"),
+    "two settings of a grid": (
+        [f"{t}_{s}_iso{i}_ch{c}.png" for t, s, i, c in itertools.product(range(2), range(2), (100, 400), range(3))],
+        ReadOptions(),
+        "after 'iso' and 'ch' count no views",
+    ),
     "two running numbers": (["1_3.png", "2_1.png", "3_2.png"], ReadOptions(), "--pattern, such as '{number}_*.png'"),
     "times that do not fill the grid": (
         by_number("{}.png", (102134, 102138, 102143)),
@@ -630,7 +652,17 @@ def test_a_sequence_may_lack_its_middle(tmp_path: Path) -> None:
     assert places_of(read(folder, ReadOptions())) == [[0, 1, -1, 2, 3]]
 
 
-@pytest.mark.parametrize("case", ["several light fields", "two running numbers"])
+CHOICES = (
+    "several light fields",
+    "two running numbers",
+    "cameras and exposures",
+    "frames of cameras",
+    "times of cameras",
+    "two settings of a grid",
+)
+
+
+@pytest.mark.parametrize("case", CHOICES)
 def test_the_pattern_that_an_error_suggests_can_be_followed(tmp_path: Path, case: str) -> None:
     names, _, _ = BAD[case]
     folder = put(tmp_path / "f", names)
