@@ -137,8 +137,6 @@ def depth(
     if unknown:
         click.echo(f"unknown: {100 * unknown:.2g} % of the pixels; no view knows anything about them")
     click.echo(_interval(maps, variant))
-    for note in light_field.notes:
-        click.echo(f"note: {note}")
     click.echo(f"written to {folder}/: {' '.join(files)}")
 
 
