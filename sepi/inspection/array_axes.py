@@ -11,14 +11,13 @@ from collections.abc import Mapping
 import numpy as np
 import numpy.typing as npt
 
-from sepi.inspection.view_layouts import FEWEST_POINTS, MOVEMENT, Views, layout_costs, points_to_match
+from sepi.inspection.view_layouts import MOVEMENT, Views, matched
 from sepi.lightfield import LightField
 
 # sequences of pictures that are looked at, reductions by which movement is searched, and its spacing
 _SEQUENCES = 8
 _REDUCTIONS = (1, 2, 4)
 _SPACING = 0.3
-_RADIUS = 2
 # matching cost in place over the least that movement gives: at most of colours, at least of views
 _COLOURS = 1.2
 _VIEWS = 1.4
@@ -57,19 +56,16 @@ def _parallax(pictures: npt.NDArray[np.generic]) -> float:
     views, middle = Views(LightField(pictures, "pictures", arranged=False)), pictures.shape[1] // 2
     steps = np.array([step for step in range(-middle, pictures.shape[1] - middle) if step], np.float64)
     offsets = np.stack([np.stack([0 * steps, steps], 1), np.stack([steps, 0 * steps], 1)])
-    count = round(MOVEMENT / _SPACING)
-    candidates = (np.arange(-count, count + 1) * (_SPACING / abs(steps).max())).astype(np.float32)
     best = np.nan
     for factor in (factor for factor in _REDUCTIONS if not views.is_too_small(factor)):
         costs = []
         for k in range(len(pictures)):
             places = [(k - views.middle[0], int(step) + middle - views.middle[1]) for step in (0, *steps)]
-            reference, *others = (views.detail(place, factor) for place in places)
-            points = points_to_match(reference)
-            if len(points) >= FEWEST_POINTS:
-                tried = (candidates, np.zeros(1, np.float32))
-                matched = [layout_costs(reference, np.stack(others), offsets, d, points, _RADIUS)[0] for d in tried]
-                costs.append((*matched[0].mean(axis=0), matched[1].mean()))
+            found = [
+                matched(views, places[0], places[1:], factor, offsets, movement, sampling=_SPACING)
+                for movement in (MOVEMENT, 0)
+            ]
+            costs += [(*moved[0].mean(axis=0), still[0].mean()) for moved, still in [found] if moved and still]
         if costs:
             *moved, still = np.mean(costs, axis=0)
             best = np.fmax(best, still / max(min(moved), 1e-6))
