@@ -91,8 +91,6 @@ class BaseDetail(NamedTuple):
         The views that are compared.
     t0, s0 : int
         Position of the reference view.
-    baselines : ndarray, shape (T, S, 2), float64
-        Down and across from the reference view, in view steps.
     noise : float
         Expected squared residual, summed over RGB, by noise alone.
     guide : ndarray, shape (H, W, 3), float32
@@ -111,7 +109,6 @@ class BaseDetail(NamedTuple):
     present: BoolMap
     t0: int
     s0: int
-    baselines: npt.NDArray[np.float64]
     noise: float
     guide: FloatMap
     reference_detail: npt.NDArray[np.int16]
@@ -165,7 +162,6 @@ def base_detail_decomposition(
         rows.low,
         present,
         *light_field.reference_position,
-        light_field.baselines,
         variance_of_residuals(noise, guide.shape[2]),
         guide,
         detail[light_field.reference_position],
@@ -229,7 +225,10 @@ def _make_detail(
     rows: Rows,
     out: npt.NDArray[np.int16],
 ) -> None:
-    window = (parameters.base_radius, edge, parameters.base_sigma_space)
+    radius = parameters.base_radius
+    squared = np.arange(radius + 1) ** 2
+    nearness = np.exp(-0.5 * (squared[:, None] + squared) / parameters.base_sigma_space**2)
+    window = (radius, 1 / (64 * edge * edge), nearness.astype(np.float32))
     kernels.detail_of_views(views, float(unit), wanted, rows.low, window, DETAIL_UNIT, out)
 
 

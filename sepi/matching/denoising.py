@@ -165,9 +165,27 @@ def _denoised_views(light_field: LightField, noise: ViewNoise, least: float) -> 
     out = np.zeros_like(views)
     height, width = light_field.shape
     by_place = np.asarray(cv2.resize(np.float32(least) * noise.by_place, (width, height)), np.float32)
-    white = full_scale(views.dtype)
-    kernels.denoise_views(views, light_field.present, white, noise.brightness, noise.variance, by_place, out)
+    lines = lines_between(noise.brightness, noise.variance)
+    kernels.denoise_views(views, light_field.present, full_scale(views.dtype), lines, by_place, out)
     return out
+
+
+def lines_between(brightness: FloatMap, variance: FloatMap) -> FloatMap:
+    """Variance of the noise by brightness: lines from one to the next that is known, level beyond both ends.
+
+    Parameters
+    ----------
+    brightness, variance : ndarray, shape (N,), float32
+        Brightness rises.
+
+    Returns
+    -------
+    ndarray, shape (N + 1, 4), float32
+        Of each line the brightness where it begins, its length, its first variance, and by how much that rises.
+    """
+    begins, variances = np.append(np.float32(-1e9), brightness), np.append(variance[:1], variance)
+    length, rise = np.append(np.diff(begins), np.float32(1)), np.append(np.diff(variances), np.float32(0))
+    return np.stack([begins, length, variances, rise], axis=1)
 
 
 def guide_of(light_field: LightField, mean: FloatMap | None = None) -> FloatMap:

@@ -78,13 +78,7 @@ class GaussNewton(AlignedViews):
         gradient, curvature : ndarray, shape (H, W), float32
             The curvature is the inverse variance of the disparity, 1 / (pixels per view step)^2.
         """
-        gradient, curvature = np.empty_like(disparity), np.empty_like(disparity)
-        image = mean, *(spline_derivatives(mean) if slopes is None else slopes)
-
-        def add(views: SplineViews, seeing: Seeing, band: Band) -> None:
-            kernels.normal_equations(views, seeing, disparity, image, band.begin, band.end, gradient, curvature)
-
-        self.in_bands(disparity, add)
+        gradient, curvature = self._sums(2, disparity, mean, *(slopes or spline_derivatives(mean)))
         # the next map is another one
         self._nearest = None
         return gradient, curvature
@@ -103,16 +97,18 @@ class GaussNewton(AlignedViews):
         gradient, curvature : ndarray, shape (H, W), float32
         evidence : Evidence
         """
-        gradient, curvature = np.empty_like(disparity), np.empty_like(disparity)
-        halves, rest = (np.empty((*n, *disparity.shape), np.float32) for n in ((4, 2), (4,)))
-        image = mean, *spline_derivatives(mean)
+        gradient, curvature, *rest = sums = self._sums(14, disparity, mean, *spline_derivatives(mean))
+        return gradient, curvature, Evidence(sums[2:10].reshape(4, 2, *disparity.shape), *rest[8:])
+
+    def _sums(self, number: int, disparity: FloatMap, *image: FloatMap) -> FloatMap:
+        """The first sums of ``kernels/gauss_newton.hpp``, with a mean and its derivatives."""
+        sums = np.empty((number, *disparity.shape), np.float32)
 
         def add(views: SplineViews, seeing: Seeing, band: Band) -> None:
-            rows = band.begin, band.end
-            kernels.equations_and_evidence(views, seeing, disparity, image, *rows, gradient, curvature, halves, rest)
+            kernels.equations_of_views(views, seeing, disparity, image, band.begin, band.end, sums)
 
         self.in_bands(disparity, add)
-        return gradient, curvature, Evidence(halves, *rest)
+        return sums
 
 
 def spline_derivatives(image: FloatMap) -> tuple[FloatMap, FloatMap]:

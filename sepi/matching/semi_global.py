@@ -17,6 +17,7 @@ import math
 from dataclasses import dataclass
 from typing import Annotated, Self
 
+import cv2
 import numpy as np
 from pydantic import Field
 
@@ -164,10 +165,11 @@ def smooth_and_choose(
     """
     variance = parameters.window_sigma**2 + contrast
     averaged, smoothed = volumes.averaged_and_smoothed(len(disparities))
-    kernels.aggregate(volumes.costs(len(disparities)), guide, parameters.window_radius, variance, averaged)
+    colours = np.stack(cv2.split(guide))
+    kernels.aggregate(volumes.costs(len(disparities)), colours, parameters.window_radius, variance, averaged)
     penalties = parameters.small_penalty, parameters.large_penalty, parameters.colour_weakening
     band = max(1, BAND_BYTES // (2 * averaged[0].nbytes))
-    kernels.semi_global(averaged, guide, *penalties, band, smoothed)
+    kernels.semi_global(averaged, colours, *penalties, band, smoothed)
     same = min(SAME_MINIMUM, SAME_SHARE * float(disparities[-1] - disparities[0]))
     disparity, margin = np.empty((2, *guide.shape[:2]), np.float32)
     kernels.choose(smoothed, averaged, disparities, same, disparity, margin)

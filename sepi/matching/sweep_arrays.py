@@ -124,23 +124,17 @@ class Visibility(NamedTuple):
     Attributes
     ----------
     nearest : ndarray, shape (T, S, n, W) or (T, S, n, 0), float32
-        From :func:`sepi.matching.nearest_surfaces.nearest_surfaces`; empty: all views see all pixels. In memory there
-        are :data:`sepi.kernels.LANES` numbers more behind it.
-    low : int
-        First row of ``nearest``.
+        From :func:`sepi.matching.nearest_surfaces.nearest_surfaces`, of the rows that the views' detail has; empty: all
+        views see all pixels. In memory there are :data:`sepi.kernels.LANES` numbers more behind it.
     occlusion_margin : float32
         By how much an occluder must be nearer, pixels per view step.
     occluded_view_weight : float32
         Weight of a view in which the pixel is occluded; none where the view has no pixel.
-    some_missing : bool
-        Whether there are such places.
     """
 
     nearest: FloatMap
-    low: int
     occlusion_margin: np.float32
     occluded_view_weight: np.float32
-    some_missing: bool
 
 
 class RobustCost(NamedTuple):

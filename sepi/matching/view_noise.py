@@ -124,7 +124,7 @@ def view_noise(light_field: LightField) -> ViewNoise:
     SepiError
         If the disparity range is unknown.
     """
-    views, image = light_field.rgb_views, light_field.reference_view
+    views, image = light_field.views, light_field.reference_view
     unit, least = 1 / full_scale(views.dtype), _least_variance(views.dtype)
     place, moves = light_field.reference_position, whole_pixel_moves(light_field)
     # beyond the picture nothing is known

@@ -210,14 +210,14 @@ def occluded_in_any_view(
     ndarray, shape (H, W), bool
     """
     baselines = light_field.baselines
-    occluded = np.empty(light_field.shape, bool)
+    occluded = np.zeros(light_field.shape, bool)
     for begin, end, rows in row_bands(light_field, present, float(np.abs(disparity).max()), BYTES_PER_PIXEL):
         nearest = z_buffers(disparity, present, baselines, *rows)
         if light_field.missing is not None:
             # a view that does not show a place cannot see a pixel there
             nearest[light_field.missing[:, :, rows.low : rows.high]] = EMPTY
         kernels.occluded_in_any_view(
-            disparity, present, baselines, nearest, rows.low, occlusion_margin, begin, end, occluded[begin:end]
+            disparity, present, baselines, nearest, rows.low, occlusion_margin, begin, end, occluded
         )
     return occluded
 
@@ -309,12 +309,10 @@ def _visibility(
     band: Band,
 ) -> Visibility:
     """In which views the pixels of a band are seen: in all of them where no map tells."""
-    low, high = band.rows
     if disparity is None or not isinstance(parameters, VisibleViewsParameters):
-        everywhere = np.empty((*light_field.grid, high - low, 0), np.float32)
+        everywhere = np.empty((*light_field.grid, band.rows.high - band.rows.low, 0), np.float32)
         if light_field.missing is not None:
             everywhere = nearest_surfaces(light_field, None, present, band.rows)
-        return Visibility(everywhere, low, np.float32(0), np.float32(1), light_field.missing is not None)
+        return Visibility(everywhere, np.float32(0), np.float32(1))
     nearest = nearest_surfaces(light_field, disparity, present, band.rows)
-    margin, weight = np.float32(parameters.occlusion_margin), np.float32(parameters.occluded_view_weight)
-    return Visibility(nearest, low, margin, weight, light_field.missing is not None)
+    return Visibility(nearest, np.float32(parameters.occlusion_margin), np.float32(parameters.occluded_view_weight))

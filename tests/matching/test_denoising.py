@@ -116,17 +116,17 @@ def test_kernel_equals_plain_means(channels: int) -> None:
     rng = np.random.default_rng(2)
     views = rng.random((1, 2, 71, 23, channels)).astype(np.float32)
     views[..., :11, :] = 0.5 + 0.01 * views[..., :11, :]
-    # columns of an array, as those that are told from views: no other kernels are compiled
     levels, variances = np.array([(0.2, 1e-4), (0.6, 4e-2)], np.float32).T
     least = rng.uniform(1, 2, views.shape[2:4]).astype(np.float32)
     present = np.array([[True, False]])
     out = np.zeros_like(views)
-    kernels.denoise_views(views, present, 1, levels, variances, least, out)
+    lines = module.lines_between(levels, variances)
+    kernels.denoise_views(views, present, 1, lines, least, out)
     np.testing.assert_allclose(out[0, 0], plain_denoised(views[0, 0], levels, variances, least), atol=2e-6)
     assert not out[0, 1].any()
     levels_of_bytes = np.rint(255 * views).astype(np.uint8)
     rounded = np.zeros_like(levels_of_bytes)
-    kernels.denoise_views(levels_of_bytes, present, 255, levels, variances, least, rounded)
+    kernels.denoise_views(levels_of_bytes, present, 255, lines, least, rounded)
     expected = plain_denoised((levels_of_bytes[0, 0] / np.float32(255)), levels, variances, least)
     np.testing.assert_allclose(rounded[0, 0], 255 * np.clip(expected, 0, 1), atol=0.51)
 

@@ -152,7 +152,7 @@ def test_costs_equal_a_plain_twin(channels: int, dtype: type, visible: bool, geo
     )
     scales, shares = np.array([0.02, 0.01], np.float32), np.array([0.4, 0.6], np.float32)
     cost = np.empty((7, 11, 13), np.float32)
-    seen = Visibility(nearest, 0, np.float32(0.1), np.float32(0.05), False)
+    seen = Visibility(nearest, np.float32(0.1), np.float32(0.05))
     candidates = sampled_candidates(disparities, light_field.baselines)
     visibility.sweep_visible_rows(views, seen, RobustCost(scales, shares), candidates, 0, 11, cost)
     expected = sweep_twin(
@@ -220,10 +220,11 @@ def test_smoothing_equals_a_plain_twin() -> None:
     cost, guide = random.random((K, H, W)).astype(np.float32), random.random((H, W, 3)).astype(np.float32) * 0.1
     # what was there before must not matter
     volume, smoothed = np.full((2, H, W, LANES), 7, np.float32)
-    semi_global.aggregate(cost, guide, 2, 0.01, volume)
+    colours = np.moveaxis(guide, 2, 0).copy()
+    semi_global.aggregate(cost, colours, 2, 0.01, volume)
     averaged = volume[:, :, :K]
     np.testing.assert_allclose(averaged, aggregate_twin(cost, guide, 2, 0.01), atol=1e-5)
-    semi_global.semi_global(volume, guide, 0.1, 0.5, 5, 3, smoothed)
+    semi_global.semi_global(volume, colours, 0.1, 0.5, 5, 3, smoothed)
     directions = [(0, 1), (0, -1), (1, 0), (-1, 0), (1, 1), (1, -1), (-1, 1), (-1, -1)]
     expected = sum(path_twin(averaged.astype(float), guide, *d, 0.1, 0.5, 5) for d in directions)
     np.testing.assert_allclose(smoothed[:, :, :K], expected, atol=1e-4)
@@ -235,7 +236,7 @@ def test_a_window_may_be_wider_than_the_picture(shape: tuple[int, int], radius: 
     random = np.random.default_rng(4)
     cost, guide = random.random((5, *shape)).astype(np.float32), random.random((*shape, 3)).astype(np.float32) * 0.1
     averaged = np.empty((*shape, LANES), np.float32)
-    semi_global.aggregate(cost, guide, radius, 0.01, averaged)
+    semi_global.aggregate(cost, np.moveaxis(guide, 2, 0).copy(), radius, 0.01, averaged)
     np.testing.assert_allclose(averaged[:, :, :5], aggregate_twin(cost, guide, radius, 0.01), atol=1e-5)
 
 

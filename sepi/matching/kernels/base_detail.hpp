@@ -3,23 +3,23 @@
 
 #include <tuple>
 
-#include "kernels/array.hpp"
+#include "pixels.hpp"
 
 namespace sepi {
 
-// Window of the bilateral filter: a disc, and standard deviations of the weights: of the sum of the RGB differences,
-// colours in 0..1, and in pixels.
+// Window of the bilateral filter, a disc: its radius, 1 / (64 s^2) for s the sum of the RGB differences that is an edge,
+// colours in 0..1, and the weights of pixels so far down and across, (radius + 1, radius + 1).
 struct BilateralWindow {
     Index radius;
-    double edge, width;
+    float falloff;
+    Array<const float, 2> nearness;
 
-    auto fields() { return std::tie(radius, edge, width); }
+    auto fields() { return std::tie(radius, falloff, nearness); }
 };
 
 // Mean of the channels without its edge-preserving mean, in detail_unit, of rows from low on of the views that are
-// present: colours (T, S, H, W, 3), which unit makes span 0..1, out (T, S, n, W). Other views are left as they are.
-template <class Colour>
-void detail_of_views(Strided<const Colour, 5> colours, float unit, Array<const bool, 2> present, Index low, BilateralWindow window, float detail_unit,
+// present: views (T, S, H, W, 3), which unit makes span 0..1, out (T, S, n, W). Other views are left as they are.
+void detail_of_views(const Views &views, float unit, Array<const bool, 2> present, Index low, const BilateralWindow &window, float detail_unit,
                      Array<std::int16_t, 4> out);
 
 }  // namespace sepi

@@ -1,3 +1,5 @@
+#include <nanobind/stl/variant.h>
+
 #include "kernels/arguments.hpp"
 #include "plane_sweep.hpp"
 #include "semi_global.hpp"
@@ -10,26 +12,27 @@ using sepi::Unlocked;
 
 // The kernels that look at the colours of views, of one type.
 template <class Colour>
-static void bind_of_colours(nb::module_ &plane_sweep, nb::module_ &visibility) {
+static void bind_of_colours(nb::module_ &plane_sweep) {
     plane_sweep.def("planes_of", &sepi::planes_of<Colour>, Unlocked(), "views"_a, "planes"_a);
     plane_sweep.def("sweep_plane_rows", &sepi::sweep_plane_rows<Colour>, Unlocked(), "views"_a, "candidates"_a, "window"_a, "expected"_a, "mask"_a, "begin"_a,
                     "end"_a, "height"_a, "width"_a, "maps"_a);
-    visibility.def("sweep_visible_rows", &sepi::sweep_visible_rows<Colour>, Unlocked(), "views"_a, "visibility"_a, "robust"_a, "candidates"_a, "begin"_a,
-                   "end"_a, "cost"_a);
 }
 
 void bind_sweeps(nb::module_ &kernels) {
     auto plane_sweep = kernels.def_submodule("plane_sweep");
-    auto visibility = kernels.def_submodule("visibility");
-    bind_of_colours<std::uint8_t>(plane_sweep, visibility);
-    bind_of_colours<std::uint16_t>(plane_sweep, visibility);
-    bind_of_colours<float>(plane_sweep, visibility);
+    bind_of_colours<std::uint8_t>(plane_sweep);
+    bind_of_colours<std::uint16_t>(plane_sweep);
+    bind_of_colours<float>(plane_sweep);
     plane_sweep.attr("SHORTEST_GAP") = sepi::SHORTEST_GAP;
+
+    auto visibility = kernels.def_submodule("visibility");
     visibility.attr("EMPTY") = sepi::EMPTY;
     visibility.attr("MISSING") = sepi::MISSING;
     visibility.def("z_buffers", &sepi::z_buffers, Unlocked(), "disparity"_a, "present"_a, "baselines"_a, "low"_a, "high"_a, "out"_a);
     visibility.def("occluded_in_any_view", &sepi::occluded_in_any_view, Unlocked(), "disparity"_a, "present"_a, "baselines"_a, "nearest"_a, "low"_a,
                    "occlusion_margin"_a, "begin"_a, "end"_a, "out"_a);
+    visibility.def("sweep_visible_rows", &sepi::sweep_visible_rows, Unlocked(), "views"_a, "visibility"_a, "robust"_a, "candidates"_a, "begin"_a, "end"_a,
+                   "cost"_a);
 
     auto semi_global = kernels.def_submodule("semi_global");
     semi_global.attr("PATHS_AT_ONCE") = sepi::PATHS_AT_ONCE;

@@ -1,15 +1,17 @@
 // Denoising: the detail of each view, kept as far as it exceeds the noise.
 #pragma once
 
-#include "kernels/array.hpp"
+#include "pixels.hpp"
 
 namespace sepi {
 
-// Views (T, S, H, W, C) without what noise alone explains, of those that are present, into out. full is the value of
-// white; variances (N,) are the noise of one channel at levels (N,), brightnesses that rise; detail is kept as far as its
-// energy exceeds least (H, W) times that of this noise. Whole numbers are rounded and cut off at black and white.
-template <class Colour>
-void denoise_views(Array<const Colour, 5> views, Array<const bool, 2> present, float full, Strided<const float, 1> levels, Strided<const float, 1> variances,
-                   Array<const float, 2> least, Array<Colour, 5> out);
+// Views that are written to, (T, S, H, W, C).
+using NewViews = std::variant<Array<std::uint8_t, 5>, Array<std::uint16_t, 5>, Array<float, 5>>;
+
+// Views (T, S, H, W, C) without what noise alone explains, of those that are present, into out, of the same type. full is
+// the value of white. noise (N, 4) says from which brightness on, which rises, the noise of one channel has a variance of
+// noise[2] + (brightness - noise[0]) / noise[1] * noise[3]; the first is below all. Detail is kept as far as its energy exceeds
+// least (H, W) times that. Whole numbers are rounded and cut off at black and white.
+void denoise_views(const Views &views, Array<const bool, 2> present, float full, Array<const float, 2> noise, Array<const float, 2> least, const NewViews &out);
 
 }  // namespace sepi

@@ -1,9 +1,5 @@
 #include "gaps.hpp"
 
-#include <vector>
-
-#include "kernels/parallel.hpp"
-
 namespace sepi {
 namespace {
 
@@ -68,50 +64,32 @@ void farther_alike(Array<const float, 2> disparity, Array<const float, 2> lowest
     });
 }
 
-template <class Colour>
-void compare_depths(Strided<const Colour, 5> views, float unit, const TwoDepths &depths, const AskedViews &asked, Index begin, Index end,
-                    Array<float, 3> sums) {
-    struct View {
-        Array<const Colour, 3> pixels;
-        Array<const float, 2> nearest;
-        double down, across;
-    };
-    std::vector<View> others;
-    for (Index t = 0; t < views.shape[0]; ++t)
-        for (Index s = 0; s < views.shape[1]; ++s)
-            if (asked.others(t, s))
-                others.push_back({views[t][s], asked.nearest[t][s], asked.baselines(t, s, 0), asked.baselines(t, s, 1)});
-    const Index H = depths.disparity.shape[0], W = depths.disparity.shape[1];
-    const double bottom = double(H - 1), right = double(W - 1);
-    parallel_for(begin, end, [&](Index y) {
+void compare_depths(const Views &views, float unit, const TwoDepths &depths, const AskedViews &asked, Index begin, Index end, Array<float, 3> sums) {
+    const Index W = depths.disparity.shape[1], S = asked.others.shape[1];
+    const double bottom = double(depths.disparity.shape[0] - 1), right = double(W - 1);
+    const auto add_view = [&](const auto &view, Index t, Index s, Index y) {
+        const double down = asked.baselines(t, s, 0), across = asked.baselines(t, s, 1);
+        const auto nearest = asked.nearest[t][s];
         for (Index x = 0; x < W; ++x) {
             const float d = depths.disparity(y, x), f = depths.farther(y, x);
             if (d == f) continue;
+            const double row = double(y) - f * down, column = double(x) - f * across;
+            const double own_row = double(y) - d * down, own_column = double(x) - d * across;
+            if (std::min(row, own_row) < 0 || std::min(column, own_column) < 0) continue;
+            if (std::max(row, own_row) >= bottom || std::max(column, own_column) >= right) continue;
+            const float *above = nearest.at(Index(row) - asked.low, Index(column)), *below = above + nearest.strides[0];
+            if (std::max(std::max(above[0], above[1]), std::max(below[0], below[1])) > f + asked.margin) continue;
             const auto colour = depths.reference[y][x];
-            float at_farther = 0, at_own = 0, number = 0;
-            for (const View &view : others) {
-                const double row = double(y) - f * view.down, column = double(x) - f * view.across;
-                const double own_row = double(y) - d * view.down, own_column = double(x) - d * view.across;
-                if (std::min(row, own_row) < 0 || std::min(column, own_column) < 0) continue;
-                if (std::max(row, own_row) >= bottom || std::max(column, own_column) >= right) continue;
-                const float *above = view.nearest.at(Index(row) - asked.low, Index(column)), *below = above + view.nearest.strides[0];
-                if (std::max(std::max(above[0], above[1]), std::max(below[0], below[1])) > f + asked.margin) continue;
-                at_farther = float(at_farther + squared_residual(view.pixels, unit, row, column, colour));
-                at_own = float(at_own + squared_residual(view.pixels, unit, own_row, own_column, colour));
-                ++number;
-            }
-            sums(0, y, x) = at_farther;
-            sums(1, y, x) = at_own;
-            sums(2, y, x) = number;
+            sums(0, y, x) = float(sums(0, y, x) + squared_residual(view, unit, row, column, colour));
+            sums(1, y, x) = float(sums(1, y, x) + squared_residual(view, unit, own_row, own_column, colour));
+            ++sums(2, y, x);
         }
+    };
+    parallel_for(begin, end, [&](Index y) {
+        for (Index view = 0; view < asked.others.shape[0] * S; ++view)
+            if (const Index t = view / S, s = view % S; asked.others(t, s))
+                std::visit([&](const auto &some) { add_view(some[t][s], t, s, y); }, views);
     });
 }
-
-#define INSTANTIATE(Colour) \
-    template void compare_depths(Strided<const Colour, 5>, float, const TwoDepths &, const AskedViews &, Index, Index, Array<float, 3>);
-INSTANTIATE(std::uint8_t)
-INSTANTIATE(std::uint16_t)
-INSTANTIATE(float)
-#undef INSTANTIATE
 
 }  // namespace sepi

@@ -3,7 +3,7 @@
 
 #include <tuple>
 
-#include "kernels/array.hpp"
+#include "pixels.hpp"
 
 namespace sepi {
 
@@ -35,8 +35,7 @@ struct AskedViews {
 };
 
 // Squared residuals of rows begin..end of views (T, S, H, W, 3), which unit makes span 0..1, where nothing hides the farther
-// depth: sums (3, H, W) of those at the farther depth, at the other one, and of how many views they are.
-template <class Colour>
-void compare_depths(Strided<const Colour, 5> views, float unit, const TwoDepths &depths, const AskedViews &asked, Index begin, Index end, Array<float, 3> sums);
+// depth: added to sums (3, H, W) are those at the farther depth, at the other one, and of how many views they are.
+void compare_depths(const Views &views, float unit, const TwoDepths &depths, const AskedViews &asked, Index begin, Index end, Array<float, 3> sums);
 
 }  // namespace sepi

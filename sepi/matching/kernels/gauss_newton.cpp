@@ -4,10 +4,6 @@
 // of the steps of an 8-bit picture. All else is done for eight pixels at once.
 #include "gauss_newton.hpp"
 
-#include <array>
-
-#include "kernels/lanes.hpp"
-#include "kernels/parallel.hpp"
 #include "splines.hpp"
 
 namespace sepi {
@@ -33,22 +29,15 @@ struct Samples {
 };
 
 // Whole weights, of sum ONE, of the four coefficients round a position, by how far it is beyond the second.
-struct CoefficientWeights {
-    Int8 before, left, right, after;
-
-    explicit CoefficientWeights(Float8 f) {
-        constexpr float ALL = ONE, THIRDS = float(2.0 / 3);
-        const Float8 g = 1.0f - f;
-        before = truncated(g * g * g * (ALL / 6) + 0.5f);
-        after = truncated(f * f * f * (ALL / 6) + 0.5f);
-        left = truncated((THIRDS - f * f * (1.0f - f * 0.5f)) * ALL + 0.5f);
-        right = truncated((THIRDS - g * g * (1.0f - g * 0.5f)) * ALL + 0.5f);
-        // what rounding leaves belongs to the larger, so that a mirrored picture is sampled alike
-        const Int8 rest = ONE - before - left - right - after, nearer = left >= right;
-        left += rest & nearer;
-        right += rest & ~nearer;
-    }
-};
+std::array<Int8, 4> coefficient_weights(Float8 f) {
+    constexpr float ALL = ONE, THIRDS = float(2.0 / 3);
+    const Float8 g = 1.0f - f;
+    const Int8 before = truncated(g * g * g * (ALL / 6) + 0.5f), after = truncated(f * f * f * (ALL / 6) + 0.5f);
+    const Int8 left = truncated((THIRDS - f * f * (1.0f - f * 0.5f)) * ALL + 0.5f), right = truncated((THIRDS - g * g * (1.0f - g * 0.5f)) * ALL + 0.5f);
+    // what rounding leaves belongs to the larger, so that a mirrored picture is sampled alike
+    const Int8 rest = ONE - before - left - right - after, nearer = left >= right;
+    return {before, left + (rest & nearer), right + (rest & ~nearer), after};
+}
 
 // Rows of four numbers in either half become columns.
 Four transposed_halves(const Four &rows) {
@@ -78,13 +67,9 @@ struct View {
         const Int8 top = truncated(y), left = truncated(x);
         store(pixels.nearest, (truncated(y + 0.5f) - low_) * width_ + truncated(x + 0.5f));
         store(pixels.coefficients, (top - low_) * pitch_ + left * 4);
-        const CoefficientWeights rows(y - __builtin_convertvector(top, Float8)), columns(x - __builtin_convertvector(left, Float8));
-        store(pixels.weights[0], rows.before | rows.before << 16);
-        store(pixels.weights[1], rows.left | rows.left << 16);
-        store(pixels.weights[2], rows.right | rows.right << 16);
-        store(pixels.weights[3], rows.after | rows.after << 16);
-        store(pixels.weights[4], columns.before | columns.left << 16);
-        store(pixels.weights[5], columns.right | columns.after << 16);
+        const auto rows = coefficient_weights(y - __builtin_convertvector(top, Float8)), columns = coefficient_weights(x - __builtin_convertvector(left, Float8));
+        for (Index n = 0; n < 4; ++n) store(pixels.weights[n], rows[n] | rows[n] << 16);
+        for (Index n = 0; n < 2; ++n) store(pixels.weights[4 + n], columns[2 * n] | columns[2 * n + 1] << 16);
         // what sampling asks for comes while others are found
         __builtin_prefetch(nearest_ + pixels.nearest[0]);
         for (Index n = 0; n < 4; ++n) __builtin_prefetch(coefficients_ + pixels.coefficients[0] + n * pitch_);
@@ -139,6 +124,17 @@ Four load_channels(Array<const float, 3> image, Index y, Index x, Index count) {
     return {load(channels[0]), load(channels[1]), load(channels[2]), load(channels[3])};
 }
 
+// By how much samples differ from what they are compared with, and the square of that of the colours.
+struct Residual {
+    Four r;
+    Float8 squared;
+
+    Residual(const Samples &samples, const Four &own) {
+        for (Index c = 0; c < 4; ++c) r[c] = samples.channels[c] - own[c];
+        squared = r[0] * r[0] + r[1] * r[1] + r[2] * r[2];
+    }
+};
+
 // Of each eight pixels of the rows first..last: begin them, add what each view that sees one of them shows, and write what
 // comes of it, at their row, column and number.
 template <class Sums, class Begin, class Add, class Write>
@@ -170,65 +166,13 @@ void over_views(const SplineViews &views, const Seeing &seeing, Array<const floa
     });
 }
 
-struct Mean : Pixels {
-    Four channels;           // times their weights
-    Float8 colours, detail;  // weights
-};
-
-// What a view adds for a pixel: slope and curvature, the colours' squared residual, and weights.
-struct Terms {
-    Float8 slope, curve, detail_slope, detail_curve, residual2, weight, detail_weight;
-};
-
-struct Equations : Pixels {
-    Four down, across;  // derivatives of what pixels are compared with
-    Float8 slope, curve, detail_slope, detail_curve;
-
-    void begin(const MeanView &image, Index y, Index x, Index count) {
-        own = load_channels(image.mean, y, x, count);
-        down = load_channels(image.down, y, x, count);
-        across = load_channels(image.across, y, x, count);
-    }
-
-    Terms add(const View &view, const Samples &samples, const SplineViews &views) {
-        Four r, g;
-        for (Index c = 0; c < 4; ++c) {
-            r[c] = samples.channels[c] - own[c];
-            g[c] = down[c] * view.down + across[c] * view.across;
-        }
-        const Float8 residual2 = r[0] * r[0] + r[1] * r[1] + r[2] * r[2];
-        const Float8 weight = samples.seen * robust_weight(residual2, views.scales2(0));
-        const Float8 detail_weight = samples.seen * (3.0f * robust_weight(3.0f * r[3] * r[3], views.scales2(1)));
-        const Terms terms{weight * (r[0] * g[0] + r[1] * g[1] + r[2] * g[2]), weight * (g[0] * g[0] + g[1] * g[1] + g[2] * g[2]),
-                          detail_weight * r[3] * g[3], detail_weight * g[3] * g[3], residual2, weight, detail_weight};
-        slope += terms.slope;
-        curve += terms.curve;
-        detail_slope += terms.detail_slope;
-        detail_curve += terms.detail_curve;
-        return terms;
-    }
-};
-
-struct Evidence : Equations {
-    std::array<std::array<Float8, 2>, 4> halves;
-    Four rest;
-};
-
-// Of colours and detail together, by their shares.
-struct Both {
-    Float8 slope, curve;
-
-    template <class Parts>
-    Both(const Parts &parts, const SplineViews &views) {
-        const float colour = views.shares(0) / views.scales2(0), detail = views.shares(1) / views.scales2(1);
-        slope = colour * parts.slope + detail * parts.detail_slope;
-        curve = colour * parts.curve + detail * parts.detail_curve;
-    }
-};
-
 }  // namespace
 
 void mean_of_views(const SplineViews &views, const Seeing &seeing, Array<const float, 2> disparity, Index begin, Index end, Array<float, 3> out) {
+    struct Mean : Pixels {
+        Four channels;           // times their weights
+        Float8 colours, detail;  // weights
+    };
     over_views<Mean>(
         views, seeing, disparity, begin, end,
         [&](Mean &sums, Index y, Index x, Index count) {
@@ -237,9 +181,8 @@ void mean_of_views(const SplineViews &views, const Seeing &seeing, Array<const f
             sums.colours = sums.detail = spread(1);
         },
         [&](Mean &sums, const View &, const Samples &samples) {
-            Four r;
-            for (Index c = 0; c < 4; ++c) r[c] = samples.channels[c] - sums.own[c];
-            const Float8 weight = samples.seen * robust_weight(r[0] * r[0] + r[1] * r[1] + r[2] * r[2], views.scales2(0));
+            const auto [r, squared] = Residual(samples, sums.own);
+            const Float8 weight = samples.seen * robust_weight(squared, views.scales2(0));
             const Float8 detail_weight = samples.seen * robust_weight(3.0f * (r[3] * r[3]), views.scales2(1));
             for (Index c = 0; c < 4; ++c) sums.channels[c] += (c < 3 ? weight : detail_weight) * samples.channels[c];
             sums.colours += weight;
@@ -251,43 +194,53 @@ void mean_of_views(const SplineViews &views, const Seeing &seeing, Array<const f
         });
 }
 
-void normal_equations(const SplineViews &views, const Seeing &seeing, Array<const float, 2> disparity, const MeanView &image, Index begin, Index end,
-                      Array<float, 2> gradient, Array<float, 2> curvature) {
+template <bool EVIDENCE>
+static void add_equations(const SplineViews &views, const Seeing &seeing, Array<const float, 2> disparity, const MeanView &image, Index begin, Index end,
+                          Array<float, 3> out) {
+    // slope and curvature, of colours and of detail; and what else is asked
+    struct Equations : Pixels {
+        Four down, across;  // derivatives of what pixels are compared with
+        Four sums;
+        std::array<Float8, EVIDENCE ? 12 : 0> evidence;
+    };
+    const float colours = views.shares(0) / views.scales2(0), detail = views.shares(1) / views.scales2(1);
+    const auto both = [=](const Four &of) { return std::array{colours * of[0] + detail * of[2], colours * of[1] + detail * of[3]}; };
     over_views<Equations>(
-        views, seeing, disparity, begin, end, [&](Equations &sums, Index y, Index x, Index count) { sums.begin(image, y, x, count); },
-        [&](Equations &sums, const View &view, const Samples &samples) { sums.add(view, samples, views); },
-        [&](const Equations &sums, Index y, Index x, Index count) {
-            const Both both(sums, views);
-            store_first(gradient.at(y, x), both.slope, count);
-            store_first(curvature.at(y, x), both.curve, count);
+        views, seeing, disparity, begin, end,
+        [&](Equations &pixels, Index y, Index x, Index count) {
+            pixels.own = load_channels(image.mean, y, x, count);
+            pixels.down = load_channels(image.down, y, x, count);
+            pixels.across = load_channels(image.across, y, x, count);
+        },
+        [&](Equations &pixels, const View &view, const Samples &samples) {
+            const auto [r, squared] = Residual(samples, pixels.own);
+            Four g;
+            for (Index c = 0; c < 4; ++c) g[c] = pixels.down[c] * view.down + pixels.across[c] * view.across;
+            const Float8 weight = samples.seen * robust_weight(squared, views.scales2(0));
+            const Float8 detail_weight = samples.seen * (3.0f * robust_weight(3.0f * r[3] * r[3], views.scales2(1)));
+            const Four terms{weight * (r[0] * g[0] + r[1] * g[1] + r[2] * g[2]), weight * (g[0] * g[0] + g[1] * g[1] + g[2] * g[2]),
+                             detail_weight * r[3] * g[3], detail_weight * g[3] * g[3]};
+            for (Index k = 0; k < 4; ++k) pixels.sums[k] += terms[k];
+            if constexpr (EVIDENCE) {
+                const auto of_view = both(terms);
+                const bool belongs[] = {view.across < 0, view.across > 0, view.down < 0, view.down > 0};
+                const Four rest{weight * squared, weight, detail_weight / 3.0f, samples.seen};
+                for (Index k = 0; k < 4; ++k) {
+                    for (Index i = 0; belongs[k] && i < 2; ++i) pixels.evidence[2 * k + i] += of_view[i];
+                    pixels.evidence[8 + k] += rest[k];
+                }
+            }
+        },
+        [&](const Equations &pixels, Index y, Index x, Index count) {
+            const auto sums = both(pixels.sums);
+            for (Index k = 0; k < 2; ++k) store_first(out.at(k, y, x), sums[k], count);
+            for (std::size_t k = 0; k < pixels.evidence.size(); ++k) store_first(out.at(2 + k, y, x), pixels.evidence[k], count);
         });
 }
 
-void equations_and_evidence(const SplineViews &views, const Seeing &seeing, Array<const float, 2> disparity, const MeanView &image, Index begin, Index end,
-                            Array<float, 2> gradient, Array<float, 2> curvature, Array<float, 4> halves, Array<float, 3> rest) {
-    over_views<Evidence>(
-        views, seeing, disparity, begin, end, [&](Evidence &sums, Index y, Index x, Index count) { sums.begin(image, y, x, count); },
-        [&](Evidence &sums, const View &view, const Samples &samples) {
-            const Terms terms = sums.add(view, samples, views);
-            const Four rest_of_view{terms.weight * terms.residual2, terms.weight, terms.detail_weight / 3.0f, samples.seen};
-            const Both both(terms, views);
-            const bool belongs[] = {view.across < 0, view.across > 0, view.down < 0, view.down > 0};
-            for (Index k = 0; k < 4; ++k) {
-                sums.rest[k] += rest_of_view[k];
-                if (!belongs[k]) continue;
-                sums.halves[k][0] += both.slope;
-                sums.halves[k][1] += both.curve;
-            }
-        },
-        [&](const Evidence &sums, Index y, Index x, Index count) {
-            const Both both(sums, views);
-            store_first(gradient.at(y, x), both.slope, count);
-            store_first(curvature.at(y, x), both.curve, count);
-            for (Index k = 0; k < 4; ++k) {
-                store_first(rest.at(k, y, x), sums.rest[k], count);
-                for (Index i = 0; i < 2; ++i) store_first(halves.at(k, i, y, x), sums.halves[k][i], count);
-            }
-        });
+void equations_of_views(const SplineViews &views, const Seeing &seeing, Array<const float, 2> disparity, const MeanView &image, Index begin, Index end,
+                        Array<float, 3> out) {
+    (out.shape[0] > 2 ? add_equations<true> : add_equations<false>)(views, seeing, disparity, image, begin, end, out);
 }
 
 }  // namespace sepi

@@ -41,13 +41,10 @@ struct MeanView {
 // Mean of the views that see each pixel, those unlike the reference view counting less, into out (H, W, 4).
 void mean_of_views(const SplineViews &views, const Seeing &seeing, Array<const float, 2> disparity, Index begin, Index end, Array<float, 3> out);
 
-// Sums of each pixel, into gradient and curvature (H, W): their ratio is the update towards less cost.
-void normal_equations(const SplineViews &views, const Seeing &seeing, Array<const float, 2> disparity, const MeanView &image, Index begin, Index end,
-                      Array<float, 2> gradient, Array<float, 2> curvature);
-
-// normal_equations, and what else the views say: gradient and curvature by the views to the left, to the right, above and
-// below alone, into halves (4, 2, H, W), and misfit, agreement, detail's agreement and number of views, into rest (4, H, W).
-void equations_and_evidence(const SplineViews &views, const Seeing &seeing, Array<const float, 2> disparity, const MeanView &image, Index begin, Index end,
-                            Array<float, 2> gradient, Array<float, 2> curvature, Array<float, 4> halves, Array<float, 3> rest);
+// Sums of each pixel, into out (2 or 14, H, W): gradient and curvature, whose ratio is the update towards less cost. And what
+// else the views say, if it is asked: the same by the views to the left, to the right, above and below alone, misfit,
+// agreement, detail's agreement and number of views.
+void equations_of_views(const SplineViews &views, const Seeing &seeing, Array<const float, 2> disparity, const MeanView &image, Index begin, Index end,
+                        Array<float, 3> out);
 
 }  // namespace sepi

@@ -1,27 +1,84 @@
-// Rows of pixels.
+// Views as pictures have them, and what kernels do alike with their rows.
 #pragma once
 
+#include <functional>
+#include <variant>
+
 #include "kernels/lanes.hpp"
+#include "kernels/parallel.hpp"
+#include "kernels/sampling.hpp"
 
 namespace sepi {
 
-// Each channel of a row (W, C) by itself into out (C, W or more), as what scale makes of numbers and of vectors of float.
-template <class Colour, class Scale, class Number = float>
-void split_channels(Array<const Colour, 2> row, Array<Number, 2> out, Scale scale) {
-    const Index W = row.shape[0], C = row.shape[1];
-    Index x = 0;
-    if (C == 3 && row.strides[0] == 3 && row.strides[1] == 1) {
-        for (; x <= W - LANES; x += LANES) {
-            const auto [red, green, blue] = load_interleaved(row.at(x));
-            store(out.at(0, x), scale(red));
-            store(out.at(1, x), scale(green));
-            store(out.at(2, x), scale(blue));
+// Views (T, S, H, W, C), of any of the types that pictures have.
+using Views = std::variant<Strided<const std::uint8_t, 5>, Strided<const std::uint16_t, 5>, Strided<const float, 5>>;
+
+inline const Index *shape_of(const Views &views) {
+    return std::visit([](const auto &some) { return some.shape; }, views);
+}
+
+// Calls body(t, s, first, number) for stretches of at most so many of the n rows of each view of a grid.
+template <class Body>
+void over_stretches(const Index (&grid)[2], Index n, Index rows, const Body &body) {
+    const Index S = grid[1], pieces = (n + rows - 1) / rows;
+    parallel_for(0, grid[0] * S * pieces, [&](Index task) {
+        const Index view = task / pieces, first = task % pieces * rows;
+        body(view / S, view % S, first, std::min(rows, n - first));
+    });
+}
+
+// Rows from first on of a view (H, W, C), which goes on mirrored: each channel by itself into out (C or more, n, W or more),
+// as what scale makes of numbers and of vectors of float.
+template <class Colour, class Number, class Scale = std::identity>
+void load_rows(Array<const Colour, 3> view, Index first, Array<Number, 3> out, Scale scale = {}) {
+    const Index W = view.shape[1], C = std::min(view.shape[2], out.shape[0]);
+    for (Index i = 0; i < out.shape[1]; ++i) {
+        const auto row = view[mirrored(first + i, view.shape[0])];
+        Index x = 0;
+        for (; x <= W - LANES && row.strides[0] == 1; x += LANES)
+            for (Index c = 0; c < C; ++c) store(out.at(c, i) + x, scale(load(row.at(0, c) + x)));
+        for (; x <= W - LANES && row.strides[0] == 3 && row.strides[1] == 1; x += LANES) {
+            const auto channels = load_interleaved(row.data + 3 * x);
+            for (Index c = 0; c < 3; ++c) store(out.at(c, i) + x, scale(channels[c]));
         }
+        for (Index c = 0; c < C; ++c)
+            for (Index rest = x; rest < W; ++rest) out(c, i, rest) = scale(float(row(rest, c)));
     }
-    if (C == 1 && row.strides[0] == 1)
-        for (; x <= W - LANES; x += LANES) store(out.at(0, x), scale(load(row.at(x))));
-    for (Index c = 0; c < C; ++c)
-        for (Index i = x; i < W; ++i) out(c, i) = scale(float(row(i, c)));
+}
+
+template <class Number, class Scale = std::identity>
+void load_rows(const Views &views, Index t, Index s, Index first, Array<Number, 3> out, Scale scale = {}) {
+    std::visit([&](const auto &some) { load_rows(some[t][s], first, out, scale); }, views);
+}
+
+// C channels of n pixels, from lines that begin stride apart, side by side and STEP from pixel to pixel, as convert makes of them.
+template <int C, int STEP = C, class Number, class Convert>
+void store_interleaved(const float *lines, Index stride, Index n, Number *__restrict out, Convert convert) {
+    for (Index x = 0; x < n; ++x)
+        for (Index c = 0; c < C; ++c) out[STEP * x + c] = convert(lines[c * stride + x]);
+}
+
+// Have a line of n go on mirrored at its ends, by so many numbers.
+inline void mirror_ends(float *line, Index n, Index beyond) {
+    for (Index x = 1; x <= beyond; ++x) {
+        line[-x] = line[mirrored(-x, n)];
+        line[n - 1 + x] = line[mirrored(n - 1 + x, n)];
+    }
+}
+
+// Sums of n lines of products, into out: add(total, k, x) adds number k of eight of them. Four vectors at a time: each waits
+// for its last product, and the others need not. Lines have LANES numbers behind them.
+template <class Add>
+void sum_products(Index n, Index products, float *out, Add add) {
+    const auto block = [&]<int SIZE>(Index x, std::integral_constant<int, SIZE>) {
+        Float8 totals[SIZE] = {};
+        for (Index k = 0; k < products; ++k)
+            for (int i = 0; i < SIZE; ++i) totals[i] = add(totals[i], k, x + i * LANES);
+        for (int i = 0; i < SIZE; ++i) store(out + x + i * LANES, totals[i]);
+    };
+    Index x = 0;
+    for (; x <= n - 4 * LANES; x += 4 * LANES) block(x, std::integral_constant<int, 4>());
+    for (; x < n; x += LANES) block(x, std::integral_constant<int, 1>());
 }
 
 }  // namespace sepi

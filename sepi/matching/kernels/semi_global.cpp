@@ -1,12 +1,7 @@
 #include "semi_global.hpp"
 
-#include <cmath>
-#include <utility>
-
 #include "kernels/exponential.hpp"
-#include "kernels/lanes.hpp"
-#include "kernels/parallel.hpp"
-#include "kernels/sampling.hpp"
+#include "pixels.hpp"
 
 namespace sepi {
 namespace {
@@ -40,29 +35,6 @@ void window_weights(Array<const float, 3> guide, Index y, Index radius, float va
     }
 }
 
-// Weighted sums over windows, of BLOCK vectors of pixels from x on: each waits for its last product, and the others need
-// not. The rows of the windows begin radius columns left of the picture.
-template <int BLOCK, class Radius>
-void window_sum(const float *const *rows, Array<const float, 2> weights, Radius radius, Index x, float *out) {
-    const Index size = 2 * radius + 1;
-    Float8 totals[BLOCK] = {};
-    for (Index i = 0; i < size; ++i) {
-        for (Index j = 0; j < size; ++j) {
-            const float *weight = weights.at(i * size + j, x), *row = rows[i] + x + j;
-            for (int n = 0; n < BLOCK; ++n) totals[n] = fma(load(weight + n * LANES), load(row + n * LANES), totals[n]);
-        }
-    }
-    for (int n = 0; n < BLOCK; ++n) store(out + x + n * LANES, totals[n]);
-}
-
-template <class Radius>
-void window_sums(const float *const *rows, Array<const float, 2> weights, Radius radius, float *out, Index W) {
-    constexpr int BLOCK = 4;
-    Index x = 0;
-    for (; x <= W - BLOCK * LANES; x += BLOCK * LANES) window_sum<BLOCK>(rows, weights, radius, x, out);
-    for (; x < W; x += LANES) window_sum<1>(rows, weights, radius, x, out);
-}
-
 // Rows of eight candidates (LANES, W) become those of a pixel each, into out (W, K'), of which the first are meant.
 void transpose_candidates(Array<const float, 2> rows, Index W, Array<float, 2> out) {
     Index x = 0;
@@ -76,85 +48,70 @@ void transpose_candidates(Array<const float, 2> rows, Index W, Array<float, 2> o
         for (Index k = 0; k < LANES; ++k) out(x, k) = rows(k, x);
 }
 
-struct Penalties {
+// What costs are smoothed with, into out (H, W, K').
+struct Smoothing {
+    Array<const float, 3> cost, guide;
     float small, large, weakening;
+    Array<float, 3> out;
 
-    // Of a change of more than one candidate between two pixels: weaker where the colours change.
-    float large_between(const float *here, const float *there) const {
-        float change = 0;
-        for (int c = 0; c < 3; ++c) change += std::abs(here[c] - there[c]);
-        return std::max(small * 1.5f, large / (1.0f + change * weakening));
+    // One pixel further along a path, from (y - dy, x - dx): path[1:-1] = cost + best - least, which is added to out; the
+    // least of it. The best of: before of the same candidate, of one beside it plus small, and the least of all plus what is
+    // left of large where colours change. before and path have an unreachable candidate at either end.
+    float next_pixel(Index y, Index x, Index dy, Index dx, float *before, float least, float *path) const {
+        const Index K = cost.shape[2], row = y - dy, column = x - dx;
+        float penalty = 0;
+        if (row < 0 || row >= cost.shape[0] || column < 0 || column >= cost.shape[1]) {
+            // before the first pixel all candidates cost nothing: its costs are its own
+            std::fill_n(before + 1, K, 0.0f);
+            least = 0;
+        } else {
+            float change = 0;
+            for (Index c = 0; c < 3; ++c) change += std::abs(guide(c, y, x) - guide(c, row, column));
+            penalty = std::max(small * 1.5f, large / (1.0f + change * weakening));
+        }
+        const Float8 whole = spread(least), jump = spread(least + penalty), step = spread(small);
+        const float *own = cost.at(y, x);
+        float *sum = out.at(y, x);
+        Float8 lowest = spread(UNREACHABLE);
+        for (Index k = 0; k < K; k += LANES) {
+            const Float8 best = smaller(smaller(load(before + k + 1), jump), smaller(load(before + k), load(before + k + 2)) + step);
+            const Float8 value = load(own + k) + best - whole;
+            store(path + k + 1, value);
+            store(sum + k, load(sum + k) + value);
+            lowest = smaller(value, lowest);
+        }
+        return least_of(lowest);
     }
-};
 
-// One pixel further along a path: path[1:-1] = cost + best - least, which is added to out (K'); the least of it.
-// The best of: before of the same candidate, of one beside it plus small, and the least of all plus large. before and
-// path have an unreachable candidate at either end.
-float next_pixel(const float *before, float least, const float *cost, float small, float large, float *path, float *out, Index K) {
-    const Float8 whole = spread(least), jump = spread(least + large), step = spread(small);
-    Float8 lowest = spread(UNREACHABLE);
-    for (Index k = 0; k < K; k += LANES) {
-        const Float8 best = smaller(smaller(load(before + k + 1), jump), smaller(load(before + k), load(before + k + 2)) + step);
-        const Float8 value = load(cost + k) + best - whole;
-        store(path + k + 1, value);
-        store(out + k, load(out + k) + value);
-        lowest = smaller(value, lowest);
-    }
-    return least_of(lowest);
-}
-
-// Add the smoothed costs of the path along row y.
-void along_row(Array<const float, 3> cost, Array<const float, 3> guide, Index y, Index dx, const Penalties &penalties, Array<float, 3> out) {
-    const Index W = cost.shape[1], K = cost.shape[2];
-    const auto both = Scratch<float, 2>(2, K + 2).filled(UNREACHABLE);
-    float *before = both.array().at(0), *path = both.array().at(1), least = 0;
-    // before the first pixel all candidates cost nothing: its costs are its own
-    std::fill_n(before + 1, K, 0.0f);
-    for (Index i = 0; i < W; ++i) {
-        const Index x = dx > 0 ? i : W - 1 - i;
-        const float large = i ? penalties.large_between(guide.at(y, x), guide.at(y, x - dx)) : 0.0f;
-        least = next_pixel(before, least, cost.at(y, x), penalties.small, large, path, out.at(y, x), K);
-        std::swap(before, path);
-    }
-}
-
-// Add the smoothed costs of paths from row to row in the rows begin..end: those that began in columns from first on.
-// One that leaves the picture at a side goes on, as a new one, at the other: all have a pixel in each row.
-// paths (2, n, K' + 2) are their costs in the row before and here, in turn, least (n) the least of the row before.
-void along_lines(Array<float, 3> paths, float *least, Index first, Array<const float, 3> cost, Array<const float, 3> guide, Index begin, Index end, Index dy,
-                 Index dx, const Penalties &penalties, Array<float, 3> out) {
-    const Index H = cost.shape[0], W = cost.shape[1], K = cost.shape[2];
-    for (Index i = begin; i < end; ++i) {
-        const Index y = dy > 0 ? i : H - 1 - i;
-        for (Index line = 0; line < std::min(PATHS_AT_ONCE, W - first); ++line) {
-            float *before = paths.at((i + 1) % 2, line), *path = paths.at(i % 2, line), large = 0;
-            const Index x = ((first + line + dx * i) % W + W) % W;
-            if (i == 0 || x - dx < 0 || x - dx >= W) {
-                std::fill_n(before + 1, K, 0.0f);
-                least[line] = 0;
-            } else {
-                large = penalties.large_between(guide.at(y, x), guide.at(y - dy, x - dx));
-            }
-            least[line] = next_pixel(before, least[line], cost.at(y, x), penalties.small, large, path, out.at(y, x), K);
+    // The paths along row y.
+    void along_row(Index y) const {
+        const Index W = cost.shape[1];
+        const auto paths = Scratch<float, 2>(2, cost.shape[2] + 2).filled(UNREACHABLE);
+        for (const Index dx : {1, -1}) {
+            float least = 0;
+            for (Index i = 0; i < W; ++i) least = next_pixel(y, dx > 0 ? i : W - 1 - i, 0, dx, paths.array().at((i + 1) % 2), least, paths.array().at(i % 2));
         }
     }
-}
+
+    // Paths from row to row in the rows begin..end: those that began in columns from first on.
+    // One that leaves the picture at a side goes on, as a new one, at the other: all have a pixel in each row.
+    // paths (2, n, K' + 2) are their costs in the row before and here, in turn, least (n) the least of the row before.
+    void along_lines(Array<float, 3> paths, float *least, Index first, Index begin, Index end, Index dy, Index dx) const {
+        const Index H = cost.shape[0], W = cost.shape[1];
+        for (Index i = begin; i < end; ++i) {
+            for (Index line = 0; line < std::min(PATHS_AT_ONCE, W - first); ++line) {
+                const Index y = dy > 0 ? i : H - 1 - i, x = ((first + line + dx * i) % W + W) % W;
+                least[line] = next_pixel(y, x, dy, dx, paths.at((i + 1) % 2, line), least[line], paths.at(i % 2, line));
+            }
+        }
+    }
+};
 
 // Number of the least cost of K', of the first of equal ones.
 Index first_least(const float *costs, Index K) {
     Float8 least = load(costs);
-    Int8 begins{};  // of the vectors that each lane is from
-    for (Index k = LANES; k < K; k += LANES) {
-        const Float8 others = load(costs + k);
-        const Int8 less = others < least;
-        least = less ? others : least;
-        begins = less ? Int8{} + std::int32_t(k) : begins;
-    }
-    const Int8 numbers = begins + Int8{0, 1, 2, 3, 4, 5, 6, 7};
-    int first = 0;
-    for (int i = 1; i < LANES; ++i)
-        if (least[i] < least[first] || (least[i] == least[first] && numbers[i] < numbers[first])) first = i;
-    return numbers[first];
+    for (Index k = LANES; k < K; k += LANES) least = smaller(load(costs + k), least);
+    return std::find(costs, costs + K - 1, least_of(least)) - costs;
 }
 
 // By how much the least cost of other candidates exceeds that of those that belong to the winner's minimum; 0 where
@@ -176,36 +133,32 @@ float margin_of(const float *costs, Index K, const float *disparities, float fou
 
 void aggregate(Array<const float, 3> cost, Array<const float, 3> guide, Index radius, float variance, Array<float, 3> out) {
     const Index K = cost.shape[0], H = cost.shape[1], W = cost.shape[2], size = 2 * radius + 1;
-    const Scratch<float, 3> by_channel(3, H, W);
-    for (Index c = 0; c < 3; ++c)
-        for (Index y = 0; y < H; ++y)
-            for (Index x = 0; x < W; ++x) by_channel.array()(c, y, x) = guide(y, x, c);
     parallel_for(0, H, [&](Index y) {
         const Scratch<float, 2> weights(size * size, W + LANES);
         const Scratch<float, 1> sums(W);
-        window_weights(by_channel.array(), y, radius, variance, weights.array(), sums.array().data);
+        window_weights(guide, y, radius, variance, weights.array(), sums.array().data);
         // what lies beyond the picture weighs nothing: it may be other rows, but for those with no memory beside them
         const auto at_ends = zeros<float, 2>(size, W + 2 * radius + LANES);
-        const Scratch<const float *, 1> rows(size);
+        const Scratch<const float *, 1> places(size * size);
         const float *first = cost.data, *last = first + K * H * W;
         // a few candidates at a time: each pixel's are written together
         const Scratch<float, 2> total(LANES, W + LANES);
         for (Index begin = 0; begin < K; begin += LANES) {
-            for (Index k = begin; k < std::min(K, begin + LANES); ++k) {
+            for (Index k = begin; k < begin + LANES; ++k) {
+                float *sum = total.array().at(k - begin);
+                if (k >= K) {
+                    std::fill_n(sum, W, UNREACHABLE);
+                    continue;
+                }
                 for (Index i = 0; i < size; ++i) {
                     const float *row = cost.at(k, clamped(y + i - radius, H));
                     if (row - first < radius || last - row < W + radius + LANES) row = std::copy_n(row, W, at_ends.array().at(i, radius)) - W;
-                    rows.array()(i) = row - radius;
+                    for (Index j = 0; j < size; ++j) places.array()(i * size + j) = row + j - radius;
                 }
-                float *place = total.array().at(k - begin);
-                if (radius == 2) {
-                    // how many is known when this is compiled, and all of it becomes one loop
-                    window_sums(rows.array().data, weights.array(), std::integral_constant<Index, 2>(), place, W);
-                } else {
-                    window_sums(rows.array().data, weights.array(), radius, place, W);
-                }
+                sum_products(W, size * size, sum, [weight = weights.array().data, pitch = W + LANES, place = places.array().data](Float8 total, Index n, Index x) {
+                    return fma(load(weight + n * pitch + x), load(place[n] + x), total);
+                });
             }
-            for (Index k = K - begin; k < LANES; ++k) std::fill_n(total.array().at(k), W, UNREACHABLE);
             Array<float, 2> pixels = out[y];
             pixels.data += begin;
             transpose_candidates(total.array(), W, pixels);
@@ -215,26 +168,22 @@ void aggregate(Array<const float, 3> cost, Array<const float, 3> guide, Index ra
 
 void semi_global(Array<const float, 3> cost, Array<const float, 3> guide, float small, float large, float weakening, Index band, Array<float, 3> out) {
     const Index H = cost.shape[0], W = cost.shape[1], K = cost.shape[2];
-    const Penalties penalties{small, large, weakening};
+    const Smoothing smoothing{cost, guide, small, large, weakening, out};
     const Index pieces = (W + PATHS_AT_ONCE - 1) / PATHS_AT_ONCE;
     for (const Index dy : {1, -1}) {
         const auto paths = Scratch<float, 4>(3 * pieces, 2, PATHS_AT_ONCE, K + 2).filled(UNREACHABLE);
         const auto least = zeros<float, 2>(3 * pieces, PATHS_AT_ONCE);
         for (Index begin = 0; begin < H; begin += band) {
             const Index end = std::min(H, begin + band);
-            if (dy > 0) {
-                parallel_for(begin, end, [&](Index y) {
-                    std::fill_n(out.at(y), W * K, 0.0f);
-                    along_row(cost, guide, y, 1, penalties, out);
-                    along_row(cost, guide, y, -1, penalties, out);
-                });
-            }
-            for (const Index direction : {0, 1, 2}) {
-                const Index dx = direction == 2 ? -1 : direction;
+            parallel_for(begin, dy > 0 ? end : begin, [&](Index y) {
+                std::fill_n(out.at(y), W * K, 0.0f);
+                smoothing.along_row(y);
+            });
+            for (const Index dx : {0, 1, -1}) {
                 // paths of one direction do not meet
                 parallel_for(0, pieces, [&](Index piece) {
-                    const Index number = direction * pieces + piece;
-                    along_lines(paths.array()[number], least.array().at(number), piece * PATHS_AT_ONCE, cost, guide, begin, end, dy, dx, penalties, out);
+                    const Index number = (dx + 1) * pieces + piece;
+                    smoothing.along_lines(paths.array()[number], least.array().at(number), piece * PATHS_AT_ONCE, begin, end, dy, dx);
                 });
             }
         }

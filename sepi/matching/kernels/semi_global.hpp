@@ -9,10 +9,10 @@ namespace sepi {
 // Paths from row to row that a thread follows together: their costs lie side by side, and fit in its cache.
 constexpr Index PATHS_AT_ONCE = 32;
 
-// Mean over a window with weights exp(-|colour difference|^2 / (2 variance)); cost (K, H, W), guide (H, W, 3), out (H, W, K').
+// Mean over a window with weights exp(-|colour difference|^2 / (2 variance)); cost (K, H, W), guide (3, H, W), out (H, W, K').
 void aggregate(Array<const float, 3> cost, Array<const float, 3> guide, Index radius, float variance, Array<float, 3> out);
 
-// Sum of the smoothed costs along eight paths, into out; cost and out (H, W, K'). All paths of a direction go through
+// Sum of the smoothed costs along eight paths, into out; cost and out (H, W, K'), guide (3, H, W). All paths of a direction go through
 // band rows before any goes on, so that costs and sums come from memory once for the paths down and once for those up.
 void semi_global(Array<const float, 3> cost, Array<const float, 3> guide, float small, float large, float weakening, Index band, Array<float, 3> out);
 

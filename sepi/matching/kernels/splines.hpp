@@ -3,7 +3,7 @@
 // do not depend on rows far away.
 #pragma once
 
-#include "kernels/array.hpp"
+#include "pixels.hpp"
 
 namespace sepi {
 
@@ -22,8 +22,7 @@ void spline_coefficients(Strided<const float, 3> image, Array<float, 3> out);
 // Colours and detail are multiplied with their units first. Rows of detail begin at detail_low, and reach SPLINE_REACH
 // farther than those that are wanted, or to the picture's end; low is the row after the first SPLINE_MARGIN ones of out.
 // of_colours and of_detail (T, S) have the views whose colours, and whose detail, are wanted; what out has of others stays.
-template <class Colour>
-void view_splines(Strided<const Colour, 5> colours, float colour_unit, Array<const std::int16_t, 4> detail, float detail_unit, Index detail_low,
+void view_splines(const Views &views, float colour_unit, Array<const std::int16_t, 4> detail, float detail_unit, Index detail_low,
                   Array<const bool, 2> of_colours, Array<const bool, 2> of_detail, Index low, Array<std::int16_t, 5> out);
 
 }  // namespace sepi
