@@ -12,7 +12,6 @@ namespace nb = nanobind;
 using namespace nb::literals;
 
 void bind_sweeps(nb::module_ &);
-void bind_splines(nb::module_ &);
 void bind_views(nb::module_ &);
 void bind_boundaries(nb::module_ &);
 void bind_regularization(nb::module_ &);
@@ -46,7 +45,7 @@ NB_MODULE(_native, m) {
     m.def("has_x86_64_v3", &has_x86_64_v3, "Whether this processor can use kernels that are built for x86-64-v3.");
     m.def("thread_count", &sepi::thread_count, "Threads of a loop, the caller's among them.");
     m.def("set_thread_count", &sepi::set_thread_count, "count"_a, "Have each loop use so many threads.");
-    for (const auto bind : {bind_sweeps, bind_splines, bind_views, bind_boundaries, bind_regularization, bind_error_bars, bind_image, bind_inspection,
+    for (const auto bind : {bind_sweeps, bind_views, bind_boundaries, bind_regularization, bind_error_bars, bind_image, bind_inspection,
                             bind_scoring, bind_scenes, bind_compared, bind_rendered, bind_applications})
         bind(m);
 

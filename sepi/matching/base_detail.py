@@ -228,8 +228,8 @@ def _make_detail(
     radius = parameters.base_radius
     squared = np.arange(radius + 1) ** 2
     nearness = np.exp(-0.5 * (squared[:, None] + squared) / parameters.base_sigma_space**2)
-    window = (radius, 1 / (64 * edge * edge), nearness.astype(np.float32))
-    kernels.detail_of_views(views, float(unit), wanted, rows.low, window, DETAIL_UNIT, out)
+    window = nearness.astype(np.float32), 1 / (64 * edge * edge)
+    kernels.detail_of_views(views, float(unit), wanted, rows.low, *window, DETAIL_UNIT, out)
 
 
 @dataclass

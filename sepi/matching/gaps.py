@@ -109,7 +109,7 @@ def compared_depths(
     for begin, end, rows in row_bands(light_field, others, float(np.abs(disparity).max()), _BYTES_PER_PIXEL):
         nearest = nearest_surfaces(light_field, other, others, rows)
         asked = (others, light_field.baselines, nearest, rows.low, occlusion_margin)
-        kernels.compare_depths(views, unit, depths, asked, begin, end, sums)
+        kernels.compare_depths(views, unit, *depths, asked, begin, end, sums)
     return sums
 
 

@@ -216,9 +216,8 @@ def occluded_in_any_view(
         if light_field.missing is not None:
             # a view that does not show a place cannot see a pixel there
             nearest[light_field.missing[:, :, rows.low : rows.high]] = EMPTY
-        kernels.occluded_in_any_view(
-            disparity, present, baselines, nearest, rows.low, occlusion_margin, begin, end, occluded
-        )
+        asked = (present, baselines, nearest, rows.low, occlusion_margin)
+        kernels.occluded_in_any_view(disparity, asked, begin, end, occluded)
     return occluded
 
 

@@ -22,7 +22,8 @@ struct Neighbours {
 // Some rows of a view, and the rows above and below that their windows reach.
 class Stretch {
   public:
-    Stretch(const BilateralWindow &window, Index number, Index width) : window_(window), number_(number), width_(width) {}
+    Stretch(Array<const float, 2> nearness, float falloff, Index number, Index width)
+        : nearness_(nearness), falloff_(falloff), number_(number), width_(width) {}
 
     // The channels, and their mean, mirrored at both ends.
     void load_channels(const Views &views, Index t, Index s, Index first, float unit) {
@@ -70,7 +71,7 @@ class Stretch {
     // Weights of the pixels of row y, and of radius pixels beyond its ends, with those dy below and first..last across.
     void weigh(Index y, Index dy, Index first, Index last) {
         const float *const own[] = {row(y, 0), row(y, 1), row(y, 2)}, *const others[] = {row(y + dy, 0), row(y + dy, 1), row(y + dy, 2)};
-        const float *nearness = window_.nearness.at(dy), falloff = window_.falloff;
+        const float *nearness = nearness_.at(dy), falloff = falloff_;
         float *out = pairs();
         for (Index x = -radius_, end = width_ + radius_, step = step_; x < end; x += LANES) {
             const Float8 colours[] = {load(own[0] + x), load(own[1] + x), load(own[2] + x)};
@@ -101,8 +102,9 @@ class Stretch {
         }
     }
 
-    const BilateralWindow &window_;
-    const Index number_, width_, radius_ = window_.radius, step_ = width_ + 2 * (radius_ + LANES);
+    const Array<const float, 2> nearness_;
+    const float falloff_;
+    const Index number_, width_, radius_ = nearness_.shape[0] - 1, step_ = width_ + 2 * (radius_ + LANES);
     // the channels and their mean; weights look at twice the radius beyond the ends
     const Scratch<float, 3> rows_ = zeros<float, 3>(4, number_ + 2 * radius_, width_ + 4 * radius_ + LANES);
     // weights of the pixel dx across, at dx + radius; what comes of them: weighted pixels, and weights
@@ -112,11 +114,11 @@ class Stretch {
 
 }  // namespace
 
-void detail_of_views(const Views &views, float unit, Array<const bool, 2> present, Index low, const BilateralWindow &window, float detail_unit,
+void detail_of_views(const Views &views, float unit, Array<const bool, 2> present, Index low, Array<const float, 2> nearness, float falloff, float detail_unit,
                      Array<std::int16_t, 4> out) {
     over_stretches(present.shape, out.shape[2], ROWS_AT_ONCE, [&](Index t, Index s, Index first, Index number) {
         if (!present(t, s)) return;
-        Stretch stretch(window, number, out.shape[3]);
+        Stretch stretch(nearness, falloff, number, out.shape[3]);
         stretch.load_channels(views, t, s, low + first, unit);
         stretch.filter();
         for (Index y = 0; y < number; ++y) stretch.store_detail(y, detail_unit, out.at(t, s, first + y));

@@ -29,8 +29,7 @@ void bind_sweeps(nb::module_ &kernels) {
     visibility.attr("EMPTY") = sepi::EMPTY;
     visibility.attr("MISSING") = sepi::MISSING;
     visibility.def("z_buffers", &sepi::z_buffers, Unlocked(), "disparity"_a, "present"_a, "baselines"_a, "low"_a, "high"_a, "out"_a);
-    visibility.def("occluded_in_any_view", &sepi::occluded_in_any_view, Unlocked(), "disparity"_a, "present"_a, "baselines"_a, "nearest"_a, "low"_a,
-                   "occlusion_margin"_a, "begin"_a, "end"_a, "out"_a);
+    visibility.def("occluded_in_any_view", &sepi::occluded_in_any_view, Unlocked(), "disparity"_a, "views"_a, "begin"_a, "end"_a, "out"_a);
     visibility.def("sweep_visible_rows", &sepi::sweep_visible_rows, Unlocked(), "views"_a, "visibility"_a, "robust"_a, "candidates"_a, "begin"_a, "end"_a,
                    "cost"_a);
 

@@ -1,5 +1,7 @@
 #include "gaps.hpp"
 
+#include <vector>
+
 namespace sepi {
 namespace {
 
@@ -64,31 +66,32 @@ void farther_alike(Array<const float, 2> disparity, Array<const float, 2> lowest
     });
 }
 
-void compare_depths(const Views &views, float unit, const TwoDepths &depths, const AskedViews &asked, Index begin, Index end, Array<float, 3> sums) {
-    const Index W = depths.disparity.shape[1], S = asked.others.shape[1];
-    const double bottom = double(depths.disparity.shape[0] - 1), right = double(W - 1);
-    const auto add_view = [&](const auto &view, Index t, Index s, Index y) {
-        const double down = asked.baselines(t, s, 0), across = asked.baselines(t, s, 1);
-        const auto nearest = asked.nearest[t][s];
-        for (Index x = 0; x < W; ++x) {
-            const float d = depths.disparity(y, x), f = depths.farther(y, x);
-            if (d == f) continue;
+void compare_depths(const Views &views, float unit, Array<const float, 2> disparity, Array<const float, 2> farther, Strided<const float, 3> reference,
+                    const AskedViews &asked, Index begin, Index end, Array<float, 3> sums) {
+    const Index W = disparity.shape[1];
+    const double bottom = double(disparity.shape[0] - 1), right = double(W - 1);
+    const auto add_view = [&](const auto &view, Array<const float, 2> nearest, double down, double across, Index y, const std::vector<Index> &columns) {
+        for (const Index x : columns) {
+            const float d = disparity(y, x), f = farther(y, x);
             const double row = double(y) - f * down, column = double(x) - f * across;
             const double own_row = double(y) - d * down, own_column = double(x) - d * across;
             if (std::min(row, own_row) < 0 || std::min(column, own_column) < 0) continue;
             if (std::max(row, own_row) >= bottom || std::max(column, own_column) >= right) continue;
             const float *above = nearest.at(Index(row) - asked.low, Index(column)), *below = above + nearest.strides[0];
             if (std::max(std::max(above[0], above[1]), std::max(below[0], below[1])) > f + asked.margin) continue;
-            const auto colour = depths.reference[y][x];
+            const auto colour = reference[y][x];
             sums(0, y, x) = float(sums(0, y, x) + squared_residual(view, unit, row, column, colour));
             sums(1, y, x) = float(sums(1, y, x) + squared_residual(view, unit, own_row, own_column, colour));
             ++sums(2, y, x);
         }
     };
     parallel_for(begin, end, [&](Index y) {
-        for (Index view = 0; view < asked.others.shape[0] * S; ++view)
-            if (const Index t = view / S, s = view % S; asked.others(t, s))
-                std::visit([&](const auto &some) { add_view(some[t][s], t, s, y); }, views);
+        std::vector<Index> columns;
+        for (Index x = 0; x < W; ++x)
+            if (disparity(y, x) != farther(y, x)) columns.push_back(x);
+        asked.for_each([&](Index t, Index s, double down, double across) {
+            std::visit([&](const auto &some) { add_view(some[t][s], asked.nearest[t][s], down, across, y, columns); }, views);
+        });
     });
 }
 

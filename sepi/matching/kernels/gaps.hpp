@@ -1,8 +1,6 @@
 // What is seen through gaps: farther surfaces of a like colour, and how well both depths fit.
 #pragma once
 
-#include <tuple>
-
 #include "pixels.hpp"
 
 namespace sepi {
@@ -13,29 +11,10 @@ namespace sepi {
 void farther_alike(Array<const float, 2> disparity, Array<const float, 2> lowest, Strided<const float, 3> colours, Index reach, float least_step,
                    float distance2, Array<float, 2> farther);
 
-// What compare_depths() compares: maps (H, W), and colours of the reference view (H, W, 3), in 0..1. Where farther equals
-// disparity nothing is compared.
-struct TwoDepths {
-    Array<const float, 2> disparity, farther;
-    Strided<const float, 3> reference;
-
-    auto fields() { return std::tie(disparity, farther, reference); }
-};
-
-// The views that are asked, others (T, S), how far from the reference view (T, S, 2) they are, and their z-buffers
-// (T, S, n, W) of the map farther, rows from low on. An occluder is nearer by more than margin.
-struct AskedViews {
-    Array<const bool, 2> others;
-    Strided<const double, 3> baselines;
-    Array<const float, 4> nearest;
-    Index low;
-    float margin;
-
-    auto fields() { return std::tie(others, baselines, nearest, low, margin); }
-};
-
-// Squared residuals of rows begin..end of views (T, S, H, W, 3), which unit makes span 0..1, where nothing hides the farther
-// depth: added to sums (3, H, W) are those at the farther depth, at the other one, and of how many views they are.
-void compare_depths(const Views &views, float unit, const TwoDepths &depths, const AskedViews &asked, Index begin, Index end, Array<float, 3> sums);
+// Squared residuals at two depths of the pixels of rows begin..end, in views (T, S, H, W, 3), which unit makes span 0..1, from
+// the reference view (H, W, 3) in 0..1: added to sums (3, H, W) are those at the farther depth, at the other one, and of how
+// many views they are. Asked is where nothing hides the farther depth; where both are equal nothing is compared.
+void compare_depths(const Views &views, float unit, Array<const float, 2> disparity, Array<const float, 2> farther, Strided<const float, 3> reference,
+                    const AskedViews &asked, Index begin, Index end, Array<float, 3> sums);
 
 }  // namespace sepi

@@ -124,16 +124,8 @@ Four load_channels(Array<const float, 3> image, Index y, Index x, Index count) {
     return {load(channels[0]), load(channels[1]), load(channels[2]), load(channels[3])};
 }
 
-// By how much samples differ from what they are compared with, and the square of that of the colours.
-struct Residual {
-    Four r;
-    Float8 squared;
-
-    Residual(const Samples &samples, const Four &own) {
-        for (Index c = 0; c < 4; ++c) r[c] = samples.channels[c] - own[c];
-        squared = r[0] * r[0] + r[1] * r[1] + r[2] * r[2];
-    }
-};
+// Of the colours.
+Float8 dot(const Four &a, const Four &b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
 // Of each eight pixels of the rows first..last: begin them, add what each view that sees one of them shows, and write what
 // comes of it, at their row, column and number.
@@ -181,8 +173,9 @@ void mean_of_views(const SplineViews &views, const Seeing &seeing, Array<const f
             sums.colours = sums.detail = spread(1);
         },
         [&](Mean &sums, const View &, const Samples &samples) {
-            const auto [r, squared] = Residual(samples, sums.own);
-            const Float8 weight = samples.seen * robust_weight(squared, views.scales2(0));
+            Four r;
+            for (Index c = 0; c < 4; ++c) r[c] = samples.channels[c] - sums.own[c];
+            const Float8 weight = samples.seen * robust_weight(dot(r, r), views.scales2(0));
             const Float8 detail_weight = samples.seen * robust_weight(3.0f * (r[3] * r[3]), views.scales2(1));
             for (Index c = 0; c < 4; ++c) sums.channels[c] += (c < 3 ? weight : detail_weight) * samples.channels[c];
             sums.colours += weight;
@@ -213,13 +206,14 @@ static void add_equations(const SplineViews &views, const Seeing &seeing, Array<
             pixels.across = load_channels(image.across, y, x, count);
         },
         [&](Equations &pixels, const View &view, const Samples &samples) {
-            const auto [r, squared] = Residual(samples, pixels.own);
-            Four g;
-            for (Index c = 0; c < 4; ++c) g[c] = pixels.down[c] * view.down + pixels.across[c] * view.across;
-            const Float8 weight = samples.seen * robust_weight(squared, views.scales2(0));
+            Four r, g;
+            for (Index c = 0; c < 4; ++c) {
+                r[c] = samples.channels[c] - pixels.own[c];
+                g[c] = pixels.down[c] * view.down + pixels.across[c] * view.across;
+            }
+            const Float8 squared = dot(r, r), weight = samples.seen * robust_weight(squared, views.scales2(0));
             const Float8 detail_weight = samples.seen * (3.0f * robust_weight(3.0f * r[3] * r[3], views.scales2(1)));
-            const Four terms{weight * (r[0] * g[0] + r[1] * g[1] + r[2] * g[2]), weight * (g[0] * g[0] + g[1] * g[1] + g[2] * g[2]),
-                             detail_weight * r[3] * g[3], detail_weight * g[3] * g[3]};
+            const Four terms{weight * dot(r, g), weight * dot(g, g), detail_weight * r[3] * g[3], detail_weight * g[3] * g[3]};
             for (Index k = 0; k < 4; ++k) pixels.sums[k] += terms[k];
             if constexpr (EVIDENCE) {
                 const auto of_view = both(terms);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <tuple>
 #include <variant>
 
 #include "kernels/lanes.hpp"
@@ -16,6 +17,26 @@ using Views = std::variant<Strided<const std::uint8_t, 5>, Strided<const std::ui
 inline const Index *shape_of(const Views &views) {
     return std::visit([](const auto &some) { return some.shape; }, views);
 }
+
+// Views that are asked whether something hides a pixel of the reference view: asked (T, S), how far they are from it
+// (T, S, 2), and their z-buffers (T, S, n, W), rows from low on. An occluder is nearer by more than margin.
+struct AskedViews {
+    Array<const bool, 2> asked;
+    Strided<const double, 3> baselines;
+    Array<const float, 4> nearest;
+    Index low;
+    float margin;
+
+    auto fields() { return std::tie(asked, baselines, nearest, low, margin); }
+
+    // Calls body(t, s, down, across) for each.
+    template <class Body>
+    void for_each(const Body &body) const {
+        for (Index t = 0; t < asked.shape[0]; ++t)
+            for (Index s = 0; s < asked.shape[1]; ++s)
+                if (asked(t, s)) body(t, s, baselines(t, s, 0), baselines(t, s, 1));
+    }
+};
 
 // Calls body(t, s, first, number) for stretches of at most so many of the n rows of each view of a grid.
 template <class Body>
@@ -67,9 +88,10 @@ inline void mirror_ends(float *line, Index n, Index beyond) {
 }
 
 // Sums of n lines of products, into out: add(total, k, x) adds number k of eight of them. Four vectors at a time: each waits
-// for its last product, and the others need not. Lines have LANES numbers behind them.
-template <class Add>
-void sum_products(Index n, Index products, float *out, Add add) {
+// for its last product, and the others need not; where how many there are is known beforehand, one loop becomes of all.
+// Lines have LANES numbers behind them.
+template <class Number, class Add>
+void sum_products(Index n, Number products, float *out, Add add) {
     const auto block = [&]<int SIZE>(Index x, std::integral_constant<int, SIZE>) {
         Float8 totals[SIZE] = {};
         for (Index k = 0; k < products; ++k)

@@ -135,8 +135,8 @@ void aggregate(Array<const float, 3> cost, Array<const float, 3> guide, Index ra
     const Index K = cost.shape[0], H = cost.shape[1], W = cost.shape[2], size = 2 * radius + 1;
     parallel_for(0, H, [&](Index y) {
         const Scratch<float, 2> weights(size * size, W + LANES);
-        const Scratch<float, 1> sums(W);
-        window_weights(guide, y, radius, variance, weights.array(), sums.array().data);
+        const Scratch<float, 1> of_weights(W);
+        window_weights(guide, y, radius, variance, weights.array(), of_weights.array().data);
         // what lies beyond the picture weighs nothing: it may be other rows, but for those with no memory beside them
         const auto at_ends = zeros<float, 2>(size, W + 2 * radius + LANES);
         const Scratch<const float *, 1> places(size * size);
@@ -144,20 +144,18 @@ void aggregate(Array<const float, 3> cost, Array<const float, 3> guide, Index ra
         // a few candidates at a time: each pixel's are written together
         const Scratch<float, 2> total(LANES, W + LANES);
         for (Index begin = 0; begin < K; begin += LANES) {
-            for (Index k = begin; k < begin + LANES; ++k) {
-                float *sum = total.array().at(k - begin);
-                if (k >= K) {
-                    std::fill_n(sum, W, UNREACHABLE);
-                    continue;
-                }
+            if (begin + LANES > K) std::fill_n(total.array().data, LANES * (W + LANES), UNREACHABLE);
+            for (Index k = begin; k < std::min(K, begin + LANES); ++k) {
                 for (Index i = 0; i < size; ++i) {
                     const float *row = cost.at(k, clamped(y + i - radius, H));
                     if (row - first < radius || last - row < W + radius + LANES) row = std::copy_n(row, W, at_ends.array().at(i, radius)) - W;
                     for (Index j = 0; j < size; ++j) places.array()(i * size + j) = row + j - radius;
                 }
-                sum_products(W, size * size, sum, [weight = weights.array().data, pitch = W + LANES, place = places.array().data](Float8 total, Index n, Index x) {
-                    return fma(load(weight + n * pitch + x), load(place[n] + x), total);
-                });
+                const auto add = [weight = weights.array().data, pitch = W + LANES, place = places.array().data](Float8 sum, Index n, Index x) {
+                    return fma(load(weight + n * pitch + x), load(place[n] + x), sum);
+                };
+                float *sums = total.array().at(k - begin);
+                radius == 2 ? sum_products(W, std::integral_constant<Index, 25>(), sums, add) : sum_products(W, size * size, sums, add);
             }
             Array<float, 2> pixels = out[y];
             pixels.data += begin;

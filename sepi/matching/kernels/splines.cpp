@@ -37,7 +37,7 @@ class Lines {
 
   private:
     static void convolve(const float *lines, Index stride, Index n, float *out) {
-        sum_products(n, 2 * REACH + 1, out, [=](Float8 total, Index k, Index x) {
+        sum_products(n, std::integral_constant<Index, 2 * REACH + 1>(), out, [=](Float8 total, Index k, Index x) {
             return total + FILTER[FULL_REACH - REACH + k] * load(lines + k * stride + x);
         });
     }

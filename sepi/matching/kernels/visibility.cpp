@@ -31,18 +31,6 @@ void add_row(const float *row, Index W, Index y, double down, double across, Arr
     }
 }
 
-// Weights of a sample's neighbours, each a pair of whole numbers of 16 bits: pixel and right neighbour, above and below.
-struct BilinearWeights {
-    Int8 upper, lower;
-
-    BilinearWeights(double fy, double fx) {
-        const auto below = std::int64_t(fy * ONE + 0.5);
-        const auto right = std::int64_t((ONE - below) * fx + 0.5), lower_right = std::int64_t(below * fx + 0.5);
-        upper = pair_of(ONE - below - right, right);
-        lower = pair_of(below - lower_right, lower_right);
-    }
-};
-
 // What a row of the reference view is compared with, and what comes of it.
 class VisibleRow {
   public:
@@ -56,7 +44,10 @@ class VisibleRow {
 
     // Cost of every candidate in row y.
     void sweep(Index y) {
-        load_reference(y);
+        // the reference view, times what the weights of samples sum to
+        const Array<float, 3> own{reference_.array().data, {4, 1, W_}, {width_, 0, 1}};
+        load_rows<float>(views_.guide, y, own, [](auto colour) { return whole(colour * COLOUR_STEPS) * float(ONE); });
+        for (Index x = 0; x < W_ && views_.reference_detail.shape[0] > 0; ++x) own(3, 0, x) = float(views_.reference_detail(y - views_.low, x) * ONE);
         for (Index t = 0; t < views_.present.shape[0]; ++t) {
             for (Index s = 0; s < views_.present.shape[1]; ++s) {
                 if (!views_.present(t, s) || (t == views_.t0 && s == views_.s0)) continue;
@@ -88,13 +79,6 @@ class VisibleRow {
         }
     }
 
-    // Row y of the reference view, times what the weights of samples sum to.
-    void load_reference(Index y) {
-        const Array<float, 3> rows{reference_.array().data, {4, 1, W_}, {width_, 0, 1}};
-        load_rows<float>(views_.guide, y, rows, [](auto colour) { return whole(colour * COLOUR_STEPS) * float(ONE); });
-        for (Index x = 0; x < W_ && views_.reference_detail.shape[0] > 0; ++x) rows(3, 0, x) = float(views_.reference_detail(y - views_.low, x) * ONE);
-    }
-
     // Add one view, whose rows from low on are loaded, at every candidate of row y.
     void add_view(Index t, Index s, Index low, Index y) {
         const Index r = candidates_.row(t, s), c = candidates_.column(t, s), width = width_;
@@ -109,7 +93,10 @@ class VisibleRow {
             // on the last column itself nothing beyond it is read with any weight
             const Index first = std::max<Index>(0, -left), last = std::min(W_, fx == 0 ? W_ - left : W_ - 1 - left);
             if (top < 0 || top > H_ - 2 || last <= first) continue;
-            const BilinearWeights weights(fy, fx);
+            // of neighbours, pairs of whole numbers of 16 bits: pixel and right neighbour, above and below
+            const auto below = std::int64_t(double(fy) * ONE + 0.5), right = std::int64_t((ONE - below) * double(fx) + 0.5);
+            const auto lower_right = std::int64_t(below * double(fx) + 0.5);
+            const Int8 upper = pair_of(ONE - below - right, right), lower = pair_of(below - lower_right, lower_right);
             const Float8 limit = spread(candidates_.disparities(k) + visibility_.occlusion_margin);
             const float *before = some_hide ? nearest.at(top - views_.low + (fy > 0.5f), first + left + (fx > 0.5f)) : nullptr;
             const std::int32_t *pairs = pairs_.array().at(top - low, 0, first + left);
@@ -125,10 +112,10 @@ class VisibleRow {
                 // pixels beyond the last add nothing to what others have added
                 if (rest < LANES) seen = first_lanes(seen, rest, 0);
                 const auto residual = [&](Index channel) {
-                    Int8 above, below;
+                    Int8 above, under;
                     std::memcpy(&above, pairs + channel * width, sizeof above);
-                    std::memcpy(&below, pairs + (4 + channel) * width, sizeof below);
-                    const Int8 sample = dot_of_pairs(above, weights.upper) + dot_of_pairs(below, weights.lower);
+                    std::memcpy(&under, pairs + (4 + channel) * width, sizeof under);
+                    const Int8 sample = dot_of_pairs(above, upper) + dot_of_pairs(under, lower);
                     return __builtin_convertvector(sample, Float8) - load(reference + channel * width);
                 };
                 const Float8 red = residual(0), green = residual(1), blue = residual(2), detail = residual(3);
@@ -183,21 +170,17 @@ void z_buffers(Array<const float, 2> disparity, Array<const bool, 2> present, St
     });
 }
 
-void occluded_in_any_view(Array<const float, 2> disparity, Array<const bool, 2> present, Strided<const double, 3> baselines, Array<const float, 4> nearest,
-                          Index low, float occlusion_margin, Index begin, Index end, Array<bool, 2> out) {
-    const Index S = present.shape[1], H = disparity.shape[0], W = disparity.shape[1];
+void occluded_in_any_view(Array<const float, 2> disparity, const AskedViews &views, Index begin, Index end, Array<bool, 2> out) {
+    const double H = double(disparity.shape[0]), W = double(disparity.shape[1]);
     parallel_for(begin, end, [&](Index y) {
-        for (Index view = 0; view < present.shape[0] * S; ++view) {
-            const Index t = view / S, s = view % S;
-            if (!present(t, s)) continue;
-            const double v = baselines(t, s, 0), u = baselines(t, s, 1);
-            for (Index x = 0; x < W; ++x) {
+        views.for_each([&](Index t, Index s, double down, double across) {
+            for (Index x = 0; x < disparity.shape[1]; ++x) {
                 const float d = disparity(y, x);
-                const double row = double(y) - d * v + 0.5, column = double(x) - d * u + 0.5;
-                if (row >= 0 && column >= 0 && row < double(H) && column < double(W))
-                    out(y, x) |= nearest(t, s, Index(row) - low, Index(column)) > d + occlusion_margin;
+                const double row = double(y) - d * down + 0.5, column = double(x) - d * across + 0.5;
+                if (row >= 0 && column >= 0 && row < H && column < W)
+                    out(y, x) |= views.nearest(t, s, Index(row) - views.low, Index(column)) > d + views.margin;
             }
-        }
+        });
     });
 }
 
