@@ -165,7 +165,7 @@ def smooth_and_choose(
     """
     variance = parameters.window_sigma**2 + contrast
     averaged, smoothed = volumes.averaged_and_smoothed(len(disparities))
-    colours = np.stack(cv2.split(guide))
+    colours = np.stack(cv2.split(guide), dtype=np.float32)
     kernels.aggregate(volumes.costs(len(disparities)), colours, parameters.window_radius, variance, averaged)
     penalties = parameters.small_penalty, parameters.large_penalty, parameters.colour_weakening
     band = max(1, BAND_BYTES // (2 * averaged[0].nbytes))
