@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import cv2
 import numpy as np
 
-from sepi.kernels import rim as kernels
 from sepi.lightfield import BoolMap, FloatMap
 
 
@@ -45,7 +45,19 @@ def rim_of(disparity: FloatMap, radius: int, step: float) -> Rim:
     -------
     Rim
     """
-    inside = np.zeros(disparity.shape, bool)
-    rim = Rim(disparity.copy(), disparity.copy(), inside, inside.copy())
-    kernels.rim_of(disparity, radius, step, rim)
-    return rim
+    window = np.ones((2 * radius + 1, 2 * radius + 1), np.uint8)
+    lowest, highest = cv2.erode(disparity, window), cv2.dilate(disparity, window)
+    inside = np.asarray(highest - lowest >= np.float64(step))
+    y, x = np.nonzero(inside)
+    middle = (lowest + highest)[inside] / 2
+    # beyond the border is nothing, which is on neither side
+    padded = np.pad(disparity.astype(np.float64), radius, constant_values=np.nan)
+    weights, sums = np.zeros((2, 2, len(y)))
+    for dy, dx in np.ndindex(window.shape):
+        there, weight = padded[y + dy, x + dx], 1 / (1 + (dy - radius) ** 2 + (dx - radius) ** 2)
+        for side, belongs in enumerate((there <= middle, there > middle)):
+            weights[side] += weight * belongs
+            sums[side] += np.where(belongs, weight * there, 0)
+    near, far = disparity.copy(), disparity.copy()
+    far[inside], near[inside] = sums / weights
+    return Rim(near, far, inside, inside & (disparity > (near + far) / 2))

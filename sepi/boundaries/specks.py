@@ -77,7 +77,7 @@ def _deep_as_something_near(disparity: FloatMap, joined: FloatMap, difference: f
 def specks_of(disparity: FloatMap, difference: float, most_pixels: int, most_of_hole: int) -> BoolMap:
     """Pixels (H, W) of parts of a map that are small; see :func:`join_specks`."""
     specks = np.empty(disparity.shape, bool)
-    kernels.specks_of(disparity, difference, most_pixels, most_of_hole, specks)
+    kernels.specks_of(np.ascontiguousarray(disparity), difference, most_pixels, most_of_hole, specks)
     return specks
 
 

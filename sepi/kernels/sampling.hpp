@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdlib>
+#include <optional>
 
 #include "array.hpp"
 
@@ -29,6 +30,53 @@ inline std::array<float, 4> cubic_weights(double f) {
         float(((-1.5 * f + 2.0) * f + 0.5) * f),
         float((0.5 * f - 0.5) * f * f),
     };
+}
+
+// Weights of a pixel, its right neighbour, and both below them, for a sample so far below and to the right of it, 0..1.
+inline std::array<float, 4> bilinear_weights(float fy, float fx) { return {(1 - fy) * (1 - fx), (1 - fy) * fx, fy * (1 - fx), fy * fx}; }
+
+// Where a sample lies: a pixel, and how far below and to the right of it, 0..1.
+struct Place {
+    Index row, column;
+    double fy, fx;
+
+    // The pixels on the other side. A sample that lies on a pixel looks at that alone, so that a mirrored picture, too, has
+    // its mirrored samples.
+    Index below() const { return row + (fy > 0); }
+    Index right() const { return column + (fx > 0); }
+};
+
+// A place in a picture (H, W), unless it lies outside, or is not known.
+inline std::optional<Place> place_within(double down, double across, Index H, Index W) {
+    if (!(0 <= down && down <= double(H - 1) && 0 <= across && across <= double(W - 1))) return std::nullopt;
+    const auto row = Index(down), column = Index(across);
+    return Place{row, column, down - double(row), across - double(column)};
+}
+
+// The same, unless a pixel right of it or below it lies outside.
+inline std::optional<Place> place_amid(double down, double across, Index H, Index W) {
+    const auto place = place_within(down, across, H, W);
+    return place && place->row < H - 1 && place->column < W - 1 ? place : std::nullopt;
+}
+
+// Whether a test holds for all pixels (i, j) that a bilinear sample looks at.
+template <class Test>
+bool all_about(const Place &at, const Test &test) {
+    return test(at.row, at.column) && test(at.row, at.right()) && test(at.below(), at.column) && test(at.below(), at.right());
+}
+
+// A bilinear sample of value(i, j).
+template <class Value>
+float bilinear(const Place &at, const Value &value) {
+    const auto [a, b, c, d] = bilinear_weights(float(at.fy), float(at.fx));
+    return a * value(at.row, at.column) + b * value(at.row, at.right()) + c * value(at.below(), at.column) + d * value(at.below(), at.right());
+}
+
+// Calls body(i, j) for the pixels of a picture (H, W) up to radius away from one, in rows and columns.
+template <class Body>
+void for_window(Index y, Index x, Index radius, Index H, Index W, const Body &body) {
+    for (Index i = std::max<Index>(0, y - radius); i < std::min(H, y + radius + 1); ++i)
+        for (Index j = std::max<Index>(0, x - radius); j < std::min(W, x + radius + 1); ++j) body(i, j);
 }
 
 }  // namespace sepi

@@ -79,11 +79,10 @@ def seen_bits(disparities: FloatArray, positions: npt.NDArray[np.float64]) -> Bi
     positions : ndarray, shape (N, 2), float64
         Where they stand, in view steps: down, across.
     """
-    farthest, bits = np.empty_like(disparities), np.empty(disparities.shape, np.uint16)
-    kernels.farthest_of_four(disparities, farthest)
+    bits = np.empty(disparities.shape, np.uint16)
     hidden, seen = np.empty((2, *disparities.shape[1:]), bool)
-    for view, own in enumerate(disparities):
-        kernels.seen_elsewhere(own, farthest, positions - positions[view], view, _SAME, hidden, seen)
+    for view in range(len(disparities)):
+        kernels.seen_elsewhere(disparities, positions - positions[view], view, _SAME, hidden, seen)
         bits[view] = hidden * np.uint16(_BIT["occluded"]) + ~seen * np.uint16(_BIT["alone"])
     return bits
 

@@ -58,13 +58,46 @@ def with_shared_light(
     # irradiance over pi
     light = (pictures / np.where(whole[..., None], albedo, 1)).astype(np.float32)
     surface = np.where(whole, things, np.int16(-1))
-    around, shown = np.empty_like(surface), np.empty_like(light)
-    kernels.one_of_four(surface, around)
-    mean, alike, variance = np.empty_like(light[0]), np.empty_like(light[0]), np.empty_like(disparities[0])
+    shown = np.empty_like(light)
+    mean, variance = np.empty_like(light[0]), np.empty_like(disparities[0])
     for view, own in enumerate(surface):
         baselines = positions - positions[view]
-        kernels.gathered_light(light, disparities, own, around, baselines, view, _BEND, mean, variance)
-        kernels.alike_light(mean, variance, own, _REACH, _DOUBT, alike)
+        kernels.gathered_light(light, disparities, surface, baselines, view, _BEND, mean, variance)
+        alike = alike_light(mean, variance, own)
         shown[view] = np.where(whole[view][..., None], alike * albedo[view], pictures[view])
         kernels.limit_bent(things[view], whole[view], _BESIDE, shown[view])
     return shown
+
+
+def alike_light(light: FloatArray, variance: FloatArray, surface: npt.NDArray[np.int16]) -> FloatArray:
+    """Mean light of the pixels about each whole one that chance alone may tell from it: 3x3 pixels from 3x3.
+
+    Parameters
+    ----------
+    light : ndarray, shape (H, W, 3), float32
+    variance : ndarray, shape (H, W), float32
+        Of the sum of its colours.
+    surface : ndarray, shape (H, W), int16
+        Which thing pixels show whole, -1 for none; these keep their light.
+
+    Returns
+    -------
+    ndarray, shape (H, W, 3), float32
+    """
+    height, width = surface.shape
+    whole = surface >= 0
+    # of a patch its grey, the variance of that, and 1 where it counts: not beyond the picture
+    patches = np.pad([light.sum(axis=2), variance, whole], ((0, 0), (_REACH + 1,) * 2, (_REACH + 1,) * 2))
+    colours = np.pad([*np.moveaxis(light, 2, 0), np.ones_like(variance)], ((0, 0), (_REACH,) * 2, (_REACH,) * 2))
+    things = np.pad(surface, _REACH, constant_values=-1)
+    own, total = patches[:, _REACH:-_REACH, _REACH:-_REACH], np.zeros((4, height, width), np.float32)
+    for y, x in np.ndindex(2 * _REACH + 1, 2 * _REACH + 1):
+        other = patches[:, y : y + height + 2, x : x + width + 2]
+        # what is apart beyond what chance makes of it
+        apart = own[2] * other[2] * (np.square(own[0] - other[0]) - np.float32(_DOUBT) * (own[1] + other[1]))
+        rows = apart[:-2] + apart[1:-1] + apart[2:]
+        alike = rows[:, :-2] + rows[:, 1:-1] + rows[:, 2:] <= 0
+        alike &= things[y : y + height, x : x + width] == surface
+        total += colours[:, y : y + height, x : x + width] * alike
+    mean = np.moveaxis(total[:3] / np.maximum(total[3], 1), 0, 2)
+    return np.where(whole[..., None], mean, light)

@@ -10,6 +10,7 @@ from sepi.kernels import reprojection as kernels
 from sepi.rendered.render_file import read_render
 from sepi.rendered.rendering import render_world
 from sepi.rendered.rig import rig_of
+from sepi.rendered.shared_light import alike_light
 from sepi.rendered.tracing import Tracer
 from sepi.rendered.world import Material
 
@@ -29,16 +30,9 @@ def falling_on_a_plane() -> dict[str, np.ndarray]:
 def gathered(light: Any, disparities: Any, things: Any, whole: Any, baselines: Any, view: int) -> Any:
     """As :func:`sepi.rendered.shared_light.with_shared_light` asks for it."""
     surface = np.where(whole, things, -1).astype(np.int16)
-    around, mean, variance = np.empty_like(surface), np.empty_like(light[0]), np.empty_like(disparities[0])
-    kernels.one_of_four(surface, around)
-    kernels.gathered_light(light, disparities, surface[view], around, baselines, view, 0.02, mean, variance)
+    mean, variance = np.empty_like(light[0]), np.empty_like(disparities[0])
+    kernels.gathered_light(light, disparities, surface, baselines, view, 0.02, mean, variance)
     return mean, variance
-
-
-def alike_light(light: Any, variance: Any, surface: Any) -> Any:
-    found = np.empty_like(light)
-    kernels.alike_light(light, variance, surface, 3, 2.0, found)
-    return found
 
 
 def test_a_plane_seen_by_all_views_has_the_mean_of_their_light() -> None:

@@ -63,7 +63,7 @@ void brightness_of_views(const RimViews<Colour> &views, const Sides &sides, Arra
         for (Index y = 0; y < H; y += STRIDE) {
             for (Index x = 0; x < W; x += STRIDE) {
                 const float d = sides.disparity(y, x);
-                const auto place = place_within(double(y) - d * views.baselines(view, 0), double(x) - d * views.baselines(view, 1), H, W);
+                const auto place = place_amid(double(y) - d * views.baselines(view, 0), double(x) - d * views.baselines(view, 1), H, W);
                 if (!sides.clean(y, x) || !place || !shows(place->row, place->column)) continue;
                 const auto there = sample(views, view, *place);
                 const auto here = sides.colour(y, x);

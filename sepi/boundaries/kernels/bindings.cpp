@@ -2,7 +2,6 @@
 #include "colour_mixture.hpp"
 #include "edge_lines.hpp"
 #include "kernels/arguments.hpp"
-#include "rim.hpp"
 #include "specks.hpp"
 #include "surface_shares.hpp"
 
@@ -39,9 +38,6 @@ void bind_boundaries(nb::module_ &kernels) {
     edge_lines.def("evidence_of_lines", &sepi::evidence_of_lines, Unlocked(), "disparity"_a, "middle"_a, "number"_a, "costs"_a, "edges"_a, "pixels"_a,
                    "evidence"_a);
     edge_lines.attr("STEPS") = sepi::STEPS;
-
-    auto rim = kernels.def_submodule("rim");
-    rim.def("rim_of", &sepi::rim_of, Unlocked(), "disparity"_a, "radius"_a, "step"_a, "rim"_a);
 
     auto specks = kernels.def_submodule("specks");
     specks.def("specks_of", &sepi::specks_of, Unlocked(), "disparity"_a, "difference"_a, "most_pixels"_a, "most_of_hole"_a, "specks"_a);

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "kernels/parallel.hpp"
+#include "kernels/sampling.hpp"
 
 namespace sepi {
 namespace {
@@ -28,45 +29,41 @@ void mixture_evidence(Array<const float, 2> disparity, const Surroundings &aroun
     std::vector<double> weights;  // by squared distance
     for (Index distance2 = 0; distance2 <= 2 * radius * radius; ++distance2) weights.push_back(std::exp(double(-distance2) / (2 * WIDTH * WIDTH)));
 
-    parallel_for(0, H, [&](Index y) {
-        for (Index x = 0; x < W; ++x) {
-            const float lowest = around.farthest(y, x), highest = around.nearest(y, x);
-            const double middle = double(lowest + highest) / 2;
-            if (highest - lowest < discontinuity || disparity(y, x) <= middle) continue;
-            Side sides[2];
-            for (Index row = std::max<Index>(0, y - radius); row < std::min(H, y + radius + 1); ++row) {
-                for (Index column = std::max<Index>(0, x - radius); column < std::min(W, x + radius + 1); ++column) {
-                    const float d = disparity(row, column);
-                    const bool clean = around.farthest(row, column) > middle || around.nearest(row, column) <= middle;
-                    // surfaces beyond the two do not count
-                    if (!clean || d > highest + discontinuity || d < lowest - discontinuity) continue;
-                    const double weight = weights[(row - y) * (row - y) + (column - x) * (column - x)];
-                    Side &side = sides[d > middle];
-                    side.weight += weight;
-                    for (Index c = 0; c < 3; ++c) {
-                        const float colour = guide(row, column, c);
-                        side.colour[c] += weight * colour;
-                        side.colour2 += weight * (colour * colour);
-                    }
-                }
-            }
-            const auto &[far, near] = sides;
-            if (far.weight < LEAST_WEIGHT || near.weight < LEAST_WEIGHT) continue;
-            double distance = 0, projection = 0, apart = 0, variance = least_variance;
-            for (const Side &side : sides) variance += side.colour2 / side.weight;
+    parallel_for_pixels(H, W, [&](Index y, Index x) {
+        const float lowest = around.farthest(y, x), highest = around.nearest(y, x);
+        const double middle = double(lowest + highest) / 2;
+        if (highest - lowest < discontinuity || disparity(y, x) <= middle) return;
+        Side sides[2];
+        for_window(y, x, radius, H, W, [&](Index row, Index column) {
+            const float d = disparity(row, column);
+            const bool clean = around.farthest(row, column) > middle || around.nearest(row, column) <= middle;
+            // surfaces beyond the two do not count
+            if (!clean || d > highest + discontinuity || d < lowest - discontinuity) return;
+            const double weight = weights[(row - y) * (row - y) + (column - x) * (column - x)];
+            Side &side = sides[d > middle];
+            side.weight += weight;
             for (Index c = 0; c < 3; ++c) {
-                const double of_far = far.colour[c] / far.weight, of_near = near.colour[c] / near.weight, own = guide(y, x, c) - of_far;
-                distance += squared(of_near - of_far);
-                projection += own * (of_near - of_far);
-                apart += squared(own);
-                variance -= of_far * of_far + of_near * of_near;
+                const float colour = guide(row, column, c);
+                side.colour[c] += weight * colour;
+                side.colour2 += weight * (colour * colour);
             }
-            // what is left of the colour beside both: a surface darker towards its edge is no mixture
-            distance = std::max(distance, 1e-12);
-            apart -= squared(std::max(projection, 0.0)) / distance;
-            const double little = std::min(std::max(threshold - projection / distance, 0.0) / RAMP, 1.0);
-            out(y, x) = float(little * distance / (distance + contrast * variance) * std::exp(-apart / (APART * variance)));
+        });
+        const auto &[far, near] = sides;
+        if (far.weight < LEAST_WEIGHT || near.weight < LEAST_WEIGHT) return;
+        double distance = 0, projection = 0, apart = 0, variance = least_variance;
+        for (const Side &side : sides) variance += side.colour2 / side.weight;
+        for (Index c = 0; c < 3; ++c) {
+            const double of_far = far.colour[c] / far.weight, of_near = near.colour[c] / near.weight, own = guide(y, x, c) - of_far;
+            distance += squared(of_near - of_far);
+            projection += own * (of_near - of_far);
+            apart += squared(own);
+            variance -= of_far * of_far + of_near * of_near;
         }
+        // what is left of the colour beside both: a surface darker towards its edge is no mixture
+        distance = std::max(distance, 1e-12);
+        apart -= squared(std::max(projection, 0.0)) / distance;
+        const double little = std::clamp((threshold - projection / distance) / RAMP, 0.0, 1.0);
+        out(y, x) = float(little * distance / (distance + contrast * variance) * std::exp(-apart / (APART * variance)));
     });
 }
 

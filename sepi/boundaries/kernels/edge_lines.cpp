@@ -16,7 +16,7 @@ constexpr Index AT_ONCE = 64;    // pixels that a thread does at a stretch
 
 void evidence_of_lines(Array<const float, 2> disparity, Array<const float, 2> middle, Array<const std::int64_t, 2> number, Array<const float, 2> costs,
                        const Edges &edges, Array<const std::int64_t, 1> pixels, Array<float, 1> evidence) {
-    const Index H = disparity.shape[0], W = disparity.shape[1], count = costs.shape[0], K = costs.shape[1], finest = STEPS * (K - 1);
+    const Index H = disparity.shape[0], W = disparity.shape[1], K = costs.shape[1], finest = STEPS * (K - 1);
     // what each share costs in a pixel of the patch about (y, x)
     const auto fill = [&](Index y, Index x, Index p, float *table) {
         const Index row = y + p / 3 - 1, column = x + p % 3 - 1;
@@ -34,22 +34,18 @@ void evidence_of_lines(Array<const float, 2> disparity, Array<const float, 2> mi
                     table[STEPS * k + step] = weight * std::min(own[k] + float(step) / float(STEPS) * (own[k + 1] - own[k]), most);
         }
     };
-    parallel_for(0, (count + AT_ONCE - 1) / AT_ONCE, [&](Index task) {
+    parallel_for_blocks(0, costs.shape[0], AT_ONCE, [&](Index i) {
         float table[PATCH][1 << 8];  // for any number of steps
-        for (Index i = task * AT_ONCE; i < std::min(count, (task + 1) * AT_ONCE); ++i) {
-            for (Index p = 0; p < PATCH; ++p) fill(pixels(i) / W, pixels(i) % W, p, table[p]);
-            float near = std::numeric_limits<float>::infinity(), far = near;
-            for (Index m = 0; m < edges.costs.shape[0]; ++m) {
-                const std::uint8_t *shares = edges.shares.at(m);
-                float total = edges.costs(m);
-                for (Index p = 0; p < PATCH; ++p) total += table[p][shares[p]];
-                if (edges.is_near(m))
-                    near = std::min(near, total);
-                else
-                    far = std::min(far, total);
-            }
-            evidence(i) = near - far;
+        for (Index p = 0; p < PATCH; ++p) fill(pixels(i) / W, pixels(i) % W, p, table[p]);
+        float near = std::numeric_limits<float>::infinity(), far = near;
+        for (Index m = 0; m < edges.costs.shape[0]; ++m) {
+            const std::uint8_t *shares = edges.shares.at(m);
+            float total = edges.costs(m);
+            for (Index p = 0; p < PATCH; ++p) total += table[p][shares[p]];
+            float &least = edges.is_near(m) ? near : far;
+            least = std::min(least, total);
         }
+        evidence(i) = near - far;
     });
 }
 

@@ -164,7 +164,7 @@ class ShownPixel {
             const auto place = place_seen(views_, view, near, y, x);
             // where the background that is there in the view is in the reference view
             const double down = double(y) - (near - far) * views_.baselines(view, 0), across = double(x) - (near - far) * views_.baselines(view, 1);
-            const auto there = place_within(down, across, background_.shape[0], background_.shape[1]);
+            const auto there = place_amid(down, across, background_.shape[0], background_.shape[1]);
             if (!place || !there) continue;
             if (const auto known = behind(*there)) {
                 for (Index k = 0; k < 4; ++k) samples_.array()(BEHIND + k, n_) = (*known)[k];

@@ -1,33 +1,17 @@
 // Where views show a pixel of some disparity, and the colours between their pixels.
 #pragma once
 
-#include <array>
-#include <optional>
-
 #include "kernels/lanes.hpp"
 #include "kernels/sampling.hpp"
 #include "rim_arrays.hpp"
 
 namespace sepi {
 
-// Where a sample lies: a pixel, and how far below and to the right of it, 0..1.
-struct Place {
-    Index row, column;
-    double fy, fx;
-};
-
-// A place in a picture (H, W), unless a pixel beside it lies outside.
-inline std::optional<Place> place_within(double down, double across, Index H, Index W) {
-    if (down < 0 || across < 0 || down >= double(H - 1) || across >= double(W - 1)) return std::nullopt;
-    const auto row = Index(down), column = Index(across);
-    return Place{row, column, down - double(row), across - double(column)};
-}
-
 // Where a view shows a pixel of disparity d, if it does.
 template <class Colour>
 [[gnu::always_inline]] inline std::optional<Place> place_seen(const RimViews<Colour> &views, Index view, float d, Index y, Index x) {
     const double down = double(y) - d * views.baselines(view, 0), across = double(x) - d * views.baselines(view, 1);
-    const auto place = place_within(down, across, views.lines.shape[2], views.nearest.shape[3]);
+    const auto place = place_amid(down, across, views.lines.shape[2], views.nearest.shape[3]);
     if (!place) return place;
     const float nearest = views.nearest(views.places(view, 0), views.places(view, 1), Index(down + 0.5) - views.low, Index(across + 0.5));
     return nearest <= d + views.margin ? place : std::nullopt;

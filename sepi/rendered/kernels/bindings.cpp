@@ -12,11 +12,8 @@ void bind_rendered(nb::module_ &kernels) {
     triangles.def("painted", &sepi::painted, Unlocked(), "faces"_a, "pixels"_a, "frame"_a, "planes"_a, "paint"_a, "fine"_a, "out"_a);
 
     auto reprojection = kernels.def_submodule("reprojection");
-    reprojection.def("farthest_of_four", &sepi::farthest_of_four, Unlocked(), "disparities"_a, "out"_a);
-    reprojection.def("seen_elsewhere", &sepi::seen_elsewhere, Unlocked(), "own"_a, "farthest"_a, "baselines"_a, "view"_a, "same"_a, "hidden"_a, "seen"_a);
-    reprojection.def("one_of_four", &sepi::one_of_four, Unlocked(), "surface"_a, "out"_a);
-    reprojection.def("gathered_light", &sepi::gathered_light, Unlocked(), "light"_a, "disparities"_a, "surface"_a, "around"_a, "baselines"_a, "view"_a,
-                     "bend"_a, "mean"_a, "variance"_a);
-    reprojection.def("alike_light", &sepi::alike_light, Unlocked(), "light"_a, "variance"_a, "surface"_a, "reach"_a, "doubt"_a, "out"_a);
+    reprojection.def("seen_elsewhere", &sepi::seen_elsewhere, Unlocked(), "disparities"_a, "baselines"_a, "view"_a, "same"_a, "hidden"_a, "seen"_a);
+    reprojection.def("gathered_light", &sepi::gathered_light, Unlocked(), "light"_a, "disparities"_a, "surface"_a, "baselines"_a, "view"_a, "bend"_a, "mean"_a,
+                     "variance"_a);
     reprojection.def("limit_bent", &sepi::limit_bent, Unlocked(), "things"_a, "whole"_a, "reach"_a, "shown"_a);
 }

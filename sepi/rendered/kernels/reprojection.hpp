@@ -6,26 +6,14 @@
 
 namespace sepi {
 
-// Least disparity of each pixel and those right of it, below it, and both; of the last ones 0.
-void farthest_of_four(Array<const float, 3> disparities, Array<float, 3> out);
-
-// Whether some view that has the point in its picture does not see it, and whether some other view sees it. A point
-// lands between four pixels of another view, of which farthest is known; where all are nearer, it is hidden.
-void seen_elsewhere(Array<const float, 2> own, Array<const float, 3> farthest, Array<const double, 2> baselines, Index view, double same,
-                    Array<bool, 2> hidden, Array<bool, 2> seen);
-
-// Which thing each pixel and those right of it, below it, and both show; -2 where they differ.
-void one_of_four(Array<const std::int16_t, 3> surface, Array<std::int16_t, 3> out);
+// Whether some view that has the point in its picture does not see it, and whether some other view sees it. Where all
+// pixels of another view about the place where a point lands are nearer, it is hidden.
+void seen_elsewhere(Array<const float, 3> disparities, Array<const double, 2> baselines, Index view, double same, Array<bool, 2> hidden, Array<bool, 2> seen);
 
 // Mean light (H, W, 3) of all views that show the surface whole, for whole pixels of one view; its own elsewhere; and the
-// variance of that mean, of all colours' sum. light (N, H, W, 3); surface is which thing pixels show whole, -1 for none,
-// around that of each four of all views.
-void gathered_light(Array<const float, 4> light, Array<const float, 3> disparities, Array<const std::int16_t, 2> surface, Array<const std::int16_t, 3> around,
-                    Array<const double, 2> baselines, Index view, double bend, Array<float, 3> mean, Array<float, 2> variance);
-
-// Mean light (H, W, 3) of the pixels about each whole one that chance alone may tell from it: 3x3 pixels from 3x3.
-void alike_light(Array<const float, 3> light, Array<const float, 2> variance, Array<const std::int16_t, 2> surface, Index reach, double doubt,
-                 Array<float, 3> out);
+// variance of that mean, of all colours' sum. light (N, H, W, 3); surface is which thing pixels show whole, -1 for none.
+void gathered_light(Array<const float, 4> light, Array<const float, 3> disparities, Array<const std::int16_t, 3> surface, Array<const double, 2> baselines,
+                    Index view, double bend, Array<float, 3> mean, Array<float, 2> variance);
 
 // Keep pixels that are not whole, amid one thing, within the light of its whole ones beside them; shown (H, W, 3).
 void limit_bent(Array<const std::int16_t, 2> things, Array<const bool, 2> whole, Index reach, Array<float, 3> shown);

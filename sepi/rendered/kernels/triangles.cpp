@@ -11,9 +11,7 @@
 namespace sepi {
 namespace {
 
-constexpr double INFINITE = std::numeric_limits<double>::infinity();
-
-// Rows of rays that are looked at together.
+// Rows of rays that a thread looks at together.
 constexpr Index BAND = 32;
 
 // Pixels: more than rounding moves a corner.
@@ -26,23 +24,9 @@ using Vector = std::array<double, 3>;  // right, down, away
 
 Vector cross(const Vector &a, const Vector &b) { return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]}; }
 
+// Rows or columns.
 struct Pixels {
     Index first = 0, last = -1;
-};
-
-struct Interval {
-    double least = INFINITE, greatest = -INFINITE;
-
-    void add(double number) {
-        least = std::min(least, number);
-        greatest = std::max(greatest, number);
-    }
-
-    // The pixels whose middles lie between, of numbers per depth.
-    Pixels middles(double axis, double focal, Index size) const {
-        const double first = focal * least + axis - 0.5 - SLACK, last = focal * greatest + axis - 0.5 + SLACK;
-        return {Index(std::ceil(std::min(std::max(first, 0.0), double(size)))), Index(std::floor(std::max(std::min(last, double(size) - 1), -1.0)))};
-    }
 };
 
 // A triangle as the camera sees it, and the pixels at which it may be met.
@@ -51,50 +35,41 @@ struct Triangle {
     Pixels rows, columns;
 
     void find_pixels(double near, const double *frame, Index size) {
-        Interval down, across;
-        const auto add = [&](double x, double y, double z) {
-            down.add(y / z);
-            across.add(x / z);
+        const auto [nearest, farthest] = std::minmax({corners[0][2], corners[1][2], corners[2][2]});
+        if (farthest < near) return;
+        // the pixels whose middles lie between the corners along an axis; all where a side goes behind the camera
+        const auto middles = [&](Index axis, double middle) -> Pixels {
+            if (nearest < near) return {0, size - 1};
+            const auto [least, most] = std::minmax({corners[0][axis] / corners[0][2], corners[1][axis] / corners[1][2], corners[2][axis] / corners[2][2]});
+            const double first = frame[0] * least + middle - 0.5 - SLACK, last = frame[0] * most + middle - 0.5 + SLACK;
+            return {Index(std::ceil(std::clamp(first, 0.0, double(size)))), Index(std::floor(std::clamp(last, -1.0, double(size - 1))))};
         };
-        for (Index k = 0; k < 3; ++k) {
-            const Vector &one = corners[k], &two = corners[(k + 1) % 3];
-            if (one[2] >= near) add(one[0], one[1], one[2]);
-            // where the side from it goes behind the camera
-            if ((one[2] >= near) != (two[2] >= near)) {
-                const double part = (near - one[2]) / (two[2] - one[2]);
-                add(one[0] + part * (two[0] - one[0]), one[1] + part * (two[1] - one[1]), near);
+        rows = middles(1, frame[1]), columns = middles(0, frame[2]);
+    }
+
+    // Where it is nearer than what is there, number n at the rays of the rows first..first + rows of depth.
+    void meet(Index n, double near, const double *frame, const double *across, Index first, Array<double, 2> depth, Array<std::int32_t, 2> out) const {
+        const Index top = std::max(rows.first, first), bottom = std::min(rows.last, first + depth.shape[0] - 1);
+        if (top > bottom) return;
+        const auto &[a, b, c] = corners;
+        // of each side the normal of the plane through it and the camera
+        const Vector sides[] = {cross(b, c), cross(c, a), cross(a, b)};
+        const double volume = a[0] * sides[0][0] + a[1] * sides[0][1] + a[2] * sides[0][2];
+        for (Index row = top; row <= bottom; ++row) {
+            const double y = (double(row) + 0.5 - frame[1]) / frame[0];
+            double at_zero[3];
+            for (Index k = 0; k < 3; ++k) at_zero[k] = sides[k][1] * y + sides[k][2];
+            for (Index column = columns.first; column <= columns.last; ++column) {
+                const double x = across[column];
+                const double u = sides[0][0] * x + at_zero[0], v = sides[1][0] * x + at_zero[1], w = sides[2][0] * x + at_zero[2], total = u + v + w;
+                const bool inside = (u >= 0 && v >= 0 && w >= 0) || (u <= 0 && v <= 0 && w <= 0);
+                if (!inside || total == 0) continue;
+                double &nearest = depth(row - first, column);
+                if (const double away = volume / total; near < away && away < nearest) nearest = away, out(row, column) = std::int32_t(n);
             }
         }
-        if (down.least > down.greatest) return;
-        rows = down.middles(frame[1], frame[0], size);
-        columns = across.middles(frame[2], frame[0], size);
     }
 };
-
-// Triangle number n at the rays of the rows first..first + rows of depth, where it is nearer than what is there.
-void meet(const Triangle &triangle, Index n, double near, const double *frame, const double *across, Index first, Array<double, 2> depth,
-          Array<std::int32_t, 2> out) {
-    const auto &[a, b, c] = triangle.corners;
-    // of each side the normal of the plane through it and the camera
-    const Vector sides[] = {cross(b, c), cross(c, a), cross(a, b)};
-    const double volume = a[0] * sides[0][0] + a[1] * sides[0][1] + a[2] * sides[0][2];
-    for (Index row = std::max(triangle.rows.first, first); row <= std::min(triangle.rows.last, first + depth.shape[0] - 1); ++row) {
-        const double y = (double(row) + 0.5 - frame[1]) / frame[0];
-        double at_zero[3];
-        for (Index k = 0; k < 3; ++k) at_zero[k] = sides[k][1] * y + sides[k][2];
-        for (Index column = triangle.columns.first; column <= triangle.columns.last; ++column) {
-            const double x = across[column];
-            const double u = sides[0][0] * x + at_zero[0], v = sides[1][0] * x + at_zero[1], w = sides[2][0] * x + at_zero[2], total = u + v + w;
-            const bool inside = (u >= 0 && v >= 0 && w >= 0) || (u <= 0 && v <= 0 && w <= 0);
-            if (!inside || total == 0) continue;
-            double &nearest = depth(row - first, column);
-            if (const double away = volume / total; near < away && away < nearest) {
-                nearest = away;
-                out(row, column) = std::int32_t(n);
-            }
-        }
-    }
-}
 
 }  // namespace
 
@@ -111,17 +86,11 @@ void first_met(Array<const double, 3> corners, Array<const double, 1> origin, Ar
         }
         triangles[n].find_pixels(near, frame.data, size);
     });
-    std::vector<std::vector<Index>> bands((size + BAND - 1) / BAND);
-    for (Index n = 1; n < count; ++n) {
-        const auto &[_, rows, columns] = triangles[n];
-        if (rows.first > rows.last || columns.first > columns.last) continue;
-        for (Index band = rows.first / BAND; band <= rows.last / BAND; ++band) bands[band].push_back(n);
-    }
     const Scratch<double, 1> across(size);
     for (Index column = 0; column < size; ++column) across.array()(column) = (double(column) + 0.5 - frame(2)) / frame(0);
-    parallel_for(0, Index(bands.size()), [&](Index band) {
-        const auto depth = Scratch<double, 2>(std::min(BAND, size - band * BAND), size).filled(INFINITE);
-        for (const Index n : bands[band]) meet(triangles[n], n, near, frame.data, across.array().data, band * BAND, depth.array(), out);
+    parallel_for(0, (size + BAND - 1) / BAND, [&](Index band) {
+        const auto depth = Scratch<double, 2>(std::min(BAND, size - band * BAND), size).filled(std::numeric_limits<double>::infinity());
+        for (Index n = 1; n < count; ++n) triangles[n].meet(n, near, frame.data, across.array().data, band * BAND, depth.array(), out);
     });
 }
 
