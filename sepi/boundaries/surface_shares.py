@@ -121,7 +121,8 @@ def _views_alike(light_field: LightField, sides: Sides, parameters: BoundaryPara
     pixels = np.ascontiguousarray(light_field.views)
     lines = pixels.reshape(*pixels.shape[:3], -1)
     margin = np.float32(parameters.occlusion_margin)
-    views = RimViews(lines, pixels.shape[4], units, places, baselines, np.empty((0, 0, 0, 0), np.float32), 0, margin)
+    nothing = np.empty((0, 0, 0, pixels.shape[3]), np.float32)
+    views = RimViews(lines, pixels.shape[4], units, places, baselines, nothing, 0, margin)
     missing = np.zeros((*light_field.grid, 0, 0), bool) if light_field.missing is None else light_field.missing
     brightness, residual = np.empty((2, len(places)))
     background_kernels.brightness_of_views(views, sides, missing, brightness, residual)

@@ -370,7 +370,7 @@ def test_brightness_is_told_view_by_view() -> None:
     still = np.zeros((40, 48), np.float32)
     rim_views = RimViews(
         views.reshape(*views.shape[:3], -1), 3, np.ones(3, np.float32), np.argwhere(field.present),
-        field.baselines[field.present], np.empty((0, 0, 0, 0), np.float32), 0, np.float32(0),
+        field.baselines[field.present], np.empty((0, 0, 0, 48), np.float32), 0, np.float32(0),
     )  # fmt: skip
     sides = Sides(still, field.reference_view, still == 0, 4)
     brightness, residual = np.empty((2, 3))

@@ -1,8 +1,10 @@
 #include "all_views.hpp"
 
 #include <cmath>
+#include <vector>
 
 #include "kernels/parallel.hpp"
+#include "kernels/sampling.hpp"
 
 namespace sepi {
 namespace {
@@ -31,11 +33,14 @@ struct Point {
 void draw_triangle(Point a, Point b, Point c, double most_area, std::int32_t pixel, Array<float, 2> nearest, Array<std::int32_t, 2> origin) {
     const double area = (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
     if (!(0.5 * EDGE_ON < area && area <= most_area)) return;
-    const auto first_of = [](double p, double q, double r) { return std::max(0.0, std::ceil(std::min({p, q, r}) - 1e-3)); };
-    const auto last_of = [](double p, double q, double r, Index n) { return std::min(double(n - 1), std::floor(std::max({p, q, r}) + 1e-3)); };
-    const double left = first_of(a.x, b.x, c.x), right = last_of(a.x, b.x, c.x, nearest.shape[1]), bottom = last_of(a.y, b.y, c.y, nearest.shape[0]);
-    // mostly one pixel, or none
-    for (double y = first_of(a.y, b.y, c.y); y <= bottom; ++y) {
+    // the pixels along an axis of n that it may touch: mostly one, or none
+    const auto touched = [](double p, double q, double r, Index n) {
+        const auto [least, most] = std::minmax({p, q, r});
+        return std::pair(std::max(0.0, std::ceil(least - 1e-3)), std::min(double(n - 1), std::floor(most + 1e-3)));
+    };
+    const auto [top, bottom] = touched(a.y, b.y, c.y, nearest.shape[0]);
+    const auto [left, right] = touched(a.x, b.x, c.x, nearest.shape[1]);
+    for (double y = top; y <= bottom; ++y) {
         for (double x = left; x <= right; ++x) {
             const double of_b = ((x - a.x) * (c.y - a.y) - (y - a.y) * (c.x - a.x)) / area;
             const double of_c = ((b.x - a.x) * (y - a.y) - (b.y - a.y) * (x - a.x)) / area;
@@ -47,80 +52,72 @@ void draw_triangle(Point a, Point b, Point c, double most_area, std::int32_t pix
     }
 }
 
-// Whether a map shows only what is behind a surface of disparity d at a position where it would show it.
-bool is_open(Array<const float, 2> disparity, double y, double x, float d, float tolerance) {
-    const Index H = disparity.shape[0], W = disparity.shape[1];
-    if (y < 0 || x < 0 || y > H - 1 || x > W - 1) return false;
-    for (Index row = Index(y); row < std::min(Index(y) + 2, H); ++row)
-        for (Index column = Index(x); column < std::min(Index(x) + 2, W); ++column)
-            if (disparity(row, column) >= d - tolerance) return false;
-    return true;
-}
+// Maps that are carried to a view v down and u across from the reference view, and what they say of it.
+struct Fusion {
+    const Sources &sources;
+    const Rules &rules;
+    const double v, u;
 
-// One map of a view, out of all that are carried to it.
-class Fusion {
-  public:
-    Fusion(const Sources &sources, const Rules &rules, double v, double u) : sources_(sources), rules_(rules), v_(v), u_(u) {
-        for (Index n = 0; n < N_; ++n) {
-            const double down = v - sources.baselines(n, 0), across = u - sources.baselines(n, 1);
-            closeness_.array()(n) = float(1 / (1 + std::hypot(down, across)));
-            carry(sources.disparity[n], sources.corners[n], down, across, rules.most_stretched, nearest_[n], origin_[n]);
-        }
-    }
+    // What a map shows at a pixel of the view.
+    struct Shown {
+        float disparity, confidence, weight;
+        const float *bars;
+    };
+
+    const Index N = sources.disparity.shape[0], H = sources.disparity.shape[1], W = sources.disparity.shape[2];
+    const Scratch<float, 3> nearest{N, H, W};
+    const Scratch<std::int32_t, 3> origin{N, H, W};
+    std::vector<Shown> maps = std::vector<Shown>(N);
+    std::vector<float> closeness = std::vector<float>(N);
+
+    double down(Index n) const { return v - sources.baselines(n, 0); }
+    double across(Index n) const { return u - sources.baselines(n, 1); }
 
     // EMPTY where none shows anything.
-    void fuse(Array<float, 2> disparity, Array<float, 2> confidence, Array<float, 3> bars) const {
-        for (Index y = 0; y < H_; ++y) {
-            for (Index x = 0; x < W_; ++x) {
-                weigh(y, x);
+    void fuse(Array<float, 2> disparity, Array<float, 2> confidence, Array<float, 3> bars) {
+        for (Index n = 0; n < N; ++n) {
+            closeness[n] = float(1 / (1 + std::hypot(down(n), across(n))));
+            carry(sources.disparity[n], sources.corners[n], down(n), across(n), rules.most_stretched, nearest.array()[n], origin.array()[n]);
+        }
+        for (Index y = 0; y < H; ++y) {
+            for (Index x = 0; x < W; ++x) {
+                for (Index n = 0; n < N; ++n) maps[n] = shown(n, y, x);
                 const float best = best_disparity(y, x);
                 // of the maps that agree with the best, the mean
                 float total = 0, belief = 0, weight = 0, sums[3] = {};
-                for (Index n = 0; n < N_; ++n) {
-                    const float d = nearest_(n, y, x);
-                    if (!(d > EMPTY) || std::abs(d - best) > rules_.tolerance) continue;
-                    total += weights_(n) * (d - best);
-                    belief += weights_(n) * believed_(n);
-                    weight += weights_(n);
-                    if (sources_.bars.shape[0] == 0) continue;
+                for (const Shown &map : maps) {
+                    if (!(map.disparity > EMPTY) || std::abs(map.disparity - best) > rules.tolerance) continue;
+                    total += map.weight * (map.disparity - best);
+                    belief += map.weight * map.confidence;
+                    weight += map.weight;
                     // maps of one light field are wrong together: their mean is no surer than they are
-                    const float *own = sources_.bars.at(n, row_of(n, y, x), column_of(n, y, x));
-                    for (Index k = 0; k < 3; ++k) sums[k] += weights_(n) * own[k];
+                    for (Index k = 0; map.bars && k < 3; ++k) sums[k] += map.weight * map.bars[k];
                 }
                 disparity(y, x) = weight > 0 ? best + total / weight : EMPTY;
                 confidence(y, x) = weight > 0 ? belief / weight : 0;
-                if (sources_.bars.shape[0] > 0)
-                    for (Index k = 0; k < 3; ++k) bars(y, x, k) = weight > 0 ? sums[k] / weight : 0;
+                for (Index k = 0; sources.bars.shape[0] > 0 && k < 3; ++k) bars(y, x, k) = weight > 0 ? sums[k] / weight : 0;
             }
         }
     }
 
-  private:
-    Index row_of(Index n, Index y, Index x) const { return origin_(n, y, x) / std::int32_t(W_); }
-    Index column_of(Index n, Index y, Index x) const { return origin_(n, y, x) % std::int32_t(W_); }
-
-    // How much each map counts at a pixel.
-    void weigh(Index y, Index x) const {
-        for (Index n = 0; n < N_; ++n) {
-            believed_(n) = origin_(n, y, x) >= 0 ? sources_.confidence(n, row_of(n, y, x), column_of(n, y, x)) : 0;
-            weights_(n) = closeness_.array()(n) * (rules_.least_weight + believed_(n));
-        }
+    Shown shown(Index n, Index y, Index x) const {
+        const std::int32_t pixel = origin.array()(n, y, x);
+        const Index row = pixel / std::int32_t(W), column = pixel % std::int32_t(W);
+        const float believed = pixel >= 0 ? sources.confidence(n, row, column) : 0;
+        const float *bars = pixel >= 0 && sources.bars.shape[0] > 0 ? sources.bars.at(n, row, column) : nullptr;
+        return {nearest.array()(n, y, x), believed, closeness[n] * (rules.least_weight + believed), bars};
     }
 
     // The disparity that most maps are for, if they differ.
     float best_disparity(Index y, Index x) const {
         float low = FARTHER, high = EMPTY, most = -FARTHER;
-        for (Index n = 0; n < N_; ++n) {
-            const float d = nearest_(n, y, x);
-            if (d > EMPTY) low = std::min(low, d), high = std::max(high, d);
-        }
-        if (!(high > low + rules_.tolerance)) return high;
+        for (const Shown &map : maps)
+            if (map.disparity > EMPTY) low = std::min(low, map.disparity), high = std::max(high, map.disparity);
+        if (!(high > low + rules.tolerance)) return high;
         float best = high;
-        for (Index n = 0; n < N_; ++n) {
-            const float d = nearest_(n, y, x);
-            if (!(d > EMPTY)) continue;
-            const float found = score(y, x, d);
-            if (found > most) best = d, most = found;
+        for (const Shown &map : maps) {
+            if (!(map.disparity > EMPTY)) continue;
+            if (const float found = score(y, x, map.disparity); found > most) best = map.disparity, most = found;
         }
         return best;
     }
@@ -128,39 +125,19 @@ class Fusion {
     // Sum of the weights of the maps that show a surface, less that of those that see through it.
     float score(Index y, Index x, float d) const {
         float sum = 0;
-        for (Index n = 0; n < N_; ++n) {
-            const float shown = nearest_(n, y, x);
-            if (std::abs(shown - d) <= rules_.tolerance) {
-                sum += weights_(n);
-            } else if (shown < d) {
-                const double down = v_ - sources_.baselines(n, 0), across = u_ - sources_.baselines(n, 1);
-                if (is_open(sources_.disparity[n], y + d * down, x + d * across, d, rules_.tolerance)) sum -= weights_(n);
+        for (Index n = 0; n < N; ++n) {
+            if (std::abs(maps[n].disparity - d) <= rules.tolerance) {
+                sum += maps[n].weight;
+            } else if (maps[n].disparity < d) {
+                // it shows only what is behind, where it would show the surface
+                const auto place = place_within(y + d * down(n), x + d * across(n), H, W);
+                const auto is_behind = [&](Index i, Index j) { return sources.disparity(n, i, j) < d - rules.tolerance; };
+                if (place && all_about(*place, is_behind)) sum -= maps[n].weight;
             }
         }
         return sum;
     }
-
-    const Sources &sources_;
-    const Rules &rules_;
-    const double v_, u_;
-    const Index N_ = sources_.disparity.shape[0], H_ = sources_.disparity.shape[1], W_ = sources_.disparity.shape[2];
-    const Scratch<float, 3> carried_{N_, H_, W_};
-    const Scratch<std::int32_t, 3> origins_{N_, H_, W_};
-    const Scratch<float, 2> of_pixel_{2, N_};
-    const Scratch<float, 1> closeness_{N_};
-    const Array<float, 3> nearest_ = carried_.array();
-    const Array<std::int32_t, 3> origin_ = origins_.array();
-    const Array<float, 1> weights_ = of_pixel_.array()[0], believed_ = of_pixel_.array()[1];
 };
-
-// The first known disparity on the way from a pixel, EMPTY where there is none.
-float walk(Array<const float, 2> disparity, Index y, Index x, double down, double across) {
-    for (Index steps = 1;; ++steps) {
-        const auto row = Index(std::nearbyint(y + steps * down)), column = Index(std::nearbyint(x + steps * across));
-        if (row < 0 || column < 0 || row >= disparity.shape[0] || column >= disparity.shape[1]) return EMPTY;
-        if (disparity(row, column) > EMPTY) return disparity(row, column);
-    }
-}
 
 // Fill what is EMPTY with the farther of the two surfaces beside it, along the way that the view has moved: gaps open
 // along it.
@@ -168,22 +145,24 @@ void extend_background(double v, double u, Array<float, 2> disparity, Array<bool
     const Index H = disparity.shape[0], W = disparity.shape[1];
     const double longest = std::max(std::abs(v), std::abs(u));
     const double down = longest > 0 ? v / longest : 0, across = longest > 0 ? u / longest : 1;
-    const Scratch<float, 2> before(H, W);
-    const auto known = before.array();
-    for (Index y = 0; y < H; ++y) std::copy_n(disparity.at(y), W, known.at(y));
+    for (Index y = 0; y < H; ++y)
+        for (Index x = 0; x < W; ++x) extended(y, x) = !(disparity(y, x) > EMPTY);
+    // the first known disparity on a way from a pixel, or what is farther than all; halves are rounded away from it
+    const auto first_along = [&](Index y, Index x, double dy, double dx) {
+        for (Index steps = 1;; ++steps) {
+            const Index row = y + Index(std::round(steps * dy)), column = x + Index(std::round(steps * dx));
+            if (row < 0 || column < 0 || row >= H || column >= W) return FARTHER;
+            if (!extended(row, column)) return disparity(row, column);
+        }
+    };
     for (Index y = 0; y < H; ++y) {
         for (Index x = 0; x < W; ++x) {
-            extended(y, x) = !(known(y, x) > EMPTY);
             if (!extended(y, x)) continue;
-            float best = FARTHER;
-            const auto look = [&](double dy, double dx) {
-                for (const double sign : {1.0, -1.0})
-                    if (const float d = walk(known, y, x, sign * dy, sign * dx); d > EMPTY) best = std::min(best, d);
-            };
-            look(down, across);
+            const auto both = [&](double dy, double dx) { return std::min(first_along(y, x, dy, dx), first_along(y, x, -dy, -dx)); };
             // across it only where nothing lies along it
-            if (best == FARTHER) look(across, -down);
-            disparity(y, x) = best < FARTHER ? best : 0;
+            float found = both(down, across);
+            if (found == FARTHER) found = both(across, -down);
+            disparity(y, x) = found < FARTHER ? found : 0;
         }
     }
 }
@@ -193,40 +172,27 @@ void extend_background(double v, double u, Array<float, 2> disparity, Array<bool
 void corner_disparities(Array<const float, 2> disparity, float tolerance, Array<float, 3> out) {
     const Index H = disparity.shape[0], W = disparity.shape[1];
     const Scratch<float, 3> slopes(2, H, W);
-    // what each pixel says of its corners; beyond the border what agrees with nothing
-    const auto said = Scratch<float, 3>(4, H + 2, W + 2).filled(NAN);
-    parallel_for(0, H, [&](Index y) {
-        const float *own = disparity.at(y);
-        float *__restrict down = slopes.array().at(0, y), *__restrict across = slopes.array().at(1, y);
-        for (Index x = 0; x < W; ++x) {
-            down[x] = slope(own + x, disparity.strides[0], y, H);
-            across[x] = slope(own + x, 1, x, W);
-        }
-        for (Index corner = 0; corner < 4; ++corner) {
-            const auto [dy, dx] = CORNERS[corner];
-            float *__restrict values = said.array().at(corner, y + 1, 1);
-            for (Index x = 0; x < W; ++x) values[x] = own[x] + down[x] * float(dy) + across[x] * float(dx);
-        }
+    const auto said = [&](Index y, Index x, auto down, auto across) {
+        return disparity(y, x) + slopes.array()(0, y, x) * down + slopes.array()(1, y, x) * across;
+    };
+    parallel_for_pixels(H, W, [&](Index y, Index x) {
+        slopes.array()(0, y, x) = slope(disparity.at(y, x), disparity.strides[0], y, H);
+        slopes.array()(1, y, x) = slope(disparity.at(y, x), 1, x, W);
     });
-    parallel_for(0, H, [&](Index y) {
-        const float *own = disparity.at(y), *down = slopes.array().at(0, y), *across = slopes.array().at(1, y);
+    parallel_for_pixels(H, W, [&](Index y, Index x) {
         for (Index corner = 0; corner < 4; ++corner) {
-            const auto [dy, dx] = CORNERS[corner];
-            const Index row = y + (dy > 0), column = dx > 0;
+            const auto [down, across] = CORNERS[corner];
+            const double mine = said(y, x, down, across);
+            float total = 0, count = 0;
             // by the rows of the pixels that share the corner: for all of them it adds up alike
-            const float *around[] = {said.array().at(2, row, column), said.array().at(3, row, column + 1), said.array().at(1, row + 1, column),
-                                     said.array().at(0, row + 1, column + 1)};
-            float *target = out.at(y, 0, corner);
-            for (Index x = 0; x < W; ++x) {
-                const double mine = own[x] + down[x] * dy + across[x] * dx;
-                float total = 0, count = 0;
-                for (const float *values : around) {
-                    const bool agrees = std::abs(values[x] - mine) <= tolerance;
-                    total += agrees ? values[x] : 0;
-                    count += agrees;
+            for (const Index i : {y + (down > 0) - 1, y + (down > 0)}) {
+                for (const Index j : {x + (across > 0) - 1, x + (across > 0)}) {
+                    if (i < 0 || j < 0 || i >= H || j >= W) continue;
+                    const float value = said(i, j, float(y - i) + float(down), float(x - j) + float(across));
+                    if (std::abs(value - mine) <= tolerance) total += value, ++count;
                 }
-                target[4 * x] = count > 0 ? total / count : float(mine);
             }
+            out(y, x, corner) = count > 0 ? total / count : float(mine);
         }
     });
 }
@@ -259,7 +225,7 @@ void maps_of_views(const Sources &sources, const Rules &rules, Array<const doubl
                    Array<float, 4> bars, Array<bool, 3> extended) {
     parallel_for(0, baselines.shape[0], [&](Index view) {
         const double v = baselines(view, 0), u = baselines(view, 1);
-        Fusion(sources, rules, v, u).fuse(disparity[view], confidence[view], bars[view]);
+        Fusion{sources, rules, v, u}.fuse(disparity[view], confidence[view], bars[view]);
         // gaps open beside the reference view's surfaces, for it is those that most of the maps are made of
         extend_background(v, u, disparity[view], extended[view]);
     });

@@ -1,4 +1,4 @@
-#include "background.hpp"
+#include "surface_shares.hpp"
 
 #include <cmath>
 #include <limits>
@@ -35,15 +35,14 @@ float median(const float *values, Index n) {
     const int middle = int(n / 2);
     // as many or fewer lie below low, more below high or it is the largest
     float low = least_from(-NONE), high = most_below(NONE);
-    for (int below = 0; below != middle;) {
-        const float half = low + (high - low) * 0.5f;
-        if (half <= low || half >= high) break;
-        below = number_below(half);
-        (below <= middle ? low : high) = half;
+    int below = 0;
+    for (float half; below != middle && (half = low + (high - low) * 0.5f) > low && half < high;) {
+        const int found = number_below(half);
+        if (found <= middle) below = found;
+        (found <= middle ? low : high) = half;
     }
-    const float after = least_from(low);
     // of an even number, the mean of both in the middle
-    return n % 2 || number_below(after) < middle ? after : (most_below(after) + after) * 0.5f;
+    return n % 2 || below < middle ? least_from(low) : (most_below(low) + least_from(low)) * 0.5f;
 }
 
 }  // namespace
@@ -62,8 +61,7 @@ void brightness_of_views(const RimViews<Colour> &views, const Sides &sides, Arra
         double own = 1e-9, other = 1e-9, rest = 0;
         for (Index y = 0; y < H; y += STRIDE) {
             for (Index x = 0; x < W; x += STRIDE) {
-                const float d = sides.disparity(y, x);
-                const auto place = place_amid(double(y) - d * views.baselines(view, 0), double(x) - d * views.baselines(view, 1), H, W);
+                const auto place = place_in(views, view, sides.disparity(y, x), y, x);
                 if (!sides.clean(y, x) || !place || !shows(place->row, place->column)) continue;
                 const auto there = sample(views, view, *place);
                 const auto here = sides.colour(y, x);

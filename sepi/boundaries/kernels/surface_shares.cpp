@@ -70,21 +70,18 @@ void go_on(const Moments &sums, NearerSurface &surface) {
 
 // The nearer surface at a pixel: where no clean pixel tells of its colour, that is the pixel's own.
 NearerSurface nearer_surface(const Sides &sides, float near, double middle, Index y, Index x) {
-    const Index H = sides.disparity.shape[0], W = sides.disparity.shape[1], radius = sides.clean_radius;
     const auto colour_at = [&](Index i, Index j) { return Channels{sides.guide(i, j, 0), sides.guide(i, j, 1), sides.guide(i, j, 2)}; };
     NearerSurface surface;
     Moments sums;
-    for (Index i = std::max<Index>(0, y - radius); i < std::min(H, y + radius + 1); ++i) {
-        for (Index j = std::max<Index>(0, x - radius); j < std::min(W, x + radius + 1); ++j) {
-            const float d = sides.disparity(i, j);
-            const Channels colour = colour_at(i, j);
-            if (d > middle) {
-                surface.least = colour < surface.least ? colour : surface.least;
-                surface.most = colour > surface.most ? colour : surface.most;
-            }
-            if (sides.clean(i, j) && std::abs(d - near) < SAME_SURFACE) sums.add(double(i - y), double(j - x), colour);
+    for_window(y, x, sides.clean_radius, sides.disparity.shape[0], sides.disparity.shape[1], [&](Index i, Index j) {
+        const float d = sides.disparity(i, j);
+        const Channels colour = colour_at(i, j);
+        if (d > middle) {
+            surface.least = colour < surface.least ? colour : surface.least;
+            surface.most = colour > surface.most ? colour : surface.most;
         }
-    }
+        if (sides.clean(i, j) && std::abs(d - near) < SAME_SURFACE) sums.add(double(i - y), double(j - x), colour);
+    });
     if (sums.weight > 0) {
         go_on(sums, surface);
     } else {
@@ -106,45 +103,54 @@ float sum_over(Index n, Index channels, Turn turn) {
 
 // What the views show of one pixel after the other.
 template <class Colour>
-class ShownPixel {
-  public:
-    ShownPixel(const RimViews<Colour> &views, const Rim &rim, Array<const float, 3> background, const Sides &sides, double scale2, double contrast2)
-        : views_(views), rim_(rim), background_(background), sides_(sides), least_scale2_(scale2), contrast2_(contrast2) {}
+struct ShownPixel {
+    const RimViews<Colour> &views;
+    const Rim &rim;
+    const Array<const float, 3> background;
+    const Sides &sides;
+    const double least_scale2, contrast2;
+
+    // rows of what the views show: colours, those behind them, and the variance of the latter
+    static constexpr Index BEHIND = 3, NOISE = 6, ROWS = 7;
+    const Scratch<float, 2> rows = zeros<float, 2>(ROWS, views.number() + LANES);
+    Index number = 0;  // views that tell
+    NearerSurface surface = {};
+    float sums[NOISE] = {}, scale2 = 0, held = 0;
 
     // Find the costs of all shares; false if the views do not tell.
     bool find(Index y, Index x, float *costs) {
-        const float near = rim_.near(y, x), far = rim_.far(y, x);
+        const float near = rim.near(y, x), far = rim.far(y, x);
         look_along_near(near, far, y, x);
-        if (n_ < FEWEST_SAMPLES) return false;
-        surface_ = nearer_surface(sides_, near, double(near + far) / 2, y, x);
+        if (number < FEWEST_SAMPLES) return false;
+        surface = nearer_surface(sides, near, double(near + far) / 2, y, x);
         // to be far, a pixel must be so whatever its colour. To be near it must have the surface's colour: before a bare
         // background, any is a share of another
-        if (rim_.is_near(y, x)) surface_.variance = squared(FREE_DEVIATION);
-        scale2_ = float(least_scale2_ + contrast2_ * mean_contrast2());
-        held_ = float(scale2_ / surface_.variance);
-        for (Index row = 0; row < NOISE; ++row) sums_[row] = sum_over(n_, 1, [&](Index v, Index) { return samples(row, v); });
+        if (rim.is_near(y, x)) surface.variance = squared(FREE_DEVIATION);
+        const float contrasts2 = sum_over(number, 3, [&](Index v, Index c) {
+            const Float8 apart = samples(BEHIND + c, v) - spread(float(surface.own[c]));
+            return apart * apart;
+        });
+        scale2 = float(least_scale2 + contrast2 * (contrasts2 / float(3 * number)));
+        held = float(scale2 / surface.variance);
+        for (Index row = 0; row < NOISE; ++row) sums[row] = sum_over(number, 1, [&](Index v, Index) { return samples(row, v); });
         for (Index k = 0; k < SHARES; ++k) costs[k] = cost_of(float(double(k) / (SHARES - 1)));
-        if (!rim_.is_near(y, x)) {
+        if (!rim.is_near(y, x)) {
             const float alone = cost_alone(far, y, x);
             for (Index k = 0; k < LITTLE; ++k) costs[k] = std::min(costs[k], alone);
         }
         return true;
     }
 
-  private:
-    // rows of what the views show: colours, those behind them, and the variance of the latter
-    static constexpr Index BEHIND = 3, NOISE = 6, ROWS = 7;
-
-    Float8 samples(Index row, Index v) const { return load(samples_.array().at(row, v)); }
+    Float8 samples(Index row, Index v) const { return load(rows.array().at(row, v)); }
 
     // Colour between pixels of the background, and its variance, if they are known.
     std::optional<std::array<float, 4>> behind(const Place &place) const {
         const auto [row, column, fy, fx] = place;
         for (Index i = row; i < row + 2; ++i)
             for (Index j = column; j < column + 2; ++j)
-                if (background_(i, j, 3) < 0) return std::nullopt;
+                if (background(i, j, 3) < 0) return std::nullopt;
         // two pixels side by side
-        const Float8 upper = load(background_.at(row, column)), lower = load(background_.at(row + 1, column));
+        const Float8 upper = load(background.at(row, column)), lower = load(background.at(row + 1, column));
         const Float8 both = fma(spread(float(fy)), lower - upper, upper);
         std::array<float, 4> found;
         for (int k = 0; k < 4; ++k) found[k] = both[k] + float(fx) * (both[k + 4] - both[k]);
@@ -152,34 +158,23 @@ class ShownPixel {
     }
 
     void take(Index view, const Place &place) {
-        const auto colour = sample(views_, view, place);
-        for (Index c = 0; c < 3; ++c) samples_.array()(c, n_) = colour[c];
-        ++n_;
+        const auto colour = sample(views, view, place);
+        for (Index c = 0; c < 3; ++c) rows.array()(c, number) = colour[c];
+        ++number;
     }
 
     // What the views show of a pixel that moves with the nearer surface, and what is behind it there.
     void look_along_near(float near, float far, Index y, Index x) {
-        n_ = 0;
-        for (Index view = 0; view < views_.number(); ++view) {
-            const auto place = place_seen(views_, view, near, y, x);
-            // where the background that is there in the view is in the reference view
-            const double down = double(y) - (near - far) * views_.baselines(view, 0), across = double(x) - (near - far) * views_.baselines(view, 1);
-            const auto there = place_amid(down, across, background_.shape[0], background_.shape[1]);
+        number = 0;
+        for (Index view = 0; view < views.number(); ++view) {
+            // and where the background that is there in the view is in the reference view
+            const auto place = place_seen(views, view, near, y, x), there = place_in(views, view, near - far, y, x);
             if (!place || !there) continue;
             if (const auto known = behind(*there)) {
-                for (Index k = 0; k < 4; ++k) samples_.array()(BEHIND + k, n_) = (*known)[k];
+                for (Index k = 0; k < 4; ++k) rows.array()(BEHIND + k, number) = (*known)[k];
                 take(view, *place);
             }
         }
-    }
-
-    // Mean squared difference of the nearer surface's colour from what is behind it.
-    float mean_contrast2() const {
-        const float sum = sum_over(n_, 3, [&](Index v, Index c) {
-            const Float8 apart = samples(BEHIND + c, v) - spread(float(surface_.own[c]));
-            return apart * apart;
-        });
-        return sum / float(3 * n_);
     }
 
     // Mean robust residual of views that show a share of one colour before the background, 0..1. The colour is that which
@@ -189,49 +184,38 @@ class ShownPixel {
         float total = 0;
         Float8 shown[3];
         for (Index c = 0; c < 3; ++c) {
-            const float along = sums_[c] - rest * sums_[BEHIND + c];
-            const double own = surface_.own[c], best = (share * along + held_ * own) / (share * share * double(n_) + held_);
-            const double fit = std::min(std::max(best, surface_.least[c]), surface_.most[c]);
-            total += float(held_ * squared(fit - own) / scale2_);
+            const float along = sums[c] - rest * sums[BEHIND + c];
+            const double own = surface.own[c], best = (share * along + held * own) / (share * share * double(number) + held);
+            const double fit = std::min(std::max(best, surface.least[c]), surface.most[c]);
+            total += float(held * squared(fit - own) / scale2);
             shown[c] = spread(float(share * fit));
         }
-        const float residuals = sum_over(n_, 1, [&](Index v, Index) {
-            const Float8 half = fma(spread(rest * rest), samples(NOISE, v), spread(scale2_));
+        const float residuals = sum_over(number, 1, [&](Index v, Index) {
+            const Float8 half = fma(spread(rest * rest), samples(NOISE, v), spread(scale2));
             const auto cost = [&](Index c) {
                 const Float8 apart = samples(c, v) - shown[c] - spread(rest) * samples(BEHIND + c, v);
                 return robust(apart * apart, half);
             };
             return cost(0) + cost(1) + cost(2);
         });
-        return (total + residuals) / float(3 * n_);
+        return (total + residuals) / float(3 * number);
     }
 
     // Mean robust residual of a pixel that moves with the more distant surface, over views that see it.
     float cost_alone(float far, Index y, Index x) {
-        n_ = 0;
-        for (Index view = 0; view < views_.number(); ++view) {
+        number = 0;
+        for (Index view = 0; view < views.number(); ++view) {
             // the reference view itself always fits
-            if (views_.baselines(view, 0) == 0 && views_.baselines(view, 1) == 0) continue;
-            if (const auto place = place_seen(views_, view, far, y, x)) take(view, *place);
+            if (views.baselines(view, 0) == 0 && views.baselines(view, 1) == 0) continue;
+            if (const auto place = place_seen(views, view, far, y, x)) take(view, *place);
         }
-        if (n_ < FEWEST_ALONE) return UNKNOWN;
-        const float sum = sum_over(n_, 3, [&, own = sides_.colour(y, x)](Index v, Index c) {
+        if (number < FEWEST_ALONE) return UNKNOWN;
+        const float sum = sum_over(number, 3, [&, own = sides.colour(y, x)](Index v, Index c) {
             const Float8 apart = samples(c, v) - spread(own[c]);
-            return robust(apart * apart, spread(scale2_));
+            return robust(apart * apart, spread(scale2));
         });
-        return sum / float(3 * n_);
+        return sum / float(3 * number);
     }
-
-    const RimViews<Colour> &views_;
-    const Rim &rim_;
-    const Array<const float, 3> background_;
-    const Sides &sides_;
-    const double least_scale2_, contrast2_;
-
-    const Scratch<float, 2> samples_ = zeros<float, 2>(ROWS, views_.number() + LANES);
-    Index n_ = 0;  // views that tell
-    NearerSurface surface_;
-    float sums_[NOISE], scale2_, held_;
 };
 
 }  // namespace
@@ -241,7 +225,7 @@ void costs_of_shares(const RimViews<Colour> &views, const Rim &rim, Array<const 
                      Array<const std::int64_t, 1> pixels, Array<float, 2> costs, Array<bool, 1> told) {
     const Index W = sides.disparity.shape[1], count = pixels.shape[0];
     parallel_for(0, (count + AT_ONCE - 1) / AT_ONCE, [&](Index task) {
-        ShownPixel<Colour> shown(views, rim, background, sides, scale2, contrast2);
+        ShownPixel<Colour> shown{views, rim, background, sides, scale2, contrast2};
         for (Index i = task * AT_ONCE; i < std::min(count, (task + 1) * AT_ONCE); ++i)
             if (shown.find(pixels(i) / W, pixels(i) % W, costs.at(i))) told(i) = true;
     });

@@ -3,18 +3,24 @@
 
 #include "kernels/lanes.hpp"
 #include "kernels/sampling.hpp"
-#include "rim_arrays.hpp"
+#include "surface_shares.hpp"
 
 namespace sepi {
 
-// Where a view shows a pixel of disparity d, if it does.
+// Where a pixel of disparity d lies in a view, if that is amid its pixels.
+template <class Colour>
+[[gnu::always_inline]] inline std::optional<Place> place_in(const RimViews<Colour> &views, Index view, float d, Index y, Index x) {
+    const double down = double(y) - d * views.baselines(view, 0), across = double(x) - d * views.baselines(view, 1);
+    return place_amid(down, across, views.lines.shape[2], views.nearest.shape[3]);
+}
+
+// The same, if nothing hides it.
 template <class Colour>
 [[gnu::always_inline]] inline std::optional<Place> place_seen(const RimViews<Colour> &views, Index view, float d, Index y, Index x) {
-    const double down = double(y) - d * views.baselines(view, 0), across = double(x) - d * views.baselines(view, 1);
-    const auto place = place_amid(down, across, views.lines.shape[2], views.nearest.shape[3]);
+    const auto place = place_in(views, view, d, y, x);
     if (!place) return place;
-    const float nearest = views.nearest(views.places(view, 0), views.places(view, 1), Index(down + 0.5) - views.low, Index(across + 0.5));
-    return nearest <= d + views.margin ? place : std::nullopt;
+    const Index row = place->row + (place->fy >= 0.5), column = place->column + (place->fx >= 0.5);
+    return views.nearest(views.places(view, 0), views.places(view, 1), row - views.low, column) <= d + views.margin ? place : std::nullopt;
 }
 
 // Colour between pixels of a view, 0..1; grey counts as three equal channels. Cubic, since a bilinear sample takes from
