@@ -32,6 +32,12 @@ inline std::array<float, 4> cubic_weights(double f) {
     };
 }
 
+// Squared distance of two colours.
+inline float squared_distance(const float *one, const float *other) {
+    const float r = one[0] - other[0], g = one[1] - other[1], b = one[2] - other[2];
+    return r * r + g * g + b * b;
+}
+
 // Weights of a pixel, its right neighbour, and both below them, for a sample so far below and to the right of it, 0..1.
 inline std::array<float, 4> bilinear_weights(float fy, float fx) { return {(1 - fy) * (1 - fx), (1 - fy) * fx, fy * (1 - fx), fy * fx}; }
 

@@ -1,10 +1,7 @@
 #include "cae.hpp"
 
-#include <array>
-#include <bit>
 #include <cmath>
 #include <limits>
-#include <numeric>
 
 #include "kernels/exponential.hpp"
 #include "kernels/parallel.hpp"
@@ -22,56 +19,22 @@ inline float logarithm(float x) { return float(std::log(double(x))); }
 // Entropy of the weighted histogram of an angular patch (N) of bins; leaves histogram at zero.
 float entropy(const std::int16_t *patch, Index N, Index own, Array<const float, 1> weights, float *histogram) {
     float total = 0, mixed = 0;
-    std::array<std::uint64_t, LEVELS / 64> filled{};  // a bit for each bin
+    const Index reach = weights.shape[0] - 1;
     for (Index n = 0; n < N; ++n) {
-        const Index level = patch[n], distance = std::abs(level - own);
-        if (distance >= weights.shape[0]) continue;
-        histogram[level] += weights(distance);
+        const Index distance = std::abs(patch[n] - own);
+        if (distance > reach) continue;
+        histogram[patch[n]] += weights(distance);
         total += weights(distance);
-        filled[level / 64] |= std::uint64_t(1) << level % 64;
     }
     // no view is anything like the pixel: as bad as a patch in which all differ
     if (total <= 0) return logarithm(float(N));
-    for (Index i = 0; i < LEVELS / 64; ++i) {
-        for (std::uint64_t bits = filled[i]; bits; bits &= bits - 1) {
-            float &weight = histogram[64 * i + std::countr_zero(bits)];
-            if (weight > 0) mixed += weight * logarithm(weight);
-            weight = 0;
-        }
+    for (Index level = std::max<Index>(0, own - reach); level <= std::min(own + reach, LEVELS - 1); ++level) {
+        float &weight = histogram[level];
+        if (weight > 0) mixed += weight * logarithm(weight);
+        weight = 0;
     }
     return logarithm(total) - mixed / total;
 }
-
-// The pixels of a sub-patch: what each of K candidates costs there, and weights.
-struct Patch {
-    std::array<const float *, PATCH * PATCH> costs;
-    std::array<float, PATCH * PATCH> weights;
-
-    // Weights by how near colours are to the centre's.
-    Patch(Array<const float, 3> response, Array<const float, 3> guide, Index top, Index left, const float *centre, float scale) {
-        for (Index n = 0; n < PATCH * PATCH; ++n) {
-            const Index y = clamped(top + n / PATCH, response.shape[0]), x = clamped(left + n % PATCH, response.shape[1]);
-            const float *colour = guide.at(y, x);
-            costs[n] = response.at(y, x);
-            const float r = colour[0] - centre[0], g = colour[1] - centre[1], b = colour[2] - centre[2];
-            weights[n] = r * r + g * g + b * b;
-        }
-        // a patch of nothing alike still has a mean
-        for (float &weight : weights) weight = exp_of_negative(std::max(weight * scale, -9.0f));
-    }
-
-    // Weighted sums of the costs, of so many candidates at a time; some of them twice where their number is no multiple.
-    template <Index BLOCK>
-    void add_up(Index K, float *__restrict out) const {
-        for (Index begin = 0; begin < K; begin += BLOCK) {
-            const Index first = std::min(begin, K - BLOCK);
-            std::array<float, BLOCK> sums{};
-            for (Index n = 0; n < PATCH * PATCH; ++n)
-                for (Index k = 0; k < BLOCK; ++k) sums[k] += weights[n] * costs[n][first + k];
-            std::copy_n(sums.data(), BLOCK, out + first);
-        }
-    }
-};
 
 }  // namespace
 
@@ -101,9 +64,16 @@ void constrained_least_patch(Array<const float, 3> response, Array<const float, 
             std::fill_n(least, K, std::numeric_limits<float>::infinity());
             for (Index part = 0; part < 9; ++part) {
                 const Index top = y - reach + part / 3 * PATCH, left = x - reach + part % 3 * PATCH;
-                const Patch patch(response, guide, top, left, guide.at(y, x), scale);
-                K >= 32 ? patch.add_up<32>(K, total) : K >= 8 ? patch.add_up<8>(K, total) : patch.add_up<1>(K, total);
-                const float weights = std::accumulate(patch.weights.begin(), patch.weights.end(), 0.0f);
+                float weights = 0;
+                std::fill_n(total, K, 0.0f);
+                for (Index n = 0; n < PATCH * PATCH; ++n) {
+                    const Index i = clamped(top + n / PATCH, H), j = clamped(left + n % PATCH, W);
+                    // a patch of nothing alike still has a mean
+                    const float weight = exp_of_negative(std::max(squared_distance(guide.at(i, j), guide.at(y, x)) * scale, -9.0f));
+                    const float *costs = response.at(i, j);
+                    for (Index k = 0; k < K; ++k) total[k] += weight * costs[k];
+                    weights += weight;
+                }
                 const double added = double(constraint) * (1 - double(weights) / (PATCH * PATCH));
                 for (Index k = 0; k < K; ++k) least[k] = std::min(least[k], float(double(total[k] / weights) + added));
             }

@@ -30,11 +30,8 @@ std::int32_t weighted_median(const std::int32_t *values, const std::int32_t *wei
         const std::int32_t middle = std::int32_t((Index(low) + high) >> 1);
         std::int32_t up_to = 0;
         for (Index n = 0; n < count; ++n) up_to += values[n] <= middle ? weights[n] : 0;
-        if (2 * Index(up_to) >= total) {
-            high = middle;
-        } else {
-            low = middle + 1;
-        }
+        const bool enough = 2 * Index(up_to) >= total;
+        (enough ? high : low) = enough ? middle : middle + 1;
     }
     return low;
 }
@@ -91,7 +88,7 @@ void keep_least(Index k, Array<const float, 3> slopes, Array<const float, 2> con
             if (beyond == step) ++j, beyond = 0;
             const Index right = std::min(j + 1, last_column);
             const float fx = float(double(beyond) / double(step));
-            const float a = (1 - fy) * (1 - fx), b = (1 - fy) * fx, c = fy * (1 - fx), d = fy * fx;
+            const auto [a, b, c, d] = bilinear_weights(fy, fx);
             const float *colour = colours.at(x), *slope_a = upper_slopes.at(j), *slope_b = upper_slopes.at(right);
             const float *slope_c = lower_slopes.at(j), *slope_d = lower_slopes.at(right);
             float cost = a * upper[j] + b * upper[right] + c * lower[j] + d * lower[right];
@@ -122,9 +119,7 @@ void median_pass(Array<const std::int32_t, 2> current, Array<const std::int32_t,
             Index count = 1;
             for (Index v = std::max(y - reach, y % gap); v < std::min(y + reach + 1, H); v += gap) {
                 for (Index u = std::max(x - reach, x % gap); u < std::min(x + reach + 1, W); u += gap) {
-                    const float *colour = guide.at(v, u);
-                    const float r = colour[0] - own[0], g = colour[1] - own[1], b = colour[2] - own[2];
-                    const Index entry = Index((r * r + g * g + b * b) * scale), last = table.shape[0] - 1;
+                    const Index entry = Index(squared_distance(guide.at(v, u), own) * scale), last = table.shape[0] - 1;
                     // written in any case, and kept where it counts: branches would be guessed wrong
                     values[count] = current(v, u), weights[count] = table(std::min(entry, last));
                     count += (entry <= last) & ((v != y) | (u != x));

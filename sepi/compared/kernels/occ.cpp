@@ -1,9 +1,9 @@
 #include "occ.hpp"
 
 #include <array>
-#include <cmath>
 #include <limits>
 
+#include "angular_patches.hpp"
 #include "kernels/parallel.hpp"
 
 namespace sepi {
@@ -39,26 +39,19 @@ Half half_of(Array<const float, 4> sheared, Array<const float, 3> reference, Ind
 }  // namespace
 
 void whole_patch_costs(Array<const float, 4> sheared, Array<const float, 3> reference, Array<float, 2> out) {
-    const Index N = sheared.shape[0], H = sheared.shape[2], W = sheared.shape[3];
+    const Index N = sheared.shape[0], W = sheared.shape[3];
     const float third = float(1.0 / 3), count = float(N), freedom = float(std::max<Index>(1, N - 1));
-    parallel_for(0, H, [&](Index y) {
+    parallel_for(0, sheared.shape[2], [&](Index y) {
         const auto rows = zeros<float, 2>(4, W);
-        float *__restrict red = rows.array().at(0), *__restrict green = rows.array().at(1), *__restrict blue = rows.array().at(2);
-        float *__restrict squares = rows.array().at(3);
-        const float *own_red = reference.at(0, y), *own_green = reference.at(1, y), *own_blue = reference.at(2, y);
-        for (Index n = 0; n < N; ++n) {
-            const float *of_red = sheared.at(n, 0, y), *of_green = sheared.at(n, 1, y), *of_blue = sheared.at(n, 2, y);
-            for (Index x = 0; x < W; ++x) {
-                // counted from the reference's colour, so that the squares keep their digits
-                const float r = of_red[x] - own_red[x], g = of_green[x] - own_green[x], b = of_blue[x] - own_blue[x];
-                red[x] += r, green[x] += g, blue[x] += b;
-                squares[x] = squares[x] + r * r + g * g + b * b;
-            }
-        }
-        float *__restrict cost = out.at(y);
+        float *red = rows.array().at(0), *green = rows.array().at(1), *blue = rows.array().at(2), *squares = rows.array().at(3);
+        // counted from the reference's colour, so that the squares keep their digits
+        for_differences(sheared, reference, -1, y, [=](Index, Index x, float r, float g, float b) {
+            red[x] += r, green[x] += g, blue[x] += b;
+            squares[x] = squares[x] + r * r + g * g + b * b;
+        });
         for (Index x = 0; x < W; ++x) {
             const float r = red[x] / count, g = green[x] / count, b = blue[x] / count, defocus = r * r + g * g + b * b;
-            cost[x] = (std::max(0.0f, squares[x] - count * defocus) / freedom + defocus) * third;
+            out(y, x) = (std::max(0.0f, squares[x] - count * defocus) / freedom + defocus) * third;
         }
     });
 }

@@ -2,6 +2,7 @@
 
 #include "kernels/exponential.hpp"
 #include "kernels/parallel.hpp"
+#include "kernels/sampling.hpp"
 
 namespace sepi {
 namespace {
@@ -20,19 +21,14 @@ void weighted_medians(Array<const float, 2> values, Array<const float, 3> guide,
         const Scratch<Entry, 1> window((2 * radius + 1) * (2 * radius + 1));
         Entry *const begin = window.array().data;
         for (Index x = 0; x < W; ++x) {
-            const float *own = guide.at(y, x);
             Entry *end = begin;
             double total = 0, below = 0;
-            for (Index v = std::max<Index>(0, y - radius); v < std::min(H, y + radius + 1); ++v) {
-                for (Index u = std::max<Index>(0, x - radius); u < std::min(W, x + radius + 1); ++u) {
-                    const float *colour = guide.at(v, u);
-                    const float r = colour[0] - own[0], g = colour[1] - own[1], b = colour[2] - own[2];
-                    const float w = weight(v, u) * exp_of_negative(factor * (r * r + g * g + b * b));
-                    if (!(w > 0)) continue;
-                    *end++ = {values(v, u), w};
-                    total += w;
-                }
-            }
+            for_window(y, x, radius, H, W, [&](Index v, Index u) {
+                const float w = weight(v, u) * exp_of_negative(factor * squared_distance(guide.at(v, u), guide.at(y, x)));
+                if (!(w > 0)) return;
+                *end++ = {values(v, u), w};
+                total += w;
+            });
             std::stable_sort(begin, end, [](const Entry &a, const Entry &b) { return a.value < b.value; });
             out(y, x) = values(y, x);
             for (const Entry *entry = begin; entry < end; ++entry) {
